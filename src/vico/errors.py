@@ -1,0 +1,33 @@
+"""Errors a person can act on: each says what went wrong, where, and how to mend it.
+
+Every error of ours derives from `VicoError` and from the builtin it refines, so callers may catch either.
+The command line prints the sentence and exits 2; anything else is a bug and shows its traceback.
+"""
+
+
+class VicoError(Exception):
+    """Base of every error that bad input or a missing part can cause."""
+
+
+class InputError(VicoError, ValueError):
+    """An argument or a value in a file is not usable."""
+
+
+class MissingFileError(VicoError, FileNotFoundError):
+    """A file or folder that was asked for is not there."""
+
+
+class OutputExistsError(VicoError, FileExistsError):
+    """The output folder holds something already; `--force` replaces it."""
+
+
+class SchemaError(VicoError, ValueError):
+    """A file is of another schema, version or owner than the one expected."""
+
+
+class EmptyInputError(VicoError, ValueError):
+    """The input was read, but holds nothing to work on."""
+
+
+class MissingExtraError(VicoError, ImportError):
+    """An optional part is not installed; the message holds the command to type."""
