@@ -1,0 +1,1 @@
+"""Where facts come from: frames, map data and elevation. Imports nothing else of ours."""

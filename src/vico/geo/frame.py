@@ -1,0 +1,90 @@
+"""The local frame: east, north, up in metres around a point on Earth."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pyproj import Transformer
+
+from vico.errors import InputError
+
+# A transverse Mercator at its own origin is true to 1e-8 within a kilometre; towards the poles and over the date line
+# the geodetic boxes that map extracts are cut by stop making sense.
+_MAX_LATITUDE = 85.0
+
+
+@dataclass(frozen=True)
+class LocalFrame:
+    """A transverse Mercator centred on a point, so that x is east and y is north, metres.
+
+    The projection is the one netconvert is given, so road networks and meshes share coordinates to a micrometre.
+
+    Attributes
+    ----------
+    lat, lon
+        The origin, degrees (WGS 84).
+
+    Raises
+    ------
+    InputError
+        If the origin is no place on Earth, or too near a pole.
+    """
+
+    lat: float
+    lon: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.lat) and math.isfinite(self.lon)):
+            raise InputError(
+                f"coordinates: ({self.lat}, {self.lon}) are no numbers; give degrees, as in 60.1690,24.9435"
+            )
+        if abs(self.lat) > _MAX_LATITUDE or abs(self.lon) > 180.0:
+            raise InputError(
+                f"coordinates: latitude {self.lat}, longitude {self.lon} out of range; latitude must be within "
+                f"-{_MAX_LATITUDE:g}..{_MAX_LATITUDE:g} and longitude within -180..180 (latitude comes first)"
+            )
+
+    @property
+    def proj4(self) -> str:
+        """The projection as a PROJ string."""
+        return f"+proj=tmerc +lat_0={self.lat!r} +lon_0={self.lon!r} +k=1 +ellps=WGS84 +units=m +no_defs"
+
+    @cached_property
+    def _transformer(self) -> Transformer:
+        return Transformer.from_crs("EPSG:4326", self.proj4, always_xy=True)
+
+    def to_enu(self, lat: ArrayLike, lon: ArrayLike) -> NDArray[np.float64]:
+        """Local coordinates of geodetic points.
+
+        Parameters
+        ----------
+        lat, lon
+            Degrees, shape ``(n,)`` (or scalars, which give shape ``(2,)``).
+
+        Returns
+        -------
+        ndarray
+            Metres east and north of the origin, shape ``(n, 2)``.
+        """
+        x, y = self._transformer.transform(np.asarray(lon, np.float64), np.asarray(lat, np.float64))
+        return np.stack([np.asarray(x, np.float64), np.asarray(y, np.float64)], axis=-1)
+
+    def to_geodetic(self, xy: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Latitude and longitude, degrees, of local points of shape ``(..., 2)``."""
+        points = np.asarray(xy, np.float64)
+        lon, lat = self._transformer.transform(points[..., 0], points[..., 1], direction="INVERSE")
+        return np.asarray(lat, np.float64), np.asarray(lon, np.float64)
+
+    def bbox(self, half: float) -> tuple[float, float, float, float]:
+        """West, south, east, north, degrees, of the smallest geodetic box around the square of half side `half`."""
+        side = np.linspace(-half, half, 5)
+        edge = np.full(5, half)
+        ring = np.concatenate(
+            [np.stack(pair, axis=-1) for pair in ((side, -edge), (side, edge), (-edge, side), (edge, side))]
+        )
+        lat, lon = self.to_geodetic(ring)
+        return float(lon.min()), float(lat.min()), float(lon.max()), float(lat.max())

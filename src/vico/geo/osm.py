@@ -1,0 +1,379 @@
+"""OpenStreetMap files: one read, clipped to a window, in local metres."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import osmium
+import shapely
+from numpy.typing import NDArray
+from shapely import MultiPolygon, Polygon
+
+from vico.errors import EmptyInputError, InputError, MissingFileError, SchemaError
+from vico.geo.frame import LocalFrame
+
+Tags = dict[str, str]
+
+# Keys whose closed ways are areas. The rest of closed ways (a roundabout, a circular footway) are lines unless they
+# say area=yes; of these keys some values are lines all the same.
+_AREA_KEYS = (
+    "building",
+    "building:part",
+    "landuse",
+    "leisure",
+    "natural",
+    "amenity",
+    "shop",
+    "tourism",
+    "office",
+    "historic",
+    "place",
+    "water",
+    "waterway",
+    "man_made",
+    "public_transport",
+    "railway",
+    "aeroway",
+    "military",
+    "area:highway",
+    "craft",
+    "healthcare",
+    "emergency",
+    "power",
+)
+_LINEAR_VALUES = {
+    "natural": {"coastline", "cliff", "ridge", "arete", "tree_row", "valley"},
+    "waterway": {"river", "stream", "canal", "ditch", "drain", "weir", "dam"},
+    "man_made": {"embankment", "cutline", "pipeline", "breakwater", "groyne", "pier", "dyke", "quay"},
+    "leisure": {"track", "slipway"},
+    "railway": {"rail", "tram", "subway", "light_rail", "narrow_gauge", "disused", "abandoned", "construction"},
+    "power": {"line", "minor_line", "cable"},
+    "historic": {"citywalls", "city_wall"},
+}
+
+
+@dataclass(frozen=True)
+class OsmNode:
+    """A tagged point; `xy` metres, shape ``(2,)``."""
+
+    id: int
+    xy: NDArray[np.float64]
+    tags: Tags
+
+
+@dataclass(frozen=True)
+class OsmWay:
+    """A line; `line` metres, shape ``(n, 2)``, one row a node of `nodes`."""
+
+    id: int
+    nodes: list[int]
+    line: NDArray[np.float64]
+    closed: bool
+    tags: Tags
+
+
+@dataclass(frozen=True)
+class OsmArea:
+    """An area from a closed way (id ``w123``) or a multipolygon relation (``r45``), whole even beyond the window."""
+
+    id: str
+    polygon: Polygon | MultiPolygon
+    tags: Tags
+
+
+@dataclass(frozen=True)
+class OsmRelation:
+    """A relation; members are (type ``n``, ``w`` or ``r``, id, role), in the file's order."""
+
+    id: int
+    members: list[tuple[str, int, str]]
+    tags: Tags
+
+
+@dataclass(frozen=True)
+class OsmData:
+    """What an OSM file holds within a window, in the order of the file.
+
+    Attributes
+    ----------
+    half
+        Half side of the window, metres; objects that touch the window widened by `margin` are kept.
+    nodes
+        Points with tags.
+    ways
+        Every way with tags (the closed ones too, also where they are areas).
+    areas
+        Closed ways and multipolygons that mean an area.
+    relations
+        Relations with a member that was kept.
+    sha256, timestamp
+        Of the file: digest of its bytes and the newest object's time (ISO 8601; None where the file has no times).
+    """
+
+    frame: LocalFrame
+    half: float
+    margin: float
+    nodes: list[OsmNode]
+    ways: list[OsmWay]
+    areas: list[OsmArea]
+    relations: list[OsmRelation]
+    sha256: str = ""
+    timestamp: str | None = None
+    broken: list[tuple[str, str]] = field(default_factory=list)
+
+
+def means_area(tags: Mapping[str, str]) -> bool:
+    """Whether a closed way with these tags is an area rather than a line.
+
+    Follows the OSM wiki's rule: `area` decides; else a key of things that have an extent, unless its value is linear.
+    """
+    if (said := tags.get("area")) in ("yes", "no"):
+        return said == "yes"
+    return any(key in tags and tags[key] not in _LINEAR_VALUES.get(key, ()) for key in _AREA_KEYS)
+
+
+def _multipolygon(outer: Iterable[NDArray[np.float64]], inner: Iterable[NDArray[np.float64]]) -> Polygon | MultiPolygon:
+    """Assemble rings from member lines, in any order and direction; unclosed rests are left out."""
+
+    def filled(lines: Iterable[NDArray[np.float64]]) -> Polygon | MultiPolygon:
+        pieces = [shapely.LineString(line) for line in lines if len(line) > 1]
+        if not pieces:
+            return Polygon()
+        merged = shapely.line_merge(shapely.MultiLineString(pieces))
+        rings = [part for part in shapely.get_parts(merged) if part.is_ring]
+        # Rings that touch in a node merge into nothing closed: polygonize finds them, at a higher price.
+        if len(rings) < len(shapely.get_parts(merged)):
+            return shapely.union_all(shapely.get_parts(shapely.polygonize(shapely.get_parts(shapely.node(merged)))))
+        return shapely.union_all([shapely.make_valid(Polygon(ring)) for ring in rings])
+
+    shape = filled(outer)
+    holes = filled(inner)
+    return shape if holes.is_empty else shapely.difference(shape, holes)
+
+
+def polygons_of(shape: shapely.Geometry, least: float = 0.0) -> list[Polygon]:
+    """The polygons within any geometry that are larger than `least` square metres."""
+    parts = shapely.get_parts(shape)
+    found: list[Polygon] = []
+    for part in parts:
+        if isinstance(part, Polygon):
+            if part.area > least:
+                found.append(part)
+        elif hasattr(part, "geoms"):
+            found += polygons_of(part, least)
+    return found
+
+
+def checked_extract(path: Path) -> Path:
+    """Return `path` if it can be an OpenStreetMap extract; say what is wrong with it if not."""
+    if not path.exists():
+        raise MissingFileError(f"{path}: no such file; give an OpenStreetMap extract (.osm or .osm.pbf)")
+    if not path.is_file():
+        raise InputError(f"{path}: is a folder; give an OpenStreetMap extract (.osm or .osm.pbf)")
+    if not path.name.endswith((".osm", ".pbf", ".osm.xml")):
+        raise InputError(f"{path}: not an OpenStreetMap file by its name; it must end in .osm, .osm.xml or .osm.pbf")
+    if path.stat().st_size == 0:
+        raise SchemaError(f"{path}: the file is empty; download it again")
+    return path
+
+
+class _Reader:
+    """The two passes over a file: relations first, to know which ways they need, then nodes and ways."""
+
+    def __init__(self, path: Path, frame: LocalFrame, reach: float) -> None:
+        self.path = str(path)
+        self.frame = frame
+        self.reach = reach
+        self.west, self.south, self.east, self.north = frame.bbox(reach)
+        self.newest = 0.0
+        self.relations: list[OsmRelation] = []
+        self.node_rows: list[tuple[int, float, float, Tags]] = []
+        self.way_rows: list[tuple[int, list[int], list[float], list[float], Tags, bool]] = []
+        self.unlocated = 0
+        self.objects = 0
+
+    def read(self) -> None:
+        wanted: set[int] = set()
+        for relation in osmium.FileProcessor(self.path, osmium.osm.RELATION):
+            self.objects += 1
+            self.newest = max(self.newest, relation.timestamp.timestamp())
+            tags = dict(relation.tags)
+            members = [(member.type, member.ref, member.role) for member in relation.members]
+            self.relations.append(OsmRelation(relation.id, members, tags))
+            if tags.get("type") == "multipolygon":
+                wanted.update(ref for kind, ref, _ in members if kind == "w")
+        entities = osmium.osm.NODE | osmium.osm.WAY
+        untagged = osmium.filter.EmptyTagFilter().enable_for(osmium.osm.NODE)
+        for thing in osmium.FileProcessor(self.path, entities).with_locations().with_filter(untagged):
+            self.objects += 1
+            self.newest = max(self.newest, thing.timestamp.timestamp())
+            if thing.is_node():
+                self._node(thing)
+            else:
+                self._way(thing, thing.id in wanted)
+
+    def _node(self, node: osmium.osm.Node) -> None:
+        place = node.location
+        if place.valid() and self.west <= place.lon <= self.east and self.south <= place.lat <= self.north:
+            self.node_rows.append((node.id, place.lat, place.lon, dict(node.tags)))
+
+    def _way(self, way: osmium.osm.Way, wanted: bool) -> None:
+        refs: list[int] = []
+        lats: list[float] = []
+        lons: list[float] = []
+        for node in way.nodes:
+            place = node.location
+            if place.valid():
+                refs.append(node.ref)
+                lats.append(place.lat)
+                lons.append(place.lon)
+        if len(refs) < 2:
+            self.unlocated += 1
+            return
+        near = max(lats) >= self.south and min(lats) <= self.north and max(lons) >= self.west and min(lons) <= self.east
+        if near or wanted:
+            self.way_rows.append((way.id, refs, lats, lons, dict(way.tags), near))
+
+
+def read_osm(
+    path: Path, frame: LocalFrame, half: float, margin: float = 60.0, *, need_buildings: bool = True
+) -> OsmData:
+    """Read what an OSM file holds around the frame's origin.
+
+    Parameters
+    ----------
+    path
+        An ``.osm``, ``.osm.xml`` or ``.osm.pbf`` file, nodes before ways before relations (as all extracts are).
+    frame
+        Local frame whose origin is the window's centre.
+    half
+        Half side of the window, metres.
+    margin
+        Objects up to this far outside the window are kept too, so that what crosses its edge is whole.
+    need_buildings
+        Whether a window without any building is an error.
+
+    Returns
+    -------
+    OsmData
+        Coordinates in local metres.
+
+    Raises
+    ------
+    MissingFileError, InputError
+        If there is no such file, or it is none by its name.
+    SchemaError
+        If the file is truncated or broken.
+    EmptyInputError
+        If it holds nothing in the window, or no building.
+    """
+    path = Path(path)
+    checked_extract(path)
+    if not (np.isfinite(half) and half > 0):
+        raise InputError(f"radius: {half} m; it must be a positive number of metres, as in --radius 400")
+    reader = _Reader(path, frame, half + margin)
+    try:
+        reader.read()
+    except (RuntimeError, ValueError, OSError, osmium.InvalidLocationError) as error:
+        # libosmium reports everything from a cut block to a bad tag as one of these.
+        raise SchemaError(f"{path}: truncated or broken ({error}); download it again, or clip it anew") from None
+    data = _assembled(reader, half, margin, sha256(path.read_bytes()).hexdigest())
+    window = f"the {2 * half:.0f} m square around {frame.lat}, {frame.lon}"
+    if not (data.ways or data.nodes or data.areas):
+        if reader.objects and reader.unlocated and not reader.way_rows:
+            raise SchemaError(f"{path}: ways come before their nodes; sort it with: osmium sort FILE -o SORTED.osm.pbf")
+        raise EmptyInputError(f"{path}: nothing in {window}; check the coordinates, or use another extract")
+    square = shapely.box(-half, -half, half, half)
+    if need_buildings and not any(
+        area.tags.get("building", "no") != "no" and shapely.intersects(area.polygon, square) for area in data.areas
+    ):
+        raise EmptyInputError(f"{path}: no building in {window}; check the coordinates, or use another extract")
+    return data
+
+
+def _assembled(reader: _Reader, half: float, margin: float, digest: str) -> OsmData:
+    """Turn rows of degrees into lines, areas and relations in metres."""
+    frame, reach = reader.frame, reader.reach
+    nodes: list[OsmNode] = []
+    if reader.node_rows:
+        places = frame.to_enu([row[1] for row in reader.node_rows], [row[2] for row in reader.node_rows])
+        inside = np.all(np.abs(places) <= reach, axis=1).tolist()
+        nodes = [
+            OsmNode(row[0], xy, row[3]) for row, xy, kept in zip(reader.node_rows, places, inside, strict=True) if kept
+        ]
+    lines = _lines(reader)
+    window = shapely.box(-reach, -reach, reach, reach)
+    shapely.prepare(window)
+    ways: list[OsmWay] = []
+    areas: list[OsmArea] = []
+    broken: list[tuple[str, str]] = []
+    by_id: dict[int, tuple[NDArray[np.float64], Tags]] = {}
+    for (way_id, refs, _, _, tags, near), line in zip(reader.way_rows, lines, strict=True):
+        by_id[way_id] = (line, tags)
+        if not near or not tags:
+            continue
+        closed = len(refs) > 3 and refs[0] == refs[-1]
+        if closed and means_area(tags):
+            polygon = _valid(Polygon(line))
+            if polygon.is_empty:
+                broken.append((f"w{way_id}", "area without extent"))
+            elif window.intersects(polygon):
+                areas.append(OsmArea(f"w{way_id}", polygon, tags))
+                ways.append(OsmWay(way_id, refs, line, closed, tags))
+        elif window.intersects(shapely.LineString(line)):
+            ways.append(OsmWay(way_id, refs, line, closed, tags))
+    kept = {("w", way.id) for way in ways} | {("n", node.id) for node in nodes}
+    relations: list[OsmRelation] = []
+    for relation in reader.relations:
+        if relation.tags.get("type") == "multipolygon":
+            area = _area_of(relation, by_id, broken)
+            if area is not None and window.intersects(area.polygon):
+                areas.append(area)
+        if any((kind, ref) in kept for kind, ref, _ in relation.members):
+            relations.append(relation)
+    newest = None
+    if reader.newest > 0:
+        newest = np.datetime_as_string(np.datetime64(int(reader.newest), "s")) + "Z"
+    return OsmData(frame, half, margin, nodes, ways, areas, relations, digest, newest, broken)
+
+
+def _lines(reader: _Reader) -> list[NDArray[np.float64]]:
+    """Project all ways in one call."""
+    if not reader.way_rows:
+        return []
+    lats = np.concatenate([row[2] for row in reader.way_rows])
+    lons = np.concatenate([row[3] for row in reader.way_rows])
+    return np.split(reader.frame.to_enu(lats, lons), np.cumsum([len(row[1]) for row in reader.way_rows])[:-1])
+
+
+def _valid(polygon: Polygon) -> Polygon | MultiPolygon:
+    """The polygonal part of a possibly self-crossing outline."""
+    if polygon.is_valid:
+        return polygon
+    parts = polygons_of(shapely.make_valid(polygon))
+    return parts[0] if len(parts) == 1 else MultiPolygon(parts)
+
+
+def _area_of(
+    relation: OsmRelation, ways: Mapping[int, tuple[NDArray[np.float64], Tags]], broken: list[tuple[str, str]]
+) -> OsmArea | None:
+    """The multipolygon's area; None where it has no meaning as one, or none of its rings is complete."""
+    members = [(ref, role) for kind, ref, role in relation.members if kind == "w" and ref in ways]
+    outer = [ways[ref][0] for ref, role in members if role != "inner"]
+    inner = [ways[ref][0] for ref, role in members if role == "inner"]
+    tags = relation.tags
+    if not any(key != "type" for key in tags):
+        # Old style: the outer way carries the tags.
+        tags = next((ways[ref][1] for ref, role in members if role != "inner" and ways[ref][1]), tags)
+    if not outer or not (means_area({**tags, "area": tags.get("area", "")}) or "highway" in tags):
+        return None
+    shape = _multipolygon(outer, inner)
+    parts = polygons_of(shape)
+    if not parts:
+        broken.append((f"r{relation.id}", "multipolygon without a complete ring (cut by the extract)"))
+        return None
+    return OsmArea(f"r{relation.id}", parts[0] if len(parts) == 1 else MultiPolygon(parts), tags)
