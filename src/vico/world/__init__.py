@@ -1,0 +1,1 @@
+"""What a world is: its model, its folder, and the look-ups everybody shares. No generation code."""

@@ -1,0 +1,350 @@
+"""A world on disk: the folder, its files, and the `World` that reads them when they are asked for.
+
+::
+
+    world.json            manifest, written last: a folder that has it is whole
+    build.json            seconds per stage and the machine; not hashed, differs every time
+    terrain.npz           height field
+    buildings.json places.json entrances.json rooms.json roads.json transit.json
+    objects.parquet       things that stand around, one row each
+    roads.net.xml roads.xodr
+    walkable.npz
+    meshes/{ground,buildings,roofs,rooms,collision,prototypes}.glb
+    map.png previews/*.png
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+import zipfile
+from collections.abc import Iterable
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+
+from vico import __version__
+from vico.errors import MissingFileError, SchemaError
+from vico.geo.frame import LocalFrame
+from vico.world import model
+from vico.world.files import read_json, sha256_of, write_bytes, write_json
+from vico.world.heights import HeightField
+from vico.world.mesh import Surface, read_glb
+from vico.world.model import Building, Entrance, Manifest, Place, Record, Roads, Room, Transit
+from vico.world.objects import Objects, read_objects
+from vico.world.walkable import WalkableMap, read_walkable
+
+if TYPE_CHECKING:
+    from vico.world.lanes import LaneGraph
+
+LAYERS = ("ground", "buildings", "roofs", "rooms", "collision")
+
+#: Files that are no part of a world's identity.
+UNHASHED = ("world.json", "build.json")
+
+R = TypeVar("R", bound=Record)
+
+
+class World:
+    """A generated place. Its parts are read from the folder the first time they are used, and kept.
+
+    Parameters
+    ----------
+    manifest
+        What the world is.
+    path
+        Its folder; None for a world that lives in memory only.
+    parts
+        Parts by attribute name, instead of the folder's (for worlds in memory): ``height``, ``buildings``, ``places``,
+        ``entrances``, ``rooms``, ``objects``, ``roads``, ``transit``, ``walkable``, ``lanes``, ``layers`` (surfaces by
+        layer) and ``models`` (surfaces by prototype).
+
+    Attributes
+    ----------
+    manifest, frame, half
+        The manifest, the local frame, and half the side of the square, metres.
+    """
+
+    def __init__(self, manifest: Manifest, path: Path | None = None, **parts: Any) -> None:
+        self.manifest = manifest
+        self.path = path
+        self.half = manifest.half
+        self.frame = LocalFrame(manifest.origin.lat, manifest.origin.lon)
+        self._layers: dict[str, list[Surface]] = dict(parts.pop("layers", {}))
+        known = {"height", "buildings", "places", "entrances", "rooms", "objects", "roads", "transit", "walkable"}
+        if unknown := set(parts) - known - {"lanes", "models"}:
+            raise TypeError(f"World: unknown parts {sorted(unknown)}")
+        for name, value in parts.items():
+            self.__dict__["_models" if name == "models" else name] = value
+
+    def file(self, name: str) -> Path:
+        """Path of one of the world's files."""
+        if self.path is None:
+            raise MissingFileError(f"world {self.manifest.name!r} lives in memory and has no {name}; write it first")
+        return self.path / name
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of ``world.json``, which holds the hashes of all other files: the world's identity."""
+        if self.path is None:
+            return hashlib.sha256(manifest_bytes(self.manifest)).hexdigest()
+        return sha256_of(self.path / "world.json")
+
+    @cached_property
+    def height(self) -> HeightField:
+        """Ground heights."""
+        return read_terrain(self.file("terrain.npz"))
+
+    @cached_property
+    def buildings(self) -> list[Building]:
+        """Buildings, in the order of their entities."""
+        return read_records(self.file("buildings.json"), Building)
+
+    @cached_property
+    def places(self) -> list[Place]:
+        """Named places."""
+        return read_records(self.file("places.json"), Place)
+
+    @cached_property
+    def entrances(self) -> list[Entrance]:
+        """Doors of the accessible buildings."""
+        return read_records(self.file("entrances.json"), Entrance)
+
+    @cached_property
+    def rooms(self) -> list[Room]:
+        """Rooms of the places, below ground."""
+        return read_records(self.file("rooms.json"), Room)
+
+    @cached_property
+    def objects(self) -> Objects:
+        """Things that stand outdoors and indoors."""
+        return read_objects(self.file("objects.parquet"))
+
+    @cached_property
+    def roads(self) -> Roads:
+        """The road database."""
+        return read_record(self.file("roads.json"), Roads)
+
+    @cached_property
+    def transit(self) -> Transit:
+        """Stops, lines, bicycle stations."""
+        return read_record(self.file("transit.json"), Transit)
+
+    @cached_property
+    def walkable(self) -> WalkableMap:
+        """Where people can walk."""
+        return read_walkable(self.file("walkable.npz"))
+
+    @cached_property
+    def lanes(self) -> LaneGraph:
+        """The lane graph of the road network."""
+        from vico.world.lanes import read_lanes
+
+        return read_lanes(self.file("roads.net.xml"))
+
+    def surfaces(self, layer: str) -> list[Surface]:
+        """Meshes of a layer (one of `LAYERS`), ENU metres."""
+        if layer not in self._layers:
+            if layer not in LAYERS:
+                raise KeyError(f"world has no layer {layer!r}; layers are {', '.join(LAYERS)}")
+            nodes = read_glb(self._mesh(layer))
+            self._layers[layer] = [surface for surfaces in nodes.values() for surface in surfaces]
+        return self._layers[layer]
+
+    def prototypes(self) -> dict[str, list[Surface]]:
+        """Models that the objects are instances of, by name; at the origin, z up, +x forward."""
+        return self._models
+
+    @cached_property
+    def _models(self) -> dict[str, list[Surface]]:
+        return read_glb(self._mesh("prototypes"))
+
+    def _mesh(self, name: str) -> Path:
+        path = self.file(f"meshes/{name}.glb")
+        if not path.exists():
+            raise MissingFileError(f"{path}: no such file; build the world anew")
+        return path
+
+    @cached_property
+    def entities(self) -> dict[int, dict[str, str]]:
+        """Kind and name of everything that segmentation images can show, by entity."""
+        found = {
+            model.ENTITY_GROUND: {"kind": "ground", "name": "ground"},
+            model.ENTITY_ROAD: {"kind": "road", "name": "road"},
+            model.ENTITY_WATER: {"kind": "water", "name": "water"},
+            model.ENTITY_GREEN: {"kind": "green", "name": "green"},
+        }
+        for b in self.buildings:
+            found[b.entity] = {"kind": "building", "name": b.name or b.id}
+        for room in self.rooms:
+            found[room.entity] = {"kind": "room", "name": f"{room.kind} {room.id}"}
+        for stop in self.transit.stops:
+            found[stop.entity] = {"kind": "bus_stop", "name": stop.name}
+        for station in self.transit.bike_stations:
+            found[station.entity] = {"kind": "bike_station", "name": station.name}
+        objects = self.objects
+        for entity, kind, name in zip(objects.entity.tolist(), objects.kind, objects.id, strict=True):
+            found.setdefault(entity, {"kind": str(kind), "name": str(name)})
+        return found
+
+    @cached_property
+    def building_by_id(self) -> dict[str, Building]:
+        """Buildings by id."""
+        return {b.id: b for b in self.buildings}
+
+    @cached_property
+    def place_by_id(self) -> dict[str, Place]:
+        """Places by id."""
+        return {p.id: p for p in self.places}
+
+    @cached_property
+    def entrance_by_id(self) -> dict[str, Entrance]:
+        """Entrances by id."""
+        return {e.id: e for e in self.entrances}
+
+    @cached_property
+    def room_by_id(self) -> dict[str, Room]:
+        """Rooms by id."""
+        return {r.id: r for r in self.rooms}
+
+
+def read_world(path: Path) -> World:
+    """Open a world folder.
+
+    Raises
+    ------
+    MissingFileError
+        If there is no finished world at `path`.
+    SchemaError
+        If its manifest is damaged, of another kind, or of another version.
+    """
+    folder = Path(path)
+    if not folder.is_dir():
+        raise MissingFileError(f"{folder}: no such folder; make one with vico world build")
+    if not (folder / "world.json").exists():
+        raise MissingFileError(f"{folder}: holds no world.json, so it is no finished world; build it with --force")
+    content = read_json(folder / "world.json")
+    if not isinstance(content, dict) or content.get("schema_name") != model.SCHEMA:
+        found = content.get("schema_name") if isinstance(content, dict) else type(content).__name__
+        raise SchemaError(f"{folder}/world.json: schema {found!r} is not {model.SCHEMA!r}; give a world folder")
+    if content.get("version") != model.VERSION:
+        raise SchemaError(
+            f"{folder}/world.json: version {content.get('version')!r} of {model.SCHEMA}, but vico {__version__} reads "
+            f"version {model.VERSION}; build the world anew"
+        )
+    try:
+        manifest = Manifest.model_validate_json(json.dumps(content))
+    except ValidationError as error:
+        raise _invalid(folder / "world.json", error) from None
+    return World(manifest, folder)
+
+
+def write_records(path: Path, records: Iterable[Record]) -> None:
+    """Write a list of records as JSON, one record a line."""
+    rows = [json.dumps(r.model_dump(mode="json"), ensure_ascii=False, separators=(",", ":")) for r in records]
+    write_bytes(path, ("[\n" + ",\n".join(rows) + "\n]\n").encode())
+
+
+def write_record(path: Path, record: Record) -> None:
+    """Write one record as JSON: a line for every entry of its lists."""
+    parts = []
+    for key, value in record.model_dump(mode="json").items():
+        if isinstance(value, list):
+            rows = [json.dumps(v, ensure_ascii=False, separators=(",", ":")) for v in value]
+            text = "[\n" + ",\n".join(rows) + "\n]" if rows else "[]"
+        else:
+            text = json.dumps(value, ensure_ascii=False, sort_keys=True)
+        parts.append(f"{json.dumps(key)}: {text}")
+    write_bytes(path, ("{\n" + ",\n".join(parts) + "\n}\n").encode())
+
+
+def read_records(path: Path, kind: type[R]) -> list[R]:
+    """Read what `write_records` wrote.
+
+    Raises
+    ------
+    MissingFileError, SchemaError
+        If the file is not there, or a record is not valid; the message gives the path within the file.
+    """
+    try:
+        return TypeAdapter(list[kind]).validate_json(_text(path))  # type: ignore[valid-type]
+    except ValidationError as error:
+        raise _invalid(path, error) from None
+
+
+def read_record(path: Path, kind: type[R]) -> R:
+    """Read what `write_record` wrote; errors as in `read_records`."""
+    try:
+        return kind.model_validate_json(_text(path))
+    except ValidationError as error:
+        raise _invalid(path, error) from None
+
+
+def _text(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise MissingFileError(f"{path}: no such file; build the world anew") from None
+
+
+def _invalid(path: Path, error: ValidationError) -> SchemaError:
+    first = error.errors()[0]
+    where = ".".join(str(part) for part in first["loc"]) or "the whole file"
+    return SchemaError(f"{path}: {where}: {first['msg']}; build the world anew")
+
+
+def write_terrain(path: Path, height: HeightField) -> None:
+    """Write a height field as ``.npz``."""
+    sink = io.BytesIO()
+    np.savez_compressed(sink, heights=height.heights, half=np.float64(height.half))
+    write_bytes(path, sink.getvalue())
+
+
+def read_terrain(path: Path) -> HeightField:
+    """Read what `write_terrain` wrote."""
+    try:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as data:
+            return HeightField(data["heights"].astype(np.float32), float(data["half"]))
+    except FileNotFoundError:
+        raise MissingFileError(f"{path}: no such file; build the world anew") from None
+    except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile) as error:
+        raise SchemaError(f"{path}: not a readable height field ({error}); build the world anew") from None
+
+
+def manifest_bytes(manifest: Manifest) -> bytes:
+    """The bytes of ``world.json``."""
+    return (json.dumps(manifest.model_dump(mode="json"), indent=1, sort_keys=True, ensure_ascii=False) + "\n").encode()
+
+
+def world_files(folder: Path) -> list[str]:
+    """Files that belong to the world in `folder`, relative paths in order."""
+    found = [p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()]
+    return sorted(name for name in found if name not in UNHASHED and not Path(name).name.startswith("."))
+
+
+def seal(folder: Path, manifest: Manifest, *, seconds: dict[str, float]) -> Manifest:
+    """Finish a world: hash every file, then write ``build.json`` and, last, ``world.json``."""
+    files = {name: sha256_of(folder / name) for name in world_files(folder)}
+    sealed = manifest.model_copy(update={"files": files})
+    write_json(
+        folder / "build.json",
+        {
+            "seconds": {k: round(v, 3) for k, v in seconds.items()},
+            "processors": os.cpu_count(),
+            "producer": __version__,
+        },
+    )
+    write_bytes(folder / "world.json", manifest_bytes(sealed))
+    return sealed
+
+
+def stage_seconds(world: World) -> dict[str, float]:
+    """Seconds each stage of the build took, from ``build.json``; empty if it is not there."""
+    path = world.file("build.json")
+    content: dict[str, float] = read_json(path)["seconds"] if path.exists() else {}
+    return content

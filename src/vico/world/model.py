@@ -1,0 +1,337 @@
+"""What a world is, as records: the shapes of every small file in a world folder.
+
+Frame: local ENU metres, origin at the window's centre, z up, yaw counter-clockwise from east in radians.
+Every record that can be seen has an `entity`: a positive integer, unique in its world, stable between builds of the
+same input, and the value that segmentation images hold.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+SCHEMA = "vico.world"
+VERSION = 1
+
+# Entity numbers by kind, so that a number alone tells what it is. Bodies of a simulation start above every world's.
+ENTITY_GROUND = 1
+ENTITY_ROAD = 2
+ENTITY_WATER = 3
+ENTITY_GREEN = 4
+FIRST_BUILDING = 1_000
+FIRST_OBJECT = 20_000
+FIRST_ROOM = 100_000
+FIRST_FURNITURE = 200_000
+FIRST_BODY = 1_000_000
+
+Point2 = tuple[float, float]
+Point3 = tuple[float, float, float]
+Ring = list[Point2]
+
+
+class Record(BaseModel):
+    """Base of the strict records: an unknown field is an error that names its path."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Origin(Record):
+    """Where the frame's origin lies on Earth, degrees (WGS 84)."""
+
+    lat: Annotated[float, Field(ge=-90, le=90)]
+    lon: Annotated[float, Field(ge=-180, le=180)]
+
+
+class Source(Record):
+    """Something the world was made from, with what its licence asks for."""
+
+    kind: str
+    name: str
+    licence: str
+    attribution: str
+    timestamp: str | None = None
+    sha256: str | None = None
+
+
+class Dropped(Record):
+    """Something the input had and the world has not, with the reason."""
+
+    id: str
+    reason: str
+
+
+class StageReport(Record):
+    """What a stage of the build made and left out. Seconds are kept apart (`build.json`): they differ every time."""
+
+    name: str
+    counts: dict[str, int]
+    dropped: list[Dropped] = []
+
+
+class Manifest(Record):
+    """`world.json`: written last, so a folder that has it is whole.
+
+    Attributes
+    ----------
+    half
+        Half the side of the square world, metres (the radius it was built with).
+    bbox
+        West, south, east, north of the square, degrees.
+    files
+        SHA-256 of every other file of the world, by path relative to the folder.
+    """
+
+    schema_name: str = SCHEMA
+    version: int = VERSION
+    producer: str
+    name: str
+    origin: Origin
+    half: float
+    bbox: tuple[float, float, float, float]
+    seed: int
+    sources: list[Source]
+    stages: list[StageReport]
+    counts: dict[str, int]
+    places_by_type: dict[str, int]
+    files: dict[str, str]
+
+
+class Building(Record):
+    """A building, seated on the terrain.
+
+    Attributes
+    ----------
+    use
+        One of residential, commercial, retail, office, hotel, industrial, civic, religious, education, health,
+        transport, garage, other.
+    footprint
+        Outer ring then holes, metres, not closed; the outer one counter-clockwise.
+    base
+        Height of the ground floor, metres: where its main entrance meets the ground.
+    height
+        Metres from `base` to the highest point of the roof.
+    accessible
+        True if people can enter: it has a reachable entrance.
+    """
+
+    id: str
+    entity: int
+    name: str | None
+    use: str
+    footprint: list[Ring]
+    base: float
+    height: float
+    levels: int
+    roof_shape: str
+    colour: str
+    accessible: bool
+    tags: dict[str, str] = {}
+
+
+class Category(StrEnum):
+    """What a place is for."""
+
+    ACCOMMODATION = "accommodation"
+    FOOD = "food"
+    STORE = "store"
+    OFFICE = "office"
+    ENTERTAINMENT = "entertainment"
+    OPEN = "open"
+    TRANSIT = "transit"
+
+
+class Entrance(Record):
+    """A door on a building's outline.
+
+    Attributes
+    ----------
+    position
+        On the outline, at ground level.
+    facing
+        Yaw of the outward normal, radians.
+    approach
+        A walkable, reachable point outside the door, within 2 m of `position`.
+    """
+
+    id: str
+    building: str
+    position: Point3
+    facing: float
+    approach: Point2
+
+
+class Place(Record):
+    """A named place people go to.
+
+    Attributes
+    ----------
+    kind
+        The OSM value that made it a place, e.g. ``restaurant``; ``apartments`` for homes.
+    building, entrance
+        Ids; None for open places (a square, a park, a stop).
+    position
+        The entrance's approach, or a reachable point of an open place, on the ground.
+    rooms
+        Ids of its rooms, entrance room first; empty for open places.
+    """
+
+    id: str
+    name: str
+    category: Category
+    kind: str
+    building: str | None
+    entrance: str | None
+    position: Point3
+    rooms: list[str] = []
+    opening_hours: str | None = None
+
+
+class Container(Record):
+    """A surface things can lie on.
+
+    Attributes
+    ----------
+    kind
+        floor, sofa, table, chair, desk or bed.
+    centre
+        Centre of the top surface.
+    size
+        Extent along the container's own x and y, metres.
+    reach
+        A free point of the room from which the surface is within 1.5 m.
+    """
+
+    id: str
+    entity: int
+    kind: str
+    centre: Point3
+    size: Point2
+    yaw: float
+    reach: Point2
+
+
+class Room(Record):
+    """A room: an oriented box in the same frame, below ground at its building, unseen from outside.
+
+    Attributes
+    ----------
+    centre
+        Middle of the floor.
+    size
+        Length along the room's own x, width along y, clear height, metres.
+    door
+        Middle of the doorway at floor level, on the wall; `inside` is the free spot a step in from it.
+    links
+        Ids of the rooms this one opens to.
+    """
+
+    id: str
+    entity: int
+    place: str
+    building: str
+    kind: str
+    centre: Point3
+    size: Point3
+    yaw: float
+    door: Point3
+    inside: Point3
+    links: list[str] = []
+    containers: list[Container] = []
+
+
+class Stop(Record):
+    """A bus stop. `wait` is where people stand; `lane`, `offset` where the bus's front door comes to rest."""
+
+    id: str
+    entity: int
+    name: str
+    wait: Point3
+    lane: str
+    offset: float
+
+
+class Line(Record):
+    """A bus line: a closed drive over lanes.
+
+    Attributes
+    ----------
+    stops
+        Stop ids in the order they are served.
+    lanes
+        Lane ids (junction lanes among them) of one round trip, starting at the first stop's lane.
+    departures
+        Seconds of the day at which a bus leaves the first stop.
+    travel
+        Scheduled seconds from leaving the first stop to arriving at each stop (first: 0), then back at the first.
+    """
+
+    id: str
+    name: str
+    colour: str
+    stops: list[str]
+    lanes: list[str]
+    departures: list[int]
+    travel: list[float]
+
+
+class BikeStation(Record):
+    """A bicycle station."""
+
+    id: str
+    entity: int
+    name: str
+    position: Point3
+    capacity: int
+    bikes: int
+
+
+class Transit(Record):
+    """`transit.json`: stops, lines, bicycle stations, and where each came from (osm, gtfs, planned)."""
+
+    stops: list[Stop]
+    lines: list[Line]
+    bike_stations: list[BikeStation]
+    origin: dict[str, str]
+
+
+class Road(Record):
+    """A stretch of a street between two junctions or ends.
+
+    Attributes
+    ----------
+    line
+        Centre line on the ground, metres.
+    sidewalk
+        none, left, right or both, seen along `line`.
+    """
+
+    id: str
+    osm_id: int
+    name: str | None
+    kind: str
+    line: list[Point2]
+    width: float
+    lanes: int
+    oneway: bool
+    sidewalk: str
+    speed: float
+    layer: int = 0
+
+
+class Junction(Record):
+    """Where three or more drivable roads meet."""
+
+    id: str
+    position: Point2
+    roads: list[str]
+    signals: bool
+
+
+class Roads(Record):
+    """`roads.json`: the road database. Crossings are points where walkers cross a carriageway."""
+
+    roads: list[Road]
+    junctions: list[Junction]
+    crossings: list[Point2]

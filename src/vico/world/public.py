@@ -1,0 +1,98 @@
+"""What anybody may know of a world: streets, buildings, named places, transit. No rooms, no things."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vico.world.folder import World
+from vico.world.heights import HeightField
+from vico.world.model import Category, Line, Point3, Ring, Stop
+from vico.world.routing import Router
+from vico.world.walkable import WalkableMap
+
+
+@dataclass(frozen=True)
+class PublicPlace:
+    """A place as a city map shows it.
+
+    Attributes
+    ----------
+    position
+        A reachable point before it, on the ground.
+    entrance
+        The door, on the building's outline; None for open places.
+    """
+
+    id: str
+    name: str
+    category: Category
+    kind: str
+    building: str | None
+    position: Point3
+    entrance: Point3 | None
+
+
+@dataclass(frozen=True)
+class PublicBuilding:
+    """A building's name and outline (outer ring, then holes), metres."""
+
+    id: str
+    name: str | None
+    footprint: list[Ring]
+
+
+@dataclass(frozen=True)
+class PublicMap:
+    """The map that agents are given.
+
+    Attributes
+    ----------
+    half
+        Half the side of the square world, metres.
+    """
+
+    half: float
+    walkable: WalkableMap
+    height: HeightField
+    places: list[PublicPlace]
+    buildings: list[PublicBuilding]
+    stops: list[Stop]
+    lines: list[Line]
+
+    @classmethod
+    def from_world(cls, world: World) -> PublicMap:
+        """Copy the public part of `world`."""
+        doors = {entrance.id: entrance.position for entrance in world.entrances}
+        places = [
+            PublicPlace(
+                p.id, p.name, p.category, p.kind, p.building, p.position, doors[p.entrance] if p.entrance else None
+            )
+            for p in world.places
+        ]
+        buildings = [PublicBuilding(b.id, b.name, b.footprint) for b in world.buildings]
+        transit = world.transit
+        return cls(world.half, world.walkable, world.height, places, buildings, transit.stops, transit.lines)
+
+    @cached_property
+    def router(self) -> Router:
+        """Finds walks on the map."""
+        return Router(self.walkable)
+
+    @cached_property
+    def place_by_id(self) -> dict[str, PublicPlace]:
+        """Places by id."""
+        return {place.id: place for place in self.places}
+
+    @cached_property
+    def _positions(self) -> NDArray[np.float64]:
+        return np.array([place.position for place in self.places], np.float64).reshape(-1, 3)
+
+    def places_near(self, xy: ArrayLike, radius: float) -> list[PublicPlace]:
+        """Places whose position is within `radius` metres, nearest first."""
+        away = np.linalg.norm(self._positions[:, :2] - np.asarray(xy, np.float64)[:2], axis=1)
+        order = np.argsort(away, kind="stable")
+        return [self.places[i] for i in order if away[i] <= radius]

@@ -1,0 +1,362 @@
+"""Walking routes on the walkable map: A* with integer costs, then pulled straight."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from vico.world.walkable import BODY, CROSSING, OPEN, ROADWAY, SIDEWALK, WalkableMap
+
+#: How much longer a metre on each surface counts than on a sidewalk, in hundredths.
+WEIGHTS = {SIDEWALK: 100, CROSSING: 110, OPEN: 120, ROADWAY: 400}
+
+# Walls are given a berth where there is room: cells closer than this cost a quarter more.
+_BERTH = 0.6
+_SNAP = 6.0  # metres a start or goal may lie off what can be walked on
+_STRAIGHT, _DIAGONAL = 10, 14  # 10 : 14 for 1 : sqrt 2; a cost unit is a thousandth of a cell on sidewalk
+_RING = 32768  # circular buckets; more than the largest change of f along an edge (14 * 500 + 14 * 100)
+
+
+@njit(cache=True)
+def _unlink(node, key, head, after, before):  # type: ignore[no-untyped-def]
+    n, p = after[node], before[node]
+    if p >= 0:
+        after[p] = n
+    else:
+        head[key] = n
+    if n >= 0:
+        before[n] = p
+
+
+@njit(cache=True)
+def _link(node, key, head, after, before):  # type: ignore[no-untyped-def]
+    first = head[key]
+    after[node], before[node] = first, -1
+    if first >= 0:
+        before[first] = node
+    head[key] = node
+
+
+@njit(cache=True)
+def _search(cost, blocked, start, goal, use_goal, g, stamp, generation, after, before, parent):  # type: ignore[no-untyped-def]
+    """A* (or Dijkstra from `start` without a goal) over cells with circular buckets. Returns True if goal was met."""
+    n = cost.shape[1]
+    rows = cost.shape[0]
+    flat = cost.ravel()
+    extra = blocked.ravel()
+    checks = extra.size == flat.size
+    head = np.full(_RING, -1, np.int32)
+    gx, gy = goal % n, goal // n
+    sx, sy = start % n, start // n
+    h = 0
+    if use_goal:
+        dx, dy = abs(sx - gx), abs(sy - gy)
+        h = 100 * (_STRAIGHT * max(dx, dy) + (_DIAGONAL - _STRAIGHT) * min(dx, dy))
+    g[start] = 0
+    stamp[start] = generation  # odd generation + 1 marks a closed cell
+    parent[start] = -1
+    level = h
+    _link(start, level % _RING, head, after, before)
+    left = 1
+    while left > 0:
+        while head[level % _RING] < 0:
+            level += 1
+        node = head[level % _RING]
+        _unlink(node, level % _RING, head, after, before)
+        left -= 1
+        stamp[node] = generation + 1
+        if use_goal and node == goal:
+            return True
+        cx, cy = node % n, node // n
+        here = flat[node]
+        for k in range(8):
+            if k < 4:
+                ox = 1 - k if k < 2 else 0
+                if k == 1:
+                    ox = -1
+                oy = 0 if k < 2 else (1 if k == 2 else -1)
+                step = _STRAIGHT
+            else:
+                ox = 1 if k % 2 == 0 else -1
+                oy = 1 if k < 6 else -1
+                step = _DIAGONAL
+            x, y = cx + ox, cy + oy
+            if x < 0 or y < 0 or x >= n or y >= rows:
+                continue
+            other = y * n + x
+            there = flat[other]
+            if there == 0 or stamp[other] == generation + 1:
+                continue
+            if checks and extra[other]:
+                continue
+            if k >= 4:
+                side, along = cy * n + x, y * n + cx
+                if flat[side] == 0 or flat[along] == 0:
+                    continue
+                if checks and (extra[side] or extra[along]):
+                    continue
+            value = g[node] + step * (np.int64(here) + np.int64(there)) // 2
+            h = 0
+            if use_goal:
+                dx, dy = abs(x - gx), abs(y - gy)
+                h = 100 * (_STRAIGHT * max(dx, dy) + (_DIAGONAL - _STRAIGHT) * min(dx, dy))
+            if stamp[other] == generation:
+                if value >= g[other]:
+                    continue
+                _unlink(other, (g[other] + h) % _RING, head, after, before)
+            else:
+                stamp[other] = generation
+                left += 1
+            g[other] = value
+            parent[other] = k
+            _link(other, (value + h) % _RING, head, after, before)
+    return False
+
+
+@njit(cache=True)
+def _backtrack(parent, start, goal, n):  # type: ignore[no-untyped-def]
+    length = 1
+    node = goal
+    for turn in range(2):
+        cells = np.empty(length if turn else 0, np.int64)
+        node, count = goal, 0
+        while True:
+            if turn:
+                cells[length - 1 - count] = node
+            count += 1
+            if node == start:
+                break
+            k = parent[node]
+            if k < 4:
+                ox = 1 if k == 0 else (-1 if k == 1 else 0)
+                oy = 0 if k < 2 else (1 if k == 2 else -1)
+            else:
+                ox = 1 if k % 2 == 0 else -1
+                oy = 1 if k < 6 else -1
+            node -= oy * n + ox
+        length = count
+    return cells
+
+
+@njit(cache=True)
+def _straight_cost(cost, clearance, blocked, checks, x0, y0, x1, y1):  # type: ignore[no-untyped-def]
+    """Cost of a straight walk between points in cell units, or -1 where there is no room for it."""
+    n = cost.shape[0]
+    length = math.hypot(x1 - x0, y1 - y0)
+    steps = max(1, math.ceil(length / 0.4))
+    total = 0.0
+    for k in range(steps + 1):
+        t = k / steps
+        x, y = x0 + (x1 - x0) * t, y0 + (y1 - y0) * t
+        i, j = min(n - 1, max(0, int(x))), min(n - 1, max(0, int(y)))
+        if cost[j, i] == 0 or (checks and blocked[j, i]):
+            return -1.0
+        u, v = min(n - 1.0, max(0.0, x - 0.5)), min(n - 1.0, max(0.0, y - 0.5))
+        a, b = min(n - 2, int(u)), min(n - 2, int(v))
+        fu, fv = u - a, v - b
+        room = (clearance[b, a] * (1 - fu) + clearance[b, a + 1] * fu) * (1 - fv) + (
+            clearance[b + 1, a] * (1 - fu) + clearance[b + 1, a + 1] * fu
+        ) * fv
+        if room < BODY - 0.02:
+            return -1.0
+        if checks:
+            for dj in range(2):
+                for di in range(2):
+                    if blocked[b + dj, a + di]:
+                        return -1.0
+        total += cost[j, i] * (0.5 if k in (0, steps) else 1.0)
+    return total / steps * length * _STRAIGHT
+
+
+@njit(cache=True)
+def _pull(cost, clearance, blocked, checks, points, g):  # type: ignore[no-untyped-def]
+    """Indices of the points to keep: straight walks that cost no more than the grid's path between their ends."""
+    count = len(points)
+    keep = np.empty(count, np.int64)
+    keep[0] = 0
+    kept = 1
+    anchor = 0
+    while anchor < count - 1:
+        good = anchor + 1
+        reach = 2
+        # Galloping, then halving: the farthest point found that a straight walk serves as well.
+        while anchor + reach < count:
+            j = anchor + reach
+            c = _straight_cost(
+                cost, clearance, blocked, checks, points[anchor, 0], points[anchor, 1], points[j, 0], points[j, 1]
+            )
+            if c < 0 or c > (g[j] - g[anchor]) * 1.012 + 20:
+                break
+            good = j
+            reach *= 2
+        low, high = good, min(count - 1, anchor + reach)
+        while high - low > 0:
+            j = (low + high + 1) // 2
+            c = _straight_cost(
+                cost, clearance, blocked, checks, points[anchor, 0], points[anchor, 1], points[j, 0], points[j, 1]
+            )
+            if c < 0 or c > (g[j] - g[anchor]) * 1.012 + 20:
+                high = j - 1
+            else:
+                low = j
+        good = max(good, low)
+        keep[kept] = good
+        kept += 1
+        anchor = good
+    return keep[:kept]
+
+
+@njit(cache=True)
+def _nearest(free, x, y, reach):  # type: ignore[no-untyped-def]
+    """Flat index of the free cell whose centre is nearest to (x, y) in cell units, or -1 within `reach` rings."""
+    n = free.shape[0]
+    ci, cj = min(n - 1, max(0, int(x))), min(n - 1, max(0, int(y)))
+    best, index = 1e18, -1
+    for r in range(reach + 1):
+        if index >= 0 and (r - 1.0) * (r - 1.0) > best:
+            break
+        for j in range(max(0, cj - r), min(n - 1, cj + r) + 1):
+            step = 1 if j in (cj - r, cj + r) else max(1, 2 * r)
+            for i in range(ci - r, ci + r + 1, step):
+                if 0 <= i < n and free[j, i]:
+                    d = (i + 0.5 - x) ** 2 + (j + 0.5 - y) ** 2
+                    if d < best:
+                        best, index = d, j * n + i
+    return index
+
+
+class Router:
+    """Finds walks on a map. Not to be shared between threads (it reuses its working memory).
+
+    Parameters
+    ----------
+    walkable
+        The map; only cells connected with its edge are walked on.
+    """
+
+    def __init__(self, walkable: WalkableMap) -> None:
+        self.walkable = walkable
+        table = np.zeros(5, np.int32)
+        for surface, weight in WEIGHTS.items():
+            table[surface] = weight
+        cost = table[walkable.cls]
+        self._clearance = np.ascontiguousarray(walkable.clearance)
+        cost[self._clearance < _BERTH] = cost[self._clearance < _BERTH] * 5 // 4
+        cost[~walkable.connected] = 0
+        self._cost = np.ascontiguousarray(cost, np.int32)
+        self._free = self._cost > 0
+        cells = cost.size
+        self._g = np.zeros(cells, np.int64)
+        self._stamp = np.zeros(cells, np.int32)
+        self._after = np.zeros(cells, np.int32)
+        self._before = np.zeros(cells, np.int32)
+        self._parent = np.zeros(cells, np.int8)
+        self._generation = 0
+        self._nothing = np.zeros((0, 0), np.bool_)
+
+    def nearest_walkable(self, xy: ArrayLike, *, within: float = 30.0) -> NDArray[np.float64] | None:
+        """Centre of the nearest connected cell, ENU metres; None if there is none within `within` metres.
+
+        A point that lies in such a cell already is returned as it is.
+        """
+        point = np.asarray(xy, np.float64)[:2]
+        if bool(self.walkable.is_connected(point)):
+            return point.copy()
+        index = self._nearest_cell(point, self._free, within)
+        return None if index < 0 else self._centre(index)
+
+    def path(
+        self, start: ArrayLike, goal: ArrayLike, *, blocked: NDArray[np.bool_] | None = None
+    ) -> NDArray[np.float64] | None:
+        """Find a walk that prefers sidewalks and crossings and keeps 0.3 m from walls.
+
+        Parameters
+        ----------
+        start, goal
+            ENU metres. A point that can't be walked on is led to the nearest one that can, up to 6 m off.
+        blocked
+            Cells that are closed besides, bool, shape ``(n, n)``.
+
+        Returns
+        -------
+        ndarray or None
+            Corner points from start to goal, shape ``(k, 2)``, ``k >= 1``; None if there is no way.
+        """
+        a, b = np.asarray(start, np.float64)[:2], np.asarray(goal, np.float64)[:2]
+        extra = self._nothing if blocked is None else np.ascontiguousarray(blocked)
+        free = self._free if blocked is None else self._free & ~extra
+        first, last = self._nearest_cell(a, free, _SNAP), self._nearest_cell(b, free, _SNAP)
+        if first < 0 or last < 0:
+            return None
+        if not self._run(first, last, extra, use_goal=True):
+            return None
+        n = self.walkable.n
+        cells = _backtrack(self._parent, first, last, n)
+        points = np.column_stack([cells % n, cells // n]) + 0.5
+        g = self._g[cells]
+        kept = _pull(self._cost, self._clearance, extra, blocked is not None, points, g)
+        route = points[kept] * self.walkable.cell - self.walkable.half
+        # The exact ends, where they lie in the cells the search began and ended in.
+        if self._flat(a) == first:
+            route = np.vstack([a, route[1:]]) if len(route) > 1 else np.vstack([a, route])
+        if self._flat(b) == last:
+            route = np.vstack([route[:-1], b]) if len(route) > 1 else b[None]
+        return route
+
+    def length(self, start: ArrayLike, goal: ArrayLike) -> float:
+        """Metres of the walk; infinite if there is none."""
+        route = self.path(start, goal)
+        return math.inf if route is None else float(np.linalg.norm(np.diff(route, axis=0), axis=1).sum())
+
+    def seconds(self, start: ArrayLike, goal: ArrayLike, speed: float = 1.0) -> float:
+        """Seconds the walk takes at `speed` metres a second; infinite if there is none."""
+        return self.length(start, goal) / speed
+
+    def distance_field(self, goal: ArrayLike, *, blocked: NDArray[np.bool_] | None = None) -> NDArray[np.float32]:
+        """Cost of the walk from every cell to `goal`, in metres of sidewalk; float32, shape ``(n, n)``; inf: no way."""
+        extra = self._nothing if blocked is None else np.ascontiguousarray(blocked)
+        free = self._free if blocked is None else self._free & ~extra
+        first = self._nearest_cell(np.asarray(goal, np.float64)[:2], free, _SNAP)
+        shape = self._cost.shape
+        if first < 0:
+            return np.full(shape, np.inf, np.float32)
+        self._run(first, first, extra, use_goal=False)
+        metre = self.walkable.cell / (100 * _STRAIGHT)
+        reached = self._stamp == self._generation + 1
+        return np.where(reached, self._g * metre, np.inf).astype(np.float32).reshape(shape)
+
+    def _run(self, first: int, last: int, extra: NDArray[np.bool_], *, use_goal: bool) -> bool:
+        self._generation += 2
+        return bool(
+            _search(
+                self._cost,
+                extra,
+                first,
+                last,
+                use_goal,
+                self._g,
+                self._stamp,
+                self._generation,
+                self._after,
+                self._before,
+                self._parent,
+            )
+        )
+
+    def _flat(self, xy: NDArray[Any]) -> int:
+        ix, iy = self.walkable.cell_of(xy)
+        return int(iy) * self.walkable.n + int(ix)
+
+    def _centre(self, index: int) -> NDArray[np.float64]:
+        return self.walkable.centre_of([index % self.walkable.n, index // self.walkable.n])
+
+    def _nearest_cell(self, xy: NDArray[Any], free: NDArray[np.bool_], within: float) -> int:
+        cells = (xy + self.walkable.half) / self.walkable.cell
+        index = int(_nearest(free, float(cells[0]), float(cells[1]), int(within / self.walkable.cell)))
+        if index < 0 or float(np.linalg.norm(self._centre(index) - xy)) > within:
+            return -1
+        return index

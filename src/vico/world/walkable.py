@@ -1,0 +1,233 @@
+"""Where people can walk: a grid of surface classes over the square world.
+
+The grid is a configuration space for a standing person: a cell is free only if a disc of `BODY` metres around its
+centre touches nothing solid, so a person may stand at the centre of any free cell.
+"""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+from scipy import ndimage
+
+from vico.errors import InputError, MissingFileError, SchemaError
+from vico.world.files import write_bytes
+
+BLOCKED, OPEN, SIDEWALK, CROSSING, ROADWAY = range(5)
+CLASS_NAMES = ("blocked", "open", "sidewalk", "crossing", "roadway")
+
+#: Free room around the centre of every free cell, metres: a person's radius (0.25) and a little.
+BODY = 0.3
+
+
+@dataclass(frozen=True)
+class WalkableMap:
+    """Surface classes on a square grid.
+
+    Attributes
+    ----------
+    cls
+        `BLOCKED`, `OPEN`, `SIDEWALK`, `CROSSING` or `ROADWAY`, uint8, shape ``(n, n)``, indexed ``[iy, ix]``;
+        cell ``[0, 0]`` has its corner at the south-west corner of the world.
+    half
+        Half the side of the square, metres.
+    cell
+        Side of a cell, metres.
+    """
+
+    cls: NDArray[np.uint8]
+    half: float
+    cell: float = 0.5
+
+    @property
+    def n(self) -> int:
+        """Cells along a side."""
+        return int(self.cls.shape[0])
+
+    def cell_of(self, xy: ArrayLike) -> NDArray[np.int64]:
+        """Column and row ``(ix, iy)`` of the cells that hold points; points outside give the nearest border cell."""
+        points = np.asarray(xy, np.float64)[..., :2]
+        index = np.floor((points + self.half) / self.cell).astype(np.int64)
+        return np.clip(index, 0, self.n - 1)
+
+    def centre_of(self, cells: ArrayLike) -> NDArray[np.float64]:
+        """Centres of cells given as ``(ix, iy)``, ENU metres."""
+        return (np.asarray(cells, np.float64) + 0.5) * self.cell - self.half
+
+    def inside(self, xy: ArrayLike) -> NDArray[np.bool_]:
+        """Which points lie in the square."""
+        points = np.asarray(xy, np.float64)
+        return np.asarray(np.all(np.abs(points[..., :2]) < self.half, axis=-1))
+
+    def class_at(self, xy: ArrayLike) -> NDArray[np.uint8]:
+        """Class under points, shape ``(...)``; outside the square everything is blocked."""
+        cells = self.cell_of(xy)
+        return np.where(self.inside(xy), self.cls[cells[..., 1], cells[..., 0]], BLOCKED).astype(np.uint8)
+
+    def is_connected(self, xy: ArrayLike) -> NDArray[np.bool_]:
+        """Which points lie in cells that can be reached on foot from the edge of the map."""
+        cells = self.cell_of(xy)
+        return np.asarray(self.inside(xy) & self.connected[cells[..., 1], cells[..., 0]])
+
+    @cached_property
+    def clearance(self) -> NDArray[np.float32]:
+        """Metres from cell centres to the nearest solid thing, at least; float32, shape ``(n, n)``; 0 where blocked."""
+        free = self.cls != BLOCKED
+        if free.all():
+            return np.full(self.cls.shape, 2 * self.half, np.float32)
+        far = ndimage.distance_transform_edt(free, sampling=self.cell)
+        # Something solid comes within BODY of a blocked cell's centre, and no nearer than BODY to a free one's.
+        return np.where(free, np.maximum(far - BODY, BODY), 0.0).astype(np.float32)
+
+    def clearance_at(self, xy: ArrayLike) -> NDArray[np.float64]:
+        """Clearance at points, bilinear between cell centres, metres, shape ``(...)``."""
+        points = np.asarray(xy, np.float64)
+        u = np.clip((points[..., 0] + self.half) / self.cell - 0.5, 0.0, self.n - 1.0)
+        v = np.clip((points[..., 1] + self.half) / self.cell - 0.5, 0.0, self.n - 1.0)
+        i = np.minimum(u.astype(np.int64), self.n - 2)
+        j = np.minimum(v.astype(np.int64), self.n - 2)
+        fu, fv = u - i, v - j
+        c = self.clearance
+        south = c[j, i] * (1 - fu) + c[j, i + 1] * fu
+        north = c[j + 1, i] * (1 - fu) + c[j + 1, i + 1] * fu
+        return np.asarray(south * (1 - fv) + north * fv, np.float64)
+
+    @cached_property
+    def connected(self) -> NDArray[np.bool_]:
+        """Cells that can be reached on foot from the map's edge, roads crossed; bool, shape ``(n, n)``.
+
+        Where walls divide the edge it is the largest of the regions that touch it: any two points of it have a way.
+        """
+        # Four neighbours: a step between diagonal cells needs both cells beside it free.
+        labels, count = ndimage.label(self.cls != BLOCKED)
+        if count == 0:
+            return np.zeros(self.cls.shape, bool)
+        sizes = np.bincount(labels.ravel(), minlength=count + 1)
+        edge = np.unique(np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]]))
+        edge = edge[edge > 0]
+        if not len(edge):
+            return np.zeros(self.cls.shape, bool)
+        return np.asarray(labels == edge[int(np.argmax(sizes[edge]))])
+
+    def random_point(
+        self,
+        rng: np.random.Generator,
+        *,
+        classes: tuple[int, ...] = (OPEN, SIDEWALK),
+        near: ArrayLike | None = None,
+        radius: float | None = None,
+        clearance: float = BODY,
+    ) -> NDArray[np.float64]:
+        """A random reachable point, ENU metres, shape ``(2,)``.
+
+        Parameters
+        ----------
+        rng
+            Decides which.
+        classes
+            Surfaces to choose from.
+        near, radius
+            Only within `radius` metres of the point `near`.
+        clearance
+            Metres of free room it needs.
+
+        Raises
+        ------
+        InputError
+            If there is no such point.
+        """
+        mask = self.connected & np.isin(self.cls, classes)
+        if clearance > BODY:
+            mask &= self.clearance >= clearance
+        if near is not None and radius is not None:
+            axis = self.centre_of(np.arange(self.n))
+            x, y = np.asarray(near, np.float64)[:2]
+            mask = mask & ((axis[None, :] - x) ** 2 + (axis[:, None] - y) ** 2 <= radius * radius)
+        free = np.flatnonzero(mask)
+        if not len(free):
+            names = ", ".join(CLASS_NAMES[c] for c in classes)
+            place = "" if near is None else f" within {radius} m of {np.asarray(near)[:2].tolist()}"
+            raise InputError(f"walkable map: no reachable {names} cell{place}; widen the search")
+        chosen = int(free[rng.integers(len(free))])
+        return self.centre_of([chosen % self.n, chosen // self.n])
+
+
+def write_walkable(path: Path, walkable: WalkableMap) -> None:
+    """Write the map as ``.npz``, whole or not at all."""
+    sink = io.BytesIO()
+    np.savez_compressed(sink, cls=walkable.cls, half=np.float64(walkable.half), cell=np.float64(walkable.cell))
+    write_bytes(path, sink.getvalue())
+
+
+def read_walkable(path: Path) -> WalkableMap:
+    """Read what `write_walkable` wrote.
+
+    Raises
+    ------
+    MissingFileError, SchemaError
+        If the file is not there, or damaged.
+    """
+    try:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as data:
+            return WalkableMap(data["cls"].astype(np.uint8), float(data["half"]), float(data["cell"]))
+    except FileNotFoundError:
+        raise MissingFileError(f"{path}: no such file; build the world anew") from None
+    except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile) as error:
+        raise SchemaError(f"{path}: not a readable walkable map ({error}); build the world anew") from None
+
+
+@njit(cache=True)
+def fill_polygon(grid, xs, ys, starts, half, cell, value):  # type: ignore[no-untyped-def]
+    """Set the cells whose centres lie in a polygon: rings end to end in xs, ys (metres), even-odd rule."""
+    n = grid.shape[0]
+    low, high = ys.min(), ys.max()
+    j0 = max(0, int(np.ceil((low + half) / cell - 0.5)))
+    j1 = min(n - 1, int(np.floor((high + half) / cell - 0.5)))
+    cuts = np.empty(len(xs), np.float64)
+    for j in range(j0, j1 + 1):
+        y = (j + 0.5) * cell - half
+        count = 0
+        for r in range(len(starts) - 1):
+            a, b = starts[r], starts[r + 1]
+            for k in range(a, b):
+                m = k + 1 if k + 1 < b else a
+                y0, y1 = ys[k], ys[m]
+                if (y0 <= y) != (y1 <= y):
+                    cuts[count] = xs[k] + (y - y0) * (xs[m] - xs[k]) / (y1 - y0)
+                    count += 1
+        row = np.sort(cuts[:count])
+        for k in range(0, count - 1, 2):
+            i0 = max(0, int(np.ceil((row[k] + half) / cell - 0.5)))
+            i1 = min(n - 1, int(np.floor((row[k + 1] + half) / cell - 0.5)))
+            for i in range(i0, i1 + 1):
+                grid[j, i] = value
+
+
+@njit(cache=True)
+def stroke(grid, x0, y0, x1, y1, radius, half, cell, value):  # type: ignore[no-untyped-def]
+    """Set the cells whose centres lie within `radius` of each of the segments (x0, y0)-(x1, y1)."""
+    n = grid.shape[0]
+    for k in range(len(x0)):
+        i0 = max(0, int(np.ceil((min(x0[k], x1[k]) - radius + half) / cell - 0.5)))
+        i1 = min(n - 1, int(np.floor((max(x0[k], x1[k]) + radius + half) / cell - 0.5)))
+        j0 = max(0, int(np.ceil((min(y0[k], y1[k]) - radius + half) / cell - 0.5)))
+        j1 = min(n - 1, int(np.floor((max(y0[k], y1[k]) + radius + half) / cell - 0.5)))
+        dx, dy = x1[k] - x0[k], y1[k] - y0[k]
+        square = dx * dx + dy * dy
+        for j in range(j0, j1 + 1):
+            y = (j + 0.5) * cell - half
+            for i in range(i0, i1 + 1):
+                x = (i + 0.5) * cell - half
+                t = 0.0
+                if square > 0.0:
+                    t = min(1.0, max(0.0, ((x - x0[k]) * dx + (y - y0[k]) * dy) / square))
+                ex, ey = x - x0[k] - t * dx, y - y0[k] - t * dy
+                if ex * ex + ey * ey < radius * radius:
+                    grid[j, i] = value

@@ -1,0 +1,272 @@
+"""Where people walk along streets: sidewalks, crossings and the corners that join them, as a graph of arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+SIDEWALK, CROSSING, CORNER = 0, 1, 2
+SHORTEST = 6.0  # metres of sidewalk left between two obstacles that are worth keeping
+_BODY = 0.3  # a walker's radius and a little air, metres
+_STEP_OFF = 1.2  # how far who is stuck steps off the kerb, metres
+_NEAR = 4.0  # buildings farther away leave all the room there is, metres
+
+
+@dataclass(frozen=True, eq=False)
+class Walkways:
+    """Stretches that people walk both ways, and the points where they meet.
+
+    Attributes
+    ----------
+    ids
+        SUMO lane ids; empty for corners.
+    kind
+        SIDEWALK, CROSSING or CORNER, uint8, shape ``(n,)``.
+    first, points, along
+        Stretch ``i``'s centre line is ``points[first[i]:first[i + 1]]``; `along` the metres from its start.
+    length, width
+        Metres, shape ``(n,)``.
+    room
+        How far a walker's centre may be to the left and to the right of the centre line, metres, shape ``(n, 2)``.
+    reach
+        The same for who has to get past somebody and steps off the kerb: as far as buildings allow, shape ``(n, 2)``.
+    junction
+        Junction a crossing or corner belongs to, -1 for sidewalks.
+    ends
+        Meeting point at the start and the end, shape ``(n, 2)``.
+    meeting_first, meeting
+        Stretches at meeting point ``k``: ``meeting[meeting_first[k]:meeting_first[k + 1]]``.
+    """
+
+    ids: list[str]
+    kind: NDArray[np.uint8]
+    first: Ints
+    points: Floats
+    along: Floats
+    length: Floats
+    width: Floats
+    room: Floats
+    reach: Floats
+    junction: Ints
+    ends: Ints
+    meeting_first: Ints
+    meeting: Ints
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def line(self, stretch: int) -> Floats:
+        """Centre line of a stretch, metres, shape ``(k, 2)``."""
+        return self.points[self.first[stretch] : self.first[stretch + 1]]
+
+    def clear_of(self, solids: list[shapely.Polygon]) -> Walkways:
+        """Without the stretches that would lead through `solids` (buildings), and with less room where one is near.
+
+        Parameters
+        ----------
+        solids
+            Footprints nobody can walk through, metres.
+        """
+        if not solids or not len(self):
+            return self
+        tree = shapely.STRtree(solids)
+        lines = shapely.linestrings(self.points, indices=np.repeat(np.arange(len(self)), np.diff(self.first)))
+        which, solid = tree.query(lines, predicate="dwithin", distance=_NEAR)
+        sides = _distances(lines[which], tree.geometries[solid])
+        away = np.full((len(self), 2), np.inf)
+        np.minimum.at(away, which, sides)
+        nearest = away.min(axis=1)
+        rows: list[_Row] = []
+        spare = int(self.ends.max()) + 1  # where a sidewalk is cut short, its end meets nothing
+        for i in range(len(self)):
+            row = _Row(
+                self.ids[i],
+                int(self.kind[i]),
+                self.line(i),
+                float(self.width[i]),
+                np.minimum(self.room[i], away[i] - _BODY),
+                np.minimum(self.reach[i], away[i] - _BODY),
+                int(self.junction[i]),
+                (int(self.ends[i, 0]), int(self.ends[i, 1])),
+            )
+            if nearest[i] >= _BODY + 0.05:
+                rows.append(row)
+            elif row.kind == SIDEWALK:
+                near = shapely.union_all([shapely.buffer(tree.geometries[k], _BODY + 0.06) for k in solid[which == i]])
+                for part in shapely.get_parts(lines[i].difference(near)):
+                    if part.length < SHORTEST:
+                        continue
+                    line = np.asarray(part.coords)
+                    ends = (
+                        row.ends[0] if np.allclose(line[0], row.line[0]) else spare,
+                        row.ends[1] if np.allclose(line[-1], row.line[-1]) else spare + 1,
+                    )
+                    spare += 2
+                    kept = tree.geometries[solid[which == i]]
+                    beside = _distances(np.full(len(kept), part), kept).min(axis=0) - _BODY
+                    room = np.clip(beside, 0.05, self.room[i])
+                    rows.append(
+                        replace(row, line=line, room=room, reach=np.clip(beside, 0.05, self.reach[i]), ends=ends)
+                    )
+        return _packed(rows)
+
+    def without(self, dropped: NDArray[np.bool_]) -> Walkways:
+        """A copy without some stretches."""
+        return _packed(
+            [
+                _Row(
+                    self.ids[i],
+                    int(self.kind[i]),
+                    self.line(i),
+                    float(self.width[i]),
+                    self.room[i],
+                    self.reach[i],
+                    int(self.junction[i]),
+                    (int(self.ends[i, 0]), int(self.ends[i, 1])),
+                )
+                for i in np.flatnonzero(~dropped).tolist()
+            ]
+        )
+
+
+@dataclass(frozen=True)
+class _Row:
+    """One stretch while the graph is put together."""
+
+    id: str
+    kind: int
+    line: Floats
+    width: float
+    room: Floats
+    reach: Floats
+    junction: int
+    ends: tuple[int, int]
+
+
+def walkways_of(
+    ways: list[tuple[str, bool, Floats, float, int]],
+    corners: list[tuple[int, Floats, list[tuple[str, int]]]],
+) -> Walkways:
+    """Join sidewalks and crossings by the areas between them.
+
+    Parameters
+    ----------
+    ways
+        Lane id, whether it is a crossing, centre line, width, junction (-1 for sidewalks).
+    corners
+        Junction, outline of the area, and the lane ends at it (lane id, 0 = its start, 1 = its end).
+    """
+    number = {way[0]: i for i, way in enumerate(ways)}
+
+    def room(width: float) -> Floats:
+        return np.full(2, max(width / 2 - _BODY, 0.05))
+
+    # Every lane end is a meeting point of its own; a corner's stretches join them in pairs.
+    rows = [
+        _Row(
+            name,
+            CROSSING if crossing else SIDEWALK,
+            line,
+            width,
+            room(width),
+            room(width) + _STEP_OFF,
+            junction,
+            (2 * i, 2 * i + 1),
+        )
+        for i, (name, crossing, line, width, junction) in enumerate(ways)
+    ]
+    for place, outline, touching in corners:
+        area = shapely.make_valid(shapely.Polygon(outline)) if len(outline) > 2 else shapely.Polygon()
+        for k, (a, side_a) in enumerate(touching):
+            for b, side_b in touching[k + 1 :]:
+                i, j = number[a], number[b]
+                if i == j:
+                    continue
+                start, end = ways[i][2][-side_a], ways[j][2][-side_b]
+                if np.linalg.norm(end - start) < 0.05:
+                    end = end + np.array([0.05, 0.0])
+                width = min(ways[i][3], ways[j][3])
+                ends = (2 * i + side_a, 2 * j + side_b)
+                path = _path_within(area, start, end)
+                rows.append(_Row("", CORNER, path, width, room(width), room(width) + _STEP_OFF, place, ends))
+    return _packed(rows)
+
+
+def _distances(lines: NDArray[np.object_], solids: NDArray[np.object_]) -> Floats:
+    """Metres from each line to its solid on the left and on the right, shape ``(n, 2)``; inf where it is not there."""
+    out = np.full((len(lines), 2), np.inf)
+    for k, side in enumerate((_NEAR, -_NEAR)):
+        strips = shapely.buffer(lines, side, cap_style="flat", join_style="mitre", single_sided=True)
+        parts = shapely.intersection(shapely.make_valid(strips), solids)
+        there = ~shapely.is_empty(parts)
+        out[there, k] = shapely.distance(lines[there], parts[there])
+    # Round the ends a solid is beside neither way of going on.
+    beyond = np.minimum(shapely.distance(shapely.get_point(lines, 0), solids), np.inf)
+    beyond = np.minimum(beyond, shapely.distance(shapely.get_point(lines, -1), solids))
+    neither = np.isinf(out).all(axis=1) | np.isnan(out).any(axis=1)
+    out[neither] = beyond[neither, None]
+    return out
+
+
+def _packed(rows: list[_Row]) -> Walkways:
+    n = len(rows)
+    first = np.zeros(n + 1, np.int32)
+    first[1:] = np.cumsum([len(row.line) for row in rows])
+    steps = [np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(row.line, axis=0), axis=1))]) for row in rows]
+    used, renamed = np.unique(np.array([row.ends for row in rows], np.int64).reshape(-1), return_inverse=True)
+    ends = renamed.reshape(-1, 2).astype(np.int32)
+    meets: list[list[int]] = [[] for _ in range(len(used))]
+    for i, (a, b) in enumerate(ends.tolist()):
+        meets[a].append(i)
+        meets[b].append(i)
+    meeting_first = np.zeros(len(used) + 1, np.int32)
+    meeting_first[1:] = np.cumsum([len(row) for row in meets])
+    return Walkways(
+        ids=[row.id for row in rows],
+        kind=np.array([row.kind for row in rows], np.uint8),
+        first=first,
+        points=np.concatenate([row.line for row in rows]) if n else np.zeros((0, 2)),
+        along=np.concatenate(steps) if n else np.zeros(0),
+        length=np.array([s[-1] for s in steps]),
+        width=np.array([row.width for row in rows]),
+        room=np.array([row.room for row in rows]).reshape(-1, 2),
+        reach=np.array([row.reach for row in rows]).reshape(-1, 2),
+        junction=np.array([row.junction for row in rows], np.int32),
+        ends=ends,
+        meeting_first=meeting_first,
+        meeting=np.array([i for row in meets for i in row], np.int32),
+    )
+
+
+def _path_within(area: shapely.Geometry, start: Floats, end: Floats) -> Floats:
+    """The shortest way between two points that stays in an area; straight where the area is degenerate."""
+    straight = np.array([start, end])
+    grown = area.buffer(0.15)
+    if area.is_empty or grown.covers(shapely.LineString(straight)):
+        return straight
+    inner = area.buffer(-_BODY)
+    rings = [np.asarray(p.exterior.coords)[:-1] for p in shapely.get_parts(inner) if isinstance(p, shapely.Polygon)]
+    if not rings or not any(len(ring) for ring in rings):
+        return straight
+    points = np.concatenate([straight, *rings])
+    a, b = np.triu_indices(len(points), 1)
+    shapely.prepare(grown)
+    lines = shapely.linestrings(np.stack([points[a], points[b]], axis=1))
+    seen = shapely.covers(grown, lines)
+    size = np.linalg.norm(points[a] - points[b], axis=1) + 1e-9
+    graph = csr_matrix((size[seen], (a[seen], b[seen])), shape=(len(points), len(points)))
+    _, before = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
+    if before[1] < 0:
+        return straight
+    chain = [1]
+    while chain[-1] != 0:
+        chain.append(int(before[chain[-1]]))
+    return points[chain[::-1]]

@@ -1,0 +1,112 @@
+"""Walking routes through central Helsinki."""
+
+import math
+import time
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from vico.world.folder import World
+from vico.world.routing import Router
+from vico.world.walkable import BLOCKED, OPEN, ROADWAY, SIDEWALK, WalkableMap
+
+
+@pytest.fixture(scope="module")
+def router(helsinki: World) -> Router:
+    return Router(helsinki.walkable)
+
+
+@pytest.fixture(scope="module")
+def trips(helsinki: World) -> list[tuple[np.ndarray, np.ndarray]]:
+    rng = np.random.default_rng(11)
+    return [(helsinki.walkable.random_point(rng), helsinki.walkable.random_point(rng)) for _ in range(40)]
+
+
+def test_connected_points_always_have_a_way(router: Router, trips: list[tuple[np.ndarray, np.ndarray]]) -> None:
+    assert all(router.path(a, b) is not None for a, b in trips)
+
+
+def test_ways_begin_and_end_where_asked(router: Router, trips: list[tuple[np.ndarray, np.ndarray]]) -> None:
+    for a, b in trips:
+        route = router.path(a, b)
+        assert route is not None
+        np.testing.assert_allclose(route[0], a)
+        np.testing.assert_allclose(route[-1], b)
+
+
+def test_ways_keep_clear_of_everything_solid(
+    helsinki: World, router: Router, trips: list[tuple[np.ndarray, np.ndarray]]
+) -> None:
+    for a, b in trips:
+        route = router.path(a, b)
+        assert route is not None
+        for start, end in pairwise(route):
+            steps = np.linspace(start, end, max(2, int(np.linalg.norm(end - start) / 0.1)))
+            assert (helsinki.walkable.class_at(steps) != BLOCKED).all()
+
+
+def test_a_way_is_as_long_back_as_there(router: Router, trips: list[tuple[np.ndarray, np.ndarray]]) -> None:
+    for a, b in trips[:10]:
+        assert router.length(a, b) == pytest.approx(router.length(b, a), rel=0.06)
+
+
+def test_the_distance_field_agrees_with_the_search(router: Router, trips: list[tuple[np.ndarray, np.ndarray]]) -> None:
+    a, b = trips[0]
+    field = router.distance_field(b)
+    ix, iy = router.walkable.cell_of(a)
+    # A field counts metres of sidewalk: never less than the walk's own length, nor more than four times as much.
+    assert router.length(a, b) * 0.94 <= field[iy, ix] <= router.length(a, b) * 4.1
+
+
+def test_people_walk_round_by_the_crossing_rather_than_down_the_road() -> None:
+    grid = np.full((80, 80), SIDEWALK, np.uint8)
+    grid[36:44, :] = ROADWAY
+    grid[36:44, 20:26] = 3
+    route = Router(WalkableMap(grid, 20.0)).path((-2.0, -10.0), (-2.0, 10.0))
+    assert route is not None
+    crossing = route[np.abs(route[:, 1]) < 2.5]
+    middle = np.array([np.interp(0.0, route[:, 1], route[:, 0])])
+    assert (np.concatenate([crossing[:, 0], middle]) > -10.5).all()
+    assert -10.5 < middle[0] < -6.5
+
+
+def test_a_blocked_way_is_walked_round() -> None:
+    walkable = WalkableMap(np.full((80, 80), OPEN, np.uint8), 20.0)
+    router = Router(walkable)
+    wall = np.zeros((80, 80), bool)
+    wall[38:42, :70] = True
+    direct, around = router.path((0, -10), (0, 10)), router.path((0, -10), (0, 10), blocked=wall)
+    assert direct is not None
+    assert around is not None
+    assert len(direct) == 2
+    assert around[:, 0].max() > 14.5
+
+
+def test_where_there_is_no_way_there_is_none() -> None:
+    grid = np.full((80, 80), OPEN, np.uint8)
+    grid[38:42, :] = BLOCKED
+    router = Router(WalkableMap(grid, 20.0))
+    assert router.path((0, -10), (0, 10)) is None
+    assert math.isinf(router.length((0, -10), (0, 10)))
+
+
+def test_the_same_question_gets_the_same_answer(
+    helsinki: World, router: Router, trips: list[tuple[np.ndarray, np.ndarray]]
+) -> None:
+    fresh = Router(helsinki.walkable)
+    for a, b in trips[:10]:
+        first, second = router.path(a, b), fresh.path(a, b)
+        assert first is not None
+        assert second is not None
+        np.testing.assert_array_equal(first, second)
+
+
+def test_a_walk_across_the_map_is_found_quickly(router: Router, trips: list[tuple[np.ndarray, np.ndarray]]) -> None:
+    router.path(*trips[0])
+    times = []
+    for a, b in trips:
+        start = time.process_time()
+        router.path(a, b)
+        times.append(time.process_time() - start)
+    assert float(np.median(times)) < 0.03
