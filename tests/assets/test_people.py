@@ -1,0 +1,182 @@
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vico.assets import people_anny
+from vico.assets.people import (
+    BOTTOMS,
+    HAIR,
+    JOINTS,
+    PARENTS,
+    SHOES,
+    TOPS,
+    Appearance,
+    J,
+    body_of,
+    random_appearance,
+)
+from vico.assets.people_decimate import cut, decimated, open_loops
+from vico.errors import InputError, MissingExtraError
+from vico.world.seeds import rng
+
+SOURCES = [
+    "procedural",
+    pytest.param(
+        "anny",
+        marks=pytest.mark.skipif(not people_anny.available(), reason="no baked bodies: vico assets install people"),
+    ),
+]
+CROWD = [random_appearance(rng(0, "crowd", k)) for k in range(12)]
+
+
+def test_the_skeleton_has_smpl_x_s_55_joints_children_after_parents() -> None:
+    assert len(JOINTS) == len(PARENTS) == 55
+    assert all(PARENTS[j] < j for j in range(55))
+    assert (JOINTS[:3], JOINTS[21:26], JOINTS[54]) == (
+        ("pelvis", "left_hip", "right_hip"),
+        ("right_wrist", "jaw", "left_eye", "right_eye", "left_index1"),
+        "right_thumb3",
+    )
+
+
+@pytest.mark.parametrize("source", SOURCES)
+@pytest.mark.parametrize("number", range(len(CROWD)))
+def test_a_body_is_a_sound_mesh(source: str, number: int) -> None:
+    body = body_of(CROWD[number], source=source)  # type: ignore[arg-type]
+    assert np.isfinite(body.vertices).all()
+    assert body.triangles.min() >= 0
+    assert body.triangles.max() < len(body.vertices)
+    np.testing.assert_allclose(np.linalg.norm(body.normals, axis=1), 1, atol=1e-3)
+    np.testing.assert_allclose(body.weights.sum(1), 1, atol=1e-5)
+    assert (np.diff(body.weights, axis=1) <= 1e-6).all()
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_a_body_stands_on_the_floor_and_is_as_tall_as_asked(source: str) -> None:
+    for look in CROWD:
+        body = body_of(replace(look, hair="bald", age=min(look.age, 29)), source=source)  # type: ignore[arg-type]
+        assert body.vertices[:, 2].min() == pytest.approx(0, abs=0.01)
+        assert body.vertices[:, 2].max() == pytest.approx(look.height, abs=0.015)
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_faces_look_along_x_and_the_left_hand_is_on_the_left(source: str) -> None:
+    body = body_of(CROWD[0], source=source)  # type: ignore[arg-type]
+    eyes = body.rest_joints[[J["left_eye"], J["right_eye"]]]
+    assert (eyes[:, 0] > body.rest_joints[J["head"], 0]).all()
+    assert body.rest_joints[J["left_wrist"], 1] > 0.2 > -0.2 > body.rest_joints[J["right_wrist"], 1]
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_in_the_t_pose_arms_lie_along_y_and_legs_along_z(source: str) -> None:
+    joints = body_of(CROWD[1], source=source).joints.astype(float)  # type: ignore[arg-type]
+    for side in ("left", "right"):
+        arm = joints[J[f"{side}_wrist"]] - joints[J[f"{side}_shoulder"]]
+        leg = joints[J[f"{side}_ankle"]] - joints[J[f"{side}_hip"]]
+        np.testing.assert_allclose(np.abs(arm / np.linalg.norm(arm)), (0, 1, 0), atol=1e-4)
+        np.testing.assert_allclose(leg / np.linalg.norm(leg), (0, 0, -1), atol=1e-4)
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_a_heavy_build_has_a_deeper_waist(source: str) -> None:
+    plain = Appearance(top="t-shirt")
+    waist = {}
+    for name, look in {
+        "slim": replace(plain, build=0.0),
+        "heavy": replace(plain, build=1.0),
+    }.items():
+        body = body_of(look, source=source, detail="full")  # type: ignore[arg-type]
+        middle = np.abs(body.vertices[:, 2] - 0.62 * look.height) < 0.02 * look.height
+        trunk = middle & np.isin(body.weight_joints[:, 0], [J["pelvis"], J["spine1"], J["spine2"], J["spine3"]])
+        waist[name] = np.ptp(body.vertices[trunk, 0])
+    assert waist["heavy"] > 1.1 * waist["slim"]
+
+
+@pytest.mark.parametrize("source", SOURCES)
+@pytest.mark.parametrize(("field", "choices"), [("hair", HAIR), ("top", TOPS), ("bottom", BOTTOMS), ("shoes", SHOES)])
+def test_every_choice_of_hair_and_clothes_makes_a_different_body(
+    source: str, field: str, choices: tuple[str, ...]
+) -> None:
+    def fingerprint(choice: str) -> bytes:
+        body = body_of(replace(Appearance(age=50), **{field: choice}), source=source)  # type: ignore[arg-type]
+        return body.vertices.tobytes() + body.colour.tobytes()
+
+    assert len({fingerprint(choice) for choice in choices}) == len(choices)
+
+
+def test_an_appearance_survives_json() -> None:
+    for look in CROWD:
+        assert Appearance.from_dict(look.to_dict()) == look
+
+
+def test_an_unknown_field_is_named() -> None:
+    with pytest.raises(InputError, match="unknown field 'hat'"):
+        Appearance.from_dict({"hat": "bowler"})
+
+
+@pytest.mark.parametrize(("field", "value"), [("height", 3.0), ("gender", 2), ("top", "toga"), ("ancestry", (0, 0, 0))])
+def test_an_impossible_look_is_refused_with_its_field(field: str, value: object) -> None:
+    with pytest.raises(InputError, match=field):
+        Appearance(**{field: value})  # type: ignore[arg-type]
+
+
+def test_a_body_of_data_that_are_not_there_says_what_to_type(tmp_path: object, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VICO_CACHE", str(tmp_path))
+    with pytest.raises(MissingExtraError, match="vico assets install people"):
+        body_of(CROWD[0], source="anny")
+
+
+def test_without_data_the_best_body_is_our_own(tmp_path: object, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VICO_CACHE", str(tmp_path))
+    np.testing.assert_array_equal(body_of(CROWD[0]).vertices, body_of(CROWD[0], source="procedural").vertices)
+
+
+@pytest.mark.parametrize("detail", ["full", "light"])
+def test_the_same_look_gives_the_same_bytes_in_a_fresh_process(detail: str, tmp_path: Path) -> None:
+    program = (
+        "import hashlib; from vico.assets.people import *; from vico.world.seeds import rng;"
+        f"b = body_of(random_appearance(rng(0, 'crowd', 3)), source='procedural', detail={detail!r});"
+        "print(hashlib.sha256(b.vertices.tobytes() + b.normals.tobytes() + b.colour.tobytes()).hexdigest())"
+    )
+    runs = set()
+    for k in range(2):
+        cache = os.environ | {"VICO_CACHE": str(tmp_path / str(k))}
+        runs.add(subprocess.run([sys.executable, "-c", program], capture_output=True, check=True, env=cache).stdout)
+    assert len(runs) == 1
+
+
+def grid(n: int) -> tuple[np.ndarray, np.ndarray]:
+    x, y = np.meshgrid(np.arange(n, dtype=float), np.arange(n, dtype=float), indexing="ij")
+    points = np.column_stack([x.ravel(), y.ravel(), np.zeros(n * n)])
+    faces = []
+    for i in range(n - 1):
+        for j in range(n - 1):
+            a = i * n + j
+            faces += [(a, a + n, a + n + 1), (a, a + n + 1, a + 1)]
+    return points, np.array(faces)
+
+
+def area(points: np.ndarray, triangles: np.ndarray) -> float:
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    return float(np.cross(b - a, c - a)[:, 2].sum() / 2)
+
+
+def test_cutting_keeps_exactly_the_positive_side() -> None:
+    from scipy.sparse import identity
+
+    points, triangles = grid(5)
+    rows, left = cut(identity(25, format="csr"), triangles, points[:, 0] - 1.3)
+    assert area(rows @ points, left) == pytest.approx(4 * 2.7)
+
+
+def test_thinning_a_flat_sheet_keeps_its_outline_and_area() -> None:
+    points, triangles = grid(12)
+    kept, left = decimated(points, triangles, 30, np.ones(len(points)))
+    assert len(kept) <= 30
+    assert area(points[kept], left) == pytest.approx(121, rel=0.02)
+    assert len(open_loops(left)) >= 4

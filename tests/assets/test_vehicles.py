@@ -1,0 +1,50 @@
+"""Vehicle models: sizes, budgets, and that they are what they claim to be."""
+
+import numpy as np
+import pytest
+
+from vico.assets.vehicles import vehicle_prototypes, vehicle_size
+
+NAMES = sorted(vehicle_prototypes())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_model_fits_the_size_traffic_uses(name: str) -> None:
+    positions = np.concatenate([s.positions for s in vehicle_prototypes()[name]])
+    low, high = positions.min(0), positions.max(0)
+    length, width, height, _, _ = vehicle_size(name)
+    # Bumpers and mirrors stick out by centimetres.
+    assert np.allclose(high[0] - low[0], length, atol=0.12)
+    assert -0.05 <= high[1] - low[1] - width < 0.25
+    assert abs(high[2] - height) < 0.16
+    assert abs(low[2]) < 0.03
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_model_has_300_to_1200_triangles(name: str) -> None:
+    assert 300 <= sum(len(s.triangles) for s in vehicle_prototypes()[name]) <= 1200
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_faces_look_outward(name: str) -> None:
+    """Normals agree with the triangles' winding."""
+    for surface in vehicle_prototypes()[name]:
+        corners = surface.positions[surface.triangles].astype(np.float64)
+        winding = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        agree = (winding * surface.normals[surface.triangles[:, 0]]).sum(1)
+        assert (agree >= -1e-9).all()
+
+
+def test_doors_of_the_bus_are_on_its_right() -> None:
+    """Door frames are the dark panels that reach from floor to eaves."""
+    (bus,) = vehicle_prototypes()["bus"]
+    corners = bus.positions[bus.triangles]
+    tall = (np.ptp(corners[:, :, 2], axis=1) > 2.0) & (np.abs(corners[:, :, 1]).min(1) > 1.2)
+    assert tall.any()
+    assert (corners[tall][:, :, 1] < 0).all()
+
+
+def test_cars_come_in_many_kinds_and_colours() -> None:
+    kinds = {name.split("_")[0] for name in NAMES}
+    assert kinds >= {"hatchback", "sedan", "suv", "van", "taxi", "bus", "bicycle"}
+    assert len(NAMES) >= 15
