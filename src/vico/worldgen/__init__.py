@@ -1,0 +1,1 @@
+"""How a world is made: one module a stage, and the pipeline that runs them."""

@@ -1,0 +1,161 @@
+"""Streets and the ground: a partition that covers the world, drapes on it and carries paint."""
+
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+
+from vico.geo.elevation import HeightSamples, read_elevation
+from vico.geo.frame import LocalFrame
+from vico.geo.osm import OsmData, OsmWay, read_osm
+from vico.world.mesh import Surface
+from vico.world.model import ENTITY_GREEN, ENTITY_GROUND, ENTITY_ROAD
+from vico.worldgen.ground import ground_from_osm, ground_partition, sea_polygons
+from vico.worldgen.streets import StreetPolygons, carriageway_width, lane_count, number, road_polygons
+from vico.worldgen.terrain import flat_terrain, terrain_from_dem
+
+PLACE = Path(str(resources.files("vico") / "data" / "helsinki.osm.pbf"))
+HALF = 250.0
+WINDOW = shapely.box(-HALF, -HALF, HALF, HALF)
+
+
+@pytest.fixture(scope="module")
+def osm() -> OsmData:
+    return read_osm(PLACE, LocalFrame(60.1690, 24.9435), HALF)
+
+
+@pytest.fixture(scope="module")
+def streets(osm: OsmData) -> StreetPolygons:
+    return road_polygons(osm)
+
+
+@pytest.fixture(scope="module")
+def ground(osm: OsmData, streets: StreetPolygons) -> list[Surface]:
+    return ground_from_osm(osm, flat_terrain(half=HALF), HALF, streets)
+
+
+def plan_area(surface: Surface) -> float:
+    a, b, c = (surface.positions[surface.triangles[:, k], :2].astype(np.float64) for k in range(3))
+    return float((((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2).sum())
+
+
+@pytest.mark.parametrize(
+    ("tags", "expected"),
+    [
+        ({"highway": "residential", "width": "7,5"}, 7.5),
+        ({"highway": "primary", "lanes": "4"}, 4 * 3.2 + 0.7),
+        ({"highway": "residential", "oneway": "yes"}, 3.2 + 0.7),
+        ({"highway": "residential", "parking:lane:both": "parallel"}, 2 * 3.2 + 0.7 + 4.0),
+        ({"highway": "service", "service": "driveway"}, 3.0),
+        ({"highway": "tertiary", "width": "wide"}, 2 * 3.2 + 0.7),
+    ],
+)
+def test_widths_follow_tags_before_class(tags: dict[str, str], expected: float) -> None:
+    assert carriageway_width(tags) == pytest.approx(expected)
+
+
+def test_lanes_are_as_tagged_or_as_usual() -> None:
+    assert lane_count({"highway": "primary", "lanes": "3"}) == 3
+    assert lane_count({"highway": "primary"}) == 4
+    assert lane_count({"highway": "residential", "oneway": "yes"}) == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("12 m", 12.0), ("40'", 12.192), ("3,5", 3.5), ("x", None), ("nan", None), (None, None)]
+)
+def test_numbers_of_tags_are_read_in_metres(text: str | None, value: float | None) -> None:
+    assert number(text) == (pytest.approx(value) if value is not None else None)
+
+
+def test_street_surfaces_do_not_overlap(streets: StreetPolygons) -> None:
+    kinds = [streets.carriageway, streets.sidewalk, streets.pedestrian, streets.path, streets.cycleway, streets.steps]
+    shared = [shapely.intersection(a, b).area for k, a in enumerate(kinds) for b in kinds[k + 1 :]]
+    assert max(shared) < 0.5
+
+
+def test_lanes_of_streets_lie_on_the_carriageway(osm: OsmData, streets: StreetPolygons) -> None:
+    lines = shapely.MultiLineString([street.line for street in streets.streets])
+    window = shapely.box(-HALF, -HALF, HALF, HALF)
+    inside = shapely.intersection(lines, window)
+    on_it = shapely.intersection(inside, shapely.buffer(streets.carriageway, 0.1))
+    assert on_it.length > 0.995 * inside.length
+
+
+def test_crossings_lie_across_carriageways(streets: StreetPolygons) -> None:
+    assert len(streets.crossings) > 60
+    near = shapely.buffer(streets.carriageway, 1.0)
+    assert all(near.contains(shapely.LineString([c.start, c.end])) for c in streets.crossings)
+
+
+def test_nothing_is_paved_under_buildings(osm: OsmData) -> None:
+    solids = [shapely.box(-30, -30, 30, 30)]
+    cleared = road_polygons(osm, solids)
+    assert shapely.intersection(cleared.sidewalk, solids[0]).area < 0.1
+    assert shapely.intersection(cleared.pedestrian, solids[0]).area < 0.1
+
+
+def test_the_partition_covers_the_window_once(osm: OsmData, streets: StreetPolygons) -> None:
+    pieces = ground_partition(osm, streets, WINDOW)
+    total = sum(shape.area for shapes in pieces.values() for shape in shapes)
+    assert total == pytest.approx(WINDOW.area, rel=1e-4)
+    assert shapely.union_all([shape for shapes in pieces.values() for shape in shapes]).area == pytest.approx(
+        WINDOW.area, rel=1e-4
+    )
+
+
+def test_the_mesh_faces_up_and_covers_the_ground_and_its_underlay(ground: list[Surface]) -> None:
+    for surface in ground:
+        assert (surface.normals[:, 2] > 0.9).all()
+    paint = sum(plan_area(s) for s in ground if s.material.name == "paint")
+    total = sum(plan_area(s) for s in ground) - paint
+    assert total == pytest.approx(2 * (2 * (HALF + 40.0)) ** 2, rel=1e-3)
+
+
+def test_entities_tell_roads_greens_and_the_rest_apart(ground: list[Surface]) -> None:
+    found = set(np.unique(np.concatenate([s.entity for s in ground])).tolist())
+    assert {ENTITY_GROUND, ENTITY_ROAD, ENTITY_GREEN} <= found
+
+
+def test_zebras_are_painted_over_the_asphalt(ground: list[Surface]) -> None:
+    paint = next(s for s in ground if s.material.name == "paint")
+    assert (paint.positions[:, 2] > 0.01).all()
+    white = (paint.colour > 220).all(axis=1)
+    assert white.sum() / 4 > 400
+
+
+def test_the_ground_follows_a_hill(osm: OsmData, streets: StreetPolygons) -> None:
+    side = np.arange(-400, 401, 25.0)
+    x, y = (v.ravel() for v in np.meshgrid(side, side))
+    hill = 30 * np.exp(-(x**2 + y**2) / 150**2) + 0.05 * x
+    terrain = terrain_from_dem(HeightSamples(np.stack([x, y, hill], 1), 25.0, "hill", ""), half=HALF)
+    for surface in ground_from_osm(osm, terrain, HALF, streets):
+        middle = surface.positions[surface.triangles].mean(axis=1).astype(np.float64)
+        above = middle[:, 2] - terrain(middle[:, :2])
+        if surface.material.name == "paint":
+            assert above.min() > -0.02
+            continue
+        top = above > -0.08  # the rest is the underlay
+        assert np.abs(above[top]).max() < 0.08
+
+
+def test_the_sea_lies_to_the_right_of_the_coast() -> None:
+    frame = LocalFrame(43.73, 7.42)
+    line = np.array([(-500.0, 0.0), (0.0, 20.0), (500.0, 0.0)])  # eastwards: land to the north
+    osm = OsmData(frame, 200.0, 0.0, [], [OsmWay(1, [1, 2, 3], line, False, {"natural": "coastline"})], [], [])
+    (sea,) = sea_polygons(osm, shapely.box(-200, -200, 200, 200))
+    assert sea.contains(shapely.Point(0, -100))
+    assert not sea.contains(shapely.Point(0, 100))
+
+
+def test_monaco_s_harbour_is_water(shared_data: Path) -> None:
+    frame = LocalFrame(43.73384, 7.41813)
+    osm = read_osm(shared_data / "places" / "monaco" / "monaco.osm.pbf", frame, 400.0)
+    terrain = terrain_from_dem(
+        read_elevation(shared_data / "places" / "monaco" / "dem_srtm.tif", frame, 400.0), half=400
+    )
+    pieces = ground_partition(osm, road_polygons(osm), shapely.box(-400, -400, 400, 400))
+    harbour = [shape for shape in pieces["water"] if shape.area > 5_000]
+    assert sum(shape.area for shape in harbour) > 20_000
+    assert all(abs(terrain(np.asarray(shape.representative_point().coords[0]))) < 8.0 for shape in harbour)

@@ -1,0 +1,89 @@
+"""Street objects of central Helsinki: where the map has them, clear of walls and lanes."""
+
+import numpy as np
+import pytest
+import shapely
+
+from vico.assets.furniture import furniture_models
+from vico.assets.street import street_models
+from vico.geo.frame import LocalFrame
+from vico.geo.osm import OsmData, OsmNode
+from vico.world.folder import World
+from vico.world.heights import HeightField
+from vico.world.objects import Objects
+from vico.worldgen.objects import objects_from_osm
+
+NOTHING = shapely.Polygon()
+
+
+def placed(nodes: list[OsmNode], **given: object) -> tuple[Objects, list[str]]:
+    osm = OsmData(LocalFrame(60.0, 25.0), 50.0, 60.0, nodes, [], [], [])
+    arguments = {"solids": [], "carriageway": NOTHING, "openings": NOTHING, "height": HeightField.flat(60.0)} | given
+    objects, dropped = objects_from_osm(osm, **arguments)
+    return objects, [entry.reason for entry in dropped]
+
+
+def node(number: int, x: float, y: float, **tags: str) -> OsmNode:
+    return OsmNode(number, np.array([x, y]), tags)
+
+
+def test_a_tree_stands_where_it_is_mapped() -> None:
+    objects, _ = placed([node(1, 3.0, 4.0, natural="tree")])
+    assert (objects.kind[0], objects.x[0], objects.y[0]) == ("tree", 3.0, 4.0)
+
+
+def test_a_mapped_height_decides_how_tall_a_tree_is() -> None:
+    objects, _ = placed([node(1, 0.0, 0.0, natural="tree", height="8", genus="Betula")])
+    assert objects.size_z[0] == pytest.approx(8.0, abs=0.1)
+    assert objects.prototype[0] == "tree_birch"
+
+
+def test_a_bench_mapped_on_the_road_stands_beside_it() -> None:
+    road = shapely.box(-50, -3, 50, 3)
+    objects, dropped = placed([node(1, 0.0, 2.0, amenity="bench")], carriageway=road)
+    assert dropped == []
+    assert not shapely.intersects(road, shapely.Polygon(objects.corners()[0]))
+
+
+def test_a_bench_deep_in_a_building_is_dropped_with_the_reason() -> None:
+    _, dropped = placed([node(1, 0.0, 0.0, amenity="bench")], solids=[shapely.box(-20, -20, 20, 20)])
+    assert dropped == ["bench: inside a building, and no room within 3 m"]
+
+
+def test_two_things_at_one_point_do_not_stand_in_each_other() -> None:
+    objects, _ = placed([node(1, 0.0, 0.0, amenity="bench"), node(2, 0.0, 0.0, amenity="post_box")])
+    first, second = (shapely.Polygon(foot) for foot in objects.feet())
+    assert not first.intersects(second)
+
+
+def test_another_object_on_the_map_changes_none_of_the_others() -> None:
+    trees = [node(k, 6.0 * k - 30, 0.0, natural="tree") for k in range(1, 9)]
+    before, _ = placed(trees)
+    after, _ = placed([*trees, node(99, 0.0, 20.0, natural="tree")])
+    np.testing.assert_array_equal(before.yaw, after.yaw[: len(before)])
+
+
+def test_stops_carry_the_entities_of_their_records(helsinki: World) -> None:
+    entity = dict(zip(helsinki.objects.id.tolist(), helsinki.objects.entity.tolist(), strict=True))
+    assert all(entity[s.id] == s.entity for s in helsinki.transit.stops if s.id in entity)
+
+
+def test_feet_are_out_of_the_way_of_walkers(helsinki: World) -> None:
+    outdoors = helsinki.objects.where(helsinki.objects.outdoors & helsinki.objects.solid)
+    inside = helsinki.walkable.inside(outdoors.position)
+    assert (helsinki.walkable.class_at(outdoors.position[inside]) == 0).all()
+
+
+@pytest.mark.parametrize("name", sorted({**street_models(), **furniture_models()}))
+def test_a_model_stands_on_the_ground_and_is_light(name: str) -> None:
+    thing = {**street_models(), **furniture_models()}[name]
+    assert thing.triangles <= 400
+    assert abs(thing.bounds[0, 2]) < 0.15  # stones and pots are set into it a little
+    assert all(np.isfinite(surface.positions).all() for surface in thing.surfaces)
+
+
+def test_plants_are_the_same_in_every_build() -> None:
+    first = street_models()["tree_lime"].surfaces
+    street_models.cache_clear()
+    second = street_models()["tree_lime"].surfaces
+    assert all(np.array_equal(a.positions, b.positions) for a, b in zip(first, second, strict=True))

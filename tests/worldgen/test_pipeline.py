@@ -1,0 +1,119 @@
+"""The build as a whole: whole or not at all, the same bytes from the same input, one sentence for bad input."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from vico.errors import EmptyInputError, InputError, MissingFileError, OutputExistsError
+from vico.world.folder import World, read_world
+from vico.worldgen import pipeline
+from vico.worldgen.pipeline import build_world, extract_centre
+
+EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
+CENTRE = {"lat": 60.1690, "lon": 24.9435}
+
+
+def test_the_same_input_and_seed_give_the_same_bytes(tmp_path: Path) -> None:
+    first = build_world(EXTRACT, **CENTRE, half=60, seed=3, out=tmp_path / "a")
+    second = build_world(EXTRACT, **CENTRE, half=60, seed=3, out=tmp_path / "b")
+    assert first.files == second.files
+    assert (tmp_path / "a" / "world.json").read_bytes() == (tmp_path / "b" / "world.json").read_bytes()
+
+
+def test_another_seed_gives_another_world(tmp_path: Path) -> None:
+    first = build_world(EXTRACT, **CENTRE, half=60, seed=3, out=tmp_path / "a")
+    second = build_world(EXTRACT, **CENTRE, half=60, seed=4, out=tmp_path / "b")
+    assert first.files["meshes/buildings.glb"] != second.files["meshes/buildings.glb"]
+
+
+def test_an_existing_folder_is_refused_and_left_alone(helsinki_path: Path) -> None:
+    before = (helsinki_path / "world.json").read_bytes()
+    with pytest.raises(OutputExistsError, match="--force"):
+        build_world(EXTRACT, **CENTRE, half=60, out=helsinki_path)
+    assert (helsinki_path / "world.json").read_bytes() == before
+
+
+def test_force_replaces_the_folder_and_what_a_killed_build_left(tmp_path: Path) -> None:
+    out = tmp_path / "world"
+    out.mkdir()
+    (out / "old.txt").write_text("old")
+    partial = tmp_path / "world.partial"
+    partial.mkdir()
+    (partial / "rubbish").write_text("left by a killed build")
+    build_world(EXTRACT, **CENTRE, half=60, out=out, force=True)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["world"]
+    assert not (out / "old.txt").exists()
+
+
+def test_an_interrupted_build_leaves_no_world_but_its_finished_stages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(pipeline, "places_from_osm", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "world")
+    assert not (tmp_path / "world").exists()
+    left = {p.name for p in (tmp_path / "world.partial").iterdir()}
+    assert {"terrain.npz", "roads.json", "roads.net.xml", "walkable.npz"} <= left
+    with pytest.raises(MissingFileError, match="no finished world"):
+        read_world(tmp_path / "world.partial")
+
+
+def test_stages_are_reported_in_order_with_their_counts(helsinki: World) -> None:
+    names = [stage.name for stage in helsinki.manifest.stages]
+    assert names[0] == "map"
+    assert {"buildings", "roads", "transit", "objects", "walkable", "places", "indoor"} <= set(names)
+    assert all(stage.counts for stage in helsinki.manifest.stages)
+
+
+def test_what_was_left_out_has_a_reason(helsinki: World) -> None:
+    dropped = [entry for stage in helsinki.manifest.stages for entry in stage.dropped]
+    assert dropped
+    assert all(entry.id and entry.reason for entry in dropped)
+
+
+def test_no_file_holds_a_time_or_a_path_of_this_machine(helsinki_path: Path, tmp_path: Path) -> None:
+    manifest = json.loads((helsinki_path / "world.json").read_text())
+    assert str(helsinki_path) not in (helsinki_path / "roads.net.xml").read_text()
+    assert "build.json" not in manifest["files"]
+
+
+def test_a_place_without_buildings_is_refused_and_nothing_is_left(tmp_path: Path) -> None:
+    with pytest.raises(EmptyInputError):
+        build_world(EXTRACT, lat=10.0, lon=10.0, half=60, out=tmp_path / "world")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("half", [0.0, -5.0, float("nan"), 1e6])
+def test_a_radius_that_makes_no_sense_is_refused(tmp_path: Path, half: float) -> None:
+    with pytest.raises(InputError, match="radius"):
+        build_world(EXTRACT, **CENTRE, half=half, out=tmp_path / "world")
+
+
+def test_the_middle_of_the_packaged_extract_is_central_helsinki() -> None:
+    lat, lon = extract_centre(EXTRACT)
+    assert lat == pytest.approx(60.169, abs=0.01)
+    assert lon == pytest.approx(24.9435, abs=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "lat", "lon", "dem"),
+    [
+        ("monaco", 43.73384, 7.41813, "dem_srtm.tif"),
+        ("nyc_les", 40.72103, -73.98768, None),
+        ("berlin_mitte", 52.5093, 13.39295, None),
+    ],
+)
+def test_other_cities_build_and_pass_the_check(
+    shared_data: Path, tmp_path: Path, name: str, lat: float, lon: float, dem: str | None
+) -> None:
+    from vico.world.check import check_world
+
+    folder = shared_data / "places" / name
+    out = tmp_path / name
+    build_world(folder / f"{name}.osm.pbf", lat=lat, lon=lon, half=300, dem=folder / dem if dem else None, out=out)
+    assert check_world(read_world(out)) == []
