@@ -1,0 +1,206 @@
+"""The light of a moment: sun, sky, haze and lamps, and the tables the shader reads them from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.world.seeds import rng
+
+Colour = tuple[float, float, float]
+SKY_STEPS = 512
+TONE_STEPS = 4096
+TONE_RANGE = 4.0
+_SHADOW_STEP = 300.0
+
+
+@dataclass(frozen=True)
+class Lighting:
+    """Daylight and lamps; colours are linear light, 1 = a white wall's brightness in full light.
+
+    Attributes
+    ----------
+    sun_direction
+        From the ground to the sun (or the moon at night), ENU; need not have unit length.
+    shadow_direction
+        From where shadows are cast: the sun's direction, held still for five minutes at a time so that the shadow map
+        of the buildings is computed seldom. None: the sun's.
+    sun_colour, ambient, bounce
+        Light of the sun, of the sky from above, and of the ground from below.
+    zenith, horizon
+        Colours of the sky overhead and at its rim; haze takes the latter.
+    fog
+        Distance at which haze hides 63 % of a thing, metres.
+    clouds
+        Share of the sky under clouds, 0..1.
+    lamps
+        How far lit windows and lamps are switched on, 0..1.
+    exposure
+        Factor on everything before tone mapping.
+    """
+
+    sun_direction: Colour = (-0.45, -0.55, 0.75)
+    shadow_direction: Colour | None = None
+    sun_colour: Colour = (2.15, 1.94, 1.62)
+    ambient: Colour = (0.66, 0.74, 0.90)
+    bounce: Colour = (0.44, 0.40, 0.34)
+    zenith: Colour = (0.17, 0.37, 0.78)
+    horizon: Colour = (0.80, 0.90, 1.00)
+    fog: float = 1600.0
+    clouds: float = 0.45
+    lamps: float = 0.0
+    exposure: float = 0.78
+
+    @classmethod
+    def at(
+        cls, seconds_of_day: float, lat: float = 50.0, *, day: int = 172, clouds: float = 0.45, fog: float = 1600.0
+    ) -> Lighting:
+        """The light at a (solar) time of day.
+
+        Parameters
+        ----------
+        seconds_of_day
+            Since midnight, local solar time; values outside one day wrap around.
+        lat
+            Latitude, degrees.
+        day
+            Day of the year, 1..365; 172 is the June solstice.
+        """
+        sun = sun_direction(seconds_of_day, lat, day)
+        held = sun_direction(np.floor(seconds_of_day / _SHADOW_STEP) * _SHADOW_STEP, lat, day)
+        up = sun[2]
+        high = _ramp(up, 0.02, 0.55)
+        day_share = _ramp(up, -0.14, 0.16)
+        glow = _ramp(up, -0.16, 0.02) * (1 - _ramp(up, 0.05, 0.38))
+        shine = _ramp(up, -0.02, 0.10) * (1 - 0.55 * clouds * clouds)
+        warm = _mix((1.0, 0.52, 0.24), (1.0, 0.92, 0.80), high)
+        night = up < -0.03
+        sun_colour = _scaled((0.10, 0.13, 0.20) if night else warm, 0.25 if night else (1.15 + 0.95 * high) * shine)
+        zenith = _mix((0.006, 0.010, 0.026), _mix((0.15, 0.27, 0.54), (0.17, 0.37, 0.78), high), day_share)
+        horizon = _mix((0.018, 0.024, 0.046), _mix((0.72, 0.74, 0.80), (0.80, 0.90, 1.00), high), day_share)
+        horizon = _mix(horizon, (0.92, 0.52, 0.30), 0.6 * glow)
+        ambient = _mix((0.040, 0.050, 0.085), _mix((0.52, 0.55, 0.64), (0.66, 0.74, 0.90), high), day_share)
+        bounce = _mix((0.022, 0.022, 0.026), _mix((0.28, 0.24, 0.21), (0.44, 0.40, 0.34), high), day_share)
+        light = (0.35, -0.30, 0.88) if night else sun
+        return cls(
+            sun_direction=light,
+            shadow_direction=light if night else (held if held[2] > 0.02 else sun),
+            sun_colour=sun_colour,
+            ambient=ambient,
+            bounce=bounce,
+            zenith=zenith,
+            horizon=horizon,
+            fog=fog,
+            clouds=clouds,
+            lamps=1.0 - _ramp(up, -0.10, 0.10),
+            exposure=0.78 + 0.75 * (1 - day_share) + 0.18 * (1 - high) * day_share,
+        )
+
+
+def sun_direction(seconds_of_day: float, lat: float, day: int = 172) -> Colour:
+    """Unit vector to the sun, ENU, from the usual declination and hour-angle formulas (Cooper 1969)."""
+    declination = np.radians(23.45) * np.sin(2 * np.pi * (284 + day) / 365)
+    hour = (seconds_of_day / 86400.0 - 0.5) * 2 * np.pi
+    phi = np.radians(lat)
+    east = -np.cos(declination) * np.sin(hour)
+    north = np.cos(phi) * np.sin(declination) - np.sin(phi) * np.cos(declination) * np.cos(hour)
+    up = np.sin(phi) * np.sin(declination) + np.cos(phi) * np.cos(declination) * np.cos(hour)
+    return float(east), float(north), float(up)
+
+
+def _ramp(value: float, low: float, high: float) -> float:
+    share = float(np.clip((value - low) / (high - low), 0.0, 1.0))
+    return share * share * (3 - 2 * share)
+
+
+def _mix(a: Colour, b: Colour, share: float) -> Colour:
+    return (a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share, a[2] + (b[2] - a[2]) * share)
+
+
+def _scaled(a: Colour, factor: float) -> Colour:
+    return (a[0] * factor, a[1] * factor, a[2] * factor)
+
+
+def unit(vector: Colour) -> NDArray[np.float64]:
+    """The vector's direction."""
+    array = np.asarray(vector, np.float64)
+    return array / max(float(np.linalg.norm(array)), 1e-12)
+
+
+def light_numbers(light: Lighting) -> NDArray[np.float32]:
+    """Everything the shader reads that is a single number; see `shade` for the order."""
+    sun, shadow = unit(light.sun_direction), unit(light.shadow_direction or light.sun_direction)
+    numbers = np.zeros(48, np.float32)
+    numbers[0:3] = sun
+    numbers[3:6] = np.asarray(light.sun_colour) * light.exposure
+    ambient, bounce = np.asarray(light.ambient) * light.exposure, np.asarray(light.bounce) * light.exposure
+    # ambient + n.z * tilt is the sky above and the lit ground below, seen by a surface of that tilt.
+    numbers[6:9] = (ambient + bounce) / 2
+    numbers[9:12] = (ambient - bounce) / 2
+    numbers[12:15] = np.asarray(light.horizon) * light.exposure
+    numbers[15] = 1.0 / max(light.fog, 1.0)
+    numbers[16] = light.lamps * 1.6
+    numbers[17] = light.clouds
+    numbers[18:21] = shadow
+    # Light that turns the corner from the sun's side, so that walls in shade do not all look alike.
+    level = np.hypot(sun[0], sun[1])
+    side = sun[:2] / level if level > 1e-6 else np.zeros(2)
+    numbers[21:23] = 0.22 * side * float(ambient.mean())
+    cloud = (np.asarray(light.ambient) * 1.05 + np.asarray(light.sun_colour) * 0.16) * light.exposure
+    numbers[23:26] = cloud
+    numbers[26:29] = cloud * 0.60
+    return numbers
+
+
+def sky_table(light: Lighting) -> NDArray[np.float32]:
+    """Linear sky colours by elevation, shape ``(SKY_STEPS, 3)``.
+
+    Row i is the sine of elevation ``s * abs(s)`` with s from -1 to 1: fine steps at the horizon.
+    """
+    s = np.linspace(-1, 1, SKY_STEPS)
+    sine = s * np.abs(s)
+    share = np.clip(sine, 0, 1)[:, None]
+    zenith, horizon = np.asarray(light.zenith), np.asarray(light.horizon)
+    sky = zenith + (horizon - zenith) * np.exp(-share * 4.2)
+    below = horizon * (0.9 + 0.1 * np.exp(np.clip(sine, -1, 0) * 6))[:, None]
+    table = np.where(sine[:, None] >= 0, sky, below)
+    return np.ascontiguousarray(table * light.exposure, np.float32)
+
+
+@lru_cache(maxsize=1)
+def tone_table() -> NDArray[np.uint8]:
+    """From linear light (0..TONE_RANGE in TONE_STEPS steps) to sRGB bytes, with a soft shoulder."""
+    x = np.arange(TONE_STEPS) * (TONE_RANGE / (TONE_STEPS - 1))
+    # Straight up to 0.55, then an exponential shoulder of matching slope: midtones keep their colour.
+    knee = 0.55
+    mapped = np.where(x < knee, x, knee + (1 - knee) * (1 - np.exp(-(x - knee) / (1 - knee))))
+    srgb = np.where(mapped <= 0.0031308, 12.92 * mapped, 1.055 * mapped ** (1 / 2.4) - 0.055)
+    return np.clip(np.round(srgb * 255), 0, 255).astype(np.uint8)
+
+
+@lru_cache(maxsize=1)
+def linear_table() -> NDArray[np.float32]:
+    """Linear light of the 256 sRGB byte values."""
+    c = np.arange(256) / 255
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+@lru_cache(maxsize=1)
+def cloud_map() -> NDArray[np.uint8]:
+    """A tiling height map of clouds, shape ``(256, 256)``: five octaves of periodic value noise, equalised."""
+    size = 256
+    generator = rng(20, "clouds")
+    total = np.zeros((size, size))
+    for octave, cells in enumerate((4, 8, 16, 32, 64)):
+        lattice = generator.random((cells, cells))
+        t = np.arange(size) * cells / size
+        i = t.astype(np.int64)
+        f = t - i
+        f = f * f * (3 - 2 * f)
+        rows = lattice[i % cells] * (1 - f)[:, None] + lattice[(i + 1) % cells] * f[:, None]
+        total += (rows[:, i % cells] * (1 - f) + rows[:, (i + 1) % cells] * f) * 0.52**octave
+    ranks = np.argsort(np.argsort(total, axis=None, kind="stable"), kind="stable")
+    return (ranks.reshape(size, size) * 256 // (size * size)).astype(np.uint8)

@@ -1,0 +1,252 @@
+"""Colours of many pixels at a time: texture, sun, sky light and haze.
+
+`vico.render.shade` lays pixels into a queue, one field behind the other; here a full queue is worked off in short loops
+over all of its places, which the compiler turns into vector code. Only loads from tables, which it can't, are loops of
+their own. Everything is single precision: colours need no more.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from vico.render.lighting import TONE_RANGE, TONE_STEPS
+
+# Places in a queue, and from one field to the next: runs are laid down in blocks of `BLOCK`, over the end, too.
+QUEUE, BLOCK = 256, 8
+STRIDE = QUEUE + 2 * BLOCK
+# Fields, float32: texture coordinates in texels and their step between samples; colour; normal; position; share of the
+# sky that is seen; light of its own; shares of the sun and the sky that moving things leave.
+U, V, SU, SV, RED, GREEN, BLUE, NX, NY, NZ, X, Y, Z, SKY, SHINE, SUN, AROUND = (k * STRIDE for k in range(17))
+_F, _G, _A, _B, _LEVEL = (k * STRIDE for k in range(17, 22))
+REAL_FIELDS = 22
+# Fields, uint32: first texel, columns and rows of the texture's level, and the pixel.
+START, COLUMNS, ROWS, PIXEL = (k * STRIDE for k in range(4))
+_I0, _I1, _I2, _I3, _T0, _T1, _T2, _T3, _PAIR, _MIDDLE = (k * STRIDE for k in range(4, 14))
+WHOLE_FIELDS = 14
+
+_ZERO, _HALF, _ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)
+_TINY = np.float32(1e-12)
+_TONE_SCALE = np.float32((TONE_STEPS - 1) / TONE_RANGE)
+_TONE_LAST = np.float32(TONE_STEPS - 1)
+# sRGB to linear light as a polynomial of the byte / 255: off by less than 0.003.
+_P1, _P2, _P3 = np.float32(0.012522878), np.float32(0.682171111), np.float32(0.305306011)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def look_up(texels: Any, real: Any, whole: Any, along: Any) -> None:
+    """Bilinear, repeating: red and blue (16 bits up) and green of every place, times 256.
+
+    Four weights that add up to 256 multiply two channels at once.
+    """
+    for i in range(QUEUE):
+        x, y = real[U + i] + along * real[SU + i], real[V + i] + along * real[SV + i]
+        floor_x, floor_y = np.floor(x), np.floor(y)
+        real[_F + i], real[_G + i] = x - floor_x, y - floor_y
+        whole[_I0 + i], whole[_I1 + i] = np.int32(floor_x), np.int32(floor_y)
+    for i in range(QUEUE):
+        columns = whole[COLUMNS + i]
+        left, right = whole[_I0 + i] & (columns - 1), (whole[_I0 + i] + 1) & (columns - 1)
+        rows = whole[ROWS + i]
+        upper = whole[START + i] + (whole[_I1 + i] & (rows - 1)) * columns
+        lower = whole[START + i] + ((whole[_I1 + i] + 1) & (rows - 1)) * columns
+        whole[_I0 + i], whole[_I1 + i] = upper + left, upper + right
+        whole[_I2 + i], whole[_I3 + i] = lower + left, lower + right
+    for i in range(QUEUE):
+        whole[_T0 + i] = texels[whole[_I0 + i]]
+        whole[_T1 + i] = texels[whole[_I1 + i]]
+        whole[_T2 + i] = texels[whole[_I2 + i]]
+        whole[_T3 + i] = texels[whole[_I3 + i]]
+    for i in range(QUEUE):
+        f, g = np.int32(real[_F + i] * np.float32(256.0)), np.int32(real[_G + i] * np.float32(256.0))
+        wd = np.int32((f * g) >> 8)
+        wb, wc = np.int32(f - wd), np.int32(g - wd)
+        wa = np.int32(256 - f - wc)
+        a, b, c, d = whole[_T0 + i], whole[_T1 + i], whole[_T2 + i], whole[_T3 + i]
+        whole[_PAIR + i] = (a & 0xFF00FF) * wa + (b & 0xFF00FF) * wb + (c & 0xFF00FF) * wc + (d & 0xFF00FF) * wd
+        whole[_MIDDLE + i] = (
+            ((a >> 8) & 0xFF) * wa + ((b >> 8) & 0xFF) * wb + ((c >> 8) & 0xFF) * wc + ((d >> 8) & 0xFF) * wd
+        )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def paint(texels: Any, real: Any, whole: Any, taps: int) -> None:
+    """Multiply the colours of all places by their textures: the mean of `taps` samples along each one's step."""
+    if taps == 0:
+        return
+    share = np.float32(1.0 / taps)
+    factor = np.float32(1.0 / (256.0 * 255.0)) * share
+    for i in range(QUEUE):
+        real[_A + i], real[_B + i], real[_LEVEL + i] = _ZERO, _ZERO, _ZERO
+    for tap in range(taps):
+        look_up(texels, real, whole, (np.float32(tap) + _HALF) * share - _HALF)
+        for i in range(QUEUE):
+            pair, middle = whole[_PAIR + i], whole[_MIDDLE + i]
+            real[_A + i] += np.float32(np.int32(pair & 0xFFFF))
+            real[_B + i] += np.float32(np.int32(middle))
+            real[_LEVEL + i] += np.float32(np.int32(pair >> 16))
+    for i in range(QUEUE):
+        r, g, b = real[_A + i] * factor, real[_B + i] * factor, real[_LEVEL + i] * factor
+        real[RED + i] *= r * (_P1 + r * (_P2 + r * _P3))
+        real[GREEN + i] *= g * (_P1 + g * (_P2 + g * _P3))
+        real[BLUE + i] *= b * (_P1 + b * (_P2 + b * _P3))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def face_sun(n: Any, shadow: Any, frame: Any, real: Any, whole: Any) -> None:
+    """Leave in `real[_F:]` how much of the sun every place gets.
+
+    Static shadows are four comparisons around a position of the shadow map, blended.
+    """
+    n0, n1, n2 = n[0], n[1], n[2]
+    most = _ZERO
+    for i in range(QUEUE):
+        facing = max(real[NX + i] * n0 + real[NY + i] * n1 + real[NZ + i] * n2, _ZERO)
+        real[_F + i] = facing
+        most = max(most, facing)
+    if most <= _ZERO:
+        return
+    f00, f01, f02, f03 = frame[0, 0], frame[0, 1], frame[0, 2], frame[0, 3] - _HALF
+    f10, f11, f12, f13 = frame[1, 0], frame[1, 1], frame[1, 2], frame[1, 3] - _HALF
+    f20, f21, f22, f23 = frame[2, 0], frame[2, 1], frame[2, 2], frame[2, 3]
+    size = np.int32(shadow.shape[0])
+    rim = np.float32(size - 1)
+    # A little off the surface, or it would shade itself.
+    off = np.float32(0.2)
+    for i in range(QUEUE):
+        px, py, pz = (
+            real[X + i] + off * real[NX + i],
+            real[Y + i] + off * real[NY + i],
+            real[Z + i] + off * real[NZ + i],
+        )
+        u = f00 * px + f01 * py + f02 * pz + f03
+        v = f10 * px + f11 * py + f12 * pz + f13
+        level = f20 * px + f21 * py + f22 * pz + f23
+        ok = (u >= _ZERO) & (v >= _ZERO) & (u < rim) & (v < rim) & (real[_F + i] > _ZERO)
+        u, v = u if ok else _ZERO, v if ok else _ZERO
+        floor_u, floor_v = np.floor(u), np.floor(v)
+        real[_A + i], real[_B + i] = u - floor_u, v - floor_v
+        real[_LEVEL + i] = level if ok else np.float32(1e9)
+        whole[_I0 + i] = np.int32(floor_v) * size + np.int32(floor_u)
+    flat = shadow.reshape(-1)
+    for i in range(QUEUE):
+        at = whole[_I0 + i]
+        below = at + np.uint32(size)
+        whole[_T0 + i], whole[_T1 + i] = flat[at], flat[at + np.uint32(1)]
+        whole[_T2 + i], whole[_T3 + i] = flat[below], flat[below + np.uint32(1)]
+    for i in range(QUEUE):
+        a, b, level = real[_A + i], real[_B + i], real[_LEVEL + i]
+        t0, t1 = np.float32(np.int32(whole[_T0 + i])), np.float32(np.int32(whole[_T1 + i]))
+        t2, t3 = np.float32(np.int32(whole[_T2 + i])), np.float32(np.int32(whole[_T3 + i]))
+        low = (_ONE - a if t0 <= level else _ZERO) + (a if t1 <= level else _ZERO)
+        high = (_ONE - a if t2 <= level else _ZERO) + (a if t3 <= level else _ZERO)
+        real[_F + i] *= (low + b * (high - low)) * real[SUN + i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def light_outdoors(n: Any, view: Any, real: Any, whole: Any) -> None:
+    """Sun, sky and haze: leaves the places' rows of the tone table in `whole`."""
+    vx, vy, vz = np.float32(view[0]), np.float32(view[1]), np.float32(view[2])
+    n0, n1, n2, n3, n4, n5, n6, n7, n8 = n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8]
+    n9, n10, n11, n12, n13, n14, n15, n21, n22 = n[9], n[10], n[11], n[12], n[13], n[14], n[15], n[21], n[22]
+    green_shine, blue_shine = np.float32(0.86), np.float32(0.62)
+    for i in range(QUEUE):
+        gx, gy, gz = real[X + i] - vx, real[Y + i] - vy, real[Z + i] - vz
+        length = np.sqrt(gx * gx + gy * gy + gz * gz)
+        haze = length * n15
+        clear = _ONE / (_ONE + haze * (_ONE + haze * (_HALF + haze * np.float32(0.1666))))
+        haze = _ONE - clear
+        toward = max((gx * n0 + gy * n1 + gz * n2) / max(length, _TINY), _ZERO)
+        glow = np.float32(0.10) * toward * toward * toward
+        nz, share = real[NZ + i], real[SKY + i] * real[AROUND + i]
+        side = real[NX + i] * n21 + real[NY + i] * n22
+        facing, shine = real[_F + i], real[SHINE + i]
+        red = real[RED + i] * (facing * n3 + (n6 + nz * n9 + side) * share + shine)
+        green = real[GREEN + i] * (facing * n4 + (n7 + nz * n10 + side) * share + shine * green_shine)
+        blue = real[BLUE + i] * (facing * n5 + (n8 + nz * n11 + side) * share + shine * blue_shine)
+        # Zero comes first below: compared so, what is no number (a wall seen edge-on) turns into 0, a valid row.
+        red = (haze * (n12 + glow * n3) + clear * red) * _TONE_SCALE
+        green = (haze * (n13 + glow * n4) + clear * green) * _TONE_SCALE
+        blue = (haze * (n14 + glow * n5) + clear * blue) * _TONE_SCALE
+        whole[_I0 + i] = np.int32(min(max(_ZERO, red), _TONE_LAST))
+        whole[_I1 + i] = np.int32(min(max(_ZERO, green), _TONE_LAST))
+        whole[_I2 + i] = np.int32(min(max(_ZERO, blue), _TONE_LAST))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def light_room(view: Any, real: Any, whole: Any) -> None:
+    """A lamp under the ceiling's middle and dimmer corners: leaves the rows of the tone table in `whole`.
+
+    `view[19:]` holds the room: centre of the floor, half length, half width, height, cosine and sine of its yaw.
+    """
+    cx, cy, cz = np.float32(view[19]), np.float32(view[20]), np.float32(view[21])
+    length, width, height = np.float32(view[22]), np.float32(view[23]), np.float32(view[24])
+    c, s = np.float32(view[25]), np.float32(view[26])
+    lamp_height = np.float32(0.92) * height
+    fall = np.float32(2.0) / (length * length + width * width + np.float32(6.0))
+    for i in range(QUEUE):
+        px, py, pz = real[X + i] - cx, real[Y + i] - cy, real[Z + i] - cz
+        nx, ny, nz = real[NX + i], real[NY + i], real[NZ + i]
+        lz = lamp_height - pz
+        squared = px * px + py * py + lz * lz
+        facing = (lz * nz - px * nx - py * ny) / np.sqrt(squared + np.float32(1e-6))
+        lamp = np.float32(0.62) * max(facing, _ZERO) / (_ONE + squared * fall)
+        a, b = length - abs(px * c + py * s), width - abs(py * c - px * s)
+        up = min(pz, height - pz)
+        # Distance to the second nearest of floor, ceiling and walls: small in edges and corners.
+        second = max(max(min(a, b), min(max(a, b), up)), _ZERO)
+        corner = _ONE - np.float32(0.30) / (_ONE + second * second * np.float32(9.0))
+        bright = (np.float32(0.36) + np.float32(0.05) * nz + np.float32(0.03) * nx + lamp) * corner
+        bright *= (np.float32(0.4) + np.float32(0.6) * real[AROUND + i]) * _TONE_SCALE
+        whole[_I0 + i] = np.int32(min(max(_ZERO, real[RED + i] * bright * np.float32(1.04)), _TONE_LAST))
+        whole[_I1 + i] = np.int32(min(max(_ZERO, real[GREEN + i] * bright), _TONE_LAST))
+        whole[_I2 + i] = np.int32(min(max(_ZERO, real[BLUE + i] * bright * np.float32(0.93)), _TONE_LAST))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def finish(
+    numbers: Any,
+    tone: Any,
+    shadow: Any,
+    shadow_frame: Any,
+    texels: Any,
+    view: Any,
+    real: Any,
+    whole: Any,
+    sun: Any,
+    contact: Any,
+    count: int,
+    taps: int,
+    dynamic: bool,
+    out: Any,
+) -> None:
+    """Colour the first `count` places of the queue and write their pixels; `out` has one dimension."""
+    if dynamic:
+        for i in range(QUEUE):
+            pixel = whole[PIXEL + i]
+            real[SUN + i], real[AROUND + i] = sun[pixel], contact[pixel]
+    paint(texels, real, whole, taps)
+    if view[18] > 0.5:
+        light_room(view, real, whole)
+    else:
+        face_sun(numbers, shadow, shadow_frame, real, whole)
+        light_outdoors(numbers, view, real, whole)
+    for i in range(count):
+        pixel = whole[PIXEL + i] * np.uint32(3)
+        out[pixel] = tone[whole[_I0 + i]]
+        out[pixel + np.uint32(1)] = tone[whole[_I1 + i]]
+        out[pixel + np.uint32(2)] = tone[whole[_I2 + i]]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def finish_sky(sky: Any, real: Any, whole: Any, count: int, out: Any) -> None:
+    """Write the first `count` places of the sky's queue."""
+    look_up(sky, real, whole, _ZERO)
+    for i in range(count):
+        pixel = whole[PIXEL + i] * np.uint32(3)
+        pair = whole[_PAIR + i]
+        out[pixel] = np.uint8((pair >> 8) & 0xFF)
+        out[pixel + np.uint32(1)] = np.uint8((whole[_MIDDLE + i] >> 8) & 0xFF)
+        out[pixel + np.uint32(2)] = np.uint8(pair >> 24)

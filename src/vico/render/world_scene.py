@@ -1,0 +1,59 @@
+"""The scene of a world folder: ground, buildings, roofs, rooms and everything placed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vico.render.lighting import Lighting
+from vico.render.scene import Scene
+from vico.world.mesh import Surface
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from vico.world.folder import World
+
+OUTDOOR_LAYERS = ("ground", "buildings", "roofs")
+
+
+def scene_of(
+    world: World,
+    *,
+    rooms: bool = True,
+    lighting: Lighting | None = None,
+    prototypes: Mapping[str, Sequence[Surface]] | None = None,
+) -> Scene:
+    """Put a world's parts together.
+
+    Parameters
+    ----------
+    rooms
+        Whether to take the rooms and the furniture in them.
+    prototypes
+        Further models that will move in the scene (vehicles, robots, goods), by name.
+    """
+    static = [surface for layer in OUTDOOR_LAYERS for surface in world.surfaces(layer)]
+    indoor = world.surfaces("rooms") if rooms else []
+    boxes = [
+        (*room.centre, room.size[0] / 2, room.size[1] / 2, room.size[2], room.yaw) for room in world.rooms if rooms
+    ]
+    models = {**world.prototypes(), **(prototypes or {})}
+    scene = Scene(static, models, indoor=indoor, rooms=np.array(boxes).reshape(-1, 7), lighting=lighting)
+    objects = world.objects
+    taken = [k for k in range(len(objects.entity)) if rooms or not objects.room[k]]
+    if taken:
+        index = np.array(taken)
+        cosine = np.cos(objects.yaw[index]) * objects.scale[index]
+        sine = np.sin(objects.yaw[index]) * objects.scale[index]
+        transforms = np.zeros((len(taken), 4, 4))
+        transforms[:, 0, 0], transforms[:, 0, 1] = cosine, -sine
+        transforms[:, 1, 0], transforms[:, 1, 1] = sine, cosine
+        transforms[:, 2, 2], transforms[:, 3, 3] = objects.scale[index], 1.0
+        transforms[:, 0, 3], transforms[:, 1, 3] = objects.x[index], objects.y[index]
+        transforms[:, 2, 3] = objects.z[index]
+        names = [str(objects.prototype[k]) for k in taken]
+        inside = np.array([bool(objects.room[k]) for k in taken])
+        scene.place(names, transforms, objects.entity[index], indoor=inside)
+    return scene

@@ -1,0 +1,180 @@
+"""What is seen where, and how far away: against rays cast by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from vico.assets.shapes import ball, box, pose_matrix
+from vico.errors import InputError
+from vico.render import Cameras, Scene, render
+from vico.world.mesh import Material, Surface, joined
+
+
+def rays(cameras: Cameras) -> NDArray[np.float64]:
+    """World directions of all pixels of the first camera, of depth 1; shape ``(h, w, 3)``."""
+    k = cameras.intrinsics
+    x = (np.arange(cameras.width) + 0.5 - k[0, 2]) / k[0, 0]
+    y = (np.arange(cameras.height) + 0.5 - k[1, 2]) / k[1, 1]
+    right, down, ahead = cameras.rotation[0]
+    return ahead + x[None, :, None] * right + y[:, None, None] * down
+
+
+def cast(
+    cameras: Cameras, boxes: list[tuple[NDArray[np.float64], NDArray[np.float64], int]]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Depth and entity of axis-aligned boxes seen by the first camera, by the slab test."""
+    directions, origin = rays(cameras), cameras.position[0]
+    depth = np.full(directions.shape[:2], np.inf)
+    entity = np.zeros(directions.shape[:2], np.int64)
+    for low, high, number in boxes:
+        with np.errstate(divide="ignore"):
+            a, b = (low - origin) / directions, (high - origin) / directions
+        near, far = np.minimum(a, b).max(axis=2), np.maximum(a, b).min(axis=2)
+        hit = (near < far) & (near > cameras.near) & (near < depth)
+        depth[hit], entity[hit] = near[hit], number
+    depth[entity == 0] = 0
+    return depth, entity
+
+
+@pytest.fixture(scope="module")
+def town() -> tuple[Scene, list[tuple[NDArray[np.float64], NDArray[np.float64], int]]]:
+    generator = np.random.Generator(np.random.PCG64(5))
+    surfaces, boxes = [], []
+    for k in range(150):
+        size = generator.uniform(1, 14, 3)
+        centre = np.array([*generator.uniform(-120, 120, 2), generator.uniform(0, 12)])
+        surfaces.append(box(size.tolist(), centre.tolist()).of_entity(1000 + k))
+        boxes.append((centre - size / 2, centre + size / 2, 1000 + k))
+    return Scene(joined(surfaces)), boxes
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.7, 2.5, 4.4])
+def test_depth_and_segmentation_of_boxes_agree_with_ray_casting(
+    town: tuple[Scene, list[tuple[NDArray[np.float64], NDArray[np.float64], int]]], yaw: float
+) -> None:
+    scene, boxes = town
+    cameras = Cameras(np.array([[3.0, -2.0, 31.0]]), np.array([[np.cos(yaw), np.sin(yaw), -0.35]]))
+    frames = render(scene, cameras, rgb=False)
+    depth, entity = cast(cameras, boxes)
+    same = frames.segmentation[0] == entity
+    assert same.mean() > 0.9995  # centres that lie on an edge to the last bit may fall to either side
+    assert np.abs(frames.depth[0] - depth)[same].max() < 1e-3  # grazing faces magnify the rounding of vertices
+    assert (entity > 0).mean() > 0.1
+
+
+def test_depth_of_a_wall_is_exact_to_a_tenth_of_a_millimetre() -> None:
+    scene = Scene([box((0.2, 60, 60), (20.1, 0, 0))])
+    frames = render(scene, Cameras(np.zeros((1, 3)), np.array([[1.0, 0, 0]])), rgb=False)
+    assert np.abs(frames.depth - 20.0).max() < 1e-4
+
+
+def test_a_watertight_ball_of_many_triangles_shows_no_cracks() -> None:
+    shell = ball((5, 5, 5), sides=90, rings=60).of_entity(7)
+    beyond = box((0.1, 80, 80), (20, 0, 0)).of_entity(9)
+    scene = Scene([shell, beyond])
+    for k in range(6):
+        eye = np.array([[-9.0 + 0.37 * k, 0.013 * k, 0.07 * k]])
+        seen = render(scene, Cameras(eye, np.array([[1.0, 0.01 * k, 0.003]])), rgb=False)
+        yy, xx = np.mgrid[0:256, 0:256]
+        inside = (yy - 128) ** 2 + (xx - 128) ** 2 < 40**2
+        assert set(np.unique(seen.segmentation[0][inside])) == {7}
+
+
+def test_terrain_under_the_camera_has_no_gaps_at_the_near_plane() -> None:
+    steps = np.linspace(-60, 60, 41)
+    x, y = np.meshgrid(steps, steps)
+    z = 0.6 * np.sin(0.3 * x) * np.cos(0.4 * y)
+    index = np.arange(41 * 41).reshape(41, 41)
+    a, b, c, d = index[:-1, :-1].ravel(), index[:-1, 1:].ravel(), index[1:, 1:].ravel(), index[1:, :-1].ravel()
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    points = np.stack([x.ravel(), y.ravel(), z.ravel()], 1)
+    scene = Scene([Surface.from_triangles(points, faces, entity=1)])
+    for k in range(8):
+        # Eyes just above the ground, looking steeply down: most triangles cross the near plane.
+        eye = np.array([[0.31 * k, 0.17 * k, 0.6 * np.sin(0.3 * 0.31 * k) * np.cos(0.4 * 0.17 * k) + 0.12]])
+        seen = render(scene, Cameras(eye, np.array([[0.6, 0.1 * k, -1.0]]), near=0.05), rgb=False)
+        assert (seen.segmentation == 1).all()
+
+
+def test_a_camera_in_a_closed_room_sees_only_the_room() -> None:
+    walls = [
+        box((8.4, 0.2, 3.4), (0, side * 3.1, -20), colour=(210, 200, 190)).of_entity(100_001) for side in (-1, 1)
+    ] + [box((0.2, 6.4, 3.4), (side * 4.1, 0, -20)).of_entity(100_001) for side in (-1, 1)]
+    walls += [box((8.4, 6.4, 0.2), (0, 0, -20 + side * 1.6)).of_entity(100_001) for side in (-1, 1)]
+    street = [box((300, 300, 0.2), (0, 0, -0.1)).of_entity(1), box((20, 20, 30), (0, 0, 15)).of_entity(1000)]
+    scene = Scene(street, indoor=walls, rooms=[[0, 0, -21.5, 4, 3, 3.0, 0.0]])
+    yaw = np.arange(8) * np.pi / 4
+    cameras = Cameras(np.tile([0.5, -0.5, -20.0], (8, 1)), np.stack([np.cos(yaw), np.sin(yaw), 0.4 * np.sin(yaw)], 1))
+    frames = render(scene, cameras)
+    assert set(np.unique(frames.segmentation)) == {100_001}
+    assert frames.depth.max() < 8.0
+    outside = render(scene, Cameras(np.array([[40.0, 0, 2]]), np.array([[-1.0, 0, 0]])))
+    assert 100_001 not in outside.segmentation
+
+
+def test_a_thin_far_pole_is_seen_where_its_centre_line_crosses_pixel_centres() -> None:
+    # 0.4 m at 100 m is half a pixel: the column whose centres lie inside must be unbroken.
+    focal = 128.0
+    middle = (0.5 / focal) * 100
+    scene = Scene([box((0.4, 0.4, 300), (100, -middle, 0)).of_entity(5)])
+    seen = render(scene, Cameras(np.zeros((1, 3)), np.array([[1.0, 0, 0]])), rgb=False).segmentation[0]
+    assert (seen[:, 128] == 5).all()
+    assert (np.delete(seen, 128, axis=1) == 0).all()
+
+
+def test_nothing_beyond_far_is_hit() -> None:
+    scene = Scene([box((0.2, 900, 900), (300, 0, 0))])
+    ahead = np.array([[1.0, 0, 0]])
+    assert render(scene, Cameras(np.zeros((1, 3)), ahead, far=299.0), rgb=False).depth.max() == 0
+    assert render(scene, Cameras(np.zeros((1, 3)), ahead, far=301.0), rgb=False).depth.min() > 299
+
+
+def test_a_face_is_seen_from_its_outer_side_only_unless_double_sided() -> None:
+    quad = np.array([[5.0, -9, -9], [5, 9, -9], [5, 9, 9], [5, -9, 9]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]])  # counter-clockwise seen from +x
+    eyes, looks = np.array([[0.0, 0, 0], [10, 0, 0]]), np.array([[1.0, 0, 0], [-1, 0, 0]])
+    single = Scene([Surface.from_triangles(quad, faces, entity=3)])
+    hits = (render(single, Cameras(eyes, looks), rgb=False).segmentation == 3).all(axis=(1, 2))
+    assert hits.tolist() == [False, True]
+    sheet = Scene([Surface.from_triangles(quad, faces, entity=3, material=Material("sheet", double_sided=True))])
+    assert (render(sheet, Cameras(eyes, looks), rgb=False).segmentation == 3).all()
+
+
+def test_placed_moving_and_skinned_things_show_their_own_entities() -> None:
+    scene = Scene([], {"crate": [box((1, 1, 1))]})
+    scene.place(["crate"], pose_matrix(6, 2, 0)[None], [20_000])
+    scene.set_rigid([scene.names["crate"]], pose_matrix(6, 0, 0)[None], [1_000_000])
+    body = ball((0.4, 0.4, 0.9), (6, -2, 0))
+    scene.set_skinned(
+        body.positions, body.normals, body.triangles, body.colour, np.full(len(body.positions), 1_000_001, np.int32)
+    )
+    view = Cameras(np.zeros((1, 3)), np.array([[1.0, 0, 0]]))
+    row = render(scene, view, rgb=False).segmentation[0, 128]
+    order = [int(row[k]) for k in range(256) if row[k] and (k == 0 or row[k] != row[k - 1])]
+    assert order == [20_000, 1_000_000, 1_000_001]
+    scene.set_rigid([], np.zeros((0, 4, 4)), [])
+    scene.set_skinned(body.positions[:0], body.normals[:0], body.triangles[:0], body.colour[:0], np.zeros(0, np.int32))
+    assert set(np.unique(render(scene, view, rgb=False).segmentation)) == {0, 20_000}
+
+
+def test_occlusion_culling_hides_nothing_that_can_be_seen(
+    town: tuple[Scene, list[tuple[NDArray[np.float64], NDArray[np.float64], int]]],
+) -> None:
+    """Against the slab test from the ground, where most of the town is hidden."""
+    scene, boxes = town
+    cameras = Cameras(np.array([[-125.0, -125.0, 1.6]]), np.array([[1.0, 0.9, 0.02]]))
+    entity = cast(cameras, boxes)[1]
+    seen = render(scene, cameras, rgb=False).segmentation[0]
+    assert set(np.unique(entity[1:-1, 1:-1])) - set(np.unique(seen)) == set()
+
+
+def test_bad_arguments_are_refused_with_a_reason() -> None:
+    with pytest.raises(InputError, match="no length"):
+        Cameras(np.zeros((1, 3)), np.zeros((1, 3)))
+    scene = Scene([])
+    with pytest.raises(InputError, match="no prototype called tree"):
+        scene.place(["tree"], np.eye(4)[None], [1])
+    with pytest.raises(InputError, match="finite"):
+        Scene([Surface.from_triangles(np.full((3, 3), np.nan), np.array([[0, 1, 2]]))])
