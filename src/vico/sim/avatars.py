@@ -1,0 +1,201 @@
+"""Avatars in motion: what an action asked for is walked out over the sub-steps of the second."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.sim.animation import CLIPS, stride_length
+from vico.sim.bodies import Bodies
+from vico.sim.collisions import sweep
+from vico.sim.indoor import Indoor
+from vico.sim.state import RADIUS, RIDER_REACH, People, Posture, Status, Vehicle
+from vico.world.heights import HeightField
+from vico.world.walkable import WalkableMap
+
+CLIP = {name: i for i, name in enumerate(CLIPS)}
+
+WALK_SPEED = 1.0
+RUN_SPEED = 2.5
+BIKE_SPEED = 3.0
+_CYCLES_PER_SECOND = 0.5
+
+
+class Avatars:
+    """Moves the people of a run.
+
+    Parameters
+    ----------
+    people
+        Their arrays; changed in place.
+    indoor, walkable, height
+        Where walls, furniture, free ground are, and how high the ground is.
+    """
+
+    def __init__(self, people: People, indoor: Indoor, walkable: WalkableMap, height: HeightField) -> None:
+        self.people = people
+        self._indoor = indoor
+        self._clearance = np.ascontiguousarray(walkable.clearance)
+        self._walkable = walkable
+        self._height = height
+        # A room may be missing altogether, but numba wants arrays of the right shape.
+        self._rooms = indoor.boxes if len(indoor.boxes) else np.zeros((1, 5))
+        self._start = indoor.furniture_start if len(indoor.boxes) else np.zeros(2, np.int64)
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Everything that decides what avatars do next."""
+        return self.people.arrays()
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go back to what `arrays` held."""
+        self.people.restore(arrays)
+
+    def bodies(self) -> Bodies:
+        """Bodies outdoors."""
+        return self.people.bodies()
+
+    def begin(self) -> None:
+        """Start a step: nobody wants anything yet, and nothing has gone wrong."""
+        p = self.people
+        p.move_left[:] = 0.0
+        p.turn_left[:] = 0.0
+        p.move_speed[:] = 0.0
+        p.velocity[:] = 0.0
+        p.status[:] = Status.OK
+        p.contact[:] = 0
+        p.reason[:] = ""
+        p.action_clip[:] = -1
+
+    def space(self) -> NDArray[np.int32]:
+        """The room each avatar is in, -1 outdoors, -2 in a bus: only those of one space can touch."""
+        return np.where(self.people.vehicle == Vehicle.BUS, -2, self.people.room).astype(np.int32)
+
+    def reach(self) -> NDArray[np.float64]:
+        """How far an avatar's body stretches fore and aft of its centre: wheels, for riders."""
+        return np.where(self.people.vehicle == Vehicle.BIKE, RIDER_REACH, 0.0)
+
+    def advance(self, dt: float, obstacles: Bodies, *, share: float) -> None:
+        """Turn and walk on by `dt` seconds.
+
+        Parameters
+        ----------
+        obstacles
+            Bodies outdoors that are no avatars.
+        share
+            Which part of the remaining turn belongs to this sub-step: 1 in the last one.
+        """
+        p = self.people
+        if not len(p):
+            return
+        moving = (p.move_left > 0.0) | (p.turn_left != 0.0)
+        p.velocity[:] = 0.0
+        if moving.any():
+            # Turning comes first, within the first half of the second, so that a walk starts in the new direction.
+            turn = p.turn_left * share
+            distance = np.minimum(p.move_left, p.move_speed * dt)
+            before = p.position[:, :2].copy()
+            outdoors, disc = _boxes(obstacles)
+            moved, contact = sweep(
+                distance, turn, p.position, p.yaw, self.reach(), self.space(), p.entity, RADIUS,
+                self._clearance, self._walkable.half, self._rooms, self._indoor.furniture, self._start,
+                outdoors, disc, obstacles.entity,
+            )  # fmt: skip
+            hit = contact != 0
+            p.turn_left -= turn
+            p.move_left -= moved
+            p.move_left[hit | (p.move_left < 1e-9)] = 0.0
+            p.turn_left[hit] = 0.0
+            p.status[hit] = Status.COLLISION
+            p.contact[hit] = contact[hit]
+            p.velocity[:] = (p.position[:, :2] - before) / dt
+            self.settle(np.flatnonzero(moved > 0.0))
+        self._animate(dt)
+
+    def settle(self, who: NDArray[np.int64]) -> None:
+        """Put feet on the ground or the floor."""
+        p = self.people
+        outdoors = who[p.room[who] < 0]
+        p.position[outdoors, 2] = self._height(p.position[outdoors, :2])
+        indoors = who[p.room[who] >= 0]
+        p.position[indoors, 2] = self._indoor.floor[p.room[indoors]]
+
+    def _animate(self, dt: float) -> None:
+        p = self.people
+        speed = np.hypot(p.velocity[:, 0], p.velocity[:, 1])
+        still = np.full(len(p), CLIP["idle"], np.int16)
+        still[p.posture == Posture.SITTING] = CLIP["sit"]
+        still[p.posture == Posture.LYING] = CLIP["sleep"]
+        still[p.turn_left != 0.0] = CLIP["turn"]
+        still[p.vehicle == Vehicle.BUS] = CLIP["ride_bus"]
+        clip = np.where(p.action_clip >= 0, p.action_clip, still)
+        walking = np.where(p.move_speed > 1.6, CLIP["run"], CLIP["walk"])
+        walking = np.where((p.held > 0).any(axis=1) & (walking == CLIP["walk"]), CLIP["carry"], walking)
+        clip = np.where(speed > 0.01, walking, clip)
+        clip = np.where(p.vehicle == Vehicle.BIKE, CLIP["ride_bike"], clip).astype(np.int16)
+        p.phase[clip != p.clip] = 0.0
+        p.clip[:] = clip
+        stride = stride_length(clip, speed, p.height)
+        gait = np.isfinite(stride)
+        p.phase[gait] += speed[gait] * dt / stride[gait]
+        p.phase[~gait] += dt * _CYCLES_PER_SECOND
+        p.phase %= 1.0
+
+
+def _boxes(bodies: Bodies) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Outlines for the sweep: ``x, y, yaw, half_length, half_width``, and which of them are discs."""
+    rows = (
+        np.column_stack([bodies.position[:, :2], bodies.yaw, bodies.half_length, bodies.half_width])
+        if len(bodies)
+        else np.zeros((0, 5))
+    )
+    return rows, bodies.round
+
+
+def free_ground(
+    walkable: WalkableMap,
+    near: NDArray[Any],
+    bodies: Bodies,
+    *,
+    within: float = 2.0,
+    connected: bool = True,
+) -> NDArray[np.float64] | None:
+    """Spot outdoors nearest to a point where someone can appear: on free ground, clear of every body.
+
+    Returns
+    -------
+    ndarray or None
+        ENU metres, shape ``(2,)``; None if there is no such spot within `within` metres.
+    """
+    point = np.asarray(near, np.float64)[:2]
+    reach = int(np.ceil(within / walkable.cell))
+    ix, iy = walkable.cell_of(point)
+    columns = np.arange(max(0, ix - reach), min(walkable.n, ix + reach + 1))
+    rows = np.arange(max(0, iy - reach), min(walkable.n, iy + reach + 1))
+    cells = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+    allowed = walkable.connected if connected else walkable.cls > 0
+    spots = walkable.centre_of(cells[allowed[cells[:, 1], cells[:, 0]]])
+    if float(walkable.clearance_at(point)) >= 0.3 and bool(walkable.inside(point)):
+        spots = np.vstack([point[None], spots])
+    spots = spots[np.abs(spots).max(axis=1) < walkable.half - 0.3] if len(spots) else spots
+    away = np.hypot(*(spots - point).T) if len(spots) else np.zeros(0)
+    for k in np.argsort(away, kind="stable"):
+        if away[k] > within:
+            return None
+        if not len(bodies) or clearances(spots[k], bodies).min() > RADIUS + 0.05:
+            return np.asarray(spots[k], np.float64)
+    return None
+
+
+def clearances(point: NDArray[Any], bodies: Bodies) -> NDArray[np.float64]:
+    """Distance from a point to the outline of each body, metres; negative inside."""
+    d = np.asarray(point, np.float64)[:2] - bodies.position[:, :2]
+    c, s = np.cos(bodies.yaw), np.sin(bodies.yaw)
+    u = np.abs(c * d[:, 0] + s * d[:, 1]) - bodies.half_length
+    v = np.abs(-s * d[:, 0] + c * d[:, 1]) - bodies.half_width
+    outside = np.hypot(np.maximum(u, 0.0), np.maximum(v, 0.0))
+    box = np.where((u > 0.0) | (v > 0.0), outside, np.maximum(u, v))
+    disc = np.hypot(d[:, 0], d[:, 1]) - bodies.half_length
+    return np.where(bodies.round, disc, box)

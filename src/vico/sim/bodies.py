@@ -1,0 +1,112 @@
+"""Bodies as arrays: what every moving thing shows of itself for collisions, drawing and recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.world.mesh import Surface
+
+KINDS = ("resident", "assistant", "robot", "car", "bus", "bicycle", "pedestrian", "object")
+RESIDENT, ASSISTANT, ROBOT, CAR, BUS, BICYCLE, PEDESTRIAN, OBJECT = range(len(KINDS))
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Upright bodies on the ground; index = the owner's stable order.
+
+    Attributes
+    ----------
+    entity
+        int32, shape ``(n,)``, unique in the simulation.
+    kind
+        Index into `KINDS`, int8, shape ``(n,)``.
+    position
+        Centre of the footprint at ground level, metres, float64, shape ``(n, 3)``.
+    yaw
+        Radians, float64, shape ``(n,)``.
+    half_length, half_width, height
+        Metres, float64, shape ``(n,)``: an oriented rectangle, or a disc where `half_length == half_width` and the
+        kind is a person.
+    velocity
+        Metres a second over the ground, float64, shape ``(n, 2)``.
+    """
+
+    entity: NDArray[np.int32]
+    kind: NDArray[np.int8]
+    position: NDArray[np.float64]
+    yaw: NDArray[np.float64]
+    half_length: NDArray[np.float64]
+    half_width: NDArray[np.float64]
+    height: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.entity)
+
+    @property
+    def round(self) -> NDArray[np.bool_]:
+        """Which bodies are discs of radius `half_length`: people on foot. The rest are rectangles."""
+        person = (self.kind == RESIDENT) | (self.kind == ASSISTANT) | (self.kind == PEDESTRIAN)
+        return np.asarray(person & (self.half_length == self.half_width), bool)
+
+    def where(self, chosen: NDArray[Any]) -> Bodies:
+        """The bodies a mask or an index array picks."""
+        return Bodies(*(getattr(self, name)[chosen] for name in self.__dataclass_fields__))
+
+    @classmethod
+    def none(cls) -> Bodies:
+        """No bodies."""
+        empty = np.zeros(0)
+        return cls(
+            np.zeros(0, np.int32), np.zeros(0, np.int8), np.zeros((0, 3)), empty, empty, empty, empty, np.zeros((0, 2))
+        )
+
+    @classmethod
+    def joined(cls, parts: Sequence[Bodies]) -> Bodies:
+        """All bodies of several owners, in order."""
+        if not parts:
+            return cls.none()
+        return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in cls.__dataclass_fields__))
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Rigid shapes to draw: `index` points into `prototypes`.
+
+    Attributes
+    ----------
+    transforms
+        Model to world, float32, shape ``(n, 4, 4)``.
+    """
+
+    prototypes: list[str]
+    index: NDArray[np.int32]
+    transforms: NDArray[np.float32]
+    entity: NDArray[np.int32]
+
+
+class Subsystem(Protocol):
+    """What the loop asks of traffic, transit, avatars and robots."""
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Every number that decides the future, random state among them: what is hashed and saved."""
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go back to what `arrays` held."""
+
+    def bodies(self) -> Bodies:
+        """Where everything is now."""
+
+    def advance(self, dt: float, obstacles: Bodies) -> None:
+        """Move on by `dt` seconds without touching anything of one's own or of `obstacles`."""
+
+    def draw(self) -> Drawn:
+        """What to draw, by prototype."""
+
+    def prototypes(self) -> dict[str, list[Surface]]:
+        """The shapes `draw` refers to."""

@@ -1,0 +1,90 @@
+"""What one run is asked to be: a frozen record; change a copy with `dataclasses.replace`."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from vico.errors import InputError
+
+DAY = 86_400
+SUBSTEPS = 10
+SUBSTEP = 0.1
+
+
+@dataclass(frozen=True)
+class SimConfig:
+    """Everything that decides a run beside the world and the community.
+
+    Attributes
+    ----------
+    seed
+        Decides whatever is left to chance.
+    start
+        Second of the day at which the run starts.
+    residents
+        How many of the community's residents take part, in the community's order; None for all.
+    assistants
+        Avatars under test, without home or schedule.
+    robots
+        Model names; robot ``i`` is the agent ``robot_i``.
+    errands
+        Robots that nobody controls go from place to place.
+    cars, pedestrians
+        Vehicles and people nobody plays.
+    transit
+        Whether buses and bicycles are there.
+    observe
+        Agents whose views are rendered; None for all, ``()`` for none. The rest of the observation is always given.
+    image
+        Side of the square images, pixels.
+    """
+
+    seed: int = 0
+    start: int = 8 * 3600
+    residents: int | None = None
+    assistants: int = 0
+    robots: tuple[str, ...] = ()
+    errands: bool = False
+    cars: int = 0
+    pedestrians: int = 0
+    transit: bool = True
+    observe: tuple[str, ...] | None = None
+    image: int = 256
+
+    def __post_init__(self) -> None:
+        for name in ("seed", "assistants", "cars", "pedestrians", "residents"):
+            value = getattr(self, name)
+            if value is not None and value < 0:
+                raise InputError(f"simulation: {name} is {value}; it has to be 0 or more")
+        if not 0 <= self.start < DAY:
+            raise InputError(f"simulation: start is second {self.start} of the day; it has to be 0..{DAY - 1}")
+        if not 16 <= self.image <= 1024:
+            raise InputError(f"simulation: images of {self.image} pixels are out of range; take 16..1024, such as 256")
+
+    def record(self) -> dict[str, Any]:
+        """The configuration as it goes into `run.json`."""
+        return asdict(self)
+
+
+def seconds_of_day(text: str) -> int:
+    """Return the second of the day that ``HH:MM`` or ``HH:MM:SS`` names.
+
+    Raises
+    ------
+    InputError
+        If the text is no time of day.
+    """
+    match = re.fullmatch(r"(\d{1,2}):(\d{2})(?::(\d{2}))?", text)
+    if match:
+        hours, minutes, seconds = (int(part or 0) for part in match.groups())
+        if hours < 24 and minutes < 60 and seconds < 60:
+            return hours * 3600 + minutes * 60 + seconds
+    raise InputError(f"{text!r} is no time of day; write HH:MM or HH:MM:SS, for example 08:00")
+
+
+def clock(second: float) -> str:
+    """Write a second of the day as ``HH:MM:SS``; days after the first start again at midnight."""
+    whole = int(second) % DAY
+    return f"{whole // 3600:02d}:{whole // 60 % 60:02d}:{whole % 60:02d}"

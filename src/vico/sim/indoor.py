@@ -1,0 +1,171 @@
+"""Rooms as arrays: walls, furniture, doors, surfaces to put things on, and where in a room there is space."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vico.sim.collisions import box_gap, room_gap
+from vico.sim.state import RADIUS
+from vico.world.model import Entrance, Place, Room
+from vico.world.objects import Objects
+
+DOOR_REACH = 2.0
+INNER_DOOR_REACH = 1.0
+
+
+@dataclass(frozen=True)
+class Door:
+    """A way out of a room: to the room with index `to`, or outdoors where `to` is -1."""
+
+    to: int
+    position: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Indoor:
+    """All rooms of a world, in the world's order.
+
+    Attributes
+    ----------
+    boxes
+        ``x, y, yaw, half length, half width`` of each floor, float64, shape ``(r, 5)``.
+    floor
+        Heights of the floors, metres, shape ``(r,)``.
+    furniture, furniture_start
+        Solid things as ``x, y, yaw, half length, half width``, shape ``(f, 5)``; those of room ``i`` are the rows
+        ``furniture_start[i]`` up to ``furniture_start[i + 1]``.
+    doors
+        Ways out of each room.
+    place
+        Index of the place each room belongs to, -1 if it is not a place of this world.
+    """
+
+    rooms: list[Room]
+    index: dict[str, int]
+    boxes: NDArray[np.float64]
+    floor: NDArray[np.float64]
+    furniture: NDArray[np.float64]
+    furniture_start: NDArray[np.int64]
+    doors: list[list[Door]]
+    place: NDArray[np.int32]
+
+    @classmethod
+    def from_world(cls, rooms: Sequence[Room], places: Sequence[Place], objects: Objects) -> Indoor:
+        """Pack the rooms, and the solid objects that stand in them."""
+        index = {room.id: i for i, room in enumerate(rooms)}
+        boxes = np.array([[*r.centre[:2], r.yaw, r.size[0] / 2, r.size[1] / 2] for r in rooms]).reshape(-1, 5)
+        rows: list[list[list[float]]] = [[] for _ in rooms]
+        for k in np.flatnonzero(np.asarray(objects.solid, bool) & (objects.room != "")):
+            room = index.get(str(objects.room[k]))
+            if room is not None:
+                o = objects
+                rows[room].append(
+                    [float(o.x[k]), float(o.y[k]), float(o.yaw[k]), float(o.size_x[k]) / 2, float(o.size_y[k]) / 2]
+                )
+        furniture = np.array([row for one in rows for row in one], np.float64).reshape(-1, 5)
+        start = np.cumsum([0, *(len(one) for one in rows)]).astype(np.int64)
+        number = {place.id: i for i, place in enumerate(places)}
+        return cls(
+            list(rooms),
+            index,
+            boxes,
+            np.array([r.centre[2] for r in rooms], np.float64),
+            furniture,
+            start,
+            _doors(rooms, places, index),
+            np.array([number.get(r.place, -1) for r in rooms], np.int32),
+        )
+
+    def gap(self, room: int, xy: NDArray[np.float64] | tuple[float, float]) -> float:
+        """Free room around a point of a room, metres: to the nearest wall or piece of furniture; negative in one."""
+        x, y = float(xy[0]), float(xy[1])
+        best = float(room_gap(x, y, self.boxes[room]))
+        for b in self.furniture[self.furniture_start[room] : self.furniture_start[room + 1]]:
+            best = min(best, float(box_gap(x, y, b[0], b[1], b[2], b[3], b[4])))
+        return best
+
+    def free_spot(self, room: int, near: ArrayLike, taken: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Spot of a room nearest to `near` where someone can stand; None if the room is full.
+
+        Parameters
+        ----------
+        taken
+            Where others stand in that room, shape ``(k, >= 2)``.
+
+        Returns
+        -------
+        ndarray or None
+            On the floor, ENU metres, shape ``(3,)``.
+        """
+        x, y, yaw, half_length, half_width = self.boxes[room]
+        u = np.arange(-half_length + RADIUS + 0.02, half_length - RADIUS, 0.2)
+        v = np.arange(-half_width + RADIUS + 0.02, half_width - RADIUS, 0.2)
+        grid = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
+        c, s = np.cos(yaw), np.sin(yaw)
+        spots = np.column_stack([x + c * grid[:, 0] - s * grid[:, 1], y + s * grid[:, 0] + c * grid[:, 1]])
+        spots = np.vstack([np.asarray(near, np.float64).reshape(1, -1)[:, :2], spots])
+        order = np.argsort(np.hypot(*(spots - spots[0]).T), kind="stable")
+        for k in order:
+            spot = spots[k]
+            # A little more than touching, so that nobody starts in a contact.
+            if len(taken) and np.hypot(*(taken[:, :2] - spot).T).min() < 2 * RADIUS + 0.05:
+                continue
+            if self.gap(room, spot) >= RADIUS + (0.0 if k == 0 else 0.02):
+                return np.array([spot[0], spot[1], self.floor[room]])
+        return None
+
+    def holds(self, room: int, point: Sequence[float]) -> bool:
+        """Whether a point lies in the room's box."""
+        box = self.boxes[room]
+        z = float(point[2]) - self.floor[room]
+        height = self.rooms[room].size[2]
+        return float(room_gap(float(point[0]), float(point[1]), box)) >= 0.0 and -0.1 <= z <= height
+
+    def support(self, room: int, xy: Sequence[float]) -> float:
+        """Height of what a thing put down at a point of a room comes to lie on: the highest surface there."""
+        best = float(self.floor[room])
+        for container in self.rooms[room].containers:
+            x, y, z = container.centre
+            inside = box_gap(
+                float(xy[0]), float(xy[1]), x, y, container.yaw, container.size[0] / 2, container.size[1] / 2
+            )
+            if inside <= 0.0 and z > best:
+                best = z
+        return best
+
+
+def _doors(rooms: Sequence[Room], places: Sequence[Place], index: dict[str, int]) -> list[list[Door]]:
+    """Ways out: a place's first room leads outdoors by its own door; a further room's door leads to those it links."""
+    doors: list[list[Door]] = [[] for _ in rooms]
+    rank = {}
+    for place in places:
+        for k, room_id in enumerate(place.rooms):
+            rank[room_id] = k
+            if k == 0 and room_id in index:
+                doors[index[room_id]].append(Door(-1, rooms[index[room_id]].door))
+    for i, room in enumerate(rooms):
+        for other_id in room.links:
+            j = index.get(other_id)
+            if j is None or any(d.to == j for d in doors[i]):
+                continue
+            # The doorway between two rooms is the door of the one further in.
+            inner = i if rank.get(room.id, 0) > rank.get(other_id, 0) else j
+            doors[i].append(Door(j, rooms[inner].door))
+            if not any(d.to == i for d in doors[j]):
+                doors[j].append(Door(i, rooms[inner].door))
+    return doors
+
+
+def entrance_of(place: Place, entrances: dict[str, Entrance]) -> Entrance | None:
+    """The door people use for a place; None for open places."""
+    return entrances.get(place.entrance) if place.entrance else None
+
+
+def near_door(position: NDArray[Any], door: Door, reach: float) -> bool:
+    """Whether someone stands within `reach` metres of a door, measured on the floor."""
+    return float(np.hypot(position[0] - door.position[0], position[1] - door.position[1])) <= reach

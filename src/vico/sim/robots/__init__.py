@@ -1,0 +1,6 @@
+"""Robots: physics bodies with controllers that drive, walk, follow ways and stop for people."""
+
+from vico.sim.robots.pilot import Status
+from vico.sim.robots.population import Mode, RobotEvent, RobotPopulation
+
+__all__ = ["Mode", "RobotEvent", "RobotPopulation", "Status"]

@@ -1,0 +1,110 @@
+"""A trot without learning: feet planned by phase, legs bent by inverse kinematics.
+
+Diagonal legs swing together. A foot on the ground moves backwards as fast as the body is to move forwards; a foot in
+the air is put where it will be half a stance ahead of the hip, and further out when the body moves faster than it
+should (Raibert, "Legged robots that balance", 1986). Leg lengths on the ground resist roll and pitch.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from vico.assets.robots import RobotModel
+from vico.assets.robots_go2 import HIP_X, HIP_Y, SHIN, SIDE, THIGH
+from vico.sim.physics.engine import Base
+
+PERIOD = 0.02
+#: Seconds a cycle lasts and the share of it a foot is on the ground.
+CYCLE, STANCE = 0.36, 0.55
+#: Height of the hips, and how high a foot swings, metres.
+BODY, LIFT = 0.27, 0.055
+
+
+@njit(cache=True)
+def leg_angles(x, y, z, side):  # type: ignore[no-untyped-def]
+    """Angles (hip, thigh, calf) that bring a foot to x, y, z in the frame of its hip; `side` is 1 left, -1 right.
+
+    Points out of reach are brought to the nearest length the leg has.
+    """
+    across = np.sqrt(max(y * y + z * z - SIDE * SIDE, 1e-6))
+    hip = np.arctan2(z, y) + np.arctan2(across, side * SIDE)
+    while hip > np.pi:
+        hip -= 2 * np.pi
+    while hip < -np.pi:
+        hip += 2 * np.pi
+    reach = min(max(np.sqrt(x * x + across * across), 0.12), THIGH + SHIN - 0.005)
+    calf = np.arccos(min(max((THIGH**2 + SHIN**2 - reach * reach) / (2 * THIGH * SHIN), -1.0), 1.0)) - np.pi
+    lean = np.arccos(min(max((THIGH**2 + reach * reach - SHIN**2) / (2 * THIGH * reach), -1.0), 1.0))
+    return hip, np.arctan2(-x, across) + lean, calf
+
+
+@njit(cache=True)
+def trot(memory, command, moving, roll, pitch, roll_rate, pitch_rate, dt):  # type: ignore[no-untyped-def]
+    """Advance the feet by `dt` and return the twelve joint angles.
+
+    `memory` holds the phase, then for every leg the foot's x, y and where it left the ground (x, y). `command` and
+    `moving` are vx, vy, wz wanted and measured.
+    """
+    memory[0] = (memory[0] + dt / CYCLE) % 1.0
+    out = np.empty(12)
+    hold = STANCE * CYCLE
+    for leg in range(4):
+        front = 1.0 if leg < 2 else -1.0
+        side = 1.0 if leg % 2 == 0 else -1.0
+        hx, hy = front * HIP_X, side * (HIP_Y + SIDE)
+        at = 1 + 4 * leg
+        phase = (memory[0] + (0.0 if leg == 0 or leg == 3 else 0.5)) % 1.0
+        vx, vy = command[0] - command[2] * hy, command[1] + command[2] * hx
+        mx, my = moving[0] - moving[2] * hy, moving[1] + moving[2] * hx
+        z = -BODY
+        if phase < STANCE:
+            memory[at] -= vx * dt
+            memory[at + 1] -= vy * dt
+            memory[at + 2], memory[at + 3] = memory[at], memory[at + 1]
+            # Stretch where the body sinks, give way where it rises.
+            z += 0.5 * (hy * roll - hx * pitch) + 0.03 * (hy * roll_rate - hx * pitch_rate)
+        else:
+            s = (phase - STANCE) / (1.0 - STANCE)
+            goal_x = 0.5 * hold * vx + 0.03 * (mx - vx)
+            goal_y = 0.5 * hold * vy + 0.06 * (my - vy)
+            goal_x = min(max(goal_x, -0.16), 0.16)
+            goal_y = min(max(goal_y, -0.10), 0.10)
+            blend = s * s * (3.0 - 2.0 * s)
+            memory[at] = memory[at + 2] + (goal_x - memory[at + 2]) * blend
+            memory[at + 1] = memory[at + 3] + (goal_y - memory[at + 3]) * blend
+            z += LIFT * np.sin(np.pi * s)
+        hip, thigh, calf = leg_angles(memory[at], memory[at + 1] + side * SIDE, z, side)
+        out[3 * leg], out[3 * leg + 1], out[3 * leg + 2] = hip, thigh, calf
+    return out
+
+
+class Trot:
+    """Our own gait for a model without a policy."""
+
+    #: Phase, the feet, and the body's motion smoothed over a step.
+    memory = 1 + 16 + 3
+
+    def __init__(self, model: RobotModel) -> None:
+        self._model = model
+
+    def targets(
+        self,
+        base: Base,
+        angles: NDArray[np.float64],
+        speeds: NDArray[np.float64],
+        command: NDArray[np.float64],
+        memory: NDArray[np.float64],
+    ) -> NDArray[Any]:
+        """Joint angles to hold for the next `PERIOD` seconds; parameters as of the policy's."""
+        local = base.rotation.T @ base.velocity
+        moving = memory[17:20]
+        moving += (np.array([local[0], local[1], base.spin[2]]) - moving) * (PERIOD / 0.1)
+        roll = math.atan2(base.rotation[2, 1], base.rotation[2, 2])
+        pitch = -math.asin(min(max(base.rotation[2, 0], -1.0), 1.0))
+        wanted = trot(memory, command, moving, roll, pitch, float(base.spin[0]), float(base.spin[1]), PERIOD)
+        return np.clip(wanted, self._model.lower, self._model.upper)

@@ -1,0 +1,85 @@
+"""The whole state as named arrays: hashed at every step, saved to one file, and read back."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.errors import MissingFileError, SchemaError
+from vico.world.files import write_bytes
+
+SCHEMA = "vico.snapshot"
+VERSION = 1
+
+
+def state_hash(arrays: Mapping[str, NDArray[Any]]) -> str:
+    """BLAKE2b-128 over names, types, shapes and bytes of all arrays, in the order given; hex."""
+    digest = hashlib.blake2b(digest_size=16)
+    for name, array in arrays.items():
+        digest.update(f"{name}|{array.dtype.str}|{array.shape}|".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def copied(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """A copy that later steps leave alone."""
+    return {name: np.array(array, copy=True) for name, array in arrays.items()}
+
+
+def part(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArray[Any]]:
+    """The arrays whose names start with ``prefix.``, without it."""
+    head = prefix + "."
+    return {name[len(head) :]: array for name, array in arrays.items() if name.startswith(head)}
+
+
+def write_snapshot(path: Path, arrays: Mapping[str, NDArray[Any]], *, owner: str) -> None:
+    """Write a snapshot as ``.npz``, whole or not at all.
+
+    Parameters
+    ----------
+    owner
+        Identity of the simulation it belongs to: version, configuration, world and community.
+    """
+    sink = io.BytesIO()
+    head = {"__schema__": np.array(SCHEMA), "__version__": np.array(VERSION), "__owner__": np.array(owner)}
+    for name, array in arrays.items():
+        if array.dtype.hasobject:
+            raise TypeError(f"snapshot: {name} holds objects; arrays of numbers and text can be saved")
+    np.savez_compressed(sink, allow_pickle=False, **head, **arrays)
+    write_bytes(path, sink.getvalue())
+
+
+def read_snapshot(path: Path, *, owner: str) -> dict[str, NDArray[Any]]:
+    """Read what `write_snapshot` wrote.
+
+    Raises
+    ------
+    MissingFileError
+        If there is no such file.
+    SchemaError
+        If it is damaged, no snapshot, or belongs to another simulation.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            arrays = {name: data[name] for name in data.files}
+    except FileNotFoundError:
+        raise MissingFileError(f"{path}: no such snapshot") from None
+    except (ValueError, OSError, EOFError, KeyError) as error:
+        raise SchemaError(f"{path}: not a readable snapshot ({error})") from None
+    schema = str(arrays.pop("__schema__", ""))
+    version = int(arrays.pop("__version__", -1))
+    found = str(arrays.pop("__owner__", ""))
+    if schema != SCHEMA or version != VERSION:
+        raise SchemaError(f"{path}: schema {schema!r} version {version} is not {SCHEMA} version {VERSION}")
+    if found != owner:
+        raise SchemaError(
+            f"{path}: was saved by a simulation of another version, world, community or configuration; "
+            "load it into one that is made in the same way"
+        )
+    return arrays

@@ -1,0 +1,276 @@
+"""The state of everyone who can be played and of every loose thing, as arrays addressed by stable indices."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from enum import IntEnum
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.errors import SchemaError
+from vico.sim.bodies import Bodies
+
+# Entity numbers of what lives in a run; a world's own numbers all lie below.
+FIRST_RESIDENT = 1_000_000
+FIRST_ASSISTANT = 1_010_000
+FIRST_ROBOT = 1_020_000
+FIRST_TRAFFIC = 1_100_000
+FIRST_BIKE = 1_200_000
+FIRST_GOODS = 1_900_000
+
+RADIUS = 0.25
+# People look a little down while they walk, radians.
+LEVEL_GAZE = -0.1
+REASON_LENGTH = 240
+
+# How far a hand reaches along the ground, and above the feet, metres.
+REACH = 1.5
+REACH_UP = 2.2
+
+
+class Status(IntEnum):
+    """How the last action went."""
+
+    OK = 0
+    COLLISION = 1
+    REFUSED = 2
+    LATE = 3
+    FAILED = 4
+
+
+class Vehicle(IntEnum):
+    """What an avatar rides on."""
+
+    NONE = 0
+    BUS = 1
+    BIKE = 2
+
+
+class Posture(IntEnum):
+    """How an avatar holds itself while nothing else is going on."""
+
+    STANDING = 0
+    SITTING = 1
+    LYING = 2
+
+
+class ArrayState:
+    """Arrays that are hashed, saved and restored together; subclasses are dataclasses of arrays."""
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Every array field by name, in the order of declaration."""
+        found = {}
+        for field in fields(self):  # type: ignore[arg-type]
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                found[field.name] = value
+        return found
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Write saved arrays back; they must be the ones `arrays` names.
+
+        Raises
+        ------
+        SchemaError
+            If an array is missing or of another shape: the snapshot belongs to another configuration.
+        """
+        for name, mine in self.arrays().items():
+            saved = arrays.get(name)
+            if saved is None or saved.shape != mine.shape:
+                raise SchemaError(
+                    f"snapshot: {type(self).__name__}.{name} is "
+                    f"{'missing' if saved is None else f'{saved.shape}, not {mine.shape}'}; "
+                    "restore it into a simulation of the same world, community and configuration"
+                )
+            mine[...] = saved
+
+
+@dataclass
+class People(ArrayState):
+    """Avatars: residents first, then assistants.
+
+    Attributes
+    ----------
+    position
+        Centre of the feet, metres, float64, shape ``(n, 3)``.
+    yaw, pitch
+        Where the eyes look, radians, float64, shape ``(n,)``; the body turns with the yaw only.
+    move_left, move_speed
+        Metres still to walk in this step, and metres a second.
+    turn_left
+        Radians still to turn in this step; positive is counter-clockwise.
+    clip, phase
+        Index into the animation's clips, and where in it (cycles).
+    action_clip
+        Clip that the last action asked for, -1 for none: it outlasts the motion until the next action.
+    room, place
+        Index of the room and place the avatar is in, -1 outdoors.
+    vehicle, vehicle_entity, vehicle_yaw
+        What it rides on, and which way that was heading when last looked at.
+    held
+        Entities in the left and right hand, 0 for none, int32, shape ``(n, 2)``.
+    contact
+        Entity that stopped the last motion; -1 for a wall, the map's edge or furniture, 0 for nothing.
+    reason
+        Why the last action was refused, late or failed; "" if it was not.
+    """
+
+    names: list[str]
+    entity: NDArray[np.int32]
+    kind: NDArray[np.int8]
+    height: NDArray[np.float64]
+    position: NDArray[np.float64]
+    yaw: NDArray[np.float64]
+    pitch: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    move_left: NDArray[np.float64]
+    move_speed: NDArray[np.float64]
+    turn_left: NDArray[np.float64]
+    clip: NDArray[np.int16]
+    phase: NDArray[np.float64]
+    action_clip: NDArray[np.int16]
+    posture: NDArray[np.int8]
+    room: NDArray[np.int32]
+    place: NDArray[np.int32]
+    vehicle: NDArray[np.int8]
+    vehicle_entity: NDArray[np.int32]
+    vehicle_yaw: NDArray[np.float64]
+    held: NDArray[np.int32]
+    cash: NDArray[np.float64]
+    status: NDArray[np.int8]
+    contact: NDArray[np.int32]
+    reason: NDArray[np.str_]
+
+    @classmethod
+    def standing(cls, names: list[str], kinds: list[int], entities: list[int]) -> Self:
+        """Avatars at the origin, outdoors, with empty hands."""
+        n = len(names)
+        return cls(
+            names=names,
+            entity=np.array(entities, np.int32),
+            kind=np.array(kinds, np.int8),
+            height=np.full(n, 1.7),
+            position=np.zeros((n, 3)),
+            yaw=np.zeros(n),
+            pitch=np.full(n, LEVEL_GAZE),
+            velocity=np.zeros((n, 2)),
+            move_left=np.zeros(n),
+            move_speed=np.zeros(n),
+            turn_left=np.zeros(n),
+            clip=np.zeros(n, np.int16),
+            phase=np.zeros(n),
+            action_clip=np.full(n, -1, np.int16),
+            posture=np.zeros(n, np.int8),
+            room=np.full(n, -1, np.int32),
+            place=np.full(n, -1, np.int32),
+            vehicle=np.zeros(n, np.int8),
+            vehicle_entity=np.zeros(n, np.int32),
+            vehicle_yaw=np.zeros(n),
+            held=np.zeros((n, 2), np.int32),
+            cash=np.zeros(n),
+            status=np.zeros(n, np.int8),
+            contact=np.zeros(n, np.int32),
+            reason=np.full(n, "", f"<U{REASON_LENGTH}"),
+        )
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def outdoors(self) -> NDArray[np.bool_]:
+        """Who stands or rides in the street on their own feet or bicycle (not in a room, not in a bus)."""
+        return np.asarray((self.room < 0) & (self.vehicle != Vehicle.BUS))
+
+    def bodies(self) -> Bodies:
+        """Those outdoors: what traffic, transit and robots have to keep clear of."""
+        return self.bodies_of(np.flatnonzero(self.outdoors()))
+
+    def bodies_of(self, who: NDArray[np.int64]) -> Bodies:
+        """Bodies of the avatars with the given indices; a cyclist's is as long as the bicycle."""
+        riding = self.vehicle[who] == Vehicle.BIKE
+        return Bodies(
+            self.entity[who],
+            self.kind[who],
+            self.position[who],
+            self.yaw[who],
+            np.where(riding, RIDER_REACH + RADIUS, RADIUS),
+            np.full(len(who), RADIUS),
+            self.height[who],
+            self.velocity[who],
+        )
+
+
+# A rider's body is three discs in a row: saddle, front and rear wheel this far from it.
+RIDER_REACH = 0.6
+
+
+@dataclass
+class Goods(ArrayState):
+    """Loose things to carry.
+
+    Attributes
+    ----------
+    prototypes
+        Name of the shape each is drawn with.
+    position, yaw
+        Centre of the bottom, metres; follows the hand while held.
+    holder
+        Entity of who or what carries it (an avatar or a robot's deck), 0 for nobody.
+    hand
+        0 left, 1 right, -1 if not in a hand.
+    room
+        Index of the room it lies in, -1 outdoors.
+    size
+        Extents of its box, metres, float64, shape ``(m, 3)``.
+    """
+
+    names: list[str]
+    prototypes: list[str]
+    entity: NDArray[np.int32]
+    position: NDArray[np.float64]
+    yaw: NDArray[np.float64]
+    holder: NDArray[np.int32]
+    hand: NDArray[np.int8]
+    room: NDArray[np.int32]
+    size: NDArray[np.float64]
+
+    @classmethod
+    def none(cls) -> Self:
+        """No goods."""
+        return cls(
+            [],
+            [],
+            np.zeros(0, np.int32),
+            np.zeros((0, 3)),
+            np.zeros(0),
+            np.zeros(0, np.int32),
+            np.zeros(0, np.int8),
+            np.zeros(0, np.int32),
+            np.zeros((0, 3)),
+        )
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def index(self, entity: int) -> int:
+        """Index of an entity, -1 if it is none of the goods."""
+        found = np.flatnonzero(self.entity == entity)
+        return int(found[0]) if len(found) else -1
+
+    def add(
+        self, name: str, prototype: str, position: NDArray[np.float64], room: int, size: NDArray[np.float64], yaw: float
+    ) -> int:
+        """Add one lying thing; returns its entity."""
+        entity = FIRST_GOODS + len(self)
+        self.names.append(name)
+        self.prototypes.append(prototype)
+        self.entity = np.append(self.entity, np.int32(entity))
+        self.position = np.vstack([self.position, position])
+        self.yaw = np.append(self.yaw, yaw)
+        self.holder = np.append(self.holder, np.int32(0))
+        self.hand = np.append(self.hand, np.int8(-1))
+        self.room = np.append(self.room, np.int32(room))
+        self.size = np.vstack([self.size, size])
+        return entity

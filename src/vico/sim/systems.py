@@ -1,0 +1,86 @@
+"""Traffic, transit and robots of a run, made from the world and the configuration."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from vico.errors import InputError
+from vico.sim.avatars import clearances
+from vico.sim.bodies import Bodies
+from vico.sim.config import SimConfig
+from vico.sim.robots import RobotPopulation
+from vico.sim.state import FIRST_BIKE, FIRST_ROBOT, FIRST_TRAFFIC
+from vico.sim.traffic import Traffic
+from vico.sim.transit import TransitSystem, traffic_and_transit
+from vico.world.folder import World
+from vico.world.seeds import rng
+
+# Robots start where there is this much free ground, and this far from everybody, metres.
+_ROBOT_ROOM = 1.0
+_ROBOT_APART = 1.5
+
+
+def traffic_and_transit_of(world: World, config: SimConfig) -> tuple[Traffic | None, TransitSystem | None]:
+    """Cars and pedestrians, buses and bicycles; None for what nobody asked for, or the world has not."""
+    transit = config.transit and bool(world.transit.lines or world.transit.bike_stations)
+    if transit:
+        return traffic_and_transit(
+            world.lanes,
+            world.transit,
+            world.height,
+            cars=config.cars,
+            pedestrians=config.pedestrians,
+            seed=config.seed,
+            first_entity=FIRST_TRAFFIC,
+            first_bike=FIRST_BIKE,
+            second=float(config.start),
+            solids=solids_of(world),
+        )
+    if not config.cars and not config.pedestrians:
+        return None, None
+    traffic = Traffic(
+        world.lanes,
+        world.height,
+        cars=config.cars,
+        pedestrians=config.pedestrians,
+        seed=config.seed,
+        first_entity=FIRST_TRAFFIC,
+        solids=solids_of(world),
+    )
+    return traffic, None
+
+
+def solids_of(world: World) -> list[shapely.Polygon]:
+    """Footprints nobody walks through: buildings and solid things outdoors."""
+    solids = [shapely.Polygon(b.footprint[0], b.footprint[1:]) for b in world.buildings]
+    things = world.objects.where(np.asarray(world.objects.solid & world.objects.outdoors, bool))
+    solids += [shapely.Polygon(corners) for corners in things.corners()]
+    return [solid for solid in solids if solid.is_valid and not solid.is_empty]
+
+
+def robots_of(world: World, config: SimConfig, others: Bodies, *, errands: bool) -> RobotPopulation | None:
+    """Robots on free ground, clear of `others`; None where nobody asked for any.
+
+    Raises
+    ------
+    InputError
+        If a model is not known, or there is no room for all.
+    """
+    if not config.robots:
+        return None
+    spawns: list[NDArray[np.float64]] = []
+    for i, kind in enumerate(config.robots):
+        stream = rng(config.seed, "robot spawn", i)
+        for _ in range(300):
+            xy = world.walkable.random_point(stream, clearance=_ROBOT_ROOM)
+            far = all(np.hypot(*(xy - spawn[:2])) > 2 * _ROBOT_APART for spawn in spawns)
+            if far and (not len(others) or clearances(xy, others).min() > _ROBOT_APART):
+                break
+        else:
+            raise InputError(f"robots: no free ground for robot {i} ({kind}); take fewer robots")
+        spawns.append(np.array([*xy, stream.uniform(-np.pi, np.pi)]))
+    return RobotPopulation(
+        world, config.robots, np.array(spawns), seed=config.seed, first_entity=FIRST_ROBOT, errands=errands
+    )

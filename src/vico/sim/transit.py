@@ -1,0 +1,488 @@
+"""Buses on their timetable and bicycles to rent: who may board what, where, and what it costs.
+
+Buses are vehicles of `Traffic` (they queue with the cars and take junctions like them); what is here sends them from
+stop to stop. Rules and prices: fare 2 on boarding a stopped bus within 3 m of a door; bicycles within 2 m, 0.2 per
+started minute, 20 more where one is left farther than 5 m from a station with a free place.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+
+from vico.assets.vehicles import BICYCLE_SIZE, BUS_SIZE, vehicle_prototypes
+from vico.errors import InputError
+from vico.sim.bodies import BICYCLE, Bodies, Drawn
+from vico.sim.traffic import Traffic
+from vico.world.heights import HeightField
+from vico.world.lanes import LaneGraph
+from vico.world.mesh import Surface
+from vico.world.model import Line, Transit
+
+DAY = 86_400
+DWELL = 30.0
+# Buses drive so fast as the timetable asks for, within these, m/s; starting and braking cost the seconds beside.
+PACE = (5.0, 10.0)
+_START_STOP = 10.0
+FARE = 2.0
+DOOR_REACH = 3.0
+CAPACITY = 60
+BIKE_REACH = 2.0
+BIKE_RATE = 0.2
+BIKE_ASTRAY = 20.0
+STATION_REACH = 5.0
+_SLOT = 0.75  # metres between bicycles in a station
+# Doors on a bus's right side, metres ahead of its centre.
+DOORS = (4.65, -0.05, -3.55)
+
+
+@dataclass(frozen=True)
+class BusPlan:
+    """What `Traffic` has to know of the buses before it places cars.
+
+    Attributes
+    ----------
+    routes
+        Lane numbers of each line's round.
+    places
+        Index in the route of each line's stops.
+    buses
+        Line of each bus.
+    starts
+        Place in the route and metres along its lane of each bus at the start: the stop the timetable puts it at.
+    at
+        That stop's index in the line.
+    begun
+        Second of the day at which each bus should have left its first stop.
+    """
+
+    routes: list[list[int]]
+    places: list[list[int]]
+    offsets: list[list[float]]
+    buses: list[int]
+    starts: list[tuple[int, float]]
+    at: list[int]
+    begun: list[float]
+
+
+def plan_buses(transit: Transit, lanes: LaneGraph, second: float) -> BusPlan:
+    """As many buses on each line as its headway asks for, each at the stop it should last have reached.
+
+    Parameters
+    ----------
+    second
+        Of the day, when the simulation starts.
+
+    Raises
+    ------
+    InputError
+        If a line names a lane or a stop the world has not.
+    """
+    stops = {stop.id: stop for stop in transit.stops}
+    plan = BusPlan([], [], [], [], [], [], [])
+    for number, line in enumerate(transit.lines):
+        unknown = [x for x in line.lanes if x not in lanes.index] + [x for x in line.stops if x not in stops]
+        if unknown:
+            raise InputError(f"transit: line {line.id} uses {unknown[0]}, which the world has not; build it anew")
+        route = [lanes.index[lane] for lane in line.lanes]
+        places: list[int] = []
+        offsets: list[float] = []
+        k = 0
+        for stop in (stops[i] for i in line.stops):
+            lane = lanes.index[stop.lane]
+            # The same lane again, further on, needs no step; otherwise the next time the round comes by.
+            if not (places and route[k] == lane and stop.offset > offsets[-1]):
+                k = next((i for i in range(k + bool(places), len(route)) if route[i] == lane), -1)
+                if k < 0:
+                    raise InputError(f"transit: line {line.id} never comes by {stop.id}; build the world anew")
+            places.append(k)
+            offsets.append(stop.offset)
+        plan.routes.append(route)
+        plan.places.append(places)
+        plan.offsets.append(offsets)
+        headway = _headway(line)
+        taken: set[int] = set()
+        for bus in range(max(1, math.ceil(line.travel[-1] / headway))):
+            gone = (second - line.departures[0]) % headway + bus * headway
+            at = max(i for i, when in enumerate(line.travel[:-1]) if when <= gone)
+            while at in taken and len(taken) < len(places):
+                at = (at + 1) % len(places)
+            if at in taken:
+                break
+            taken.add(at)
+            plan.buses.append(number)
+            plan.starts.append((places[at], offsets[at]))
+            plan.at.append(at)
+            plan.begun.append(second - gone)
+    return plan
+
+
+def _headway(line: Line) -> int:
+    return line.departures[1] - line.departures[0] if len(line.departures) > 1 else 600
+
+
+def traffic_and_transit(
+    lanes: LaneGraph,
+    transit: Transit,
+    height: HeightField,
+    *,
+    cars: int,
+    pedestrians: int,
+    seed: int,
+    first_entity: int,
+    first_bike: int,
+    second: float,
+    solids: Sequence[shapely.Polygon] = (),
+) -> tuple[Traffic, TransitSystem]:
+    """Traffic with the buses in it, and what runs them.
+
+    Parameters
+    ----------
+    first_entity, first_bike
+        Entities of vehicles and pedestrians, and of bicycles, are numbered from here.
+    second
+        Of the day, when the simulation starts.
+    """
+    plan = plan_buses(transit, lanes, second)
+    traffic = Traffic(
+        lanes,
+        height,
+        cars=cars,
+        pedestrians=pedestrians,
+        seed=seed,
+        first_entity=first_entity,
+        routes=plan.routes,
+        buses=plan.buses,
+        bus_starts=plan.starts,
+        solids=solids,
+    )
+    return traffic, TransitSystem(transit, traffic, plan, second=second, first_bike=first_bike)
+
+
+class TransitSystem:
+    """Timetable, riders' rules, bicycles.
+
+    Attributes
+    ----------
+    clock
+        Second of the day (runs on past midnight), shape ``(1,)``.
+    dwell
+        Seconds each bus still stands at its stop.
+    stop
+        Index in its line of the stop each bus stands at or drives to.
+    begun
+        Second of the day at which each bus's round began by the timetable.
+    aboard
+        Riders in each bus.
+    taken
+        Departures each line has begun since the first one of the first day.
+    bike_xy, bike_yaw
+        Where each bicycle is.
+    bike_rider
+        Who rides it, -1 for nobody; the caller's numbers.
+    bike_since
+        Clock at which the ride began.
+    """
+
+    def __init__(self, transit: Transit, traffic: Traffic, plan: BusPlan, *, second: float, first_bike: int) -> None:
+        self.transit, self.traffic = transit, traffic
+        self.first_bike = first_bike
+        self._plan = plan
+        self._vehicle = np.arange(traffic.cars, traffic.cars + traffic.buses)
+        self._headway = np.array([_headway(line) for line in transit.lines], np.float64)
+        self._first = np.array([line.departures[0] for line in transit.lines], np.float64)
+        buses = traffic.buses
+        self.clock = np.array([float(second)])
+        self.dwell = np.full(buses, DWELL / 2)
+        self.stop = np.array(plan.at, np.int32)
+        self.begun = np.array(plan.begun)
+        self.aboard = np.zeros(buses, np.int32)
+        self.taken = np.ceil((second - self._first) / np.maximum(self._headway, 1.0)).astype(np.int64)
+        stations = transit.bike_stations
+        self._station_xy = np.array([s.position[:2] for s in stations]).reshape(-1, 2)
+        self._station_capacity = np.array([s.capacity for s in stations], np.int32)
+        self._station_yaw = _rack_yaws(traffic, self._station_xy)
+        self.bike_station = np.repeat(np.arange(len(stations), dtype=np.int32), [s.bikes for s in stations])
+        n = len(self.bike_station)
+        self.bike_slot = (
+            np.concatenate([np.arange(s.bikes, dtype=np.int32) for s in stations]) if n else np.zeros(0, np.int32)
+        )
+        self.bike_xy, self.bike_yaw = np.zeros((n, 2)), np.zeros(n)
+        for bike in range(n):
+            self._dock(bike, int(self.bike_station[bike]), int(self.bike_slot[bike]))
+        self.bike_rider = np.full(n, -1, np.int32)
+        self.bike_since = np.zeros(n)
+        for bus in range(buses):
+            self._send(bus, int(self.stop[bus]))
+            traffic.fleet.arrived[self._vehicle[bus]] = True
+
+    # -- the subsystem contract --------------------------------------------------------------------------------------
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Every number that decides the future; the buses' own motion is among the traffic's."""
+        return {name: getattr(self, name).copy() for name in _STATE}
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go back to what `arrays` held."""
+        for name in _STATE:
+            getattr(self, name)[...] = arrays[name]
+
+    def advance(self, dt: float, obstacles: Bodies) -> None:
+        """Run the timetable on by `dt` seconds; the buses themselves move with the traffic."""
+        self.clock += dt
+        fleet = self.traffic.fleet
+        for bus, v in enumerate(self._vehicle.tolist()):
+            if not fleet.arrived[v]:
+                self.dwell[bus] = DWELL
+                continue
+            self.dwell[bus] = max(self.dwell[bus] - dt, 0.0)
+            line = self._plan.buses[bus]
+            if self.dwell[bus] > 0.0:
+                continue
+            if self.stop[bus] == 0:
+                # From the first stop a bus leaves at the next departure nobody has taken; a late one leaves at once.
+                if self.clock[0] < self._first[line] + self.taken[line] * self._headway[line]:
+                    continue
+                self.begun[bus] = self._first[line] + self.taken[line] * self._headway[line]
+                self.taken[line] += 1
+            self.stop[bus] = (self.stop[bus] + 1) % len(self._plan.places[line])
+            self._send(bus, int(self.stop[bus]))
+
+    def bodies(self) -> Bodies:
+        """Bicycles left astray; racks are street furniture, buses are among the traffic's bodies, and ridden bicycles
+        among their riders'.
+        """
+        free = np.flatnonzero((self.bike_rider < 0) & (self.bike_station < 0))
+        n = len(free)
+        return Bodies(
+            entity=(self.first_bike + free).astype(np.int32),
+            kind=np.full(n, BICYCLE, np.int8),
+            position=np.column_stack([self.bike_xy[free], self.traffic.height(self.bike_xy[free])]),
+            yaw=self.bike_yaw[free],
+            half_length=np.full(n, BICYCLE_SIZE[0] / 2),
+            half_width=np.full(n, BICYCLE_SIZE[1] / 2),
+            height=np.full(n, BICYCLE_SIZE[2]),
+            velocity=np.zeros((n, 2)),
+        )
+
+    def draw(self) -> Drawn:
+        """All bicycles, ridden ones too."""
+        n = len(self.bike_yaw)
+        c, s = np.cos(self.bike_yaw), np.sin(self.bike_yaw)
+        transforms = np.tile(np.eye(4, dtype=np.float32), (n, 1, 1))
+        transforms[:, 0, 0], transforms[:, 0, 1], transforms[:, 1, 0], transforms[:, 1, 1] = c, -s, s, c
+        transforms[:, :2, 3], transforms[:, 2, 3] = self.bike_xy, self.traffic.height(self.bike_xy)
+        entity = np.arange(self.first_bike, self.first_bike + n, dtype=np.int32)
+        return Drawn(["bicycle"], np.zeros(n, np.int32), transforms, entity)
+
+    def prototypes(self) -> dict[str, list[Surface]]:
+        """The bicycle."""
+        return {"bicycle": vehicle_prototypes()["bicycle"]}
+
+    # -- buses -------------------------------------------------------------------------------------------------------
+
+    def _send(self, bus: int, stop: int) -> None:
+        line, fleet, v = self._plan.buses[bus], self.traffic.fleet, self._vehicle[bus]
+        fleet.goal[v] = self._plan.places[line][stop]
+        fleet.goal_offset[v] = self._plan.offsets[line][stop]
+        fleet.arrived[v] = False
+        timetable = self.line_of(bus)
+        due = self.begun[bus] + timetable.travel[stop or len(timetable.stops)]
+        left = max(due - self.clock[0] - _START_STOP, 1.0)
+        fleet.pace[v] = min(max(self._metres(bus, stop) / left, PACE[0]), PACE[1])
+
+    def _metres(self, bus: int, stop: int) -> float:
+        """How far a bus has to drive to a stop, metres."""
+        line, fleet, v, lanes = self._plan.buses[bus], self.traffic.fleet, self._vehicle[bus], self.traffic.lanes
+        route, place = self._plan.routes[line], int(fleet.place[v])
+        metres = self._plan.offsets[line][stop] - float(fleet.offset[v])
+        while place != self._plan.places[line][stop]:
+            here, place = route[place], (place + 1) % len(route)
+            if route[place] not in (lanes.left[here], lanes.right[here]):
+                metres += float(lanes.length[here])
+        return metres
+
+    def stopped_at(self, bus: int) -> str | None:
+        """Id of the stop at which a bus stands with its doors open, None while it drives."""
+        if not self.traffic.fleet.arrived[self._vehicle[bus]]:
+            return None
+        return self.line_of(bus).stops[int(self.stop[bus])]
+
+    def line_of(self, bus: int) -> Line:
+        """The line a bus serves."""
+        return self.transit.lines[self._plan.buses[bus]]
+
+    def entity_of(self, bus: int) -> int:
+        """The bus's entity."""
+        return int(self.traffic.first_entity + self._vehicle[bus])
+
+    def bus_pose(self, bus: int) -> NDArray[np.float64]:
+        """x, y, yaw of a bus's centre."""
+        shapes, v = self.traffic.shapes, self._vehicle[bus]
+        return np.array([shapes.x[v], shapes.y[v], shapes.yaw[v]])
+
+    def doors(self, bus: int) -> NDArray[np.float64]:
+        """Where a bus's doors are, on its right side, metres, shape ``(3, 2)``."""
+        return _beside(self.bus_pose(bus), DOORS, BUS_SIZE[1] / 2)
+
+    def exit_spots(self, bus: int) -> NDArray[np.float64]:
+        """Points half a metre outside each door, where riders get off if they are free, shape ``(3, 2)``."""
+        return _beside(self.bus_pose(bus), DOORS, BUS_SIZE[1] / 2 + 0.5)
+
+    def seat(self, bus: int, rider: int) -> NDArray[np.float64]:
+        """x, y, yaw of a rider's seat; `rider` is the caller's number for them."""
+        x, y, yaw = self.bus_pose(bus)
+        row, side = divmod(rider % 20, 2)
+        ahead, left = 3.2 - 0.85 * row, 0.75 if side == 0 else -0.75
+        c, s = math.cos(yaw), math.sin(yaw)
+        return np.array([x + ahead * c - left * s, y + ahead * s + left * c, yaw])
+
+    def bus_at(self, xy: ArrayLike, reach: float = DOOR_REACH) -> int | None:
+        """The bus that stands at a stop with a door within `reach` of a point; the nearest, None if there is none."""
+        point = np.asarray(xy, np.float64)[:2]
+        best: tuple[float, int] | None = None
+        for bus in range(self.traffic.buses):
+            if self.traffic.fleet.arrived[self._vehicle[bus]]:
+                away = float(np.linalg.norm(self.doors(bus) - point, axis=1).min())
+                if away <= reach and (best is None or away < best[0]):
+                    best = (away, bus)
+        return None if best is None else best[1]
+
+    def board(self, bus: int) -> float:
+        """Take a rider in; returns the fare.
+
+        Raises
+        ------
+        InputError
+            If the bus drives or is full.
+        """
+        if self.stopped_at(bus) is None:
+            raise InputError("enter_bus: the bus is not at a stop")
+        if self.aboard[bus] >= CAPACITY:
+            raise InputError("enter_bus: the bus is full")
+        self.aboard[bus] += 1
+        return FARE
+
+    def alight(self, bus: int) -> None:
+        """Let a rider off.
+
+        Raises
+        ------
+        InputError
+            If the bus drives.
+        """
+        if self.stopped_at(bus) is None:
+            raise InputError("exit_bus: the bus is moving")
+        self.aboard[bus] -= 1
+
+    def arrivals(self, stop: str) -> list[tuple[str, float]]:
+        """Scheduled buses at a stop from now on: line name and seconds from now, the next three of each line."""
+        rows: list[tuple[str, float]] = []
+        for number, line in enumerate(self.transit.lines):
+            for k, name in enumerate(line.stops):
+                if name == stop:
+                    when = self._first[number] + line.travel[k] - self.clock[0]
+                    wait = when % self._headway[number]
+                    rows += [(line.name, wait + i * self._headway[number]) for i in range(3)]
+        return sorted(rows, key=lambda row: row[1])
+
+    # -- bicycles ----------------------------------------------------------------------------------------------------
+
+    def bike_at(self, xy: ArrayLike, reach: float = BIKE_REACH) -> int | None:
+        """The nearest bicycle nobody rides within `reach` of a point, None if there is none."""
+        if not len(self.bike_rider):
+            return None
+        away = np.linalg.norm(self.bike_xy - np.asarray(xy, np.float64)[:2], axis=1)
+        away[self.bike_rider >= 0] = np.inf
+        best = int(np.argmin(away))
+        return best if away[best] <= reach else None
+
+    def free_bikes(self) -> NDArray[np.int32]:
+        """Bicycles that stand in each station."""
+        docked = self.bike_station[(self.bike_rider < 0) & (self.bike_station >= 0)]
+        return np.bincount(docked, minlength=len(self._station_capacity)).astype(np.int32)
+
+    def mount(self, bike: int, rider: int) -> None:
+        """Begin a ride.
+
+        Raises
+        ------
+        InputError
+            If somebody rides it.
+        """
+        if self.bike_rider[bike] >= 0:
+            raise InputError("enter_bike: somebody rides it")
+        self.bike_rider[bike], self.bike_since[bike] = rider, self.clock[0]
+        self.bike_station[bike] = self.bike_slot[bike] = -1
+
+    def carry(self, bike: int, x: float, y: float, yaw: float) -> None:
+        """Take a ridden bicycle along with its rider."""
+        self.bike_xy[bike], self.bike_yaw[bike] = (x, y), yaw
+
+    def dismount(self, bike: int) -> float:
+        """End a ride where the bicycle is; returns the price.
+
+        Within 5 m of a station with a free place the bicycle goes into it. Elsewhere it stays, and that costs more.
+        """
+        station = self._station_near(self.bike_xy[bike])
+        price = ride_price(self.clock[0] - self.bike_since[bike], returned=station >= 0)
+        self.bike_rider[bike] = -1
+        if station >= 0:
+            used = set(self.bike_slot[self.bike_station == station].tolist())
+            self._dock(bike, station, next(k for k in range(len(used) + 1) if k not in used))
+        return price
+
+    def _station_near(self, xy: NDArray[np.float64]) -> int:
+        """The nearest station within reach that has a free place, -1 for none."""
+        if not len(self._station_xy):
+            return -1
+        away = np.linalg.norm(self._station_xy - xy, axis=1)
+        away[self.free_bikes() >= self._station_capacity] = np.inf
+        best = int(np.argmin(away))
+        return best if away[best] <= STATION_REACH else -1
+
+    def _dock(self, bike: int, station: int, slot: int) -> None:
+        """Stand a bicycle in its place: side by side along the rack, from its middle outwards."""
+        yaw = self._station_yaw[station]
+        aside = _SLOT * ((slot + 1) // 2) * (1 if slot % 2 else -1)
+        self.bike_station[bike], self.bike_slot[bike] = station, slot
+        self.bike_xy[bike] = self._station_xy[station] + aside * np.array([np.cos(yaw), np.sin(yaw)])
+        self.bike_yaw[bike] = yaw + np.pi / 2
+
+
+_STATE = (
+    "clock", "dwell", "stop", "begun", "aboard", "taken", "bike_station", "bike_slot", "bike_xy", "bike_yaw",
+    "bike_rider", "bike_since",
+)  # fmt: skip
+
+
+def ride_price(seconds: float, *, returned: bool) -> float:
+    """Price of a bicycle ride: 0.2 per started minute, 20 more if it was not brought to a station."""
+    return BIKE_RATE * math.ceil(max(seconds, 1e-9) / 60.0) + (0.0 if returned else BIKE_ASTRAY)
+
+
+def _beside(pose: NDArray[np.float64], ahead: Sequence[float], right: float) -> NDArray[np.float64]:
+    """Points `ahead` of a pose and `right` of it."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    return np.array([[pose[0] + a * c + right * s, pose[1] + a * s - right * c] for a in ahead])
+
+
+def _rack_yaws(traffic: Traffic, spots: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Racks stand along the nearest sidewalk or street."""
+    lanes, walks = traffic.lanes, traffic.walks
+    lines = [shapely.LineString(walks.line(i)) for i in range(len(walks)) if walks.kind[i] == 0]
+    lines = lines or [shapely.LineString(lanes.line(i)) for i in range(len(lanes))]
+    yaws = []
+    for spot in spots:
+        point = shapely.Point(spot)
+        line = lines[int(np.argmin(shapely.distance(lines, point)))]
+        at = line.project(point)
+        a, b = line.interpolate(max(at - 1.0, 0.0)), line.interpolate(min(at + 1.0, line.length))
+        yaws.append(math.atan2(b.y - a.y, b.x - a.x))
+    return np.array(yaws)

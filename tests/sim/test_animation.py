@@ -1,0 +1,185 @@
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from vico.assets.people import J, body_of, random_appearance
+from vico.errors import InputError
+from vico.render.skinning import crowd_of, skin
+from vico.sim.animation import CLIPS, clip_index, hand_frames, hand_position, pose, stride_length, style_of
+from vico.world.seeds import rng
+
+LOOKS = [random_appearance(rng(5, "walker", k)) for k in range(6)]
+BODIES = [body_of(look, source="procedural") for look in LOOKS]
+CROWD = crowd_of(BODIES, range(1, len(BODIES) + 1))
+STYLE = np.stack(
+    [style_of(b, rng(5, "manner", k), age=look.age) for k, (b, look) in enumerate(zip(BODIES, LOOKS, strict=True))]
+)
+N = len(BODIES)
+
+
+def posed(clip: str, phase: float, speed: float = 0.0, x: float | NDArray[np.float64] = 0.0) -> NDArray[np.float32]:
+    """Everybody's vertices in one pose, at x."""
+    rotations, offsets = pose(np.full(N, clip_index(clip)), np.full(N, phase), np.full(N, speed), STYLE)
+    positions = np.zeros((N, 3))
+    positions[:, 0] = x
+    return skin(CROWD, rotations, offsets, positions, np.zeros(N))[0]
+
+
+def feet(person: int, side: str) -> NDArray[np.int64]:
+    """Vertices of a shoe's sole."""
+    first, last = CROWD.starts[person], CROWD.starts[person + 1]
+    own = np.isin(CROWD.weight_joints[first:last, 0], [J[f"{side}_ankle"], J[f"{side}_foot"]])
+    return first + np.flatnonzero(own & (CROWD.vertices[first:last, 2] < 0.03))
+
+
+@pytest.mark.parametrize(("clip", "speed"), [("walk", 0.3), ("walk", 1.0), ("walk", 1.8), ("carry", 1.0), ("run", 2.5)])
+def test_a_planted_foot_stays_within_two_centimetres_while_the_body_moves_on(clip: str, speed: float) -> None:
+    stride = stride_length(np.full(N, clip_index(clip)), np.full(N, speed), STYLE[:, 12])
+    # The left foot is flat on the ground in this part of its stance.
+    duty = 0.36 if clip == "run" else 0.62
+    start, end = 0.2 * duty, 0.5 * duty
+    before, after = (posed(clip, p, speed, x=p * stride) for p in (start, end))
+    travelled = (end - start) * stride.min()
+    assert travelled > 0.06
+    for person in range(N):
+        sole = feet(person, "left")
+        assert np.linalg.norm(after[sole] - before[sole], axis=1).max() < 0.02
+
+
+@pytest.mark.parametrize(
+    ("clip", "speed"),
+    [
+        ("walk", 0.3),
+        ("walk", 1.0),
+        ("walk", 1.8),
+        ("run", 2.5),
+        ("idle", 0.0),
+        ("turn", 0.0),
+        ("pick", 0.0),
+        ("sit", 0.0),
+        ("sleep", 0.0),
+    ],
+)
+def test_nobody_sinks_more_than_a_centimetre_into_the_ground(clip: str, speed: float) -> None:
+    lowest = min(posed(clip, p, speed)[:, 2].min() for p in np.linspace(0, 1, 25))
+    assert lowest > -0.01
+
+
+@pytest.mark.parametrize("clip", ["idle", "talk", "wave", "walk", "carry", "drink"])
+def test_somebody_standing_or_walking_always_touches_the_ground(clip: str) -> None:
+    for phase in np.linspace(0, 1, 25):
+        vertices = posed(clip, phase, 1.0 if clip in ("walk", "carry") else 0.0)
+        lows = [vertices[CROWD.starts[i] : CROWD.starts[i + 1], 2].min() for i in range(N)]
+        assert max(lows) < 0.012
+
+
+def test_both_feet_leave_the_ground_when_running() -> None:
+    lows = [posed("run", p, 2.5)[:, 2].min() for p in np.linspace(0, 1, 40)]
+    assert max(lows) > 0.01
+
+
+@pytest.mark.parametrize("clip", CLIPS)
+def test_a_cycle_closes(clip: str) -> None:
+    speed = {"walk": 1.2, "carry": 1.0, "run": 2.5}.get(clip, 0.0)
+    np.testing.assert_allclose(posed(clip, 0.0, speed), posed(clip, 1.0 - 1e-7, speed), atol=2e-3)
+
+
+@pytest.mark.parametrize("clip", CLIPS)
+def test_motion_is_smooth(clip: str) -> None:
+    speed = {"walk": 1.2, "carry": 1.0, "run": 2.5}.get(clip, 0.0)
+    frames = np.array([posed(clip, p, speed) for p in np.linspace(0, 1, 101)])
+    # A hundredth of a cycle takes at least 7 ms when running: nothing moves faster than 14 m/s.
+    assert np.abs(np.diff(frames, axis=0)).max() < 0.12
+
+
+@pytest.mark.parametrize("clip", CLIPS)
+def test_limbs_keep_their_length_and_nothing_is_nan(clip: str) -> None:
+    rotations, offsets = pose(np.full(N, clip_index(clip)), np.linspace(0, 0.9, N), np.full(N, 1.0), STYLE)
+    assert np.isfinite(rotations).all()
+    assert np.isfinite(offsets).all()
+    assert np.linalg.norm(rotations, axis=2).max() <= np.pi + 1e-5
+
+
+@pytest.mark.parametrize("clip", ["walk", "run", "sit", "idle", "pick", "ride_bike"])
+def test_knees_bend_backward_only(clip: str) -> None:
+    for phase in np.linspace(0, 1, 20):
+        rotations, _ = pose(np.full(N, clip_index(clip)), np.full(N, phase), np.full(N, 1.5), STYLE)
+        knees = rotations[:, [J["left_knee"], J["right_knee"]], 1]
+        assert knees.min() > -0.05
+
+
+def test_arms_swing_against_the_legs() -> None:
+    rotations, offsets = pose(np.full(N, clip_index("walk")), np.zeros(N), np.full(N, 1.2), STYLE)
+    palms = hand_frames(CROWD.joints, rotations, offsets)[:, :, :3, 3]
+    # At phase 0 the left heel strikes ahead, so the right hand is ahead.
+    assert (palms[:, 1, 0] > palms[:, 0, 0]).all()
+
+
+def test_a_hand_that_reaches_is_ahead_and_a_hand_that_picks_is_low() -> None:
+    for clip, axis, low, high in (("reach", 0, 0.40, 0.9), ("pick", 2, 0.0, 0.45), ("drink", 2, 1.1, 2.0)):
+        for person in range(N):
+            rotations, offsets = pose(
+                np.array([clip_index(clip)]), np.array([0.5]), np.zeros(1), STYLE[person : person + 1]
+            )
+            place = hand_position(rotations[0], offsets[0], BODIES[person], 1)
+            scale = BODIES[person].height / 1.72
+            assert low * scale < place[axis] < high * scale
+
+
+def test_seats_are_at_the_height_of_chairs() -> None:
+    vertices = posed("sit", 0.0)
+    for person in range(N):
+        own = slice(CROWD.starts[person], CROWD.starts[person + 1])
+        hips = np.isin(CROWD.weight_joints[own, 0], [J["pelvis"]])
+        assert 0.28 < np.quantile(vertices[own][hips, 2], 0.02) < 0.50
+
+
+def test_the_pelvis_bobs_by_centimetres_at_a_walk() -> None:
+    heights = np.array(
+        [
+            pose(np.full(N, clip_index("walk")), np.full(N, p), np.full(N, 1.3), STYLE)[1][:, 2]
+            for p in np.linspace(0, 1, 50)
+        ]
+    )
+    assert np.ptp(heights, axis=0).min() > 0.02
+    assert np.ptp(heights, axis=0).max() < 0.08
+
+
+def test_stride_grows_with_speed_and_stature() -> None:
+    walk = clip_index("walk")
+    slow, quick, tall = stride_length(walk, np.array([0.5, 1.5, 1.5]), np.array([1.7, 1.7, 1.9]))
+    assert slow < quick < tall
+    assert 1.2 < stride_length(walk, 1.0, 1.72) < 1.35
+    assert np.isinf(stride_length(clip_index("sit"), 0.0, 1.7))
+
+
+def test_people_move_in_manners_of_their_own() -> None:
+    same = np.stack([style_of(BODIES[0], rng(5, "manner", k)) for k in range(5)])
+    rotations, _ = pose(np.full(5, clip_index("walk")), np.full(5, 0.1), np.full(5, 1.2), same)
+    assert len({row.tobytes() for row in rotations}) == 5
+
+
+def test_an_unknown_motion_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(InputError, match="no motion 'moonwalk'; known are idle, walk"):
+        clip_index("moonwalk")
+
+
+def test_nobody_is_posed_without_fuss() -> None:
+    rotations, offsets = pose(np.zeros(0, int), np.zeros(0), np.zeros(0), np.zeros((0, STYLE.shape[1])))
+    assert rotations.shape == (0, 55, 3)
+    assert offsets.shape == (0, 3)
+
+
+def test_poses_have_the_same_bytes_in_a_fresh_process() -> None:
+    program = (
+        "import hashlib, numpy as np; from vico.assets.people import Appearance, body_of;"
+        "from vico.sim.animation import *;"
+        "s = style_of(body_of(Appearance(), source='procedural'))[None];"
+        "r, o = pose(np.array([clip_index('walk')]), np.array([0.3]), np.array([1.1]), s);"
+        "print(hashlib.sha256(r.tobytes() + o.tobytes()).hexdigest())"
+    )
+    runs = {subprocess.run([sys.executable, "-c", program], capture_output=True, check=True).stdout for _ in range(2)}
+    assert len(runs) == 1

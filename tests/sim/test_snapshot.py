@@ -1,0 +1,111 @@
+"""The state as a whole: hashed, saved, restored, repeated."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import toy_city
+from vico.agents.schedule import followers_of
+from vico.errors import MissingFileError, SchemaError
+from vico.sim.config import SimConfig
+from vico.sim.gather import Gatherer
+from vico.sim.simulation import Simulation
+from vico.world.public import PublicMap
+
+MORNING = SimConfig(start=8 * 3600 - 20, assistants=1, observe=())
+
+
+def fresh(config: SimConfig = MORNING) -> Simulation:
+    """The toy city before 08:00."""
+    return Simulation(toy_city.world(), toy_city.community(), config)
+
+
+def followed(sim: Simulation, steps: int) -> list[dict[str, Any]]:
+    """Let residents follow their schedules; return the actions they took."""
+    agents = Gatherer(followers_of(toy_city.community(), PublicMap.from_world(sim.world)))
+    observations, infos = sim.observe()
+    taken = []
+    for _ in range(steps):
+        gathered = agents.gather(observations, infos)
+        result = sim.step(gathered.actions)
+        observations, infos = result.observations, result.infos
+        taken.append(gathered.actions)
+    return taken
+
+
+def hashes(sim: Simulation, actions: list[dict[str, Any]]) -> list[str]:
+    """Take actions; return the state's hash after each step."""
+    return [sim.step(action).hash for action in actions]
+
+
+def test_equal_actions_give_equal_hashes_at_every_step() -> None:
+    actions = followed(fresh(), 60)
+    assert hashes(fresh(), actions) == hashes(fresh(), actions)
+
+
+def test_another_seed_gives_another_hash() -> None:
+    other = SimConfig(seed=1, start=MORNING.start, assistants=1, observe=())
+    assert fresh().state_hash() != fresh(other).state_hash()
+
+
+def test_saved_loaded_and_continued_equals_uninterrupted(tmp_path: Path) -> None:
+    actions = followed(fresh(), 60)
+    through, first = fresh(), fresh()
+    expected = hashes(through, actions)
+    hashes(first, actions[:25])
+    first.save(tmp_path / "half.npz")
+    second = fresh()
+    second.load(tmp_path / "half.npz")
+    assert hashes(second, actions[25:]) == expected[25:]
+
+
+def test_restoring_a_snapshot_forgets_what_came_after() -> None:
+    sim = fresh()
+    actions = followed(fresh(), 40)
+    hashes(sim, actions[:20])
+    kept, digest = sim.snapshot(), sim.state_hash()
+    onwards = hashes(sim, actions[20:])
+    sim.restore(kept)
+    assert sim.state_hash() == digest
+    assert hashes(sim, actions[20:]) == onwards
+
+
+def test_a_snapshot_of_another_configuration_is_refused(tmp_path: Path) -> None:
+    fresh().save(tmp_path / "a.npz")
+    other = fresh(SimConfig(start=MORNING.start, assistants=2, observe=()))
+    with pytest.raises(SchemaError, match="another"):
+        other.load(tmp_path / "a.npz")
+
+
+def test_a_broken_or_missing_snapshot_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "b.npz").write_bytes(b"not a zip")
+    with pytest.raises(SchemaError, match="readable"):
+        fresh().load(tmp_path / "b.npz")
+    with pytest.raises(MissingFileError):
+        fresh().load(tmp_path / "c.npz")
+
+
+def test_two_fresh_processes_agree_on_every_hash() -> None:
+    here = Path(__file__).parent
+    program = (
+        f"import sys; sys.path[:0] = [{str(here)!r}, {str(here.parent)!r}]\n"
+        "from test_snapshot import fresh, followed\n"
+        "sim = fresh(); followed(sim, 80); print(sim.state_hash())\n"
+    )
+    runs = [
+        subprocess.run(
+            [sys.executable, "-c", program],
+            capture_output=True,
+            text=True,
+            check=True,
+            env=os.environ | {"PYTHONHASHSEED": str(k)},
+        ).stdout
+        for k in (1, 2)
+    ]
+    assert runs[0] == runs[1] != ""

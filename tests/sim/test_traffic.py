@@ -1,0 +1,214 @@
+"""Traffic on the streets of central Helsinki: nothing ever touches, nothing ever gridlocks, all repeats exactly."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from road_city import HALF, road_city
+from vico.errors import InputError
+from vico.sim.bodies import RESIDENT, Bodies
+from vico.sim.traffic import Traffic
+from vico.sim.traffic_walkers import place_walker
+from vico.world.heights import HeightField
+from vico.world.walkways import SIDEWALK
+
+
+def _traffic(cars: int = 30, pedestrians: int = 30, seed: int = 1) -> Traffic:
+    city = road_city()
+    return Traffic(
+        city.lanes,
+        HeightField.flat(HALF),
+        cars=cars,
+        pedestrians=pedestrians,
+        seed=seed,
+        first_entity=1_000_000,
+        solids=city.solids,
+    )
+
+
+def _person(x: float, y: float) -> Bodies:
+    one = np.full(1, 0.25)
+    return Bodies(
+        np.array([7], np.int32), np.array([RESIDENT], np.int8), np.array([[x, y, 0.0]]), np.zeros(1), one, one,
+        np.array([1.7]), np.zeros((1, 2)),
+    )  # fmt: skip
+
+
+def _run(traffic: Traffic, seconds: int, obstacles: Bodies | None = None) -> int:
+    """Overlaps counted over all sub-steps."""
+    overlaps = 0
+    for _ in range(seconds * 10):
+        traffic.advance(0.1, obstacles or Bodies.none())
+        overlaps += traffic.overlaps(obstacles)
+    return overlaps
+
+
+@pytest.mark.parametrize(("cars", "pedestrians"), [(30, 30), (120, 200)])
+def test_no_two_bodies_overlap_in_any_sub_step(cars: int, pedestrians: int) -> None:
+    assert _run(_traffic(cars, pedestrians), 240) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("cars", "pedestrians"), [(30, 30), (120, 200)])
+def test_no_two_bodies_overlap_in_half_an_hour(cars: int, pedestrians: int) -> None:
+    assert _run(_traffic(cars, pedestrians), 1800) == 0
+
+
+@pytest.mark.slow
+def test_an_hour_of_dense_traffic_never_gridlocks() -> None:
+    traffic = _traffic(120, 200)
+    for _ in range(12):
+        before = traffic.fleet.rounds.sum()
+        _run(traffic, 300)
+        assert traffic.fleet.rounds.sum() - before > 30
+    # Taken out of a jam: fewer than one in ten of those that drove through.
+    assert traffic.fleet.rescued.sum() < 0.1 * traffic.fleet.rounds.sum()
+
+
+@dataclass
+class _Watched:
+    """What a run showed: seconds that each body stood at its longest, and the share of time it moved."""
+
+    longest: NDArray[np.float64]
+    moving: NDArray[np.float64]
+    overlaps: int
+
+
+def _watched(traffic: Traffic, seconds: int) -> _Watched:
+    """Standing = within a metre of where it was; looked at once a second."""
+    here = np.column_stack([traffic.shapes.x, traffic.shapes.y])
+    stood, longest, moved, overlaps = np.zeros(len(here)), np.zeros(len(here)), np.zeros(len(here)), 0
+    for _ in range(seconds):
+        overlaps += _run(traffic, 1)
+        now = np.column_stack([traffic.shapes.x, traffic.shapes.y])
+        away = np.linalg.norm(now - here, axis=1) > 1.0
+        here[away] = now[away]
+        stood = np.where(away, 0.0, stood + 1.0)
+        longest = np.maximum(longest, stood)
+        moved += np.hypot(traffic.shapes.vx, traffic.shapes.vy) > 0.1
+    return _Watched(longest, moved / seconds, overlaps)
+
+
+def test_everybody_gets_on_for_ten_minutes() -> None:
+    traffic = _traffic(30, 30)
+    seen = _watched(traffic, 600)
+    assert seen.longest.max() < 90.0
+    assert seen.moving[:30].mean() > 0.85
+    assert seen.moving[30:].mean() > 0.95
+    assert seen.overlaps == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_everybody_gets_on_for_an_hour(seed: int) -> None:
+    traffic = _traffic(30, 30, seed)
+    seen = _watched(traffic, 3600)
+    assert seen.longest.max() < 180.0
+    assert seen.moving[:30].mean() > 0.85
+    assert seen.moving[30:].mean() > 0.85
+    assert seen.overlaps == 0
+    assert traffic.fleet.rescued.sum() < 0.02 * traffic.fleet.rounds.sum()
+
+
+def test_two_people_who_meet_between_walls_do_not_stand_there() -> None:
+    traffic = _traffic(0, 2)
+    narrow = (traffic.walks.kind == SIDEWALK) & (traffic.walks.length > 30.0)
+    stretch = int(np.argmin(np.where(narrow, traffic.walks.room.sum(axis=1), np.inf)))
+    for i, (share, way) in enumerate([(0.4, 1), (0.6, -1)]):
+        offset = share * traffic.walks.length[stretch]
+        assert place_walker(traffic._paths, traffic.crowd, i, stretch, offset, way, traffic.shapes, i)
+    assert _watched(traffic, 120).longest.max() < 30.0
+
+
+def test_only_one_vehicle_is_granted_a_junction_at_a_time() -> None:
+    traffic = _traffic(60, 0)
+    zone = traffic.lanes.zone
+    for _ in range(1200):
+        traffic.advance(0.1, Bodies.none())
+        inside = [int(z) for z in zone[traffic.fleet.lane] if z >= 0]
+        assert len(inside) == len(set(inside))
+
+
+def test_cars_keep_moving() -> None:
+    traffic = _traffic(30, 30)
+    speeds = []
+    for _ in range(3000):
+        traffic.advance(0.1, Bodies.none())
+        speeds.append(traffic.fleet.speed.mean())
+    assert np.mean(speeds) > 2.5
+
+
+def test_a_car_stops_for_a_person_in_its_lane() -> None:
+    traffic = _traffic(1, 0)
+    lane = int(np.argmax(np.where((traffic.lanes.inside < 0) & ~traffic.lanes.buses_only, traffic.lanes.length, 0)))
+    traffic.fleet.lane[0], traffic.fleet.offset[0], traffic.fleet.speed[0] = lane, 12.0, 8.0
+    traffic.fleet.planned[0] = 0
+    x, y, _ = traffic.lanes.at(lane, 12.0)
+    traffic.shapes.x[0], traffic.shapes.y[0] = x, y
+    person = _person(*traffic.lanes.at(lane, 60.0)[:2])
+    assert _run(traffic, 30, person) == 0
+    assert traffic.fleet.speed[0] < 0.1
+    gap = 60.0 - 0.25 - traffic.fleet.offset[0]
+    assert 0.5 < gap < 4.0
+
+
+def test_pedestrians_stay_out_of_buildings_and_within_reach_of_their_way() -> None:
+    import shapely
+
+    traffic = _traffic(0, 60)
+    _run(traffic, 300)
+    people = shapely.points(traffic.walkers.position[:, :2])
+    assert not len(shapely.STRtree(road_city().solids).query(people, predicate="within")[0])
+    ways = shapely.union_all([shapely.LineString(traffic.walks.line(i)) for i in range(len(traffic.walks))])
+    assert shapely.distance(people, ways).max() < 2.5
+
+
+def test_pedestrians_walk_about_as_fast_as_people() -> None:
+    traffic = _traffic(0, 60)
+    _run(traffic, 300)
+    _, walked = traffic.gait
+    assert 0.8 < np.median(walked) / 300 < 1.5
+
+
+def test_the_same_seed_gives_the_same_state() -> None:
+    states = []
+    for _ in range(2):
+        traffic = _traffic()
+        for _ in range(600):
+            traffic.advance(0.1, Bodies.none())
+        states.append(traffic.arrays())
+    assert all(np.array_equal(states[0][k], states[1][k]) for k in states[0])
+
+
+def test_another_seed_gives_another_state() -> None:
+    a, b = _traffic(seed=1), _traffic(seed=2)
+    assert not np.array_equal(a.arrays()["fleet.lane"], b.arrays()["fleet.lane"])
+
+
+def test_going_on_from_a_saved_state_equals_never_having_stopped() -> None:
+    traffic = _traffic()
+    for _ in range(300):
+        traffic.advance(0.1, Bodies.none())
+    saved = traffic.arrays()
+    for _ in range(300):
+        traffic.advance(0.1, Bodies.none())
+    other = _traffic()
+    other.restore(saved)
+    for _ in range(300):
+        other.advance(0.1, Bodies.none())
+    there, here = traffic.arrays(), other.arrays()
+    assert all(np.array_equal(there[k], here[k]) for k in there)
+
+
+def test_more_cars_than_streets_hold_are_refused() -> None:
+    with pytest.raises(InputError, match="--cars"):
+        _traffic(cars=4000, pedestrians=0)
+
+
+def test_what_is_drawn_are_known_prototypes_at_the_bodies() -> None:
+    traffic = _traffic()
+    drawn = traffic.draw()
+    assert set(drawn.prototypes) <= set(traffic.prototypes())
+    assert np.allclose(drawn.transforms[:, :3, 3], traffic.bodies().position[: len(drawn.index)], atol=1e-3)

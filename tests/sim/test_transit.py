@@ -1,0 +1,155 @@
+"""Buses and bicycles in central Helsinki: timetable, boarding, prices."""
+
+import numpy as np
+import pytest
+
+from road_city import HALF, road_city
+from vico.errors import InputError
+from vico.sim.bodies import Bodies
+from vico.sim.traffic import Traffic
+from vico.sim.transit import DWELL, FARE, TransitSystem, ride_price, traffic_and_transit
+from vico.world.heights import HeightField
+
+
+def _systems(cars: int = 20, pedestrians: int = 20) -> tuple[Traffic, TransitSystem]:
+    city = road_city()
+    return traffic_and_transit(
+        city.lanes,
+        city.transit,
+        HeightField.flat(HALF),
+        cars=cars,
+        pedestrians=pedestrians,
+        seed=3,
+        first_entity=1_000_000,
+        first_bike=1_100_000,
+        second=8 * 3600.0,
+        solids=city.solids,
+    )
+
+
+def _advance(traffic: Traffic, transit: TransitSystem) -> None:
+    traffic.advance(0.1, transit.bodies())
+    transit.advance(0.1, traffic.bodies())
+
+
+def test_a_bus_serves_every_stop_of_its_line_in_order() -> None:
+    traffic, transit = _systems()
+    served: list[str] = []
+    for _ in range(15_000):
+        _advance(traffic, transit)
+        stop = transit.stopped_at(0)
+        if stop and (not served or served[-1] != stop):
+            served.append(stop)
+    order = transit.line_of(0).stops
+    first = order.index(served[0])
+    assert len(served) >= len(order)
+    assert served == [order[(first + k) % len(order)] for k in range(len(served))]
+
+
+def test_buses_come_to_their_first_stop_within_two_minutes_of_the_timetable() -> None:
+    traffic, transit = _systems(30, 30)
+    late, was = [], [True] * traffic.buses
+    for _ in range(15_000):
+        _advance(traffic, transit)
+        for bus in range(traffic.buses):
+            there = transit.stopped_at(bus) == transit.line_of(bus).stops[0]
+            if there and not was[bus]:
+                late.append(transit.clock[0] - transit.begun[bus] - transit.line_of(bus).travel[-1])
+            was[bus] = there
+    assert late
+    assert max(map(abs, late)) < 120.0
+
+
+def test_a_bus_stands_thirty_seconds_at_a_stop() -> None:
+    traffic, transit = _systems(0, 0)
+    stood, last = [], 0
+    for step in range(9_000):
+        _advance(traffic, transit)
+        at = transit.stopped_at(0)
+        if at and at != transit.line_of(0).stops[0]:
+            last += 1
+        elif last:
+            stood.append((step, last))
+            last = 0
+    # The first one counted was under way when the run began.
+    assert stood[1:]
+    assert all(abs(steps / 10 - DWELL) < 0.3 for _, steps in stood[1:])
+
+
+def test_a_stopped_bus_can_be_boarded_from_the_place_to_wait() -> None:
+    _, transit = _systems()
+    waits = {stop.id: stop.wait for stop in transit.transit.stops}
+    stop = transit.stopped_at(0)
+    assert stop is not None
+    assert transit.bus_at(waits[stop]) == 0
+    assert transit.board(0) == FARE
+    assert transit.aboard[0] == 1
+
+
+def test_a_bus_out_of_reach_is_not_found() -> None:
+    _, transit = _systems()
+    assert transit.bus_at(transit.doors(0)[0] + (40.0, 40.0)) is None
+
+
+def test_a_moving_bus_can_be_neither_boarded_nor_left() -> None:
+    traffic, transit = _systems(0, 0)
+    while transit.stopped_at(0):
+        _advance(traffic, transit)
+    with pytest.raises(InputError, match="not at a stop"):
+        transit.board(0)
+    with pytest.raises(InputError, match="moving"):
+        transit.alight(0)
+
+
+def test_a_ride_costs_by_the_started_minute_and_more_when_left_astray() -> None:
+    assert ride_price(1.0, returned=True) == pytest.approx(0.2)
+    assert ride_price(60.0, returned=True) == pytest.approx(0.2)
+    assert ride_price(61.0, returned=True) == pytest.approx(0.4)
+    assert ride_price(61.0, returned=False) == pytest.approx(20.4)
+
+
+def test_a_bicycle_taken_and_brought_back_is_in_the_station_again() -> None:
+    _, transit = _systems(0, 0)
+    before = transit.free_bikes()
+    bike = transit.bike_at(transit.transit.bike_stations[0].position)
+    assert bike is not None
+    transit.mount(bike, 0)
+    assert transit.free_bikes().sum() == before.sum() - 1
+    transit.carry(bike, *transit.transit.bike_stations[0].position[:2], 0.0)
+    assert transit.dismount(bike) < 1.0
+    assert np.array_equal(transit.free_bikes(), before)
+
+
+def test_a_bicycle_left_astray_stays_there_as_a_body() -> None:
+    _, transit = _systems(0, 0)
+    bike = transit.bike_at(transit.transit.bike_stations[0].position)
+    assert bike is not None
+    transit.mount(bike, 0)
+    transit.carry(bike, 3.0, 4.0, 0.5)
+    assert transit.dismount(bike) > 20.0
+    assert transit.bodies().position[:, :2].tolist() == [[3.0, 4.0]]
+
+
+def test_transit_goes_on_from_a_saved_state_as_if_never_stopped() -> None:
+    traffic, transit = _systems()
+    for _ in range(400):
+        _advance(traffic, transit)
+    saved = traffic.arrays(), transit.arrays()
+    other_traffic, other = _systems()
+    other_traffic.restore(saved[0])
+    other.restore(saved[1])
+    for _ in range(400):
+        _advance(traffic, transit)
+        _advance(other_traffic, other)
+    for a, b in ((traffic, other_traffic), (transit, other)):
+        here, there = a.arrays(), b.arrays()
+        assert all(np.array_equal(here[k], there[k]) for k in here)
+
+
+def test_buses_and_bicycles_overlap_nobody() -> None:
+    traffic, transit = _systems()
+    overlaps = 0
+    for _ in range(3000):
+        _advance(traffic, transit)
+        overlaps += traffic.overlaps(Bodies.joined([transit.bodies()]))
+    assert overlaps == 0
