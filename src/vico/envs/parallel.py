@@ -1,0 +1,238 @@
+"""The simulation as a PettingZoo `ParallelEnv`: residents, assistants and robots act at once, a second at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+from pettingzoo import ParallelEnv
+
+from vico.community import read_community
+from vico.community.model import Community
+from vico.envs.spaces import action_space, observation_space, robot_space, short_form
+from vico.errors import InputError
+from vico.sim.config import SimConfig, seconds_of_day
+from vico.sim.events import Event
+from vico.sim.simulation import Simulation, Trouble
+from vico.world.folder import World, read_world
+from vico.world.public import PublicMap
+from vico.world.seeds import rng
+
+Setup = Callable[[Simulation], None]
+
+
+class CommunityEnv(ParallelEnv):  # type: ignore[misc]
+    """A community in a world.
+
+    Agents are called ``resident_0``, ``assistant_0``, ``robot_0`` and so on. Observations and actions are described
+    in `vico.envs.spaces`. There is no reward of its own (0 for everybody): tasks judge the state. An episode ends,
+    truncated, after `max_steps` steps.
+
+    Parameters
+    ----------
+    world, community
+        What to simulate.
+    config
+        See `SimConfig`; `reset(seed=...)` replaces its seed.
+    max_steps
+        Length of an episode, steps of one second.
+    setup
+        Called with the fresh simulation at each reset: to add objects and place agents.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "name": "vico/community-v0", "is_parallelizable": True}  # noqa: RUF012
+    render_mode = "rgb_array"
+
+    def __init__(
+        self,
+        world: World,
+        community: Community | None = None,
+        config: SimConfig | None = None,
+        *,
+        max_steps: int = 1500,
+        setup: Setup | None = None,
+    ) -> None:
+        if max_steps < 1:
+            raise InputError(f"env: max_steps is {max_steps}; it has to be 1 or more")
+        self.world = world
+        self.community = community
+        self.config = config or SimConfig()
+        self.max_steps = max_steps
+        self.public_map = PublicMap.from_world(world)
+        self.events: list[Event] = []
+        self._setup = setup
+        self._episode = 0
+        self._places = [place.id for place in world.places]
+        # Made at once, so that the agents and their spaces are known before the first reset.
+        self._simulation: Simulation | None = self._fresh(self.config.seed)
+        self._views: dict[str, Any] = {}
+        self.possible_agents: list[str] = list(self.sim.agents)
+        self.agents: list[str] = []
+        seeing = {self.possible_agents[i] for i in self.sim.seeing}
+        self._observation_spaces = {
+            name: observation_space(self.config.image if name in seeing else None) for name in self.possible_agents
+        }
+        people = self.sim.stage.people.names
+        robots = self.sim.stage.robots
+        self._action_spaces: dict[str, spaces.Dict] = {
+            name: action_space(len(self._places), len(people), world.half) for name in people
+        }
+        if robots is not None:
+            self._action_spaces |= {name: robot_space(robots.control_size(k)) for k, name in enumerate(robots.names)}
+
+    @property
+    def sim(self) -> Simulation:
+        """The simulation under way; for evaluators, not for agents."""
+        if self._simulation is None:
+            raise InputError("env: closed; make a new one with vico.make")
+        return self._simulation
+
+    def observation_space(self, agent: str) -> spaces.Dict:
+        """Space of an agent's observations; the same object each time."""
+        return self._observation_spaces[self._known(agent)]
+
+    def action_space(self, agent: str) -> spaces.Dict:
+        """Space of an agent's actions; the same object each time."""
+        return self._action_spaces[self._known(agent)]
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
+        """Start an episode.
+
+        Parameters
+        ----------
+        seed
+            Decides the episode. Without one, the first episode takes the configuration's, and later ones follow
+            from it.
+        options
+            Not used.
+        """
+        if seed is not None:
+            self.config, self._episode = replace(self.config, seed=seed), 0
+        number = self._episode
+        self._episode += 1
+        drawn = self.config.seed if number == 0 else int(rng(self.config.seed, "episode", number).integers(2**31))
+        unused = self.sim.metrics.steps == 0 and self.sim.config.seed == drawn and not self.agents
+        if not unused:
+            self._simulation = self._fresh(drawn)
+        self.agents = list(self.possible_agents)
+        self.events = []
+        observations, infos = self.sim.observe()
+        self._views = observations
+        return observations, infos
+
+    def step(
+        self, actions: Mapping[str, Any], troubles: Mapping[str, Trouble] | None = None
+    ) -> tuple[
+        dict[str, dict[str, Any]], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
+    ]:
+        """Let one second pass; who has no action waits, bad actions are refused with a reason.
+
+        `infos` hold ``entities`` (kind and name of what is in view) and ``hash`` (of the whole state).
+        """
+        if not self.agents:
+            raise InputError("env: the episode is over (or has not begun); call reset() before step()")
+        short = {
+            name: short_form(action, self._places, self.sim.stage.people.names) for name, action in actions.items()
+        }
+        result = self.sim.step(short, troubles)
+        over = self.sim.metrics.steps >= self.max_steps
+        names = self.agents
+        if over:
+            self.agents = []
+        self.events = result.events
+        self._views = result.observations
+        infos = {name: {**result.infos[name], "hash": result.hash} for name in names}
+        return (
+            {name: result.observations[name] for name in names},
+            dict.fromkeys(names, 0.0),
+            dict.fromkeys(names, False),
+            dict.fromkeys(names, over),
+            infos,
+        )
+
+    def render(self) -> NDArray[np.uint8]:
+        """What the seeing agents see, side by side, uint8, shape ``(image, k * image, 3)``."""
+        pictures = [view["rgb"] for view in self._views.values() if "rgb" in view]
+        if not pictures:
+            raise InputError("env: nobody's views are rendered; make the env with observe='all', and reset it")
+        return np.concatenate(pictures, axis=1)
+
+    def state_hash(self) -> str:
+        """Hash of the whole state."""
+        return self.sim.state_hash()
+
+    def close(self) -> None:
+        """Let go of the simulation."""
+        self._simulation = None
+        self.agents = []
+
+    def _fresh(self, seed: int) -> Simulation:
+        previous = getattr(self, "_simulation", None)
+        eyes = previous.made_eyes if previous is not None else None
+        simulation = Simulation(self.world, self.community, replace(self.config, seed=seed), eyes=eyes)
+        if self._setup is not None:
+            self._setup(simulation)
+        return simulation
+
+    def _known(self, agent: str) -> str:
+        if agent not in self._action_spaces:
+            raise InputError(f"env: no agent is called {agent!r}; there are {', '.join(self.possible_agents)}")
+        return agent
+
+
+def make(
+    world: World | Path | str,
+    community: Community | Path | str | None = None,
+    *,
+    seed: int = 0,
+    start: str = "08:00",
+    residents: int | None = None,
+    assistants: int = 0,
+    robots: tuple[str, ...] = (),
+    cars: int = 0,
+    pedestrians: int = 0,
+    transit: bool = True,
+    observe: str | tuple[str, ...] = "all",
+    image: int = 256,
+    max_steps: int = 1500,
+    setup: Setup | None = None,
+) -> CommunityEnv:
+    """Make an environment from a world and a community, or from their folders.
+
+    Parameters
+    ----------
+    start
+        Time of day, ``HH:MM`` or ``HH:MM:SS``.
+    observe
+        Whose views are rendered: ``"all"``, ``"none"``, or names.
+    setup
+        Called with the fresh `Simulation` at each reset.
+
+    Raises
+    ------
+    InputError
+        If the community belongs to another world, or a name or number is not usable.
+    """
+    place = world if isinstance(world, World) else read_world(Path(world))
+    people = community if community is None or isinstance(community, Community) else read_community(Path(community))
+    seeing = {"all": None, "none": ()}.get(observe, (observe,)) if isinstance(observe, str) else tuple(observe)
+    config = SimConfig(
+        seed=seed,
+        start=seconds_of_day(start),
+        residents=residents,
+        assistants=assistants,
+        robots=tuple(robots),
+        cars=cars,
+        pedestrians=pedestrians,
+        transit=transit,
+        observe=seeing,
+        image=image,
+    )
+    return CommunityEnv(place, people, config, max_steps=max_steps, setup=setup)

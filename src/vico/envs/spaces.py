@@ -1,0 +1,240 @@
+"""Spaces: what an observation looks like, and actions as plain numbers for learners.
+
+Actions may be given in two forms. The short one names the action and its fields, as in
+``{"type": "move_forward", "distance": 1.0}`` (see `vico.sim.actions.FIELDS`). The other is an element of
+`action_space`: ``type`` is the action's number in `vico.sim.actions.ACTIONS`, and every field is there, whether the
+action uses it or not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from vico.sim.actions import ACTIONS, EARSHOT, LONGEST_TEXT
+from vico.sim.avatars import RUN_SPEED
+
+#: `amount` counts in these: metres to move, degrees to turn, metres to be heard.
+FULL_TURN = 180.0
+#: `control` is for robots only.
+AVATAR_ACTIONS = tuple(kind for kind in ACTIONS if kind != "control")
+_PHRASES = ("Hello!", "Good morning.", "Excuse me.", "Thank you.", "See you later.", "Do you need help?")
+
+
+class TextSpace(spaces.Space[str]):
+    """Text in any script, up to a length; samples are everyday phrases."""
+
+    def __init__(self, longest: int, *, seed: int | None = None) -> None:
+        super().__init__(dtype=str, seed=seed)
+        self.longest = longest
+
+    def sample(self, mask: Any = None, probability: Any = None) -> str:
+        """Return one of a few phrases."""
+        return _PHRASES[int(self.np_random.integers(len(_PHRASES)))]
+
+    def contains(self, x: Any) -> bool:
+        """Whether `x` is text that is not too long."""
+        return isinstance(x, str) and len(x) <= self.longest
+
+    @property
+    def is_np_flattenable(self) -> bool:
+        """Text does not flatten to numbers."""
+        return False
+
+    def __repr__(self) -> str:
+        return f"TextSpace({self.longest})"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, TextSpace) and other.longest == self.longest
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+class ListSpace(spaces.Space[list[Any]]):
+    """Lists of any length whose elements belong to one space; samples hold up to three."""
+
+    def __init__(self, element: spaces.Space[Any], *, seed: int | None = None) -> None:
+        super().__init__(seed=seed)
+        self.element = element
+
+    def sample(self, mask: Any = None, probability: Any = None) -> list[Any]:
+        """Return up to three samples of the element's space."""
+        return [self.element.sample() for _ in range(int(self.np_random.integers(4)))]
+
+    def contains(self, x: Any) -> bool:
+        """Whether `x` is a list of elements of the space."""
+        return isinstance(x, list) and all(self.element.contains(part) for part in x)
+
+    @property
+    def is_np_flattenable(self) -> bool:
+        """Lists of any length do not flatten."""
+        return False
+
+    def __repr__(self) -> str:
+        return f"ListSpace({self.element})"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ListSpace) and other.element == self.element
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+class NumberSpace(spaces.Space[float]):
+    """A plain Python number within bounds."""
+
+    def __init__(self, low: float, high: float, *, whole: bool = False, seed: int | None = None) -> None:
+        super().__init__(seed=seed)
+        self.low, self.high, self.whole = low, high, whole
+
+    def sample(self, mask: Any = None, probability: Any = None) -> float:
+        """Return a number, uniform between the bounds (or within a thousand of the lower one, where it is far)."""
+        value = float(self.np_random.uniform(self.low, min(self.high, self.low + 1000.0)))
+        return int(value) if self.whole else value
+
+    def contains(self, x: Any) -> bool:
+        """Whether `x` is a number within the bounds."""
+        good = isinstance(x, int) if self.whole else isinstance(x, (int, float))
+        return good and not isinstance(x, bool) and self.low <= x <= self.high
+
+    @property
+    def is_np_flattenable(self) -> bool:
+        """These stay plain numbers."""
+        return False
+
+    def __repr__(self) -> str:
+        return f"NumberSpace({self.low}, {self.high})"
+
+    def __eq__(self, other: object) -> bool:
+        mine = (self.low, self.high, self.whole)
+        return isinstance(other, NumberSpace) and (other.low, other.high, other.whole) == mine
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def _number(low: float, high: float, *shape: int, dtype: Any = np.float64) -> spaces.Box:
+    return spaces.Box(low, high, shape, dtype)
+
+
+def observation_space(image: int | None) -> spaces.Dict:
+    """The space of an agent's observations; without pictures where `image` (their side, pixels) is None."""
+    far, entity = 1e7, 2**31 - 1
+    point = ListSpace(NumberSpace(-far, far))
+    message = spaces.Dict(
+        {
+            "time": NumberSpace(0.0, far),
+            "speaker": TextSpace(64),
+            "text": TextSpace(LONGEST_TEXT),
+            "position": point,
+        }
+    )
+    state = spaces.Dict(
+        {
+            "time": NumberSpace(0.0, far),
+            "cash": NumberSpace(-far, far),
+            "held": ListSpace(NumberSpace(0, entity, whole=True)),
+            "vehicle": TextSpace(16),
+            "building": TextSpace(64),
+            "room": TextSpace(64),
+            "place": TextSpace(64),
+            "accessible_places": ListSpace(TextSpace(64)),
+            "doors": ListSpace(spaces.Dict({"to": TextSpace(64), "position": point})),
+            "posture": TextSpace(16),
+            "action_status": TextSpace(16),
+            "action_reason": TextSpace(1000),
+        }
+    )
+    parts: dict[str, spaces.Space[Any]] = {
+        "pose": _number(-far, far, 6),
+        "events": ListSpace(message),
+        "state": state,
+    }
+    if image is not None:
+        parts |= {
+            "rgb": spaces.Box(0, 255, (image, image, 3), np.uint8),
+            "depth": _number(0.0, np.inf, image, image, dtype=np.float32),
+            "segmentation": spaces.Box(0, entity, (image, image), np.int32),
+            "extrinsics": _number(-np.inf, np.inf, 4, 4),
+            "intrinsics": _number(-np.inf, np.inf, 3, 3),
+        }
+    return spaces.Dict(parts)
+
+
+def action_space(places: int, people: int, half: float) -> spaces.Dict:
+    """The space of an avatar's actions: the number of the action, and every field an action may have.
+
+    Parameters
+    ----------
+    places, people
+        How many there are: `place` and `agent` are indices.
+    half
+        Half the side of the world, metres: bounds `target`.
+    """
+    return spaces.Dict(
+        {
+            "type": spaces.Discrete(len(AVATAR_ACTIONS)),
+            "amount": _number(0.0, 1.0, dtype=np.float32),
+            "target": _number(-half, half, 3, dtype=np.float32),
+            "hand": spaces.Discrete(2),
+            "entity": spaces.Discrete(2**31 - 1),
+            "agent": spaces.Discrete(max(1, people)),
+            "place": spaces.Discrete(max(1, places)),
+            "index": spaces.Discrete(64),
+            "text": TextSpace(LONGEST_TEXT),
+        }
+    )
+
+
+def robot_space(size: int) -> spaces.Dict:
+    """The space of a robot's actions: its control vector, each number -1..1."""
+    return spaces.Dict({"vector": _number(-1.0, 1.0, size, dtype=np.float32)})
+
+
+def short_form(action: Any, places: Sequence[str], people: Sequence[str]) -> Any:
+    """Translate an element of `action_space` into the short form; anything else is passed on as it is.
+
+    `amount` is a share: of 2.5 m for a move, of 180 degrees for a turn, of 10 m for a message.
+    """
+    if not isinstance(action, Mapping):
+        return action
+    if "type" not in action:
+        vector = action.get("vector")
+        return {"type": "control", "vector": vector} if vector is not None else action
+    if isinstance(action["type"], str):
+        return action
+    try:
+        kind = AVATAR_ACTIONS[int(action["type"])]
+        return {"type": kind} | _FIELDS.get(kind, _no_fields)(action, places, people)
+    except (KeyError, IndexError, TypeError, ValueError):
+        # It is refused where all actions are judged, with the reason.
+        return action
+
+
+def _no_fields(action: Mapping[str, Any], places: Sequence[str], people: Sequence[str]) -> dict[str, Any]:
+    return {}
+
+
+def _amount(action: Mapping[str, Any]) -> float:
+    return float(np.asarray(action["amount"], np.float64).reshape(-1)[0])
+
+
+def _point(action: Mapping[str, Any]) -> list[float]:
+    target: NDArray[np.float64] = np.asarray(action["target"], np.float64)
+    return [float(value) for value in target]
+
+
+_FIELDS = {
+    "move_forward": lambda a, places, people: {"distance": _amount(a) * RUN_SPEED},
+    "turn_left": lambda a, places, people: {"degrees": _amount(a) * FULL_TURN},
+    "turn_right": lambda a, places, people: {"degrees": _amount(a) * FULL_TURN},
+    "look_at": lambda a, places, people: {"target": _point(a)},
+    "pick": lambda a, places, people: {"hand": int(a["hand"]), "object": int(a["entity"])},
+    "put": lambda a, places, people: {"hand": int(a["hand"])},
+    "hand_over": lambda a, places, people: {"hand": int(a["hand"]), "agent": people[int(a["agent"])]},
+    "enter": lambda a, places, people: {"place": places[int(a["place"])]},
+    "communicate": lambda a, places, people: {"text": a["text"], "range": max(0.1, _amount(a) * EARSHOT)},
+    "task_complete": lambda a, places, people: {"index": int(a["index"])},
+}
