@@ -1,0 +1,46 @@
+"""Planners for the community assistant tasks, over one set of skills."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from vico.agents.assistant.heuristic import HeuristicDelivery
+from vico.agents.assistant.random_planner import RandomPlanner
+from vico.errors import InputError
+from vico.world.public import PublicMap
+
+
+class Planner(Protocol):
+    """Turns what an assistant observes into its next action."""
+
+    def act(self, observation: Mapping[str, Any], info: Mapping[str, Any]) -> dict[str, Any]:
+        """Return one action for one observation."""
+
+
+METHODS: dict[str, type[HeuristicDelivery] | type[RandomPlanner]] = {
+    "random": RandomPlanner,
+    "heuristic": HeuristicDelivery,
+}
+
+
+def make_planner(
+    method: str, instructions: list[dict[str, Any]], public_map: PublicMap, *, seed: int, number: int = 0, of: int = 1
+) -> Planner:
+    """Make a planner by name.
+
+    Parameters
+    ----------
+    instructions
+        What the task tells the assistants (`Task.instructions`).
+    number, of
+        Which of how many assistants this one is.
+
+    Raises
+    ------
+    InputError
+        If there is no such method.
+    """
+    if method not in METHODS:
+        raise InputError(f"no method called {method!r}; there are {', '.join(sorted(METHODS))}")
+    return METHODS[method](instructions, public_map, seed=seed, number=number, of=of)

@@ -1,0 +1,305 @@
+"""What every assistant can do: go somewhere, look around, walk up to a thing, leave a building.
+
+A skill is asked once a step for an action, and answers None when it is done. Skills see what the agent observes and
+the public map, nothing else.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vico.agents.perception import DepthGrid, Sighting, sightings
+from vico.agents.wayfinding import Walker
+from vico.world.public import PublicMap
+
+Action = dict[str, Any]
+
+WALK = 1.0  # metres a step
+OUTSIDE = "outside"  # where a door leads that leads into no other room
+ENTER_REACH = 1.8
+DOOR_REACH = 1.5
+INNER_DOOR_REACH = 0.8
+GRASP = 1.15  # metres from a thing at which one stops to pick it up; arms reach 1.5
+
+
+@dataclass(frozen=True)
+class View:
+    """One observation with its info, under short names."""
+
+    observation: Mapping[str, Any]
+    entities: Mapping[int, Mapping[str, str]]
+
+    @cached_property
+    def pose(self) -> NDArray[np.float64]:
+        """Position and unit facing vector, shape ``(6,)``."""
+        return np.asarray(self.observation["pose"], np.float64)
+
+    @property
+    def state(self) -> Mapping[str, Any]:
+        """The part of the observation that is not an image."""
+        state: Mapping[str, Any] = self.observation["state"]
+        return state
+
+    @property
+    def room(self) -> str | None:
+        """Id of the room one is in; None outdoors."""
+        return self.state["room"] or None
+
+    @property
+    def place(self) -> str | None:
+        """Id of the place one is in; None outdoors."""
+        return self.state["place"] or None
+
+    @property
+    def held(self) -> list[int]:
+        """Entities in the hands, 0 where one is free."""
+        return [int(entity or 0) for entity in self.state["held"]]
+
+    @property
+    def collided(self) -> bool:
+        """Whether the last motion was stopped by something."""
+        return str(self.state["action_status"]) == "collision"
+
+    @property
+    def refused(self) -> bool:
+        """Whether the last action was refused."""
+        return str(self.state["action_status"]) == "refused"
+
+    @cached_property
+    def things(self) -> list[Sighting]:
+        """Named things in view, nearest first."""
+        return sightings(self.observation, self.entities)
+
+    def away(self, point: ArrayLike) -> float:
+        """Metres to a point, over the ground."""
+        x, y = np.asarray(point, np.float64)[:2] - self.pose[:2]
+        return math.hypot(x, y)
+
+
+class Body:
+    """The skills of one assistant, with what it remembers of rooms.
+
+    Parameters
+    ----------
+    public_map
+        What it knows of the world.
+    generator
+        Decides how it gets out of others' way.
+    """
+
+    def __init__(self, public_map: PublicMap, generator: np.random.Generator) -> None:
+        self.map = public_map
+        self._walker = Walker(public_map, generator)
+        self._grids: dict[str, DepthGrid] = {}
+        self._trail: list[str] = []
+        self._tries = 0
+
+    def notice(self, view: View) -> None:
+        """Take in a new observation: the room's depth, and the way one came."""
+        room = view.room
+        if room is None:
+            self._trail.clear()
+            return
+        if room in self._trail:
+            del self._trail[self._trail.index(room) + 1 :]
+        else:
+            self._trail.append(room)
+        grid = self._grid(view)
+        carried = [entity for entity in view.held if entity]
+        goods = [thing.entity for thing in view.things if thing.kind == "object"]
+        grid.see(view.observation, floor=float(view.pose[2]), ignore=carried + goods)
+        if view.collided:
+            grid.bump(view.pose[:2] + view.pose[3:5] * 0.45)
+
+    def _grid(self, view: View) -> DepthGrid:
+        room = str(view.room)
+        if room not in self._grids:
+            self._grids[room] = DepthGrid(view.pose[:2])
+        return self._grids[room]
+
+    def go_to(self, view: View, region: Mapping[str, Any]) -> Action | None:
+        """Go to a region of a task: into the place, or to the middle of the spot outdoors."""
+        if region["kind"] == "place":
+            return self.go_inside(view, str(region["place"]))
+        if view.room is not None:
+            return self.leave(view)
+        return self.walk_to(view, region["centre"], near=1.0)
+
+    def go_inside(self, view: View, place_id: str) -> Action | None:
+        """Go into a place by its entrance."""
+        if view.place == place_id:
+            return None
+        if view.room is not None:
+            return self.leave(view)
+        place = self.map.place_by_id[place_id]
+        door = place.entrance or place.position
+        at_door = view.away(door) <= ENTER_REACH
+        if at_door and not (view.refused and self._tries > 3):
+            self._tries = self._tries + 1 if view.refused else 1
+            return {"type": "enter", "place": place_id}
+        self._tries = 0
+        return self.walk_to(view, place.position, near=0.3) or {"type": "wait"}
+
+    def leave(self, view: View) -> Action | None:
+        """Leave the building, room by room, the way one came."""
+        doors: Sequence[Mapping[str, Any]] = view.state["doors"]
+        out = next((door for door in doors if door["to"] == OUTSIDE), None)
+        if out is not None:
+            step = self.walk_indoors(view, out["position"], near=DOOR_REACH)
+            return step or {"type": "exit"}
+        back = self._trail[-2] if len(self._trail) > 1 else str(doors[0]["to"])
+        return self.go_through(view, back)
+
+    def go_through(self, view: View, room: str) -> Action | None:
+        """Go through the door to a neighbouring room; None once there."""
+        if view.room == room:
+            return None
+        door = next((door for door in view.state["doors"] if door["to"] == room), None)
+        if door is None:
+            return None
+        step = self.walk_indoors(view, door["position"], near=INNER_DOOR_REACH)
+        return step or {"type": "enter", "place": room}
+
+    def walk_indoors(self, view: View, target: ArrayLike, *, near: float) -> Action | None:
+        """Walk within a room around what depth images showed; None once within `near` metres of the target."""
+        if view.away(target) <= near:
+            return None
+        route = self._grid(view).route(view.pose[:2], target, near=near * 0.9)
+        if not len(route):  # nothing known to be in the way of trying
+            route = np.asarray(target, np.float64)[None, :2]
+        # As far along the route as one straight step of at most a metre follows it.
+        aim = route[0]
+        for point in route[1:]:
+            if view.away(point) > 1.0 or _bends(view.pose[:2], route, point):
+                break
+            aim = point
+        turn = turn_to(view.pose, aim)
+        if abs(turn) > math.radians(8.0):
+            return turn_action(turn)
+        return {"type": "move_forward", "distance": max(min(1.0, view.away(aim)), 0.1)}
+
+    def approach(self, view: View, position: ArrayLike, *, near: float) -> Action | None:
+        """Walk up to a point, indoors or out; None once within `near` metres."""
+        if view.away(position) <= near:
+            return None
+        if view.room is not None:
+            return self.walk_indoors(view, position, near=near)
+        return self.walk_to(view, position, near=near)
+
+    def walk_to(self, view: View, point: ArrayLike, *, near: float) -> Action | None:
+        """Walk outdoors on the public map; None once within `near` metres, or where no way leads nearer."""
+        if view.away(point) <= near:
+            self._walker.stop()
+            return None
+        x, y = (float(value) for value in np.asarray(point, np.float64)[:2])
+        return self._walker.towards((x, y), WALK, dict(view.observation), {"entities": view.entities})
+
+
+def turn_to(pose: NDArray[np.float64], target: ArrayLike) -> float:
+    """Radians to turn, counter-clockwise positive, to face a point."""
+    x, y = np.asarray(target, np.float64)[:2] - pose[:2]
+    return math.remainder(math.atan2(y, x) - math.atan2(pose[4], pose[3]), 2 * math.pi)
+
+
+def turn_action(radians: float) -> Action:
+    """The action that turns by an angle, counter-clockwise positive."""
+    return {"type": "turn_left" if radians >= 0 else "turn_right", "degrees": abs(math.degrees(radians))}
+
+
+def _bends(start: NDArray[np.float64], route: NDArray[np.float64], end: NDArray[np.float64]) -> bool:
+    """Whether the points before `end` leave the straight line from start to it by more than a hand's breadth."""
+    way = end - start
+    length = math.hypot(*way)
+    for point in route:
+        if np.array_equal(point, end):
+            return False
+        across = abs(way[0] * (point[1] - start[1]) - way[1] * (point[0] - start[0])) / max(length, 1e-9)
+        if across > 0.12:
+            return True
+    return False
+
+
+class LookAround:
+    """Search: turn about at one spot after the other, indoors in one room after the other.
+
+    Parameters
+    ----------
+    wanted
+        Tells whether a sighting is what is looked for.
+    region
+        Where to look; None for wherever one is.
+    """
+
+    def __init__(self, body: Body, wanted: Callable[[Sighting], bool], region: Mapping[str, Any] | None) -> None:
+        self.body = body
+        self.wanted = wanted
+        self.turns = 0
+        self.found: Sighting | None = None
+        self._spots: list[NDArray[np.float64]] = []
+        self._rooms_done: set[str] = set()
+        self._walked = 0
+        if region is not None and region["kind"] == "outdoor":
+            middle = np.asarray(region["centre"], np.float64)[:2]
+            reach = 0.6 * max(float(region["radius"]), 3.0)
+            ring = [middle + reach * np.array([math.cos(a), math.sin(a)]) for a in (0.0, 1.57, 3.14, 4.71)]
+            self._spots = [spot for spot in ring if body.map.walkable.is_connected(spot)]
+
+    def act(self, view: View) -> Action | None:
+        """Return the next action; None when something was found (see `found`) or everything was looked at."""
+        self.found = next((thing for thing in view.things if self.wanted(thing)), None)
+        if self.found is not None:
+            return None
+        if self.turns < 4:
+            self.turns += 1
+            return {"type": "turn_left", "degrees": 85.0}
+        return self._elsewhere(view)
+
+    def _elsewhere(self, view: View) -> Action | None:
+        if view.room is None:
+            while self._spots:
+                step = self.body.approach(view, self._spots[0], near=1.0)
+                self._walked += 1
+                if step is not None and self._walked < 20:
+                    return step
+                self._spots.pop(0)
+                self._walked = 0
+                self.turns = 1
+                return {"type": "turn_left", "degrees": 85.0}
+            return None
+        if view.room not in self._rooms_done:
+            middle = self._room_middle(view)
+            self._walked += 1
+            step = self.body.walk_indoors(view, middle, near=0.8) if self._walked < 12 else None
+            if step is not None:
+                return step
+            self._rooms_done.add(view.room)
+            self._walked = 0
+            self.turns = 1
+            return {"type": "turn_left", "degrees": 85.0}
+        doors = [str(door["to"]) for door in view.state["doors"]]
+        onward = [room for room in doors if room != OUTSIDE and room not in self._rooms_done]
+        if not onward:
+            return None
+        step = self.body.go_through(view, onward[0])
+        if step is not None and step["type"] == "enter":
+            self.turns = 0
+        self._walked += 1
+        if self._walked > 40:
+            self._rooms_done.add(onward[0])
+            self._walked = 0
+        return step
+
+    @staticmethod
+    def _room_middle(view: View) -> NDArray[np.float64]:
+        """Middle of the doors' side and what is seen of the floor: a spot from which more of the room is in view."""
+        depth = np.asarray(view.observation["depth"])
+        ahead = float(np.median(depth[depth > 0])) if bool((depth > 0).any()) else 1.0
+        middle: NDArray[np.float64] = view.pose[:2] + view.pose[3:5] * min(ahead * 0.5, 3.0)
+        return middle

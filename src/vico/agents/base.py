@@ -1,0 +1,68 @@
+"""What an agent is, and the simplest one: random actions."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from vico.world.public import PublicMap
+from vico.world.seeds import rng
+
+Action = dict[str, Any]
+Observation = dict[str, Any]
+Info = dict[str, Any]
+
+
+class Agent(Protocol):
+    """Turns observations into actions, once a step. Sees nothing else of the world but public maps."""
+
+    def act(self, observation: Observation, info: Info) -> Action:
+        """Return the action for the coming second."""
+
+
+class RandomAgent:
+    """Walks, turns, talks and goes through doors at random.
+
+    Parameters
+    ----------
+    name
+        Whose stream of chance it uses.
+    seed
+        Of the run.
+    """
+
+    def __init__(self, name: str, *, seed: int = 0) -> None:
+        self._rng = rng(seed, "random agent", name)
+
+    def act(self, observation: Observation, info: Info) -> Action:
+        """Return some action that makes sense where the agent is; two out of three are steps ahead."""
+        state = observation["state"]
+        draw = float(self._rng.random())
+        if state["action_status"] == "collision" or draw < 0.2:
+            side = "turn_left" if self._rng.random() < 0.5 else "turn_right"
+            return {"type": side, "degrees": float(self._rng.uniform(20.0, 160.0))}
+        if draw < 0.25 and state["room"]:
+            return {"type": "exit"}
+        if draw < 0.25 and state["accessible_places"]:
+            options = state["accessible_places"]
+            return {"type": "enter", "place": options[int(self._rng.integers(len(options)))]}
+        if draw < 0.27:
+            return {"type": "communicate", "text": "Hello!"}
+        if draw < 0.32:
+            return {"type": ("drink", "eat", "wait")[int(self._rng.integers(3))]}
+        return {"type": "move_forward", "distance": float(self._rng.uniform(0.2, 1.2))}
+
+
+def heading(observation: Observation) -> float:
+    """Yaw an agent looks along, radians."""
+    pose = observation["pose"]
+    return float(np.arctan2(pose[4], pose[3]))
+
+
+def wrapped(angle: float) -> float:
+    """The same direction within -pi..pi."""
+    return float((angle + np.pi) % (2 * np.pi) - np.pi)
+
+
+__all__ = ["Action", "Agent", "Info", "Observation", "PublicMap", "RandomAgent", "heading", "wrapped"]

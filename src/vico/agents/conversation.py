@@ -1,0 +1,160 @@
+"""What residents say when they meet: short, friendly, and about their own lives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from vico.agents.base import Action, Info, Observation
+from vico.agents.wayfinding import distance_to
+
+# People greet within this distance, metres, and not twice within this time, seconds.
+GREETING_DISTANCE = 6.0
+GREETING_PAUSE = 1200.0
+# A chat in passing ends after this many lines of one's own.
+_LINES = 2
+_RANGE = 8.0
+
+
+class Speaker(Protocol):
+    """What a conversation needs to know of a resident."""
+
+    @property
+    def id(self) -> str:
+        """Name of the agent."""
+
+    @property
+    def name(self) -> str:
+        """Name of the person."""
+
+    @property
+    def occupation(self) -> str:
+        """What they do."""
+
+    @property
+    def hobbies(self) -> list[str]:
+        """What they like to do."""
+
+
+@dataclass(frozen=True)
+class Acquaintance:
+    """Somebody a resident knows: name, and what ties them (friend, colleague, ...; the note says more)."""
+
+    agent: str
+    name: str
+    kind: str
+    note: str
+
+    @property
+    def first_name(self) -> str:
+        """What one calls them."""
+        return self.name.split()[0]
+
+
+class Conversation:
+    """Decides whether to speak, and what to say.
+
+    Parameters
+    ----------
+    resident
+        Who speaks.
+    known
+        Whom they know.
+    generator
+        Decides which words.
+    """
+
+    def __init__(self, resident: Speaker, known: Sequence[Acquaintance], generator: np.random.Generator) -> None:
+        self._me = resident
+        self._known = {person.agent: person for person in known}
+        self._rng = generator
+        self._greeted: dict[str, float] = {}
+        self._said: dict[str, int] = {}
+
+    def line(self, observation: Observation, info: Info, errand: str) -> Action | None:
+        """Return something to say now, or None.
+
+        Parameters
+        ----------
+        errand
+            What one is about, to follow "I'm ", such as "on my way to work".
+        """
+        time = observation["state"]["time"]
+        for message in observation["events"]:
+            reply = self._reply(message, time, errand)
+            if reply is not None:
+                return reply
+        return self._greet(observation, info, time, errand)
+
+    def _reply(self, message: dict[str, Any], time: float, errand: str) -> Action | None:
+        speaker, text = message["speaker"], message["text"]
+        person = self._known.get(speaker)
+        mine = self._me.name.split()[0]
+        if mine.lower() not in text.lower():
+            return None
+        if time - self._greeted.get(speaker, -1e9) > GREETING_PAUSE:
+            self._said[speaker] = 0
+        self._greeted[speaker] = time
+        if self._said.get(speaker, 0) >= _LINES:
+            return None
+        self._said[speaker] = self._said.get(speaker, 0) + 1
+        if person is None:
+            return _say(f"Hello! I'm {mine}. Sorry, I'm {errand}.")
+        return _say(self._choose(self._answers(person, errand, last="?" not in text)))
+
+    def _greet(self, observation: Observation, info: Info, time: float, errand: str) -> Action | None:
+        for entity, what in info["entities"].items():
+            person = self._known.get(what.get("agent", ""))
+            if person is None or time - self._greeted.get(person.agent, -1e9) <= GREETING_PAUSE:
+                continue
+            if distance_to(entity, observation) > GREETING_DISTANCE:
+                continue
+            self._greeted[person.agent] = time
+            self._said[person.agent] = 1
+            return _say(self._choose(self._greetings(person, time, errand)))
+        return None
+
+    def _greetings(self, person: Acquaintance, time: float, errand: str) -> list[str]:
+        other = person.first_name
+        hour = time % 86_400 / 3600
+        hello = "Good morning" if hour < 11 else "Hello" if hour < 18 else "Good evening"
+        lines = [
+            f"{hello}, {other}! I'm {errand}. And you?",
+            f"Hi {other}, how are you today?",
+            f"{hello}, {other}! Where are you off to?",
+        ]
+        if person.kind == "colleague":
+            lines.append(f"{hello}, {other}! Are you working today, too?")
+        if person.kind in ("friend", "family") and self._me.hobbies:
+            lines.append(f"{other}! Nice to see you. Any time for {self._hobby()} this week?")
+        if person.kind == "neighbour":
+            lines.append(f"{hello}, {other}! Is everything all right at home?")
+        return lines
+
+    def _answers(self, person: Acquaintance, errand: str, *, last: bool) -> list[str]:
+        other = person.first_name
+        if last:
+            return [f"See you, {other}!", f"Take care, {other}.", f"Have a good one, {other}!"]
+        lines = [
+            f"Hi {other}! I'm {errand}.",
+            f"Fine, thanks, {other}. I'm {errand}.",
+            f"Good to see you, {other}. I'm {errand}, a little in a hurry.",
+        ]
+        if self._me.hobbies:
+            lines.append(f"All well, {other}. Looking forward to some {self._hobby()} later.")
+        if self._me.occupation:
+            lines.append(f"Busy as ever, {other}: the life of a {self._me.occupation.lower()}.")
+        return lines
+
+    def _hobby(self) -> str:
+        return self._choose(self._me.hobbies).lower()
+
+    def _choose(self, options: Sequence[str]) -> str:
+        return options[int(self._rng.integers(len(options)))]
+
+
+def _say(text: str) -> Action:
+    return {"type": "communicate", "text": text, "range": _RANGE}

@@ -1,0 +1,76 @@
+"""The walker reaches its goal by actions alone, and gets around what is in the way."""
+
+import math
+
+import numpy as np
+import pytest
+
+from vico.agents.assistant.skills import turn_to
+from vico.agents.wayfinding import Walker
+from vico.world.heights import HeightField
+from vico.world.public import PublicMap
+from vico.world.seeds import rng
+from vico.world.walkable import BLOCKED, OPEN, WalkableMap
+
+HALF = 40.0
+
+
+def map_with_wall() -> PublicMap:
+    """Open ground with a wall across the middle, open at its northern end only."""
+    cells = np.full((160, 160), OPEN, np.uint8)
+    cells[:140, 78:82] = BLOCKED
+    return PublicMap(HALF, WalkableMap(cells, HALF), HeightField.flat(HALF), [], [], [], [])
+
+
+class Point:
+    """A body that does what it is told, except inside closed discs."""
+
+    def __init__(self, x: float, y: float) -> None:
+        self.pose = np.array([x, y, 0.0, 1.0, 0.0, 0.0])
+        self.discs: list[tuple[float, float, float]] = []
+        self.collided = False
+
+    def do(self, action: dict) -> None:
+        self.collided = False
+        if action["type"] in ("turn_left", "turn_right"):
+            angle = math.radians(action["degrees"]) * (1 if action["type"] == "turn_left" else -1)
+            c, s = math.cos(angle), math.sin(angle)
+            self.pose[3:5] = c * self.pose[3] - s * self.pose[4], s * self.pose[3] + c * self.pose[4]
+        elif action["type"] == "move_forward":
+            there = self.pose[:2] + self.pose[3:5] * action["distance"]
+            if any(math.hypot(there[0] - x, there[1] - y) < r for x, y, r in self.discs):
+                self.collided = True
+            else:
+                self.pose[:2] = there
+
+
+def walk(walker: Walker, body: Point, goal: tuple[float, float], limit: int) -> int:
+    for step in range(limit):
+        status = {"action_status": "collision" if body.collided else "ok", "action_reason": "stopped by a car"}
+        action = walker.towards(goal, 1.0, {"pose": body.pose, "state": status}, {"entities": {}})
+        if action is None:
+            return step
+        body.do(action)
+    raise AssertionError(f"still {walker.remaining(body.pose[:2]):.1f} m to go after {limit} steps")
+
+
+def test_walker_goes_around_a_wall_it_knows_of() -> None:
+    body = Point(-20.0, -20.0)
+    steps = walk(Walker(map_with_wall(), rng(0, "walk")), body, (20.0, -20.0), 200)
+    shortest = 2 * math.hypot(20.0, 50.0)  # over the wall's northern end at y = 30
+    assert math.hypot(body.pose[0] - 20.0, body.pose[1] + 20.0) <= 0.5
+    assert shortest * 0.95 <= steps <= shortest * 1.25
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_walker_gets_past_what_the_map_does_not_show(seed: int) -> None:
+    body = Point(-30.0, 0.0)
+    body.discs = [(-20.0, 0.0, 1.2)]
+    walk(Walker(map_with_wall(), rng(seed, "walk")), body, (-10.0, 0.0), 120)
+    assert math.hypot(body.pose[0] + 10.0, body.pose[1]) <= 0.5
+
+
+@pytest.mark.parametrize(("x", "y", "degrees"), [(0, 5, 90), (0, -5, -90), (5, 0, 0), (-5, 1e-9, 180)])
+def test_turn_is_counter_clockwise_positive(x: float, y: float, degrees: float) -> None:
+    pose = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
+    assert math.degrees(turn_to(pose, (x, y))) == pytest.approx(degrees)
