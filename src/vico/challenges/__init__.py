@@ -1,0 +1,1 @@
+"""What is asked and how it is judged: one folder a challenge, one runner, one results table."""

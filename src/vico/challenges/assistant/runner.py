@@ -1,0 +1,214 @@
+"""Running assistant episodes: a task, a world with its people, planners that see only what they may, and a verdict."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.agents.assistant import Planner, make_planner
+from vico.agents.schedule import followers_of
+from vico.assets.goods import GOODS, good_prototype, good_surfaces
+from vico.challenges.assistant.delivery import delivered, generate_delivery
+from vico.challenges.assistant.model import Task, write_task
+from vico.challenges.results import EpisodeResult
+from vico.community import build_community
+from vico.community.model import Community
+from vico.envs import CommunityEnv, Simulation, make
+from vico.world.folder import World
+
+START = "08:00"
+RESIDENTS = 15
+# In a window of 800 m; smaller ones have as many for their size, so that the cars find room.
+CARS, PEDESTRIANS = 30, 30
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass
+class TrueState:
+    """The evaluator's look at the simulation; agents never get it."""
+
+    simulation: Simulation
+
+    def _index(self, name: str) -> int:
+        return self.simulation.stage.goods.names.index(name)
+
+    def object_position(self, name: str) -> NDArray[np.float64]:
+        """See `StateView`."""
+        position: NDArray[np.float64] = self.simulation.stage.goods.position[self._index(name)]
+        return position
+
+    def object_room(self, name: str) -> str | None:
+        """See `StateView`."""
+        room = int(self.simulation.stage.goods.room[self._index(name)])
+        return None if room < 0 else self.simulation.stage.indoor.rooms[room].id
+
+    def object_holder(self, name: str) -> str | None:
+        """See `StateView`."""
+        goods = self.simulation.stage.goods
+        holder = int(goods.holder[self._index(name)])
+        return None if holder == 0 else self.simulation.entity(holder)["name"]
+
+
+class Judge:
+    """Keeps the verdicts of one episode.
+
+    A subtask is judged once and for all when an assistant reports it (`task_complete`), or else at the episode's end.
+    `done_at` tells when what was judged a success had last become true.
+    """
+
+    def __init__(self, task: Task, world: World, state: TrueState) -> None:
+        self.task, self.world, self.state = task, world, state
+        # The simulation knows things by the names agents hear; the rule by their ids.
+        names = {thing.id: thing.name for thing in task.objects}
+        self._subtasks = [s.model_copy(update={"objects": [names[i] for i in s.objects]}) for s in task.subtasks]
+        self.verdicts: list[bool | None] = [None] * len(task.subtasks)
+        self.since: list[int | None] = [None] * len(task.subtasks)
+
+    def watch(self, step: int) -> None:
+        """Look at the state after a step."""
+        for k, subtask in enumerate(self._subtasks):
+            if self.verdicts[k] is None:
+                done = delivered(subtask, self.state, self.world)
+                self.since[k] = (self.since[k] if self.since[k] is not None else step) if done else None
+
+    def report(self, index: int) -> None:
+        """An assistant says that a subtask is done."""
+        if 0 <= index < len(self.verdicts) and self.verdicts[index] is None:
+            self.verdicts[index] = self.since[index] is not None
+
+    @property
+    def over(self) -> bool:
+        """Whether everything was reported."""
+        return None not in self.verdicts
+
+    def final(self) -> list[bool]:
+        """Verdicts, with what nobody reported judged as it stands."""
+        return [since is not None if v is None else v for v, since in zip(self.verdicts, self.since, strict=True)]
+
+
+def community_for(world: World, *, residents: int = RESIDENTS) -> Community:
+    """People among whom episodes of a world take place: always the same ones."""
+    return build_community(world, residents=residents, seed=0)
+
+
+def run_episode(
+    world: World,
+    community: Community,
+    task: Task,
+    *,
+    method: str,
+    progress: Progress | None = None,
+    label: str = "episode",
+) -> EpisodeResult:
+    """Play one task through and judge it.
+
+    Parameters
+    ----------
+    method
+        Name of the planner; see `vico.agents.assistant.METHODS`.
+    progress
+        Called with `label`, the step and the limit.
+    """
+    began = time.perf_counter()
+    count = len(task.assistants)
+    names = [f"assistant_{i}" for i in range(count)]
+    env = make(
+        world,
+        community,
+        seed=task.seed,
+        start=START,
+        assistants=count,
+        cars=_for_size(CARS, world),
+        pedestrians=_for_size(PEDESTRIANS, world),
+        observe=tuple(names),
+        max_steps=task.steps,
+        setup=lambda simulation: _set_up(simulation, task),
+    )
+    observations, infos = env.reset(seed=task.seed)
+    planners: dict[str, Planner] = {
+        name: make_planner(method, task.instructions(), env.public_map, seed=task.seed, number=i, of=count)
+        for i, name in enumerate(names)
+    }
+    followers = followers_of(community, env.public_map, seed=task.seed)
+    judge = Judge(task, world, TrueState(env.sim))
+    judge.watch(0)
+    steps = 0
+    while env.agents and not judge.over:
+        actions = {name: followers[name].act(observations[name], infos[name]) for name in followers}
+        actions |= {name: planners[name].act(observations[name], infos[name]) for name in names}
+        observations, _, _, _, infos = env.step(actions)
+        steps += 1
+        judge.watch(steps)
+        for name in names:
+            # Only what the simulation accepted counts as a report.
+            if actions[name]["type"] == "task_complete" and observations[name]["state"]["action_status"] == "ok":
+                judge.report(int(actions[name]["index"]))
+        if progress is not None:
+            progress(label, steps, task.steps)
+    return _result(task, method, judge, env, steps, time.perf_counter() - began)
+
+
+def _for_size(number: int, world: World) -> int:
+    return min(number, round(number * (world.half / 400.0) ** 2))
+
+
+def _set_up(simulation: Simulation, task: Task) -> None:
+    for thing in task.objects:
+        simulation.add_object(
+            thing.name,
+            good_prototype(thing.kind, thing.colour),
+            good_surfaces(thing.kind, thing.colour),
+            thing.position,
+            room=thing.room or "",
+            size=GOODS[thing.kind].size,
+            yaw=thing.yaw,
+        )
+    for i, start in enumerate(task.assistants):
+        simulation.place_agent(f"assistant_{i}", (*start.position, 0.0), yaw=start.yaw)
+
+
+def _result(task: Task, method: str, judge: Judge, env: CommunityEnv, steps: int, seconds: float) -> EpisodeResult:
+    success = judge.final()
+    done_at = [since if ok else None for ok, since in zip(success, judge.since, strict=True)]
+    finished = [step for step in done_at if step is not None]
+    return EpisodeResult(
+        world=task.world,
+        seed=task.seed,
+        category=task.category,
+        method=method,
+        assistants=len(task.assistants),
+        success=success,
+        done_at=done_at,
+        steps=max(finished) if all(success) else task.steps,
+        limit=task.steps,
+        wall_seconds=seconds,
+        state_hash=env.state_hash(),
+    )
+
+
+def evaluate(
+    worlds: list[World],
+    *,
+    method: str,
+    assistants: int,
+    seeds: int,
+    steps: int,
+    folder: Path,
+    progress: Progress | None = None,
+) -> list[EpisodeResult]:
+    """Generate and play `seeds` delivery episodes a world; task files go to ``folder/tasks``."""
+    episodes = []
+    for number, world in enumerate(worlds):
+        community = community_for(world)
+        for seed in range(seeds):
+            task = generate_delivery(world, seed=seed, assistants=assistants, steps=steps)
+            write_task(folder / "tasks" / f"{number}_{world.manifest.name}_{seed}.json", task)
+            label = f"{world.manifest.name}, seed {seed}"
+            episodes.append(run_episode(world, community, task, method=method, progress=progress, label=label))
+    return episodes
