@@ -1,0 +1,206 @@
+"""A community on disk.
+
+::
+
+    community.json   manifest, written last: a folder that has it is whole
+    residents.json   people with their schedules
+    groups.json relations.json
+    origin.json      where the world was; not hashed, no part of the community's identity
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import TypeAdapter, ValidationError
+
+from vico.community.model import SCHEMA, VERSION, Community, CommunityManifest, Group, Relation, Resident
+from vico.errors import MissingFileError, OutputExistsError, SchemaError
+from vico.world.files import read_json, write_bytes, write_json
+from vico.world.folder import World
+from vico.world.model import Record
+
+R = TypeVar("R", bound=Record)
+
+_PARTS = ("residents.json", "groups.json", "relations.json")
+_FILES = ("community.json", "origin.json", *_PARTS)
+
+
+def _rows(records: Sequence[Record]) -> bytes:
+    rows = [json.dumps(r.model_dump(mode="json"), ensure_ascii=False, indent=1) for r in records]
+    return ("[\n" + ",\n".join(rows) + "\n]\n").encode()
+
+
+def _contents(community: Community) -> tuple[dict[str, bytes], bytes]:
+    """The bytes of the parts, and of the manifest."""
+    lists: tuple[Sequence[Record], ...] = (community.residents, community.groups, community.relations)
+    parts = {name: _rows(records) for name, records in zip(_PARTS, lists, strict=True)}
+    manifest = CommunityManifest(
+        producer=community.producer,
+        author=community.author,
+        seed=community.seed,
+        date=community.date,
+        weekday=community.weekday,
+        world=community.world,
+        counts={name.removesuffix(".json"): len(records) for name, records in zip(_PARTS, lists, strict=True)},
+        files={name: hashlib.sha256(content).hexdigest() for name, content in parts.items()},
+    )
+    text = json.dumps(manifest.model_dump(mode="json"), indent=1, sort_keys=True, ensure_ascii=False) + "\n"
+    return parts, text.encode()
+
+
+def digest_of(community: Community) -> str:
+    """SHA-256 of the bytes of ``community.json``, which holds the hashes of the rest: the community's identity."""
+    return hashlib.sha256(_contents(community)[1]).hexdigest()
+
+
+def write_community(
+    community: Community, path: Path, *, force: bool = False, world: Path | None = None
+) -> CommunityManifest:
+    """Write a community, whole or not at all: into a neighbouring folder that takes its name at the end.
+
+    Parameters
+    ----------
+    path
+        Folder to make.
+    force
+        Replace a community that is there.
+    world
+        Folder of the world, remembered so that it need not be named again.
+
+    Raises
+    ------
+    OutputExistsError
+        If `path` exists and `force` is not given, or holds anything but a community.
+    """
+    path = Path(path)
+    if path.exists() or path.is_symlink():
+        if not force:
+            raise OutputExistsError(f"{path}: exists already; choose another --out, or replace it with --force")
+        strangers = sorted(p.name for p in path.iterdir() if p.name not in _FILES) if path.is_dir() else [path.name]
+        if strangers:
+            raise OutputExistsError(f"{path}: holds {strangers[0]!r}, which no community does; choose another --out")
+    parts, manifest = _contents(community)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    fresh = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
+    try:
+        fresh.chmod(0o755)
+        for name, content in parts.items():
+            write_bytes(fresh / name, content)
+        if world is not None:
+            write_json(fresh / "origin.json", {"world": os.path.relpath(Path(world).resolve(), path.resolve())})
+        write_bytes(fresh / "community.json", manifest)
+        if path.exists():
+            old = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
+            os.replace(path, old / "old")
+            os.replace(fresh, path)
+            shutil.rmtree(old)
+        else:
+            os.replace(fresh, path)
+    finally:
+        shutil.rmtree(fresh, ignore_errors=True)
+    return CommunityManifest.model_validate_json(manifest)
+
+
+def read_manifest(path: Path) -> CommunityManifest:
+    """Read the manifest of a community folder.
+
+    Raises
+    ------
+    MissingFileError
+        If there is no finished community at `path`.
+    SchemaError
+        If it is of another kind or version, or damaged.
+    """
+    path = Path(path)
+    if not path.is_dir():
+        raise MissingFileError(f"{path}: no such folder; make one with vico community build")
+    if not (path / "community.json").exists():
+        raise MissingFileError(
+            f"{path}: holds no community.json, so it is no finished community; build it with --force"
+        )
+    content = read_json(path / "community.json")
+    found = content.get("schema_name") if isinstance(content, dict) else type(content).__name__
+    if found != SCHEMA:
+        raise SchemaError(f"{path}/community.json: schema {found!r} is not {SCHEMA!r}; give a community folder")
+    if content.get("version") != VERSION:
+        raise SchemaError(
+            f"{path}/community.json: version {content.get('version')!r} of {SCHEMA}, but this vico reads "
+            f"version {VERSION}; build the community anew"
+        )
+    try:
+        return CommunityManifest.model_validate_json(json.dumps(content))
+    except ValidationError as error:
+        raise _invalid(path / "community.json", error) from None
+
+
+def read_community(path: Path, world: World | None = None) -> Community:
+    """Read a community folder.
+
+    Parameters
+    ----------
+    world
+        The world it is wanted for; another one is refused.
+
+    Raises
+    ------
+    MissingFileError
+        If there is no finished community at `path`.
+    SchemaError
+        If it is of another kind or version, damaged, or made for another world.
+    """
+    path = Path(path)
+    manifest = read_manifest(path)
+    if world is not None and manifest.world.digest != world.digest:
+        raise SchemaError(
+            f"{path}: made for world {manifest.world.name!r} ({manifest.world.digest[:12]}), not for "
+            f"{world.manifest.name!r} ({world.digest[:12]}); give that world, or build a community for this one"
+        )
+    return Community(
+        producer=manifest.producer,
+        author=manifest.author,
+        seed=manifest.seed,
+        date=manifest.date,
+        world=manifest.world,
+        residents=_records(path / "residents.json", Resident, manifest),
+        groups=_records(path / "groups.json", Group, manifest),
+        relations=_records(path / "relations.json", Relation, manifest),
+    )
+
+
+def world_of(path: Path) -> Path | None:
+    """Folder of the world that a community was made for, if it is still where it was."""
+    origin = Path(path) / "origin.json"
+    if not origin.exists():
+        return None
+    content = read_json(origin)
+    if not isinstance(content, dict) or not isinstance(content.get("world"), str):
+        raise SchemaError(f"{origin}: does not say where the world is; give it with --world")
+    found = Path(os.path.normpath(Path(path).resolve() / content["world"]))
+    return found if (found / "world.json").exists() else None
+
+
+def _records(path: Path, kind: type[R], manifest: CommunityManifest) -> list[R]:
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise MissingFileError(f"{path}: no such file; build the community anew") from None
+    if hashlib.sha256(content).hexdigest() != manifest.files.get(path.name):
+        raise SchemaError(f"{path}: changed since the community was built; restore it, or build the community anew")
+    try:
+        return TypeAdapter(list[kind]).validate_json(content)  # type: ignore[valid-type]
+    except ValidationError as error:
+        raise _invalid(path, error) from None
+
+
+def _invalid(path: Path, error: ValidationError) -> SchemaError:
+    first = error.errors()[0]
+    where = ".".join(str(part) for part in first["loc"]) or "the whole file"
+    return SchemaError(f"{path}: {where}: {first['msg']}; build the community anew")

@@ -1,0 +1,116 @@
+"""Opening hours: the common forms of OSM's `opening_hours`, and what is usual where a place says nothing."""
+
+from __future__ import annotations
+
+import re
+
+DAYS = ("Mo", "Tu", "We", "Th", "Fr", "Sa", "Su")
+MINUTES = 24 * 60
+
+#: Open from, until, in minutes of the day; `until` may lie past midnight.
+Span = tuple[int, int]
+
+_DAY = "(?:Mo|Tu|We|Th|Fr|Sa|Su|PH|SH)"
+_DAYS = re.compile(rf"{_DAY}(?:\s*-\s*{_DAY})?(?:\s*,\s*{_DAY}(?:\s*-\s*{_DAY})?)*")
+_TIMES = re.compile(r"(\d{1,2})(?::(\d{2}))?\s*-\s*(\d{1,2})(?::(\d{2}))?")
+# A comma before a day name starts a new rule ("Mo-Fr 8:00-20:00, Sa 9:00-18:00"), unless it only lists days.
+_RULES = re.compile(rf";|,\s*(?={_DAYS.pattern}\s*(?:\d|off|closed))")
+
+_USUAL: dict[str, tuple[str, ...]] = {
+    "07:30-19:00": ("cafe", "coffee", "bakery", "pastry", "confectionery"),
+    "11:00-23:00": ("restaurant", "food_court", "fast_food", "ice_cream"),
+    "16:00-24:00": ("bar", "pub", "biergarten", "nightclub", "casino"),
+    "10:00-18:00": ("museum", "gallery", "arts_centre", "attraction", "zoo", "aquarium"),
+    "09:00-20:00": ("library", "community_centre", "social_centre"),
+    "12:00-23:30": ("cinema", "theatre", "bowling_alley", "miniature_golf", "amusement_arcade", "events_venue"),
+    "06:30-22:00": ("fitness_centre", "sports_centre", "swimming_pool", "sports_hall", "dance"),
+    "07:00-22:00": ("supermarket", "convenience", "kiosk", "grocery", "greengrocer", "department_store", "mall"),
+    "08:00-18:00": ("marketplace", "pharmacy", "clinic", "doctors", "dentist", "post_office", "place_of_worship"),
+    "08:00-17:00": ("school", "kindergarten", "university", "college", "music_school", "language_school"),
+    "10:00-19:00": ("store",),
+    "08:00-18:30": ("office",),
+    "24/7": ("open", "transit", "accommodation", "park", "garden", "square", "hotel", "hostel", "station", "police"),
+    "10:00-22:00": ("entertainment", "food"),
+}
+_USUAL_BY_KIND = {kind: text for text, kinds in _USUAL.items() for kind in kinds}
+
+
+def _days_of(text: str) -> set[int]:
+    found: set[int] = set()
+    for part in text.split(","):
+        ends = [p.strip() for p in part.split("-")]
+        if ends[0] not in DAYS or ends[-1] not in DAYS:
+            continue  # public and school holidays: the communities' day is neither
+        first, last = DAYS.index(ends[0]), DAYS.index(ends[-1])
+        found.update((first + k) % 7 for k in range((last - first) % 7 + 1))
+    return found
+
+
+def _spans_of(text: str) -> list[Span] | None:
+    spans: list[Span] = []
+    for part in text.split(","):
+        match = _TIMES.fullmatch(part.strip().rstrip("+"))
+        if match is None:
+            return None
+        start = int(match[1]) * 60 + int(match[2] or 0)
+        end = int(match[3]) * 60 + int(match[4] or 0)
+        if start > MINUTES or end > 30 * 60:
+            return None
+        spans.append((start, end if end > start else end + MINUTES))
+    return spans
+
+
+def weekly_hours(text: str) -> list[list[Span]] | None:
+    """Read an `opening_hours` value.
+
+    Parameters
+    ----------
+    text
+        For example ``Mo-Fr 08:00-20:00; Sa 10:00-18:00; PH off``, ``Tu-Sa 11:00-14:30,17:00-00:00`` or ``24/7``.
+
+    Returns
+    -------
+    list of list of Span or None
+        For each day, Monday first, when it is open; None if the value has forms not read here (months, sunset,
+        comments): nothing is known then.
+    """
+    if text.strip() == "24/7":
+        return [[(0, MINUTES)] for _ in DAYS]
+    week: list[list[Span]] = [[] for _ in DAYS]
+    for rule in _RULES.split(text):
+        if not (rule := rule.strip()):
+            continue
+        match = _DAYS.match(rule)
+        days = set(range(7)) if match is None else _days_of(match[0])
+        rest = rule[match.end() :].strip(" :") if match else rule
+        if rest in ("off", "closed"):
+            spans: list[Span] | None = []
+        elif rest == "":
+            spans = [(0, MINUTES)]
+        else:
+            spans = _spans_of(rest)
+        if spans is None:
+            return None
+        for day in sorted(days):
+            week[day] = list(spans)
+    return week
+
+
+def open_spans(text: str, weekday: int) -> list[Span] | None:
+    """When a place is open on a day (0 Monday .. 6 Sunday), by its `opening_hours`; None if they can't be read.
+
+    Spans that reach past midnight are kept whole; what spills over from the day before comes first.
+    """
+    week = weekly_hours(text)
+    if week is None:
+        return None
+    spill = [(0, end - MINUTES) for _, end in week[(weekday - 1) % 7] if end > MINUTES]
+    return sorted(spill + week[weekday])
+
+
+def usual_spans(kind: str, category: str) -> list[Span]:
+    """When a place of this kind is usually open on a working day."""
+    text = _USUAL_BY_KIND.get(kind) or _USUAL_BY_KIND.get(category, "08:00-20:00")
+    spans = open_spans(text, 1)
+    assert spans is not None
+    return spans

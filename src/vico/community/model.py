@@ -1,0 +1,278 @@
+"""What a community is, as records: residents, groups, relations and the schedule of one day."""
+
+from __future__ import annotations
+
+import re
+from datetime import date as Date  # the field of that name would hide it
+from enum import StrEnum
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, ConfigDict, Field, with_config
+from typing_extensions import TypedDict  # pydantic needs this one before Python 3.12
+
+from vico.world.model import Point2, Record
+
+SCHEMA = "vico.community"
+VERSION = 1
+
+DAY = 86_400
+LAST = "23:59:59"
+WEEKDAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")
+
+_CLOCK = re.compile(r"([01]\d|2[0-3]):([0-5]\d):([0-5]\d)")
+
+
+def seconds_of(clock: str) -> int:
+    """Seconds of the day of ``HH:MM:SS``."""
+    hours, minutes, seconds = clock.split(":")
+    return int(hours) * 3600 + int(minutes) * 60 + int(seconds)
+
+
+def clock_of(seconds: int) -> str:
+    """``HH:MM:SS`` of a second of the day; the day's end gives 23:59:59, the last second there is."""
+    seconds = min(seconds, DAY - 1)
+    return f"{seconds // 3600:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}"
+
+
+def _is_clock(text: str) -> str:
+    if not _CLOCK.fullmatch(text):
+        raise ValueError(f"{text!r} is no time of day; write HH:MM:SS")
+    return text
+
+
+Clock = Annotated[str, AfterValidator(_is_clock)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Channel = Annotated[int, Field(ge=0, le=255)]
+Colour = tuple[Channel, Channel, Channel]
+
+
+class ItemType(StrEnum):
+    """What kind of thing a schedule item is."""
+
+    SLEEP = "sleep"
+    MEAL = "meal"
+    MAIN = "main"
+    COMMUTE = "commute"
+
+
+class ScheduleItem(Record):
+    """A stretch of a resident's day.
+
+    Attributes
+    ----------
+    start, end
+        ``HH:MM:SS``; the next item starts when this one ends; the last one ends 23:59:59.
+    place, building
+        Ids of where it happens; `building` is None at open places; both None on the way (``commute``).
+    """
+
+    type: ItemType
+    start: Clock
+    end: Clock
+    activity: Annotated[str, Field(min_length=1)]
+    place: str | None
+    building: str | None
+
+
+@with_config(ConfigDict(extra="forbid"))
+class Appearance(TypedDict):
+    """How a resident looks: the fields of `vico.assets.people.Appearance`, which makes a body of them.
+
+    A plain dictionary with checked keys, so that it can be handed to `Appearance.from_dict` as it is.
+    """
+
+    gender: Share
+    age: Annotated[float, Field(ge=4, le=100)]
+    height: Annotated[float, Field(ge=0.9, le=2.2)]
+    build: Share
+    muscle: Share
+    ancestry: tuple[Share, Share, Share]
+    skin: Colour
+    hair: Literal["bald", "crop", "short", "curly", "bob", "long", "ponytail", "bun"]
+    hair_colour: Colour
+    eyes: Colour
+    beard: bool
+    glasses: bool
+    top: Literal["t-shirt", "shirt", "jumper", "hoodie", "jacket", "suit", "coat", "dress"]
+    top_colour: Colour
+    under_colour: Colour
+    bottom: Literal["trousers", "jeans", "shorts", "skirt", "leggings"]
+    bottom_colour: Colour
+    shoes: Literal["trainers", "shoes", "boots", "sandals"]
+    shoes_colour: Colour
+
+
+class Personality(Record):
+    """The big five, 0..1, and the words people who know them would use."""
+
+    openness: Share
+    conscientiousness: Share
+    extraversion: Share
+    agreeableness: Share
+    neuroticism: Share
+    traits: list[str]
+
+
+class Resident(Record):
+    """Somebody who lives here.
+
+    Attributes
+    ----------
+    values
+        What matters most to them, the first most (Schwartz's ten basic values).
+    cash
+        Money they carry, 100..1000.
+    home, workplace, known_places
+        Ids of places; `workplace` is None for those who have none.
+    spawn
+        Where they stand when a simulation starts with them outdoors, ENU metres.
+    """
+
+    id: Annotated[str, Field(pattern=r"^resident_\d+$")]
+    name: Annotated[str, Field(min_length=3)]
+    age: Annotated[int, Field(ge=0, le=110)]
+    gender: Literal["female", "male"]
+    appearance: Appearance
+    occupation: str
+    values: list[str]
+    personality: Personality
+    hobbies: list[str]
+    lifestyle: str
+    biography: str
+    cash: int
+    home: str
+    workplace: str | None
+    known_places: list[str]
+    spawn: Point2
+    schedule: list[ScheduleItem]
+
+    @property
+    def first_name(self) -> str:
+        """What friends call them."""
+        return self.name.split()[0]
+
+    def item_at(self, seconds: int) -> ScheduleItem:
+        """The schedule item of a second of the day; at a boundary, the one that starts."""
+        clock = clock_of(seconds % DAY)
+        return next((item for item in reversed(self.schedule) if item.start <= clock), self.schedule[0])
+
+
+class Group(Record):
+    """People who meet.
+
+    Attributes
+    ----------
+    place
+        Id of the meeting place.
+    members
+        Ids of residents.
+    start, end
+        When they meet on the community's day; every member's schedule has it.
+    """
+
+    id: Annotated[str, Field(pattern=r"^group_\d+$")]
+    name: str
+    description: str
+    activity: str
+    place: str
+    members: list[str]
+    start: Clock
+    end: Clock
+
+
+class RelationKind(StrEnum):
+    """What ties two residents; of several ties the first in this order counts."""
+
+    FAMILY = "family"
+    FRIEND = "friend"
+    COLLEAGUE = "colleague"
+    NEIGHBOUR = "neighbour"
+
+
+class Relation(Record):
+    """An edge of the social network; it holds both ways.
+
+    Attributes
+    ----------
+    between
+        Ids of the two residents, in their order in the community.
+    note
+        What it is in words: partners, flatmates, same book circle.
+    strength
+        0 hardly known .. 1 inseparable.
+    since
+        Year.
+    """
+
+    between: tuple[str, str]
+    kind: RelationKind
+    note: str
+    strength: Share
+    since: int
+
+
+class WorldIdentity(Record):
+    """Which world a community lives in."""
+
+    name: str
+    digest: str
+
+
+class Community(Record):
+    """Residents of a world, what ties them, and one day of each.
+
+    Attributes
+    ----------
+    author
+        Who wrote it: ``procedural``, or the name of a language model.
+    date
+        The day that the schedules are for, ISO.
+    """
+
+    producer: str
+    author: str
+    seed: int
+    date: Date
+    world: WorldIdentity
+    residents: list[Resident]
+    groups: list[Group]
+    relations: list[Relation]
+
+    @property
+    def weekday(self) -> str:
+        """Name of the day of the week the schedules are for."""
+        return WEEKDAYS[self.date.weekday()]
+
+    @property
+    def resident_by_id(self) -> dict[str, Resident]:
+        """Residents by id."""
+        return {r.id: r for r in self.residents}
+
+    def groups_of(self, resident: str) -> list[Group]:
+        """Groups a resident belongs to."""
+        return [g for g in self.groups if resident in g.members]
+
+    def relations_of(self, resident: str) -> list[Relation]:
+        """Ties of a resident."""
+        return [r for r in self.relations if resident in r.between]
+
+
+class CommunityManifest(Record):
+    """`community.json`: written last, so a folder that has it is whole.
+
+    Attributes
+    ----------
+    files
+        SHA-256 of the other files, by name.
+    """
+
+    schema_name: str = SCHEMA
+    version: int = VERSION
+    producer: str
+    author: str
+    seed: int
+    date: Date
+    weekday: str
+    world: WorldIdentity
+    counts: dict[str, int]
+    files: dict[str, str]

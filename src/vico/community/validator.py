@@ -1,0 +1,322 @@
+"""Is a community grounded in its world? Every finding says where, what, and how to mend it.
+
+The findings are written for people and for authors: a language model gets them back with its draft.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from vico.community.ground import SPAWN_GAP, Ground
+from vico.community.jobs import job_of, jobs_at, works_at
+from vico.community.model import LAST, Community, ItemType, Resident, ScheduleItem, seconds_of
+from vico.community.work import STUDY_KINDS
+from vico.world.folder import World
+from vico.world.model import Category, Place
+
+CASH = (100, 1000)
+
+#: Staff are at their place so long before it opens and after it closes, at most, minutes.
+_STAFF_MARGIN = 60
+
+# A walk may be planned with time to spare, but not with an hour of it.
+_SLACK = 2.0
+_SPARE = 10 * 60
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something wrong.
+
+    Attributes
+    ----------
+    where
+        Path into the community: ``resident_3.schedule[5]``.
+    what
+        What is wrong, with the values.
+    mend
+        What to do about it.
+    """
+
+    where: str
+    what: str
+    mend: str
+
+
+def check_community(community: Community, world: World) -> list[Finding]:
+    """Check that a community is grounded in a world.
+
+    Checks that it was made for this world; names and ids are unique; homes are accommodation; workplaces employ the
+    occupation and appear in the biography; known places exist and include all that are used; cash is 100..1000;
+    schedules cover the day without gaps, walks are possible and long enough for the router, opening hours hold where
+    they are given; groups meet at places that exist, and their members' schedules say so; everybody has a group;
+    relations join residents; and spawn points are reachable and 2 m apart.
+
+    Returns
+    -------
+    list of Finding
+        Empty if all is well.
+    """
+    if community.world.digest != world.digest:
+        return [
+            Finding(
+                "world.digest",
+                f"the community was made for world {community.world.name!r} ({community.world.digest[:12]}), not for "
+                f"this one, {world.manifest.name!r} ({world.digest[:12]})",
+                "give the world it was made for, or build a community for this one",
+            )
+        ]
+    if not community.residents:
+        return [Finding("residents", "nobody lives here", "write at least one resident")]
+    return _Check(community, Ground(world, community.date.weekday())).run()
+
+
+class _Check:
+    def __init__(self, community: Community, ground: Ground) -> None:
+        self.community = community
+        self.ground = ground
+        self.found: list[Finding] = []
+
+    def say(self, where: str, what: str, mend: str) -> None:
+        self.found.append(Finding(where, what, mend))
+
+    def run(self) -> list[Finding]:
+        self.unique()
+        for resident in self.community.residents:
+            self.person(resident)
+            self.schedule(resident)
+        self.groups()
+        self.relations()
+        self.spawns()
+        return self.found
+
+    def place(self, where: str, place_id: str) -> Place | None:
+        """Look a place up; say so if it doesn't exist or can't be reached."""
+        place = self.ground.place_by_id.get(place_id)
+        if place is None:
+            self.say(where, f"there is no place {place_id!r} in this world", "use the id of a place of the world")
+        elif not self.ground.reachable(place):
+            self.say(where, f"{place.name} ({place_id}) can't be reached on foot", "choose another place")
+            return None
+        return place
+
+    def unique(self) -> None:
+        for what, values in (
+            ("id", [r.id for r in self.community.residents]),
+            ("name", [r.name for r in self.community.residents]),
+            ("group id", [g.id for g in self.community.groups]),
+            ("group name", [g.name for g in self.community.groups]),
+        ):
+            for value, count in Counter(values).items():
+                if count > 1:
+                    self.say(what, f"{count} share the {what} {value!r}", f"give each its own {what}")
+
+    def person(self, r: Resident) -> None:
+        home = self.place(f"{r.id}.home", r.home)
+        if home is not None and home.category is not Category.ACCOMMODATION:
+            self.say(
+                f"{r.id}.home",
+                f"{home.name} ({r.home}) is of category {home.category.value}, not accommodation",
+                "choose an accommodation place as home",
+            )
+        self.workplace(r)
+        if not CASH[0] <= r.cash <= CASH[1]:
+            self.say(f"{r.id}.cash", f"{r.cash} is not in {CASH[0]}..{CASH[1]}", "give an amount in that range")
+        for k, known in enumerate(r.known_places):
+            self.place(f"{r.id}.known_places[{k}]", known)
+        used = {r.home, *([r.workplace] if r.workplace else []), *(i.place for i in r.schedule if i.place)}
+        used |= {g.place for g in self.community.groups_of(r.id)}
+        if unknown := sorted(used - set(r.known_places)):
+            self.say(
+                f"{r.id}.known_places", f"{', '.join(unknown)} are used but not known", "add them to the known places"
+            )
+        if not self.community.groups_of(r.id):
+            self.say(r.id, f"{r.name} is in no group", "add them to a group they like and are free for")
+        if int(r.appearance["age"]) != r.age or r.appearance["gender"] != (0.0 if r.gender == "female" else 1.0):
+            self.say(
+                f"{r.id}.appearance",
+                f"age {r.appearance['age']:g}, gender {r.appearance['gender']:g} don't agree with {r.age}, {r.gender}",
+                "use the resident's age; gender 0 for female, 1 for male",
+            )
+
+    def workplace(self, r: Resident) -> None:
+        where, student = f"{r.id}.workplace", r.occupation.lower().startswith("student")
+        if r.workplace is None:
+            if (job_of(r.occupation) is not None and not _works_without_place(r.occupation)) or student:
+                self.say(where, f"{r.name} is {r.occupation!r} but has no workplace", "choose a place that employs one")
+            return
+        place = self.place(where, r.workplace)
+        if place is None:
+            return
+        if student:
+            fits = place.kind.split(";")[0].strip().lower() in STUDY_KINDS
+        else:
+            fits = not r.occupation.lower().startswith("retired") and works_at(r.occupation, place)
+        if not fits:
+            jobs = ", ".join(job.title for job in jobs_at(place)) or "nobody"
+            self.say(
+                where,
+                f"{r.name} is {r.occupation!r}, but {place.name} is a {place.kind} ({place.category.value})",
+                f"choose a place of another kind, or an occupation it employs: {jobs}",
+            )
+        if place.name.casefold() not in r.biography.casefold():
+            self.say(
+                f"{r.id}.biography",
+                f"it does not mention {r.name}'s workplace, {place.name}",
+                f"mention {place.name}, or change the workplace to the one that the biography tells of",
+            )
+
+    def schedule(self, r: Resident) -> None:
+        items = r.schedule
+        if not items:
+            self.say(f"{r.id}.schedule", "it is empty", "plan the day from 00:00:00 to 23:59:59")
+            return
+        if items[0].start != "00:00:00":
+            self.say(f"{r.id}.schedule[0]", f"the day starts at {items[0].start}", "start at 00:00:00")
+        if items[-1].end != LAST:
+            self.say(f"{r.id}.schedule[{len(items) - 1}]", f"the day ends at {items[-1].end}", f"end at {LAST}")
+        for k, item in enumerate(items):
+            where = f"{r.id}.schedule[{k}]"
+            if item.end <= item.start:
+                self.say(where, f"it ends at {item.end}, not after its start {item.start}", "give it some time")
+            if k and item.start != items[k - 1].end:
+                self.say(
+                    where,
+                    f"it starts at {item.start}, but the item before ends at {items[k - 1].end}",
+                    "let each item start when the one before ends",
+                )
+            if item.type is ItemType.COMMUTE:
+                self.commute(r, k, where)
+            else:
+                self.stay(r, item, where)
+                if k and items[k - 1].type is not ItemType.COMMUTE:
+                    self.joined(items[k - 1], item, where)
+
+    def commute(self, r: Resident, k: int, where: str) -> None:
+        items, item = r.schedule, r.schedule[k]
+        if item.place is not None or item.building is not None:
+            self.say(where, "a commute has a place or a building", "leave both empty on the way")
+        if not 0 < k < len(items) - 1 or ItemType.COMMUTE in (items[k - 1].type, items[k + 1].type):
+            self.say(where, "a commute is not between two stays", "put commutes between things to do, one each")
+            return
+        a, b = items[k - 1].place, items[k + 1].place
+        if a not in self.ground.place_by_id or b not in self.ground.place_by_id or a is None or b is None:
+            return  # said already
+        needed = self.ground.seconds(a, b)
+        given = _length(item)
+        names = f"from {self.ground.place_by_id[a].name} to {self.ground.place_by_id[b].name}"
+        if math.isinf(needed):
+            self.say(where, f"there is no way {names}", "choose a place that can be reached")
+        elif given < needed:
+            self.say(
+                where,
+                f"{given} s for the walk {names}, which takes {needed:.0f} s",
+                f"allow {math.ceil(needed)} s or more",
+            )
+        elif given > _SLACK * needed + _SPARE:
+            self.say(
+                where, f"{given} s for the walk {names}, which takes {needed:.0f} s", "leave later or arrive earlier"
+            )
+
+    def joined(self, before: ScheduleItem, item: ScheduleItem, where: str) -> None:
+        places = self.ground.place_by_id
+        a, b = before.place, item.place
+        if a in places and b in places and a is not None and b is not None and not self.ground.same_spot(a, b):
+            self.say(
+                where,
+                f"nobody gets from {places[a].name} to {places[b].name} in no time",
+                "insert a commute between them",
+            )
+
+    def stay(self, r: Resident, item: ScheduleItem, where: str) -> None:
+        if item.place is None:
+            self.say(where, f"{item.activity!r} has no place", "say where it happens")
+            return
+        place = self.place(where, item.place)
+        if place is None:
+            return
+        if item.building != place.building:
+            self.say(where, f"building {item.building!r} is not that of {place.name}", f"write {place.building!r}")
+        if item.type is ItemType.SLEEP and place.category is not Category.ACCOMMODATION:
+            self.say(where, f"{place.name} is no place to sleep", "sleep at home")
+        spans = self.ground.given_hours(place)
+        if spans is None or place.id == r.home:
+            return
+        margin = _STAFF_MARGIN * 60 if place.id == r.workplace else 0
+        start, end = seconds_of(item.start), seconds_of(item.end)
+        if not any(a * 60 - margin <= start and end <= b * 60 + margin for a, b in spans):
+            self.say(
+                where,
+                f"{place.name} is not open {item.start}-{item.end} on {self.community.weekday} ({place.opening_hours})",
+                "choose another time or another place",
+            )
+
+    def groups(self) -> None:
+        people = {r.id: r for r in self.community.residents}
+        for g in self.community.groups:
+            self.place(f"{g.id}.place", g.place)
+            if g.end <= g.start:
+                self.say(g.id, f"it meets from {g.start} to {g.end}", "let it end after it starts")
+            if len(set(g.members)) != len(g.members):
+                self.say(f"{g.id}.members", "somebody is named twice", "name each member once")
+            if len(g.members) < min(2, len(people)):
+                self.say(f"{g.id}.members", f"{len(g.members)} members make no group", "find at least two")
+            for member in g.members:
+                if member not in people:
+                    self.say(f"{g.id}.members", f"there is no resident {member!r}", "use ids of residents")
+                elif not any(
+                    i.place == g.place and i.start == g.start and i.end == g.end for i in people[member].schedule
+                ):
+                    self.say(
+                        f"{member}.schedule",
+                        f"it does not have the {g.name} ({g.id}) at {g.place}, {g.start}-{g.end}",
+                        "put the meeting into the schedule",
+                    )
+
+    def relations(self) -> None:
+        people = {r.id: r for r in self.community.residents}
+        for k, relation in enumerate(self.community.relations):
+            where, (a, b) = f"relations[{k}]", relation.between
+            if a not in people or b not in people or a == b:
+                self.say(where, f"{a!r} and {b!r} are not two residents", "join two residents by their ids")
+            elif (
+                not self.community.date.year - max(people[a].age, people[b].age)
+                <= relation.since
+                <= self.community.date.year
+            ):
+                self.say(
+                    where, f"{people[a].name} and {people[b].name} since {relation.since}", "give a year in their lives"
+                )
+        pairs = Counter(tuple(sorted(r.between)) for r in self.community.relations)
+        for pair, count in pairs.items():
+            if count > 1:
+                self.say("relations", f"{count} relations join {pair[0]} and {pair[1]}", "keep one, the closest")
+
+    def spawns(self) -> None:
+        residents, walkable = self.community.residents, self.ground.world.walkable
+        points = np.array([r.spawn for r in residents], float)
+        reachable = walkable.is_connected(points)
+        for r, ok in zip(residents, reachable.tolist(), strict=True):
+            if not ok:
+                self.say(f"{r.id}.spawn", f"{r.spawn} can't be reached from the map's edge", "choose a walkable point")
+        gaps = np.linalg.norm(points[:, None] - points[None], axis=2)
+        for i, j in np.argwhere(np.triu(gaps < SPAWN_GAP - 1e-9, 1)).tolist():
+            self.say(
+                f"{residents[j].id}.spawn",
+                f"it is {gaps[i, j]:.2f} m from {residents[i].id}'s",
+                f"keep spawn points {SPAWN_GAP:g} m apart",
+            )
+
+
+def _length(item: ScheduleItem) -> int:
+    return seconds_of(item.end) + (1 if item.end == LAST else 0) - seconds_of(item.start)
+
+
+def _works_without_place(occupation: str) -> bool:
+    return any(
+        word in occupation.lower() for word in ("freelance", "independent", "self-employed", "retired", "former")
+    )

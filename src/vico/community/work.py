@@ -1,0 +1,182 @@
+"""Homes, workplaces and working hours: where everybody belongs, drawn from the places that there are."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from vico.community.ground import Ground, kind_of
+from vico.community.hours import Span
+from vico.community.jobs import FREELANCE, GUESTS, JOBS, RETIRED, STUDIES, Job, jobs_at
+from vico.community.people import Household, Sketch
+from vico.world.model import Category, Place
+
+#: Where students study. `workplace` of a student is one of these.
+STUDY_KINDS = frozenset({"university", "college", "research_institute", "library", "music_school"})
+
+# What any place with an open door offers: minutes before opening and after closing that staff are there, at most.
+_BEFORE, _AFTER = 45, 30
+_LATEST = 23 * 60 + 30
+
+
+def assign_homes(rng: np.random.Generator, ground: Ground, households: Sequence[Household]) -> None:
+    """Give each household a home: guests a room, all others a dwelling; the emptiest first, at times a neighbour's."""
+    dwellings, rooms = ground.homes()
+    taken: Counter[str] = Counter()
+    for household in households:
+        options = (rooms or dwellings) if household.kind == "guest" else (dwellings or rooms)
+        if household.kind == "flatmates" and household.members[0].status == "student":
+            options = [p for p in options if kind_of(p) == "dormitory"] or options
+        fewest = min(taken[p.id] for p in options)
+        neighbours = [p for p in options if 0 < taken[p.id] < 4]
+        if neighbours and rng.random() < 0.15:
+            options = neighbours
+        else:
+            options = [p for p in options if taken[p.id] == fewest]
+        home = options[int(rng.integers(len(options)))]
+        household.home = home.id
+        taken[home.id] += len(household.members)
+        for member in household.members:
+            member.home = home.id
+
+
+def employers(ground: Ground) -> list[Place]:
+    """Places where people work on the day: somebody's trade, and not closed."""
+    return [
+        p
+        for p in ground.places()
+        if p.category is not Category.TRANSIT
+        and jobs_at(p)
+        and any(min(end, 24 * 60) - max(start, 6 * 60) >= 4 * 60 for start, end in ground.hours(p))
+    ]
+
+
+def study_places(ground: Ground) -> list[Place]:
+    """Places where students study, open on the day."""
+    found = [p for p in ground.places() if kind_of(p) in STUDY_KINDS and _long_enough(ground.hours(p))]
+    return [p for p in found if kind_of(p) != "library"] or found
+
+
+def _long_enough(spans: Sequence[Span]) -> bool:
+    return any(start <= 11 * 60 and end >= 16 * 60 for start, end in spans)
+
+
+def assign_work(rng: np.random.Generator, ground: Ground, sketches: Sequence[Sketch]) -> None:
+    """Give everybody an occupation, and a workplace and hours to those who have one."""
+    offers: dict[str, list[Place]] = {}
+    trades: dict[str, Job] = {}
+    for place in employers(ground):
+        for job in jobs_at(place):
+            offers.setdefault(job.title, []).append(place)
+            trades[job.title] = job
+    titles = [t for t in [*(j.title for j in JOBS), *sorted(set(trades) - {j.title for j in JOBS})] if t in trades]
+    study = study_places(ground)
+    held: Counter[str] = Counter()
+    staff: Counter[str] = Counter()
+    late = 0
+    for sketch in sketches:
+        if sketch.status == "worker":
+            late += _hire(rng, ground, sketch, [trades[t] for t in titles], offers, held, staff, late)
+        elif sketch.status == "student":
+            place = study[int(rng.integers(len(study)))]
+            options = ["music"] if kind_of(place) == "music_school" else list(STUDIES)
+            sketch.subject = _rare(rng, options, held)
+            sketch.occupation = f"student of {sketch.subject}"
+            sketch.workplace = place.id
+            start = int(rng.choice([8 * 60 + 15, 8 * 60 + 30, 9 * 60 + 15, 10 * 60 + 15]))
+            opens = min(s for s, e in ground.hours(place) if e >= 16 * 60)
+            start = max(start, 5 * math.ceil(opens / 5))
+            sketch.shift = (start, start + 5 * int(rng.integers(60, 73)))
+        elif sketch.status == "freelancer":
+            sketch.occupation = _rare(rng, [f[0] for f in FREELANCE], held)
+        elif sketch.status == "retired":
+            sketch.subject = _rare(rng, [r[0] for r in RETIRED], held)
+            sketch.occupation = f"retired {sketch.subject}"
+        else:
+            sketch.occupation = _rare(rng, [g[0] for g in GUESTS], held)
+
+
+def _rare(rng: np.random.Generator, options: Sequence[str], held: Counter[str]) -> str:
+    fewest = min(held[o] for o in options)
+    options = [o for o in options if held[o] == fewest]
+    chosen = options[int(rng.integers(len(options)))]
+    held[chosen] += 1
+    return chosen
+
+
+def _hire(
+    rng: np.random.Generator,
+    ground: Ground,
+    sketch: Sketch,
+    jobs: Sequence[Job],
+    offers: dict[str, list[Place]],
+    held: Counter[str],
+    staff: Counter[str],
+    late: int,
+) -> bool:
+    """Find somebody a job; returns whether it is in the evening."""
+    weights = np.zeros(len(jobs))
+    for k, job in enumerate(jobs):
+        low, high = job.ages
+        # Half the weight of a trade is its share of the places; the square root keeps the many shops from crowding out.
+        weights[k] = job.weight * len(offers[job.title]) ** 0.5 * 0.07 ** held[job.title]
+        weights[k] *= 1.0 if low <= sketch.age <= high else 1e-6
+        weights[k] *= 0.25**late if job.shift == "evening" else 1.0
+        weights[k] *= 1.4 if job.shift in ("office", "bank", "school", "health") else 1.0
+    job = jobs[int(rng.choice(len(jobs), p=weights / weights.sum()))]
+    places = [p for p in offers[job.title] if p.id != sketch.home] or offers[job.title]
+    # Some work where somebody of the community works already: that makes colleagues.
+    w = np.array([0.02 if staff[p.id] > 2 else 1 + 0.9 * len(places) * (staff[p.id] > 0) for p in places])
+    place = places[int(rng.choice(len(places), p=w / w.sum()))]
+    held[job.title] += 1
+    staff[place.id] += 1
+    sketch.job, sketch.occupation, sketch.workplace = job, job.title, place.id
+    start, end = _shift(rng, job.shift, ground.hours(place))
+    if end > 22 * 60:  # home before midnight, however far
+        end = min(end, 23 * 60 + 40 - (ground.minutes(place.id, sketch.home) or 0)) // 5 * 5
+    sketch.shift = start, end
+    return sketch.shift[1] > 21 * 60
+
+
+def _five(minutes: float) -> int:
+    return round(minutes / 5) * 5
+
+
+def _shift(rng: np.random.Generator, pattern: str, spans: Sequence[Span]) -> tuple[int, int]:
+    """Working hours that fit the pattern of the trade and the hours of the place, minutes."""
+    # What spills over from the night before is nobody's shift here.
+    spans = [span for span in spans if span[1] > 6 * 60] or list(spans)
+    opens = max(min(start for start, _ in spans), 6 * 60)
+    closes = min(max(end for _, end in spans), 24 * 60)
+    low, high = max(5 * 60 + 30, opens - _BEFORE), min(_LATEST, closes + _AFTER)
+    length = _five(float(rng.integers(455, 505)))
+    first = bool(rng.random() < 0.55)
+    if pattern in ("office", "bank"):
+        start = int(rng.choice([480, 495, 510, 525, 540, 555], p=[0.1, 0.2, 0.33, 0.15, 0.17, 0.05]))
+        length += 10
+    elif pattern == "school":
+        start, length = int(rng.choice([465, 470, 480, 485])), _five(float(rng.integers(430, 490)))
+    elif pattern == "health":
+        start = int(rng.choice([435, 450, 465, 480, 540]))
+    elif pattern == "hotel":
+        start = int(rng.choice([405, 420])) if first else int(rng.choice([870, 885]))
+    elif pattern == "sport":
+        start = max(opens - 15, 390) if first else 810
+    elif pattern == "evening":
+        start = min(closes + 10, _LATEST) - length
+    elif pattern == "kitchen":
+        start = opens - 45 if first and opens <= 12 * 60 else min(closes + 15, _LATEST) - length
+        start = max(start, 8 * 60)
+    elif pattern == "early":
+        start = opens - int(rng.choice([20, 30])) if first else opens + int(rng.choice([45, 75, 90]))
+    else:  # shop, day
+        start = opens - int(rng.choice([10, 15, 20])) if first else min(closes + 10, 21 * 60) - length
+    if opens > start + 300:  # opens in the evening only
+        start = low
+    start = _five(max(low, min(start, high - min(length, high - low))))
+    if start < low:
+        start += 5
+    return start, min(start + length, high // 5 * 5)
