@@ -1,0 +1,1 @@
+"""For eyes: the replay page and the demo film."""
