@@ -1,0 +1,1 @@
+"""For hands: the `vico` command, one module a verb."""

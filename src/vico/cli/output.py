@@ -1,0 +1,114 @@
+"""What the verbs share: progress bars on stderr, results on stdout."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from vico.errors import InputError, OutputExistsError
+
+Report = Callable[[str, int, int], None]
+
+
+@contextmanager
+def progress_bars() -> Iterator[Report]:
+    """Give a function `(stage, done, total)` that keeps one bar a stage on stderr.
+
+    Where stderr is no terminal, a line a stage is written when it is done, and one each tenth of a long one. What
+    fails takes its bars with it: the sentence that says why stands alone.
+    """
+    console = Console(file=sys.stderr)
+    if not console.is_terminal:
+        yield _lines()
+        return
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description:<22}"),
+        BarColumn(bar_width=30),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console, refresh_per_second=4) as progress:
+        tasks: dict[str, Any] = {}
+
+        def report(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = progress.add_task(stage, total=max(total, 1))
+            progress.update(tasks[stage], completed=done, total=max(total, 1))
+
+        try:
+            yield report
+        except BaseException:
+            progress.live.transient = True
+            raise
+
+
+def _lines() -> Report:
+    began: dict[str, float] = {}
+    told: dict[str, int] = {}
+
+    def report(stage: str, done: int, total: int) -> None:
+        start = began.setdefault(stage, time.perf_counter())
+        tenth = 10 * done // max(total, 1)
+        if tenth == told.get(stage, 0) or (total < 100 and done < total):
+            return
+        told[stage] = tenth
+        seconds = time.perf_counter() - start
+        print(f"{stage:<22} {done}/{total}  {seconds:.1f} s", file=sys.stderr, flush=True)
+
+    return report
+
+
+def check_output(out: Path, *inputs: Path, force: bool) -> None:
+    """Say before any work what would be wrong with an output folder after it.
+
+    Parameters
+    ----------
+    inputs
+        What the verb reads.
+    force
+        Whether what is there may be replaced.
+
+    Raises
+    ------
+    OutputExistsError
+        If there is something, and `force` is not given.
+    InputError
+        If nothing can be written there; or if `force` would delete an input, the current folder or the home folder.
+    """
+    if not force and out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise OutputExistsError(f"{out}: exists already; choose another --out, or replace it with --force")
+    ground = out.absolute().parent
+    while not ground.exists() and ground != ground.parent:
+        ground = ground.parent
+    if not ground.is_dir():
+        raise InputError(f"--out {out}: {ground} is not a directory; choose another folder")
+    if not os.access(ground, os.W_OK | os.X_OK):
+        raise InputError(f"--out {out}: {ground} cannot be written to; choose another folder")
+    folder = out.resolve()
+    for kept in (*inputs, Path.cwd(), Path.home()):
+        if kept.resolve().is_relative_to(folder):
+            raise InputError(f"--out {out}: holds {kept}, which --force would delete; choose another folder")
+
+
+def print_json(content: Any) -> None:
+    """Print one JSON document on stdout."""
+    print(json.dumps(content, indent=1, sort_keys=True, ensure_ascii=False, default=str))
+
+
+def print_table(title: str, rows: Mapping[str, Any]) -> None:
+    """Print names and values as a two-column table on stdout."""
+    table = Table(title=title, title_justify="left", show_header=False)
+    for name, value in rows.items():
+        table.add_row(name, f"{value:,.2f}" if isinstance(value, float) else f"{value}")
+    Console().print(table)

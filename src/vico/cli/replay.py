@@ -1,0 +1,46 @@
+"""`vico replay`: the page and the film of a recorded run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from vico.cli.output import progress_bars
+from vico.errors import MissingFileError
+from vico.render import render_top_down
+from vico.render.world_scene import scene_of
+from vico.sim.recording import read_run
+from vico.viewer.demo_film import write_demo_film
+from vico.viewer.from_run import recording_of
+from vico.viewer.replay import write_replay
+from vico.world.folder import read_world
+
+_PICTURE = 1200  # pixels along a side of the ground picture
+
+
+def replay(path: Path, *, film: bool = True, world: Path | None = None) -> int:
+    """Write ``replay.html`` (and ``demo.mp4``) into the run's folder.
+
+    Parameters
+    ----------
+    world
+        The world it ran in, if it is no longer where it was.
+    """
+    run = read_run(path)
+    folder = world or Path(run.manifest["world"]["path"])
+    if not (folder / "world.json").exists():
+        raise MissingFileError(f"{path}: its world is no longer at {folder}; say where it is with --world")
+    place = read_world(folder)
+    recording = recording_of(run)
+    with progress_bars() as report:
+        report("ground picture", 0, 1)
+        picture = render_top_down(scene_of(place, rooms=False), place.half, _PICTURE)
+        report("ground picture", 1, 1)
+        report("replay page", 0, 1)
+        write_replay(path / "replay.html", recording, place, picture=picture)
+        report("replay page", 1, 1)
+        if film and recording.views:
+            report("film", 0, 1)
+            write_demo_film(path / "demo.mp4", recording, place)
+            report("film", 1, 1)
+    print(path / "replay.html")
+    return 0

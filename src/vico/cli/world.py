@@ -1,0 +1,116 @@
+"""`vico world build`, `vico world info`, `vico check world`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.cli.output import check_output, print_json, print_table, progress_bars
+from vico.world.folder import World, read_world, stage_seconds
+from vico.worldgen.pipeline import build_world, extract_centre
+from vico.worldgen.previews import Viewpoint
+
+
+def photograph(world: World, views: Sequence[Viewpoint]) -> Iterator[NDArray[np.uint8]]:
+    """Take street-level pictures with our own renderer."""
+    from vico.render.cameras import Cameras
+    from vico.render.frames import render
+    from vico.render.world_scene import scene_of
+
+    scene = scene_of(world, rooms=False)
+    for view in views:
+        cameras = Cameras(
+            np.array([view.position]),
+            np.array([view.forward]),
+            fov_y=view.fov_y,
+            width=view.width,
+            height=view.height,
+        )
+        yield render(scene, cameras, depth=False, segmentation=False, samples=2).rgb[0]
+
+
+def build(
+    *,
+    out: Path,
+    osm: Path | None = None,
+    lat: float | None = None,
+    lon: float | None = None,
+    half: float = 400.0,
+    dem: Path | None = None,
+    seed: int = 0,
+    force: bool = False,
+    json: bool = False,
+) -> int:
+    """Build a world; without `osm` from the packaged extract, without a centre around the extract's middle."""
+    from vico.worldgen.packaged import extract_for
+
+    if osm is None:
+        osm = extract_for(lat, lon, half).path
+    if lat is None or lon is None:
+        lat, lon = extract_centre(osm)
+    check_output(out, osm, *([dem] if dem is not None else []), force=force)
+    with progress_bars() as report:
+        build_world(
+            osm,
+            lat=lat,
+            lon=lon,
+            half=half,
+            dem=dem,
+            seed=seed,
+            out=out,
+            force=force,
+            progress=report,
+            photograph=photograph,
+        )
+    return info(out, json=json)
+
+
+def facts(world: World) -> dict[str, Any]:
+    """What `world info` tells."""
+    manifest = world.manifest
+    seconds = stage_seconds(world)
+    return {
+        "name": manifest.name,
+        "origin": [manifest.origin.lat, manifest.origin.lon],
+        "half": manifest.half,
+        "seed": manifest.seed,
+        "digest": world.digest,
+        **manifest.counts,
+        "places_by_type": manifest.places_by_type,
+        "dropped": {stage.name: len(stage.dropped) for stage in manifest.stages if stage.dropped},
+        "seconds": {**seconds, "total": round(sum(seconds.values()), 3)},
+        "megabytes": round(sum(p.stat().st_size for p in world.file(".").rglob("*") if p.is_file()) / 1e6, 2),
+        "sources": [source.model_dump(mode="json") for source in manifest.sources],
+    }
+
+
+def info(path: Path, *, json: bool = False) -> int:
+    """Say what a world holds."""
+    content = facts(read_world(path))
+    if json:
+        print_json(content)
+        return 0
+    rows = {name: value for name, value in content.items() if not isinstance(value, dict | list)}
+    rows |= {f"places: {kind}": number for kind, number in content["places_by_type"].items()}
+    rows |= {f"seconds: {stage}": value for stage, value in content["seconds"].items()}
+    rows |= {f"source: {source['name']}": source["attribution"] for source in content["sources"]}
+    print_table(f"world {path}", rows)
+    return 0
+
+
+def check(path: Path, *, json: bool = False) -> int:
+    """Check a world; 1 if anything is wrong."""
+    from vico.world.check import check_world
+
+    findings = check_world(read_world(path))
+    if json:
+        print_json({"ok": not findings, "findings": [finding._asdict() for finding in findings]})
+    else:
+        for finding in findings:
+            print(f"{finding.id}: {finding.where}: {finding.what}")
+        print(f"{path}: {len(findings)} findings" if findings else f"{path}: all is well")
+    return 1 if findings else 0

@@ -1,0 +1,311 @@
+"""Bad input: exit code 2, one clear sentence, and nothing half-written."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from command_line import vico
+from vico.worldgen.packaged import packaged_extract
+
+EMPTY_MAP = """<?xml version="1.0"?>
+<osm version="0.6"><bounds minlat="60.16" minlon="24.94" maxlat="60.17" maxlon="24.95"/>
+<node id="1" lat="60.165" lon="24.945" version="1"/><node id="2" lat="60.1651" lon="24.945" version="1"/>
+<way id="3" version="1"><nd ref="1"/><nd ref="2"/><tag k="highway" v="footway"/></way></osm>
+"""
+HERE = ("--lat", 60.1690, "--lon", 24.9435)
+
+
+def contents(folder: Path) -> list[str]:
+    """What lies below a folder, hidden things too."""
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """Run what must be refused; return the sentence."""
+    assert vico(*arguments) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith("vico: ")
+    assert printed.err.count("\n") == 1, printed.err
+    return printed.err
+
+
+@pytest.fixture
+def maps(tmp_path: Path) -> Path:
+    """A folder with broken maps."""
+    folder = tmp_path / "maps"
+    folder.mkdir()
+    whole = packaged_extract().path.read_bytes()
+    (folder / "cut.osm.pbf").write_bytes(whole[: len(whole) // 3])
+    (folder / "words.osm").write_text("hello\n")
+    (folder / "words.osm.pbf").write_text("hello\n")
+    (folder / "nothing.osm.pbf").write_bytes(b"")
+    (folder / "map.txt").write_text("hello\n")
+    (folder / "footpath.osm").write_text(EMPTY_MAP)
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("missing.osm.pbf", "no such file"),
+        ("cut.osm.pbf", "truncated or broken"),
+        ("words.osm", "truncated or broken"),
+        ("words.osm.pbf", "truncated or broken"),
+        ("nothing.osm.pbf", "empty"),
+        ("map.txt", "must end in .osm"),
+        ("footpath.osm", "no building"),
+    ],
+)
+def test_a_map_that_is_no_use_is_refused(
+    maps: Path, name: str, says: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    before = contents(tmp_path)
+    sentence = refused(capsys, "world", "build", "--osm", maps / name, "--out", tmp_path / "w")
+    assert says in sentence
+    assert name in sentence
+    assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (("--center", "10.0,10.0"), "nothing in the"),
+        (("--center", "100.0,10.0"), "out of range"),
+        (("--center", "60.0,200.0"), "out of range"),
+        (("--center", "nan,24.0"), "no numbers"),
+        (("--center", "Helsinki"), "write for example"),
+        (("--center", "60.1"), "write for example"),
+        (("--center", "60.1,24.9", "--lat", 60.1, "--lon", 24.9), "not both"),
+        (("--lat", 60.1), "go together"),
+        ((*HERE, "--radius", -5), "radius: -5"),
+        ((*HERE, "--radius", "nan"), "radius: nan"),
+        ((*HERE, "--radius", 90_000), "radius: 90000"),
+        ((*HERE, "--seed", -1), "seed: -1"),
+        ((*HERE, "--dem", "missing.tif"), "no such elevation file"),
+    ],
+)
+def test_a_window_that_cannot_be_is_refused(
+    options: tuple[object, ...], says: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    extract = packaged_extract().path
+    assert says in refused(capsys, "world", "build", "--osm", extract, *options, "--out", tmp_path / "w")
+    assert contents(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [((), "say where"), (("--center", "60.0,200.0"), "not on Earth"), (("--center", "48.85,2.35"), "pass --osm FILE")],
+)
+def test_a_place_without_a_map_is_refused(
+    options: tuple[object, ...], says: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    assert says in refused(capsys, "world", "build", *options, "--out", tmp_path / "w")
+    assert contents(tmp_path) == []
+
+
+@pytest.fixture
+def other_version(helsinki_path: Path, tmp_path: Path) -> Path:
+    """The world as another vico might have written it."""
+    return changed(helsinki_path, tmp_path / "other_version", version=99)
+
+
+def changed(world: Path, folder: Path, **fields: Any) -> Path:
+    """A copy of a world folder with other entries in its manifest."""
+    folder.mkdir()
+    for path in world.iterdir():
+        if path.name != "world.json":
+            (folder / path.name).symlink_to(path)
+    content = json.loads((world / "world.json").read_text())
+    (folder / "world.json").write_text(json.dumps({**content, **fields}))
+    return folder
+
+
+@pytest.mark.parametrize(
+    "verb",
+    [
+        ("world", "info", "WORLD"),
+        ("check", "world", "WORLD"),
+        ("community", "build", "WORLD", "--out", "OUT"),
+        ("run", "WORLD", "PEOPLE", "--out", "OUT"),
+        ("eval", "assistant", "--worlds", "WORLD", "--out", "OUT"),
+    ],
+    ids=lambda verb: " ".join(verb[:2]),
+)
+def test_a_world_of_another_version_is_refused(
+    verb: tuple[str, ...],
+    other_version: Path,
+    helsinki_people: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    words = {"WORLD": other_version, "PEOPLE": helsinki_people, "OUT": tmp_path / "out"}
+    assert "version 99" in refused(capsys, *(words.get(word, word) for word in verb))
+    assert not (tmp_path / "out").exists()
+
+
+def test_people_of_another_world_are_refused(
+    helsinki_path: Path, helsinki_people: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    elsewhere = changed(helsinki_path, tmp_path / "elsewhere", name="elsewhere")
+    sentence = refused(capsys, "run", elsewhere, helsinki_people, "--out", tmp_path / "run")
+    assert "made for world 'helsinki'" in sentence
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (("--robots", "husky,frob", "--cars", 2), "robot 'frob' is not known; choose among"),
+        (("--observe", "resident_0,Bob", "--cars", 2), "nobody is called 'Bob'; there are resident_0"),
+        (("--start", "25:00"), "no time of day"),
+        (("--start", "8am"), "no time of day"),
+        (("--steps", 0), "--steps 0"),
+        (("--cars", -1), "cars is -1"),
+        (("--pedestrians", -1), "pedestrians is -1"),
+        (("--seed", -1), "seed is -1"),
+    ],
+)
+def test_a_run_that_cannot_be_is_refused(
+    options: tuple[object, ...],
+    says: str,
+    helsinki_path: Path,
+    helsinki_people: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert says in refused(capsys, "run", helsinki_path, helsinki_people, *options, "--out", tmp_path / "run")
+    assert contents(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (("--method", "frob"), "there are heuristic, random"),
+        (("--assistants", 3), "3 assistants"),
+        (("--seeds", 0), "at least one"),
+        (("--steps", 0), "at least one"),
+    ],
+)
+def test_an_evaluation_that_cannot_be_is_refused(
+    options: tuple[object, ...], says: str, helsinki_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sentence = refused(capsys, "eval", "assistant", "--worlds", helsinki_path, *options, "--out", tmp_path / "e")
+    assert says in sentence
+    assert contents(tmp_path) == []
+
+
+@pytest.mark.parametrize("options", [("--residents", 0), ("--residents", -3), ("--seed", -1)])
+def test_a_community_that_cannot_be_is_refused(
+    options: tuple[object, ...], helsinki_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    refused(capsys, "community", "build", helsinki_path, *options, "--out", tmp_path / "c")
+    assert contents(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    "verb",
+    [
+        ("world", "build", *HERE, "--radius", 60, "--out", "OUT"),
+        ("community", "build", "WORLD", "--out", "OUT"),
+        ("run", "WORLD", "PEOPLE", "--out", "OUT"),
+        ("eval", "assistant", "--worlds", "WORLD", "--out", "OUT"),
+        ("demo", "--out", "OUT"),
+    ],
+    ids=lambda verb: str(verb[0]),
+)
+@pytest.mark.parametrize("kind", ["folder", "file", "below a file"])
+def test_what_exists_is_not_overwritten(
+    verb: tuple[object, ...],
+    kind: str,
+    helsinki_path: Path,
+    helsinki_people: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    mine = tmp_path / "mine" if kind != "folder" else tmp_path / "mine" / "letter.txt"
+    mine.parent.mkdir(exist_ok=True)
+    mine.write_text("dear")
+    out = tmp_path / "mine" / "below" if kind == "below a file" else tmp_path / "mine"
+    before = contents(tmp_path)
+    words: dict[object, object] = {"WORLD": helsinki_path, "PEOPLE": helsinki_people, "OUT": out}
+    sentence = refused(capsys, *(words.get(word, word) for word in verb))
+    assert ("not a directory" if kind == "below a file" else "exists") in sentence
+    assert contents(tmp_path) == before
+    assert mine.read_text() == "dear"
+
+
+@pytest.mark.parametrize("read", ["world", "people"])
+def test_force_never_deletes_what_the_run_reads(
+    read: str, helsinki_path: Path, helsinki_people: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    parts = {"world": tmp_path / "project" / "world", "people": tmp_path / "project" / "people"}
+    shutil.copytree(helsinki_path, parts["world"], symlinks=True)
+    shutil.copytree(helsinki_people, parts["people"])
+    before = contents(tmp_path)
+    for out in (parts[read], tmp_path / "project"):
+        sentence = refused(capsys, "run", parts["world"], parts["people"], "--force", "--out", out)
+        assert "--force would delete" in sentence
+    assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    "verb",
+    [
+        ("world", "info", "NOWHERE"),
+        ("check", "world", "NOWHERE"),
+        ("community", "build", "NOWHERE", "--out", "OUT"),
+        ("check", "community", "NOWHERE"),
+        ("run", "NOWHERE", "NOWHERE", "--out", "OUT"),
+        ("replay", "NOWHERE"),
+        ("eval", "assistant", "--worlds", "NOWHERE", "--out", "OUT"),
+    ],
+    ids=lambda verb: " ".join(verb[:2]),
+)
+def test_a_folder_that_is_not_there_is_named(
+    verb: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = {"NOWHERE": tmp_path / "nowhere", "OUT": tmp_path / "out"}
+    assert str(tmp_path / "nowhere") in refused(capsys, *(words.get(word, word) for word in verb))
+    assert contents(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("world", "build"),
+        ("world",),
+        (),
+        ("frobnicate",),
+        ("run", "w"),
+        ("run", "w", "c", "--out", "o", "--steps", "many"),
+        ("eval", "assistant", "--worlds", "w", "--out", "o", "--category", "frob"),
+        ("bench", "frob"),
+    ],
+    ids=lambda arguments: " ".join(arguments) or "nothing",
+)
+def test_a_command_that_is_not_understood_exits_2(
+    arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert vico(*arguments) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert "Traceback" not in printed.err
+    assert "--help" in printed.err
+
+
+def test_a_fresh_process_prints_no_traceback_either(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "vico.cli.main", "world", "build", "--osm", "missing.osm", "--out", "w"],
+        cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "vico: missing.osm: no such file; give an OpenStreetMap extract (.osm or .osm.pbf)\n"
+    assert contents(tmp_path) == []

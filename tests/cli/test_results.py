@@ -1,0 +1,167 @@
+"""What the verbs print for machines."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from command_line import vico
+from vico.cli import bench, doctor
+from vico.sim.recording import read_run
+
+# The least that the two verbs promise to tell.
+WORLD_KEYS = {
+    "buildings", "accessible_buildings", "places", "places_by_type", "roads", "junctions", "amenity_objects",
+    "natural_objects", "transit", "collision_faces", "watertight_buildings", "seconds", "sources",
+}  # fmt: skip
+RUN_KEYS = {
+    "steps", "wall_seconds", "real_time_factor", "peak_rss_mb", "state_hash", "collisions", "arrivals", "late",
+}  # fmt: skip
+EVAL_KEYS = {"category", "method", "assistants", "subtasks", "SR", "Ts", "episodes", "wall_seconds"}
+
+
+def printed(capsys: pytest.CaptureFixture[str]) -> Any:
+    return json.loads(capsys.readouterr().out)
+
+
+def test_world_info_tells_every_count(helsinki_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert vico("world", "info", helsinki_path, "--json") == 0
+    facts = printed(capsys)
+    assert facts.keys() >= WORLD_KEYS
+    assert facts["watertight_buildings"] == facts["buildings"] > 20
+    assert sum(facts["places_by_type"].values()) == facts["places"]
+    assert facts["sources"][0]["licence"] == "ODbL-1.0"
+    assert min(facts["seconds"].values()) >= 0
+
+
+def test_a_sound_world_is_found_sound(helsinki_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert vico("check", "world", helsinki_path, "--json") == 0
+    assert printed(capsys) == {"ok": True, "findings": []}
+
+
+def test_a_damaged_world_exits_1(helsinki_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for path in helsinki_path.iterdir():
+        if path.name != "transit.json":
+            (tmp_path / path.name).symlink_to(path)
+    (tmp_path / "transit.json").write_text((helsinki_path / "transit.json").read_text() + " ")
+    assert vico("check", "world", tmp_path, "--json") == 1
+    assert not printed(capsys)["ok"]
+
+
+def test_run_tells_its_metrics(helsinki_run: tuple[Path, dict[str, Any]]) -> None:
+    path, metrics = helsinki_run
+    assert metrics.keys() >= RUN_KEYS
+    assert metrics["steps"] == 8
+    assert metrics["state_hash"] == read_run(path).hashes[-1]
+    assert metrics == json.loads((path / "metrics.json").read_text())
+
+
+def test_the_same_run_has_the_same_hash_and_another_seed_another(
+    helsinki_run: tuple[Path, dict[str, Any]],
+    helsinki_path: Path,
+    helsinki_people: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    hashes = []
+    for seed in (0, 1):
+        # Who looks does not change what happens.
+        code = vico(
+            "run", helsinki_path, helsinki_people, "--steps", 8, "--robots", "husky", "--cars", 3, "--pedestrians", 3,
+            "--observe", "none", "--seed", seed, "--out", tmp_path / f"{seed}", "--json",
+        )  # fmt: skip
+        assert code == 0
+        hashes.append(printed(capsys)["state_hash"])
+    assert hashes[0] == helsinki_run[1]["state_hash"]
+    assert hashes[1] != hashes[0]
+
+
+def test_eval_tells_rates_and_leaves_tasks_and_results(
+    helsinki_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "results"
+    words = ("--category", "delivery", "--method", "random", "--seeds", 1, "--steps", 3)
+    assert vico("eval", "assistant", "--worlds", helsinki_path, *words, "--out", out, "--json") == 0
+    told = printed(capsys)
+    assert told.keys() >= EVAL_KEYS
+    assert (told["episodes"], told["subtasks"], told["SR"], told["Ts"]) == (1, 6, 0.0, 3.0)
+    assert len(list((out / "tasks").glob("*.json"))) == 1
+    assert json.loads((out / "results.json").read_text())["summary"] == told
+    assert "| delivery | random | 1 | 1 | 6 |" in (out / "results.md").read_text()
+
+
+def test_a_run_leaves_nothing_beside_its_folder(helsinki_path: Path, helsinki_people: Path, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [
+            sys.executable, "-m", "vico.cli.main", "run", str(helsinki_path), str(helsinki_people), "--steps", "2",
+            "--robots", "husky,go2", "--cars", "2", "--pedestrians", "2", "--observe", "none", "--out", "run",
+        ],
+        cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+
+
+def test_progress_without_a_terminal_is_a_line_a_stage(
+    helsinki_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert vico("community", "build", helsinki_path, "--residents", 3, "--out", tmp_path / "p") == 0
+    assert capsys.readouterr().err.split()[:4] == ["people", "and", "schedules", "1/1"]
+
+
+def test_output_that_nobody_reads_on_is_no_error(helsinki_path: Path) -> None:
+    done = subprocess.run(
+        f"{sys.executable} -m vico.cli.main world info {helsinki_path} --json | head -c 1",
+        shell=True, capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    assert (done.stdout, done.stderr) == ("{", "")
+
+
+def test_doctor_finds_what_the_tests_run_on(capsys: pytest.CaptureFixture[str]) -> None:
+    assert vico("doctor", "--json") == 0
+    found = {finding["what"]: finding for finding in printed(capsys)}
+    assert found["renderer"]["ok"]
+    assert found["film encoder"]["ok"]
+    assert found.keys() >= {"Python", "numpy", "mujoco", "memory", "free disk"}
+
+
+def test_doctor_exits_1_and_says_what_to_type(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(doctor, "_BASE", ("numpy", "no-such-package"))
+    assert vico("doctor", "--json") == 1
+    missing = [finding for finding in printed(capsys) if not finding["ok"] and finding["needed"]]
+    assert [(f["what"], f["mend"]) for f in missing] == [("no-such-package", "pip install virtual-community")]
+
+
+def test_bench_says_where_benchmarks_are_to_be_had(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(bench, "SCRIPTS", tmp_path)
+    assert vico("bench", "world") == 2
+    assert "come with the repository" in capsys.readouterr().err
+
+
+def test_bench_world_measures_every_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = tmp_path / "results" / "world.md"
+    assert bench.bench("world", table=table, json=True, options=("--radius", "60", "-n", "1")) == 0
+    seconds, memory = printed(capsys)["tables"]
+    stages = {row["stage"]: float(row["median s"]) for row in seconds["rows"]}
+    assert stages.keys() >= {"map", "buildings", "roads", "previews", "total"}
+    assert stages["whole command"] > stages["total"] > stages["buildings"] > 0
+    assert float(memory["rows"][0]["median MB"]) > 100
+    assert "/" not in table.read_text().split("Made by")[0].replace("x86/64", "")
+
+
+def test_every_benchmark_is_a_script_that_explains_itself() -> None:
+    for name in ("render", "sim", "world", "memory"):
+        script = bench.SCRIPTS / f"{name}.py"
+        done = subprocess.run([sys.executable, str(script), "--help"], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        assert f"benchmarks/{name}.py" in done.stdout
+        assert "--table" in done.stdout
