@@ -1,0 +1,65 @@
+"""Worlds that many tests look at, built once a session from real data."""
+
+from __future__ import annotations
+
+import io
+import json
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from command_line import vico
+from vico.community import build_community, write_community
+from vico.world.folder import World, read_world
+from vico.worldgen.pipeline import build_world
+
+EXTRACT = Path(__file__).parents[1] / "src" / "vico" / "data" / "helsinki.osm.pbf"
+SHARED = Path(__file__).parents[2] / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def helsinki_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with 300 m x 300 m of central Helsinki, built from the packaged extract."""
+    out = tmp_path_factory.mktemp("worlds") / "helsinki"
+    build_world(EXTRACT, lat=60.1690, lon=24.9435, half=150.0, seed=0, out=out)
+    return out
+
+
+@pytest.fixture(scope="session")
+def helsinki(helsinki_path: Path) -> World:
+    """The world in `helsinki_path`."""
+    return read_world(helsinki_path)
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Real data beside the checkout; tests that need it are skipped where it is absent."""
+    if not SHARED.is_dir():
+        pytest.skip(f"{SHARED} is not there: real extracts beside the checkout are needed")
+    return SHARED
+
+
+@pytest.fixture(scope="session")
+def helsinki_people(helsinki: World, helsinki_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A community folder with four residents of `helsinki_path`."""
+    out = tmp_path_factory.mktemp("communities") / "people"
+    write_community(build_community(helsinki, residents=4), out, world=helsinki_path)
+    return out
+
+
+@pytest.fixture(scope="session")
+def helsinki_run(
+    helsinki_path: Path, helsinki_people: Path, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, dict[str, Any]]:
+    """A run folder of eight steps with one observer and the Husky, and what ``vico run --json`` printed."""
+    out = tmp_path_factory.mktemp("runs") / "run"
+    printed = io.StringIO()
+    with redirect_stdout(printed):
+        code = vico(
+            "run", helsinki_path, helsinki_people, "--steps", 8, "--robots", "husky", "--cars", 3,
+            "--pedestrians", 3, "--observe", "resident_0", "--out", out, "--json",
+        )  # fmt: skip
+    assert code == 0
+    return out, json.loads(printed.getvalue())

@@ -1,0 +1,60 @@
+"""Streets of real places for the tests of roads, lanes, transit and traffic: built once a session."""
+
+import tempfile
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import shapely
+
+from vico.geo.frame import LocalFrame
+from vico.geo.osm import OsmData, polygons_of, read_osm
+from vico.world.heights import HeightField
+from vico.world.lanes import LaneGraph, read_lanes
+from vico.world.model import Transit
+from vico.worldgen.netconvert import RoadNetwork, road_network
+from vico.worldgen.transit import transit_from_osm
+
+EXTRACT = Path(__file__).parents[1] / "src" / "vico" / "data" / "helsinki.osm.pbf"
+HALF = 400.0
+# Centres of the extracts beside the checkout, degrees.
+PLACES = {
+    "monaco": (43.73384, 7.41813),
+    "nyc_les": (40.72103, -73.98768),
+    "berlin_mitte": (52.50930, 13.39295),
+}
+
+
+@dataclass(frozen=True)
+class RoadCity:
+    """A place's map data and what the road stages make of it."""
+
+    osm: OsmData
+    network: RoadNetwork
+    lanes: LaneGraph
+    transit: Transit
+    solids: list[shapely.Polygon]
+
+
+def lanes_of(network: RoadNetwork) -> LaneGraph:
+    """Read a network's lanes back from its file."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "roads.net.xml"
+        path.write_bytes(network.net_xml)
+        return read_lanes(path)
+
+
+@cache
+def road_city(path: Path = EXTRACT, lat: float = 60.1690, lon: float = 24.9435) -> RoadCity:
+    """Roads, lanes and transit of 800 m x 800 m; central Helsinki where nothing else is asked for."""
+    osm = read_osm(path, LocalFrame(lat, lon), HALF)
+    network = road_network(osm)
+    lanes = lanes_of(network)
+    solids = [
+        polygon
+        for area in osm.areas
+        if area.tags.get("building", "no") != "no"
+        for polygon in polygons_of(area.polygon)
+    ]
+    transit = transit_from_osm(osm, lanes, HeightField.flat(HALF), solids=solids)
+    return RoadCity(osm, network, lanes, transit, solids)

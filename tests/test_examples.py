@@ -1,0 +1,39 @@
+"""The examples run as they are printed in the documentation."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def run(name: str, *arguments: str) -> str:
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / name), *arguments], capture_output=True, text=True, timeout=400, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_first_world_builds_and_is_seen(tmp_path: Path) -> None:
+    printed = run("01_first_world.py", "--out", str(tmp_path / "w"), "--radius", "100")
+    assert "buildings" in printed
+    assert (tmp_path / "w.png").stat().st_size > 20_000
+
+
+def test_first_agent_walks(helsinki_path: Path) -> None:
+    printed = run("02_first_agent.py", "--world", str(helsinki_path), "--steps", "30")
+    metres = float(printed.split("walked ")[1].split(" m")[0])
+    assert metres >= 8
+
+
+def test_delivery_gives_a_verdict_for_each_errand(helsinki_path: Path) -> None:
+    printed = run("03_delivery.py", "--world", str(helsinki_path), "--steps", "60")
+    assert printed.count("done") == 6
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.name)
+def test_each_example_says_how_it_is_run(path: Path) -> None:
+    assert f"python examples/{path.name} " in path.read_text()
