@@ -1,0 +1,73 @@
+"""What the benchmarks share: naming the machine, running a child and weighing it, and a table in markdown."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+_VERSIONS = ("numpy", "numba", "mujoco", "shapely")
+
+
+@dataclass(frozen=True)
+class Child:
+    """A process that ran to its end."""
+
+    output: str
+    seconds: float
+    peak_mb: float
+
+
+def machine() -> str:
+    """The machine and the versions that decide the figures; no names of folders."""
+    model = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        lines = [line for line in info.read_text().splitlines() if line.startswith("model name")]
+        model = lines[0].split(":", 1)[1].strip() if lines else model
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9
+    versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in _VERSIONS)
+    return (
+        f"Machine: {platform.machine()}, {model}, {os.cpu_count()} processors, {memory:.0f} GB, load "
+        f"{os.getloadavg()[0]:.1f} at the start; Python {platform.python_version()}, {versions}."
+    )
+
+
+def vico(*arguments: str) -> Child:
+    """Run `vico` in a process of its own; its peak memory is that of its largest process."""
+    began = time.perf_counter()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "vico.cli.main", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    # Both are small, and stderr is lines only: neither pipe fills before the other is read.
+    assert process.stdout is not None
+    assert process.stderr is not None
+    output, errors = process.stdout.read(), process.stderr.read()
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        sys.exit(f"vico {' '.join(arguments)}: exit status {process.returncode}\n{errors}")
+    peak = usage.ru_maxrss / (1024 if sys.platform != "darwin" else 1024 * 1024)
+    return Child(output, time.perf_counter() - began, peak)
+
+
+def row(name: str, values: Sequence[float], digits: int) -> str:
+    """A line of a table: median, least and greatest of n measurements."""
+    low, high, middle = min(values), max(values), statistics.median(values)
+    return f"| {name} | {middle:.{digits}f} | {low:.{digits}f} | {high:.{digits}f} | {len(values)} |"
+
+
+def publish(lines: Sequence[str], table: Path | None) -> None:
+    """Print a report, and write it where it was asked for."""
+    text = "\n".join(lines) + "\n"
+    print(text)
+    if table is not None:
+        table.parent.mkdir(parents=True, exist_ok=True)
+        table.write_text(text, encoding="utf-8")
