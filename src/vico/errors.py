@@ -31,3 +31,9 @@ class EmptyInputError(VicoError, ValueError):
 
 class MissingExtraError(VicoError, ImportError):
     """An optional part is not installed; the message holds the command to type."""
+
+
+class SourceError(VicoError, OSError):
+    """A service in the network did not give what was asked for; `status` is its HTTP status, if it answered."""
+
+    status: int | None = None
