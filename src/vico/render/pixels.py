@@ -20,8 +20,8 @@ STRIDE = QUEUE + 2 * BLOCK
 # Fields, float32: texture coordinates in texels and their step between samples; colour; normal; position; share of the
 # sky that is seen; light of its own; shares of the sun and the sky that moving things leave.
 U, V, SU, SV, RED, GREEN, BLUE, NX, NY, NZ, X, Y, Z, SKY, SHINE, SUN, AROUND = (k * STRIDE for k in range(17))
-_F, _G, _A, _B, _LEVEL = (k * STRIDE for k in range(17, 22))
-REAL_FIELDS = 22
+_F, _G, _A, _B, _LEVEL, _LIT = (k * STRIDE for k in range(17, 23))
+REAL_FIELDS = 23
 # Fields, uint32: first texel, columns and rows of the texture's level, and the pixel.
 START, COLUMNS, ROWS, PIXEL = (k * STRIDE for k in range(4))
 _I0, _I1, _I2, _I3, _T0, _T1, _T2, _T3, _PAIR, _MIDDLE = (k * STRIDE for k in range(4, 14))
@@ -37,7 +37,7 @@ _P1, _P2, _P3 = np.float32(0.012522878), np.float32(0.682171111), np.float32(0.3
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def look_up(texels: Any, real: Any, whole: Any, along: Any) -> None:
-    """Bilinear, repeating: red and blue (16 bits up) and green of every place, times 256.
+    """Bilinear, repeating: red and blue (16 bits up), green and alpha (16 bits up) of every place, times 256.
 
     Four weights that add up to 256 multiply two channels at once.
     """
@@ -67,31 +67,39 @@ def look_up(texels: Any, real: Any, whole: Any, along: Any) -> None:
         a, b, c, d = whole[_T0 + i], whole[_T1 + i], whole[_T2 + i], whole[_T3 + i]
         whole[_PAIR + i] = (a & 0xFF00FF) * wa + (b & 0xFF00FF) * wb + (c & 0xFF00FF) * wc + (d & 0xFF00FF) * wd
         whole[_MIDDLE + i] = (
-            ((a >> 8) & 0xFF) * wa + ((b >> 8) & 0xFF) * wb + ((c >> 8) & 0xFF) * wc + ((d >> 8) & 0xFF) * wd
+            ((a >> 8) & 0xFF00FF) * wa
+            + ((b >> 8) & 0xFF00FF) * wb
+            + ((c >> 8) & 0xFF00FF) * wc
+            + ((d >> 8) & 0xFF00FF) * wd
         )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def paint(texels: Any, real: Any, whole: Any, taps: int) -> None:
-    """Multiply the colours of all places by their textures: the mean of `taps` samples along each one's step."""
+    """Multiply the colours of all places by their textures: the mean of `taps` samples along each one's step.
+
+    A texture's alpha says how much of a place's own light is on.
+    """
     if taps == 0:
         return
     share = np.float32(1.0 / taps)
     factor = np.float32(1.0 / (256.0 * 255.0)) * share
     for i in range(QUEUE):
-        real[_A + i], real[_B + i], real[_LEVEL + i] = _ZERO, _ZERO, _ZERO
+        real[_A + i], real[_B + i], real[_LEVEL + i], real[_LIT + i] = _ZERO, _ZERO, _ZERO, _ZERO
     for tap in range(taps):
         look_up(texels, real, whole, (np.float32(tap) + _HALF) * share - _HALF)
         for i in range(QUEUE):
             pair, middle = whole[_PAIR + i], whole[_MIDDLE + i]
             real[_A + i] += np.float32(np.int32(pair & 0xFFFF))
-            real[_B + i] += np.float32(np.int32(middle))
+            real[_B + i] += np.float32(np.int32(middle & 0xFFFF))
+            real[_LIT + i] += np.float32(np.int32(middle >> 16))
             real[_LEVEL + i] += np.float32(np.int32(pair >> 16))
     for i in range(QUEUE):
         r, g, b = real[_A + i] * factor, real[_B + i] * factor, real[_LEVEL + i] * factor
         real[RED + i] *= r * (_P1 + r * (_P2 + r * _P3))
         real[GREEN + i] *= g * (_P1 + g * (_P2 + g * _P3))
         real[BLUE + i] *= b * (_P1 + b * (_P2 + b * _P3))
+        real[SHINE + i] *= real[_LIT + i] * factor
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

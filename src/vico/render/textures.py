@@ -85,12 +85,13 @@ def _mip_levels(material: Material) -> list[NDArray[np.uint8]]:
     if pixels.shape[2] == 3:
         pixels = np.concatenate([pixels, np.full((*pixels.shape[:2], 1), 255, np.uint8)], axis=2)
     levels = [pixels]
-    # Averages are taken in (roughly) linear light, and of opaque texels only, so that leaves keep their colour.
+    # Averages are taken in (roughly) linear light, and where alpha means holes of opaque texels only, so that leaves
+    # keep their colour.
     light: NDArray[Any] = (pixels[..., :3].astype(np.float32) / 255) ** 2
     alpha: NDArray[Any] = pixels[..., 3].astype(np.float32) / 255
     opaque = float((alpha >= 0.5).mean())
     while max(light.shape[:2]) > 1 and len(levels) < LEVELS:
-        weight = np.maximum(alpha, 1e-3)
+        weight = np.maximum(alpha, 1e-3) if material.cutout else np.ones_like(alpha)
         total = _halved(weight)
         light = _halved(light * weight[..., None]) / total[..., None]
         alpha = _halved(alpha)

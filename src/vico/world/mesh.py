@@ -37,7 +37,8 @@ class Material:
     cutout
         Texels with alpha under one half are holes (leaves, fences).
     emission
-        Share of the colour that shines by itself at night (lit windows), 0..1.
+        Share of the colour that shines by itself at night (lit windows), 0..1. A texture's alpha, where it does not
+        mean holes, says how much of that each texel does.
     double_sided
         Drawn from behind too.
     """
