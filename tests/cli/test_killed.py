@@ -159,7 +159,7 @@ def test_a_killed_demo_needs_no_force(
         raise Killed
 
     monkeypatch.setattr(demo.run_verb, "run", killed)
-    monkeypatch.setattr(demo.world_verb, "build", lambda **_: 0)
+    monkeypatch.setattr(demo.world_verb, "build", lambda *_, **__: 0)
     monkeypatch.setattr(demo.community_verb, "build", lambda *_, **__: 0)
     for _ in range(2):  # the second time finds what the first one left
         with pytest.raises(Killed):

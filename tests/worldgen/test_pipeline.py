@@ -7,7 +7,7 @@ import pytest
 
 from vico.errors import EmptyInputError, InputError, MissingFileError, OutputExistsError
 from vico.world.folder import World, read_world
-from vico.worldgen import pipeline
+from vico.worldgen import recipe
 from vico.worldgen.pipeline import build_world, extract_centre
 
 EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
@@ -52,7 +52,7 @@ def test_an_interrupted_build_leaves_no_world_but_its_finished_stages(
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(pipeline, "places_from_osm", interrupt)
+    monkeypatch.setattr(recipe, "places_from_osm", interrupt)
     with pytest.raises(KeyboardInterrupt):
         build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "world")
     assert not (tmp_path / "world").exists()

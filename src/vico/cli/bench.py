@@ -13,6 +13,7 @@ from vico.cli import community, world
 from vico.cli.output import print_json
 from vico.errors import MissingFileError, VicoError
 from vico.worldgen.packaged import packaged_extract
+from vico.worldgen.sources import Sources
 
 SCRIPTS = Path(__file__).parents[3] / "benchmarks"
 RESIDENTS = 15
@@ -73,7 +74,7 @@ def _prepare(here: Path, parts: tuple[str, ...]) -> None:
     place = packaged_extract()
     with redirect_stdout(io.StringIO()):
         if "world" in parts:
-            world.build(out=here / "world", osm=place.path, lat=place.lat, lon=place.lon, half=place.half)
+            world.build(Sources(place.path), out=here / "world", lat=place.lat, lon=place.lon, half=place.half)
         if "people" in parts:
             community.build(here / "world", out=here / "people", residents=RESIDENTS, seed=0, force=False, json=False)
 

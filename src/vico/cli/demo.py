@@ -14,6 +14,7 @@ from vico.cli import run as run_verb
 from vico.cli import world as world_verb
 from vico.cli.output import check_output
 from vico.worldgen.packaged import packaged_extract
+from vico.worldgen.sources import Sources
 
 
 def demo(out: Path, *, seed: int = 0, force: bool = False) -> int:
@@ -31,7 +32,7 @@ def demo(out: Path, *, seed: int = 0, force: bool = False) -> int:
     for folder in (world, people, run):
         shutil.rmtree(folder, ignore_errors=True)
     console.rule("1 of 4: the world")
-    world_verb.build(out=world, osm=extract.path, lat=extract.lat, lon=extract.lon, half=extract.half, seed=seed)
+    world_verb.build(Sources(extract.path), out=world, lat=extract.lat, lon=extract.lon, half=extract.half, seed=seed)
     console.rule("2 of 4: its people")
     community_verb.build(world, out=people, residents=15, seed=seed, force=False, json=False)
     console.rule("3 of 4: half an hour of their morning")

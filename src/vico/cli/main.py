@@ -45,12 +45,17 @@ def world_build(
     lon: float | None = None,
     center: Annotated[str | None, tyro.conf.arg(metavar="LAT,LON")] = None,
     radius: float = 400.0,
-    dem: Path | None = None,
+    dem: tuple[Path, ...] = (),
+    tiles: str | None = None,
+    photos: str | None = None,
+    places: tuple[str, ...] = (),
+    gtfs: tuple[Path, ...] = (),
+    layouts: Path | None = None,
     seed: int = 0,
     force: bool = False,
     json: bool = False,
 ) -> int:
-    """Make a world from OpenStreetMap data.
+    """Make a world from OpenStreetMap data. A build that was killed goes on where it stopped.
 
     Example: vico world build --lat 60.1690 --lon 24.9435 --out helsinki
 
@@ -63,12 +68,18 @@ def world_build(
         lon: Longitude of the window's centre, degrees.
         center: Both in one. Without any, the middle of the extract.
         radius: Half the window's side, metres.
-        dem: Elevation: GeoTIFF, .hgt or zipped .hgt. Without it the ground is flat.
+        dem: Elevation: GeoTIFF, .hgt or zipped .hgt; one or several. Without it the ground is flat.
+        tiles: Photogrammetry: path or address of a tileset.json, or "google" (your key in the environment).
+        photos: Street pictures: a folder with poses, or "mapillary" or "google" (your key in the environment).
+        places: Further places: Overture GeoParquet files, or "google" (your key in the environment).
+        gtfs: Timetables: zipped GTFS feeds.
+        layouts: Folder of room layouts to choose from.
         seed: Decides what the map leaves open.
-        force: Replace what is in the output folder.
+        force: Replace what is in the output folder; stages whose inputs did not change are kept.
         json: Print the result as JSON.
     """
     from vico.cli import world as verb
+    from vico.worldgen.sources import Sources
 
     if center is not None:
         if lat is not None or lon is not None:
@@ -76,7 +87,55 @@ def world_build(
         lat, lon = _pair(center, "--center")
     if (lat is None) != (lon is None):
         raise InputError("world build: --lat and --lon go together")
-    return verb.build(out=out, osm=osm, lat=lat, lon=lon, half=radius, dem=dem, seed=seed, force=force, json=json)
+    if osm is None:
+        osm = verb.locate(lat, lon, radius)
+    sources = Sources(osm, dem=dem, tiles=tiles, photos=photos, places=places, gtfs=gtfs, layouts=layouts)
+    return verb.build(sources, out=out, lat=lat, lon=lon, half=radius, seed=seed, force=force, json=json)
+
+
+@world.command(name="rebuild")
+def world_rebuild(path: Positional[Path], stage: Comma, json: bool = False) -> int:
+    """Run stages of a world again, and whatever depends on what they change.
+
+    Example: vico world rebuild helsinki --stage objects,indoor
+
+    Args:
+        path: World folder.
+        stage: Names of stages, separated by commas; a wrong one names them all.
+        json: Print the result as JSON.
+    """
+    from vico.cli import world as verb
+
+    return verb.rebuild(path, [name.strip() for name in stage.split(",") if name.strip()], json=json)
+
+
+@world.command(name="build-many")
+def world_build_many(
+    table: Positional[Path],
+    out: Path,
+    workers: int = 0,
+    ray: bool = False,
+    force: bool = False,
+    json: bool = False,
+) -> int:
+    """Build a table of places side by side.
+
+    The table is CSV: name,lat,lon and, where wanted, osm,radius,dem,tiles,gtfs,places,photos,seed. Worlds that are
+    there are kept, those that fail are told at the end (exit 1) and do not stop the others.
+
+    Example: vico world build-many places.csv --out worlds --workers 4
+
+    Args:
+        table: The places; file names in it are relative to it.
+        out: Parent folder of the worlds.
+        workers: Processes side by side; 0 is one a processor.
+        ray: Hand the places to a Ray cluster instead (the extra "scale").
+        force: Build anew worlds that are there.
+        json: Print the outcomes as JSON.
+    """
+    from vico.cli import world as verb
+
+    return verb.build_table(table, out=out, workers=workers or os.cpu_count() or 1, ray=ray, force=force, json=json)
 
 
 @world.command(name="info")

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from vico.cli import community, replay, run, world
 from vico.worldgen.packaged import packaged_extract
+from vico.worldgen.sources import Sources
 
 _RADIUS = 150.0
 
@@ -21,7 +22,7 @@ def warm_up() -> int:
     place = packaged_extract()
     with tempfile.TemporaryDirectory(prefix="vico-") as folder, redirect_stdout(io.StringIO()):
         here = Path(folder)
-        world.build(out=here / "world", osm=place.path, lat=place.lat, lon=place.lon, half=_RADIUS)
+        world.build(Sources(place.path), out=here / "world", lat=place.lat, lon=place.lon, half=_RADIUS)
         community.build(here / "world", out=here / "people", residents=3, seed=0, force=False, json=False)
         run.run(here / "world", here / "people", out=here / "run", steps=5, cars=5, pedestrians=5)
         replay.replay(here / "run", film=True)

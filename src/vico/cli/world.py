@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,9 @@ from numpy.typing import NDArray
 
 from vico.cli.output import check_output, print_json, print_table, progress_bars
 from vico.world.folder import World, read_world, stage_seconds
-from vico.worldgen.pipeline import build_world, extract_centre
+from vico.worldgen.pipeline import build_world, extract_centre, rebuild_world
 from vico.worldgen.previews import Viewpoint
+from vico.worldgen.sources import Sources
 
 
 def photograph(world: World, views: Sequence[Viewpoint]) -> Iterator[NDArray[np.uint8]]:
@@ -34,32 +36,26 @@ def photograph(world: World, views: Sequence[Viewpoint]) -> Iterator[NDArray[np.
 
 
 def build(
+    sources: Sources,
     *,
     out: Path,
-    osm: Path | None = None,
     lat: float | None = None,
     lon: float | None = None,
     half: float = 400.0,
-    dem: Path | None = None,
     seed: int = 0,
     force: bool = False,
     json: bool = False,
 ) -> int:
-    """Build a world; without `osm` from the packaged extract, without a centre around the extract's middle."""
-    from vico.worldgen.packaged import extract_for
-
-    if osm is None:
-        osm = extract_for(lat, lon, half).path
+    """Build a world; without a centre around the map's middle."""
     if lat is None or lon is None:
-        lat, lon = extract_centre(osm)
-    check_output(out, osm, *([dem] if dem is not None else []), force=force)
+        lat, lon = extract_centre(sources.osm)
+    check_output(out, *sources.files(), force=force)
     with progress_bars() as report:
         build_world(
-            osm,
+            sources,
             lat=lat,
             lon=lon,
             half=half,
-            dem=dem,
             seed=seed,
             out=out,
             force=force,
@@ -67,6 +63,47 @@ def build(
             photograph=photograph,
         )
     return info(out, json=json)
+
+
+def locate(lat: float | None, lon: float | None, half: float) -> Path:
+    """Find a map that covers a window: the packaged extract."""
+    from vico.worldgen.packaged import extract_for
+
+    return extract_for(lat, lon, half).path
+
+
+def rebuild(path: Path, stages: Sequence[str], *, json: bool = False) -> int:
+    """Run stages of a world again."""
+    with progress_bars() as report:
+        rebuild_world(path, stages, progress=report, photograph=photograph)
+    return info(path, json=json)
+
+
+def build_table(
+    table: Path, *, out: Path, workers: int, ray: bool = False, force: bool = False, json: bool = False
+) -> int:
+    """Build a table of places; 1 if any failed."""
+    from vico.worldgen.many import build_many, read_place_table
+
+    rows = read_place_table(table)
+    outcomes = []
+    with progress_bars() as report:
+        report("places", 0, len(rows))
+        for outcome in build_many(
+            rows, out, locate=locate, photograph=photograph, workers=workers, force=force, ray=ray
+        ):
+            outcomes.append(outcome)
+            report("places", len(outcomes), len(rows))
+    order = {row.name: k for k, row in enumerate(rows)}
+    outcomes.sort(key=lambda outcome: order[outcome.name])
+    failed = [outcome for outcome in outcomes if outcome.state == "failed"]
+    if json:
+        print_json({"ok": not failed, "places": [asdict(outcome) for outcome in outcomes]})
+    else:
+        for o in outcomes:
+            what = o.reason or f"{o.buildings} buildings, {o.places} places, {o.seconds:.1f} s"
+            print(f"{o.name}: {o.state}: {what}")
+    return 1 if failed else 0
 
 
 def facts(world: World) -> dict[str, Any]:
@@ -83,7 +120,7 @@ def facts(world: World) -> dict[str, Any]:
         "places_by_type": manifest.places_by_type,
         "dropped": {stage.name: len(stage.dropped) for stage in manifest.stages if stage.dropped},
         "seconds": {**seconds, "total": round(sum(seconds.values()), 3)},
-        "megabytes": round(sum(p.stat().st_size for p in world.file(".").rglob("*") if p.is_file()) / 1e6, 2),
+        "megabytes": round(sum(world.file(name).stat().st_size for name in manifest.files) / 1e6, 2),
         "sources": [source.model_dump(mode="json") for source in manifest.sources],
     }
 

@@ -4,6 +4,8 @@
 
     world.json            manifest, written last: a folder that has it is whole
     build.json            seconds per stage and the machine; not hashed, differs every time
+    report.html           what was built, for a person: map, views, counts, what was left out; not hashed
+    .stages/              what the stages made, to run one again; no part of the world, may be deleted
     terrain.npz           height field
     buildings.json places.json entrances.json rooms.json roads.json transit.json
     objects.parquet       things that stand around, one row each
@@ -45,7 +47,7 @@ if TYPE_CHECKING:
 LAYERS = ("ground", "buildings", "roofs", "rooms", "collision")
 
 #: Files that are no part of a world's identity.
-UNHASHED = ("world.json", "build.json")
+UNHASHED = ("world.json", "build.json", "report.html")
 
 R = TypeVar("R", bound=Record)
 
@@ -301,7 +303,7 @@ def _invalid(path: Path, error: ValidationError) -> SchemaError:
 def write_terrain(path: Path, height: HeightField) -> None:
     """Write a height field as ``.npz``."""
     sink = io.BytesIO()
-    np.savez_compressed(sink, heights=height.heights, half=np.float64(height.half))
+    np.savez_compressed(sink, **height.arrays())  # type: ignore[arg-type]
     write_bytes(path, sink.getvalue())
 
 
@@ -309,7 +311,7 @@ def read_terrain(path: Path) -> HeightField:
     """Read what `write_terrain` wrote."""
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as data:
-            return HeightField(data["heights"].astype(np.float32), float(data["half"]))
+            return HeightField.from_arrays(data)
     except FileNotFoundError:
         raise MissingFileError(f"{path}: no such file; build the world anew") from None
     except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile) as error:
@@ -324,7 +326,9 @@ def manifest_bytes(manifest: Manifest) -> bytes:
 def world_files(folder: Path) -> list[str]:
     """Files that belong to the world in `folder`, relative paths in order."""
     found = [p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()]
-    return sorted(name for name in found if name not in UNHASHED and not Path(name).name.startswith("."))
+    return sorted(
+        name for name in found if name not in UNHASHED and not any(part.startswith(".") for part in Path(name).parts)
+    )
 
 
 def seal(folder: Path, manifest: Manifest, *, seconds: dict[str, float]) -> Manifest:

@@ -1,0 +1,220 @@
+"""Many worlds side by side: a table of places, a process each, or tasks of a Ray cluster."""
+
+from __future__ import annotations
+
+import csv
+import multiprocessing
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from vico.errors import InputError, MissingExtraError, MissingFileError, SchemaError, VicoError
+from vico.world.folder import read_world, stage_seconds
+from vico.worldgen.pipeline import build_world
+from vico.worldgen.previews import Photograph
+from vico.worldgen.sources import SERVICES, Sources
+
+_MOST_BYTES = 16 << 20
+
+
+@dataclass(frozen=True)
+class PlaceRow:
+    """A world to build; a row of the table. Several files in a cell are separated by ``;``."""
+
+    name: str
+    lat: float
+    lon: float
+    osm: str = ""
+    radius: float = 400.0
+    dem: str = ""
+    tiles: str = ""
+    gtfs: str = ""
+    places: str = ""
+    photos: str = ""
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a place: built, kept (it was there), or failed with a reason."""
+
+    name: str
+    state: str
+    buildings: int = 0
+    places: int = 0
+    seconds: float = 0.0
+    reason: str = ""
+
+
+Locate = Callable[[float, float, float], Path]
+
+
+def read_place_table(path: Path) -> list[PlaceRow]:
+    """Read a table of places, CSV with a header: ``name,lat,lon`` and any other field of `PlaceRow`.
+
+    File names are taken relative to the table's folder.
+
+    Raises
+    ------
+    MissingFileError, SchemaError
+        If it is not there or a row can't be read; the message gives the line.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise MissingFileError(f"{path}: no such file; give a CSV table with columns name, lat, lon")
+    if path.stat().st_size > _MOST_BYTES:
+        raise SchemaError(f"{path}: larger than {_MOST_BYTES >> 20} MB; split the table")
+    known = {f.name: f.type for f in fields(PlaceRow)}
+    rows: list[PlaceRow] = []
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            reader = csv.DictReader(file, skipinitialspace=True)
+            columns = [c.strip() for c in reader.fieldnames or []]
+            missing = [c for c in ("name", "lat", "lon") if c not in columns]
+            unknown = [c for c in columns if c not in known]
+            if missing or unknown:
+                what = f"lacks {', '.join(missing)}" if missing else f"has unknown columns {', '.join(unknown)}"
+                raise SchemaError(f"{path}: the header {what}; columns are {', '.join(known)}")
+            for content in reader:
+                rows.append(_row(content, path, reader.line_num))
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise SchemaError(f"{path}: not a CSV table in UTF-8 ({error})") from None
+    doubled = sorted({row.name for row in rows if [r.name for r in rows].count(row.name) > 1})
+    if doubled:
+        raise SchemaError(f"{path}: {', '.join(doubled)} named twice; every world needs a folder of its own")
+    if not rows:
+        raise SchemaError(f"{path}: holds no place; add rows below the header")
+    return rows
+
+
+def _row(content: dict[str, str], path: Path, line: int) -> PlaceRow:
+    text = {key.strip(): (value or "").strip() for key, value in content.items() if key is not None}
+    name = text["name"]
+    if not name or name in (".", "..") or any(c in name for c in "/\\\0"):
+        raise SchemaError(f"{path}:{line}: name {name!r} can't be a folder's name")
+    try:
+        row = PlaceRow(
+            name,
+            float(text["lat"]),
+            float(text["lon"]),
+            osm=_beside(text.get("osm", ""), path),
+            radius=float(text.get("radius") or PlaceRow.radius),
+            dem=_beside(text.get("dem", ""), path),
+            tiles=_beside(text.get("tiles", ""), path),
+            gtfs=_beside(text.get("gtfs", ""), path),
+            places=_beside(text.get("places", ""), path),
+            photos=_beside(text.get("photos", ""), path),
+            seed=int(text.get("seed") or PlaceRow.seed),
+        )
+    except ValueError as error:
+        raise SchemaError(f"{path}:{line}: {name}: {error}") from None
+    if not (-90 <= row.lat <= 90 and -180 <= row.lon <= 180):
+        raise SchemaError(f"{path}:{line}: {name}: {row.lat}, {row.lon} is not on Earth")
+    return row
+
+
+def _beside(text: str, table: Path) -> str:
+    parts = [part.strip() for part in text.split(";") if part.strip()]
+    return ";".join(part if "://" in part or part in SERVICES else str(table.parent / part) for part in parts)
+
+
+def build_many(
+    rows: Sequence[PlaceRow],
+    out: Path,
+    *,
+    locate: Locate,
+    photograph: Photograph | None = None,
+    workers: int = 1,
+    force: bool = False,
+    ray: bool = False,
+) -> Iterator[Outcome]:
+    """Build every place into a folder of `out`; a world that is there and whole is kept, one that fails is told.
+
+    Parameters
+    ----------
+    rows
+        The places.
+    out
+        Parent folder of the worlds.
+    locate
+        Finds a map for a place without a file: latitude, longitude, half side to a path.
+    photograph
+        Takes the street-level pictures; a function of a module, as other processes must find it.
+    workers
+        How many processes side by side (not used with `ray`).
+    force
+        Build worlds anew that are there.
+    ray
+        Hand the places to a Ray cluster (the extra ``scale``).
+
+    Yields
+    ------
+    Outcome
+        As each is done, in no fixed order.
+
+    Raises
+    ------
+    MissingExtraError
+        If `ray` is asked for and not installed.
+    """
+    if workers < 1:
+        raise InputError(f"workers: {workers}; at least one is needed")
+    if ray:
+        yield from _with_ray(rows, out, locate, photograph, force)
+        return
+    if workers == 1:
+        for row in rows:
+            yield build_one(row, out, locate, photograph, force)
+        return
+    # Fresh processes: a fork of one with compiled code and threads in it may hang.
+    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+        for done in as_completed([pool.submit(build_one, row, out, locate, photograph, force) for row in rows]):
+            yield done.result()
+
+
+def build_one(row: PlaceRow, out: Path, locate: Locate, photograph: Photograph | None, force: bool) -> Outcome:
+    """Build one place; bad input becomes an outcome, so that it does not end the others."""
+    folder = Path(out) / row.name
+    try:
+        if not force and (folder / "world.json").exists():
+            counts = read_world(folder).manifest.counts
+            return Outcome(row.name, "kept", counts["buildings"], counts["places"])
+        sources = Sources(
+            osm=Path(row.osm) if row.osm else locate(row.lat, row.lon, row.radius),
+            dem=tuple(Path(p) for p in row.dem.split(";") if p),
+            tiles=row.tiles or None,
+            photos=row.photos or None,
+            places=tuple(p for p in row.places.split(";") if p),
+            gtfs=tuple(Path(p) for p in row.gtfs.split(";") if p),
+        )
+        manifest = build_world(
+            sources,
+            lat=row.lat,
+            lon=row.lon,
+            half=row.radius,
+            seed=row.seed,
+            out=folder,
+            force=force,
+            photograph=photograph,
+        )
+    except (VicoError, OSError) as error:
+        return Outcome(row.name, "failed", reason=str(error))
+    counts, seconds = manifest.counts, sum(stage_seconds(read_world(folder)).values())
+    return Outcome(row.name, "built", counts["buildings"], counts["places"], round(seconds, 2))
+
+
+def _with_ray(
+    rows: Sequence[PlaceRow], out: Path, locate: Locate, photograph: Photograph | None, force: bool
+) -> Iterator[Outcome]:
+    try:
+        import ray
+    except ImportError:
+        raise MissingExtraError("Ray is not installed: pip install 'virtual-community[scale]'") from None
+    if not ray.is_initialized():
+        ray.init(include_dashboard=False, log_to_driver=False)
+    task = ray.remote(build_one)
+    waiting = [task.remote(row, Path(out).absolute(), locate, photograph, force) for row in rows]
+    while waiting:
+        done, waiting = ray.wait(waiting)
+        yield from ray.get(done)

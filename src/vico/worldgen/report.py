@@ -1,0 +1,132 @@
+"""``report.html``: what was built, for a person: map, views, counts, what was left out and why, seconds, licences."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from html import escape
+
+from vico.world.files import write_bytes
+from vico.world.folder import World, stage_seconds
+from vico.world.model import Dropped, StageReport
+
+_SHOWN_IDS = 200
+_STYLE = """
+:root { color-scheme: light dark; --ink: #22252a; --soft: #63676e; --line: #d9dade; --paper: #fbfaf7; --bar: #0072b2; }
+@media (prefers-color-scheme: dark) {
+  :root { --ink: #e8e6e1; --soft: #a2a5aa; --line: #3b3e44; --paper: #1b1d20; --bar: #56b4e9; }
+}
+body { margin: 0 auto; max-width: 1180px; padding: 2rem 1.2rem 4rem; background: var(--paper); color: var(--ink);
+  font: 16px/1.5 system-ui, sans-serif; }
+h1 { margin: 0; font-size: 2rem; } h2 { margin: 2.6rem 0 .6rem; font-size: 1.25rem; }
+p.lead { margin: .2rem 0 1.6rem; color: var(--soft); }
+img { width: 100%; height: auto; border-radius: 4px; display: block; background: var(--line); }
+.views { display: grid; grid-template-columns: repeat(auto-fill, minmax(270px, 1fr)); gap: .7rem; margin-top: .7rem; }
+.figures { display: grid; grid-template-columns: repeat(auto-fill, minmax(150px, 1fr)); gap: .8rem 1.4rem; }
+.figures b { display: block; font-size: 1.5rem; font-variant-numeric: tabular-nums; line-height: 1.2; }
+.figures span { color: var(--soft); font-size: .9rem; }
+table { border-collapse: collapse; width: 100%; font-size: .95rem; }
+th { text-align: left; font-weight: 600; } th, td { padding: .3rem .9rem .3rem 0; border-bottom: 1px solid var(--line);
+  vertical-align: top; } td.n { text-align: right; white-space: nowrap; width: 5rem; }
+td.bar { width: 45%; } td.bar i { display: block; height: .75rem; margin-top: .35rem; background: var(--bar);
+  border-radius: 2px; min-width: 1px; }
+details { border-bottom: 1px solid var(--line); padding: .35rem 0; } summary { cursor: pointer; }
+details p { color: var(--soft); font-size: .85rem; overflow-wrap: anywhere; margin: .3rem 0 .3rem 1.2rem; }
+code { font-size: .85em; }
+"""
+
+
+def report_page(world: World) -> str:
+    """Return the page, HTML; its pictures are the world's own files, by relative path."""
+    manifest = world.manifest
+    origin, side = manifest.origin, 2 * manifest.half
+    views = sorted(p.relative_to(world.file(".")).as_posix() for p in world.file(".").glob("previews/*.png"))
+    seconds = stage_seconds(world)
+    parts = [
+        "<!doctype html><html lang=en><meta charset=utf-8>",
+        "<meta name=viewport content='width=device-width, initial-scale=1'>",
+        f"<title>{escape(manifest.name)}: a world</title><style>{_STYLE}</style>",
+        f"<h1>{escape(manifest.name)}</h1>",
+        f"<p class=lead>{side:.0f} m × {side:.0f} m around {origin.lat:.5f}, {origin.lon:.5f}; seed {manifest.seed}; "
+        f"{escape(manifest.producer)}; built in {sum(seconds.values()):.1f} s</p>",
+        "<img src='map.png' alt='The world from above: streets, buildings, places and bus lines'>",
+    ]
+    if views:
+        pictures = "".join(
+            f"<a href='{escape(v)}'><img src='{escape(v)}' alt='A street seen at eye height' loading=lazy></a>"
+            for v in views
+        )
+        parts.append(f"<h2>In its streets</h2><div class=views>{pictures}</div>")
+    parts.append("<h2>What is there</h2>" + _figures(manifest.counts))
+    parts.append("<h2>Places by type</h2>" + _bars(manifest.places_by_type.items(), unit=""))
+    parts.append("<h2>What was left out, and why</h2>" + _left_out(manifest.stages))
+    parts.append("<h2>Stage by stage</h2>" + _stage_table(manifest.stages))
+    parts.append("<h2>Seconds a stage</h2>" + _bars(seconds.items(), unit=" s"))
+    rows = [
+        (
+            escape(s.kind),
+            escape(s.name),
+            escape(s.attribution),
+            escape(s.licence),
+            escape(s.timestamp or ""),
+            f"<code>{escape((s.sha256 or '')[:12])}</code>",
+        )
+        for s in manifest.sources
+    ]
+    head = ("what", "name", "credit", "licence", "as of", "SHA-256")
+    parts.append("<h2>Sources and licences</h2>" + _table(head, rows))
+    return "\n".join(parts) + "\n"
+
+
+def write_report(world: World) -> None:
+    """Write the page into the world's folder. It tells seconds, so it is no part of the world's identity."""
+    write_bytes(world.file("report.html"), report_page(world).encode())
+
+
+def _words(name: str) -> str:
+    return escape(name.replace("_", " "))
+
+
+def _figures(counts: dict[str, int]) -> str:
+    cells = "".join(f"<div><b>{number:,}</b><span>{_words(name)}</span></div>" for name, number in counts.items())
+    return f"<div class=figures>{cells}</div>"
+
+
+def _bars(values: Iterable[tuple[str, float]], *, unit: str) -> str:
+    pairs = list(values)
+    most = max((value for _, value in pairs), default=0) or 1
+    rows = "".join(
+        f"<tr><td>{_words(name)}</td><td class=n>{value if isinstance(value, int) else f'{value:.2f}'}{unit}</td>"
+        f"<td class=bar><i style='width:{100 * value / most:.1f}%'></i></td></tr>"
+        for name, value in pairs
+    )
+    return f"<table>{rows}</table>"
+
+
+def _left_out(stages: Sequence[StageReport]) -> str:
+    parts = []
+    for stage in stages:
+        reasons: dict[str, list[Dropped]] = defaultdict(list)
+        for dropped in stage.dropped:
+            reasons[dropped.reason].append(dropped)
+        for reason, them in sorted(reasons.items(), key=lambda item: (-len(item[1]), item[0])):
+            ids = ", ".join(escape(d.id) for d in them[:_SHOWN_IDS])
+            more = f" and {len(them) - _SHOWN_IDS} more" if len(them) > _SHOWN_IDS else ""
+            parts.append(
+                f"<details><summary>{_words(stage.name)}: {len(them):,} × {escape(reason)}</summary>"
+                f"<p>{ids}{more}</p></details>"
+            )
+    return "".join(parts) or "<p>Nothing.</p>"
+
+
+def _stage_table(stages: Sequence[StageReport]) -> str:
+    rows = [
+        (_words(s.name), "; ".join(f"{_words(name)} {number:,}" for name, number in s.counts.items())) for s in stages
+    ]
+    return _table(("stage", "made"), rows)
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    top = "".join(f"<th>{cell}</th>" for cell in head)
+    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
+    return f"<table><tr>{top}</tr>{body}</table>"

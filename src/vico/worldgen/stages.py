@@ -1,0 +1,147 @@
+"""The stages of a build: run, timed, reported, and kept, so that a killed build resumes and one stage runs alone.
+
+A stage is a function of typed inputs. What it made is kept in a file of its own together with a key: a digest of the
+stage's name, of this package's code, and of all inputs. A later build whose stage has the same key reads the file
+instead of computing. So a build that was killed goes on where it stopped, a build with one other option computes only
+what depends on it, and a stage that is run again by name passes on nothing new unless its result is another.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, TypeVar
+
+from vico import __version__
+from vico.errors import SchemaError
+from vico.world.model import Dropped, StageReport
+from vico.worldgen.product import digest_of, read_head, read_product, write_product
+
+Progress = Callable[[str, int, int], None]
+T = TypeVar("T")
+
+_ROOMS = ("geo", "world", "assets", "worldgen", "llm")
+SUFFIX = ".stage"
+
+
+@cache
+def code_digest() -> str:
+    """SHA-256 of the code that builds worlds: another version of it may make other products from the same inputs."""
+    root = Path(__file__).parents[1]
+    total = sha256(__version__.encode())
+    for room in _ROOMS:
+        for path in sorted((root / room).rglob("*.py")):
+            total.update(path.relative_to(root).as_posix().encode())
+            total.update(path.read_bytes())
+    return total.hexdigest()
+
+
+class Stages:
+    """Runs stages and keeps what they made.
+
+    Parameters
+    ----------
+    folder
+        Where products are kept; None keeps nothing.
+    again
+        Names of stages to run even if their product is there.
+    progress
+        Called with a stage's name, how much of it is done, and how much there is.
+
+    Attributes
+    ----------
+    seconds
+        Wall seconds a stage took, by name.
+    reports
+        What the stages made and left out.
+    kept
+        Names of stages whose product was read instead of computed.
+    """
+
+    def __init__(self, folder: Path | None, *, again: Collection[str] = (), progress: Progress | None = None) -> None:
+        self.seconds: dict[str, float] = {}
+        self.reports: list[StageReport] = []
+        self.kept: list[str] = []
+        self._folder = folder
+        self._again = set(again)
+        self._progress = progress
+        self._digests: dict[int, tuple[Any, str]] = {}
+
+    def given(self, value: T, digest: str) -> T:
+        """Make an input known by a digest of its own (of the file it was read from), and return it."""
+        self._digests[id(value)] = (value, digest)
+        return value
+
+    def run(self, name: str, function: Callable[..., T], *inputs: Any, **options: Any) -> T:
+        """Run a stage, or read what it made from the same inputs before.
+
+        `inputs` and `options` are passed to `function`; both count towards the key. A callable among the options
+        does not: it says how, not what (a progress callback, a picture taker).
+        """
+        self._tell(name, 0)
+        start = time.perf_counter()
+        value = self._product(name, function, inputs, options)
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+        self._tell(name, 1)
+        return value
+
+    @contextmanager
+    def timed(self, name: str) -> Iterator[None]:
+        """Time a step that keeps no product: reading the sources, writing files, taking pictures."""
+        self._tell(name, 0)
+        start = time.perf_counter()
+        yield
+        self.seconds[name] = time.perf_counter() - start
+        self._tell(name, 1)
+
+    def report(self, name: str, counts: dict[str, int], dropped: Iterable[Dropped] = ()) -> None:
+        """Record what a stage made and left out."""
+        self.reports.append(StageReport(name=name, counts=counts, dropped=list(dropped)))
+
+    def sweep(self) -> None:
+        """Remove products of stages that this build did not have."""
+        if self._folder is not None and self._folder.is_dir():
+            for path in self._folder.glob(f"*{SUFFIX}"):
+                if path.name.removesuffix(SUFFIX) not in self.seconds:
+                    path.unlink()
+
+    def _tell(self, name: str, done: int) -> None:
+        if self._progress is not None:
+            self._progress(name, done, 1)
+
+    def _product(self, name: str, function: Callable[..., T], inputs: tuple[Any, ...], options: dict[str, Any]) -> T:
+        if self._folder is None:
+            return function(*inputs, **options)
+        what = {key: self._digest(value) for key, value in sorted(options.items()) if not callable(value)}
+        parts = [
+            name,
+            code_digest(),
+            *(self._digest(value) for value in inputs),
+            *(f"{k}={v}" for k, v in what.items()),
+        ]
+        key = sha256("\n".join(parts).encode()).hexdigest()
+        path = self._folder / f"{name}{SUFFIX}"
+        if name not in self._again and path.exists():
+            kept = self._read(path, key)
+            if kept is not None:
+                self.kept.append(name)
+                return self.given(*kept)
+        value = function(*inputs, **options)
+        return self.given(value, write_product(path, value, key=key))
+
+    def _read(self, path: Path, key: str) -> tuple[Any, str] | None:
+        """The product, if it was made under this key and is whole: a torn one is simply made anew."""
+        try:
+            return read_product(path) if read_head(path)[0] == key else None
+        except SchemaError:
+            os.unlink(path)
+            return None
+
+    def _digest(self, value: Any) -> str:
+        known = self._digests.get(id(value))
+        return known[1] if known is not None and known[0] is value else digest_of(value)
