@@ -12,16 +12,13 @@ from pyproj import Transformer
 
 from vico.errors import InputError
 
-# A transverse Mercator at its own origin is true to 1e-8 within a kilometre; towards the poles and over the date line
-# the geodetic boxes that map extracts are cut by stop making sense.
-_MAX_LATITUDE = 85.0
-
 
 @dataclass(frozen=True)
 class LocalFrame:
     """A transverse Mercator centred on a point, so that x is east and y is north, metres.
 
-    The projection is the one netconvert is given, so road networks and meshes share coordinates to a micrometre.
+    The projection is the one netconvert is given, so road networks and meshes share coordinates to a micrometre. At its
+    own origin it is true to 1e-8 within a kilometre, at the poles and on the date line as anywhere.
 
     Attributes
     ----------
@@ -31,7 +28,7 @@ class LocalFrame:
     Raises
     ------
     InputError
-        If the origin is no place on Earth, or too near a pole.
+        If the origin is no place on Earth.
     """
 
     lat: float
@@ -42,10 +39,10 @@ class LocalFrame:
             raise InputError(
                 f"coordinates: ({self.lat}, {self.lon}) are no numbers; give degrees, as in 60.1690,24.9435"
             )
-        if abs(self.lat) > _MAX_LATITUDE or abs(self.lon) > 180.0:
+        if abs(self.lat) > 90.0 or abs(self.lon) > 180.0:
             raise InputError(
                 f"coordinates: latitude {self.lat}, longitude {self.lon} out of range; latitude must be within "
-                f"-{_MAX_LATITUDE:g}..{_MAX_LATITUDE:g} and longitude within -180..180 (latitude comes first)"
+                "-90..90 and longitude within -180..180 (latitude comes first)"
             )
 
     @property
@@ -80,11 +77,28 @@ class LocalFrame:
         return np.asarray(lat, np.float64), np.asarray(lon, np.float64)
 
     def bbox(self, half: float) -> tuple[float, float, float, float]:
-        """West, south, east, north, degrees, of the smallest geodetic box around the square of half side `half`."""
+        """West, south, east, north, degrees, of the smallest geodetic box around the square of half side `half`.
+
+        Over the date line west is larger than east, as in GeoJSON; around a pole the box goes all the way round.
+        `boxes` gives plain boxes.
+        """
         side = np.linspace(-half, half, 5)
         edge = np.full(5, half)
         ring = np.concatenate(
             [np.stack(pair, axis=-1) for pair in ((side, -edge), (side, edge), (-edge, side), (edge, side))]
         )
         lat, lon = self.to_geodetic(ring)
-        return float(lon.min()), float(lat.min()), float(lon.max()), float(lat.max())
+        south, north = float(lat.min()), float(lat.max())
+        pole = 90.0 if self.lat >= 0 else -90.0
+        if np.abs(self.to_enu(pole, self.lon)).max() <= half:
+            return -180.0, min(south, pole), 180.0, max(north, pole)
+        off = (lon - self.lon + 180.0) % 360.0 - 180.0
+        west, east = float(off.min()) + self.lon, float(off.max()) + self.lon
+        return west + 360.0 * (west < -180.0), south, east - 360.0 * (east > 180.0), north
+
+    def boxes(self, half: float) -> list[tuple[float, float, float, float]]:
+        """`bbox` as boxes whose west is smaller than their east: two where the square lies over the date line."""
+        west, south, east, north = self.bbox(half)
+        if west <= east:
+            return [(west, south, east, north)]
+        return [(west, south, 180.0, north), (-180.0, south, east, north)]

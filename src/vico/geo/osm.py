@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -54,6 +55,7 @@ _LINEAR_VALUES = {
     "power": {"line", "minor_line", "cable"},
     "historic": {"citywalls", "city_wall"},
 }
+_STAMP = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ")
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,8 @@ class OsmData:
     relations
         Relations with a member that was kept.
     sha256, timestamp
-        Of the file: digest of its bytes and the newest object's time (ISO 8601; None where the file has no times).
+        Of the file: digest of its bytes and the newest object's time, or the one in its header where objects have none
+        (ISO 8601; None where neither has).
     """
 
     frame: LocalFrame
@@ -189,7 +192,11 @@ class _Reader:
         self.frame = frame
         self.reach = reach
         self.west, self.south, self.east, self.north = frame.bbox(reach)
+        # Over the date line, longitudes are counted on beyond 180 degrees.
+        self.wraps = self.west > self.east
+        self.east += 360.0 * self.wraps
         self.newest = 0.0
+        self.stamp = ""
         self.relations: list[OsmRelation] = []
         self.node_rows: list[tuple[int, float, float, Tags]] = []
         self.way_rows: list[tuple[int, list[int], list[float], list[float], Tags, bool]] = []
@@ -197,6 +204,8 @@ class _Reader:
         self.objects = 0
 
     def read(self) -> None:
+        with osmium.io.Reader(self.path, osmium.osm.NOTHING) as file:
+            self.stamp = file.header().get("osmosis_replication_timestamp")
         wanted: set[int] = set()
         for relation in osmium.FileProcessor(self.path, osmium.osm.RELATION):
             self.objects += 1
@@ -218,8 +227,12 @@ class _Reader:
 
     def _node(self, node: osmium.osm.Node) -> None:
         place = node.location
-        if place.valid() and self.west <= place.lon <= self.east and self.south <= place.lat <= self.north:
-            self.node_rows.append((node.id, place.lat, place.lon, dict(node.tags)))
+        if not place.valid():
+            return
+        lat, lon = place.lat, place.lon
+        east = lon + 360.0 if self.wraps and lon < 0.0 else lon
+        if self.west <= east <= self.east and self.south <= lat <= self.north:
+            self.node_rows.append((node.id, lat, lon, dict(node.tags)))
 
     def _way(self, way: osmium.osm.Way, wanted: bool) -> None:
         refs: list[int] = []
@@ -230,7 +243,7 @@ class _Reader:
             if place.valid():
                 refs.append(node.ref)
                 lats.append(place.lat)
-                lons.append(place.lon)
+                lons.append(place.lon + 360.0 if self.wraps and place.lon < 0.0 else place.lon)
         if len(refs) < 2:
             self.unlocated += 1
             return
@@ -338,6 +351,8 @@ def _assembled(reader: _Reader, half: float, margin: float, digest: str) -> OsmD
     newest = None
     if reader.newest > 0:
         newest = np.datetime_as_string(np.datetime64(int(reader.newest), "s")) + "Z"
+    elif _STAMP.fullmatch(reader.stamp):
+        newest = reader.stamp
     return OsmData(frame, half, margin, nodes, ways, areas, relations, digest, newest, broken)
 
 
