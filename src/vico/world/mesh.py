@@ -41,6 +41,8 @@ class Material:
         mean holes, says how much of that each texel does.
     double_sided
         Drawn from behind too.
+    photo
+        A photo: kept as JPEG in files, which loses detail nobody sees and a tenth of the bytes remain.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Material:
     cutout: bool = False
     emission: float = 0.0
     double_sided: bool = False
+    photo: bool = False
 
 
 @dataclass(frozen=True)
@@ -157,6 +160,7 @@ def joined(surfaces: Iterable[Surface]) -> list[Surface]:
 # glTF is y-up: (x, y, z) of ours is (x, z, -y) of the file's.
 _TO_GLTF = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], np.float32)
 _FLOAT, _UINT, _UBYTE = 5126, 5125, 5121
+_PHOTO_QUALITY = 88  # of JPEG
 _SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
@@ -263,8 +267,13 @@ def _material_entry(material: Material, buffer: _Buffer, images: list[dict[str, 
     pbr: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": 0.9}
     if material.texture is not None:
         packed = io.BytesIO()
-        Image.fromarray(material.texture).save(packed, "PNG", compress_level=6)
-        images.append({"bufferView": buffer.view(packed.getvalue()), "mimeType": "image/png", "name": material.name})
+        if material.photo and material.texture.shape[2] == 3:
+            Image.fromarray(material.texture).save(packed, "JPEG", quality=_PHOTO_QUALITY)
+            kind = "image/jpeg"
+        else:
+            Image.fromarray(material.texture).save(packed, "PNG", compress_level=6)
+            kind = "image/png"
+        images.append({"bufferView": buffer.view(packed.getvalue()), "mimeType": kind, "name": material.name})
         pbr["baseColorTexture"] = {"index": len(images) - 1}
     entry: dict[str, Any] = {"name": material.name, "pbrMetallicRoughness": pbr}
     if material.cutout:
@@ -326,10 +335,11 @@ def _surfaces_of(document: dict[str, Any], binary: memoryview) -> dict[str, list
     materials = []
     for entry in document.get("materials", []):
         texture = entry["pbrMetallicRoughness"].get("baseColorTexture")
-        pixels = None
+        pixels, photo = None, False
         if texture is not None:
             image = document["images"][document["textures"][texture["index"]]["source"]]
             pixels = np.asarray(Image.open(io.BytesIO(bytes_of(image["bufferView"]))))
+            photo = image.get("mimeType") == "image/jpeg"
         materials.append(
             Material(
                 entry["name"],
@@ -337,6 +347,7 @@ def _surfaces_of(document: dict[str, Any], binary: memoryview) -> dict[str, list
                 cutout=entry.get("alphaMode") == "MASK",
                 emission=float(entry.get("extras", {}).get("emission", 0.0)),
                 double_sided=bool(entry.get("doubleSided", False)),
+                photo=photo,
             )
         )
     layers: dict[str, list[Surface]] = {}
