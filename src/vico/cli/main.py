@@ -179,6 +179,32 @@ def community_build(
     return verb.build(path, out=out, residents=residents, seed=seed, force=force, json=json)
 
 
+@app.command(name="export")
+def export(
+    path: Positional[Path],
+    to: Literal["gltf", "usd", "mjcf", "geojson", "xodr"],
+    out: Path,
+    rooms: bool = False,
+    force: bool = False,
+    json: bool = False,
+) -> int:
+    """Write a world in another format: glTF, OpenUSD, MuJoCo, GeoJSON, OpenDRIVE.
+
+    Example: vico export helsinki --to mjcf --out helsinki_mjcf
+
+    Args:
+        path: World folder.
+        to: The format. "usd" needs the extra of that name.
+        out: Folder to make; refused if it exists, unless --force.
+        rooms: With what lies indoors.
+        force: Replace what is in the output folder.
+        json: Print the result as JSON.
+    """
+    from vico.cli import world as verb
+
+    return verb.export(path, to, out=out, rooms=rooms, force=force, json=json)
+
+
 @check.command(name="world")
 def check_world(path: Positional[Path], json: bool = False) -> int:
     """Check a world: schema, hashes, buildings, entrances, rooms, lanes, transit. Exit 1 if anything is wrong.

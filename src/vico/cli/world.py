@@ -151,3 +151,16 @@ def check(path: Path, *, json: bool = False) -> int:
             print(f"{finding.id}: {finding.where}: {finding.what}")
         print(f"{path}: {len(findings)} findings" if findings else f"{path}: all is well")
     return 1 if findings else 0
+
+
+def export(path: Path, to: str, *, out: Path, rooms: bool = False, force: bool = False, json: bool = False) -> int:
+    """Write a world in another format."""
+    from vico.world.exports import export_world
+
+    check_output(out, path, force=force)
+    counts = export_world(read_world(path), to, out, rooms=rooms, force=force)
+    if json:
+        print_json({"format": to, "out": str(out), **counts})
+    else:
+        print(f"{out}: {to}, " + ", ".join(f"{number:,} {name}" for name, number in counts.items()))
+    return 0

@@ -1,0 +1,89 @@
+"""Which formats there are, and the one call that writes any of them."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from vico.errors import InputError, OutputExistsError
+from vico.world.exports.geojson import write_geojson
+from vico.world.exports.gltf import write_gltf
+from vico.world.exports.mjcf import write_mjcf
+from vico.world.exports.usd import write_usd
+from vico.world.files import write_bytes
+from vico.world.folder import World
+
+Writer = Callable[..., dict[str, int]]
+
+
+def _write_xodr(world: World, folder: Path, *, rooms: bool) -> dict[str, int]:
+    """OpenDRIVE, with SUMO's network beside it: the world's own road files."""
+    del rooms  # roads lie outdoors
+    for name in ("roads.xodr", "roads.net.xml"):
+        write_bytes(folder / name, world.file(name).read_bytes())
+    return {"roads": len([road for road in world.roads.roads if road.lanes > 0]), "lanes": len(world.lanes)}
+
+
+#: Writers by format. Each takes the world, an empty folder and ``rooms`` and returns what it wrote, counted.
+FORMATS: dict[str, Writer] = {
+    "gltf": write_gltf,
+    "usd": write_usd,
+    "mjcf": write_mjcf,
+    "geojson": write_geojson,
+    "xodr": _write_xodr,
+}
+
+
+def export_world(world: World, to: str, out: Path, *, rooms: bool = False, force: bool = False) -> dict[str, int]:
+    """Write a world in another format.
+
+    Parameters
+    ----------
+    world
+        As read from its folder.
+    to
+        One of `FORMATS`.
+    out
+        Folder to make; whole or not at all.
+    rooms
+        With what lies indoors (rooms below the ground, furniture).
+    force
+        Replace what is at `out`.
+
+    Returns
+    -------
+    dict
+        What was written, counted.
+
+    Raises
+    ------
+    InputError
+        If there is no such format.
+    OutputExistsError
+        If `out` holds something and `force` is false.
+    MissingExtraError
+        If the format needs a library that is not installed.
+    """
+    if to not in FORMATS:
+        raise InputError(f"export: no format {to!r}; there are {', '.join(FORMATS)}")
+    out = Path(out)
+    if out.exists() and not force and (not out.is_dir() or any(out.iterdir())):
+        raise OutputExistsError(f"{out}: exists already; choose another folder, or add --force to replace it")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    folder = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
+    try:
+        counts = FORMATS[to](world, folder, rooms=rooms)
+        lines = [f"{source.attribution} ({source.licence})" for source in world.manifest.sources]
+        write_bytes(folder / "CREDITS.txt", ("\n".join(lines) + "\n").encode())
+        folder.chmod(0o755)
+        if out.is_dir():
+            shutil.rmtree(out)
+        elif out.exists():
+            out.unlink()
+        folder.rename(out)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    return counts

@@ -1,0 +1,150 @@
+"""What is where, for maps: GeoJSON (RFC 7946), longitude and latitude in degrees (WGS 84), heights in metres."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.geo.frame import LocalFrame
+from vico.world.files import write_bytes
+from vico.world.folder import World
+
+Feature = dict[str, Any]
+
+
+def write_geojson(world: World, folder: Path, *, rooms: bool) -> dict[str, int]:
+    """Write one feature collection a kind: buildings, places, entrances, roads, transit, objects (and rooms)."""
+    kinds = {
+        "buildings": _buildings(world),
+        "places": _places(world),
+        "entrances": _entrances(world),
+        "roads": _roads(world),
+        "transit": _transit(world),
+        "objects": _objects(world, rooms),
+    }
+    if rooms:
+        kinds["rooms"] = _rooms(world)
+    counts = {}
+    for name, features in kinds.items():
+        rows = [json.dumps(f, ensure_ascii=False, separators=(",", ":")) for f in features]
+        text = '{"type":"FeatureCollection","features":[\n' + ",\n".join(rows) + "\n]}\n"
+        write_bytes(folder / f"{name}.geojson", text.encode())
+        counts[name] = len(rows)
+    return counts
+
+
+def _feature(shape: str, coordinates: Any, key: str, /, **properties: Any) -> Feature:
+    return {
+        "type": "Feature",
+        "id": key,
+        "geometry": {"type": shape, "coordinates": coordinates},
+        "properties": {name: value for name, value in properties.items() if value is not None},
+    }
+
+
+def _point(frame: LocalFrame, xyz: Sequence[float]) -> list[float]:
+    lat, lon = frame.to_geodetic(np.asarray(xyz[:2], np.float64))
+    return [round(float(lon), 7), round(float(lat), 7), *([round(float(xyz[2]), 2)] if len(xyz) > 2 else [])]
+
+
+def _line(frame: LocalFrame, points: Sequence[Sequence[float]] | NDArray[Any]) -> list[list[float]]:
+    xy = np.asarray(points, np.float64)
+    lat, lon = frame.to_geodetic(xy[:, :2])
+    return np.round(np.column_stack([lon, lat]), 7).tolist()
+
+
+def _buildings(world: World) -> Iterator[Feature]:
+    for b in world.buildings:
+        rings = [_line(world.frame, [*ring, ring[0]]) for ring in b.footprint]
+        yield _feature(
+            "Polygon",
+            rings,
+            b.id,
+            name=b.name,
+            use=b.use,
+            height=round(b.height, 2),
+            base=round(b.base, 2),
+            levels=b.levels,
+            roof=b.roof_shape,
+            colour=b.colour,
+            accessible=b.accessible,
+        )
+
+
+def _places(world: World) -> Iterator[Feature]:
+    for p in world.places:
+        yield _feature(
+            "Point",
+            _point(world.frame, p.position),
+            p.id,
+            name=p.name,
+            category=p.category.value,
+            kind=p.kind,
+            building=p.building,
+            opening_hours=p.opening_hours,
+        )
+
+
+def _entrances(world: World) -> Iterator[Feature]:
+    for e in world.entrances:
+        yield _feature("Point", _point(world.frame, e.position), e.id, building=e.building, facing=round(e.facing, 4))
+
+
+def _roads(world: World) -> Iterator[Feature]:
+    for r in world.roads.roads:
+        yield _feature(
+            "LineString",
+            _line(world.frame, r.line),
+            r.id,
+            name=r.name,
+            kind=r.kind,
+            width=r.width,
+            lanes=r.lanes,
+            oneway=r.oneway,
+            sidewalk=r.sidewalk,
+            speed=round(r.speed, 2),
+            layer=r.layer,
+        )
+
+
+def _transit(world: World) -> Iterator[Feature]:
+    transit = world.transit
+    for s in transit.stops:
+        yield _feature("Point", _point(world.frame, s.wait), s.id, name=s.name, kind="bus_stop")
+    for b in transit.bike_stations:
+        place = _point(world.frame, b.position)
+        yield _feature("Point", place, b.id, name=b.name, kind="bike_station", capacity=b.capacity)
+    for line in transit.lines:
+        path = np.concatenate([world.lanes.line(world.lanes.index[lane])[:, :2] for lane in line.lanes])
+        yield _feature(
+            "LineString", _line(world.frame, path), line.id, name=line.name, kind="bus_line", stops=line.stops
+        )
+
+
+def _objects(world: World, rooms: bool) -> Iterator[Feature]:
+    objects = world.objects if rooms else world.objects.where(world.objects.outdoors)
+    for k in range(len(objects)):
+        yield _feature(
+            "Point",
+            _point(world.frame, (objects.x[k], objects.y[k], objects.z[k])),
+            str(objects.id[k]),
+            kind=str(objects.kind[k]),
+            group=str(objects.group[k]),
+            height=round(float(objects.size_z[k]), 2),
+            room=str(objects.room[k]) or None,
+        )
+
+
+def _rooms(world: World) -> Iterator[Feature]:
+    for r in world.rooms:
+        c, s = np.cos(r.yaw), np.sin(r.yaw)
+        corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]) * np.array(r.size[:2]) / 2
+        ring = corners @ np.array([[c, s], [-s, c]]) + np.array(r.centre[:2])
+        yield _feature(
+            "Polygon", [_line(world.frame, ring.tolist())], r.id, kind=r.kind, place=r.place, floor=r.centre[2]
+        )
