@@ -47,9 +47,9 @@ class StreetImage:
         When, ISO 8601, if it is told.
     source, attribution
         Name of the source, and whom to credit.
-    exact_height
-        Whether ``position[2]`` counts from the world's zero. Otherwise it is only a guess above unknown ground, and
-        the camera must be seated on the terrain.
+    eye
+        Metres above the ground below it, where that is all that is known of its height: ``position[2]`` is the same
+        number then, and the camera must be lifted on the terrain. None: ``position[2]`` counts from the world's zero.
     """
 
     id: str
@@ -60,7 +60,7 @@ class StreetImage:
     captured: str | None
     source: str
     attribution: str
-    exact_height: bool = False
+    eye: float | None = None
 
 
 class StreetImages(Protocol):

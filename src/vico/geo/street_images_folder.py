@@ -44,13 +44,14 @@ from vico.geo.street_images import (
     undistorted,
     within,
 )
-from vico.geo.street_images_mapillary import images_in
+from vico.geo.street_images_mapillary import EYE, images_in
 
 _MOST_BYTES = 64 << 20
 _MOST_JSON = 512 << 20
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
-Latitude, Longitude = Annotated[Number, Field(ge=-85, le=85)], Annotated[Number, Field(ge=-180, le=180)]
+Latitude = Annotated[Number, Field(ge=-85, le=85)]
+Longitude = Annotated[Number, Field(ge=-180, le=180)]
 Bend = Annotated[Number, Field(ge=-2, le=2)]
 
 
@@ -115,7 +116,6 @@ class Reference(BaseModel):
     model_config = ConfigDict(extra="ignore")
     latitude: Latitude
     longitude: Longitude
-    altitude: Number = 0.0
 
 
 class Reconstruction(BaseModel):
@@ -236,7 +236,7 @@ class FolderImages:
                     bend=(photo.k1, photo.k2),
                     captured=photo.captured,
                     attribution=record.attribution,
-                    exact_height=photo.altitude is not None,
+                    eye=photo.eye if photo.altitude is None else None,
                 )
             )
         return cameras
@@ -256,14 +256,14 @@ class FolderImages:
                 _Camera(
                     id=image.id,
                     file=image.url() or "",
-                    position=np.array([*image.place(frame), image.computed_altitude or 0.0]),
+                    position=np.array([*image.place(frame), EYE]),
                     rotation=image.rotation(),
                     focal=image.camera_parameters[0],
                     fov=None,
                     bend=(bend[0], bend[1]),
                     captured=_iso(taken),
                     attribution=self._attribution,
-                    exact_height=False,
+                    eye=EYE,
                 )
             )
         return cameras
@@ -285,6 +285,7 @@ class FolderImages:
                     kind = "an unknown" if lens is None else f"a {lens.projection_type}"
                     self.refused.append((name, f"{kind} camera; only perspective photos are used"))
                     continue
+                # Altitudes are the receiver's, ten metres off: only the place is taken.
                 rotation = turned(shot.rotation)
                 centre = -rotation.T @ np.array(shot.translation)
                 lat, lon = here.to_geodetic(centre[:2])
@@ -293,14 +294,14 @@ class FolderImages:
                     _Camera(
                         id=name,
                         file=name,
-                        position=np.array([x, y, centre[2] + part.reference_lla.altitude]),
+                        position=np.array([x, y, EYE]),
                         rotation=rotation,
                         focal=lens.focal,
                         fov=None,
                         bend=(lens.k1, lens.k2),
                         captured=_iso(shot.capture_time),
                         attribution=self._attribution,
-                        exact_height=False,
+                        eye=EYE,
                     )
                 )
         return cameras
@@ -324,7 +325,7 @@ class _Camera:
     bend: tuple[float, float]
     captured: str | None
     attribution: str
-    exact_height: bool
+    eye: float | None
 
     def photo(self, data: bytes, longest: int, source: str) -> StreetImage:
         picture = decoded(data, f"photo {self.file}", longest=longest)
@@ -342,7 +343,7 @@ class _Camera:
             self.captured,
             source,
             self.attribution,
-            self.exact_height,
+            self.eye,
         )
 
 

