@@ -1,14 +1,14 @@
 """The ground as people see it: streets, pavements, squares, lawns and water, draped on the terrain.
 
-A partition: every spot belongs to one kind of surface, so nothing flickers. Only paint lies on top, two centimetres up.
+A partition: every spot belongs to one kind of surface, so nothing flickers. Only paint lies on top, two centimetres
+up. Where two kinds meet at different heights an upright face closes the step: kerbs, quays, the edges of bridges.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
 
-import mapbox_earcut
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -18,53 +18,27 @@ from shapely.geometry.base import BaseGeometry
 from vico.geo.osm import OsmData, polygons_of
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface, joined
-from vico.world.model import ENTITY_GREEN, ENTITY_GROUND, ENTITY_ROAD, ENTITY_WATER
-from vico.worldgen.markings import Quads, road_markings
-from vico.worldgen.roofs import rings_of
-from vico.worldgen.streets import StreetPolygons, on_the_ground
-from vico.worldgen.textures import material
+from vico.world.model import ENTITY_GROUND, ENTITY_ROAD
+from vico.worldgen.bridges import bridge_surfaces, portal_surfaces, spans_over_water
+from vico.worldgen.drape import Curtain, Grid, Heights, curtain, triangulated
+from vico.worldgen.grading import is_level, open_water
+from vico.worldgen.kerbs import Water
+from vico.worldgen.levels import overpasses
+from vico.worldgen.markings import Quads, drives_left, pitch_lines, road_markings
+from vico.worldgen.partition import ground_partition, mapped_areas, sea_polygons
+from vico.worldgen.pavings import LOOKS, Look, coloured, ground_material, look_of
+from vico.worldgen.stairs import flights_of
+from vico.worldgen.streets import Crossing, StreetPolygons, on_the_ground
 
-Rgb = tuple[int, int, int]
+__all__ = ["ground_from_osm", "ground_partition", "mapped_areas", "sea_polygons", "terrain_normals"]
 
-_SLOPED_CELL = 8.0  # metres between the mesh's own points where the ground is not level
-_FLAT_CELL = 50.0  # there only to keep triangles compact
-_UNDERLAY = 0.12  # metres below: shows through nothing but the hairlines between two surfaces
-_KERB = 0.22
-_GRID = 0.001  # metres: overlays on a grid are robust where free ones fail on nearly coincident outlines
-
-_GRASS = {"grass", "meadow", "village_green", "recreation_ground", "cemetery", "flowerbed", "allotments", "orchard"}
-_WOODS = {"wood", "scrub", "heath", "grassland", "forest", "shrubbery", "fell"}
-_PARKS = {"park", "garden", "golf_course", "dog_park", "common", "nature_reserve"}
-
-
-@dataclass(frozen=True)
-class _Kind:
-    """How a kind of ground looks: material, metres a texture covers, tint, entity."""
-
-    material: str
-    tile: float
-    tint: Rgb
-    entity: int
-
-
-_KINDS: dict[str, _Kind] = {
-    "carriageway": _Kind("asphalt", 9.0, (255, 255, 255), ENTITY_ROAD),
-    "parking": _Kind("asphalt", 9.0, (255, 250, 244), ENTITY_ROAD),
-    "cycleway": _Kind("asphalt", 9.0, (255, 206, 188), ENTITY_ROAD),
-    "kerb": _Kind("blank_stone", 2.4, (206, 204, 200), ENTITY_GROUND),
-    "sidewalk": _Kind("paving", 4.0, (236, 236, 236), ENTITY_GROUND),
-    "pedestrian": _Kind("setts", 3.2, (255, 246, 236), ENTITY_GROUND),
-    "steps": _Kind("paving", 4.0, (214, 208, 200), ENTITY_GROUND),
-    "path": _Kind("grit", 5.0, (255, 252, 246), ENTITY_GROUND),
-    "playground": _Kind("grit", 5.0, (255, 240, 214), ENTITY_GROUND),
-    "ballast": _Kind("grit", 5.0, (166, 156, 148), ENTITY_GROUND),
-    "pitch": _Kind("grit", 5.0, (214, 150, 122), ENTITY_GROUND),
-    "grass": _Kind("grass", 10.0, (255, 255, 255), ENTITY_GREEN),
-    "woods": _Kind("grass", 10.0, (200, 206, 180), ENTITY_GREEN),
-    "water": _Kind("water", 14.0, (255, 255, 255), ENTITY_WATER),
-    "yard": _Kind("paving", 4.0, (204, 202, 198), ENTITY_GROUND),
-    "field": _Kind("grass", 10.0, (238, 236, 214), ENTITY_GREEN),
-}
+_UNDERLAY = 0.5  # metres below: shows through nothing but the hairlines between two surfaces
+_LIFT, _LIFT_SLOPED = 0.02, 0.035  # of paint
+_STEEP = 0.77  # upward part of a normal below which bare ground is held by a wall
+_SLAB = 0.6  # thickness of a bridge's edge over water
+_HELD = ("yard", "field", "grass", "garden", "woods", "sidewalk", "pedestrian", "path", "parking")
+_LONG = 12.0
+_FINE = 0.6
 
 
 def ground_from_osm(
@@ -77,7 +51,7 @@ def ground_from_osm(
     osm
         The extract.
     terrain
-        What the ground is draped on.
+        What the ground is draped on, as `graded` made it from the same streets.
     half
         Half side of the world's square, metres.
     streets
@@ -93,245 +67,295 @@ def ground_from_osm(
     reach = half + apron
     window = shapely.box(-reach, -reach, reach, reach)
     pieces = ground_partition(osm, streets, window)
-    level = terrain.heights.size == 4 or float(np.ptp(terrain.heights)) < 0.01
-    cell = _FLAT_CELL if level else _SLOPED_CELL
-    surfaces = [_draped(shapes, _KINDS[name], terrain, reach, cell) for name, shapes in pieces.items()]
-    underlay = _draped([window], _KINDS["yard"], terrain, reach, cell, lift=-_UNDERLAY)
-    rails = [
-        way.line
-        for way in osm.ways
-        if way.tags.get("railway") in ("rail", "light_rail", "narrow_gauge") and on_the_ground(way.tags)
-    ]
-    quads = road_markings(streets, window, yellow=osm.frame.lon < -30.0, tracks=rails, longest=None if level else 3.0)
-    return joined([*surfaces, underlay, *(_painted(group, terrain, lift=0.025 if level else 0.04) for group in quads)])
+    upper, lower = Grid.of(terrain.upper, reach), Grid.of(terrain.lower, reach)
+    waters = open_water(terrain, pieces.get("water", [])) if terrain.steps is not None else []
+    flights = flights_of(osm, terrain, streets.steps)
+    surfaces: list[Surface] = []
+    for name, shapes in pieces.items():
+        look = look_of(name)
+        if name == "water" and waters:
+            surfaces += _water_surfaces(waters, look, terrain, lower)
+        elif name.startswith("carriageway"):
+            surfaces += _draped(shapes, look, terrain.lower, terrain, lower)
+        elif name == "steps":
+            surfaces += _draped(_without(shapes, flights.area), look, terrain.upper, terrain, upper)
+            surfaces += _draped(_within(shapes, flights.area), look, lambda xy: terrain.upper(xy) - 0.3, terrain, upper)
+        else:
+            held = name.partition(":")[0] in _HELD
+            surfaces += _draped(shapes, look, terrain.upper, terrain, upper, held=held)
+    wet = shapely.union_all([shapely.buffer(water.polygon, 0.6, quad_segs=1) for water in waters])
+    dry = shapely.difference(window, wet)
+    surfaces += _draped([dry], LOOKS["yard"], lambda xy: terrain.smooth(xy) - _UNDERLAY, terrain, upper)
+    if terrain.steps is not None:
+        surfaces += _kerbs(streets, terrain, window)
+        surfaces += _banks(osm, waters, terrain, window)
+        surfaces += _tactile(streets, terrain, window)
+    surfaces += flights.surfaces()
+    surfaces += bridge_surfaces(osm, terrain, streets, window)
+    surfaces += portal_surfaces(osm, terrain, streets, window)
+    level = is_level(terrain)
+    tracks = _tracks(osm)
+    quads = road_markings(
+        streets,
+        window,
+        yellow=osm.frame.lon < -30.0,
+        tracks=tracks,
+        longest=None if level else 3.0,
+        left_driving=drives_left(osm.frame.lat, osm.frame.lon),
+        stepped=flights.area,
+    )
+    quads += _fields(osm, window)
+    lift = _LIFT if level else _LIFT_SLOPED
+    surfaces += [_painted(group, terrain, lift=lift + 0.006 * group.rank) for group in quads]
+    return joined(surfaces)
 
 
-def ground_partition(osm: OsmData, streets: StreetPolygons, window: Polygon) -> dict[str, list[Polygon]]:
-    """Divide the window among the kinds of ground, in order of precedence.
-
-    Returns
-    -------
-    dict
-        Polygons by kind (a key of the look-up table above); together they cover the window, and none overlap.
-    """
-    soft = mapped_areas(osm, window)
-    # Lawns and ponds that lie within a square are beds in it; other greens end where the square begins.
-    square: BaseGeometry = streets.pedestrian
-    beds = [shape for name in ("water", "grass", "woods", "playground") for shape in soft[name]]
-    inner = [
-        bed
-        for bed in beds
-        if bed.area < 0.6 * square.area and shapely.intersection(bed, square).area > 0.9 * bed.area > 0.0
-    ]
-    if inner:
-        square = shapely.difference(square, shapely.union_all(inner, grid_size=_GRID), grid_size=_GRID)
-    paved = shapely.union_all([streets.sidewalk, square, streets.cycleway], grid_size=_GRID)
-    kerb = shapely.buffer(streets.carriageway, _KERB, quad_segs=2, join_style="mitre")
-    kerb = shapely.difference(shapely.set_precision(kerb, _GRID), streets.carriageway, grid_size=_GRID)
-    kerb = shapely.intersection(_flat(kerb), _flat(paved), grid_size=_GRID)
-    ranked: list[tuple[str, BaseGeometry]] = [
-        ("carriageway", streets.carriageway),
-        ("kerb", kerb),
-        ("steps", streets.steps),
-        ("pedestrian", square),
-        ("cycleway", streets.cycleway),
-        ("sidewalk", streets.sidewalk),
-        ("path", streets.path),
-        ("parking", streets.parking),
-    ]
-    ranked += [(name, shapely.union_all(shapes, grid_size=_GRID)) for name, shapes in soft.items()]
-    left: BaseGeometry = window
-    result: dict[str, list[Polygon]] = {}
-    for name, shape in ranked:
-        shape = _flat(shapely.set_precision(shape, _GRID))
-        mine = polygons_of(shapely.intersection(shape, left, grid_size=_GRID), 0.02)
-        if mine:
-            result[name] = mine
-            left = _flat(shapely.difference(left, shape, grid_size=_GRID))
-    built = [area.polygon for area in osm.areas if area.tags.get("building", "no") != "no"]
-    near = shapely.buffer(shapely.union_all([*built, streets.carriageway], grid_size=_GRID), 30.0, quad_segs=2)
-    near = shapely.set_precision(near, _GRID)
-    result["yard"] = polygons_of(shapely.intersection(left, near, grid_size=_GRID), 0.02)
-    result["field"] = polygons_of(shapely.difference(left, near, grid_size=_GRID), 0.02)
-    return {name: shapes for name, shapes in result.items() if shapes}
-
-
-def _flat(shape: BaseGeometry) -> shapely.MultiPolygon:
-    """The polygons of an overlay: where outlines touch, it gives lines and points too, and then refuses them."""
-    return shapely.MultiPolygon(polygons_of(shape))
-
-
-def mapped_areas(osm: OsmData, window: Polygon) -> dict[str, list[BaseGeometry]]:
-    """Mapped areas by kind of ground, in order of precedence."""
-    found: dict[str, list[BaseGeometry]] = {
-        name: [] for name in ("water", "ballast", "playground", "pitch", "grass", "woods")
-    }
-    for area in osm.areas:
-        tags = area.tags
-        if not on_the_ground(tags) or tags.get("building", "no") != "no":
+def _tracks(osm: OsmData) -> list[NDArray[np.float64]]:
+    """Railways at ground level, cut where a street's bridge lies over them."""
+    above = overpasses(osm)
+    spans = spans_over_water(osm)
+    found = []
+    for way in osm.ways:
+        tags = way.tags
+        if tags.get("railway") not in ("rail", "light_rail", "narrow_gauge") or not on_the_ground(tags):
             continue
-        landuse, leisure, natural = tags.get("landuse"), tags.get("leisure"), tags.get("natural")
-        kind = None
-        if (
-            natural == "water"
-            or tags.get("waterway") == "riverbank"
-            or landuse in ("basin", "reservoir")
-            or leisure == "swimming_pool"
-            or tags.get("amenity") == "fountain"
-        ):
-            kind = "water"
-        elif leisure == "playground" or natural in ("sand", "beach", "shingle") or tags.get("golf") == "bunker":
-            kind = "playground"
-        elif leisure == "pitch":
-            kind = "grass" if tags.get("surface") in ("grass", "artificial_turf") else "pitch"
-        elif natural in _WOODS or landuse == "forest":
-            kind = "woods"
-        elif landuse in _GRASS or leisure in _PARKS:
-            kind = "grass"
-        elif landuse == "railway":
-            kind = "ballast"
-        if kind:
-            found[kind] += polygons_of(shapely.intersection(area.polygon, window))
-    found["ballast"] += [
-        shapely.buffer(shapely.LineString(way.line), 1.8, cap_style="flat")
-        for way in osm.ways
-        if way.tags.get("railway") in ("rail", "light_rail", "narrow_gauge") and on_the_ground(way.tags)
+        if way.id in above:
+            continue
+        line: BaseGeometry = shapely.LineString(way.line)
+        if tags.get("bridge", "no") == "no":
+            line = shapely.difference(line, spans)
+        found += [np.asarray(part.coords) for part in shapely.get_parts(line) if part.geom_type == "LineString"]
+    return [line for line in found if len(line) > 1]
+
+
+def _fields(osm: OsmData, window: Polygon) -> list[Quads]:
+    """The lines of sports fields."""
+    lines = [
+        quad
+        for area in osm.areas
+        if area.tags.get("leisure") == "pitch" and on_the_ground(area.tags) and window.intersects(area.polygon)
+        for shape in polygons_of(area.polygon)
+        for quad in pitch_lines(shape, area.tags.get("sport", ""))
     ]
-    # A pond within a park is water, a lawn within a wood is lawn: small before large comes with the kinds' order, but
-    # the sea comes last of the waters and gives way to everything mapped on it (piers, moles).
-    sea = sea_polygons(osm, window)
-    if sea:
-        land = shapely.union_all(
-            [shape for name, shapes in found.items() if name != "water" for shape in shapes], grid_size=_GRID
-        )
-        found["water"].append(shapely.difference(shapely.union_all(sea), land, grid_size=_GRID))
-    return found
+    return [Quads(np.stack(lines), (236, 236, 230), low=False)] if lines else []
 
 
-def sea_polygons(osm: OsmData, window: Polygon) -> list[Polygon]:
-    """The sea within the window: what lies to the right of the coastlines, which OSM draws with land on their left."""
-    coast = [way.line for way in osm.ways if way.tags.get("natural") == "coastline"]
-    lines = [shapely.LineString(line) for line in coast]
-    touching = [line for line in lines if shapely.intersects(line, window)]
-    if not touching:
-        return []
-    edges = shapely.node(shapely.union_all([*touching, window.exterior]))
-    faces = [
-        face
-        for face in shapely.get_parts(shapely.polygonize(shapely.get_parts(edges)))
-        if shapely.intersection(face, window).area > 1.0 and window.contains(face.representative_point())
-    ]
-    starts = np.concatenate([line[:-1] for line in coast])
-    ends = np.concatenate([line[1:] for line in coast])
-    sea: list[Polygon] = []
-    for face in faces:
-        point = np.asarray(face.representative_point().coords[0])
-        along = ends - starts
-        share = np.clip(((point - starts) * along).sum(1) / np.maximum((along**2).sum(1), 1e-9), 0, 1)
-        away = point - (starts + along * share[:, None])
-        distance = np.hypot(*away.T)
-        # Beside a convex corner two segments are equally near; the one the point is most square to decides.
-        near = np.flatnonzero(distance < distance.min() + 1e-6)
-        cross = along[near, 0] * away[near, 1] - along[near, 1] * away[near, 0]
-        cross = cross / np.maximum(np.hypot(*along[near].T), 1e-9)
-        if cross[np.abs(cross).argmax()] < 0:
-            sea.append(face)
-    return sea
+def _without(shapes: Sequence[Polygon], area: BaseGeometry) -> list[Polygon]:
+    return polygons_of(shapely.difference(shapely.MultiPolygon(list(shapes)), area), 0.02)
 
 
-def _cut_to_cells(shapes: Sequence[BaseGeometry], reach: float, cell: float) -> list[Polygon]:
-    """Cut polygons along a square grid, halving again and again so that large outlines are clipped few times."""
-    count = max(int(np.ceil(2 * reach / cell)), 1)
-    edges = np.linspace(-reach, reach, count + 1)
-    done: list[Polygon] = []
-    pending: list[tuple[Polygon, int, int, int, int]] = [
-        (polygon, 0, count, 0, count) for shape in shapes for polygon in polygons_of(shape, 1e-4)
-    ]
-    while pending:
-        polygons = np.array([row[0] for row in pending], object)
-        bounds = np.array([row[1:] for row in pending])
-        box = shapely.bounds(polygons)
-        # Shrink each range of cells to those its polygon touches.
-        bounds[:, 0] = np.maximum(bounds[:, 0], np.searchsorted(edges, box[:, 0] + 1e-9, "right") - 1)
-        bounds[:, 1] = np.minimum(bounds[:, 1], np.maximum(np.searchsorted(edges, box[:, 2] - 1e-9), bounds[:, 0] + 1))
-        bounds[:, 2] = np.maximum(bounds[:, 2], np.searchsorted(edges, box[:, 1] + 1e-9, "right") - 1)
-        bounds[:, 3] = np.minimum(bounds[:, 3], np.maximum(np.searchsorted(edges, box[:, 3] - 1e-9), bounds[:, 2] + 1))
-        wide, tall = bounds[:, 1] - bounds[:, 0], bounds[:, 3] - bounds[:, 2]
-        whole = (wide <= 1) & (tall <= 1)
-        done += polygons[whole].tolist()
-        rest, limits = polygons[~whole], bounds[~whole]
-        if not len(rest):
-            break
-        across = (wide >= tall)[~whole]
-        low = np.where(across, limits[:, 0], limits[:, 2])
-        high = np.where(across, limits[:, 1], limits[:, 3])
-        middle = (low + high) // 2
-        at = edges[np.clip(middle, 0, count)]
-        big = 2 * reach
-        first = shapely.box(
-            np.full(len(rest), -big), np.full(len(rest), -big), np.where(across, at, big), np.where(across, big, at)
-        )
-        second = shapely.box(
-            np.where(across, at, -big), np.where(across, -big, at), np.full(len(rest), big), np.full(len(rest), big)
-        )
-        pending = []
-        for halves, side in ((shapely.intersection(rest, first), 0), (shapely.intersection(rest, second), 1)):
-            for shape, limit, is_across, cut in zip(
-                halves, limits.tolist(), across.tolist(), middle.tolist(), strict=True
-            ):
-                k = (0 if is_across else 2) + (1 - side)
-                kept = [*limit[:k], cut, *limit[k + 1 :]]
-                pending += [(polygon, kept[0], kept[1], kept[2], kept[3]) for polygon in polygons_of(shape, 1e-4)]
-    return done
+def _within(shapes: Sequence[Polygon], area: BaseGeometry) -> list[Polygon]:
+    return polygons_of(shapely.intersection(shapely.MultiPolygon(list(shapes)), area), 0.02)
 
 
-def _draped(
-    shapes: Sequence[BaseGeometry], kind: _Kind, terrain: HeightField, reach: float, cell: float, *, lift: float = 0.0
+def _surface(
+    flat: NDArray[np.float64],
+    z: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    look: Look,
+    normals: NDArray[np.float64],
+    uv: NDArray[np.float64] | None = None,
 ) -> Surface:
-    """Triangulate polygons cell by cell and lay them on the terrain."""
-    points: list[NDArray[np.float64]] = []
-    triangles: list[NDArray[np.int64]] = []
-    count = 0
-    for polygon in _cut_to_cells(shapes, reach, cell):
-        rings = rings_of(polygon)
-        corners = np.concatenate(rings)
-        ends = np.cumsum([len(ring) for ring in rings]).astype(np.uint32)
-        found = mapbox_earcut.triangulate_float64(corners, ends).reshape(-1, 3).astype(np.int64)
-        if len(found):
-            points.append(corners)
-            triangles.append(found + count)
-            count += len(corners)
-    stuff = material(kind.material)
-    if not points:
-        return Surface.from_triangles(
-            np.zeros((0, 3)), np.zeros((0, 3), np.int32), normals=np.zeros((0, 3)), material=stuff
-        )
-    flat = np.concatenate(points)
-    faces = np.concatenate(triangles)
-    ux, uy = (flat[faces[:, 1]] - flat[faces[:, 0]]).T
-    vx, vy = (flat[faces[:, 2]] - flat[faces[:, 0]]).T
-    turn = ux * vy - uy * vx
-    faces = np.where((turn < 0)[:, None], faces[:, [0, 2, 1]], faces)[np.abs(turn) > 1e-9]
     return Surface.from_triangles(
-        np.c_[flat, terrain(flat) + lift],
+        np.c_[flat, z],
         faces,
-        colour=kind.tint,
-        entity=kind.entity,
-        uv=flat / kind.tile,
-        normals=terrain_normals(terrain, flat),
-        material=stuff,
+        colour=coloured(look, flat),
+        entity=look.entity,
+        uv=(flat if uv is None else uv) / look.tile,
+        normals=normals,
+        material=ground_material(look.material),
     )
 
 
+def _draped(
+    shapes: Iterable[BaseGeometry],
+    look: Look,
+    heights: Heights,
+    terrain: HeightField,
+    grid: Grid,
+    *,
+    held: bool = False,
+) -> list[Surface]:
+    """Triangulate polygons and lay them on the ground; where it is too steep to be bare it shows a wall."""
+    flat, faces = triangulated(grid.cut(shapes))
+    if not len(faces):
+        return []
+    z, normals = heights(flat), terrain_normals(terrain, flat)
+    if not held:
+        return [_surface(flat, z, faces, look, normals)]
+    corners = np.c_[flat, z][faces]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    steep = across[:, 2] < _STEEP * np.linalg.norm(across, axis=1)
+    result = [_surface(flat, z, faces[~steep], look, normals)] if not steep.all() else []
+    if steep.any():
+        level = normals[:, :2] / np.maximum(np.linalg.norm(normals[:, :2], axis=1, keepdims=True), 1e-6)
+        # Courses run level: along the wall one way, up the other.
+        uv = np.stack([flat[:, 0] * -level[:, 1] + flat[:, 1] * level[:, 0], z], axis=1)
+        result.append(_surface(flat, z, faces[steep], LOOKS["wall"], normals, uv))
+    return result
+
+
+def _hung(found: Curtain, look: Look, tile: float | None = None) -> list[Surface]:
+    if not len(found.triangles):
+        return []
+    return [
+        Surface.from_triangles(
+            found.positions,
+            found.triangles,
+            colour=coloured(look, found.positions[:, :2]),
+            entity=look.entity,
+            uv=found.uv / (tile or look.tile),
+            normals=found.normals,
+            material=ground_material(look.material),
+        )
+    ]
+
+
+def _water_surfaces(waters: Sequence[Water], look: Look, terrain: HeightField, grid: Grid) -> list[Surface]:
+    found = []
+    for water in waters:
+        flat, faces = triangulated(grid.cut([water.polygon]))
+        if len(faces):
+            up = np.broadcast_to((0.0, 0.0, 1.0), (len(flat), 3))
+            found.append(_surface(flat, water.level(flat), faces, look, np.asarray(up)))
+    return found
+
+
+def _faced_lines(shapes: Iterable[BaseGeometry], low: Heights, high: Heights, spacing: float) -> list[BaseGeometry]:
+    """Outlines with the inside to their right, with as many points as their heights need."""
+    rings = [
+        ring
+        for shape in shapes
+        for polygon in polygons_of(shape, 0.05)
+        for ring in (polygon.normalize().exterior, *polygon.normalize().interiors)
+    ]
+    if not rings:
+        return []
+    dense = shapely.segmentize(shapely.linestrings([ring.coords for ring in rings]), spacing)
+    points, owner = shapely.get_coordinates(dense, return_index=True)
+    corner = np.zeros(len(points), bool)
+    own = shapely.get_coordinates(rings)
+    # Points of the rings themselves stay; of those between only where heights bend, and every few metres.
+    keys = {(round(x, 6), round(y, 6)) for x, y in own.tolist()}
+    corner[:] = [(round(x, 6), round(y, 6)) in keys for x, y in points.tolist()]
+    bend = np.zeros(len(points))
+    for heights in (low, high):
+        z = heights(points)
+        bend[1:-1] = np.maximum(bend[1:-1], np.abs(z[:-2] - 2 * z[1:-1] + z[2:]))
+    kept = corner | (bend > 0.002)
+    kept[1:] |= bend[:-1] > 0.002
+    kept[:-1] |= bend[1:] > 0.002
+    kept |= np.arange(len(points)) % max(round(_LONG / spacing), 1) == 0
+    lines = []
+    borders = [0, *(np.flatnonzero(owner[1:] != owner[:-1]) + 1).tolist(), len(owner)]
+    for start, end in pairwise(borders):
+        chosen = points[start:end][kept[start:end]]
+        if len(chosen) > 1:
+            lines.append(shapely.LineString(chosen))
+    return lines
+
+
+def _kerbs(streets: StreetPolygons, terrain: HeightField, window: Polygon) -> list[Surface]:
+    """The faces of kerb stones."""
+    carriageway = shapely.intersection(streets.carriageway, window)
+    lines = _faced_lines([carriageway], terrain.lower, terrain.upper, _FINE)
+    return _hung(curtain(lines, terrain.lower, terrain.upper, least=0.004), LOOKS["kerb"])
+
+
+def _banks(osm: OsmData, waters: Sequence[Water], terrain: HeightField, window: Polygon) -> list[Surface]:
+    """Quays and banks, and under bridges the water that goes on there and the edges of the deck."""
+    found: list[Surface] = []
+    if not waters:
+        return found
+    spans = spans_over_water(osm)
+    mapped = shapely.union_all([shapely.set_precision(s, 0.001) for s in mapped_areas(osm, window)["water"]])
+    tree = shapely.STRtree([water.polygon for water in waters])
+    frame = shapely.buffer(window, -0.2)
+    for water in waters:
+        lines = _split(_faced_lines([water.polygon], water.level, terrain.upper, 3.0), frame)
+        over, bank = _sorted_by(lines, shapely.buffer(spans, 0.3))
+        found += _hung(curtain(bank, _below(water.level, 0.3), terrain.upper), LOOKS["quay"])
+        found += _hung(curtain(over, lambda xy: terrain.upper(xy) - _SLAB, terrain.upper), LOOKS["kerb"])
+    dry = shapely.union_all([water.polygon for water in waters])
+    under = polygons_of(shapely.difference(shapely.intersection(mapped, spans), shapely.buffer(dry, 0.001)), 1.0)
+    for shape in under:
+        water = waters[int(tree.nearest(shape))]
+        flat, faces = triangulated([shape])
+        up = np.broadcast_to((0.0, 0.0, 1.0), (len(flat), 3))
+        found.append(_surface(flat, water.level(flat), faces, LOOKS["water"], np.asarray(up)))
+        found.append(_surface(flat, terrain.smooth(flat) - _SLAB, faces[:, ::-1], LOOKS["kerb"], -np.asarray(up)))
+        edges = _faced_lines([shape], water.level, terrain.smooth, 3.0)
+        _, walls = _sorted_by(edges, shapely.buffer(dry, 0.3))
+        found += _hung(
+            curtain(walls, _below(water.level, 0.3), lambda xy: terrain.smooth(xy) - _SLAB + 0.02),
+            LOOKS["quay"],
+        )
+    return found
+
+
+def _below(heights: Heights, depth: float) -> Heights:
+    return lambda xy: heights(xy) - depth
+
+
+def _split(lines: Sequence[BaseGeometry], frame: Polygon) -> list[BaseGeometry]:
+    """Leave out the segments on the window's own edge."""
+    _, inner = _sorted_by(lines, shapely.difference(shapely.buffer(frame, 50.0), frame))
+    return inner
+
+
+def _sorted_by(lines: Sequence[BaseGeometry], area: BaseGeometry) -> tuple[list[BaseGeometry], list[BaseGeometry]]:
+    """Segments of lines whose middles lie within an area, and the rest; directions kept."""
+    if not len(lines):
+        return [], []
+    points, line = shapely.get_coordinates(list(lines), return_index=True)
+    first = np.flatnonzero(line[:-1] == line[1:])
+    middles = (points[first] + points[first + 1]) / 2
+    shapely.prepare(area)
+    inside = shapely.contains_xy(area, middles[:, 0], middles[:, 1])
+    pieces = np.stack([points[first], points[first + 1]], axis=1)
+    return list(shapely.linestrings(pieces[inside])), list(shapely.linestrings(pieces[~inside]))
+
+
+def _tactile(streets: StreetPolygons, terrain: HeightField, window: Polygon) -> list[Surface]:
+    """Ribbed slabs on the pavement before painted crossings."""
+    pavement = shapely.union_all([streets.sidewalk, streets.pedestrian])
+    shapely.prepare(pavement)
+    quads: list[NDArray[np.float64]] = []
+    for crossing in streets.crossings:
+        if crossing.painted:
+            quads += _slabs_at(crossing, pavement)
+    if not quads:
+        return []
+    corners = np.stack(quads)
+    inside = (np.abs(corners) < window.bounds[2]).all(axis=(1, 2))
+    group = Quads(corners[inside], (255, 255, 255), low=False)
+    return [_painted(group, terrain, lift=0.012, look=LOOKS["tactile"])]
+
+
+def _slabs_at(crossing: Crossing, pavement: BaseGeometry) -> list[NDArray[np.float64]]:
+    a, b = np.array(crossing.start), np.array(crossing.end)
+    along = (b - a) / max(float(np.hypot(*(b - a))), 1e-9)
+    across = np.array([-along[1], along[0]]) * min(crossing.width, 3.0) / 2
+    found = []
+    for end, out in ((a, -along), (b, along)):
+        near, far = end + out * 0.25, end + out * 0.85
+        if shapely.contains_xy(pavement, *((near + far) / 2)):
+            quad = np.array([near - across, near + across, far + across, far - across])
+            turned = float(np.cross(np.r_[quad[1] - quad[0], 0], np.r_[quad[2] - quad[0], 0])[2]) < 0
+            found.append(quad[::-1] if turned else quad)
+    return found
+
+
 def terrain_normals(terrain: HeightField, xy: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit normals of the ground at points, by central differences over a metre."""
+    """Unit normals of the smooth ground at points, by central differences over a metre."""
     east, north = np.array([0.5, 0.0]), np.array([0.0, 0.5])
-    dx, dy = terrain(xy + east) - terrain(xy - east), terrain(xy + north) - terrain(xy - north)
+    dx = terrain.smooth(xy + east) - terrain.smooth(xy - east)
+    dy = terrain.smooth(xy + north) - terrain.smooth(xy - north)
     normal = np.stack([-dx, -dy, np.ones(len(xy))], axis=1)
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True), np.float64)
 
 
-def _painted(quads: Quads, terrain: HeightField, *, lift: float) -> Surface:
+def _painted(quads: Quads, terrain: HeightField, *, lift: float, look: Look | None = None) -> Surface:
     """Paint and rails: quads a little above the ground."""
     corners = quads.corners.reshape(-1, 2)
     n = len(quads.corners)
@@ -339,11 +363,13 @@ def _painted(quads: Quads, terrain: HeightField, *, lift: float) -> Surface:
     triangles = (
         np.concatenate([first + np.array([0, 1, 2]), first + np.array([0, 2, 3])]) if n else np.zeros((0, 3), np.int32)
     )
+    ground = terrain.lower(corners) if quads.low else terrain.upper(corners)
     return Surface.from_triangles(
-        np.c_[corners, terrain(corners) + lift],
+        np.c_[corners, ground + lift],
         triangles,
         colour=quads.colour,
-        entity=ENTITY_ROAD,
+        entity=ENTITY_ROAD if quads.low else ENTITY_GROUND,
         normals=terrain_normals(terrain, corners),
-        material=Material("paint"),
+        uv=None if look is None else corners / look.tile,
+        material=Material("paint") if look is None else ground_material(look.material),
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
@@ -17,6 +17,7 @@ from shapely import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo.osm import OsmData, OsmWay, means_area, polygons_of
+from vico.worldgen.levels import is_bridge, overpasses
 
 LANE_WIDTH = 3.2
 """Metres; netconvert's default too, so that its lanes lie within the painted carriageway."""
@@ -62,6 +63,20 @@ _LOOSE = {
     "pebblestone",
     "woodchips",
 }
+_LEDGE = 0.5  # metres of a bridge's edge beside its carriageway
+
+PAVINGS: dict[str, str] = {
+    **dict.fromkeys(("sett", "cobblestone", "unhewn_cobblestone", "cobblestone:flattened"), "setts"),
+    **dict.fromkeys(("paving_stones", "paving_stones:lanes", "bricks", "brick"), "stones"),
+    **dict.fromkeys(("concrete", "concrete:plates", "concrete:lanes"), "concrete"),
+    **dict.fromkeys(("asphalt", "chipseal", "tartan", "rubber"), "asphalt"),
+    **dict.fromkeys(("gravel", "fine_gravel", "compacted", "pebblestone", "unpaved"), "gravel"),
+    **dict.fromkeys(("ground", "dirt", "earth", "mud", "woodchips"), "earth"),
+    **dict.fromkeys(("grass", "grass_paver"), "grass"),
+    **dict.fromkeys(("wood", "metal_grid"), "wood"),
+    "sand": "sand",
+}
+"""What a way or area is paved with, by its `surface`; what is not here looks as its kind usually does."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +89,14 @@ class Street:
         Metres, shape ``(n, 2)``, in the direction of the way (and of traffic where `oneway`).
     width
         Of the carriageway, kerb to kerb, metres.
+    kerbed
+        Whether it lies below its surroundings, between kerbs.
+    cycle_left, cycle_right
+        Whether a lane for bicycles is painted on that side, seen along `line`.
+    parking_left, parking_right
+        Widths of the parking lanes at the kerbs, metres; `slanted` if cars stand across the street in them.
+    tracks
+        Whether trams run in it.
     """
 
     way: int
@@ -82,6 +105,13 @@ class Street:
     width: float
     lanes: int
     oneway: bool
+    kerbed: bool = True
+    cycle_left: bool = False
+    cycle_right: bool = False
+    parking_left: float = 0.0
+    parking_right: float = 0.0
+    slanted: bool = False
+    tracks: bool = False
 
 
 @dataclass(frozen=True)
@@ -95,13 +125,19 @@ class Crossing:
     width
         Across the walking direction, metres.
     painted
-        Whether it is marked with stripes.
+        Whether it is marked.
+    marking
+        How: zebra, lines, dashes, ladder or dots.
+    signals
+        Whether lights stop the traffic there.
     """
 
     start: tuple[float, float]
     end: tuple[float, float]
     width: float
     painted: bool
+    marking: str = "zebra"
+    signals: bool = False
 
     @property
     def polygon(self) -> Polygon:
@@ -135,6 +171,10 @@ class StreetPolygons:
         The lines and stripes the polygons came from.
     rails
         Centre lines of tram tracks in the street, metres.
+    sunken
+        Part of `carriageway` between kerbs: streets, without drives and yards.
+    paved
+        What the map says ways and squares are paved with: polygons by the names in `PAVINGS`, across kinds.
     """
 
     carriageway: MultiPolygon
@@ -148,6 +188,8 @@ class StreetPolygons:
     streets: list[Street]
     crossings: list[Crossing]
     rails: list[NDArray[np.float64]]
+    sunken: MultiPolygon = field(default_factory=MultiPolygon)
+    paved: dict[str, MultiPolygon] = field(default_factory=dict)
 
 
 def number(text: str | None) -> float | None:
@@ -247,9 +289,14 @@ def road_polygons(osm: OsmData, obstacles: Sequence[BaseGeometry] = ()) -> Stree
     streets: list[Street] = []
     rails: list[NDArray[np.float64]] = []
     marked: list[OsmWay] = []
+    kerbed: list[BaseGeometry] = []
+    paved: dict[str, list[BaseGeometry]] = {}
+    above = overpasses(osm)
+    trams = [LineString(way.line) for way in osm.ways if way.tags.get("railway") == "tram" and on_the_ground(way.tags)]
+    tram_tree = shapely.STRtree(trams)
     for way in osm.ways:
         tags = way.tags
-        if not on_the_ground(tags) or (way.closed and means_area(tags)):
+        if not on_the_ground(tags) or (way.closed and means_area(tags)) or way.id in above:
             continue
         if tags.get("railway") == "tram":
             rails.append(way.line)
@@ -261,13 +308,20 @@ def road_polygons(osm: OsmData, obstacles: Sequence[BaseGeometry] = ()) -> Stree
             width = carriageway_width(tags)
             strip = shapely.buffer(line, width / 2, quad_segs=4)
             drive.append(strip)
+            _note_paving(paved, tags, strip)
             if tags.get("tunnel") == "building_passage" or tags.get("covered", "no") != "no":
                 through.append(strip)
-            path = way.line[::-1] if tags.get("oneway") == "-1" else way.line
-            streets.append(Street(way.id, kind, path, width, lane_count(tags), is_oneway(tags)))
-            walk += _sidewalks(line, width, tags)
+            sides = _sidewalks(line, width, tags)
+            bordered = bool(sides) or _said_sidewalk(tags) or kind in ("primary", "trunk", "secondary", "busway")
+            if bordered and tags.get("surface") not in _LOOSE and kind not in ("service", "living_street"):
+                kerbed.append(strip)
+            streets.append(_street(way, width, bool(len(tram_tree.query(line, "dwithin", 3.0)))))
+            walk += sides
+            if is_bridge(tags):
+                walk.append(shapely.buffer(line, width / 2 + _LEDGE, cap_style="flat"))
         elif kind in ("pedestrian", "platform"):
             square.append(shapely.buffer(line, max(number(tags.get("width")) or 5.0, 2.0) / 2, quad_segs=4))
+            _note_paving(paved, tags, square[-1])
         elif kind in _FOOT_WIDTH:
             if tags.get("footway") == "crossing" or tags.get("cycleway") == "crossing":
                 marked.append(way)
@@ -275,6 +329,7 @@ def road_polygons(osm: OsmData, obstacles: Sequence[BaseGeometry] = ()) -> Stree
             width = number(tags.get("width")) or (2.6 if tags.get("footway") == "sidewalk" else _FOOT_WIDTH[kind])
             strip = shapely.buffer(line, min(max(width, 1.4), 12.0) / 2, quad_segs=3)
             unpaved = tags.get("surface") in _LOOSE or (kind in ("path", "track") and "surface" not in tags)
+            _note_paving(paved, tags, strip)
             {"steps": stairs, "cycleway": cycle}.get(kind, loose if unpaved else walk).append(strip)
     for area in osm.areas:
         tags = area.tags
@@ -292,6 +347,9 @@ def road_polygons(osm: OsmData, obstacles: Sequence[BaseGeometry] = ()) -> Stree
             stairs.append(area.polygon)
         elif tags.get("amenity") == "parking" and tags.get("parking", "surface") in ("surface", "lane", "street_side"):
             car_park.append(area.polygon)
+        else:
+            continue
+        _note_paving(paved, tags, area.polygon)
     # Closing the outline rounds the inner corners of junctions the way kerbs do.
     carriageway = shapely.union_all(drive, grid_size=_GRID)
     carriageway = shapely.buffer(shapely.buffer(carriageway, _KERB_RADIUS, quad_segs=4), -_KERB_RADIUS, quad_segs=4)
@@ -330,6 +388,73 @@ def road_polygons(osm: OsmData, obstacles: Sequence[BaseGeometry] = ()) -> Stree
         streets=streets,
         crossings=crossings,
         rails=rails,
+        sunken=_sunken(kerbed, carriageway),
+        paved={
+            name: _multi(shapely.intersection(_multi(shapely.union_all(paved[name], grid_size=_GRID)), window))
+            for name in sorted(paved)
+        },
+    )
+
+
+def _sunken(kerbed: list[BaseGeometry], carriageway: BaseGeometry) -> MultiPolygon:
+    """The kerbed part of the carriageways, the rounded corners of their junctions with it."""
+    if not kerbed:
+        return MultiPolygon()
+    shape = shapely.union_all(kerbed, grid_size=_GRID)
+    shape = shapely.buffer(shapely.buffer(shape, 2 * _KERB_RADIUS, quad_segs=3), -2 * _KERB_RADIUS + 0.1, quad_segs=3)
+    return _multi(shapely.intersection(_multi(shapely.set_precision(shape, _GRID)), carriageway, grid_size=_GRID))
+
+
+def _note_paving(paved: dict[str, list[BaseGeometry]], tags: Mapping[str, str], shape: BaseGeometry) -> None:
+    """Remember where the map says what the ground is paved with."""
+    name = PAVINGS.get(tags.get("surface", "").split(";")[0])
+    if name is not None:
+        paved.setdefault(name, []).append(shape)
+
+
+def _said_sidewalk(tags: Mapping[str, str]) -> bool:
+    """Whether the map says that there is a sidewalk, drawn as a way of its own perhaps."""
+    keys = ("sidewalk", "sidewalk:both", "sidewalk:left", "sidewalk:right")
+    return any(tags.get(key, "no") not in ("no", "none") for key in keys)
+
+
+_STANDING = {"parallel": 2.0, "lane": 2.0, "street_side": 2.2, "diagonal": 4.2, "perpendicular": 4.8}
+
+
+def _street(way: OsmWay, width: float, tracks: bool) -> Street:
+    """A street with what is painted along it, turned round where traffic runs against the way."""
+    tags = way.tags
+    oneway = is_oneway(tags)
+
+    def cycles(side: str) -> bool:
+        own = tags.get(f"cycleway:{side}", tags.get("cycleway:both"))
+        if own is None and tags.get("cycleway") == "lane":
+            return side == "right" or not oneway
+        return own == "lane"
+
+    parking, slanted = {}, False
+    for side in ("left", "right"):
+        said = tags.get(f"parking:{side}", tags.get(f"parking:lane:{side}"))
+        said = said or tags.get("parking:both", tags.get("parking:lane:both", ""))
+        kind = tags.get(f"parking:{side}:orientation", said) if said in ("lane", "street_side") else said
+        parking[side] = _STANDING.get(said, 0.0)
+        slanted = slanted or kind in ("diagonal", "perpendicular")
+    turned = tags.get("oneway") == "-1"
+    left, right = ("right", "left") if turned else ("left", "right")
+    return Street(
+        way.id,
+        tags["highway"],
+        way.line[::-1] if turned else way.line,
+        width,
+        lane_count(tags),
+        oneway,
+        kerbed=tags["highway"] not in ("service", "living_street") and tags.get("surface") not in _LOOSE,
+        cycle_left=cycles(left),
+        cycle_right=cycles(right),
+        parking_left=parking[left],
+        parking_right=parking[right],
+        slanted=slanted,
+        tracks=tracks,
     )
 
 
@@ -360,19 +485,17 @@ def _sidewalks(line: LineString, width: float, tags: Mapping[str, str]) -> list[
 
 def _crossings(osm: OsmData, carriageway: BaseGeometry, streets: list[Street], marked: list[OsmWay]) -> list[Crossing]:
     """Crossings drawn as ways, cut at the kerbs; then those that are points only, square to their street."""
-    unmarked = ("unmarked", "no", "informal")
     kinds = {node.id: node.tags for node in osm.nodes if node.tags.get("highway") == "crossing"}
     found: list[Crossing] = []
     shapely.prepare(carriageway)
     for way in marked:
-        own = way.tags.get("crossing") or next(
-            (kinds[n].get("crossing", "") for n in way.nodes if n in kinds), "unmarked"
-        )
+        node_tags = next((kinds[n] for n in way.nodes if n in kinds), {})
+        look = _marking({**node_tags, **way.tags}, "unmarked")
         width = min(max(number(way.tags.get("width")) or _CROSSING_WIDTH, 2.0), 8.0)
         for piece in shapely.get_parts(shapely.intersection(LineString(way.line), carriageway)):
             if isinstance(piece, LineString) and 2.0 < piece.length < 40.0:
                 (ax, ay), (bx, by) = piece.coords[0], piece.coords[-1]
-                found.append(Crossing((ax, ay), (bx, by), width, own not in unmarked))
+                found.append(Crossing((ax, ay), (bx, by), width, *look))
     middles = np.array([((c.start[0] + c.end[0]) / 2, (c.start[1] + c.end[1]) / 2) for c in found]).reshape(-1, 2)
     by_node: dict[int, Street] = {}
     lines = {street.way: street for street in streets}
@@ -391,6 +514,22 @@ def _crossings(osm: OsmData, carriageway: BaseGeometry, streets: list[Street], m
         along = along / max(float(np.hypot(*along)), 1e-9)
         across = np.array([-along[1], along[0]]) * (street.width / 2)
         a, b = node.xy - across, node.xy + across
-        painted = kinds[node.id].get("crossing", "zebra") not in unmarked
-        found.append(Crossing((float(a[0]), float(a[1])), (float(b[0]), float(b[1])), _CROSSING_WIDTH, painted))
+        look = _marking(kinds[node.id], "zebra")
+        found.append(Crossing((float(a[0]), float(a[1])), (float(b[0]), float(b[1])), _CROSSING_WIDTH, *look))
     return found
+
+
+_MARKINGS = {
+    **dict.fromkeys(("lines", "lines:paired", "lines:rainbow"), "lines"),
+    **dict.fromkeys(("dashes", "dashes:paired"), "dashes"),
+    **dict.fromkeys(("dots", "dots:paired", "pictograms"), "dots"),
+    **dict.fromkeys(("ladder", "ladder:skewed", "ladder:paired"), "ladder"),
+}
+
+
+def _marking(tags: Mapping[str, str], usual: str) -> tuple[bool, str, bool]:
+    """Whether a crossing is painted, how, and whether it has signals."""
+    said, kind = tags.get("crossing:markings"), tags.get("crossing", usual)
+    signals = kind == "traffic_signals" or tags.get("crossing:signals", "no") != "no"
+    painted = said != "no" if said is not None else kind not in ("unmarked", "no", "informal")
+    return painted, _MARKINGS.get(said or "", "zebra"), signals

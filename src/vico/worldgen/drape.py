@@ -1,0 +1,182 @@
+"""Polygons laid on the ground: cut where the ground bends, so that few triangles stay close to the height field."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import mapbox_earcut
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from vico.geo.osm import polygons_of
+from vico.worldgen.roofs import rings_of
+
+Floats = NDArray[np.float64]
+
+#: Heights at points, shape ``(n, 2)`` -> ``(n,)``.
+Heights = Callable[[Floats], Floats]
+
+TOLERANCE = 0.012
+"""Metres by which the middle of an uncut square may lie off the height field, for each time it is halved."""
+
+_FINEST = 0.9
+_WIDEST = 14.0  # metres: vertices carry the large patches of colour
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Squares of sides ``finest * 2**level`` over ``[-reach, reach]``, and which of them need no cutting."""
+
+    reach: float
+    even: list[NDArray[np.bool_]]
+
+    @classmethod
+    def of(cls, height: Heights, reach: float) -> Grid:
+        """Find where heights are as good as planar."""
+        depth = max(math.ceil(math.log2(2 * reach / _FINEST)), 1)
+        n = 2**depth
+        axis = np.linspace(-reach, reach, n + 1)
+        z = height(np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)).reshape(n + 1, n + 1)
+        even = [np.ones((n, n), bool)]
+        for level in range(1, depth + 1):
+            side = 2**level
+            corner, mid = z[::side, ::side], z[side // 2 :: side, side // 2 :: side]
+            a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]
+            across, up = z[::side, side // 2 :: side], z[side // 2 :: side, ::side]
+            off = np.abs(mid - (a + b + c + d) / 4)
+            off = np.maximum(off, np.abs(a + d - b - c) / 4)
+            for found, expected in (
+                (across[:-1], (a + b) / 2),
+                (across[1:], (c + d) / 2),
+                (up[:, :-1], (a + c) / 2),
+                (up[:, 1:], (b + d) / 2),
+            ):
+                off = np.maximum(off, np.abs(found - expected))
+            below = even[-1]
+            calm = below[::2, ::2] & below[1::2, ::2] & below[::2, 1::2] & below[1::2, 1::2]
+            even.append(calm & (off <= TOLERANCE))
+        return cls(reach, even)
+
+    def cut(self, shapes: Iterable[BaseGeometry]) -> list[Polygon]:
+        """Cut polygons along the squares as far as the heights ask for."""
+        depth = len(self.even) - 1
+        done: list[Polygon] = []
+        pending = [polygon for shape in shapes for polygon in polygons_of(shape, 1e-4)]
+        polygons = np.array(pending, object)
+        column, row = np.zeros(len(polygons), np.int64), np.zeros(len(polygons), np.int64)
+        for level in range(depth, -1, -1):
+            if not len(polygons):
+                break
+            side = 2 * self.reach / 2 ** (depth - level)
+            whole = self.even[level][row, column] & ((side <= _WIDEST) | (level == 0))
+            done += polygons[whole].tolist()
+            polygons, column, row = polygons[~whole], column[~whole], row[~whole]
+            if level == 0 or not len(polygons):
+                break
+            for axis in (0, 1):
+                polygons, column, row = self._halved(polygons, column, row, axis, side)
+        return done
+
+    def _halved(
+        self, polygons: NDArray[np.object_], column: NDArray[np.int64], row: NDArray[np.int64], axis: int, side: float
+    ) -> tuple[NDArray[np.object_], NDArray[np.int64], NDArray[np.int64]]:
+        """Part polygons at the middles of their squares; along the second axis the columns are halved already."""
+        place = (column if axis == 0 else row).copy()
+        middle = -self.reach + (place + 0.5) * side
+        box = shapely.bounds(polygons)
+        below, beyond = box[:, 2 + axis] <= middle + 1e-9, box[:, axis] >= middle - 1e-9
+        both = ~(below | beyond)
+        far = 4 * self.reach
+        low = [np.full(int(both.sum()), -far), np.full(int(both.sum()), -far)]
+        high = [np.full(int(both.sum()), far), np.full(int(both.sum()), far)]
+        parts: list[NDArray[np.object_]] = [polygons[below], polygons[beyond & ~below]]
+        new_place = [2 * place[below], 2 * place[beyond & ~below] + 1]
+        other = row if axis == 0 else column
+        new_other = [other[below], other[beyond & ~below]]
+        for upper in (0, 1):
+            lo, hi = [v.copy() for v in low], [v.copy() for v in high]
+            (hi if upper == 0 else lo)[axis] = middle[both]
+            clipped = shapely.intersection(polygons[both], shapely.box(lo[0], lo[1], hi[0], hi[1]))
+            pieces, owner = shapely.get_parts(clipped, return_index=True)
+            kept = (shapely.get_type_id(pieces) == 3) & (shapely.area(pieces) > 1e-4)
+            parts.append(pieces[kept])
+            new_place.append(2 * place[both][owner[kept]] + upper)
+            new_other.append(other[both][owner[kept]])
+        merged, places, others = np.concatenate(parts), np.concatenate(new_place), np.concatenate(new_other)
+        return (merged, places, others) if axis == 0 else (merged, others, places)
+
+
+def triangulated(polygons: Sequence[Polygon]) -> tuple[Floats, NDArray[np.int64]]:
+    """Corners, shape ``(n, 2)``, and triangles, counter-clockwise from above, shape ``(m, 3)``, of polygons."""
+    points: list[Floats] = []
+    triangles: list[NDArray[np.int64]] = []
+    count = 0
+    for polygon in polygons:
+        rings = rings_of(polygon)
+        corners = np.concatenate(rings)
+        ends = np.cumsum([len(ring) for ring in rings]).astype(np.uint32)
+        found = mapbox_earcut.triangulate_float64(corners, ends).reshape(-1, 3).astype(np.int64)
+        if len(found):
+            points.append(corners)
+            triangles.append(found + count)
+            count += len(corners)
+    if not points:
+        return np.zeros((0, 2)), np.zeros((0, 3), np.int64)
+    flat, faces = np.concatenate(points), np.concatenate(triangles)
+    ux, uy = (flat[faces[:, 1]] - flat[faces[:, 0]]).T
+    vx, vy = (flat[faces[:, 2]] - flat[faces[:, 0]]).T
+    turn = ux * vy - uy * vx
+    return flat, np.where((turn < 0)[:, None], faces[:, [0, 2, 1]], faces)[np.abs(turn) > 1e-9]
+
+
+@dataclass(frozen=True)
+class Curtain:
+    """Upright faces along lines.
+
+    Attributes
+    ----------
+    positions, normals
+        Metres, shape ``(4 n, 3)``; the faces look to the right of the lines.
+    uv
+        Metres along the line and up, shape ``(4 n, 2)``.
+    triangles
+        Shape ``(2 n, 3)``.
+    """
+
+    positions: Floats
+    normals: Floats
+    uv: Floats
+    triangles: NDArray[np.int64]
+
+
+def curtain(lines: Sequence[BaseGeometry], bottom: Heights, top: Heights, *, least: float = 0.01) -> Curtain:
+    """Hang faces between two heights along lines (whose points are taken as they are)."""
+    points, line = shapely.get_coordinates(list(lines), return_index=True)
+    first = np.flatnonzero(line[:-1] == line[1:]) if len(line) else np.zeros(0, np.int64)
+    a, b = points[first], points[first + 1]
+    length = np.hypot(*(b - a).T)
+    along = np.cumsum(length) - length
+    low = np.stack([bottom(a), bottom(b)], axis=1) if len(first) else np.zeros((0, 2))
+    high = np.stack([top(a), top(b)], axis=1) if len(first) else np.zeros((0, 2))
+    kept = ((high - low).max(axis=1) > least) & (length > 1e-6)
+    a, b, low, length, along = a[kept], b[kept], low[kept], length[kept], along[kept]
+    high = np.maximum(high[kept], low)
+    n = len(a)
+    positions = np.empty((n, 4, 3))
+    positions[:, 0, :2] = positions[:, 3, :2] = a
+    positions[:, 1, :2] = positions[:, 2, :2] = b
+    positions[:, 0, 2], positions[:, 1, 2] = low.T
+    positions[:, 3, 2], positions[:, 2, 2] = high.T
+    right = np.stack([(b - a)[:, 1], -(b - a)[:, 0], np.zeros(n)], axis=1) / np.maximum(length, 1e-9)[:, None]
+    uv = np.stack(
+        [np.stack([along, along + length, along + length, along], axis=1), positions[..., 2]], axis=-1
+    ).reshape(-1, 2)
+    start = 4 * np.arange(n)[:, None]
+    # Seen from the right of a line, its start lies at the right hand.
+    triangles = np.concatenate([start + np.array([0, 1, 2]), start + np.array([0, 2, 3])])
+    return Curtain(positions.reshape(-1, 3), np.repeat(right, 4, axis=0), uv, triangles)
