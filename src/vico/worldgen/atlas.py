@@ -17,9 +17,9 @@ from vico.world.mesh import Material, Surface
 _GUTTER = 4  # pixels around a chart: two mip levels before neighbours mix
 _BEND = np.cos(np.radians(14.0))  # neighbouring faces that turn less than this share a chart ...
 _FLAT = 0.10  # ... if they stay this near its plane, metres
-_LEAST_AREA = 0.3  # square metres; smaller pieces are not worth a chart
+_LEAST_AREA = 1.0  # square metres; smaller pieces are not worth a chart
+_UNDERSIDE = -0.9  # normals with a smaller z look at the ground
 _WELD = 1e-3  # metres
-_UPRIGHT = 0.7  # normals with a smaller z are walls: their charts stand on the ground
 
 
 @dataclass(frozen=True)
@@ -79,6 +79,8 @@ class Atlas:
         In the order of the surfaces they came from.
     texel
         Side of a texel, metres.
+    pieces
+        Plane pieces the surfaces have, those without a chart included: what `Chart.patch` counts.
     """
 
     pages: tuple[NDArray[np.uint8], ...]
@@ -86,6 +88,7 @@ class Atlas:
     known: tuple[NDArray[np.bool_], ...]
     charts: tuple[Chart, ...]
     texel: float
+    pieces: int = 0
 
 
 @dataclass(frozen=True)
@@ -116,7 +119,8 @@ def unwrap(
     Parameters
     ----------
     walls, roofs
-        The two layers. Surfaces with holes (cutout) or two sides stay as they are, and so do pieces under 0.3 m2.
+        The two layers. Surfaces with holes (cutout) or two sides stay as they are, and so do pieces under 1 m2
+        and undersides.
     texel
         Side of a texel, metres; a piece too large for a page gets coarser ones.
     page
@@ -144,7 +148,7 @@ def unwrap(
     count = len(patches.entity)
     if wanted is not None and len(wanted) != count:
         raise InputError(f"atlas: {len(wanted)} pieces are chosen from, but the surfaces have {count}")
-    chosen = patches.area >= _LEAST_AREA
+    chosen = (patches.area >= _LEAST_AREA) & (patches.normal[:, 2] > _UNDERSIDE)
     if wanted is not None:
         chosen &= wanted
     index = np.flatnonzero(chosen)
@@ -189,6 +193,7 @@ def unwrap(
         tuple(np.zeros(size, np.bool_) for size in sizes),
         tuple(charts),
         texel,
+        count,
     )
     made: tuple[list[Surface], list[Surface]] = ([], [])
     first = 0
@@ -240,12 +245,9 @@ def repacked(
     tuple
         Walls, roofs and atlas as from `unwrap`, with the texels of the charts that stay.
     """
-    patches = len(_patches([*walls, *roofs], len(walls)).entity)
-    wanted = np.zeros(patches, np.bool_)
+    wanted = np.zeros(atlas.pieces, np.bool_)
     shares = coverage(atlas)
     for chart, share in zip(atlas.charts, shares, strict=True):
-        if chart.patch >= patches:
-            raise InputError("atlas: its charts are of other walls and roofs; unwrap these first")
         wanted[chart.patch] = share >= least
     side = page or max((p.shape[1] for p in atlas.pages), default=4096)
     new_walls, new_roofs, new = unwrap(walls, roofs, texel=atlas.texel, page=side, wanted=wanted)
