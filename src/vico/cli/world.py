@@ -148,7 +148,8 @@ def check(path: Path, *, json: bool = False) -> int:
         print_json({"ok": not findings, "findings": [finding._asdict() for finding in findings]})
     else:
         for finding in findings:
-            print(f"{finding.id}: {finding.where}: {finding.what}")
+            at = "" if finding.at is None else f" at {finding.at[0]:.1f} m east, {finding.at[1]:.1f} m north"
+            print(f"{finding.id}: {finding.where}{at}: {finding.what}")
         print(f"{path}: {len(findings)} findings" if findings else f"{path}: all is well")
     return 1 if findings else 0
 

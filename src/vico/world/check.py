@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -13,21 +14,40 @@ from numpy.typing import NDArray
 from vico.errors import VicoError
 from vico.world.files import sha256_of
 from vico.world.folder import World, world_files
+from vico.world.lanes import LaneGraph
 from vico.world.mesh import Surface, read_glb
 from vico.world.model import Building, Room
+from vico.world.solid_checks import coplanar_overlaps
 
 _APPROACH = 2.0
 _REACH = 1.5
 _SEATED = 0.5  # metres a ground floor may lie above the highest ground at its walls
 _BODY = 0.25
+_FLICKER = 0.05  # square metres in one plane that an eye would see
+_TOUCH = 0.01  # square metres of outlines that may overlap
+_KERB = 0.4  # metres at each side of a lane that no vehicle's body sweeps
+_JOINED = ("fence", "wall", "guard_rail", "hedge", "retaining_wall")  # pieces of a barrier meet, and meet their posts
 
 
 class Finding(NamedTuple):
-    """Something wrong: which rule, where, and what."""
+    """Something wrong.
+
+    Attributes
+    ----------
+    id
+        Which rule.
+    where
+        Id of the thing (a building, an object, a lane), or a file's name.
+    what
+        One sentence.
+    at
+        East and north of it, metres; None for files.
+    """
 
     id: str
     where: str
     what: str
+    at: tuple[float, float] | None = None
 
 
 def check_world(world: World) -> list[Finding]:
@@ -48,11 +68,13 @@ def check_world(world: World) -> list[Finding]:
         _files,
         _buildings_closed,
         _buildings_seated,
+        _buildings_apart,
         _entrances,
         _places,
         _rooms,
         _containers,
         _objects,
+        _clearances,
         _roads,
         _transit,
         _entities,
@@ -61,7 +83,28 @@ def check_world(world: World) -> list[Finding]:
             findings += rule(world)
         except VicoError as error:
             findings.append(Finding("readable", rule.__name__.strip("_"), str(error)))
-    return findings
+    return _located(world, findings) if findings else findings
+
+
+def _located(world: World, findings: list[Finding]) -> list[Finding]:
+    """The findings with the places of the things they name, as far as the world can be read."""
+    at: dict[str, tuple[float, float]] = {}
+    with contextlib.suppress(VicoError):
+        for building in world.buildings:
+            middle = _outline(building).representative_point()
+            at[building.id] = (middle.x, middle.y)
+        at |= {door.id: door.position[:2] for door in world.entrances}
+        at |= {place.id: place.position[:2] for place in world.places}
+        for room in world.rooms:
+            at[room.id] = room.centre[:2]
+            at |= {container.id: container.centre[:2] for container in room.containers}
+        at |= dict(zip(world.objects.id.tolist(), world.objects.position[:, :2].tolist(), strict=True))
+        at |= {stop.id: stop.wait[:2] for stop in world.transit.stops}
+        lanes = world.lanes
+        for k, name in enumerate(lanes.ids):
+            at[name] = tuple(lanes.line(k)[0, :2].tolist())
+    found = ((f, at.get(f.where)) for f in findings)
+    return [f._replace(at=(round(float(p[0]), 2), round(float(p[1]), 2))) if p is not None else f for f, p in found]
 
 
 def _files(world: World) -> Iterator[Finding]:
@@ -151,6 +194,22 @@ def _buildings_seated(world: World) -> Iterator[Finding]:
             yield Finding("building flat", building.id, f"its height is {building.height} m")
         if not _outline(building).is_valid:
             yield Finding("building outline", building.id, "its footprint crosses itself")
+
+
+def _buildings_apart(world: World) -> Iterator[Finding]:
+    """No two drawn faces of walls and roofs lie in one plane, face the same way and overlap: they would flicker."""
+    surfaces = [*world.surfaces("buildings"), *world.surfaces("roofs")]
+    numbers = {building.entity: building.id for building in world.buildings}
+    corners = np.concatenate([s.positions[s.triangles] for s in surfaces])
+    entity = np.concatenate([s.entity[s.triangles[:, 0]] for s in surfaces])
+    pairs = coplanar_overlaps(corners, least=_FLICKER, among=np.isin(entity, list(numbers)))
+    areas: dict[tuple[int, int], float] = {}
+    for a, b, area in zip(pairs.first[pairs.same], pairs.second[pairs.same], pairs.area[pairs.same], strict=True):
+        key = (min(int(entity[a]), int(entity[b])), max(int(entity[a]), int(entity[b])))
+        areas[key] = areas.get(key, 0.0) + float(area)
+    for (one, other), area in sorted(areas.items()):
+        whom = "itself" if one == other else numbers[other]
+        yield Finding("building faces overlap", numbers[one], f"{area:.2f} m2 lie in one plane with faces of {whom}")
 
 
 def _entrances(world: World) -> Iterator[Finding]:
@@ -299,6 +358,39 @@ def _objects(world: World) -> Iterator[Finding]:
     off = np.abs(world.height(objects.position[outside]) - objects.z[outside]) > 0.05
     for k in outside[off].tolist():
         yield Finding("object not seated", str(objects.id[k]), "its foot is not at ground level")
+
+
+def _lane_bands(lanes: LaneGraph, chosen: NDArray[np.int64]) -> NDArray[np.object_]:
+    """What vehicles sweep on each lane, a little narrower than the lane."""
+    lines = np.array([shapely.LineString(lanes.line(int(k))[:, :2]) for k in chosen], object)
+    return np.asarray(shapely.buffer(lines, lanes.width[chosen] / 2 - _KERB, cap_style="flat"), object)
+
+
+def _clearances(world: World) -> Iterator[Finding]:
+    """Nothing solid stands on a lane that is driven, nor in another solid thing."""
+    objects = world.objects
+    solid = np.flatnonzero(objects.outdoors & objects.solid)
+    if not len(solid):
+        return
+    feet = shapely.polygons(objects.feet()[solid])
+    lanes = world.lanes
+    driven = np.flatnonzero(lanes.inside < 0) if len(lanes) else np.zeros(0, np.int64)
+    if len(driven):
+        bands = _lane_bands(lanes, driven)
+        for k, lane in np.column_stack(shapely.STRtree(bands).query(feet, predicate="intersects")).tolist():
+            inside = float(shapely.area(shapely.intersection(feet[k], bands[lane])))
+            if inside > _TOUCH:
+                what = f"{inside:.2f} m2 of its foot stand on lane {lanes.ids[int(driven[lane])]}"
+                yield Finding("object on a lane", str(objects.id[solid[k]]), what)
+    left, right = shapely.STRtree(feet).query(feet, predicate="intersects")
+    chosen = left < right
+    for a, b in zip(left[chosen].tolist(), right[chosen].tolist(), strict=True):
+        if str(objects.kind[solid[a]]) in _JOINED and str(objects.kind[solid[b]]) in _JOINED:
+            continue
+        common = float(shapely.area(shapely.intersection(feet[a], feet[b])))
+        if common > _TOUCH:
+            what = f"{common:.2f} m2 of its foot stand in {objects.id[solid[b]]}"
+            yield Finding("objects overlap", str(objects.id[solid[a]]), what)
 
 
 def _roads(world: World) -> Iterator[Finding]:
