@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
-import mapbox_earcut
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import Polygon
 
-from vico.geo.osm import OsmData, polygons_of
+from vico.geo.osm import OsmData, OsmWay, polygons_of
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface
 from vico.world.model import FIRST_BUILDING, Building, Dropped
@@ -19,12 +18,13 @@ from vico.world.seeds import rng
 from vico.worldgen import facades
 from vico.worldgen.facades import BACK, BLANK, FRONT, SHOPFRONT, Look
 from vico.worldgen.outlines import BuildingPlan, PartPlan, building_plans
-from vico.worldgen.roofs import building_solid, rings_of
-from vico.worldgen.rooftops import rooftop_parts
+from vico.worldgen.outlines_plans import RULES
+from vico.worldgen.roofs import rings_of
+from vico.worldgen.rooftops import cornices, posts, rooftop_parts
+from vico.worldgen.solids import Seat, SolidMesh, collision_bodies, leaky, seat_of, solid_meshes
 from vico.worldgen.streets import on_the_ground
 from vico.worldgen.textures import material
 
-_SKIRT = 0.3  # metres the walls reach below the lowest ground, so that no gap shows
 _FRONT_REACH = 17.0  # metres from a street's centre line within which a wall faces it
 _SHOPS = ("ground_shops", "ground_cafes")
 # Roof furniture: material and tint.
@@ -32,6 +32,7 @@ _FINISHES = {
     "cornice": ("blank_plaster", (255, 253, 248)),
     "penthouse": ("blank_plaster", (190, 192, 194)),
     "chimney": ("blank_brick", (226, 210, 200)),
+    "post": ("blank_plaster", (150, 152, 156)),
 }
 _KEPT_TAGS = (
     "building",
@@ -65,6 +66,8 @@ class BuildingsResult:
         What the map had and the world has not, with reasons.
     watertight
         Buildings all of whose solids are closed and face outwards.
+    rules
+        How many heights each rule decided (`outlines_plans.RULES`).
     """
 
     records: list[Building]
@@ -73,6 +76,7 @@ class BuildingsResult:
     collision: list[Surface]
     dropped: list[Dropped]
     watertight: int
+    rules: dict[str, int] = field(default_factory=dict)
 
     @property
     def collision_faces(self) -> int:
@@ -80,16 +84,14 @@ class BuildingsResult:
         return sum(len(surface.triangles) for surface in self.collision)
 
 
-@dataclass(frozen=True)
-class _Seat:
-    """Where a building stands: `bottom` of its walls and `base` (ground floor), metres."""
-
-    bottom: float
-    base: float
-
-
-def buildings_from_osm(osm: OsmData, terrain: HeightField, *, seed: int) -> BuildingsResult:
-    """Build every building of an extract that touches the world's square.
+def buildings_from_osm(
+    osm: OsmData,
+    terrain: HeightField,
+    *,
+    seed: int,
+    fit: Callable[[list[BuildingPlan]], list[BuildingPlan]] | None = None,
+) -> BuildingsResult:
+    """Build every building of an extract whose middle lies within the world's square.
 
     Parameters
     ----------
@@ -99,6 +101,8 @@ def buildings_from_osm(osm: OsmData, terrain: HeightField, *, seed: int) -> Buil
         What the buildings stand on.
     seed
         Decides what the map leaves open: heights, roofs, colours.
+    fit
+        Changes the plans before anything is built, for example to heights that were measured.
 
     Returns
     -------
@@ -106,26 +110,37 @@ def buildings_from_osm(osm: OsmData, terrain: HeightField, *, seed: int) -> Buil
         Records, meshes and collision bodies.
     """
     plans, dropped = building_plans(osm, seed=seed)
+    if fit is not None:
+        plans = fit(plans)
     region = facades.region_of(osm.frame.lat, osm.frame.lon)
-    seats = [_seat(plan, terrain) for plan in plans]
-    looks = [
-        facades.look_of(
+    seats = [seat_of(plan, terrain) for plan in plans]
+
+    def look_of(plan: BuildingPlan, tags: Mapping[str, str]) -> Look:
+        return facades.look_of(
             plan.use,
-            {**plan.tags, **plan.parts[0].tags},
+            {**plan.tags, **tags},
             levels=plan.levels,
             area=plan.outline.area,
             region=region,
             random=rng(seed, "facade", plan.id),
         )
-        for plan in plans
-    ]
+
+    looks = [look_of(plan, plan.parts[0].tags) for plan in plans]
+    streets = shapely.STRtree([shapely.LineString(way.line) for way in osm.ways if _is_street(way)])
+    ledges = cornices(plans, [look.wall for look in looks], [seat.base for seat in seats])
     plans = [
-        replace(plan, rooftop=rooftop_parts(plan, look.wall, rng(seed, "rooftop", plan.id)))
-        for plan, look in zip(plans, looks, strict=True)
+        replace(plan, rooftop=[*ledge, *rooftop_parts(plan, rng(seed, "rooftop", plan.id)), *posts(plan, streets)])
+        for plan, ledge in zip(plans, ledges, strict=True)
     ]
-    mesh = _meshes(plans, seats)
+    mesh = solid_meshes(plans, seats)
     edges = _edges(plans, seats, osm)
-    walls, roofs = _dressed(mesh, edges, plans, seats, looks, seed)
+    # A part that is said to be of another colour or stuff is dressed by itself, with the building's own draws.
+    dress = [
+        look if part.finish or not _dressed_apart(part, plan) else look_of(plan, part.tags)
+        for plan, look in zip(plans, looks, strict=True)
+        for part in plan.solids
+    ]
+    walls, roofs = _dressed(mesh, edges, plans, seats, dress, seed)
     records = [
         _record(plan, FIRST_BUILDING + k, seat, look)
         for k, (plan, seat, look) in enumerate(zip(plans, seats, looks, strict=True))
@@ -133,77 +148,35 @@ def buildings_from_osm(osm: OsmData, terrain: HeightField, *, seed: int) -> Buil
     collision = [
         body
         for k, (plan, seat) in enumerate(zip(plans, seats, strict=True))
-        for part in plan.parts
-        for body in _collision(part, seat, FIRST_BUILDING + k)
+        for part in (*plan.parts, *(solid for solid in plan.rooftop if solid.finish == "post"))
+        for body in collision_bodies(part, seat, FIRST_BUILDING + k)
     ]
-    return BuildingsResult(records, walls, roofs, collision, dropped, len(plans) - len(_leaky(mesh)))
+    rules = {rule: count for rule in RULES if (count := sum(plan.rule == rule for plan in plans))}
+    return BuildingsResult(records, walls, roofs, collision, dropped, len(plans) - len(leaky(mesh)), rules)
 
 
-def _seat(plan: BuildingPlan, terrain: HeightField) -> _Seat:
-    """Seat a building: walls down to the lowest ground under it, ground floor a little above that on a slope."""
-    outline = np.asarray(shapely.segmentize(plan.outline.exterior, 3.0).coords)[:, :2]
-    ground = terrain(outline)
-    lowest, highest = float(ground.min()), float(ground.max())
-    base = lowest + min(0.4 * (highest - lowest), 1.5)
-    return _Seat(lowest - _SKIRT, base)
+_DRESS_KEYS = (
+    "building:colour",
+    "building:color",
+    "building:material",
+    "building:facade:material",
+    "roof:colour",
+    "roof:color",
+    "roof:material",
+)
 
 
-def _heights(part: PartPlan, seat: _Seat) -> tuple[float, float]:
-    """Underside and eaves of a part above sea level."""
-    return (seat.bottom if part.low <= 0 else seat.base + part.low), seat.base + part.eaves
+def _dressed_apart(part: PartPlan, plan: BuildingPlan) -> bool:
+    first = plan.parts[0].tags
+    return any(part.tags.get(key) != first.get(key) for key in _DRESS_KEYS)
 
 
-@dataclass
-class _Mesh:
-    """All solids together; `part` and `plan` say whose a face is, `parts` whose part is of which plan."""
-
-    points: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    part: NDArray[np.int64]
-    plan_of_part: NDArray[np.int64]
-    broken: list[int] = field(default_factory=list)
-
-
-def _meshes(plans: list[BuildingPlan], seats: list[_Seat]) -> _Mesh:
-    points: list[NDArray[np.float64]] = []
-    faces: list[NDArray[np.int64]] = []
-    owner: list[NDArray[np.int64]] = []
-    plan_of_part: list[int] = []
-    broken: list[int] = []
-    count = 0
-    for p, (plan, seat) in enumerate(zip(plans, seats, strict=True)):
-        for part in plan.solids:
-            low, eaves = _heights(part, seat)
-            # Solids are made near the origin and near height 0: the kernel's tolerance grows with coordinates.
-            x, y = (round(v) for v in part.polygon.centroid.coords[0])
-            local = shapely.transform(part.polygon, lambda xy, x=x, y=y: xy - (x, y))
-            solid = building_solid(local, low - eaves, 0.0, part.roof).simplify(0.002)
-            solid_mesh = solid.to_mesh64()
-            vertices = np.asarray(solid_mesh.vert_properties, np.float64)[:, :3]
-            triangles = np.asarray(solid_mesh.tri_verts, np.int64)
-            if not len(triangles) or solid.volume() <= 0:
-                broken.append(p)
-            points.append(vertices + np.array([x, y, eaves]))
-            faces.append(triangles + count)
-            owner.append(np.full(len(triangles), len(plan_of_part), np.int64))
-            count += len(vertices)
-            plan_of_part.append(p)
-    if not points:
-        return _Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64))
-    return _Mesh(np.concatenate(points), np.concatenate(faces), np.concatenate(owner), np.array(plan_of_part), broken)
-
-
-def _leaky(mesh: _Mesh) -> set[int]:
-    """Plans with a solid that is empty, inside out, or has an edge without its exact counterpart."""
-    start, end = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
-    size = np.int64(len(mesh.points))
-    forward, backward = np.sort(start * size + end), np.sort(end * size + start)
-    if len(forward) == len(backward) and np.array_equal(forward, backward) and (np.diff(forward) > 0).all():
-        return set(mesh.broken)
-    there = np.isin(start * size + end, backward)
-    _, index, counts = np.unique(start * size + end, return_inverse=True, return_counts=True)
-    bad = ~there | (counts[index] > 1)
-    return set(mesh.broken) | set(mesh.plan_of_part[np.repeat(mesh.part, 3)[bad]].tolist())
+def _is_street(way: OsmWay) -> bool:
+    return (
+        way.tags.get("highway") not in (None, "steps", "corridor", "elevator", "platform", "service", "path")
+        and "building" not in way.tags
+        and on_the_ground(way.tags)
+    )
 
 
 @dataclass
@@ -216,7 +189,7 @@ class _Edges:
     first: NDArray[np.int64]
 
 
-def _edges(plans: list[BuildingPlan], seats: list[_Seat], osm: OsmData) -> _Edges:
+def _edges(plans: list[BuildingPlan], seats: list[Seat], osm: OsmData) -> _Edges:
     """Every wall's line, and what it shows: nothing towards a neighbour, a front towards a street."""
     starts: list[NDArray[np.float64]] = []
     ends: list[NDArray[np.float64]] = []
@@ -242,13 +215,7 @@ def _edges(plans: list[BuildingPlan], seats: list[_Seat], osm: OsmData) -> _Edge
     outward = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.maximum(length, 1e-9)[:, None]
     middle = (start + end) / 2
     style = np.full(len(start), BACK, np.int64)
-    streets = [
-        shapely.LineString(way.line)
-        for way in osm.ways
-        if way.tags.get("highway") not in (None, "steps", "corridor", "elevator", "platform", "service", "path")
-        and "building" not in way.tags
-        and on_the_ground(way.tags)
-    ]
+    streets = [shapely.LineString(way.line) for way in osm.ways if _is_street(way)]
     if streets:
         near = shapely.STRtree(streets).query(
             shapely.points(middle + outward * 1.0), predicate="dwithin", distance=_FRONT_REACH
@@ -312,7 +279,7 @@ class _Pile:
 
 
 def _dressed(
-    mesh: _Mesh, edges: _Edges, plans: list[BuildingPlan], seats: list[_Seat], looks: list[Look], seed: int
+    mesh: SolidMesh, edges: _Edges, plans: list[BuildingPlan], seats: list[Seat], looks: list[Look], seed: int
 ) -> tuple[list[Surface], list[Surface]]:
     """Give every triangle its material and texture coordinates; cut walls where the material changes."""
     if not len(mesh.faces):
@@ -327,8 +294,10 @@ def _dressed(
     tall = np.array(
         [plans[p].use in ("retail", "commercial", "office", "civic", "hotel") or plans[p].shops > 0 for p in of]
     )
-    ground = np.where(tall, 4.0, 3.5)
-    single = (levels <= 1) | (eaves - base < 5.6)
+    # Halls and churches have one row of windows from a low base to the eaves.
+    hall = np.array([look.hall for look in looks])
+    ground = np.where(hall, np.minimum(2.4, 0.25 * (eaves - base)), np.where(tall, 4.0, 3.5))
+    single = ((levels <= 1) | (eaves - base < 5.6)) & ~hall
     ground_top = np.where(low > 0, base + low, np.where(single, eaves, base + ground))
     plinth = np.where((base - bottom > 0.75) & (low <= 0), base, np.nan)
     points, faces, owner = mesh.points, mesh.faces, mesh.part
@@ -345,13 +314,14 @@ def _dressed(
     shift = random.integers(0, 4, (len(edges.start) + 1, 2)).astype(np.float64) / 4
     entity = (FIRST_BUILDING + of[owner]).astype(np.int32)
     z = corner[..., 2]
-    # Zones: 0 roof and undersides, 1 blank, 2 plinth, 3 shopfront, 4 ground floor, 5 upper floors.
+    # Zones: 0 roof and undersides, 1 blank, 2 plinth, 3 shopfront, 4 ground floor, 5 upper floors, 6 those of a back.
     style = np.where(edge >= 0, edges.style[edge], BLANK)
     height = middle[:, 2]
     zone = np.where(style == BLANK, 1, 5)
     zone[(zone == 5) & (height > eaves[owner])] = 1
     zone[(zone == 5) & (height < ground_top[owner])] = 4
     zone[(zone == 4) & (style == SHOPFRONT)] = 3
+    zone[(zone == 5) & (style == BACK)] = 6
     zone[(height < plinth[owner])] = 2
     zone[~upright] = 0
     start = edges.start[edge]
@@ -361,7 +331,7 @@ def _dressed(
     along = np.einsum("nki,ni->nk", corner[..., :2] - start[:, None, :], direction)
     walls: dict[str, _Pile] = {}
     roofs: dict[str, _Pile] = {}
-    look_of = [looks[p] for p in of]
+    look_of = looks
     names = {
         0: [look.roof for look in look_of],
         1: [
@@ -371,6 +341,7 @@ def _dressed(
         3: [_SHOPS[zlib.crc32(plans[p].id.encode()) % len(_SHOPS)] for p in of],
         4: [look.ground for look in look_of],
         5: [look.wall for look in look_of],
+        6: [look.back for look in look_of],
     }
     white, stone = (255, 255, 255), (206, 202, 196)
     tints = {
@@ -380,10 +351,11 @@ def _dressed(
         3: [white] * len(parts),
         4: [look.ground_tint for look in look_of],
         5: [look.tint for look in look_of],
+        6: [look.back_tint for look in look_of],
     }
     wished = np.array([look.bay for look in look_of])[owner]
-    storeys = np.maximum(np.round((eaves - ground_top) / 3.25), 1.0)
-    for k in range(6):
+    storeys = np.where(hall, facades.STOREYS, np.maximum(np.round((eaves - ground_top) / 3.25), 1.0))
+    for k in range(7):
         chosen = np.flatnonzero(zone == k)
         if not len(chosen):
             continue
@@ -412,13 +384,10 @@ def _dressed(
             bay = np.where(k == 3, 4.2, wished[chosen])
             count = facades.bays(length[chosen], bay)
             u = facades.bay_coordinates(along[chosen], length[chosen, None], count[:, None]) + shift[edge[chosen], :1]
-            if k == 5:
-                v = (
-                    facades.storey_coordinates(
-                        z[chosen], ground_top[mine][:, None], eaves[mine][:, None], storeys[mine][:, None]
-                    )
-                    + shift[edge[chosen], 1:]
-                )
+            if k >= 5:
+                v = facades.storey_coordinates(
+                    z[chosen], ground_top[mine][:, None], eaves[mine][:, None], storeys[mine][:, None]
+                ) + np.where(hall[mine][:, None], 0.0, shift[edge[chosen], 1:])
             else:
                 v = (z[chosen] - base[mine][:, None]) / (ground_top[mine] - base[mine])[:, None]
                 v = np.clip(v, 0.004, 0.996)
@@ -491,7 +460,7 @@ def _slope_uv(corner: NDArray[np.float64], normal: NDArray[np.float64], label: N
     )
 
 
-def _record(plan: BuildingPlan, entity: int, seat: _Seat, look: Look) -> Building:
+def _record(plan: BuildingPlan, entity: int, seat: Seat, look: Look) -> Building:
     standing = [part.polygon for part in plan.parts if part.low < 2.5] or [part.polygon for part in plan.parts]
     # A millimetre grid, so that the written outline is the valid one and not its rounding.
     merged = polygons_of(shapely.set_precision(shapely.union_all(standing), 0.001))
@@ -512,83 +481,3 @@ def _record(plan: BuildingPlan, entity: int, seat: _Seat, look: Look) -> Buildin
         accessible=False,
         tags={key: plan.tags[key] for key in _KEPT_TAGS if key in plan.tags},
     )
-
-
-def _collision(part: PartPlan, seat: _Seat, entity: int) -> list[Surface]:
-    """Convex prisms that fill a part's walls, up to half the height of a pitched roof."""
-    low, eaves = _heights(part, seat)
-    top = eaves + (part.roof.height if part.roof.shape == "flat" else 0.5 * part.roof.height)
-    bodies: list[Surface] = []
-    for shape in polygons_of(shapely.simplify(part.polygon, 0.25), 0.5):
-        for ring in convex_pieces(shape):
-            n = len(ring)
-            points = np.concatenate([np.c_[ring, np.full(n, low)], np.c_[ring, np.full(n, top)]])
-            i = np.arange(n)
-            j = (i + 1) % n
-            fan = np.arange(1, n - 1)
-            triangles = np.concatenate(
-                [
-                    np.stack([i, j, n + j], axis=1),
-                    np.stack([i, n + j, n + i], axis=1),
-                    np.stack([np.zeros_like(fan), fan + 1, fan], axis=1),
-                    np.stack([np.full_like(fan, n), n + fan, n + fan + 1], axis=1),
-                ]
-            )
-            out = points - points.mean(axis=0)
-            normals = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
-            bodies.append(
-                Surface.from_triangles(
-                    points, triangles, normals=normals, entity=entity, material=Material("collision")
-                )
-            )
-    return bodies
-
-
-def convex_pieces(polygon: Polygon) -> list[NDArray[np.float64]]:
-    """Divide a polygon into convex ones: ears, then merged across every diagonal that is not needed.
-
-    Returns
-    -------
-    list of ndarray
-        Counter-clockwise rings, not closed, shape ``(n, 2)``.
-
-    Notes
-    -----
-    Hertel and Mehlhorn (1983): at most four times the least number of pieces.
-    """
-    rings = rings_of(polygon)
-    points = np.concatenate(rings)
-    ends = np.cumsum([len(ring) for ring in rings]).astype(np.uint32)
-    triangles = mapbox_earcut.triangulate_float64(points, ends).reshape(-1, 3).astype(int)
-    pieces: dict[int, list[int]] = {}
-    side: dict[tuple[int, int], int] = {}
-    for k, (a, b, c) in enumerate(triangles.tolist()):
-        (ux, uy), (vx, vy) = points[b] - points[a], points[c] - points[a]
-        area = float(ux * vy - uy * vx)
-        if abs(area) < 1e-9:
-            continue
-        pieces[k] = [a, b, c] if area > 0 else [a, c, b]
-        for i in range(3):
-            side[pieces[k][i], pieces[k][(i + 1) % 3]] = k
-    for a, b in sorted(side):
-        first, second = side.get((a, b)), side.get((b, a))
-        if first is None or second is None or first == second:
-            continue
-        one, two = pieces[first], pieces[second]
-        i, j = one.index(a), two.index(b)
-        ring = one[i + 1 :] + one[: i + 1]
-        # Walk the first from b round to a, then the second's corners between a and b.
-        rest = two[j:] + two[:j]
-        merged = ring + [v for v in rest if v not in (a, b)]
-        if not _is_convex(points[merged]):
-            continue
-        pieces[first] = merged
-        del pieces[second]
-        for u, v in [key for key, of in side.items() if of == second]:
-            side[u, v] = first
-    return [points[ring] for ring in pieces.values()]
-
-
-def _is_convex(ring: NDArray[np.float64]) -> bool:
-    before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
-    return bool((before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] > -1e-9).all())

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import zlib
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.shapes import box, pose_matrix
-from vico.world.mesh import Surface, joined
-from vico.world.model import Building, Entrance
-from vico.worldgen.textures import BAYS, STOREYS, material
+from vico.worldgen.textures import BAYS, STOREYS
 
 Rgb = tuple[int, int, int]
 
@@ -22,7 +19,7 @@ BLANK, BACK, FRONT, SHOPFRONT = 0, 1, 2, 3
 ROOF_TILE = {"roof_tiles": 3.2, "roof_metal": 2.4, "roof_slate": 3.2, "roof_gravel": 4.0}
 """Metres a roof texture covers."""
 
-BLANK_TILE = {"blank_plaster": 3.0, "blank_brick": 2.4, "blank_stone": 2.4}
+BLANK_TILE = {"blank_plaster": 3.0, "blank_brick": 2.4, "blank_stone": 2.4, "blank_boards": 3.0}
 """Metres a blank wall's texture covers."""
 
 _PLASTER: tuple[Rgb, ...] = (
@@ -42,6 +39,48 @@ _PLASTER: tuple[Rgb, ...] = (
 _BRICK: tuple[Rgb, ...] = ((255, 255, 255), (232, 216, 208), (255, 238, 214), (206, 196, 190), (246, 224, 206))
 _STONE: tuple[Rgb, ...] = ((242, 236, 226), (226, 222, 216), (236, 222, 204), (214, 208, 204), (232, 204, 190))
 _PANEL: tuple[Rgb, ...] = ((240, 240, 240), (214, 220, 226), (226, 218, 204))
+_SAND: tuple[Rgb, ...] = ((255, 246, 230), (246, 222, 196), (255, 236, 204), (238, 206, 188), (244, 240, 232))
+_TERRACOTTA: tuple[Rgb, ...] = ((255, 252, 244), (240, 226, 206), (236, 196, 170), (214, 212, 208), (246, 240, 228))
+_BOARDS: tuple[Rgb, ...] = (
+    (255, 255, 252),
+    (238, 226, 176),
+    (196, 204, 206),
+    (178, 104, 86),
+    (206, 216, 196),
+    (224, 206, 178),
+    (168, 188, 204),
+)
+_WARM: tuple[Rgb, ...] = (
+    (255, 224, 164),
+    (255, 236, 196),
+    (252, 206, 150),
+    (248, 196, 168),
+    (255, 244, 222),
+    (240, 216, 176),
+    (252, 224, 200),
+    (236, 180, 148),
+)
+_TIMBER: tuple[Rgb, ...] = ((255, 255, 250), (255, 246, 226), (250, 232, 200), (255, 250, 240))
+_WHITE: tuple[Rgb, ...] = ((255, 255, 255),)
+_PALETTES: Mapping[str, tuple[Rgb, ...]] = {
+    "wall_brick": _BRICK,
+    "wall_tenement": (*_BRICK, (226, 188, 170), (255, 226, 196)),
+    "wall_loft": _BRICK,
+    "wall_stone": _STONE,
+    "wall_arched": _SAND,
+    "wall_french": ((255, 250, 240), (255, 244, 226), (250, 238, 214), (244, 240, 234)),
+    "wall_shuttered": _WARM,
+    "wall_timbered": _TIMBER,
+    "wall_boards": _BOARDS,
+    "wall_ribbon": _STONE,
+    "wall_slab": _STONE,
+    "wall_grid": _TERRACOTTA,
+    "wall_panels": _PANEL,
+    "wall_church": _SAND,
+    "wall_shed": ((255, 255, 255), (226, 216, 206), (196, 190, 186), (214, 160, 140)),
+    "wall_glass": _WHITE,
+    "wall_fins": (*_WHITE, (236, 226, 210), (206, 210, 216)),
+}
 _ROOF: Mapping[str, tuple[Rgb, ...]] = {
     "roof_tiles": ((176, 104, 82), (160, 92, 74), (172, 116, 92)),
     "roof_metal": ((104, 108, 112), (128, 74, 62), (84, 92, 92), (112, 148, 132), (70, 72, 76)),
@@ -79,7 +118,19 @@ _NAMED: Mapping[str, Rgb] = {
 
 @dataclass(frozen=True)
 class Look:
-    """The materials and colours of one building; `bay` is the wished width of a bay, metres."""
+    """The materials and colours of one building.
+
+    Attributes
+    ----------
+    wall, ground, blank, roof, back
+        Materials of upper floors, ground floor, walls without windows, roof, and upper floors away from streets.
+    bay
+        Wished width of a bay, metres.
+    tint, ground_tint, roof_tint, back_tint
+        What multiplies their pictures.
+    hall
+        One row of windows from a low base to the eaves, as churches have.
+    """
 
     wall: str
     ground: str
@@ -89,6 +140,163 @@ class Look:
     tint: Rgb
     ground_tint: Rgb
     roof_tint: Rgb
+    back: str = "wall_plain"
+    back_tint: Rgb = (255, 255, 255)
+    hall: bool = False
+
+
+Shares = tuple[tuple[str, float], ...]
+
+_OWN_COLOUR = ("wall_brick", "wall_tenement", "wall_loft", "wall_timbered", "wall_shed", "wall_arched", "wall_church")
+_DRESSY = (
+    "wall_classic",
+    "wall_stone",
+    "wall_arched",
+    "wall_french",
+    "wall_brick",
+    "wall_tenement",
+    "wall_timbered",
+    "wall_shuttered",
+    "wall_grid",
+)
+"""Families whose backs are plainer than their fronts."""
+
+_BAY: Mapping[str, float] = {
+    "wall_glass": 3.6,
+    "wall_fins": 3.9,
+    "wall_ribbon": 3.9,
+    "wall_panels": 4.4,
+    "wall_stone": 3.3,
+    "wall_arched": 3.1,
+    "wall_grid": 3.6,
+    "wall_slab": 3.4,
+    "wall_balconies": 3.6,
+    "wall_loft": 3.8,
+    "wall_tenement": 3.2,
+    "wall_french": 2.7,
+    "wall_shuttered": 2.8,
+    "wall_timbered": 2.9,
+    "wall_boards": 2.9,
+    "wall_church": 4.4,
+    "wall_shed": 4.0,
+}
+"""Wished width of a bay, metres; 3 for all others."""
+
+_BLANKS: Mapping[str, str] = {
+    "wall_brick": "blank_brick",
+    "wall_tenement": "blank_brick",
+    "wall_loft": "blank_brick",
+    "wall_stone": "blank_stone",
+    "wall_arched": "blank_stone",
+    "wall_church": "blank_stone",
+    "wall_glass": "blank_stone",
+    "wall_boards": "blank_boards",
+    "wall_shed": "blank_boards",
+}
+
+_GROUNDS: Mapping[str, tuple[str, ...]] = {
+    "wall_classic": ("ground_rusticated", "ground_rusticated", "ground_arcade", "ground_plain"),
+    "wall_plain": ("ground_plain", "ground_plain", "ground_rusticated"),
+    "wall_brick": ("ground_brick", "ground_brick", "ground_rusticated"),
+    "wall_tenement": ("ground_brownstone", "ground_brownstone", "ground_brick", "ground_loft"),
+    "wall_stone": ("ground_arcade", "ground_rusticated"),
+    "wall_arched": ("ground_arcade", "ground_rusticated"),
+    "wall_french": ("ground_rusticated", "ground_shuttered", "ground_arcade"),
+    "wall_shuttered": ("ground_shuttered", "ground_shuttered", "ground_plain"),
+    "wall_timbered": ("ground_plain", "ground_shuttered", "ground_rusticated"),
+    "wall_boards": ("ground_boards",),
+    "wall_ribbon": ("ground_lobby",),
+    "wall_glass": ("ground_lobby",),
+    "wall_fins": ("ground_lobby",),
+    "wall_grid": ("ground_lobby", "ground_arcade"),
+    "wall_slab": ("ground_plain", "ground_lobby"),
+    "wall_balconies": ("ground_plain", "ground_lobby"),
+    "wall_panels": ("ground_gates",),
+    "wall_loft": ("ground_loft", "ground_brick"),
+    "wall_church": ("ground_base",),
+    "wall_shed": ("ground_shed",),
+}
+
+_OF_MATERIAL: Mapping[str, Shares] = {
+    **dict.fromkeys(("brick", "bricks"), (("wall_brick", 1.0),)),
+    **dict.fromkeys(("sandstone", "limestone"), (("wall_arched", 0.6), ("wall_stone", 0.4))),
+    **dict.fromkeys(("stone", "granite", "marble"), (("wall_stone", 1.0),)),
+    **dict.fromkeys(("glass", "mirror"), (("wall_glass", 1.0),)),
+    **dict.fromkeys(
+        ("plaster", "stucco", "render", "loam", "adobe", "clay"), (("wall_classic", 0.6), ("wall_plain", 0.4))
+    ),
+    **dict.fromkeys(("concrete", "cement_block", "cement"), (("wall_ribbon", 0.5), ("wall_slab", 0.5))),
+    **dict.fromkeys(("metal", "steel", "tin", "metal_plates", "aluminium"), (("wall_panels", 1.0),)),
+    **dict.fromkeys(("timber_framing", "half_timbered", "timber_frame"), (("wall_timbered", 1.0),)),
+    **dict.fromkeys(("wood", "timber", "vinyl", "vinyl_siding", "weatherboard"), (("wall_boards", 1.0),)),
+    **dict.fromkeys(("tiles", "panels", "eternit"), (("wall_grid", 1.0),)),
+}
+_OF_STYLE: Mapping[str, Shares] = {
+    **dict.fromkeys(("modern", "contemporary", "high-tech", "postmodern"), (("wall_grid", 0.5), ("wall_fins", 0.5))),
+    **dict.fromkeys(("brutalist", "brutalism"), (("wall_ribbon", 0.5), ("wall_slab", 0.5))),
+    **dict.fromkeys(("international_style", "functionalism", "modernism", "bauhaus"), (("wall_plain", 1.0),)),
+    **dict.fromkeys(
+        ("neoclassicism", "neoclassical", "classicism", "empire", "eclectic", "historicism", "art_nouveau"),
+        (("wall_classic", 0.7), ("wall_stone", 0.3)),
+    ),
+    **dict.fromkeys(
+        ("baroque", "neo-baroque", "renaissance", "neo-renaissance", "neo-romanesque", "romanesque"),
+        (("wall_arched", 1.0),),
+    ),
+    **dict.fromkeys(("victorian", "georgian", "edwardian", "federal"), (("wall_brick", 0.8), ("wall_classic", 0.2))),
+    **dict.fromkeys(("haussmann", "second_empire"), (("wall_french", 1.0),)),
+    **dict.fromkeys(("half-timbered", "timber_frame", "tudor"), (("wall_timbered", 1.0),)),
+}
+_MODERN: Shares = (("wall_ribbon", 0.28), ("wall_glass", 0.25), ("wall_grid", 0.27), ("wall_fins", 0.2))
+# What streets are lined with, by region: old town houses, small old ones, cottages, houses of 1920-1975, later ones.
+_CUSTOMS: Mapping[str, Mapping[str, Shares]] = {
+    "northern": {
+        "old": (("wall_classic", 0.55), ("wall_stone", 0.12), ("wall_brick", 0.15), ("wall_french", 0.1),
+                ("wall_arched", 0.08)),
+        "small": (("wall_classic", 0.5), ("wall_plain", 0.2), ("wall_shuttered", 0.15), ("wall_brick", 0.15)),
+        "cottage": (("wall_plain", 0.5), ("wall_brick", 0.2), ("wall_shuttered", 0.3)),
+        "middle": (("wall_plain", 0.6), ("wall_slab", 0.2), ("wall_brick", 0.2)),
+        "new": (("wall_balconies", 0.5), ("wall_grid", 0.3), ("wall_plain", 0.2)),
+    },
+    "nordic": {
+        "old": (("wall_classic", 0.68), ("wall_stone", 0.14), ("wall_arched", 0.08), ("wall_brick", 0.1)),
+        "small": (("wall_classic", 0.6), ("wall_plain", 0.3), ("wall_boards", 0.1)),
+        "cottage": (("wall_boards", 0.55), ("wall_plain", 0.45)),
+        "middle": (("wall_plain", 0.7), ("wall_slab", 0.15), ("wall_brick", 0.15)),
+        "new": (("wall_balconies", 0.55), ("wall_grid", 0.25), ("wall_fins", 0.2)),
+    },
+    "british": {
+        "old": (("wall_brick", 0.42), ("wall_stone", 0.24), ("wall_classic", 0.16), ("wall_arched", 0.12),
+                ("wall_loft", 0.06)),
+        "small": (("wall_brick", 0.7), ("wall_classic", 0.2), ("wall_stone", 0.1)),
+        "cottage": (("wall_brick", 0.85), ("wall_plain", 0.15)),
+        "middle": (("wall_brick", 0.5), ("wall_ribbon", 0.2), ("wall_slab", 0.15), ("wall_stone", 0.15)),
+        "new": (("wall_grid", 0.4), ("wall_glass", 0.2), ("wall_balconies", 0.2), ("wall_fins", 0.2)),
+    },
+    "german": {
+        "old": (("wall_classic", 0.5), ("wall_arched", 0.24), ("wall_shuttered", 0.14), ("wall_brick", 0.06),
+                ("wall_stone", 0.06)),
+        "small": (("wall_shuttered", 0.4), ("wall_classic", 0.28), ("wall_timbered", 0.14), ("wall_plain", 0.1),
+                  ("wall_arched", 0.08)),
+        "cottage": (("wall_shuttered", 0.4), ("wall_plain", 0.35), ("wall_timbered", 0.25)),
+        "middle": (("wall_plain", 0.75), ("wall_slab", 0.25)),
+        "new": (("wall_balconies", 0.5), ("wall_grid", 0.3), ("wall_plain", 0.2)),
+    },
+    "southern": {
+        "old": (("wall_shuttered", 0.4), ("wall_french", 0.36), ("wall_classic", 0.14), ("wall_arched", 0.1)),
+        "small": (("wall_shuttered", 0.8), ("wall_french", 0.2)),
+        "cottage": (("wall_shuttered", 0.75), ("wall_plain", 0.25)),
+        "middle": (("wall_balconies", 0.55), ("wall_shuttered", 0.25), ("wall_plain", 0.2)),
+        "new": (("wall_balconies", 0.8), ("wall_fins", 0.1), ("wall_grid", 0.1)),
+    },
+    "american": {
+        "old": (("wall_tenement", 0.6), ("wall_brick", 0.24), ("wall_loft", 0.12), ("wall_stone", 0.04)),
+        "small": (("wall_tenement", 0.55), ("wall_brick", 0.35), ("wall_boards", 0.1)),
+        "cottage": (("wall_boards", 0.75), ("wall_brick", 0.25)),
+        "middle": (("wall_brick", 0.75), ("wall_slab", 0.1), ("wall_plain", 0.15)),
+        "new": (("wall_grid", 0.3), ("wall_fins", 0.25), ("wall_balconies", 0.2), ("wall_brick", 0.25)),
+    },
+}  # fmt: skip
 
 
 def colour_of(tag: str | None) -> Rgb | None:
@@ -108,95 +316,143 @@ def colour_of(tag: str | None) -> Rgb | None:
 def look_of(
     use: str, tags: Mapping[str, str], *, levels: int, area: float, region: str, random: np.random.Generator
 ) -> Look:
-    """Dress a building: by its material and colour tags, else by use and region, else by its own draw.
+    """Dress a building: by its material, architecture and colour tags, else by use, age, size and region, and a draw.
 
-    `region` is one of northern, southern (the Mediterranean) and american.
+    `region` is what `region_of` says; an unknown one counts as northern.
     """
-    draw = random.random(6)
-
-    def pick(options: Sequence[str], shares: Sequence[float], value: float) -> str:
-        edges = np.cumsum(shares) / np.sum(shares)
-        return options[int(np.searchsorted(edges, min(value, 0.999999), side="right"))]
-
-    said = tags.get("building:material", tags.get("building:facade:material", "")).lower()
-    homes = ("wall_classic", "wall_plain", "wall_brick", "wall_stone", "wall_balconies")
-    if said in ("brick", "bricks"):
-        wall = "wall_brick"
-    elif said in ("stone", "granite", "limestone", "sandstone", "marble"):
-        wall = "wall_stone"
-    elif said in ("glass", "mirror"):
-        wall = "wall_glass"
-    elif said in ("plaster", "stucco", "render"):
-        wall = "wall_classic" if draw[0] < 0.6 else "wall_plain"
-    elif said in ("concrete", "cement_block"):
-        wall = "wall_ribbon"
-    elif said in ("metal", "steel", "tin"):
-        wall = "wall_panels"
-    elif use in ("industrial", "garage") or (use == "transport" and area > 1500):
-        wall = "wall_panels" if draw[0] < 0.6 else "wall_brick"
-    elif use in ("civic", "religious", "education", "health"):
-        shares = (0.7, 0.0, 0.3) if use == "religious" else (0.5, 0.3, 0.2)
-        wall = pick(("wall_stone", "wall_classic", "wall_brick"), shares, draw[0])
-    elif use == "office":
-        wall = pick(("wall_ribbon", "wall_glass", "wall_stone", "wall_classic"), (0.35, 0.3, 0.2, 0.15), draw[0])
-    elif use in ("commercial", "retail", "transport"):
-        wall = pick(
-            ("wall_classic", "wall_stone", "wall_ribbon", "wall_glass", "wall_brick"),
-            (0.3, 0.25, 0.2, 0.1, 0.15),
-            draw[0],
-        )
-    elif levels >= 8:
-        wall = pick(
-            ("wall_balconies", "wall_plain", "wall_brick"), (0.5, 0.3, 0.0 if region == "southern" else 0.2), draw[0]
-        )
-    elif region == "american":
-        wall = pick(homes, (0.08, 0.1, 0.7, 0.07, 0.05), draw[0])
-    elif region == "southern":
-        wall = pick(homes, (0.58, 0.24, 0.0, 0.06, 0.12), draw[0])
-    else:
-        wall = pick(homes, (0.5, 0.22, 0.1, 0.1, 0.08), draw[0])
-    palette = {"wall_brick": _BRICK, "wall_stone": _STONE, "wall_ribbon": _STONE, "wall_panels": _PANEL}.get(
-        wall, _PLASTER
-    )
-    tint: Rgb = (255, 255, 255) if wall == "wall_glass" else palette[int(draw[1] * len(palette))]
+    draw = random.random(8)
+    wall = family_of(use, tags, levels=levels, area=area, region=region, draw=(float(draw[0]), float(draw[5])))
+    palette = _PALETTES.get(wall, _PLASTER)
+    tint: Rgb = palette[int(draw[1] * len(palette))]
     given = colour_of(tags.get("building:colour", tags.get("building:color")))
-    if given is not None and wall != "wall_glass":
+    if given is not None and wall not in ("wall_glass", "wall_fins"):
         # The pictures are paler than white plaster; brick is red of its own, so only a brick's shade is taken over.
-        strength = 0.5 if wall == "wall_brick" else 1.0
+        strength = 0.5 if wall in _OWN_COLOUR else 1.0
         tint = _mixed((255, 255, 255), _lifted(given), strength)
-    ground = {
-        "wall_classic": "ground_rusticated" if draw[2] < 0.8 else "ground_arcade",
-        "wall_plain": "ground_rusticated",
-        "wall_brick": "ground_brick",
-        "wall_stone": "ground_arcade" if draw[2] < 0.6 else "ground_rusticated",
-        "wall_ribbon": "ground_lobby",
-        "wall_glass": "ground_lobby",
-        "wall_balconies": "ground_rusticated" if draw[2] < 0.6 else "ground_lobby",
-        "wall_panels": "ground_gates",
-    }[wall]
-    if use == "religious":
-        ground = "ground_arcade"
-    if use in ("garage", "industrial"):
+    options = _GROUNDS[wall]
+    ground = options[int(draw[2] * len(options))]
+    if use in ("garage", "industrial") and wall != "wall_shed":
         ground = "ground_gates"
-    blank = {"wall_brick": "blank_brick", "wall_stone": "blank_stone", "wall_glass": "blank_stone"}.get(
-        wall, "blank_plaster"
-    )
+    elif use in ("office", "hotel", "commercial") and levels >= 7 and draw[6] < 0.7:
+        ground = "ground_lobby"
     roof = _roof_material(tags, region, float(draw[3]))
     shades = _ROOF[roof]
     roof_tint = colour_of(tags.get("roof:colour", tags.get("roof:color"))) or shades[int(draw[4] * len(shades))]
-    stony = ground in ("ground_arcade", "ground_lobby", "ground_brick")
-    ground_tint = tint if not stony or ground == "ground_brick" else _mixed((226, 222, 216), tint, 0.3)
-    bay = {"wall_glass": 3.6, "wall_ribbon": 3.9, "wall_panels": 4.4, "wall_stone": 3.3, "wall_balconies": 3.6}.get(
-        wall, 3.0
+    stony = ground in ("ground_arcade", "ground_lobby", "ground_rusticated", "ground_loft") and draw[6] < 0.5
+    ground_tint: Rgb = _mixed((226, 222, 216), tint, 0.3) if stony else tint
+    if ground == "ground_brownstone":
+        ground_tint = (255, 255, 255)
+    elif wall in _OWN_COLOUR and ground not in ("ground_brick", "ground_shed"):
+        ground_tint = _STONE[int(draw[7] * len(_STONE))]
+    bay = _BAY.get(wall, 3.0) * (0.92 + 0.2 * float(draw[7]))
+    back, back_tint = wall, tint
+    if wall in _DRESSY and area > 120.0:
+        brick = wall in ("wall_brick", "wall_tenement", "wall_loft") or (region == "british" and draw[6] < 0.7)
+        back = "wall_back_brick" if brick else "wall_back"
+        back_tint = (255, 250, 240) if brick else _mixed((238, 234, 226), tint, 0.5)
+    blank = _BLANKS.get(wall, "blank_brick" if back == "wall_back_brick" else "blank_plaster")
+    hall = wall == "wall_church"
+    return Look(wall, ground, blank, roof, bay, tint, ground_tint, roof_tint, back, back_tint, hall)
+
+
+def family_of(
+    use: str,
+    tags: Mapping[str, str],
+    *,
+    levels: int,
+    area: float,
+    region: str,
+    draw: tuple[float, float] = (0.5, 0.5),
+) -> str:
+    """The family of facade a building belongs to, by name of its material.
+
+    What the map says of material and architecture comes first; then use and height; homes and houses of trade follow
+    the customs of their region, the old ones where the map or a small plot suggests age.
+    """
+    said = tags.get("building:material", tags.get("building:facade:material", "")).lower()
+    style = tags.get("building:architecture", "").lower()
+    small = area < 60.0 and levels <= 1
+    if said in _OF_MATERIAL:
+        return _picked(_OF_MATERIAL[said], draw[0])
+    if use == "religious" and tags.get("building") not in ("house", "residential", "apartments", "office", "yes"):
+        return "wall_church"
+    if style in _OF_STYLE and levels >= 2:
+        return _picked(_OF_STYLE[style], draw[0])
+    if tags.get("building") in ("shed", "hut", "barn", "cabin", "farm_auxiliary", "stable"):
+        return "wall_shed" if said not in ("brick", "stone") else "wall_brick"
+    if use == "garage" or small:
+        return _picked((("wall_plain", 0.5), ("wall_shed", 0.2), ("wall_brick", 0.15), ("wall_panels", 0.15)), draw[0])
+    year = year_of(tags.get("start_date"))
+    if use == "industrial" or (use == "transport" and area > 1500):
+        old = year is not None and year < 1945
+        return _picked((("wall_loft", 1.0),) if old else (("wall_panels", 0.6), ("wall_loft", 0.4)), draw[0])
+    if levels >= 14:
+        homes = use == "residential"
+        return _picked(
+            (("wall_balconies", 0.45), ("wall_slab", 0.25), ("wall_fins", 0.3))
+            if homes
+            else (("wall_glass", 0.45), ("wall_fins", 0.3), ("wall_ribbon", 0.15), ("wall_grid", 0.1)),
+            draw[0],
+        )
+    customs = _CUSTOMS.get(region, _CUSTOMS["northern"])
+    old_town = "heritage" in tags or "historic" in tags
+    if year is None and not old_town and area < 320.0 and levels <= 5 and use not in ("office", "industrial"):
+        old_town = draw[1] < 0.6
+    if old_town:
+        year = year if year is not None else 1880
+    if year is not None:
+        old = year < 1920
+        middle = 1920 <= year < 1975
+        table = customs["old"] if old else customs["middle"] if middle else customs["new"]
+        if old and levels <= 4 and area < 420.0 and use in ("residential", "other", "retail", "commercial", "hotel"):
+            table = customs["cottage"] if area < 140.0 and levels <= 3 else customs["small"]
+        return _picked(table, draw[0])
+    if use in ("civic", "education", "health", "religious"):
+        return _picked((("wall_stone", 0.3), ("wall_arched", 0.25), *customs["old"], *customs["middle"]), draw[0])
+    if use in ("office", "commercial", "retail", "transport", "hotel"):
+        modern = _picked(_MODERN, draw[0])
+        return modern if draw[1] < (0.7 if use == "office" else 0.4) else _picked(customs["old"], draw[0])
+    if levels >= 8:
+        table = (("wall_balconies", 0.35), ("wall_plain", 0.2), ("wall_slab", 0.2), ("wall_grid", 0.1))
+        return _picked((*table, *customs["middle"]), draw[0])
+    if levels <= 2 and area < 260.0:
+        return _picked(customs["cottage"], draw[0])
+    return _picked(
+        customs["old"] if draw[1] < 0.62 else customs["middle"] if draw[1] < 0.86 else customs["new"], draw[0]
     )
-    return Look(wall, ground, blank, roof, bay, tint, ground_tint, roof_tint)
+
+
+def year_of(text: str | None) -> int | None:
+    """The year a ``start_date`` means: ``1887``, ``~1900``, ``1960s``, ``C19``, ``before 1800``; None for others."""
+    if not text:
+        return None
+    century = re.search(r"\bC(\d{1,2})\b", text.strip())
+    if century:
+        return int(century.group(1)) * 100 - 50
+    year = re.search(r"(?<!\d)(1\d{3}|20\d{2})(?!\d{2})", text)
+    return int(year.group(1)) if year else None
+
+
+def _picked(table: Sequence[tuple[str, float]], draw: float) -> str:
+    """One of the names, by their shares."""
+    edges = np.cumsum([share for _, share in table])
+    return table[int(np.searchsorted(edges, min(draw, 0.999999) * edges[-1], side="right"))][0]
 
 
 def region_of(lat: float, lon: float) -> str:
-    """What building customs to expect: american, southern (around the Mediterranean) or northern."""
+    """What building customs to expect: american, southern (Mediterranean), british, german, nordic or northern.
+
+    Only customs of windows and stuffs hang on it; what the map says of a building always goes first.
+    """
     if lon < -30.0:
         return "american"
-    return "southern" if -25.0 < lat < 45.5 else "northern"
+    if -25.0 < lat < 45.5:
+        return "southern"
+    if lon < 2.0 and lat > 49.6:
+        return "british"
+    if lat > 54.8:
+        return "nordic"
+    return "german" if 5.8 < lon < 17.5 and lat > 45.5 else "northern"
 
 
 def _roof_material(tags: Mapping[str, str], region: str, draw: float) -> str:
@@ -315,63 +571,3 @@ def storey_coordinates(
 ) -> NDArray[np.float64]:
     """Vertical texture coordinate of upper floors between two heights, in sheets of `STOREYS` storeys."""
     return (z - low) / (high - low) * count / STOREYS
-
-
-_DOOR_COLOURS: tuple[Rgb, ...] = (
-    (122, 78, 52),
-    (92, 62, 46),
-    (62, 84, 72),
-    (58, 70, 92),
-    (128, 56, 48),
-    (150, 118, 82),
-)
-_GLAZED = {"retail", "commercial", "office", "hotel", "civic", "transport", "health"}
-
-
-def door_surfaces(entrances: Sequence[Entrance], buildings: Sequence[Building]) -> list[Surface]:
-    """Doors at entrances: a double door in a stone surround, standing a hand's breadth out of the wall.
-
-    Parameters
-    ----------
-    entrances
-        Where doors are; their position is the middle of the threshold.
-    buildings
-        The buildings they belong to: their use decides between glass and wood.
-
-    Returns
-    -------
-    list of Surface
-        For the "buildings" layer, entity that of the building.
-    """
-    known = {building.id: building for building in buildings}
-    wood, glazed, stone = material("door_wood"), material("door_glass"), material("blank_stone")
-    made: list[Surface] = []
-    for entrance in entrances:
-        building = known[entrance.building]
-        shop = building.use in _GLAZED
-        colour = _DOOR_COLOURS[zlib.crc32(entrance.id.encode()) % len(_DOOR_COLOURS)]
-        place = pose_matrix(*entrance.position, entrance.facing)
-        width, height = (1.9, 2.6) if shop else (1.6, 2.5)
-        posts = [
-            box((0.14, 0.3, height + 0.35), (0.05, side * (width / 2 + 0.15), (height + 0.05) / 2), material=stone)
-            for side in (-1, 1)
-        ]
-        lintel = box((0.16, width + 0.6, 0.32), (0.05, 0.0, height + 0.16), material=stone)
-        step = box((0.35, width + 0.5, 0.24), (0.1, 0.0, -0.06), material=stone)
-        made += [s.tinted((214, 210, 204)).moved(place).of_entity(building.entity) for s in (*posts, lintel, step)]
-        leaf = Surface.from_triangles(
-            np.array(
-                [
-                    (0.05, -width / 2, 0.06),
-                    (0.05, width / 2, 0.06),
-                    (0.05, width / 2, height),
-                    (0.05, -width / 2, height),
-                ]
-            ),
-            np.array([(0, 1, 2), (0, 2, 3)]),
-            colour=(255, 255, 255) if shop else colour,
-            uv=np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]),
-            material=glazed if shop else wood,
-        )
-        made.append(leaf.moved(place).of_entity(building.entity))
-    return joined(made)

@@ -23,7 +23,7 @@ from vico.world.model import Manifest, Origin, Source, Transit
 from vico.world.objects import Objects, write_objects
 from vico.world.walkable import WalkableMap, write_walkable
 from vico.worldgen.buildings import BuildingsResult, buildings_from_osm
-from vico.worldgen.facades import door_surfaces
+from vico.worldgen.facade_fronts import street_fronts
 from vico.worldgen.ground import ground_from_osm, mapped_areas
 from vico.worldgen.indoor import Indoors, furnish
 from vico.worldgen.netconvert import road_network
@@ -150,7 +150,9 @@ def make_world(
 
     ground = stages.run("ground", ground_from_osm, data, height, half, streets)
     stages.report("ground", {"faces": _faces(ground)})
-    doors = door_surfaces(entrances, buildings)
+    fronts = street_fronts(indoors.places, entrances, buildings, built.walls, seed=seed)
+    doors = fronts.surfaces
+    stages.report("fronts", fronts.counts)
     with stages.timed("write"):
         layers, models = _write_meshes(folder, built, doors, ground, indoors, objects)
     stages.report("write", {name: _faces(surfaces) for name, surfaces in layers.items()})
