@@ -1,4 +1,4 @@
-"""Make a 3D tileset of a built world, as aerial photogrammetry would: bumpy, melted, with cars, holes and shadows in it.
+"""Make a 3D tileset of a built world, as aerial photogrammetry would: bumpy, melted, with cars, holes and shadows.
 
     python scripts/photogrammetry.py out/monaco out/monaco_tiles --half 200 --picture out/monaco_tiles.png
 

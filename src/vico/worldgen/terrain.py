@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,11 @@ from scipy.spatial import cKDTree
 
 from vico.errors import EmptyInputError
 from vico.geo.elevation import HeightSamples
+from vico.geo.osm import OsmData
+from vico.geo.tile_mesh import TileMesh
 from vico.world.heights import HeightField
+from vico.worldgen.sight import Sight
+from vico.worldgen.tile_ground import ground_samples, on_ground
 
 APRON = 60.0
 """Metres the height field goes on beyond the world's square, so that what crosses the edge stands on something."""
@@ -19,6 +24,7 @@ APRON = 60.0
 _CELL = 4.0
 _NEIGHBOURS = 25
 _MOST_SAMPLES = 40_000
+_TILE_BIN, _TILE_KNOT = 5.0, 8.0
 
 
 def is_outlier(points: NDArray[np.float64], neighbours: int = _NEIGHBOURS) -> NDArray[np.bool_]:
@@ -119,3 +125,98 @@ def terrain_from_dem(samples: HeightSamples, *, half: float, apron: float = APRO
 def flat_terrain(*, half: float, apron: float = APRON) -> HeightField:
     """A level field at height 0."""
     return HeightField.flat(half + apron)
+
+
+@dataclass(frozen=True)
+class TileTerrain:
+    """How the ground was found in a photogrammetry mesh.
+
+    Attributes
+    ----------
+    samples
+        Places on streets and open ground where the mesh has a height.
+    outliers
+        Those of them that lie on cars, trees, roofs or noise.
+    missed
+        Places where the mesh has a hole.
+    residual
+        Root mean square of the kept samples' distance to the height field, metres.
+    """
+
+    samples: int
+    outliers: int
+    missed: int
+    residual: float
+
+
+def terrain_from_tiles(
+    mesh: TileMesh, osm: OsmData, *, half: float, apron: float = APRON, sight: Sight | None = None
+) -> tuple[HeightField, TileTerrain]:
+    """Fit a regular height field to the ground of a photogrammetry mesh.
+
+    Parameters
+    ----------
+    mesh
+        The city, buildings, trees, cars and all.
+    osm
+        Its map: the streets to sample along, the buildings to keep off.
+    half
+        Half side of the world's square, metres.
+    apron
+        How far the field goes beyond it, metres.
+    sight
+        Rays against `mesh`, if somebody has made them ready.
+
+    Returns
+    -------
+    tuple
+        The field, cells of at most 4 m; and how it was found.
+
+    Raises
+    ------
+    EmptyInputError
+        If the mesh has hardly any ground.
+    MissingExtraError
+        If embreex is not installed.
+
+    Notes
+    -----
+    Paper, appendix A.1; spec section 1, terrain: rays along streets and ground, robust filter, medians of 5 m bins, a
+    smoothing thin-plate fit over them (which goes on under buildings), bilinear look-up.
+    """
+    if not len(mesh.triangles):
+        raise EmptyInputError("terrain: the tile mesh has no triangles; give a tileset of this place, or a DEM")
+    reach = half + apron
+    rays = sight or Sight(mesh.positions, mesh.triangles)
+    found = ground_samples(rays, osm, reach=reach, top=float(mesh.positions[:, 2].max()) + 10.0)
+    ground = found.points[on_ground(found.points)] if len(found.points) else found.points
+    if len(ground) < 12:
+        raise EmptyInputError(
+            f"terrain: only {len(ground)} of {len(found.points)} rays at the tile mesh meet ground; give a tileset "
+            "with the ground in it, or an elevation file"
+        )
+    cell = np.floor(ground[:, :2] / _TILE_BIN).astype(np.int64)
+    _, owner, many = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(owner.ravel(), kind="stable")
+    bins = np.array([np.median(part, axis=0) for part in np.split(ground[order], np.cumsum(many)[:-1])])
+    knots = np.linspace(-reach, reach, max(math.ceil(2 * reach / _TILE_KNOT), 4) + 1)
+    x, y = np.meshgrid(knots, knots)
+    fit = RBFInterpolator(
+        bins[:, :2] / _TILE_BIN,
+        bins[:, 2],
+        neighbors=min(32, len(bins)),
+        kernel="thin_plate_spline",
+        smoothing=0.4,
+        degree=1,
+    )
+    rough = fit(np.stack([x.ravel(), y.ravel()], axis=1) / _TILE_BIN).reshape(x.shape)
+    # Far from any sample a plane through the last ones runs away.
+    rough = np.clip(rough, bins[:, 2].min(), bins[:, 2].max())
+    fine = np.linspace(-reach, reach, math.ceil(2 * reach / _CELL) + 1)
+    heights = RectBivariateSpline(knots, knots, rough, kx=3, ky=3)(fine, fine)
+    field = HeightField(np.clip(heights, rough.min(), rough.max()).astype(np.float32), reach)
+    off = field(ground[:, :2]) - ground[:, 2]
+    report = TileTerrain(
+        len(found.points), len(found.points) - len(ground), found.missed, float(np.sqrt((off**2).mean()))
+    )
+    return field, report
