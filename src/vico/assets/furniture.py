@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from functools import cache
 
+from vico.assets.furniture_home import home_models
+from vico.assets.furniture_public import public_models
+from vico.assets.furniture_shops import shop_models
+from vico.assets.furniture_small import small_models
 from vico.assets.model import Model, Top, model
 from vico.assets.shapes import Colour, ball, box, cylinder, lathe
 from vico.world.mesh import Surface
@@ -335,6 +339,6 @@ def furniture_models() -> dict[str, Model]:
         _round_table(), _chair("chair", _OAK, _OAK), _chair("restaurant_chair", _WALNUT, _RED), _stool(),
         _office_chair(), _desk(), _shelf(), _bookcase(), _counter(), _kitchen(), _fridge(), _stove(), _floor_lamp(),
         _wardrobe(), _television(), _pot_plant(), _filing_cabinet(), _clothes_rack(), _display_table(), _plinth(),
-        _pew(), _stage(), _washstand(), _treadmill(),
+        _pew(), _stage(), _washstand(), _treadmill(), *home_models(), *shop_models(), *public_models(), *small_models(),
     ]  # fmt: skip
     return {m.name: m for m in models}

@@ -288,6 +288,9 @@ def _check_enter(values: Mapping[str, Any], i: int, stage: Stage) -> str | None:
         if door is None:
             return f"enter: no door leads from here to {name}"
         if not near_door(p.position[i], door, INNER_DOOR_REACH):
+            up = door.position[2] - float(p.position[i, 2])
+            if abs(up) > 0.5:
+                return f"enter: the door to {name} is {abs(up):.1f} m further {'up' if up > 0 else 'down'}; take the stairs"
             return f"enter: the door to {name} is farther than {INNER_DOOR_REACH:g} m away"
     else:
         place = stage.place(name)
@@ -299,7 +302,8 @@ def _check_enter(values: Mapping[str, Any], i: int, stage: Stage) -> str | None:
         if away > DOOR_REACH:
             return f"enter: the entrance of {place.name} is {away:.1f} m away; {DOOR_REACH:g} m or less is needed"
         room = stage.indoor.index[place.rooms[0]]
-    if stage.indoor.free_spot(room, stage.indoor.rooms[room].inside, stage.people_in(room)) is None:
+    anchor = stage.indoor.arrival(room, int(p.room[i]) if p.room[i] >= 0 else -1)
+    if stage.indoor.free_spot(room, anchor, stage.people_in(room)) is None:
         return "enter: it is full"
     return None
 

@@ -120,7 +120,7 @@ class Avatars:
         outdoors = who[p.room[who] < 0]
         p.position[outdoors, 2] = self._height(p.position[outdoors, :2])
         indoors = who[p.room[who] >= 0]
-        p.position[indoors, 2] = self._indoor.floor[p.room[indoors]]
+        p.position[indoors, 2] = self._indoor.floors_at(p.room[indoors], p.position[indoors])
 
     def _animate(self, dt: float) -> None:
         p = self.people

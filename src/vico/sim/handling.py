@@ -120,7 +120,7 @@ def _ahead(i: int, size: NDArray[np.float64], stage: Stage) -> Spot | str:
             if stage.world.walkable.class_at((x, y)) > 0:
                 return Spot(np.array([x, y, float(stage.world.height((x, y)))]))
         elif stage.indoor.gap(int(p.room[i]), (x, y)) >= min(size[0], size[1]) / 2:
-            return Spot(np.array([x, y, stage.indoor.floor[p.room[i]]]))
+            return Spot(np.array([x, y, stage.indoor.floor_at(int(p.room[i]), (x, y))]))
     return "put: no free ground ahead; turn, or name a target"
 
 
@@ -132,7 +132,7 @@ def _at_point(point: tuple[float, ...], i: int, stage: Stage) -> Spot | str:
         return f"put: the point is {away:.1f} m away; reach is {REACH} m"
     room = int(p.room[i])
     if room >= 0:
-        if not stage.indoor.holds(room, (x, y, float(stage.indoor.floor[room]))):
+        if not stage.indoor.holds(room, (x, y, stage.indoor.floor_at(room, (x, y)))):
             return "put: the point is outside this room"
         height = stage.indoor.support(room, (x, y))
     else:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,14 +17,19 @@ from vico.world.objects import Objects
 
 DOOR_REACH = 2.0
 INNER_DOOR_REACH = 1.0
+_LEVEL = 0.5  # metres a door may lie above or below who goes through it
 
 
 @dataclass(frozen=True)
 class Door:
-    """A way out of a room: to the room with index `to`, or outdoors where `to` is -1."""
+    """A way out of a room: to the room with index `to`, or outdoors where `to` is -1.
+
+    `inside` is the free spot of this room where people stand who come in by it; None in worlds that don't say.
+    """
 
     to: int
     position: tuple[float, float, float]
+    inside: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -81,6 +87,35 @@ class Indoor:
             np.array([number.get(r.place, -1) for r in rooms], np.int32),
         )
 
+    def floor_at(self, room: int, xy: ArrayLike) -> float:
+        """Height of a room's floor at a point, metres: on stairs it depends on where one stands."""
+        if room not in self.stairs:
+            return float(self.floor[room])
+        x, y = np.asarray(xy, np.float64)[:2]
+        return self.rooms[room].floor_at(float(x), float(y))
+
+    def floors_at(self, rooms: NDArray[np.int32], xy: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Heights of the floors under several people, metres, shape ``(n,)``."""
+        heights: NDArray[np.float64] = self.floor[rooms]
+        for k in np.flatnonzero(np.isin(rooms, self._stairs_index)):
+            heights[k] = self.floor_at(int(rooms[k]), xy[k])
+        return heights
+
+    @cached_property
+    def stairs(self) -> frozenset[int]:
+        """Rooms whose floor climbs."""
+        return frozenset(i for i, room in enumerate(self.rooms) if room.rise)
+
+    @cached_property
+    def _stairs_index(self) -> NDArray[np.int32]:
+        return np.array(sorted(self.stairs), np.int32)
+
+    def arrival(self, room: int, origin: int) -> NDArray[np.float64]:
+        """Where people stand who come into a room from another one (-1: from outdoors), ENU metres."""
+        record = self.rooms[room]
+        door = next((d for d in self.doors[room] if d.to == origin), None)
+        return np.asarray(record.inside if door is None or door.inside is None else door.inside, np.float64)
+
     def gap(self, room: int, xy: NDArray[np.float64] | tuple[float, float]) -> float:
         """Free room around a point of a room, metres: to the nearest wall or piece of furniture; negative in one."""
         x, y = float(xy[0]), float(xy[1])
@@ -110,25 +145,29 @@ class Indoor:
         spots = np.column_stack([x + c * grid[:, 0] - s * grid[:, 1], y + s * grid[:, 0] + c * grid[:, 1]])
         spots = np.vstack([np.asarray(near, np.float64).reshape(1, -1)[:, :2], spots])
         order = np.argsort(np.hypot(*(spots - spots[0]).T), kind="stable")
+        level = self.floor_at(room, spots[0])
         for k in order:
             spot = spots[k]
+            # On stairs the other flight may be near, and yet a floor away.
+            if room in self.stairs and abs(self.floor_at(room, spot) - level) > 0.6:
+                continue
             # A little more than touching, so that nobody starts in a contact.
             if len(taken) and np.hypot(*(taken[:, :2] - spot).T).min() < 2 * RADIUS + 0.05:
                 continue
             if self.gap(room, spot) >= RADIUS + (0.0 if k == 0 else 0.02):
-                return np.array([spot[0], spot[1], self.floor[room]])
+                return np.array([spot[0], spot[1], self.floor_at(room, spot)])
         return None
 
     def holds(self, room: int, point: Sequence[float]) -> bool:
         """Whether a point lies in the room's box."""
         box = self.boxes[room]
-        z = float(point[2]) - self.floor[room]
+        z = float(point[2]) - self.floor_at(room, point[:2])
         height = self.rooms[room].size[2]
         return float(room_gap(float(point[0]), float(point[1]), box)) >= 0.0 and -0.1 <= z <= height
 
     def support(self, room: int, xy: Sequence[float]) -> float:
         """Height of what a thing put down at a point of a room comes to lie on: the highest surface there."""
-        best = float(self.floor[room])
+        best = self.floor_at(room, xy)
         for container in self.rooms[room].containers:
             x, y, z = container.centre
             inside = box_gap(
@@ -140,23 +179,33 @@ class Indoor:
 
 
 def _doors(rooms: Sequence[Room], places: Sequence[Place], index: dict[str, int]) -> list[list[Door]]:
-    """Ways out: a place's first room leads outdoors by its own door; a further room's door leads to those it links."""
+    """Ways out, as the rooms list them.
+
+    Where a room lists none, a place's first room leads outdoors by its own door, and a further room's door leads to
+    those it links.
+    """
     doors: list[list[Door]] = [[] for _ in rooms]
+    listed = {i for i, room in enumerate(rooms) if room.doors}
+    for i in sorted(listed):
+        for way in rooms[i].doors:
+            to = index.get(way.to, -2) if way.to else -1
+            if to >= -1:
+                doors[i].append(Door(to, way.position, way.inside))
     rank = {}
     for place in places:
         for k, room_id in enumerate(place.rooms):
             rank[room_id] = k
-            if k == 0 and room_id in index:
+            if k == 0 and room_id in index and index[room_id] not in listed:
                 doors[index[room_id]].append(Door(-1, rooms[index[room_id]].door))
     for i, room in enumerate(rooms):
         for other_id in room.links:
             j = index.get(other_id)
-            if j is None or any(d.to == j for d in doors[i]):
+            if j is None or i in listed or any(d.to == j for d in doors[i]):
                 continue
             # The doorway between two rooms is the door of the one further in.
             inner = i if rank.get(room.id, 0) > rank.get(other_id, 0) else j
             doors[i].append(Door(j, rooms[inner].door))
-            if not any(d.to == i for d in doors[j]):
+            if j not in listed and not any(d.to == i for d in doors[j]):
                 doors[j].append(Door(i, rooms[inner].door))
     return doors
 
@@ -167,5 +216,7 @@ def entrance_of(place: Place, entrances: dict[str, Entrance]) -> Entrance | None
 
 
 def near_door(position: NDArray[Any], door: Door, reach: float) -> bool:
-    """Whether someone stands within `reach` metres of a door, measured on the floor."""
+    """Whether someone stands within `reach` metres of a door, measured on the floor, and on the door's level."""
+    if abs(float(position[2]) - door.position[2]) > _LEVEL:
+        return False
     return float(np.hypot(position[0] - door.position[0], position[1] - door.position[1])) <= reach

@@ -65,7 +65,7 @@ def enter(values: Mapping[str, Any], i: int, stage: Stage) -> None:
     else:
         room = indoor.index[values["place"]]
         name = indoor.rooms[room].kind
-    place_in_room(i, room, stage)
+    place_in_room(i, room, stage, near=indoor.arrival(room, -1 if outdoors else int(p.room[i])))
     if outdoors:
         stage.events.add("enter", p.names[i], f"enters {name}", p.position[i], place=values["place"])
 
@@ -81,9 +81,16 @@ def place_in_room(i: int, room: int, stage: Stage, *, near: NDArray[Any] | None 
     p.room[i] = room
     p.place[i] = indoor.place[room]
     # From the door into the room: that is where people look when they come in.
-    p.yaw[i] = math.atan2(record.centre[1] - record.door[1], record.centre[0] - record.door[0])
+    door = next((d.position for d in indoor.doors[room] if d.inside is not None and _same(d.inside, anchor)), None)
+    ahead = record.centre if door is None else (float(anchor[0]), float(anchor[1]))
+    behind = record.door if door is None else door
+    p.yaw[i] = math.atan2(ahead[1] - behind[1], ahead[0] - behind[0])
     p.pitch[i] = LEVEL_GAZE
     follow_hands(stage)
+
+
+def _same(point: tuple[float, float, float], other: NDArray[np.float64]) -> bool:
+    return math.hypot(point[0] - float(other[0]), point[1] - float(other[1])) < 1e-6
 
 
 def spot_outside(i: int, stage: Stage) -> NDArray[np.float64] | None:

@@ -15,6 +15,8 @@ from vico.sim.stage import Stage
 from vico.sim.timetable import Appointment, whereabouts
 from vico.world.routing import Router
 
+_PASSAGES = ("hall", "corridor", "stairs", "lift", "storage", "bathroom", "washroom", "shower_room")
+
 
 def place_residents(stage: Stage, days: Sequence[Sequence[Appointment]], second: int) -> None:
     """Put each resident where the day says: in a place, or on the way to one.
@@ -49,7 +51,9 @@ def place_residents(stage: Stage, days: Sequence[Sequence[Appointment]], second:
 def place_at(i: int, index: int, stage: Stage) -> None:
     """Put someone into a place: its first room with space, or the ground in front of it."""
     place = stage.world.places[index]
-    for room_id in place.rooms:
+    # Where people stay comes before where they pass; within each, rooms near the street come first.
+    order = sorted(place.rooms, key=lambda name: stage.indoor.rooms[stage.indoor.index[name]].kind in _PASSAGES)
+    for room_id in order:
         room = stage.indoor.index[room_id]
         inside = stage.indoor.rooms[room].inside
         if stage.indoor.free_spot(room, inside, stage.people_in(room, without=i)) is not None:

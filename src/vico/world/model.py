@@ -7,6 +7,7 @@ same input, and the value that segmentation images hold.
 
 from __future__ import annotations
 
+import math
 from enum import StrEnum
 from typing import Annotated
 
@@ -212,6 +213,28 @@ class Container(Record):
     reach: Point2
 
 
+#: Level stretch at either end of the flights of a stairs room, metres along its own x.
+LANDING = 1.1
+
+
+class Doorway(Record):
+    """A way out of a room, as seen from that room.
+
+    Attributes
+    ----------
+    to
+        Id of the room it leads to; empty for the way outdoors.
+    position
+        Middle of the doorway on this room's wall, at floor level; in a lift, the floor before the panel.
+    inside
+        A free spot of this room a step in from it: where people stand who come in this way.
+    """
+
+    to: str
+    position: Point3
+    inside: Point3
+
+
 class Room(Record):
     """A room: an oriented box in the same frame, below ground at its building, unseen from outside.
 
@@ -224,7 +247,12 @@ class Room(Record):
     door
         Middle of the doorway at floor level, on the wall; `inside` is the free spot a step in from it.
     links
-        Ids of the rooms this one opens to.
+        Ids of the rooms this one opens to. Cars of a lift (kind ``lift``), one a floor, link each other.
+    rise
+        Metres its floor climbs (kind ``stairs``), else 0: half of it where the room's own y is negative, going along
+        own x; the other half on the way back. At either end `LANDING` metres are level. A wall parts the flights.
+    doors
+        Every way out with where it is, the one nearest to the street first; may be empty in worlds made by hand.
     """
 
     id: str
@@ -239,6 +267,20 @@ class Room(Record):
     inside: Point3
     links: list[str] = []
     containers: list[Container] = []
+    rise: float = 0.0
+    doors: list[Doorway] = []
+
+    def floor_at(self, x: float, y: float) -> float:
+        """Height of the floor at a point of the room, ENU metres."""
+        if not self.rise:
+            return self.centre[2]
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        dx, dy = x - self.centre[0], y - self.centre[1]
+        along, across = c * dx + s * dy, c * dy - s * dx
+        run = self.size[0] - 2 * LANDING
+        share = min(1.0, max(0.0, (along + self.size[0] / 2 - LANDING) / run))
+        climbed = share / 2 if across < 0 else 1.0 - share / 2
+        return self.centre[2] + self.rise * climbed
 
 
 class Stop(Record):

@@ -5,87 +5,63 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
-from vico.assets.furniture import furniture_models
-from vico.assets.interior import WALL_HEIGHT
-from vico.assets.shapes import pose_matrix
+from vico.assets.furniture_public import RISE
 from vico.world.heights import HeightField
-from vico.world.mesh import Surface, joined
-from vico.world.model import FIRST_FURNITURE, FIRST_ROOM, Building, Container, Place, Room
-from vico.world.objects import Objects
+from vico.world.model import Building, Category, Entrance, Place
 from vico.world.seeds import rng
-from vico.worldgen.layouts import VARIANTS, Plan, RoomPlan, plan_of, use_of
+from vico.worldgen.floorplans import FLATS, USES, area_of
+from vico.worldgen.indoor_rooms import Indoors, Slot, assembled
+from vico.worldgen.indoor_uses import use_of
+from vico.worldgen.layout_library import LayoutAuthor, Library, authored, read_library
+from vico.worldgen.layouts import VARIANTS, Plan, plan_of
 
-_DEPTH = 6.0  # metres from the ground down to the first floor of rooms
-_STOREY = 3.4
+__all__ = ["Indoors", "furnish"]
+
+_COVER = 3.3  # metres of ground over the highest ceiling
 _GAP = 0.4
-_DEEPEST = 400
-
-
-@dataclass(frozen=True)
-class Indoors:
-    """What the stage made.
-
-    Attributes
-    ----------
-    places
-        The places, with the ids of their rooms.
-    rooms
-        Rooms, in the order of their places.
-    furniture
-        Objects in them.
-    surfaces
-        Walls, floors, ceilings, doors, with the rooms' entities.
-    """
-
-    places: list[Place]
-    rooms: list[Room]
-    furniture: Objects
-    surfaces: list[Surface]
-
-
-@dataclass(frozen=True)
-class _Slot:
-    """Where a plan is put: its middle, yaw, floor height, and extent."""
-
-    x: float
-    y: float
-    z: float
-    yaw: float
-    size: tuple[float, float]
-
-    @property
-    def shape(self) -> shapely.Polygon:
-        c, s = math.cos(self.yaw), math.sin(self.yaw)
-        a, b = self.size[0] / 2, self.size[1] / 2
-        return shapely.Polygon(
-            [(self.x + c * u - s * v, self.y + s * u + c * v) for u, v in ((-a, -b), (a, -b), (a, b), (-a, b))]
-        )
+_DEEPEST = 3000.0
+# Storeys of a house from which on a plan may have two floors, and three.
+_LEVELS_FOR = (3, 6)
+_KEPT_FREE = 0.9  # share of a place's part of the house that its plan may cover
+_BY_USE = {
+    "residential": ("apartments", Category.ACCOMMODATION),
+    "hotel": ("hotel", Category.ACCOMMODATION),
+    "office": ("company", Category.OFFICE),
+    "commercial": ("company", Category.OFFICE),
+    "retail": ("shop", Category.STORE),
+    "industrial": ("workshop", Category.OFFICE),
+    "religious": ("place_of_worship", Category.ENTERTAINMENT),
+    "education": ("school", Category.OFFICE),
+    "health": ("clinic", Category.OFFICE),
+    "civic": ("townhall", Category.OFFICE),
+    "transport": ("station", Category.TRANSIT),
+    "garage": ("parking", Category.TRANSIT),
+}
 
 
 class _Ground:
     """The rooms there are, so that no two meet."""
 
     def __init__(self) -> None:
-        self._cells: dict[tuple[int, int], list[tuple[float, shapely.Polygon]]] = defaultdict(list)
+        self._cells: dict[tuple[int, int], list[tuple[float, float, shapely.Polygon]]] = defaultdict(list)
 
-    def take(self, slot: _Slot) -> bool:
+    def take(self, slot: Slot) -> bool:
         """Claim a slot if it is free."""
-        shape = slot.shape
-        room = shape.buffer(_GAP / 2, join_style="mitre")
+        room = slot.shape.buffer(_GAP / 2, join_style="mitre")
+        low, high = slot.z - _GAP / 2, slot.z + slot.height + _GAP / 2
         cells = list(self._around(room))
         for cell in cells:
-            for z, other in self._cells[cell]:
-                if abs(z - slot.z) < WALL_HEIGHT + _GAP and other.intersects(room):
+            for bottom, top, other in self._cells[cell]:
+                if low < top and bottom < high and other.intersects(room):
                     return False
         for cell in cells:
-            self._cells[cell].append((slot.z, room))
+            self._cells[cell].append((low, high, room))
         return True
 
     @staticmethod
@@ -96,7 +72,16 @@ class _Ground:
                 yield i, j
 
 
-def furnish(places: Sequence[Place], *, buildings: Sequence[Building], height: HeightField, seed: int = 0) -> Indoors:
+def furnish(
+    places: Sequence[Place],
+    *,
+    buildings: Sequence[Building],
+    height: HeightField,
+    seed: int = 0,
+    entrances: Sequence[Entrance] = (),
+    library: Path | None = None,
+    author: LayoutAuthor | None = None,
+) -> Indoors:
     """Give every place in a building its rooms.
 
     Parameters
@@ -104,69 +89,135 @@ def furnish(places: Sequence[Place], *, buildings: Sequence[Building], height: H
     places
         Places; those without a building keep none.
     buildings
-        The buildings they are in.
+        The buildings they are in; their area and levels decide how large and how high a plan is.
     height
         Ground heights: all rooms lie at least 3 m below.
     seed
-        Decides colours and handedness.
+        Decides plans, colours, handedness.
+    entrances
+        Doors; a building that has one but no place gets a place of its own, as its use suggests.
+    library
+        Folder of layouts (see `vico.worldgen.layout_library`): a place whose use they cover gets the nearest fit.
+    author
+        Somebody who draws layouts; asked for the places that the library does not cover.
 
     Returns
     -------
     Indoors
-        Rooms lie under their building's footprint where it has room for them, in storeys of 3.4 m; no two overlap.
+        Rooms lie under their building's footprint where it has room for them; no two overlap.
+
+    Raises
+    ------
+    MissingFileError, SchemaError, InputError
+        If the library can't be used.
     """
+    shelf = read_library(library) if library is not None else None
+    everyone = [*places, *_unnamed(places, buildings, entrances)]
     by_id = {b.id: b for b in buildings}
     wanted: dict[str, list[int]] = defaultdict(list)
-    for k, place in enumerate(places):
+    for k, place in enumerate(everyone):
         if place.building is not None:
             wanted[place.building].append(k)
     ground = _Ground()
-    slots: dict[int, tuple[_Slot, Plan]] = {}
+    slots: dict[int, tuple[Slot, Plan]] = {}
     for building in buildings:
         if building.id in wanted:
-            chosen = [(k, _plan(places[k], seed)) for k in wanted[building.id]]
+            count = len(wanted[building.id])
+            chosen = [(k, _plan(everyone[k], building, count, seed, shelf, author)) for k in wanted[building.id]]
             for k, slot, plan in _stacked(by_id[building.id], chosen, height, ground):
                 slots[k] = (slot, plan)
-    return _assembled(places, slots)
+    return assembled(everyone, slots)
 
 
-def _plan(place: Place, seed: int) -> Plan:
-    variant = int(rng(seed, "rooms", place.id).integers(VARIANTS))
-    return plan_of(use_of(place.category, place.kind), variant)
+def _unnamed(places: Sequence[Place], buildings: Sequence[Building], entrances: Sequence[Entrance]) -> Iterator[Place]:
+    """Places for buildings that can be entered but hold none."""
+    known = {place.building for place in places}
+    doors: dict[str, Entrance] = {}
+    for door in entrances:
+        doors.setdefault(door.building, door)
+    for building in buildings:
+        entrance = doors.get(building.id)
+        if entrance is not None and building.id not in known:
+            kind, category = _BY_USE.get(building.use, ("events_venue", Category.ENTERTAINMENT))
+            name = building.name or f"{building.use.capitalize()} building {building.id}"
+            x, y = entrance.approach
+            yield Place(id=f"{building.id}.hall", name=name, category=category, kind=kind, building=building.id,
+                        entrance=entrance.id, position=(x, y, entrance.position[2]))  # fmt: skip
+
+
+def _plan(
+    place: Place, building: Building, count: int, seed: int, shelf: Library | None, author: LayoutAuthor | None
+) -> Plan:
+    """The plan of a place: from the library, from the author, else by its use and its part of the house."""
+    chance = rng(seed, "rooms", place.id)
+    use = use_of(place.category, place.kind)
+    area = shapely.Polygon(building.footprint[0], building.footprint[1:]).area
+    share = _KEPT_FREE * area * max(1, building.levels) / count
+    if shelf is not None:
+        found = shelf.nearest(use, place.category, min(share, area), chance)
+        if found is not None:
+            return found.plan(seed)
+    if author is not None:
+        drawn = authored(author, place, use=use, area=min(share, area), seed=seed)
+        if drawn is not None:
+            return drawn.plan(seed)
+    variant = int(chance.integers(VARIANTS))
+    if use == "flat":
+        options = [name for name in FLATS if area_of(name, 0) * USES[name].storeys <= max(share, area_of(FLATS[0], 0))]
+        if building.levels < 2 and "maisonette" in options:
+            options.remove("maisonette")
+        weights = np.array(
+            [{"flat_small": 0.6, "flat_medium": 1.0, "flat_large": 1.0, "maisonette": 0.5}[o] for o in options]
+        )
+        return plan_of(options[int(chance.choice(len(options), p=weights / weights.sum()))], 0, 1, variant)
+    storeys = _storeys(use, building.levels, share)
+    size = max((k for k in range(len(USES[use].sizes)) if area_of(use, k) * storeys <= share), default=0)
+    return plan_of(use, size, storeys, variant)
+
+
+def _storeys(use: str, levels: int, share: float) -> int:
+    """Floors a plan gets: as many as use, house and the place's part of it allow, three only in high houses."""
+    most = 1 + sum(levels >= least for least in _LEVELS_FOR)
+    fits = max(1, int(share / area_of(use, 0)))
+    return max(1, min(USES[use].storeys, most, fits))
 
 
 def _stacked(
     building: Building, wanted: list[tuple[int, Plan]], height: HeightField, ground: _Ground
-) -> Iterator[tuple[int, _Slot, Plan]]:
-    """Slots for a building's plans: rows along its longer side, then the next storey down."""
+) -> Iterator[tuple[int, Slot, Plan]]:
+    """Slots for a building's plans: side by side in rows along its longer side, then the next storey down."""
     shape = shapely.Polygon(building.footprint[0], building.footprint[1:])
     centre, yaw, extent = _frame(shape)
-    wide = max(plan.size[0] for _, plan in wanted) + _GAP
-    deep = max(plan.size[1] for _, plan in wanted) + _GAP
-    columns, rows = max(1, int(extent[0] // wide)), max(1, int(extent[1] // deep))
     c, s = math.cos(yaw), math.sin(yaw)
-    spots = []
-    for i in range(columns):
-        for j in range(rows):
-            u, v = (i - (columns - 1) / 2) * wide, (j - (rows - 1) / 2) * deep
-            x, y = centre[0] + c * u - s * v, centre[1] + s * u + c * v
-            spots.append((not shape.contains(shapely.Point(x, y)), x, y))
-    inside = [spot for spot in spots if not spot[0]] or [min(spots)]
-    level, at = 0, 0
-    for k, plan in wanted:
-        while True:
-            _, x, y = inside[at]
-            slot = _Slot(x, y, 0.0, yaw, plan.size)
-            low = min(float(height(np.array(slot.shape.exterior.coords)[:4]).min()), building.base)
-            slot = _Slot(x, y, round(low - _DEPTH - _STOREY * level, 3), yaw, plan.size)
-            at += 1
-            if at == len(inside):
-                level, at = level + 1, 0
-            if level > _DEEPEST:
-                raise RuntimeError(f"indoor: no room under building {building.id} within {_DEEPEST} storeys")
-            if ground.take(slot):
-                break
-        yield k, slot, plan
+    down = 0.0
+    waiting = list(wanted)
+    while waiting:
+        rest: list[tuple[int, Plan]] = []
+        u, v, row, layer = 0.0, 0.0, 0.0, 0.0
+        for k, plan in waiting:
+            w, h = plan.size
+            if u > 0.0 and u + w > extent[0]:
+                u, v, row = 0.0, v + row + _GAP, 0.0
+            if v > 0.0 and v + h > extent[1]:
+                rest.append((k, plan))
+                continue
+            across = max(0.0, extent[1] - h) / 2 if v == 0.0 and h > extent[1] / 2 else v
+            a = (u + w / 2) - max(extent[0], w) / 2
+            b = (across + h / 2) - max(extent[1], h) / 2
+            x, y = round(centre[0] + c * a - s * b, 3), round(centre[1] + s * a + c * b, 3)
+            slot = Slot(x, y, 0.0, yaw, plan.size, plan.height)
+            low = min(float(height(slot.samples()).min()), building.base)
+            slot = replace(slot, z=round(low - _COVER - plan.height - down, 3))
+            u += w + _GAP
+            if not ground.take(slot):
+                rest.append((k, plan))
+                continue
+            row, layer = max(row, h), max(layer, plan.height)
+            yield k, slot, plan
+        down += max(layer, RISE) + _GAP
+        if down > _DEEPEST:
+            raise RuntimeError(f"indoor: no room under building {building.id} within {_DEEPEST:g} m")
+        waiting = rest
 
 
 def _frame(shape: shapely.Polygon) -> tuple[tuple[float, float], float, tuple[float, float]]:
@@ -178,103 +229,3 @@ def _frame(shape: shapely.Polygon) -> tuple[tuple[float, float], float, tuple[fl
     yaw = math.atan2(along[1], along[0]) % math.pi
     middle = corners.mean(axis=0)
     return (float(middle[0]), float(middle[1])), yaw, (max(a, b), min(a, b))
-
-
-def _assembled(places: Sequence[Place], slots: dict[int, tuple[_Slot, Plan]]) -> Indoors:
-    models = furniture_models()
-    rooms: list[Room] = []
-    rows: list[dict[str, Any]] = []
-    surfaces: list[Surface] = []
-    furnished: list[Place] = []
-    for k, place in enumerate(places):
-        if k not in slots:
-            furnished.append(place)
-            continue
-        slot, plan = slots[k]
-        ids = [f"{place.id}.room{i}" for i in range(len(plan.rooms))]
-        for i, plan_room in enumerate(plan.rooms):
-            entity = FIRST_ROOM + len(rooms)
-            matrix = pose_matrix(slot.x, slot.y, slot.z, slot.yaw) @ pose_matrix(plan_room.x, 0.0, 0.0)
-            first = FIRST_FURNITURE + len(rows)
-            for n, item in enumerate(plan_room.items):
-                model = models[item.prototype]
-                x, y, z = _moved(matrix, (item.x, item.y, 0.0))
-                rows.append(
-                    {
-                        "id": f"{ids[i]}.{n}",
-                        "entity": first + n,
-                        "kind": model.kind,
-                        "group": "indoor",
-                        "prototype": model.name,
-                        "x": x,
-                        "y": y,
-                        "z": z,
-                        "yaw": round(math.remainder(item.yaw + slot.yaw, 2 * math.pi), 4),
-                        "scale": 1.0,
-                        "size_x": model.size[0],
-                        "size_y": model.size[1],
-                        "size_z": model.size[2],
-                        "solid": True,
-                        "room": ids[i],
-                    }
-                )
-            rooms.append(_room(place, ids, i, plan_room, slot, matrix, entity, first))
-            surfaces += [surface.moved(matrix).of_entity(entity) for surface in _shell(plan_room)]
-        furnished.append(place.model_copy(update={"rooms": ids}))
-    return Indoors(furnished, rooms, Objects.from_rows(rows), joined(surfaces))
-
-
-_SHELLS: dict[int, list[Surface]] = {}
-
-
-def _shell(room: RoomPlan) -> list[Surface]:
-    """A plan's surfaces, one a material."""
-    key = id(room)  # plans are cached for good, so their identity is theirs
-    if key not in _SHELLS:
-        _SHELLS[key] = joined(room.shell)
-    return _SHELLS[key]
-
-
-def _room(
-    place: Place,
-    ids: list[str],
-    index: int,
-    plan: RoomPlan,
-    slot: _Slot,
-    matrix: NDArray[np.float64],
-    entity: int,
-    first: int,
-) -> Room:
-    containers = []
-    for n, spot in enumerate(plan.spots):
-        reach = _moved(matrix, (*spot.reach, 0.0))
-        containers.append(
-            Container(
-                id=f"{ids[index]}.{spot.kind}{n}",
-                entity=entity if spot.item < 0 else first + spot.item,
-                kind=spot.kind,
-                centre=_moved(matrix, spot.centre),
-                size=spot.size,
-                yaw=round(math.remainder(spot.yaw + slot.yaw, 2 * math.pi), 4),
-                reach=reach[:2],
-            )
-        )
-    return Room(
-        id=ids[index],
-        entity=entity,
-        place=place.id,
-        building=place.building or "",
-        kind=plan.kind,
-        centre=_moved(matrix, (0.0, 0.0, 0.0)),
-        size=(plan.size[0], plan.size[1], WALL_HEIGHT),
-        yaw=round(slot.yaw, 6),
-        door=_moved(matrix, (*plan.door, 0.0)),
-        inside=_moved(matrix, (*plan.inside, 0.0)),
-        links=[ids[i] for i in plan.links],
-        containers=containers,
-    )
-
-
-def _moved(matrix: NDArray[np.float64], point: tuple[float, float, float]) -> tuple[float, float, float]:
-    x, y, z = matrix[:3, :3] @ np.asarray(point) + matrix[:3, 3]
-    return round(float(x), 3), round(float(y), 3), round(float(z), 3)
