@@ -133,7 +133,7 @@ class FolderImages:
     Parameters
     ----------
     folder
-        Holds the pictures and one of the pose files the module describes; they are looked for in that order.
+        Holds the pictures and one of the pose files the module describes; they are tried in that order.
     attribution
         Whom to credit where the pose file does not say.
     longest
@@ -156,11 +156,17 @@ class FolderImages:
         if not self._folder.is_dir():
             raise MissingFileError(f"{folder}: no such folder of photos")
         own, graph = self._folder / "photos.json", self._folder / "images.json"
-        found = [own, *sorted(self._folder.glob("reconstruction*.json")), graph]
-        self._poses = next((path for path in found if path.is_file()), None)
-        if self._poses is None:
+        named = [own, *sorted(self._folder.glob("reconstruction*.json")), graph]
+        self._found = [path for path in named if path.is_file()]
+        if not self._found:
             raise MissingFileError(f"{folder}: no photos.json, reconstruction.json (OpenSfM) or images.json "
                                    "(Mapillary) there; photos need poses")  # fmt: skip
+        self._poses = self._found[0]
+
+    @property
+    def files(self) -> list[Path]:
+        """The pose files there are."""
+        return list(self._found)
 
     def near(self, frame: LocalFrame, half: float, *, most: int) -> Iterator[StreetImage]:
         """Photos in the square of half side `half`; see `StreetImages.near`.
@@ -172,14 +178,18 @@ class FolderImages:
         EmptyInputError
             If none of its photos was taken in the square.
         """
-        self.refused = []
-        assert self._poses is not None
-        if self._poses.name == "photos.json":
-            cameras = self._own(frame)
-        elif self._poses.name == "images.json":
-            cameras = self._graph(frame)
-        else:
-            cameras = self._reconstructed(frame)
+        cameras: list[_Camera] = []
+        # A folder may have several: the first that names pictures that are there.
+        for path in self._found:
+            self._poses, self.refused = path, []
+            if path.name == "photos.json":
+                cameras = self._own(frame)
+            elif path.name == "images.json":
+                cameras = self._graph(frame)
+            else:
+                cameras = self._reconstructed(frame)
+            if any((self._folder / camera.file).is_file() for camera in cameras):
+                break
         inside = [c for c in cameras if within(c.position, half)]
         if not inside:
             raise EmptyInputError(
@@ -205,13 +215,12 @@ class FolderImages:
         if not path.is_relative_to(self._folder.resolve()):
             raise SchemaError(f"{self._poses}: {name!r} lies outside the folder; put the photo into it")
         if not path.is_file():
-            raise MissingFileError(f"{path}: no such photo, though {self._poses and self._poses.name} names it")
+            raise MissingFileError(f"{path}: no such photo, though {self._poses.name} names it")
         if path.stat().st_size > _MOST_BYTES:
             raise SchemaError(f"{path}: {path.stat().st_size:,} bytes are more than a photo has")
         return path.read_bytes()
 
     def _text(self) -> bytes:
-        assert self._poses is not None
         if self._poses.stat().st_size > _MOST_JSON:
             raise SchemaError(f"{self._poses}: {self._poses.stat().st_size:,} bytes are too many for a pose file")
         return self._poses.read_bytes()

@@ -46,8 +46,19 @@ def paint_chart(
     farthest: float,
     steepest: float,
     feather: float,
+    unshade: float,
 ) -> tuple[NDArray[np.uint8], NDArray[np.bool_], list[int]]:
     """Paint a chart with its cameras, the first on top.
+
+    Parameters
+    ----------
+    farthest, steepest
+        As of `seen_from`.
+    feather
+        Width of a seam, metres.
+    unshade
+        Where the chart's colours are known, those of patches this wide, metres, stay as they are, and the photo gives
+        what is finer: its shadows, its vignette and what was painted over leave little trace. 0: the photo gives all.
 
     Returns
     -------
@@ -60,6 +71,7 @@ def paint_chart(
     inside = atlas.inside[chart.page][chart.box]
     colour = atlas.pages[chart.page][chart.box].astype(np.float32)
     known = atlas.known[chart.page][chart.box].copy()
+    before = atlas.pages[chart.page][chart.box], atlas.known[chart.page][chart.box]
     shape = chart.height, chart.width
     quality = np.zeros((len(layers), *shape), np.float32)
     found = np.zeros((len(layers), *shape, 3), np.uint8)
@@ -73,7 +85,9 @@ def paint_chart(
                 layer.shot, points[here], chart.normal, sight, texel=atlas.texel, farthest=farthest, steepest=steepest
             )
             place = here[seen.index]
-            quality[k, rows].reshape(-1)[place] = seen.quality
+            # What was painted over is a guess: better than nothing, and worse than what is known.
+            guess = seen.painted & before[1][rows].ravel()[place]
+            quality[k, rows].reshape(-1)[place] = np.where(guess, 0.0, seen.quality)
             found[k, rows].reshape(-1, 3)[place] = layer.shot.colours(seen.xy, seen.pixels)
     best = quality.max(axis=0)
     given = [0] * len(layers)
@@ -92,7 +106,19 @@ def paint_chart(
         lines = np.flatnonzero(holds.any(axis=1))
         box = slice(int(lines[0]), int(lines[-1]) + 1)
         lab = layers[k].curve.applied(lab_of(found[k, box])) + layers[k].shade.astype(np.float32)
-        colour[box] += (rgb_of(lab.astype(np.float32)) - colour[box]) * alpha[box, :, None]
+        if unshade > 0:
+            trusted = (holds & before[1])[box]
+            lab += _broad(lab_of(before[0][box]) - lab, trusted, unshade / atlas.texel)
+        colour[box] += (rgb_of(lab) - colour[box]) * alpha[box, :, None]
         known |= (alpha > 0.5) & inside
         given[k] = int((alpha > 0.5).sum())
     return np.clip(np.round(colour), 0, 255).astype(np.uint8), known, given
+
+
+def _broad(gap: NDArray[np.float32], trusted: NDArray[np.bool_], sigma: float) -> NDArray[np.float32]:
+    """The smooth part of a difference that is known in some texels, shape ``(h, w, 3)``; 0 far from all of these."""
+    cv2 = opencv()
+    weight = trusted.astype(np.float32)
+    share = cv2.GaussianBlur(weight, (0, 0), sigma)
+    smooth = cv2.GaussianBlur(gap * weight[..., None], (0, 0), sigma)
+    return np.asarray(smooth / np.maximum(share, 1e-2)[..., None], np.float32)

@@ -13,7 +13,8 @@ from vico.errors import MissingExtraError, MissingFileError
 from vico.worldgen.streetview_match import opencv
 
 _TALLEST = 3.4  # metres: a bus
-_LEAST_TALL, _LEAST_WIDE = 0.5, 0.25  # metres: what is smaller is no person and no vehicle
+_PERSON, _VEHICLE = 2.0, 2.4  # metres: how high each reaches, at most
+_LEAST_TALL, _LEAST_WIDE = 0.5, 0.2  # metres: what is smaller is no person and no vehicle
 _CONTACT = 0.5  # metres: it stands on the ground, so its foot hides what is lower than this
 _FARTHEST = 45.0  # metres: beyond, a person is a few pixels
 _SHIFTS = ((0, 0), (0, 3), (0, -3), (3, 0), (-3, 0))  # pixels that the two pictures may be out of step by
@@ -63,8 +64,8 @@ class StandingDifferences:
 
     Notes
     -----
-    How much the two differ where nothing can move (walls higher than a bus) tells what is usual in this photo.
-    Larger differences lower down, which reach the ground and are as large as a person, are cut out by GrabCut.
+    How much the two differ on most of the ground, and on most of the walls, tells what is usual in this photo. Larger
+    differences which reach the ground and are as large as a person are cut out by GrabCut.
     What else differs there (a shop front the world does not know) is masked too: it is left to other photos.
     """
 
@@ -84,18 +85,23 @@ class StandingDifferences:
         if not zone.any():
             return np.zeros(view.depth.shape, np.bool_)
         gap = _difference(photo, render, solid)
-        still = solid & (above > _TALLEST + 0.5)
-        reference = gap[still] if still.sum() > 500 else gap[zone]
-        middle = float(np.median(reference))
-        spread = 1.4826 * float(np.median(np.abs(reference - middle)))
-        limit = max(middle + self.sure * spread, 12.0)
-        seeds = (zone & (gap > limit)).astype(np.uint8)
+        # Pavements are plain and walls are not: each has a usual difference of its own.
+        low = zone & (above < _CONTACT)
+        wall = solid & (above >= _CONTACT)
+        level = np.ones(gap.shape, np.float32)
+        for part in (low, wall & (depth < _FARTHEST)):
+            if part.any():
+                middle = float(np.median(gap[part]))
+                spread = 1.4826 * float(np.median(np.abs(gap[part] - middle)))
+                level[part] = np.maximum(middle + self.sure * spread, 10.0)
+        ratio = gap / level
+        seeds = (zone & (ratio > 1.0)).astype(np.uint8)
         seeds = cv2.morphologyEx(seeds, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
-        seeds = cv2.morphologyEx(seeds, cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8))
-        things = _standing(seeds, depth, above, view.focal * share)
-        if not things.any():
+        seeds = cv2.morphologyEx(seeds, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
+        core, reach = _standing(seeds, depth, above, view.focal * share)
+        if not core.any():
             return np.zeros(view.depth.shape, np.bool_)
-        things = _cut_out(photo, things, zone, gap < middle + spread)
+        things = _cut_out(photo, core, reach & solid, ratio)
         grown = cv2.dilate(things.astype(np.uint8), np.ones((5, 5), np.uint8))
         full = cv2.resize(grown, (width, height), interpolation=cv2.INTER_NEAREST)
         return np.asarray(full > 0)
@@ -117,47 +123,64 @@ def _difference(photo: NDArray[np.uint8], render: NDArray[np.uint8], solid: NDAr
 
 def _standing(
     seeds: NDArray[np.uint8], depth: NDArray[np.float32], above: NDArray[np.float32], focal: float
-) -> NDArray[np.bool_]:
-    """Those patches that reach the ground and are as large as a person."""
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """The patches that stand on the ground and are as large as a person, and where the rest of each thing may be.
+
+    What hides the ground shows best, and tells where a thing stands and how wide it is; its upper part is before a
+    wall, where the difference may be small: a person's reach is a man's height, a vehicle's a van's.
+    """
     cv2 = opencv()
     count, labels, boxes, _ = cv2.connectedComponentsWithStats(seeds, connectivity=8)
-    things = np.zeros(seeds.shape, np.bool_)
+    core, reach = np.zeros(seeds.shape, np.bool_), np.zeros(seeds.shape, np.bool_)
+    height, width = seeds.shape
     for k in range(1, count):
         x, y, wide, tall, area = boxes[k].tolist()
-        if area < 12:
+        if area < 10:
             continue
         part = labels[y : y + tall, x : x + wide] == k
         foot = part & (above[y : y + tall, x : x + wide] < _CONTACT)
         if not foot.any():
             continue
         # A thing stands where its lowest pixels are: there the render shows the ground at the thing's own distance.
-        rows = np.flatnonzero(foot.any(axis=1))
-        line = foot & (np.arange(tall)[:, None] >= rows[-1] - 2)
+        bottom = int(np.flatnonzero(foot.any(axis=1))[-1])
+        line = foot & (np.arange(tall)[:, None] >= bottom - 2)
         metre = focal / max(float(np.median(depth[y : y + tall, x : x + wide][line])), 0.5)
-        if tall >= _LEAST_TALL * metre and wide >= _LEAST_WIDE * metre and area >= 0.25 * wide * tall:
-            things[y : y + tall, x : x + wide] |= part
-    return things
+        if tall < _LEAST_TALL * metre or wide < _LEAST_WIDE * metre or area < 0.2 * wide * tall:
+            continue
+        core[y : y + tall, x : x + wide] |= part
+        upright = _PERSON if wide < 1.3 * metre else _VEHICLE
+        top = max(int(y + bottom - upright * metre), 0)
+        aside = max(round(0.15 * metre), 1)
+        reach[top : y + bottom + 2, max(x - aside, 0) : min(x + wide + aside, width)] = True
+        reach[y : y + tall, x : x + wide] |= part
+    return core, reach
 
 
 def _cut_out(
-    photo: NDArray[np.uint8], things: NDArray[np.bool_], zone: NDArray[np.bool_], same: NDArray[np.bool_]
+    photo: NDArray[np.uint8], core: NDArray[np.bool_], reach: NDArray[np.bool_], ratio: NDArray[np.float32]
 ) -> NDArray[np.bool_]:
-    """The things with the outline their colours have; they never shrink below their cores."""
+    """The things with the outline their colours have, within their reach; they never shrink below their cores."""
     cv2 = opencv()
-    around = cv2.dilate(things.astype(np.uint8), np.ones((25, 25), np.uint8)) > 0
-    core = cv2.erode(things.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
-    if not core.any():
-        return things
-    label = np.full(things.shape, cv2.GC_BGD, np.uint8)
-    label[around & zone] = cv2.GC_PR_BGD
-    label[things] = cv2.GC_PR_FGD
-    label[around & same & ~things] = cv2.GC_BGD
-    label[core] = cv2.GC_FGD
+    sure = cv2.erode(core.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    near = cv2.dilate(reach.astype(np.uint8), np.ones((31, 31), np.uint8)) > 0
+    if not sure.any() or (near & ~reach).sum() < 50:
+        return core
+    label = np.full(core.shape, cv2.GC_BGD, np.uint8)
+    label[reach] = cv2.GC_PR_BGD
+    label[reach & (ratio > 0.5)] = cv2.GC_PR_FGD
+    label[core] = cv2.GC_PR_FGD
+    label[sure] = cv2.GC_FGD
+    # Only what is near a thing tells how its surroundings look.
+    rows, columns = np.flatnonzero(near.any(axis=1)), np.flatnonzero(near.any(axis=0))
+    box = slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+    label = np.ascontiguousarray(label[box])
     # GrabCut starts its colour clusters from OpenCV's own stream: the same each time.
     cv2.setRNGSeed(1)
-    smooth = cv2.GaussianBlur(photo, (0, 0), 1.0)
+    smooth = np.ascontiguousarray(cv2.GaussianBlur(photo, (0, 0), 0.8)[box])
     cv2.grabCut(smooth, label, None, np.zeros((1, 65)), np.zeros((1, 65)), 3, cv2.GC_INIT_WITH_MASK)
-    return np.asarray(((label == cv2.GC_FGD) | (label == cv2.GC_PR_FGD)) & zone | core)
+    things = core.copy()
+    things[box] |= ((label == cv2.GC_FGD) | (label == cv2.GC_PR_FGD)) & reach[box]
+    return np.asarray(cv2.morphologyEx(things.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8)) > 0)
 
 
 @dataclass(frozen=True)

@@ -108,7 +108,9 @@ def lab_of(rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
     """SRGB colours of shape ``(..., 3)`` as CIE L*a*b*, float32 of the same shape."""
     cv2 = opencv()
     flat = rgb.reshape(1, -1, 3).astype(np.float32) / 255
-    return np.asarray(cv2.cvtColor(flat, cv2.COLOR_RGB2LAB).reshape(rgb.shape), np.float32) if rgb.size else flat
+    if not rgb.size:
+        return flat.reshape(rgb.shape).astype(np.float32)
+    return np.asarray(cv2.cvtColor(flat, cv2.COLOR_RGB2LAB).reshape(rgb.shape), np.float32)
 
 
 def rgb_of(lab: NDArray[np.float32]) -> NDArray[np.float32]:

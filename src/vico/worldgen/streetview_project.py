@@ -16,6 +16,10 @@ from vico.worldgen.streetview_match import opencv
 from vico.worldgen.streetview_paint import lab_of
 from vico.worldgen.streetview_pose import Pose, projected
 
+PATCH = 0.8
+"""Metres of wall whose mean colours are compared: the wall's texture is blurred, and would have the photo's detail
+taken for too much contrast."""
+
 _SAMPLE = 0.5  # metres between the samples that charts are judged by
 _OFF_WALL = 0.03  # metres that rays end before the wall
 _BORDER = 0.01  # share of a photo's sides that is not used: lenses are worst there
@@ -59,7 +63,7 @@ class Shot:
     def colours(self, xy: NDArray[np.float64], pixels: NDArray[np.float64]) -> NDArray[np.uint8]:
         """Colours at pixels `xy`, each the mean of a patch about `pixels` wide; shape ``(n, 3)``."""
         cv2 = opencv()
-        level = np.clip(np.round(np.log2(np.maximum(pixels, 1.0))), 0, len(self.pyramid) - 1).astype(np.int64)
+        level = np.clip(np.floor(np.log2(np.maximum(pixels, 1.0))), 0, len(self.pyramid) - 1).astype(np.int64)
         out = np.zeros((len(xy), 3), np.uint8)
         for k in np.unique(level).tolist():
             mine = np.flatnonzero(level == k)
@@ -91,12 +95,15 @@ class Seen:
         How many of the photo's pixels a texel there is wide, the shorter way, shape ``(n,)``.
     quality
         0..1, shape ``(n,)``: 1 for sharp and seen from the front.
+    painted
+        Where the photo was painted over, bool, shape ``(n,)``.
     """
 
     index: NDArray[np.int64]
     xy: NDArray[np.float64]
     pixels: NDArray[np.float64]
     quality: NDArray[np.float64]
+    painted: NDArray[np.bool_]
 
 
 def seen_from(
@@ -153,7 +160,7 @@ def seen_from(
     pixels = shot.intrinsics[0, 0] * texel / np.maximum(distance, 1e-9)
     hidden = shot.masked[xy[:, 1].astype(np.int64), xy[:, 0].astype(np.int64)]
     quality = np.minimum(pixels * cosine, 1.0) * np.sqrt(cosine) * np.where(hidden, _PAINTED, 1.0)
-    return Seen(index, xy, pixels * np.sqrt(cosine), quality)
+    return Seen(index, xy, pixels * np.sqrt(cosine), quality, hidden)
 
 
 @dataclass(frozen=True)
@@ -167,7 +174,7 @@ class Samples:
     chart
         Rising, shape ``(n,)``; `bounds` are where each chart's begin and the last ends, shape ``(charts + 1,)``.
     lab
-        The atlas's colours there, CIE L*a*b*, shape ``(n, 3)``.
+        The atlas's colours around there, the mean of a patch of `PATCH`, CIE L*a*b*, shape ``(n, 3)``.
     known
         Whether those are of a photo.
     centre, radius
@@ -193,6 +200,8 @@ def texel_centres(chart: Chart, rows: slice | NDArray[Any], columns: slice | NDA
 
 def samples_of(atlas: Atlas) -> Samples:
     """Sample an atlas."""
+    cv2 = opencv()
+    wide = max(round(PATCH / atlas.texel), 1)
     points, normals, owner, rgb, known = [], [], [], [], []
     centre, radius = np.zeros((len(atlas.charts), 3)), np.zeros(len(atlas.charts))
     for k, chart in enumerate(atlas.charts):
@@ -205,7 +214,8 @@ def samples_of(atlas: Atlas) -> Samples:
         points.append(where)
         normals.append(np.broadcast_to(chart.normal, where.shape))
         owner.append(np.full(len(where), k))
-        rgb.append(atlas.pages[chart.page][chart.box][np.ix_(rows, columns)][inside])
+        mean = cv2.blur(atlas.pages[chart.page][chart.box], (wide, wide), borderType=cv2.BORDER_REPLICATE)
+        rgb.append(mean[np.ix_(rows, columns)][inside])
         known.append(atlas.known[chart.page][chart.box][np.ix_(rows, columns)][inside])
         across, up = chart.right * chart.width / 2, chart.up * chart.height / 2
         centre[k], radius[k] = chart.origin + across + up, np.linalg.norm(across + up)
