@@ -18,6 +18,7 @@ _GUTTER = 4  # pixels around a chart: two mip levels before neighbours mix
 _BEND = np.cos(np.radians(14.0))  # neighbouring faces that turn less than this share a chart ...
 _FLAT = 0.10  # ... if they stay this near its plane, metres
 _LEAST_AREA = 1.0  # square metres; smaller pieces are not worth a chart
+_THIN, _SPARSE = 0.4, 0.12  # metres of the shorter side, share of its rectangle: mouldings and rims, no faces
 _UNDERSIDE = -0.9  # normals with a smaller z look at the ground
 _WELD = 1e-3  # metres
 
@@ -119,8 +120,8 @@ def unwrap(
     Parameters
     ----------
     walls, roofs
-        The two layers. Surfaces with holes (cutout) or two sides stay as they are, and so do pieces under 1 m2
-        and undersides.
+        The two layers. Surfaces with holes (cutout) or two sides stay as they are, and so do pieces under 1 m2,
+        mouldings and undersides.
     texel
         Side of a texel, metres; a piece too large for a page gets coarser ones.
     page
@@ -148,7 +149,11 @@ def unwrap(
     count = len(patches.entity)
     if wanted is not None and len(wanted) != count:
         raise InputError(f"atlas: {len(wanted)} pieces are chosen from, but the surfaces have {count}")
-    chosen = (patches.area >= _LEAST_AREA) & (patches.normal[:, 2] > _UNDERSIDE)
+    chosen = (
+        (patches.area >= np.maximum(_LEAST_AREA, _SPARSE * patches.size.prod(axis=1)))
+        & (patches.size.min(axis=1, initial=np.inf) >= _THIN)
+        & (patches.normal[:, 2] > _UNDERSIDE)
+    )
     if wanted is not None:
         chosen &= wanted
     index = np.flatnonzero(chosen)

@@ -176,10 +176,11 @@ class _Photos:
         triangle: NDArray[np.int32],
         u: NDArray[np.float32],
         v: NDArray[np.float32],
+        chart: NDArray[np.int64],
         right: NDArray[np.float64],
         up: NDArray[np.float64],
     ) -> NDArray[np.uint8]:
-        """Colours at points of triangles, each averaged over a texel of the given sides; shape ``(n, 3)``."""
+        """Colours at points of triangles, each averaged over a texel of its chart (sides by chart); ``(n, 3)``."""
         out = np.zeros((len(triangle), 3), np.uint8)
         which = self.texture_of[triangle]
         order = np.argsort(which, kind="stable")
@@ -188,7 +189,7 @@ class _Photos:
         for start, stop in zip(first, [*first[1:], len(order)], strict=True):
             texture = self.textures[which[order[start]]] if which[order[start]] >= 0 else white
             _fetch(
-                texture, order[start:stop], triangle, u, v, right, up,
+                texture, order[start:stop], triangle, u, v, chart, right, up,
                 self.positions, self.triangles, self.uv, self.colour, out,
             )  # fmt: skip
         return out
@@ -196,25 +197,26 @@ class _Photos:
 
 @numba.njit(cache=True)
 def _fetch(  # type: ignore[no-untyped-def]
-    texture, chosen, triangle, u, v, right, up, positions, triangles, uv, colour, out
+    texture, chosen, triangle, u, v, chart, rights, ups, positions, triangles, uv, colour, out
 ):
     height, width = texture.shape[:2]
     total = np.zeros(3)
     for n in chosen:
         t = triangle[n]
+        right, up = rights[chart[n]], ups[chart[n]]
         ia, ib, ic = triangles[t]
         a, b, c = positions[ia], positions[ib], positions[ic]
         wb, wc = u[n], v[n]
         wa = 1.0 - wb - wc
         # Barycentric weights change linearly over the texel: how far does it reach in the photo?
-        rr = right[n, 0] ** 2 + right[n, 1] ** 2 + right[n, 2] ** 2
-        uu = up[n, 0] ** 2 + up[n, 1] ** 2 + up[n, 2] ** 2
+        rr = right[0] ** 2 + right[1] ** 2 + right[2] ** 2
+        uu = up[0] ** 2 + up[1] ** 2 + up[2] ** 2
         bx = by = cx = cy = 0.0
         for k in range(3):
-            bx += (b[k] - a[k]) * right[n, k] / rr
-            by += (b[k] - a[k]) * up[n, k] / uu
-            cx += (c[k] - a[k]) * right[n, k] / rr
-            cy += (c[k] - a[k]) * up[n, k] / uu
+            bx += (b[k] - a[k]) * right[k] / rr
+            by += (b[k] - a[k]) * up[k] / uu
+            cx += (c[k] - a[k]) * right[k] / rr
+            cy += (c[k] - a[k]) * up[k] / uu
         det = bx * cy - cx * by
         ua, va = uv[ia, 0] * width, uv[ia, 1] * height
         ub, vb = uv[ib, 0] * width - ua, uv[ib, 1] * height - va
@@ -298,47 +300,38 @@ def _paint(
     )
     corner = np.array([(chart.x, chart.y) for chart in atlas.charts])
     wall = np.abs(normal[:, 2]) < 0.5
+    side = np.linalg.norm(up, axis=1)
     odd = [np.zeros(known.shape, np.bool_) for known in atlas.known]
     total = sum(int(np.count_nonzero(inside)) for inside in atlas.inside)
     rays = done = 0
     for page, chart, column, row in _batches(atlas):
         x, y = corner[chart, 0] + column, corner[chart, 1] + row
-        out = normal[chart]
-        centre = origin[chart] + (column + 0.5)[:, None] * right[chart] + (row + 0.5)[:, None] * up[chart]
-        stand = expected.offset[chart]
-        stand = stand[:, 0] + stand[:, 1] * (column + 0.5) + stand[:, 2] * (row + 0.5)
+        centre, out, stand = _texels(chart, column, row, origin, right, up, normal, expected.offset)
         hits = sight.first(centre + cage * out, -out, most=2 * cage)
         rays += len(chart)
-        triangle, u, v = hits.triangle.copy(), hits.u.copy(), hits.v.copy()
+        triangle, u, v = hits.triangle, hits.u, hits.v
         offset = cage - hits.distance
-        good = (triangle >= 0) & (np.einsum("nk,nk->n", photos.normal[triangle], out) >= _AGREES)
+        good = _agree(triangle, photos.normal, chart, normal)
         off = good & (offset - stand > _STANDS_OFF)
         again = np.flatnonzero(~good | off)
         if len(again):
+            outward = out[again]
             start = np.maximum(stand[again] - _BEHIND, -cage)
-            second = sight.first(
-                centre[again] + start[:, None] * out[again],
-                out[again],
-                most=np.minimum(_BEHIND + _STANDS_OFF, 2 * cage),
-            )
+            most = min(_BEHIND + _STANDS_OFF, 2 * cage)
+            second = sight.first(centre[again] + start[:, None] * outward, outward, most=most)
             rays += len(again)
-            found = (second.triangle >= 0) & (
-                np.einsum("nk,nk->n", photos.normal[second.triangle], out[again]) >= _AGREES
-            )
+            found = _agree(second.triangle, photos.normal, chart[again], normal)
             use = again[found]
             triangle[use], u[use], v[use] = second.triangle[found], second.u[found], second.v[found]
             offset[use] = start[found] + second.distance[found]
             good[use], off[use] = True, False
         good &= np.abs(offset) <= cage
         take = np.flatnonzero(good)
-        colour = photos(triangle[take], u[take], v[take], right[chart[take]], up[chart[take]])
+        whose = chart[take]
+        colour = photos(triangle[take], u[take], v[take], whose, right, up)
+        height = row[take] * side[whose]
         reject, fringe = _oddities(
-            colour,
-            off[take],
-            wall[chart[take]],
-            row[take] * np.linalg.norm(up[chart[take]], axis=1),
-            expected.luminance[chart[take]],
-            expected.green[chart[take]],
+            colour, off[take], wall[whose], height, expected.luminance[whose], expected.green[whose]
         )
         odd[page][y[take[fringe]], x[take[fringe]]] = True
         keep = take[~reject]
@@ -353,6 +346,32 @@ def _paint(
         if mask.any():
             _forget_near(mask, known)
     return rays
+
+
+@numba.njit(cache=True)
+def _texels(chart, column, row, origin, right, up, normal, expected):  # type: ignore[no-untyped-def]
+    """Centres and normals of texels, and how far out of the plane the photographed surface is expected."""
+    centre, out = np.empty((len(chart), 3)), np.empty((len(chart), 3))
+    stand = np.empty(len(chart))
+    for n in range(len(chart)):
+        c, i, j = chart[n], column[n] + 0.5, row[n] + 0.5
+        for k in range(3):
+            centre[n, k] = origin[c, k] + i * right[c, k] + j * up[c, k]
+            out[n, k] = normal[c, k]
+        stand[n] = expected[c, 0] + expected[c, 1] * i + expected[c, 2] * j
+    return centre, out, stand
+
+
+@numba.njit(cache=True)
+def _agree(triangle, normals, chart, normal):  # type: ignore[no-untyped-def]
+    """Whether what was hit faces the chart's way."""
+    agree = np.zeros(len(triangle), np.bool_)
+    for n in range(len(triangle)):
+        t = triangle[n]
+        if t >= 0:
+            a, b = normals[t], normal[chart[n]]
+            agree[n] = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] >= _AGREES
+    return agree
 
 
 def _oddities(
