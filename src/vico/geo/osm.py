@@ -16,6 +16,8 @@ from shapely import MultiPolygon, Polygon
 
 from vico.errors import EmptyInputError, InputError, MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
+from vico.geo.outlines import check_size, is_scribble, mended, simplified
+from vico.geo.outlines import polygons_of as polygons_of
 
 Tags = dict[str, str]
 
@@ -115,6 +117,8 @@ class OsmData:
     sha256, timestamp
         Of the file: digest of its bytes and the newest object's time, or the one in its header where objects have none
         (ISO 8601; None where neither has).
+    broken
+        Id and what is wrong with it, of each object that was left out or mended.
     """
 
     frame: LocalFrame
@@ -151,24 +155,11 @@ def _multipolygon(outer: Iterable[NDArray[np.float64]], inner: Iterable[NDArray[
         # Rings that touch in a node merge into nothing closed: polygonize finds them, at a higher price.
         if len(rings) < len(shapely.get_parts(merged)):
             return shapely.union_all(shapely.get_parts(shapely.polygonize(shapely.get_parts(shapely.node(merged)))))
-        return shapely.union_all([shapely.make_valid(Polygon(ring)) for ring in rings])
+        return shapely.union_all([mended(Polygon(ring))[0] for ring in rings])
 
     shape = filled(outer)
     holes = filled(inner)
     return shape if holes.is_empty else shapely.difference(shape, holes)
-
-
-def polygons_of(shape: shapely.Geometry, least: float = 0.0) -> list[Polygon]:
-    """The polygons within any geometry that are larger than `least` square metres."""
-    parts = shapely.get_parts(shape)
-    found: list[Polygon] = []
-    for part in parts:
-        if isinstance(part, Polygon):
-            if part.area > least:
-                found.append(part)
-        elif hasattr(part, "geoms"):
-            found += polygons_of(part, least)
-    return found
 
 
 def checked_extract(path: Path) -> Path:
@@ -177,8 +168,11 @@ def checked_extract(path: Path) -> Path:
         raise MissingFileError(f"{path}: no such file; give an OpenStreetMap extract (.osm or .osm.pbf)")
     if not path.is_file():
         raise InputError(f"{path}: is a folder; give an OpenStreetMap extract (.osm or .osm.pbf)")
-    if not path.name.endswith((".osm", ".pbf", ".osm.xml")):
-        raise InputError(f"{path}: not an OpenStreetMap file by its name; it must end in .osm, .osm.xml or .osm.pbf")
+    if not path.name.endswith((".osm", ".pbf", ".osm.xml", ".osm.gz", ".osm.bz2")):
+        raise InputError(
+            f"{path}: not an OpenStreetMap file by its name; it must end in .osm, .osm.xml, .osm.gz, .osm.bz2 or "
+            ".osm.pbf"
+        )
     if path.stat().st_size == 0:
         raise SchemaError(f"{path}: the file is empty; download it again")
     return path
@@ -201,6 +195,8 @@ class _Reader:
         self.node_rows: list[tuple[int, float, float, Tags]] = []
         self.way_rows: list[tuple[int, list[int], list[float], list[float], Tags, bool]] = []
         self.unlocated = 0
+        self.partial: dict[int, int] = {}  # way -> nodes that are missing
+        self.drafts = 0
         self.objects = 0
 
     def read(self) -> None:
@@ -246,7 +242,10 @@ class _Reader:
                 lons.append(place.lon + 360.0 if self.wraps and place.lon < 0.0 else place.lon)
         if len(refs) < 2:
             self.unlocated += 1
+            self.drafts += any(node.ref < 0 for node in way.nodes)
             return
+        if len(refs) < len(way.nodes):
+            self.partial[way.id] = len(way.nodes) - len(refs)
         near = max(lats) >= self.south and min(lats) <= self.north and max(lons) >= self.west and min(lons) <= self.east
         if near or wanted:
             self.way_rows.append((way.id, refs, lats, lons, dict(way.tags), near))
@@ -260,7 +259,8 @@ def read_osm(
     Parameters
     ----------
     path
-        An ``.osm``, ``.osm.xml`` or ``.osm.pbf`` file, nodes before ways before relations (as all extracts are).
+        An ``.osm``, ``.osm.xml``, ``.osm.gz``, ``.osm.bz2`` or ``.osm.pbf`` file, nodes before ways before relations
+        (as all extracts are).
     frame
         Local frame whose origin is the window's centre.
     half
@@ -288,6 +288,7 @@ def read_osm(
     checked_extract(path)
     if not (np.isfinite(half) and half > 0):
         raise InputError(f"radius: {half} m; it must be a positive number of metres, as in --radius 400")
+    check_size(path)
     reader = _Reader(path, frame, half + margin)
     try:
         reader.read()
@@ -297,6 +298,10 @@ def read_osm(
     data = _assembled(reader, half, margin, sha256(path.read_bytes()).hexdigest())
     window = f"the {2 * half:.0f} m square around {frame.lat}, {frame.lon}"
     if not (data.ways or data.nodes or data.areas):
+        if reader.drafts and not reader.way_rows:
+            raise SchemaError(
+                f"{path}: has negative ids; number it anew with: osmium renumber FILE -o NUMBERED.osm.pbf"
+            )
         if reader.objects and reader.unlocated and not reader.way_rows:
             raise SchemaError(f"{path}: ways come before their nodes; sort it with: osmium sort FILE -o SORTED.osm.pbf")
         raise EmptyInputError(f"{path}: nothing in {window}; check the coordinates, or use another extract")
@@ -331,13 +336,17 @@ def _assembled(reader: _Reader, half: float, margin: float, digest: str) -> OsmD
             continue
         closed = len(refs) > 3 and refs[0] == refs[-1]
         if closed and means_area(tags):
-            polygon = _valid(Polygon(line))
+            polygon, fault = mended(Polygon(line))
             if polygon.is_empty:
-                broken.append((f"w{way_id}", "area without extent"))
+                broken.append((f"w{way_id}", fault or "area without extent"))
             elif window.intersects(polygon):
-                areas.append(OsmArea(f"w{way_id}", polygon, tags))
+                if fault:
+                    broken.append((f"w{way_id}", fault))
+                if way_id in reader.partial:
+                    broken.append((f"w{way_id}", f"{reader.partial[way_id]} of its nodes are not in the file"))
+                areas.append(_plain(OsmArea(f"w{way_id}", polygon, tags), broken))
                 ways.append(OsmWay(way_id, refs, line, closed, tags))
-        elif window.intersects(shapely.LineString(line)):
+        elif np.isfinite(line).all() and window.intersects(shapely.LineString(line)):
             ways.append(OsmWay(way_id, refs, line, closed, tags))
     kept = {("w", way.id) for way in ways} | {("n", node.id) for node in nodes}
     relations: list[OsmRelation] = []
@@ -345,7 +354,10 @@ def _assembled(reader: _Reader, half: float, margin: float, digest: str) -> OsmD
         if relation.tags.get("type") == "multipolygon":
             area = _area_of(relation, by_id, broken)
             if area is not None and window.intersects(area.polygon):
-                areas.append(area)
+                missing = sum(kind == "w" and ref not in by_id for kind, ref, _ in relation.members)
+                if missing:
+                    broken.append((area.id, f"{missing} of its member ways are not in the file; kept what closes"))
+                areas.append(_plain(area, broken))
         if any((kind, ref) in kept for kind, ref, _ in relation.members):
             relations.append(relation)
     newest = None
@@ -365,12 +377,15 @@ def _lines(reader: _Reader) -> list[NDArray[np.float64]]:
     return np.split(reader.frame.to_enu(lats, lons), np.cumsum([len(row[1]) for row in reader.way_rows])[:-1])
 
 
-def _valid(polygon: Polygon) -> Polygon | MultiPolygon:
-    """The polygonal part of a possibly self-crossing outline."""
-    if polygon.is_valid:
-        return polygon
-    parts = polygons_of(shapely.make_valid(polygon))
-    return parts[0] if len(parts) == 1 else MultiPolygon(parts)
+def _plain(area: OsmArea, broken: list[tuple[str, str]]) -> OsmArea:
+    """The area; a building's outline without more corners than walls and roofs can be made for."""
+    if "building" not in area.tags and "building:part" not in area.tags:
+        return area
+    shape, what = simplified(area.polygon)
+    if what is None:
+        return area
+    broken.append((area.id, what))
+    return OsmArea(area.id, shape, area.tags)
 
 
 def _area_of(
@@ -385,6 +400,12 @@ def _area_of(
         # Old style: the outer way carries the tags.
         tags = next((ways[ref][1] for ref, role in members if role != "inner" and ways[ref][1]), tags)
     if not outer or not (means_area({**tags, "area": tags.get("area", "")}) or "highway" in tags):
+        return None
+    if not all(np.isfinite(line).all() for line in (*outer, *inner)):
+        broken.append((f"r{relation.id}", "multipolygon with points too far away"))
+        return None
+    if is_scribble(outer) or is_scribble(inner):
+        broken.append((f"r{relation.id}", "its rings cross too often to mean an area; left out"))
         return None
     shape = _multipolygon(outer, inner)
     parts = polygons_of(shape)
