@@ -343,7 +343,7 @@ FILES = noisy_files()
     st.lists(st.tuples(st.integers(0, 700) | st.integers(0, 20000), st.integers(0, 255)), max_size=6),
     st.integers(0, 20000),
 )
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_damaged_files_give_heights_or_one_of_our_errors(
     tmp_path_factory: pytest.TempPathFactory, name: str, damage: list[tuple[int, int]], length: int
 ) -> None:

@@ -13,7 +13,7 @@ HELSINKI = LocalFrame(60.1690, 24.9435)
 
 
 @given(st.floats(-90, 90), st.floats(-180, 180), st.floats(-2500, 2500), st.floats(-2500, 2500))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_there_and_back_is_the_same_point(lat: float, lon: float, x: float, y: float) -> None:
     frame = LocalFrame(lat, lon)
     back = frame.to_enu(*frame.to_geodetic((x, y)))
@@ -44,7 +44,7 @@ def test_a_point_off_the_earth_is_refused(lat: float, lon: float) -> None:
 
 
 @given(st.sampled_from([-90, -89, 0, 60, 89, 89.99, 90]) | st.floats(-90, 90), st.floats(-180, 180))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_the_boxes_hold_the_square_anywhere_on_earth(lat: float, lon: float) -> None:
     frame = LocalFrame(lat, lon)
     boxes = frame.boxes(400.0)

@@ -317,7 +317,7 @@ def test_quarters_leave_no_gap() -> None:
     assert "(60.1,24.9," in query(boxes[:1])
 
 
-@pytest.mark.parametrize("name", ["helsinki", "monaco"])
+@pytest.mark.parametrize("name", [pytest.param("helsinki", marks=pytest.mark.slow), "monaco"])
 def test_the_derived_answers_are_the_extracts_they_were_made_from(name: str, shared_data: Path, tmp_path: Path) -> None:
     content = (shared_data / "samples" / f"overpass_{name}_800m_derived.json").read_bytes()
     lat, lon = {"helsinki": (60.1690, 24.9435), "monaco": (43.73384, 7.41813)}[name]

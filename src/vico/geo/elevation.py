@@ -210,6 +210,8 @@ def _centres(
 
 def _spacing(xy: NDArray[np.float64], path: Path) -> float:
     """Distance between neighbouring pixels, metres."""
+    if not np.isfinite(xy).all():
+        raise SchemaError(f"{path}: some of its pixels lie nowhere on Earth; check its georeferencing")
     steps = [np.hypot(*np.diff(xy, axis=axis).reshape(-1, 2).T) for axis in (0, 1)]
     medians = [float(np.median(step)) for step in steps if len(step)]
     spacing = max(medians, default=0.0)

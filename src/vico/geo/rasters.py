@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import io
+import logging
 import math
 import re
 import struct
@@ -241,6 +242,8 @@ def _unpredicted(raw: bytes, rows: int, wide: int, dtype: np.dtype[np.generic], 
 
 
 def _geotiff(path: Path) -> Raster:
+    log = logging.getLogger("tifffile")  # it tells of each bad tag; we tell of the file, once
+    silent, log.disabled = log.disabled, True
     try:
         with tifffile.TiffFile(path) as file:
             page = file.pages[0]
@@ -257,6 +260,8 @@ def _geotiff(path: Path) -> Raster:
         raise SchemaError(
             f"{path}: not a readable GeoTIFF ({type(error).__name__}: {words}); save it anew, deflated or uncompressed"
         ) from None
+    finally:
+        log.disabled = silent
     return raster
 
 
