@@ -1,29 +1,90 @@
-"""How long a world takes to build, stage by stage, and how much memory.
+"""How long a world takes to build, stage by stage, and how much memory; how time grows with the radius; other cities.
 
-    python benchmarks/world.py [--radius 400] [-n 3] [--table benchmarks/results/world.md]
+    python benchmarks/world.py [--radius 400] [-n 3] [--data FOLDER] [--table benchmarks/results/world.md]
 
 The packaged place, built anew each time in a process of its own. Stage seconds are wall time, as the world's own
-``build.json`` tells them; the last lines are the whole command, imports and report included.
+``build.json`` tells them; the last lines are the whole command, imports and report included. With ``--data`` (a folder
+with ``places/NAME/NAME.osm.pbf``, and ``SOURCE.txt`` beside it that tells the centre) every place there is built once,
+and the largest extract at several radii.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import re
 import tempfile
 from pathlib import Path
+from typing import Any
 
 from reporting import machine, publish, row, vico
 
 from vico.worldgen.packaged import packaged_extract
 
 GOAL = 90.0
+RADII = (200, 300, 400, 500, 600)
+
+
+def places_in(data: Path) -> list[tuple[str, list[str]]]:
+    """Every place that holds buildings: its name, and the options that tell where it is and what it is made from."""
+    found = []
+    for folder in sorted((data / "places").iterdir()):
+        about = (folder / "SOURCE.txt").read_text()
+        centre = re.search(r"centre lat,lon: (-?[\d.]+),(-?[\d.]+)", about)
+        if centre is None or "no buildings" in about:
+            continue
+        words = ["--osm", str(folder / f"{folder.name}.osm.pbf"), "--center", f"{centre[1]},{centre[2]}"]
+        words += ["--dem", str(folder / "dem_srtm.tif")] if (folder / "dem_srtm.tif").exists() else []
+        feeds = sorted(folder.glob("gtfs*.zip"))
+        words += ["--gtfs", *map(str, feeds)] if feeds else []
+        found.append((folder.name, words))
+    return found
+
+
+def built(words: list[str], out: Path) -> tuple[dict[str, Any], float, float]:
+    """Build a world: what it says of itself, seconds of the whole command, peak memory in MB."""
+    child = vico("world", "build", *words, "--out", str(out), "--json")
+    return json.loads(child.output), child.seconds, child.peak_mb
+
+
+def of_places(data: Path, scratch: Path) -> list[str]:
+    """A table of every place, once each."""
+    lines = [
+        "",
+        "## Other cities, once each",
+        "",
+        "| place | s | peak MB | world MB | buildings (accessible) | places | amenity | natural | transit | faces |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for name, words in places_in(data):
+        facts, seconds, peak = built(words, scratch / name)
+        lines.append(
+            f"| {name} | {seconds:.1f} | {peak:.0f} | {facts['megabytes']:.0f} | {facts['buildings']} "
+            f"({facts['accessible_buildings']}) | {facts['places']} | {facts['amenity_objects']} | "
+            f"{facts['natural_objects']} | {facts['transit']} | {facts['collision_faces']} |"
+        )
+    return lines
+
+
+def of_radii(data: Path, scratch: Path) -> list[str]:
+    """How time grows with the window, in the extract that is large enough for the largest of them."""
+    words = dict(places_in(data))["helsinki"]
+    lines = ["", "## Time against size: Helsinki", "", "| radius m | s | s per ha | peak MB | buildings | places |"]
+    lines.append("|---|---|---|---|---|---|")
+    for radius in RADII:
+        facts, seconds, peak = built([*words, "--radius", str(radius)], scratch / f"r{radius}")
+        lines.append(
+            f"| {radius} | {seconds:.1f} | {seconds / (4 * radius**2 / 1e4):.2f} | {peak:.0f} | {facts['buildings']} | "
+            f"{facts['places']} |"
+        )
+    return lines
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--radius", type=float, default=400.0)
     parser.add_argument("-n", type=int, default=3, help="builds")
+    parser.add_argument("--data", type=Path, help="folder with more places")
     parser.add_argument("--table", type=Path)
     given = parser.parse_args()
     place, about = packaged_extract(), machine()
@@ -35,6 +96,7 @@ def main() -> None:
             facts.append(json.loads(child.output))
             whole.append(child.seconds)
             peaks.append(child.peak_mb)
+        more = of_radii(given.data, Path(folder)) + of_places(given.data, Path(folder)) if given.data else []
     last = facts[-1]
     lines = [
         "# World: seconds a stage",
@@ -54,7 +116,7 @@ def main() -> None:
     lines.append(row("whole command", whole, 2))
     lines += ["", "| memory | median MB | least | greatest | n |", "|---|---|---|---|---|"]
     lines.append(row("peak resident set", peaks, 0))
-    publish(lines, given.table)
+    publish(lines + more, given.table)
 
 
 if __name__ == "__main__":
