@@ -17,8 +17,9 @@ from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, read_osm
 from vico.world.model import FIRST_BUILDING
 from vico.world.seeds import rng
-from vico.worldgen.buildings import BuildingsResult, buildings_from_osm, convex_pieces
+from vico.worldgen.buildings import BuildingsResult, buildings_from_osm
 from vico.worldgen.outlines import building_plans
+from vico.worldgen.solids import convex_pieces
 from vico.worldgen.terrain import flat_terrain, terrain_from_dem
 
 PLACE = Path(str(resources.files("vico") / "data" / "helsinki.osm.pbf"))

@@ -108,13 +108,11 @@ def tidy(polygon: Polygon) -> Polygon:
     """A polygon without corners that are none: a wall is one line from corner to corner, so that its bays are whole."""
     rings = []
     for ring in rings_of(polygon):
-        before, after = np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0)
-        base = after - before
-        offset = np.abs(base[:, 0] * (ring - before)[:, 1] - base[:, 1] * (ring - before)[:, 0])
-        kept = ring[offset > 0.012 * np.maximum(np.hypot(*base.T), 1e-9)]
-        rings.append(kept if len(kept) >= 3 else ring)
-    tidied = Polygon(rings[0], rings[1:])
-    return tidied if tidied.is_valid and tidied.area > 0.0 else polygon
+        # From the farthest corner on: where a ring begins it is never made straighter.
+        first = int(np.hypot(*(ring - ring.mean(axis=0)).T).argmax())
+        rings.append(np.roll(ring, -first, axis=0))
+    tidied = shapely.simplify(Polygon(rings[0], rings[1:]), 0.012)
+    return tidied if isinstance(tidied, Polygon) and tidied.is_valid and tidied.area > 0.0 else polygon
 
 
 def apart(plans: list[BuildingPlan], dropped: list[Dropped]) -> list[BuildingPlan]:

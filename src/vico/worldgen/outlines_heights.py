@@ -20,46 +20,15 @@ _NEAR = 100.0  # metres within which neighbours of the same use decide
 _REACH = 220.0  # metres within which the nearest of any use do
 
 # Storeys of kinds that look alike everywhere, whatever stands beside them.
-_KIND_LEVELS = {
-    **dict.fromkeys(
-        [
-            "garage",
-            "garages",
-            "carport",
-            "shed",
-            "hut",
-            "kiosk",
-            "service",
-            "toilets",
-            "greenhouse",
-            "bungalow",
-            "cabin",
-            "houseboat",
-            "static_caravan",
-            "barn",
-            "cowshed",
-            "stable",
-            "sty",
-            "farm_auxiliary",
-            "transformer_tower",
-            "pavilion",
-            "supermarket",
-            "boathouse",
-            "gatehouse",
-            "container",
-            "tent",
-            "bunker",
-        ],
-        1,
-    ),
-    **dict.fromkeys(
-        ["house", "detached", "semidetached_house", "terrace", "farm", "villa", "fire_station", "kindergarten"], 2
-    ),
-    **dict.fromkeys(["school", "civic", "public", "library", "museum", "community_centre", "parking", "courthouse"], 3),
-    **dict.fromkeys(["university", "hospital", "dormitory", "government"], 4),
-    "department_store": 4,
-    "hotel": 5,
+_STOREYS_OF_KINDS = {
+    1: "garage garages carport shed hut kiosk service toilets greenhouse bungalow cabin houseboat static_caravan barn "
+    "cowshed stable sty farm_auxiliary transformer_tower pavilion supermarket boathouse gatehouse container bunker",
+    2: "house detached semidetached_house terrace farm villa fire_station kindergarten",
+    3: "school civic public library museum community_centre parking courthouse",
+    4: "university hospital dormitory government department_store",
+    5: "hotel",
 }
+_KIND_LEVELS = {kind: storeys for storeys, kinds in _STOREYS_OF_KINDS.items() for kind in kinds.split()}
 # Of these, neighbours know better where there are any.
 _YIELDING = ("house", "detached", "semidetached_house", "terrace", "villa", "university", "hotel", "civic", "public",
              "dormitory", "government", "department_store", "museum", "school")  # fmt: skip

@@ -39,7 +39,7 @@ class BoxFrame:
         if shape in _ALWAYS:
             return True
         fill = polygon.area / max(4.0 * self.half_length * self.half_width, 1e-9)
-        return not holes and fill > _FILL.get(shape, 0.74)
+        return not holes and fill > _FILL.get(shape, 0.83)
 
 
 def box_frame(polygon: Polygon, direction: float | None) -> BoxFrame:
@@ -93,9 +93,8 @@ def _ends(shape: str, frame: BoxFrame, run: float) -> Profile | None:
     if shape in ("hipped", "side_hipped", "mansard", "quadruple_saltbox"):
         slope = slope_of(shape, run)
         reach = min(slope[-1][0], half)
-        near = [(d, z) for d, z in slope if d < reach] + [
-            (reach, float(np.interp(reach, [d for d, _ in slope], [z for _, z in slope])))
-        ]
+        height = float(np.interp(reach, [d for d, _ in slope], [z for _, z in slope]))
+        near = [*((d, z) for d, z in slope if d < reach), (reach, height)]
     elif shape in ("half-hipped", "side_half-hipped"):
         reach = min(0.45 * run, half)
         near = [(0.0, 0.55), (reach, 0.55 + reach / run)]

@@ -1,28 +1,34 @@
-"""What sits on and juts out of buildings: cornices, chimneys, penthouses. Closed solids of their own."""
+"""What sits on, juts out of and holds up buildings: cornices, chimneys, penthouses, posts; closed solids each."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from vico.geo.osm import polygons_of
-from vico.worldgen.outlines import BuildingPlan, PartPlan
-from vico.worldgen.roofs import Roof
+from vico.worldgen.outlines_plans import BuildingPlan, PartPlan
+from vico.worldgen.roofs import Roof, rings_of
 
 _CORNICE_WALLS = ("wall_classic", "wall_stone", "wall_brick", "wall_plain")
+_CHIMNEYED = ("hipped", "gabled", "half-hipped", "mansard", "gambrel", "hipped-and-gabled")
+_CORNICE_DEEP, _CORNICE_ABOVE = 0.42, 0.03
+_POST = 0.24  # metres: side of a post
+_POST_EVERY = 6.0
+_ROADWAY = 3.6  # metres from a street's centre line that stay free of posts
 
 
-def rooftop_parts(plan: BuildingPlan, wall: str, random: np.random.Generator) -> list[PartPlan]:
-    """Decide the small solids of a building's roof.
+def rooftop_parts(plan: BuildingPlan, random: np.random.Generator) -> list[PartPlan]:
+    """Decide the small solids of a building's roof: penthouses and chimneys.
 
     Parameters
     ----------
     plan
         The building.
-    wall
-        Its facade material: old-fashioned ones get a cornice.
     random
         The building's own stream.
 
@@ -33,57 +39,134 @@ def rooftop_parts(plan: BuildingPlan, wall: str, random: np.random.Generator) ->
     """
     made: list[PartPlan] = []
     for part in plan.parts:
-        if part.low > 0 or part.eaves < 4.5 or part.polygon.area < 50.0:
+        if part.levels == 0 or part.eaves < 4.5 or part.polygon.area < 50.0:
             continue
         bare = part.roof.shape == "flat" and part.roof.height <= 0.0
-        if wall in _CORNICE_WALLS and part.levels >= 2 and not bare:
-            made += _cornice(part)
-        if part.roof.shape == "flat" and not bare:
-            made += _penthouses(part, random)
-        elif part.roof.shape in ("hipped", "gabled", "mansard") and plan.use in (
-            "residential",
-            "hotel",
-            "commercial",
-            "civic",
-        ):
-            made += _chimneys(part, random)
+        if bare or (part.low > 0.0 and part.roof.shape != "flat"):
+            continue
+        above = [other.polygon for other in plan.parts if other is not part and other.top > part.eaves + 0.3]
+        free = shapely.difference(part.polygon, shapely.union_all(above)) if above else part.polygon
+        if part.roof.shape == "flat":
+            made += _penthouses(part, free, random)
+        elif part.roof.shape in _CHIMNEYED and plan.use in ("residential", "hotel", "commercial", "civic"):
+            made += _chimneys(part, free, random)
     return made
 
 
-def _cornice(part: PartPlan) -> list[PartPlan]:
-    outline = shapely.simplify(part.polygon, 0.35)
-    outer = shapely.buffer(outline, 0.32, join_style="mitre", mitre_limit=1.6)
-    inner = shapely.buffer(outline, -0.25, join_style="mitre", mitre_limit=1.6)
-    rings = polygons_of(shapely.simplify(shapely.difference(outer, inner), 0.03), 0.5)
-    low, high = part.eaves - 0.42, part.eaves + 0.03
-    return [_solid(ring, low, high, "cornice") for ring in rings]
+def cornices(plans: Sequence[BuildingPlan], walls: Sequence[str], bases: Sequence[float]) -> list[list[PartPlan]]:
+    """Ledges under the eaves of old-fashioned walls, cut where neighbours stand or have theirs.
+
+    Parameters
+    ----------
+    plans
+        All buildings, solids apart from each other.
+    walls
+        Facade material of each.
+    bases
+        Height of each one's ground floor, metres.
+
+    Returns
+    -------
+    list of list of PartPlan
+        One list a building.
+    """
+    rows = [(part, p) for p, plan in enumerate(plans) for part in plan.parts]
+    made: list[list[PartPlan]] = [[] for _ in plans]
+    if not rows:
+        return made
+    tree = shapely.STRtree([part.polygon for part, _ in rows])
+    of_part: dict[int, list[tuple[BaseGeometry, float, float]]] = {}
+    for k, (part, p) in enumerate(rows):
+        bare = part.roof.shape == "flat" and part.roof.height <= 0.0
+        if walls[p] not in _CORNICE_WALLS or part.levels < 2 or bare or part.polygon.area < 50.0 or part.eaves < 4.5:
+            continue
+        low, high = bases[p] + part.eaves - _CORNICE_DEEP, bases[p] + part.eaves + _CORNICE_ABOVE
+        outline = shapely.simplify(part.polygon, 0.2)
+        outer = shapely.buffer(outline, 0.32, join_style="mitre", mitre_limit=1.6)
+        # Against the wall, not into it: an inner face would come to lie in the plane of some other wall.
+        shape: BaseGeometry = shapely.difference(outer, part.polygon)
+        taken: list[BaseGeometry] = []
+        for j in sorted(tree.query(outer, predicate="dwithin", distance=0.4).tolist()):
+            other, q = rows[j]
+            if j != k and bases[q] + other.top > low - 0.1 and bases[q] + other.low < high:
+                taken.append(other.polygon)
+            taken += [ledge for ledge, bottom, top in of_part.get(j, []) if top > low - 0.02 and bottom < high + 0.02]
+        if taken:
+            # A finger's breadth clear of them, so that no two faces lie in one plane.
+            shape = shapely.difference(shape, shapely.buffer(shapely.union_all(taken), 0.012, join_style="mitre"))
+        # An opening takes away what is thinner than a hand.
+        core = shapely.buffer(shape, -0.04, join_style="mitre")
+        shape = shapely.intersection(shapely.buffer(core, 0.045, join_style="mitre", mitre_limit=2.0), shape)
+        kept = polygons_of(shape, 0.12)
+        of_part[k] = [(ledge, low, high) for ledge in kept]
+        made[p] += [_solid(ledge, low - bases[p], high - bases[p], "cornice") for ledge in kept]
+    return made
 
 
-def _penthouses(part: PartPlan, random: np.random.Generator) -> list[PartPlan]:
+def posts(plan: BuildingPlan, streets: shapely.STRtree) -> list[PartPlan]:
+    """What holds up the canopies of a building: posts inside their corners and along their edges.
+
+    Parameters
+    ----------
+    plan
+        The building; a part without storeys that begins above the ground is a canopy.
+    streets
+        Centre lines that posts keep clear of.
+
+    Returns
+    -------
+    list of PartPlan
+        From the ground up into the canopy.
+    """
+    made: list[PartPlan] = []
+    for part in plan.parts:
+        if part.levels > 0 or part.low < 1.5 or part.polygon.area < 4.0:
+            continue
+        others = [other.polygon for other in plan.parts if other is not part and other.low < part.low - 0.5]
+        standing = shapely.union_all(others) if others else None
+        inside = polygons_of(shapely.buffer(part.polygon, -0.5, join_style="mitre"), 0.01)
+        for shape in inside or [part.polygon]:
+            ring = shapely.segmentize(shapely.simplify(shape, 0.4).exterior, _POST_EVERY)
+            for x, y in rings_of(Polygon(ring))[0]:
+                foot = shapely.box(x - _POST / 2, y - _POST / 2, x + _POST / 2, y + _POST / 2)
+                if standing is not None and standing.distance(foot) < 1.0:
+                    continue
+                if len(streets.query(foot, predicate="dwithin", distance=_ROADWAY)) or not part.polygon.contains(foot):
+                    continue
+                if any(foot.distance(post.polygon) < 1.5 for post in made):
+                    continue
+                made.append(_solid(foot, 0.0, part.low + 0.06, "post"))
+    return made
+
+
+def _penthouses(part: PartPlan, free: BaseGeometry, random: np.random.Generator) -> list[PartPlan]:
     """Lift and plant rooms: one for every 700 m2 of flat roof or so, well inside."""
-    room = max(polygons_of(shapely.buffer(part.polygon, -4.0)), key=lambda shape: shape.area, default=None)
+    room = max(polygons_of(shapely.buffer(free, -4.0)), key=lambda shape: shape.area, default=None)
     if part.polygon.area < 180.0 or room is None:
         return []
     made: list[PartPlan] = []
-    for size, turn, at in zip(random.uniform(2.2, 6.5, (4, 2)), [0] * 4, random.random((4, 2)), strict=True):
+    for size, at in zip(random.uniform(2.2, 6.5, (4, 2)), random.random((4, 2)), strict=True):
         if len(made) >= min(int(part.polygon.area / 700.0) + 1, 4):
             break
-        box = _box(_spot(room, at), size, _main_direction(part.polygon) + turn)
-        if part.polygon.contains(shapely.buffer(box, 1.0)) and not any(box.intersects(m.polygon) for m in made):
+        box = _box(_spot(room, at), size, _main_direction(part.polygon))
+        if free.contains(shapely.buffer(box, 1.0)) and not any(box.intersects(m.polygon) for m in made):
             made.append(_solid(box, part.eaves - 0.2, part.eaves + float(random.uniform(1.6, 3.0)), "penthouse"))
     return made
 
 
-def _chimneys(part: PartPlan, random: np.random.Generator) -> list[PartPlan]:
-    room = max(polygons_of(shapely.buffer(part.polygon, -2.2)), key=lambda shape: shape.area, default=None)
+def _chimneys(part: PartPlan, free: BaseGeometry, random: np.random.Generator) -> list[PartPlan]:
+    # Towards the ridge: a chimney at the eaves would have to stand free as high as the roof.
+    inset = max(1.2, 0.65 * part.polygon.area / part.polygon.exterior.length)
+    room = max(polygons_of(shapely.buffer(free, -inset)), key=lambda shape: shape.area, default=None)
     if room is None:
         return []
     made: list[PartPlan] = []
     count = min(int(part.polygon.area / 130.0) + 1, 5)
     for at in random.random((count, 2)):
         box = _box(_spot(room, at), np.array([1.3, 0.65]), _main_direction(part.polygon))
-        if part.polygon.contains(box) and not any(box.intersects(m.polygon) for m in made):
-            made.append(_solid(box, part.eaves, part.top + float(random.uniform(0.5, 1.1)), "chimney"))
+        if free.contains(box) and not any(box.intersects(m.polygon) for m in made):
+            # Its foot lies a little under the eaves: on them it would share a plane with other solids' tops.
+            made.append(_solid(box, part.eaves - 0.07, part.top + float(random.uniform(0.5, 1.1)), "chimney"))
     return made
 
 
