@@ -128,11 +128,11 @@ class Window:
         mine = np.radians(self.frame.bbox(self.reach))
         if north < mine[1] or south > mine[3]:
             return False
+        turn = 2 * math.pi
         if east < west:  # over the date line
-            east += 2 * math.pi
-        return any(
-            west <= mine[2] + turn and east >= mine[0] + turn for turn in (-2 * math.pi, 0.0, 2 * math.pi, 4 * math.pi)
-        )
+            east += turn
+        first, last = mine[0], mine[2] + (turn if mine[2] < mine[0] else 0.0)
+        return any(west <= last + k * turn and east >= first + k * turn for k in (-1, 0, 1))
 
 
 def boxes_touch(
