@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
 
 from vico.errors import InputError
 from vico.worldgen.atlas import Atlas
@@ -15,6 +16,7 @@ from vico.worldgen.enhance_fill import exemplar_fill, pull_push
 from vico.worldgen.enhance_sharpen import BackProjection
 
 _LARGEST_PAGE = 8192
+_NEAR, _TRUSTED = 4, 0.5  # shreds of photo with fewer known texels than this share within a few texels are filled too
 _TILE, _MARGIN = 1024, 16  # pixels an upscaler sees at a time, and how far they overlap
 
 
@@ -99,13 +101,16 @@ def inpainted(atlas: Atlas, *, inpainter: Inpainter | None = None) -> Atlas:
             continue
         # Plug-ins see the picture as people do, top row first.
         upright = abs(float(chart.normal[2])) < 0.5
-        made = fill(piece[::-1].copy(), missing[::-1].copy(), usable=(inside & known)[::-1].copy(), upright=upright)
+        usable = inside & known & (_around(known) >= _TRUSTED * _around(inside))
+        hole = inside & ~usable if usable.any() else missing
+        usable = inside & ~hole
+        made = fill(piece[::-1].copy(), hole[::-1].copy(), usable=usable[::-1].copy(), upright=upright)
         if made.shape != piece.shape or made.dtype != np.uint8:
             raise InputError(
                 f"in-painting: {type(fill).__name__} answered {made.dtype} {made.shape} for a picture of uint8 "
                 f"{piece.shape}; it must keep size and type"
             )
-        piece[missing] = made[::-1][missing]
+        piece[hole] = made[::-1][hole]
     return replace(atlas, pages=tuple(pages))
 
 
@@ -166,6 +171,11 @@ def padded(atlas: Atlas) -> Atlas:
     return replace(
         atlas, pages=tuple(pull_push(page, inside) for page, inside in zip(atlas.pages, atlas.inside, strict=True))
     )
+
+
+def _around(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Share of set texels in the square about each."""
+    return uniform_filter(mask.astype(np.float32), 2 * _NEAR + 1, mode="constant") + np.float32(1e-6)
 
 
 def _enlarged(page: NDArray[np.uint8], enlarge: Upscaler) -> NDArray[np.uint8]:

@@ -17,7 +17,7 @@ _SMALLEST = 20  # texels of a side below which no coarser level is made
 _UNKNOWN = 3 * 70.0**2  # what a source texel costs that is not known itself
 _GUESSED = 0.25  # weight of a texel that is filled already, against a known one
 _DRIFT = 4.0  # what a texel of height between copy and source costs, squared differences, at full resolution
-_MOST_DRIFT = 900.0
+_MOST_DRIFT = 9000.0
 
 
 def pull_push(image: NDArray[np.uint8], known: NDArray[np.bool_]) -> NDArray[np.uint8]:
@@ -124,7 +124,7 @@ def exemplar_fill(
     goods, holes = [np.ascontiguousarray(good)], [np.ascontiguousarray(missing)]
     while len(pictures) < _LEVELS and min(pictures[-1].shape[:2]) > _SMALLEST:
         small, _ = _halved(pictures[-1], goods[-1])
-        half = _reduced(goods[-1]) >= 3  # mostly known
+        half = _reduced(goods[-1]) >= 2  # half of it is known
         if not half.any():
             break
         pictures.append(small)
@@ -134,9 +134,10 @@ def exemplar_fill(
     for k in range(len(pictures) - 1, -1, -1):
         start = pull_push(pictures[k], goods[k])
         sources = np.argwhere(goods[k]).astype(np.int32)
+        row = np.searchsorted(sources[:, 0], np.arange(goods[k].shape[0] + 1))
         drift = _DRIFT * 4.0**k if upright else 0.0
         rounds = 6 if k == len(pictures) - 1 else 2
-        field = _matched(start, holes[k], goods[k], sources, field, drift, rounds, np.uint64(seed * 977 + k))
+        field = _matched(start, holes[k], goods[k], sources, row, field, drift, rounds, np.uint64(seed * 977 + k))
         if k == 0:
             return _copied(pictures[0], holes[0], field, start)
     raise AssertionError("a picture has at least one level")
@@ -199,7 +200,7 @@ def _next(state):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _matched(start, hole, good, sources, coarse, drift, rounds, seed):  # type: ignore[no-untyped-def]
+def _matched(start, hole, good, sources, row, coarse, drift, rounds, seed):  # type: ignore[no-untyped-def]
     """Find a source for every missing texel: from the coarser level, from neighbours, and at random, nearer and nearer.
 
     `start` is painted along the way: what is found first is what the next is compared with.
@@ -218,8 +219,12 @@ def _matched(start, hole, good, sources, coarse, drift, rounds, seed):  # type: 
                 if coarse[cy, cx, 0] >= 0:
                     sy, sx = coarse[cy, cx, 0] * 2 + y % 2, coarse[cy, cx, 1] * 2 + x % 2
             if sy < 0 or sy >= height or sx >= width or not good[sy, sx]:
+                # From the same row where it has a known texel and rows are level, else from anywhere.
+                low, high = row[y], row[y + 1]
+                if drift == 0.0 or low == high:
+                    low, high = 0, len(sources)
                 state, bits = _next(state)
-                pick = sources[int(bits % np.uint64(len(sources)))]
+                pick = sources[low + int(bits % np.uint64(high - low))]
                 sy, sx = pick[0], pick[1]
             field[y, x, 0], field[y, x, 1] = sy, sx
     if coarse.shape[0]:
