@@ -23,8 +23,8 @@ from vico.geo.web import Web, cache_folder
 
 #: Where to ask unless `VICO_OVERPASS` or an argument says otherwise.
 ENDPOINT = "https://overpass-api.de/api/interpreter"
-#: Map data reach this far beyond the window, metres: as far as `read_osm` keeps them.
-MARGIN = 60.0
+#: Map data reach this far beyond the window, metres: as far as `read_osm` keeps them, and one for a rounded radius.
+MARGIN = 61.0
 
 _SECONDS, _MEMORY = 180, 512 << 20  # what a query may take on the server; its own defaults
 _MOST_HALF = 10_000.0
