@@ -347,6 +347,8 @@ class Road(Record):
         Centre line on the ground, metres.
     sidewalk
         none, left, right or both, seen along `line`.
+    closed
+        Why neither traffic nor walkers use it, though it is drawn; None for the rest.
     """
 
     id: str
@@ -360,6 +362,7 @@ class Road(Record):
     sidewalk: str
     speed: float
     layer: int = 0
+    closed: str | None = None
 
 
 class Junction(Record):

@@ -14,40 +14,56 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo.osm import polygons_of
-from vico.worldgen.roofs import rings_of
+from vico.world.heights import HeightField
 
 Floats = NDArray[np.float64]
 
 #: Heights at points, shape ``(n, 2)`` -> ``(n,)``.
 Heights = Callable[[Floats], Floats]
 
-TOLERANCE = 0.012
-"""Metres by which the middle of an uncut square may lie off the height field, for each time it is halved."""
+CLOSE, NEAR, ROUGH = 0.02, 0.05, 0.4
+"""Metres by which the middle of an uncut square may lie off its heights: of streets, of other ground, out of sight."""
 
-_FINEST = 0.9
+_USUAL = 1.75  # metres: cells where the field has none
 _WIDEST = 14.0  # metres: vertices carry the large patches of colour
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Squares of sides ``finest * 2**level`` over ``[-reach, reach]``, and which of them need no cutting."""
+    """Squares of sides ``finest * 2**level`` from the corner ``(low, low)`` on, and which of them need no cutting."""
 
-    reach: float
+    low: float
+    side: float
     even: list[NDArray[np.bool_]]
 
     @classmethod
-    def of(cls, height: Heights, reach: float) -> Grid:
-        """Find where heights are as good as planar."""
-        depth = max(math.ceil(math.log2(2 * reach / _FINEST)), 1)
-        n = 2**depth
-        axis = np.linspace(-reach, reach, n + 1)
-        z = height(np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)).reshape(n + 1, n + 1)
+    def of(cls, field: HeightField, height: Heights, reach: float, tolerance: float = CLOSE) -> Grid:
+        """Find where heights are as good as planar, on squares that halve or double the field's own.
+
+        Parameters
+        ----------
+        field
+            The ground; its smooth part bends only along the borders of its cells.
+        height
+            Heights that may leave that smooth part, near edges.
+        reach
+            Half the side of what is to be cut, metres.
+        """
+        cell = field.cell if field.heights.shape[0] > 2 else _USUAL
+        low = -field.half + cell * math.floor(max(field.half - reach, 0.0) / cell)
+        depth = max(math.ceil(math.log2(2 * -low / cell)), 0) + 1
+        n, side = 2**depth, cell * 2 ** (depth - 1)
+        axis = np.linspace(low, low + side, n + 1)
+        at = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+        whole = height(at).reshape(n + 1, n + 1)
+        steps = whole - field.smooth(at).reshape(n + 1, n + 1)
         even = [np.ones((n, n), bool)]
         for level in range(1, depth + 1):
-            side = 2**level
-            corner, mid = z[::side, ::side], z[side // 2 :: side, side // 2 :: side]
+            size = 2**level
+            z = steps if level == 1 else whole
+            corner, mid = z[::size, ::size], z[size // 2 :: size, size // 2 :: size]
             a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]
-            across, up = z[::side, side // 2 :: side], z[side // 2 :: side, ::side]
+            across, up = z[::size, size // 2 :: size], z[size // 2 :: size, ::size]
             off = np.abs(mid - (a + b + c + d) / 4)
             off = np.maximum(off, np.abs(a + d - b - c) / 4)
             for found, expected in (
@@ -59,8 +75,8 @@ class Grid:
                 off = np.maximum(off, np.abs(found - expected))
             below = even[-1]
             calm = below[::2, ::2] & below[1::2, ::2] & below[::2, 1::2] & below[1::2, 1::2]
-            even.append(calm & (off <= TOLERANCE))
-        return cls(reach, even)
+            even.append(calm & (off <= tolerance))
+        return cls(low, side, even)
 
     def cut(self, shapes: Iterable[BaseGeometry]) -> list[Polygon]:
         """Cut polygons along the squares as far as the heights ask for."""
@@ -72,7 +88,7 @@ class Grid:
         for level in range(depth, -1, -1):
             if not len(polygons):
                 break
-            side = 2 * self.reach / 2 ** (depth - level)
+            side = self.side / 2 ** (depth - level)
             whole = self.even[level][row, column] & ((side <= _WIDEST) | (level == 0))
             done += polygons[whole].tolist()
             polygons, column, row = polygons[~whole], column[~whole], row[~whole]
@@ -87,11 +103,11 @@ class Grid:
     ) -> tuple[NDArray[np.object_], NDArray[np.int64], NDArray[np.int64]]:
         """Part polygons at the middles of their squares; along the second axis the columns are halved already."""
         place = (column if axis == 0 else row).copy()
-        middle = -self.reach + (place + 0.5) * side
+        middle = self.low + (place + 0.5) * side
         box = shapely.bounds(polygons)
         below, beyond = box[:, 2 + axis] <= middle + 1e-9, box[:, axis] >= middle - 1e-9
         both = ~(below | beyond)
-        far = 4 * self.reach
+        far = 4 * self.side
         low = [np.full(int(both.sum()), -far), np.full(int(both.sum()), -far)]
         high = [np.full(int(both.sum()), far), np.full(int(both.sum()), far)]
         parts: list[NDArray[np.object_]] = [polygons[below], polygons[beyond & ~below]]
@@ -113,21 +129,40 @@ class Grid:
 
 def triangulated(polygons: Sequence[Polygon]) -> tuple[Floats, NDArray[np.int64]]:
     """Corners, shape ``(n, 2)``, and triangles, counter-clockwise from above, shape ``(m, 3)``, of polygons."""
-    points: list[Floats] = []
-    triangles: list[NDArray[np.int64]] = []
-    count = 0
-    for polygon in polygons:
-        rings = rings_of(polygon)
-        corners = np.concatenate(rings)
-        ends = np.cumsum([len(ring) for ring in rings]).astype(np.uint32)
-        found = mapbox_earcut.triangulate_float64(corners, ends).reshape(-1, 3).astype(np.int64)
-        if len(found):
-            points.append(corners)
-            triangles.append(found + count)
-            count += len(corners)
-    if not points:
+    if not len(polygons):
         return np.zeros((0, 2)), np.zeros((0, 3), np.int64)
-    flat, faces = np.concatenate(points), np.concatenate(triangles)
+    every = np.array(polygons, object)
+    rings, owner = shapely.get_rings(every, return_index=True)
+    coordinates, ring = shapely.get_coordinates(rings, return_index=True)
+    # Rings end where they begin: the doubled point goes.
+    last = np.r_[ring[1:] != ring[:-1], True]
+    flat, ring = coordinates[~last], ring[~last]
+    size = np.bincount(ring, minlength=len(rings))
+    ring_end = np.cumsum(size)
+    ring_start = ring_end - size
+    first_ring = np.searchsorted(owner, np.arange(len(every)))
+    last_ring = np.searchsorted(owner, np.arange(len(every)), "right") - 1
+    simple = first_ring == last_ring
+    corners = size[first_ring]
+    three = ring_start[first_ring[simple & (corners == 3)]]
+    triangles: list[NDArray[np.int64]] = [three[:, None] + np.arange(3)]
+    fours = np.flatnonzero(simple & (corners == 4))
+    start = ring_start[first_ring[fours]]
+    quad = flat[start[:, None] + np.arange(4)]
+    edge = np.roll(quad, -1, axis=1) - quad
+    after = np.roll(edge, -1, axis=1)
+    turn = edge[..., 0] * after[..., 1] - edge[..., 1] * after[..., 0]
+    convex = (turn > 1e-9).all(axis=1) | (turn < -1e-9).all(axis=1)
+    start = start[convex]
+    triangles += [start[:, None] + np.array([0, 1, 2]), start[:, None] + np.array([0, 2, 3])]
+    rest = np.ones(len(every), bool)
+    rest[simple & (corners == 3)] = False
+    rest[fours[convex]] = False
+    for k in np.flatnonzero(rest).tolist():
+        a, b = int(ring_start[first_ring[k]]), int(ring_end[last_ring[k]])
+        ends = (ring_end[first_ring[k] : last_ring[k] + 1] - a).astype(np.uint32)
+        triangles.append(mapbox_earcut.triangulate_float64(flat[a:b], ends).reshape(-1, 3).astype(np.int64) + a)
+    faces = np.concatenate(triangles)
     ux, uy = (flat[faces[:, 1]] - flat[faces[:, 0]]).T
     vx, vy = (flat[faces[:, 2]] - flat[faces[:, 0]]).T
     turn = ux * vy - uy * vx

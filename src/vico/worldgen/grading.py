@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from scipy import ndimage
 from scipy.spatial import cKDTree
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
@@ -22,7 +23,7 @@ from vico.world.heights import HeightField
 from vico.worldgen.kerbs import Water, steps_field
 from vico.worldgen.levels import ON_FOOT, Passage, is_bridge, overpasses, passages
 from vico.worldgen.outlines import building_plans
-from vico.worldgen.partition import ground_partition
+from vico.worldgen.partition import water_pieces
 from vico.worldgen.profiles import Network
 from vico.worldgen.streets import StreetPolygons, carriageway_width, on_the_ground
 
@@ -63,8 +64,7 @@ def graded(height: HeightField, osm: OsmData, streets: StreetPolygons) -> Height
     """
     base = _levelled(replace(height, steps=None), osm, streets)
     window = shapely.box(-height.half, -height.half, height.half, height.half)
-    pieces = ground_partition(osm, streets, window)
-    waters = open_water(base, pieces.get("water", []))
+    waters = open_water(base, water_pieces(osm, streets, window))
     cell = _STEP_CELL if height.half < _LARGE else _STEP_CELL_LARGE
     return replace(base, steps=steps_field(base, streets, waters, cell=cell))
 
@@ -178,7 +178,9 @@ def _blended(
     part = np.clip(out / _BANK, 0.0, 1.0)
     part = part * part * (3.0 - 2.0 * part)
     ground[beside] += (1.0 - part) * (street - ground[beside])
-    return HeightField(ground.reshape(count + 1, count + 1).astype(np.float32), height.half)
+    # Shoulders are wide enough that this reaches no carriageway; creases would cost triangles and show in the light.
+    even = ndimage.gaussian_filter(ground.reshape(count + 1, count + 1), 0.8, mode="nearest")
+    return HeightField(even.astype(np.float32), height.half)
 
 
 def _samples(network: Network, found: Floats, wide: Floats, covers: NDArray[np.bool_]) -> tuple[Floats, Floats, Floats]:

@@ -20,7 +20,7 @@ from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface, joined
 from vico.world.model import ENTITY_GROUND, ENTITY_ROAD
 from vico.worldgen.bridges import bridge_surfaces, portal_surfaces, spans_over_water
-from vico.worldgen.drape import Curtain, Grid, Heights, curtain, triangulated
+from vico.worldgen.drape import NEAR, ROUGH, Curtain, Grid, Heights, curtain, triangulated
 from vico.worldgen.grading import is_level, open_water
 from vico.worldgen.kerbs import Water
 from vico.worldgen.levels import overpasses
@@ -34,9 +34,11 @@ __all__ = ["ground_from_osm", "ground_partition", "mapped_areas", "sea_polygons"
 
 _UNDERLAY = 0.5  # metres below: shows through nothing but the hairlines between two surfaces
 _LIFT, _LIFT_SLOPED = 0.02, 0.035  # of paint
-_STEEP = 0.77  # upward part of a normal below which bare ground is held by a wall
+_STEEP = 0.68  # upward part of a normal below which bare ground is held by a wall
+_SLOPING = 0.985  # ... and below which a yard is not paved
 _SLAB = 0.6  # thickness of a bridge's edge over water
 _HELD = ("yard", "field", "grass", "garden", "woods", "sidewalk", "pedestrian", "path", "parking")
+_NATURAL = ("yard", "field", "grass", "garden", "woods", "farmland", "earth", "ballast", "sand")
 _LONG = 12.0
 _FINE = 0.6
 
@@ -67,14 +69,20 @@ def ground_from_osm(
     reach = half + apron
     window = shapely.box(-reach, -reach, reach, reach)
     pieces = ground_partition(osm, streets, window)
-    upper, lower = Grid.of(terrain.upper, reach), Grid.of(terrain.lower, reach)
+    upper = Grid.of(terrain, terrain.upper, reach)
+    lower = Grid.of(terrain, terrain.lower, reach)
     waters = open_water(terrain, pieces.get("water", [])) if terrain.steps is not None else []
+    near = Grid.of(terrain, terrain.upper, reach, NEAR)
+    calm = Grid.of(terrain, terrain.smooth, reach, ROUGH)
     flights = flights_of(osm, terrain, streets.steps)
     surfaces: list[Surface] = []
+    hidden = _hidden(osm)
     for name, shapes in pieces.items():
         look = look_of(name)
+        if name in ("yard", "field"):
+            shapes = _without(shapes, hidden)
         if name == "water" and waters:
-            surfaces += _water_surfaces(waters, look, terrain, lower)
+            surfaces += _water_surfaces(waters, look, calm)
         elif name.startswith("carriageway"):
             surfaces += _draped(shapes, look, terrain.lower, terrain, lower)
         elif name == "steps":
@@ -82,10 +90,11 @@ def ground_from_osm(
             surfaces += _draped(_within(shapes, flights.area), look, lambda xy: terrain.upper(xy) - 0.3, terrain, upper)
         else:
             held = name.partition(":")[0] in _HELD
-            surfaces += _draped(shapes, look, terrain.upper, terrain, upper, held=held)
+            grid = near if name in _NATURAL else upper
+            surfaces += _draped(shapes, look, terrain.upper, terrain, grid, held=held)
     wet = shapely.union_all([shapely.buffer(water.polygon, 0.6, quad_segs=1) for water in waters])
     dry = shapely.difference(window, wet)
-    surfaces += _draped([dry], LOOKS["yard"], lambda xy: terrain.smooth(xy) - _UNDERLAY, terrain, upper)
+    surfaces += _draped([dry], LOOKS["yard"], lambda xy: terrain.smooth(xy) - _UNDERLAY, terrain, calm)
     if terrain.steps is not None:
         surfaces += _kerbs(streets, terrain, window)
         surfaces += _banks(osm, waters, terrain, window)
@@ -108,6 +117,19 @@ def ground_from_osm(
     lift = _LIFT if level else _LIFT_SLOPED
     surfaces += [_painted(group, terrain, lift=lift + 0.006 * group.rank) for group in quads]
     return joined(surfaces)
+
+
+def _hidden(osm: OsmData) -> BaseGeometry:
+    """Ground well within buildings, which nobody sees."""
+    built = [
+        area.polygon
+        for area in osm.areas
+        if area.tags.get("building", "no") not in ("no", "roof", "carport", "bridge", "ruins", "construction")
+        and not any(key in area.tags for key in ("min_height", "building:min_level"))
+        and on_the_ground(area.tags)
+    ]
+    deep = shapely.buffer(np.array(built, object), -1.5, join_style="mitre")
+    return shapely.union_all(deep[~shapely.is_empty(deep)], grid_size=0.01)
 
 
 def _tracks(osm: OsmData) -> list[NDArray[np.float64]]:
@@ -151,9 +173,9 @@ def _within(shapes: Sequence[Polygon], area: BaseGeometry) -> list[Polygon]:
 def _surface(
     flat: NDArray[np.float64],
     z: NDArray[np.float64],
+    normals: NDArray[np.float64],
     faces: NDArray[np.int64],
     look: Look,
-    normals: NDArray[np.float64],
     uv: NDArray[np.float64] | None = None,
 ) -> Surface:
     return Surface.from_triangles(
@@ -181,18 +203,32 @@ def _draped(
     if not len(faces):
         return []
     z, normals = heights(flat), terrain_normals(terrain, flat)
-    if not held:
-        return [_surface(flat, z, faces, look, normals)]
+    if not held or is_level(terrain):
+        return [_surface(flat, z, normals, faces, look)]
     corners = np.c_[flat, z][faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     steep = across[:, 2] < _STEEP * np.linalg.norm(across, axis=1)
-    result = [_surface(flat, z, faces[~steep], look, normals)] if not steep.all() else []
+    sloping = ~steep & (across[:, 2] < _SLOPING * np.linalg.norm(across, axis=1)) & (look is LOOKS["yard"])
+    result = []
+    for chosen, shown in ((~steep & ~sloping, look), (sloping, LOOKS["field"])):
+        if chosen.any():
+            result.append(_surface(*_used(flat, z, normals, faces[chosen]), shown))
     if steep.any():
-        level = normals[:, :2] / np.maximum(np.linalg.norm(normals[:, :2], axis=1, keepdims=True), 1e-6)
-        # Courses run level: along the wall one way, up the other.
-        uv = np.stack([flat[:, 0] * -level[:, 1] + flat[:, 1] * level[:, 0], z], axis=1)
-        result.append(_surface(flat, z, faces[steep], LOOKS["wall"], normals, uv))
+        # Courses run level, along the wall's nearer axis.
+        corner = faces[steep].ravel()
+        east = np.repeat(np.abs(across[steep, 1]) > np.abs(across[steep, 0]), 3)
+        uv = np.stack([np.where(east, flat[corner, 0], flat[corner, 1]), z[corner]], axis=1)
+        own = np.arange(len(corner)).reshape(-1, 3)
+        result.append(_surface(flat[corner], z[corner], normals[corner], own, LOOKS["wall"], uv))
     return result
+
+
+def _used(
+    flat: NDArray[np.float64], z: NDArray[np.float64], normals: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """The points that triangles use, numbered anew."""
+    kept, index = np.unique(faces, return_inverse=True)
+    return flat[kept], z[kept], normals[kept], index.reshape(-1, 3)
 
 
 def _hung(found: Curtain, look: Look, tile: float | None = None) -> list[Surface]:
@@ -211,13 +247,13 @@ def _hung(found: Curtain, look: Look, tile: float | None = None) -> list[Surface
     ]
 
 
-def _water_surfaces(waters: Sequence[Water], look: Look, terrain: HeightField, grid: Grid) -> list[Surface]:
+def _water_surfaces(waters: Sequence[Water], look: Look, grid: Grid) -> list[Surface]:
     found = []
     for water in waters:
         flat, faces = triangulated(grid.cut([water.polygon]))
         if len(faces):
             up = np.broadcast_to((0.0, 0.0, 1.0), (len(flat), 3))
-            found.append(_surface(flat, water.level(flat), faces, look, np.asarray(up)))
+            found.append(_surface(flat, water.level(flat), np.asarray(up), faces, look))
     return found
 
 
@@ -231,7 +267,7 @@ def _faced_lines(shapes: Iterable[BaseGeometry], low: Heights, high: Heights, sp
     ]
     if not rings:
         return []
-    dense = shapely.segmentize(shapely.linestrings([ring.coords for ring in rings]), spacing)
+    dense = shapely.segmentize(np.array(rings, object), spacing)
     points, owner = shapely.get_coordinates(dense, return_index=True)
     corner = np.zeros(len(points), bool)
     own = shapely.get_coordinates(rings)
@@ -282,8 +318,8 @@ def _banks(osm: OsmData, waters: Sequence[Water], terrain: HeightField, window: 
         water = waters[int(tree.nearest(shape))]
         flat, faces = triangulated([shape])
         up = np.broadcast_to((0.0, 0.0, 1.0), (len(flat), 3))
-        found.append(_surface(flat, water.level(flat), faces, LOOKS["water"], np.asarray(up)))
-        found.append(_surface(flat, terrain.smooth(flat) - _SLAB, faces[:, ::-1], LOOKS["kerb"], -np.asarray(up)))
+        found.append(_surface(flat, water.level(flat), np.asarray(up), faces, LOOKS["water"]))
+        found.append(_surface(flat, terrain.smooth(flat) - _SLAB, -np.asarray(up), faces[:, ::-1], LOOKS["kerb"]))
         edges = _faced_lines([shape], water.level, terrain.smooth, 3.0)
         _, walls = _sorted_by(edges, shapely.buffer(dry, 0.3))
         found += _hung(

@@ -121,7 +121,11 @@ def steps_field(smooth: HeightField, streets: StreetPolygons, waters: Sequence[W
     edge = np.where(inside, -near, near)
     sunk = _near(streets.sunken, n, half, cell, 2 * _FADE)
     sunk[_filled(polygons_of(streets.sunken), n, half, cell)] = 0.0
-    low = -KERB * np.clip(1.0 - sunk / _FADE, 0.0, 1.0)
+    low = np.full((n, n), -KERB)
+    # Only on drives the carriageway comes up: beyond the kerbs its height has nobody to mind it, and stays even.
+    drives = polygons_of(shapely.buffer(shapely.difference(streets.carriageway, streets.sunken), 1.2, quad_segs=2))
+    rising = _filled(drives, n, half, cell) & ~_filled(polygons_of(streets.sunken), n, half, cell)
+    low[rising] = (-KERB * np.clip(1.0 - sunk / _FADE, 0.0, 1.0))[rising]
     ramp = _near(lowered_kerbs(streets.crossings), n, half, cell, RAMP)
     high = -(KERB - _FLUSH) * np.clip(1.0 - ramp / RAMP, 0.0, 1.0) * np.clip(2.0 - sunk / _FADE, 0.0, 1.0)
     if waters:

@@ -112,7 +112,7 @@ def road_network(osm: OsmData, half: float | None = None) -> RoadNetwork:
     used = [street for street in streets if is_traffic_street(street)]
     if not used:
         raise EmptyInputError("road network: no public street in the window; choose another centre or a larger radius")
-    used += [s for s in streets if s.kind == "pedestrian" and not s.covered and s.layer >= 0]
+    used += [s for s in streets if s.kind == "pedestrian" and not s.covered and s.layer >= 0 and not s.above]
     binary = netconvert_binary()
     with tempfile.TemporaryDirectory(prefix="vico-roads-") as folder:
         work = Path(folder)

@@ -57,16 +57,7 @@ def ground_partition(osm: OsmData, streets: StreetPolygons, window: Polygon) -> 
         is paved with, the kind goes on with it: ``sidewalk:setts``.
     """
     soft = mapped_areas(osm, window)
-    # Lawns and ponds that lie within a square are beds in it; other greens end where the square begins.
-    square: BaseGeometry = streets.pedestrian
-    beds = [shape for name in ("water", "garden", "grass", "woods", "playground") for shape in soft[name]]
-    inner = [
-        bed
-        for bed in beds
-        if bed.area < 0.6 * square.area and shapely.intersection(bed, square).area > 0.9 * bed.area > 0.0
-    ]
-    if inner:
-        square = shapely.difference(square, shapely.union_all(inner, grid_size=_GRID), grid_size=_GRID)
+    square = _square(streets, soft)
     paved = shapely.union_all([streets.sidewalk, square, streets.cycleway], grid_size=_GRID)
     kerb = shapely.buffer(streets.carriageway, _CURB, quad_segs=2, join_style="mitre")
     kerb = shapely.difference(shapely.set_precision(kerb, _GRID), streets.carriageway, grid_size=_GRID)
@@ -96,6 +87,42 @@ def ground_partition(osm: OsmData, streets: StreetPolygons, window: Polygon) -> 
     result["yard"] = polygons_of(shapely.intersection(left, near, grid_size=_GRID), 0.02)
     result["field"] = polygons_of(shapely.difference(left, near, grid_size=_GRID), 0.02)
     return {name: shapes for name, shapes in result.items() if shapes}
+
+
+def _square(streets: StreetPolygons, soft: dict[str, list[BaseGeometry]]) -> BaseGeometry:
+    """Squares without the lawns and ponds within them, which are beds; other greens end where the square begins."""
+    square: BaseGeometry = streets.pedestrian
+    shapely.prepare(square)
+    inner = [
+        bed
+        for name in ("water", "garden", "grass", "woods", "playground")
+        for bed in soft[name]
+        if bed.area < 0.6 * square.area
+        and square.intersects(bed)
+        and shapely.intersection(bed, square).area > 0.9 * bed.area > 0.0
+    ]
+    if not inner:
+        return square
+    return shapely.difference(square, shapely.union_all(inner, grid_size=_GRID), grid_size=_GRID)
+
+
+def water_pieces(osm: OsmData, streets: StreetPolygons, window: Polygon) -> list[Polygon]:
+    """The waters of `ground_partition` alone."""
+    soft = mapped_areas(osm, window)
+    if not soft["water"]:
+        return []
+    water = flat(shapely.union_all(soft["water"], grid_size=_GRID))
+    taken = [
+        streets.carriageway,
+        _square(streets, soft),
+        streets.steps,
+        streets.cycleway,
+        streets.sidewalk,
+        streets.path,
+        streets.parking,
+    ]
+    near = shapely.union_all([shapely.intersection(flat(shape), water, grid_size=_GRID) for shape in taken])
+    return polygons_of(shapely.difference(water, flat(near), grid_size=_GRID), 0.02)
 
 
 def _by_paving(kind: str, shapes: list[Polygon], paved: dict[str, shapely.MultiPolygon]) -> dict[str, list[Polygon]]:

@@ -322,6 +322,7 @@ _PAINTERS: dict[str, Callable[[np.random.Generator], Picture]] = {
 }
 
 
+@cache
 def ground_material(name: str) -> Material:
     """The material of that name."""
     return Material(name, _PAINTERS[name](rng(0, "ground", name)))

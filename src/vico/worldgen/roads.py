@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from vico.geo.osm import OsmData, OsmWay
 from vico.world.model import Junction, Road, Roads
+from vico.worldgen.levels import OVER_A_STREET, overpasses
 
 # Lanes each way, lane width (m) and speed (m/s) where the map says nothing: urban defaults by class of road.
 DEFAULTS: dict[str, tuple[int, float, float]] = {
@@ -54,6 +55,8 @@ class Street:
         none, left, right or both.
     access
         all, bus (buses only) or private.
+    above
+        Whether it passes over another street on a bridge, where traffic can't follow.
     """
 
     way: int
@@ -71,6 +74,7 @@ class Street:
     layer: int
     covered: bool
     tags: dict[str, str]
+    above: bool = False
 
     @property
     def drivable(self) -> bool:
@@ -223,6 +227,7 @@ def streets_from_osm(osm: OsmData, half: float) -> list[Street]:
     """
     streets: list[Street] = []
     new_id = -1
+    above = overpasses(osm)
     for way in osm.ways:
         if "highway" not in way.tags:
             continue
@@ -230,7 +235,7 @@ def streets_from_osm(osm: OsmData, half: float) -> list[Street]:
         for part, (nodes, line) in enumerate(pieces):
             street = _street(way, part, nodes, line)
             if street is not None and np.linalg.norm(line[1:] - line[:-1], axis=1).sum() > 0.5:
-                streets.append(street)
+                streets.append(replace(street, above=way.id in above))
     return _medians_cleared(streets)
 
 
@@ -258,7 +263,7 @@ def _medians_cleared(streets: list[Street]) -> list[Street]:
 
 def is_traffic_street(street: Street) -> bool:
     """Whether public traffic uses a street at ground level: what the road network is made of."""
-    if not street.drivable or street.access == "private" or street.covered or street.layer < 0:
+    if not street.drivable or street.access == "private" or street.covered or street.layer < 0 or street.above:
         return False
     if street.kind == "service":
         return street.access == "bus" or street.tags.get("bus", street.tags.get("psv")) in ("yes", "designated")
@@ -327,6 +332,7 @@ def _road(street: Street, start: int, end: int, count: int) -> Road:
         sidewalk=street.sidewalk,
         speed=street.speed,
         layer=-1 if street.covered and street.layer >= 0 else street.layer,
+        closed=OVER_A_STREET if street.above else None,
     )
 
 
