@@ -138,7 +138,8 @@ def read_elevation(
     points, filled, counts = _together(cuts, frame, half)
     digests = {path: _sha256(path) for path in given}
     files = tuple((cut.path.name, digests[cut.path], count) for cut, count in zip(cuts, counts, strict=True) if count)
-    used = [path for path in given if path in {cut.path for cut in cuts}]
+    gave = {cut.path for cut, count in zip(cuts, counts, strict=True) if count}
+    used = [path for path in given if path in gave]
     total = digests[used[0]] if len(used) == 1 else sha256("".join(digests[path] for path in used).encode()).hexdigest()
     return HeightSamples(points, cuts[0].spacing, ", ".join(path.name for path in used), total, filled, files)
 
