@@ -5,16 +5,17 @@ import math
 import numpy as np
 import pytest
 
-from vico.world.model import Building, Entrance
 from vico.world.seeds import rng
 from vico.worldgen.facades import (
     bay_coordinates,
     bays,
     colour_of,
     cut_at_heights,
-    door_surfaces,
+    family_of,
     look_of,
+    region_of,
     storey_coordinates,
+    year_of,
 )
 from vico.worldgen.roofs import Roof, building_solid
 from vico.worldgen.textures import _PAINTERS, BAYS, STOREYS, material
@@ -68,8 +69,30 @@ def test_textures_are_painted_alike_each_time() -> None:
     assert not np.array_equal(a, c)
 
 
-def test_there_are_few_materials() -> None:
-    assert sum(name.startswith(("wall", "ground_", "blank", "roof", "door")) for name in _PAINTERS) <= 25
+def test_a_city_needs_few_materials_but_has_many_families() -> None:
+    families = [name for name in _PAINTERS if name.startswith("wall_") and "back" not in name]
+    assert len(families) >= 14
+    assert sum(name.startswith(("wall", "ground_", "blank", "roof", "door")) for name in _PAINTERS) <= 48
+
+
+@pytest.mark.parametrize("name", sorted(n for n in _PAINTERS if n.startswith("wall_") and "shed" not in n))
+def test_some_windows_of_every_family_are_lit_at_night_and_most_of_the_wall_is_not(name: str) -> None:
+    painted = material(name)
+    assert painted.texture is not None
+    assert painted.emission == 1.0
+    glow = painted.texture[..., 3] / 255
+    assert 0.002 < glow.mean() < 0.3
+    # Bay by bay the windows differ: no two of a row look the same.
+    bays_of_row = painted.texture[:128].reshape(128, BAYS, -1, 4).swapaxes(0, 1)
+    assert len({bay.tobytes() for bay in bays_of_row}) == BAYS
+
+
+def test_what_a_facade_looks_like_follows_its_neighbours_left_and_right() -> None:
+    for name in ("wall_classic", "wall_timbered", "ground_shops"):
+        texture = material(name).texture
+        assert texture is not None
+        seam = np.abs(texture[:, 0, :3].astype(int) - texture[:, -1, :3]).mean()
+        assert seam < 30.0, name
 
 
 def test_a_tagged_colour_tints_the_wall() -> None:
@@ -93,25 +116,61 @@ def test_material_tags_decide_the_wall() -> None:
     assert look.wall == "wall_brick"
 
 
-def test_doors_stand_proud_of_the_wall_at_their_entrance() -> None:
-    building = Building(
-        id="w1",
-        entity=1000,
-        name=None,
-        use="retail",
-        footprint=[[(0, 0), (10, 0), (10, 8), (0, 8)]],
-        base=2.0,
-        height=9.0,
-        levels=2,
-        roof_shape="flat",
-        colour="#ffffff",
-        accessible=True,
-    )
-    door = Entrance(id="e1", building="w1", position=(4.0, 0.0, 2.0), facing=-math.pi / 2, approach=(4.0, -1.0))
-    surfaces = door_surfaces([door], [building])
-    glazed = next(s for s in surfaces if s.material.name == "door_glass")
-    assert glazed.positions[:, 1].max() < -0.02
-    assert glazed.positions[:, 0].mean() == pytest.approx(4.0)
-    assert glazed.positions[:, 2].min() == pytest.approx(2.06, abs=0.01)
-    assert np.allclose(glazed.normals, (0, -1, 0), atol=1e-6)
-    assert all((s.entity == 1000).all() for s in surfaces)
+@pytest.mark.parametrize(
+    ("text", "year"),
+    [
+        ("1887", 1887),
+        ("~1900", 1900),
+        ("1960s", 1960),
+        ("C19", 1850),
+        ("before 1800", 1800),
+        ("soon", None),
+        (None, None),
+    ],
+)
+def test_start_dates_are_read(text: str | None, year: int | None) -> None:
+    assert year_of(text) == year
+
+
+@pytest.mark.parametrize(
+    ("use", "tags", "levels", "region", "family"),
+    [
+        ("residential", {"building:material": "timber_framing"}, 3, "german", "wall_timbered"),
+        ("residential", {"building:material": "wood"}, 2, "nordic", "wall_boards"),
+        ("religious", {"building": "church"}, 1, "british", "wall_church"),
+        ("residential", {"building:architecture": "brutalist"}, 6, "northern", "wall_slab"),
+        ("industrial", {"start_date": "1905"}, 3, "northern", "wall_loft"),
+    ],
+)
+def test_tags_decide_the_family(use: str, tags: dict[str, str], levels: int, region: str, family: str) -> None:
+    assert family_of(use, tags, levels=levels, area=300.0, region=region, draw=(0.9, 0.5)) == family
+
+
+def test_towers_are_of_glass_or_panels_whatever_the_region() -> None:
+    random = rng(0, "towers")
+    for region in ("northern", "southern", "american", "british", "german", "nordic", "elsewhere"):
+        seen = {
+            family_of("office", {}, levels=30, area=1500.0, region=region, draw=tuple(random.random(2)))
+            for _ in range(40)
+        }
+        assert seen <= {"wall_glass", "wall_fins", "wall_ribbon", "wall_grid"}
+        assert len(seen) > 1
+
+
+def test_every_family_has_all_its_materials_in_every_region() -> None:
+    random = rng(0, "looks")
+    for k in range(600):
+        region = ("northern", "southern", "american", "british", "german", "nordic")[k % 6]
+        use = ("residential", "office", "retail", "hotel", "industrial", "civic", "religious", "garage")[k % 8]
+        look = look_of(
+            use, {}, levels=int(random.integers(1, 20)), area=float(random.uniform(20, 900)), region=region,
+            random=rng(k, "look"),
+        )  # fmt: skip
+        assert {look.wall, look.ground, look.blank, look.roof, look.back} <= set(_PAINTERS)
+        assert 2.0 < look.bay < 6.0
+
+
+def test_regions_are_told_apart() -> None:
+    places = {(60.17, 24.94): "nordic", (51.51, -0.1): "british", (49.41, 8.7): "german", (43.73, 7.42): "southern",
+              (40.72, -73.99): "american", (50.85, 4.35): "northern"}  # fmt: skip
+    assert {at: region_of(*at) for at in places} == places

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -43,6 +44,7 @@ _SHELVES = {
     "wine",
 }
 _DUMMIES = {"clothes", "shoes", "fashion", "boutique", "fabric", "bag", "second_hand", "charity", "department_store"}
+_MOST_SHIFT = 0.6  # metres a door may stand beside its entrance: the threshold is wider than that
 _SHARED_MATERIALS = ("ground_shops", "ground_cafes", "ground_loft", "ground_lobby")
 
 
@@ -185,7 +187,10 @@ def _apportioned(spots: Sequence[_Spot]) -> list[_Spot]:
             wall = spot.wall
             assert wall is not None
             half = _WIDTH[spot.kind] / 2 + 0.3
-            s = min(max(wall.along(*spot.entrance.position[:2]), half), max(wall.length - half, wall.length / 2))
+            # Nothing of a doorway, its lintel and canopy included, hangs over the wall's end.
+            clear = min(_WIDTH[spot.kind] / 2 + 0.46, wall.length / 2)
+            s = min(max(wall.along(*spot.entrance.position[:2]), clear), wall.length - clear)
+            s = _settled(wall, s, half)
             a, b = wall.bay_edges(s - half, s + half)
             if spot.kind == "shop" and b - a < 3.4:  # a shop has a window beside its door
                 a, b = wall.bay_edges(s - half - 0.9, s + half + 0.9)
@@ -197,6 +202,18 @@ def _apportioned(spots: Sequence[_Spot]) -> list[_Spot]:
         made += [_with(spot, *rows[k]) for k, spot in enumerate(group)]
     rank = {spot.entrance.id: k for k, spot in enumerate(spots)}
     return sorted(made, key=lambda spot: rank[spot.entrance.id])
+
+
+def _settled(wall: Wall, s: float, half: float) -> float:
+    """Move a door that would cost two bays their windows into one of them, if that is a small step away."""
+    phase = wall.first - math.floor(wall.first)
+    place = s / wall.bay + phase
+    low, high = math.floor(place) + half / wall.bay, math.floor(place) + 1 - half / wall.bay
+    if low > high or low <= place <= high or is_bare(wall, s - half, s + half):
+        return s
+    moved = (min(max(place, low), high) - phase) * wall.bay
+    on_wall = half <= moved <= wall.length - half
+    return moved if on_wall and abs(moved - s) <= _MOST_SHIFT else s
 
 
 def _with(spot: _Spot, s: float, a: float, b: float) -> _Spot:
@@ -260,7 +277,7 @@ class _Front:
         kind = self.spot.kind
         height = min(2.5 if kind != "house" else 2.25, max(self.top - self.z - 0.35, 1.95))
         colour = _DOOR_COLOURS[int(self.random.integers(len(_DOOR_COLOURS)))]
-        stone: Rgb = tuple(min(int(c * 0.4 + t * 0.6), 255) for c, t in zip(_STONE, self._tint(), strict=True))  # type: ignore[assignment]
+        stone = _mixed(_STONE, self._tint(), 0.6)
         if kind == "office" or (kind == "shop"):
             self._door("glass" if kind == "shop" else "office", height, 0.05)
             self._surround(height, (96, 98, 100), wide=0.12, deep=0.12)
@@ -284,7 +301,7 @@ class _Front:
     def _plates(self, height: float) -> None:
         """Names beside the door (offices, practices) or, for a lone one in a house of offices, above it."""
         spot = self.spot
-        boards = [b for p in spot.names if (b := self.boards.by_place.get(p.id)) is not None]
+        boards = self._boards_of(spot.names)
         if not boards:
             return
         if spot.kind in ("office", "shop") and self.top - (self.z + height) > 0.72:
@@ -297,6 +314,9 @@ class _Front:
             wide = board.aspect * high
             self.place.panel(side, side + wide, z, z + high, 0.035, uv=board.uv, colour=_WHITE, stuff=self._page(board))
             self.counts["signs"] += 1
+
+    def _boards_of(self, names: Sequence[Named]) -> list[Board]:
+        return [self.boards.by_place[place.id] for place in names if place.id in self.boards.by_place]
 
     def _page(self, board: Board) -> str:
         return self.boards.materials[board.page].name
@@ -318,7 +338,7 @@ class _Front:
         height = min(2.5, max(self.top - z - 0.7, 2.05))
         self._door("hotel", height, 0.05)
         self._surround(height, (150, 132, 100), wide=0.14, deep=0.12)
-        boards = [b for p in self.spot.names if (b := self.boards.by_place.get(p.id)) is not None]
+        boards = self._boards_of(self.spot.names)
         half = self.width / 2 + 0.45
         low = z + height + 0.3
         colour: Rgb = boards[0].ground if boards else (60, 52, 48)
@@ -349,7 +369,7 @@ class _Front:
         assert wall is not None
         self.counts["shop_fronts"] += 1
         shops = [p for p in spot.names if p.category in (Category.STORE, Category.FOOD)]
-        boards = [b for p in shops if (b := self.boards.by_place.get(p.id)) is not None]
+        boards = self._boards_of(shops)
         lead = shops[0]
         scale = wall.high - wall.low
         low, high = (wall.low + 0.735 * scale, wall.low + 0.915 * scale) if 3.0 < scale < 4.8 else (
@@ -425,6 +445,11 @@ class _Front:
             tall = 0.8 / short[0].aspect
             self.place.plate(side, z - tall, z, 0.16, 0.96, uv=short[0].uv, stuff=self._page(short[0]))
         self.counts["projecting_signs"] += 1
+
+
+def _mixed(a: Rgb, b: Rgb, share: float) -> Rgb:
+    r, g, blue = (round(x + (y - x) * share) for x, y in zip(a, b, strict=True))
+    return r, g, blue
 
 
 def _dim(colour: Rgb, factor: float) -> Rgb:

@@ -11,9 +11,9 @@ import numpy as np
 from vico.world.mesh import Material, Surface
 from vico.world.model import Entrance
 from vico.worldgen.facade_walls import Wall
-from vico.worldgen.textures import material
+from vico.worldgen.textures import BAYS, material
 from vico.worldgen.textures_doors import CELLS
-from vico.worldgen.textures_grounds import PIER, PIER_ELSE
+from vico.worldgen.textures_grounds import BARE, PIER, PIER_ELSE
 
 Rgb = tuple[int, int, int]
 Uv = tuple[float, float, float, float]
@@ -162,16 +162,16 @@ class Place:
 
 def bare(place: Place, wall: Wall, a: float, b: float) -> None:
     """Cover a stretch of a wall with what it shows between its windows: the same picture, drawn from its piers."""
-    share = PIER.get(wall.material, PIER_ELSE)
-    wide = 2 * share * wall.bay
-    count = max(1, math.ceil((b - a) / wide - 0.25))
+    stuff = BARE.get(wall.material, wall.material)
+    share = PIER.get(stuff, PIER_ELSE)
+    bay, colour = (wall.bay, wall.colour) if stuff == wall.material else (3.0, (208, 204, 198))
+    count = max(1, math.ceil((b - a) / (2 * share * bay) - 0.25))
     step = (b - a) / count
-    half = min(step / wall.bay / 2, share)
+    half = min(step / bay / 2, share)
     for k in range(count):
         n = math.floor(wall.first) + k
-        uv = ((n - half) / 8, wall.v(wall.low), (n + half) / 8, wall.v(wall.high))
-        place.panel(a + k * step, a + (k + 1) * step, wall.low, wall.high, 0.02, uv=uv, colour=wall.colour,
-                    stuff=wall.material)  # fmt: skip
+        uv = ((n - half) / BAYS, wall.v(wall.low), (n + half) / BAYS, wall.v(wall.high))
+        place.panel(a + k * step, a + (k + 1) * step, wall.low, wall.high, 0.02, uv=uv, colour=colour, stuff=stuff)
 
 
 def is_bare(wall: Wall, a: float, b: float) -> bool:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.worldgen.textures import BAYS, STOREYS
+from vico.worldgen.textures import BAYS
+from vico.worldgen.textures import STOREYS as STOREYS
 
 Rgb = tuple[int, int, int]
 
@@ -381,7 +382,9 @@ def family_of(
     if tags.get("building") in ("shed", "hut", "barn", "cabin", "farm_auxiliary", "stable"):
         return "wall_shed" if said not in ("brick", "stone") else "wall_brick"
     if use == "garage" or small:
-        return _picked((("wall_plain", 0.5), ("wall_shed", 0.2), ("wall_brick", 0.15), ("wall_panels", 0.15)), draw[0])
+        return _picked(
+            (("wall_plain", 0.56), ("wall_shed", 0.14), ("wall_brick", 0.15), ("wall_panels", 0.15)), draw[0]
+        )
     year = year_of(tags.get("start_date"))
     if use == "industrial" or (use == "transport" and area > 1500):
         old = year is not None and year < 1945

@@ -117,6 +117,27 @@ def _without_tonos(character: str) -> str:
     return character
 
 
+def letters_width(text: str, size: int, *, bold: bool = True) -> int:
+    """Width of what `lettered` draws, pixels."""
+    return (int(_places(text, 2 * size, bold)[1]) + 2) // 2 + 1
+
+
+def _places(text: str, size: int, bold: bool) -> tuple[list[tuple[str, float, float]], float]:
+    """Where each character begins and how wide it is, and where the text ends."""
+    weight = size / 44.0 if bold else 0.0
+    places: list[tuple[str, float, float]] = []
+    x = weight + 1.0
+    for character in text:
+        parts = _parts(character)
+        if character in _DRAWN or parts is None:
+            wide = (_DRAWN[character][0] + 0.28) * 0.7 * size
+        else:
+            wide = float(_font(size).getlength(parts[0]))
+        places.append((character, x, wide))
+        x += wide + weight
+    return places, x + weight
+
+
 def lettered(text: str, size: int, *, bold: bool = True) -> NDArray[np.uint8]:
     """Draw spelled text.
 
@@ -138,20 +159,10 @@ def lettered(text: str, size: int, *, bold: bool = True) -> NDArray[np.uint8]:
     font = _font(size)
     cap = 0.7 * size
     line = 1.12 * size
-    weight = max(size / 30.0, 0.0) if bold else 0.0
+    weight = size / 44.0 if bold else 0.0
     stroke = max(round(0.085 * size + weight), 1)
-    places: list[tuple[str, float, float]] = []
-    x = weight + 1.0
-    for character in text:
-        if character in _DRAWN:
-            wide = (_DRAWN[character][0] + 0.28) * cap
-        else:
-            parts = _parts(character)
-            assert parts is not None
-            wide = float(font.getlength(parts[0]))
-        places.append((character, x, wide))
-        x += wide + weight
-    image = Image.new("L", (max(int(x + weight + 2), 1), round(1.5 * size)), 0)
+    places, _ = _places(text, size, bold)
+    image = Image.new("L", (2 * letters_width(text, target, bold=bold), round(1.5 * size)), 0)
     draw = ImageDraw.Draw(image)
     for character, left, wide in places:
         if character in _DRAWN:
@@ -190,4 +201,4 @@ def lettered(text: str, size: int, *, bold: bool = True) -> NDArray[np.uint8]:
                 points = [(middle + px * cap, base - py * cap) for px, py in polyline_of]
                 draw.line(points, fill=255, width=stroke, joint="curve")
     height = round(1.5 * target)
-    return np.asarray(image.resize((max((image.width + 1) // 2, 1), height), Image.Resampling.BOX))
+    return np.asarray(image.resize((image.width // 2, height), Image.Resampling.BOX))

@@ -12,7 +12,7 @@ from PIL import Image
 
 from vico.world.mesh import Material
 from vico.world.model import Category, Place
-from vico.worldgen.lettering import lettered, spelled
+from vico.worldgen.lettering import lettered, letters_width, spelled
 
 Rgb = tuple[int, int, int]
 
@@ -33,7 +33,7 @@ _STYLES: dict[str, tuple[tuple[Rgb, Rgb], ...]] = {
     "fun": (((56, 24, 66), (252, 224, 120)), ((24, 26, 32), (244, 92, 92)), ((20, 40, 70), (250, 250, 250))),
 }  # fmt: skip
 _ROW, _FONT, _PAGE, _MOST_PAGES = 48, 30, 2048, 2
-_TEXELS_A_METRE = 96.0
+_MOST_BOARDS = 6000
 
 
 @dataclass(frozen=True)
@@ -116,17 +116,15 @@ def paint_boards(places: Sequence[Place]) -> Boards:
         return Boards({}, (), tuple(mute))
     for share in (1.0, 0.75, 0.5, 0.375, 0.25):
         row, font = round(_ROW * share / 4) * 4, max(round(_FONT * share), 7)
-        made = {key: _board(key[0], key[1], key[2], font, row) for key in sorted(wanted)}
-        pages = _packed([picture.shape[1] for picture in made.values()], row)
+        pages = _packed([_board_width(key[0], font) for key in sorted(wanted)], row)
         if pages is not None:
             break
-    else:  # more names than even the smallest letters leave room for: the rest stay without
-        keys = sorted(wanted)[: _MOST_PAGES * (_PAGE // row) * 6]
-        for key in sorted(wanted)[len(keys) :]:
+    else:  # more names than even the smallest letters leave room for: the last ones stay without
+        for key in sorted(wanted)[_MOST_BOARDS:]:
             mute += wanted.pop(key)
-        made = {key: picture[:, : _PAGE // 6] for key, picture in made.items() if key in wanted}
-        pages = _packed([picture.shape[1] for picture in made.values()], row)
+        pages = _packed([_board_width(key[0], font) for key in sorted(wanted)], row)
         assert pages is not None
+    made = {key: _board(key[0], key[1], key[2], font, row) for key in sorted(wanted)}
     count = max(page for page, _, _ in pages) + 1
     highest = max(y for page, _, y in pages if page == count - 1) + row
     canvases = [np.zeros((_PAGE, _PAGE, 4), np.uint8) for _ in range(count)]
@@ -154,20 +152,27 @@ def _board(text: str, ground: Rgb, letters: Rgb, font: int, row: int) -> NDArray
     """One board: coverage of the letters mixes the colours; letters shine, the board a little. Row 0 is the bottom."""
     mask = lettered(text, font)
     margin = round(0.45 * font)
-    if mask.shape[1] > _PAGE // 2 - 2 * margin:
-        wide = _PAGE // 2 - 2 * margin
-        mask = np.asarray(Image.fromarray(mask).resize((wide, mask.shape[0]), Image.Resampling.BOX))
-    cover = np.zeros((row, mask.shape[1] + 2 * margin), np.float32)
+    wide = _board_width(text, font)
+    if mask.shape[1] > wide - 2 * margin:
+        mask = np.asarray(Image.fromarray(mask).resize((wide - 2 * margin, mask.shape[0]), Image.Resampling.BOX))
+    cover = np.zeros((row, wide), np.float32)
     # The middle of a capital, 0.77 of the font's size below the mask's top, goes to the middle of the board.
     top = round(row / 2 - 0.79 * font)
     a, b = max(top, 0), min(top + mask.shape[0], row)
     cover[a:b, margin : margin + mask.shape[1]] = mask[a - top : b - top] / np.float32(255)
+    cover = (np.round(cover * 5) / 5).astype(np.float32)  # a handful of shades: files are smaller by a third
     colour = (
         np.asarray(ground, np.float32) * (1 - cover[..., None]) + np.asarray(letters, np.float32) * cover[..., None]
     )
     bright = sum(letters) > sum(ground)
     glow = 40 + 215 * cover if bright else 190 - 120 * cover
     return np.concatenate([colour, glow[..., None]], axis=2).round().astype(np.uint8)[::-1]
+
+
+def _board_width(text: str, font: int) -> int:
+    """Pixels a board is wide; names longer than half a page are squeezed."""
+    margin = round(0.45 * font)
+    return min(letters_width(text, font) + 2 * margin, _PAGE // 2)
 
 
 def _packed(widths: Sequence[int], row: int) -> list[tuple[int, int, int]] | None:

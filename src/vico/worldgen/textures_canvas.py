@@ -46,7 +46,7 @@ class Canvas:
         self.pixels[b:d, a:c] *= factor
 
     def stroke(self, x0: float, y0: float, x1: float, y1: float, width: float, colour: Colour) -> None:
-        """Draw a slanting bar with hard edges."""
+        """Draw a slanting bar, its long edges smoothed."""
         half = width / 2
         a, c = max(int(min(x0, x1) - half), 0), int(max(x0, x1) + half) + 1
         b, d = max(int(min(y0, y1) - half), 0), int(max(y0, y1) + half) + 1
@@ -55,9 +55,10 @@ class Canvas:
         ux, uy = (x1 - x0) / length, (y1 - y0) / length
         along = (x - x0) * ux + (y - y0) * uy
         across = np.abs((y - y0) * ux - (x - x0) * uy)
-        inside = (across <= half) & (along >= 0) & (along <= length)
-        self.pixels[b:d, a:c][inside] = colour
-        self.glow[b:d, a:c][inside] = 0.0
+        cover = np.clip(half + 0.5 - across, 0, 1) * ((along >= 0) & (along <= length))
+        view = self.pixels[b:d, a:c]
+        view += (np.asarray(colour, np.float32) - view) * cover[..., None].astype(np.float32)
+        self.glow[b:d, a:c][cover > 0.5] = 0.0
 
     def arch(self, x0: float, y0: float, x1: float, y1: float, colour: Colour, *, opacity: float = 1.0) -> None:
         """Fill an upright shape with a half-round head; `y1` is its top."""

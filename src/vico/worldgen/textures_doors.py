@@ -104,8 +104,8 @@ def paint_doors(random: np.random.Generator) -> NDArray[np.uint8]:
     canvas.rect(x, y, x + 128, y + 256, (208, 206, 202))
     glass(canvas, x + 8, y + 214, x + 120, y + 248, lively=0.0, lit=1.0)
     for left in (x + 8, x + 66):
-        show_window(canvas, left, y + 12, left + 54, y + 206, kind=3)
-        canvas.rect(left + 12, y + 128, left + 42, y + 140, (236, 234, 228), 0.7)
+        glass(canvas, left, y + 12, left + 54, y + 206, lively=0.0, lit=1.0)
+        canvas.rect(left + 14, y + 130, left + 40, y + 142, (226, 224, 218), 0.55)
     _handle(canvas, x + 54, y + 84, 44)
     _handle(canvas, x + 70, y + 84, 44)
     for name in ("office", "hotel"):
@@ -114,7 +114,7 @@ def paint_doors(random: np.random.Generator) -> NDArray[np.uint8]:
         canvas.rect(x, y, x + 256, y + 256, (92, 96, 100) if name == "office" else (150, 122, 74))
         for k in range(4):
             left = x + 6 + k * 62
-            show_window(canvas, left, y + 8, left + 58, y + 200, kind=3 if name == "office" else 2, lamp=0.95)
+            glass(canvas, left, y + 8, left + 58, y + 200, lively=0.0, lit=1.0)
             glass(canvas, left, y + 206, left + 58, y + 250, lively=0.0, lit=1.0)
         _handle(canvas, x + 120, y + 84, 44)
         _handle(canvas, x + 134, y + 84, 44)
@@ -149,8 +149,8 @@ def paint_doors(random: np.random.Generator) -> NDArray[np.uint8]:
     canvas.rect(cell.x, cell.y, cell.x + 128, cell.y + 256, (232, 231, 228))
     cell = CELLS["stripes"]
     for k in range(8):
-        tone = (238, 236, 230) if k % 2 else (150, 148, 146)
-        canvas.rect(cell.x + k * 16, cell.y, cell.x + k * 16 + 16, cell.y + 256, tone)
+        stripe = (238, 236, 230) if k % 2 else (150, 148, 146)
+        canvas.rect(cell.x + k * 16, cell.y, cell.x + k * 16 + 16, cell.y + 256, stripe)
     cell = CELLS["cross"]
     canvas.rect(cell.x, cell.y, cell.x + 128, cell.y + 128, (20, 60, 36), glow=60)
     for a, b, c, d in ((46, 14, 82, 114), (14, 46, 114, 82)):

@@ -15,6 +15,14 @@ from vico.worldgen.textures_windows import Window, glass, railing, shutters, win
 _PX = 256  # pixels a bay and a ground floor
 _W = BAYS * _PX
 
+BARE = {
+    "ground_shops": "ground_rusticated",
+    "ground_cafes": "ground_rusticated",
+    "ground_lobby": "ground_rusticated",
+    "ground_loft": "ground_rusticated",
+    "ground_gates": "ground_plain",
+}
+"""What stands for bare wall where a sheet has next to none between its windows."""
 PIER = {
     "ground_shops": 0.05,
     "ground_cafes": 0.11,
@@ -22,6 +30,8 @@ PIER = {
     "ground_gates": 0.08,
     "ground_arcade": 0.18,
     "ground_loft": 0.07,
+    "ground_brownstone": 0.13,
+    "ground_shuttered": 0.18,
 }
 """Share of a bay, to either side of its edge, that shows bare wall; elsewhere it is `PIER_ELSE`."""
 PIER_ELSE = 0.22
@@ -105,7 +115,7 @@ def show_window(
     across = np.linspace(0, 1, width, dtype=np.float32)[None, :, None]
     sheen = np.clip((up * 0.9 + 0.5 * across - float(random.uniform(0.7, 1.0))) * 3.0, 0, 1)
     view = canvas.pixels[b:d, a:c]
-    view *= np.float32(0.88)
+    view *= np.float32(0.8)
     view += (np.array([126, 142, 156], np.float32) - view) * (0.1 + 0.26 * sheen)
     canvas.shade(a, d - 5, c, d, 0.7)
 
@@ -120,7 +130,7 @@ def _shops(random: np.random.Generator) -> Picture:
         edges = np.linspace(x + 18, x + _PX - 18, 4 if i % 2 else 3)
         kind = int(random.integers(4))
         for left, right in pairwise(edges):
-            show_window(canvas, left + 2, 26, right - 2, 184, kind=kind, lamp=float(random.choice([0.35, 0.75, 1.0])))
+            show_window(canvas, left + 2, 26, right - 2, 184, kind=kind, lamp=float(random.choice([0.25, 0.6, 0.85])))
         board = np.asarray(boards[i % len(boards)], np.float32)
         canvas.rect(x + 12, 190, x + _PX - 12, 230, board)
         canvas.rect(x + 12, 227, x + _PX - 12, 230, board * 1.25)
@@ -141,7 +151,7 @@ def _cafes(random: np.random.Generator) -> Picture:
         canvas.rect(x + 30, 12, x + _PX - 30, 222, paint * 0.85)
         parts = [(x + 38, x + 124), (x + 132, x + _PX - 38)]
         kind = int(random.integers(4))
-        lamp = float(random.choice([0.3, 0.8, 1.0]))
+        lamp = float(random.choice([0.3, 0.65, 0.9]))
         for left, right in parts:
             show_window(canvas, left, 58, right, 156, kind=kind, lamp=lamp)
             glass(canvas, left, 162, right, 184, lively=0.0, lit=lamp)

@@ -48,9 +48,9 @@ def _classic(random: np.random.Generator) -> Picture:
     for _, j, x, y in _cells():
         look = Window(2, 2, 0.32, surround=7, hood=hoods[j], frame=(244, 243, 239))
         window(canvas, x - 23, y + 30, x + 23, y + 101, look, lit=0.34)
-        if j == 1:
-            for k in range(5):
-                canvas.rect(x - 22 + k * 9.6, y + 12, x - 16 + k * 9.6, y + 21, (238, 236, 231))
+        if j == 1:  # an apron below the sill
+            canvas.shade(x - 26, y + 9, x + 26, y + 21, 0.9)
+            canvas.shade(x - 24, y + 11, x + 24, y + 19, 1.16)
     return canvas.texture()
 
 
@@ -172,14 +172,14 @@ def _timbered(random: np.random.Generator) -> Picture:
     def beam(x0: float, y0: float, x1: float, y1: float, width: float = 7.0) -> None:
         canvas.stroke(x0, y0, x1, y1, width, wood * float(random.uniform(0.88, 1.1)))
 
-    for j in range(STOREYS):
-        y = j * _PX
-        canvas.rect(0, y, _W, y + 9, wood)
-        canvas.shade(0, y + 9, _W, y + 10.5, 0.75)
-        canvas.shade(0, y, _W, y + 2, 0.7)
-        canvas.rect(0, y + 118, _W, y + _PX, wood * 0.94)
+    for floor in range(STOREYS):
+        low = floor * _PX
+        canvas.rect(0, low, _W, low + 9, wood)
+        canvas.shade(0, low + 9, _W, low + 10.5, 0.75)
+        canvas.shade(0, low, _W, low + 2, 0.7)
+        canvas.rect(0, low + 118, _W, low + _PX, wood * 0.94)
         for k in range(BAYS * 4):
-            canvas.rect(k * 32 + 10, y + 1, k * 32 + 18, y + 7, wood * 1.15)
+            canvas.rect(k * 32 + 10, low + 1, k * 32 + 18, low + 7, wood * 1.15)
     for i, j, x, y in _cells():
         left = i * _PX
         canvas.rect(left - 4 if i else 0, y + 8, left + 4, y + 120, wood * float(random.uniform(0.9, 1.08)))
@@ -209,9 +209,9 @@ def _timbered(random: np.random.Generator) -> Picture:
 def _boards(random: np.random.Generator) -> Picture:
     """Painted weatherboards, white corner and window trims."""
     canvas = plaster(_H, _W, random, (206, 204, 200))
-    for y in range(0, _H, 8):
-        canvas.pixels[y : y + 1] *= 0.74
-        canvas.pixels[y + 1 : y + 3] *= 0.94
+    for row in range(0, _H, 8):
+        canvas.pixels[row : row + 1] *= 0.74
+        canvas.pixels[row + 1 : row + 3] *= 0.94
     for j in range(STOREYS):
         canvas.rect(0, j * _PX, _W, j * _PX + 6, (240, 239, 236))
         canvas.shade(0, j * _PX + 6, _W, j * _PX + 7, 0.8)
