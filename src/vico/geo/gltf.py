@@ -423,9 +423,10 @@ class _Reader:
                 continue
             values = found[number]
             accessor = self._entry("accessors", attributes[name]) if name in attributes else {}
-            # Draco keeps integers as they are; what they mean the accessor says.
-            if accessor.get("normalized") and values.dtype.kind in "iu":
-                values = np.maximum(values / float(np.iinfo(values.dtype).max), -1.0)
+            # Draco hands out integers in wider types than they have: what they mean the accessor says.
+            kind = _COMPONENTS[accessor.get("componentType", 5126)]
+            if accessor.get("normalized") and kind.kind in "iu" and values.dtype.kind in "iu":
+                values = np.maximum(values / float(np.iinfo(kind).max), -1.0)
             arrays[name] = values[:, 0] if values.ndim == 2 and values.shape[1] == 1 else values
         return arrays, faces
 
