@@ -132,7 +132,7 @@ def _standing(
     cv2 = opencv()
     count, labels, boxes, _ = cv2.connectedComponentsWithStats(seeds, connectivity=8)
     core, reach = np.zeros(seeds.shape, np.bool_), np.zeros(seeds.shape, np.bool_)
-    height, width = seeds.shape
+    width = seeds.shape[1]
     for k in range(1, count):
         x, y, wide, tall, area = boxes[k].tolist()
         if area < 10:

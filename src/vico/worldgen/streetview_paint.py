@@ -91,13 +91,13 @@ def colour_curve(
     target = _quantiles(reference[:, 0], shares, None)
     rise, run = np.diff(target), np.diff(source)
     steep = np.clip(rise / np.maximum(run, 1e-3), 0.25, _STEEPEST)
-    # From the middle outwards, so that bounding a slope at one end does not shift everything.
     curve = np.concatenate([[0.0], np.cumsum(steep * np.maximum(run, 1e-3))])
     knots = source[0] + np.concatenate([[0.0], np.cumsum(np.maximum(run, 1e-3))])
     curve += float(np.mean(target - curve))
-    low, high = knots[0] - 30.0, knots[-1] + 30.0
-    knots = np.concatenate([[low], knots, [high]])
-    curve = np.clip(np.concatenate([[curve[0] - 30.0], curve, [curve[-1] + 30.0]]), 0.0, 100.0)
+    # Detail is darker and lighter than any patch's mean: the ends go on as steeply as the whole.
+    slope = float(np.clip((target[-1] - target[0]) / max(source[-1] - source[0], 1.0), 0.5, _STEEPEST))
+    knots = np.concatenate([[knots[0] - 40.0], knots, [knots[-1] + 40.0]])
+    curve = np.clip(np.concatenate([[curve[0] - 40.0 * slope], curve, [curve[-1] + 40.0 * slope]]), 0.0, 100.0)
     spread = np.maximum(np.std(photo[:, 1:], axis=0), 0.5), np.maximum(np.std(reference[:, 1:], axis=0), 0.5)
     gain = np.clip(spread[1] / spread[0], 0.7, 1.4).astype(np.float64)
     shift = np.median(reference[:, 1:], axis=0) - np.median(photo[:, 1:], axis=0) * gain

@@ -64,7 +64,7 @@ class PoseFit:
     refined
         Pose refined on the points' reprojection; None if no consensus was found.
     inliers
-        Which matches agree with `refined` (with `five_point`, if that is None), bool, shape ``(n,)``.
+        Which matches agree with `refined`, bool, shape ``(n,)``.
     error
         Their root mean square reprojection error, pixels.
     uncertainty
@@ -131,7 +131,7 @@ def fit_pose(
         return none
     used = matches.taken(solid)
     world = points[solid]
-    five_point, agreed = _five_point(used, world, prior, intrinsics, pixels)
+    five_point = _five_point(used, world, prior, intrinsics, pixels)
     starts = [pose for pose in (_by_points(used, world, intrinsics, pixels), five_point) if pose is not None]
     best: tuple[Pose, NDArray[np.bool_], float] | None = None
     for start in starts:
@@ -140,7 +140,6 @@ def fit_pose(
             best = pose, inlier, spread
     inliers = np.zeros(len(matches), np.bool_)
     if best is None or best[1].sum() < 6:
-        inliers[solid] = agreed
         return PoseFit(five_point, None, inliers, float("nan"), float("inf"))
     pose, inlier, spread = best
     inliers[solid] = inlier
@@ -179,11 +178,11 @@ def projected(points: NDArray[np.float64], pose: Pose, intrinsics: NDArray[np.fl
 
 def _five_point(
     matches: Matches, world: NDArray[np.float64], prior: Pose, intrinsics: NDArray[np.float64], pixels: float
-) -> tuple[Pose | None, NDArray[np.bool_]]:
+) -> Pose | None:
     """The essential matrix's rotation and direction, and the step's length from the points' depths."""
     relative = relative_pose(matches, intrinsics, pixels=pixels / 2)
     if relative is None:
-        return None, np.zeros(len(matches), np.bool_)
+        return None
     turn, direction, agreed = relative
     # Photo ray x, render point X: x is parallel to turn @ X + s * direction, which gives s for each point.
     ray = np.column_stack([matches.photo, np.ones(len(matches))]) @ np.linalg.inv(intrinsics).T
@@ -194,14 +193,14 @@ def _five_point(
     steps = -(along * across).sum(axis=1) / np.maximum(parallax, 1e-12)
     use = agreed & (parallax > 1e-3)
     if use.sum() < 5:
-        return None, agreed
+        return None
     # Far points tell little of the step: weigh each by what a pixel's error would change.
     weight = (np.sqrt(parallax) / np.linalg.norm(moved, axis=1))[use]
     order = np.argsort(steps[use], kind="stable")
     total = np.cumsum(weight[order])
     step = float(steps[use][order][np.searchsorted(total, total[-1] / 2)])
     centre = -turn.T @ (direction * step)
-    return Pose(prior.world(centre[None])[0], turn @ prior.rotation), agreed
+    return Pose(prior.world(centre[None])[0], turn @ prior.rotation)
 
 
 def relative_pose(
