@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,8 @@ from command_line import vico
 from vico.community import build_community, write_community
 from vico.world.folder import World, read_world
 from vico.worldgen.pipeline import build_world
+
+os.environ["VICO_OVERPASS"] = "off"  # tests ask no server but their own
 
 EXTRACT = Path(__file__).parents[1] / "src" / "vico" / "data" / "helsinki.osm.pbf"
 SHARED = Path(__file__).parents[2] / "shared" / "data"

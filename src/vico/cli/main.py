@@ -51,6 +51,8 @@ def world_build(
     places: tuple[str, ...] = (),
     gtfs: tuple[Path, ...] = (),
     layouts: Path | None = None,
+    overpass: str | None = None,
+    refresh: bool = False,
     seed: int = 0,
     force: bool = False,
     json: bool = False,
@@ -59,21 +61,26 @@ def world_build(
 
     Example: vico world build --lat 60.1690 --lon 24.9435 --out helsinki
 
+    Example: vico world build --lat 48.8530 --lon 2.3499 --out paris
+
     Example: vico world build --osm monaco.osm.pbf --center 43.7338,7.4181 --dem srtm.tif --out monaco
 
     Args:
         out: Folder to make; refused if it exists, unless --force.
-        osm: Map extract, .osm or .osm.pbf. Without it the packaged extract is used, if it covers the window.
+        osm: Map extract, .osm or .osm.pbf, plain or packed. Without it the packaged extract is used if it covers the
+            window, else an Overpass server is asked.
         lat: Latitude of the window's centre, degrees.
         lon: Longitude of the window's centre, degrees.
         center: Both in one. Without any, the middle of the extract.
         radius: Half the window's side, metres.
-        dem: Elevation: GeoTIFF, .hgt or zipped .hgt; one or several. Without it the ground is flat.
+        dem: Elevation: GeoTIFF, .hgt or packed .hgt; one or several that cover the window. Flat ground without.
         tiles: Photogrammetry: path or address of a tileset.json, or "google" (your key in the environment).
         photos: Street pictures: a folder with poses, or "mapillary" or "google" (your key in the environment).
         places: Further places: Overture GeoParquet files, or "google" (your key in the environment).
         gtfs: Timetables: zipped GTFS feeds.
         layouts: Folder of room layouts to choose from.
+        overpass: Address of the Overpass server, or "off"; else the environment's VICO_OVERPASS, else the public one.
+        refresh: Ask the server even if its answer is in the cache.
         seed: Decides what the map leaves open.
         force: Replace what is in the output folder; stages whose inputs did not change are kept.
         json: Print the result as JSON.
@@ -88,7 +95,7 @@ def world_build(
     if (lat is None) != (lon is None):
         raise InputError("world build: --lat and --lon go together")
     if osm is None:
-        osm = verb.locate(lat, lon, radius)
+        osm = verb.locate(lat, lon, radius, overpass=overpass, refresh=refresh)
     sources = Sources(osm, dem=dem, tiles=tiles, photos=photos, places=places, gtfs=gtfs, layouts=layouts)
     return verb.build(sources, out=out, lat=lat, lon=lon, half=radius, seed=seed, force=force, json=json)
 

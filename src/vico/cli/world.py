@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -65,11 +66,16 @@ def build(
     return info(out, json=json)
 
 
-def locate(lat: float | None, lon: float | None, half: float) -> Path:
-    """Find a map that covers a window: the packaged extract."""
-    from vico.worldgen.packaged import extract_for
+def locate(
+    lat: float | None, lon: float | None, half: float, *, overpass: str | None = None, refresh: bool = False
+) -> Path:
+    """Find a map that covers a window: the packaged extract, else one from an Overpass server (``off``: none)."""
+    from vico.geo.overpass import Overpass
+    from vico.worldgen.packaged import map_for
 
-    return extract_for(lat, lon, half).path
+    endpoint = overpass or os.environ.get("VICO_OVERPASS")
+    source = None if endpoint == "off" else Overpass(endpoint, refresh=refresh)
+    return map_for(lat, lon, half, source=source)
 
 
 def rebuild(path: Path, stages: Sequence[str], *, json: bool = False) -> int:

@@ -130,12 +130,18 @@ def build_world(
     with stages.timed("map"):
         data = read_osm(sources.osm, frame, half)
         stages.given(data, f"{data.sha256} {frame} {half}")
-        samples = read_elevation(sources.dem[0], frame, half) if sources.dem else None
+        samples = read_elevation(sources.dem, frame, half) if sources.dem else None
         if samples is not None:
             stages.given(samples, f"{samples.sha256} {frame} {half}")
     stages.report(
         "map",
-        {"nodes": len(data.nodes), "ways": len(data.ways), "areas": len(data.areas)},
+        {
+            "nodes": len(data.nodes),
+            "ways": len(data.ways),
+            "areas": len(data.areas),
+            "heights": 0 if samples is None else len(samples.points),
+            "heights_filled": 0 if samples is None else samples.filled,
+        },
         [Dropped(id=key, reason=reason) for key, reason in data.broken],
     )
     _clear(folder)

@@ -308,13 +308,8 @@ def _sources(data: OsmData, samples: HeightSamples | None, osm: Path) -> list[So
         )
     ]
     if samples is not None:
-        sources.append(
-            Source(
-                kind="elevation",
-                name=samples.name,
-                licence="as its provider states",
-                attribution=samples.name,
-                sha256=samples.sha256,
-            )
-        )
+        sources += [
+            Source(kind="elevation", name=name, licence="as its provider states", attribution=name, sha256=digest)
+            for name, digest, _ in samples.files
+        ]
     return sources

@@ -59,7 +59,7 @@ def report_page(world: World) -> str:
         parts.append(f"<h2>In its streets</h2><div class=views>{pictures}</div>")
     parts.append("<h2>What is there</h2>" + _figures(manifest.counts))
     parts.append("<h2>Places by type</h2>" + _bars(manifest.places_by_type.items(), unit=""))
-    parts.append("<h2>What was left out, and why</h2>" + _left_out(manifest.stages))
+    parts.append("<h2>What was left out or mended, and why</h2>" + _left_out(manifest.stages))
     parts.append("<h2>Stage by stage</h2>" + _stage_table(manifest.stages))
     parts.append("<h2>Seconds a stage</h2>" + _bars(seconds.items(), unit=" s"))
     rows = [
