@@ -10,6 +10,7 @@ from typing import Any, Protocol
 
 from vico.agents.base import Action, Info, Observation
 from vico.agents.conversation import Acquaintance, Conversation, Speaker
+from vico.agents.indoor_walk import IndoorWalker
 from vico.agents.wayfinding import Walker
 from vico.world.public import PublicMap, PublicPlace
 from vico.world.seeds import rng
@@ -124,6 +125,7 @@ class ScheduleFollower:
         self._stays = with_ways(stays_of(resident.schedule, public_map.place_by_id), public_map)
         self._rng = generator
         self._walker = Walker(public_map, generator)
+        self._indoors = IndoorWalker()
         self._conversation = Conversation(resident, known, generator)
         self._posture = "standing"
         self._tick = 0
@@ -227,30 +229,23 @@ class ScheduleFollower:
     def _leave(self, observation: Observation) -> Action:
         """Walk to the door that leads out, and through it."""
         self._walker.stop()
-        state, pose = observation["state"], observation["pose"]
+        state = observation["state"]
         doors = state["doors"]
         out = next((door for door in doors if door["to"] == "outside"), None)
         if out is None:
-            # A room further in: back the way that has not been tried yet.
+            # A room further in: doors are listed with the way to the street first.
             self._tried.add(state["room"])
             out = next((door for door in doors if door["to"] not in self._tried), doors[0] if doors else None)
         if out is None:
             return {"type": "wait"}
         outside = out["to"] == "outside"
-        away = math.hypot(out["position"][0] - pose[0], out["position"][1] - pose[1])
-        if away <= (1.9 if outside else 0.9):
-            if outside:
-                self._tried = set()
-                return {"type": "exit"}
-            return {"type": "enter", "place": out["to"]}
-        if state["action_status"] == "collision":
-            side = "turn_left" if self._rng.random() < 0.5 else "turn_right"
-            return {"type": side, "degrees": float(self._rng.uniform(40.0, 100.0))}
-        turned = math.atan2(out["position"][1] - pose[1], out["position"][0] - pose[0]) - math.atan2(pose[4], pose[3])
-        aligned = math.cos(turned) > 0.97
-        if not aligned and self._tick % 2 == 0:
-            return {"type": "look_at", "target": [*out["position"][:2], float(pose[2]) + 1.5]}
-        return {"type": "move_forward", "distance": min(1.0, max(0.3, away - 1.0))}
+        step = self._indoors.towards(observation, out["position"], near=1.9 if outside else 0.9)
+        if step is not None:
+            return step
+        if outside:
+            self._tried = set()
+            return {"type": "exit"}
+        return {"type": "enter", "place": out["to"]}
 
     def _walk(self, observation: Observation, info: Info, stay: Stay, place: PublicPlace) -> Action:
         self._arrived = None

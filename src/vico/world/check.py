@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from vico.errors import VicoError
 from vico.world.files import sha256_of
 from vico.world.folder import World, world_files
+from vico.world.indoor_checks import walkable_inside
 from vico.world.lanes import LaneGraph
 from vico.world.mesh import Surface, read_glb
 from vico.world.model import Building, Room
@@ -73,6 +74,7 @@ def check_world(world: World) -> list[Finding]:
         _places,
         _rooms,
         _containers,
+        _indoors,
         _objects,
         _clearances,
         _roads,
@@ -334,6 +336,15 @@ def _containers(world: World) -> Iterator[Finding]:
                 yield Finding("container far", container.id, f"its reach point is {away:.2f} m from the surface")
             if not box.contains(shapely.Point(container.centre[:2])):
                 yield Finding("container outside", container.id, f"it is not in {room.id}")
+
+
+def _indoors(world: World) -> Iterator[Finding]:
+    """From the street every room and everything that holds things can be walked to."""
+    # Containers have a rule of their own; rooms of worlds made by hand may list no doors.
+    rooms = [room for room in world.rooms if room.doors]
+    for found in walkable_inside(rooms, world.objects):
+        if not found.id.startswith("container"):
+            yield Finding(*found)
 
 
 def _objects(world: World) -> Iterator[Finding]:

@@ -73,7 +73,7 @@ _TABLES = {
 _BY_PIECE = {
     "bedside_table": "table_lamp clock_small book",
     "side_table": "table_lamp vase",
-    "counter": "till",
+    "counter": "papers small_plant gift_box",
     "kitchen": "toaster pot soap",
     "desk": "mug papers phone pen_pot",
     "chest_of_drawers": "table_lamp vase book_stack",

@@ -160,12 +160,13 @@ def layout_schema() -> dict[str, Any]:
 def layout_guide() -> str:
     """The rules a layout has to keep, in words, for an author."""
     return (
-        "Rooms are rectangles [x0, y0, x1, y1] in metres that lie within the size and do not overlap; neighbours share "
-        "a wall. Every room can be reached through doors from the one door to 'outside', which lies on the "
-        "plan's edge. A door's middle lies on the wall its two rooms share, half its width and 5 cm away from the wall's "
-        f"ends; it is at least {_CLEAR_WIDTH} m wide. Furniture stands within its room, does not overlap, leaves 1 m "
-        "before each door free, and lets a body of 25 cm radius walk from door to door and to every table, desk, sofa, "
-        "chair and bed. Yaw 0 means that the side one uses a piece from looks east; pieces at the north wall have yaw -90."
+        "Rooms are rectangles [x0, y0, x1, y1] in metres that lie within the size and do not overlap; neighbours "
+        "share a wall. Every room can be reached through doors from the one door to 'outside', which lies on the "
+        "plan's edge. A door's middle lies on the wall its two rooms share, half its width and 5 cm away from the "
+        f"wall's ends; it is at least {_CLEAR_WIDTH} m wide. Furniture stands within its room, does not overlap, "
+        "leaves 1 m before each door free, and lets a body of 25 cm radius walk from door to door and to every table, "
+        "desk, sofa, chair and bed. Yaw 0 means that the side one uses a piece from looks east; pieces at the north "
+        "wall have yaw -90."
     )
 
 

@@ -123,7 +123,7 @@ def furnished(sketch: Sketch, chance: np.random.Generator, variant: int = 0) -> 
             RECIPES[room.kind](canvas)
             items = canvas.items
         dress = dressed(room.kind, items, chance) if room.kind not in ("stairs", "lift") else Dressed((), {})
-        spots = _spots(room, canvas, items, dress) if not room.rise else ()
+        spots = _spots(room, canvas, items, dress) if room.kind not in ("stairs", "lift") else ()
         rooms.append(
             RoomPlan(
                 kind=room.kind,

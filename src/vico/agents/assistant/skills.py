@@ -244,6 +244,7 @@ class LookAround:
         self.found: Sighting | None = None
         self._spots: list[NDArray[np.float64]] = []
         self._rooms_done: set[str] = set()
+        self._ways: dict[str, list[str]] = {}  # rooms known to lie behind each room's doors
         self._walked = 0
         if region is not None and region["kind"] == "outdoor":
             middle = np.asarray(region["centre"], np.float64)[:2]
@@ -283,18 +284,36 @@ class LookAround:
             self._walked = 0
             self.turns = 1
             return {"type": "turn_left", "degrees": 85.0}
-        doors = [str(door["to"]) for door in view.state["doors"]]
-        onward = [room for room in doors if room != OUTSIDE and room not in self._rooms_done]
-        if not onward:
+        if view.room not in self._ways:
+            self._ways[view.room] = [str(door["to"]) for door in view.state["doors"] if door["to"] != OUTSIDE]
+        onward = self._next_room(view.room)
+        if onward is None:
             return None
-        step = self.body.go_through(view, onward[0])
-        if step is not None and step["type"] == "enter":
-            self.turns = 0
+        step = self.body.go_through(view, onward)
         self._walked += 1
+        if step is not None and step["type"] == "enter":
+            self.turns = 4 if onward in self._rooms_done else 0  # no second look at what was seen
+            self._walked = 0
         if self._walked > 40:
-            self._rooms_done.add(onward[0])
+            # That door can't be got to: the room behind it has to go without a look.
+            self._rooms_done.add(onward)
+            self._ways[view.room].remove(onward)
             self._walked = 0
         return step
+
+    def _next_room(self, here: str) -> str | None:
+        """The neighbour through which the nearest room lies that was not looked at; None if all were."""
+        first: dict[str, str] = {name: name for name in self._ways[here]}
+        queue = list(first)
+        while queue:
+            room = queue.pop(0)
+            if room not in self._rooms_done:
+                return first[room]
+            for name in self._ways.get(room, []):
+                if name != here and name not in first:
+                    first[name] = first[room]
+                    queue.append(name)
+        return None
 
     @staticmethod
     def _room_middle(view: View) -> NDArray[np.float64]:
