@@ -11,10 +11,9 @@ from itertools import pairwise
 import numpy as np
 
 from vico.world.mesh import Surface
-from vico.world.model import Building, Category, Entrance
-from vico.world.model import Place as Named
+from vico.world.model import Building, Category, Entrance, Place
 from vico.world.seeds import rng
-from vico.worldgen.facade_pieces import Pieces, Place, Rgb, bare, cell_uv, is_bare
+from vico.worldgen.facade_pieces import Face, Pieces, Rgb, bare, cell_uv, is_bare
 from vico.worldgen.facade_walls import GroundFloors, Wall
 from vico.worldgen.signs import Board, Boards, paint_boards
 
@@ -64,14 +63,14 @@ class _Spot:
     building: Building
     wall: Wall | None
     kind: str
-    names: tuple[Named, ...]
+    names: tuple[Place, ...]
     s: float = 0.0
     a: float = 0.0
     b: float = 0.0
 
 
 def street_fronts(
-    places: Sequence[Named],
+    places: Sequence[Place],
     entrances: Sequence[Entrance],
     buildings: Sequence[Building],
     walls: Sequence[Surface],
@@ -101,7 +100,7 @@ def street_fronts(
     """
     known = {building.id: building for building in buildings}
     ground = GroundFloors(walls)
-    at_door: dict[str, list[Named]] = {}
+    at_door: dict[str, list[Place]] = {}
     for place in places:
         if place.entrance is not None:
             at_door.setdefault(place.entrance, []).append(place)
@@ -114,7 +113,7 @@ def street_fronts(
     spots = _apportioned(spots)
     signed = [p for spot in spots for p in spot.names if _has_board(p)]
     boards = paint_boards(signed)
-    pieces = Pieces({m.name: m for m in boards.materials})
+    pieces = Pieces({m.name: m for m in (*(s.material for s in walls), *boards.materials)})
     counts: Counter[str] = Counter(doors=0, shop_fronts=0, signs=0, awnings=0, projecting_signs=0)
     for spot in spots:
         _Front(spot, pieces, boards, counts, rng(seed, "front", spot.entrance.id)).build()
@@ -123,14 +122,14 @@ def street_fronts(
     return Fronts(pieces.surfaces(), dict(sorted(counts.items())))
 
 
-def _has_board(place: Named) -> bool:
+def _has_board(place: Place) -> bool:
     return place.kind not in ("apartments", "place_of_worship", "church") and place.category not in (
         Category.OPEN,
         Category.TRANSIT,
     )
 
 
-def _kind(building: Building, names: Sequence[Named]) -> str:
+def _kind(building: Building, names: Sequence[Place]) -> str:
     """What kind of entrance this is: shop, hotel, hall, office, church, gate, house or stairs."""
     if building.use == "religious":
         return "church"
@@ -229,7 +228,7 @@ class _Front:
         self.spot, self.boards, self.counts, self.random = spot, boards, counts, random
         entity = spot.building.entity
         wall = spot.wall
-        self.place = Place.on(pieces, entity, wall) if wall is not None else Place.before(pieces, entity, spot.entrance)
+        self.face = Face.on(pieces, entity, wall) if wall is not None else Face.before(pieces, entity, spot.entrance)
         self.z = spot.entrance.position[2]
         self.top = wall.high if wall is not None else self.z + 3.4
         self.width = min(_WIDTH[spot.kind], spot.b - spot.a - 0.2)
@@ -244,7 +243,7 @@ class _Front:
             margin = self.width / 2 + 0.25
             whole = not shop or wall.material not in _SHARED_MATERIALS
             if whole and not is_bare(wall, spot.s - margin, spot.s + margin):
-                bare(self.place, wall, spot.a, spot.b)
+                bare(self.face, wall, spot.a, spot.b)
         if shop:
             self._shop()
         elif spot.kind in ("hotel", "hall"):
@@ -258,17 +257,17 @@ class _Front:
 
     def _door(self, cell: str, height: float, d: float, colour: Rgb = _WHITE) -> None:
         s, half = self.spot.s, self.width / 2
-        self.place.panel(s - half, s + half, self.z - 0.05, self.z + height, d, uv=cell_uv(cell), colour=colour)
+        self.face.panel(s - half, s + half, self.z - 0.05, self.z + height, d, uv=cell_uv(cell), colour=colour)
 
     def _surround(self, height: float, colour: Rgb, *, wide: float = 0.26, deep: float = 0.16) -> None:
         """Posts, a lintel and a step of stone."""
         s, half, z = self.spot.s, self.width / 2, self.z
         for left, right in ((s - half - wide, s - half), (s + half, s + half + wide)):
-            self.place.slab(left, right, z - 0.3, z + height, deep, colour=colour, cell="stone", under=False)
-        self.place.slab(
+            self.face.slab(left, right, z - 0.3, z + height, deep, colour=colour, cell="stone", under=False)
+        self.face.slab(
             s - half - wide - 0.06, s + half + wide + 0.06, z + height, z + height + 0.28, deep + 0.05, colour=colour
         )
-        self.place.slab(
+        self.face.slab(
             s - half - 0.1, s + half + 0.1, z - 0.3, z + 0.07, deep + 0.22, colour=(188, 184, 178), under=False
         )
 
@@ -286,7 +285,7 @@ class _Front:
             self._surround(height, stone, wide=0.14, deep=0.1)
             half = self.width / 2 + 0.3
             if self.random.random() < 0.4:
-                self.place.slab(
+                self.face.slab(
                     self.spot.s - half, self.spot.s + half, self.z + height + 0.28, self.z + height + 0.36, 0.7,
                     colour=(120, 116, 112),
                 )  # fmt: skip
@@ -312,10 +311,10 @@ class _Front:
             high = min(0.24, 0.62 / board.aspect)
             z = self.z + 1.7 - 0.27 * k
             wide = board.aspect * high
-            self.place.panel(side, side + wide, z, z + high, 0.035, uv=board.uv, colour=_WHITE, stuff=self._page(board))
+            self.face.panel(side, side + wide, z, z + high, 0.035, uv=board.uv, colour=_WHITE, stuff=self._page(board))
             self.counts["signs"] += 1
 
-    def _boards_of(self, names: Sequence[Named]) -> list[Board]:
+    def _boards_of(self, names: Sequence[Place]) -> list[Board]:
         return [self.boards.by_place[place.id] for place in names if place.id in self.boards.by_place]
 
     def _page(self, board: Board) -> str:
@@ -327,9 +326,7 @@ class _Front:
         if wide > most:
             high *= most / wide
             wide = most
-        self.place.panel(
-            s - wide / 2, s + wide / 2, z, z + high, d, uv=board.uv, colour=_WHITE, stuff=self._page(board)
-        )
+        self.face.panel(s - wide / 2, s + wide / 2, z, z + high, d, uv=board.uv, colour=_WHITE, stuff=self._page(board))
         self.counts["signs"] += 1
 
     def _hotel(self) -> None:
@@ -343,20 +340,20 @@ class _Front:
         low = z + height + 0.3
         colour: Rgb = boards[0].ground if boards else (60, 52, 48)
         if self.spot.kind == "hotel":
-            self.place.slab(s - half, s + half, low, low + 0.34, 1.3, colour=colour)
+            self.face.slab(s - half, s + half, low, low + 0.34, 1.3, colour=colour)
             if boards:
                 self._board(boards[0], s, low + 0.03, 2 * half - 0.1, 0.28, 1.305)
         elif boards:
-            self.place.slab(s - half, s + half, low, low + 0.5, 0.16, colour=colour)
+            self.face.slab(s - half, s + half, low, low + 0.5, 0.16, colour=colour)
             self._board(boards[0], s, low + 0.06, 2 * half - 0.1, 0.38, 0.165)
         for side in (-half + 0.1, half - 0.22):
-            self.place.slab(s + side, s + side + 0.12, z + 1.75, z + 2.05, 0.18, colour=_WHITE, cell="lamp")
+            self.face.slab(s + side, s + side + 0.12, z + 1.75, z + 2.05, 0.18, colour=_WHITE, cell="lamp")
 
     def _church(self) -> None:
         height = min(3.6, max(0.55 * self.spot.building.height, 2.2))
         self._door("portal", height, 0.06, self._tint())
         s, half = self.spot.s, self.width / 2
-        self.place.slab(s - half - 0.2, s + half + 0.2, self.z - 0.3, self.z + 0.1, 0.5, colour=_STONE, under=False)
+        self.face.slab(s - half - 0.2, s + half + 0.2, self.z - 0.3, self.z + 0.1, 0.5, colour=_STONE, under=False)
 
     def _gate(self) -> None:
         height = min(2.5, max(self.top - self.z - 0.2, 2.0))
@@ -379,15 +376,15 @@ class _Front:
         ground: Rgb = boards[0].ground if boards else (74, 76, 80)
         dark = sum(ground) < 420
         paint: Rgb = ground if dark else (60, 60, 62)
-        a, b, z, place = spot.a + 0.04, spot.b - 0.04, self.z, self.place
+        a, b, z, face = spot.a + 0.04, spot.b - 0.04, self.z, self.face
         if b - a > 2.6:  # not the whole pier: the wall shows between neighbours
             edge = min(0.22, (b - a) * 0.05)
             a, b = a + edge, b - edge
-        place.panel(a, b, z - 0.6, low, 0.03, uv=cell_uv("paint"), colour=_dim(paint, 0.8))
+        face.panel(a, b, z - 0.6, low, 0.03, uv=cell_uv("paint"), colour=_dim(paint, 0.8))
         door = min(self.width, b - a - 0.1)
         left, right = max(spot.s - door / 2, a + 0.05), min(spot.s + door / 2, b - 0.05)
         height = min(2.4, low - z - 0.08)
-        place.panel(left, right, z - 0.02, z + height, 0.06, uv=cell_uv("glass"), colour=_WHITE)
+        face.panel(left, right, z - 0.02, z + height, 0.06, uv=cell_uv("glass"), colour=_WHITE)
         kind = (
             2 if lead.category is Category.FOOD else 0 if lead.kind in _SHELVES else 1 if lead.kind in _DUMMIES else 3
         )
@@ -400,12 +397,12 @@ class _Front:
             step = (x1 - x0) / count
             for k in range(count):
                 uv = cell_uv(f"vitrine_{kind}", min(step / 2.3, 1.0))
-                place.panel(x0 + k * step + 0.03, x0 + (k + 1) * step - 0.03, z + riser, low - 0.1, 0.05, uv=uv,
+                face.panel(x0 + k * step + 0.03, x0 + (k + 1) * step - 0.03, z + riser, low - 0.1, 0.05, uv=uv,
                             colour=_WHITE)  # fmt: skip
-            place.panel(x0, x1, z - 0.6, z + riser - 0.04, 0.055, uv=cell_uv("paint"), colour=paint)
+            face.panel(x0, x1, z - 0.6, z + riser - 0.04, 0.055, uv=cell_uv("paint"), colour=paint)
         for x in (a, b - 0.14):
-            place.slab(x, x + 0.14, z - 0.6, low, 0.11, colour=paint, under=False)
-        place.slab(a - 0.03, b + 0.03, low, high, 0.14, colour=ground)
+            face.slab(x, x + 0.14, z - 0.6, low, 0.11, colour=paint, under=False)
+        face.slab(a - 0.03, b + 0.03, low, high, 0.14, colour=ground)
         self._names(boards, a, b, low, high)
         awning = random.random() < (0.45 if lead.category is Category.FOOD else 0.12)
         if awning and low - 0.75 - z > 2.0 and b - a > 1.8:
@@ -427,23 +424,23 @@ class _Front:
         striped = self.random.random() < 0.5
         colour = _lift(ground)
         uv = cell_uv("stripes" if striped else "paint")
-        self.place.slope(a, b, (low - 0.5, 1.05), (low + 0.02, 0.14), uv=uv, colour=colour)
-        self.place.slope(a, b, (low - 0.72, 1.06), (low - 0.5, 1.05), uv=uv, colour=colour)
+        self.face.slope(a, b, (low - 0.5, 1.05), (low + 0.02, 0.14), uv=uv, colour=colour)
+        self.face.slope(a, b, (low - 0.72, 1.06), (low - 0.5, 1.05), uv=uv, colour=colour)
 
     def _projecting(
-        self, boards: Sequence[Board], shops: Sequence[Named], a: float, b: float, low: float, high: float
+        self, boards: Sequence[Board], shops: Sequence[Place], a: float, b: float, low: float, high: float
     ) -> None:
         """A sign at a right angle to the wall: a pharmacy's cross, or a short name."""
         side = a + 0.1 if self.random.random() < 0.5 else b - 0.1
         z = high - 0.1
         if any(shop.kind in ("pharmacy", "chemist") for shop in shops):
-            self.place.plate(side, z - 0.6, z, 0.2, 0.8, uv=cell_uv("cross"), stuff="doors")
+            self.face.plate(side, z - 0.6, z, 0.2, 0.8, uv=cell_uv("cross"), stuff="doors")
         else:
             short = [board for board in boards if board.aspect < 4.2]
             if not short or self.random.random() > 0.35:
                 return
             tall = 0.8 / short[0].aspect
-            self.place.plate(side, z - tall, z, 0.16, 0.96, uv=short[0].uv, stuff=self._page(short[0]))
+            self.face.plate(side, z - tall, z, 0.16, 0.96, uv=short[0].uv, stuff=self._page(short[0]))
         self.counts["projecting_signs"] += 1
 
 

@@ -77,7 +77,7 @@ class Pieces:
 
 
 @dataclass(frozen=True)
-class Place:
+class Face:
     """Where pieces are set: `s` runs to the right along the wall, `d` away from it, metres."""
 
     pieces: Pieces
@@ -87,12 +87,12 @@ class Place:
     out: tuple[float, float]
 
     @classmethod
-    def on(cls, pieces: Pieces, entity: int, wall: Wall) -> Place:
+    def on(cls, pieces: Pieces, entity: int, wall: Wall) -> Face:
         """Before a wall, from its start."""
         return cls(pieces, entity, wall.start, wall.right, wall.out)
 
     @classmethod
-    def before(cls, pieces: Pieces, entity: int, entrance: Entrance) -> Place:
+    def before(cls, pieces: Pieces, entity: int, entrance: Entrance) -> Face:
         """Before an entrance, from its threshold's middle."""
         c, s = math.cos(entrance.facing), math.sin(entrance.facing)
         return cls(pieces, entity, (entrance.position[0], entrance.position[1]), (-s, c), (c, s))
@@ -160,7 +160,7 @@ class Place:
             self.pieces.add(stuff, corners, (rx * sign, ry * sign, 0.0), uv, (255, 255, 255), self.entity)
 
 
-def bare(place: Place, wall: Wall, a: float, b: float) -> None:
+def bare(face: Face, wall: Wall, a: float, b: float) -> None:
     """Cover a stretch of a wall with what it shows between its windows: the same picture, drawn from its piers."""
     stuff = BARE.get(wall.material, wall.material)
     share = PIER.get(stuff, PIER_ELSE)
@@ -171,7 +171,7 @@ def bare(place: Place, wall: Wall, a: float, b: float) -> None:
     for k in range(count):
         n = math.floor(wall.first) + k
         uv = ((n - half) / BAYS, wall.v(wall.low), (n + half) / BAYS, wall.v(wall.high))
-        place.panel(a + k * step, a + (k + 1) * step, wall.low, wall.high, 0.02, uv=uv, colour=colour, stuff=stuff)
+        face.panel(a + k * step, a + (k + 1) * step, wall.low, wall.high, 0.02, uv=uv, colour=colour, stuff=stuff)
 
 
 def is_bare(wall: Wall, a: float, b: float) -> bool:

@@ -69,7 +69,7 @@ def show_window(
     if c - a < 3 or d - b < 3:
         return
     up = np.linspace(0, 1, d - b, dtype=np.float32)[:, None, None]
-    warm = np.array([[176, 150, 112], [168, 162, 150], [162, 122, 78], [150, 152, 150]][kind], np.float32)
+    warm = np.array([[168, 140, 102], [152, 138, 116], [160, 120, 76], [140, 132, 118]][kind], np.float32)
     canvas.pixels[b:d, a:c] = warm * (0.5 + 0.5 * np.clip(1.2 - np.abs(up - 0.75) * 1.3, 0.1, 1))
     canvas.glow[b:d, a:c] = 255 * lamp
     width, height = c - a, d - b

@@ -93,7 +93,28 @@ def _tenement(random: np.random.Generator) -> Picture:
                 canvas.rect(x + side - 10, y + 30, x + side + 10, y + 42, (196, 194, 190))
                 for k in range(4):
                     canvas.shade(x + side - 8, y + 32 + k * 2.5, x + side + 8, y + 33 + k * 2.5, 0.7)
+    for column in (1, 5):
+        _fire_escape(canvas, column * _PX + _PX / 2)
     return canvas.texture()
+
+
+def _fire_escape(canvas: Canvas, x: float) -> None:
+    """Iron landings and stairs before a column of windows, and the shadow they throw on the bricks."""
+    iron = (40, 38, 38)
+    for j in range(STOREYS):
+        y = j * _PX + 16.0
+        canvas.shade(x - 44, y - 12, x + 52, y, 0.72)
+        canvas.rect(x - 48, y, x + 48, y + 4, iron)
+        railing(canvas, x - 48, y + 4, x + 46, y + 36, iron, gap=5.5)
+        top = y + 108 if j < STOREYS - 1 else _H - 1
+        rise = (top - y) / 108
+        for side in (0.0, 11.0):
+            canvas.stroke(x - 34 + side, y + 4, x - 34 + side + 60 * rise, top, 2.2, iron)
+        for step in range(round(12 * rise)):
+            left = x - 34 + 5 * step
+            canvas.rect(left, y + 4 + 9 * step, left + 12, y + 5.4 + 9 * step, iron)
+    for side in (-48, 46):
+        canvas.rect(x + side, 0, x + side + 2, _H, iron)
 
 
 def _stone(random: np.random.Generator) -> Picture:
