@@ -15,6 +15,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from shapely import Polygon
 
+from vico.errors import EmptyInputError
 from vico.geo.osm import OsmData
 from vico.geo.tile_mesh import TileMesh
 from vico.world.heights import HeightField
@@ -183,6 +184,47 @@ def fit_to_tiles(
             )
         )
     return moved, FitReport(tuple(fits))
+
+
+def settled(mesh: TileMesh, plans: list[BuildingPlan], height: HeightField) -> tuple[TileMesh, float]:
+    """Lower a mesh of buildings alone onto a terrain that comes from elsewhere.
+
+    Tilesets of city models have no ground, and count heights from the ellipsoid where elevation files count from the
+    sea: between the two lie up to 100 m.
+
+    Parameters
+    ----------
+    mesh
+        The city model, in the plans' frame.
+    plans
+        The same city from the map.
+    height
+        What the buildings shall stand on.
+
+    Returns
+    -------
+    tuple
+        The mesh with its buildings' feet on the terrain, and by how much it was raised, metres.
+
+    Raises
+    ------
+    EmptyInputError
+        If no planned building has anything of the mesh in it.
+    """
+    tree = shapely.STRtree([shapely.buffer(plan.outline, 0.5) for plan in plans])
+    points = mesh.positions
+    vertex, plan = tree.query(shapely.points(points[:, :2]), predicate="intersects") if plans else ((), ())
+    owner = np.asarray(plan, np.int64)
+    feet = np.full(len(plans), np.inf)
+    np.minimum.at(feet, owner, points[np.asarray(vertex, np.int64), 2])
+    # A planned building that only a corner of another reaches into has no foot in the mesh.
+    stand = np.flatnonzero(np.bincount(owner, minlength=len(plans)) >= _LEAST_POINTS)
+    if not len(stand):
+        raise EmptyInputError(
+            "tiles: not one building of the map has anything of the tileset in it; check the tileset's place and crs"
+        )
+    by = float(np.median([seat_of(plans[k], height).base - feet[k] for k in stand.tolist()]))
+    return replace(mesh, positions=points + np.array([0.0, 0.0, by])), by
 
 
 @dataclass(frozen=True)

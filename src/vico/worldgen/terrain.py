@@ -25,6 +25,7 @@ _CELL = 4.0
 _NEIGHBOURS = 25
 _MOST_SAMPLES = 40_000
 _TILE_BIN, _TILE_KNOT = 5.0, 8.0
+_STEEPEST = 0.3
 
 
 def is_outlier(points: NDArray[np.float64], neighbours: int = _NEIGHBOURS) -> NDArray[np.bool_]:
@@ -210,8 +211,11 @@ def terrain_from_tiles(
         degree=1,
     )
     rough = fit(np.stack([x.ravel(), y.ravel()], axis=1) / _TILE_BIN).reshape(x.shape)
-    # Far from any sample a plane through the last ones runs away.
-    rough = np.clip(rough, bins[:, 2].min(), bins[:, 2].max())
+    # Far from any sample a plane through the last ones runs away: no steeper than ground is, from the nearest.
+    away, nearest = cKDTree(bins[:, :2]).query(np.stack([x.ravel(), y.ravel()], axis=1))
+    most = (_TILE_BIN + _STEEPEST * away).reshape(x.shape)
+    level = bins[nearest, 2].reshape(x.shape)
+    rough = np.clip(rough, level - most, level + most)
     fine = np.linspace(-reach, reach, math.ceil(2 * reach / _CELL) + 1)
     heights = RectBivariateSpline(knots, knots, rough, kx=3, ky=3)(fine, fine)
     field = HeightField(np.clip(heights, rough.min(), rough.max()).astype(np.float32), reach)
