@@ -104,9 +104,10 @@ def flights_of(osm: OsmData, terrain: HeightField, where: BaseGeometry) -> Fligh
         for piece in shapely.get_parts(shapely.intersection(line, where)):
             if piece.geom_type != "LineString" or piece.length < 0.8 or np.abs(piece.bounds).max() > reach:
                 continue
-            faces = list(_flight(np.asarray(piece.coords), width, terrain))
-            if faces:
-                areas.append(shapely.buffer(piece, width / 2, cap_style="flat", join_style="mitre"))
+            run = _rising(np.asarray(piece.coords), terrain)
+            faces = list(_flight(*run, width)) if run is not None else []
+            if faces and run is not None:
+                areas.append(shapely.buffer(shapely.LineString(run[0]), width / 2, cap_style="flat"))
                 quads += [quad for quad, _ in faces]
                 normals += [normal for _, normal in faces]
     return Flights(
@@ -116,20 +117,28 @@ def flights_of(osm: OsmData, terrain: HeightField, where: BaseGeometry) -> Fligh
     )
 
 
-def _flight(line: Floats, width: float, terrain: HeightField) -> Iterable[tuple[Floats, Floats]]:
-    """Faces of the steps along a line: tread, riser, and the two sides."""
+def _rising(line: Floats, terrain: HeightField) -> tuple[Floats, Floats] | None:
+    """The stretch of a line that rises all along, as points every decimetre, upwards, and their heights."""
     path = shapely.LineString(line)
     places = np.linspace(0.0, path.length, max(int(path.length / 0.1), 4) + 1)
     points = shapely.get_coordinates(shapely.line_interpolate_point(path, places))
     z = terrain.upper(points)
-    if abs(z[-1] - z[0]) < _LEAST:
-        return
     if z[-1] < z[0]:
         points, z = points[::-1], z[::-1]
-    z = np.maximum.accumulate(z)
+    first, last = int(z.argmin()), int(z.argmax())
+    if last - first < 4 or z[last] - z[first] < _LEAST:
+        return None
+    points, z = points[first : last + 1], z[first : last + 1]
+    even = np.maximum.accumulate(z)
+    # Stairs over a hollow would float.
+    return None if float((even - z).max()) > 0.1 else (points, even)
+
+
+def _flight(points: Floats, z: Floats, width: float) -> Iterable[tuple[Floats, Floats]]:
+    """Faces of the steps along a rising line: tread, riser, and the two sides."""
     rise = z[-1] - z[0]
     # On ground steeper than stairs can be, steps are as high as their going lets them be.
-    count = int(min(max(round(rise / RISE), 1), max(path.length / 0.22, 1)))
+    count = int(min(max(round(rise / RISE), 1), max(len(points) * 0.1 / 0.22, 1)))
     edges = z[0] + rise * np.arange(count + 1) / count
     edge = np.minimum(np.searchsorted(z, edges - 1e-9), len(points) - 1)
     along = np.gradient(points, axis=0)

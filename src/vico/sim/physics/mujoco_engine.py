@@ -27,6 +27,8 @@ from vico.world.heights import HeightField
 NEAR = 10.0
 #: Finest grid of the ground, metres: finer ones cost time and give robots nothing.
 _CELL = 2.0
+#: ... and where it has kerbs, which are ramps half a metre wide then.
+_KERB_CELL = 0.5
 #: Kinematic bodies are this much larger than what they stand for: soft contact never lets the real ones overlap.
 _SKIN = 0.03
 _PARKED = -500.0
@@ -410,7 +412,10 @@ def _grid(scenery: Scenery) -> tuple[NDArray[np.float64], float]:
     field = scenery.height
     if field.heights.shape[0] != field.heights.shape[1]:
         raise InputError("physics: the height field has to be square")
-    count = min(field.heights.shape[0], round(2 * field.half / _CELL) + 1)
+    if field.steps is None:
+        count = min(field.heights.shape[0], round(2 * field.half / _CELL) + 1)
+    else:
+        count = min(field.steps.edge.shape[0], round(2 * field.half / _KERB_CELL) + 1)
     axis = np.linspace(-field.half, field.half, max(count, 2))
     xx, yy = np.meshgrid(axis, axis)
     return field(np.stack([xx, yy], axis=-1)), field.half
