@@ -18,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 from vico.geo.osm import OsmArea, OsmData, Tags, polygons_of
 from vico.world.model import Dropped
 from vico.world.seeds import rng
-from vico.worldgen.outlines_apart import apart, supported
+from vico.worldgen.outlines_apart import apart, supported, without_slivers
 from vico.worldgen.outlines_heights import STOREY, level_estimates, said_height, said_levels, weighted_median
 from vico.worldgen.outlines_parts import OPEN_KINDS, SMALL_KINDS, part_of
 from vico.worldgen.outlines_plans import BuildingPlan, PartPlan
@@ -236,7 +236,8 @@ def _rest_of_outline(main: PartPlan, parts: list[PartPlan]) -> list[PartPlan]:
         low = replace(main, eaves=eaves, levels=max(round(eaves / STOREY), 1), roof=Roof("flat", 0.0))
         solids += [replace(low, polygon=piece) for piece in polygons_of(under, 6.0)]
         rest = shapely.difference(rest, part.polygon, grid_size=0.001)
-    return [replace(main, polygon=piece) for piece in polygons_of(rest, 6.0)] + solids
+    pieces = [piece for piece in without_slivers(rest, main.polygon) if piece.area > 6.0]
+    return [replace(main, polygon=piece) for piece in pieces] + solids
 
 
 def _id_key(name: str) -> tuple[str, int, int]:

@@ -20,6 +20,7 @@ _LEAST_AREA = 2.0  # square metres
 _GAP = 1.5  # metres between a solid and what it rests on that are a difference between two taggings
 _RESTING = 0.3  # share of its area that must rest on others
 _HELD = 0.2  # share of its outline that must be fixed to others' walls, where less of it rests
+_TOUCHING = 0.003  # square metres that two outlines share where they only touch
 _SPANNED = 5.0  # metres of street beneath that make it a passage
 _BARE = Roof("flat", 0.0)
 
@@ -158,19 +159,20 @@ def _beside(part: PartPlan, other: PartPlan) -> list[PartPlan]:
     if other.low >= part.top - 0.02 or part.low >= other.top - 0.02:
         return [part]
     common = shapely.intersection(part.polygon, other.polygon)
-    if common.area <= 0.02:
+    if common.area <= _TOUCHING:
         return [part]
     rest = [
-        replace(part, polygon=piece) for piece in _clean(shapely.difference(part.polygon, other.polygon), part.polygon)
+        replace(part, polygon=piece)
+        for piece in without_slivers(shapely.difference(part.polygon, other.polygon), part.polygon)
     ]
     if other.low > part.low + 0.3:
         levels = max(round((other.low - part.low - 0.6) / STOREY), 1) if part.levels else 0
         under = replace(part, eaves=other.low, levels=levels, roof=_BARE)
-        rest += [replace(under, polygon=piece) for piece in _clean(common, part.polygon)]
+        rest += [replace(under, polygon=piece) for piece in without_slivers(common, part.polygon)]
     return rest
 
 
-def _clean(shape: BaseGeometry, whole: Polygon) -> list[Polygon]:
+def without_slivers(shape: BaseGeometry, whole: Polygon) -> list[Polygon]:
     """Pieces of a cut outline without the slivers that are left between two outlines that nearly agree."""
     opened = shapely.buffer(shapely.buffer(shape, -0.15, join_style="mitre"), 0.15, join_style="mitre", mitre_limit=2.5)
     kept = shapely.intersection(shapely.intersection(opened, shape), whole)

@@ -163,7 +163,7 @@ def _chimneys(part: PartPlan, free: BaseGeometry, random: np.random.Generator) -
     made: list[PartPlan] = []
     count = min(int(part.polygon.area / 130.0) + 1, 5)
     for at in random.random((count, 2)):
-        box = _box(_spot(room, at), np.array([1.3, 0.65]), _main_direction(part.polygon))
+        box = _box(_spot(room, at), np.array([1.1, 0.6]), _main_direction(part.polygon))
         if free.contains(box) and not any(box.intersects(m.polygon) for m in made):
             # Its foot lies a little under the eaves: on them it would share a plane with other solids' tops.
             made.append(_solid(box, part.eaves - 0.07, part.top + float(random.uniform(0.5, 1.1)), "chimney"))
