@@ -12,7 +12,7 @@ from PIL import Image
 from vico.errors import InputError
 from vico.world.mesh import Material
 
-LEVELS = 12
+LEVELS = 13  # up to 4096 texels a side
 CUTOUT, DOUBLE_SIDED = 1, 2
 
 
@@ -47,7 +47,9 @@ def pack_textures(materials: Sequence[Material]) -> Textures:
     size = np.zeros((n, 3), np.int32)
     flags = np.zeros(n, np.uint8)
     emission = np.zeros(n, np.float32)
-    parts: list[NDArray[np.uint32]] = [np.full(1, 0xFFFFFFFF, np.uint32)]
+    textures = {id(m.texture): m.texture.shape[:2] for m in materials if m.texture is not None}
+    # One array from the start: joining the levels at the end would take the memory of a photographed city twice.
+    texels = np.full(1 + sum(_texel_count(*sides) for sides in textures.values()), 0xFFFFFFFF, np.uint32)
     position = 1
     known: dict[int, int] = {}
     for index, material in enumerate(materials):
@@ -67,19 +69,31 @@ def pack_textures(materials: Sequence[Material]) -> Textures:
             if k < len(levels):
                 level = levels[k].astype(np.uint32)
                 packed = level[..., 0] | level[..., 1] << 8 | level[..., 2] << 16 | level[..., 3] << 24
-                parts.append(packed.astype(np.uint32).ravel())
+                texels[position : position + packed.size] = packed.ravel()
                 start[index, k] = position
                 position += packed.size
             else:
                 start[index, k] = start[index, k - 1]
-    return Textures(np.concatenate(parts), start, size, flags, emission)
+    return Textures(texels[:position], start, size, flags, emission)
+
+
+def _sides(height: int, width: int) -> tuple[int, int]:
+    """Sides of a texture's finest level: powers of two, no larger than there are levels for."""
+    tall, wide = (min(1 << max(side - 1, 0).bit_length(), 1 << (LEVELS - 1)) for side in (height, width))
+    return tall, wide
+
+
+def _texel_count(height: int, width: int) -> int:
+    """Texels of all levels of a texture."""
+    height, width = _sides(height, width)
+    return sum(max(height >> k, 1) * max(width >> k, 1) for k in range(max(height, width).bit_length()))
 
 
 def _mip_levels(material: Material) -> list[NDArray[np.uint8]]:
     pixels = material.texture
     if pixels is None or pixels.ndim != 3 or pixels.shape[2] not in (3, 4) or pixels.dtype != np.uint8:
         raise InputError(f"material {material.name}: a texture must be uint8 of shape (h, w, 3) or (h, w, 4)")
-    height, width = (min(1 << max(side - 1, 0).bit_length(), 1 << (LEVELS - 1)) for side in pixels.shape[:2])
+    height, width = _sides(*pixels.shape[:2])
     if (height, width) != pixels.shape[:2]:
         pixels = np.asarray(Image.fromarray(pixels).resize((width, height), Image.Resampling.LANCZOS))
     if pixels.shape[2] == 3:

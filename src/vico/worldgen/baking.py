@@ -186,7 +186,7 @@ class _Photos:
         order = np.argsort(which, kind="stable")
         first = np.flatnonzero(np.diff(which[order], prepend=np.int32(-2)))
         white = np.full((1, 1, 3), 255, np.uint8)
-        for start, stop in zip(first, [*first[1:], len(order)], strict=True):
+        for start, stop in zip(first, [*first[1:], len(order)][: len(first)], strict=True):
             texture = self.textures[which[order[start]]] if which[order[start]] >= 0 else white
             _fetch(
                 texture, order[start:stop], triangle, u, v, chart, right, up,
@@ -388,7 +388,7 @@ def _oddities(
     light = 0.299 * r + 0.587 * g + 0.114 * b
     leaves = wall & (excess > _GREEN) & (excess > green + _GREENER)
     hole = (light < _DARK) & (light < _DARKER * luminance)
-    obstacle = wall & off & (height < _LOW)
+    obstacle = wall & off & (height < _LOW) & (luminance > 0)  # the coarse bake doesn't know yet what stands off
     return leaves | hole | obstacle, leaves | obstacle
 
 

@@ -162,6 +162,9 @@ class DiffusionInpainter:
         Pixels of a side that the model sees at a time, a multiple of 16.
     device
         Where to run, "cpu" or "cuda".
+    without
+        Parts of the model to leave out: ``("text_encoder_3", "tokenizer_3")`` spares Stable Diffusion 3 its largest
+        text encoder.
 
     Raises
     ------
@@ -182,6 +185,7 @@ class DiffusionInpainter:
     strength: float = 0.99
     side: int = 512
     device: str = "cpu"
+    without: tuple[str, ...] = ()
     facade_prompt: str = FACADE_PROMPT
     roof_prompt: str = ROOF_PROMPT
     _pipeline: Any = field(init=False, repr=False, compare=False)
@@ -189,7 +193,9 @@ class DiffusionInpainter:
     def __post_init__(self) -> None:
         if self.side < _STEP or self.side % _STEP:
             raise InputError(f"in-painting: a side of {self.side} pixels; it must be a multiple of {_STEP}")
-        object.__setattr__(self, "_pipeline", _diffusion("AutoPipelineForInpainting", self.model, self.device))
+        object.__setattr__(
+            self, "_pipeline", _diffusion("AutoPipelineForInpainting", self.model, self.device, self.without)
+        )
 
     def __call__(
         self, image: NDArray[np.uint8], missing: NDArray[np.bool_], *, usable: NDArray[np.bool_], upright: bool
@@ -295,7 +301,7 @@ class DiffusionUpscaler:
         return large[: height * 4, : width * 4]
 
 
-def _diffusion(pipeline: str, model: str | Path, device: str) -> Any:
+def _diffusion(pipeline: str, model: str | Path, device: str, without: tuple[str, ...] = ()) -> Any:
     """Load a pipeline of `diffusers`: safetensors only, so that no weights can run code."""
     try:
         import diffusers
@@ -307,17 +313,14 @@ def _diffusion(pipeline: str, model: str | Path, device: str) -> Any:
     local = Path(model).is_dir()
     try:
         loaded = getattr(diffusers, pipeline).from_pretrained(
-            str(model),
-            torch_dtype=torch.float32 if device == "cpu" else torch.float16,
-            use_safetensors=True,
-            local_files_only=local,
+            str(model), use_safetensors=True, local_files_only=local, **dict.fromkeys(without)
         )
     except (OSError, ValueError, TypeError, KeyError) as error:
         reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
         raise SchemaError(
             f"diffusion: {model}: can't be loaded as {pipeline} ({reason}); give a folder or a model's name"
         ) from None
-    loaded = loaded.to(device)
+    loaded = loaded.to(device, torch.float32 if device == "cpu" else torch.float16)
     loaded.set_progress_bar_config(disable=True)
     if getattr(loaded, "safety_checker", None) is not None:
         loaded.safety_checker = None  # it blacks out whole pictures; these are of walls

@@ -31,7 +31,7 @@ class BackProjection:
 
     factor: int = 2
     blur: float = 0.45
-    rounds: int = 4
+    rounds: int = 3
 
     def __call__(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Enlarge one picture."""
