@@ -263,14 +263,11 @@ def measure(world: World, count: int, seed: int, pictures: Path | None) -> list[
         row("rotation in the metadata, degrees", [c.turn for c in before], 2),
         row("rotation after, degrees", [after[k].turn for k in accepted], 3),
     ]
-    five = [
-        abs(report.photos[k].five_point.norm)
-        for k in accepted
-        if report.photos[k].five_point is not None  # type: ignore[union-attr]
-    ]
+    five = {k: correction(pose, cameras[k]) for k in accepted if (pose := report.photos[k].five_point_pose) is not None}
     lines += [
-        row("norm of the five-point method's correction, m", five, 2),
-        row("norm of the correction used, m", [report.photos[k].moved.norm for k in accepted], 2),  # type: ignore[union-attr]
+        row("position by the five-point method alone, m", [c.shift for c in five.values()], 3),
+        row("rotation by the five-point method alone, degrees", [c.turn for c in five.values()], 3),
+        row("norm of the correction used, m", [p.moved.norm for p in report.photos if p.pose and p.moved], 2),
         "",
         f"{len(accepted)} of {count} poses accepted, {better} of these nearer to the truth than the metadata; "
         f"{count - len(accepted)} refused.",
@@ -291,16 +288,6 @@ def measure(world: World, count: int, seed: int, pictures: Path | None) -> list[
     lines += _movers(recorder.masks, [movers[k] for k in accepted], pictures)
     lines += [f"Processor time: {spent / count:.1f} s a photo, renders and projection included.", ""]
     if pictures is not None:
-        np.savez_compressed(
-            pictures / "views.npz",
-            **{
-                f"{n}_{k}": getattr(v, n)
-                for k, (v, _) in enumerate(recorder.masks)
-                for n in ("photo", "render", "depth", "above")
-            },
-            focal=recorder.masks[0][0].focal,
-            **{f"true_{k}": movers[a] for k, a in enumerate(accepted)},
-        )
         _sheet(pictures, world, photos, report, result, model, new_walls, new_roofs, cameras)
     return lines
 

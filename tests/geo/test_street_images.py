@@ -25,7 +25,7 @@ def jpeg(width: int = 64, height: int = 48, colour: tuple[int, int, int] = (200,
     return packed.getvalue()
 
 
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 @given(ANGLES, ANGLES, ANGLES)
 def test_an_angle_axis_vector_gives_a_rotation_about_it(x: float, y: float, z: float) -> None:
     rotation = turned((x, y, z))
@@ -34,7 +34,7 @@ def test_an_angle_axis_vector_gives_a_rotation_about_it(x: float, y: float, z: f
     assert np.allclose(rotation @ np.array([x, y, z]), [x, y, z], atol=1e-9)
 
 
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 @given(st.floats(0, 359.9), st.floats(-80, 80), st.floats(-170, 170))
 def test_a_camera_looks_where_heading_and_pitch_say(heading: float, pitch: float, roll: float) -> None:
     rotation = looking(heading, pitch, roll)
@@ -51,7 +51,7 @@ def test_a_level_camera_to_the_east_sees_south_to_its_right() -> None:
     assert np.allclose(down, [0, 0, -1], atol=1e-12)
 
 
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 @given(st.floats(-0.25, 0.25), st.floats(-0.1, 0.1), st.floats(0.6, 1.2))
 def test_undistortion_takes_each_pixel_from_where_the_lens_put_it(k1: float, k2: float, share: float) -> None:
     # The picture holds its own coordinates, so that every pixel tells where it was taken from.
@@ -73,7 +73,7 @@ def test_a_large_photo_is_made_smaller() -> None:
     assert decoded(jpeg(900, 600), "photo", longest=300).shape == (200, 300, 3)
 
 
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 @given(st.binary(max_size=200), st.integers(0, 600))
 def test_a_broken_photo_is_refused_in_one_sentence(junk: bytes, cut: int) -> None:
     for data in (junk, jpeg()[:cut] if cut < 500 else b"\xff\xd8" + junk):
@@ -153,7 +153,7 @@ def test_photos_of_elsewhere_are_refused(tmp_path: Path) -> None:
         list(FolderImages(folder(tmp_path)).near(LocalFrame(48.0, 11.0), 50.0, most=5))
 
 
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 @given(st.binary(max_size=80))
 def test_a_broken_reconstruction_is_refused(tmp_path_factory: pytest.TempPathFactory, junk: bytes) -> None:
     path = tmp_path_factory.mktemp("photos")

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vico.errors import InputError, MissingExtraError, MissingFileError
+from vico.errors import InputError, MissingExtraError
 from vico.geo.street_images import StreetImage, looking, pinhole, turned
 from vico.render import Cameras, Scene, render
 from vico.world.mesh import Surface
@@ -277,13 +277,6 @@ def test_plug_ins_say_what_to_install(tmp_path: Path, monkeypatch: pytest.Monkey
             matcher.match(picture, picture, reach)
     with pytest.raises(MissingExtraError, match="pip install"):
         LanguageGroundedMovers("a", "b").mask(View(picture, picture, reach, reach, 50.0))
-
-
-def test_plug_ins_without_weights_say_so(tmp_path: Path) -> None:
-    pytest.importorskip("kornia", reason="kornia and torch are not installed")
-    picture, reach = np.zeros((64, 64, 3), np.uint8), np.ones((64, 64), np.float32)
-    with pytest.raises(MissingFileError, match="no such LoFTR checkpoint"):
-        LoftrMatcher(tmp_path / "weights.ckpt").match(picture, picture, reach)
 
 
 def test_a_configuration_that_can_not_be_meant_is_refused() -> None:

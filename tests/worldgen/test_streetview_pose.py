@@ -79,6 +79,7 @@ def test_points_beside_an_edge_have_no_clear_depth() -> None:
     assert clear.tolist() == [True, False, False, True]
 
 
+@settings(max_examples=40, deadline=None)
 @given(st.tuples(SMALL, SMALL, SMALL), st.tuples(SMALL, SMALL, SMALL))
 def test_the_norm_of_a_motion_is_that_of_its_inverse(turn: tuple[float, ...], step: tuple[float, ...]) -> None:
     rotation, translation = turned(np.array(turn) * 1.5), np.array(step) * 5

@@ -84,17 +84,16 @@ class StandingDifferences:
         zone = solid & (above < _TALLEST) & (depth < _FARTHEST)
         if not zone.any():
             return np.zeros(view.depth.shape, np.bool_)
-        gap = _difference(photo, render, solid)
         # Pavements are plain and walls are not: each has a usual difference of its own.
         low = zone & (above < _CONTACT)
-        wall = solid & (above >= _CONTACT)
-        level = np.ones(gap.shape, np.float32)
-        for part in (low, wall & (depth < _FARTHEST)):
-            if part.any():
-                middle = float(np.median(gap[part]))
-                spread = 1.4826 * float(np.median(np.abs(gap[part] - middle)))
-                level[part] = np.maximum(middle + self.sure * spread, 10.0)
-        ratio = gap / level
+        wall = solid & (above >= _CONTACT) & (depth < _FARTHEST)
+        ratio = np.zeros(depth.shape, np.float32)
+        for gap, least in ((_difference(photo, render, solid), 10.0), (_busier(photo, render), 4.0)):
+            for part in (low, wall):
+                if part.any():
+                    middle = float(np.median(gap[part]))
+                    spread = 1.4826 * float(np.median(np.abs(gap[part] - middle)))
+                    ratio[part] = np.maximum(ratio[part], gap[part] / max(middle + self.sure * spread, least))
         seeds = (zone & (ratio > 1.0)).astype(np.uint8)
         seeds = cv2.morphologyEx(seeds, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
         seeds = cv2.morphologyEx(seeds, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
@@ -119,6 +118,18 @@ def _difference(photo: NDArray[np.uint8], render: NDArray[np.uint8], solid: NDAr
         b[..., k] = (b[..., k] - mid_b) * gain + mid_a
     gaps = [np.abs(a - np.roll(b, shift, (0, 1))) @ np.array([0.7, 1.3, 1.3], np.float32) for shift in _SHIFTS]
     return np.asarray(cv2.GaussianBlur(np.min(gaps, axis=0), (0, 0), 1.5))
+
+
+def _busier(photo: NDArray[np.uint8], render: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """How much more edges the photo has than the render: a dark car looks like a shadow, but for its edges."""
+    cv2 = opencv()
+    busy = []
+    for picture in (photo, render):
+        grey = cv2.GaussianBlur(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY), (0, 0), 1.0).astype(np.float32)
+        edges = np.hypot(cv2.Sobel(grey, cv2.CV_32F, 1, 0), cv2.Sobel(grey, cv2.CV_32F, 0, 1)) / 8
+        # The largest nearby: an edge that is a few pixels off in the render is there all the same.
+        busy.append(edges if picture is photo else cv2.dilate(edges, np.ones((9, 9), np.uint8)))
+    return np.asarray(cv2.GaussianBlur(np.maximum(busy[0] - 1.5 * busy[1], 0), (0, 0), 3.0))
 
 
 def _standing(
@@ -244,7 +255,7 @@ class LanguageGroundedMovers:
             return getattr(kit, name).from_pretrained(weights, local_files_only=True)
         except (OSError, ValueError) as error:
             raise MissingFileError(
-                f"{weights}: no weights of a {name} there ({str(error).splitlines()[0][:160]}); "
+                f"{weights}: {name} finds no weights there ({str(error).splitlines()[0][:160]}); "
                 "leave the detector out to use the one that needs none"
             ) from None
 

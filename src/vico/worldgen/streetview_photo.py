@@ -112,6 +112,8 @@ class PhotoOutcome:
         Share of the picture that was masked.
     charts, texels
         How many it was projected on.
+    pose, five_point_pose
+        The pose that is used, if one is, and the five-point method's.
     """
 
     id: str
@@ -128,6 +130,7 @@ class PhotoOutcome:
     charts: int = 0
     texels: int = 0
     pose: Pose | None = None
+    five_point_pose: Pose | None = None
 
 
 def flat_ground(xy: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -175,6 +178,7 @@ def prepared(
             inliers=int(fit.inliers.sum()),
             error=fit.error,
             moved=None if fit.refined is None else correction(metadata, fit.refined),
+            five_point_pose=five_point,
             five_point=None if five_point is None else correction(metadata, five_point),
         )
         reason = _doubts(outcome, fit, found, metadata, config)
