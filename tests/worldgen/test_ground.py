@@ -145,7 +145,9 @@ def test_the_ground_follows_a_hill(osm: OsmData, streets: StreetPolygons) -> Non
         lying = across[:, 2] > 0.7 * np.linalg.norm(across, axis=1)
         # What is far below is the underlay, what is far above the mouths of tunnels.
         top = lying & (above > -0.12) & (above < 2.0)
-        assert np.percentile(np.abs(above[top]), 99.5) < 0.05
+        # Treads of stairs, of concrete, lie within half a step.
+        if top.any():
+            assert np.percentile(np.abs(above[top]), 99.5) < (0.1 if "concrete" in surface.material.name else 0.05)
 
 
 def test_the_sea_lies_to_the_right_of_the_coast() -> None:

@@ -54,7 +54,7 @@ LOOKS: dict[str, Look] = {
     "farmland": Look("ground_furrows", 8.0, (255, 255, 255), ENTITY_GREEN, 0.12),
     "earth": Look("ground_earth", 7.0, (255, 255, 255), ENTITY_GROUND, 0.12),
     "water": Look("ground_water", 18.0, (255, 255, 255), ENTITY_WATER, 0.05),
-    "yard": Look("ground_slabs", 5.0, (206, 203, 198), ENTITY_GROUND, 0.10),
+    "yard": Look("ground_slabs", 5.0, (204, 204, 203), ENTITY_GROUND, 0.10),
     "field": Look("ground_grass", 11.0, (240, 236, 206), ENTITY_GREEN, 0.16),
     "wall": Look("ground_blocks", 3.0, (214, 208, 200), ENTITY_GROUND, 0.05),
     "quay": Look("ground_blocks", 4.0, (176, 172, 166), ENTITY_GROUND, 0.05),
@@ -155,7 +155,7 @@ def _asphalt(random: np.random.Generator) -> Picture:
 
 
 def _slabs(random: np.random.Generator) -> Picture:
-    canvas = Canvas(512, 512, (186, 182, 176), random)
+    canvas = Canvas(512, 512, (178, 177, 174), random)
     _courses(canvas, 8, 8, 0.028, 0.84, bond=0.5)
     canvas.noise(3, 6)
     canvas.grain(4)
