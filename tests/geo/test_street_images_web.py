@@ -159,6 +159,21 @@ def test_large_boxes_are_asked_for_in_pieces() -> None:
     assert max(max(e - w, n - s) for w, s, e, n in pieces) <= 0.0101
 
 
+def test_a_place_on_the_date_line_is_asked_for_on_both_sides() -> None:
+    asked = []
+
+    def handler(request: Request) -> Answer:
+        asked.append([float(v) for v in request.query["bbox"].split(",")])
+        return Answer(200, b'{"data": []}')
+
+    with serve(handler) as base:
+        assert list(Mapillary(TOKEN, Web(retries=0), address=base).near(LocalFrame(0.0, 180.0), 300.0, most=3)) == []
+    assert [box[0] < box[2] for box in asked] == [True, True]
+    assert {box[2] for box in asked} >= {180.0}
+    with pytest.raises(InputError, match="pole"):
+        list(Mapillary(TOKEN, Web(retries=0)).near(LocalFrame(90.0, 0.0), 300.0, most=3))
+
+
 def test_the_documented_shape_of_an_answer_is_read(shared_data: Path) -> None:
     answer = (shared_data / "samples" / "mapillary_images_bbox.json").read_bytes()
     images, broken, after = images_in(answer, "sample")

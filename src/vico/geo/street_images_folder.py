@@ -50,7 +50,7 @@ _MOST_BYTES = 64 << 20
 _MOST_JSON = 512 << 20
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
-Latitude = Annotated[Number, Field(ge=-85, le=85)]
+Latitude = Annotated[Number, Field(ge=-90, le=90)]
 Longitude = Annotated[Number, Field(ge=-180, le=180)]
 Bend = Annotated[Number, Field(ge=-2, le=2)]
 

@@ -123,7 +123,7 @@ class GoogleStreetView:
                 return None
             where = document["location"]
             north, east = float(where["lat"]), float(where["lng"])
-            if not (math.isfinite(north) and math.isfinite(east) and abs(north) <= 85 and abs(east) <= 180):
+            if not (math.isfinite(north) and math.isfinite(east) and abs(north) <= 90 and abs(east) <= 180):
                 raise ValueError("location out of range")
             return {
                 "pano_id": str(document["pano_id"]),

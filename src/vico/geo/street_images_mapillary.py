@@ -43,6 +43,7 @@ ATTRIBUTION = "Mapillary contributors (CC BY-SA 4.0)"
 _GRAPH = "https://graph.mapillary.com"
 _MOST_SIDE = 0.01  # degrees: the API refuses larger boxes
 _PAGE = 500
+_MOST_PIECES = 1000
 _MOST_PAGES = 200
 _LEAST_SIDE = 0.0006  # degrees: a box is not quartered below this, however full
 _MOST_PHOTO = 64 << 20
@@ -221,8 +222,11 @@ class Mapillary:
         """Photos in the square of half side `half`; see `StreetImages.near`."""
         self.refused = []
         found: dict[str, MapillaryImage] = {}
-        for box in boxes(frame.bbox(half)):
-            for image in self._listed(box):
+        pieces = [piece for box in frame.boxes(half) for piece in boxes(box)]
+        if len(pieces) > _MOST_PIECES:
+            raise InputError(f"mapillary: the place takes {len(pieces):,} requests, it is too large or lies at a pole")
+        for piece in pieces:
+            for image in self._listed(piece):
                 found.setdefault(image.id, image)
         usable = []
         for image in sorted(found.values(), key=lambda i: i.id):
