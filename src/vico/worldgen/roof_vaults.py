@@ -36,14 +36,16 @@ def drawn_together(polygon: Polygon, rings: list[NDArray[np.float64]], low: floa
     None for a pyramid over an outline that is not seen whole from any point of it.
     """
     steps = {"dome": _DOME, "onion": _ONION}.get(roof.shape, [])
-    if len(rings) == 1:
-        for point in (polygon.centroid, polygon.representative_point()):
-            centre = np.asarray(point.coords[0])
-            if _sees_all(rings[0], centre):
+    for point in (polygon.centroid, polygon.representative_point()):
+        centre = np.asarray(point.coords[0])
+        if _sees_all(rings[0], centre):
+            if len(rings) == 1:
                 return _loft(rings[0], centre, low, steps, roof.height)
+            # What stands in the middle (a lantern, a spire) is cut out of the roof and doesn't change it.
+            return prism(rings, low, roof.height) ^ _loft(rings[0], centre, low - 1.0, steps, roof.height)
     if not steps:
         return None
-    # Over wings and courtyards the vault spans the hull, and the outline is cut out of it.
+    # Over wings the vault spans the hull, and the outline is cut out of it.
     hull = shapely.convex_hull(polygon)
     ring = rings_of(shapely.buffer(hull, 0.02, join_style="mitre"))[0]
     vault = _loft(ring, np.asarray(hull.centroid.coords[0]), low - 1.0, steps, roof.height)

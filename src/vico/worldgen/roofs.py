@@ -179,7 +179,11 @@ def building_solid(polygon: Polygon, low: float, eaves: float, roof: Roof) -> Ma
             solid = profiled_solid(rings, low - eaves, roof, frame)
         else:
             solid = sloped_solid(polygon, rings, low - eaves, roof)
-    return _as_high_as(solid.simplify(_SPECK), roof.height).translate((0.0, 0.0, eaves))
+    solid = solid.simplify(_SPECK)
+    if len(rings) == 1 or roof.shape not in ("dome", "onion", "pyramidal"):
+        # A dome's or a pyramid's top may lie over a hole: what is left of it stays as it would be without.
+        solid = _as_high_as(solid, roof.height)
+    return solid.translate((0.0, 0.0, eaves))
 
 
 def _as_high_as(solid: Manifold, height: float) -> Manifold:
