@@ -15,7 +15,7 @@ from vico.world.model import Building, Category, Entrance, Place
 from vico.world.seeds import rng
 from vico.worldgen.facade_pieces import Face, Pieces, Rgb, bare, cell_uv, is_bare
 from vico.worldgen.facade_walls import GroundFloors, Wall
-from vico.worldgen.signs import Board, Boards, paint_boards
+from vico.worldgen.signs import Board, Boards, colours_of, paint_boards
 
 _WHITE: Rgb = (255, 255, 255)
 _STONE: Rgb = (222, 218, 210)
@@ -373,7 +373,7 @@ class _Front:
             self.z + 2.95, self.z + 3.6)  # fmt: skip
         low = max(low, self.z + 2.25)
         high = min(max(high, low + 0.5), self.top - 0.04)
-        ground: Rgb = boards[0].ground if boards else (74, 76, 80)
+        ground: Rgb = boards[0].ground if boards else colours_of(lead)[0]
         dark = sum(ground) < 420
         paint: Rgb = ground if dark else (60, 60, 62)
         a, b, z, face = spot.a + 0.04, spot.b - 0.04, self.z, self.face

@@ -26,6 +26,12 @@ def cell_uv(name: str, share: float = 1.0) -> Uv:
     return left, bottom, left + (right - left) * share, top
 
 
+@cache
+def _stuff(name: str) -> Material:
+    """Materials that no wall brought along: the sheet of doors above all, painted once a process."""
+    return material(name)
+
+
 @dataclass
 class Pieces:
     """Quads by material while they are gathered."""
@@ -70,7 +76,7 @@ class Pieces:
                     np.repeat(np.asarray(self._colours[name], np.uint8), 4, axis=0),
                     np.repeat(np.asarray(self._entities[name], np.int32), 4),
                     faces.reshape(-1, 3),
-                    self.materials.get(name) or material(name),
+                    self.materials.get(name) or _stuff(name),
                 )
             )
         return made
