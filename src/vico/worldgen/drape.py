@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 #: Heights at points, shape ``(n, 2)`` -> ``(n,)``.
 Heights = Callable[[Floats], Floats]
 
-CLOSE, NEAR, ROUGH = 0.02, 0.04, 0.15
+CLOSE, NEAR, ROUGH = 0.02, 0.04, 0.25
 """Metres by which the middle of an uncut square may lie off its heights: of streets, of other ground, out of sight."""
 
 _USUAL = 1.75  # metres: cells where the field has none
