@@ -1,13 +1,14 @@
 """Tilesets that are written: they read back as what they were, fine and coarse."""
 
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from vico.errors import EmptyInputError, InputError, OutputExistsError
+from vico.errors import EmptyInputError, InputError, MissingExtraError, OutputExistsError
 from vico.geo.frame import LocalFrame
 from vico.geo.tile_mesh import TileMesh
 from vico.geo.tiles3d import read_tileset
@@ -126,6 +127,16 @@ def test_leaves_divide_the_square_evenly() -> None:
     _, counts = np.unique(cells, axis=0, return_counts=True)
     assert len(counts) == 16
     assert counts.max() - counts.min() <= 2
+
+
+def test_without_dracopy_both_ways_say_what_to_type(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("DracoPy", reason="Draco is an extra")
+    write_tileset(hilly(5), FRAME, tmp_path / "t")
+    monkeypatch.setitem(sys.modules, "DracoPy", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'virtual-community\[photos\]'"):
+        read_tileset(tmp_path / "t", FRAME, 150.0)
+    with pytest.raises(MissingExtraError, match=r"pip install 'virtual-community\[photos\]'"):
+        write_tileset(hilly(5), FRAME, tmp_path / "u")
 
 
 def test_what_can_not_be_written_says_so(tmp_path: Path) -> None:

@@ -124,7 +124,8 @@ def read_gltf(data: bytes, where: str, *, resource: Callable[[str], bytes] | Non
     """
     try:
         document, binary = _document(data)
-        return _Reader(document, binary, resource).scene()
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is sorted out point by point
+            return _Reader(document, binary, resource).scene()
     except GltfFault as fault:
         raise SchemaError(f"{where}: {fault}") from None
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, OverflowError, struct.error) as error:

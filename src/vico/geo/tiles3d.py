@@ -23,7 +23,7 @@ from vico.geo.gltf import read_gltf
 from vico.geo.tile_mesh import TileMesh
 from vico.geo.tiles3d_content import TileContent, TileFile, read_tile_file
 from vico.geo.tiles3d_source import MOST_BYTES, TileSource, tile_source
-from vico.geo.tiles3d_volumes import ECEF, WEB_MERCATOR, Window
+from vico.geo.tiles3d_volumes import ECEF, LARGEST, WEB_MERCATOR, Window
 from vico.geo.web import Web
 
 _Z_UP: dict[str, NDArray[np.float64]] = {
@@ -171,7 +171,8 @@ def read_tileset(
         raise SchemaError(f"{files.name(files.root)}: is a single tile; give the tileset.json that names it")
     walk = _Walk(files, error, limits or TileLimits())
     walk.window = _window(outermost.tileset["root"], frame, half + margin, crs, files.name(files.root))
-    found = walk.tileset(outermost.tileset, files.root, np.eye(4), 0, (files.root,))
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is sorted out point by point
+        found = walk.tileset(outermost.tileset, files.root, np.eye(4), 0, (files.root,))
     if not found.pieces:
         why = f": {walk.left_out[0][0]}: {walk.left_out[0][1]}" if walk.left_out else ""
         raise EmptyInputError(
@@ -206,8 +207,8 @@ def _transform(tile: dict[str, Any], where: str) -> NDArray[np.float64]:
         matrix = np.asarray(tile["transform"], np.float64)
     except (ValueError, TypeError):
         matrix = np.zeros(0)
-    if matrix.shape != (16,) or not np.isfinite(matrix).all():
-        raise SchemaError(f"{where}: a tile's transform is no 16 finite numbers; export it anew")
+    if matrix.shape != (16,) or not (np.abs(matrix) < LARGEST).all():
+        raise SchemaError(f"{where}: a tile's transform is no 16 numbers of sensible size; export it anew")
     return matrix.reshape(4, 4).T
 
 
@@ -401,10 +402,13 @@ class _Place:
         """The place of a tile of ours."""
         refine = tile.get("refine")
         error = tile.get("geometricError")
+        transform = self.transform @ _transform(tile, where)
+        if not (np.abs(transform) < LARGEST).all():
+            raise SchemaError(f"{where}: the tiles' transforms grow beyond all bounds; export it anew")
         own = float(error) if isinstance(error, int | float) and math.isfinite(error) else self.error
         return _Place(
             self.base,
-            self.transform @ _transform(tile, where),
+            transform,
             str(refine).upper() if refine else self.refine,
             own,
             self.axis,

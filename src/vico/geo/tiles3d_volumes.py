@@ -18,6 +18,9 @@ from vico.geo.frame import LocalFrame
 ECEF = "EPSG:4978"
 WEB_MERCATOR = "EPSG:3857"
 
+LARGEST = 1e12
+"""Metres, and factors: beyond, a tileset is broken."""
+
 _LOW, _HIGH = -1000.0, 9500.0  # metres; no city lies outside
 
 
@@ -154,6 +157,6 @@ def boxes_touch(
 
 def _numbers(values: Sequence[float], count: int) -> NDArray[np.float64]:
     numbers = np.asarray(values, np.float64)
-    if numbers.shape != (count,) or not np.isfinite(numbers).all():
-        raise ValueError(f"a bounding volume needs {count} finite numbers")
+    if numbers.shape != (count,) or not (np.abs(numbers) < LARGEST).all():
+        raise ValueError(f"a bounding volume needs {count} numbers of sensible size")
     return numbers
