@@ -13,11 +13,12 @@ from vico.render import Cameras, Scene, render
 from vico.world.mesh import Surface
 from vico.world.seeds import rng
 from vico.worldgen.atlas import Atlas, textured, unwrap
+from vico.worldgen.product import digest_of
 from vico.worldgen.sight import Sight
 from vico.worldgen.streetview import reproject
 from vico.worldgen.streetview_mask import LanguageGroundedMovers, StandingDifferences, View
 from vico.worldgen.streetview_match import LoftrMatcher, Matches, SiftMatcher, XfeatMatcher
-from vico.worldgen.streetview_paint import colour_curve, lab_of, painted, patched, rgb_of
+from vico.worldgen.streetview_paint import FastMarching, Patches, colour_curve, lab_of, rgb_of
 from vico.worldgen.streetview_photo import Photographer, StreetviewConfig, above_ground
 from vico.worldgen.streetview_pose import Pose, correction
 
@@ -233,10 +234,10 @@ def test_painting_over_leaves_the_rest() -> None:
     mask = np.zeros((40, 60), np.bool_)
     mask[10:20, 20:30] = True
     holed = np.where(mask[..., None], 255, picture).astype(np.uint8)
-    filled = painted(holed, mask)
+    filled = FastMarching()(holed, mask)
     assert (filled[~mask] == picture[~mask]).all()
     assert np.abs(filled[mask].astype(int) - picture[mask]).mean() < 25
-    assert painted(picture, np.zeros_like(mask)) is picture
+    assert FastMarching()(picture, np.zeros_like(mask)) is picture
 
 
 def test_patches_fill_a_pattern() -> None:
@@ -244,7 +245,7 @@ def test_patches_fill_a_pattern() -> None:
     picture = np.kron(np.indices((16, 16)).sum(axis=0) % 2, np.ones((8, 8)))[..., None].repeat(3, axis=2) * 200
     mask = np.zeros(picture.shape[:2], np.bool_)
     mask[40:64, 40:64] = True
-    filled = patched(np.where(mask[..., None], 90, picture).astype(np.uint8), mask)
+    filled = Patches()(np.where(mask[..., None], 90, picture).astype(np.uint8), mask)
     assert np.abs(filled.astype(float) - picture)[mask].mean() < 60
 
 
@@ -277,6 +278,13 @@ def test_plug_ins_say_what_to_install(tmp_path: Path, monkeypatch: pytest.Monkey
             matcher.match(picture, picture, reach)
     with pytest.raises(MissingExtraError, match="pip install"):
         LanguageGroundedMovers("a", "b").mask(View(picture, picture, reach, reach, 50.0))
+
+
+def test_a_configuration_and_a_report_can_be_kept_as_a_stage_s_product() -> None:
+    s = street()
+    outcome = reproject(s.model, [], photographer(s.model), s.sight)[1]
+    assert digest_of(StreetviewConfig()) != digest_of(StreetviewConfig(painter=Patches()))
+    assert digest_of(outcome) == digest_of(outcome)
 
 
 def test_a_configuration_that_can_not_be_meant_is_refused() -> None:

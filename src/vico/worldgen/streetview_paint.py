@@ -19,31 +19,57 @@ _KNOTS = 33
 _STEEPEST = 2.5
 
 
-def painted(picture: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Fill by fast marching (Telea 2004): smooth, and at once."""
-    cv2 = opencv()
-    return np.asarray(cv2.inpaint(picture, mask.astype(np.uint8), 5.0, cv2.INPAINT_TELEA)) if mask.any() else picture
+@dataclass(frozen=True)
+class FastMarching:
+    """Fills by fast marching (Telea 2004): smooth, and at once.
 
-
-def patched(picture: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Fill with patches of the picture itself (Barnes et al. 2009), through PyPatchMatch.
-
-    Raises
-    ------
-    MissingExtraError
-        If it is not installed.
+    Attributes
+    ----------
+    radius
+        Pixels around a filled one that count.
     """
-    try:
-        import patchmatch
-    except ImportError:
-        raise MissingExtraError(
-            "patches: PyPatchMatch is not installed; type: pip install 'virtual-community[patches]'"
-        ) from None
-    if not mask.any():
-        return picture
-    patchmatch.set_random_seed(1)
-    filled: NDArray[Any] = patchmatch.inpaint(picture, mask.astype(np.uint8)[..., None], patch_size=5)
-    return np.where(mask[..., None], filled, picture).astype(np.uint8)
+
+    radius: float = 5.0
+
+    def __call__(self, picture: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
+        """See `Painter`."""
+        cv2 = opencv()
+        if not mask.any():
+            return picture
+        return np.asarray(cv2.inpaint(picture, mask.astype(np.uint8), self.radius, cv2.INPAINT_TELEA))
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Fills with patches of the picture itself (Barnes et al. 2009), through PyPatchMatch.
+
+    Attributes
+    ----------
+    side
+        Of a patch, pixels.
+    """
+
+    side: int = 5
+
+    def __call__(self, picture: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
+        """See `Painter`.
+
+        Raises
+        ------
+        MissingExtraError
+            If it is not installed.
+        """
+        try:
+            import patchmatch
+        except ImportError:
+            raise MissingExtraError(
+                "patches: PyPatchMatch is not installed; type: pip install 'virtual-community[patches]'"
+            ) from None
+        if not mask.any():
+            return picture
+        patchmatch.set_random_seed(1)
+        filled: NDArray[Any] = patchmatch.inpaint(picture, mask.astype(np.uint8)[..., None], patch_size=self.side)
+        return np.where(mask[..., None], filled, picture).astype(np.uint8)
 
 
 @dataclass(frozen=True)

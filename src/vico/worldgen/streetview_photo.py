@@ -13,7 +13,7 @@ from vico.errors import InputError
 from vico.geo.street_images import StreetImage
 from vico.worldgen.streetview_mask import Movers, StandingDifferences, View
 from vico.worldgen.streetview_match import Matcher, SiftMatcher, opencv
-from vico.worldgen.streetview_paint import Painter, painted
+from vico.worldgen.streetview_paint import FastMarching, Painter
 from vico.worldgen.streetview_pose import Correction, Pose, PoseFit, correction, fit_pose
 from vico.worldgen.streetview_project import Shot
 
@@ -64,7 +64,7 @@ class StreetviewConfig:
 
     matcher: Matcher = field(default_factory=SiftMatcher)
     movers: Movers | None = field(default_factory=StandingDifferences)
-    painter: Painter = painted
+    painter: Painter = field(default_factory=FastMarching)
     width: int = 1024
     pose: Literal["refined", "five_point"] = "refined"
     shift: float = 4.0
