@@ -17,7 +17,7 @@ from vico.world.seeds import rng
 DOOR_HEIGHT = 2.1
 WALL_HEIGHT = 2.7
 THICK = 0.1  # metres between the faces of a wall
-SILL, HEAD = 0.85, 2.35
+SILL, SHOP_SILL, HEAD = 0.85, 0.4, 2.35
 _TILE = {"planks": 2.0, "tiles": 1.2, "carpet": 2.0, "stone": 1.6, "concrete": 4.0, "parquet": 1.2, "chequer": 1.2}
 _WALL_TILE = 2.4
 _STEPS = 8  # risers a flight

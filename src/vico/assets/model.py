@@ -68,7 +68,7 @@ class Model:
         points = np.concatenate([surface.positions for surface in self.surfaces])
         return np.array([points.min(0), points.max(0)], np.float64)
 
-    @property
+    @cached_property
     def size(self) -> tuple[float, float, float]:
         """Extent along x, y, z of the box around the origin that holds the model, metres."""
         low, high = self.bounds

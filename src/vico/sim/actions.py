@@ -290,7 +290,8 @@ def _check_enter(values: Mapping[str, Any], i: int, stage: Stage) -> str | None:
         if not near_door(p.position[i], door, INNER_DOOR_REACH):
             up = door.position[2] - float(p.position[i, 2])
             if abs(up) > 0.5:
-                return f"enter: the door to {name} is {abs(up):.1f} m further {'up' if up > 0 else 'down'}; take the stairs"
+                way = "up" if up > 0 else "down"
+                return f"enter: the door to {name} is {abs(up):.1f} m further {way}; take the stairs"
             return f"enter: the door to {name} is farther than {INNER_DOOR_REACH:g} m away"
     else:
         place = stage.place(name)

@@ -162,13 +162,25 @@ class Canvas:
         marks = {int(labels[cell]) for cell in self._spots}
         return len(marks) == 1 and 0 not in marks
 
-    def _block(self, box: Box) -> None:
+    def _leaves_ring(self, window: tuple[int, int, int, int]) -> bool:
+        """Whether what is free right around a blocked rectangle hangs together: then it parts nothing."""
+        y0, y1, x0, x1 = window
+        ny, nx = self.taken.shape
+        a, b, c, d = max(y0 - 1, 0), min(y1 + 1, ny), max(x0 - 1, 0), min(x1 + 1, nx)
+        ring = ~self.taken[a:b, c:d]
+        ring[y0 - a : y1 - a, x0 - c : x1 - c] = False
+        return int(ndimage.label(ring)[1]) <= 1
+
+    def _block(self, box: Box) -> tuple[int, int, int, int]:
+        """Take a rectangle and what is too near to it; the rows and columns of cells that were taken."""
         ny, nx = self.taken.shape
         x0 = math.ceil((box[0] - BODY + self.size[0] / 2) / GRID - 0.5)
         x1 = math.floor((box[2] + BODY + self.size[0] / 2) / GRID - 0.5)
         y0 = math.ceil((box[1] - BODY + self.size[1] / 2) / GRID - 0.5)
         y1 = math.floor((box[3] + BODY + self.size[1] / 2) / GRID - 0.5)
-        self.taken[max(y0, 0) : min(y1 + 1, ny), max(x0, 0) : min(x1 + 1, nx)] = True
+        window = max(y0, 0), max(min(y1 + 1, ny), 0), max(x0, 0), max(min(x1 + 1, nx), 0)
+        self.taken[window[0] : window[1], window[2] : window[3]] = True
+        return window
 
     def block_all(self, items: Iterable[Furnishing]) -> None:
         """Take furniture that is there already into account."""
@@ -223,9 +235,11 @@ class Canvas:
         if front is not None and any(_meet(front, other, 0.0) for other in [*self.solid, *solid]):
             return False
         before = self.taken.copy()
-        for box in solid:
-            self._block(box)
-        if solid and not self._is_whole():
+        windows = [self._block(box) for box in solid]
+        if not all(self._leaves_ring(window) for window in windows) and not self._is_whole():
+            self.taken = before
+            return False
+        if any(self.taken[cell] for cell in self._spots):
             self.taken = before
             return False
         self.solid += solid
@@ -268,7 +282,8 @@ class Canvas:
         tuple or None
             The wall and where along it; None if it fits nowhere.
         """
-        model = furniture_models()[name]
+        models = furniture_models()
+        model = models[name]
         deep, wide = model.size[0], max(model.size[1], width)
         order = [sides] if isinstance(sides, int) else list(sides) if sides is not None else self.walls
         for side in order:
@@ -282,7 +297,7 @@ class Canvas:
             for at in self._ordered(spots, along, side):
                 if model.size[2] > _LOW and self._covers_window(side, at, wide):
                     continue
-                inner = deep + gap + (max((e[1] for e in extra), default=0.0) + 0.3 if extra else 0.0)
+                inner = deep / 2 + gap + max([deep / 2, *(e[1] + max(models[e[0]].size[:2]) / 2 + 0.02 for e in extra)])
                 if not self._is_free(self._strip(side, at, wide, 0.0, inner)):
                     continue
                 x, y = _middle(self._strip(side, at, 0.0, gap, deep))

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from vico.assets.shapes import Colour
 
 
 @dataclass(frozen=True)
 class Look:
-    """Floor and its colour, what is on the walls, from which palette, and whether there are windows."""
+    """Floor and its colour, what is on the walls, from which palette, whether there are windows, or shop windows."""
 
     floor: str
     tone: Colour
     walls: str
     palette: int
     daylight: bool = True
+    street: bool = False
 
 
 _WOOD, _PALE, _GREY_TILE, _WARM_TILE, _CARPET, _STONE, _CONCRETE = (
@@ -106,4 +107,10 @@ def _looks() -> dict[str, Look]:
     }
 
 
-LOOKS = _looks()
+_STREET = [
+    "shop", "clothes_shop", "pharmacy", "electronics_shop", "bookshop", "jeweller", "florist", "furniture_shop",
+    "toy_shop", "wine_shop", "kiosk", "salon", "repair_shop", "laundry", "bakery", "cafe", "fast_food", "bar",
+    "dining_room", "bank_hall", "gym",
+]  # fmt: skip
+LOOKS = {kind: replace(look, street=kind in _STREET) for kind, look in _looks().items()}
+LOOKS |= {kind: replace(PLAIN, street=True) for kind in _STREET if kind not in LOOKS}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import shapely
 from numpy.typing import NDArray
 
 from vico.assets.furniture import furniture_models
+from vico.assets.model import Model
 from vico.assets.shapes import pose_matrix
 from vico.world.mesh import Surface, joined
 from vico.world.model import FIRST_FURNITURE, FIRST_ROOM, Category, Container, Doorway, Place, Room
@@ -53,6 +55,11 @@ class Slot:
     size: tuple[float, float]
     height: float
 
+    @cached_property
+    def direction(self) -> tuple[float, float]:
+        """Cosine and sine of its yaw."""
+        return math.cos(self.yaw), math.sin(self.yaw)
+
     @property
     def shape(self) -> shapely.Polygon:
         """Its outline."""
@@ -87,8 +94,8 @@ def assembled(places: Sequence[Place], slots: dict[int, tuple[Slot, Plan]]) -> I
             surfaces.append(replace(surface.moved(matrix), entity=surface.entity + np.int32(entity)))
         for i, room in enumerate(plan.rooms):
             first = FIRST_FURNITURE + len(rows)
-            rows += _objects(room, ids[i], slot, matrix, first)
-            rooms.append(_room(place, ids, i, room, slot, matrix, entity + i, first))
+            rows += _objects(room, ids[i], slot, first)
+            rooms.append(_room(place, ids, i, room, slot, entity + i, first))
         furnished.append(place.model_copy(update={"rooms": ids}))
     return Indoors(furnished, rooms, Objects.from_rows(rows), joined(surfaces))
 
@@ -102,13 +109,16 @@ def rooms_of_plan(plan: Plan, place: str = "plan") -> tuple[list[Room], Objects]
     return made.rooms, made.furniture
 
 
-def _objects(
-    room: RoomPlan, name: str, slot: Slot, matrix: NDArray[np.float64], first: int
-) -> Iterator[dict[str, Any]]:
-    models = furniture_models()
+@cache
+def _sized(prototype: str) -> tuple[Model, tuple[float, float, float]]:
+    model = furniture_models()[prototype]
+    return model, model.size
+
+
+def _objects(room: RoomPlan, name: str, slot: Slot, first: int) -> Iterator[dict[str, Any]]:
     for n, item in enumerate(room.items):
-        model = models[item.prototype]
-        x, y, z = _moved(matrix, (item.x, item.y, item.z))
+        model, size = _sized(item.prototype)
+        x, y, z = _moved(slot, (item.x, item.y, item.z))
         yield {
             "id": f"{name}.{n}",
             "entity": first + n,
@@ -120,9 +130,9 @@ def _objects(
             "z": z,
             "yaw": round(math.remainder(item.yaw + slot.yaw, 2 * math.pi), 4),
             "scale": 1.0,
-            "size_x": model.size[0],
-            "size_y": model.size[1],
-            "size_z": model.size[2],
+            "size_x": size[0],
+            "size_y": size[1],
+            "size_z": size[2],
             "solid": model.solid,
             "room": name,
         }
@@ -134,15 +144,14 @@ def _room(
     index: int,
     plan: RoomPlan,
     slot: Slot,
-    matrix: NDArray[np.float64],
     entity: int,
     first: int,
 ) -> Room:
     doors = [
         Doorway(
             to="" if door.to == OUTSIDE else ids[door.to],
-            position=_moved(matrix, door.position),
-            inside=_moved(matrix, door.inside),
+            position=_moved(slot, door.position),
+            inside=_moved(slot, door.inside),
         )
         for door in plan.doors
     ]
@@ -152,32 +161,31 @@ def _room(
         place=place.id,
         building=place.building or "",
         kind=plan.kind,
-        centre=_moved(matrix, plan.centre),
+        centre=_moved(slot, plan.centre),
         size=plan.size,
         yaw=round(math.remainder(slot.yaw + plan.yaw, 2 * math.pi), 6),
         door=doors[0].position,
         inside=doors[0].inside,
         links=[ids[i] for i in plan.links],
-        containers=[_container(spot, n, ids[index], slot, matrix, entity, first) for n, spot in enumerate(plan.spots)],
+        containers=[_container(spot, n, ids[index], slot, entity, first) for n, spot in enumerate(plan.spots)],
         rise=plan.rise,
         doors=doors,
     )
 
 
-def _container(
-    spot: Spot, n: int, room: str, slot: Slot, matrix: NDArray[np.float64], entity: int, first: int
-) -> Container:
+def _container(spot: Spot, n: int, room: str, slot: Slot, entity: int, first: int) -> Container:
     return Container(
         id=f"{room}.{spot.kind}{n}",
         entity=entity if spot.item < 0 else first + spot.item,
         kind=spot.kind,
-        centre=_moved(matrix, spot.centre),
+        centre=_moved(slot, spot.centre),
         size=spot.size,
         yaw=round(math.remainder(spot.yaw + slot.yaw, 2 * math.pi), 4),
-        reach=_moved(matrix, (*spot.reach, 0.0))[:2],
+        reach=_moved(slot, (*spot.reach, 0.0))[:2],
     )
 
 
-def _moved(matrix: NDArray[np.float64], point: tuple[float, float, float]) -> tuple[float, float, float]:
-    x, y, z = matrix[:3, :3] @ np.asarray(point) + matrix[:3, 3]
-    return round(float(x), 3), round(float(y), 3), round(float(z), 3)
+def _moved(slot: Slot, point: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z = point
+    c, s = slot.direction
+    return round(slot.x + c * x - s * y, 3), round(slot.y + s * x + c * y, 3), round(slot.z + z, 3)

@@ -16,7 +16,7 @@ import numpy as np
 
 from vico.assets.furniture import furniture_models
 from vico.assets.furniture_public import RISE
-from vico.assets.interior import DOOR_HEIGHT, HEAD, SILL, THICK, Inside, WallOpening, shell
+from vico.assets.interior import DOOR_HEIGHT, HEAD, SHOP_SILL, SILL, THICK, Inside, WallOpening, shell
 from vico.world.mesh import Surface
 from vico.world.model import LANDING
 from vico.world.seeds import rng
@@ -111,7 +111,7 @@ def furnished(sketch: Sketch, chance: np.random.Generator, variant: int = 0) -> 
         size = (round(x1 - x0, 3), round(y1 - y0, 3))
         mine = sorted(openings[i], key=lambda o: -1 if o[0] == OUTSIDE else order[o[0]])
         look = LOOKS.get(room.kind, PLAIN)
-        windows = _windows(sketch, room, size, mine) if look.daylight else []
+        windows = _windows(sketch, room, size, mine, street=look.street) if look.daylight else []
         canvas = Canvas(size, [o[1] for o in mine if not o[3]], windows, chance)
         if room.items is not None:
             items = list(room.items)
@@ -198,21 +198,25 @@ def _from_the_street(sketch: Sketch) -> list[int]:
     return [away.get(i, 10**6) for i in range(len(sketch.rooms))]
 
 
-def _windows(sketch: Sketch, room: SketchRoom, size: tuple[float, float], ways: Sequence[_Way]) -> list[Opening]:
-    """Windows in the walls that are the house's own, 1.6 m wide, some 3 m apart, clear of doors."""
+def _windows(
+    sketch: Sketch, room: SketchRoom, size: tuple[float, float], ways: Sequence[_Way], *, street: bool
+) -> list[Opening]:
+    """Windows in the walls that are the house's own, some 3 m apart, clear of doors; shops have them at the street."""
     x0, y0, x1, y1 = room.box
     w, h = sketch.size
     outer = {EAST: abs(x1 - w) < 0.01, NORTH: abs(y1 - h) < 0.01, WEST: x0 < 0.01, SOUTH: y0 < 0.01}
+    wide = 2.2 if street else 1.6
+    way_out = next((opening.side for to, opening, _, _ in ways if to == OUTSIDE), SOUTH)
     found = []
     for side, is_outer in outer.items():
         length = size[1] if side in (EAST, WEST) else size[0]
-        if not is_outer or length < 2.2:
+        if not is_outer or length < wide + 0.6 or (street and side != way_out):
             continue
-        count = max(1, int(length / 3.0))
+        count = max(1, int(length / (wide + 0.7 if street else 3.0)))
         for k in range(count):
             at = round(((k + 0.5) / count - 0.5) * length, 2)
-            if all(o.side != side or abs(o.at - at) > (o.width + 1.6) / 2 + 0.15 for _, o, _, _ in ways):
-                found.append(Opening(side, at, 1.6))
+            if all(o.side != side or abs(o.at - at) > (o.width + wide) / 2 + 0.15 for _, o, _, _ in ways):
+                found.append(Opening(side, at, wide))
     return found
 
 
@@ -266,7 +270,8 @@ def _inside(
         kind = "entrance" if other == OUTSIDE else "door"
         parts.append(WallOpening(opening.side, opening.at, opening.width, low, low + DOOR_HEIGHT, kind, index < other))
     head = min(HEAD, room.height - 0.3)
-    parts += [WallOpening(o.side, o.at, o.width, SILL, head, "window") for o in windows]
+    sill = SHOP_SILL if look.street else SILL
+    parts += [WallOpening(o.side, o.at, o.width, sill, head, "window") for o in windows]
     palette = PALETTES[look.palette]
     return Inside(
         entity=index,
@@ -321,13 +326,15 @@ def _spots(room: SketchRoom, canvas: Canvas, items: Sequence[Furnishing], dress:
         c, s = math.cos(item.yaw), math.sin(item.yaw)
         cx = item.x + c * top.centre[0] - s * top.centre[1]
         cy = item.y + s * top.centre[0] + c * top.centre[1]
-        u, v = (px - cx) * c + (py - cy) * s, (py - cy) * c - (px - cx) * s
+        around = np.flatnonzero((np.abs(px - cx) < REACH) & (np.abs(py - cy) < REACH))
+        dx, dy = px[around] - cx, py[around] - cy
+        u, v = dx * c + dy * s, dy * c - dx * s
         away = np.hypot(np.maximum(np.abs(u) - top.size[0] / 2, 0), np.maximum(np.abs(v) - top.size[1] / 2, 0))
         middle = np.hypot(u, v)
         near = np.flatnonzero((away <= REACH - 0.3) & (middle <= REACH - 0.1))
         if not len(near):
             continue
-        best = near[int(np.argmin(middle[near]))]
+        best = around[near[int(np.argmin(middle[near]))]]
         chairs += top.kind == "chair"
         spots.append(
             Spot(
