@@ -16,11 +16,13 @@ from vico.worldgen.atlas import Atlas, textured, unwrap
 from vico.worldgen.product import digest_of
 from vico.worldgen.sight import Sight
 from vico.worldgen.streetview import reproject
+from vico.worldgen.streetview_blend import Layer, paint_chart
 from vico.worldgen.streetview_mask import LanguageGroundedMovers, StandingDifferences, View
 from vico.worldgen.streetview_match import LoftrMatcher, Matches, SiftMatcher, XfeatMatcher
 from vico.worldgen.streetview_paint import FastMarching, Patches, colour_curve, lab_of, rgb_of
 from vico.worldgen.streetview_photo import Photographer, StreetviewConfig, above_ground
 from vico.worldgen.streetview_pose import Pose, correction
+from vico.worldgen.streetview_project import Shot
 
 cv2 = pytest.importorskip("cv2", reason="OpenCV is the extra photos")
 pytest.importorskip("embreex", reason="embreex is the extra photos")
@@ -210,6 +212,22 @@ def test_a_photo_without_a_known_height_is_lifted_on_the_terrain() -> None:
     low = replace(photo(), eye=2.0, position=photo().position * (1, 1, 0) + (0, 0, 2.0))
     _, report = reproject(s.model, [low], photographer(s.model), s.sight, config=CONFIG, ground=lambda xy: xy[:, 0] * 0)
     assert report.photos[0].used
+
+
+def test_a_camera_that_sees_a_speck_of_a_wall_leaves_it_as_it_is() -> None:
+    s = street()
+    _, depth, _ = photographer(s.model)(TRUE.position, TRUE.rotation, LENS, WIDTH, HEIGHT)
+    masked = np.ones((HEIGHT, WIDTH), np.bool_)
+    masked[100:102, 240:242] = False
+    shot = Shot("a", photo().picture, masked, TRUE, LENS, depth)
+    flat = colour_curve(lab_of(photo().picture[:20, :20].reshape(-1, 3)), np.tile(np.float32([50, 0, 0]), (9, 1)))
+    for k, chart in enumerate(s.model.charts):
+        colour, _, given = paint_chart(
+            s.model, k, [Layer(shot, flat, np.zeros(3))], s.sight,
+            farthest=60.0, steepest=1.3, feather=0.5, unshade=1.0,
+        )  # fmt: skip
+        assert given == [0]
+        assert (colour == s.model.pages[chart.page][chart.box]).all()
 
 
 def test_no_photos_change_nothing() -> None:

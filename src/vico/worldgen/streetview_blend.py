@@ -94,10 +94,10 @@ def paint_chart(
     width = max(feather / atlas.texel, 1.0)
     for k in reversed(range(len(layers))):
         holds = (quality[k] > 0) & (quality[k] >= _WORSE * best)
-        if not holds.any():
-            continue
         # Specks that occlusion leaves are no places to put a seam around.
         holds &= cv2.morphologyEx(holds.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) > 0
+        if not holds.any():
+            continue
         # Seams run where a photo ends on the chart, not along the chart's own outline.
         free = (holds | ~inside).astype(np.uint8)
         depth = cv2.distanceTransform(free, cv2.DIST_L2, 3) if not free.all() else np.full(shape, width, np.float32)
