@@ -269,7 +269,8 @@ def _gym(c: Canvas) -> None:
     for _ in range(3):
         c.against("exercise_bike", front=0.6)
     c.against("dumbbell_rack", front=0.8)
-    c.fill([("bench_press", 0, 0, 0)], (2.6, 2.2), aisle=0.8, inset=1.5, most=4)
+    c.fill([("bench_press", 0, 0, 0)], (2.6, 2.2), aisle=0.8, inset=1.5, most=6)
+    c.fill([("exercise_bike", 0, 0, 90)], (1.7, 2.1), aisle=0.7, inset=2.0, most=6)
     for k in range(2):
         c.lay("yoga_mat", -c.size[0] / 4 + 1.0 * k, -c.size[1] / 4, 1)
 
