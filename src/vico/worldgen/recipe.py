@@ -22,8 +22,10 @@ from vico.world.mesh import Surface, write_glb
 from vico.world.model import Manifest, Origin, Source, Transit
 from vico.world.objects import Objects, write_objects
 from vico.world.walkable import WalkableMap, write_walkable
+from vico.worldgen.bridges import pier_feet, portal_feet, portals_of
 from vico.worldgen.buildings import BuildingsResult, buildings_from_osm
 from vico.worldgen.facade_fronts import street_fronts
+from vico.worldgen.grading import graded, standing_outlines
 from vico.worldgen.ground import ground_from_osm, mapped_areas
 from vico.worldgen.indoor import Indoors, furnish
 from vico.worldgen.netconvert import road_network
@@ -55,12 +57,15 @@ def make_world(
         height = stages.run("terrain", flat_terrain, half=half)
     else:
         height = stages.run("terrain", terrain_from_dem, samples, half=half)
+    # Kerbs lie at the borders of the streets, so both come from the same polygons, and before anything stands on them.
+    streets = stages.run("streets", _streets, data, seed=seed)
+    height = stages.run("grading", graded, height, data, streets)
     write_terrain(folder / "terrain.npz", height)
     stages.report("terrain", {"cells": int(height.heights.shape[0] - 1) ** 2, "flat": int(samples is None)})
 
     built = stages.run("buildings", buildings_from_osm, data, height, seed=seed)
     solids = _standing(built, height)
-    streets = stages.run("streets", road_polygons, data, solids)
+    solids += [*pier_feet(data, height, streets), *portal_feet(portals_of(data, streets))]
 
     roads = stages.run("roads", roads_from_osm, data, half)
     write_record(folder / "roads.json", roads)
@@ -205,6 +210,10 @@ def make_world(
         layers=layers,
         models=models,
     )
+
+
+def _streets(data: OsmData, *, seed: int) -> StreetPolygons:
+    return road_polygons(data, standing_outlines(data, seed=seed))
 
 
 def _standing(built: BuildingsResult, height: HeightField) -> list[BaseGeometry]:
