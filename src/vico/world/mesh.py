@@ -271,7 +271,7 @@ def _material_entry(material: Material, buffer: _Buffer, images: list[dict[str, 
             Image.fromarray(material.texture).save(packed, "JPEG", quality=_PHOTO_QUALITY)
             kind = "image/jpeg"
         else:
-            Image.fromarray(material.texture).save(packed, "PNG", compress_level=6)
+            Image.fromarray(material.texture).save(packed, "PNG", compress_level=4)
             kind = "image/png"
         images.append({"bufferView": buffer.view(packed.getvalue()), "mimeType": kind, "name": material.name})
         pbr["baseColorTexture"] = {"index": len(images) - 1}
