@@ -8,7 +8,7 @@ from scipy.ndimage import gaussian_filter
 from vico.errors import InputError
 from vico.world.seeds import rng
 from vico.worldgen.atlas import Atlas, Chart
-from vico.worldgen.enhance import inpainted, padded, upscaled
+from vico.worldgen.enhance import evened, inpainted, padded, upscaled
 from vico.worldgen.enhance_fill import exemplar_fill, pull_push
 from vico.worldgen.enhance_sharpen import BackProjection
 
@@ -134,3 +134,20 @@ def test_plug_ins_that_answer_wrongly_and_pages_too_large_are_refused() -> None:
         upscaled(atlas, upscaler=BackProjection(factor=3))
     with pytest.raises(InputError, match="pages of 128 at most"):
         upscaled(atlas, upscaler=BackProjection(factor=64))
+
+
+def test_walls_in_the_shade_of_the_day_become_as_bright_as_those_in_the_sun() -> None:
+    page, inside = np.zeros((64, 512, 3), np.uint8), np.zeros((64, 512), bool)
+    charts = []
+    for k in range(16):
+        angle = 2 * np.pi * k / 16
+        normal = np.array([np.cos(angle), np.sin(angle), 0.0])
+        placed = chart(0, 4 + 30 * k, 4, 20, 20, entity=k + 1)
+        charts.append(Chart(**{**vars(placed), "normal": normal}))
+        page[placed.box], inside[placed.box] = round(110 * np.exp(0.4 * normal[1])), True
+    done = evened(Atlas((page,), (inside,), (inside.copy(),), tuple(charts), 0.1, 16))
+    before = [int(page[c.box].mean()) for c in charts]
+    after = [int(done.pages[0][c.box].mean()) for c in charts]
+    assert max(before) / min(before) > 2.1
+    assert max(after) / min(after) < 1.35
+    assert max(after) == pytest.approx(max(before), rel=0.15)

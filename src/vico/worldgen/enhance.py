@@ -114,6 +114,53 @@ def inpainted(atlas: Atlas, *, inpainter: Inpainter | None = None) -> Atlas:
     return replace(atlas, pages=tuple(pages))
 
 
+def evened(atlas: Atlas, *, most: float = 2.5) -> Atlas:
+    """Take the light of the day the photos were made out of them, so that walls in their shade are not shaded twice.
+
+    Parameters
+    ----------
+    atlas
+        With photos on it.
+    most
+        By what a chart may be brightened.
+
+    Returns
+    -------
+    Atlas
+        With every chart as bright as if it had faced the light: a first-order fit of the charts' luminance (log odds) to
+        their normals is taken off. Fewer than eight charts with photos stay as they are.
+    """
+    charts, normals, light, weight = [], [], [], []
+    for k, chart in enumerate(atlas.charts):
+        colours = atlas.pages[chart.page][chart.box][atlas.known[chart.page][chart.box]]
+        if len(colours) >= 50:
+            charts.append(k)
+            normals.append(chart.normal)
+            share = np.clip(np.median(colours @ np.array([0.299, 0.587, 0.114])) / 255, 0.02, 0.98)
+            light.append(np.log(share / (1 - share)))  # in the units in which the gain below is a factor
+            weight.append(np.sqrt(len(colours)))
+    if len(charts) < 8:
+        return atlas
+    wall = np.abs(np.array(normals)[:, 2]) < 0.5
+    basis = np.column_stack([wall, ~wall, np.array(normals)[:, :2]]).astype(np.float64)
+    scale = np.array(weight)[:, None]
+    # A slight pull to zero: one bright or dark building is not the sun.
+    rows = np.concatenate([basis * scale, np.diag([1e-6, 1e-6, 1.0, 1.0]) * float(np.mean(weight))])
+    fit = np.linalg.lstsq(rows, np.concatenate([np.array(light) * scale[:, 0], np.zeros(4)]), rcond=None)[0]
+    sun = fit[2:]
+    pages = [page.copy() for page in atlas.pages]
+    for chart in atlas.charts:
+        away = np.linalg.norm(sun) - float(chart.normal[:2] @ sun)
+        gain = min(float(np.exp(away)), most) if abs(chart.normal[2]) < 0.5 else 1.0
+        piece = pages[chart.page][chart.box]
+        # Bright texels must not burn out: the gain fades towards white.
+        table = np.arange(256) / 255.0
+        table = np.round(255 * gain * table / (1 + (gain - 1) * table)).astype(np.uint8)
+        inside = atlas.inside[chart.page][chart.box]
+        piece[inside] = table[piece[inside]]
+    return replace(atlas, pages=tuple(pages))
+
+
 def upscaled(atlas: Atlas, *, upscaler: Upscaler | None = None) -> Atlas:
     """Make the texels finer; texture coordinates of the surfaces stay valid.
 
