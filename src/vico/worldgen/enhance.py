@@ -127,8 +127,8 @@ def evened(atlas: Atlas, *, most: float = 2.5) -> Atlas:
     Returns
     -------
     Atlas
-        With every chart as bright as if it had faced the light: a first-order fit of the charts' luminance (log odds) to
-        their normals is taken off. Fewer than eight charts with photos stay as they are.
+        With every wall as bright as if it had faced the light: a first-order fit of the charts' luminance (log odds)
+        to their normals is taken off. Fewer than eight charts with photos stay as they are.
     """
     charts, normals, light, weight = [], [], [], []
     for k, chart in enumerate(atlas.charts):
