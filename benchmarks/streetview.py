@@ -404,7 +404,7 @@ def main() -> None:
         "# Street photos: poses mended and walls painted",
         "",
         f"{machine()[:-1]}, OpenCV {cv2.__version__}.",
-        "Made by `python benchmarks/streetview.py --table benchmarks/results/streetview.md`.",
+        "Made by `python benchmarks/streetview.py --berlin FOLDER --table benchmarks/results/streetview.md`.",
         "",
     ]
     if given.world is not None:
