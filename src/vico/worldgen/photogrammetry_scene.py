@@ -196,7 +196,7 @@ def _as_seen(surface: Surface, texel: float) -> NDArray[np.uint8]:
     texture = surface.material.texture
     assert texture is not None
     colours = texture[..., :3].astype(np.float32)
-    if texture.shape[2] == 4:
+    if surface.material.cutout and texture.shape[2] == 4:  # elsewhere alpha is what shines at night
         solid = texture[..., 3:] >= 128
         mean = colours[solid[..., 0]].mean(axis=0) if solid.any() else np.full(3, 128.0)
         colours = np.where(solid, colours, mean)

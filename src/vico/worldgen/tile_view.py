@@ -40,7 +40,7 @@ def tile_surfaces(mesh: TileMesh, *, entity: int = 1) -> list[Surface]:
                 mesh.colour[used],
                 np.full(len(used), entity, np.int32),
                 local.reshape(-1, 3).astype(np.int32),
-                Material(f"tile {texture}", picture, double_sided=True),
+                Material(f"tile {texture}", picture, double_sided=True, photo=True),
             )
         )
     return surfaces
