@@ -18,6 +18,7 @@ from PIL import Image
 from vico.errors import VicoError
 from vico.geo.tile_mesh import TileMesh
 from vico.render import Cameras, render
+from vico.render.lighting import Lighting
 from vico.render.scene import Scene
 from vico.world.folder import read_world
 from vico.world.tileset import write_tileset
@@ -33,7 +34,10 @@ def picture_of(mesh: TileMesh, reach: float) -> Image.Image:
     camera = Cameras(
         position[None], (forward / np.linalg.norm(forward))[None], fov_y=float(np.radians(50.0)), width=1280, height=720
     )
-    frames = render(Scene(tile_surfaces(mesh)), camera, depth=False, segmentation=False, samples=2)
+    # The photos have their light in them already.
+    even = Lighting(sun_colour=(0.0, 0.0, 0.0), ambient=(0.85, 0.85, 0.85), bounce=(0.85, 0.85, 0.85), fog=20_000.0)
+    scene = Scene(tile_surfaces(mesh), lighting=even)
+    frames = render(scene, camera, depth=False, segmentation=False, samples=2)
     return Image.fromarray(frames.rgb[0])
 
 
