@@ -26,8 +26,9 @@ def _is_closed_drive(line: Line, lanes: LaneGraph) -> bool:
 def _check(transit: Transit, lanes: LaneGraph) -> None:
     stops = {stop.id: stop for stop in transit.stops}
     assert transit.lines
+    assert max(len(line.stops) for line in transit.lines) >= 4
     for line in transit.lines:
-        assert len(line.stops) >= 4
+        assert len(set(line.stops)) == len(line.stops) >= 2
         assert _is_closed_drive(line, lanes)
         assert all(stops[stop].lane in line.lanes for stop in line.stops)
         assert line.travel == sorted(line.travel)

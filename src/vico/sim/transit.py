@@ -8,6 +8,7 @@ started minute, 20 more where one is left farther than 5 m from a station with a
 from __future__ import annotations
 
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -106,10 +107,10 @@ def plan_buses(transit: Transit, lanes: LaneGraph, second: float) -> BusPlan:
         plan.routes.append(route)
         plan.places.append(places)
         plan.offsets.append(offsets)
-        headway = _headway(line)
         taken: set[int] = set()
-        for bus in range(max(1, math.ceil(line.travel[-1] / headway))):
-            gone = (second - line.departures[0]) % headway + bus * headway
+        last = bisect_right(line.departures, second % DAY) - 1 + len(line.departures) * int(second // DAY)
+        for bus in range(_fleet(line)):
+            gone = second - departure(line, last - bus)
             at = max(i for i, when in enumerate(line.travel[:-1]) if when <= gone)
             while at in taken and len(taken) < len(places):
                 at = (at + 1) % len(places)
@@ -123,8 +124,28 @@ def plan_buses(transit: Transit, lanes: LaneGraph, second: float) -> BusPlan:
     return plan
 
 
-def _headway(line: Line) -> int:
-    return line.departures[1] - line.departures[0] if len(line.departures) > 1 else 600
+def departure(line: Line, number: int) -> int:
+    """When a line's departure of this number is, seconds from the midnight before the first; each day is alike."""
+    days, of_the_day = divmod(number, len(line.departures))
+    return line.departures[of_the_day] + DAY * days
+
+
+def _next(line: Line, second: float) -> int:
+    """Number of the first departure at a time or after it."""
+    days, of_the_day = divmod(second, DAY)
+    return bisect_left(line.departures, of_the_day) + len(line.departures) * int(days)
+
+
+def _fleet(line: Line) -> int:
+    """Buses under way when most are: departures within the time of one round, but no more than stops."""
+    n = len(line.departures)
+    ahead = 0
+    most = 1
+    for k in range(n):
+        while departure(line, ahead + 1) < line.departures[k] + line.travel[-1]:
+            ahead += 1
+        most = max(most, ahead - k + 1)
+    return min(most, len(line.stops))
 
 
 def traffic_and_transit(
@@ -195,15 +216,13 @@ class TransitSystem:
         self.first_bike = first_bike
         self._plan = plan
         self._vehicle = np.arange(traffic.cars, traffic.cars + traffic.buses)
-        self._headway = np.array([_headway(line) for line in transit.lines], np.float64)
-        self._first = np.array([line.departures[0] for line in transit.lines], np.float64)
         buses = traffic.buses
         self.clock = np.array([float(second)])
         self.dwell = np.full(buses, DWELL / 2)
         self.stop = np.array(plan.at, np.int32)
         self.begun = np.array(plan.begun)
         self.aboard = np.zeros(buses, np.int32)
-        self.taken = np.ceil((second - self._first) / np.maximum(self._headway, 1.0)).astype(np.int64)
+        self.taken = np.array([_next(line, second) for line in transit.lines], np.int64)
         stations = transit.bike_stations
         self._station_xy = np.array([s.position[:2] for s in stations]).reshape(-1, 2)
         self._station_capacity = np.array([s.capacity for s in stations], np.int32)
@@ -247,9 +266,10 @@ class TransitSystem:
                 continue
             if self.stop[bus] == 0:
                 # From the first stop a bus leaves at the next departure nobody has taken; a late one leaves at once.
-                if self.clock[0] < self._first[line] + self.taken[line] * self._headway[line]:
+                due = departure(self.transit.lines[line], int(self.taken[line]))
+                if self.clock[0] < due:
                     continue
-                self.begun[bus] = self._first[line] + self.taken[line] * self._headway[line]
+                self.begun[bus] = due
                 self.taken[line] += 1
             self.stop[bus] = (self.stop[bus] + 1) % len(self._plan.places[line])
             self._send(bus, int(self.stop[bus]))
@@ -384,12 +404,12 @@ class TransitSystem:
     def arrivals(self, stop: str) -> list[tuple[str, float]]:
         """Scheduled buses at a stop from now on: line name and seconds from now, the next three of each line."""
         rows: list[tuple[str, float]] = []
-        for number, line in enumerate(self.transit.lines):
+        for line in self.transit.lines:
             for k, name in enumerate(line.stops):
                 if name == stop:
-                    when = self._first[number] + line.travel[k] - self.clock[0]
-                    wait = when % self._headway[number]
-                    rows += [(line.name, wait + i * self._headway[number]) for i in range(3)]
+                    now = float(self.clock[0]) - line.travel[k]
+                    first = _next(line, now)
+                    rows += [(line.name, departure(line, first + i) - now) for i in range(3)]
         return sorted(rows, key=lambda row: row[1])
 
     # -- bicycles ----------------------------------------------------------------------------------------------------

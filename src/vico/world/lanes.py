@@ -18,7 +18,7 @@ from defusedxml.ElementTree import ParseError, iterparse
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from vico.errors import EmptyInputError, MissingFileError, SchemaError
+from vico.errors import MissingFileError, SchemaError
 from vico.world.walkways import Walkways, walkways_of
 
 Floats = NDArray[np.float64]
@@ -214,14 +214,12 @@ class _Lane:
 
 
 def read_lanes(path: Path) -> LaneGraph:
-    """Read a SUMO network.
+    """Read a SUMO network; a place without streets gives a graph of no lanes.
 
     Raises
     ------
     MissingFileError, SchemaError
         If there is no such file, or it is no SUMO network.
-    EmptyInputError
-        If it holds no lane for vehicles.
     """
     path = Path(path)
     if not path.is_file():
@@ -231,8 +229,6 @@ def read_lanes(path: Path) -> LaneGraph:
     except (ParseError, DefusedXmlException, KeyError, ValueError) as error:
         raise SchemaError(f"{path}: not a readable SUMO network ({error}); build the world anew") from None
     driven = [lane for lane in lanes if (lane.cars or lane.buses) and lane.function in ("normal", "internal")]
-    if not driven:
-        raise EmptyInputError(f"{path}: no lane for vehicles; build the world anew")
     return _assembled(driven, lanes, junctions, links)
 
 
@@ -337,8 +333,8 @@ def _assembled(
         edges=edges,
         edge=np.array([edge_number[lane.edge] for lane in driven], np.int32),
         first=first,
-        points=np.concatenate([lane.line for lane in driven]),
-        along=np.concatenate(steps),
+        points=np.concatenate([np.zeros((0, 2)), *(lane.line for lane in driven)]),
+        along=np.concatenate([np.zeros(0), *steps]),
         length=length,
         width=np.array([lane.width for lane in driven]),
         speed=np.array([lane.speed for lane in driven]),
@@ -360,7 +356,7 @@ def _assembled(
         junctions=[j["id"] for j in junctions],
         junction_position=np.array([[float(j["x"]), float(j["y"])] for j in junctions]).reshape(-1, 2),
         signals=np.array([j.get("type", "").startswith("traffic_light") for j in junctions], bool),
-        zones=int(zone.max()) + 1,
+        zones=int(zone.max(initial=-1)) + 1,
         walks=_walks(lanes, links, junction_number),
     )
 

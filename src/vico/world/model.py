@@ -330,12 +330,19 @@ class BikeStation(Record):
 
 
 class Transit(Record):
-    """`transit.json`: stops, lines, bicycle stations, and where each came from (osm, gtfs, planned)."""
+    """`transit.json`: stops, lines, bicycle stations, and where each came from (osm, gtfs, planned).
+
+    Attributes
+    ----------
+    left_out
+        Routes of the sources that no line drives, with the reason.
+    """
 
     stops: list[Stop]
     lines: list[Line]
     bike_stations: list[BikeStation]
     origin: dict[str, str]
+    left_out: list[Dropped] = []
 
 
 class Road(Record):

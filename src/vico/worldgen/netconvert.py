@@ -14,7 +14,8 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from vico.errors import EmptyInputError, MissingExtraError, VicoError
+from vico.errors import MissingExtraError, VicoError
+from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData
 from vico.worldgen.roads import DEFAULTS, SIDEWALK_WIDTH, WALKING, Street, is_traffic_street, streets_from_osm
 
@@ -99,20 +100,18 @@ def road_network(osm: OsmData, half: float | None = None) -> RoadNetwork:
     Returns
     -------
     RoadNetwork
-        Equal input gives equal bytes.
+        Equal input gives equal bytes; an empty network where the window has no street for people or traffic.
 
     Raises
     ------
-    EmptyInputError
-        If the window has no street that public traffic uses.
     MissingExtraError, NetconvertError
         If netconvert is not installed, or gives no network.
     """
     streets = streets_from_osm(osm, half or osm.half)
     used = [street for street in streets if is_traffic_street(street)]
-    if not used:
-        raise EmptyInputError("road network: no public street in the window; choose another centre or a larger radius")
     used += [s for s in streets if s.kind == "pedestrian" and not s.covered and s.layer >= 0 and not s.above]
+    if not used:
+        return empty_network(osm.frame, half or osm.half)
     binary = netconvert_binary()
     with tempfile.TemporaryDirectory(prefix="vico-roads-") as folder:
         work = Path(folder)
@@ -138,6 +137,38 @@ def road_network(osm: OsmData, half: float | None = None) -> RoadNetwork:
                 f"road network: netconvert gave no network ({said[0]}); exit status {done.returncode}"
             )
         return RoadNetwork(_plain_net(net.read_bytes()), _plain_xodr(xodr.read_bytes()))
+
+
+def empty_network(frame: LocalFrame, half: float) -> RoadNetwork:
+    """The network of a place without streets (a pedestrian quarter, a campus): valid files with nothing in them.
+
+    netconvert refuses to write one, so this is written here, as SUMO 1.20 and OpenDRIVE 1.4 have it.
+    """
+    west, south, east, north = frame.bbox(half)
+    net = f"""<?xml version="1.0" encoding="UTF-8"?>
+
+<net version="1.20" walkingareas="true" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" \
+xsi:noNamespaceSchemaLocation="http://sumo.dlr.de/xsd/net_file.xsd">
+
+    <location netOffset="0.000,0.000" convBoundary="{-half:.3f},{-half:.3f},{half:.3f},{half:.3f}" \
+origBoundary="{west:.6f},{south:.6f},{east:.6f},{north:.6f}" projParameter="{frame.proj4}"/>
+
+</net>
+"""
+    xodr = f"""<?xml version="1.0" encoding="UTF-8"?>
+
+<OpenDRIVE>
+    <header revMajor="1" revMinor="4" name="" version="1.00" date="" north="{half:.3f}" south="{-half:.3f}" \
+east="{half:.3f}" west="{-half:.3f}">
+        <geoReference>
+ <![CDATA[
+ {frame.proj4}
+]]>
+        </geoReference>
+    </header>
+</OpenDRIVE>
+"""
+    return RoadNetwork(net.encode(), xodr.encode())
 
 
 def _plain_net(content: bytes) -> bytes:

@@ -1,0 +1,542 @@
+"""Timetables: zipped GTFS feeds (https://gtfs.org/documentation/schedule/reference/), cut to a window.
+
+A feed is read in streams, so that one of a whole country fits in memory; a hostile one is refused in bounded time and
+space. Rows that can't be used are left out and named in `Feed.broken`.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+import zipfile
+import zlib
+from collections import Counter, defaultdict
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field
+from datetime import date, timedelta
+from hashlib import sha256
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from vico.errors import InputError, MissingFileError, SchemaError
+from vico.geo.frame import LocalFrame
+
+DAY = 86_400
+
+_MOST_BYTES = 4 << 30  # unpacked, of one table
+_MOST_RATIO = 400  # unpacked to packed; timetables pack 10 to 40 to 1
+_MOST_LINE = 1 << 16
+_MOST_STOPS = 400  # calls of one trip
+_MOST_REPEATS = 2_000  # departures that one row of frequencies.txt may stand for
+_MOST_DAYS = 3_660
+_MOST_BROKEN = 200
+_WEEK = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
+_TIME = re.compile(r"\s*(\d{1,3}):([0-5]\d):([0-5]\d)\s*")
+_DATE = re.compile(r"(\d{4})(\d\d)(\d\d)")
+_COLOUR = re.compile(r"[0-9a-fA-F]{6}")
+_TRAMS = {0, 5, 12, *range(900, 907)}
+
+
+@dataclass(frozen=True)
+class GtfsStop:
+    """A stop in the window; `xy` metres, ENU."""
+
+    id: str
+    name: str
+    xy: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class GtfsRoute:
+    """A route that stops in the window; `kind` is bus or tram, `colour` ``#rrggbb`` or empty."""
+
+    id: str
+    name: str
+    title: str
+    kind: str
+    colour: str
+    agency: str
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Trips of a route that call at the same stops of the window in the same order.
+
+    Attributes
+    ----------
+    route
+        Id of the route.
+    direction
+        ``0`` or ``1`` as the feed says, else empty.
+    stops
+        Ids of the calls in the window: the longest run of a trip between two of its calls outside.
+    departures
+        Seconds of the service day at which a bus leaves the first of them, sorted; beyond 86,400 after midnight.
+    travel
+        Seconds from then to each of them, in the median of the trips; the first is 0.
+    line
+        The way driven in the window's surroundings, ENU metres, shape ``(n, 2)`` as tuples; empty where no shape says.
+    """
+
+    route: str
+    direction: str
+    stops: tuple[str, ...]
+    departures: tuple[int, ...]
+    travel: tuple[int, ...]
+    line: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Feed:
+    """What a GTFS feed says about a window on one day of service.
+
+    Attributes
+    ----------
+    name, sha256
+        Of the file.
+    day
+        The day whose timetable it is, ISO 8601; empty where nothing runs in the window.
+    stops, routes, patterns
+        Those of buses and trams that stop in the window, sorted by id; patterns of trams are not among them.
+    attribution
+        Who publishes it, as the feed says.
+    broken
+        Id and fault of rows that were left out (the first 200).
+    """
+
+    name: str
+    sha256: str
+    day: str
+    stops: tuple[GtfsStop, ...]
+    routes: tuple[GtfsRoute, ...]
+    patterns: tuple[Pattern, ...]
+    attribution: str
+    broken: tuple[tuple[str, str], ...] = ()
+
+
+def read_gtfs(path: Path, frame: LocalFrame, half: float, *, day: date | None = None) -> Feed:
+    """Read the bus routes of a zipped GTFS feed that stop in a window.
+
+    Parameters
+    ----------
+    path
+        The feed, a zip.
+    frame
+        Local frame whose origin is the window's centre.
+    half
+        Half side of the window, metres.
+    day
+        Day of service; the weekday with the most trips in the window where not given (the first of several).
+
+    Returns
+    -------
+    Feed
+        Times are seconds of the service day.
+
+    Raises
+    ------
+    MissingFileError
+        If there is no such file.
+    SchemaError
+        If it is no readable feed, lacks a table it must have, or unpacks to an absurd size.
+    InputError
+        If nothing in the window runs on `day`.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise MissingFileError(f"{path}: no such file; give a zipped GTFS feed")
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return _Reader(path, archive, frame, half).read(day)
+    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, NotImplementedError, ValueError) as error:
+        if isinstance(error, SchemaError | InputError):
+            raise
+        reason = str(error).replace(str(path), "").strip(" :'") or type(error).__name__
+        raise SchemaError(f"{path}: not a readable GTFS zip ({reason}); download it again") from None
+
+
+def kind_of(route_type: str) -> str | None:
+    """Return bus, tram or None for a route type, basic or extended."""
+    try:
+        number = int(route_type)
+    except ValueError:
+        return None
+    if number in (3, 11) or 700 <= number <= 716 or number == 800:
+        return "bus"
+    return "tram" if number in _TRAMS else None
+
+
+def seconds_of(text: str) -> int | None:
+    """Return a time (``25:10:00`` is ten past one the next day) as seconds of the service day, None if it is none."""
+    match = _TIME.fullmatch(text)
+    return None if match is None else int(match[1]) * 3600 + int(match[2]) * 60 + int(match[3])
+
+
+def _date_of(text: str) -> date | None:
+    match = _DATE.fullmatch(text.strip())
+    try:
+        return None if match is None else date(int(match[1]), int(match[2]), int(match[3]))
+    except ValueError:
+        return None
+
+
+class _Bounded(io.RawIOBase):
+    """A member of a zip, unpacked no further than its bound."""
+
+    def __init__(self, stream: io.BufferedIOBase, most: int, what: str) -> None:
+        self._stream, self._left, self._what = stream, most, what
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
+        data = self._stream.read(len(buffer))
+        self._left -= len(data)
+        if self._left < 0:
+            raise SchemaError(f"{self._what} unpacks to an absurd size; this is no timetable")
+        buffer[: len(data)] = data
+        return len(data)
+
+
+# stop_sequence, stop id, arrival, departure (None where not given)
+Call = tuple[int, str, int | None, int | None]
+
+
+@dataclass
+class _Trip:
+    """A trip and its calls."""
+
+    route: str
+    service: str
+    direction: str
+    shape: str
+    calls: list[Call] = field(default_factory=list)
+
+
+class _Reader:
+    def __init__(self, path: Path, archive: zipfile.ZipFile, frame: LocalFrame, half: float) -> None:
+        self.path, self.archive, self.frame, self.half = path, archive, frame, half
+        self.broken: list[tuple[str, str]] = []
+        self.members: dict[str, zipfile.ZipInfo] = {}
+        for info in archive.infolist():
+            parts = info.filename.replace("\\", "/").split("/")
+            # Some feeds lie in a folder of their zip.
+            if len(parts) <= 2 and parts[-1].endswith(".txt"):
+                self.members.setdefault(parts[-1], info)
+
+    def read(self, day: date | None) -> Feed:
+        self._need("stops.txt", "routes.txt", "trips.txt", "stop_times.txt")
+        if "calendar.txt" not in self.members and "calendar_dates.txt" not in self.members:
+            raise SchemaError(f"{self.path}: has neither calendar.txt nor calendar_dates.txt; a GTFS feed has one")
+        agencies = self._agencies()
+        stops, parents = self._stops()
+        routes = self._routes(agencies)
+        trips = self._calling(self._trips(routes), stops) if stops else {}
+        served = {trip.route for trip in trips.values()}
+        chosen = self._day(trips, day)
+        patterns: list[Pattern] = []
+        if chosen is not None:
+            running = self._running(trips, chosen)
+            patterns = self._patterns({k: t for k, t in running.items() if routes[t.route].kind == "bus"}, stops)
+        used = {s for p in patterns for s in p.stops} | {c[1] for t in trips.values() for c in t.calls if c[1] in stops}
+        names = {stop: parents.get(stop, "") for stop in used}
+        return Feed(
+            name=self.path.name,
+            sha256=sha256(self.path.read_bytes()).hexdigest(),
+            day="" if chosen is None else chosen.isoformat(),
+            stops=tuple(GtfsStop(k, names[k] or k, stops[k]) for k in sorted(used)),
+            routes=tuple(routes[k] for k in sorted(served)),
+            patterns=tuple(patterns),
+            attribution=self._attribution(agencies, {routes[k].agency for k in served}),
+            broken=tuple(self.broken),
+        )
+
+    # -- tables ------------------------------------------------------------------------------------------------------
+
+    def _need(self, *names: str) -> None:
+        for name in names:
+            if name not in self.members:
+                raise SchemaError(f"{self.path}: has no {name}, which every GTFS feed has; download it again")
+
+    def _fault(self, what: str, why: str) -> None:
+        if len(self.broken) < _MOST_BROKEN:
+            self.broken.append((what, why))
+
+    def _lines(self, text: io.TextIOWrapper, name: str) -> Iterator[str]:
+        while line := text.readline(_MOST_LINE):
+            if len(line) >= _MOST_LINE:
+                raise SchemaError(f"{self.path}: {name} has a line of more than {_MOST_LINE:,} characters")
+            yield line.replace("\0", "")
+
+    def _rows(self, name: str, needed: Sequence[str], wanted: Sequence[str] = ()) -> Iterator[list[str]]:
+        """The named columns of a table, row by row; empty texts for optional columns that it lacks."""
+        if name not in self.members:
+            return
+        info = self.members[name]
+        most = min(_MOST_BYTES, max(info.compress_size, 1 << 16) * _MOST_RATIO)
+        with self.archive.open(info) as stream:
+            raw = io.BufferedReader(_Bounded(stream, most, f"{self.path}: {name}"), 1 << 16)  # type: ignore[arg-type]
+            text = io.TextIOWrapper(raw, encoding="utf-8-sig", newline="")
+            table = csv.reader(self._lines(text, name))
+            try:
+                header = [column.strip() for column in next(table, [])]
+                missing = [column for column in needed if column not in header]
+                if missing:
+                    raise SchemaError(f"{self.path}: {name} has no column {missing[0]}; the feed can't be used")
+                at = [header.index(column) if column in header else -1 for column in (*needed, *wanted)]
+                last = max(at)
+                for row in table:
+                    if len(row) > last:
+                        yield [row[k] if k >= 0 else "" for k in at]
+                    elif row:
+                        row = row + [""] * (last + 1 - len(row))
+                        yield [row[k] if k >= 0 else "" for k in at]
+            except UnicodeDecodeError as error:
+                raise SchemaError(f"{self.path}: {name} is not UTF-8 ({error.reason}); save it as UTF-8") from None
+            except csv.Error as error:
+                raise SchemaError(f"{self.path}: {name}, line {table.line_num}: {error}; mend the table") from None
+
+    def _agencies(self) -> dict[str, str]:
+        return {key.strip(): name.strip() for name, key in self._rows("agency.txt", ["agency_name"], ["agency_id"])}
+
+    def _stops(self) -> tuple[dict[str, tuple[float, float]], dict[str, str]]:
+        """Places and names of the stops in the window."""
+        keys: list[str] = []
+        names: list[str] = []
+        degrees: list[tuple[float, float]] = []
+        for key, name, lat, lon, kind in self._rows("stops.txt", ["stop_id"], ["stop_name", "stop_lat", "stop_lon",
+                                                                                "location_type"]):  # fmt: skip
+            if kind.strip() not in ("", "0"):
+                continue
+            try:
+                y, x = float(lat), float(lon)
+            except ValueError:
+                y = x = np.nan
+            if not (abs(y) <= 90.0 and abs(x) <= 180.0):
+                self._fault(f"stop {key[:60]}", f"no place on Earth ({lat[:20]}, {lon[:20]})")
+                continue
+            keys.append(key)
+            names.append(name.strip())
+            degrees.append((y, x))
+        if not keys:
+            return {}, {}
+        south, north = self.frame.bbox(self.half)[1::2]
+        table = np.array(degrees)
+        # Far away the projection has no bounds: only stops of these latitudes are asked about.
+        near = np.flatnonzero((table[:, 0] >= south) & (table[:, 0] <= north))
+        xy = self.frame.to_enu(table[near, 0], table[near, 1]).reshape(-1, 2)
+        inside = np.isfinite(xy).all(axis=1) & (np.abs(xy).max(axis=1, initial=0.0) <= self.half)
+        chosen = {keys[i]: (round(float(x), 3), round(float(y), 3)) for i, (x, y) in zip(near[inside], xy[inside],
+                                                                                         strict=True)}  # fmt: skip
+        return chosen, {keys[i]: names[i] for i in near[inside]}
+
+    def _routes(self, agencies: dict[str, str]) -> dict[str, GtfsRoute]:
+        only = next(iter(agencies.values())) if len(agencies) == 1 else ""
+        routes = {}
+        wanted = ["route_short_name", "route_long_name", "route_color", "agency_id"]
+        for key, kind, short, long, colour, agency in self._rows("routes.txt", ["route_id", "route_type"], wanted):
+            what = kind_of(kind.strip())
+            if what is None:
+                continue
+            name = short.strip() or long.strip() or key
+            shade = f"#{colour.strip().lower()}" if _COLOUR.fullmatch(colour.strip()) else ""
+            routes[key] = GtfsRoute(key, name, long.strip(), what, shade, agencies.get(agency.strip(), only))
+        return routes
+
+    def _trips(self, routes: Collection[str]) -> dict[str, _Trip]:
+        trips = {}
+        rows = self._rows("trips.txt", ["route_id", "trip_id", "service_id"], ["direction_id", "shape_id"])
+        for route, key, service, direction, shape in rows:
+            if route in routes:
+                trips[key] = _Trip(route, service, direction.strip(), shape.strip())
+        return trips
+
+    def _calling(self, trips: dict[str, _Trip], stops: Collection[str]) -> dict[str, _Trip]:
+        """Trips that call in the window, with all their calls. Two passes: most of a large feed never comes near."""
+        near = {trip for trip, stop in self._rows("stop_times.txt", ["trip_id", "stop_id"]) if stop in stops}
+        near &= trips.keys()
+        if not near:
+            return {}
+        wanted = ["arrival_time", "departure_time"]
+        for key, stop, place, arrival, departure in self._rows(
+            "stop_times.txt", ["trip_id", "stop_id", "stop_sequence"], wanted
+        ):
+            if key not in near:
+                continue
+            try:
+                order = int(place)
+            except ValueError:
+                self._fault(f"trip {key[:60]}", f"stop_sequence {place[:20]!r} is no number; the call is left out")
+                continue
+            calls = trips[key].calls
+            if len(calls) < _MOST_STOPS:
+                came, left = seconds_of(arrival), seconds_of(departure)
+                calls.append((order, stop, came if came is not None else left, left if left is not None else came))
+        kept = {}
+        for key in sorted(near):
+            trips[key].calls.sort(key=lambda call: call[0])
+            fault = _timed(trips[key])
+            if fault is None:
+                kept[key] = trips[key]
+            else:
+                self._fault(f"trip {key[:60]}", fault)
+        return kept
+
+    # -- days --------------------------------------------------------------------------------------------------------
+
+    def _services(self, wanted: Collection[str]) -> dict[str, set[date]]:
+        """Days on which services run."""
+        days: dict[str, set[date]] = defaultdict(set)
+        for key, first, last, *week in self._rows("calendar.txt", ["service_id", "start_date", "end_date"], _WEEK):
+            if key not in wanted:
+                continue
+            start, end = _date_of(first), _date_of(last)
+            if start is None or end is None:
+                self._fault(f"service {key[:60]}", f"dates {first[:12]!r}, {last[:12]!r} are none; left out")
+                continue
+            for k in range(min((end - start).days + 1, _MOST_DAYS)):
+                if week[(start.weekday() + k) % 7].strip() == "1":
+                    days[key].add(start + timedelta(days=k))
+        for key, text, what in self._rows("calendar_dates.txt", ["service_id", "date", "exception_type"]):
+            when = _date_of(text) if key in wanted else None
+            if when is not None and what.strip() == "1":
+                days[key].add(when)
+            elif when is not None and what.strip() == "2":
+                days[key].discard(when)
+        return days
+
+    def _day(self, trips: dict[str, _Trip], day: date | None) -> date | None:
+        """The day asked for, else the weekday with the most trips; None where there are no trips at all."""
+        self._days = self._services({trip.service for trip in trips.values()})
+        load: Counter[date] = Counter()
+        for service, count in Counter(trip.service for trip in trips.values()).items():
+            for when in self._days.get(service, ()):
+                load[when] += count
+        if day is not None and trips:
+            if not load[day]:
+                span = f"it runs from {min(load)} to {max(load)}" if load else "its calendar has no day"
+                raise InputError(f"{self.path}: nothing in the window runs on {day}; {span}")
+            return day
+        weekdays = [when for when in load if when.weekday() < 5 and load[when]] or [w for w in load if load[w]]
+        return min(weekdays, key=lambda when: (-load[when], when)) if weekdays else None
+
+    def _running(self, trips: dict[str, _Trip], day: date) -> dict[str, _Trip]:
+        """Trips of the day; those of frequencies.txt once for each departure."""
+        running = {key: trip for key, trip in trips.items() if day in self._days.get(trip.service, ())}
+        repeated: dict[str, list[_Trip]] = defaultdict(list)
+        rows = self._rows("frequencies.txt", ["trip_id", "start_time", "end_time", "headway_secs"])
+        for key, first, last, gap in rows:
+            trip = running.get(key)
+            if trip is None:
+                continue
+            start, end = seconds_of(first), seconds_of(last)
+            step = int(gap) if gap.strip().isdecimal() and len(gap.strip()) < 7 else 0
+            if start is None or end is None or step < 1 or (end - start) / step > _MOST_REPEATS:
+                self._fault(
+                    f"trip {key[:60]}", f"frequency {first[:9]}-{last[:9]} every {gap[:9]} s makes no timetable"
+                )
+                continue
+            shift = trip.calls[0][3] or 0
+            for begin in range(start, end, step):
+                if len(repeated[key]) >= _MOST_REPEATS:
+                    break
+                calls: list[Call] = [
+                    (n, s, (a or 0) - shift + begin, (d or 0) - shift + begin) for n, s, a, d in trip.calls
+                ]
+                repeated[key].append(_Trip(trip.route, trip.service, trip.direction, trip.shape, calls))
+        plain = {key: trip for key, trip in running.items() if key not in repeated}
+        return plain | {f"{key} {k}": trip for key, runs in repeated.items() for k, trip in enumerate(runs)}
+
+    # -- patterns ----------------------------------------------------------------------------------------------------
+
+    def _patterns(self, trips: dict[str, _Trip], stops: Collection[str]) -> list[Pattern]:
+        runs: dict[tuple[str, str, tuple[str, ...]], list[tuple[int, list[int], str]]] = defaultdict(list)
+        for trip in trips.values():
+            calls = _within(trip, stops)
+            if calls:
+                begin = calls[0][3] or 0
+                gone = [0, *((call[2] or 0) - begin for call in calls[1:])]
+                key = (trip.route, trip.direction, tuple(call[1] for call in calls))
+                runs[key].append((begin, gone, trip.shape))
+        lines = self._shapes({row[2] for rows in runs.values() for row in rows if row[2]})
+        patterns = []
+        for (route, direction, called), rows in sorted(runs.items()):
+            shapes = Counter(shape for *_, shape in rows)
+            shape = min(shapes, key=lambda s: (-shapes[s], s))
+            travel = np.median(np.array([gone for _, gone, _ in rows]), axis=0)
+            patterns.append(
+                Pattern(
+                    route=route,
+                    direction=direction,
+                    stops=called,
+                    departures=tuple(sorted({begin for begin, *_ in rows})),
+                    travel=tuple(int(t) for t in np.maximum.accumulate(travel)),
+                    line=lines.get(shape, ()),
+                )
+            )
+        return patterns
+
+    def _shapes(self, wanted: Collection[str]) -> dict[str, tuple[tuple[float, float], ...]]:
+        """Lines of shapes near the window."""
+        rows: dict[str, list[tuple[int, float, float]]] = defaultdict(list)
+        if not wanted:
+            return {}
+        for key, lat, lon, order in self._rows(
+            "shapes.txt", ["shape_id", "shape_pt_lat", "shape_pt_lon", "shape_pt_sequence"]
+        ):
+            if key in wanted:
+                try:
+                    y, x, n = float(lat), float(lon), int(order)
+                except ValueError:
+                    continue
+                if abs(y - self.frame.lat) < 1.0 and abs((x - self.frame.lon + 180.0) % 360.0 - 180.0) <= 90.0:
+                    rows[key].append((n, y, x))
+        lines = {}
+        for key in sorted(rows):
+            table = np.array([(y, x) for _, y, x in sorted(rows[key])])
+            xy = self.frame.to_enu(table[:, 0], table[:, 1])
+            near = np.isfinite(xy).all(axis=1) & (np.abs(xy).max(axis=1) <= 2.0 * self.half + 200.0)
+            lines[key] = tuple((round(float(x), 2), round(float(y), 2)) for x, y in xy[near])
+        return lines
+
+    def _attribution(self, agencies: dict[str, str], served: Collection[str]) -> str:
+        """Who made it: the publisher of feed_info.txt and attributions.txt, else the agencies that serve the window."""
+        named = [name.strip() for (name,) in self._rows("feed_info.txt", ["feed_publisher_name"])]
+        named += [name.strip() for (name,) in self._rows("attributions.txt", ["organization_name"])]
+        named = [name for name in named if name] or sorted(name for name in served if name)
+        named = named or list(agencies.values())
+        return ", ".join(dict.fromkeys(name[:200] for name in named[:12])) or self.path.name
+
+
+def _timed(trip: _Trip) -> str | None:
+    """Fill in the times of calls that have none, evenly between those that have; says why where that can't be done."""
+    calls = trip.calls
+    if len(calls) < 2:
+        return "calls at fewer than two stops; left out"
+    known = [k for k, call in enumerate(calls) if call[2] is not None]
+    if not known or known[0] != 0 or known[-1] != len(calls) - 1:
+        return "has no time at its first or last stop; left out"
+    for a, b in pairwise(known):
+        start, end = calls[a][3] or 0, calls[b][2] or 0
+        if end < start:
+            return f"its times go back at stop {calls[b][1][:40]}; left out"
+        for k in range(a + 1, b):
+            when = start + (end - start) * (k - a) // (b - a)
+            calls[k] = (calls[k][0], calls[k][1], when, when)
+    return None
+
+
+def _within(trip: _Trip, stops: Collection[str]) -> list[Call]:
+    """The longest run of calls in the window."""
+    best: list[Call] = []
+    run: list[Call] = []
+    for call in [*trip.calls, None]:
+        if call is not None and call[1] in stops:
+            run.append(call)
+        else:
+            best = run if len(run) > len(best) else best
+            run = []
+    return best
