@@ -332,6 +332,8 @@ def _closed(lanes: LaneGraph, leaves: NDArray[np.bool_]) -> NDArray[np.bool_]:
     from scipy.sparse.csgraph import breadth_first_order, connected_components
 
     n = len(lanes)
+    if not n:
+        return np.zeros(0, bool)
     a, b = np.repeat(np.arange(n), np.diff(lanes.next_first)), lanes.next
     driven = ~(lanes.buses_only[a] | lanes.buses_only[b])
     a, b = a[driven], b[driven]
@@ -348,7 +350,7 @@ def _closed(lanes: LaneGraph, leaves: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _at_border(lanes: LaneGraph, point: NDArray[np.int32]) -> NDArray[np.bool_]:
     """Which points (one a lane) lie where the map cuts the streets off."""
-    reach = np.abs(lanes.points).max()
+    reach = np.abs(lanes.points).max(initial=0.0)
     return np.asarray(np.abs(lanes.points[point]).max(axis=1) > reach - 6.0)
 
 

@@ -498,6 +498,8 @@ def _rack_yaws(traffic: Traffic, spots: NDArray[np.float64]) -> NDArray[np.float
     lanes, walks = traffic.lanes, traffic.walks
     lines = [shapely.LineString(walks.line(i)) for i in range(len(walks)) if walks.kind[i] == 0]
     lines = lines or [shapely.LineString(lanes.line(i)) for i in range(len(lanes))]
+    if not lines:
+        return np.zeros(len(spots))
     yaws = []
     for spot in spots:
         point = shapely.Point(spot)

@@ -340,7 +340,7 @@ def _assembled(
         speed=np.array([lane.speed for lane in driven]),
         inside=inside,
         zone=zone,
-        buses_only=np.array([not lane.cars for lane in driven]),
+        buses_only=np.array([not lane.cars for lane in driven], bool),
         left=np.array(
             [by_place.get((lane.edge, lane.index + 1), -1) if s else -1 for lane, s in zip(driven, side, strict=True)],
             np.int32,

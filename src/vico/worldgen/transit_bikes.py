@@ -23,6 +23,7 @@ _CAPACITY = 12
 _EACH = 40_000.0  # square metres of window for each planned station
 _FEWEST, _MOST = 2, 6
 _APART = 80.0
+_ASIDE = 2.2  # metres from the middle of a footway
 _FOOTWAYS = ("pedestrian", "footway", "living_street", "path", "cycleway")
 
 
@@ -65,7 +66,9 @@ def _planned(osm: OsmData, walks: Walkways, half: float, seed: int) -> list[NDAr
         window = shapely.box(5.0 - half, 5.0 - half, half - 5.0, half - 5.0)
         for way in osm.ways:
             if way.tags.get("highway") in _FOOTWAYS and len(way.line) > 1:
-                stretches += [part for part in shapely.get_parts(shapely.LineString(way.line).intersection(window))
+                # Beside the way, not on it.
+                beside = shapely.offset_curve(shapely.LineString(way.line), -_ASIDE)
+                stretches += [part for part in shapely.get_parts(beside.intersection(window))
                               if part.geom_type == "LineString" and part.length > 15.0]  # fmt: skip
     if not stretches:
         return []
