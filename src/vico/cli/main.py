@@ -53,6 +53,10 @@ def world_build(
     layouts: Path | None = None,
     overpass: str | None = None,
     refresh: bool = False,
+    texel: float = 0.10,
+    inpaint: Literal["exemplar", "patchmatch", "diffusion"] = "exemplar",
+    upscale: Literal["none", "sharpen", "realesrgan", "diffusion"] = "none",
+    model: str = "",
     seed: int = 0,
     force: bool = False,
     json: bool = False,
@@ -74,19 +78,24 @@ def world_build(
         center: Both in one. Without any, the middle of the extract.
         radius: Half the window's side, metres.
         dem: Elevation: GeoTIFF, .hgt or packed .hgt; one or several that cover the window. Flat ground without.
-        tiles: Photogrammetry: path or address of a tileset.json, or "google" (your key in the environment).
-        photos: Street pictures: a folder with poses, or "mapillary" or "google" (your key in the environment).
+        tiles: Photogrammetry: path or address of a tileset.json. Ground, heights and walls are taken from it.
+        photos: Street pictures: a folder with poses, or "mapillary" (MAPILLARY_TOKEN in the environment).
         places: Further places: Overture GeoParquet files, or "google" (your key in the environment).
         gtfs: Timetables: zipped GTFS feeds.
         layouts: Folder of room layouts to choose from.
         overpass: Address of the Overpass server, or "off"; else the environment's VICO_OVERPASS, else the public one.
         refresh: Ask the server even if its answer is in the cache.
+        texel: Side of a texel of photographed walls, metres.
+        inpaint: What fills parts of walls that no photo shows.
+        upscale: What makes photographed walls finer.
+        model: For "diffusion": a folder with the model, or its name on a hub.
         seed: Decides what the map leaves open.
         force: Replace what is in the output folder; stages whose inputs did not change are kept.
         json: Print the result as JSON.
     """
     from vico.cli import world as verb
     from vico.worldgen.sources import Sources
+    from vico.worldgen.texturing import Texturing
 
     if center is not None:
         if lat is not None or lon is not None:
@@ -97,7 +106,8 @@ def world_build(
     if osm is None:
         osm = verb.locate(lat, lon, radius, overpass=overpass, refresh=refresh)
     sources = Sources(osm, dem=dem, tiles=tiles, photos=photos, places=places, gtfs=gtfs, layouts=layouts)
-    return verb.build(sources, out=out, lat=lat, lon=lon, half=radius, seed=seed, force=force, json=json)
+    how = Texturing(texel=texel, inpaint=inpaint, upscale=upscale, model=model)
+    return verb.build(sources, out=out, lat=lat, lon=lon, half=radius, seed=seed, texturing=how, force=force, json=json)
 
 
 @world.command(name="rebuild")

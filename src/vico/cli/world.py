@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
@@ -16,6 +17,8 @@ from vico.world.folder import World, read_world, stage_seconds
 from vico.worldgen.pipeline import build_world, extract_centre, rebuild_world
 from vico.worldgen.previews import Viewpoint
 from vico.worldgen.sources import Sources
+from vico.worldgen.streetview_photo import Photographer
+from vico.worldgen.texturing import Texturing
 
 
 def photograph(world: World, views: Sequence[Viewpoint]) -> Iterator[NDArray[np.uint8]]:
@@ -44,6 +47,7 @@ def build(
     lon: float | None = None,
     half: float = 400.0,
     seed: int = 0,
+    texturing: Texturing | None = None,
     force: bool = False,
     json: bool = False,
 ) -> int:
@@ -62,8 +66,29 @@ def build(
             force=force,
             progress=report,
             photograph=photograph,
+            texturing=texturing,
+            studio=studio,
         )
     return info(out, json=json)
+
+
+def studio(world: World) -> Photographer:
+    """Take pictures of an unfinished world with pinhole cameras whose principal point is the middle."""
+    from vico.render.cameras import Cameras
+    from vico.render.frames import render
+    from vico.render.world_scene import scene_of
+
+    scene = scene_of(world, rooms=False)
+
+    def take(
+        position: NDArray[np.float64], rotation: NDArray[np.float64], intrinsics: NDArray[np.float64], w: int, h: int
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.int32]]:
+        fov = 2 * math.atan(h / 2 / intrinsics[1, 1])
+        camera = Cameras(position[None], rotation[2][None], up=-rotation[1], fov_y=fov, width=w, height=h)
+        frames = render(scene, camera, samples=1)
+        return frames.rgb[0], frames.depth[0], frames.segmentation[0]
+
+    return take
 
 
 def locate(
@@ -81,7 +106,7 @@ def locate(
 def rebuild(path: Path, stages: Sequence[str], *, json: bool = False) -> int:
     """Run stages of a world again."""
     with progress_bars() as report:
-        rebuild_world(path, stages, progress=report, photograph=photograph)
+        rebuild_world(path, stages, progress=report, photograph=photograph, studio=studio)
     return info(path, json=json)
 
 

@@ -11,6 +11,7 @@ import math
 import os
 import shutil
 from collections.abc import Collection
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -18,17 +19,18 @@ import osmium
 from PIL import Image
 
 from vico.errors import InputError, MissingFileError, OutputExistsError, SchemaError
-from vico.geo.elevation import read_elevation
 from vico.geo.frame import LocalFrame
-from vico.geo.osm import checked_extract, read_osm
+from vico.geo.osm import checked_extract
 from vico.world.files import read_json, write_json
 from vico.world.folder import World, read_world, seal
-from vico.world.model import Dropped, Manifest
+from vico.world.model import Manifest
+from vico.worldgen.evidence import gather
 from vico.worldgen.previews import Photograph, map_picture, viewpoints
 from vico.worldgen.recipe import make_world
 from vico.worldgen.report import write_report
 from vico.worldgen.sources import Sources
 from vico.worldgen.stages import Progress, Stages
+from vico.worldgen.texturing import Studio, Texturing
 
 STAGES = ".stages"
 _REQUEST = "request.json"
@@ -74,6 +76,8 @@ def build_world(
     keep_stages: bool = True,
     progress: Progress | None = None,
     photograph: Photograph | None = None,
+    texturing: Texturing | None = None,
+    studio: Studio | None = None,
 ) -> Manifest:
     """Build a world folder.
 
@@ -101,6 +105,10 @@ def build_world(
         Called with a stage's name, how much of it is done, and how much there is.
     photograph
         Takes the street-level pictures; none are made without.
+    texturing
+        How photos come onto the walls.
+    studio
+        Renders the unfinished world for street photos to be matched with; they need it.
 
     Returns
     -------
@@ -127,29 +135,30 @@ def build_world(
     frame = LocalFrame(lat, lon)
     folder = out.with_name(f"{out.name}.partial")
     stages = Stages(folder / STAGES, again=again, progress=progress)
-    with stages.timed("map"):
-        data = read_osm(sources.osm, frame, half)
-        stages.given(data, f"{data.sha256} {frame} {half}")
-        samples = read_elevation(sources.dem, frame, half) if sources.dem else None
-        if samples is not None:
-            stages.given(samples, f"{samples.sha256} {frame} {half}")
-    stages.report(
-        "map",
-        {
-            "nodes": len(data.nodes),
-            "ways": len(data.ways),
-            "areas": len(data.areas),
-            "heights": 0 if samples is None else len(samples.points),
-            "heights_filled": 0 if samples is None else samples.filled,
-        },
-        [Dropped(id=key, reason=reason) for key, reason in data.broken],
-    )
+    given = gather(sources, frame, half, stages)
     _clear(folder)
     if not (folder / STAGES).exists() and (out / STAGES).is_dir():
         shutil.copytree(out / STAGES, folder / STAGES, copy_function=os.link)  # what did not change need not be made
-    request: dict[str, Any] = {"lat": lat, "lon": lon, "half": half, "seed": seed, "sources": sources.to_json()}
+    texturing = texturing or Texturing()
+    request: dict[str, Any] = {
+        "lat": lat,
+        "lon": lon,
+        "half": half,
+        "seed": seed,
+        "sources": sources.to_json(),
+        "texturing": asdict(texturing),
+    }
     write_json(folder / STAGES / _REQUEST, request)
-    world = make_world(data, samples, half=half, seed=seed, folder=folder, sources=sources, stages=stages)
+    world = make_world(
+        given,
+        half=half,
+        seed=seed,
+        folder=folder,
+        sources=sources,
+        stages=stages,
+        texturing=texturing,
+        studio=studio,
+    )
     with stages.timed("previews"):
         counts = _pictures(world, folder, photograph)
     stages.report("previews", counts)
@@ -168,6 +177,7 @@ def rebuild_world(
     *,
     progress: Progress | None = None,
     photograph: Photograph | None = None,
+    studio: Studio | None = None,
 ) -> Manifest:
     """Run stages of a world again, and whatever depends on a result that changed.
 
@@ -202,6 +212,8 @@ def rebuild_world(
         again=again,
         progress=progress,
         photograph=photograph,
+        texturing=Texturing(**request["texturing"]),
+        studio=studio,
     )
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -12,30 +14,45 @@ from shapely.geometry.base import BaseGeometry
 from vico import __version__
 from vico.assets.furniture import furniture_models
 from vico.assets.street import street_models
+from vico.errors import EmptyInputError, InputError
 from vico.geo.elevation import HeightSamples
 from vico.geo.osm import OsmData
+from vico.geo.street_images import StreetImage
+from vico.geo.tile_mesh import TileMesh
 from vico.world.files import sha256_of, write_bytes
 from vico.world.folder import World, write_record, write_records, write_terrain
 from vico.world.heights import HeightField
 from vico.world.lanes import read_lanes
 from vico.world.mesh import Surface, write_glb
-from vico.world.model import Manifest, Origin, Source, Transit
+from vico.world.model import Manifest, Origin, Transit
 from vico.world.objects import Objects, write_objects
 from vico.world.walkable import WalkableMap, write_walkable
 from vico.worldgen.bridges import pier_feet, portal_feet, portals_of
 from vico.worldgen.buildings import BuildingsResult, buildings_from_osm
+from vico.worldgen.evidence import Evidence
 from vico.worldgen.facade_fronts import street_fronts
+from vico.worldgen.fitting import buildings_on_tiles, settled
 from vico.worldgen.grading import graded, standing_outlines
 from vico.worldgen.ground import ground_from_osm, mapped_areas
-from vico.worldgen.indoor import Indoors, furnish
+from vico.worldgen.indoor import furnish
 from vico.worldgen.netconvert import road_network
 from vico.worldgen.objects import objects_from_osm
+from vico.worldgen.outlines import building_plans
 from vico.worldgen.places import places_from_osm
 from vico.worldgen.roads import roads_from_osm
 from vico.worldgen.sources import Sources
 from vico.worldgen.stages import Stages
 from vico.worldgen.streets import StreetPolygons, road_polygons
-from vico.worldgen.terrain import flat_terrain, terrain_from_dem
+from vico.worldgen.terrain import flat_terrain, terrain_from_dem, terrain_from_tiles
+from vico.worldgen.texturing import (
+    Studio,
+    Texturing,
+    enhanced,
+    kept_where_photographed,
+    painted_as_built,
+    painted_from_street,
+    painted_from_tiles,
+)
 from vico.worldgen.transit import transit_from_osm
 from vico.worldgen.walkable import walkable_map
 
@@ -43,27 +60,38 @@ _BARRIER_KINDS = ("fence", "wall", "guard_rail", "hedge")
 
 
 def make_world(
-    data: OsmData,
-    samples: HeightSamples | None,
+    given: Evidence,
     *,
     half: float,
     seed: int,
     folder: Path,
     sources: Sources,
     stages: Stages,
+    texturing: Texturing,
+    studio: Studio | None,
 ) -> World:
-    """Run every stage between the map and the pictures, and write the world's files into `folder`."""
-    if samples is None:
+    """Run every stage between the sources and the pictures, and write the world's files into `folder`."""
+    data, tiles = given.data, given.tiles
+    if tiles is not None:
+        height, raised = stages.run("terrain", _ground_of_tiles, data, given.samples, tiles, half=half, seed=seed)
+        if raised:
+            tiles = replace(tiles, positions=tiles.positions + np.array([0.0, 0.0, raised]))
+    elif given.samples is None:
         height = stages.run("terrain", flat_terrain, half=half)
     else:
-        height = stages.run("terrain", terrain_from_dem, samples, half=half)
+        height = stages.run("terrain", terrain_from_dem, given.samples, half=half)
     # Kerbs lie at the borders of the streets, so both come from the same polygons, and before anything stands on them.
     streets = stages.run("streets", _streets, data, seed=seed)
     height = stages.run("grading", graded, height, data, streets)
     write_terrain(folder / "terrain.npz", height)
-    stages.report("terrain", {"cells": int(height.heights.shape[0] - 1) ** 2, "flat": int(samples is None)})
+    flat = given.samples is None and tiles is None
+    stages.report("terrain", {"cells": int(height.heights.shape[0] - 1) ** 2, "flat": int(flat)})
 
-    built = stages.run("buildings", buildings_from_osm, data, height, seed=seed)
+    if tiles is None:
+        built = stages.run("buildings", buildings_from_osm, data, height, seed=seed)
+    else:
+        built, fits = stages.run("buildings", buildings_on_tiles, data, height, tiles, seed=seed)
+        stages.report("fit", fits.counts())
     solids = _standing(built, height)
     solids += [*pier_feet(data, height, streets), *portal_feet(portals_of(data, streets))]
 
@@ -146,7 +174,19 @@ def make_world(
     )
     stages.report("places", {"places": len(places), "entrances": len(entrances)}, dropped)
 
-    indoors = stages.run("indoor", furnish, places, buildings=buildings, height=height, seed=seed)
+    if sources.layouts is not None:
+        files = sorted(sources.layouts.glob("*.json"))
+        stages.given(sources.layouts, " ".join(f"{path.name} {sha256_of(path)}" for path in files))
+    indoors = stages.run(
+        "indoor",
+        furnish,
+        places,
+        buildings=buildings,
+        height=height,
+        seed=seed,
+        entrances=entrances,
+        library=sources.layouts,
+    )
     write_records(folder / "places.json", indoors.places)
     write_records(folder / "rooms.json", indoors.rooms)
     objects = Objects.joined([outdoors, indoors.furniture])
@@ -156,10 +196,47 @@ def make_world(
     ground = stages.run("ground", ground_from_osm, data, height, half, streets)
     stages.report("ground", {"faces": _faces(ground)})
     fronts = street_fronts(indoors.places, entrances, buildings, built.walls, seed=seed)
-    doors = fronts.surfaces
     stages.report("fronts", fronts.counts)
+    models = _models(objects)
+    parts: dict[str, Any] = {
+        "height": height,
+        "buildings": buildings,
+        "places": indoors.places,
+        "entrances": entrances,
+        "rooms": indoors.rooms,
+        "objects": objects,
+        "roads": roads,
+        "transit": transit,
+        "walkable": walkable,
+        "lanes": lanes,
+        "models": models,
+    }
+    manifest = Manifest(
+        producer=f"vico {__version__}",
+        name=sources.osm.name.removesuffix(".pbf").removesuffix(".osm"),
+        origin=Origin(lat=data.frame.lat, lon=data.frame.lon),
+        half=half,
+        bbox=tuple(round(v, 7) for v in data.frame.bbox(half)),
+        seed=seed,
+        sources=list(given.credits),
+        stages=[],
+        counts={},
+        places_by_type={},
+        files={},
+    )
+    layers = {
+        "ground": ground,
+        "buildings": [*built.walls, *fronts.surfaces],
+        "roofs": built.roofs,
+        "rooms": indoors.surfaces,
+        "collision": built.collision,
+    }
+    if tiles is not None or given.images:
+        seen = World(manifest, folder, layers=layers, **parts)
+        walls, roofs = _painted(given.images, tiles, built, seen, texturing=texturing, stages=stages, studio=studio)
+        layers |= {"buildings": [*walls, *fronts.surfaces], "roofs": roofs}
     with stages.timed("write"):
-        layers, models = _write_meshes(folder, built, doors, ground, indoors, objects)
+        _write_meshes(folder, layers, len(fronts.surfaces), models)
     stages.report("write", {name: _faces(surfaces) for name, surfaces in layers.items()})
 
     counts = {
@@ -181,35 +258,63 @@ def make_world(
     by_type = dict.fromkeys(sorted({p.category.value for p in indoors.places}), 0)
     for place in indoors.places:
         by_type[place.category.value] += 1
-    manifest = Manifest(
-        producer=f"vico {__version__}",
-        name=sources.osm.name.removesuffix(".pbf").removesuffix(".osm"),
-        origin=Origin(lat=data.frame.lat, lon=data.frame.lon),
-        half=half,
-        bbox=tuple(round(v, 7) for v in data.frame.bbox(half)),
-        seed=seed,
-        sources=_sources(data, samples, sources.osm),
-        stages=[],
-        counts=counts,
-        places_by_type=by_type,
-        files={},
-    )
-    return World(
-        manifest,
-        folder,
-        height=height,
-        buildings=buildings,
-        places=indoors.places,
-        entrances=entrances,
-        rooms=indoors.rooms,
-        objects=objects,
-        roads=roads,
-        transit=transit,
-        walkable=walkable,
-        lanes=lanes,
-        layers=layers,
-        models=models,
-    )
+    manifest = manifest.model_copy(update={"counts": counts, "places_by_type": by_type})
+    return World(manifest, folder, layers=layers, **parts)
+
+
+def _ground_of_tiles(
+    data: OsmData, samples: HeightSamples | None, mesh: TileMesh, *, half: float, seed: int
+) -> tuple[HeightField, float]:
+    """The ground, and by how much the tile mesh has to be raised to stand on it.
+
+    An elevation file that is given goes before the mesh's own ground; a mesh of buildings alone has none.
+    """
+    if samples is None:
+        try:
+            return terrain_from_tiles(mesh, data, half=half)[0], 0.0
+        except EmptyInputError:
+            height = flat_terrain(half=half)
+    else:
+        height = terrain_from_dem(samples, half=half)
+    plans, _ = building_plans(data, seed=seed)
+    return height, settled(mesh, plans, height)[1]
+
+
+def _painted(
+    images: Sequence[StreetImage],
+    tiles: TileMesh | None,
+    built: BuildingsResult,
+    world: World,
+    *,
+    texturing: Texturing,
+    stages: Stages,
+    studio: Studio | None,
+) -> tuple[list[Surface], list[Surface]]:
+    """Walls and roofs that wear photos where there are any."""
+    if tiles is not None:
+        painted = stages.run("bake", painted_from_tiles, built.walls, built.roofs, tiles, texel=texturing.texel)
+    else:
+        painted = stages.run("bake", painted_as_built, built.walls, built.roofs, texel=texturing.texel)
+    if images and studio is None:
+        raise InputError("photos: nobody is here to render what they are matched with; pass a studio")
+    if images and studio is not None:
+        walls, roofs = painted.surfaces()
+        layers = {"ground": world.surfaces("ground"), "buildings": walls, "roofs": roofs}
+        seen = World(world.manifest, world.path, layers=layers, objects=world.objects, models=world.prototypes())
+        painted, report = stages.run(
+            "streetview",
+            painted_from_street,
+            painted,
+            list(images),
+            world.height,
+            others=world.surfaces("ground"),
+            photograph=studio(seen),
+        )
+        stages.report("streetview", report.counts, report.dropped)
+    painted = kept_where_photographed(built.walls, built.roofs, painted)
+    painted = stages.run("enhance", enhanced, painted, texturing)
+    stages.report("texture", painted.counts)
+    return painted.surfaces()
 
 
 def _streets(data: OsmData, *, seed: int) -> StreetPolygons:
@@ -276,49 +381,23 @@ def _faces(surfaces: Iterable[Surface]) -> int:
     return sum(len(surface.triangles) for surface in surfaces)
 
 
-def _write_meshes(
-    folder: Path,
-    built: BuildingsResult,
-    doors: list[Surface],
-    ground: list[Surface],
-    indoors: Indoors,
-    objects: Objects,
-) -> tuple[dict[str, list[Surface]], dict[str, Sequence[Surface]]]:
-    meshes = folder / "meshes"
-    write_glb(meshes / "ground.glb", {"ground": ground})
-    write_glb(meshes / "buildings.glb", {"walls": built.walls, "doors": doors})
-    write_glb(meshes / "roofs.glb", {"roofs": built.roofs})
-    write_glb(meshes / "rooms.glb", {"rooms": indoors.surfaces})
-    write_glb(meshes / "collision.glb", {f"part_{k}": [body] for k, body in enumerate(built.collision)})
+def _models(objects: Objects) -> dict[str, Sequence[Surface]]:
     used = set(objects.prototype.tolist())
-    models: dict[str, Sequence[Surface]] = {
+    return {
         name: list(model.surfaces) for name, model in {**street_models(), **furniture_models()}.items() if name in used
     }
+
+
+def _write_meshes(
+    folder: Path, layers: dict[str, list[Surface]], fronts: int, models: dict[str, Sequence[Surface]]
+) -> None:
+    """Write the layers; the last `fronts` of the buildings' surfaces stand before their walls."""
+    meshes = folder / "meshes"
+    buildings = layers["buildings"]
+    walls, doors = buildings[: len(buildings) - fronts], buildings[len(buildings) - fronts :]
+    write_glb(meshes / "ground.glb", {"ground": layers["ground"]})
+    write_glb(meshes / "buildings.glb", {"walls": walls, "doors": doors})
+    write_glb(meshes / "roofs.glb", {"roofs": layers["roofs"]})
+    write_glb(meshes / "rooms.glb", {"rooms": layers["rooms"]})
+    write_glb(meshes / "collision.glb", {f"part_{k}": [body] for k, body in enumerate(layers["collision"])})
     write_glb(meshes / "prototypes.glb", models)
-    layers = {
-        "ground": ground,
-        "buildings": [*built.walls, *doors],
-        "roofs": built.roofs,
-        "rooms": indoors.surfaces,
-        "collision": built.collision,
-    }
-    return layers, models
-
-
-def _sources(data: OsmData, samples: HeightSamples | None, osm: Path) -> list[Source]:
-    sources = [
-        Source(
-            kind="map",
-            name=osm.name,
-            licence="ODbL-1.0",
-            attribution="© OpenStreetMap contributors",
-            timestamp=data.timestamp,
-            sha256=data.sha256 or sha256_of(osm),
-        )
-    ]
-    if samples is not None:
-        sources += [
-            Source(kind="elevation", name=name, licence="as its provider states", attribution=name, sha256=digest)
-            for name, digest, _ in samples.files
-        ]
-    return sources

@@ -23,9 +23,9 @@ class Sources:
     tiles
         A photogrammetry tileset: path or address of its ``tileset.json``.
     photos
-        Street pictures: a folder with poses.
+        Street pictures: a folder with poses, or ``mapillary``.
     places
-        Further places: GeoParquet files of Overture.
+        Further places: GeoParquet files of Overture, or ``google``.
     gtfs
         Timetables: zipped GTFS feeds.
     layouts
@@ -39,6 +39,17 @@ class Sources:
     places: tuple[str, ...] = ()
     gtfs: tuple[Path, ...] = ()
     layouts: Path | None = None
+
+    def __post_init__(self) -> None:
+        for what, value, reader in (
+            ("tiles", self.tiles, "vico.geo.tiles3d.read_tileset"),
+            ("photos", self.photos, "vico.geo.street_images_google.GoogleStreetView"),
+        ):
+            if value == "google":
+                raise InputError(
+                    f"{what}: Google's terms forbid to keep its content or what is derived from it, and a world is a "
+                    f"folder of files; read it in memory with {reader}, or give another source"
+                )
 
     def files(self) -> Iterator[Path]:
         """Every local file or folder among them."""

@@ -1,0 +1,140 @@
+"""What the sources of a world give, read once before its stages run."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from vico.errors import InputError
+from vico.geo.elevation import HeightSamples, read_elevation
+from vico.geo.frame import LocalFrame
+from vico.geo.osm import OsmData, read_osm
+from vico.geo.street_images import StreetImage, StreetImages
+from vico.geo.street_images_folder import FolderImages
+from vico.geo.street_images_mapillary import Mapillary
+from vico.geo.tile_mesh import TileMesh
+from vico.geo.tiles3d import read_tileset
+from vico.geo.web import Web, cache_folder
+from vico.world.files import sha256_of
+from vico.world.model import Dropped, Source
+from vico.worldgen.product import digest_of
+from vico.worldgen.sources import Sources
+from vico.worldgen.stages import Stages
+
+_TILE_MARGIN = 80.0  # metres: as far as the terrain goes beyond the window, and what hides its border
+_MOST_PHOTOS = 400
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the sources gave.
+
+    Attributes
+    ----------
+    data
+        The map.
+    samples
+        Heights, if there is an elevation file.
+    tiles
+        The photogrammetry mesh of the place, if there is a tileset.
+    images
+        Street photos.
+    credits
+        Every source, with what its licence asks for.
+    """
+
+    data: OsmData
+    samples: HeightSamples | None
+    tiles: TileMesh | None
+    images: Sequence[StreetImage]
+    credits: list[Source]
+
+
+def gather(sources: Sources, frame: LocalFrame, half: float, stages: Stages) -> Evidence:
+    """Read every source, and report what could not be read.
+
+    Raises
+    ------
+    VicoError
+        Of whichever kind the source's reader raises; each is one sentence.
+    """
+    where = f"{frame} {half}"
+    with stages.timed("map"):
+        data = read_osm(sources.osm, frame, half)
+        stages.given(data, f"{data.sha256} {where}")
+        samples = read_elevation(sources.dem, frame, half) if sources.dem else None
+        if samples is not None:
+            stages.given(samples, f"{samples.sha256} {where}")
+    stages.report(
+        "map",
+        {
+            "nodes": len(data.nodes),
+            "ways": len(data.ways),
+            "areas": len(data.areas),
+            "heights": 0 if samples is None else len(samples.points),
+            "heights_filled": 0 if samples is None else samples.filled,
+        },
+        [Dropped(id=key, reason=reason) for key, reason in data.broken],
+    )
+    credits = [
+        Source(
+            kind="map",
+            name=sources.osm.name,
+            licence="ODbL-1.0",
+            attribution="© OpenStreetMap contributors",
+            timestamp=data.timestamp,
+            sha256=data.sha256 or sha256_of(sources.osm),
+        )
+    ]
+    if samples is not None:
+        credits += [
+            Source(kind="elevation", name=name, licence="as its provider states", attribution=name, sha256=digest)
+            for name, digest, _ in samples.files
+        ]
+    tiles = None
+    if sources.tiles is not None:
+        with stages.timed("tiles"):
+            tiles = _tiles(sources.tiles, frame, half, stages, credits)
+    images: list[StreetImage] = []
+    if sources.photos is not None:
+        with stages.timed("photos"):
+            images = _photos(sources.photos, frame, half, stages, credits)
+    return Evidence(data, samples, tiles, images, credits)
+
+
+def _tiles(source: str, frame: LocalFrame, half: float, stages: Stages, credits: list[Source]) -> TileMesh:
+    mesh, report = read_tileset(source, frame, half, margin=_TILE_MARGIN, web=Web(cache=cache_folder() / "tiles"))
+    stages.given(mesh, digest_of(mesh))
+    dropped = [Dropped(id=uri, reason=reason) for uri, reason in report.left_out]
+    stages.report("tiles", {"tiles": report.read, "triangles": len(mesh.triangles)}, dropped)
+    attribution = "; ".join(mesh.attributions) or _file_name(source)
+    credits.append(
+        Source(kind="tiles", name=_file_name(source), licence="as its provider states", attribution=attribution)
+    )
+    return mesh
+
+
+def _photos(source: str, frame: LocalFrame, half: float, stages: Stages, credits: list[Source]) -> list[StreetImage]:
+    reader: StreetImages
+    if source == "mapillary":
+        token = os.environ.get("MAPILLARY_TOKEN")
+        if not token:
+            raise InputError("photos: set MAPILLARY_TOKEN in the environment to your access token of mapillary.com")
+        reader = Mapillary(token, Web(cache=cache_folder() / "photos"))
+    else:
+        reader = FolderImages(Path(source))
+    images = list(reader.near(frame, half, most=_MOST_PHOTOS))
+    dropped = [Dropped(id=key, reason=reason) for key, reason in reader.refused]
+    stages.report("photos", {"photos": len(images)}, dropped)
+    for attribution in dict.fromkeys(image.attribution for image in images):
+        name = "Mapillary" if source == "mapillary" else _file_name(source)
+        licence = "CC-BY-SA-4.0" if source == "mapillary" else "as its provider states"
+        credits.append(Source(kind="photos", name=name, licence=licence, attribution=attribution))
+    return images
+
+
+def _file_name(source: str) -> str:
+    """The last part of a path or address, without a query: it may hold a key."""
+    return source.split("?")[0].rstrip("/").rsplit("/", 1)[-1]
