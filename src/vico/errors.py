@@ -37,3 +37,14 @@ class SourceError(VicoError, OSError):
     """A service in the network did not give what was asked for; `status` is its HTTP status, if it answered."""
 
     status: int | None = None
+
+
+class LlmReplyError(VicoError, ValueError):
+    """A language model's replies stayed unusable; `findings` holds what was wrong with the last, `answer` its text."""
+
+    findings: tuple[str, ...] = ()
+    answer: str = ""
+
+
+class LlmBudgetError(VicoError, RuntimeError):
+    """The calls, tokens or money a caller granted are spent."""
