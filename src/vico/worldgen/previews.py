@@ -261,9 +261,10 @@ def viewpoints(world: World, *, count: int = 8) -> list[Viewpoint]:
     things = objects.position[:, :2] if len(objects) else np.zeros((0, 2))
     trees = things[objects.kind == "tree"] if len(objects) else things
     found: list[tuple[float, tuple[float, float], float]] = []
-    for road in world.roads.roads:
-        if road.layer != 0 or (road.lanes == 0 and road.kind != "pedestrian"):
-            continue
+    ways = [road for road in world.roads.roads if road.layer == 0]
+    streets = [road for road in ways if road.lanes or road.kind == "pedestrian"]
+    # Where there is no street, footways are where people look from.
+    for road in streets or ways:
         line = shapely.LineString(road.line)
         for d in np.arange(min(10.0, line.length / 2), line.length, 22.0):
             here, ahead = line.interpolate(d), line.interpolate(min(d + 2.0, line.length))
