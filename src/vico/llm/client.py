@@ -122,6 +122,17 @@ class LanguageModel:
         endpoint = recorded_endpoint(replayed) if replayed is not None else Endpoint.from_environment(env)
         return cls(endpoint, **options)
 
+    @property
+    def recorded(self) -> bool:
+        """Whether calls are recorded or replayed, so that it matters in which order they are made."""
+        return self._recorder is not None or self._replay is not None
+
+    @property
+    def name(self) -> str:
+        """The model and all that its answers hang on besides the questions, for a key: no secret is in it."""
+        options = ", ".join(f"{key} {value}" for key, value in self._options.items() if value is not None)
+        return f"{self.endpoint.model} at {self.endpoint.base}" + (f" ({options})" if options else "")
+
     def ask(
         self, messages: Sequence[Message], reply: type[T], *, check: Check[T] | None = None, rounds: int = 3
     ) -> Reply[T]:

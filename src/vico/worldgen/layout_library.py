@@ -358,8 +358,8 @@ def read_library(folder: Path) -> Library:
 class LayoutAuthor(Protocol):
     """Somebody who draws floor plans: a language model, a vision model, a script."""
 
-    def draw(self, request: LayoutRequest, feedback: Sequence[str]) -> str:
-        """Answer with a layout as JSON text.
+    def draw(self, request: LayoutRequest, feedback: Sequence[str]) -> str | None:
+        """Answer with a layout as JSON text; None gives up.
 
         Parameters
         ----------
@@ -378,6 +378,8 @@ class LayoutRequest:
     ----------
     size
         Extent the plan may have at most, metres.
+    place
+        Id of the place it is for.
     """
 
     name: str
@@ -386,6 +388,16 @@ class LayoutRequest:
     use: str
     size: tuple[float, float]
     seed: int
+    place: str = ""
+
+
+def misfits(layout: Layout, request: LayoutRequest) -> list[str]:
+    """`findings_of` a layout, after whether it is larger than what was asked for."""
+    wrong = findings_of(layout)
+    w, h = request.size
+    if layout.size[0] > w + 0.01 or layout.size[1] > h + 0.01:
+        wrong.insert(0, f"size: {layout.size} is larger than the {w:g} x {h:g} m there are")
+    return wrong
 
 
 def authored(
@@ -396,21 +408,21 @@ def authored(
     Returns
     -------
     Layout or None
-        None if every answer was bad: the caller then plans by rule.
+        None if every answer was bad, or the author gave up: the caller then plans by rule.
     """
     side = round(max(5.0, min(24.0, math.sqrt(max(area, 25.0)))), 1)
-    request = LayoutRequest(place.name, place.kind, place.category.value, use, (side, side), seed)
+    request = LayoutRequest(place.name, place.kind, place.category.value, use, (side, side), seed, place.id)
     feedback: list[str] = []
     for _ in range(attempts):
         answer = author.draw(request, tuple(feedback))
+        if answer is None:
+            return None
         try:
             layout = _well_formed(answer, "layout")
         except SchemaError as error:
             feedback = [str(error)]
             continue
-        feedback = findings_of(layout)
-        if layout.size[0] > side + 0.01 or layout.size[1] > side + 0.01:
-            feedback.insert(0, f"size: {layout.size} is larger than the {side:g} x {side:g} m there are")
+        feedback = misfits(layout, request)
         if not feedback:
             return layout
         feedback = feedback[:8]
