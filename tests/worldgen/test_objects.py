@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import shapely
 
-from vico.assets.furniture import furniture_models
 from vico.assets.street import street_models
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, OsmNode
@@ -74,11 +73,11 @@ def test_feet_are_out_of_the_way_of_walkers(helsinki: World) -> None:
     assert (helsinki.walkable.class_at(outdoors.position[inside]) == 0).all()
 
 
-@pytest.mark.parametrize("name", sorted({**street_models(), **furniture_models()}))
+@pytest.mark.parametrize("name", sorted(street_models()))
 def test_a_model_stands_on_the_ground_and_is_light(name: str) -> None:
-    thing = {**street_models(), **furniture_models()}[name]
+    thing = street_models()[name]
     assert thing.triangles <= 400
-    assert abs(thing.bounds[0, 2]) < 0.15  # stones and pots are set into it a little
+    assert -0.5 <= thing.bounds[0, 2] < 0.15  # walls, posts and hedges reach into the ground, for slopes
     assert all(np.isfinite(surface.positions).all() for surface in thing.surfaces)
 
 

@@ -210,20 +210,20 @@ def _conifer(name: str, *, height: float, radius: float, leaves: Colour) -> Mode
     return model(name, parts, kind="tree", group="natural", foot=(0.5, 0.5))
 
 
-def _palm(name: str) -> Model:
+def _palm(name: str, *, trunk: float = 6.2, girth: float = 0.21, fronds: int = 22, reach: float = 2.3) -> Model:
     """A fan of fronds on a slender, slightly bent trunk."""
     random = rng(0, "tree", name)
     bark = (128, 106, 82)
-    knots = [np.array([0.25 * (k / 5) ** 2, 0, 6.2 * k / 5]) for k in range(6)]
-    parts = [_limb(knots[k], knots[k + 1], 0.21 - 0.012 * k, 0.20 - 0.012 * k, bark, 6) for k in range(5)]
+    knots = [np.array([0.25 * (k / 5) ** 2, 0, trunk * k / 5]) for k in range(6)]
+    parts = [_limb(knots[k], knots[k + 1], girth - 0.012 * k, girth - 0.01 - 0.012 * k, bark, 6) for k in range(5)]
     top = knots[-1]
     material = leaf_material("frond")
-    for k in range(22):
+    for k in range(fronds):
         turn = 2 * np.pi * k * 0.382 + random.uniform(-0.1, 0.1)
-        lift = 0.9 - 1.25 * k / 21
+        lift = 0.9 - 1.25 * k / (fronds - 1)
         flat = np.array([np.cos(turn), np.sin(turn), 0.0])
         aside = np.array([-np.sin(turn), np.cos(turn), 0.0]) * 0.42
-        spine = [top + flat * 2.3 * t + [0, 0, 2.1 * (lift * t - 0.95 * t * t)] for t in np.linspace(0, 1, 4)]
+        spine = [top + reach * (flat * t + [0, 0, 0.91 * (lift * t - 0.95 * t * t)]) for t in np.linspace(0, 1, 4)]
         points, uv = [], []
         for t, p in zip(np.linspace(0, 1, 4), spine, strict=True):
             points += [p - aside, p + aside]
@@ -270,17 +270,53 @@ def _bush(name: str, radii: tuple[float, float, float], leaves: Colour, cards: i
     return model(name, [core, leafage], kind="shrub", group="natural", foot=(radii[0] * 1.5, radii[1] * 1.5))
 
 
-def _hedge(length: float = 2.0, width: float = 0.7, height: float = 1.2) -> Model:
-    random = rng(0, "hedge")
-    core = box((length, width * 0.9, height * 0.95), (0, 0, height * 0.475), colour=(44, 66, 34))
+def _willow(name: str) -> Model:
+    """A weeping tree: curtains of thin twigs that hang from a dome nearly to the ground."""
+    random = rng(0, "tree", name)
+    bark = (92, 80, 66)
+    height, wide = 9.5, 3.9
+    fork = np.array([0.1, 0.0, 2.6])
+    parts = [_limb(np.zeros(3), fork, 0.34, 0.26, bark, 7)]
+    for branch in range(7):
+        turn = 2 * np.pi * (branch + random.uniform(-0.2, 0.2)) / 7
+        end = np.array([2.3 * np.cos(turn), 2.3 * np.sin(turn), height - 2.0 + random.uniform(-0.4, 0.4)])
+        parts.append(_limb(fork, end, 0.15, 0.04, bark, 4))
+    cards = 120
+    k = np.arange(cards) + 0.5
+    around = k * (np.pi * (3 - np.sqrt(5)))
+    share = np.sqrt(k / cards)
+    radius = wide * share * random.uniform(0.92, 1.05, cards)
+    top = height - 0.4 - (height * 0.3) * share**3
+    long = np.where(share > 0.62, random.uniform(2.0, 3.1, cards), random.uniform(0.9, 1.5, cards))
+    out = np.column_stack([np.cos(around), np.sin(around), np.zeros(cards)])
+    centres = out * radius[:, None]
+    centres[:, 2] = top - long
+    aside = np.column_stack([-np.sin(around), np.cos(around), np.zeros(cards)])
+    lean = aside + out * random.normal(0, 0.6, (cards, 1))
+    light = random.uniform(0.72, 1.0, cards)[:, None] * np.where(share > 0.62, 1.0, 0.85)[:, None]
+    colours = np.clip(np.array((150, 176, 88)) * light, 0, 255).astype(np.uint8)
+    normals = _unit(out * 0.8 + np.array([0, 0, 0.5]))
+    up = out * -0.1 + np.array([0, 0, 1.0])
+    leafage = _cards(centres, _unit(lean) * 0.62, up * long[:, None], normals, colours, leaf_material("small"))
+    parts.append(leafage)
+    return model(name, parts, kind="tree", group="natural", foot=(0.75, 0.75))
+
+
+def _hedge(name: str, length: float, width: float, height: float, *, kind: str = "hedge") -> Model:
+    """A clipped hedge along x; its core reaches below the ground, so that it closes on slopes too."""
+    random = rng(0, name)
+    deep = 0.4
+    core = box((length, width * 0.9, height * 0.95 + deep), (0, 0, (height * 0.95 - deep) / 2), colour=(44, 66, 34))
     # Rows of cards on both sides and the top, a little out of line.
-    columns = (np.arange(8) + 0.5) / 8 * length - length / 2
-    rows = [(side, z) for side in (-1, 1) for z in (0.22, 0.62, 1.0)] + [(0, height)]
-    x = np.concatenate([columns for _ in rows]) + random.uniform(-0.08, 0.08, 8 * len(rows))
-    side = np.repeat([row[0] for row in rows], 8).astype(np.float64)
-    z = np.repeat([row[1] for row in rows], 8) + random.uniform(-0.06, 0.06, 8 * len(rows))
+    count = max(4, round(4 * length))
+    columns = (np.arange(count) + 0.5) / count * length - length / 2
+    levels = np.linspace(0.2, height - 0.18, max(2, round(height / 0.42)))
+    rows = [(side, z) for side in (-1, 1) for z in levels] + [(0, height)] * max(1, round(width / 0.6))
+    x = np.concatenate([columns for _ in rows]) + random.uniform(-0.08, 0.08, count * len(rows))
+    side = np.repeat([row[0] for row in rows], count).astype(np.float64)
+    z = np.repeat([row[1] for row in rows], count) + random.uniform(-0.06, 0.06, count * len(rows))
     cards = len(x)
-    y = np.where(side == 0, random.uniform(-0.2, 0.2, cards), side * width / 2)
+    y = np.where(side == 0, random.uniform(-0.3, 0.3, cards) * width, side * width / 2)
     out = np.column_stack([np.zeros(cards), side, np.where(side == 0, 1.0, 0.0)])
     facing = _unit(out + random.normal(0, 0.22, (cards, 3)))
     spin = _unit(np.cross(facing, random.normal(0, 1, (cards, 3))))
@@ -295,27 +331,104 @@ def _hedge(length: float = 2.0, width: float = 0.7, height: float = 1.2) -> Mode
         colours,
         leaf_material("small"),
     )
-    return model("hedge", [core, leafage], group="natural", foot=(length, width))
+    return model(name, [core, leafage], kind=kind, group="natural", foot=(length, width))
+
+
+def _flowers(name: str, tones: tuple[Colour, ...]) -> Model:
+    """A patch of a flower bed: low leaves, and blossoms over them."""
+    random = rng(0, "flowers", name)
+    half = 0.55
+    soil = box((2 * half, 2 * half, 0.16), (0, 0, -0.05), colour=(84, 66, 50))
+    parts = [soil]
+    for lot, (count, size, low, high) in enumerate(((34, 0.15, 0.1, 0.24), (44, 0.09, 0.24, 0.38))):
+        xy = random.uniform(-half + 0.06, half - 0.06, (count, 2))
+        centres = np.column_stack([xy, random.uniform(low, high, count)])
+        facing = _unit(random.normal(0, 0.6, (count, 3)) + np.array([0.0, 0.0, 1.0]))
+        spin = _unit(np.cross(facing, random.normal(0, 1, (count, 3))))
+        palette = np.array([(104, 146, 70)] if lot == 0 else tones)
+        colours = palette[random.integers(0, len(palette), count)] * random.uniform(0.85, 1.0, (count, 1))
+        normals = _unit(facing + np.array([0, 0, 0.8]))
+        parts.append(
+            _cards(centres, spin * size, np.cross(facing, spin) * size, normals, colours.astype(np.uint8),
+                   leaf_material("broad"))
+        )  # fmt: skip
+    return model(name, parts, kind="flowers", group="natural", foot=(2 * half, 2 * half))
+
+
+def _rock(name: str, radii: tuple[float, float, float], tone: Colour) -> Model:
+    """A boulder with flat faces, sunk into the ground a little."""
+    random = rng(0, "rock", name)
+    round_one = ball(radii, (0, 0, radii[2] * 0.4), colour=tone, sides=8, rings=6)
+    lumps = round_one.positions.astype(np.float64)
+    # Points at one place move alike, or the stone would burst.
+    _, where = np.unique(np.round(lumps, 4), axis=0, return_inverse=True)
+    lumps = lumps * (1 + random.uniform(-0.16, 0.12, (int(where.max()) + 1, 1)))[where.ravel()]
+    lumps[:, 2] = np.maximum(lumps[:, 2], -0.1)
+    stone = Surface.from_triangles(lumps, round_one.triangles, colour=tone)
+    return model(name, [stone], kind="stone", group="natural", foot=(radii[0] * 1.8, radii[1] * 1.8))
+
+
+def _stump(name: str) -> Model:
+    parts = [
+        _limb(np.zeros(3), np.array([0, 0, 0.45]), 0.34, 0.26, (92, 74, 58), 9),
+        box((0.36, 0.36, 0.02), (0, 0, 0.44), colour=(196, 164, 116)),
+    ]
+    return model(name, parts, kind="stump", group="natural", foot=(0.6, 0.6))
 
 
 def plant_models() -> list[Model]:
     """Every plant and stone of the streets."""
-    stone = ball((0.62, 0.5, 0.42), (0, 0, 0.3), colour=(128, 124, 118), sides=7, rings=4)
     return [
         _crown_tree("tree_lime", height=11.0, crown=(3.0, 4.0), bare=2.6, trunk=0.22, bark=(88, 74, 60),
                     leaves=(116, 156, 74), texture="broad", card=0.85),
+        _crown_tree("tree_lime_tall", height=14.5, crown=(3.1, 5.6), bare=3.0, trunk=0.26, bark=(84, 72, 60),
+                    leaves=(108, 150, 70), texture="broad", card=0.95, cards=112),
         _crown_tree("tree_maple", height=9.5, crown=(3.4, 3.3), bare=2.4, trunk=0.2, bark=(96, 84, 72),
                     leaves=(132, 160, 66), texture="broad", card=0.9),
         _crown_tree("tree_oak", height=12.5, crown=(4.3, 4.2), bare=2.8, trunk=0.3, bark=(78, 66, 54),
                     leaves=(98, 138, 62), texture="broad", card=1.1),
+        _crown_tree("tree_chestnut", height=13.0, crown=(4.0, 4.8), bare=2.4, trunk=0.32, bark=(86, 70, 60),
+                    leaves=(92, 130, 56), texture="broad", card=1.15),
+        _crown_tree("tree_plane", height=14.0, crown=(4.7, 4.6), bare=3.8, trunk=0.32, bark=(184, 176, 152),
+                    leaves=(126, 158, 80), texture="broad", card=1.15),
+        _crown_tree("tree_pollard", height=5.6, crown=(1.8, 1.2), bare=2.9, trunk=0.2, bark=(164, 154, 132),
+                    leaves=(118, 156, 72), texture="broad", card=0.62, cards=80),
         _crown_tree("tree_birch", height=10.0, crown=(2.0, 4.0), bare=2.2, trunk=0.14, bark=(214, 210, 200),
                     leaves=(146, 176, 84), texture="small", card=0.75),
+        _crown_tree("tree_poplar", height=17.0, crown=(1.5, 7.7), bare=1.0, trunk=0.26, bark=(104, 94, 78),
+                    leaves=(112, 150, 72), texture="small", card=0.95, cards=118),
         _crown_tree("tree_young", height=5.6, crown=(1.4, 1.9), bare=1.9, trunk=0.09, bark=(102, 88, 72),
                     leaves=(128, 166, 78), texture="small", card=0.52, cards=72),
+        _crown_tree("tree_fruit", height=4.6, crown=(2.0, 1.6), bare=1.1, trunk=0.12, bark=(98, 82, 66),
+                    leaves=(124, 158, 72), texture="small", card=0.58, cards=84),
+        _crown_tree("tree_blossom", height=5.0, crown=(2.1, 1.7), bare=1.4, trunk=0.11, bark=(86, 66, 60),
+                    leaves=(255, 186, 250), texture="small", card=0.6, cards=84),
+        _crown_tree("tree_olive", height=5.2, crown=(2.2, 1.8), bare=1.2, trunk=0.24, bark=(128, 118, 102),
+                    leaves=(148, 160, 122), texture="small", card=0.62, cards=84),
+        _crown_tree("tree_cypress", height=12.0, crown=(0.95, 5.8), bare=0.2, trunk=0.16, bark=(96, 80, 64),
+                    leaves=(66, 98, 58), texture="small", card=0.62, cards=110),
+        _crown_tree("tree_stone_pine", height=12.0, crown=(4.2, 1.6), bare=7.2, trunk=0.26, bark=(128, 92, 70),
+                    leaves=(88, 128, 66), texture="needle", card=1.0, cards=112),
+        _crown_tree("tree_pine", height=15.0, crown=(2.5, 3.9), bare=5.6, trunk=0.22, bark=(158, 106, 72),
+                    leaves=(92, 128, 78), texture="needle", card=0.95, cards=105),
+        _willow("tree_willow"),
         _conifer("tree_spruce", height=11.5, radius=2.5, leaves=(74, 112, 66)),
+        _conifer("tree_fir", height=17.0, radius=2.7, leaves=(64, 102, 70)),
+        _conifer("tree_larch", height=14.0, radius=2.4, leaves=(132, 164, 88)),
         _palm("tree_palm"),
+        _palm("tree_palm_tall", trunk=11.5, girth=0.19, fronds=18, reach=1.8),
+        _palm("tree_palm_date", trunk=4.2, girth=0.34, fronds=26, reach=3.0),
         _bush("shrub", (0.75, 0.75, 0.55), (112, 152, 74), 46, 0.3),
         _bush("shrub_tall", (0.9, 0.9, 0.95), (98, 136, 70), 58, 0.36),
-        _hedge(),
-        model("stone", [stone], group="natural", foot=(1.1, 0.9)),
+        _bush("shrub_flowering", (0.8, 0.8, 0.65), (206, 130, 196), 50, 0.3),
+        _hedge("hedge", 2.0, 0.7, 1.2),
+        _hedge("hedge_low", 2.0, 0.5, 0.6),
+        _hedge("hedge_high", 2.0, 0.9, 2.0),
+        _hedge("hedge_block", 1.0, 1.0, 1.2),
+        _flowers("flowers", ((206, 52, 60), (240, 206, 80), (236, 232, 224))),
+        _flowers("flowers_violet", ((128, 84, 168), (206, 120, 180), (236, 232, 240))),
+        _flowers("flowers_yellow", ((246, 200, 50), (240, 150, 50), (226, 90, 60))),
+        _rock("stone", (0.62, 0.5, 0.42), (136, 132, 126)),
+        _rock("rock", (1.3, 1.0, 0.95), (124, 120, 112)),
+        _stump("stump"),
     ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Things that stand in streets, modelled from boxes and turned solids: some forty kinds, at life size."""
+"""Things that stand outdoors, at life size: the commonest here, further lots in the modules beside this one."""
 
 from __future__ import annotations
 
@@ -8,47 +8,36 @@ from functools import cache
 from vico.assets.model import Model, Top, model
 from vico.assets.plants import plant_models
 from vico.assets.shapes import Colour, ball, box, cylinder, extrusion, lathe, pose_matrix
+from vico.assets.street_barriers import barrier_models
+from vico.assets.street_civic import civic_models
+from vico.assets.street_parts import BLUE, GREEN, IRON, RED, STEEL, STONE, WHITE, WOOD, YELLOW, post, tilted
+from vico.assets.street_play import play_models
+from vico.assets.street_traffic import traffic_models
 from vico.world.mesh import Surface
-
-_IRON: Colour = (58, 62, 66)
-_STEEL: Colour = (150, 154, 158)
-_GREEN: Colour = (52, 84, 66)
-_WOOD: Colour = (150, 112, 74)
-_STONE: Colour = (164, 160, 152)
-_GLASS: Colour = (150, 178, 190)
-_WHITE: Colour = (232, 232, 228)
-_RED: Colour = (186, 44, 38)
-_YELLOW: Colour = (226, 178, 40)
-_BLUE: Colour = (40, 88, 156)
-_BRONZE: Colour = (94, 100, 84)
-
-
-def _post(height: float, radius: float = 0.05, colour: Colour = _IRON, x: float = 0.0, y: float = 0.0) -> Surface:
-    return cylinder(radius, height, colour=colour, sides=6, centre=(x, y, 0))
 
 
 def _bench() -> Model:
-    parts = [box((0.09, 1.7, 0.035), (x, 0, 0.44), colour=_WOOD) for x in (-0.16, -0.05, 0.06, 0.17)]
-    parts += [box((0.03, 1.7, 0.09), (-0.25 - 0.03 * k, 0, 0.58 + 0.13 * k), colour=_WOOD) for k in range(3)]
+    parts = [box((0.09, 1.7, 0.035), (x, 0, 0.44), colour=WOOD) for x in (-0.16, -0.05, 0.06, 0.17)]
+    parts += [box((0.03, 1.7, 0.09), (-0.25 - 0.03 * k, 0, 0.58 + 0.13 * k), colour=WOOD) for k in range(3)]
     for y in (-0.7, 0.7):
         parts += [
-            box((0.05, 0.06, 0.44), (0.17, y, 0.22), colour=_IRON),
-            box((0.05, 0.06, 0.88), (-0.24, y, 0.44), colour=_IRON),
-            box((0.46, 0.06, 0.04), (-0.02, y, 0.40), colour=_IRON),
-            box((0.40, 0.05, 0.04), (-0.02, y, 0.64), colour=_IRON),
+            box((0.05, 0.06, 0.44), (0.17, y, 0.22), colour=IRON),
+            box((0.05, 0.06, 0.88), (-0.24, y, 0.44), colour=IRON),
+            box((0.46, 0.06, 0.04), (-0.02, y, 0.40), colour=IRON),
+            box((0.40, 0.05, 0.04), (-0.02, y, 0.64), colour=IRON),
         ]
     return model("bench", parts, foot=(0.6, 1.7))
 
 
 def _picnic_table() -> Model:
-    parts = [box((0.16, 1.8, 0.04), (x, 0, 0.75), colour=_WOOD) for x in (-0.27, -0.09, 0.09, 0.27)]
+    parts = [box((0.16, 1.8, 0.04), (x, 0, 0.75), colour=WOOD) for x in (-0.27, -0.09, 0.09, 0.27)]
     for x in (-0.68, 0.68):
-        parts.append(box((0.28, 1.8, 0.04), (x, 0, 0.45), colour=_WOOD))
+        parts.append(box((0.28, 1.8, 0.04), (x, 0, 0.45), colour=WOOD))
     for y in (-0.6, 0.6):
         parts += [
-            box((1.5, 0.07, 0.08), (0, y, 0.40), colour=_WOOD),
-            box((0.07, 0.07, 0.72), (-0.25, y, 0.37), colour=_WOOD),
-            box((0.07, 0.07, 0.72), (0.25, y, 0.37), colour=_WOOD),
+            box((1.5, 0.07, 0.08), (0, y, 0.40), colour=WOOD),
+            box((0.07, 0.07, 0.72), (-0.25, y, 0.37), colour=WOOD),
+            box((0.07, 0.07, 0.72), (0.25, y, 0.37), colour=WOOD),
         ]
     return model("picnic_table", parts, top=Top("table", 0.77, (0.7, 1.8)))
 
@@ -56,58 +45,39 @@ def _picnic_table() -> Model:
 def _waste_basket() -> Model:
     parts = [
         lathe([(0.0, 0.06), (0.19, 0.06), (0.22, 0.78), (0.22, 0.78), (0.17, 0.78), (0.16, 0.6), (0, 0.6)],
-              sides=8, colour=_GREEN),
-        cylinder(0.05, 0.06, colour=_IRON, sides=6),
-        lathe([(0.0, 0.95), (0.24, 0.92), (0.0, 1.04)], sides=8, colour=_IRON),
-        box((0.03, 0.03, 0.2), (0, 0.2, 0.86), colour=_IRON),
-        box((0.03, 0.03, 0.2), (0, -0.2, 0.86), colour=_IRON),
+              sides=8, colour=GREEN),
+        cylinder(0.05, 0.06, colour=IRON, sides=6),
+        lathe([(0.0, 0.95), (0.24, 0.92), (0.0, 1.04)], sides=8, colour=IRON),
+        box((0.03, 0.03, 0.2), (0, 0.2, 0.86), colour=IRON),
+        box((0.03, 0.03, 0.2), (0, -0.2, 0.86), colour=IRON),
     ]  # fmt: skip
     return model("waste_basket", parts)
 
 
 def _recycling() -> Model:
     parts = []
-    for k, colour in enumerate((_GREEN, _BLUE, _YELLOW)):
+    for k, colour in enumerate((GREEN, BLUE, YELLOW)):
         y = (k - 1) * 1.25
         parts += [
             box((1.1, 1.1, 1.3), (0, y, 0.68), colour=(96, 104, 100)),
             box((1.14, 1.14, 0.16), (0, y, 1.4), colour=colour),
             cylinder(0.14, 0.03, colour=(28, 30, 30), sides=8, centre=(0, 0, 0)).moved(
-                _tilted(0.56, y, 1.12)
+                tilted(0.56, y, 1.12)
             ),
             box((0.01, 0.6, 0.3), (0.555, y, 0.7), colour=colour),
         ]  # fmt: skip
     return model("recycling", parts)
 
 
-def _tilted(x: float, y: float, z: float):  # type: ignore[no-untyped-def]
-    """Turn the z axis to +x, then move."""
-    matrix = pose_matrix(x, y, z)
-    matrix[:3, :3] = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]
-    return matrix
-
-
-def _hoop(x: float, y: float, wide: float = 0.75, high: float = 0.8) -> list[Surface]:
-    return [
-        box((0.05, 0.05, high), (x - wide / 2, y, high / 2), colour=_STEEL),
-        box((0.05, 0.05, high), (x + wide / 2, y, high / 2), colour=_STEEL),
-        box((wide + 0.05, 0.05, 0.05), (x, y, high), colour=_STEEL),
-    ]
-
-
-def _bicycle_parking() -> Model:
-    return model("bicycle_parking", [part for k in range(4) for part in _hoop(0, (k - 1.5) * 0.8)])
-
-
 def _fountain() -> Model:
     basin = lathe(
         [(0.0, 0.0), (1.9, 0.0), (1.9, 0.0), (2.0, 0.55), (2.0, 0.55), (1.72, 0.55), (1.72, 0.55), (1.66, 0.36)],
         sides=16,
-        colour=_STONE,
+        colour=STONE,
     )
     water = lathe([(1.7, 0.42), (0.0, 0.42)], sides=16, colour=(92, 138, 164))
     bowl = lathe(
-        [(0.3, 0.3), (0.16, 0.9), (0.16, 1.1), (0.75, 1.4), (0.75, 1.4), (0.62, 1.4), (0, 1.3)], sides=10, colour=_STONE
+        [(0.3, 0.3), (0.16, 0.9), (0.16, 1.1), (0.75, 1.4), (0.75, 1.4), (0.62, 1.4), (0, 1.3)], sides=10, colour=STONE
     )
     jet = lathe([(0.12, 1.34), (0.05, 1.7), (0.0, 1.95)], sides=6, colour=(206, 226, 236))
     return model("fountain", [basin, _flipped(water), bowl, jet])
@@ -132,44 +102,20 @@ def _flipped(surface: Surface) -> Surface:
 def _post_box() -> Model:
     colour = (238, 120, 24)
     parts = [
-        box((0.08, 0.3, 0.75), (0, 0, 0.38), colour=_IRON),
+        box((0.08, 0.3, 0.75), (0, 0, 0.38), colour=IRON),
         box((0.36, 0.5, 0.6), (0, 0, 1.02), colour=colour),
         extrusion([(-0.2, 1.32), (0.2, 1.32), (0.2, 1.36), (-0.2, 1.42)], 0.54, colour=colour),
         box((0.01, 0.36, 0.04), (0.185, 0, 1.2), colour=(40, 34, 30)),
-        box((0.01, 0.2, 0.16), (0.185, 0, 0.98), colour=_WHITE),
+        box((0.01, 0.2, 0.16), (0.185, 0, 0.98), colour=WHITE),
     ]
     return model("post_box", parts)
 
 
-def _telephone() -> Model:
-    parts = [
-        box((0.9, 0.9, 0.12), (0, 0, 2.28), colour=_RED),
-        box((0.9, 0.9, 0.05), (0, 0, 0.025), colour=_STONE),
-        box((0.03, 0.82, 2.2), (-0.42, 0, 1.12), colour=_GLASS),
-        box((0.82, 0.03, 2.2), (0, 0.42, 1.12), colour=_GLASS),
-        box((0.82, 0.03, 2.2), (0, -0.42, 1.12), colour=_GLASS),
-        box((0.16, 0.3, 0.5), (-0.3, 0, 1.35), colour=_IRON),
-    ]
-    parts += [box((0.07, 0.07, 2.2), (x, y, 1.12), colour=_RED) for x in (-0.42, 0.42) for y in (-0.42, 0.42)]
-    return model("telephone", parts)
-
-
-def _cabinet(name: str, size: tuple[float, float, float], colour: Colour, trim: Colour) -> Model:
-    x, y, z = size
-    parts = [
-        box((x, y, z), (0, 0, z / 2 + 0.05), colour=colour),
-        box((x + 0.06, y + 0.06, 0.05), (0, 0, z + 0.07), colour=trim),
-        box((x - 0.06, y - 0.06, 0.06), (0, 0, 0.03), colour=_IRON),
-        box((0.01, 0.015, z * 0.85), (x / 2 + 0.003, 0, z / 2 + 0.05), colour=trim),
-    ]
-    return model(name, parts)
-
-
 def _vending_machine() -> Model:
     parts = [
-        box((0.75, 0.95, 1.85), (0, 0, 0.95), colour=_BLUE),
+        box((0.75, 0.95, 1.85), (0, 0, 0.95), colour=BLUE),
         box((0.02, 0.6, 1.2), (0.38, 0.1, 1.15), colour=(60, 78, 92)),
-        box((0.02, 0.16, 0.6), (0.38, -0.35, 1.2), colour=_WHITE),
+        box((0.02, 0.16, 0.6), (0.38, -0.35, 1.2), colour=WHITE),
         box((0.02, 0.6, 0.2), (0.38, 0.1, 0.35), colour=(30, 32, 34)),
     ]
     for k in range(4):
@@ -182,10 +128,10 @@ def _vending_machine() -> Model:
 def _parking_meter() -> Model:
     parts = [
         box((0.2, 0.26, 1.15), (0, 0, 0.575), colour=(70, 74, 80)),
-        box((0.26, 0.34, 0.5), (0, 0, 1.38), colour=_BLUE),
+        box((0.26, 0.34, 0.5), (0, 0, 1.38), colour=BLUE),
         box((0.01, 0.2, 0.14), (0.134, 0, 1.46), colour=(190, 206, 196)),
-        box((0.02, 0.3, 0.3), (0, 0, 1.85), colour=_BLUE),
-        box((0.024, 0.1, 0.2), (0, 0, 1.85), colour=_WHITE),
+        box((0.02, 0.3, 0.3), (0, 0, 1.85), colour=BLUE),
+        box((0.024, 0.1, 0.2), (0, 0, 1.85), colour=WHITE),
     ]
     return model("parking_meter", parts)
 
@@ -194,8 +140,8 @@ def _atm() -> Model:
     parts = [
         box((0.6, 0.8, 1.75), (-0.05, 0, 0.875), colour=(64, 88, 120)),
         box((0.02, 0.5, 0.36), (0.255, 0, 1.35), colour=(30, 44, 60)),
-        box((0.2, 0.5, 0.05), (0.3, 0, 1.06), colour=_STEEL),
-        box((0.02, 0.8, 0.2), (0.255, 0, 1.66), colour=_YELLOW),
+        box((0.2, 0.5, 0.05), (0.3, 0, 1.06), colour=STEEL),
+        box((0.02, 0.8, 0.2), (0.255, 0, 1.66), colour=YELLOW),
     ]
     return model("atm", parts)
 
@@ -203,16 +149,16 @@ def _atm() -> Model:
 def _drinking_water() -> Model:
     parts = [
         lathe([(0.22, 0), (0.14, 0.1), (0.12, 0.7), (0.26, 0.86), (0.26, 0.86), (0.2, 0.88), (0, 0.82)],
-              sides=8, colour=_STEEL),
-        box((0.04, 0.04, 0.14), (-0.12, 0, 0.94), colour=_IRON),
-        box((0.14, 0.03, 0.03), (-0.06, 0, 1.0), colour=_IRON),
+              sides=8, colour=STEEL),
+        box((0.04, 0.04, 0.14), (-0.12, 0, 0.94), colour=IRON),
+        box((0.14, 0.03, 0.03), (-0.06, 0, 1.0), colour=IRON),
     ]  # fmt: skip
     return model("drinking_water", parts)
 
 
 def _bollard() -> Model:
     profile = [(0.11, 0), (0.11, 0.06), (0.08, 0.1), (0.08, 0.78), (0.1, 0.82), (0.09, 0.9), (0, 0.95)]
-    return model("bollard", [lathe(profile, sides=8, colour=_IRON)])
+    return model("bollard", [lathe(profile, sides=8, colour=IRON)])
 
 
 def _street_lamp() -> Model:
@@ -239,19 +185,19 @@ def _park_lamp() -> Model:
 def _fire_hydrant() -> Model:
     parts = [
         lathe([(0.16, 0), (0.16, 0.05), (0.11, 0.06), (0.11, 0.55), (0.14, 0.56), (0.14, 0.6), (0.09, 0.72), (0, 0.76)],
-              sides=8, colour=_RED),
-        box((0.12, 0.36, 0.12), (0, 0, 0.42), colour=_RED),
-        box((0.3, 0.12, 0.12), (0.05, 0, 0.42), colour=_YELLOW),
+              sides=8, colour=RED),
+        box((0.12, 0.36, 0.12), (0, 0, 0.42), colour=RED),
+        box((0.3, 0.12, 0.12), (0.05, 0, 0.42), colour=YELLOW),
     ]  # fmt: skip
     return model("fire_hydrant", parts)
 
 
 def _advertising_column() -> Model:
     parts = [
-        cylinder(0.68, 0.3, colour=_STONE, sides=14),
+        cylinder(0.68, 0.3, colour=STONE, sides=14),
         cylinder(0.6, 2.5, colour=(214, 202, 178), sides=14, centre=(0, 0, 0.3)),
-        cylinder(0.7, 0.25, colour=_GREEN, sides=14, centre=(0, 0, 2.8)),
-        lathe([(0.7, 3.05), (0.3, 3.35), (0.0, 3.5)], sides=14, colour=_GREEN),
+        cylinder(0.7, 0.25, colour=GREEN, sides=14, centre=(0, 0, 2.8)),
+        lathe([(0.7, 3.05), (0.3, 3.35), (0.0, 3.5)], sides=14, colour=GREEN),
     ]
     tones: tuple[Colour, ...] = ((176, 62, 54), (58, 96, 136), (214, 170, 70), (86, 128, 92), (120, 84, 120))
     for k, tone in enumerate(tones):
@@ -261,106 +207,41 @@ def _advertising_column() -> Model:
     return model("advertising_column", parts)
 
 
-def _board(name: str, wide: float, high: float, lift: float, colour: Colour, legs: int) -> Model:
+def _board(name: str, wide: float, high: float, lift: float, tones: tuple[Colour, Colour, Colour], legs: int) -> Model:
+    """A framed board with a picture of three tones on both sides."""
+    paper, shape, line = tones
     parts = [
-        box((0.1, wide, high), (0, 0, lift + high / 2), colour=_IRON),
-        box((0.11, wide - 0.12, high - 0.12), (0, 0, lift + high / 2), colour=colour),
-        box((0.115, wide * 0.5, high * 0.22), (0, wide * 0.08, lift + high * 0.66), colour=_WHITE),
+        box((0.1, wide, high), (0, 0, lift + high / 2), colour=IRON),
+        box((0.11, wide - 0.12, high - 0.12), (0, 0, lift + high / 2), colour=paper),
+        box((0.114, wide - 0.12, high * 0.3), (0, 0, lift + high * 0.25), colour=shape),
+        box((0.118, wide * 0.3, high * 0.4), (0, -wide * 0.2, lift + high * 0.36), colour=line),
+        box((0.118, wide * 0.4, high * 0.08), (0, wide * 0.16, lift + high * 0.82), colour=line),
+        box((0.118, wide * 0.4, high * 0.04), (0, wide * 0.16, lift + high * 0.70), colour=shape),
+        box((0.118, wide * 0.4, high * 0.04), (0, wide * 0.16, lift + high * 0.62), colour=shape),
     ]
     for k in range(legs):
         y = 0.0 if legs == 1 else (k - 0.5) * (wide - 0.3)
-        parts.append(_post(lift, 0.06, _IRON, y=y))
+        parts.append(post(lift, 0.06, IRON, y=y))
     return model(name, parts)
 
 
 def _flagpole() -> Model:
     parts = [
-        lathe([(0.12, 0), (0.08, 0.3), (0.045, 8.0), (0.08, 8.06), (0, 8.16)], sides=7, colour=_WHITE),
+        lathe([(0.12, 0), (0.08, 0.3), (0.045, 8.0), (0.08, 8.06), (0, 8.16)], sides=7, colour=WHITE),
         box((0.9, 0.012, 0.55), (0.5, 0, 7.6), colour=(48, 88, 160)),
-        box((0.9, 0.016, 0.14), (0.5, 0, 7.6), colour=_WHITE),
+        box((0.9, 0.016, 0.14), (0.5, 0, 7.6), colour=WHITE),
     ]
     return model("flagpole", parts, foot=(0.25, 0.25))
 
 
-def _statue() -> Model:
-    parts = [
-        box((1.5, 1.5, 0.2), (0, 0, 0.1), colour=_STONE),
-        box((1.0, 1.0, 1.3), (0, 0, 0.8), colour=(140, 130, 122)),
-        box((1.14, 1.14, 0.12), (0, 0, 1.48), colour=_STONE),
-        lathe([(0.34, 1.54), (0.26, 2.2), (0.2, 2.5), (0.0, 2.5)], sides=8, colour=_BRONZE),
-        lathe([(0.2, 2.4), (0.29, 2.75), (0.27, 3.0), (0.1, 3.12), (0, 3.14)], sides=8, colour=_BRONZE),
-        ball((0.13, 0.12, 0.16), (0.02, 0, 3.3), colour=_BRONZE, sides=7, rings=5),
-        box((0.12, 0.12, 0.6), (0.08, 0.32, 2.72), colour=_BRONZE),
-        box((0.5, 0.12, 0.12), (0.24, -0.3, 2.88), colour=_BRONZE),
-    ]
-    return model("statue", parts, kind="artwork")
-
-
-def _sculpture() -> Model:
-    parts = [
-        box((1.1, 1.1, 0.35), (0, 0, 0.175), colour=_STONE),
-        lathe(
-            [(0.3, 0.35), (0.5, 0.9), (0.22, 1.5), (0.42, 2.0), (0.12, 2.6), (0, 2.7)], sides=10, colour=(160, 96, 60)
-        ),
-        ball((0.3, 0.3, 0.3), (0, 0, 2.85), colour=(186, 150, 70), sides=9, rings=6),
-    ]
-    return model("sculpture", parts, kind="artwork")
-
-
-def _memorial() -> Model:
-    parts = [
-        box((0.9, 1.3, 0.15), (0, 0, 0.075), colour=_STONE),
-        extrusion([(-0.25, 0.15), (0.25, 0.15), (0.12, 1.6), (-0.2, 1.6)], 0.95, colour=(112, 106, 102)),
-        box((0.02, 0.55, 0.4), (0.2, 0, 0.95), colour=(176, 150, 90)),
-    ]
-    return model("memorial", parts)
-
-
 def _obelisk() -> Model:
     parts = [
-        box((1.6, 1.6, 0.4), (0, 0, 0.2), colour=_STONE),
-        box((1.0, 1.0, 0.8), (0, 0, 0.8), colour=_STONE),
+        box((1.6, 1.6, 0.4), (0, 0, 0.2), colour=STONE),
+        box((1.0, 1.0, 0.8), (0, 0, 0.8), colour=STONE),
         cylinder(0.5, 5.0, top=0.3, sides=4, colour=(170, 162, 150), centre=(0, 0, 1.2)),
         cylinder(0.3, 0.4, top=0.01, sides=4, colour=(150, 142, 130), centre=(0, 0, 6.2)),
     ]
     return model("obelisk", parts, kind="monument")
-
-
-def _kiosk() -> Model:
-    parts = [
-        box((2.4, 3.0, 2.3), (0, 0, 1.15), colour=(188, 204, 188)),
-        box((3.0, 3.6, 0.14), (0.1, 0, 2.42), colour=_GREEN),
-        box((0.04, 2.0, 1.0), (1.21, 0, 1.55), colour=(70, 92, 104)),
-        box((0.4, 2.2, 0.06), (1.35, 0, 1.02), colour=_WOOD),
-        box((0.04, 2.6, 0.3), (1.5, 0, 2.24), colour=_RED),
-        box((0.9, 0.04, 1.9), (-0.3, 1.51, 0.97), colour=_WOOD),
-    ]
-    return model("kiosk", parts)
-
-
-def _shelter() -> Model:
-    """A waiting shelter, open to +x."""
-    parts = [
-        box((1.5, 3.6, 0.08), (0, 0, 2.4), colour=_IRON),
-        box((0.03, 3.3, 1.9), (-0.65, 0, 1.3), colour=_GLASS),
-        box((1.1, 0.03, 1.9), (-0.1, 1.68, 1.3), colour=_GLASS),
-        box((0.36, 2.4, 0.05), (-0.4, 0, 0.46), colour=_WOOD),
-        box((0.08, 0.06, 0.46), (-0.4, -0.9, 0.23), colour=_IRON),
-        box((0.08, 0.06, 0.46), (-0.4, 0.9, 0.23), colour=_IRON),
-        box((1.1, 0.06, 1.5), (-0.1, -1.68, 1.35), colour=(196, 92, 60)),
-    ]
-    parts += [box((0.07, 0.07, 2.4), (x, y, 1.2), colour=_IRON) for x in (-0.65, 0.45) for y in (-1.68, 1.68)]
-    return model("shelter", parts)
-
-
-def _bus_stop() -> Model:
-    parts = [
-        _post(2.9, 0.045, _STEEL),
-        box((0.05, 0.5, 0.5), (0, 0.27, 2.6), colour=_BLUE),
-        box((0.056, 0.36, 0.2), (0, 0.27, 2.64), colour=_WHITE),
-        box((0.05, 0.3, 0.55), (0, 0.05, 1.5), colour=(212, 190, 70)),
-    ]
-    return model("bus_stop", parts, group="transit", foot=(0.2, 0.2))
 
 
 def _bike_station() -> Model:
@@ -381,37 +262,18 @@ def _bike_station() -> Model:
 
 def _clock() -> Model:
     parts = [
-        _post(3.4, 0.07, (36, 48, 44)),
+        post(3.4, 0.07, (36, 48, 44)),
         box((0.26, 0.8, 0.8), (0, 0, 3.75), colour=(36, 48, 44)),
-        box((0.28, 0.66, 0.66), (0, 0, 3.75), colour=_WHITE),
+        box((0.28, 0.66, 0.66), (0, 0, 3.75), colour=WHITE),
         box((0.29, 0.04, 0.26), (0, 0, 3.86), colour=(20, 20, 20)),
         box((0.29, 0.2, 0.04), (0, 0.09, 3.75), colour=(20, 20, 20)),
     ]
     return model("clock", parts, foot=(0.2, 0.2))
 
 
-def _traffic_signals() -> Model:
-    parts = [_post(3.3, 0.06, (58, 60, 60)), box((0.24, 0.3, 0.9), (0.16, 0, 2.85), colour=(30, 32, 32))]
-    for z, tone in ((3.12, (214, 52, 44)), (2.85, (206, 160, 40)), (2.58, (50, 170, 96))):
-        parts.append(box((0.03, 0.17, 0.17), (0.29, 0, z), colour=tone))
-    parts.append(box((0.2, 0.24, 0.5), (0, 0.24, 2.3), colour=(30, 32, 32)))
-    return model("traffic_signals", parts, foot=(0.2, 0.2))
-
-
-def _gate() -> Model:
-    parts = [_post(1.2, 0.08, _IRON, y=-1.0), _post(1.2, 0.08, _IRON, y=1.0)]
-    return model("gate", parts, solid=False)
-
-
-def _lift_gate() -> Model:
-    parts = [box((0.3, 0.3, 1.0), (0, 0, 0.5), colour=_YELLOW), box((0.08, 0.08, 2.8), (0, 0.12, 2.3), colour=_WHITE)]
-    parts += [box((0.085, 0.085, 0.3), (0, 0.12, 1.3 + 0.7 * k), colour=_RED) for k in range(3)]
-    return model("lift_gate", parts, foot=(0.35, 0.35))
-
-
 def _charging_station() -> Model:
     parts = [
-        box((0.35, 0.5, 1.6), (0, 0, 0.8), colour=_WHITE),
+        box((0.35, 0.5, 1.6), (0, 0, 0.8), colour=WHITE),
         box((0.02, 0.4, 0.3), (0.18, 0, 1.3), colour=(40, 60, 70)),
         box((0.36, 0.51, 0.14), (0, 0, 0.98), colour=(76, 168, 84)),
         box((0.1, 0.1, 0.3), (0.22, 0.14, 0.7), colour=(28, 30, 30)),
@@ -430,13 +292,13 @@ def _parcel_locker() -> Model:
 
 
 def _binoculars() -> Model:
-    parts = [_post(1.25, 0.06, _STEEL), box((0.4, 0.3, 0.24), (0, 0, 1.4), colour=_STEEL)]
-    parts += [cylinder(0.07, 0.16, sides=7, colour=_IRON).moved(_tilted(0.18, y, 1.42)) for y in (-0.08, 0.08)]
+    parts = [post(1.25, 0.06, STEEL), box((0.4, 0.3, 0.24), (0, 0, 1.4), colour=STEEL)]
+    parts += [cylinder(0.07, 0.16, sides=7, colour=IRON).moved(tilted(0.18, y, 1.42)) for y in (-0.08, 0.08)]
     return model("binoculars", parts)
 
 
 def _planter() -> Model:
-    parts = [lathe([(0.38, 0), (0.5, 0.55), (0.5, 0.55), (0.42, 0.55), (0.4, 0.48), (0, 0.48)], sides=8, colour=_STONE)]
+    parts = [lathe([(0.38, 0), (0.5, 0.55), (0.5, 0.55), (0.42, 0.55), (0.4, 0.48), (0, 0.48)], sides=8, colour=STONE)]
     tones: tuple[Colour, ...] = ((92, 136, 66), (196, 74, 96), (224, 190, 80), (88, 126, 60), (190, 90, 160))
     for k, tone in enumerate(tones):
         turn = 2 * math.pi * k / 5
@@ -448,69 +310,49 @@ def _planter() -> Model:
 def _subway_entrance() -> Model:
     """A canopy over stairs that open to +x."""
     parts = [
-        box((4.2, 0.25, 1.0), (0, 1.35, 0.5), colour=_STONE),
-        box((4.2, 0.25, 1.0), (0, -1.35, 0.5), colour=_STONE),
-        box((0.25, 2.9, 1.0), (-2.0, 0, 0.5), colour=_STONE),
-        box((4.5, 3.2, 0.12), (0, 0, 2.7), colour=_IRON),
+        box((4.2, 0.25, 1.0), (0, 1.35, 0.5), colour=STONE),
+        box((4.2, 0.25, 1.0), (0, -1.35, 0.5), colour=STONE),
+        box((0.25, 2.9, 1.0), (-2.0, 0, 0.5), colour=STONE),
+        box((4.5, 3.2, 0.12), (0, 0, 2.7), colour=IRON),
         box((0.1, 1.6, 0.5), (2.2, 0, 2.4), colour=(244, 124, 36)),
         box((3.9, 2.45, 0.02), (0, 0, 0.02), colour=(40, 40, 42)),
     ]
-    parts += [box((0.1, 0.1, 2.7), (x, y, 1.35), colour=_IRON) for x in (-2.0, 2.0) for y in (-1.35, 1.35)]
+    parts += [box((0.1, 0.1, 2.7), (x, y, 1.35), colour=IRON) for x in (-2.0, 2.0) for y in (-1.35, 1.35)]
     parts += [box((0.3, 2.45, 0.03), (1.8 - 0.4 * k, 0, 0.03), colour=(90 - 12 * k,) * 3) for k in range(5)]
     return model("subway_entrance", parts, group="transit")
 
 
-def _fence() -> Model:
-    parts = [box((2.0, 0.04, 0.04), (0, 0, z), colour=_IRON) for z in (0.2, 1.05)]
-    parts += [box((0.025, 0.025, 0.95), (-0.9 + 0.2 * k, 0, 0.62), colour=_IRON) for k in range(10)]
-    parts.append(box((0.06, 0.06, 1.15), (-1.0, 0, 0.575), colour=_IRON))
-    return model("fence", parts, foot=(2.0, 0.1))
-
-
-def _wall() -> Model:
-    parts = [
-        box((2.02, 0.35, 1.5), (0, 0, 0.75), colour=(152, 140, 126)),
-        box((2.04, 0.45, 0.1), (0, 0, 1.55), colour=(172, 164, 152)),
-    ]
-    return model("wall", parts, foot=(2.0, 0.4))
-
-
-def _guard_rail() -> Model:
-    parts = [box((2.0, 0.05, 0.3), (0, 0, 0.6), colour=_STEEL), box((0.1, 0.1, 0.7), (-0.9, 0.06, 0.35), colour=_STEEL)]
-    return model("guard_rail", parts, foot=(2.0, 0.2))
-
-
 def _pole(name: str, height: float, radius: float, colour: Colour) -> Model:
-    return model(name, [_post(height, radius, colour)], foot=(2 * radius, 2 * radius))
+    return model(name, [post(height, radius, colour)], foot=(2 * radius, 2 * radius))
 
 
 def _table_tennis() -> Model:
     parts = [
         box((1.52, 2.74, 0.08), (0, 0, 0.76), colour=(64, 104, 128)),
-        box((1.6, 0.03, 0.16), (0, 0, 0.88), colour=_STEEL),
-        box((0.8, 0.3, 0.72), (0, 0.8, 0.36), colour=_STONE),
-        box((0.8, 0.3, 0.72), (0, -0.8, 0.36), colour=_STONE),
+        box((1.6, 0.03, 0.16), (0, 0, 0.88), colour=STEEL),
+        box((0.8, 0.3, 0.72), (0, 0.8, 0.36), colour=STONE),
+        box((0.8, 0.3, 0.72), (0, -0.8, 0.36), colour=STONE),
     ]
     return model("table_tennis", parts, top=Top("table", 0.8, (1.5, 2.7)))
 
 
 def _swing() -> Model:
-    parts = [box((0.08, 3.2, 0.08), (0, 0, 2.3), colour=_RED)]
+    parts = [box((0.08, 3.2, 0.08), (0, 0, 2.3), colour=RED)]
     for y in (-1.5, 1.5):
-        parts += [box((0.08, 0.08, 2.3), (x, y, 1.15), colour=_BLUE) for x in (-0.5, 0.5)]
-        parts.append(box((1.1, 0.08, 0.08), (0, y, 2.28), colour=_BLUE))
+        parts += [box((0.08, 0.08, 2.3), (x, y, 1.15), colour=BLUE) for x in (-0.5, 0.5)]
+        parts.append(box((1.1, 0.08, 0.08), (0, y, 2.28), colour=BLUE))
     for y in (-0.6, 0.6):
         parts.append(box((0.2, 0.5, 0.04), (0, y, 0.5), colour=(30, 30, 30)))
-        parts += [box((0.015, 0.015, 1.8), (0, y + s, 1.4), colour=_STEEL) for s in (-0.22, 0.22)]
+        parts += [box((0.015, 0.015, 1.8), (0, y + s, 1.4), colour=STEEL) for s in (-0.22, 0.22)]
     return model("swing", parts, kind="playground")
 
 
 def _slide() -> Model:
-    chute = extrusion([(-0.2, 1.35), (1.9, 0.2), (1.9, 0.3), (-0.2, 1.45)], 0.5, colour=_YELLOW)
-    parts = [chute, box((0.7, 0.7, 0.08), (-0.55, 0, 1.4), colour=_BLUE)]
-    parts += [box((0.07, 0.07, 2.2), (x, y, 1.1), colour=_RED) for x in (-0.85, -0.25) for y in (-0.3, 0.3)]
-    parts += [box((0.05, 0.6, 0.05), (-0.95, 0, 0.3 * k + 0.2), colour=_STEEL) for k in range(4)]
-    parts.append(lathe([(0.62, 2.1), (0.0, 2.6)], sides=4, colour=_RED).moved(pose_matrix(-0.55, 0, 0)))
+    chute = extrusion([(-0.2, 1.35), (1.9, 0.2), (1.9, 0.3), (-0.2, 1.45)], 0.5, colour=YELLOW)
+    parts = [chute, box((0.7, 0.7, 0.08), (-0.55, 0, 1.4), colour=BLUE)]
+    parts += [box((0.07, 0.07, 2.2), (x, y, 1.1), colour=RED) for x in (-0.85, -0.25) for y in (-0.3, 0.3)]
+    parts += [box((0.05, 0.6, 0.05), (-0.95, 0, 0.3 * k + 0.2), colour=STEEL) for k in range(4)]
+    parts.append(lathe([(0.62, 2.1), (0.0, 2.6)], sides=4, colour=RED).moved(pose_matrix(-0.55, 0, 0)))
     return model("slide", parts, kind="playground")
 
 
@@ -518,22 +360,17 @@ def _slide() -> Model:
 def street_models() -> dict[str, Model]:
     """Models of everything that stands outdoors, by prototype name."""
     models = [
-        _bench(), _picnic_table(), _waste_basket(), _recycling(), _bicycle_parking(), _fountain(), _post_box(),
-        _telephone(), _vending_machine(), _parking_meter(), _atm(), _drinking_water(), _bollard(), _street_lamp(),
-        _park_lamp(), _fire_hydrant(), _advertising_column(), _flagpole(), _statue(), _sculpture(), _memorial(),
-        _obelisk(), _kiosk(), _shelter(), _bus_stop(), _bike_station(), _clock(), _traffic_signals(), _gate(),
-        _lift_gate(), _charging_station(), _parcel_locker(), _binoculars(), _planter(), _subway_entrance(), _fence(),
-        _wall(), _guard_rail(), _table_tennis(), _swing(), _slide(),
-        _board("billboard", 3.6, 2.6, 1.6, (196, 156, 84), 2),
-        _board("poster_box", 1.3, 1.9, 0.5, (84, 128, 156), 2),
-        _board("information", 1.5, 1.1, 0.9, (96, 132, 92), 2),
-        _board("sign", 0.6, 0.6, 2.0, (44, 90, 160), 1),
-        _cabinet("street_cabinet", (0.45, 1.1, 1.2), (118, 126, 118), (96, 104, 96)),
-        _cabinet("toilets", (2.4, 3.4, 2.7), (96, 116, 108), (64, 80, 74)),
-        _cabinet("grit_bin", (0.7, 1.0, 0.75), (214, 168, 48), (190, 146, 36)),
-        _cabinet("luggage_locker", (0.7, 2.4, 1.8), (120, 130, 140), (90, 100, 110)),
-        _pole("utility_pole", 7.5, 0.12, (120, 96, 72)),
-        _pole("mast", 12.0, 0.16, _STEEL),
-        _pole("pillar", 3.0, 0.25, _STONE),
+        _bench(), _picnic_table(), _waste_basket(), _recycling(), _fountain(), _post_box(),
+        _vending_machine(), _parking_meter(), _atm(), _drinking_water(), _bollard(), _street_lamp(),
+        _park_lamp(), _fire_hydrant(), _advertising_column(), _flagpole(),
+        _obelisk(), _bike_station(), _clock(),
+        _charging_station(), _parcel_locker(), _binoculars(), _planter(), _subway_entrance(),
+        _table_tennis(), _swing(), _slide(),
+        _board("billboard", 3.6, 2.6, 1.6, ((226, 214, 186), (58, 110, 150), (206, 92, 56)), 2),
+        _board("poster_box", 1.3, 1.9, 0.5, ((214, 222, 226), (176, 62, 74), (40, 48, 60)), 2),
+        _board("information", 1.5, 1.1, 0.9, ((226, 230, 214), (96, 140, 92), (60, 92, 130)), 2),
+        _board("sign", 0.6, 0.6, 2.0, ((44, 90, 160), (44, 90, 160), (232, 232, 228)), 1),
+        _pole("pillar", 3.0, 0.25, STONE),
     ]  # fmt: skip
-    return {m.name: m for m in [*models, *plant_models()]}
+    lots = [models, civic_models(), traffic_models(), play_models(), barrier_models(), plant_models()]
+    return {m.name: m for lot in lots for m in lot}
