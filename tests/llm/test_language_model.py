@@ -99,6 +99,7 @@ def test_the_object_is_found_in_what_is_said_around_it(text: str) -> None:
     ("answer", "finding"),
     [
         ("", "no JSON object"),
+        ('{"name": "a", "kind": "bar", "\\u001b[2J\\n": 1}', "[2J : Extra inputs"),
         ("I would rather not.", "no JSON object"),
         ('{"name": "Kulma", "kind": ', "broken at character"),
         ('{"name": "Kul", "tags": [{"kind": "bar"}, {"kin', "broken at character"),
@@ -114,6 +115,7 @@ def test_what_is_no_record_is_refused_quickly(answer: str, finding: str) -> None
     with model_server(answer) as (base, _), pytest.raises(LlmReplyError) as caught:
         model(base).ask(MESSAGES, Shop, rounds=0)
     assert finding in caught.value.findings[0]
+    assert str(caught.value).isprintable()
     assert time.process_time() - start < 2.0
 
 
@@ -128,7 +130,8 @@ def test_a_server_that_takes_no_schema_is_told_it_in_words_from_then_on() -> Non
         asker = model(base)
         assert [asker.ask(MESSAGES, Shop).value for _ in range(2)] == [KULMA, KULMA]
     assert ["response_format" in body for body in script.asked] == [True, False, False]
-    assert '"enum":["bakery","bar"]' in script.asked[1]["messages"][0]["content"]
+    assert '"enum":["bakery","bar"]' in script.last_words(1)
+    assert [message["role"] for message in script.asked[1]["messages"]] == ["system", "user"]
 
 
 def test_options_that_a_server_refuses_are_left_out() -> None:
@@ -217,7 +220,10 @@ def test_nobody_there_is_said_at_once() -> None:
 
 @pytest.mark.parametrize("answer", [says("", refusal="I can't."), says("", finish="content_filter")])
 def test_a_refusal_is_not_argued_with(answer: Answer) -> None:
-    with model_server(answer) as (base, script), pytest.raises(LlmReplyError, match="tiny: refuses: "):
+    with (
+        model_server(answer) as (base, script),
+        pytest.raises(LlmReplyError, match=r"tiny: refuses: (I can't|filtered)"),
+    ):
         model(base).ask(MESSAGES, Shop)
     assert len(script.asked) == 1
 
@@ -362,8 +368,8 @@ def test_what_the_cache_knew_is_recorded_and_replayed_free_of_charge(tmp_path: P
         (b"", "no recorded calls"),
         (b"{}\n", "line 1"),
         (b"\xff\n", "line 1"),
-        (b'{"base": "x", "model": "m", "digest": "d", "usage": {"calls": 1, "euros": 2}}\n', "usage"),
-        (b'{"base": "x", "model": "m", "digest": "d", "version": 2}\n', "line 1"),
+        (b'{"base": "x", "model": "m", "digest": "d", "request": {}, "text": "", "usage": {"euros": 2}}\n', "usage"),
+        (b'{"base": "x", "model": "m", "digest": "d", "request": {}, "text": "", "version": 2}\n', "line 1"),
     ],
 )
 def test_a_file_that_is_no_recording_is_refused(tmp_path: Path, content: bytes, words: str) -> None:

@@ -15,9 +15,9 @@ from pydantic import BaseModel
 from vico.errors import InputError, LlmReplyError
 from vico.llm.budget import Budget, Usage
 from vico.llm.endpoint import Endpoint
-from vico.llm.messages import Message, checked, system, tokens_of, user
+from vico.llm.messages import Message, checked, tokens_of, user
 from vico.llm.recording import Answer, Cache, Recorder, Replay, digest_of, recorded_endpoint
-from vico.llm.replies import Check, instruction, read, response_format
+from vico.llm.replies import Check, instruction, plain, read, response_format
 from vico.llm.transport import Transport, Trouble, post
 
 T = TypeVar("T", bound=BaseModel)
@@ -101,7 +101,7 @@ class LanguageModel:
         self._cache = Cache(cache) if cache is not None else None
         self._recorder = Recorder(record, endpoint) if record is not None else None
         self._replay = Replay(replay) if replay is not None else None
-        self._refused: set[str] = set(self._replay.refused) if self._replay else set()
+        self._refused: set[str] = set()
         self._transport, self._sleep = transport, sleep
         self._lock = threading.Lock()
 
@@ -203,20 +203,18 @@ class LanguageModel:
         if found is None or found.value is None or text is None:
             return None
         if self._recorder is not None:
-            self._recorder.answered(self._request(said, reply), Answer(text, "stop", "", Usage()), cached=True)
+            self._recorder.keep(request, Answer(text, "stop", "", Usage()), cached=True)
         return Reply(found.value, Usage(), 0)
 
-    def _repair(self, text: str, findings: Sequence[str], reply: type[BaseModel]) -> list[Message]:
+    @staticmethod
+    def _repair(text: str, findings: Sequence[str], reply: type[BaseModel]) -> list[Message]:
         """What is said after a bad reply: that reply alone, so that requests don't grow from round to round."""
         listed = "\n".join(f"- {finding}" for finding in findings)
-        words = f"This can't be used:\n{listed}\nMend it, and reply with the whole JSON object and nothing else."
-        if self._part(reply) not in self._refused:  # there the schema is in the instructions anyway
-            words += "\n" + instruction(reply)
-        turns = [user(words)]
+        turns = [user(f"This can't be used:\n{listed}\nMend it. {instruction(reply)}")]
         return [{"role": "assistant", "content": text[:_MOST_QUOTED]}, *turns] if text.strip() else turns
 
     def _whole(self, said: Sequence[Message], reply: type[BaseModel]) -> dict[str, Any]:
-        """The request with all its parts, whatever a server refuses of them: what the cache goes by."""
+        """The request with all its parts, whatever a server refuses of them: cache and recordings go by it."""
         request = {"model": self.endpoint.model, "messages": list(said), "response_format": response_format(reply)}
         return request | {name: value for name, value in self._options.items() if value is not None}
 
@@ -225,7 +223,7 @@ class LanguageModel:
         request = self._whole(said, reply)
         if self._part(reply) in self._refused:
             del request["response_format"]
-            request["messages"] = [system(instruction(reply)), *said]
+            request["messages"] = _in_words(said, reply)
         for name in ("seed", "temperature"):
             if name in self._refused:
                 request.pop(name, None)
@@ -241,7 +239,7 @@ class LanguageModel:
     def _answer(self, turns: Sequence[Message], reply: type[BaseModel]) -> Answer:
         """A server's answer, of any kind, within the budget."""
         if self._replay is not None:
-            free = self._replay.cached(self._request(turns, reply))
+            free = self._replay.cached(self._whole(turns, reply))
             if free is not None:
                 return free
         asked = self._priced(Usage(1, tokens_of(turns), 0))
@@ -257,7 +255,7 @@ class LanguageModel:
     def _told(self, turns: Sequence[Message], reply: type[BaseModel]) -> Answer:
         """The answer, asked for without what the server turns out to refuse."""
         if self._replay is not None:
-            return self._replay.answer(self._request(turns, reply))
+            return self._replay.answer(self._whole(turns, reply))
         tried: set[str] = set()
         while True:
             request = self._request(turns, reply)
@@ -276,9 +274,7 @@ class LanguageModel:
                 self._forget(tried)
                 raise
         if self._recorder is not None:
-            for part in sorted(tried):
-                self._recorder.refused(part)
-            self._recorder.answered(request, answer, cached=False)
+            self._recorder.keep(self._whole(turns, reply), answer, cached=False)
         return answer
 
     def _forget(self, tried: set[str]) -> None:
@@ -321,7 +317,7 @@ class LanguageModel:
             text = "".join(str(p.get("text", "")) for p in text if isinstance(p, dict) and p.get("type") == "text")
         text = text.encode("utf-8", "replace").decode() if isinstance(text, str) else ""  # lone surrogates
         finish = str(choice.get("finish_reason") or "")
-        refusal = str(message.get("refusal") or ("filtered by the service" if finish == "content_filter" else ""))
+        refusal = plain(str(message.get("refusal") or ("filtered" if finish == "content_filter" else "")))
         counted = content.get("usage")
         counted = counted if isinstance(counted, dict) else {}
         usage = Usage(
@@ -334,6 +330,16 @@ class LanguageModel:
             return usage
         read, written = self.endpoint.price
         return replace(usage, cost=(usage.read * read + usage.written * written) / 1e6)
+
+
+def _in_words(said: Sequence[Message], reply: type[BaseModel]) -> list[Message]:
+    """Messages that ask for a schema in their last one: not every server takes a second system message."""
+    *before, last = said
+    words = instruction(reply)
+    content = last["content"]
+    if isinstance(content, list):
+        return [*before, {**last, "content": [*content, {"type": "text", "text": words}]}]
+    return [*before, last if words in content else {**last, "content": f"{content}\n{words}"}]
 
 
 def _count(value: object, otherwise: int) -> int:

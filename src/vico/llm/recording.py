@@ -35,7 +35,7 @@ class Answer:
 
 
 class _Line(BaseModel):
-    """A line of a recording: an answer, or a part of requests that the server refused."""
+    """A line of a recording: an answer, what was asked in words, and the digest by which it is found."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
@@ -44,13 +44,12 @@ class _Line(BaseModel):
     base: str
     model: str
     digest: str
-    request: dict[str, Any] | None = None
-    text: str = ""
+    request: dict[str, Any]
+    text: str
     finish: str = ""
     refusal: str = ""
     usage: dict[str, float | int] = {}
     cached: bool = False
-    refused: str | None = None
 
 
 def digest_of(request: Mapping[str, Any]) -> str:
@@ -66,19 +65,15 @@ class Recorder:
         self.path, self.endpoint = Path(path), endpoint
         self._lock = threading.Lock()
 
-    def answered(self, request: Mapping[str, Any], answer: Answer, *, cached: bool) -> None:
-        """Record an answer."""
+    def keep(self, request: Mapping[str, Any], answer: Answer, *, cached: bool) -> None:
+        """Append an answer."""
         usage: dict[str, float | int] = asdict(answer.usage)
         self._append(_Line(base=self.endpoint.base, model=self.endpoint.model, digest=digest_of(request),
                            request=_shown(request), text=answer.text, finish=answer.finish, refusal=answer.refusal,
                            usage=usage, cached=cached))  # fmt: skip
 
-    def refused(self, part: str) -> None:
-        """Record that the server refuses a part of requests, as a replay has to leave it out too."""
-        self._append(_Line(base=self.endpoint.base, model=self.endpoint.model, digest="", refused=part))
-
     def _append(self, line: _Line) -> None:
-        text = json.dumps(line.model_dump(exclude_defaults=False, exclude_none=True), ensure_ascii=True)
+        text = json.dumps(line.model_dump(), ensure_ascii=True)
         with self._lock:
             try:
                 self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -105,8 +100,6 @@ class Replay:
     ----------
     base, model
         Whose answers they are.
-    refused
-        Parts of requests the server refused then.
 
     Raises
     ------
@@ -118,7 +111,6 @@ class Replay:
         self.path = Path(path)
         self._answers: dict[str, deque[tuple[Answer, bool]]] = defaultdict(deque)
         self._lock = threading.Lock()
-        self.refused: set[str] = set()
         self.base = self.model = ""
         try:
             with self.path.open("rb") as file:
@@ -142,10 +134,7 @@ class Replay:
             what = error.errors()[0]["msg"] if isinstance(error, ValidationError) else "its usage has other fields"
             raise SchemaError(f"{self.path}: line {number} is no recorded call ({what}); record it anew") from None
         self.base, self.model = self.base or line.base, self.model or line.model
-        if line.refused is not None:
-            self.refused.add(line.refused)
-        else:
-            self._answers[line.digest].append((Answer(line.text, line.finish, line.refusal, usage), line.cached))
+        self._answers[line.digest].append((Answer(line.text, line.finish, line.refusal, usage), line.cached))
 
     def cached(self, request: Mapping[str, Any]) -> Answer | None:
         """The next answer to a request if it came from the cache then, and so cost nothing; else None."""

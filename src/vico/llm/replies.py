@@ -101,7 +101,7 @@ def read(text: str, reply: type[T], check: Check[T] | None) -> Read[T]:
         except ValidationError as error:
             wrong = [_finding(one) for one in error.errors(include_url=False, include_input=False)]
         else:
-            wrong = check(value) if check is not None else []
+            wrong = list(check(value)) if check is not None else []
             if not wrong:
                 return Read(value, [])
         if len(content) > worst:
@@ -109,12 +109,17 @@ def read(text: str, reply: type[T], check: Check[T] | None) -> Read[T]:
     if broken is not None and 2 * worst < len(said):
         # What could be read are parts of the broken object, and their faults would lead astray.
         findings = [broken]
-    return Read(None, findings[:_MOST_FINDINGS] or ["the reply holds no JSON object"])
+    return Read(None, [plain(one) for one in findings[:_MOST_FINDINGS]] or ["the reply holds no JSON object"])
 
 
 def _finding(error: Any) -> str:
     path = ".".join(str(part) for part in error["loc"]) or "the whole object"
-    return f"{path}: {error['msg'].removeprefix('Value error, ')}"[:400]
+    return f"{path}: {error['msg'].removeprefix('Value error, ')}"
+
+
+def plain(words: str) -> str:
+    """A model's words as one line without control characters, fit for an error message."""
+    return " ".join("".join(c if c.isprintable() else " " for c in words).split())[:400]
 
 
 def _objects(text: str) -> tuple[list[str], str | None]:
