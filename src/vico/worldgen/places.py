@@ -6,12 +6,15 @@ from collections.abc import Sequence
 
 import shapely
 
-from vico.geo.osm import OsmData, Tags
+from vico.geo.osm import OsmData
+from vico.geo.places import FoundPlace
 from vico.world.heights import HeightField
 from vico.world.model import Building, Category, Dropped, Entrance, Place, Roads, Transit
 from vico.world.routing import Router
 from vico.world.walkable import WalkableMap
 from vico.worldgen.places_doors import Finder
+from vico.worldgen.places_found import compared
+from vico.worldgen.places_names import Streets, unused
 from vico.worldgen.places_osm import named_places
 
 _LARGE_HOUSE = 4000.0  # square metres of floor above which a house has two stairways
@@ -26,6 +29,7 @@ def places_from_osm(
     height: HeightField,
     roads: Roads,
     transit: Transit | None = None,
+    found: Sequence[FoundPlace] = (),
 ) -> tuple[list[Place], list[Entrance], list[Dropped]]:
     """Find the places of a map, the buildings they are in, and their entrances.
 
@@ -43,6 +47,9 @@ def places_from_osm(
         Named streets, for the addresses of homes.
     transit
         Stops and stations, which become places of their own with the same ids.
+    found
+        Places of other sources: they confirm, refine or close the map's places, and add those it lacks. Of sources
+        whose content may not be kept (Google) nothing but ids and what is decided here gets into the result.
 
     Returns
     -------
@@ -50,12 +57,18 @@ def places_from_osm(
         Places in the order of the map, then homes, then transit; what was left out, with the reason.
     """
     finder = Finder(osm, buildings, walkable, height)
-    dropped: list[Dropped] = []
+    streets = Streets(finder, roads)
+    mapped = named_places(osm)
+    told = compared(mapped, found)
+    dropped: list[Dropped] = list(told.dropped)
     places: list[Place] = []
     seen: set[tuple[str, str | None]] = set()
-    for named in named_places(osm):
-        reason = finder.misfit(named)
+    for named in [*mapped, *told.added]:
+        reason = "closed, as another source says" if named.id in told.closed else finder.misfit(named)
         if reason is None:
+            named = told.refined.get(named.id, named)
+            if not named.name:
+                named = streets.invented(named)
             place = finder.outdoors(named) if finder.is_outdoors(named) else finder.indoors(named)
             if isinstance(place, Place):
                 key = (place.name.casefold(), place.building or f"{place.category}")
@@ -67,25 +80,23 @@ def places_from_osm(
             else:
                 reason = place
         if reason is not None:
-            dropped.append(Dropped(id=named.id, reason=f"{named.kind} {named.name!r}: {reason}"))
-    places += _homes(finder, roads)
+            label = f"{named.kind} {named.name!r}" if named.name else named.kind
+            dropped.append(Dropped(id=named.id, reason=f"{label}: {reason}"))
+    places += _homes(finder, streets)
     if transit is not None:
         places += _transit_places(transit, walkable, height, dropped)
     return places, finder.entrances, dropped
 
 
-def _homes(finder: Finder, roads: Roads) -> list[Place]:
+def _homes(finder: Finder, streets: Streets) -> list[Place]:
     """Apartments in residential buildings, a place for each stairway; more buildings count where these are few."""
-    streets = [(road.name, shapely.LineString(road.line)) for road in roads.roads if road.name and len(road.line) > 1]
-    tree = shapely.STRtree([line for _, line in streets])
-    addresses = _addresses(finder)
     used: set[str] = set()
     homes: list[Place] = []
 
     def add(building: Building, shape: shapely.Polygon) -> None:
         floor = shape.area * max(building.levels, 1)
         tags = finder.tags_of(building)
-        address = addresses.get(building.id)
+        address = streets.addresses.get(building.id)
         for k in range(2 if floor > _LARGE_HOUSE else 1):
             door = finder.building_door(building, k)
             if door is None:
@@ -94,15 +105,13 @@ def _homes(finder: Finder, roads: Roads) -> list[Place]:
                 name = f"Apartments, {address}"
             elif tags.get("name"):
                 name = f"Apartments, {tags['name']}"
-            elif streets:
-                near = int(tree.nearest(shapely.Point(door.position[:2])))
-                name = f"Apartments on {streets[near][0]}"
             else:
-                name = "Apartments"
+                street = streets.nearest(door.position[:2])
+                name = f"Apartments on {street}" if street else "Apartments"
             homes.append(
                 Place(
                     id=f"{building.id}.home{k}",
-                    name=_unused(name, used),
+                    name=unused(name, used),
                     category=Category.ACCOMMODATION,
                     kind="apartments",
                     building=building.id,
@@ -130,32 +139,6 @@ def _homes(finder: Finder, roads: Roads) -> list[Place]:
             break
         add(building, shape)
     return homes
-
-
-def _unused(name: str, used: set[str]) -> str:
-    """The name, or the name with the first free letter or number."""
-    candidates = [name, *(f"{name} {letter}" for letter in "BCDEFGHJKLMN"), *(f"{name} {k}" for k in range(14, 999))]
-    chosen = next(candidate for candidate in candidates if candidate not in used)
-    used.add(chosen)
-    return chosen
-
-
-def _addresses(finder: Finder) -> dict[str, str]:
-    """Street and number by building: its own tags, else the address points in it."""
-    found: dict[str, str] = {}
-    for building in finder.buildings:
-        if text := _address(finder.tags_of(building)):
-            found[building.id] = text
-    for node in finder.osm.nodes:
-        text = _address(node.tags)
-        if text and (at := finder.building_at(node.xy, 1.5)) is not None:
-            found.setdefault(finder.buildings[at].id, text)
-    return found
-
-
-def _address(tags: Tags) -> str | None:
-    street, number = tags.get("addr:street"), tags.get("addr:housenumber")
-    return f"{street} {number.split(';')[0].split(',')[0]}" if street and number else None
 
 
 def _transit_places(

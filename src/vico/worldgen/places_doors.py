@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -21,9 +21,13 @@ from vico.worldgen.places_osm import Named
 
 _NO_DOOR = {"no", "service", "garage", "emergency", "exit", "fire_exit", "private"}
 
-_MATCH = 8.0  # metres from a building's outline within which a place is taken to be in it
+MATCH = 8.0  # metres from a building's outline within which a place is taken to be in it
 _OWN_DOOR = 12.0  # metres within which a mapped entrance is a place's own
 _SAME_DOOR = 2.5  # metres within which two doors are one
+_SHOP_GAP = 4.5  # metres between the doors of two shops
+_MOST_THROUGH = 8  # shops deep inside that one mapped entrance serves
+_WHOLE = 0.7  # share of a building's ground above which an area in it is the building
+_DEEP = 14.0  # metres from every wall at which a shop has none of its own
 _STEP = 0.8  # metres between the points of an outline that are tried as doors
 _APPROACHES = (0.7, 1.0, 1.3, 1.6, 1.9)
 _OUTDOORS = (Category.OPEN, Category.TRANSIT)
@@ -60,6 +64,8 @@ class Finder:
         self.tree = shapely.STRtree(self.shapes)
         self.index = {b.id: i for i, b in enumerate(buildings)}
         self.entrances: list[Entrance] = []
+        self._through: Counter[str] = Counter()
+        self._taken: dict[int, dict[str, tuple[float, float]]] = defaultdict(dict)
         self._own: dict[str, list[Entrance]] = defaultdict(list)
         self._doors: dict[int, _Doors] = {}
         self._area_tags = {area.id: area.tags for area in osm.areas}
@@ -124,16 +130,26 @@ class Finder:
     def indoors(self, named: Named) -> Place | str:
         """A place in a building, with its door."""
         whole = self.index.get(named.id)
+        shared: list[tuple[float, int]] = []
         if whole is None and named.area is not None:
             hits = self.tree.query(named.area, predicate="intersects")
             shared = [(self.shapes[i].intersection(named.area).area, -int(i)) for i in hits]
             if shared and max(shared)[0] > 4.0:
                 whole = -max(shared)[1]
-        at = whole if whole is not None else self.building_at(named.xy, _MATCH)
+        at = whole if whole is not None else self.building_at(named.xy, MATCH)
+        part = None
+        if whole is not None and shared and max(shared)[0] < _WHOLE * self.shapes[whole].area:
+            # A shop drawn as a part of its building.
+            whole, part = None, named.area
         if at is None:
-            return f"no building within {_MATCH:g} m"
+            return f"no building within {MATCH:g} m"
         building = self.buildings[at]
-        door = self.building_door(building) if whole is not None else self._door_near(at, named.xy)
+        if whole is not None:
+            door = self.building_door(building)
+        elif named.exact:
+            door = self._own_door(at, named.xy if part is None else self._front(at, part, named.xy))
+        else:
+            door = self.building_door(building, len(self._own[building.id]))
         if door is None:
             return f"building {building.id} has no wall that can be reached on foot"
         return Place(
@@ -168,13 +184,60 @@ class Finder:
                 cost = cost + np.maximum(0.0, 12.0 - away)
         return self._made(at, doors, int(np.argmin(cost)))
 
-    def _door_near(self, at: int, xy: NDArray[np.float64]) -> Entrance | None:
-        """The door of a shop: a mapped entrance near it, else the wall nearest to it."""
-        near = sorted((float(np.hypot(*(p - xy))), k) for k, (p, _) in enumerate(self._mapped.get(at, [])))
-        for distance, k in near:
-            if distance < _OWN_DOOR and (door := self._entrance(at, self._mapped[at][k][0], 3.0)) is not None:
-                return door
-        return self._entrance(at, xy, math.inf)
+    def _front(self, at: int, part: shapely.Geometry, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where a part of a building has its best door: on the outline it shares, else `xy`."""
+        doors = self._candidates(at)
+        if not len(doors.at):
+            return xy
+        along = np.flatnonzero(shapely.dwithin(part, shapely.points(doors.at), 0.8))
+        return xy if not len(along) else doors.at[along[int(np.argmin(doors.cost[along]))]]
+
+    def _own_door(self, at: int, xy: NDArray[np.float64]) -> Entrance | None:
+        """The door of a shop: a mapped entrance near it, else the wall nearest to it, shared with others only in need.
+
+        Shops deep inside a building (a mall's) are entered by the building's doors.
+        """
+        mapped = [place for place, _ in self._mapped.get(at, [])]
+        taken = self._taken[at]
+        deep = float(self.shapes[at].exterior.distance(shapely.Point(xy))) > _DEEP
+        near = sorted((float(np.hypot(*(place - xy))), k) for k, place in enumerate(mapped))
+        doors = [
+            door
+            for distance, k in near
+            if (deep or distance < _OWN_DOOR) and (door := self._entrance(at, mapped[k], 3.0)) is not None
+        ]
+        free = [door for door in doors if door.id not in taken]
+        if doors and deep:
+            # Not all of a mall through one door.
+            chosen = next((door for door in doors if self._through[door.id] < _MOST_THROUGH), None)
+            chosen = chosen or self._entrance(at, xy, math.inf) or doors[0]
+            self._through[chosen.id] += 1
+            return chosen
+        chosen = free[0] if free else self._spaced(at, xy, taken)
+        if chosen is None and doors:
+            chosen = doors[0]
+        if chosen is None:
+            chosen = self._entrance(at, xy, math.inf)
+        if chosen is not None:
+            taken[chosen.id] = chosen.position[:2]
+        return chosen
+
+    def _spaced(self, at: int, xy: NDArray[np.float64], taken: dict[str, tuple[float, float]]) -> Entrance | None:
+        """The wall nearest to a point that is no other shop's; None where that is another street's, or far off."""
+        doors = self._candidates(at)
+        if not len(doors.at):
+            return None
+        away = np.linalg.norm(doors.at - xy, axis=1) + 0.35 * doors.cost
+        best = int(np.argmin(away))
+        others = np.array(list(taken.values())).reshape(-1, 2)
+        if len(others):
+            gap = np.linalg.norm(doors.at[:, None] - others[None], axis=2).min(axis=1)
+            alike = (doors.out @ doors.out[best] > 0.7) & (doors.cost < doors.cost[best] + 4.0)
+            away = np.where((gap >= _SHOP_GAP) & (away < away[best] + _OWN_DOOR) & alike, away, np.inf)
+            best = int(np.argmin(away))
+            if not np.isfinite(away[best]):
+                return None
+        return self._made(at, doors, best)
 
     def _entrance(self, at: int, xy: NDArray[np.float64], within: float) -> Entrance | None:
         """The door nearest to a point."""

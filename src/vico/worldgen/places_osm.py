@@ -68,7 +68,17 @@ _CLOSED_VALUES = {"no", "vacant", "disused", "closed", "abandoned"}
 
 @dataclass(frozen=True)
 class Named:
-    """Something with a name that people go to."""
+    """Something with a name that people go to.
+
+    Attributes
+    ----------
+    xy
+        Where, metres, shape ``(2,)``.
+    area
+        Its area, None for points.
+    exact
+        False where `xy` may say which building it is in, but not where its door is.
+    """
 
     id: str
     name: str
@@ -77,6 +87,7 @@ class Named:
     xy: NDArray[np.float64]
     tags: Tags
     area: shapely.Geometry | None
+    exact: bool = True
 
 
 def named_places(osm: OsmData) -> list[Named]:
