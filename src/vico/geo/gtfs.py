@@ -276,7 +276,9 @@ class _Reader:
         if name not in self.members:
             return
         info = self.members[name]
-        most = min(_MOST_BYTES, max(info.compress_size, 1 << 16) * _MOST_RATIO)
+        most = min(_MOST_BYTES, max(info.compress_size, 1 << 14) * _MOST_RATIO)
+        if info.file_size > most:
+            raise SchemaError(f"{self.path}: {name} unpacks to an absurd size; this is no timetable")
         with self.archive.open(info) as stream:
             raw = io.BufferedReader(_Bounded(stream, most, f"{self.path}: {name}"), 1 << 16)  # type: ignore[arg-type]
             text = io.TextIOWrapper(raw, encoding="utf-8-sig", newline="")
