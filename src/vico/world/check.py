@@ -24,7 +24,8 @@ _APPROACH = 2.0
 _REACH = 1.5
 _SEATED = 0.5  # metres a ground floor may lie above the highest ground at its walls
 _BODY = 0.25
-_FLICKER = 0.05  # square metres in one plane that an eye would see
+_FLICKER = 0.05  # square metres of two triangles in one plane that count
+_SEEN = 0.5  # square metres of two buildings in one plane that an eye would see
 _TOUCH = 0.01  # square metres of outlines that may overlap
 _KERB = 0.4  # metres at each side of a lane that no vehicle's body sweeps
 _JOINED = ("fence", "wall", "guard_rail", "hedge", "retaining_wall")  # pieces of a barrier meet, and meet their posts
@@ -182,7 +183,8 @@ def _buildings_seated(world: World) -> Iterator[Finding]:
     for building in world.buildings:
         ground = world.height(np.array(building.footprint[0]))
         low = lowest.get(building.entity, math.inf)
-        if ground.min() + 0.05 < low < ground.min() + 2.2:
+        canopy = building.tags.get("building") == "roof"  # open below, however low it is
+        if ground.min() + 0.05 < low < ground.min() + 2.2 and not canopy:
             yield Finding(
                 "building floats", building.id, f"its walls begin at {low:.2f} m, the ground at {ground.min():.2f} m"
             )
@@ -210,6 +212,8 @@ def _buildings_apart(world: World) -> Iterator[Finding]:
         key = (min(int(entity[a]), int(entity[b])), max(int(entity[a]), int(entity[b])))
         areas[key] = areas.get(key, 0.0) + float(area)
     for (one, other), area in sorted(areas.items()):
+        if area < _SEEN:
+            continue
         whom = "itself" if one == other else numbers[other]
         yield Finding("building faces overlap", numbers[one], f"{area:.2f} m2 lie in one plane with faces of {whom}")
 
