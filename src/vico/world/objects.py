@@ -27,6 +27,14 @@ FEET = {
     "bus_stop": 0.2,
     "clock": 0.2,
     "sign": 0.15,
+    "surveillance": 0.2,
+    "traffic_mirror": 0.15,
+    "speed_camera": 0.25,
+    "railway_signal": 0.25,
+    "catenary_mast": 0.35,
+    "utility_pole": 0.3,
+    "mast": 0.5,
+    "lift_gate": 0.35,
 }
 
 _TYPES: dict[str, pa.DataType] = {
