@@ -123,6 +123,11 @@ def _looks(surfaces: list[Surface], asset: Element, body: Element, folder: Path)
     for surface in joined(surfaces):
         # MuJoCo has no vertex colours: one mesh a tint of a material, tints rounded to a few steps.
         tints, tint_of = np.unique(_tints(surface), axis=0, return_inverse=True)
+        tint_of = np.ravel(tint_of)
+        faces_of = np.bincount(tint_of)
+        # A mesh needs four corners there: a lone triangle takes the tint that most others have.
+        lone = [k for k in range(len(tints)) if len(np.unique(surface.triangles[tint_of == k])) < 4]
+        tint_of = np.where(np.isin(tint_of, lone), int(faces_of.argmax()), tint_of)
         texture = surface.material.texture
         if texture is not None:
             picture = io.BytesIO()
@@ -130,7 +135,9 @@ def _looks(surfaces: list[Surface], asset: Element, body: Element, folder: Path)
             write_bytes(folder / "assets" / f"texture{count}.png", picture.getvalue())
             SubElement(asset, "texture", type="2d", name=f"texture{count}", file=f"texture{count}.png")
         for k, tint in enumerate(tints):
-            faces = surface.triangles[np.ravel(tint_of) == k]
+            faces = surface.triangles[tint_of == k]
+            if len(np.unique(faces)) < 4:
+                continue
             name = f"looks{count}_{k}"
             write_bytes(folder / "assets" / f"{name}.obj", _obj(surface, faces))
             SubElement(asset, "mesh", name=name, file=f"{name}.obj", inertia="shell")
