@@ -115,7 +115,7 @@ def transit_from_osm(
         # Routes that only cut a corner of the window take nobody anywhere: a round is planned beside them.
         planned, source = _planned(osm, kerbs, mapped, half, seed)
         if planned is not None:
-            chosen = [planned, *chosen][:_MOST_LINES]
+            chosen = [planned, *chosen]
             names = source if len(chosen) == 1 or source != "osm" else names
         elif not chosen:
             why = "no streets for traffic in the window" if not len(lanes) else "no closed drive past four stops"

@@ -229,7 +229,12 @@ def _runs(
                 run.append((pole, rank))
     there = [pole for pole, _ in both[0]]
     back = [pole for pole, _ in both[1]]
-    return [there, back] if split else [there]
+    if not split:
+        return [there]
+    # Many list the stops of the way back in the order of the way there.
+    if there and len(back) > 1 and math.dist(back[0].xy, there[0].xy) < math.dist(back[-1].xy, there[0].xy):
+        back.reverse()
+    return [there, back]
 
 
 def _is_same(one: Pole, other: Pole) -> bool:
