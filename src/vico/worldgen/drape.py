@@ -15,17 +15,19 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo.osm import polygons_of
 from vico.world.heights import HeightField
+from vico.worldgen.kerbs import filled
 
 Floats = NDArray[np.float64]
 
 #: Heights at points, shape ``(n, 2)`` -> ``(n,)``.
 Heights = Callable[[Floats], Floats]
 
-CLOSE, NEAR, ROUGH = 0.02, 0.04, 0.25
+CLOSE, NEAR, ROUGH = 0.025, 0.15, 2.5
 """Metres by which the middle of an uncut square may lie off its heights: of streets, of other ground, out of sight."""
 
 _USUAL = 1.75  # metres: cells where the field has none
 _WIDEST = 14.0  # metres: vertices carry the large patches of colour
+_DRAWN_LOW = 1.0  # metres beyond a carriageway's border at which its height may count
 
 
 @dataclass(frozen=True)
@@ -37,45 +39,62 @@ class Grid:
     even: list[NDArray[np.bool_]]
 
     @classmethod
-    def of(cls, field: HeightField, height: Heights, reach: float, tolerance: float = CLOSE) -> Grid:
+    def of(
+        cls,
+        field: HeightField,
+        reach: float,
+        tolerance: float,
+        *,
+        exact: Sequence[BaseGeometry] = (),
+        sunken: Sequence[BaseGeometry] = (),
+        free: Sequence[BaseGeometry] = (),
+    ) -> Grid:
         """Find where heights are as good as planar, on squares that halve or double the field's own.
 
         Parameters
         ----------
         field
             The ground; its smooth part bends only along the borders of its cells.
-        height
-            Heights that may leave that smooth part, near edges.
         reach
             Half the side of what is to be cut, metres.
+        tolerance
+            Metres, where nothing else is said.
+        exact
+            Where `CLOSE` is; within `sunken` the lower side of the field counts, elsewhere the upper.
+        free
+            Where heights don't matter.
         """
         cell = field.cell if field.heights.shape[0] > 2 else _USUAL
         low = -field.half + cell * math.floor(max(field.half - reach, 0.0) / cell)
         depth = max(math.ceil(math.log2(2 * -low / cell)), 0) + 1
         n, side = 2**depth, cell * 2 ** (depth - 1)
+        fine = side / n
         axis = np.linspace(low, low + side, n + 1)
         at = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
-        whole = height(at).reshape(n + 1, n + 1)
-        steps = whole - field.smooth(at).reshape(n + 1, n + 1)
+        smooth = field.smooth(at).reshape(n + 1, n + 1)
+        drawn = smooth
+        if len(exact):
+            drawn = field.upper(at).reshape(n + 1, n + 1)
+        most = np.full((n, n), tolerance)
+        for areas, own in ((free, np.inf), (exact, CLOSE)):
+            # Squares are judged by their middles: a free one lies well within, an exact one may only touch.
+            most[_within(areas, -1.5 * fine if own > tolerance else 0.8 * fine, n, low, fine)] = own
         even = [np.ones((n, n), bool)]
+        sides = [(drawn, most)] if np.isfinite(tolerance) else []
+        if len(sunken):
+            here = _within(sunken, _DRAWN_LOW, n, low, fine)
+            sides.append((field.lower(at).reshape(n + 1, n + 1), np.where(here, CLOSE, np.inf)))
         for level in range(1, depth + 1):
             size = 2**level
-            z = steps if level == 1 else whole
-            corner, mid = z[::size, ::size], z[size // 2 :: size, size // 2 :: size]
-            a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]
-            across, up = z[::size, size // 2 :: size], z[size // 2 :: size, ::size]
-            off = np.abs(mid - (a + b + c + d) / 4)
-            off = np.maximum(off, np.abs(a + d - b - c) / 4)
-            for found, expected in (
-                (across[:-1], (a + b) / 2),
-                (across[1:], (c + d) / 2),
-                (up[:, :-1], (a + c) / 2),
-                (up[:, 1:], (b + d) / 2),
-            ):
-                off = np.maximum(off, np.abs(found - expected))
             below = even[-1]
             calm = below[::2, ::2] & below[1::2, ::2] & below[::2, 1::2] & below[1::2, 1::2]
-            even.append(calm & (off <= tolerance))
+            for k, (whole, least) in enumerate(sides):
+                least = np.minimum(
+                    np.minimum(least[::2, ::2], least[1::2, ::2]), np.minimum(least[::2, 1::2], least[1::2, 1::2])
+                )
+                sides[k] = (whole, least)
+                calm &= _off(whole - smooth if level == 1 else whole, size) <= least
+            even.append(calm)
         return cls(low, side, even)
 
     def cut(self, shapes: Iterable[BaseGeometry]) -> list[Polygon]:
@@ -125,6 +144,29 @@ class Grid:
             new_other.append(other[both][owner[kept]])
         merged, places, others = np.concatenate(parts), np.concatenate(new_place), np.concatenate(new_other)
         return (merged, places, others) if axis == 0 else (merged, others, places)
+
+
+def _within(areas: Sequence[BaseGeometry], grown: float, n: int, low: float, cell: float) -> NDArray[np.bool_]:
+    """Which of a grid's squares have their middles within areas that are grown (or shrunk)."""
+    shapes = shapely.buffer(np.array(list(areas), object), grown, quad_segs=1)
+    return filled([polygon for shape in shapes for polygon in polygons_of(shape)], n, -(low + cell / 2), cell)
+
+
+def _off(z: Floats, size: int) -> Floats:
+    """How far the middles of squares and of their sides lie off what their corners say, metres."""
+    half = size // 2
+    corner, mid = z[::size, ::size], z[half::size, half::size]
+    a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]
+    across, up = z[::size, half::size], z[half::size, ::size]
+    off = np.maximum(np.abs(mid - (a + b + c + d) / 4), np.abs(a + d - b - c) / 4)
+    for found, expected in (
+        (across[:-1], (a + b) / 2),
+        (across[1:], (c + d) / 2),
+        (up[:, :-1], (a + c) / 2),
+        (up[:, 1:], (b + d) / 2),
+    ):
+        off = np.maximum(off, np.abs(found - expected))
+    return np.asarray(off)
 
 
 def triangulated(polygons: Sequence[Polygon]) -> tuple[Floats, NDArray[np.int64]]:

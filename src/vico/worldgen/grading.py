@@ -33,6 +33,8 @@ _CELL = 2.0
 _SPACING = 5.0
 _SMOOTH = 40.0  # metres: shorter bumps are not a street's
 _SHOULDER = 3.5  # metres beside a carriageway that lie level with it
+_TERRACE, _STEEPEST = 0.3, 0.15  # metres and slope that heights along one street differ by at most
+_WALL_ROOM = 2.0  # metres between two streets for a wall that holds the upper one
 _BANK = 8.0  # metres over which the ground goes back to the elevation model's
 _FREEBOARD, _FREEBOARD_SMALL, _BRIM = 1.3, 0.4, 0.12  # metres from banks down to waters, ponds, basins
 _SMALL, _BASIN = 2500.0, 150.0  # square metres
@@ -94,13 +96,15 @@ def _levelled(height: HeightField, osm: OsmData, streets: StreetPolygons) -> Hei
     for row, deck in zip(network.rows, decks, strict=True):
         if deck and len(row):
             weight[[row[0], row[-1]]] = np.maximum(weight[[row[0], row[-1]]], 1.0)
-    found = network.levelled(wanted, weight, length=_SMOOTH, spacing=_SPACING)
+    streets_alone = [row for row, deck, width in zip(network.rows, decks, widths, strict=True) if not deck and width]
+    beside = network.abreast(wide, streets_alone, _WALL_ROOM)
+    found = network.levelled(wanted, weight, length=_SMOOTH, spacing=_SPACING, abreast=beside)
     needs = passages(osm, above)
     if needs:
         rows = [row for row, deck in zip(network.rows, decks, strict=True) if deck]
         high, least = raised(network.points, np.unique(np.concatenate(rows)), found, needs, height)
         weight[high], wanted[high] = 4.0, least
-        found = network.levelled(wanted, weight, length=_SMOOTH, spacing=_SPACING)
+        found = network.levelled(wanted, weight, length=_SMOOTH, spacing=_SPACING, abreast=beside)
     if is_level(height) and float(np.abs(found - height(network.points))[covers].max(initial=0.0)) < 0.02:
         return height
     return _pitches(_blended(height, network, found, wide, covers), osm)
@@ -171,15 +175,20 @@ def _blended(
     # Of several streets the one whose kerb is nearest counts most; symmetric samples of one give its height abeam.
     outside = np.maximum(away - half_width[index], 0.0)
     share = (away / (half_width[index] + 1.5)) ** 2 + 4.0 * outside**2
+    best = index[np.arange(len(index)), share.argmin(axis=1)][:, None]
     share = 1.0 / (share - share.min(axis=1, keepdims=True) + 0.06) ** 2
-    share[~np.isfinite(away)] = 0.0
+    # Streets above and below each other on a hillside keep their own heights, up to the walls between them.
+    apart = np.hypot(*(sample[index] - sample[best]).transpose(2, 0, 1))
+    share[~np.isfinite(away) | (np.abs(level[index] - level[best]) > _TERRACE + _STEEPEST * apart)] = 0.0
     street = (share * level[index]).sum(axis=1) / share.sum(axis=1)
     out = np.min(np.where(np.isfinite(away), away - half_width[index], np.inf), axis=1) - _SHOULDER
     part = np.clip(out / _BANK, 0.0, 1.0)
     part = part * part * (3.0 - 2.0 * part)
     ground[beside] += (1.0 - part) * (street - ground[beside])
-    # Shoulders are wide enough that this reaches no carriageway; creases would cost triangles and show in the light.
+    # Creases would cost triangles and show in the light, but a street stays as it is beside a terrace's wall.
     even = ndimage.gaussian_filter(ground.reshape(count + 1, count + 1), 0.8, mode="nearest")
+    firm = np.clip(1.0 - (out + _SHOULDER - 0.5) / 1.5, 0.0, 1.0)
+    even.reshape(-1)[beside] += firm * (ground[beside] - even.reshape(-1)[beside])
     return HeightField(even.astype(np.float32), height.half)
 
 

@@ -7,11 +7,13 @@ up. Where two kinds meet at different heights an upright face closes the step: k
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from scipy import ndimage
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -20,27 +22,30 @@ from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface, joined
 from vico.world.model import ENTITY_GROUND, ENTITY_ROAD
 from vico.worldgen.bridges import bridge_surfaces, portal_surfaces, spans_over_water
-from vico.worldgen.drape import NEAR, ROUGH, Curtain, Grid, Heights, curtain, triangulated
+from vico.worldgen.conform import Plan, conforming
+from vico.worldgen.drape import CLOSE, NEAR, ROUGH, Curtain, Grid, Heights, curtain, triangulated
 from vico.worldgen.grading import is_level, open_water
-from vico.worldgen.kerbs import Water
+from vico.worldgen.kerbs import RAMP, Water, lowered_kerbs
 from vico.worldgen.levels import overpasses
 from vico.worldgen.markings import Quads, drives_left, pitch_lines, road_markings
 from vico.worldgen.partition import ground_partition, mapped_areas, sea_polygons
 from vico.worldgen.pavings import LOOKS, Look, coloured, ground_material, look_of
 from vico.worldgen.stairs import flights_of
 from vico.worldgen.streets import Crossing, StreetPolygons, on_the_ground
+from vico.worldgen.thinning import thinned
 
 __all__ = ["ground_from_osm", "ground_partition", "mapped_areas", "sea_polygons", "terrain_normals"]
 
-_UNDERLAY = 0.5  # metres below: shows through nothing but the hairlines between two surfaces
+_UNDERLAY, _UNDERLAY_SLOPED = 0.5, 3.0  # metres below: shows through nothing but the hairlines between two surfaces
+_UNDER_STAIRS = 0.3
 _LIFT, _LIFT_SLOPED = 0.02, 0.035  # of paint
-_STEEP = 0.68  # upward part of a normal below which bare ground is held by a wall
-_SLOPING = 0.985  # ... and below which a yard is not paved
+_STEEP = 1.08  # slope from which bare ground is held by a wall
+_SLOPING = 0.17  # ... and from which a yard is not paved
+_SLOPE_CELL = 2.0
 _SLAB = 0.6  # thickness of a bridge's edge over water
 _HELD = ("yard", "field", "grass", "garden", "woods", "sidewalk", "pedestrian", "path", "parking")
-_NATURAL = ("yard", "field", "grass", "garden", "woods", "farmland", "earth", "ballast", "sand")
+_PAVED = ("kerb", "steps", "pedestrian", "cycleway", "sidewalk", "path", "parking")
 _LONG = 12.0
-_FINE = 0.6
 
 
 def ground_from_osm(
@@ -69,46 +74,35 @@ def ground_from_osm(
     reach = half + apron
     window = shapely.box(-reach, -reach, reach, reach)
     pieces = ground_partition(osm, streets, window)
-    upper = Grid.of(terrain, terrain.upper, reach)
-    lower = Grid.of(terrain, terrain.lower, reach)
+    level = is_level(terrain)
     waters = open_water(terrain, pieces.get("water", [])) if terrain.steps is not None else []
-    near = Grid.of(terrain, terrain.upper, reach, NEAR)
-    calm = Grid.of(terrain, terrain.smooth, reach, ROUGH)
     flights = flights_of(osm, terrain, streets.steps)
-    surfaces: list[Surface] = []
-    hidden = _hidden(osm)
-    for name, shapes in pieces.items():
-        look = look_of(name)
-        if name in ("yard", "field"):
-            shapes = _without(shapes, hidden)
-        if name == "water" and waters:
-            surfaces += _water_surfaces(waters, look, calm)
-        elif name.startswith("carriageway"):
-            surfaces += _draped(shapes, look, terrain.lower, terrain, lower)
-        elif name == "steps":
-            surfaces += _draped(_without(shapes, flights.area), look, terrain.upper, terrain, upper)
-            surfaces += _draped(_within(shapes, flights.area), look, lambda xy: terrain.upper(xy) - 0.3, terrain, upper)
-        else:
-            held = name.partition(":")[0] in _HELD
-            grid = near if name in _NATURAL else upper
-            surfaces += _draped(shapes, look, terrain.upper, terrain, grid, held=held)
-    wet = shapely.union_all([shapely.buffer(water.polygon, 0.6, quad_segs=1) for water in waters])
-    dry = shapely.difference(window, wet)
-    surfaces += _draped([dry], LOOKS["yard"], lambda xy: terrain.smooth(xy) - _UNDERLAY, terrain, calm)
+    laid = _laid(pieces, terrain, waters, reach, hidden=_hidden(osm), stairs=flights.area)
+    wet = shapely.union_all([water.polygon for water in waters])
+    exact: list[BaseGeometry] = [
+        shape for name, shapes in pieces.items() if name.partition(":")[0] in _PAVED for shape in shapes
+    ]
+    grid = Grid.of(terrain, reach, NEAR, exact=exact, free=[wet, flights.area])
+    street_grid = Grid.of(terrain, reach, np.inf, sunken=[streets.carriageway])
+    parts = [triangulated((street_grid if piece.carriageway else grid).cut(piece.shapes)) for piece in laid]
+    plan = _thinned(conforming(parts, _ends_of_kerbs(streets)), laid, terrain)
+    surfaces = [
+        _covered(plan, number, piece, terrain) for number, piece in enumerate(laid) if (plan.piece == number).any()
+    ]
+    dry = shapely.difference(window, shapely.buffer(wet, 0.6, quad_segs=1))
+    surfaces += _underlay(dry, terrain, reach)
     if terrain.steps is not None:
-        surfaces += _kerbs(streets, terrain, window)
-        surfaces += _banks(osm, waters, terrain, window)
+        surfaces += _kerbs(plan, laid, streets, terrain, reach)
+        surfaces += _banks(osm, waters, plan, laid, terrain, window)
         surfaces += _tactile(streets, terrain, window)
     surfaces += flights.surfaces()
     surfaces += bridge_surfaces(osm, terrain, streets, window)
     surfaces += portal_surfaces(osm, terrain, streets, window)
-    level = is_level(terrain)
-    tracks = _tracks(osm)
     quads = road_markings(
         streets,
         window,
         yellow=osm.frame.lon < -30.0,
-        tracks=tracks,
+        tracks=_tracks(osm),
         longest=None if level else 3.0,
         left_driving=drives_left(osm.frame.lat, osm.frame.lon),
         stepped=flights.area,
@@ -117,6 +111,112 @@ def ground_from_osm(
     lift = _LIFT if level else _LIFT_SLOPED
     surfaces += [_painted(group, terrain, lift=lift + 0.006 * group.rank) for group in quads]
     return joined(surfaces)
+
+
+def _thinned(plan: Plan, laid: Sequence[_Piece], terrain: HeightField) -> Plan:
+    """Leave out what the drawn ground doesn't need."""
+    used = np.array([0 if piece.carriageway else 2 if piece.water >= 0 else 1 for piece in laid], np.int64)
+    natural = np.array([piece.natural for piece in laid], bool)
+    level: Heights = lambda xy: np.zeros(len(xy))  # noqa: E731
+    return thinned(plan, (terrain.lower, terrain.upper, level), used, np.where(natural, NEAR, CLOSE))
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """Polygons of one look at heights of their own; `water` is the number of the water they are."""
+
+    shapes: list[Polygon]
+    look: Look
+    heights: Heights
+    carriageway: bool = False
+    water: int = -1
+    natural: bool = False
+
+
+def _laid(
+    pieces: dict[str, list[Polygon]],
+    terrain: HeightField,
+    waters: Sequence[Water],
+    reach: float,
+    *,
+    hidden: BaseGeometry,
+    stairs: BaseGeometry,
+) -> list[_Piece]:
+    """What is laid on the ground: the partition, walls where it is too steep to be bare, no paving on hillsides."""
+    steep, sloping = _slopes(terrain, reach)
+    laid: list[_Piece] = []
+    walls: list[Polygon] = []
+    hills: list[Polygon] = []
+    for name, shapes in pieces.items():
+        base = name.partition(":")[0]
+        if base in ("yard", "field"):
+            shapes = _without(shapes, hidden)
+        if name == "water" and waters:
+            continue
+        if base in _HELD and not steep.is_empty:
+            walls += _within(shapes, steep)
+            shapes = _without(shapes, steep)
+        if name == "yard" and not sloping.is_empty:
+            hills += _within(shapes, sloping)
+            shapes = _without(shapes, sloping)
+        if name == "steps":
+            lower = _within(shapes, stairs)
+            shapes = _without(shapes, stairs)
+            laid.append(_Piece(lower, look_of(name), lambda xy: terrain.upper(xy) - _UNDER_STAIRS))
+        street = base == "carriageway"
+        natural = not street and base not in _PAVED
+        laid.append(_Piece(shapes, look_of(name), terrain.lower if street else terrain.upper, street, natural=natural))
+    laid.append(_Piece(hills, LOOKS["field"], terrain.upper, natural=True))
+    laid.append(_Piece(walls, LOOKS["wall"], terrain.upper, natural=True))
+    laid += [_Piece([water.polygon], LOOKS["water"], water.level, water=k) for k, water in enumerate(waters)]
+    return laid
+
+
+def _slopes(terrain: HeightField, reach: float) -> tuple[BaseGeometry, BaseGeometry]:
+    """Where the ground is too steep to be bare, and where it is too steep to be paved: regions with round borders."""
+    none = shapely.MultiPolygon()
+    if is_level(terrain):
+        return none, none
+    n = round(2 * reach / _SLOPE_CELL)
+    cell = 2 * reach / n
+    axis = (np.arange(n) + 0.5) * cell - reach
+    z = terrain.smooth(np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)).reshape(n, n)
+    found = []
+    for spread, most, close in ((0.3, _STEEP, 1.2), (2.0, _SLOPING, 4.0)):
+        north, east = np.gradient(ndimage.gaussian_filter(z, spread, mode="nearest"), cell)
+        mask = np.hypot(north, east) > most
+        # Runs of squares in a row are one box.
+        edge = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+        (rows, starts), (_, ends) = np.nonzero(edge == 1), np.nonzero(edge == -1)
+        low = axis[rows] - 0.5001 * cell
+        boxes = shapely.box(starts * cell - reach, low, ends * cell - reach, low + 1.0002 * cell)
+        squares = shapely.union_all(boxes)
+        opened = shapely.buffer(shapely.buffer(squares, close, quad_segs=3), -2 * close, quad_segs=3)
+        rounded = shapely.simplify(shapely.buffer(opened, close, quad_segs=3), 0.15)
+        found.append(shapely.set_precision(rounded, 0.001))
+    steep, sloping = found
+    return steep, sloping
+
+
+def _ends_of_kerbs(streets: StreetPolygons) -> NDArray[np.float64]:
+    """Points of kerbs where they begin to come down to a crossing, and where they are down, shape ``(n, 2)``."""
+    lowered = lowered_kerbs(streets.crossings)
+    outline = shapely.boundary(streets.carriageway)
+    found = [
+        shapely.intersection(shapely.boundary(shapely.buffer(lowered, away, quad_segs=6)), outline)
+        for away in (0.05, RAMP)
+    ]
+    points = shapely.get_parts(shapely.get_parts(found))
+    return shapely.get_coordinates(points[shapely.get_type_id(points) == 0])
+
+
+def _underlay(dry: BaseGeometry, terrain: HeightField, reach: float) -> list[Surface]:
+    """What shows through hairlines between surfaces instead of the sky."""
+    below = _UNDERLAY if is_level(terrain) else _UNDERLAY_SLOPED
+    flat, faces = triangulated(Grid.of(terrain, reach, ROUGH).cut([dry]))
+    if not len(faces):
+        return []
+    return [_surface(flat, terrain.smooth(flat) - below, terrain_normals(terrain, flat), faces, LOOKS["yard"])]
 
 
 def _hidden(osm: OsmData) -> BaseGeometry:
@@ -189,46 +289,30 @@ def _surface(
     )
 
 
-def _draped(
-    shapes: Iterable[BaseGeometry],
-    look: Look,
-    heights: Heights,
-    terrain: HeightField,
-    grid: Grid,
-    *,
-    held: bool = False,
-) -> list[Surface]:
-    """Triangulate polygons and lay them on the ground; where it is too steep to be bare it shows a wall."""
-    flat, faces = triangulated(grid.cut(shapes))
-    if not len(faces):
-        return []
-    z, normals = heights(flat), terrain_normals(terrain, flat)
-    if not held or is_level(terrain):
-        return [_surface(flat, z, normals, faces, look)]
+def _covered(plan: Plan, number: int, piece: _Piece, terrain: HeightField) -> Surface:
+    """Lay a piece of the plan on its heights."""
+    flat, faces = _used(plan.corners, plan.triangles[plan.piece == number])
+    z = piece.heights(flat)
+    if piece.water >= 0:
+        up = np.broadcast_to((0.0, 0.0, 1.0), (len(flat), 3))
+        return _surface(flat, z, np.asarray(up), faces, piece.look)
+    normals = terrain_normals(terrain, flat)
+    if piece.look is not LOOKS["wall"]:
+        return _surface(flat, z, normals, faces, piece.look)
+    # Courses run level, along the wall's nearer axis.
     corners = np.c_[flat, z][faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    steep = across[:, 2] < _STEEP * np.linalg.norm(across, axis=1)
-    sloping = ~steep & (across[:, 2] < _SLOPING * np.linalg.norm(across, axis=1)) & (look is LOOKS["yard"])
-    result = []
-    for chosen, shown in ((~steep & ~sloping, look), (sloping, LOOKS["field"])):
-        if chosen.any():
-            result.append(_surface(*_used(flat, z, normals, faces[chosen]), shown))
-    if steep.any():
-        # Courses run level, along the wall's nearer axis.
-        corner = faces[steep].ravel()
-        east = np.repeat(np.abs(across[steep, 1]) > np.abs(across[steep, 0]), 3)
-        uv = np.stack([np.where(east, flat[corner, 0], flat[corner, 1]), z[corner]], axis=1)
-        own = np.arange(len(corner)).reshape(-1, 3)
-        result.append(_surface(flat[corner], z[corner], normals[corner], own, LOOKS["wall"], uv))
-    return result
+    corner = faces.ravel()
+    east = np.repeat(np.abs(across[:, 1]) > np.abs(across[:, 0]), 3)
+    uv = np.stack([np.where(east, flat[corner, 0], flat[corner, 1]), z[corner]], axis=1)
+    own = np.arange(len(corner)).reshape(-1, 3)
+    return _surface(flat[corner], z[corner], normals[corner], own, piece.look, uv)
 
 
-def _used(
-    flat: NDArray[np.float64], z: NDArray[np.float64], normals: NDArray[np.float64], faces: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+def _used(flat: NDArray[np.float64], faces: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """The points that triangles use, numbered anew."""
     kept, index = np.unique(faces, return_inverse=True)
-    return flat[kept], z[kept], normals[kept], index.reshape(-1, 3)
+    return flat[kept], index.reshape(-1, 3)
 
 
 def _hung(found: Curtain, look: Look, tile: float | None = None) -> list[Surface]:
@@ -245,16 +329,6 @@ def _hung(found: Curtain, look: Look, tile: float | None = None) -> list[Surface
             material=ground_material(look.material),
         )
     ]
-
-
-def _water_surfaces(waters: Sequence[Water], look: Look, grid: Grid) -> list[Surface]:
-    found = []
-    for water in waters:
-        flat, faces = triangulated(grid.cut([water.polygon]))
-        if len(faces):
-            up = np.broadcast_to((0.0, 0.0, 1.0), (len(flat), 3))
-            found.append(_surface(flat, water.level(flat), np.asarray(up), faces, look))
-    return found
 
 
 def _faced_lines(shapes: Iterable[BaseGeometry], low: Heights, high: Heights, spacing: float) -> list[BaseGeometry]:
@@ -291,28 +365,51 @@ def _faced_lines(shapes: Iterable[BaseGeometry], low: Heights, high: Heights, sp
     return lines
 
 
-def _kerbs(streets: StreetPolygons, terrain: HeightField, window: Polygon) -> list[Surface]:
-    """The faces of kerb stones."""
-    carriageway = shapely.intersection(streets.carriageway, window)
-    lines = _faced_lines([carriageway], terrain.lower, terrain.upper, _FINE)
+def _chains(plan: Plan, edges: NDArray[np.int64], reach: float) -> list[BaseGeometry]:
+    """Edges of the plan joined to lines; those on the rim of what is drawn are left out."""
+    pieces = plan.corners[edges]
+    rim = np.abs(pieces).max(axis=2).min(axis=1) > reach - 0.01
+    if rim.all():
+        return []
+    lines = shapely.multilinestrings([shapely.linestrings(pieces[~rim])])[0]
+    return list(shapely.get_parts(shapely.line_merge(lines, directed=True)))
+
+
+def _kerbs(
+    plan: Plan, laid: Sequence[_Piece], streets: StreetPolygons, terrain: HeightField, reach: float
+) -> list[Surface]:
+    """The faces of kerb stones: between the very corners of what lies on both sides."""
+    numbers = np.array([k for k, piece in enumerate(laid) if piece.carriageway], np.int64)
+    lines = _chains(plan, plan.border(numbers, shapely.boundary(streets.carriageway))[:, ::-1], reach)
     return _hung(curtain(lines, terrain.lower, terrain.upper, least=0.004), LOOKS["kerb"])
 
 
-def _banks(osm: OsmData, waters: Sequence[Water], terrain: HeightField, window: Polygon) -> list[Surface]:
+def _banks(
+    osm: OsmData,
+    waters: Sequence[Water],
+    plan: Plan,
+    laid: Sequence[_Piece],
+    terrain: HeightField,
+    window: Polygon,
+) -> list[Surface]:
     """Quays and banks, and under bridges the water that goes on there and the edges of the deck."""
     found: list[Surface] = []
     if not waters:
         return found
     spans = spans_over_water(osm)
+    over_spans = shapely.buffer(spans, 0.3)
     mapped = shapely.union_all([shapely.set_precision(s, 0.001) for s in mapped_areas(osm, window)["water"]])
     tree = shapely.STRtree([water.polygon for water in waters])
-    frame = shapely.buffer(window, -0.2)
-    for water in waters:
-        lines = _split(_faced_lines([water.polygon], water.level, terrain.upper, 3.0), frame)
-        over, bank = _sorted_by(lines, shapely.buffer(spans, 0.3))
+    dry = shapely.union_all([water.polygon for water in waters])
+    outline = shapely.boundary(dry)
+    for number, piece in enumerate(laid):
+        if piece.water < 0:
+            continue
+        water = waters[piece.water]
+        rims = plan.border(np.array([number]), outline)
+        over, bank = _sorted_by(_chains(plan, rims[:, ::-1], window.bounds[2]), over_spans)
         found += _hung(curtain(bank, _below(water.level, 0.3), terrain.upper), LOOKS["quay"])
         found += _hung(curtain(over, lambda xy: terrain.upper(xy) - _SLAB, terrain.upper), LOOKS["kerb"])
-    dry = shapely.union_all([water.polygon for water in waters])
     under = polygons_of(shapely.difference(shapely.intersection(mapped, spans), shapely.buffer(dry, 0.001)), 1.0)
     for shape in under:
         water = waters[int(tree.nearest(shape))]
@@ -331,12 +428,6 @@ def _banks(osm: OsmData, waters: Sequence[Water], terrain: HeightField, window: 
 
 def _below(heights: Heights, depth: float) -> Heights:
     return lambda xy: heights(xy) - depth
-
-
-def _split(lines: Sequence[BaseGeometry], frame: Polygon) -> list[BaseGeometry]:
-    """Leave out the segments on the window's own edge."""
-    _, inner = _sorted_by(lines, shapely.difference(shapely.buffer(frame, 50.0), frame))
-    return inner
 
 
 def _sorted_by(lines: Sequence[BaseGeometry], area: BaseGeometry) -> tuple[list[BaseGeometry], list[BaseGeometry]]:

@@ -116,15 +116,15 @@ def steps_field(smooth: HeightField, streets: StreetPolygons, waters: Sequence[W
     n = round(2 * half / cell) + 1
     cell = 2 * half / (n - 1)
     region = lower_side(streets, [water.polygon for water in waters])
-    inside = _filled(polygons_of(region), n, half, cell)
+    inside = filled(polygons_of(region), n, half, cell)
     near = _near(region, n, half, cell, EDGE_RANGE)
     edge = np.where(inside, -near, near)
     sunk = _near(streets.sunken, n, half, cell, 2 * _FADE)
-    sunk[_filled(polygons_of(streets.sunken), n, half, cell)] = 0.0
+    sunk[filled(polygons_of(streets.sunken), n, half, cell)] = 0.0
     low = np.full((n, n), -KERB)
     # Only on drives the carriageway comes up: beyond the kerbs its height has nobody to mind it, and stays even.
     drives = polygons_of(shapely.buffer(shapely.difference(streets.carriageway, streets.sunken), 1.2, quad_segs=2))
-    rising = _filled(drives, n, half, cell) & ~_filled(polygons_of(streets.sunken), n, half, cell)
+    rising = filled(drives, n, half, cell) & ~filled(polygons_of(streets.sunken), n, half, cell)
     low[rising] = (-KERB * np.clip(1.0 - sunk / _FADE, 0.0, 1.0))[rising]
     ramp = _near(lowered_kerbs(streets.crossings), n, half, cell, RAMP)
     high = -(KERB - _FLUSH) * np.clip(1.0 - ramp / RAMP, 0.0, 1.0) * np.clip(2.0 - sunk / _FADE, 0.0, 1.0)
@@ -135,7 +135,7 @@ def steps_field(smooth: HeightField, streets: StreetPolygons, waters: Sequence[W
             for k, water in enumerate(waters):
                 beyond = shapely.simplify(shapely.buffer(water.polygon, 2 * cell, quad_segs=2), 0.2)
                 _fill(owner, [water.polygon] if own else polygons_of(beyond), half, cell, float(k))
-        owner[_filled(polygons_of(streets.carriageway), n, half, cell)] = -1.0
+        owner[filled(polygons_of(streets.carriageway), n, half, cell)] = -1.0
         for k, water in enumerate(waters):
             rows, columns = np.nonzero(owner == k)
             at = np.stack([columns * cell - half, rows * cell - half], axis=1)
@@ -147,7 +147,7 @@ def steps_field(smooth: HeightField, streets: StreetPolygons, waters: Sequence[W
     )
 
 
-def _filled(polygons: Sequence[Polygon], n: int, half: float, cell: float) -> NDArray[np.bool_]:
+def filled(polygons: Sequence[Polygon], n: int, half: float, cell: float) -> NDArray[np.bool_]:
     """Which nodes of a grid lie in polygons."""
     grid = np.zeros((n, n), np.uint8)
     _fill(grid, polygons, half, cell, 1)

@@ -7,11 +7,35 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 Floats = NDArray[np.float64]
+
+_TIE = 3.0  # how much streets side by side keep to each other's height, where the ground counts 1
+
+
+@dataclass(frozen=True)
+class Abreast:
+    """Points that lie beside a piece of another line: the point, the piece's ends, and where along it, 0..1."""
+
+    point: NDArray[np.int64]
+    piece: NDArray[np.int64]
+    share: Floats
+
+    @classmethod
+    def none(cls) -> Abreast:
+        """No such points."""
+        return cls(np.zeros(0, np.int64), np.zeros((0, 2), np.int64), np.zeros(0))
+
+    def rows(self, n: int) -> sparse.csr_matrix:
+        """Differences in height, as rows over `n` points."""
+        k = np.arange(len(self.point))
+        values = _TIE * np.concatenate([np.ones(len(k)), self.share - 1.0, -self.share])
+        columns = np.concatenate([self.point, self.piece[:, 0], self.piece[:, 1]])
+        return sparse.csr_matrix((values, (np.tile(k, 3), columns)), shape=(len(k), n))
 
 
 @dataclass(frozen=True)
@@ -72,7 +96,40 @@ class Network:
                 met += [(others[a], node, others[b]) for b in range(a + 1, len(others)) if cosine[a, b] < -0.7]
         return np.concatenate([*triples, np.array(met, np.int64).reshape(-1, 3), np.zeros((0, 3), np.int64)])
 
-    def levelled(self, wanted: Floats, weight: Floats, *, length: float, spacing: float) -> Floats:
+    def abreast(self, wide: Floats, chosen: Sequence[NDArray[np.int64]], gap: float) -> Abreast:
+        """Find where lines run side by side, with no room for a wall between what lies along them.
+
+        Parameters
+        ----------
+        wide
+            Half the width of what lies along the lines, at each point, metres.
+        chosen
+            The lines (of `rows`) that count.
+        gap
+            Metres between the two for a wall.
+        """
+        pairs = [np.stack([row[:-1], row[1:]], axis=1) for row in chosen if len(row) > 1]
+        if not pairs:
+            return Abreast.none()
+        owner = np.repeat(np.arange(len(pairs)), [len(own) for own in pairs])
+        pair = np.concatenate(pairs)
+        tree = shapely.STRtree(shapely.linestrings(self.points[pair]))
+        point = np.concatenate([own[:, 0] for own in pairs])
+        reach = wide[point] + float(wide.max(initial=0.0)) + gap
+        row, other = tree.query(shapely.points(self.points[point]), predicate="dwithin", distance=reach)
+        a, b, c = self.points[point[row]], self.points[pair[other, 0]], self.points[pair[other, 1]]
+        along = c - b
+        share = ((a - b) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-9)
+        off = np.hypot(*(a - b - along * np.clip(share, 0.0, 1.0)[:, None]).T)
+        mine = self.points[pair[row, 1]] - a
+        cosine = np.abs((mine * along).sum(axis=1)) / np.maximum(np.hypot(*mine.T) * np.hypot(*along.T), 1e-9)
+        kept = (owner[row] != owner[other]) & (share >= 0.0) & (share <= 1.0) & (cosine > 0.8)
+        kept &= (off < wide[point[row]] + wide[pair[other, 0]] + gap) & (pair[other] != point[row][:, None]).all(axis=1)
+        return Abreast(point[row[kept]], pair[other[kept]], share[kept])
+
+    def levelled(
+        self, wanted: Floats, weight: Floats, *, length: float, spacing: float, abreast: Abreast | None = None
+    ) -> Floats:
         """Heights near the wanted ones that change their slope slowly.
 
         Parameters
@@ -83,6 +140,8 @@ class Network:
             Bumps much shorter than this are smoothed away, metres.
         spacing
             As the network was cut with.
+        abreast
+            Places that come to lie as high as each other.
 
         Returns
         -------
@@ -119,6 +178,7 @@ class Network:
             ),
             shape=(k, n),
         )
+        tied = (abreast or Abreast.none()).rows(n)
         middle = float(wanted.mean())
-        matrix = (bending.T @ bending + pulling.T @ pulling + sparse.diags(weight**2 + 1e-9)).tocsc()
+        matrix = (bending.T @ bending + pulling.T @ pulling + tied.T @ tied + sparse.diags(weight**2 + 1e-9)).tocsc()
         return np.asarray(spsolve(matrix, weight**2 * (wanted - middle))) + middle
