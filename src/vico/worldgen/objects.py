@@ -185,7 +185,7 @@ def _settle(wish: Wish, model: Model, site: _Site, seed: int, rows: list[dict[st
             break
         reason = reason or why
     else:
-        return f"{model.kind}: {reason}" + ("" if wish.piece else f", and no room within {reach:g} m")
+        return f"{model.kind}: {reason}" + (f", and no room within {reach:g} m" if reach and not wish.piece else "")
     if model.solid:
         site.claim(shape, piece=wish.piece)
     size = model.size
