@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from vico.worldgen.indoor import Indoors, furnish
 from vico.worldgen.indoor_uses import use_of
 from vico.worldgen.layout_library import Layout, findings_of
 from vico.worldgen.layout_llm import EXAMPLE, LlmLayoutAuthor, furnish_drawn
+from vico.worldgen.stages import Stages
 
 
 def example(use: str, **changes: Any) -> str:
@@ -34,9 +36,9 @@ def small(use: str) -> str:
     return example(use, size=[5.0, 5.0], rooms=rooms, doors=[{"between": ["all", "outside"], "at": [2.5, 0]}])
 
 
-def author_at(base: str, **options: Any) -> LlmLayoutAuthor:
+def author_at(base: str, *, workers: int = 1, **options: Any) -> LlmLayoutAuthor:
     options = {"timeout": 5.0, "sleep": lambda seconds: None, "retries": 1, **options}
-    return LlmLayoutAuthor(LanguageModel(Endpoint(base, "tiny"), **options))
+    return LlmLayoutAuthor(LanguageModel(Endpoint(base, "tiny"), **options), workers=workers)
 
 
 @pytest.fixture
@@ -44,8 +46,8 @@ def pubs(helsinki: World) -> list[Place]:
     return [p for p in helsinki.places if use_of(p.category, p.kind) == "bar" and p.building is not None][:3]
 
 
-def drawn(helsinki: World, places: list[Place], author: LlmLayoutAuthor, **options: Any) -> tuple[Indoors, list[Any]]:
-    return furnish_drawn(places, author=author, buildings=helsinki.buildings, height=helsinki.height, **options)
+def drawn(helsinki: World, places: list[Place], author: LlmLayoutAuthor) -> tuple[Indoors, list[Any]]:
+    return furnish_drawn(places, author=author, buildings=helsinki.buildings, height=helsinki.height)
 
 
 def test_the_example_is_without_a_fault() -> None:
@@ -86,7 +88,7 @@ def test_a_place_whose_plan_stays_bad_is_planned_by_rule_and_reported(helsinki: 
 
 def test_a_spent_budget_leaves_the_rest_to_the_rules_one_by_one(helsinki: World, pubs: list[Place]) -> None:
     with model_server(small("bar")) as (base, script):
-        _, left = drawn(helsinki, pubs, author_at(base, budget=Budget(calls=1)), workers=1)
+        _, left = drawn(helsinki, pubs, author_at(base, budget=Budget(calls=1)))
     assert len(script.asked) == 1
     assert [d.id for d in left] == [p.id for p in pubs[1:]]
     assert all("all 1 calls of the budget are spent" in d.reason for d in left)
@@ -106,7 +108,7 @@ def test_a_server_that_dies_midway_costs_the_rest_their_plans_and_is_reported(
     helsinki: World, pubs: list[Place]
 ) -> None:
     with model_server(small("bar"), refuses(500, "out of memory")) as (base, _):
-        _, left = drawn(helsinki, pubs, author_at(base), workers=1)
+        _, left = drawn(helsinki, pubs, author_at(base))
     assert [d.id for d in left] == [p.id for p in pubs[1:]]
     assert all("out of memory" in d.reason for d in left)
 
@@ -117,6 +119,38 @@ def test_it_serves_as_any_author_does(helsinki: World, pubs: list[Place]) -> Non
         made = furnish(pubs[:2], buildings=helsinki.buildings, height=helsinki.height, author=author)
     assert (author.drawn, len(author.dropped)) == (1, 1)
     assert "shop" in {room.kind for room in made.rooms}
+
+
+def test_several_are_asked_for_at_a_time(helsinki: World, pubs: list[Place]) -> None:
+    meeting = threading.Barrier(3, timeout=10)
+
+    def answer(request: Request) -> Answer:
+        meeting.wait()  # goes on when all three calls are here
+        return says(small("bar"))
+
+    with serve(answer) as base:
+        author = author_at(f"{base}/v1", workers=3)
+        _, left = drawn(helsinki, pubs, author)
+    assert (author.drawn, left) == (3, [])
+
+
+def test_a_stage_knows_its_author_and_keeps_what_was_drawn(helsinki: World, pubs: list[Place], tmp_path: Path) -> None:
+    def built(author: LlmLayoutAuthor) -> tuple[Stages, Any]:
+        stages = Stages(tmp_path)
+        stages.given(author, author.digest)
+        height = stages.given(helsinki.height, "ground")
+        return stages, stages.run(
+            "indoor", furnish_drawn, pubs[:2], author=author, buildings=helsinki.buildings, height=height
+        )
+
+    with model_server(small("bar"), "no") as (base, _):
+        _, (first, left) = built(author_at(base))
+    stages, (again, still_left) = built(author_at(base))
+    assert stages.kept == ["indoor"]
+    assert (again.rooms, still_left) == (first.rooms, left)
+    assert len(left) == 1
+    with pytest.raises(SourceError, match="nobody listens"):
+        built(author_at(base, temperature=0.9))
 
 
 def test_branches_of_a_chain_in_rooms_of_one_size_share_a_plan(helsinki: World, pubs: list[Place]) -> None:

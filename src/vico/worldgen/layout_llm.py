@@ -62,6 +62,9 @@ class LlmLayoutAuthor:
         Whom to ask.
     rounds
         How often a plan may be mended.
+    workers
+        Calls under way at a time; one if they are recorded or replayed. Where a budget does not reach for all
+        places and there are several, it depends on the server's pace who gets a plan.
 
     Attributes
     ----------
@@ -71,8 +74,8 @@ class LlmLayoutAuthor:
         Number of plans that were drawn.
     """
 
-    def __init__(self, model: LanguageModel, *, rounds: int = 3) -> None:
-        self.model, self.rounds = model, rounds
+    def __init__(self, model: LanguageModel, *, rounds: int = 3, workers: int = 4) -> None:
+        self.model, self.rounds, self.workers = model, rounds, workers
         self.dropped: list[Dropped] = []
         self.drawn = 0
         self._heard = False  # whether it ever answered
@@ -82,7 +85,7 @@ class LlmLayoutAuthor:
 
     @property
     def digest(self) -> str:
-        """What plans hang on besides the places: the model, its options and what it is told."""
+        """What plans hang on besides the places, to know a stage's inputs by: model, options, what it is told."""
         told = json.dumps([self.model.name, self.rounds, _briefing()])
         return hashlib.sha256(told.encode()).hexdigest()
 
@@ -109,7 +112,7 @@ class LlmLayoutAuthor:
         layout, reason = self._drawn(request)
         return self._told(request, layout, reason)
 
-    def draw_all(self, requests: Sequence[LayoutRequest], *, workers: int) -> dict[LayoutRequest, str]:
+    def draw_all(self, requests: Sequence[LayoutRequest]) -> dict[LayoutRequest, str]:
         """Draw many plans, some at a time; requests that got none are missing, and are in `dropped`.
 
         Requests that differ in the place's id alone (branches of a chain in rooms of one size) share a plan.
@@ -117,7 +120,7 @@ class LlmLayoutAuthor:
         groups: dict[LayoutRequest, list[LayoutRequest]] = {}
         for request in requests:
             groups.setdefault(replace(request, place=""), []).append(request)
-        with ThreadPoolExecutor(1 if self.model.recorded else max(1, workers)) as pool:
+        with ThreadPoolExecutor(1 if self.model.recorded else max(1, self.workers)) as pool:
             waiting = [pool.submit(self._drawn, members[0]) for members in groups.values()]
             try:
                 drawn = [one.result() for one in waiting]
@@ -180,7 +183,6 @@ def furnish_drawn(
     seed: int = 0,
     entrances: Sequence[Entrance] = (),
     library: Path | None = None,
-    workers: int = 4,
 ) -> tuple[Indoors, list[Dropped]]:
     """`furnish` with plans from a language model, asked for several at a time.
 
@@ -188,9 +190,6 @@ def furnish_drawn(
     ----------
     author
         Who draws; asked for all places that the library does not cover.
-    workers
-        Calls under way at a time; one if they are recorded or replayed. Where a budget does not reach for all
-        places and there are several, it depends on the server's pace who gets a plan.
 
     Returns
     -------
@@ -210,7 +209,7 @@ def furnish_drawn(
     # Mapped places first, in their order: halls without a name can do with the rules if the budget runs out.
     order = {place.id: k for k, place in enumerate(places)}
     requests = sorted(wanted.requests, key=lambda request: order.get(request.place, len(order)))
-    plans = author.draw_all(requests, workers=workers)
+    plans = author.draw_all(requests)
     made = furnish(
         places, buildings=buildings, height=height, seed=seed, entrances=entrances, library=library,
         author=_Drawn(plans),
