@@ -87,6 +87,7 @@ def plan_buses(transit: Transit, lanes: LaneGraph, second: float) -> BusPlan:
     """
     stops = {stop.id: stop for stop in transit.stops}
     plan = BusPlan([], [], [], [], [], [], [])
+    standing: list[tuple[int, float]] = []
     for number, line in enumerate(transit.lines):
         unknown = [x for x in line.lanes if x not in lanes.index] + [x for x in line.stops if x not in stops]
         if unknown:
@@ -107,21 +108,25 @@ def plan_buses(transit: Transit, lanes: LaneGraph, second: float) -> BusPlan:
         plan.routes.append(route)
         plan.places.append(places)
         plan.offsets.append(offsets)
-        taken: set[int] = set()
         last = bisect_right(line.departures, second % DAY) - 1 + len(line.departures) * int(second // DAY)
         for bus in range(_fleet(line)):
             gone = second - departure(line, last - bus)
             at = max(i for i, when in enumerate(line.travel[:-1]) if when <= gone)
-            while at in taken and len(taken) < len(places):
-                at = (at + 1) % len(places)
-            if at in taken:
+            later = ((at + i) % len(places) for i in range(len(places)))
+            at = next((i for i in later if not _stands(route[places[i]], offsets[i], standing)), -1)
+            if at < 0:
                 break
-            taken.add(at)
+            standing.append((route[places[at]], offsets[at]))
             plan.buses.append(number)
             plan.starts.append((places[at], offsets[at]))
             plan.at.append(at)
             plan.begun.append(second - gone)
     return plan
+
+
+def _stands(lane: int, offset: float, standing: Sequence[tuple[int, float]]) -> bool:
+    """Whether one of the buses that stand already is in the way of another; lines share stops."""
+    return any(lane == other and abs(offset - where) < BUS_SIZE[0] + 2.0 for other, where in standing)
 
 
 def departure(line: Line, number: int) -> int:
