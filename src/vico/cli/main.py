@@ -57,6 +57,10 @@ def world_build(
     inpaint: Literal["exemplar", "patchmatch", "diffusion"] = "exemplar",
     upscale: Literal["none", "sharpen", "realesrgan", "diffusion"] = "none",
     model: str = "",
+    layout_llm: bool = False,
+    llm_calls: int | None = None,
+    llm_tokens: int | None = None,
+    llm_cost: float | None = None,
     seed: int = 0,
     force: bool = False,
     json: bool = False,
@@ -89,6 +93,10 @@ def world_build(
         inpaint: What fills parts of walls that no photo shows.
         upscale: What makes photographed walls finer.
         model: For "diffusion": a folder with the model, or its name on a hub.
+        layout_llm: A language model draws floor plans (VICO_LLM_BASE_URL, VICO_LLM_MODEL, VICO_LLM_KEY).
+        llm_calls: Most calls to it.
+        llm_tokens: Most tokens.
+        llm_cost: Most dollars, at the prices of VICO_LLM_PRICE.
         seed: Decides what the map leaves open.
         force: Replace what is in the output folder; stages whose inputs did not change are kept.
         json: Print the result as JSON.
@@ -111,7 +119,7 @@ def world_build(
 
 
 @world.command(name="rebuild")
-def world_rebuild(path: Positional[Path], stage: Comma, json: bool = False) -> int:
+def world_rebuild(path: Positional[Path], stage: Comma, layout_llm: bool = False, json: bool = False) -> int:
     """Run stages of a world again, and whatever depends on what they change.
 
     Example: vico world rebuild helsinki --stage objects,indoor
@@ -119,11 +127,14 @@ def world_rebuild(path: Positional[Path], stage: Comma, json: bool = False) -> i
     Args:
         path: World folder.
         stage: Names of stages, separated by commas; a wrong one names them all.
+        layout_llm: With the language model that drew its floor plans.
         json: Print the result as JSON.
     """
     from vico.cli import world as verb
 
-    return verb.rebuild(path, [name.strip() for name in stage.split(",") if name.strip()], json=json)
+    names = [name.strip() for name in stage.split(",") if name.strip()]
+    author = verb.layout_author(None, None, None) if layout_llm else None
+    return verb.rebuild(path, names, author=author, json=json)
 
 
 @world.command(name="build-many")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from vico.cli.output import check_output, print_json, print_table, progress_bars
 from vico.world.folder import World, read_world, stage_seconds
+from vico.worldgen.layout_llm import LlmLayoutAuthor
 from vico.worldgen.pipeline import build_world, extract_centre, rebuild_world
 from vico.worldgen.previews import Viewpoint
 from vico.worldgen.sources import Sources
@@ -48,6 +50,7 @@ def build(
     half: float = 400.0,
     seed: int = 0,
     texturing: Texturing | None = None,
+    author: LlmLayoutAuthor | None = None,
     force: bool = False,
     json: bool = False,
 ) -> int:
@@ -68,8 +71,20 @@ def build(
             photograph=photograph,
             texturing=texturing,
             studio=studio,
+            author=author,
         )
+    if author is not None:
+        print(f"language model: {author.model.budget.spent}", file=sys.stderr)
     return info(out, json=json)
+
+
+def layout_author(calls: int | None, tokens: int | None, cost: float | None) -> LlmLayoutAuthor:
+    """The language model that the environment names, as an author of floor plans."""
+    from vico.geo.web import cache_folder
+    from vico.llm import Budget, LanguageModel
+
+    budget = Budget(calls=calls, tokens=tokens, cost=cost)
+    return LlmLayoutAuthor(LanguageModel.from_environment(cache=cache_folder() / "llm", budget=budget))
 
 
 def studio(world: World) -> Photographer:
@@ -103,10 +118,10 @@ def locate(
     return map_for(lat, lon, half, source=source)
 
 
-def rebuild(path: Path, stages: Sequence[str], *, json: bool = False) -> int:
+def rebuild(path: Path, stages: Sequence[str], *, author: LlmLayoutAuthor | None = None, json: bool = False) -> int:
     """Run stages of a world again."""
     with progress_bars() as report:
-        rebuild_world(path, stages, progress=report, photograph=photograph, studio=studio)
+        rebuild_world(path, stages, progress=report, photograph=photograph, studio=studio, author=author)
     return info(path, json=json)
 
 

@@ -25,6 +25,7 @@ from vico.world.files import read_json, write_json
 from vico.world.folder import World, read_world, seal
 from vico.world.model import Manifest
 from vico.worldgen.evidence import gather
+from vico.worldgen.layout_llm import LlmLayoutAuthor
 from vico.worldgen.previews import Photograph, map_picture, viewpoints
 from vico.worldgen.recipe import make_world
 from vico.worldgen.report import write_report
@@ -78,6 +79,7 @@ def build_world(
     photograph: Photograph | None = None,
     texturing: Texturing | None = None,
     studio: Studio | None = None,
+    author: LlmLayoutAuthor | None = None,
 ) -> Manifest:
     """Build a world folder.
 
@@ -109,6 +111,8 @@ def build_world(
         How photos come onto the walls.
     studio
         Renders the unfinished world for street photos to be matched with; they need it.
+    author
+        Draws the floor plans of places that no layout of `sources` covers.
 
     Returns
     -------
@@ -147,6 +151,7 @@ def build_world(
         "seed": seed,
         "sources": sources.to_json(),
         "texturing": asdict(texturing),
+        "drawn_layouts": author is not None,
     }
     write_json(folder / STAGES / _REQUEST, request)
     world = make_world(
@@ -158,6 +163,7 @@ def build_world(
         stages=stages,
         texturing=texturing,
         studio=studio,
+        author=author,
     )
     with stages.timed("previews"):
         counts = _pictures(world, folder, photograph)
@@ -178,6 +184,7 @@ def rebuild_world(
     progress: Progress | None = None,
     photograph: Photograph | None = None,
     studio: Studio | None = None,
+    author: LlmLayoutAuthor | None = None,
 ) -> Manifest:
     """Run stages of a world again, and whatever depends on a result that changed.
 
@@ -194,6 +201,8 @@ def rebuild_world(
         request = read_json(kept / _REQUEST)
     except MissingFileError:
         raise InputError(f"{path}: its {STAGES} folder is gone, so no stage can be run alone; build it anew") from None
+    if request["drawn_layouts"] and author is None:
+        raise InputError(f"{path}: a language model drew its floor plans; say again which: add --layout-llm")
     names = sorted(p.stem for p in kept.glob("*.stage"))
     for name in again:
         if name not in names:
@@ -214,6 +223,7 @@ def rebuild_world(
         photograph=photograph,
         texturing=Texturing(**request["texturing"]),
         studio=studio,
+        author=author,
     )
 
 

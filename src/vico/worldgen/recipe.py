@@ -24,7 +24,7 @@ from vico.world.folder import World, write_record, write_records, write_terrain
 from vico.world.heights import HeightField
 from vico.world.lanes import read_lanes
 from vico.world.mesh import Surface, write_glb
-from vico.world.model import Manifest, Origin, Transit
+from vico.world.model import Dropped, Manifest, Origin, Transit
 from vico.world.objects import Objects, write_objects
 from vico.world.walkable import WalkableMap, write_walkable
 from vico.worldgen.bridges import pier_feet, portal_feet, portals_of
@@ -35,6 +35,7 @@ from vico.worldgen.fitting import buildings_on_tiles, settled
 from vico.worldgen.grading import graded, standing_outlines
 from vico.worldgen.ground import ground_from_osm, mapped_areas
 from vico.worldgen.indoor import furnish
+from vico.worldgen.layout_llm import LlmLayoutAuthor, furnish_drawn
 from vico.worldgen.netconvert import road_network
 from vico.worldgen.objects import objects_from_osm
 from vico.worldgen.outlines import building_plans
@@ -69,6 +70,7 @@ def make_world(
     stages: Stages,
     texturing: Texturing,
     studio: Studio | None,
+    author: LlmLayoutAuthor | None,
 ) -> World:
     """Run every stage between the sources and the pictures, and write the world's files into `folder`."""
     data, tiles = given.data, given.tiles
@@ -177,21 +179,25 @@ def make_world(
     if sources.layouts is not None:
         files = sorted(sources.layouts.glob("*.json"))
         stages.given(sources.layouts, " ".join(f"{path.name} {sha256_of(path)}" for path in files))
-    indoors = stages.run(
-        "indoor",
-        furnish,
-        places,
-        buildings=buildings,
-        height=height,
-        seed=seed,
-        entrances=entrances,
-        library=sources.layouts,
-    )
+    inside = {
+        "buildings": buildings,
+        "height": height,
+        "seed": seed,
+        "entrances": entrances,
+        "library": sources.layouts,
+    }
+    undrawn: list[Dropped] = []
+    if author is None:
+        indoors = stages.run("indoor", furnish, places, **inside)
+    else:
+        stages.given(author, author.digest)
+        indoors, undrawn = stages.run("indoor", furnish_drawn, places, author=author, **inside)
     write_records(folder / "places.json", indoors.places)
     write_records(folder / "rooms.json", indoors.rooms)
     objects = Objects.joined([outdoors, indoors.furniture])
     write_objects(folder / "objects.parquet", objects)
-    stages.report("indoor", {"rooms": len(indoors.rooms), "indoor_objects": len(indoors.furniture)})
+    counts = {"rooms": len(indoors.rooms), "indoor_objects": len(indoors.furniture)}
+    stages.report("indoor", counts, undrawn)
 
     ground = stages.run("ground", ground_from_osm, data, height, half, streets)
     stages.report("ground", {"faces": _faces(ground)})
