@@ -48,7 +48,7 @@ DOOR_BEHIND_FRONT = 1.3  # metres from a bus's front to the middle of its front 
 _REACH = 18.0  # a mapped pole stands this near to the lane it serves, metres
 _FEED_REACH = 30.0  # and one of a timetable, whose places are rougher
 _ILL = 6.0  # metres of drive that a metre off the pole is worth
-_MOST_LINES = 4
+_MOST_LINES = 3  # more would stand in each other's way at the stops they share
 
 
 @dataclass(frozen=True)
@@ -211,12 +211,15 @@ def _driven(routes: Sequence[Route], kerbs: Kerbs, mapped: Sequence[Berth], left
         else:
             fits.append((route, *fit))
 
-    def rank(k: int) -> tuple[bool, bool, float, int]:
+    ways = [drive.driven(loop) for _, loop, drive, _ in fits]
+
+    def rank(k: int) -> tuple[bool, bool, bool, float, int]:
         route, loop, _, cost = fits[k]
         frequent = -float(len(route.departures))
-        return route.origin != "gtfs", len(loop) < MIN_STOPS, frequent or cost / len(loop), k
+        return ways[k][1] > 0, route.origin != "gtfs", len(loop) < MIN_STOPS, frequent or cost / len(loop), k
 
     chosen: list[_Chosen] = []
+    streets: set[int] = set()
     for k in sorted(range(len(fits)), key=rank):
         route, loop, drive, _ = fits[k]
         twin = next((i for i, line in enumerate(chosen) if line.loop == loop and len(line.names) < 3), -1)
@@ -225,11 +228,28 @@ def _driven(routes: Sequence[Route], kerbs: Kerbs, mapped: Sequence[Berth], left
             # Two lines that share their way through the window are driven as one, with the buses of both.
             times = sorted({*chosen[twin].departures, *route.departures})
             chosen[twin] = replace(chosen[twin], names=(*chosen[twin].names, route.name), departures=tuple(times))
-        elif len(chosen) < _MOST_LINES and len(set(loop) - taken) >= min(2, len(loop)):
+        elif ways[k][1] and (streets & ways[k][0] or _gap(route) < _round_seconds(kerbs.lanes, ways[k][0], loop)):
+            # Who turns on the spot reaches into the lane of who comes the other way: both would wait for ever.
+            left_out.append(Dropped(id=route.id, reason=f"bus {route.name}: has to turn where others drive"))
+        elif len(chosen) < _MOST_LINES and 2 * len(set(loop) - taken) >= max(len(loop), 4 if len(loop) > 3 else 2):
+            if ways[k][1]:
+                seconds = _round_seconds(kerbs.lanes, ways[k][0], loop)
+                route = replace(route, interval=max(route.interval or 0, int(seconds)))
             chosen.append(_Chosen((route.name,), route, loop, drive, route.departures))
+            streets |= ways[k][0]
         else:
             left_out.append(Dropped(id=route.id, reason=f"bus {route.name}: other lines serve its stops already"))
     return chosen
+
+
+def _gap(route: Route) -> float:
+    """Seconds between two buses of a timetable, in the median; without one they may be as rare as need be."""
+    return float(np.median(np.diff(route.departures))) if len(route.departures) > 1 else math.inf
+
+
+def _round_seconds(lanes: LaneGraph, way: set[int], loop: Sequence[Berth]) -> float:
+    """How long a round takes at most, about: below that between two buses there is but one on the way."""
+    return float(lanes.length[sorted(way)].sum()) / 6.0 + 45.0 * len(loop)
 
 
 def _fit(route: Route, kerbs: Kerbs, known: Sequence[Berth]) -> tuple[tuple[Berth, ...], Drive, float] | str:
@@ -254,9 +274,10 @@ def _fit(route: Route, kerbs: Kerbs, known: Sequence[Berth]) -> tuple[tuple[Bert
     best: tuple[float, list[Berth]] = (math.inf, [])
     for rows in ([*there, *back][:MAX_STOPS], there[:MAX_STOPS], [*back, *there[::-1]][:MAX_STOPS]):
         loop = list(dict.fromkeys(drive.best_round(rows)[1]))
-        if len(loop) >= 2 and drive.round(loop) < MAX_LOOP:
+        if len(loop) >= 2 and drive.round(loop) < min(MAX_LOOP, best[0]):
             best = (drive.round(loop), loop)
-            break
+            if not drive.driven(loop)[1]:
+                break
     if not best[1]:
         return f"no closed drive of {MAX_LOOP / 1000:g} km past its stops"
     return tuple(best[1]), drive, best[0]

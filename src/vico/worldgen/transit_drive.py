@@ -18,6 +18,7 @@ BUS_LENGTH = 12.0
 
 _U_TURN_COST = 3000.0  # no bus turns on the spot where a round exists
 _LANE_CHANGE_COST = 120.0
+_LEAST_CHANGE = 80.0  # metres of lane that a bus needs to find a gap in the one beside, with others waiting there
 _ASTRAY = 1.7  # how much longer a metre off a route's mapped way counts
 _ON_WAY = 8.0  # metres from a route's mapped way within which a lane is on it
 _MOST_CHOICES = 6
@@ -108,15 +109,15 @@ class Drive:
         rows = np.repeat(np.arange(n), np.diff(lanes.next_first))
         turn = np.abs((lanes.at(np.arange(n), lanes.length)[:, 2] - lanes.at(np.arange(n), 0.0)[:, 2] + np.pi)
                       % (2 * np.pi) - np.pi)  # fmt: skip
-        uturn = (lanes.inside >= 0) & (turn > 2.6)
-        self.cost = lanes.length + np.where(uturn, _U_TURN_COST, 0.0)
+        self.uturn = (lanes.inside >= 0) & (turn > 2.6)
+        self.cost = lanes.length + np.where(self.uturn, _U_TURN_COST, 0.0)
         if way is not None and not way.is_empty and n:
             middle = shapely.points(lanes.at(np.arange(n), lanes.length / 2)[:, :2])
             shapely.prepare(way)
             self.cost = self.cost * np.where(shapely.dwithin(way, middle, _ON_WAY), 1.0, _ASTRAY)
         sources, targets, weights = [rows], [lanes.next], [self.cost[rows]]
         for side in (lanes.left, lanes.right):
-            have = np.flatnonzero((side >= 0) & (lanes.length > 40.0))
+            have = np.flatnonzero((side >= 0) & (lanes.length > _LEAST_CHANGE))
             sources.append(have)
             targets.append(side[have])
             weights.append(np.full(len(have), _LANE_CHANGE_COST))
@@ -169,6 +170,11 @@ class Drive:
         if len(loop) < 2:
             return math.inf
         return float(sum(self.metres(a, b) for a, b in zip(loop, [*loop[1:], loop[0]], strict=True)))
+
+    def driven(self, loop: Sequence[Berth]) -> tuple[set[int], int]:
+        """Lanes of a closed drive, and how often it turns on the spot."""
+        lanes = [i for a, b in zip(loop, [*loop[1:], loop[0]], strict=True) for i in self.lanes_between(a, b)]
+        return {berth.lane for berth in loop} | set(lanes), int(self.uturn[lanes].sum())
 
     def best_round(self, choices: Sequence[Sequence[tuple[float, Berth]]]) -> tuple[float, list[Berth]]:
         """The cheapest closed drive that serves one berth of each choice, in order.
