@@ -24,6 +24,7 @@ from vico.worldgen.sources import Sources
 from vico.worldgen.stages import Stages
 
 _TILE_MARGIN = 80.0  # metres: as far as the terrain goes beyond the window, and what hides its border
+_TILE_ERROR = 0.4  # metres: coarser tiles have photos too blurred for walls with texels of 10 cm
 _MOST_PHOTOS = 400
 
 
@@ -105,7 +106,9 @@ def gather(sources: Sources, frame: LocalFrame, half: float, stages: Stages) -> 
 
 
 def _tiles(source: str, frame: LocalFrame, half: float, stages: Stages, credits: list[Source]) -> TileMesh:
-    mesh, report = read_tileset(source, frame, half, margin=_TILE_MARGIN, web=Web(cache=cache_folder() / "tiles"))
+    mesh, report = read_tileset(
+        source, frame, half, error=_TILE_ERROR, margin=_TILE_MARGIN, web=Web(cache=cache_folder() / "tiles")
+    )
     stages.given(mesh, digest_of(mesh))
     dropped = [Dropped(id=uri, reason=reason) for uri, reason in report.left_out]
     stages.report("tiles", {"tiles": report.read, "triangles": len(mesh.triangles)}, dropped)

@@ -20,7 +20,7 @@ from vico.worldgen.sight import Sight
 from vico.worldgen.streetview import StreetviewReport, reproject
 from vico.worldgen.streetview_photo import Photographer
 
-INPAINTERS = ("exemplar", "patchmatch", "diffusion")
+INPAINTERS = ("exemplar", "patchmatch", "diffusion", "none")
 UPSCALERS = ("none", "sharpen", "realesrgan", "diffusion")
 
 #: Makes a world that is being built visible to whoever matches photos with it.
@@ -36,17 +36,20 @@ class Texturing:
     texel
         Side of a texel, metres.
     inpaint
-        What fills texels that no photo shows: one of `INPAINTERS`.
+        What fills texels that no photo shows: one of `INPAINTERS`; with ``none`` they stay grey.
     upscale
         What makes texels finer: one of `UPSCALERS`.
     model
         For ``diffusion``: a folder with the model, or its name on a hub.
+    even
+        Whether the light of the day the photos were made is taken out of them.
     """
 
     texel: float = 0.10
     inpaint: str = "exemplar"
     upscale: str = "none"
     model: str = ""
+    even: bool = True
 
     def __post_init__(self) -> None:
         if not 0.01 <= self.texel <= 2.0:
@@ -136,11 +139,13 @@ def kept_where_photographed(
 
 def enhanced(painted: Painted, how: Texturing) -> Painted:
     """Fill what no photo shows, and make the texels finer if asked to."""
-    atlas = inpainted(evened(painted.atlas), inpainter=_inpainter(how))
+    atlas = evened(painted.atlas) if how.even else painted.atlas
     counts = dict(painted.counts)
-    counts["texels_filled"] = sum(
-        int((inside & ~known).sum()) for inside, known in zip(atlas.inside, atlas.known, strict=True)
-    )
+    if how.inpaint != "none":
+        atlas = inpainted(atlas, inpainter=_inpainter(how))
+        counts["texels_filled"] = sum(
+            int((inside & ~known).sum()) for inside, known in zip(atlas.inside, atlas.known, strict=True)
+        )
     upscaler = _upscaler(how)
     if upscaler is not None:
         atlas = upscaled(atlas, upscaler=upscaler)
