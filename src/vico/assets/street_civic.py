@@ -58,7 +58,7 @@ def _figure(base: float, tone: Colour) -> list[Surface]:
 
 def _pedestal(side: float, height: float, tone: Colour = GRANITE) -> list[Surface]:
     return [
-        box((side * 1.5, side * 1.5, 0.18), (0, 0, 0.09), colour=STONE),
+        box((side * 1.5, side * 1.5, 0.58), (0, 0, -0.11), colour=STONE),
         box((side * 1.22, side * 1.22, 0.2), (0, 0, 0.28), colour=tone),
         box((side, side, height - 0.5), (0, 0, 0.36 + (height - 0.5) / 2), colour=tone),
         box((side * 1.14, side * 1.14, 0.14), (0, 0, height - 0.07), colour=STONE),
@@ -136,7 +136,7 @@ def _monuments() -> list[Model]:
 def _fountains() -> list[Model]:
     jet: Colour = (206, 226, 236)
     basin = [
-        box((4.4, 4.4, 0.06), (0, 0, 0.03), colour=GRANITE),
+        box((4.4, 4.4, 0.46), (0, 0, -0.17), colour=GRANITE),
         *[box((4.4 if k % 2 else 0.3, 0.3 if k % 2 else 4.4, 0.45), xy, colour=STONE) for k, xy in
           enumerate([(2.05, 0, 0.225), (0, 2.05, 0.225), (-2.05, 0, 0.225), (0, -2.05, 0.225)])],
         box((3.8, 3.8, 0.02), (0, 0, 0.3), colour=WATER),
@@ -249,7 +249,7 @@ def _kiosk() -> Model:
     """A kiosk with a counter, magazines and a broad roof."""
     wall: Colour = (178, 196, 184)
     parts = [
-        box((2.2, 2.9, 0.2), (0, 0, 0.1), colour=GRANITE),
+        box((2.2, 2.9, 0.6), (0, 0, -0.1), colour=GRANITE),
         box((2.1, 2.8, 2.2), (0, 0, 1.2), colour=wall),
         box((2.8, 3.5, 0.1), (0.1, 0, 2.42), colour=GREEN),
         box((2.2, 2.9, 0.24), (0, 0, 2.34), colour=GREEN),
@@ -347,7 +347,7 @@ def _boxes() -> list[Model]:
         box((0.02, 0.3, 0.16), (0.36, 0, 0.4), colour=BLACK),
     ]
     toilets = [
-        box((2.3, 3.3, 2.5), (0, 0, 1.25), colour=(104, 122, 116)),
+        box((2.3, 3.3, 2.9), (0, 0, 1.05), colour=(104, 122, 116)),
         box((2.6, 3.6, 0.14), (0, 0, 2.57), colour=(64, 80, 74)),
         *[box((0.03, 0.9, 2.0), (1.16, y, 1.02), colour=(70, 90, 84)) for y in (-0.8, 0.8)],
         *[box((0.05, 0.05, 0.14), (1.18, y + 0.34, 1.05), colour=STEEL) for y in (-0.8, 0.8)],

@@ -297,9 +297,9 @@ def _shelter() -> Model:
         parts.append(box((0.02, 1.1, 1.9), (-0.68, (k - 1) * 1.16, 1.32), colour=GLASS))
         parts.append(box((0.03, 1.1, 0.05), (-0.68, (k - 1) * 1.16, 0.35), colour=IRON))
     parts.append(box((1.0, 0.02, 1.9), (-0.15, 1.72, 1.32), colour=GLASS))
-    parts += [box((0.07, 0.07, 2.4), (-0.68, y, 1.2), colour=IRON) for y in (-1.74, -0.58, 0.58, 1.74)]
-    parts += [box((0.07, 0.07, 2.4), (0.4, y, 1.2), colour=IRON) for y in (-1.74, 1.74)]
-    parts += [box((0.06, 0.05, 0.46), (-0.42, y, 0.23), colour=IRON) for y in (-0.7, 1.1)]
+    parts += [box((0.07, 0.07, 2.8), (-0.68, y, 1.0), colour=IRON) for y in (-1.74, -0.58, 0.58, 1.74)]
+    parts += [box((0.07, 0.07, 2.8), (0.4, y, 1.0), colour=IRON) for y in (-1.74, 1.74)]
+    parts += [box((0.06, 0.05, 0.86), (-0.42, y, 0.03), colour=IRON) for y in (-0.7, 1.1)]
     return model("shelter", parts)
 
 
@@ -364,6 +364,12 @@ def _masts() -> list[Model]:
     timber: Colour = (120, 96, 72)
     pole = [cylinder(0.15, 8.4, top=0.11, sides=7, colour=timber), box((0.12, 2.0, 0.12), (0, 0, 7.9), colour=timber)]
     pole += [cylinder(0.05, 0.16, sides=6, colour=WHITE, centre=(0, y, 7.96)) for y in (-0.9, -0.35, 0.35, 0.9)]
+    steel = [
+        lathe([(0.17, 0), (0.17, 0.5), (0.12, 0.56), (0.085, 7.6), (0, 7.7)], sides=8, colour=(104, 110, 112)),
+        *[ring((0, 0, z), 0.15, 0.06, (86, 90, 92), axis="z", sides=8) for z in (6.6, 6.9)],
+        tube((0.08, 0, 6.75), (0.6, 0, 6.75), 0.02, IRON),
+        cylinder(0.05, 0.16, sides=6, colour=(130, 70, 50)).moved(tilted(0.5, 0, 6.75)),
+    ]
     mast = [cylinder(0.2, 14.0, top=0.1, sides=8, colour=STEEL), box((0.4, 0.6, 1.0), (0.2, 0, 0.9), colour=STONE)]
     for k in range(3):
         turn = 2 * math.pi * k / 3
@@ -392,6 +398,7 @@ def _masts() -> list[Model]:
         tower += [tube((0, y, z + 0.4), (0, y, z - 0.6), 0.06, (110, 70, 50), sides=4) for y in (-3.3, 3.3)]
     return [
         model("utility_pole", pole, foot=(0.3, 0.3)),
+        model("pole_steel", steel, kind="utility_pole", foot=(0.3, 0.3)),
         model("mast", mast, foot=(0.5, 0.5)),
         model("catenary_mast", catenary, foot=(0.35, 0.35)),
         model("power_tower", tower),
@@ -400,7 +407,7 @@ def _masts() -> list[Model]:
 
 def _elevator() -> Model:
     parts = [
-        box((2.0, 2.0, 2.5), (0, 0, 1.25), colour=(140, 168, 180)),
+        box((2.0, 2.0, 2.9), (0, 0, 1.05), colour=(140, 168, 180)),
         box((2.2, 2.2, 0.16), (0, 0, 2.58), colour=IRON),
         box((0.04, 1.1, 2.1), (1.01, 0, 1.05), colour=STEEL),
         box((0.05, 0.02, 2.1), (1.02, 0, 1.05), colour=BLACK),

@@ -280,6 +280,13 @@ def _board(tags: Tags, where: str, random: np.random.Generator | None) -> str | 
     return "sign_guide" if kind in ("guidepost", "route_marker") else "information"
 
 
+def _pole(tags: Tags, where: str, random: np.random.Generator | None) -> str:
+    """Poles in towns, which hold lamps and tram wires, are of steel; those of power and telephone lines of wood."""
+    lines = ("power", "telecom") if "man_made" in tags else ("",)
+    wooden = tags.get("material", "wood" if "power" in tags else "") == "wood"
+    return "utility_pole" if wooden or tags.get("utility", "-") in lines else "pole_steel"
+
+
 def _clock(tags: Tags, where: str, random: np.random.Generator | None) -> str | None:
     return None if tags.get("support") in ("wall", "wall_mounted", "building", "roof", "tower") else "clock"
 
@@ -288,5 +295,5 @@ _DETAILS = {
     "bench": _bench, "waste_basket": _basket, "bins": _bins, "recycling": _recycling, "post_box": _post_box,
     "bicycle_parking": _bicycles, "street_lamp": _lamp, "sculpture": _art, "memorial": _memorial,
     "statue": _monument, "vending_machine": _machine, "surveillance": _camera, "fountain": _fountain,
-    "information": _board, "clock": _clock,
+    "information": _board, "clock": _clock, "utility_pole": _pole,
 }  # fmt: skip
