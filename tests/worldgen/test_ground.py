@@ -17,7 +17,7 @@ from vico.worldgen.streets import StreetPolygons, carriageway_width, lane_count,
 from vico.worldgen.terrain import flat_terrain, terrain_from_dem
 
 PLACE = Path(str(resources.files("vico") / "data" / "helsinki.osm.pbf"))
-HALF = 250.0
+HALF = 110.0
 WINDOW = shapely.box(-HALF, -HALF, HALF, HALF)
 
 
@@ -84,9 +84,10 @@ def test_lanes_of_streets_lie_on_the_carriageway(osm: OsmData, streets: StreetPo
 
 
 def test_crossings_lie_across_carriageways(streets: StreetPolygons) -> None:
-    assert len(streets.crossings) > 60
+    inside = [c for c in streets.crossings if np.abs([c.start, c.end]).max() < HALF + 50.0]
+    assert len(inside) > 10
     near = shapely.buffer(streets.carriageway, 1.0)
-    assert all(near.contains(shapely.LineString([c.start, c.end])) for c in streets.crossings)
+    assert all(near.contains(shapely.LineString([c.start, c.end])) for c in inside)
 
 
 def test_nothing_is_paved_under_buildings(osm: OsmData) -> None:
@@ -126,7 +127,7 @@ def test_zebras_are_painted_over_the_asphalt(ground: list[Surface]) -> None:
     paint = next(s for s in ground if s.material.name == "paint")
     assert (paint.positions[:, 2] > 0.01).all()
     white = (paint.colour > 220).all(axis=1)
-    assert white.sum() / 4 > 400
+    assert white.sum() / 4 > 80
 
 
 def test_the_ground_follows_a_hill(osm: OsmData, streets: StreetPolygons) -> None:
@@ -160,12 +161,12 @@ def test_the_sea_lies_to_the_right_of_the_coast() -> None:
 
 
 def test_monaco_s_harbour_is_water(shared_data: Path) -> None:
-    frame = LocalFrame(43.73384, 7.41813)
-    osm = read_osm(shared_data / "places" / "monaco" / "monaco.osm.pbf", frame, 400.0)
+    frame = LocalFrame(43.7350, 7.4235)
+    osm = read_osm(shared_data / "places" / "monaco" / "monaco.osm.pbf", frame, 250.0)
     terrain = terrain_from_dem(
-        read_elevation(shared_data / "places" / "monaco" / "dem_srtm.tif", frame, 400.0), half=400
+        read_elevation(shared_data / "places" / "monaco" / "dem_srtm.tif", frame, 250.0), half=250
     )
-    pieces = ground_partition(osm, road_polygons(osm), shapely.box(-400, -400, 400, 400))
+    pieces = ground_partition(osm, road_polygons(osm), shapely.box(-250, -250, 250, 250))
     harbour = [shape for shape in pieces["water"] if shape.area > 5_000]
     assert sum(shape.area for shape in harbour) > 20_000
     assert all(abs(terrain(np.asarray(shape.representative_point().coords[0]))) < 8.0 for shape in harbour)

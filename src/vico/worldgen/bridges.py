@@ -32,6 +32,7 @@ _PIER_EVERY = 22.0
 _FILLED = 2.6  # metres: a ramp lower than this is an embankment between walls
 _RAILS = ("rail", "light_rail", "tram", "narrow_gauge", "subway", "monorail")
 _DARK: tuple[int, int, int] = (26, 27, 29)
+_BEHIND = 7.0  # metres into a tunnel where the ground tells whether there is a hill
 _FOOT_HEADROOM, _HEADROOM = 2.8, 4.8
 
 
@@ -445,10 +446,27 @@ def portal_surfaces(osm: OsmData, terrain: HeightField, streets: StreetPolygons,
             continue
         ground = float(terrain(np.array(portal.place)))
         low = float(min(ground, terrain(np.array(foot)).min())) - 0.3
+        if float(terrain(np.array(portal.place) + _BEHIND * u)) - ground < 0.4 * portal.height:
+            _well(stone, foot, u, left, ground)
+            continue
         top = ground + portal.height + 0.9
         stone.box(foot, low, top, "wall")
         _opening(stone, portal, ground, u, left)
     return joined(stone.surfaces())
+
+
+def _well(stone: Masonry, foot: Sequence[Floats], u: Floats, left: Floats, ground: float) -> None:
+    """The way down where no hill stands above a tunnel: a dark shaft between parapets, open towards the street."""
+    stone.add([np.r_[p[:2], ground + 0.05] for p in foot], "kerb", _DARK)
+    near_right, far_right, far_left, near_left = foot
+    thick = 0.3
+    right_in, left_in = left * thick, -left * thick
+    for wall in (
+        [near_right, far_right, far_right + right_in, near_right + right_in],
+        [near_left + left_in, far_left + left_in, far_left, near_left],
+        [far_right - u * thick, far_right, far_left, far_left - u * thick],
+    ):
+        stone.box(wall, ground - 0.3, ground + _PARAPET + 0.1, "wall")
 
 
 def _opening(stone: Masonry, portal: Portal, ground: float, u: Floats, left: Floats) -> None:

@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 #: Heights at points, shape ``(n, 2)`` -> ``(n,)``.
 Heights = Callable[[Floats], Floats]
 
-CLOSE, NEAR, ROUGH = 0.025, 0.15, 2.5
+CLOSE, NEAR, ROUGH = 0.03, 0.15, 2.5
 """Metres by which the middle of an uncut square may lie off its heights: of streets, of other ground, out of sight."""
 
 _USUAL = 1.75  # metres: cells where the field has none

@@ -42,6 +42,7 @@ _LIFT, _LIFT_SLOPED = 0.02, 0.035  # of paint
 _STEEP = 1.08  # slope from which bare ground is held by a wall
 _SLOPING = 0.17  # ... and from which a yard is not paved
 _SLOPE_CELL = 2.0
+_NARROW = 0.8  # metres, half the width of the narrowest lawn on a hillside
 _SLAB = 0.6  # thickness of a bridge's edge over water
 _HELD = ("yard", "field", "grass", "garden", "woods", "sidewalk", "pedestrian", "path", "parking")
 _PAVED = ("kerb", "steps", "pedestrian", "cycleway", "sidewalk", "path", "parking")
@@ -157,8 +158,10 @@ def _laid(
             walls += _within(shapes, steep)
             shapes = _without(shapes, steep)
         if name == "yard" and not sloping.is_empty:
-            hills += _within(shapes, sloping)
-            shapes = _without(shapes, sloping)
+            # A strip too narrow for a lawn stays as it is.
+            wide = [shape for shape in _within(shapes, sloping) if not shapely.buffer(shape, -_NARROW).is_empty]
+            hills += wide
+            shapes = _without(shapes, shapely.MultiPolygon(wide))
         if name == "steps":
             lower = _within(shapes, stairs)
             shapes = _without(shapes, stairs)

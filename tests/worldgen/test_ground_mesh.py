@@ -1,0 +1,41 @@
+"""The conforming mesh of the ground: no corner of one triangle on another's edge, and fewer corners at no cost."""
+
+import numpy as np
+import shapely
+
+from vico.worldgen.conform import Plan, conforming
+from vico.worldgen.drape import triangulated
+from vico.worldgen.thinning import thinned
+
+
+def area_of(plan: Plan) -> float:
+    a, b, c = (plan.corners[plan.triangles[:, k]] for k in range(3))
+    return float(((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]).sum() / 2)
+
+
+def pieces(n: int = 6) -> list[tuple[np.ndarray, np.ndarray]]:
+    """A large square beside a column of small ones."""
+    small = [shapely.box(8, 8 * k / n, 10, 8 * (k + 1) / n) for k in range(n)]
+    return [triangulated([shapely.box(0, 0, 8, 8)]), triangulated(small)]
+
+
+def test_neighbours_share_their_corners() -> None:
+    plan = conforming(pieces())
+    edges = np.concatenate([plan.triangles[:, [0, 1]], plan.triangles[:, [1, 2]], plan.triangles[:, [2, 0]]])
+    known = {tuple(edge) for edge in edges.tolist()}
+    alone = np.array([edge for edge in edges.tolist() if (edge[1], edge[0]) not in known])
+    middle = plan.corners[alone].mean(axis=1)
+    rim = (np.abs(middle) < 1e-9).any(axis=1) | (np.abs(middle - [10, 8]) < 1e-9).any(axis=1)
+    assert rim.all()
+    assert abs(area_of(plan) - 80.0) < 1e-6
+
+
+def test_a_plane_needs_few_corners_and_a_bump_keeps_its_own() -> None:
+    plan = conforming(pieces())
+    used, tolerance = np.zeros(2, np.int64), np.full(2, 0.02)
+    slope = thinned(plan, [lambda xy: 0.3 * xy[:, 0]], used, tolerance)
+    assert len(slope.triangles) <= 6
+    assert abs(area_of(slope) - 80.0) < 1e-6
+    bump = thinned(plan, [lambda xy: np.abs(xy[:, 1] - 4.0)], used, tolerance)
+    top = np.flatnonzero(np.abs(bump.corners[:, 1] - 4.0) < 1e-9)
+    assert np.isin(top, bump.triangles).any()
