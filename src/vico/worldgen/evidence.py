@@ -10,7 +10,11 @@ from pathlib import Path
 from vico.errors import InputError
 from vico.geo.elevation import HeightSamples, read_elevation
 from vico.geo.frame import LocalFrame
+from vico.geo.gtfs import Feed, read_gtfs
 from vico.geo.osm import OsmData, read_osm
+from vico.geo.places import FoundPlace
+from vico.geo.places_google import GooglePlaces, google_key
+from vico.geo.places_overture import OverturePlaces
 from vico.geo.street_images import StreetImage, StreetImages
 from vico.geo.street_images_folder import FolderImages
 from vico.geo.street_images_mapillary import Mapillary
@@ -42,6 +46,10 @@ class Evidence:
         The photogrammetry mesh of the place, if there is a tileset.
     images
         Street photos.
+    found
+        Places that other sources know.
+    feeds
+        Timetables.
     credits
         Every source, with what its licence asks for.
     """
@@ -50,6 +58,8 @@ class Evidence:
     samples: HeightSamples | None
     tiles: TileMesh | None
     images: Sequence[StreetImage]
+    found: Sequence[FoundPlace]
+    feeds: Sequence[Feed]
     credits: list[Source]
 
 
@@ -102,7 +112,28 @@ def gather(sources: Sources, frame: LocalFrame, half: float, stages: Stages) -> 
     if sources.photos is not None:
         with stages.timed("photos"):
             images = _photos(sources.photos, frame, half, stages, credits)
-    return Evidence(data, samples, tiles, images, credits)
+    found: list[FoundPlace] = []
+    if sources.places:
+        with stages.timed("found places"):
+            found = _places(sources.places, frame, half, stages, credits)
+    feeds = []
+    if sources.gtfs:
+        with stages.timed("timetables"):
+            feeds = [read_gtfs(path, frame, half) for path in sources.gtfs]
+        for path, feed in zip(sources.gtfs, feeds, strict=True):
+            stages.given(feed, f"{feed.sha256} {where}")
+            credits.append(
+                Source(
+                    kind="timetable",
+                    name=path.name,
+                    licence="as its provider states",
+                    attribution=feed.attribution,
+                    sha256=feed.sha256,
+                )
+            )
+        broken = [Dropped(id=key, reason=reason) for feed in feeds for key, reason in feed.broken]
+        stages.report("timetables", {"feeds": len(feeds)}, broken)
+    return Evidence(data, samples, tiles, images, found, feeds, credits)
 
 
 def _tiles(source: str, frame: LocalFrame, half: float, stages: Stages, credits: list[Source]) -> TileMesh:
@@ -136,6 +167,28 @@ def _photos(source: str, frame: LocalFrame, half: float, stages: Stages, credits
         licence = "CC-BY-SA-4.0" if source == "mapillary" else "as its provider states"
         credits.append(Source(kind="photos", name=name, licence=licence, attribution=attribution))
     return images
+
+
+def _places(
+    names: Sequence[str], frame: LocalFrame, half: float, stages: Stages, credits: list[Source]
+) -> list[FoundPlace]:
+    files = [Path(name) for name in names if name != "google"]
+    readers: list[OverturePlaces | GooglePlaces] = [OverturePlaces(files)] if files else []
+    if "google" in names:
+        readers.append(GooglePlaces(google_key(), Web()))
+    found: list[FoundPlace] = []
+    dropped: list[Dropped] = []
+    for reader in readers:
+        near = reader.near(frame, half)
+        found += near
+        dropped += [Dropped(id=key, reason=reason) for key, reason in reader.refused]
+        for attribution in dict.fromkeys(place.attribution for place in near):
+            google = isinstance(reader, GooglePlaces)
+            licence = "Google Maps Platform terms: place ids only" if google else "CDLA-Permissive-2.0, ODbL-1.0"
+            name = "Google Places" if google else "Overture Maps"
+            credits.append(Source(kind="places", name=name, licence=licence, attribution=attribution))
+    stages.report("found places", {"found": len(found)}, dropped)
+    return found
 
 
 def _file_name(source: str) -> str:

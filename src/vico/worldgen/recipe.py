@@ -113,14 +113,18 @@ def make_world(
             "crossings": len(roads.crossings),
             "lanes": len(lanes),
         },
+        [] if len(lanes) else [Dropped(id="roads", reason="no street for traffic in the window")],
     )
 
-    transit = stages.run("transit", transit_from_osm, data, lanes, height, half=half, solids=solids, seed=seed)
+    transit = stages.run(
+        "transit", transit_from_osm, data, lanes, height, half=half, solids=solids, seed=seed, feeds=list(given.feeds)
+    )
     transit = _off_the_road(transit, streets, height)
     write_record(folder / "transit.json", transit)
     stages.report(
         "transit",
         {"stops": len(transit.stops), "lines": len(transit.lines), "bike_stations": len(transit.bike_stations)},
+        transit.left_out,
     )
 
     footways = _footways(streets)
@@ -159,6 +163,7 @@ def make_world(
         height=height,
         roads=roads,
         transit=transit,
+        found=list(given.found),
     )
     open_ids = {entrance.building for entrance in entrances}
     buildings = [b.model_copy(update={"accessible": b.id in open_ids}) for b in built.records]
