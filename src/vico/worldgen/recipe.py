@@ -139,6 +139,7 @@ def make_world(
         transit=transit,
         half=half,
         seed=seed,
+        lanes=lanes,
     )
     barrier = np.isin(outdoors.kind, _BARRIER_KINDS)
     object_counts = {
