@@ -15,6 +15,7 @@ from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.worldgen.atlas import Atlas, coverage, repacked, textured
 from vico.worldgen.baking import bake
+from vico.worldgen.daylight import sun_in, without_sun
 from vico.worldgen.enhance import Inpainter, Upscaler, evened, inpainted, padded, upscaled
 from vico.worldgen.sight import Sight
 from vico.worldgen.streetview import StreetviewReport, reproject
@@ -120,9 +121,7 @@ def painted_from_street(
 
     `others` are surfaces that hide walls beside these: the ground. The report has what became of each photo.
     """
-    surfaces = [*painted.walls, *painted.roofs, *others]
-    corners = np.concatenate([s.positions[s.triangles] for s in surfaces]).reshape(-1, 3)
-    sight = Sight(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
+    sight = _sight_of([*painted.walls, *painted.roofs, *others])
     atlas, report = reproject(painted.atlas, images, photograph, sight, ground=height)
     return replace(painted, atlas=atlas, counts={**painted.counts, **report.counts}), report
 
@@ -139,8 +138,17 @@ def kept_where_photographed(
 
 def enhanced(painted: Painted, how: Texturing) -> Painted:
     """Fill what no photo shows, and make the texels finer if asked to."""
-    atlas = evened(painted.atlas) if how.even else painted.atlas
+    atlas = painted.atlas
     counts = dict(painted.counts)
+    if how.even and atlas.charts:
+        sight = _sight_of([*painted.walls, *painted.roofs])
+        sun = sun_in(atlas, sight)
+        if sun is None:
+            atlas = evened(atlas)
+        else:
+            atlas = without_sun(atlas, sun, sight)
+            counts["sun_azimuth"] = round(sun.azimuth)
+            counts["sun_height"] = round(sun.height)
     if how.inpaint != "none":
         atlas = inpainted(atlas, inpainter=_inpainter(how))
         counts["texels_filled"] = sum(
@@ -176,6 +184,11 @@ def mesh_of(surfaces: Sequence[Surface]) -> TileMesh:
         tuple(textures),
         np.concatenate([s.colour for s in surfaces]),
     )
+
+
+def _sight_of(surfaces: Sequence[Surface]) -> Sight:
+    corners = np.concatenate([s.positions[s.triangles] for s in surfaces]).reshape(-1, 3)
+    return Sight(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
 
 
 def _inpainter(how: Texturing) -> Inpainter | None:
