@@ -71,6 +71,19 @@ def test_three_thousand_corners_are_simplified_within_five_centimetres() -> None
     assert shapely.hausdorff_distance(part, Polygon(ring)) < 0.07
 
 
+def test_an_outline_that_begins_above_its_parts_leaves_nothing_upside_down() -> None:
+    # Central Helsinki, way 29072452: an outline from the second storey on, with raised parts below that in it.
+    things: Things = [
+        (shapely.box(0, 0, 30, 30), {"building": "yes", "building:levels": "4", "building:min_level": "2"}),
+        (shapely.box(0, 0, 30, 20), {"building:part": "yes", "building:levels": "3"}),
+        (shapely.box(2, 21, 12, 29), {"building:part": "yes", "building:levels": "4", "building:min_level": "1"}),
+    ]
+    plan = planned(things)["w1"]
+    assert all(part.eaves > part.low for part in plan.parts)
+    result = buildings_from_osm(town(things), flat_terrain(half=100), seed=0)
+    assert result.watertight == len(result.records) == 1
+
+
 def test_a_hole_of_a_multipolygon_stays_open() -> None:
     ring = Polygon(shapely.box(0, 0, 40, 30).exterior.coords, [shapely.box(12, 10, 28, 20).exterior.coords])
     built = buildings_from_osm(town([(ring, {"building": "yes"})]), flat_terrain(half=100.0), seed=0)
