@@ -68,8 +68,11 @@ def photographer_of(scene: Scene, *, samples: int = 1) -> Photographer:
     return photograph
 
 
-def true_pages(atlas: Atlas, surfaces: list[Surface]) -> tuple[NDArray[np.uint8], ...]:
-    """The atlas's pages in the colours that the surfaces have: their textures times their vertex colours."""
+def true_pages(atlas: Atlas, surfaces: list[Surface], *, reach: float = 0.03) -> tuple[NDArray[np.uint8], ...]:
+    """The atlas's pages in the colours that the surfaces have: their textures times their vertex colours.
+
+    Surfaces may stand `reach` metres before the atlas's walls, and at least 0.17 m behind; grey (128) where none are.
+    """
     corners = np.concatenate([s.positions[s.triangles] for s in surfaces]).reshape(-1, 3)
     owner = np.repeat(np.arange(len(surfaces)), [len(s.triangles) for s in surfaces])
     uv = np.concatenate([s.uv[s.triangles] for s in surfaces])
@@ -87,7 +90,7 @@ def true_pages(atlas: Atlas, surfaces: list[Surface]) -> tuple[NDArray[np.uint8]
     for chart in atlas.charts:
         inside = atlas.inside[chart.page][chart.box]
         points = texel_centres(chart, slice(None), slice(None))[inside]
-        hits = sight.first(points + 0.03 * chart.normal, -chart.normal, most=0.2)
+        hits = sight.first(points + reach * chart.normal, -chart.normal, most=reach + max(reach, 0.17))
         found = hits.triangle >= 0
         tri = hits.triangle[found]
         weights = np.stack([1 - hits.u - hits.v, hits.u, hits.v], axis=1)[found]
