@@ -327,7 +327,10 @@ class TransitSystem:
         line, fleet, v, lanes = self._plan.buses[bus], self.traffic.fleet, self._vehicle[bus], self.traffic.lanes
         route, place = self._plan.routes[line], int(fleet.place[v])
         metres = self._plan.offsets[line][stop] - float(fleet.offset[v])
-        while place != self._plan.places[line][stop]:
+        # A stop that lies behind the bus on the lane it is on comes after a whole round.
+        going = metres < 0.0
+        while going or place != self._plan.places[line][stop]:
+            going = False
             here, place = route[place], (place + 1) % len(route)
             if route[place] not in (lanes.left[here], lanes.right[here]):
                 metres += float(lanes.length[here])

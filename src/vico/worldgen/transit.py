@@ -53,13 +53,19 @@ _MOST_LINES = 3  # more would stand in each other's way at the stops they share
 
 @dataclass(frozen=True)
 class _Chosen:
-    """A line that is driven: its names, its loop, who drives it."""
+    """A line that is driven: its names, its loop, who drives it, and the sources' routes it stands for."""
 
     names: tuple[str, ...]
     route: Route | None
     loop: tuple[Berth, ...]
     drive: Drive
     departures: tuple[int, ...] = ()
+    ids: tuple[str, ...] = ()
+
+    @property
+    def timed(self) -> bool:
+        """Whether the sources say when its buses leave the first stop."""
+        return bool(self.departures) or (self.route is not None and self.route.interval is not None)
 
 
 def transit_from_osm(
@@ -120,6 +126,7 @@ def transit_from_osm(
         elif not chosen:
             why = "no streets for traffic in the window" if not len(lanes) else "no closed drive past four stops"
             left_out.append(Dropped(id="bus lines", reason=f"{why}: none is planned"))
+    chosen = _waiting_apart(chosen, left_out)
     served = [berth for line in chosen for berth in line.loop]
     kept = list(dict.fromkeys([*mapped, *served]))
     walks = lanes.walks.clear_of(solids or [])
@@ -227,7 +234,9 @@ def _driven(routes: Sequence[Route], kerbs: Kerbs, mapped: Sequence[Berth], left
         if twin >= 0 and bool(route.departures) == bool(chosen[twin].departures):
             # Two lines that share their way through the window are driven as one, with the buses of both.
             times = sorted({*chosen[twin].departures, *route.departures})
-            chosen[twin] = replace(chosen[twin], names=(*chosen[twin].names, route.name), departures=tuple(times))
+            line = chosen[twin]
+            names, ids = (*line.names, route.name), (*line.ids, route.id)
+            chosen[twin] = replace(line, names=names, departures=tuple(times), ids=ids)
         elif ways[k][1] and (streets & ways[k][0] or _gap(route) < _round_seconds(kerbs.lanes, ways[k][0], loop)):
             # Who turns on the spot reaches into the lane of who comes the other way: both would wait for ever.
             left_out.append(Dropped(id=route.id, reason=f"bus {route.name}: has to turn where others drive"))
@@ -235,11 +244,37 @@ def _driven(routes: Sequence[Route], kerbs: Kerbs, mapped: Sequence[Berth], left
             if ways[k][1]:
                 seconds = _round_seconds(kerbs.lanes, ways[k][0], loop)
                 route = replace(route, interval=max(route.interval or 0, int(seconds)))
-            chosen.append(_Chosen((route.name,), route, loop, drive, route.departures))
+            chosen.append(_Chosen((route.name,), route, loop, drive, route.departures, (route.id,)))
             streets |= ways[k][0]
         else:
             left_out.append(Dropped(id=route.id, reason=f"bus {route.name}: other lines serve its stops already"))
     return chosen
+
+
+def _waiting_apart(chosen: Sequence[_Chosen], left_out: list[Dropped]) -> list[_Chosen]:
+    """Lines whose buses can wait for their time, minutes at a stop, in a lane that no other line drives.
+
+    No bus gets past one that stands at the kerb: buses of several lines that wait in one lane hold one another up for
+    a round and more. A line of our own timing starts at such a stop; others' timetables say where theirs do.
+    """
+    ways = [line.drive.driven(line.loop)[0] for line in chosen]
+
+    def start(k: int, kept: Sequence[int]) -> int:
+        """The first stop of line k in a lane of its own among these, -1 if it has none."""
+        others = {lane for i in kept if i != k for lane in ways[i]}
+        loop = chosen[k].loop[:1] if chosen[k].timed else chosen[k].loop
+        return next((n for n, berth in enumerate(loop) if berth.lane not in others), -1)
+
+    kept: list[int] = []
+    for k in sorted(range(len(chosen)), key=lambda k: (not chosen[k].timed, k)):
+        if all(start(i, [*kept, k]) >= 0 for i in [*kept, k]):
+            kept.append(k)
+            continue
+        why = "its buses and others' would wait for their time in each other's way"
+        for what, name in zip(chosen[k].ids or chosen[k].names, chosen[k].names, strict=True):
+            left_out.append(Dropped(id=what, reason=f"bus {name}: {why}"))
+    firsts = [(chosen[k], start(k, kept)) for k in sorted(kept)]
+    return [replace(line, loop=(*line.loop[first:], *line.loop[:first])) for line, first in firsts]
 
 
 def _gap(route: Route) -> float:

@@ -16,7 +16,8 @@ FIRST_DEPARTURE, LAST_DEPARTURE = 5 * 3600, 23 * 3600
 HEADWAY = (360.0, 600.0)
 
 _JUNCTION_SECONDS = 6.0
-_MOST_SLACK = 0.35  # of a round that drives may be drawn out by, so that buses wait less at the first stop
+_STOP_SECONDS = 10.0  # that braking for a stop and starting from it cost
+_SLOWEST = 5.5  # m/s between stops; buses that have time drive no slower than a little below it
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
 
@@ -60,7 +61,7 @@ def line_record(
         loop = [loop[-1], *loop[:-1]]
     chain = [loop[0].lane]
     travel = [0.0]
-    clock = 0.0
+    clock = slowest = 0.0
     for k, (start, end) in enumerate(zip(loop, [*loop[1:], loop[0]], strict=True)):
         leg = drive.lanes_between(start, end)
         driven = [start.lane, *leg]
@@ -70,6 +71,8 @@ def line_record(
         junctions = len({int(z) for z in lanes.zone[driven] if z >= 0})
         # Drives in traffic take a quarter longer than at the limit, and every junction is waited for a little.
         clock += max(seconds, 0.0) * 1.25 + _JUNCTION_SECONDS * junctions + 4.0
+        metres = float(lanes.length[driven].sum()) - start.offset - float(lanes.length[end.lane]) + end.offset
+        slowest += metres / _SLOWEST + _STOP_SECONDS + DWELL
         travel.append(round(clock, 1))
         clock += DWELL
         chain += leg if k < len(loop) - 1 else leg[:-1]
@@ -83,9 +86,10 @@ def line_record(
         # Whole minutes, so that the timetable can be read.
         headway = math.ceil(headway / 60.0) * 60.0
         times = list(range(first, last + 1, int(headway)))
-    # A bus that waits for its next round at one stop is in others' way: what is left over is spread over the drives.
+    # A bus that waits for its next round at one stop is in others' way: what is left over is spread over the drives,
+    # as far as buses drive that slowly.
     rest = max(1, math.ceil(clock / headway)) * headway - clock
-    spare = min(rest, _MOST_SLACK * clock)
+    spare = min(rest, max(slowest - clock, 0.0))
     under_way = [t - DWELL * max(i - 1, 0) for i, t in enumerate(travel)]
     travel = [round(t + spare * share / max(under_way[-1], 1.0), 1) for t, share in zip(travel, under_way, strict=True)]
     return Line(
