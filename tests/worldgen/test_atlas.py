@@ -123,7 +123,8 @@ def test_pages_are_kept_as_jpeg_and_come_back_as_photos(tmp_path: Path) -> None:
     assert b"image/jpeg" in (tmp_path / "a.glb").read_bytes()
     back = read_glb(tmp_path / "a.glb")
     assert {s.material.photo for layer in back.values() for s in layer} == {True}
-    assert back["buildings"][0].material.texture is back["roofs"][0].material.texture
+    # Walls and roofs are written to files of their own: a page that both shared would be in both.
+    assert not {s.material.name for s in back["buildings"]} & {s.material.name for s in back["roofs"]}
     texture = back["buildings"][0].material.texture
     assert texture is not None
     assert texture.shape == atlas.pages[0].shape

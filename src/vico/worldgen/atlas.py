@@ -161,7 +161,16 @@ def unwrap(
     step = np.maximum(texel, patches.size[index].max(axis=1, initial=0.0) / room)
     cells = np.maximum(np.ceil(patches.size[index] / step[:, None] - 1e-6), 1).astype(np.int64)
     cells = np.minimum(cells, room)
-    places = _pack(cells + 2 * _GUTTER, page)
+    # Walls and roofs are files of their own: on pages of their own, no page is written twice.
+    roof = np.zeros(count + 1, np.bool_)
+    roof[patches.face_patch] = np.repeat(np.arange(len(surfaces)) >= len(walls), [len(s.triangles) for s in surfaces])
+    places, first = np.zeros((len(index), 3), np.int64), 0
+    for layer in (False, True):
+        mine = np.flatnonzero(roof[index] == layer)
+        if len(mine):
+            places[mine] = _pack(cells[mine] + 2 * _GUTTER, page)
+            places[mine, 0] += first
+            first = int(places[mine, 0].max()) + 1
     charts = []
     for k, p in enumerate(index):
         # The spare part of the last texels is shared between both ends.
