@@ -17,7 +17,8 @@ from vico.worldgen.facades import (
     storey_coordinates,
     year_of,
 )
-from vico.worldgen.roofs import Roof, building_solid
+from vico.worldgen.roof_shapes import Roof
+from vico.worldgen.roofs import building_solid
 from vico.worldgen.textures import _PAINTERS, BAYS, STOREYS, material
 
 

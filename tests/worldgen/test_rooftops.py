@@ -9,7 +9,7 @@ from vico.world.seeds import rng
 from vico.world.solid_checks import coplanar_overlaps
 from vico.worldgen.buildings import buildings_from_osm
 from vico.worldgen.outlines_plans import BuildingPlan, PartPlan
-from vico.worldgen.roofs import Roof
+from vico.worldgen.roof_shapes import Roof
 from vico.worldgen.rooftops import cornices, posts, rooftop_parts
 from vico.worldgen.terrain import flat_terrain
 

@@ -19,7 +19,7 @@ from vico.worldgen import facades
 from vico.worldgen.facades import BACK, BLANK, FRONT, SHOPFRONT, Look
 from vico.worldgen.outlines import BuildingPlan, PartPlan, building_plans
 from vico.worldgen.outlines_plans import RULES
-from vico.worldgen.roofs import rings_of
+from vico.worldgen.roof_shapes import rings_of
 from vico.worldgen.rooftops import cornices, posts, rooftop_parts
 from vico.worldgen.solids import Seat, SolidMesh, collision_bodies, leaky, seat_of, solid_meshes
 from vico.worldgen.streets import on_the_ground

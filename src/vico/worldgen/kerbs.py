@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from vico.geo.osm import polygons_of
 from vico.world.heights import EDGE_RANGE, HeightField, Steps
 from vico.world.walkable import fill_polygon
-from vico.worldgen.roofs import rings_of
+from vico.worldgen.roof_shapes import rings_of
 from vico.worldgen.streets import Crossing, StreetPolygons
 
 KERB = 0.12

@@ -22,7 +22,7 @@ from vico.worldgen.outlines_apart import apart, supported, without_slivers
 from vico.worldgen.outlines_heights import STOREY, level_estimates, said_height, said_levels, weighted_median
 from vico.worldgen.outlines_parts import OPEN_KINDS, SMALL_KINDS, part_of
 from vico.worldgen.outlines_plans import BuildingPlan, PartPlan
-from vico.worldgen.roofs import Roof, shape_named
+from vico.worldgen.roof_shapes import Roof, shape_named
 from vico.worldgen.streets import number
 
 __all__ = ["STOREY", "BuildingPlan", "PartPlan", "building_plans", "use_of"]

@@ -13,7 +13,7 @@ from vico.geo.osm import OsmData, polygons_of
 from vico.world.model import Dropped
 from vico.worldgen.outlines_heights import STOREY
 from vico.worldgen.outlines_plans import BuildingPlan, PartPlan
-from vico.worldgen.roofs import Roof, rings_of
+from vico.worldgen.roof_shapes import Roof, rings_of
 from vico.worldgen.streets import on_the_ground
 
 _LEAST_AREA = 2.0  # square metres

@@ -13,7 +13,7 @@ from shapely import Polygon
 from vico.geo.osm import Tags
 from vico.worldgen.outlines_heights import STOREY, kind_eaves, said_height, said_levels
 from vico.worldgen.outlines_plans import PartPlan
-from vico.worldgen.roofs import Roof, inradius, shape_named
+from vico.worldgen.roof_shapes import Roof, inradius, shape_named
 from vico.worldgen.streets import number
 
 OPEN_KINDS = {"roof", "carport", "canopy", "bridge"}

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from shapely import Polygon
 
 from vico.geo.osm import Tags
-from vico.worldgen.roofs import Roof
+from vico.worldgen.roof_shapes import Roof
 
 RULES = ("height tag", "levels tag", "parts", "kind", "neighbours", "area", "town")
 """How a height was decided, strongest first: tagged, by its parts, by the kind of building, by neighbours of its use

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from vico.worldgen.roof_profiles import Profile, slope_of
-from vico.worldgen.roofs import Roof, inradius, prism
+from vico.worldgen.roof_shapes import Roof, inradius, prism
 
 _OVERLAP = 0.02  # metres by which cutters stick out of what they cut, so that no two faces coincide
 _GABLED = ("gabled", "gambrel", "round", "half-hipped", "side_half-hipped", "side_hipped", "hipped-and-gabled")

@@ -12,7 +12,7 @@ from manifold3d import CrossSection, Manifold
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from vico.worldgen.roofs import Roof, prism
+from vico.worldgen.roof_shapes import Roof, prism
 
 Profile = list[tuple[float, float]]
 """Corners of a roof's outline in section, left to right: distance, and height as a share of the whole."""

@@ -10,7 +10,7 @@ from manifold3d import Manifold, Mesh64
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from vico.worldgen.roofs import Roof, prism, rings_of
+from vico.worldgen.roof_shapes import Roof, prism, rings_of
 
 _DOME = [(math.cos(a), math.sin(a)) for a in np.linspace(0.0, math.pi / 2, 8)[1:-1]]
 # Width and height of an onion's rings. It swells out to the drum's walls, not beyond: a bulge past the outline would

@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo.osm import polygons_of
 from vico.worldgen.outlines_plans import BuildingPlan, PartPlan
-from vico.worldgen.roofs import Roof, rings_of
+from vico.worldgen.roof_shapes import Roof, rings_of
 
 _CORNICE_WALLS = ("wall_classic", "wall_stone", "wall_brick", "wall_plain")
 _CHIMNEYED = ("hipped", "gabled", "half-hipped", "mansard", "gambrel", "hipped-and-gabled")

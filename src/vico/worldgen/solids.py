@@ -15,7 +15,8 @@ from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface
 from vico.world.solid_checks import open_edges
 from vico.worldgen.outlines_plans import BuildingPlan, PartPlan
-from vico.worldgen.roofs import building_solid, rings_of
+from vico.worldgen.roof_shapes import rings_of
+from vico.worldgen.roofs import building_solid
 
 _SKIRT = 0.3  # metres the walls reach below the lowest ground, so that no gap shows
 

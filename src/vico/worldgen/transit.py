@@ -260,10 +260,12 @@ def _waiting_apart(chosen: Sequence[_Chosen], left_out: list[Dropped]) -> list[_
     ways = [line.drive.driven(line.loop)[0] for line in chosen]
 
     def start(k: int, kept: Sequence[int]) -> int:
-        """The first stop of line k in a lane of its own among these, -1 if it has none."""
+        """A stop of line k in a lane of its own among these, with another beside it if there is; -1 if it has none."""
         others = {lane for i in kept if i != k for lane in ways[i]}
         loop = chosen[k].loop[:1] if chosen[k].timed else chosen[k].loop
-        return next((n for n, berth in enumerate(loop) if berth.lane not in others), -1)
+        own = [n for n, berth in enumerate(loop) if berth.lane not in others]
+        # Cars get past where they may change lanes.
+        return min(own, key=lambda n: chosen[k].drive.lanes.left[loop[n].lane] < 0, default=-1)
 
     kept: list[int] = []
     for k in sorted(range(len(chosen)), key=lambda k: (not chosen[k].timed, k)):
