@@ -123,7 +123,8 @@ def painted_from_street(
     """
     sight = _sight_of([*painted.walls, *painted.roofs, *others])
     atlas, report = reproject(painted.atlas, images, photograph, sight, ground=height)
-    return replace(painted, atlas=atlas, counts={**painted.counts, **report.counts}), report
+    known = sum(int(mask.sum()) for mask in atlas.known)
+    return replace(painted, atlas=atlas, counts={**painted.counts, "texels_known": known}), report
 
 
 def kept_where_photographed(
