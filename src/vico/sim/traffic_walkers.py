@@ -23,6 +23,8 @@ Ints = NDArray[np.int32]
 
 RADIUS = 0.25
 _LEAD = 0.7  # how far ahead the point runs, m
+_LEAD_ROUND = 2.0  # and for who gets nowhere: past a vehicle that stands on the point, m
+_HINDERED = 3.0  # who has got nowhere for so long looks that far ahead, s
 _SEE = 2.2  # how far ahead others are avoided, m
 _TOUCH = 0.03
 _ASK = 1.5  # a vehicle that has stood so long before somebody is waiting for them to go, s
@@ -116,13 +118,14 @@ def _next_stretch(paths, crowd, i, node):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _run_ahead(paths, crowd, gates, asked, i, x, y, dt):  # type: ignore[no-untyped-def]
-    """Move the followed point on until it is `_LEAD` ahead of the walker; True if a crossing has to be waited for.
+    """Move the followed point on until it is far enough ahead; True if a crossing has to be waited for.
 
     Nobody waits for the vehicle that stands waiting for them: who is `asked` to go goes.
     """
+    lead = _LEAD_ROUND if crowd.jammed[i] > _HINDERED else _LEAD
     for _ in range(12):
         px, py, _, _, _, _ = _point(paths, crowd, i)
-        if (px - x) ** 2 + (py - y) ** 2 >= _LEAD * _LEAD:
+        if (px - x) ** 2 + (py - y) ** 2 >= lead * lead:
             return False
         stretch = crowd.stretch[i]
         offset = crowd.offset[i] + crowd.way[i] * 0.12
