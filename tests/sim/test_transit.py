@@ -60,6 +60,25 @@ def test_buses_come_to_their_first_stop_within_two_minutes_of_the_timetable() ->
     assert max(map(abs, late)) < 120.0
 
 
+def test_a_stop_behind_the_bus_is_a_whole_round_away() -> None:
+    traffic, transit = _systems(0, 0)
+    short = next(k for k in range(traffic.buses) if len(transit.line_of(k).stops) == 2)
+    line = transit.line_of(short)
+    number = traffic.lanes.index
+    around = sum(float(traffic.lanes.length[number[lane]]) for lane in line.lanes)
+    while transit.stop[short] != 1 or transit.stopped_at(short):
+        _advance(traffic, transit)
+    there = transit._metres(short, 1)
+    while not transit.stopped_at(short):
+        _advance(traffic, transit)
+    assert there > 0.0
+    # From the second stop to the first, which lies behind it on the same lane, and on to the second again.
+    first = next(s for s in transit.transit.stops if s.id == line.stops[0])
+    second = next(s for s in transit.transit.stops if s.id == line.stops[1])
+    assert first.lane == second.lane
+    assert transit._metres(short, 0) == pytest.approx(around - (second.offset - first.offset), abs=1.0)
+
+
 def test_a_bus_stands_thirty_seconds_at_a_stop() -> None:
     traffic, transit = _systems(0, 0)
     stood, last = [], 0

@@ -156,3 +156,12 @@ def test_heidelberg_drives_by_its_timetable(shared_data: Path) -> None:
     assert by_name.keys() & {"33", "35"}
     assert all(len(line.departures) >= 50 for line in transit.lines)
     assert transit.origin["lines"] == "gtfs"
+
+
+def test_buses_wait_for_their_time_in_lanes_that_no_other_line_drives() -> None:
+    transit = road_city().transit
+    lane_of = {stop.id: stop.lane for stop in transit.stops}
+    assert len(transit.lines) > 1
+    for line in transit.lines:
+        others = {lane for other in transit.lines if other is not line for lane in other.lanes}
+        assert lane_of[line.stops[0]] not in others
