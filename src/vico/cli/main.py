@@ -54,7 +54,7 @@ def world_build(
     overpass: str | None = None,
     refresh: bool = False,
     texel: float = 0.10,
-    inpaint: Literal["exemplar", "patchmatch", "diffusion"] = "exemplar",
+    inpaint: Literal["exemplar", "patchmatch", "diffusion", "none"] = "exemplar",
     upscale: Literal["none", "sharpen", "realesrgan", "diffusion"] = "none",
     model: str = "",
     layout_llm: bool = False,
