@@ -24,7 +24,7 @@ from vico.world.model import ENTITY_GROUND, ENTITY_ROAD
 from vico.worldgen.bridges import bridge_surfaces, portal_surfaces, spans_over_water
 from vico.worldgen.conform import Plan, conforming
 from vico.worldgen.drape import CLOSE, NEAR, ROUGH, Curtain, Grid, Heights, curtain, triangulated
-from vico.worldgen.grading import is_level, open_water
+from vico.worldgen.grading import is_level, open_water, standing_outlines
 from vico.worldgen.kerbs import RAMP, Water, lowered_kerbs
 from vico.worldgen.levels import overpasses
 from vico.worldgen.markings import Quads, drives_left, pitch_lines, road_markings
@@ -232,7 +232,11 @@ def _hidden(osm: OsmData) -> BaseGeometry:
         and on_the_ground(area.tags)
     ]
     deep = shapely.buffer(np.array(built, object), -1.5, join_style="mitre")
-    return shapely.union_all(deep[~shapely.is_empty(deep)], grid_size=0.01)
+    mapped = shapely.union_all(deep[~shapely.is_empty(deep)], grid_size=0.01)
+    # Not every building of the map is built whole, or at all: people walk on what is left of its ground.
+    standing = shapely.union_all(shapely.make_valid(standing_outlines(osm, seed=0)), grid_size=0.01)
+    both = shapely.intersection(mapped, shapely.buffer(standing, -1.5, join_style="mitre"), grid_size=0.01)
+    return shapely.MultiPolygon(polygons_of(both))
 
 
 def _tracks(osm: OsmData) -> list[NDArray[np.float64]]:
