@@ -82,7 +82,8 @@ def page_data(recording: Recording, world: World, *, picture: NDArray[np.uint8] 
 
 
 def _tracks(tracks: NDArray[np.float32], unit: float) -> str:
-    scaled = np.concatenate([tracks[..., :2] / unit, tracks[..., 2:] * 10_000], axis=-1)
+    turns = tracks[..., 2:] - 2 * np.pi * np.rint(tracks[..., 2:] / (2 * np.pi))
+    scaled = np.concatenate([tracks[..., :2] / unit, turns * 10_000], axis=-1)
     gone = ~np.isfinite(scaled).all(axis=-1)
     # Yaw of +-pi is +-31,416: it fits beside the mark for a body that is not there.
     whole = np.clip(np.nan_to_num(np.rint(scaled)), -32767, 32767).astype("<i2")
