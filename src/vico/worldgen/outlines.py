@@ -13,12 +13,11 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
-from shapely.geometry.base import BaseGeometry
 
 from vico.geo.osm import OsmArea, OsmData, Tags, polygons_of
 from vico.world.model import Dropped
 from vico.world.seeds import rng
-from vico.worldgen.outlines_apart import apart, supported, without_slivers
+from vico.worldgen.outlines_apart import apart, areas_of, supported, without_slivers
 from vico.worldgen.outlines_heights import STOREY, level_estimates, said_height, said_levels, weighted_median
 from vico.worldgen.outlines_parts import OPEN_KINDS, SMALL_KINDS, part_of
 from vico.worldgen.outlines_plans import BuildingPlan, PartPlan
@@ -226,7 +225,7 @@ def _rest_of_outline(main: PartPlan, parts: list[PartPlan]) -> list[PartPlan]:
     standing = shapely.union_all([part.polygon for part in parts if part.low <= 0.0], grid_size=0.001)
     if shapely.intersection(standing, main.polygon).area >= _COVERED * main.polygon.area:
         return []
-    rest: BaseGeometry = shapely.difference(main.polygon, standing, grid_size=0.001)
+    rest = areas_of(shapely.difference(main.polygon, standing, grid_size=0.001))
     solids: list[PartPlan] = []
     for part in sorted((p for p in parts if p.low > 2.0 and p.levels > 0), key=lambda p: p.low):
         under = shapely.intersection(rest, part.polygon)
@@ -236,7 +235,7 @@ def _rest_of_outline(main: PartPlan, parts: list[PartPlan]) -> list[PartPlan]:
         if eaves > main.low + 0.3:  # else the outline itself begins higher up, and nothing of it is below the part
             low = replace(main, eaves=eaves, levels=max(round(eaves / STOREY), 1), roof=Roof("flat", 0.0))
             solids += [replace(low, polygon=piece) for piece in polygons_of(under, 6.0)]
-        rest = shapely.difference(rest, part.polygon, grid_size=0.001)
+        rest = areas_of(shapely.difference(rest, part.polygon, grid_size=0.001))
     pieces = [piece for piece in without_slivers(rest, main.polygon) if piece.area > 6.0]
     return [replace(main, polygon=piece) for piece in pieces] + solids
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
-from shapely import Polygon
+from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo.osm import OsmData, polygons_of
@@ -172,10 +172,14 @@ def _beside(part: PartPlan, other: PartPlan) -> list[PartPlan]:
     return rest
 
 
+def areas_of(shape: BaseGeometry) -> MultiPolygon:
+    """The areas of an overlay: of two that touch along a line it holds the line too, which no further overlay takes."""
+    return MultiPolygon(polygons_of(shape))
+
+
 def without_slivers(shape: BaseGeometry, whole: Polygon) -> list[Polygon]:
     """Pieces of a cut outline without the slivers that are left between two outlines that nearly agree."""
-    opened = shapely.buffer(shapely.buffer(shape, -0.15, join_style="mitre"), 0.15, join_style="mitre", mitre_limit=2.5)
-    # Areas alone: an overlay of two that touch along a line holds the line too, and no overlay takes such a mixture.
-    areas = shapely.MultiPolygon(polygons_of(shapely.intersection(opened, shape)))
-    kept = shapely.intersection(areas, whole)
+    areas = areas_of(shape)
+    opened = shapely.buffer(shapely.buffer(areas, -0.15, join_style="mitre"), 0.15, join_style="mitre", mitre_limit=2.5)
+    kept = shapely.intersection(areas_of(shapely.intersection(opened, areas)), whole)
     return polygons_of(shapely.simplify(kept, 0.02), _LEAST_AREA)
