@@ -22,11 +22,13 @@ def play(world: World, people: Community, *, method: str, steps: int, seed: int,
 
 
 def test_the_heuristic_delivers_something_within_five_minutes(helsinki: World, few: Community) -> None:
-    result = play(helsinki, few, method="heuristic", steps=300, seed=1)
-    assert sum(result.success) >= 1
-    assert [step is not None for step in result.done_at] == result.success
-    assert all(20 < step <= 300 for step in result.done_at if step is not None)
-    assert result.steps == 300  # not everything was done
+    # Three episodes: how far the first errand of a single one is, is luck.
+    results = [play(helsinki, few, method="heuristic", steps=300, seed=seed) for seed in (0, 1, 2)]
+    assert sum(sum(result.success) for result in results) >= 1
+    for result in results:
+        assert [step is not None for step in result.done_at] == result.success
+        assert all(20 < step <= 300 for step in result.done_at if step is not None)
+        assert result.steps == 300  # not everything was done
 
 
 @pytest.mark.parametrize(("method", "assistants"), [("random", 1), ("heuristic", 2)])
