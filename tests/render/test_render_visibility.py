@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from vico.assets.shapes import ball, box, pose_matrix
 from vico.errors import InputError
-from vico.render import Cameras, Scene, render
+from vico.render import Cameras, Frames, Scene, Stills, render
 from vico.world.mesh import Material, Surface, joined
 
 
@@ -98,13 +98,18 @@ def test_terrain_under_the_camera_has_no_gaps_at_the_near_plane() -> None:
         assert (seen.segmentation == 1).all()
 
 
-def test_a_camera_in_a_closed_room_sees_only_the_room() -> None:
+def _room() -> Scene:
     walls = [
         box((8.4, 0.2, 3.4), (0, side * 3.1, -20), colour=(210, 200, 190)).of_entity(100_001) for side in (-1, 1)
     ] + [box((0.2, 6.4, 3.4), (side * 4.1, 0, -20)).of_entity(100_001) for side in (-1, 1)]
     walls += [box((8.4, 6.4, 0.2), (0, 0, -20 + side * 1.6)).of_entity(100_001) for side in (-1, 1)]
     street = [box((300, 300, 0.2), (0, 0, -0.1)).of_entity(1), box((20, 20, 30), (0, 0, 15)).of_entity(1000)]
-    scene = Scene(street, indoor=walls, rooms=[[0, 0, -21.5, 4, 3, 3.0, 0.0]])
+    ball = box((0.5, 0.5, 1.0), (0, 0, 0.5))
+    return Scene(street, {"ball": [ball]}, indoor=walls, rooms=[[0, 0, -21.5, 4, 3, 3.0, 0.0]])
+
+
+def test_a_camera_in_a_closed_room_sees_only_the_room() -> None:
+    scene = _room()
     yaw = np.arange(8) * np.pi / 4
     cameras = Cameras(np.tile([0.5, -0.5, -20.0], (8, 1)), np.stack([np.cos(yaw), np.sin(yaw), 0.4 * np.sin(yaw)], 1))
     frames = render(scene, cameras)
@@ -112,6 +117,54 @@ def test_a_camera_in_a_closed_room_sees_only_the_room() -> None:
     assert frames.depth.max() < 8.0
     outside = render(scene, Cameras(np.array([[40.0, 0, 2]]), np.array([[-1.0, 0, 0]])))
     assert 100_001 not in outside.segmentation
+
+
+def test_a_view_of_a_room_is_repeated_while_nothing_in_it_can_have_changed() -> None:
+    scene, stills = _room(), Stills()
+    cameras = Cameras(np.array([[-2.0, 0.5, -20.0], [40.0, 0, 2]]), np.array([[1.0, 0, -0.2], [-1.0, 0, 0]]))
+
+    def look(x: float, y: float) -> Frames:
+        pose = np.eye(4)
+        pose[:3, 3] = x, y, -21.5
+        scene.set_rigid([scene.names["ball"]], pose[None], [7])
+        seen = render(scene, cameras, before=stills)
+        fresh = render(scene, cameras)
+        for name in ("rgb", "depth", "segmentation"):
+            assert np.array_equal(getattr(seen, name), getattr(fresh, name))
+        return seen
+
+    look(60.0, 0.0)
+    assert stills.repeated == 0
+    look(61.0, 0.0)  # in the next room but five
+    assert stills.repeated == 1
+    assert 7 in look(1.0, 0.5).segmentation[0]  # it comes in
+    assert stills.repeated == 1
+    look(1.1, 0.5)
+    look(60.0, 0.0)
+    assert stills.repeated == 1
+    assert 7 not in look(60.0, 0.0).segmentation[0]
+    assert stills.repeated == 2
+    scene.place(
+        ["ball"], np.array([[1.0, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, -21.5], [0, 0, 0, 1]])[None], [8], indoor=True
+    )
+    assert 8 in look(60.0, 0.0).segmentation[0]  # something is put there
+    assert stills.repeated == 2
+
+
+def test_colours_that_come_later_are_the_same() -> None:
+    scene, stills = _room(), Stills()
+    pose = np.eye(4)
+    pose[:3, 3] = 30.0, 1.0, 0.0
+    scene.set_rigid([scene.names["ball"]], pose[None], [7])
+    cameras = Cameras(np.array([[-2.0, 0.5, -20.0], [40.0, 0, 2]]), np.array([[1.0, 0, -0.2], [-1.0, 0, 0]]))
+    at_once = render(scene, cameras)
+    for k in range(3):
+        later = render(scene, cameras, before=stills, colours_later=True)
+        assert np.array_equal(later.depth, at_once.depth)
+        assert np.array_equal(later.segmentation, at_once.segmentation)
+        assert len(later.later) == (2 if k == 0 else 1)  # the room's view is repeated
+        later.finish()
+        assert np.array_equal(later.rgb, at_once.rgb)
 
 
 def test_a_thin_far_pole_is_seen_where_its_centre_line_crosses_pixel_centres() -> None:

@@ -1,9 +1,12 @@
 """Buses and bicycles in central Helsinki: timetable, boarding, prices."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from road_city import HALF, road_city
+from vico.assets.vehicles import vehicle_prototypes
 from vico.errors import InputError
 from vico.sim.bodies import Bodies
 from vico.sim.traffic import Traffic
@@ -172,3 +175,19 @@ def test_buses_and_bicycles_overlap_nobody() -> None:
         _advance(traffic, transit)
         overlaps += traffic.overlaps(Bodies.joined([transit.bodies()]))
     assert overlaps == 0
+
+
+def test_doors_open_to_the_kerb() -> None:
+    traffic, transit = _systems(0, 0)
+    x, y, yaw = transit.bus_pose(0)
+    left = np.array([-np.sin(yaw), np.cos(yaw)])
+    assert ((transit.doors(0) - (x, y)) @ left < -1.0).all()
+    traffic.lanes = replace(traffic.lanes, lefthand=True)
+    assert ((transit.doors(0) - (x, y)) @ left > 1.0).all()
+    assert ((transit.exit_spots(0) - (x, y)) @ left > 1.5).all()
+    here, there = vehicle_prototypes()["bus"][0], traffic.prototypes()["bus"][0]
+    corners = there.positions[there.triangles]
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    turned = (outward * there.normals[there.triangles[:, 0]]).sum(axis=1)
+    assert (turned > -1e-9).all()
+    assert np.allclose(there.positions * (1, -1, 1), here.positions)

@@ -7,7 +7,7 @@ be seen from any side at street distance, 300 to 1200 triangles.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
 
@@ -324,6 +324,17 @@ def _fittings(build: _Build, paint: Colour) -> list[Surface]:
         box((build.wheelbase - build.wheel * 2.6, 0.03, 0.12), (middle, half - 0.02, 0.27), colour=_TRIM),
     ]  # fmt: skip
     return parts + _both_sides(sides)
+
+
+def mirrored(surface: Surface) -> Surface:
+    """The same with left and right exchanged."""
+    other = np.array([1.0, -1.0, 1.0], np.float32)
+    return replace(
+        surface,
+        positions=surface.positions * other,
+        normals=surface.normals * other,
+        triangles=np.ascontiguousarray(surface.triangles[:, ::-1]),
+    )
 
 
 def bus(paint: Colour = (0, 114, 178), sign: Colour = (246, 170, 30)) -> Surface:

@@ -66,7 +66,8 @@ def run(
         _restart(out, cut_short, config, place)
     with progress_bars() as report:
         report("setting the scene", 0, 1)
-        sim = Simulation(place, people, config)
+        # Residents act on depth, segmentation and what they hear; only the recorder looks at colours.
+        sim = Simulation(place, people, config, colours_later=True)
         agents = Gatherer(followers_of(people, PublicMap.from_world(place), seed=seed))
         observations, infos = sim.observe()
         report("setting the scene", 1, 1)

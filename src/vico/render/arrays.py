@@ -17,6 +17,8 @@ TILE, BLOCK = 8, 4
 # Triangles whose numbers the shader keeps at hand.
 RECORDS = 2048
 OUTDOORS, INDOORS, ANYWHERE = 0, 1, 2
+# Static instances that are looked at together.
+CROWD = 48
 
 
 class Prototypes(NamedTuple):
@@ -38,8 +40,27 @@ class Prototypes(NamedTuple):
     pixels: NDArray[np.float32]
 
 
+class Groups(NamedTuple):
+    """Neighbours among the static instances, `CROWD` at a time, shape ``(g, ...)``.
+
+    Attributes
+    ----------
+    low, high
+        Corners of a box around them, float32.
+    where
+        OUTDOORS or INDOORS if all are, else ANYWHERE, uint8.
+    radius
+        Of the largest bounding sphere among them, float32.
+    """
+
+    low: NDArray[np.float32]
+    high: NDArray[np.float32]
+    where: NDArray[np.uint8]
+    radius: NDArray[np.float32]
+
+
 class Instances(NamedTuple):
-    """Placed prototypes: the static ones first.
+    """Placed prototypes: the static ones first, in groups of neighbours; then what moves; then spare room.
 
     Attributes
     ----------
@@ -49,6 +70,8 @@ class Instances(NamedTuple):
         OUTDOORS, INDOORS or ANYWHERE, uint8.
     sphere
         Centre and radius of a bounding sphere in the world, float32, shape ``(n, 4)``.
+    groups
+        Of the static ones.
     """
 
     matrix: NDArray[np.float32]
@@ -56,6 +79,7 @@ class Instances(NamedTuple):
     entity: NDArray[np.int32]
     where: NDArray[np.uint8]
     sphere: NDArray[np.float32]
+    groups: Groups
 
 
 class Avatars(NamedTuple):

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,13 +16,14 @@ from numpy.typing import NDArray
 from vico.errors import InputError
 from vico.render.arrays import Buffers, buffers_for
 from vico.render.cameras import Cameras
-from vico.render.raster import draw
+from vico.render.raster import draw, renew_tiles
 from vico.render.scene import Scene
 from vico.render.shade import Light, shade, write_depth, write_entities
-from vico.render.shadows import cast_moving
+from vico.render.shadows import cast_moving, is_disturbed
 from vico.world.mesh import Material, Surface
 
 _MOVING_SHADOW_METRES = 70.0
+_View = tuple[NDArray[np.float64], int, int]
 _EMPTY_U8, _EMPTY_F32, _EMPTY_I32 = np.zeros(0, np.uint8), np.zeros(0, np.float32), np.zeros(0, np.int32)
 
 
@@ -42,6 +44,77 @@ class Frames:
     rgb: NDArray[np.uint8]
     depth: NDArray[np.float32]
     segmentation: NDArray[np.int32]
+    later: tuple[Future[None], ...] = ()
+
+    def finish(self) -> None:
+        """Wait for colours that are still being worked on; see ``colours_later`` of `render`."""
+        for colours in self.later:
+            colours.result()
+
+
+class Stills:
+    """What each camera of a batch saw last, so that a view in which nothing can have changed is not taken again.
+
+    That is: a camera that stands still in a room, where nothing that moves comes into sight or darkens anything,
+    neither then nor now. Out of doors there is always somebody about. Copies equal new pictures bit for bit.
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[int, _Still] = {}
+        self._buffers: dict[int, Buffers] = {}
+        self.repeated = 0
+
+    def buffers(self, k: int, scene: Scene, width: int, height: int) -> Buffers:
+        """Scratch memory that stays camera `k`'s until its colours are there."""
+        self._buffers[k] = _fitting(self._buffers.get(k), scene, width, height)
+        return self._buffers[k]
+
+    def repeat(self, k: int, scene: Scene, view: _View, light: Light, into: Sequence[NDArray[Any]]) -> bool:
+        """Copy the last pictures of camera `k` if they are still right."""
+        still = self._known.get(k)
+        if still is None or still.of != (view[0].tobytes(), scene.version) or still.light is not light:
+            return False
+        if [p.shape for p in still.pictures] != [p.shape for p in into] or still.is_disturbed(scene, view):
+            return False
+        for old, new in zip(still.pictures, into, strict=True):
+            new[...] = old
+        self.repeated += 1
+        return True
+
+    def keep(
+        self, k: int, scene: Scene, view: _View, light: Light, pictures: Sequence[NDArray[Any]], b: Buffers
+    ) -> None:
+        """Remember pictures just taken with buffers `b`, if they can be right again."""
+        self._known.pop(k, None)
+        numbers, width, height = view
+        if numbers[18] < 0.5:
+            return
+        renew_tiles(b.keys, b.tiles, b.blocks, b.strip, width, height)
+        of = numbers.tobytes(), scene.version
+        still = _Still(of, light, b.tiles.copy(), b.blocks.copy(), [p.copy() for p in pictures])
+        if not still.is_disturbed(scene, view):
+            self._known[k] = still
+
+
+@dataclass(frozen=True)
+class _Still:
+    """Pictures, what they were taken of, and the coarse depths of what is seen."""
+
+    of: tuple[bytes, int]
+    light: Light
+    tiles: NDArray[np.uint32]
+    blocks: NDArray[np.uint32]
+    pictures: list[NDArray[Any]]
+
+    def is_disturbed(self, scene: Scene, view: _View) -> bool:
+        n, width, height = view
+        reach = _shadow_reach(n)
+        return bool(is_disturbed(scene.arrays, n, self.light.numbers, self.tiles, self.blocks, width, height, reach))
+
+
+def _shadow_reach(numbers: NDArray[np.float64]) -> float:
+    """How near things that move must be to cast a shadow into a view, metres: in a room only those in it, or close."""
+    return _MOVING_SHADOW_METRES if numbers[18] < 0.5 else float(np.hypot(numbers[22], numbers[23])) * 2.0 + 1.0
 
 
 def render(
@@ -54,6 +127,8 @@ def render(
     samples: int = 1,
     threads: int | None = None,
     without: NDArray[np.int32] | None = None,
+    before: Stills | None = None,
+    colours_later: bool = False,
 ) -> Frames:
     """Take a picture with every camera.
 
@@ -67,6 +142,11 @@ def render(
         not depend on it.
     without
         Entity of a body that each camera does not see (its own), 0 for none, shape ``(k,)``.
+    before
+        What the same cameras saw in the last call: a view in which nothing can have changed is copied.
+    colours_later
+        With `before`: return when depth and segmentation are there, and let threads work on RGB. It must not be read,
+        nor the scene be changed, before `Frames.finish`.
     """
     if samples < 1:
         raise InputError(f"render: samples is {samples}; it must be at least 1")
@@ -87,11 +167,29 @@ def render(
             colours[k] = np.round(blocks.mean(axis=(1, 3))).astype(np.uint8)
             if depth or segmentation:
                 _take(scene, views[k], None, _EMPTY_U8, _part(depths, k), _part(entities, k))
-        else:
-            _take(scene, views[k], light, _part(colours, k), _part(depths, k), _part(entities, k))
+            return
+        pictures = _part(colours, k), _part(depths, k), _part(entities, k)
+        if before is None or light is None:
+            _take(scene, views[k], light, *pictures)
+        elif not before.repeat(k, scene, views[k], light, pictures):
+            b = before.buffers(k, scene, size[1], size[0]) if colours_later else _buffers(scene, size[1], size[0])
+            drawn = _see(scene, views[k], b, pictures[1], pictures[2])
+            if colours_later:
+                seen[k] = drawn
+            else:
+                colour(k, b, drawn)
 
+    def colour(k: int, b: Buffers, drawn: int) -> None:
+        assert before is not None
+        assert light is not None
+        _colour(scene, views[k], light, b, drawn, colours[k])
+        before.keep(k, scene, views[k], light, (_part(colours, k), _part(depths, k), _part(entities, k)), b)
+
+    seen: dict[int, int] = {}
     _for_each(take, count, threads)
-    return Frames(colours, depths, entities)
+    crew = _crew(min(threads or _available(), max(count, 1)))
+    later = [crew.submit(colour, k, before._buffers[k], seen[k]) for k in sorted(seen) if before is not None]
+    return Frames(colours, depths, entities, tuple(later))
 
 
 def render_top_down(scene: Scene, half: float, pixels: int, *, samples: int = 2) -> NDArray[np.uint8]:
@@ -142,21 +240,31 @@ def _part(values: NDArray[Any], k: int) -> NDArray[Any]:
 
 
 def _for_each(task: Callable[[int], None], count: int, threads: int | None) -> None:
-    available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    workers = min(threads or available, count)
+    workers = min(threads or _available(), count)
     if workers <= 1:
         for k in range(count):
             task(k)
         return
     # The compiled code holds no interpreter lock, so plain threads run side by side; unlike numba's own threading
     # layers they may be used from several threads and after a fork.
-    with ThreadPoolExecutor(workers) as pool:
-        list(pool.map(task, range(count)))
+    list(_crew(workers).map(task, range(count)))
 
 
-def _view(
-    scene: Scene, cameras: Cameras, k: int, samples: int, unseen: int = 0
-) -> tuple[NDArray[np.float64], int, int]:
+def _available() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@cache
+def _crew(workers: int) -> ThreadPoolExecutor:
+    """Threads that stay, and with them their scratch memory."""
+    return ThreadPoolExecutor(workers, "render")
+
+
+# A forked child has none of its parent's threads.
+os.register_at_fork(after_in_child=_crew.cache_clear)
+
+
+def _view(scene: Scene, cameras: Cameras, k: int, samples: int, unseen: int = 0) -> _View:
     """The numbers of one camera: position, rotation, focal length, centre, depths, and the room it is in."""
     numbers = np.zeros(32)
     numbers[0:3], numbers[3:12] = cameras.position[k], cameras.rotation[k].ravel()
@@ -175,38 +283,52 @@ def _view(
 
 def _take(
     scene: Scene,
-    view: tuple[NDArray[np.float64], int, int],
+    view: _View,
     light: Light | None,
     rgb: NDArray[np.uint8],
     depth: NDArray[np.float32],
     segmentation: NDArray[np.int32],
 ) -> None:
-    numbers, width, height = view
-    buffers = _buffers(scene, width, height)
-    drawn = draw(scene.arrays, numbers, buffers, width, height)
+    buffers = _buffers(scene, view[1], view[2])
+    drawn = _see(scene, view, buffers, depth, segmentation)
     if light is not None and rgb.size:
-        moving = cast_moving(scene.arrays, numbers, light.numbers, buffers, width, height, _MOVING_SHADOW_METRES)
-        shade(scene.arrays, numbers, light, buffers, drawn, moving, width, height, rgb)
+        _colour(scene, view, light, buffers, drawn, rgb)
+
+
+def _see(
+    scene: Scene, view: _View, buffers: Buffers, depth: NDArray[np.float32], segmentation: NDArray[np.int32]
+) -> int:
+    """Find what is visible; returns how many items were drawn."""
+    numbers, width, height = view
+    drawn: int = draw(scene.arrays, numbers, buffers, width, height)
     if depth.size:
         write_depth(buffers.keys, depth)
     if segmentation.size:
         write_entities(scene.arrays, buffers, drawn, segmentation)
+    return drawn
+
+
+def _colour(scene: Scene, view: _View, light: Light, buffers: Buffers, drawn: int, rgb: NDArray[np.uint8]) -> None:
+    """Colour what is visible."""
+    numbers, width, height = view
+    moving = cast_moving(scene.arrays, numbers, light.numbers, buffers, width, height, _shadow_reach(numbers))
+    shade(scene.arrays, numbers, light, buffers, drawn, moving, width, height, rgb)
 
 
 def _buffers(scene: Scene, width: int, height: int) -> Buffers:
-    """Scratch memory of the running thread, grown where the scene has grown."""
+    """Scratch memory of the running thread."""
+    buffers = _fitting(getattr(_local, "buffers", None), scene, width, height)
+    _local.buffers = buffers
+    return buffers
+
+
+def _fitting(known: Buffers | None, scene: Scene, width: int, height: int) -> Buffers:
+    """The same scratch memory, or new one where the pictures are others or the scene has grown."""
     a = scene.arrays
     items = len(a.cluster_where) + len(a.instances.entity) + len(a.avatars.span) + 1
     spans = (a.clusters.span, a.prototypes.levels.reshape(-1, 4), a.avatars.span)
     most = max(int((s[:, 3] - s[:, 2]).max(initial=1)) for s in spans)
-    known: Buffers | None = getattr(_local, "buffers", None)
-    size = (width, height)
-    if (
-        known is None
-        or getattr(_local, "size", None) != size
-        or len(known.code) < items
-        or known.vertex.shape[1] < most
-    ):
-        known = buffers_for(scene.arrays, width, height)
-        _local.buffers, _local.size = known, size
+    fits = known is not None and len(known.strip) == width and len(known.sun) == width * height
+    if known is None or not fits or len(known.code) < items or known.vertex.shape[1] < most:
+        return buffers_for(a, width, height)
     return known

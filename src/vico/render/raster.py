@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from vico.render.arrays import ANYWHERE, BLOCK, INDOORS, TILE
+from vico.render.arrays import ANYWHERE, BLOCK, CROWD, INDOORS, TILE
 from vico.render.fill import fill, fill_cutout
 from vico.render.geometry import GROUP
 from vico.render.textures import CUTOUT, DOUBLE_SIDED
@@ -19,6 +19,8 @@ from vico.render.textures import CUTOUT, DOUBLE_SIDED
 BUCKETS = 640
 # The coarse depth buffer is renewed after this many triangles.
 _RENEW = 1200
+# ... or after this many boxes were compared with it.
+_ASKED = 48
 # Triangles that touch no more tiles than these are looked up in it one by one.
 _MOST_TILES = 64
 
@@ -71,7 +73,7 @@ def camera_matrix(placed: Any, clusters: int, instances: int, view: Any, code: i
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _set_box(matrix: Any, low: Any, high: Any, box: Any) -> None:
+def set_box(matrix: Any, low: Any, high: Any, box: Any) -> None:
     """Centre and half axes of a bounding box in camera space: 12 numbers."""
     cx = 0.5 * (float(low[0]) + high[0]) - matrix[12]
     cy = 0.5 * (float(low[1]) + high[1]) - matrix[13]
@@ -85,7 +87,7 @@ def _set_box(matrix: Any, low: Any, high: Any, box: Any) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _in_view(box: Any, view: Any, width: int, height: int) -> bool:
+def in_view(box: Any, view: Any, width: int, height: int) -> bool:
     """Whether a box in camera space may touch the viewing frustum."""
     reach = abs(box[5]) + abs(box[8]) + abs(box[11])
     if box[2] + reach <= view[16] or box[2] - reach >= view[17]:
@@ -106,7 +108,7 @@ def _in_view(box: Any, view: Any, width: int, height: int) -> bool:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _hidden(box: Any, view: Any, tiles: Any, blocks: Any, width: int, height: int) -> bool:
+def is_hidden(box: Any, view: Any, tiles: Any, blocks: Any, width: int, height: int) -> bool:
     """Whether everything drawn so far covers a box that lies beyond the near plane."""
     nearest = box[2] - abs(box[5]) - abs(box[8]) - abs(box[11])
     if nearest <= view[16]:
@@ -154,8 +156,42 @@ def _distance(low: Any, high: Any, view: Any) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def worth_drawing(
+    k: int,
+    owners: Any,
+    places: Any,
+    spheres: Any,
+    unseen: int,
+    indoors: bool,
+    view: Any,
+    width: int,
+    height: int,
+) -> bool:
+    """A cheap first test of an instance: a sphere against the planes of the frustum, and its size on screen."""
+    if unseen != 0 and owners[k] == unseen:
+        return False
+    where = places[k]
+    if where != ANYWHERE and (where == INDOORS) != indoors:
+        return False
+    dx, dy, dz = spheres[k, 0] - view[0], spheres[k, 1] - view[1], spheres[k, 2] - view[2]
+    radius = float(spheres[k, 3])
+    ahead = dx * view[9] + dy * view[10] + dz * view[11]
+    if ahead + radius <= view[16] or ahead - radius >= view[17] or 2.0 * radius * view[12] < 0.8 * ahead:
+        return False
+    tangent_x, tangent_y = 0.5 * width / view[12], 0.5 * height / view[12]
+    aside = abs(dx * view[3] + dy * view[4] + dz * view[5])
+    if (aside - ahead * tangent_x) > radius * np.sqrt(1.0 + tangent_x * tangent_x):
+        return False
+    above = abs(dx * view[6] + dy * view[7] + dz * view[8])
+    return (above - ahead * tangent_y) <= radius * np.sqrt(1.0 + tangent_y * tangent_y)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _collect(arrays: Any, view: Any, buffers: Any, width: int, height: int) -> int:
-    """List what may be in view, nearest first."""
+    """List what may be in view, nearest first: clusters, groups of static instances, what moves, avatars.
+
+    Numbered in this order. What is in a group is looked at when its turn comes: most groups are hidden by then.
+    """
     clusters, instances, indoors = len(arrays.cluster_where), int(arrays.counts[0]), view[18] > 0.5
     matrix, box = buffers.matrix, buffers.box
     cluster_where, lows, highs, cones = (
@@ -164,17 +200,15 @@ def _collect(arrays: Any, view: Any, buffers: Any, width: int, height: int) -> i
         arrays.clusters.high,
         arrays.clusters.cone,
     )
-    placed, owners, places = arrays.instances.matrix, arrays.instances.entity, arrays.instances.where
-    prototype, model_low, model_high = arrays.instances.prototype, arrays.prototypes.low, arrays.prototypes.high
     codes, buckets = buffers.code, buffers.bucket
     found = 0
     skip = False
-    camera_matrix(placed, clusters, instances, view, clusters + instances, matrix)
+    camera_matrix(arrays.instances.matrix, clusters, instances, view, clusters + instances, matrix)
     for k in range(clusters):
         if k % GROUP == 0:
             group = k // GROUP
-            _set_box(matrix, arrays.clusters.group_low[group], arrays.clusters.group_high[group], box)
-            skip = not _in_view(box, view, width, height)
+            set_box(matrix, arrays.clusters.group_low[group], arrays.clusters.group_high[group], box)
+            skip = not in_view(box, view, width, height)
         if skip:
             continue
         where = cluster_where[k]
@@ -190,50 +224,42 @@ def _collect(arrays: Any, view: Any, buffers: Any, width: int, height: int) -> i
             length = np.sqrt(dx * dx + dy * dy + dz * dz)
             if dx * cone[0] + dy * cone[1] + dz * cone[2] > cone[3] * length + radius * (1.0 + cone[3]):
                 continue
-        _set_box(matrix, low, high, box)
-        if not _in_view(box, view, width, height):
+        set_box(matrix, low, high, box)
+        if not in_view(box, view, width, height):
             continue
         codes[found] = k
         buckets[found] = min(int(20.0 * np.sqrt(_distance(low, high, view))), BUCKETS - 1)
         found += 1
-    unseen = int(view[27])
-    sphere = arrays.instances.sphere
-    tangent_x, tangent_y = 0.5 * width / view[12], 0.5 * height / view[12]
-    slant_x, slant_y = np.sqrt(1.0 + tangent_x * tangent_x), np.sqrt(1.0 + tangent_y * tangent_y)
-    for k in range(instances):
-        if unseen != 0 and owners[k] == unseen:
+    fixed, groups = int(arrays.counts[1]), arrays.instances.groups
+    where_of, group_low, group_high, widest = groups.where, groups.low, groups.high, groups.radius
+    for k in range(len(where_of)):
+        if where_of[k] != ANYWHERE and (where_of[k] == INDOORS) != indoors:
             continue
-        where = places[k]
-        if where != ANYWHERE and (where == INDOORS) != indoors:
+        low, high = group_low[k], group_high[k]
+        set_box(matrix, low, high, box)
+        nearest = box[2] - abs(box[5]) - abs(box[8]) - abs(box[11])
+        if 2.0 * widest[k] * view[12] < 0.8 * nearest or not in_view(box, view, width, height):
             continue
-        # A cheap first test: a sphere against the planes of the frustum, and its size on screen.
-        dx, dy, dz = sphere[k, 0] - view[0], sphere[k, 1] - view[1], sphere[k, 2] - view[2]
-        radius = float(sphere[k, 3])
-        ahead = dx * view[9] + dy * view[10] + dz * view[11]
-        if ahead + radius <= view[16] or ahead - radius >= view[17] or 2.0 * radius * view[12] < 0.8 * ahead:
-            continue
-        aside = abs(dx * view[3] + dy * view[4] + dz * view[5])
-        above = abs(dx * view[6] + dy * view[7] + dz * view[8])
-        if (aside - ahead * tangent_x) > radius * slant_x or (above - ahead * tangent_y) > radius * slant_y:
-            continue
-        model = prototype[k]
-        low, high = model_low[model], model_high[model]
-        camera_matrix(placed, clusters, instances, view, clusters + k, matrix)
-        _set_box(matrix, low, high, box)
-        if not _in_view(box, view, width, height):
-            continue
-        distance = max(np.sqrt(dx * dx + dy * dy + dz * dz) - radius, 0.0)
         codes[found] = clusters + k
+        buckets[found] = min(int(20.0 * np.sqrt(_distance(low, high, view))), BUCKETS - 1)
+        found += 1
+    unseen, spheres = int(view[27]), arrays.instances.sphere
+    owners, places = arrays.instances.entity, arrays.instances.where
+    for k in range(fixed, instances):
+        if not worth_drawing(k, owners, places, spheres, unseen, indoors, view, width, height):
+            continue
+        dx, dy, dz = spheres[k, 0] - view[0], spheres[k, 1] - view[1], spheres[k, 2] - view[2]
+        distance = max(np.sqrt(dx * dx + dy * dy + dz * dz) - spheres[k, 3], 0.0)
+        codes[found] = clusters + len(where_of) + k - fixed
         buckets[found] = min(int(20.0 * np.sqrt(distance)), BUCKETS - 1)
         found += 1
-    first = clusters + instances
-    camera_matrix(placed, clusters, instances, view, first, matrix)
+    first = clusters + len(where_of) + instances - fixed
     for k in range(arrays.counts[2]):
         if unseen != 0 and arrays.mesh.entity[arrays.avatars.span[k, 0]] == unseen:
             continue
         low, high = arrays.avatars.low[k], arrays.avatars.high[k]
-        _set_box(matrix, low, high, box)
-        if not _in_view(box, view, width, height):
+        set_box(matrix, low, high, box)
+        if not in_view(box, view, width, height):
             continue
         codes[found] = first + k
         buckets[found] = min(int(20.0 * np.sqrt(_distance(low, high, view))), BUCKETS - 1)
@@ -412,11 +438,15 @@ def draw(arrays: Any, view: Any, buffers: Any, width: int, height: int) -> int:
     keys, tiles, matrix, box, v = buffers.keys, buffers.tiles, buffers.matrix, buffers.box, buffers.vertex
     empty = np.uint64(np.float32(1.0 / view[17]).view(np.uint32)) << np.uint64(32)
     keys[:] = empty
-    buffers.slot[:] = -1
     tiles[:] = np.uint32(empty >> np.uint64(32))
     buffers.blocks[:] = np.uint32(empty >> np.uint64(32))
     found = _collect(arrays, view, buffers, width, height)
-    clusters, instances = len(arrays.cluster_where), int(arrays.counts[0])
+    clusters, instances, fixed = len(arrays.cluster_where), int(arrays.counts[0]), int(arrays.counts[1])
+    buffers.slot[clusters + fixed :] = -1
+    group_low, group_high = arrays.instances.groups.low, arrays.instances.groups.high
+    groups = len(group_low)
+    owners, places, spheres = arrays.instances.entity, arrays.instances.where, arrays.instances.sphere
+    unseen, indoors = int(view[27]), view[18] > 0.5
     mesh, textures, flags = arrays.mesh, arrays.textures, arrays.textures.flags
     triangles, corners = mesh.triangle, mesh.corner
     lows, highs, spans = arrays.clusters.low, arrays.clusters.high, arrays.clusters.span
@@ -428,115 +458,139 @@ def draw(arrays: Any, view: Any, buffers: Any, width: int, height: int) -> int:
     drawn_codes, base, firsts, slots = buffers.drawn, buffers.base, buffers.level, buffers.slot
     xs, ys, zs = mesh.x, mesh.y, mesh.z
     near = np.float32(view[16])
-    drawn, number, since = 0, 1, 0
+    drawn, number, since, asked = 0, 1, 0, 0
     ids = np.empty(3, np.int64)
     for k in range(found):
-        code = ordered[k]
-        camera_matrix(placed, clusters, instances, view, code, matrix)
-        model, avatar = 0, 0
-        if code < clusters:
-            _set_box(matrix, lows[code], highs[code], box)
-        elif code < clusters + instances:
-            model = prototype[code - clusters]
-            _set_box(matrix, model_low[model], model_high[model], box)
-        else:
-            avatar = code - clusters - instances
-            _set_box(matrix, avatar_low[avatar], avatar_high[avatar], box)
-        if since > _RENEW:
+        entry = ordered[k]
+        # Few triangles may hide much (a room's walls), so questions asked count, too.
+        if since > _RENEW or (since > 0 and asked > _ASKED):
             renew_tiles(keys, tiles, blocks, strip, width, height)
-            since = 0
-        if _hidden(box, view, tiles, blocks, width, height):
-            continue
-        if code < clusters:
-            span = spans[code]
-        elif code < clusters + instances:
-            span = levels[model, _level(box, view, limits[model])]
-        else:
-            span = avatar_span[avatar]
-        first, end, origin = span[0], span[1], span[2]
-        _transform(xs[origin : span[3]], ys[origin : span[3]], zs[origin : span[3]], matrix, view, v)
-        cut = box[2] - abs(box[5]) - abs(box[8]) - abs(box[11]) <= view[16] * 1.001
-        sx, sy, sw, sz = v[3], v[4], v[5], v[2]
-        for t in range(first, end):
-            a, b, c = triangles[t, 0] - origin, triangles[t, 1] - origin, triangles[t, 2] - origin
-            flag = flags[triangles[t, 3]]
-            if cut and min(sz[a], sz[b], sz[c]) < near:
-                if max(sz[a], sz[b], sz[c]) > near:
-                    ids[0], ids[1], ids[2] = a, b, c
-                    both = flag & DOUBLE_SIDED != 0
-                    _clipped(
-                        triangles[t],
-                        corners,
-                        textures,
-                        flag & CUTOUT != 0,
-                        view,
+            since, asked = 0, 0
+        asked += 1
+        first_code, end_code = entry, entry + 1
+        grouped = clusters <= entry < clusters + groups
+        if grouped:
+            camera_matrix(placed, clusters, instances, view, clusters + instances, matrix)
+            set_box(matrix, group_low[entry - clusters], group_high[entry - clusters], box)
+            if is_hidden(box, view, tiles, blocks, width, height):
+                continue
+            first_code = clusters + (entry - clusters) * CROWD
+            end_code = min(first_code + CROWD, clusters + fixed)
+        elif entry >= clusters:
+            first_code = entry - groups + fixed
+            end_code = first_code + 1
+        for code in range(first_code, end_code):
+            if grouped and not worth_drawing(
+                code - clusters, owners, places, spheres, unseen, indoors, view, width, height
+            ):
+                continue
+            camera_matrix(placed, clusters, instances, view, code, matrix)
+            model, avatar = 0, 0
+            if code < clusters:
+                set_box(matrix, lows[code], highs[code], box)
+            elif code < clusters + instances:
+                model = prototype[code - clusters]
+                set_box(matrix, model_low[model], model_high[model], box)
+                if not in_view(box, view, width, height):
+                    continue
+            else:
+                avatar = code - clusters - instances
+                set_box(matrix, avatar_low[avatar], avatar_high[avatar], box)
+            if since > _RENEW:
+                renew_tiles(keys, tiles, blocks, strip, width, height)
+                since, asked = 0, 0
+            if is_hidden(box, view, tiles, blocks, width, height):
+                continue
+            if code < clusters:
+                span = spans[code]
+            elif code < clusters + instances:
+                span = levels[model, _level(box, view, limits[model])]
+            else:
+                span = avatar_span[avatar]
+            first, end, origin = span[0], span[1], span[2]
+            _transform(xs[origin : span[3]], ys[origin : span[3]], zs[origin : span[3]], matrix, view, v)
+            cut = box[2] - abs(box[5]) - abs(box[8]) - abs(box[11]) <= view[16] * 1.001
+            sx, sy, sw, sz = v[3], v[4], v[5], v[2]
+            for t in range(first, end):
+                a, b, c = triangles[t, 0] - origin, triangles[t, 1] - origin, triangles[t, 2] - origin
+                flag = flags[triangles[t, 3]]
+                if cut and min(sz[a], sz[b], sz[c]) < near:
+                    if max(sz[a], sz[b], sz[c]) > near:
+                        ids[0], ids[1], ids[2] = a, b, c
+                        both = flag & DOUBLE_SIDED != 0
+                        _clipped(
+                            triangles[t],
+                            corners,
+                            textures,
+                            flag & CUTOUT != 0,
+                            view,
+                            keys,
+                            width,
+                            height,
+                            v,
+                            ids,
+                            number + t - first,
+                            both,
+                        )
+                    continue
+                x0, y0 = float(sx[a]), float(sy[a])
+                x1, y1 = float(sx[b]), float(sy[b])
+                x2, y2 = float(sx[c]), float(sy[c])
+                if (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0) >= 0 and flag & DOUBLE_SIDED == 0:
+                    continue
+                if _unseen(tiles, width, height, x0, y0, x1, y1, x2, y2, max(sw[a], sw[b], sw[c])):
+                    continue
+                if flag & CUTOUT:
+                    p, q, r = (
+                        corners[triangles[t, 0]],
+                        corners[triangles[t, 1]],
+                        corners[triangles[t, 2]],
+                    )
+                    fill_cutout(
                         keys,
                         width,
                         height,
-                        v,
-                        ids,
+                        x0,
+                        y0,
+                        float(sw[a]),
+                        x1,
+                        y1,
+                        float(sw[b]),
+                        x2,
+                        y2,
+                        float(sw[c]),
                         number + t - first,
-                        both,
+                        textures,
+                        triangles[t, 3],
+                        float(p[6]),
+                        float(p[7]),
+                        float(q[6]),
+                        float(q[7]),
+                        float(r[6]),
+                        float(r[7]),
                     )
-                continue
-            x0, y0 = float(sx[a]), float(sy[a])
-            x1, y1 = float(sx[b]), float(sy[b])
-            x2, y2 = float(sx[c]), float(sy[c])
-            if (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0) >= 0 and flag & DOUBLE_SIDED == 0:
-                continue
-            if _unseen(tiles, width, height, x0, y0, x1, y1, x2, y2, max(sw[a], sw[b], sw[c])):
-                continue
-            if flag & CUTOUT:
-                p, q, r = (
-                    corners[triangles[t, 0]],
-                    corners[triangles[t, 1]],
-                    corners[triangles[t, 2]],
-                )
-                fill_cutout(
-                    keys,
-                    width,
-                    height,
-                    x0,
-                    y0,
-                    float(sw[a]),
-                    x1,
-                    y1,
-                    float(sw[b]),
-                    x2,
-                    y2,
-                    float(sw[c]),
-                    number + t - first,
-                    textures,
-                    triangles[t, 3],
-                    float(p[6]),
-                    float(p[7]),
-                    float(q[6]),
-                    float(q[7]),
-                    float(r[6]),
-                    float(r[7]),
-                )
-            else:
-                fill(
-                    keys,
-                    width,
-                    height,
-                    x0,
-                    y0,
-                    float(sw[a]),
-                    x1,
-                    y1,
-                    float(sw[b]),
-                    x2,
-                    y2,
-                    float(sw[c]),
-                    number + t - first,
-                )
-        drawn_codes[drawn] = code
-        base[drawn] = number
-        firsts[drawn] = first
-        slots[code] = drawn
-        drawn += 1
-        number += end - first
-        since += end - first
+                else:
+                    fill(
+                        keys,
+                        width,
+                        height,
+                        x0,
+                        y0,
+                        float(sw[a]),
+                        x1,
+                        y1,
+                        float(sw[b]),
+                        x2,
+                        y2,
+                        float(sw[c]),
+                        number + t - first,
+                    )
+            drawn_codes[drawn] = code
+            base[drawn] = number
+            firsts[drawn] = first
+            slots[code] = drawn
+            drawn += 1
+            number += end - first
+            since += end - first
     base[drawn] = number
     return drawn

@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from vico.errors import InputError
-from vico.render.arrays import ANYWHERE, INDOORS, OUTDOORS, Arrays, Avatars, Instances, Prototypes
+from vico.render.arrays import ANYWHERE, CROWD, INDOORS, OUTDOORS, Arrays, Avatars, Groups, Instances, Prototypes
 from vico.render.geometry import Mesh, Soup, clustered, grouped, joined_meshes, mesh_of, simplified, soup_of
 from vico.render.lighting import Lighting, cloud_map, light_numbers, linear_table, sky_table, tone_table, unit
 from vico.render.shade import SKY_SIZE, Light, paint_sky
@@ -103,6 +103,7 @@ class Scene:
                 meshes.append(mesh_of(coarse))
         mesh = joined_meshes(meshes)
         self.names = {name: k for k, name in enumerate(models)}
+        self.version = 0  # of all that stays where it is
         self.rooms = np.zeros((0, 7)) if rooms is None else np.asarray(rooms, np.float64).reshape(-1, 7)
         self._static_size = len(mesh.triangle), len(mesh.x)
         self._lighting = lighting or Lighting()
@@ -118,9 +119,11 @@ class Scene:
             np.zeros(0, np.int32),
             np.zeros(0, np.uint8),
             np.zeros((0, 4), np.float32),
+            _NO_GROUPS,
         )
-        self._placed = empty
-        self._avatar_starts: tuple[NDArray[np.int32], NDArray[np.int64]] | None = None
+        self._placed = self._spacious = empty
+        # The mesh and the arrays whose triangles and colours it holds.
+        self._clothed: tuple[Any, ...] | None = None
         self.arrays = Arrays(
             mesh,
             textures,
@@ -169,7 +172,7 @@ class Scene:
         rows = _rows(transforms, len(number))
         inside = np.broadcast_to(np.asarray(indoor, bool), len(number))
         where = np.where(inside, INDOORS, OUTDOORS).astype(np.uint8)
-        added = self._instances(rows, number, _entities(entities, len(number)), where)
+        added = _neighbours_together(self._instances(rows, number, _entities(entities, len(number)), where))
         moving = self._moving()
         self._placed = _joined(self._placed, added)
         self._set_instances(moving)
@@ -179,6 +182,7 @@ class Scene:
             self._low = np.minimum(self._low, rows[outdoors][:, [3, 7, 11]].min(axis=0))
             self._high = np.maximum(self._high, rows[outdoors][:, [3, 7, 11]].max(axis=0) + np.array([0, 0, 12.0]))
         self._light = self._shadow = self._relief = None
+        self.version += 1
 
     def set_rigid(self, prototype_index: ArrayLike, transforms: ArrayLike, entity: ArrayLike) -> None:
         """Replace the things that move as a whole; `prototype_index` are values of `Scene.names`."""
@@ -204,7 +208,8 @@ class Scene:
         vertices, normals
             World positions and unit normals, float32, shape ``(V, 3)``.
         triangles
-            int32, shape ``(T, 3)``. Passing the same array again is cheaper than passing an equal one.
+            int32, shape ``(T, 3)``. Passing the same arrays of triangles, colours and entities again is cheaper than
+            passing equal ones; they must not be changed in between.
         colour
             sRGB, uint8, shape ``(V, 3)``.
         entity
@@ -213,6 +218,7 @@ class Scene:
         vertex_count, triangle_count = len(vertices), len(triangles)
         if not vertex_count or not triangle_count:
             self._replace(avatars=_no_avatars())
+            self._clothed = None
             self.arrays.counts[2] = 0
             return
         first_triangle, first_vertex = self._static_size
@@ -220,32 +226,43 @@ class Scene:
         if len(mesh.x) < first_vertex + vertex_count or len(mesh.triangle) < first_triangle + triangle_count:
             mesh = _with_room(mesh, self._static_size, vertex_count * 5 // 4, triangle_count * 5 // 4)
             self._replace(mesh=mesh)
-        topology = np.ascontiguousarray(triangles, np.int32)
-        owner = np.ascontiguousarray(entity, np.int32)
-        change = np.flatnonzero(np.diff(owner[topology[:, 0]])) + 1
-        starts = np.concatenate([[0], change, [triangle_count]])
-        span = np.zeros((len(starts) - 1, 4), np.int32)
+        known = self._clothed
+        if known is None or any(a is not b for a, b in zip(known, (mesh, triangles, colour, entity), strict=True)):
+            self._clothed = None
+            span = self._clothe(mesh, triangles, colour, entity)
+            self._clothed = (mesh, triangles, colour, entity)
+        else:
+            span = self.arrays.avatars.span
         low, high = np.zeros((len(span), 3), np.float32), np.zeros((len(span), 3), np.float32)
-        faulty = _set_avatars(
-            mesh,
-            np.ascontiguousarray(vertices, np.float32),
-            np.ascontiguousarray(normals, np.float32),
-            topology,
-            np.ascontiguousarray(colour, np.uint8),
-            owner,
-            starts,
-            linear_table(),
-            first_vertex,
-            first_triangle,
-            self._skin,
-            span,
-            low,
-            high,
-        )
-        if faulty:
-            raise InputError("scene: an avatar's triangle names a vertex that is not there, or a vertex is not finite")
+        posed = np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(normals, np.float32)
+        if not _pose_avatars(mesh, *posed, first_vertex, span, low, high):
+            raise InputError("scene: a vertex of an avatar is not finite")
         self._replace(avatars=Avatars(low, high, span))
         self.arrays.counts[2] = len(span)
+
+    def _clothe(
+        self, mesh: Mesh, triangles: NDArray[np.int32], colour: NDArray[np.uint8], entity: NDArray[np.int32]
+    ) -> NDArray[np.int32]:
+        """Write what of the avatars no pose changes; returns each body's range of triangles and vertices."""
+        first_triangle, first_vertex = self._static_size
+        topology = np.ascontiguousarray(triangles, np.int32)
+        owner = np.ascontiguousarray(entity, np.int32)
+        if topology.min() < 0 or topology.max() >= len(owner):
+            raise InputError("scene: an avatar's triangle names a vertex that is not there")
+        change = np.flatnonzero(np.diff(owner[topology[:, 0]])) + 1
+        starts = np.concatenate([[0], change])
+        ends = np.append(starts[1:], len(topology))
+        vertices = slice(first_vertex, first_vertex + len(owner))
+        mesh.corner[vertices, 6:8] = 0.0
+        mesh.corner[vertices, 8:11] = linear_table()[colour]
+        faces = slice(first_triangle, first_triangle + len(topology))
+        mesh.triangle[faces, :3] = topology + np.int32(first_vertex)
+        mesh.triangle[faces, 3] = self._skin
+        mesh.entity[faces] = owner[topology[:, 0]]
+        least = np.minimum.reduceat(topology.min(axis=1), starts)
+        most = np.maximum.reduceat(topology.max(axis=1), starts)
+        span = [first_triangle + starts, first_triangle + ends, first_vertex + least, first_vertex + most + 1]
+        return np.stack(span, axis=1).astype(np.int32)
 
     def light(self) -> Light:
         """The tables the shader reads, made anew where the light or the static scene has changed."""
@@ -272,14 +289,15 @@ class Scene:
         return int(_room_of(self.rooms, float(position[0]), float(position[1]), float(position[2])))
 
     def _moving(self) -> Instances:
-        fixed = int(self.arrays.counts[1])
+        moving = slice(int(self.arrays.counts[1]), int(self.arrays.counts[0]))
         all_of = self.arrays.instances
         return Instances(
-            all_of.matrix[fixed:],
-            all_of.prototype[fixed:],
-            all_of.entity[fixed:],
-            all_of.where[fixed:],
-            all_of.sphere[fixed:],
+            all_of.matrix[moving],
+            all_of.prototype[moving],
+            all_of.entity[moving],
+            all_of.where[moving],
+            all_of.sphere[moving],
+            _NO_GROUPS,
         )
 
     def _instances(
@@ -297,12 +315,22 @@ class Scene:
         # A hair more than exact, for the rounding.
         radius = np.linalg.norm(high - low, axis=1) / 2 * scale * 1.001
         sphere = np.concatenate([centre, radius[:, None]], axis=1).astype(np.float32)
-        return Instances(rows, number, entity, where, sphere)
+        return Instances(rows, number, entity, where, sphere, _NO_GROUPS)
 
     def _set_instances(self, moving: Instances) -> None:
-        self._replace(instances=_joined(self._placed, moving))
-        self.arrays.counts[0] = len(self.arrays.instances.entity)
-        self.arrays.counts[1] = len(self._placed.entity)
+        """Put what moves behind what stays; copying all that stays is left for when there is no room."""
+        fixed, count = len(self._placed.entity), len(moving.entity)
+        if self._spacious is not self._placed or len(self.arrays.instances.entity) < fixed + count:
+            self._replace(instances=_with_spare(self._placed, count * 5 // 4 + 8))
+            self._spacious = self._placed
+        all_of, rows = self.arrays.instances, slice(fixed, fixed + count)
+        all_of.matrix[rows], all_of.prototype[rows], all_of.entity[rows] = (
+            moving.matrix,
+            moving.prototype,
+            moving.entity,
+        )
+        all_of.where[rows], all_of.sphere[rows] = moving.where, moving.sphere
+        self.arrays.counts[0], self.arrays.counts[1] = fixed + count, fixed
 
     def _replace(
         self, *, mesh: Mesh | None = None, instances: Instances | None = None, avatars: Avatars | None = None
@@ -339,13 +367,54 @@ def _no_avatars() -> Avatars:
 
 
 def _joined(a: Instances, b: Instances) -> Instances:
+    where, sphere = np.concatenate([a.where, b.where]), np.concatenate([a.sphere, b.sphere])
     return Instances(
         np.concatenate([a.matrix, b.matrix]),
         np.concatenate([a.prototype, b.prototype]),
         np.concatenate([a.entity, b.entity]),
-        np.concatenate([a.where, b.where]),
-        np.concatenate([a.sphere, b.sphere]),
+        where,
+        sphere,
+        _groups_of(where, sphere),
     )
+
+
+def _with_spare(a: Instances, spare: int) -> Instances:
+    def wide(values: NDArray[Any]) -> NDArray[Any]:
+        return np.concatenate([values, np.zeros((spare, *values.shape[1:]), values.dtype)])
+
+    return Instances(wide(a.matrix), wide(a.prototype), wide(a.entity), wide(a.where), wide(a.sphere), a.groups)
+
+
+_NO_GROUPS = Groups(
+    np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), np.zeros(0, np.uint8), np.zeros(0, np.float32)
+)
+
+
+def _groups_of(where: NDArray[np.uint8], sphere: NDArray[np.float32]) -> Groups:
+    if not len(where):
+        return _NO_GROUPS
+    starts = np.arange(0, len(where), CROWD)
+    radius = sphere[:, 3:]
+    # A hair more than exact, for the rounding of sums in single precision.
+    low = np.minimum.reduceat(sphere[:, :3] - radius, starts) - np.float32(0.001)
+    high = np.maximum.reduceat(sphere[:, :3] + radius, starts) + np.float32(0.001)
+    least, most = np.minimum.reduceat(where, starts), np.maximum.reduceat(where, starts)
+    mixed = np.where(least == most, least, np.uint8(ANYWHERE)).astype(np.uint8)
+    return Groups(low, high, mixed, np.maximum.reduceat(radius[:, 0], starts))
+
+
+def _neighbours_together(a: Instances) -> Instances:
+    """The same things in another order: outdoors, then indoors, each along a curve that fills space."""
+    if not len(a.entity):
+        return a
+    centre = a.sphere[:, :3].astype(np.float64)
+    cell = np.floor((centre - centre.min(axis=0)) / max(float(np.ptp(centre, axis=0).max()), 1e-6) * 1023.0)
+    code = np.zeros(len(cell), np.int64)
+    for bit in range(10):
+        for axis in range(3):
+            code |= ((cell[:, axis].astype(np.int64) >> bit) & 1) << (3 * bit + axis)
+    order = np.lexsort((np.arange(len(code)), code, a.where))
+    return Instances(a.matrix[order], a.prototype[order], a.entity[order], a.where[order], a.sphere[order], a.groups)
 
 
 def _rows(transforms: ArrayLike, count: int) -> NDArray[np.float32]:
@@ -396,52 +465,32 @@ def _room_of(rooms: NDArray[np.float64], x: float, y: float, z: float) -> int:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _set_avatars(
+def _pose_avatars(
     mesh: Mesh,
     vertices: NDArray[np.float32],
     normals: NDArray[np.float32],
-    triangles: NDArray[np.int32],
-    colour: NDArray[np.uint8],
-    entity: NDArray[np.int32],
-    starts: NDArray[np.int64],
-    linear: NDArray[np.float32],
     first_vertex: int,
-    first_triangle: int,
-    material: int,
     span: NDArray[np.int32],
     low: NDArray[np.float32],
     high: NDArray[np.float32],
 ) -> bool:
-    count = len(vertices)
-    faulty = False
-    xs, ys, zs, corners, faces, owners = mesh.x, mesh.y, mesh.z, mesh.corner, mesh.triangle, mesh.entity
-    for i in range(count):
+    """Write positions, normals and bounds; False if a position is not finite."""
+    xs, ys, zs, corners = mesh.x, mesh.y, mesh.z, mesh.corner
+    total = np.float32(0.0)
+    for i in range(len(vertices)):
         k = first_vertex + i
         x, y, z = vertices[i, 0], vertices[i, 1], vertices[i, 2]
         xs[k], ys[k], zs[k] = x, y, z
-        if not np.isfinite(x + y + z):
-            faulty = True
+        # Zero for finite numbers, else none.
+        total += (x - x) + (y - y) + (z - z)
         corner = corners[k]
         corner[0], corner[1], corner[2] = x, y, z
         corner[3], corner[4], corner[5] = normals[i, 0], normals[i, 1], normals[i, 2]
-        corner[6], corner[7] = 0.0, 0.0
-        corner[8], corner[9], corner[10] = linear[colour[i, 0]], linear[colour[i, 1]], linear[colour[i, 2]]
     for body in range(len(span)):
-        least, most = count, -1
-        for t in range(starts[body], starts[body + 1]):
-            a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-            least, most = min(least, a, b, c), max(most, a, b, c)
-            if least < 0 or most >= count:
-                return True
-            face = faces[first_triangle + t]
-            face[0], face[1], face[2], face[3] = first_vertex + a, first_vertex + b, first_vertex + c, material
-            owners[first_triangle + t] = entity[a]
-        span[body, 0], span[body, 1] = first_triangle + starts[body], first_triangle + starts[body + 1]
-        span[body, 2], span[body, 3] = first_vertex + least, first_vertex + most + 1
         for axis in range(3):
             line = xs if axis == 0 else (ys if axis == 1 else zs)
-            smallest = largest = line[first_vertex + least]
-            for v in range(first_vertex + least, first_vertex + most + 1):
+            smallest = largest = line[span[body, 2]]
+            for v in range(span[body, 2], span[body, 3]):
                 smallest, largest = min(smallest, line[v]), max(largest, line[v])
             low[body, axis], high[body, axis] = smallest, largest
-    return faulty
+    return bool(total == 0.0)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vico.render.arrays import INDOORS
 from vico.render.fill import PAD, fill, fill_cutout
+from vico.render.raster import camera_matrix, in_view, is_hidden, set_box, worth_drawing
 from vico.render.textures import CUTOUT, DOUBLE_SIDED
 
 
@@ -155,6 +156,98 @@ def _box_blur(values: NDArray[np.float32], reach: int, axis: int) -> NDArray[np.
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _cast(
+    arrays: Any,
+    k: int,
+    view: Any,
+    numbers: Any,
+    width: int,
+    height: int,
+    reach: float,
+    centre: Any,
+    corners: Any,
+    inverse: Any,
+    sun: Any,
+    points: Any,
+    bounds: Any,
+) -> bool:
+    """Where on the screen a moving thing may darken something: False if nowhere.
+
+    Leaves its centre, half axes (columns of `corners`), world-to-unit-box transform, the sun's direction in that
+    frame, and the bounds (first and end column, first and end row).
+    """
+    rigid, indoors = arrays.counts[0], view[18] > 0.5
+    sx, sy, sz = float(numbers[18]), float(numbers[19]), float(numbers[20])
+    round_shape = k >= rigid
+    if round_shape:
+        if indoors and view[27] != 0.0 and arrays.mesh.entity[arrays.avatars.span[k - rigid, 0]] == int(view[27]):
+            # Nobody sees their own body: in a room, its shadow would be a stain around nothing.
+            return False
+        low, high = arrays.avatars.low[k - rigid], arrays.avatars.high[k - rigid]
+        corners[:, :] = 0.0
+        for axis in range(3):
+            centre[axis] = 0.5 * (float(low[axis]) + high[axis])
+            corners[axis, axis] = 0.5 * (float(high[axis]) - low[axis])
+        corners[0, 0], corners[1, 1] = min(corners[0, 0], 0.30), min(corners[1, 1], 0.30)
+    else:
+        m = arrays.instances.matrix[k]
+        model = arrays.instances.prototype[k]
+        low, high = arrays.prototypes.low[model], arrays.prototypes.high[model]
+        for row in range(3):
+            total = float(m[row * 4 + 3])
+            for axis in range(3):
+                total += m[row * 4 + axis] * 0.5 * (float(low[axis]) + high[axis])
+                corners[row, axis] = m[row * 4 + axis] * 0.5 * (float(high[axis]) - low[axis])
+            centre[row] = total
+    gx, gy, gz = centre[0] - view[0], centre[1] - view[1], centre[2] - view[2]
+    if gx * gx + gy * gy + gz * gz > reach * reach:
+        return False
+    up = abs(corners[2, 0]) + abs(corners[2, 1]) + abs(corners[2, 2])
+    for axis in range(3):
+        length = corners[0, axis] ** 2 + corners[1, axis] ** 2 + corners[2, axis] ** 2
+        if length < 1e-8:
+            return False
+        for row in range(3):
+            inverse[axis, row] = corners[row, axis] / length
+        inverse[axis, 3] = -(inverse[axis, 0] * centre[0] + inverse[axis, 1] * centre[1] + inverse[axis, 2] * centre[2])
+        sun[axis] = inverse[axis, 0] * sx + inverse[axis, 1] * sy + inverse[axis, 2] * sz
+    # The box and its shadow on the ground beneath, with a rim for the contact shadow; in rooms the latter alone.
+    throw = 0.0 if indoors else min(2.0 * up / max(sz, 0.08), 14.0)
+    rim, middle, tall = 1.3, 0.0, 1.1
+    if indoors and round_shape:
+        rim, middle, tall = 2.0, -1.0, 0.5 / up
+    for corner in range(16):
+        a = rim if corner & 1 else -rim
+        b = rim if corner & 2 else -rim
+        c = middle + (tall if corner & 4 else -tall)
+        away = throw if corner & 8 else 0.0
+        wx = centre[0] + a * corners[0, 0] + b * corners[0, 1] + c * corners[0, 2] - away * sx - view[0]
+        wy = centre[1] + a * corners[1, 0] + b * corners[1, 1] + c * corners[1, 2] - away * sy - view[1]
+        wz = centre[2] + a * corners[2, 0] + b * corners[2, 1] + c * corners[2, 2] - away * sz - view[2]
+        points[corner, 0] = wx * view[3] + wy * view[4] + wz * view[5]
+        points[corner, 1] = wx * view[6] + wy * view[7] + wz * view[8]
+        points[corner, 2] = wx * view[9] + wy * view[10] + wz * view[11]
+    near = float(view[16])
+    left, right, top, bottom = 1e30, -1e30, 1e30, -1e30
+    for i in range(16):
+        if points[i, 2] <= near:
+            continue
+        w = view[12] / points[i, 2]
+        px, py = view[14] + w * points[i, 0], view[15] + w * points[i, 1]
+        left, right, top, bottom = min(left, px), max(right, px), min(top, py), max(bottom, py)
+        for j in range(16):
+            # What lies behind the near plane is cut off there.
+            if points[j, 2] <= near:
+                s = (points[i, 2] - near) / (points[i, 2] - points[j, 2])
+                px = view[14] + view[12] / near * (points[i, 0] + s * (points[j, 0] - points[i, 0]))
+                py = view[15] + view[12] / near * (points[i, 1] + s * (points[j, 1] - points[i, 1]))
+                left, right, top, bottom = min(left, px), max(right, px), min(top, py), max(bottom, py)
+    bounds[0], bounds[1] = int(min(max(left, 0.0), 1e9)), int(max(min(right + 1.0, float(width)), -1.0))
+    bounds[2], bounds[3] = int(min(max(top, 0.0), 1e9)), int(max(min(bottom + 1.0, float(height)), -1.0))
+    return bool(bounds[0] < bounds[1] and bounds[2] < bounds[3])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def cast_moving(arrays: Any, view: Any, numbers: Any, buffers: Any, width: int, height: int, reach: float) -> bool:
     """Darken `buffers.sun` and `buffers.contact` where moving things stand between a pixel and the sun or the ground.
 
@@ -162,84 +255,17 @@ def cast_moving(arrays: Any, view: Any, numbers: Any, buffers: Any, width: int, 
     through it, the darker, which softens the rim. Only casters within `reach` metres are taken. Returns whether there
     were any.
     """
-    clusters, rigid = len(arrays.cluster_where), arrays.counts[0]
-    fixed, avatars = arrays.counts[1], arrays.counts[2]
-    sx, sy, sz = float(numbers[18]), float(numbers[19]), float(numbers[20])
-    inverse = np.zeros((3, 4))
-    half, sun = np.zeros(3), np.zeros(3)
-    centre = np.zeros(3)
-    corners = np.zeros((3, 3))
+    clusters, rigid, indoors = len(arrays.cluster_where), arrays.counts[0], view[18] > 0.5
+    inverse, corners, points = np.zeros((3, 4)), np.zeros((3, 3)), np.zeros((16, 3))
+    sun, centre, bounds = np.zeros(3), np.zeros(3), np.zeros(4, np.int64)
     started = False
     pixel = 1.0 / view[12]
-    for k in range(fixed, rigid + avatars):
-        # The caster's centre, half axes (columns of `corners`) and the world-to-unit-box transform.
+    for k in range(arrays.counts[1], rigid + arrays.counts[2]):
         round_shape = k >= rigid
-        if round_shape:
-            low, high = arrays.avatars.low[k - rigid], arrays.avatars.high[k - rigid]
-            for axis in range(3):
-                centre[axis] = 0.5 * (float(low[axis]) + high[axis])
-                half[axis] = 0.5 * (float(high[axis]) - low[axis])
-            half[0], half[1] = min(half[0], 0.30), min(half[1], 0.30)
-            corners[:, :] = 0.0
-            for axis in range(3):
-                corners[axis, axis] = half[axis]
-        else:
-            m = arrays.instances.matrix[k]
-            model = arrays.instances.prototype[k]
-            low, high = arrays.prototypes.low[model], arrays.prototypes.high[model]
-            for row in range(3):
-                total = float(m[row * 4 + 3])
-                for axis in range(3):
-                    total += m[row * 4 + axis] * 0.5 * (float(low[axis]) + high[axis])
-                    corners[row, axis] = m[row * 4 + axis] * 0.5 * (float(high[axis]) - low[axis])
-                centre[row] = total
-        gx, gy, gz = centre[0] - view[0], centre[1] - view[1], centre[2] - view[2]
-        if gx * gx + gy * gy + gz * gz > reach * reach:
+        if not _cast(arrays, k, view, numbers, width, height, reach, centre, corners, inverse, sun, points, bounds):
             continue
+        x_first, x_last, y_first, y_last = bounds[0], bounds[1], bounds[2], bounds[3]
         up = abs(corners[2, 0]) + abs(corners[2, 1]) + abs(corners[2, 2])
-        degenerate = False
-        for axis in range(3):
-            length = corners[0, axis] ** 2 + corners[1, axis] ** 2 + corners[2, axis] ** 2
-            if length < 1e-8:
-                degenerate = True
-                break
-            for row in range(3):
-                inverse[axis, row] = corners[row, axis] / length
-            inverse[axis, 3] = -(
-                inverse[axis, 0] * centre[0] + inverse[axis, 1] * centre[1] + inverse[axis, 2] * centre[2]
-            )
-            sun[axis] = inverse[axis, 0] * sx + inverse[axis, 1] * sy + inverse[axis, 2] * sz
-        if degenerate:
-            continue
-        # Screen bounds of the box and of its shadow on the ground beneath, with a rim for the contact shadow.
-        throw = min(2.0 * up / max(sz, 0.08), 14.0)
-        left, right, top, bottom = 1e30, -1e30, 1e30, -1e30
-        behind, ahead = False, False
-        for corner in range(16):
-            a = 1.3 if corner & 1 else -1.3
-            b = 1.3 if corner & 2 else -1.3
-            c = 1.1 if corner & 4 else -1.1
-            away = throw if corner & 8 else 0.0
-            wx = centre[0] + a * corners[0, 0] + b * corners[0, 1] + c * corners[0, 2] - away * sx - view[0]
-            wy = centre[1] + a * corners[1, 0] + b * corners[1, 1] + c * corners[1, 2] - away * sy - view[1]
-            wz = centre[2] + a * corners[2, 0] + b * corners[2, 1] + c * corners[2, 2] - away * sz - view[2]
-            cz = wx * view[9] + wy * view[10] + wz * view[11]
-            if cz <= view[16]:
-                behind = True
-                continue
-            ahead = True
-            w = view[12] / cz
-            px = view[14] + w * (wx * view[3] + wy * view[4] + wz * view[5])
-            py = view[15] + w * (wx * view[6] + wy * view[7] + wz * view[8])
-            left, right, top, bottom = min(left, px), max(right, px), min(top, py), max(bottom, py)
-        if not ahead:
-            continue
-        if behind:
-            left, top, right, bottom = 0.0, 0.0, float(width), float(height)
-        x_first, x_last = int(max(left, 0.0)), int(min(right + 1.0, float(width)))
-        y_first, y_last = int(max(top, 0.0)), int(min(bottom + 1.0, float(height)))
-        if x_first >= x_last or y_first >= y_last:
-            continue
         if not started:
             buffers.sun[:] = np.float32(1.0)
             buffers.contact[:] = np.float32(1.0)
@@ -266,33 +292,34 @@ def cast_moving(arrays: Any, view: Any, numbers: Any, buffers: Any, width: int, 
                 a = inverse[0, 0] * x + inverse[0, 1] * y + inverse[0, 2] * z + inverse[0, 3]
                 b = inverse[1, 0] * x + inverse[1, 1] * y + inverse[1, 2] * z + inverse[1, 3]
                 c = inverse[2, 0] * x + inverse[2, 1] * y + inverse[2, 2] * z + inverse[2, 3]
-                if round_shape:
-                    # Distances along the ray at which it enters and leaves the unit ball.
-                    qa = sun[0] * sun[0] + sun[1] * sun[1] + sun[2] * sun[2]
-                    qb = a * sun[0] + b * sun[1] + c * sun[2]
-                    qc = a * a + b * b + c * c - 1.0
-                    root = qb * qb - qa * qc
-                    near, far = 0.0, -1.0
-                    if root > 0.0:
-                        root = np.sqrt(root)
-                        near, far = (-qb - root) / qa, (-qb + root) / qa
-                    soft = 0.22
-                else:
-                    near, far = -1e30, 1e30
-                    for axis in range(3):
-                        o = a if axis == 0 else (b if axis == 1 else c)
-                        d = sun[axis]
-                        if abs(d) < 1e-9:
-                            if abs(o) > 1.0:
-                                far = -1e30
-                        else:
-                            t0, t1 = (-1.0 - o) / d, (1.0 - o) / d
-                            near, far = max(near, min(t0, t1)), min(far, max(t0, t1))
-                    soft = 0.5
-                way = far - max(near, 0.0)
-                if far > 0.0 and way > 0.0:
-                    dark = min(way / soft, 1.0)
-                    buffers.sun[row * width + column] *= np.float32(1.0 - dark * dark * (3.0 - 2.0 * dark))
+                if not indoors:
+                    if round_shape:
+                        # Distances along the ray at which it enters and leaves the unit ball.
+                        qa = sun[0] * sun[0] + sun[1] * sun[1] + sun[2] * sun[2]
+                        qb = a * sun[0] + b * sun[1] + c * sun[2]
+                        qc = a * a + b * b + c * c - 1.0
+                        root = qb * qb - qa * qc
+                        near, far = 0.0, -1.0
+                        if root > 0.0:
+                            root = np.sqrt(root)
+                            near, far = (-qb - root) / qa, (-qb + root) / qa
+                        soft = 0.22
+                    else:
+                        near, far = -1e30, 1e30
+                        for axis in range(3):
+                            o = a if axis == 0 else (b if axis == 1 else c)
+                            d = sun[axis]
+                            if abs(d) < 1e-9:
+                                if abs(o) > 1.0:
+                                    far = -1e30
+                            else:
+                                t0, t1 = (-1.0 - o) / d, (1.0 - o) / d
+                                near, far = max(near, min(t0, t1)), min(far, max(t0, t1))
+                        soft = 0.5
+                    way = far - max(near, 0.0)
+                    if far > 0.0 and way > 0.0:
+                        dark = min(way / soft, 1.0)
+                        buffers.sun[row * width + column] *= np.float32(1.0 - dark * dark * (3.0 - 2.0 * dark))
                 if abs(z - foot) < 0.5:
                     # Under and beside the thing even the sky is hidden.
                     spread = np.sqrt(a * a + b * b) if round_shape else max(abs(a), abs(b))
@@ -302,3 +329,48 @@ def cast_moving(arrays: Any, view: Any, numbers: Any, buffers: Any, width: int, 
                         dark = min(dark * (1.5 if round_shape else 4.0), 0.75)
                         buffers.contact[row * width + column] *= np.float32(1.0 - dark)
     return started
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def is_disturbed(
+    arrays: Any, view: Any, numbers: Any, tiles: Any, blocks: Any, width: int, height: int, reach: float
+) -> bool:
+    """Whether a moving thing may be seen in a room, or darken something that is.
+
+    `tiles` and `blocks` are the coarse depths of the room without such things: what lies behind them all is hidden.
+    """
+    rigid, fixed, unseen = int(arrays.counts[0]), int(arrays.counts[1]), int(view[27])
+    clusters = len(arrays.cluster_where)
+    spheres, owners, places = arrays.instances.sphere, arrays.instances.entity, arrays.instances.where
+    placed, prototype = arrays.instances.matrix, arrays.instances.prototype
+    model_low, model_high = arrays.prototypes.low, arrays.prototypes.high
+    matrix, box = np.zeros(16, np.float32), np.zeros(16)
+    inverse, corners, points = np.zeros((3, 4)), np.zeros((3, 3)), np.zeros((16, 3))
+    sun, centre, bounds = np.zeros(3), np.zeros(3), np.zeros(4, np.int64)
+    for k in range(fixed, rigid):
+        if worth_drawing(k, owners, places, spheres, unseen, view[18] > 0.5, view, width, height):
+            camera_matrix(placed, clusters, rigid, view, clusters + k, matrix)
+            set_box(matrix, model_low[prototype[k]], model_high[prototype[k]], box)
+            if in_view(box, view, width, height) and not is_hidden(box, view, tiles, blocks, width, height):
+                return True
+        if _cast(arrays, k, view, numbers, width, height, reach, centre, corners, inverse, sun, points, bounds):
+            return True
+    camera_matrix(placed, clusters, rigid, view, clusters + rigid, matrix)
+    low, high = np.zeros(3), np.zeros(3)
+    for k in range(arrays.counts[2]):
+        if unseen != 0 and arrays.mesh.entity[arrays.avatars.span[k, 0]] == unseen:
+            continue
+        for axis in range(3):
+            low[axis], high[axis] = float(arrays.avatars.low[k, axis]), float(arrays.avatars.high[k, axis])
+        set_box(matrix, low, high, box)
+        if in_view(box, view, width, height) and not is_hidden(box, view, tiles, blocks, width, height):
+            return True
+        # The floor around somebody's feet, which is all that they darken in a room.
+        for axis in range(2):
+            middle, half = 0.5 * (low[axis] + high[axis]), min(0.5 * (high[axis] - low[axis]), 0.30)
+            low[axis], high[axis] = middle - 2.01 * half, middle + 2.01 * half
+        low[2], high[2] = low[2] - 0.51, low[2] + 0.51
+        set_box(matrix, low, high, box)
+        if in_view(box, view, width, height) and not is_hidden(box, view, tiles, blocks, width, height):
+            return True
+    return False

@@ -97,7 +97,7 @@ class Indoor:
     def floors_at(self, rooms: NDArray[np.int32], xy: NDArray[np.float64]) -> NDArray[np.float64]:
         """Heights of the floors under several people, metres, shape ``(n,)``."""
         heights: NDArray[np.float64] = self.floor[rooms]
-        for k in np.flatnonzero(np.isin(rooms, self._stairs_index)):
+        for k in np.flatnonzero(self._climbs[rooms]):
             heights[k] = self.floor_at(int(rooms[k]), xy[k])
         return heights
 
@@ -107,8 +107,8 @@ class Indoor:
         return frozenset(i for i, room in enumerate(self.rooms) if room.rise)
 
     @cached_property
-    def _stairs_index(self) -> NDArray[np.int32]:
-        return np.array(sorted(self.stairs), np.int32)
+    def _climbs(self) -> NDArray[np.bool_]:
+        return np.array([bool(room.rise) for room in self.rooms], bool)
 
     def arrival(self, room: int, origin: int) -> NDArray[np.float64]:
         """Where people stand who come into a room from another one (-1: from outdoors), ENU metres."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -46,6 +46,9 @@ class Eyes(Protocol):
 
     def names(self, entities: Sequence[int]) -> dict[int, dict[str, str]]:
         """Kind and name of entities that can be seen."""
+
+    def under_way(self) -> Callable[[], None]:
+        """What to call, from any thread, to wait for the colours of the last look."""
 
     def moved_to(self, sim: Any) -> Eyes:
         """The same for another simulation, with as much of the scene as can be kept."""

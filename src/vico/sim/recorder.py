@@ -17,7 +17,7 @@ import json
 import resource
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from fractions import Fraction
 from pathlib import Path
@@ -190,11 +190,12 @@ class Recorder:
         self._finish_filming()
         pictures = {name: seen["rgb"] for name, seen in observations.items() if "rgb" in seen}
         if pictures:
-            self._filming = self._film_crew.submit(self._film, pictures)
+            self._filming = self._film_crew.submit(self._film, pictures, self.sim.colours())
         seconds = self.sim.metrics.seconds
         seconds["films"] = seconds.get("films", 0.0) + time.perf_counter() - watch
 
-    def _film(self, pictures: Mapping[str, NDArray[np.uint8]]) -> None:
+    def _film(self, pictures: Mapping[str, NDArray[np.uint8]], colours: Callable[[], None]) -> None:
+        colours()
         for name, picture in pictures.items():
             if name not in self._films:
                 self._films[name] = ViewFilm(self.out / "views" / f"{name}.mp4", picture.shape[0])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vico.assets.people import PASSERS_BY, Appearance, body_of, passer_by
 from vico.community.model import Resident
-from vico.render import Cameras, Lighting, render
+from vico.render import Cameras, Frames, Lighting, Stills, render
 from vico.render.skinning import Crowd, crowd_of, skin
 from vico.render.world_scene import scene_of
 from vico.sim.animation import clip_index, hand_frames, pose, stride_length, style_of
@@ -41,6 +41,10 @@ class Seen(Protocol):
         """What the run is asked to be."""
 
     @property
+    def colours_later(self) -> bool:
+        """Whether `look` may return before RGB is there."""
+
+    @property
     def stage(self) -> Stage:
         """Everybody and everything, as it is now."""
 
@@ -67,6 +71,7 @@ class SceneEyes:
 
     def __init__(self, sim: Seen) -> None:
         self._image = sim.config.image
+        self._frames: Frames | None = None
         self._scene = scene_of(sim.world, prototypes=_shapes(sim))
         self._attach(sim)
 
@@ -81,6 +86,8 @@ class SceneEyes:
     def _attach(self, sim: Seen) -> None:
         self._sim = sim
         self._lit = -1.0
+        self.finish()
+        self._stills = Stills()
         self._people(sim)
 
     def _people(self, sim: Seen) -> None:
@@ -104,14 +111,28 @@ class SceneEyes:
 
     def look(self, stage: Stage, poses: NDArray[np.float64], own: NDArray[np.int32]) -> Views:
         """Render one view a pose, in one call; each without the body that is its own."""
+        self.finish()
         self._light(stage)
         self._set_people_and_things(stage)
         cameras = Cameras(poses[:, :3], poses[:, 3:], width=self._image, height=self._image)
-        frames = render(self._scene, cameras, without=own)
+        later = self._sim.colours_later
+        frames = render(self._scene, cameras, without=own, before=self._stills, colours_later=later)
+        self._frames = frames if later else None
         return Views(frames.rgb, frames.depth, frames.segmentation, cameras.extrinsics, cameras.intrinsics)
+
+    def finish(self) -> None:
+        """Wait for colours that are still being worked on."""
+        if self._frames is not None:
+            self._frames.finish()
+            self._frames = None
+
+    def under_way(self) -> Callable[[], None]:
+        """What to call, from any thread, to wait for the colours of the last look."""
+        return self._frames.finish if self._frames is not None else _nothing
 
     def photograph(self, stage: Stage, cameras: Cameras, *, samples: int = 2) -> NDArray[np.uint8]:
         """Take stills with any cameras, smoothed by `samples` squared; uint8, shape ``(k, h, w, 3)``."""
+        self.finish()
         self._light(stage)
         self._set_people_and_things(stage)
         return render(self._scene, cameras, depth=False, segmentation=False, samples=samples).rgb
@@ -182,6 +203,10 @@ class SceneEyes:
                 transforms[k, :3, 3] = p.position[i] + np.array([cy * x - sy * y, sy * x + cy * y, hanging])
         index = np.array([names.index(name) for name in goods.prototypes], np.int32)
         return Drawn(names, index, transforms.astype(np.float32), goods.entity)
+
+
+def _nothing() -> None:
+    pass
 
 
 def _shapes(sim: Seen) -> dict[str, Sequence[Surface]]:

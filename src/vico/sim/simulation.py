@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -82,6 +82,9 @@ class Simulation:
         What the run is asked to be.
     eyes
         Renders what agents see; None makes the usual one the first time it is needed.
+    colours_later
+        RGB of observations is worked on while the next step goes on: faster where nobody but a recorder looks at it.
+        It must not be read before `Simulation.colours` was called.
 
     Raises
     ------
@@ -96,6 +99,7 @@ class Simulation:
         config: SimConfig | None = None,
         *,
         eyes: Eyes | None = None,
+        colours_later: bool = False,
     ) -> None:
         if community is not None and community.world.digest != world.digest:
             raise InputError(
@@ -103,6 +107,7 @@ class Simulation:
                 f"({world.manifest.name!r}); give that world, or build a community for this one"
             )
         self.world = world
+        self.colours_later = colours_later
         self.community = community
         self.config = config or SimConfig()
         self.metrics = Metrics()
@@ -238,6 +243,10 @@ class Simulation:
             self._eyes = self._eyes.moved_to(self)
         self._attached = True
         return self._eyes
+
+    def colours(self) -> Callable[[], None]:
+        """What to call, from any thread, to wait for the RGB of the last observations."""
+        return self._eyes.under_way() if self._eyes is not None else lambda: None
 
     @property
     def made_eyes(self) -> Eyes | None:

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from vico.assets.vehicles import CAR_KINDS, vehicle_prototypes, vehicle_size
+from vico.assets.vehicles import CAR_KINDS, mirrored, vehicle_prototypes, vehicle_size
 from vico.errors import InputError
 from vico.sim import traffic_vehicles as driving
 from vico.sim import traffic_walkers as walking
@@ -106,6 +106,7 @@ class Traffic:
             haste=np.concatenate([makes_random.uniform(0.85, 1.05, cars), np.full(len(buses), 0.95)]),
             line=np.concatenate([np.full(cars, -1), np.asarray(buses, np.int64)]).astype(np.int32),
         )
+        self._bodies: Bodies | None = None  # as they stand since they last moved; asked for by everybody
         self.fleet = _new_fleet(self.vehicles, seed)
         self.crowd = _new_crowd(pedestrians, seed)
         self.gates = driving.Gates(
@@ -196,12 +197,18 @@ class Traffic:
         for name, part in self._parts():
             for field in part._fields:
                 getattr(part, field)[...] = arrays[f"{name}.{field}"]
+        self._bodies = None
 
     def _parts(self) -> list[tuple[str, Any]]:
         return [("fleet", self.fleet), ("crowd", self.crowd), ("gates", self.gates), ("shapes", self.shapes)]
 
     def bodies(self) -> Bodies:
         """Vehicles, then pedestrians."""
+        if self._bodies is None:
+            self._bodies = self._bodies_now()
+        return self._bodies
+
+    def _bodies_now(self) -> Bodies:
         n = len(self.shapes.x)
         xy = np.column_stack([self.shapes.x, self.shapes.y])
         return Bodies(
@@ -238,6 +245,7 @@ class Traffic:
         driving.relocate(net, makes, fleet, gates, all_, self._entries, _ENTRY_SPEED, PATIENCE)
         for field in ("x", "y", "yaw", "vx", "vy"):
             getattr(self.shapes, field)[:] = getattr(all_, field)[:n]
+        self._bodies = None
 
     def draw(self) -> Drawn:
         """Cars and buses; pedestrians are drawn by whoever skins people."""
@@ -262,7 +270,9 @@ class Traffic:
 
     def prototypes(self) -> dict[str, list[Surface]]:
         """Models of the vehicles, by the names `draw` uses."""
-        return vehicle_prototypes()
+        models = vehicle_prototypes()
+        # Doors open to the kerb.
+        return models | {"bus": [mirrored(part) for part in models["bus"]]} if self.lanes.lefthand else models
 
     # -- what others ask ---------------------------------------------------------------------------------------------
 

@@ -285,6 +285,8 @@ class TransitSystem:
         """
         free = np.flatnonzero((self.bike_rider < 0) & (self.bike_station < 0))
         n = len(free)
+        if not n:
+            return Bodies.none()
         return Bodies(
             entity=(self.first_bike + free).astype(np.int32),
             kind=np.full(n, BICYCLE, np.int8),
@@ -355,13 +357,18 @@ class TransitSystem:
         shapes, v = self.traffic.shapes, self._vehicle[bus]
         return np.array([shapes.x[v], shapes.y[v], shapes.yaw[v]])
 
+    @property
+    def _kerb(self) -> float:
+        """1 where the kerb is on the right of a lane, -1 where traffic keeps left."""
+        return -1.0 if self.traffic.lanes.lefthand else 1.0
+
     def doors(self, bus: int) -> NDArray[np.float64]:
-        """Where a bus's doors are, on its right side, metres, shape ``(3, 2)``."""
-        return _beside(self.bus_pose(bus), DOORS, BUS_SIZE[1] / 2)
+        """Where a bus's doors are, on the side of the kerb, metres, shape ``(3, 2)``."""
+        return _beside(self.bus_pose(bus), DOORS, BUS_SIZE[1] / 2 * self._kerb)
 
     def exit_spots(self, bus: int) -> NDArray[np.float64]:
         """Points half a metre outside each door, where riders get off if they are free, shape ``(3, 2)``."""
-        return _beside(self.bus_pose(bus), DOORS, BUS_SIZE[1] / 2 + 0.5)
+        return _beside(self.bus_pose(bus), DOORS, (BUS_SIZE[1] / 2 + 0.5) * self._kerb)
 
     def seat(self, bus: int, rider: int) -> NDArray[np.float64]:
         """x, y, yaw of a rider's seat; `rider` is the caller's number for them."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +14,11 @@ from vico.render.film import read_film, write_film
 from vico.viewer.map_picture import MapPicture
 from vico.viewer.recording import Recording
 from vico.world.folder import World
+from vico.world.threads import in_order
 
 WIDTH, HEIGHT = 1280, 720
-RATE = 20
-SECONDS = 22.0
+RATE = 16
+SECONDS = 21.0
 _INK, _SOFT, _PAPER = (29, 35, 41), (93, 104, 115), (255, 255, 255)
 _COLOURS = {
     "resident": (213, 94, 0),
@@ -47,19 +49,29 @@ def _frames(recording: Recording, world: World) -> Iterator[NDArray[np.uint8]]:
     chosen = _most_alive(recording, 4)
     steps = [int(time) for time in times]
     films = {name: read_film(recording.views[name], wanted=set(steps)) for name in chosen}
-    views: dict[str, NDArray[np.uint8] | None] = dict.fromkeys(chosen)
-    for k, (time, step) in enumerate(zip(times, steps, strict=True)):
-        frame = stage.copy()
-        _draw_bodies(frame, recording, base, float(time), chosen)
-        for number, name in enumerate(chosen):
+
+    def moments() -> Iterator[tuple[float, list[NDArray[np.uint8] | None]]]:
+        views: list[NDArray[np.uint8] | None] = [None] * len(chosen)
+        for k, (time, step) in enumerate(zip(times, steps, strict=True)):
             if k == 0 or step != steps[k - 1]:
                 # A film that was cut short keeps its last picture.
-                views[name] = next(films[name], views[name])
-            _draw_view(frame, recording, name, number, views[name], step)
-        _draw_talk(frame, recording, step)
-        yield np.asarray(frame)
+                views = [next(films[name], view) for name, view in zip(chosen, views, strict=True)]
+            yield float(time), views
+
+    def draw(moment: tuple[float, list[NDArray[np.uint8] | None]]) -> NDArray[np.uint8]:
+        time, views = moment
+        frame = stage.copy()
+        _draw_bodies(frame, recording, base, time, chosen)
+        for number, (name, view) in enumerate(zip(chosen, views, strict=True)):
+            _draw_view(frame, recording, name, number, view, int(time))
+        _draw_talk(frame, recording, int(time))
+        return np.asarray(frame)
+
+    # Decoding and encoding go on here while frames are drawn beside.
+    yield from in_order(draw, moments())
 
 
+@cache
 def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
     return ImageFont.load_default(size)
 
@@ -133,7 +145,7 @@ def _draw_view(
     x = _LEFT + (number % 2) * (_TILE + 12)
     y = 8 + (number // 2) * (_TILE + 46)
     if image is not None:
-        frame.paste(Image.fromarray(image).resize((_TILE, _TILE), Image.Resampling.BICUBIC), (x, y))
+        frame.paste(Image.fromarray(image).resize((_TILE, _TILE), Image.Resampling.BILINEAR), (x, y))
     person = recording.people[name]
     now = recording.start + step
     doing = next((s["activity"] for s in person["schedule"] if _second(s["start"]) <= now <= _second(s["end"])), "")

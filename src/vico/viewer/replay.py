@@ -18,6 +18,7 @@ from vico.render.film import read_key_frames
 from vico.viewer.recording import Recording
 from vico.world.files import write_bytes
 from vico.world.folder import World
+from vico.world.threads import in_order
 
 UNIT = 0.02  # metres a track unit, at best: 16 bits reach 655 m; wider runs have larger units
 _HIDDEN = -32768
@@ -73,7 +74,8 @@ def page_data(recording: Recording, world: World, *, picture: NDArray[np.uint8] 
             for e in recording.events
         ],
         "agents": [
-            recording.people[name] | {"id": name, "pictures": _pictures(recording.views.get(name))} for name in names
+            recording.people[name] | {"id": name, "pictures": pictures}
+            for name, pictures in zip(names, in_order(_pictures, map(recording.views.get, names)), strict=True)
         ],
         "metrics": {k: v for k, v in recording.metrics.items() if isinstance(v, (int, float, str))},
         "picture": _uri(picture, 80) if picture is not None else None,

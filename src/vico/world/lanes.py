@@ -50,7 +50,10 @@ class LaneGraph:
     buses_only
         True where cars may not drive.
     left, right
-        Neighbour lanes in the same direction, -1 for none, int32.
+        Neighbour lanes in the same direction, towards the middle of the street and towards its kerb, -1 for none,
+        int32; where traffic keeps left the sides are the other way round.
+    lefthand
+        Whether traffic keeps left.
     next_first, next, previous_first, previous
         Lanes that follow and precede lane ``i``: ``next[next_first[i]:next_first[i + 1]]``.
     junctions, junction_position, signals
@@ -84,6 +87,7 @@ class LaneGraph:
     signals: NDArray[np.bool_]
     zones: int
     walks: Walkways
+    lefthand: bool = False
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -225,11 +229,11 @@ def read_lanes(path: Path) -> LaneGraph:
     if not path.is_file():
         raise MissingFileError(f"{path}: no such file; build the world anew")
     try:
-        lanes, junctions, links = _parsed(path)
+        lanes, junctions, links, lefthand = _parsed(path)
     except (ParseError, DefusedXmlException, KeyError, ValueError) as error:
         raise SchemaError(f"{path}: not a readable SUMO network ({error}); build the world anew") from None
     driven = [lane for lane in lanes if (lane.cars or lane.buses) and lane.function in ("normal", "internal")]
-    return _assembled(driven, lanes, junctions, links)
+    return _assembled(driven, lanes, junctions, links, lefthand=lefthand)
 
 
 def _clean_line(text: str) -> Floats:
@@ -246,16 +250,18 @@ def _allows(attributes: dict[str, str], who: str) -> bool:
     return who not in attributes.get("disallow", "").split() and attributes.get("disallow") != "all"
 
 
-def _parsed(path: Path) -> tuple[list[_Lane], list[dict[str, str]], list[dict[str, str]]]:
+def _parsed(path: Path) -> tuple[list[_Lane], list[dict[str, str]], list[dict[str, str]], bool]:
     lanes: list[_Lane] = []
     junctions: list[dict[str, str]] = []
     links: list[dict[str, str]] = []
     root: Any = None
+    lefthand = False
     for event, element in iterparse(path, events=("start", "end"), forbid_dtd=True):
         if root is None:
             root = element
             if element.tag != "net":
                 raise ValueError(f"root element is <{element.tag}>, not <net>")
+            lefthand = element.get("lefthand") == "true"
         if event != "end":
             continue
         if element.tag == "edge":
@@ -282,7 +288,7 @@ def _parsed(path: Path) -> tuple[list[_Lane], list[dict[str, str]], list[dict[st
             links.append(dict(element.attrib))
         if element.tag in ("edge", "junction", "connection"):
             root.clear()
-    return lanes, [j for j in junctions if j.get("type") != "internal"], links
+    return lanes, [j for j in junctions if j.get("type") != "internal"], links, lefthand
 
 
 def _csr(pairs: list[tuple[int, int]], n: int) -> tuple[Ints, Ints]:
@@ -301,7 +307,12 @@ def _junction_of(lane: _Lane, junctions: dict[str, int]) -> int:
 
 
 def _assembled(
-    driven: list[_Lane], lanes: list[_Lane], junctions: list[dict[str, str]], links: list[dict[str, str]]
+    driven: list[_Lane],
+    lanes: list[_Lane],
+    junctions: list[dict[str, str]],
+    links: list[dict[str, str]],
+    *,
+    lefthand: bool,
 ) -> LaneGraph:
     n = len(driven)
     index = {lane.id: i for i, lane in enumerate(driven)}
@@ -358,6 +369,7 @@ def _assembled(
         signals=np.array([j.get("type", "").startswith("traffic_light") for j in junctions], bool),
         zones=int(zone.max(initial=-1)) + 1,
         walks=_walks(lanes, links, junction_number),
+        lefthand=lefthand,
     )
 
 
