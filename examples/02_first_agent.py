@@ -15,7 +15,7 @@ from vico.world.folder import read_world
 
 
 class CafeGoer:
-    """Follows a route of the public map to the nearest place where one can eat."""
+    """Follows a route of the public map to the nearest place to eat that is worth a walk."""
 
     def __init__(self, public_map) -> None:
         self.map = public_map
@@ -25,10 +25,9 @@ class CafeGoer:
         """Turn towards the next corner of the route, or walk on."""
         x, y, _, east, north, _ = observation["pose"]
         if self.route is None:
-            cafe = min(
-                (place for place in self.map.places if place.category == "food"),
-                key=lambda place: math.dist(place.position[:2], (x, y)),
-            )
+            food = [place for place in self.map.places if place.category == "food"]
+            food.sort(key=lambda place: math.dist(place.position[:2], (x, y)))
+            cafe = next(place for place in food if math.dist(place.position[:2], (x, y)) > 30.0)
             print(f"going to {cafe.name}")
             self.route = list(self.map.router.path((x, y), cafe.position[:2]))
         while self.route and math.dist(self.route[0], (x, y)) < 0.5:

@@ -22,8 +22,8 @@ from vico.render.lighting import Lighting
 from vico.render.scene import Scene
 from vico.world.folder import read_world
 from vico.world.tileset import write_tileset
-from vico.worldgen.photogrammetry import Photogrammetry, photogrammetry
-from vico.worldgen.tile_view import tile_surfaces
+from vico.worldgen.photos.photogrammetry import Photogrammetry, photogrammetry
+from vico.worldgen.photos.tile_view import tile_surfaces
 
 
 def picture_of(mesh: TileMesh, reach: float) -> Image.Image:

@@ -12,8 +12,8 @@ from vico.geo.osm import OsmData, polygons_of, read_osm
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph, read_lanes
 from vico.world.model import Transit
-from vico.worldgen.netconvert import RoadNetwork, road_network
-from vico.worldgen.transit import transit_from_osm
+from vico.worldgen.streets.netconvert import RoadNetwork, road_network
+from vico.worldgen.transit.stage import transit_from_osm
 
 EXTRACT = Path(__file__).parents[1] / "src" / "vico" / "data" / "helsinki.osm.pbf"
 HALF = 400.0
@@ -45,9 +45,9 @@ def lanes_of(network: RoadNetwork) -> LaneGraph:
 
 
 @cache
-def road_city(path: Path = EXTRACT, lat: float = 60.1690, lon: float = 24.9435) -> RoadCity:
+def road_city(path: Path = EXTRACT, lat: float = 60.1690, lon: float = 24.9435, half: float = HALF) -> RoadCity:
     """Roads, lanes and transit of 800 m x 800 m; central Helsinki where nothing else is asked for."""
-    osm = read_osm(path, LocalFrame(lat, lon), HALF)
+    osm = read_osm(path, LocalFrame(lat, lon), half)
     network = road_network(osm)
     lanes = lanes_of(network)
     solids = [
@@ -56,5 +56,5 @@ def road_city(path: Path = EXTRACT, lat: float = 60.1690, lon: float = 24.9435) 
         if area.tags.get("building", "no") != "no"
         for polygon in polygons_of(area.polygon)
     ]
-    transit = transit_from_osm(osm, lanes, HeightField.flat(HALF), solids=solids)
+    transit = transit_from_osm(osm, lanes, HeightField.flat(half), solids=solids)
     return RoadCity(osm, network, lanes, transit, solids)

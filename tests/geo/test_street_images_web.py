@@ -71,7 +71,7 @@ def test_mapillary_photos_come_page_by_page_and_bad_ones_are_told() -> None:
         if "after" not in request.query:
             rows = [
                 entry(1, base),
-                entry(2, base, camera_type="spherical", is_pano=True),
+                entry(2, base, camera_type="fisheye"),
                 entry(3, base, camera_parameters=[]),
             ]
             paging = {"cursors": {"after": "PAGE2"}, "next": "https://example.invalid/with?access_token=x"}
@@ -96,7 +96,7 @@ def test_mapillary_photos_come_page_by_page_and_bad_ones_are_told() -> None:
         photos = {p.id: p for p in source.near(HERE, 100.0, most=9)}
     assert sorted(photos) == ["1", "7"]
     reasons = dict(source.refused)
-    assert "spherical" in reasons["2"]
+    assert "fisheye" in reasons["2"]
     assert "focal" in reasons["3"]
     assert "nothing there (404)" in reasons["4"]
     assert "not a readable photo" in reasons["5"]
@@ -174,13 +174,35 @@ def test_a_place_on_the_date_line_is_asked_for_on_both_sides() -> None:
         list(Mapillary(TOKEN, Web(retries=0)).near(LocalFrame(90.0, 0.0), 300.0, most=3))
 
 
+def test_panoramas_are_cut_into_photos() -> None:
+    def listed(request: Request) -> Answer:
+        rows = [
+            entry(1, base, camera_type="spherical", is_pano=True, camera_parameters=[]),
+            entry(2, base, camera_type="equirectangular", camera_parameters=[]),
+        ]
+        return Answer(200, json.dumps({"data": rows}).encode())
+
+    def picture(path: str) -> Answer:
+        packed = io.BytesIO()
+        Image.new("RGB", (160, 60 if path.endswith("/2.jpg") else 80), (200, 100, 50)).save(packed, "JPEG")
+        return Answer(200, packed.getvalue())
+
+    with serve(mapillary(listed, picture)) as base:
+        source = Mapillary(TOKEN, Web(retries=0), address=base)
+        photos = list(source.near(HERE, 100.0, most=9))
+    assert [photo.id for photo in photos] == ["1/0", "1/60", "1/120", "1/180", "1/240", "1/300"]
+    assert all(photo.intrinsics[0, 0] == pytest.approx(160 / (2 * np.pi)) for photo in photos)
+    assert [key for key, reason in source.refused if "no whole panorama" in reason] == ["2"]
+
+
 def test_the_documented_shape_of_an_answer_is_read(shared_data: Path) -> None:
     answer = (shared_data / "samples" / "mapillary_images_bbox.json").read_bytes()
     images, broken, after = images_in(answer, "sample")
     assert [image.id for image in images] == ["100000000000001"]
     assert broken == []
     assert after is None
-    assert "spherical" in (images[0].unusable() or "")
+    assert images[0].whole
+    assert images[0].unusable() is None
 
 
 def test_a_source_needs_its_key() -> None:

@@ -18,7 +18,7 @@ from vico.sim.simulation import Simulation
 from vico.world.folder import World
 from vico.world.model import Category, Room
 from vico.world.public import PublicMap
-from vico.worldgen.indoor import furnish
+from vico.worldgen.indoor.stage import furnish
 
 CELL = 0.1
 

@@ -6,7 +6,7 @@ import pytest
 from vico.errors import EmptyInputError, InputError
 from vico.geo.tile_mesh import TileMesh
 from vico.world.mesh import Surface
-from vico.worldgen.baking import Baked, bake
+from vico.worldgen.photos.baking import Baked, bake
 
 pytest.importorskip("embreex", reason="baking casts rays with embreex")
 

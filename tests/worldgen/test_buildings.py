@@ -17,10 +17,10 @@ from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, read_osm
 from vico.world.model import FIRST_BUILDING
 from vico.world.seeds import rng
-from vico.worldgen.buildings import BuildingsResult, buildings_from_osm
-from vico.worldgen.outlines import building_plans
-from vico.worldgen.solids import convex_pieces
-from vico.worldgen.terrain import flat_terrain, terrain_from_dem
+from vico.worldgen.buildings.outlines import building_plans
+from vico.worldgen.buildings.solids import convex_pieces
+from vico.worldgen.buildings.stage import BuildingsResult, buildings_from_osm
+from vico.worldgen.ground.terrain import flat_terrain, terrain_from_dem
 
 PLACE = Path(str(resources.files("vico") / "data" / "helsinki.osm.pbf"))
 HALF = 250.0
@@ -172,8 +172,8 @@ from importlib import resources
 from pathlib import Path
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import read_osm
-from vico.worldgen.buildings import buildings_from_osm
-from vico.worldgen.terrain import flat_terrain
+from vico.worldgen.buildings.stage import buildings_from_osm
+from vico.worldgen.ground.terrain import flat_terrain
 osm = read_osm(Path(str(resources.files("vico") / "data" / "helsinki.osm.pbf")), LocalFrame(60.1690, 24.9435), 120.0)
 built = buildings_from_osm(osm, flat_terrain(half=120.0), seed=SEED)
 digest = hashlib.sha256(repr(built.records).encode())

@@ -7,10 +7,10 @@ from scipy.ndimage import gaussian_filter
 
 from vico.errors import InputError
 from vico.world.seeds import rng
-from vico.worldgen.atlas import Atlas, Chart
-from vico.worldgen.enhance import evened, inpainted, padded, upscaled
-from vico.worldgen.enhance_fill import exemplar_fill, pull_push
-from vico.worldgen.enhance_sharpen import BackProjection
+from vico.worldgen.photos.atlas import Atlas, Chart
+from vico.worldgen.photos.enhance import evened, inpainted, padded, upscaled
+from vico.worldgen.photos.enhance_fill import exemplar_fill, pull_push
+from vico.worldgen.photos.enhance_sharpen import BackProjection
 
 
 def facade(height: int = 96, width: int = 160) -> np.ndarray:

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 
 from vico.world.seeds import rng
-from vico.worldgen.facades import (
+from vico.worldgen.buildings.roof_shapes import Roof
+from vico.worldgen.buildings.roofs import building_solid
+from vico.worldgen.facades.cuts import cut_at_heights
+from vico.worldgen.facades.looks import (
     bay_coordinates,
     bays,
     colour_of,
-    cut_at_heights,
     family_of,
     look_of,
     region_of,
     storey_coordinates,
     year_of,
 )
-from vico.worldgen.roof_shapes import Roof
-from vico.worldgen.roofs import building_solid
-from vico.worldgen.textures import _PAINTERS, BAYS, STOREYS, material
+from vico.worldgen.facades.textures import _PAINTERS, BAYS, STOREYS, material
 
 
 def test_a_wall_holds_a_whole_number_of_bays() -> None:

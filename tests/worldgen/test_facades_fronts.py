@@ -8,9 +8,9 @@ import pytest
 
 from vico.world.mesh import Surface
 from vico.world.model import Building, Category, Entrance, Place
-from vico.worldgen.facade_fronts import street_fronts
-from vico.worldgen.facade_walls import GroundFloors
-from vico.worldgen.textures import BAYS, material
+from vico.worldgen.facades.fronts import street_fronts
+from vico.worldgen.facades.textures import BAYS, material
+from vico.worldgen.facades.walls import GroundFloors
 
 _FACING = math.radians(-60.0)
 _OUT = np.array([math.cos(_FACING), math.sin(_FACING)])

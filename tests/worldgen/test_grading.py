@@ -13,15 +13,15 @@ from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, OsmWay, read_osm
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
-from vico.worldgen.bridges import decks_of
-from vico.worldgen.grading import graded, open_water, standing_outlines
-from vico.worldgen.ground import ground_from_osm
-from vico.worldgen.kerbs import KERB, lowered_kerbs
-from vico.worldgen.levels import CLEARANCE, OVER_A_STREET, overpasses, passages
-from vico.worldgen.partition import ground_partition, water_pieces
-from vico.worldgen.roads import is_traffic_street, roads_from_osm, streets_from_osm
-from vico.worldgen.streets import StreetPolygons, road_polygons
-from vico.worldgen.terrain import flat_terrain, terrain_from_dem
+from vico.worldgen.buildings.partition import ground_partition, water_pieces
+from vico.worldgen.ground.bridges import decks_of, portal_feet, portals_of
+from vico.worldgen.ground.grading import graded, open_water, standing_outlines
+from vico.worldgen.ground.kerbs import KERB, lowered_kerbs
+from vico.worldgen.ground.stage import ground_from_osm
+from vico.worldgen.ground.terrain import flat_terrain, terrain_from_dem
+from vico.worldgen.streets.levels import CLEARANCE, OVER_A_STREET, overpasses, passages
+from vico.worldgen.streets.roads import is_traffic_street, roads_from_osm, streets_from_osm
+from vico.worldgen.streets.streets import StreetPolygons, road_polygons
 
 PLACE = Path(str(resources.files("vico") / "data" / "helsinki.osm.pbf"))
 HALF = 120.0
@@ -90,7 +90,9 @@ def test_drawn_ground_and_height_field_agree(osm: OsmData, streets: StreetPolygo
     points = drawn(ground_from_osm(osm, level, HALF, streets))
     away = points[:, 2] - level(points[:, :2])
     edge = shapely.distance(shapely.points(points[:, :2]), shapely.boundary(streets.carriageway))
-    seen = (away > -0.35) & (away < 2.0)  # the rest is the underlay and the mouths of tunnels
+    mouths = shapely.buffer(shapely.union_all(portal_feet(portals_of(osm, streets))), 0.1)
+    # The rest is the underlay, and the mouths of tunnels stand on the ground.
+    seen = (away > -0.35) & (away < 2.0) & ~shapely.contains_xy(mouths, points[:, 0], points[:, 1])
     assert np.percentile(np.abs(away[seen & (edge > 0.12)]), 99.9) < 0.05
 
 
@@ -162,3 +164,53 @@ def test_a_place_without_streets_has_a_ground(osm: OsmData) -> None:
     window = shapely.box(-HALF, -HALF, HALF, HALF)
     pieces = ground_partition(empty, streets, window)
     assert sum(p.area for shapes in pieces.values() for p in shapes) == pytest.approx(window.area, rel=1e-3)
+
+
+def test_ramps_of_a_bridge_over_a_street_climb_gently(crossroads: OsmData) -> None:
+    streets = road_polygons(crossroads, [])
+    field = graded(flat_terrain(half=180.0), crossroads, streets)
+    (deck,) = decks_of(crossroads, field)
+    x = np.arange(-150.0, 150.0, 3.0)
+    ground = field.smooth(np.stack([x, np.zeros_like(x)], axis=1))
+    ramp = np.abs(x) > 42.0
+    both = ramp[1:] & ramp[:-1] & (np.sign(x[1:]) == np.sign(x[:-1]))
+    assert (np.abs(np.diff(ground)) / 3.0)[both].max() < 0.085
+    assert (np.abs(np.diff(deck.z)) / np.hypot(*np.diff(deck.line, axis=0).T)).max() < 0.085
+
+
+def test_a_footway_beside_a_bridge_lies_as_high_and_has_no_parapet_between(crossroads: OsmData) -> None:
+    beside = _way(9, [40, 50], [(-40, 6.6), (40, 6.6)], highway="footway", bridge="yes", layer="1")
+    osm = replace(crossroads, ways=[*crossroads.ways, beside])
+    field = graded(flat_terrain(half=180.0), osm, road_polygons(osm, []))
+    road, walk = sorted(decks_of(osm, field), key=lambda deck: deck.way.id)
+    middle = np.abs(walk.line[:, 0]) < 30.0
+    level = np.interp(walk.line[middle, 0], road.line[:, 0], road.z)
+    assert np.abs(walk.z[middle] - level).max() < 0.35
+
+
+def test_stairs_lead_up_to_a_bridge_flight_after_flight(crossroads: OsmData) -> None:
+    flights = [
+        _way(10, [60, 61], [(0.5, 3), (0.5, 10)], highway="steps"),
+        _way(11, [61, 62], [(0.5, 10), (0.5, 17)], highway="steps"),
+    ]
+    bridge = next(way for way in crossroads.ways if way.id == 3)
+    joined = replace(
+        bridge, nodes=[bridge.nodes[0], 60, bridge.nodes[-1]], line=np.array([(-40, 0), (0.5, 3), (40, 0)])
+    )
+    others = [way for way in crossroads.ways if way.id != 3]
+    assert overpasses(replace(crossroads, ways=[*others, joined, *flights])) == {3, 10, 11}
+
+
+def test_water_flows_on_below_a_bridge_without_a_hole(shared_data: Path) -> None:
+    frame = LocalFrame(42.507297, 1.527672)
+    place = shared_data / "places" / "andorra"
+    osm = read_osm(place / "andorra.osm.pbf", frame, 60.0, need_buildings=False)
+    streets = road_polygons(osm, [])
+    field = graded(terrain_from_dem(read_elevation([place / "dem_srtm.tif"], frame, 60.0), half=60.0), osm, streets)
+    surfaces = ground_from_osm(osm, field, 60.0, streets)
+    (water,) = (s for s in surfaces if s.material.name == "ground_water")
+    corners = water.positions[water.triangles].astype(np.float64)
+    flow = shapely.union_all(shapely.buffer(shapely.polygons(corners[..., :2]), 0.02))
+    # The river's line leads below the Pont Prat de la Creu, which the map parts the water at.
+    river = shapely.LineString([(20.0, 36.0), (7.0, 12.0), (-4.0, -9.0), (-20.0, -38.0)])
+    assert shapely.difference(river, flow).length < 1.0

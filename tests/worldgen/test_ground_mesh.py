@@ -3,9 +3,9 @@
 import numpy as np
 import shapely
 
-from vico.worldgen.conform import Plan, conforming
-from vico.worldgen.drape import triangulated
-from vico.worldgen.thinning import thinned
+from vico.worldgen.ground.conform import Plan, conforming
+from vico.worldgen.ground.drape import triangulated
+from vico.worldgen.ground.thinning import thinned
 
 
 def area_of(plan: Plan) -> float:

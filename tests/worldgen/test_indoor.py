@@ -13,11 +13,11 @@ from vico.assets.goods import GOODS
 from vico.world.folder import World
 from vico.world.indoor_checks import walkable_inside
 from vico.world.model import FIRST_FURNITURE, Category, Entrance
-from vico.worldgen.floorplans import FLATS, OUTSIDE, USES, sketch_of
-from vico.worldgen.indoor import furnish
-from vico.worldgen.indoor_rooms import rooms_of_plan
-from vico.worldgen.indoor_uses import use_of
-from vico.worldgen.layouts import REACH, plan_of, uses
+from vico.worldgen.indoor.floorplans import FLATS, OUTSIDE, USES, sketch_of
+from vico.worldgen.indoor.layouts import REACH, plan_of, uses
+from vico.worldgen.indoor.rooms import rooms_of_plan
+from vico.worldgen.indoor.stage import furnish
+from vico.worldgen.indoor.uses import use_of
 
 SMALL = {model.name for model in small_models()}
 

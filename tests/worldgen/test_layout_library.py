@@ -17,9 +17,7 @@ from vico.errors import InputError, MissingFileError, SchemaError, VicoError
 from vico.world.folder import World
 from vico.world.indoor_checks import walkable_inside
 from vico.world.model import Category
-from vico.worldgen.indoor import furnish
-from vico.worldgen.indoor_rooms import rooms_of_plan
-from vico.worldgen.layout_library import (
+from vico.worldgen.indoor.layout_library import (
     Layout,
     LayoutRequest,
     authored,
@@ -30,6 +28,8 @@ from vico.worldgen.layout_library import (
     read_library,
     write_layout,
 )
+from vico.worldgen.indoor.rooms import rooms_of_plan
+from vico.worldgen.indoor.stage import furnish
 
 BAR: dict[str, Any] = {
     "schema": "vico.layout",

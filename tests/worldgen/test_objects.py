@@ -1,22 +1,24 @@
 """Street objects of central Helsinki: where the map has them, clear of walls and lanes."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 import shapely
 
 from vico.assets.street import street_models
 from vico.geo.frame import LocalFrame
-from vico.geo.osm import OsmData, OsmNode
+from vico.geo.osm import OsmData, OsmNode, OsmWay
 from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.objects import Objects
-from vico.worldgen.objects import objects_from_osm
+from vico.worldgen.objects.stage import objects_from_osm
 
 NOTHING = shapely.Polygon()
 
 
-def placed(nodes: list[OsmNode], **given: object) -> tuple[Objects, list[str]]:
-    osm = OsmData(LocalFrame(60.0, 25.0), 50.0, 60.0, nodes, [], [], [])
+def placed(nodes: list[OsmNode], *, ways: Sequence[OsmWay] = (), **given: object) -> tuple[Objects, list[str]]:
+    osm = OsmData(LocalFrame(60.0, 25.0), 50.0, 60.0, nodes, list(ways), [], [])
     arguments = {"solids": [], "carriageway": NOTHING, "openings": NOTHING, "height": HeightField.flat(60.0)} | given
     objects, dropped = objects_from_osm(osm, **arguments)
     return objects, [entry.reason for entry in dropped]
@@ -53,6 +55,46 @@ def test_two_things_at_one_point_do_not_stand_in_each_other() -> None:
     objects, _ = placed([node(1, 0.0, 0.0, amenity="bench"), node(2, 0.0, 0.0, amenity="post_box")])
     first, second = (shapely.Polygon(foot) for foot in objects.feet())
     assert not first.intersects(second)
+
+
+def test_a_bollard_mapped_twice_stands_once() -> None:
+    objects, dropped = placed([node(1, 0.0, 0.0, barrier="bollard"), node(2, 0.28, 0.05, barrier="bollard")])
+    assert objects.id.tolist() == ["n1"]
+    assert dropped == ["bollard: mapped twice"]
+
+
+def test_a_row_of_bollards_lets_those_stand_that_are_mapped_one_by_one() -> None:
+    row = OsmWay(7, [1, 2], np.array([[0.0, 0.0], [8.5, 0.0]]), False, {"barrier": "bollard"})
+    alone, _ = placed([], ways=[row])
+    objects, _ = placed([node(3, 3.7, 0.0, barrier="bollard")], ways=[row])
+    assert len(alone) == len(objects) == 6
+    assert "n3" in objects.id
+    assert "w7.2" not in objects.id
+    assert np.diff(np.sort(objects.x)).min() > 1.1
+
+
+@pytest.mark.parametrize(
+    "tags",
+    [{"highway": "street_lamp"}, {"amenity": "waste_basket"}, {"barrier": "bollard"}, {"amenity": "bicycle_parking"}],
+)
+@pytest.mark.parametrize("north", [0.0, 0.3, 0.9, 1.3, 2.1])
+def test_whatever_stands_on_a_pavement_leaves_a_way_past(tags: dict[str, str], north: float) -> None:
+    wall, road, pavement = shapely.box(-50, 2.2, 50, 12), shapely.box(-50, -8, 50, 0), shapely.box(-50, 0, 50, 2.2)
+    objects, dropped = placed([node(1, 0.0, north, **tags)], solids=[wall], carriageway=road, openings=pavement)
+    assert len(objects) + len(dropped) == 1
+    for foot in objects.feet():
+        assert max(2.2 - foot[:, 1].max(), foot[:, 1].min()) > 0.89
+
+
+def test_posts_across_a_path_leave_it_open() -> None:
+    path, hedge = shapely.box(-20, -1.5, 20, 1.5), [shapely.box(-20, 1.5, 20, 3), shapely.box(-20, -3, 20, -1.5)]
+    posts = [node(k, 0.0, y, barrier="bollard") for k, y in enumerate((-1.2, -0.7, 0.0, 0.7, 1.2), 1)]
+    objects, _ = placed(posts, solids=hedge, openings=path)
+    blocked = shapely.union_all([shapely.buffer(shapely.Polygon(foot), 0.44) for foot in objects.feet()])
+    free = shapely.difference(shapely.buffer(path, -0.44), blocked)
+    ways = [part for part in shapely.get_parts(free) if part.bounds[0] < -19 and part.bounds[2] > 19]
+    assert len(objects) >= 2
+    assert len(ways) == 1
 
 
 def test_another_object_on_the_map_changes_none_of_the_others() -> None:

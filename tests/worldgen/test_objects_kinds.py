@@ -11,10 +11,11 @@ from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, OsmNode, OsmWay
 from vico.world.heights import HeightField
 from vico.world.objects import Objects
-from vico.worldgen import objects_kinds, objects_trees
-from vico.worldgen.objects import objects_from_osm
-from vico.worldgen.objects_kinds import region, sign_of, thing_of
-from vico.worldgen.objects_trees import climate, spread, tree_wish
+from vico.worldgen.objects import kinds as objects_kinds
+from vico.worldgen.objects import trees as objects_trees
+from vico.worldgen.objects.kinds import region, sign_of, thing_of
+from vico.worldgen.objects.stage import objects_from_osm
+from vico.worldgen.objects.trees import climate, spread, tree_wish
 
 NOTHING = shapely.Polygon()
 

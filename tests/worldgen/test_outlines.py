@@ -10,11 +10,11 @@ from shapely import MultiPolygon, Polygon
 
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, OsmWay
-from vico.worldgen.buildings import buildings_from_osm
-from vico.worldgen.outlines import building_plans
-from vico.worldgen.outlines_parts import bearing_of
-from vico.worldgen.outlines_plans import RULES, BuildingPlan
-from vico.worldgen.terrain import flat_terrain
+from vico.worldgen.buildings.outlines import building_plans
+from vico.worldgen.buildings.outlines_parts import bearing_of
+from vico.worldgen.buildings.outlines_plans import RULES, BuildingPlan
+from vico.worldgen.buildings.stage import buildings_from_osm
+from vico.worldgen.ground.terrain import flat_terrain
 
 Things = list[tuple[Polygon | MultiPolygon, Mapping[str, str]]]
 

@@ -16,16 +16,16 @@ from vico.world.folder import World, read_world
 from vico.world.heights import HeightField
 from vico.world.seeds import rng
 from vico.world.tileset import write_tileset
-from vico.worldgen.fitting import buildings_on_tiles, fit_to_tiles, settled
-from vico.worldgen.outlines import BuildingPlan, building_plans
-from vico.worldgen.photogrammetry import Photogrammetry, photogrammetry
+from vico.worldgen.buildings.fitting import buildings_on_tiles, fit_to_tiles, settled
+from vico.worldgen.buildings.outlines import BuildingPlan, building_plans
+from vico.worldgen.buildings.solids import leaky, seat_of, solid_meshes
+from vico.worldgen.ground.terrain import terrain_from_tiles
+from vico.worldgen.ground.tile_ground import on_ground
+from vico.worldgen.photos.photogrammetry import Photogrammetry, photogrammetry
+from vico.worldgen.photos.sight import Sight
+from vico.worldgen.photos.surface_net import surface_net
+from vico.worldgen.photos.tile_view import tile_surfaces
 from vico.worldgen.pipeline import build_world
-from vico.worldgen.sight import Sight
-from vico.worldgen.solids import leaky, seat_of, solid_meshes
-from vico.worldgen.surface_net import surface_net
-from vico.worldgen.terrain import terrain_from_tiles
-from vico.worldgen.tile_ground import on_ground
-from vico.worldgen.tile_view import tile_surfaces
 
 EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
 HALF = 80.0

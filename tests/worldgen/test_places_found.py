@@ -16,10 +16,10 @@ from vico.geo.osm import OsmData, read_osm
 from vico.geo.places import FoundPlace
 from vico.world.folder import World
 from vico.world.model import Category, Dropped, Entrance, Place
-from vico.worldgen.places import places_from_osm
-from vico.worldgen.places_found import compared, likeness
-from vico.worldgen.places_kinds import meaning_of
-from vico.worldgen.places_osm import Named, named_places
+from vico.worldgen.places.found import compared, likeness
+from vico.worldgen.places.kinds import meaning_of
+from vico.worldgen.places.osm import Named, named_places
+from vico.worldgen.places.stage import places_from_osm
 
 
 @pytest.fixture(scope="module")

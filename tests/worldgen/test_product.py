@@ -68,6 +68,26 @@ def test_arrays_shapes_and_records_come_back(tmp_path: Path) -> None:
     assert back["surfaces"][0].material.texture is back["surfaces"][1].material.texture
 
 
+@pytest.mark.parametrize(
+    "array",
+    [
+        np.zeros((0, 3), np.float32),
+        np.array(2.5),
+        np.arange(24, dtype=np.int16).reshape(4, 6)[::2, ::-3],
+        np.array([[True, False], [True, True]]).T,
+        np.array(["bench", "ö"]),
+        np.array([1.0, np.nan, -0.0]),
+    ],
+)
+def test_arrays_of_any_layout_come_back_and_can_be_written_to(tmp_path: Path, array: np.ndarray) -> None:
+    write_product(tmp_path / "a", [array, array], key="k")
+    (back, same), _ = read_product(tmp_path / "a")
+    assert back is same
+    assert (back.dtype, back.shape) == (array.dtype, array.shape)
+    assert back.tobytes() == np.ascontiguousarray(array).tobytes()
+    assert back.flags.writeable
+
+
 def test_a_digest_is_the_same_in_another_process() -> None:
     code = "from vico.worldgen.product import digest_of; print(digest_of({'a': [1, 2.5], 'b': {'x', 'y', 'z'}}))"
     other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()

@@ -5,11 +5,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 
 from road_city import HALF, PLACES, lanes_of, road_city
 from vico.errors import MissingExtraError
-from vico.worldgen.netconvert import netconvert_binary, road_network
-from vico.worldgen.roads import roads_from_osm, streets_from_osm
+from vico.geo.frame import LocalFrame
+from vico.geo.osm import OsmArea, OsmData, OsmWay
+from vico.worldgen.streets.levels import OVER_A_STREET
+from vico.worldgen.streets.netconvert import netconvert_binary, road_network
+from vico.worldgen.streets.roads import (
+    THROUGH_A_BUILDING,
+    UNDERGROUND,
+    closed_roads,
+    is_traffic_street,
+    roads_from_osm,
+    streets_from_osm,
+)
+from vico.worldgen.streets.sides import drives_left, keeps_left
 
 
 def test_no_road_leaves_the_window() -> None:
@@ -69,3 +81,85 @@ def test_other_cities_give_a_network_within_their_window(place: str, shared_data
     city = road_city(shared_data / "places" / place / f"{place}.osm.pbf", *PLACES[place])
     assert len(city.lanes) > 200
     assert np.abs(city.lanes.points).max() < HALF + 20.0
+
+
+def _street(number: int, corners: list[tuple[float, float]], **tags: str) -> OsmWay:
+    nodes = [100 * number + k for k in range(len(corners))]
+    return OsmWay(number, nodes, np.array(corners, float), False, {"highway": "residential", **tags})
+
+
+def _map(*ways: OsmWay, lat: float = 60.169, lon: float = 24.9435, country: str = "") -> OsmData:
+    frame = LocalFrame(lat, lon)
+    house = shapely.box(-5, 30, 5, 40)
+    areas = [OsmArea("w900", house, {"building": "yes", "addr:country": country})] if country else []
+    return OsmData(frame, 150.0, 60.0, [], list(ways), areas, [])
+
+
+def test_ways_are_closed_for_a_reason_that_the_report_names() -> None:
+    osm = _map(
+        _street(1, [(-90, 0), (-20, 0)], tunnel="building_passage"),
+        _street(2, [(-90, 20), (-20, 20)], covered="yes"),
+        _street(3, [(-90, 40), (-20, 40)], tunnel="yes"),
+        _street(4, [(0, -90), (0, 90)]),
+        _street(5, [(-40, -50), (40, -50)], bridge="yes", layer="1"),
+        _street(6, [(20, 60), (90, 60)], layer="-1"),
+    )
+    house = shapely.box(-60, 10, -40, 30)
+    open_ = [street.way for street in streets_from_osm(osm, 150.0, [house]) if is_traffic_street(street)]
+    assert open_ == [1, 4]
+    assert {d.id: d.reason for d in closed_roads(roads_from_osm(osm, solids=[house]))} == {
+        "w2": THROUGH_A_BUILDING,
+        "w3": UNDERGROUND,
+        "w5": OVER_A_STREET,
+        "w6": UNDERGROUND,
+    }
+
+
+@pytest.mark.parametrize(
+    ("lat", "lon", "left"),
+    [
+        (51.515, -0.103, True), (53.35, -6.26, True), (50.95, 1.86, False), (50.73, 1.61, False), (35.68, 139.7, True),
+        (35.18, 129.08, False), (43.1, 131.9, False), (22.3, 114.17, True), (22.55, 114.06, False), (19.0, 72.8, True),
+        (31.55, 74.3, True), (34.5, 69.2, False), (13.75, 100.5, True), (17.97, 102.6, False), (1.3, 103.8, True),
+        (-33.9, 151.2, True), (-12.8, 28.2, True), (-11.66, 27.5, False), (-8.8, 13.2, False), (-33.9, 18.4, True),
+        (18.0, -76.8, True), (20.0, -75.8, False), (60.17, 24.94, False), (43.73, 7.42, False), (35.9, 14.5, True),
+    ],
+)  # fmt: skip
+def test_which_side_traffic_keeps_to(lat: float, lon: float, left: bool) -> None:
+    assert drives_left(lat, lon) is left
+
+
+def test_the_country_of_addresses_goes_before_the_coarse_map() -> None:
+    assert keeps_left(_map(country="MT"))
+    assert not keeps_left(_map(lat=51.5, lon=-0.1, country="fr"))
+
+
+@pytest.mark.parametrize(("country", "side"), [("GB", -1.0), ("FI", 1.0)])
+def test_oncoming_lanes_lie_on_the_side_the_country_says(country: str, side: float) -> None:
+    osm = _map(_street(1, [(-90, 0), (90, 0)], lanes="4"), _street(2, [(0, -90), (0, 90)]), country=country)
+    lanes = lanes_of(road_network(osm))
+    assert lanes.lefthand is (country == "GB")
+    east = [k for k in np.flatnonzero(lanes.inside < 0) if lanes.line(k)[-1, 0] - lanes.line(k)[0, 0] > 20]
+    assert east
+    for lane in east:
+        # Eastbound lanes lie south of the middle where traffic keeps right, the kerb's the farthest out.
+        assert np.sign(lanes.line(lane)[:, 1]).tolist() == [-side] * len(lanes.line(lane))
+        if lanes.left[lane] >= 0:
+            assert abs(lanes.line(lane)[0, 1]) > abs(lanes.line(int(lanes.left[lane]))[0, 1])
+
+
+def test_a_bridge_over_water_is_open_to_traffic_walkers_and_buses(shared_data: Path) -> None:
+    city = road_city(shared_data / "places" / "andorra" / "andorra.osm.pbf", 42.50745, 1.52536)
+    lanes, walks = city.lanes, city.lanes.walks
+    bridge = 225345368  # Pont Prat de la Creu over the Valira
+    assert bridge not in {road.osm_id for road in roads_from_osm(city.osm).roads if road.closed}
+    deck = shapely.LineString(next(way.line for way in city.osm.ways if way.id == bridge)).buffer(6, cap_style="flat")
+    over = {
+        lanes.ids[k]
+        for k in np.flatnonzero((lanes.inside < 0) & (lanes.component == 0) & ~lanes.buses_only)
+        if shapely.intersection(shapely.LineString(lanes.line(k)), deck).length > 8.0
+    }
+    assert over
+    assert any(over.intersection(line.lanes) for line in city.transit.lines)
+    walked = (shapely.intersection(shapely.LineString(walks.line(k)), deck).length for k in range(len(walks)))
+    assert max(walked) > 8.0

@@ -7,11 +7,11 @@ from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData
 from vico.world.seeds import rng
 from vico.world.solid_checks import coplanar_overlaps
-from vico.worldgen.buildings import buildings_from_osm
-from vico.worldgen.outlines_plans import BuildingPlan, PartPlan
-from vico.worldgen.roof_shapes import Roof
-from vico.worldgen.rooftops import cornices, posts, rooftop_parts
-from vico.worldgen.terrain import flat_terrain
+from vico.worldgen.buildings.outlines_plans import BuildingPlan, PartPlan
+from vico.worldgen.buildings.roof_shapes import Roof
+from vico.worldgen.buildings.rooftops import cornices, posts, rooftop_parts
+from vico.worldgen.buildings.stage import buildings_from_osm
+from vico.worldgen.ground.terrain import flat_terrain
 
 
 def plan_of(name: str, *parts: PartPlan) -> BuildingPlan:

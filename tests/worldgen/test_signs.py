@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from vico.world.model import Category, Place
-from vico.worldgen.lettering import lettered, spelled
-from vico.worldgen.signs import board_text, paint_boards
+from vico.worldgen.facades.lettering import lettered, spelled
+from vico.worldgen.facades.signs import board_text, paint_boards
 
 
 def _place(name: str, key: str = "n1", category: Category = Category.STORE, kind: str = "clothes") -> Place:

@@ -9,20 +9,21 @@ import pytest
 
 from vico.errors import InputError, MissingExtraError
 from vico.geo.street_images import StreetImage, looking, pinhole, turned
+from vico.geo.street_images_panorama import cut
 from vico.render import Cameras, Scene, render
 from vico.world.mesh import Surface
 from vico.world.seeds import rng
-from vico.worldgen.atlas import Atlas, textured, unwrap
+from vico.worldgen.photos.atlas import Atlas, textured, unwrap
+from vico.worldgen.photos.sight import Sight
+from vico.worldgen.photos.streetview import reproject
+from vico.worldgen.photos.streetview_blend import Layer, paint_chart
+from vico.worldgen.photos.streetview_mask import LanguageGroundedMovers, StandingDifferences, View
+from vico.worldgen.photos.streetview_match import LoftrMatcher, Matches, SiftMatcher, XfeatMatcher
+from vico.worldgen.photos.streetview_paint import FastMarching, Patches, colour_curve, lab_of, rgb_of
+from vico.worldgen.photos.streetview_photo import Photographer, StreetviewConfig, above_ground
+from vico.worldgen.photos.streetview_pose import Pose, correction
+from vico.worldgen.photos.streetview_project import Shot
 from vico.worldgen.product import digest_of
-from vico.worldgen.sight import Sight
-from vico.worldgen.streetview import reproject
-from vico.worldgen.streetview_blend import Layer, paint_chart
-from vico.worldgen.streetview_mask import LanguageGroundedMovers, StandingDifferences, View
-from vico.worldgen.streetview_match import LoftrMatcher, Matches, SiftMatcher, XfeatMatcher
-from vico.worldgen.streetview_paint import FastMarching, Patches, colour_curve, lab_of, rgb_of
-from vico.worldgen.streetview_photo import Photographer, StreetviewConfig, above_ground
-from vico.worldgen.streetview_pose import Pose, correction
-from vico.worldgen.streetview_project import Shot
 
 cv2 = pytest.importorskip("cv2", reason="OpenCV is the extra photos")
 pytest.importorskip("embreex", reason="embreex is the extra photos")
@@ -169,7 +170,7 @@ def test_a_photo_of_elsewhere_is_refused_with_the_reason() -> None:
     far = replace(photo("far"), position=np.array([900.0, 0, 1500.0]), rotation=looking(0.0, 80.0))
     made, report = reproject(s.model, [other, far], photographer(s.model), s.sight, config=CONFIG)
     assert [p.used for p in report.photos] == [False, False]
-    assert "matches agree on a pose; 20 are needed" in report.photos[0].reason
+    assert "matches agree on a pose; 10 are needed" in report.photos[0].reason
     assert "shows nothing" in report.photos[1].reason
     assert [d.id for d in report.dropped] == ["test other", "test far"]
     assert all((a == b).all() for a, b in zip(made.pages, s.model.pages, strict=True))
@@ -201,10 +202,10 @@ def test_what_stands_in_the_street_is_masked_and_not_painted_on_the_wall() -> No
     assert 0.01 < report.photos[0].masked < 0.3
     bare, _ = reproject(s.model, [photo(extra=things)], take, s.sight, config=replace(CONFIG, movers=None))
     clear, _ = reproject(s.model, [photo()], take, s.sight, config=replace(CONFIG, movers=None))
-    both = zip(bare.pages, clear.pages, strict=True)
-    hidden = [(np.abs(a.astype(int) - b).max(axis=2) > 60) & i for (a, b), i in zip(both, made.inside, strict=True)]
-    assert sum(int(h.sum()) for h in hidden) > 150
-    assert error(made, hidden) < 0.6 * error(bare, hidden)
+    for atlas in (made, bare):  # even what is not masked is kept off a wall that is known to look otherwise
+        pairs = zip(atlas.pages, clear.pages, made.inside, strict=True)
+        stained = sum(int(((np.abs(a.astype(int) - b).max(axis=2) > 60) & i).sum()) for a, b, i in pairs)
+        assert stained < 150
 
 
 def test_a_photo_without_a_known_height_is_lifted_on_the_terrain() -> None:
@@ -222,12 +223,44 @@ def test_a_camera_that_sees_a_speck_of_a_wall_leaves_it_as_it_is() -> None:
     shot = Shot("a", photo().picture, masked, TRUE, LENS, depth)
     flat = colour_curve(lab_of(photo().picture[:20, :20].reshape(-1, 3)), np.tile(np.float32([50, 0, 0]), (9, 1)))
     for k, chart in enumerate(s.model.charts):
-        colour, _, given = paint_chart(
+        colour, _, given, _ = paint_chart(
             s.model, k, [Layer(shot, flat, np.zeros(3))], s.sight,
             farthest=60.0, steepest=1.3, feather=0.5, unshade=1.0,
         )  # fmt: skip
         assert given == [0]
         assert (colour == s.model.pages[chart.page][chart.box]).all()
+
+
+def rendered_panorama(pose: Pose, width: int) -> np.ndarray:
+    """Equirectangular, put together of renders to all six sides."""
+    side = width // 2
+    lens = pinhole(side, side, side / 2)
+    take = photographer(street().true)
+    column, row = np.meshgrid(np.arange(width) + 0.5, np.arange(width // 2) + 0.5)
+    longitude, latitude = (column / width - 0.5) * 2 * np.pi, (0.5 - row / (width // 2)) * np.pi
+    flat = np.cos(latitude)
+    rays = np.stack([flat * np.sin(longitude), -np.sin(latitude), flat * np.cos(longitude)], axis=-1) @ pose.rotation
+    made = np.zeros((width // 2, width, 3), np.uint8)
+    for heading, pitch in ((0, 0), (90, 0), (180, 0), (270, 0), (0, 89.99), (0, -89.99)):
+        rotation = looking(heading, pitch)
+        picture, _, _ = take(pose.position, rotation, lens, side, side)
+        seen = rays @ rotation.T
+        here = (seen[..., 2] > 0) & (np.abs(seen[..., :2]).max(axis=-1) <= seen[..., 2] * 1.001)
+        xy = np.clip((seen[here][:, :2] / seen[here][:, 2:] + 1) * side / 2, 0, side - 1).astype(int)
+        made[here] = picture[xy[:, 1], xy[:, 0]]
+    return made
+
+
+def test_a_rendered_panorama_is_cut_into_what_cameras_would_see() -> None:
+    true = Pose(TRUE.position, looking(40.0, 6.0, -5.0))
+    whole = StreetImage("p", rendered_panorama(true, 1440), true.position, true.rotation, LENS, None, "test", "me")
+    take = photographer(street().true)
+    for view in cut(whole)[:2]:
+        h, w = view.picture.shape[:2]
+        direct, _, _ = take(view.position, view.rotation, view.intrinsics, w, h)
+        gap = np.abs(cv2.GaussianBlur(view.picture, (0, 0), 1.0).astype(int) - cv2.GaussianBlur(direct, (0, 0), 1.0))
+        assert np.median(gap) < 2
+        assert (gap.max(axis=2) > 25).mean() < 0.02
 
 
 def test_no_photos_change_nothing() -> None:

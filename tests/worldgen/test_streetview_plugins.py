@@ -7,8 +7,8 @@ import pytest
 
 from vico.errors import MissingFileError
 from vico.world.seeds import rng
-from vico.worldgen.streetview_mask import LanguageGroundedMovers, View
-from vico.worldgen.streetview_match import LoftrMatcher, XfeatMatcher
+from vico.worldgen.photos.streetview_mask import LanguageGroundedMovers, View
+from vico.worldgen.photos.streetview_match import LoftrMatcher, XfeatMatcher
 
 pytest.importorskip("cv2", reason="OpenCV is the extra photos")
 torch = pytest.importorskip("torch", reason="torch is not installed")

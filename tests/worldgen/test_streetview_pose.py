@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from vico.geo.street_images import looking, pinhole, turned
 from vico.world.seeds import rng
-from vico.worldgen.streetview_match import Matches
-from vico.worldgen.streetview_pose import Pose, correction, fit_pose, lifted, projected, se3_norm
+from vico.worldgen.photos.streetview_match import Matches
+from vico.worldgen.photos.streetview_pose import Pose, correction, fit_pose, lifted, projected, se3_norm
 
 pytest.importorskip("cv2", reason="OpenCV is the extra photos")
 

@@ -7,7 +7,7 @@ import numpy as np
 from vico.geo.elevation import HeightSamples, read_elevation
 from vico.geo.frame import LocalFrame
 from vico.world.seeds import rng
-from vico.worldgen.terrain import flat_terrain, is_outlier, terrain_from_dem
+from vico.worldgen.ground.terrain import flat_terrain, is_outlier, terrain_from_dem
 
 
 def grid(height: object, spacing: float = 30.0, reach: float = 560.0) -> np.ndarray:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError
 from vico.world.mesh import Surface
-from vico.worldgen.texturing import Painted, Texturing, enhanced, mesh_of, painted_from_tiles
+from vico.worldgen.photos.texturing import Painted, Texturing, enhanced, mesh_of, painted_from_tiles
 
 
 @pytest.fixture(scope="module")

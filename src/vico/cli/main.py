@@ -51,6 +51,7 @@ def world_build(
     places: tuple[str, ...] = (),
     gtfs: tuple[Path, ...] = (),
     layouts: Path | None = None,
+    things: Literal["procedural", "installed"] = "procedural",
     overpass: str | None = None,
     refresh: bool = False,
     texel: float = 0.10,
@@ -87,6 +88,7 @@ def world_build(
         places: Further places: Overture GeoParquet files, or "google" (your key in the environment).
         gtfs: Timetables: zipped GTFS feeds.
         layouts: Folder of room layouts to choose from.
+        things: Whose models street furniture and furniture wear: our own, or those of `vico assets install things`.
         overpass: Address of the Overpass server, or "off"; else the environment's VICO_OVERPASS, else the public one.
         refresh: Ask the server even if its answer is in the cache.
         texel: Side of a texel of photographed walls, metres.
@@ -102,8 +104,8 @@ def world_build(
         json: Print the result as JSON.
     """
     from vico.cli import world as verb
+    from vico.worldgen.photos.texturing import Texturing
     from vico.worldgen.sources import Sources
-    from vico.worldgen.texturing import Texturing
 
     if center is not None:
         if lat is not None or lon is not None:
@@ -113,7 +115,16 @@ def world_build(
         raise InputError("world build: --lat and --lon go together")
     if osm is None:
         osm = verb.locate(lat, lon, radius, overpass=overpass, refresh=refresh)
-    sources = Sources(osm, dem=dem, tiles=tiles, photos=photos, places=places, gtfs=gtfs, layouts=layouts)
+    sources = Sources(
+        osm,
+        dem=dem,
+        tiles=tiles,
+        photos=photos,
+        places=places,
+        gtfs=gtfs,
+        layouts=layouts,
+        installed_things=things == "installed",
+    )
     how = Texturing(texel=texel, inpaint=inpaint, upscale=upscale, model=model)
     return verb.build(sources, out=out, lat=lat, lon=lon, half=radius, seed=seed, texturing=how, force=force, json=json)
 
@@ -386,18 +397,24 @@ def evaluate_assistant(
 
 
 @assets.command(name="install")
-def assets_install(what: Positional[Literal["people", "robots", "things", "all"]] = "all", force: bool = False) -> int:
-    """Fetch richer bodies and robots from the packages that ship them, and print their licences.
+def assets_install(
+    what: Positional[Literal["people", "robots", "things", "all"]] = "all",
+    pack: Path | None = None,
+    force: bool = False,
+) -> int:
+    """Fetch richer bodies, robots and furniture from the packages that ship them, and print their licences.
 
     Example: vico assets install people
 
     Args:
         what: Which pack.
+        pack: For "things": a .deb of sweethome3d-furniture or a folder with its archives. Without it the one the
+            system has, else what apt-get downloads.
         force: Fetch and prepare again.
     """
     from vico.cli import assets as verb
 
-    return verb.install(what, force=force)
+    return verb.install(what, pack=pack, force=force)
 
 
 @assets.command(name="status")

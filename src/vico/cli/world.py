@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from vico.cli.output import check_output, print_json, print_table, progress_bars
 from vico.world.folder import World, read_world, stage_seconds
-from vico.worldgen.layout_llm import LlmLayoutAuthor
+from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
+from vico.worldgen.photos.streetview_photo import Photographer
+from vico.worldgen.photos.texturing import Texturing
 from vico.worldgen.pipeline import build_world, extract_centre, rebuild_world
 from vico.worldgen.previews import Viewpoint
 from vico.worldgen.sources import Sources
-from vico.worldgen.streetview_photo import Photographer
-from vico.worldgen.texturing import Texturing
 
 
 def photograph(world: World, views: Sequence[Viewpoint]) -> Iterator[NDArray[np.uint8]]:

@@ -4,7 +4,7 @@ Its terms allow to store one thing of an answer, the place id. Names, types, pos
 content: they may steer a decision while the process runs (which map place is confirmed, that a building has a
 restaurant) and are then forgotten. `FoundPlace.may_be_kept` is false for them, answers never enter the cache, and who
 puts them into a world has to see to it that only ids and own decisions are written
-(`vico.worldgen.places_found`).
+(`vico.worldgen.places.found`).
 """
 
 from __future__ import annotations

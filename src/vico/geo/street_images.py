@@ -1,6 +1,7 @@
 """Photos taken in the street: what one is, where they come from, and what all sources share.
 
 Sources are `street_images_mapillary`, `street_images_google` and `street_images_folder`; each has a `near`.
+`street_images_panorama` cuts panoramas into photos.
 """
 
 from __future__ import annotations
@@ -140,8 +141,16 @@ def undistorted(picture: NDArray[np.uint8], focal: float, k1: float, k2: float) 
     y = ((np.arange(height) + 0.5 - height / 2) / focal).astype(np.float32)[:, None]
     square = x * x + y * y
     bend = 1.0 + square * (np.float32(k1) + np.float32(k2) * square)
-    column = np.clip(x * bend * focal + (width / 2 - 0.5), 0, width - 1.001)
-    row = np.clip(y * bend * focal + (height / 2 - 0.5), 0, height - 1.001)
+    return sampled(picture, x * bend * focal + (width / 2 - 0.5), y * bend * focal + (height / 2 - 0.5))
+
+
+def sampled(picture: NDArray[np.uint8], column: NDArray[np.float32], row: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """The picture's colours at places between its pixels (0 is the first one's centre), between its edges.
+
+    `column` and `row` have the shape ``(h, w)`` of the picture that is made, which has shape ``(h, w, 3)``.
+    """
+    height, width = picture.shape[:2]
+    column, row = np.clip(column, 0, width - 1.001), np.clip(row, 0, height - 1.001)
     c, r = column.astype(np.int32), row.astype(np.int32)
     right, low = (column - c)[..., None], (row - r)[..., None]
     next_c, next_r = np.minimum(c + 1, width - 1), np.minimum(r + 1, height - 1)

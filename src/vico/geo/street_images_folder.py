@@ -9,9 +9,10 @@
 
     `heading` is clockwise from north and `pitch` upwards, degrees; `fov` is the vertical field of view, degrees (or
     `focal`: over the longer side); `eye` is metres above the ground, or `altitude` metres above the world's zero.
-    Only `file`, `lat`, `lon`, `heading` and one of `fov` and `focal` are needed.
+    Only `file`, `lat`, `lon`, `heading` and one of `fov` and `focal` are needed. A panorama of the whole sphere says
+    ``"projection": "equirectangular"`` instead of `fov` and `focal`; its `heading` is that of its middle column.
 ``reconstruction*.json`` (OpenSfM)
-    Cameras, shots and ``reference_lla``; perspective cameras only.
+    Cameras, shots and ``reference_lla``; perspective and spherical cameras only.
 ``images.json`` (an answer of Mapillary's API)
     The pictures' addresses are names of files in the folder.
 """
@@ -45,6 +46,7 @@ from vico.geo.street_images import (
     within,
 )
 from vico.geo.street_images_mapillary import EYE, images_in
+from vico.geo.street_images_panorama import KINDS, LONGER, cut
 
 _MOST_BYTES = 64 << 20
 _MOST_JSON = 512 << 20
@@ -65,6 +67,7 @@ class Photo(BaseModel):
     heading: Number
     pitch: Annotated[Number, Field(ge=-89, le=89)] = 0.0
     roll: Number = 0.0
+    projection: Literal["perspective", "equirectangular"] = "perspective"
     fov: Annotated[Number, Field(ge=5, le=160)] | None = None
     focal: Annotated[Number, Field(ge=0.1, le=10)] | None = None
     eye: Annotated[Number, Field(ge=0, le=200)] = 1.7
@@ -75,7 +78,10 @@ class Photo(BaseModel):
 
     @model_validator(mode="after")
     def _one_lens(self) -> Photo:
-        if (self.fov is None) == (self.focal is None):
+        if self.projection == "equirectangular":
+            if not (self.fov is None and self.focal is None and self.k1 == self.k2 == 0.0):
+                raise ValueError("an equirectangular panorama has no fov, focal, k1 and k2")
+        elif (self.fov is None) == (self.focal is None):
             raise ValueError("give one of fov and focal")
         return self
 
@@ -202,12 +208,13 @@ class FolderImages:
             if taken == most:
                 break
             try:
-                photo = inside[k].photo(self._bytes(inside[k].file), self._longest, self.name)
+                photos = inside[k].photos(self._bytes(inside[k].file), self._longest, self.name)
             except (SchemaError, MissingFileError) as error:
                 self.refused.append((inside[k].id, str(error)))
                 continue
-            taken += 1
-            yield photo
+            for photo in photos[: most - taken]:
+                taken += 1
+                yield photo
 
     def _bytes(self, name: str) -> bytes:
         """A file of the folder; names that lead out of it are refused."""
@@ -246,6 +253,7 @@ class FolderImages:
                     captured=photo.captured,
                     attribution=record.attribution,
                     eye=photo.eye if photo.altitude is None else None,
+                    whole=photo.projection == "equirectangular",
                 )
             )
         return cameras
@@ -260,19 +268,20 @@ class FolderImages:
                 self.refused.append((image.id, reason))
                 continue
             taken = None if image.captured_at is None else image.captured_at / 1000
-            bend = (*image.camera_parameters[1:3], 0.0, 0.0)[:2]
+            bend = (0.0, 0.0) if image.whole else (*image.camera_parameters[1:3], 0.0, 0.0)[:2]
             cameras.append(
                 _Camera(
                     id=image.id,
                     file=image.url() or "",
                     position=np.array([*image.place(frame), EYE]),
                     rotation=image.rotation(),
-                    focal=image.camera_parameters[0],
+                    focal=None if image.whole else image.camera_parameters[0],
                     fov=None,
                     bend=(bend[0], bend[1]),
                     captured=_iso(taken),
                     attribution=self._attribution,
                     eye=EYE,
+                    whole=image.whole,
                 )
             )
         return cameras
@@ -290,9 +299,10 @@ class FolderImages:
             here = LocalFrame(part.reference_lla.latitude, part.reference_lla.longitude)
             for name, shot in sorted(part.shots.items()):
                 lens = part.cameras.get(shot.camera)
-                if lens is None or lens.projection_type != "perspective" or lens.focal is None:
+                whole = lens is not None and lens.projection_type in KINDS
+                if lens is None or not (whole or (lens.projection_type == "perspective" and lens.focal is not None)):
                     kind = "an unknown" if lens is None else f"a {lens.projection_type}"
-                    self.refused.append((name, f"{kind} camera; only perspective photos are used"))
+                    self.refused.append((name, f"{kind} camera; only perspective photos and panoramas are used"))
                     continue
                 # Altitudes are the receiver's, ten metres off: only the place is taken.
                 rotation = turned(shot.rotation)
@@ -311,6 +321,7 @@ class FolderImages:
                         captured=_iso(shot.capture_time),
                         attribution=self._attribution,
                         eye=EYE,
+                        whole=whole,
                     )
                 )
         return cameras
@@ -335,17 +346,19 @@ class _Camera:
     captured: str | None
     attribution: str
     eye: float | None
+    whole: bool = False
 
-    def photo(self, data: bytes, longest: int, source: str) -> StreetImage:
-        picture = decoded(data, f"photo {self.file}", longest=longest)
+    def photos(self, data: bytes, longest: int, source: str) -> list[StreetImage]:
+        """The photo, or those that the panorama is cut into."""
+        picture = decoded(data, f"photo {self.file}", longest=longest * LONGER if self.whole else longest)
         height, width = picture.shape[:2]
         if self.fov is not None:
             focal = height / 2 / math.tan(math.radians(self.fov) / 2)
         else:
             focal = (self.focal or 1.0) * max(width, height)
-        return StreetImage(
+        image = StreetImage(
             self.id,
-            undistorted(picture, focal, *self.bend),
+            picture if self.whole else undistorted(picture, focal, *self.bend),
             self.position,
             self.rotation,
             pinhole(width, height, focal),
@@ -354,6 +367,7 @@ class _Camera:
             self.attribution,
             self.eye,
         )
+        return cut(image) if self.whole else [image]
 
 
 def _iso(seconds: float | None) -> str | None:

@@ -2,7 +2,7 @@
 
 The images' poses are those of its own reconstruction (``computed_geometry``, ``computed_rotation``), which follow
 OpenSfM's convention: the rotation is an angle-axis vector that takes east-north-up to the camera's right-down-forward;
-``camera_parameters`` are focal length over the longer side, k1 and k2.
+``camera_parameters`` are focal length over the longer side, k1 and k2. Panoramas are cut into photos.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from vico.geo.street_images import (
     undistorted,
     within,
 )
+from vico.geo.street_images_panorama import KINDS, LONGER, cut
 from vico.geo.web import Web
 
 FIELDS = (
@@ -80,22 +81,29 @@ class MapillaryImage(BaseModel):
 
     def unusable(self) -> str | None:
         """Why this photo can't be used, or None."""
-        if self.is_pano or self.camera_type not in (None, "perspective"):
-            return f"a {self.camera_type or 'panorama'} camera; only perspective photos are used"
+        if not self.whole and (self.is_pano or self.camera_type not in (None, "perspective")):
+            return f"a {self.camera_type} camera; only perspective photos and whole panoramas are used"
         if self.computed_geometry is None and self.geometry is None:
             return "no position"
         if self.computed_rotation is None and self._compass() is None:
             return "no orientation"
-        if not self.camera_parameters or not 0.2 <= self.camera_parameters[0] <= 5.0:
+        if not self.whole and (not self.camera_parameters or not 0.2 <= self.camera_parameters[0] <= 5.0):
             return "no focal length"
-        if any(abs(k) > 2.0 for k in self.camera_parameters[1:3]):
+        if not self.whole and any(abs(k) > 2.0 for k in self.camera_parameters[1:3]):
             return f"lens distortion {self.camera_parameters[1:3]} is out of range"
         if not self.url():
             return "no picture"
         return None
 
+    @property
+    def whole(self) -> bool:
+        """Whether it is a panorama of the whole sphere."""
+        return self.camera_type in KINDS or (self.is_pano and self.camera_type is None)
+
     def url(self) -> str | None:
-        """Address of the picture: 2,048 pixels wide where there is one."""
+        """Address of the picture: 2,048 pixels wide where there is one, of panoramas the largest."""
+        if self.whole:
+            return self.thumb_original_url or self.thumb_2048_url
         return self.thumb_2048_url or self.thumb_original_url
 
     def _compass(self) -> float | None:
@@ -118,23 +126,27 @@ class MapillaryImage(BaseModel):
         lon, lat = point.coordinates
         return frame.to_enu(lat, lon)
 
-    def image(self, frame: LocalFrame, data: bytes, *, source: str, attribution: str, longest: int) -> StreetImage:
-        """The photo, undistorted, with its camera.
+    def photos(
+        self, frame: LocalFrame, data: bytes, *, source: str, attribution: str, longest: int
+    ) -> list[StreetImage]:
+        """The photo with its camera, undistorted; of a panorama the pictures it is cut into.
 
         Raises
         ------
         SchemaError
-            If `data` is no readable picture.
+            If `data` is no readable picture, or no whole panorama.
         """
-        picture = decoded(data, f"{source} photo {self.id}", longest=longest)
+        picture = decoded(data, f"{source} photo {self.id}", longest=longest * LONGER if self.whole else longest)
         height, width = picture.shape[:2]
-        focal = self.camera_parameters[0] * max(width, height)
-        k1, k2 = (*self.camera_parameters[1:3], 0.0, 0.0)[:2]
         taken = None
         if self.captured_at is not None and 0 < self.captured_at < 1 << 42:
             taken = datetime.fromtimestamp(self.captured_at / 1000, UTC).isoformat(timespec="seconds")
+        focal, k1, k2 = (*self.camera_parameters[:3], 0.0, 0.0, 0.0)[:3]
+        if self.whole:
+            focal, k1, k2 = 1.0, 0.0, 0.0
+        focal *= max(width, height)
         # Altitudes are the receiver's, ten metres off and above another zero than the terrain's.
-        return StreetImage(
+        image = StreetImage(
             self.id,
             undistorted(picture, focal, k1, k2),
             np.array([*self.place(frame), EYE]),
@@ -145,6 +157,7 @@ class MapillaryImage(BaseModel):
             attribution,
             eye=EYE,
         )
+        return cut(image) if self.whole else [image]
 
 
 def images_in(answer: bytes, what: str) -> tuple[list[MapillaryImage], list[tuple[str, str]], str | None]:
@@ -186,7 +199,7 @@ def images_in(answer: bytes, what: str) -> tuple[list[MapillaryImage], list[tupl
 
 
 class Mapillary:
-    """Perspective photos of Mapillary around a place.
+    """Photos and panoramas of Mapillary around a place.
 
     Parameters
     ----------
@@ -244,12 +257,13 @@ class Mapillary:
             image = usable[k]
             try:
                 data = self._web.get(image.url() or "", most=_MOST_PHOTO)
-                photo = image.image(frame, data, source=self.name, attribution=ATTRIBUTION, longest=self._longest)
+                photos = image.photos(frame, data, source=self.name, attribution=ATTRIBUTION, longest=self._longest)
             except (SourceError, SchemaError) as error:
                 self.refused.append((image.id, str(error)))
                 continue
-            taken += 1
-            yield photo
+            for photo in photos[: most - taken]:
+                taken += 1
+                yield photo
 
     def _listed(self, box: tuple[float, float, float, float]) -> Iterator[MapillaryImage]:
         """Everything in a box: page by page, or quarter by quarter where a full page has no next one."""

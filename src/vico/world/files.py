@@ -6,19 +6,20 @@ import hashlib
 import json
 import os
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from vico.errors import MissingFileError, SchemaError
 
 
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write a whole file or nothing: to a temporary neighbour, synced, then renamed over `path`."""
+def write_bytes(path: Path, content: bytes | Sequence[bytes]) -> None:
+    """Write a whole file, given in one or several pieces, or nothing: to a temporary neighbour, then renamed."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
-            file.write(content)
+            file.writelines([content] if isinstance(content, bytes | bytearray | memoryview) else content)
             file.flush()
             os.fsync(file.fileno())
         os.chmod(temporary, 0o644)

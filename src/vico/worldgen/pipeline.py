@@ -25,13 +25,13 @@ from vico.world.files import read_json, write_json
 from vico.world.folder import World, read_world, seal
 from vico.world.model import Manifest
 from vico.worldgen.evidence import gather
-from vico.worldgen.layout_llm import LlmLayoutAuthor
+from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
+from vico.worldgen.photos.texturing import Studio, Texturing
 from vico.worldgen.previews import Photograph, map_picture, viewpoints
 from vico.worldgen.recipe import make_world
 from vico.worldgen.report import write_report
 from vico.worldgen.sources import Sources
 from vico.worldgen.stages import Progress, Stages
-from vico.worldgen.texturing import Studio, Texturing
 
 STAGES = ".stages"
 _REQUEST = "request.json"

@@ -27,6 +27,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.errors import SchemaError
 from vico.world.files import write_bytes
+from vico.world.threads import in_order
 
 _MAGIC = b"vicoprod"
 _MOST_BLOB = 2 << 30
@@ -79,14 +80,15 @@ class _Writer:
         if value.dtype == object:
             return {"objects": [self.tree(item) for item in value.ravel().tolist()], "of": list(value.shape)}
         return {
-            "array": self.blob(np.ascontiguousarray(value).tobytes()),
+            # A view and no copy: the pages of a district's photos fill half a gigabyte.
+            "array": self.blob(np.ascontiguousarray(value).reshape(-1).view(np.uint8).data),
             "type": value.dtype.str,
             "of": list(value.shape),
         }
 
 
 class _Reader:
-    def __init__(self, blobs: list[bytes]) -> None:
+    def __init__(self, blobs: list[Any]) -> None:
         self._blobs = blobs
         self._known: dict[int, Any] = {}
 
@@ -129,10 +131,11 @@ class _Reader:
     def _leaf(self, kind: str, node: dict[str, Any]) -> Any:
         data = self._blobs[node[kind]]
         if kind == "bytes":
-            return data
+            return bytes(data)
         if kind == "shape":
-            return shapely.from_wkb(data)
-        return np.frombuffer(bytearray(data), np.dtype(node["type"])).reshape(node["of"])
+            return shapely.from_wkb(bytes(data))
+        # The array lives in what was decompressed, which can be written to.
+        return np.frombuffer(data, np.dtype(node["type"])).reshape(node["of"])
 
 
 def _name_of(kind: type) -> str:
@@ -165,7 +168,7 @@ def digest_of(value: Any) -> str:
     return _digest(*packed(value))
 
 
-def _digest(tree: bytes, blobs: list[bytes | memoryview]) -> str:
+def _digest(tree: Any, blobs: list[Any]) -> str:
     total = sha256(struct.pack("<Q", len(tree)))
     total.update(tree)
     for blob in blobs:
@@ -179,10 +182,10 @@ def write_product(path: Path, value: Any, *, key: str) -> str:
     tree, blobs = packed(value)
     digest = _digest(tree, blobs)
     codec = pa.Codec("zstd", compression_level=1)
-    small = [codec.compress(blob, asbytes=True) for blob in (tree, *blobs)]
+    small = list(in_order(lambda blob: codec.compress(blob, asbytes=True), (tree, *blobs)))
     sizes = [(len(raw), len(s)) for raw, s in zip((tree, *blobs), small, strict=True)]
     head = json.dumps({"key": key, "digest": digest, "sizes": sizes}).encode()
-    write_bytes(path, b"".join([_MAGIC, struct.pack("<Q", len(head)), head, *small]))
+    write_bytes(path, [_MAGIC, struct.pack("<Q", len(head)), head, *small])
     return digest
 
 
@@ -230,12 +233,12 @@ def read_product(path: Path) -> tuple[Any, str]:
             if not 0 <= raw <= _MOST_BLOB or not 0 <= small <= len(data) - start:
                 raise ValueError("truncated")
             chunk = data[start : start + small]
-            parts.append(codec.decompress(chunk, raw, asbytes=True) if raw else b"")
+            parts.append(codec.decompress(chunk, raw) if raw else bytearray())
             start += small
         tree, blobs = parts[0], parts[1:]
         if _digest(tree, list(blobs)) != head["digest"]:
             raise ValueError("its content is not what its digest says")
-        value = _Reader(blobs).value(json.loads(tree))
+        value = _Reader(blobs).value(json.loads(bytes(tree)))
     except (OSError, ValueError, KeyError, IndexError, TypeError, AttributeError, ImportError, ShapelyError) as error:
         raise SchemaError(f"{path}: not a readable stage product ({error}); build the world anew") from None
     return value, str(head["digest"])

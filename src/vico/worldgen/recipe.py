@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,8 +12,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from vico import __version__
-from vico.assets.furniture import furniture_models
-from vico.assets.street import street_models
+from vico.assets.things import credits_of, our_models, read_things
 from vico.errors import EmptyInputError, InputError
 from vico.geo.elevation import HeightSamples
 from vico.geo.osm import OsmData
@@ -24,28 +23,23 @@ from vico.world.folder import World, write_record, write_records, write_terrain
 from vico.world.heights import HeightField
 from vico.world.lanes import read_lanes
 from vico.world.mesh import Surface, write_glb
-from vico.world.model import Dropped, Manifest, Origin, Transit
+from vico.world.model import Dropped, Manifest, Origin, Source, Transit
 from vico.world.objects import Objects, write_objects
 from vico.world.walkable import WalkableMap, write_walkable
-from vico.worldgen.bridges import pier_feet, portal_feet, portals_of
-from vico.worldgen.buildings import BuildingsResult, buildings_from_osm
+from vico.worldgen.buildings.fitting import buildings_on_tiles, settled
+from vico.worldgen.buildings.outlines import building_plans
+from vico.worldgen.buildings.stage import BuildingsResult, buildings_from_osm
 from vico.worldgen.evidence import Evidence
-from vico.worldgen.facade_fronts import street_fronts
-from vico.worldgen.fitting import buildings_on_tiles, settled
-from vico.worldgen.grading import graded, standing_outlines
-from vico.worldgen.ground import ground_from_osm, mapped_areas
-from vico.worldgen.indoor import furnish
-from vico.worldgen.layout_llm import LlmLayoutAuthor, furnish_drawn
-from vico.worldgen.netconvert import road_network
-from vico.worldgen.objects import objects_from_osm
-from vico.worldgen.outlines import building_plans
-from vico.worldgen.places import places_from_osm
-from vico.worldgen.roads import roads_from_osm
-from vico.worldgen.sources import Sources
-from vico.worldgen.stages import Stages
-from vico.worldgen.streets import StreetPolygons, road_polygons
-from vico.worldgen.terrain import flat_terrain, terrain_from_dem, terrain_from_tiles
-from vico.worldgen.texturing import (
+from vico.worldgen.facades.fronts import street_fronts
+from vico.worldgen.ground.bridges import pier_feet, portal_feet, portals_of
+from vico.worldgen.ground.grading import graded, standing_outlines
+from vico.worldgen.ground.stage import ground_from_osm, mapped_areas
+from vico.worldgen.ground.terrain import flat_terrain, terrain_from_dem, terrain_from_tiles
+from vico.worldgen.ground.walkable import walkable_map
+from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor, furnish_drawn
+from vico.worldgen.indoor.stage import furnish
+from vico.worldgen.objects.stage import objects_from_osm
+from vico.worldgen.photos.texturing import (
     Studio,
     Texturing,
     enhanced,
@@ -54,9 +48,16 @@ from vico.worldgen.texturing import (
     painted_from_street,
     painted_from_tiles,
 )
-from vico.worldgen.transit import transit_from_osm
-from vico.worldgen.walkable import walkable_map
+from vico.worldgen.places.stage import places_from_osm
+from vico.worldgen.sources import Sources
+from vico.worldgen.stages import Stages
+from vico.worldgen.streets.netconvert import road_network
+from vico.worldgen.streets.roads import closed_roads, roads_from_osm
+from vico.worldgen.streets.streets import StreetPolygons, road_polygons
+from vico.worldgen.transit.stage import transit_from_osm
 
+# Faces that photos cover less than this share of keep their facade.
+_LEAST_COVERED = 0.3
 _BARRIER_KINDS = ("fence", "wall", "guard_rail", "hedge")
 
 
@@ -73,6 +74,7 @@ def make_world(
     author: LlmLayoutAuthor | None,
 ) -> World:
     """Run every stage between the sources and the pictures, and write the world's files into `folder`."""
+    stand_ins = read_things()[0] if sources.installed_things else {}
     data, tiles = given.data, given.tiles
     if tiles is not None:
         height, raised = stages.run("terrain", _ground_of_tiles, data, given.samples, tiles, half=half, seed=seed)
@@ -97,9 +99,9 @@ def make_world(
     solids = _standing(built, height)
     solids += [*pier_feet(data, height, streets), *portal_feet(portals_of(data, streets))]
 
-    roads = stages.run("roads", roads_from_osm, data, half)
+    roads = stages.run("roads", roads_from_osm, data, half, solids=solids)
     write_record(folder / "roads.json", roads)
-    network = stages.run("network", road_network, data, half)
+    network = stages.run("network", road_network, data, half, solids=solids)
     write_bytes(folder / "roads.net.xml", network.net_xml)
     write_bytes(folder / "roads.xodr", network.xodr)
     lanes = stages.given(read_lanes(folder / "roads.net.xml"), sha256_of(folder / "roads.net.xml"))
@@ -113,7 +115,10 @@ def make_world(
             "crossings": len(roads.crossings),
             "lanes": len(lanes),
         },
-        [] if len(lanes) else [Dropped(id="roads", reason="no street for traffic in the window")],
+        [
+            *([] if len(lanes) else [Dropped(id="roads", reason="no street for traffic in the window")]),
+            *closed_roads(roads),
+        ],
     )
 
     transit = stages.run(
@@ -205,11 +210,11 @@ def make_world(
     counts = {"rooms": len(indoors.rooms), "indoor_objects": len(indoors.furniture)}
     stages.report("indoor", counts, undrawn)
 
-    ground = stages.run("ground", ground_from_osm, data, height, half, streets)
+    ground = stages.run("ground", ground_from_osm, data, height, half, streets, standing=solids)
     stages.report("ground", {"faces": _faces(ground)})
     fronts = street_fronts(indoors.places, entrances, buildings, built.walls, seed=seed)
     stages.report("fronts", fronts.counts)
-    models = _models(objects)
+    models, credits = _models(objects, stand_ins)
     parts: dict[str, Any] = {
         "height": height,
         "buildings": buildings,
@@ -230,7 +235,7 @@ def make_world(
         half=half,
         bbox=tuple(round(v, 7) for v in data.frame.bbox(half)),
         seed=seed,
-        sources=list(given.credits),
+        sources=[*given.credits, *credits],
         stages=[],
         counts={},
         places_by_type={},
@@ -304,7 +309,11 @@ def _painted(
 ) -> tuple[list[Surface], list[Surface]]:
     """Walls and roofs that wear photos where there are any."""
     if tiles is not None:
-        painted = stages.run("bake", painted_from_tiles, built.walls, built.roofs, tiles, texel=texturing.texel)
+        # Where street photos may still come, hardly covered faces wait for them.
+        least = 0.0 if images else _LEAST_COVERED
+        painted = stages.run(
+            "bake", painted_from_tiles, built.walls, built.roofs, tiles, texel=texturing.texel, least=least
+        )
     else:
         painted = stages.run("bake", painted_as_built, built.walls, built.roofs, texel=texturing.texel)
     if images and studio is None:
@@ -323,7 +332,7 @@ def _painted(
             photograph=studio(seen),
         )
         stages.report("streetview", report.counts, report.dropped)
-    painted = kept_where_photographed(built.walls, built.roofs, painted)
+    painted = kept_where_photographed(built.walls, built.roofs, painted, least=_LEAST_COVERED)
     painted = stages.run("enhance", enhanced, painted, texturing)
     stages.report("texture", painted.counts)
     return painted.surfaces()
@@ -393,11 +402,20 @@ def _faces(surfaces: Iterable[Surface]) -> int:
     return sum(len(surface.triangles) for surface in surfaces)
 
 
-def _models(objects: Objects) -> dict[str, Sequence[Surface]]:
+def _models(
+    objects: Objects, stand_ins: Mapping[str, Sequence[Surface]]
+) -> tuple[dict[str, Sequence[Surface]], list[Source]]:
+    """The models of what stands in the world, and whom to thank for those that are not ours."""
     used = set(objects.prototype.tolist())
-    return {
-        name: list(model.surfaces) for name, model in {**street_models(), **furniture_models()}.items() if name in used
+    models: dict[str, Sequence[Surface]] = {
+        name: list(stand_ins.get(name, model.surfaces)) for name, model in our_models().items() if name in used
     }
+    foreign = [name for name in models if name in stand_ins]
+    credits = [
+        Source(kind="things", name=c.collection, licence=c.licence, attribution=c.words, sha256=read_things()[2])
+        for c in (credits_of(foreign) if foreign else ())
+    ]
+    return models, credits
 
 
 def _write_meshes(

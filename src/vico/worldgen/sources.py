@@ -30,6 +30,8 @@ class Sources:
         Timetables: zipped GTFS feeds.
     layouts
         A folder of room layouts to choose from.
+    installed_things
+        Show the models of `vico assets install things` instead of ours, where there are.
     """
 
     osm: Path
@@ -39,6 +41,7 @@ class Sources:
     places: tuple[str, ...] = ()
     gtfs: tuple[Path, ...] = ()
     layouts: Path | None = None
+    installed_things: bool = False
 
     def __post_init__(self) -> None:
         for what, value, reader in (
@@ -93,6 +96,7 @@ class Sources:
                 places=tuple(content["places"]),
                 gtfs=tuple(Path(p) for p in content["gtfs"]),
                 layouts=None if content["layouts"] is None else Path(content["layouts"]),
+                installed_things=bool(content["installed_things"]),
             )
         except (KeyError, TypeError) as error:
             raise InputError(f"the recorded sources of the world can't be read ({error}); build it anew") from None

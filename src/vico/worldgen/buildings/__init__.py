@@ -1,0 +1,1 @@
+"""Buildings: outlines from the map, heights by rule, roofs of every shape, watertight solids."""

@@ -1,0 +1,185 @@
+"""Solids of planned buildings: seated on the ground, meshed, and as convex bodies to collide with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import mapbox_earcut
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import Polygon
+
+from vico.geo.osm import polygons_of
+from vico.world.heights import HeightField
+from vico.world.mesh import Material, Surface
+from vico.world.solid_checks import open_edges
+from vico.worldgen.buildings.outlines_plans import BuildingPlan, PartPlan
+from vico.worldgen.buildings.roof_shapes import rings_of
+from vico.worldgen.buildings.roofs import building_solid
+
+_SKIRT = 0.3  # metres the walls reach below the lowest ground, so that no gap shows
+
+
+@dataclass(frozen=True)
+class Seat:
+    """Where a building stands: `bottom` of its walls and `base` (ground floor), metres."""
+
+    bottom: float
+    base: float
+
+
+def seat_of(plan: BuildingPlan, terrain: HeightField) -> Seat:
+    """Seat a building: walls down to the lowest ground under it, ground floor a little above that on a slope."""
+    outline = np.asarray(shapely.segmentize(plan.outline.exterior, 3.0).coords)[:, :2]
+    ground = terrain(outline)
+    lowest, highest = float(ground.min()), float(ground.max())
+    base = lowest + min(0.4 * (highest - lowest), 1.5)
+    return Seat(lowest - _SKIRT, base)
+
+
+def heights_of(part: PartPlan, seat: Seat) -> tuple[float, float]:
+    """Underside and eaves of a part above sea level."""
+    return (seat.bottom if part.low <= 0 else seat.base + part.low), seat.base + part.eaves
+
+
+Mesh = tuple[NDArray[np.float64], NDArray[np.int64]]
+"""Points, ENU metres, shape ``(n, 3)``, and faces, shape ``(m, 3)``, of one closed solid."""
+
+
+@dataclass
+class SolidMesh:
+    """All solids together; `part` and `plan` say whose a face is, `parts` whose part is of which plan."""
+
+    points: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    part: NDArray[np.int64]
+    plan_of_part: NDArray[np.int64]
+    broken: list[int] = field(default_factory=list)
+
+
+def part_mesh(part: PartPlan, seat: Seat) -> Mesh:
+    """The solid of a part on its seat; without faces where nothing comes of it."""
+    if part.mesh is not None:
+        return part.mesh[0] + (0.0, 0.0, seat.base), part.mesh[1]
+    low, eaves = heights_of(part, seat)
+    # Solids are made near the origin and near height 0: the kernel's tolerance grows with coordinates.
+    x, y = (round(v) for v in part.polygon.centroid.coords[0])
+    local = shapely.transform(part.polygon, lambda xy, x=x, y=y: xy - (x, y))
+    solid = building_solid(local, low - eaves, 0.0, part.roof).simplify(0.002)
+    body = solid.to_mesh64()
+    vertices = np.asarray(body.vert_properties, np.float64)[:, :3]
+    triangles = np.asarray(body.tri_verts, np.int64)
+    if solid.volume() <= 0:
+        triangles = triangles[:0]
+    return vertices + np.array([x, y, eaves]), triangles
+
+
+def solid_meshes(plans: list[BuildingPlan], seats: list[Seat], known: list[list[Mesh]] | None = None) -> SolidMesh:
+    """Mesh every solid of every plan, on its seat; `known` are those of the plans' parts."""
+    points: list[NDArray[np.float64]] = []
+    faces: list[NDArray[np.int64]] = []
+    owner: list[NDArray[np.int64]] = []
+    plan_of_part: list[int] = []
+    broken: list[int] = []
+    count = 0
+    for p, (plan, seat) in enumerate(zip(plans, seats, strict=True)):
+        parts = known[p] if known is not None else [part_mesh(part, seat) for part in plan.parts]
+        for vertices, triangles in (*parts, *(part_mesh(part, seat) for part in plan.rooftop)):
+            if not len(triangles):
+                broken.append(p)
+            points.append(vertices)
+            faces.append(triangles + count)
+            owner.append(np.full(len(triangles), len(plan_of_part), np.int64))
+            count += len(vertices)
+            plan_of_part.append(p)
+    if not points:
+        return SolidMesh(np.zeros((0, 3)), np.zeros((0, 3), np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64))
+    return SolidMesh(
+        np.concatenate(points), np.concatenate(faces), np.concatenate(owner), np.array(plan_of_part), broken
+    )
+
+
+def leaky(mesh: SolidMesh) -> set[int]:
+    """Plans with a solid that is empty, inside out, or has an edge without its exact counterpart."""
+    return set(mesh.broken) | set(mesh.plan_of_part[mesh.part[open_edges(mesh.faces)]].tolist())
+
+
+def collision_bodies(part: PartPlan, seat: Seat, entity: int) -> list[Surface]:
+    """Convex prisms that fill a part's walls, up to half the height of a pitched roof."""
+    low, eaves = heights_of(part, seat)
+    top = eaves + (part.roof.height if part.roof.shape == "flat" else 0.5 * part.roof.height)
+    bodies: list[Surface] = []
+    for shape in polygons_of(shapely.simplify(part.polygon, 0.25), 0.5):
+        for ring in convex_pieces(shape):
+            n = len(ring)
+            points = np.concatenate([np.c_[ring, np.full(n, low)], np.c_[ring, np.full(n, top)]])
+            i = np.arange(n)
+            j = (i + 1) % n
+            fan = np.arange(1, n - 1)
+            triangles = np.concatenate(
+                [
+                    np.stack([i, j, n + j], axis=1),
+                    np.stack([i, n + j, n + i], axis=1),
+                    np.stack([np.zeros_like(fan), fan + 1, fan], axis=1),
+                    np.stack([np.full_like(fan, n), n + fan, n + fan + 1], axis=1),
+                ]
+            )
+            out = points - points.mean(axis=0)
+            normals = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
+            bodies.append(
+                Surface.from_triangles(
+                    points, triangles, normals=normals, entity=entity, material=Material("collision")
+                )
+            )
+    return bodies
+
+
+def convex_pieces(polygon: Polygon) -> list[NDArray[np.float64]]:
+    """Divide a polygon into convex ones: ears, then merged across every diagonal that is not needed.
+
+    Returns
+    -------
+    list of ndarray
+        Counter-clockwise rings, not closed, shape ``(n, 2)``.
+
+    Notes
+    -----
+    Hertel and Mehlhorn (1983): at most four times the least number of pieces.
+    """
+    rings = rings_of(polygon)
+    points = np.concatenate(rings)
+    ends = np.cumsum([len(ring) for ring in rings]).astype(np.uint32)
+    triangles = mapbox_earcut.triangulate_float64(points, ends).reshape(-1, 3).astype(int)
+    pieces: dict[int, list[int]] = {}
+    side: dict[tuple[int, int], int] = {}
+    for k, (a, b, c) in enumerate(triangles.tolist()):
+        (ux, uy), (vx, vy) = points[b] - points[a], points[c] - points[a]
+        area = float(ux * vy - uy * vx)
+        if abs(area) < 1e-9:
+            continue
+        pieces[k] = [a, b, c] if area > 0 else [a, c, b]
+        for i in range(3):
+            side[pieces[k][i], pieces[k][(i + 1) % 3]] = k
+    for a, b in sorted(side):
+        first, second = side.get((a, b)), side.get((b, a))
+        if first is None or second is None or first == second:
+            continue
+        one, two = pieces[first], pieces[second]
+        i, j = one.index(a), two.index(b)
+        ring = one[i + 1 :] + one[: i + 1]
+        # Walk the first from b round to a, then the second's corners between a and b.
+        rest = two[j:] + two[:j]
+        merged = ring + [v for v in rest if v not in (a, b)]
+        if not _is_convex(points[merged]):
+            continue
+        pieces[first] = merged
+        del pieces[second]
+        for u, v in [key for key, of in side.items() if of == second]:
+            side[u, v] = first
+    return [points[ring] for ring in pieces.values()]
+
+
+def _is_convex(ring: NDArray[np.float64]) -> bool:
+    before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    return bool((before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] > -1e-9).all())

@@ -1,0 +1,196 @@
+"""Sign boards with the names of places, many on a page: letters, colours by trade, plain boards where letters lack."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from vico.world.mesh import Material
+from vico.world.model import Category, Place
+from vico.worldgen.facades.lettering import lettered, letters_width, spelled
+
+Rgb = tuple[int, int, int]
+
+# Board and letters, by trade; the last ones suit anything.
+_STYLES: dict[str, tuple[tuple[Rgb, Rgb], ...]] = {
+    "food": (
+        ((122, 36, 34), (250, 236, 206)), ((38, 58, 48), (240, 222, 170)), ((46, 40, 36), (244, 214, 150)),
+        ((236, 226, 206), (112, 40, 34)), ((160, 84, 38), (255, 244, 222)), ((28, 30, 34), (248, 248, 246)),
+    ),
+    "store": (
+        ((34, 46, 76), (246, 246, 248)), ((28, 30, 32), (248, 248, 246)), ((246, 246, 244), (36, 38, 42)),
+        ((66, 30, 52), (244, 230, 236)), ((30, 74, 76), (238, 248, 246)), ((196, 48, 44), (255, 250, 244)),
+        ((232, 224, 208), (58, 50, 42)), ((228, 186, 60), (40, 34, 30)),
+    ),
+    "health": (((244, 248, 246), (20, 124, 72)), ((20, 110, 66), (248, 252, 250))),
+    "office": (((58, 66, 76), (240, 242, 244)), ((196, 198, 200), (36, 40, 46)), ((30, 56, 92), (240, 244, 250))),
+    "stay": (((46, 34, 30), (236, 204, 140)), ((28, 44, 66), (240, 224, 176))),
+    "fun": (((56, 24, 66), (252, 224, 120)), ((24, 26, 32), (244, 92, 92)), ((20, 40, 70), (250, 250, 250))),
+}  # fmt: skip
+_ROW, _FONT, _PAGE, _MOST_PAGES = 48, 30, 2048, 2
+_MOST_BOARDS = 6000
+
+
+@dataclass(frozen=True)
+class Board:
+    """A painted board on a page.
+
+    Attributes
+    ----------
+    page
+        Index into `Boards.materials`.
+    uv
+        Left, bottom, right and top, texture coordinates.
+    aspect
+        Its width by its height.
+    ground, letters
+        Colours.
+    """
+
+    page: int
+    uv: tuple[float, float, float, float]
+    aspect: float
+    ground: Rgb
+    letters: Rgb
+
+
+@dataclass(frozen=True)
+class Boards:
+    """Boards by the id of their place; `mute` lists places whose name has letters that can't be drawn."""
+
+    by_place: dict[str, Board]
+    materials: tuple[Material, ...]
+    mute: tuple[str, ...]
+
+
+def trade_of(place: Place) -> str:
+    """What kind of sign suits a place."""
+    if place.kind in ("pharmacy", "clinic", "doctors", "dentist", "hospital", "chemist", "optician"):
+        return "health"
+    return {
+        Category.FOOD: "food",
+        Category.STORE: "store",
+        Category.OFFICE: "office",
+        Category.ACCOMMODATION: "stay",
+    }.get(place.category, "fun")
+
+
+def colours_of(place: Place) -> tuple[Rgb, Rgb]:
+    """Board and letters: of a chain the same everywhere, since they hang on the name alone."""
+    styles = _STYLES[trade_of(place)]
+    return styles[zlib.crc32(place.name.encode()) % len(styles)]
+
+
+def board_text(place: Place) -> str | None:
+    """What a place's board says, shortened to fit; None where its letters can't be drawn."""
+    text = spelled(place.name)
+    if text is None:
+        return None
+    for cut in (" - ", " | ", " (", ", ", " / "):
+        if len(text) > 22 and cut in text[3:]:
+            text = text[: text.index(cut, 3)]
+    if len(text) > 30:
+        text = text[:30].rsplit(" ", 1)[0]
+    return text.upper() if zlib.crc32(b"case" + place.name.encode()) % 3 == 0 else text
+
+
+def paint_boards(places: Sequence[Place]) -> Boards:
+    """Paint a board for every place, equal ones once, on at most two pages.
+
+    Letters are made smaller where a city has more names than the pages hold.
+    """
+    wanted: dict[tuple[str, Rgb, Rgb], list[str]] = {}
+    mute = []
+    for place in places:
+        text = board_text(place)
+        if text is None:
+            mute.append(place.id)
+            continue
+        wanted.setdefault((text, *colours_of(place)), []).append(place.id)
+    if not wanted:
+        return Boards({}, (), tuple(mute))
+    for share in (1.0, 0.75, 0.5, 0.375, 0.25):
+        row, font = round(_ROW * share / 4) * 4, max(round(_FONT * share), 7)
+        pages = _packed([_board_width(key[0], font) for key in sorted(wanted)], row)
+        if pages is not None:
+            break
+    else:  # more names than even the smallest letters leave room for: the last ones stay without
+        for key in sorted(wanted)[_MOST_BOARDS:]:
+            mute += wanted.pop(key)
+        pages = _packed([_board_width(key[0], font) for key in sorted(wanted)], row)
+        assert pages is not None
+    made = {key: _board(key[0], key[1], key[2], font, row) for key in sorted(wanted)}
+    count = max(page for page, _, _ in pages) + 1
+    highest = max(y for page, _, y in pages if page == count - 1) + row
+    canvases = [np.zeros((_PAGE, _PAGE, 4), np.uint8) for _ in range(count)]
+    if count == 1:  # a small place needs a small page
+        canvases = [np.zeros((1 << max(highest - 1, 1).bit_length(), _PAGE, 4), np.uint8)]
+    by_place: dict[str, Board] = {}
+    for (key, picture), (page, x, y) in zip(made.items(), pages, strict=True):
+        height, width = picture.shape[:2]
+        canvas = canvases[page]
+        canvas[y : y + height, x : x + width] = picture
+        e = 0.6
+        uv = (
+            (x + e) / _PAGE,
+            (y + e) / canvas.shape[0],
+            (x + width - e) / _PAGE,
+            (y + height - e) / canvas.shape[0],
+        )
+        board = Board(page, uv, width / height, key[1], key[2])
+        by_place.update(dict.fromkeys(wanted[key], board))
+    materials = tuple(Material(f"signs_{k}", canvas, emission=1.0) for k, canvas in enumerate(canvases))
+    return Boards(by_place, materials, tuple(mute))
+
+
+def _board(text: str, ground: Rgb, letters: Rgb, font: int, row: int) -> NDArray[np.uint8]:
+    """One board: coverage of the letters mixes the colours; letters shine, the board a little. Row 0 is the bottom."""
+    mask = lettered(text, font)
+    margin = round(0.45 * font)
+    wide = _board_width(text, font)
+    if mask.shape[1] > wide - 2 * margin:
+        mask = np.asarray(Image.fromarray(mask).resize((wide - 2 * margin, mask.shape[0]), Image.Resampling.BOX))
+    cover = np.zeros((row, wide), np.float32)
+    # The middle of a capital, 0.77 of the font's size below the mask's top, goes to the middle of the board.
+    top = round(row / 2 - 0.79 * font)
+    a, b = max(top, 0), min(top + mask.shape[0], row)
+    cover[a:b, margin : margin + mask.shape[1]] = mask[a - top : b - top] / np.float32(255)
+    cover = (np.round(cover * 5) / 5).astype(np.float32)  # a handful of shades: files are smaller by a third
+    colour = (
+        np.asarray(ground, np.float32) * (1 - cover[..., None]) + np.asarray(letters, np.float32) * cover[..., None]
+    )
+    bright = sum(letters) > sum(ground)
+    glow = 40 + 215 * cover if bright else 190 - 120 * cover
+    return np.concatenate([colour, glow[..., None]], axis=2).round().astype(np.uint8)[::-1]
+
+
+def _board_width(text: str, font: int) -> int:
+    """Pixels a board is wide; names longer than half a page are squeezed."""
+    margin = round(0.45 * font)
+    return min(letters_width(text, font) + 2 * margin, _PAGE // 2)
+
+
+def _packed(widths: Sequence[int], row: int) -> list[tuple[int, int, int]] | None:
+    """Lay boards in rows: page, x and y of each; None if they need more pages than there may be."""
+    order = sorted(range(len(widths)), key=lambda k: (-widths[k], k))
+    rows: list[list[int]] = []  # page, y, used width
+    places: list[tuple[int, int, int]] = [(0, 0, 0)] * len(widths)
+    rows_a_page = _PAGE // row
+    for k in order:
+        for entry in rows:
+            if entry[2] + widths[k] + 2 <= _PAGE:
+                break
+        else:
+            page, line = divmod(len(rows), rows_a_page)
+            if page >= _MOST_PAGES:
+                return None
+            entry = [page, line * row, 0]
+            rows.append(entry)
+        places[k] = (entry[0], entry[2], entry[1])
+        entry[2] += widths[k] + 2
+    return places

@@ -1,0 +1,105 @@
+"""Polygons parted along a line of equal east or north."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+_STRAIGHT = 1e-8  # square metres: corners that turn the other way by less are straight
+
+
+def halved(polygons: NDArray[np.object_], middle: Floats, axis: int) -> tuple[NDArray[np.object_], NDArray[np.object_]]:
+    """Part polygons that lie on both sides of a line.
+
+    Parameters
+    ----------
+    polygons
+        Shape ``(n,)``.
+    middle
+        Where each one's line runs, metres, shape ``(n,)``.
+    axis
+        0: the line is one of equal east, 1: of equal north.
+
+    Returns
+    -------
+    tuple
+        What lies below and beyond, shape ``(n,)`` each; polygons, or collections of whatever the rest of an odd one is.
+    """
+    below, beyond = np.empty(len(polygons), object), np.empty(len(polygons), object)
+    easy = shapely.get_num_interior_rings(polygons) == 0
+    rings = _Rings.of(polygons[easy])
+    easy[easy] = rings.convex() | rings.crossed_twice(middle[easy], axis)
+    rings = _Rings.of(polygons[easy])
+    below[easy] = rings.clipped(middle[easy], axis, 1.0)
+    beyond[easy] = rings.clipped(middle[easy], axis, -1.0)
+    hard = np.flatnonzero(~easy)
+    if len(hard):
+        box = shapely.bounds(polygons[hard])
+        box += (-1.0, -1.0, 1.0, 1.0)  # so that only the line cuts
+        for out, side in ((below, 2 + axis), (beyond, axis)):
+            cut = box.copy()
+            cut[:, side] = middle[hard]
+            out[hard] = shapely.intersection(polygons[hard], shapely.box(*cut.T))
+    return below, beyond
+
+
+@dataclass(frozen=True)
+class _Rings:
+    """Outer rings as edges from `a` to `b`, shape ``(n, 2)``, of the polygons `row`, which begin at `start`."""
+
+    a: Floats
+    b: Floats
+    row: NDArray[np.int64]
+    start: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, polygons: NDArray[np.object_]) -> _Rings:
+        points, row = shapely.get_coordinates(shapely.get_exterior_ring(polygons), return_index=True)
+        edge = np.flatnonzero(row[1:] == row[:-1])
+        row = row[edge]
+        return cls(points[edge], points[edge + 1], row, np.searchsorted(row, np.arange(len(polygons))))
+
+    def convex(self) -> NDArray[np.bool_]:
+        """Which rings turn one way only."""
+        if not len(self.start):
+            return np.zeros(0, bool)
+        along = self.b - self.a
+        following = np.arange(1, len(self.row) + 1)
+        following[np.r_[self.start[1:], len(self.row)] - 1] = self.start
+        after = along[following]
+        turn = along[:, 0] * after[:, 1] - along[:, 1] * after[:, 0]
+        least, most = np.minimum.reduceat(turn, self.start), np.maximum.reduceat(turn, self.start)
+        return np.asarray((least >= -_STRAIGHT) | (most <= _STRAIGHT))
+
+    def crossed_twice(self, middle: Floats, axis: int) -> NDArray[np.bool_]:
+        """Which rings a line crosses twice, far from their corners: both parts are in one piece then."""
+        if not len(self.start):
+            return np.zeros(0, bool)
+        away, away_after = self.a[:, axis] - middle[self.row], self.b[:, axis] - middle[self.row]
+        crossings = np.add.reduceat((away * away_after < 0.0).astype(np.int64), self.start)
+        clear = np.minimum.reduceat(np.abs(away), self.start) > 1e-6
+        return np.asarray(clear & (crossings == 2))
+
+    def clipped(self, middle: Floats, axis: int, side: float) -> NDArray[np.object_]:
+        """What of rings lies before a line, or beyond it, in one piece (Sutherland and Hodgman, 1974)."""
+        at = middle[self.row]
+        away, away_after = side * (self.a[:, axis] - at), side * (self.b[:, axis] - at)
+        crosses = away * away_after < 0.0
+        share = np.where(crosses, away / np.where(crosses, away - away_after, 1.0), 0.0)
+        points = np.stack([self.a, self.a + share[:, None] * (self.b - self.a)], axis=1)
+        points[:, 1, axis] = at
+        kept = np.stack([away <= 0.0, crosses], axis=1)
+        row = np.repeat(self.row, kept.sum(axis=1))
+        # What has two corners is a line: no ring, and no area.
+        enough = np.bincount(row, minlength=len(middle)) >= 3
+        out = np.full(len(middle), shapely.Polygon(), object)
+        if enough.any():
+            used = enough[row]
+            number = np.cumsum(enough) - 1
+            out[enough] = shapely.polygons(shapely.linearrings(points[kept][used], indices=number[row[used]]))
+        return out

@@ -1,0 +1,201 @@
+"""The sharp edges of the ground: kerbs, lowered where people cross, and the banks of water, as a `Steps` field."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numba import njit
+from numpy.typing import NDArray
+from shapely import MultiLineString, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from vico.geo.osm import polygons_of
+from vico.world.heights import EDGE_RANGE, HeightField, Steps
+from vico.world.walkable import fill_polygon
+from vico.worldgen.buildings.roof_shapes import rings_of
+from vico.worldgen.streets.streets import Crossing, StreetPolygons
+
+KERB = 0.12
+"""Metres a sidewalk lies above the carriageway."""
+
+RAMP = 1.3
+"""Metres over which a sidewalk comes down to a crossing."""
+
+_FADE = 1.5  # metres over which a kerb runs out beside a drive
+_FLUSH = 0.01  # metres that stay of a lowered kerb
+_GRID = 0.001
+_MOST = 32_000  # millimetres
+
+
+_SHORE_REACH = 30.0
+_SHORE_SOFT = 0.7
+
+
+@dataclass(frozen=True)
+class Water:
+    """A piece of open water.
+
+    Attributes
+    ----------
+    shore, banks
+        Points of its banks and their heights, metres, shapes ``(n, 2)`` and ``(n,)``; one point for a level surface.
+    drop
+        How far the surface lies below the lowest banks nearby, metres.
+    """
+
+    polygon: Polygon
+    shore: NDArray[np.float64]
+    banks: NDArray[np.float64]
+    drop: float
+
+    def level(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Height of the surface at points, shape ``(n, 2)``."""
+        if len(self.shore) == 1:
+            return np.full(len(xy), float(self.banks[0]) - self.drop)
+        out = np.empty(len(xy))
+        _soft_least(np.ascontiguousarray(xy, np.float64), self.shore, self.banks, out)
+        return out - self.drop
+
+
+@njit(cache=True)
+def _soft_least(xy, shore, banks, out):  # type: ignore[no-untyped-def]
+    """About the lowest bank near each point, smooth from point to point."""
+    lowest = banks.min()
+    for k in range(len(xy)):
+        total, weight = 0.0, 1e-12
+        for i in range(len(shore)):
+            square = (xy[k, 0] - shore[i, 0]) ** 2 + (xy[k, 1] - shore[i, 1]) ** 2
+            near = 1.0 / (1.0 + square / _SHORE_REACH**2) ** 2
+            weight += near
+            total += near * np.exp(-(banks[i] - lowest) / _SHORE_SOFT)
+        out[k] = lowest - _SHORE_SOFT * np.log(max(total / weight, 1e-12))
+
+
+def lowered_kerbs(crossings: Iterable[Crossing]) -> MultiLineString:
+    """The stretches of kerb at both ends of crossings, metres."""
+    lines = []
+    for crossing in crossings:
+        a, b = np.array(crossing.start), np.array(crossing.end)
+        along = (b - a) / max(float(np.hypot(*(b - a))), 1e-9)
+        across = np.array([-along[1], along[0]]) * crossing.width / 2
+        lines += [[a - across, a + across], [b - across, b + across]]
+    return shapely.MultiLineString(lines)
+
+
+def lower_side(streets: StreetPolygons, waters: Sequence[Polygon]) -> BaseGeometry:
+    """What lies below its surroundings, carriageways and water: its outline is where kerbs and banks are."""
+    shapes = [streets.carriageway, *shapely.set_precision(np.array(list(waters), object), _GRID)]
+    return shapely.union_all(shapes, grid_size=_GRID)
+
+
+def steps_field(smooth: HeightField, streets: StreetPolygons, waters: Sequence[Water], *, cell: float) -> Steps | None:
+    """Lay kerbs and banks on a field.
+
+    Parameters
+    ----------
+    smooth
+        The ground without them.
+    streets
+        The streets: their `sunken` part lies `KERB` lower than what is beside it.
+    waters
+        Open water, not overlapping the carriageways.
+    cell
+        Spacing of the result, metres, about.
+
+    Returns
+    -------
+    Steps or None
+        None where the ground has no such edge.
+    """
+    if streets.sunken.is_empty and not waters:
+        return None
+    half = smooth.half
+    n = round(2 * half / cell) + 1
+    cell = 2 * half / (n - 1)
+    region = lower_side(streets, [water.polygon for water in waters])
+    inside = filled(polygons_of(region), n, half, cell)
+    near = _near(region, n, half, cell, EDGE_RANGE)
+    edge = np.where(inside, -near, near)
+    sunk = _near(streets.sunken, n, half, cell, 2 * _FADE)
+    sunk[filled(polygons_of(streets.sunken), n, half, cell)] = 0.0
+    low = np.full((n, n), -KERB)
+    # Only on drives the carriageway comes up: beyond the kerbs its height has nobody to mind it, and stays even.
+    drives = polygons_of(shapely.buffer(shapely.difference(streets.carriageway, streets.sunken), 1.2, quad_segs=2))
+    rising = filled(drives, n, half, cell) & ~filled(polygons_of(streets.sunken), n, half, cell)
+    low[rising] = (-KERB * np.clip(1.0 - sunk / _FADE, 0.0, 1.0))[rising]
+    ramp = _near(lowered_kerbs(streets.crossings), n, half, cell, RAMP)
+    high = -(KERB - _FLUSH) * np.clip(1.0 - ramp / RAMP, 0.0, 1.0) * np.clip(2.0 - sunk / _FADE, 0.0, 1.0)
+    if waters:
+        # The level goes on a little beyond the bank, where look-ups still need the lower side.
+        owner = np.full((n, n), -1.0, np.float32)
+        for own in (False, True):
+            for k, water in enumerate(waters):
+                beyond = shapely.simplify(shapely.buffer(water.polygon, 2 * cell, quad_segs=2), 0.2)
+                _fill(owner, [water.polygon] if own else polygons_of(beyond), half, cell, float(k))
+        owner[filled(polygons_of(streets.carriageway), n, half, cell)] = -1.0
+        for k, water in enumerate(waters):
+            rows, columns = np.nonzero(owner == k)
+            at = np.stack([columns * cell - half, rows * cell - half], axis=1)
+            low[rows, columns] = water.level(at) - smooth(at)
+    return Steps(
+        np.round(edge * (127.0 / EDGE_RANGE)).astype(np.int8),
+        np.clip(np.round(low * 1000.0), -_MOST, _MOST).astype(np.int16),
+        np.round(high * 1000.0).astype(np.int16),
+    )
+
+
+def filled(polygons: Sequence[Polygon], n: int, half: float, cell: float) -> NDArray[np.bool_]:
+    """Which nodes of a grid lie in polygons."""
+    grid = np.zeros((n, n), np.uint8)
+    _fill(grid, polygons, half, cell, 1)
+    return grid == 1
+
+
+def _fill(
+    grid: NDArray[np.uint8] | NDArray[np.float32], polygons: Sequence[Polygon], half: float, cell: float, value: float
+) -> None:
+    # What fills cells by their centres fills nodes where the cells are shifted by half of one.
+    for polygon in polygons:
+        rings = rings_of(polygon)
+        points = np.concatenate(rings)
+        starts = np.cumsum([0, *(len(ring) for ring in rings)])
+        xs, ys = np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
+        fill_polygon(grid, xs, ys, starts, float(half + cell / 2), float(cell), value)
+
+
+def _near(shape: BaseGeometry, n: int, half: float, cell: float, reach: float) -> NDArray[np.float32]:
+    """Distance of a grid's nodes from the lines or outlines of a shape, at most `reach`."""
+    grid = np.full((n, n), reach, np.float32)
+    lines = shapely.get_parts(shape if isinstance(shape, MultiLineString) else shapely.boundary(shape))
+    lines = shapely.get_parts(lines)
+    if len(lines):
+        points, line = shapely.get_coordinates(lines, return_index=True)
+        first = np.flatnonzero(line[:-1] == line[1:])
+        a, b = points[first], points[first + 1]
+        _approach(grid, a[:, 0].copy(), a[:, 1].copy(), b[:, 0].copy(), b[:, 1].copy(), half, cell, reach)
+    return grid
+
+
+@njit(cache=True)
+def _approach(grid, x0, y0, x1, y1, half, cell, reach):  # type: ignore[no-untyped-def]
+    """Lower a grid's values to the distances of its nodes from segments."""
+    n = grid.shape[0]
+    for k in range(len(x0)):
+        i0 = max(0, int(np.ceil((min(x0[k], x1[k]) - reach + half) / cell)))
+        i1 = min(n - 1, int(np.floor((max(x0[k], x1[k]) + reach + half) / cell)))
+        j0 = max(0, int(np.ceil((min(y0[k], y1[k]) - reach + half) / cell)))
+        j1 = min(n - 1, int(np.floor((max(y0[k], y1[k]) + reach + half) / cell)))
+        dx, dy = x1[k] - x0[k], y1[k] - y0[k]
+        square = dx * dx + dy * dy
+        for j in range(j0, j1 + 1):
+            y = j * cell - half
+            for i in range(i0, i1 + 1):
+                x = i * cell - half
+                t = 0.0
+                if square > 0.0:
+                    t = min(1.0, max(0.0, ((x - x0[k]) * dx + (y - y0[k]) * dy) / square))
+                away = np.hypot(x - x0[k] - t * dx, y - y0[k] - t * dy)
+                grid[j, i] = min(grid[j, i], away)

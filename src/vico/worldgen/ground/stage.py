@@ -1,0 +1,539 @@
+"""The ground as people see it: streets, pavements, squares, lawns and water, draped on the terrain.
+
+A partition: every spot belongs to one kind of surface, so nothing flickers. Only paint lies on top, two centimetres
+up. Where two kinds meet at different heights an upright face closes the step: kerbs, quays, the edges of bridges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy import ndimage
+from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from vico.geo.osm import OsmData, polygons_of
+from vico.world.heights import HeightField
+from vico.world.mesh import Material, Surface, joined
+from vico.world.model import ENTITY_GROUND, ENTITY_ROAD
+from vico.worldgen.buildings.partition import ground_partition, mapped_areas, sea_polygons
+from vico.worldgen.ground.bridges import bridge_surfaces, portal_surfaces, spans_over_water
+from vico.worldgen.ground.conform import Plan, conforming
+from vico.worldgen.ground.contours import region_above
+from vico.worldgen.ground.drape import CLOSE, NEAR, ROUGH, Curtain, Grid, Heights, curtain, triangulated
+from vico.worldgen.ground.grading import is_level, open_water, piped_waters
+from vico.worldgen.ground.kerbs import RAMP, Water, lowered_kerbs
+from vico.worldgen.ground.markings import Quads, pitch_lines, road_markings
+from vico.worldgen.ground.pavings import LOOKS, Look, coloured, ground_material, look_of
+from vico.worldgen.ground.stairs import flights_of
+from vico.worldgen.ground.thinning import thinned
+from vico.worldgen.streets.levels import overpasses
+from vico.worldgen.streets.sides import keeps_left
+from vico.worldgen.streets.streets import Crossing, StreetPolygons, on_the_ground
+
+__all__ = ["ground_from_osm", "ground_partition", "mapped_areas", "sea_polygons", "terrain_normals"]
+
+_UNDERLAY, _UNDERLAY_SLOPED = 0.5, 3.0  # metres below: shows through nothing but the hairlines between two surfaces
+_UNDER_STAIRS = 0.3
+_LIFT, _LIFT_SLOPED = 0.02, 0.035  # of paint
+_STEEP = 1.08  # slope from which bare ground is held by a wall
+_SLOPING = 0.17  # ... and from which a yard is not paved
+_SLOPE_CELL = 2.0
+_NARROW = 0.8  # metres, half the width of the narrowest lawn on a hillside
+_SLAB = 0.6  # thickness of a bridge's edge over water
+_AT_EDGE = 0.06  # metres within which two outlines are the same edge
+_OVERHANG = 6.0  # metres beside the ways of bridges where water that is hidden goes on
+_HELD = ("yard", "field", "grass", "garden", "woods", "sidewalk", "pedestrian", "path", "parking")
+_PAVED = ("kerb", "steps", "pedestrian", "cycleway", "sidewalk", "path", "parking")
+_LONG = 12.0
+
+
+def ground_from_osm(
+    osm: OsmData,
+    terrain: HeightField,
+    half: float,
+    streets: StreetPolygons,
+    *,
+    standing: Sequence[BaseGeometry] = (),
+    apron: float = 40.0,
+) -> list[Surface]:
+    """Make the ground's surfaces.
+
+    Parameters
+    ----------
+    osm
+        The extract.
+    terrain
+        What the ground is draped on, as `graded` made it from the same streets.
+    half
+        Half side of the world's square, metres.
+    streets
+        `streets.road_polygons` of the same extract.
+    standing
+        Footprints of the buildings as they were built, where they stand on the ground: nobody sees what lies well
+        within them, and it is not drawn.
+    apron
+        How far the ground is drawn beyond the square, metres, so that its edge is not in sight from within streets.
+
+    Returns
+    -------
+    list of Surface
+        One a material, for the layer "ground"; entities tell ground, road, water and green apart.
+    """
+    reach = half + apron
+    window = shapely.box(-reach, -reach, reach, reach)
+    pieces = ground_partition(osm, streets, window)
+    level = is_level(terrain)
+    waters = open_water(terrain, pieces.get("water", []), piped_waters(osm)) if terrain.steps is not None else []
+    flights = flights_of(osm, terrain, streets.steps)
+    laid = _laid(pieces, terrain, waters, reach, hidden=_hidden(osm, standing), stairs=flights.area)
+    wet = shapely.union_all([water.polygon for water in waters])
+    exact: list[BaseGeometry] = [
+        shape for name, shapes in pieces.items() if name.partition(":")[0] in _PAVED for shape in shapes
+    ]
+    grid = Grid.of(terrain, reach, NEAR, exact=exact, free=[wet, flights.area])
+    street_grid = Grid.of(terrain, reach, np.inf, sunken=[streets.carriageway])
+    # Streets at the lower heights by themselves, what lies at the upper ones in one go.
+    cut = {
+        number: shapes
+        for own, low in ((street_grid, True), (grid, False))
+        for chosen in [[k for k, piece in enumerate(laid) if piece.carriageway == low]]
+        for number, shapes in zip(chosen, own.cut_each([laid[k].shapes for k in chosen]), strict=True)
+    }
+    parts = [triangulated(cut[number]) for number in range(len(laid))]
+    plan = _thinned(conforming(parts, _ends_of_kerbs(streets)), laid, terrain)
+    surfaces = [
+        _covered(plan, number, piece, terrain) for number, piece in enumerate(laid) if (plan.piece == number).any()
+    ]
+    under = _under_bridges(osm, wet, window) if waters else []
+    dry = shapely.difference(window, shapely.buffer(shapely.union_all([wet, *under]), 0.6, quad_segs=1))
+    surfaces += _underlay(dry, terrain, reach)
+    if terrain.steps is not None:
+        surfaces += _kerbs(plan, laid, streets, terrain, reach)
+        surfaces += _banks(under, waters, plan, laid, terrain, window)
+        surfaces += _tactile(streets, terrain, window)
+    surfaces += flights.surfaces()
+    surfaces += bridge_surfaces(osm, terrain, streets, window)
+    surfaces += portal_surfaces(osm, terrain, streets, window)
+    quads = road_markings(
+        streets,
+        window,
+        yellow=osm.frame.lon < -30.0,
+        tracks=_tracks(osm),
+        longest=None if level else 3.0,
+        left_driving=keeps_left(osm),
+        stepped=flights.area,
+    )
+    quads += _fields(osm, window)
+    lift = _LIFT if level else _LIFT_SLOPED
+    surfaces += [_painted(group, terrain, lift=lift + 0.006 * group.rank) for group in quads]
+    return joined(surfaces)
+
+
+def _thinned(plan: Plan, laid: Sequence[_Piece], terrain: HeightField) -> Plan:
+    """Leave out what the drawn ground doesn't need."""
+    used = np.array([0 if piece.carriageway else 2 if piece.water >= 0 else 1 for piece in laid], np.int64)
+    natural = np.array([piece.natural for piece in laid], bool)
+    level: Heights = lambda xy: np.zeros(len(xy))  # noqa: E731
+    return thinned(plan, (terrain.lower, terrain.upper, level), used, np.where(natural, NEAR, CLOSE))
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """Polygons of one look at heights of their own; `water` is the number of the water they are."""
+
+    shapes: list[Polygon]
+    look: Look
+    heights: Heights
+    carriageway: bool = False
+    water: int = -1
+    natural: bool = False
+
+
+def _laid(
+    pieces: dict[str, list[Polygon]],
+    terrain: HeightField,
+    waters: Sequence[Water],
+    reach: float,
+    *,
+    hidden: BaseGeometry,
+    stairs: BaseGeometry,
+) -> list[_Piece]:
+    """What is laid on the ground: the partition, walls where it is too steep to be bare, no paving on hillsides."""
+    steep, sloping = _slopes(terrain, reach)
+    laid: list[_Piece] = []
+    walls: list[Polygon] = []
+    hills: list[Polygon] = []
+    for name, shapes in pieces.items():
+        base = name.partition(":")[0]
+        if base in ("yard", "field"):
+            shapes = _without(shapes, hidden)
+        if name == "water" and waters:
+            continue
+        if base in _HELD and not steep.is_empty:
+            walls += _within(shapes, steep)
+            shapes = _without(shapes, steep)
+        if name == "yard" and not sloping.is_empty:
+            # A strip too narrow for a lawn stays as it is.
+            wide = [shape for shape in _within(shapes, sloping) if not shapely.buffer(shape, -_NARROW).is_empty]
+            hills += wide
+            shapes = _without(shapes, shapely.MultiPolygon(wide))
+        if name == "steps":
+            lower = _within(shapes, stairs)
+            shapes = _without(shapes, stairs)
+            laid.append(_Piece(lower, look_of(name), lambda xy: terrain.upper(xy) - _UNDER_STAIRS))
+        street = base == "carriageway"
+        natural = not street and base not in _PAVED
+        laid.append(_Piece(shapes, look_of(name), terrain.lower if street else terrain.upper, street, natural=natural))
+    laid.append(_Piece(hills, LOOKS["field"], terrain.upper, natural=True))
+    laid.append(_Piece(walls, LOOKS["wall"], terrain.upper, natural=True))
+    laid += [_Piece([water.polygon], LOOKS["water"], water.level, water=k) for k, water in enumerate(waters)]
+    return laid
+
+
+def _slopes(terrain: HeightField, reach: float) -> tuple[BaseGeometry, BaseGeometry]:
+    """Where the ground is too steep to be bare, and where it is too steep to be paved: regions with round borders."""
+    none = shapely.MultiPolygon()
+    if is_level(terrain):
+        return none, none
+    n = round(2 * reach / _SLOPE_CELL)
+    cell = 2 * reach / n
+    axis = (np.arange(n) + 0.5) * cell - reach
+    z = terrain.smooth(np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)).reshape(n, n)
+    found = []
+    for spread, most, close in ((0.3, _STEEP, 1.2), (2.0, _SLOPING, 4.0)):
+        north, east = np.gradient(ndimage.gaussian_filter(z, spread, mode="nearest"), cell)
+        bent = shapely.simplify(region_above(np.hypot(north, east), most, low=float(axis[0]), cell=cell), 0.1)
+        opened = shapely.buffer(shapely.buffer(bent, close, quad_segs=3), -2 * close, quad_segs=3)
+        rounded = shapely.simplify(shapely.buffer(opened, close, quad_segs=3), 0.15)
+        found.append(shapely.set_precision(rounded, 0.001))
+    steep, sloping = found
+    return steep, sloping
+
+
+def _ends_of_kerbs(streets: StreetPolygons) -> NDArray[np.float64]:
+    """Points of kerbs where they begin to come down to a crossing, and where they are down, shape ``(n, 2)``."""
+    lowered = lowered_kerbs(streets.crossings)
+    outline = shapely.boundary(streets.carriageway)
+    found = [
+        shapely.intersection(shapely.boundary(shapely.buffer(lowered, away, quad_segs=6)), outline)
+        for away in (0.05, RAMP)
+    ]
+    points = shapely.get_parts(shapely.get_parts(found))
+    return shapely.get_coordinates(points[shapely.get_type_id(points) == 0])
+
+
+def _underlay(dry: BaseGeometry, terrain: HeightField, reach: float) -> list[Surface]:
+    """What shows through hairlines between surfaces instead of the sky."""
+    below = _UNDERLAY if is_level(terrain) else _UNDERLAY_SLOPED
+    flat, faces = triangulated(Grid.of(terrain, reach, ROUGH).cut([dry]))
+    if not len(faces):
+        return []
+    return [_surface(flat, terrain.smooth(flat) - below, terrain_normals(terrain, flat), faces, LOOKS["yard"])]
+
+
+def _hidden(osm: OsmData, standing: Sequence[BaseGeometry]) -> BaseGeometry:
+    """Ground well within buildings, which nobody sees."""
+    if not len(standing):
+        return shapely.MultiPolygon()
+    built = [
+        area.polygon
+        for area in osm.areas
+        if area.tags.get("building", "no") not in ("no", "roof", "carport", "bridge", "ruins", "construction")
+        and not any(key in area.tags for key in ("min_height", "building:min_level"))
+        and on_the_ground(area.tags)
+    ]
+    deep = shapely.buffer(np.array(built, object), -1.5, join_style="mitre")
+    mapped = shapely.union_all(deep[~shapely.is_empty(deep)], grid_size=0.01)
+    # Not every building of the map is built whole, or at all: people walk on what is left of its ground.
+    whole = shapely.union_all(shapely.make_valid(np.array(list(standing), object)), grid_size=0.01)
+    both = shapely.intersection(mapped, shapely.buffer(whole, -1.5, join_style="mitre"), grid_size=0.01)
+    return shapely.MultiPolygon(polygons_of(both))
+
+
+def _tracks(osm: OsmData) -> list[NDArray[np.float64]]:
+    """Railways at ground level, cut where a street's bridge lies over them."""
+    above = overpasses(osm)
+    spans = spans_over_water(osm)
+    found = []
+    for way in osm.ways:
+        tags = way.tags
+        if tags.get("railway") not in ("rail", "light_rail", "narrow_gauge") or not on_the_ground(tags):
+            continue
+        if way.id in above:
+            continue
+        line: BaseGeometry = shapely.LineString(way.line)
+        if tags.get("bridge", "no") == "no":
+            line = shapely.difference(line, spans)
+        found += [np.asarray(part.coords) for part in shapely.get_parts(line) if part.geom_type == "LineString"]
+    return [line for line in found if len(line) > 1]
+
+
+def _fields(osm: OsmData, window: Polygon) -> list[Quads]:
+    """The lines of sports fields."""
+    lines = [
+        quad
+        for area in osm.areas
+        if area.tags.get("leisure") == "pitch" and on_the_ground(area.tags) and window.intersects(area.polygon)
+        for shape in polygons_of(area.polygon)
+        for quad in pitch_lines(shape, area.tags.get("sport", ""))
+    ]
+    return [Quads(np.stack(lines), (236, 236, 230), low=False)] if lines else []
+
+
+def _without(shapes: Sequence[Polygon], area: BaseGeometry) -> list[Polygon]:
+    return polygons_of(shapely.difference(shapely.MultiPolygon(list(shapes)), area), 0.02)
+
+
+def _within(shapes: Sequence[Polygon], area: BaseGeometry) -> list[Polygon]:
+    return polygons_of(shapely.intersection(shapely.MultiPolygon(list(shapes)), area), 0.02)
+
+
+def _surface(
+    flat: NDArray[np.float64],
+    z: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    look: Look,
+    uv: NDArray[np.float64] | None = None,
+) -> Surface:
+    return Surface.from_triangles(
+        np.c_[flat, z],
+        faces,
+        colour=coloured(look, flat),
+        entity=look.entity,
+        uv=(flat if uv is None else uv) / look.tile,
+        normals=normals,
+        material=ground_material(look.material),
+    )
+
+
+def _covered(plan: Plan, number: int, piece: _Piece, terrain: HeightField) -> Surface:
+    """Lay a piece of the plan on its heights."""
+    flat, faces = _used(plan.corners, plan.triangles[plan.piece == number])
+    z = piece.heights(flat)
+    if piece.water >= 0:
+        up = np.broadcast_to((0.0, 0.0, 1.0), (len(flat), 3))
+        return _surface(flat, z, np.asarray(up), faces, piece.look)
+    normals = terrain_normals(terrain, flat)
+    if piece.look is not LOOKS["wall"]:
+        return _surface(flat, z, normals, faces, piece.look)
+    # Courses run level, along the wall's nearer axis.
+    corners = np.c_[flat, z][faces]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    corner = faces.ravel()
+    east = np.repeat(np.abs(across[:, 1]) > np.abs(across[:, 0]), 3)
+    uv = np.stack([np.where(east, flat[corner, 0], flat[corner, 1]), z[corner]], axis=1)
+    own = np.arange(len(corner)).reshape(-1, 3)
+    return _surface(flat[corner], z[corner], normals[corner], own, piece.look, uv)
+
+
+def _used(flat: NDArray[np.float64], faces: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The points that triangles use, numbered anew."""
+    kept, index = np.unique(faces, return_inverse=True)
+    return flat[kept], index.reshape(-1, 3)
+
+
+def _hung(found: Curtain, look: Look, tile: float | None = None) -> list[Surface]:
+    if not len(found.triangles):
+        return []
+    return [
+        Surface.from_triangles(
+            found.positions,
+            found.triangles,
+            colour=coloured(look, found.positions[:, :2]),
+            entity=look.entity,
+            uv=found.uv / (tile or look.tile),
+            normals=found.normals,
+            material=ground_material(look.material),
+        )
+    ]
+
+
+def _faced_lines(shapes: Iterable[BaseGeometry], low: Heights, high: Heights, spacing: float) -> list[BaseGeometry]:
+    """Outlines with the inside to their right, with as many points as their heights need."""
+    rings = [
+        ring
+        for shape in shapes
+        for polygon in polygons_of(shape, 0.05)
+        for ring in (polygon.normalize().exterior, *polygon.normalize().interiors)
+    ]
+    if not rings:
+        return []
+    dense = shapely.segmentize(np.array(rings, object), spacing)
+    points, owner = shapely.get_coordinates(dense, return_index=True)
+    corner = np.zeros(len(points), bool)
+    own = shapely.get_coordinates(rings)
+    # Points of the rings themselves stay; of those between only where heights bend, and every few metres.
+    keys = {(round(x, 6), round(y, 6)) for x, y in own.tolist()}
+    corner[:] = [(round(x, 6), round(y, 6)) in keys for x, y in points.tolist()]
+    bend = np.zeros(len(points))
+    for heights in (low, high):
+        z = heights(points)
+        bend[1:-1] = np.maximum(bend[1:-1], np.abs(z[:-2] - 2 * z[1:-1] + z[2:]))
+    kept = corner | (bend > 0.002)
+    kept[1:] |= bend[:-1] > 0.002
+    kept[:-1] |= bend[1:] > 0.002
+    kept |= np.arange(len(points)) % max(round(_LONG / spacing), 1) == 0
+    lines = []
+    borders = [0, *(np.flatnonzero(owner[1:] != owner[:-1]) + 1).tolist(), len(owner)]
+    for start, end in pairwise(borders):
+        chosen = points[start:end][kept[start:end]]
+        if len(chosen) > 1:
+            lines.append(shapely.LineString(chosen))
+    return lines
+
+
+def _chains(plan: Plan, edges: NDArray[np.int64], reach: float) -> list[BaseGeometry]:
+    """Edges of the plan joined to lines; those on the rim of what is drawn are left out."""
+    pieces = plan.corners[edges]
+    rim = np.abs(pieces).max(axis=2).min(axis=1) > reach - 0.01
+    if rim.all():
+        return []
+    lines = shapely.multilinestrings([shapely.linestrings(pieces[~rim])])[0]
+    return list(shapely.get_parts(shapely.line_merge(lines, directed=True)))
+
+
+def _kerbs(
+    plan: Plan, laid: Sequence[_Piece], streets: StreetPolygons, terrain: HeightField, reach: float
+) -> list[Surface]:
+    """The faces of kerb stones: between the very corners of what lies on both sides."""
+    numbers = np.array([k for k, piece in enumerate(laid) if piece.carriageway], np.int64)
+    lines = _chains(plan, plan.border(numbers, shapely.boundary(streets.carriageway))[:, ::-1], reach)
+    return _hung(curtain(lines, terrain.lower, terrain.upper, least=0.004), LOOKS["kerb"])
+
+
+def _under_bridges(osm: OsmData, wet: BaseGeometry, window: Polygon) -> list[Polygon]:
+    """Water that goes on under bridges, beside what of it is in sight (`wet`).
+
+    What a bridge carries is wider than its ways: pavements and strips between two carriageways hide water too. Some
+    maps call what flows under a bridge a tunnel.
+    """
+    shapes = [*mapped_areas(osm, window)["water"], *piped_waters(osm)]
+    below = shapely.union_all([shapely.set_precision(shape, 0.001) for shape in shapes])
+    hidden = shapely.difference(shapely.intersection(below, window), shapely.buffer(wet, 0.001))
+    spans = spans_over_water(osm)
+    beneath = shapely.intersection(hidden, shapely.buffer(spans, _OVERHANG, quad_segs=2))
+    return [shape for shape in polygons_of(beneath, 1.0) if shape.intersects(spans)]
+
+
+def _banks(
+    under: Sequence[Polygon],
+    waters: Sequence[Water],
+    plan: Plan,
+    laid: Sequence[_Piece],
+    terrain: HeightField,
+    window: Polygon,
+) -> list[Surface]:
+    """Quays and banks, and `under` bridges the water that goes on there and the edges of the deck."""
+    found: list[Surface] = []
+    if not waters:
+        return found
+    tree = shapely.STRtree([water.polygon for water in waters])
+    dry = shapely.union_all([water.polygon for water in waters])
+    outline = shapely.boundary(dry)
+    over_spans = shapely.buffer(shapely.union_all(under), _AT_EDGE)
+    for number, piece in enumerate(laid):
+        if piece.water < 0:
+            continue
+        water = waters[piece.water]
+        rims = plan.border(np.array([number]), outline)
+        over, bank = _sorted_by(_chains(plan, rims[:, ::-1], window.bounds[2]), over_spans)
+        found += _hung(curtain(bank, _below(water.level, 0.3), terrain.upper), LOOKS["quay"])
+        found += _hung(curtain(over, lambda xy: terrain.upper(xy) - _SLAB, terrain.upper), LOOKS["kerb"])
+    for shape in under:
+        water = waters[int(tree.nearest(shape))]
+        flat, faces = triangulated([shape])
+        up = np.broadcast_to((0.0, 0.0, 1.0), (len(flat), 3))
+        found.append(_surface(flat, water.level(flat), np.asarray(up), faces, LOOKS["water"]))
+        found.append(_surface(flat, terrain.smooth(flat) - _SLAB, -np.asarray(up), faces[:, ::-1], LOOKS["kerb"]))
+        edges = _faced_lines([shape], water.level, terrain.smooth, 3.0)
+        _, walls = _sorted_by(edges, shapely.buffer(dry, _AT_EDGE))
+        found += _hung(
+            curtain(walls, _below(water.level, 0.3), lambda xy: terrain.smooth(xy) - _SLAB + 0.02),
+            LOOKS["quay"],
+        )
+    return found
+
+
+def _below(heights: Heights, depth: float) -> Heights:
+    return lambda xy: heights(xy) - depth
+
+
+def _sorted_by(lines: Sequence[BaseGeometry], area: BaseGeometry) -> tuple[list[BaseGeometry], list[BaseGeometry]]:
+    """Segments of lines that lie within an area, and the rest; directions kept."""
+    if not len(lines):
+        return [], []
+    points, line = shapely.get_coordinates(list(lines), return_index=True)
+    first = np.flatnonzero(line[:-1] == line[1:])
+    shapely.prepare(area)
+    inside = np.ones(len(first), bool)
+    for share in (0.0, 0.5, 1.0):
+        at = points[first] + share * (points[first + 1] - points[first])
+        inside &= shapely.contains_xy(area, at[:, 0], at[:, 1])
+    pieces = np.stack([points[first], points[first + 1]], axis=1)
+    return list(shapely.linestrings(pieces[inside])), list(shapely.linestrings(pieces[~inside]))
+
+
+def _tactile(streets: StreetPolygons, terrain: HeightField, window: Polygon) -> list[Surface]:
+    """Ribbed slabs on the pavement before painted crossings."""
+    pavement = shapely.union_all([streets.sidewalk, streets.pedestrian])
+    shapely.prepare(pavement)
+    quads: list[NDArray[np.float64]] = []
+    for crossing in streets.crossings:
+        if crossing.painted:
+            quads += _slabs_at(crossing, pavement)
+    if not quads:
+        return []
+    corners = np.stack(quads)
+    inside = (np.abs(corners) < window.bounds[2]).all(axis=(1, 2))
+    group = Quads(corners[inside], (255, 255, 255), low=False)
+    return [_painted(group, terrain, lift=0.012, look=LOOKS["tactile"])]
+
+
+def _slabs_at(crossing: Crossing, pavement: BaseGeometry) -> list[NDArray[np.float64]]:
+    a, b = np.array(crossing.start), np.array(crossing.end)
+    along = (b - a) / max(float(np.hypot(*(b - a))), 1e-9)
+    across = np.array([-along[1], along[0]]) * min(crossing.width, 3.0) / 2
+    found = []
+    for end, out in ((a, -along), (b, along)):
+        near, far = end + out * 0.25, end + out * 0.85
+        if shapely.contains_xy(pavement, *((near + far) / 2)):
+            quad = np.array([near - across, near + across, far + across, far - across])
+            turned = float(np.cross(np.r_[quad[1] - quad[0], 0], np.r_[quad[2] - quad[0], 0])[2]) < 0
+            found.append(quad[::-1] if turned else quad)
+    return found
+
+
+def terrain_normals(terrain: HeightField, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit normals of the smooth ground at points, by central differences over a metre."""
+    east, north = np.array([0.5, 0.0]), np.array([0.0, 0.5])
+    dx = terrain.smooth(xy + east) - terrain.smooth(xy - east)
+    dy = terrain.smooth(xy + north) - terrain.smooth(xy - north)
+    normal = np.stack([-dx, -dy, np.ones(len(xy))], axis=1)
+    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True), np.float64)
+
+
+def _painted(quads: Quads, terrain: HeightField, *, lift: float, look: Look | None = None) -> Surface:
+    """Paint and rails: quads a little above the ground."""
+    corners = quads.corners.reshape(-1, 2)
+    n = len(quads.corners)
+    first = 4 * np.arange(n)[:, None]
+    triangles = (
+        np.concatenate([first + np.array([0, 1, 2]), first + np.array([0, 2, 3])]) if n else np.zeros((0, 3), np.int32)
+    )
+    ground = terrain.lower(corners) if quads.low else terrain.upper(corners)
+    return Surface.from_triangles(
+        np.c_[corners, ground + lift],
+        triangles,
+        colour=quads.colour,
+        entity=ENTITY_ROAD if quads.low else ENTITY_GROUND,
+        normals=terrain_normals(terrain, corners),
+        uv=None if look is None else corners / look.tile,
+        material=Material("paint") if look is None else ground_material(look.material),
+    )

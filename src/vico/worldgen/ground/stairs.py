@@ -1,0 +1,162 @@
+"""Flights of stairs outdoors, with treads, risers and strings, where the ground rises along them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from vico.geo.osm import OsmData
+from vico.world.heights import HeightField
+from vico.world.mesh import Surface
+from vico.worldgen.ground.pavings import LOOKS, coloured, ground_material
+from vico.worldgen.streets.levels import overpasses
+from vico.worldgen.streets.streets import number, on_the_ground
+
+Floats = NDArray[np.float64]
+
+RISE = 0.16
+"""Metres a step is high."""
+
+_LEAST = 0.35  # metres of rise below which painted edges do
+_STRING = 0.45  # depth of the sides
+_WIDTH = 2.4
+
+
+@dataclass(frozen=True)
+class Flights:
+    """Boxes that steps are made of.
+
+    Attributes
+    ----------
+    area
+        Where they lie.
+    quads
+        Corners of their faces, metres, shape ``(n, 4, 3)``, counter-clockwise from outside; `normals` ``(n, 3)``.
+    """
+
+    area: BaseGeometry
+    quads: Floats
+    normals: Floats
+
+    def surfaces(self) -> list[Surface]:
+        """The faces with their texture."""
+        n = len(self.quads)
+        if not n:
+            return []
+        look = LOOKS["steps"]
+        positions = self.quads.reshape(-1, 3)
+        normals = np.repeat(self.normals, 4, axis=0)
+        first = 4 * np.arange(n)[:, None]
+        upright = np.abs(normals[:, 2]) < 0.5
+        uv = np.where(
+            upright[:, None],
+            np.stack([positions[:, 0] + positions[:, 1], positions[:, 2]], axis=1),
+            positions[:, :2],
+        )
+        shade = np.where(upright, 0.86, 1.0)[:, None]
+        return [
+            Surface.from_triangles(
+                positions,
+                np.concatenate([first + np.array([0, 1, 2]), first + np.array([0, 2, 3])]),
+                colour=np.clip(coloured(look, positions[:, :2]) * shade, 0, 255).astype(np.uint8),
+                entity=look.entity,
+                uv=uv / look.tile,
+                normals=normals,
+                material=ground_material(look.material),
+            )
+        ]
+
+
+def flights_of(osm: OsmData, terrain: HeightField, where: BaseGeometry) -> Flights:
+    """Build the stairs of a map.
+
+    Parameters
+    ----------
+    osm
+        The map: ways with ``highway=steps``.
+    terrain
+        The graded ground, which rises along them.
+    where
+        The ground that is drawn as stairs; flights elsewhere (in buildings) are left out.
+
+    Returns
+    -------
+    Flights
+        Treads lie within half a step of the ground.
+    """
+    above = overpasses(osm)
+    shapely.prepare(where)
+    quads: list[Floats] = []
+    normals: list[Floats] = []
+    areas: list[BaseGeometry] = []
+    reach = terrain.half - 1.0
+    for way in osm.ways:
+        tags = way.tags
+        if tags.get("highway") != "steps" or not on_the_ground(tags) or way.id in above or way.closed:
+            continue
+        line = shapely.LineString(way.line)
+        width = min(max(number(tags.get("width")) or _WIDTH, 1.2), 12.0)
+        for piece in shapely.get_parts(shapely.intersection(line, where)):
+            if piece.geom_type != "LineString" or piece.length < 0.8 or np.abs(piece.bounds).max() > reach:
+                continue
+            run = _rising(np.asarray(piece.coords), terrain)
+            faces = list(_flight(*run, width)) if run is not None else []
+            if faces and run is not None:
+                areas.append(shapely.buffer(shapely.LineString(run[0]), width / 2, cap_style="flat"))
+                quads += [quad for quad, _ in faces]
+                normals += [normal for _, normal in faces]
+    return Flights(
+        shapely.union_all(areas) if areas else shapely.MultiPolygon(),
+        np.stack(quads) if quads else np.zeros((0, 4, 3)),
+        np.stack(normals) if normals else np.zeros((0, 3)),
+    )
+
+
+def _rising(line: Floats, terrain: HeightField) -> tuple[Floats, Floats] | None:
+    """The stretch of a line that rises all along, as points every decimetre, upwards, and their heights."""
+    path = shapely.LineString(line)
+    places = np.linspace(0.0, path.length, max(int(path.length / 0.1), 4) + 1)
+    points = shapely.get_coordinates(shapely.line_interpolate_point(path, places))
+    z = terrain.upper(points)
+    if z[-1] < z[0]:
+        points, z = points[::-1], z[::-1]
+    first, last = int(z.argmin()), int(z.argmax())
+    if last - first < 4 or z[last] - z[first] < _LEAST:
+        return None
+    points, z = points[first : last + 1], z[first : last + 1]
+    even = np.maximum.accumulate(z)
+    # Stairs over a hollow would float.
+    return None if float((even - z).max()) > 0.1 else (points, even)
+
+
+def _flight(points: Floats, z: Floats, width: float) -> Iterable[tuple[Floats, Floats]]:
+    """Faces of the steps along a rising line: tread, riser, and the two sides."""
+    rise = z[-1] - z[0]
+    # On ground steeper than stairs can be, steps are as high as their going lets them be.
+    count = int(min(max(round(rise / RISE), 1), max(len(points) * 0.1 / 0.22, 1)))
+    edges = z[0] + rise * np.arange(count + 1) / count
+    edge = np.minimum(np.searchsorted(z, edges - 1e-9), len(points) - 1)
+    along = np.gradient(points, axis=0)
+    along /= np.maximum(np.hypot(*along.T)[:, None], 1e-9)
+    left = np.stack([-along[:, 1], along[:, 0]], axis=1) * width / 2
+    up = np.array([0.0, 0.0, 1.0])
+    for k in range(count):
+        a, b = int(edge[k]), int(edge[k + 1])
+        if a == b:
+            continue
+        top = (edges[k] + edges[k + 1]) / 2
+        below = top - rise / count if k else edges[0] - 0.1
+        r0, r1 = np.r_[points[a] - left[a], top], np.r_[points[b] - left[b], top]
+        l0, l1 = np.r_[points[a] + left[a], top], np.r_[points[b] + left[b], top]
+        yield np.stack([r0, r1, l1, l0]), up
+        down = up * (top - below)
+        yield np.stack([l0 - down, r0 - down, r0, l0]), np.r_[-along[a], 0.0]
+        deep = up * _STRING
+        side = np.r_[left[a], 0.0] / (width / 2)
+        yield np.stack([r0 - deep, r1 - deep, r1, r0]), -side
+        yield np.stack([l1 - deep, l0 - deep, l0, l1]), side

@@ -1,0 +1,349 @@
+"""From a sketch to a furnished plan: rooms with doors, furniture, containers and the small things on them.
+
+Which plan a place gets is decided by what it is for; plans are made once in their own frame (origin at the middle of
+the lowest floor) and placed as often as needed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from vico.assets.furniture import furniture_models
+from vico.assets.furniture_public import RISE
+from vico.assets.interior import DOOR_HEIGHT, HEAD, SHOP_SILL, SILL, THICK, Inside, WallOpening, shell
+from vico.world.mesh import Surface
+from vico.world.model import LANDING
+from vico.world.seeds import rng
+from vico.worldgen.indoor.floorplans import OUTSIDE, USES, Sketch, SketchRoom, sketch_of
+from vico.worldgen.indoor.furnishing import EAST, GRID, NORTH, SOUTH, STEP_IN, WEST, Canvas, Furnishing, Opening
+from vico.worldgen.indoor.furnishing_public import PUBLIC
+from vico.worldgen.indoor.furnishing_rooms import ROOMS
+from vico.worldgen.indoor.furnishing_small import Dressed, dressed
+from vico.worldgen.indoor.looks import LOOKS, PALETTES, PLAIN, Look
+
+REACH = 1.5
+_MOST_CHAIRS = 3  # containers of this kind a room
+_LARGEST_TOP = 24  # containers a room
+RECIPES = {**ROOMS, **PUBLIC}
+VARIANTS = 4
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A container of a plan: kind, index of its furniture (-1: the floor), centre, size, yaw, and the reach point."""
+
+    kind: str
+    item: int
+    centre: tuple[float, float, float]
+    size: tuple[float, float]
+    yaw: float
+    reach: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class DoorPlan:
+    """A way out of a room: to which room (-1: outdoors), where, and the free spot inside; plan frame."""
+
+    to: int
+    position: tuple[float, float, float]
+    inside: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class RoomPlan:
+    """A room of a plan, all in the plan's frame; `yaw` is 0 but for stairs, `size` runs along its own axes."""
+
+    kind: str
+    centre: tuple[float, float, float]
+    size: tuple[float, float, float]
+    yaw: float
+    rise: float
+    doors: tuple[DoorPlan, ...]
+    items: tuple[Furnishing, ...]
+    spots: tuple[Spot, ...]
+
+    @property
+    def links(self) -> tuple[int, ...]:
+        """Rooms this one opens to."""
+        return tuple(sorted({door.to for door in self.doors if door.to != OUTSIDE}))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Rooms of a place, the one with the way out first; `shell` holds indices of rooms as entities."""
+
+    use: str
+    rooms: tuple[RoomPlan, ...]
+    size: tuple[float, float]
+    height: float
+    shell: tuple[Surface, ...]
+
+
+def uses() -> list[str]:
+    """All uses there are plans for."""
+    return list(USES)
+
+
+@cache
+def plan_of(use: str, size: int = 0, storeys: int = 1, variant: int = 0) -> Plan:
+    """The furnished plan of a use; variants differ in handedness, colours and furniture."""
+    sketch = sketch_of(use, size, storeys, mirrored=variant % 2 == 1)
+    return furnished(sketch, rng(0, "plan", use, size, storeys, variant), variant)
+
+
+def furnished(sketch: Sketch, chance: np.random.Generator, variant: int = 0) -> Plan:
+    """Give a sketch walls, doors, windows, furniture, containers and small things."""
+    w, h = sketch.size
+    boxes = [_inner(room) for room in sketch.rooms]
+    openings = _doorways(sketch, boxes)
+    order = _from_the_street(sketch)
+    rooms: list[RoomPlan] = []
+    insides: list[Inside] = []
+    for i, room in enumerate(sketch.rooms):
+        x0, y0, x1, y1 = boxes[i]
+        cx, cy, z = round((x0 + x1) / 2 - w / 2, 3), round((y0 + y1) / 2 - h / 2, 3), round(room.storey * RISE, 3)
+        size = (round(x1 - x0, 3), round(y1 - y0, 3))
+        mine = sorted(openings[i], key=lambda o: -1 if o[0] == OUTSIDE else order[o[0]])
+        look = LOOKS.get(room.kind, PLAIN)
+        windows = _windows(sketch, room, size, mine, street=look.street) if look.daylight else []
+        canvas = Canvas(size, [o[1] for o in mine if not o[3]], windows, chance)
+        if room.items is not None:
+            items = list(room.items)
+        elif room.rise:
+            items = [Furnishing("stair_wall", *_turned(-LANDING / 2, 0.0, room.facing), room.facing * math.pi / 2)]
+        elif room.kind == "lift":
+            items = [Furnishing("lift_panel", *_lift_panel(canvas))]
+        else:
+            RECIPES[room.kind](canvas)
+            items = canvas.items
+        dress = dressed(room.kind, items, chance) if room.kind not in ("stairs", "lift") else Dressed((), {})
+        spots = _spots(room, canvas, items, dress) if room.kind not in ("stairs", "lift") else ()
+        rooms.append(
+            RoomPlan(
+                kind=room.kind,
+                centre=(cx, cy, z),
+                size=(
+                    *(size if room.facing % 2 == 0 or not room.rise else size[::-1]),
+                    room.height,
+                ),
+                yaw=room.facing * math.pi / 2 if room.rise else 0.0,
+                rise=room.rise,
+                doors=tuple(
+                    _door_plan(sketch, room, canvas, other, opening, low, ride, (cx, cy, z))
+                    for other, opening, low, ride in mine
+                ),
+                items=tuple(
+                    replace(i, x=round(i.x + cx, 3), y=round(i.y + cy, 3), z=round(i.z + z, 3))
+                    for i in (*items, *dress.things)
+                ),
+                spots=tuple(_shifted(spot, cx, cy, z) for spot in spots),
+            )
+        )
+        insides.append(
+            _inside(
+                i, room, look, (cx, cy, z), size, mine, windows, variant, rooms[-1].doors[0].to if mine else OUTSIDE
+            )
+        )
+    return Plan(sketch.use, tuple(rooms), sketch.size, round(sketch.height, 3), tuple(shell(insides)))
+
+
+def _inner(room: SketchRoom) -> tuple[float, float, float, float]:
+    """A room's rectangle within its walls."""
+    x0, y0, x1, y1 = room.box
+    half = THICK / 2
+    return round(x0 + half, 3), round(y0 + half, 3), round(x1 - half, 3), round(y1 - half, 3)
+
+
+#: Of a room's way out: room it leads to, the opening, its height above the room's floor, and whether it is a lift's.
+_Way = tuple[int, Opening, float, bool]
+
+
+def _doorways(sketch: Sketch, boxes: Sequence[tuple[float, float, float, float]]) -> list[list[_Way]]:
+    found: list[list[_Way]] = [[] for _ in boxes]
+    for door in sketch.doors:
+        for mine, other in ((door.a, door.b), (door.b, door.a)):
+            if mine == OUTSIDE:
+                continue
+            x0, y0, x1, y1 = boxes[mine]
+            cx, cy = (x0 + x1) / 2, (y0 + y1) / 2
+            x, y = door.at
+            gaps = {EAST: abs(x - x1), NORTH: abs(y - y1), WEST: abs(x - x0), SOUTH: abs(y - y0)}
+            side = min(gaps, key=lambda k: gaps[k])
+            at = round(y - cy if side in (EAST, WEST) else x - cx, 3)
+            low = round((door.storey - sketch.rooms[mine].storey) * RISE, 3) if not door.lift else 0.0
+            found[mine].append((other, Opening(side, at, door.width), low, door.lift))
+    return found
+
+
+def _from_the_street(sketch: Sketch) -> list[int]:
+    """Doors between each room and the street."""
+    links: dict[int, list[int]] = {i: [] for i in range(-1, len(sketch.rooms))}
+    for door in sketch.doors:
+        links[door.a].append(door.b)
+        links[door.b].append(door.a)
+    away = {OUTSIDE: 0}
+    queue = deque([OUTSIDE])
+    while queue:
+        here = queue.popleft()
+        for other in links[here]:
+            if other not in away:
+                away[other] = away[here] + 1
+                queue.append(other)
+    return [away.get(i, 10**6) for i in range(len(sketch.rooms))]
+
+
+def _windows(
+    sketch: Sketch, room: SketchRoom, size: tuple[float, float], ways: Sequence[_Way], *, street: bool
+) -> list[Opening]:
+    """Windows in the walls that are the house's own, some 3 m apart, clear of doors; shops have them at the street."""
+    x0, y0, x1, y1 = room.box
+    w, h = sketch.size
+    outer = {EAST: abs(x1 - w) < 0.01, NORTH: abs(y1 - h) < 0.01, WEST: x0 < 0.01, SOUTH: y0 < 0.01}
+    wide = 2.2 if street else 1.6
+    way_out = next((opening.side for to, opening, _, _ in ways if to == OUTSIDE), SOUTH)
+    found = []
+    for side, is_outer in outer.items():
+        length = size[1] if side in (EAST, WEST) else size[0]
+        if not is_outer or length < wide + 0.6 or (street and side != way_out):
+            continue
+        count = max(1, int(length / (wide + 0.7 if street else 3.0)))
+        for k in range(count):
+            at = round(((k + 0.5) / count - 0.5) * length, 2)
+            if all(o.side != side or abs(o.at - at) > (o.width + wide) / 2 + 0.15 for _, o, _, _ in ways):
+                found.append(Opening(side, at, wide))
+    return found
+
+
+def _turned(u: float, v: float, turn: int) -> tuple[float, float]:
+    c, s = (1, 0, -1, 0)[turn % 4], (0, 1, 0, -1)[turn % 4]
+    return round(c * u - s * v, 3), round(s * u + c * v, 3)
+
+
+def _lift_panel(canvas: Canvas) -> tuple[float, float, float]:
+    """Opposite the door of the car."""
+    side = canvas.far
+    x, y = Opening(side, 0.0, 1.0).point(canvas.size, 0.02)
+    return round(x, 3), round(y, 3), round(math.remainder((side + 2) * math.pi / 2, 2 * math.pi), 5)
+
+
+def _door_plan(
+    sketch: Sketch,
+    room: SketchRoom,
+    canvas: Canvas,
+    other: int,
+    opening: Opening,
+    low: float,
+    ride: bool,
+    centre: tuple[float, float, float],
+) -> DoorPlan:
+    cx, cy, z = centre
+    x, y = opening.point(canvas.size)
+    ix, iy = opening.point(canvas.size, STEP_IN)
+    if ride:
+        x, y = Opening(canvas.far, 0.0, 1.0).point(canvas.size, 0.3)
+        ix = iy = 0.0
+    z = round(z + low, 3)
+    return DoorPlan(other, (round(cx + x, 3), round(cy + y, 3), z), (round(cx + ix, 3), round(cy + iy, 3), z))
+
+
+def _inside(
+    index: int,
+    room: SketchRoom,
+    look: Look,
+    centre: tuple[float, float, float],
+    size: tuple[float, float],
+    ways: Sequence[_Way],
+    windows: Sequence[Opening],
+    variant: int,
+    first: int,
+) -> Inside:
+    parts = []
+    for other, opening, low, ride in ways:
+        if ride:
+            continue
+        kind = "entrance" if other == OUTSIDE else "door"
+        parts.append(WallOpening(opening.side, opening.at, opening.width, low, low + DOOR_HEIGHT, kind, index < other))
+    head = min(HEAD, room.height - 0.3)
+    sill = SHOP_SILL if look.street else SILL
+    parts += [WallOpening(o.side, o.at, o.width, sill, head, "window") for o in windows]
+    palette = PALETTES[look.palette]
+    return Inside(
+        entity=index,
+        centre=centre,
+        size=(*size, room.height),
+        floor=room.floor or look.floor,
+        floor_colour=look.tone,
+        walls=room.walls or look.walls,
+        wall_colour=room.colour or palette[(variant // 2 + index) % len(palette)],
+        openings=tuple(parts),
+        rise=room.rise,
+        facing=room.facing if room.rise else 0,
+    )
+
+
+def _shifted(spot: Spot, x: float, y: float, z: float) -> Spot:
+    a, b, c = spot.centre
+    return replace(
+        spot,
+        centre=(round(a + x, 3), round(b + y, 3), round(c + z, 3)),
+        reach=(round(spot.reach[0] + x, 3), round(spot.reach[1] + y, 3)),
+    )
+
+
+def _spots(room: SketchRoom, canvas: Canvas, items: Sequence[Furnishing], dress: Dressed) -> tuple[Spot, ...]:
+    """The containers of a room that can be reached from its door."""
+    models = furniture_models()
+    size = canvas.size
+    if room.items is not None:
+        canvas.block_all(items)
+    rows, columns = np.nonzero(canvas.reachable())
+    if not len(rows):
+        return ()
+    px = (columns + 0.5) * GRID - size[0] / 2
+    py = (rows + 0.5) * GRID - size[1] / 2
+    home = canvas.doors[0].point(size, STEP_IN)
+    spots = [
+        Spot(
+            "floor",
+            -1,
+            (0.0, 0.0, 0.0),
+            (round(size[0] - 0.6, 3), round(size[1] - 0.6, 3)),
+            0.0,
+            (round(home[0], 3), round(home[1], 3)),
+        )
+    ]
+    chairs = 0
+    for k, item in enumerate(items):
+        top = dress.tops.get(k, models[item.prototype].top)
+        if top is None or (top.kind == "chair" and chairs >= _MOST_CHAIRS) or len(spots) >= _LARGEST_TOP:
+            continue
+        c, s = math.cos(item.yaw), math.sin(item.yaw)
+        cx = item.x + c * top.centre[0] - s * top.centre[1]
+        cy = item.y + s * top.centre[0] + c * top.centre[1]
+        around = np.flatnonzero((np.abs(px - cx) < REACH) & (np.abs(py - cy) < REACH))
+        dx, dy = px[around] - cx, py[around] - cy
+        u, v = dx * c + dy * s, dy * c - dx * s
+        away = np.hypot(np.maximum(np.abs(u) - top.size[0] / 2, 0), np.maximum(np.abs(v) - top.size[1] / 2, 0))
+        middle = np.hypot(u, v)
+        near = np.flatnonzero((away <= REACH - 0.3) & (middle <= REACH - 0.1))
+        if not len(near):
+            continue
+        best = around[near[int(np.argmin(middle[near]))]]
+        chairs += top.kind == "chair"
+        spots.append(
+            Spot(
+                top.kind,
+                k,
+                (round(cx, 3), round(cy, 3), round(top.height + item.z, 3)),
+                (round(top.size[0], 3), round(top.size[1], 3)),
+                item.yaw,
+                (round(float(px[best]), 3), round(float(py[best]), 3)),
+            )
+        )
+    return tuple(spots)

@@ -1,0 +1,297 @@
+"""Trees and shrubs: which model by species, climate and size; rows; and what grows where only an area is mapped."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from vico.assets.street import street_models
+from vico.geo.frame import LocalFrame
+from vico.geo.osm import OsmArea, OsmData, Tags
+from vico.world.heights import HeightField
+from vico.world.seeds import rng
+from vico.worldgen.objects.wishes import Wish, metres
+
+_GENERA = {
+    "tilia": "tree_lime", "acer": "tree_maple", "platanus": "tree_plane", "quercus": "tree_oak",
+    "aesculus": "tree_chestnut", "castanea": "tree_chestnut", "juglans": "tree_chestnut", "fagus": "tree_chestnut",
+    "betula": "tree_birch", "alnus": "tree_lime_tall", "populus": "tree_poplar", "picea": "tree_spruce",
+    "pinus": "tree_pine", "abies": "tree_fir", "pseudotsuga": "tree_fir", "larix": "tree_larch",
+    "cedrus": "tree_stone_pine", "taxus": "tree_cypress", "thuja": "tree_cypress", "juniperus": "tree_cypress",
+    "sequoia": "tree_fir", "sequoiadendron": "tree_fir", "metasequoia": "tree_larch", "taxodium": "tree_larch",
+    "cupressus": "tree_cypress", "chamaecyparis": "tree_cypress", "phoenix": "tree_palm_date",
+    "washingtonia": "tree_palm_tall", "trachycarpus": "tree_palm", "chamaerops": "tree_palm_date",
+    "syagrus": "tree_palm_tall", "cocos": "tree_palm_tall", "salix": "tree_willow", "sorbus": "tree_young",
+    "prunus": "tree_blossom", "malus": "tree_fruit", "pyrus": "tree_fruit", "crataegus": "tree_fruit",
+    "magnolia": "tree_blossom", "cercis": "tree_blossom", "lagerstroemia": "tree_blossom", "amelanchier": "tree_fruit",
+    "citrus": "tree_fruit", "ficus": "tree_oak", "olea": "tree_olive", "eucalyptus": "tree_lime_tall",
+    "ulmus": "tree_oak", "zelkova": "tree_oak", "fraxinus": "tree_lime_tall", "carpinus": "tree_lime",
+    "robinia": "tree_lime_tall", "gleditsia": "tree_maple", "ailanthus": "tree_lime_tall", "ginkgo": "tree_lime_tall",
+    "liquidambar": "tree_maple", "liriodendron": "tree_lime_tall", "celtis": "tree_oak", "corylus": "tree_young",
+    "catalpa": "tree_chestnut", "morus": "tree_fruit", "jacaranda": "tree_blossom", "sophora": "tree_maple",
+    "styphnolobium": "tree_maple", "pyracantha": "tree_fruit", "laurus": "tree_olive",
+}  # fmt: skip
+# Common names of the languages of our maps, by what they begin or end with.
+_NAMES = {
+    "linden": "tilia", "lime": "tilia", "linde": "tilia", "tilleul": "tilia", "lehmus": "tilia", "lind": "tilia",
+    "maple": "acer", "ahorn": "acer", "érable": "acer", "vaahtera": "acer", "lönn": "acer", "plane": "platanus",
+    "sycamore": "platanus", "platan": "platanus", "oak": "quercus", "eiche": "quercus", "chêne": "quercus",
+    "tammi": "quercus", "birch": "betula", "birke": "betula", "bouleau": "betula", "koivu": "betula",
+    "björk": "betula", "poplar": "populus", "pappel": "populus", "peuplier": "populus", "poppeli": "populus",
+    "spruce": "picea", "fichte": "picea", "épicéa": "picea", "kuusi": "picea", "pine": "pinus", "kiefer": "pinus",
+    "mänty": "pinus", "tanne": "abies", "sapin": "abies", "cypress": "cupressus", "zypresse": "cupressus",
+    "cyprès": "cupressus", "palm": "phoenix", "willow": "salix", "weide": "salix", "saule": "salix", "paju": "salix",
+    "cherry": "prunus", "kirsche": "prunus", "cerisier": "prunus", "apple": "malus", "apfel": "malus",
+    "pommier": "malus", "chestnut": "aesculus", "kastanie": "aesculus", "marronnier": "aesculus", "olive": "olea",
+    "elm": "ulmus", "ash": "fraxinus", "beech": "fagus", "buche": "fagus", "larch": "larix", "lärche": "larix",
+}  # fmt: skip
+_NEEDLES = ("tree_spruce", "tree_fir", "tree_larch", "tree_pine", "tree_stone_pine", "tree_cypress")
+_PALMS = ("tree_palm", "tree_palm_tall", "tree_palm_date")
+
+# What grows along streets, and in woods; a name that comes twice is twice as common.
+_MIXES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "boreal": (
+        ("tree_lime", "tree_lime", "tree_lime_tall", "tree_maple", "tree_birch", "tree_oak", "tree_young"),
+        ("tree_pine", "tree_pine", "tree_spruce", "tree_spruce", "tree_birch", "tree_birch", "tree_fir"),
+    ),
+    "temperate": (
+        ("tree_lime", "tree_lime_tall", "tree_maple", "tree_maple", "tree_plane", "tree_chestnut", "tree_oak",
+         "tree_birch", "tree_young", "tree_blossom"),
+        ("tree_oak", "tree_oak", "tree_maple", "tree_lime_tall", "tree_chestnut", "tree_birch", "tree_spruce",
+         "tree_pine"),
+    ),
+    "alpine": (
+        ("tree_lime", "tree_maple", "tree_birch", "tree_chestnut", "tree_larch", "tree_fruit", "tree_poplar"),
+        ("tree_spruce", "tree_spruce", "tree_fir", "tree_larch", "tree_pine", "tree_birch"),
+    ),
+    "mediterranean": (
+        ("tree_plane", "tree_plane", "tree_palm_date", "tree_palm", "tree_palm_tall", "tree_stone_pine", "tree_olive",
+         "tree_pollard", "tree_cypress"),
+        ("tree_stone_pine", "tree_stone_pine", "tree_pine", "tree_oak", "tree_cypress", "tree_olive"),
+    ),
+    "tropical": (
+        ("tree_palm", "tree_palm_tall", "tree_palm_date", "tree_oak", "tree_chestnut", "tree_blossom"),
+        ("tree_oak", "tree_chestnut", "tree_lime_tall", "tree_palm", "tree_palm_tall"),
+    ),
+}  # fmt: skip
+
+# Square metres a tree has of its own where an area is planted.
+_ROOM = {
+    "wood": 45.0, "forest": 45.0, "orchard": 60.0, "park": 240.0, "garden": 260.0, "cemetery": 260.0,
+    "village_green": 380.0, "recreation_ground": 500.0, "nature_reserve": 120.0, "dog_park": 320.0,
+}  # fmt: skip
+_SHRUB_ROOM = 7.0
+_BARE = {
+    "leisure": ("pitch", "playground", "swimming_pool", "track", "stadium", "sports_centre", "marina"),
+    "natural": ("water", "beach", "sand", "bare_rock", "wetland"),
+    "amenity": ("parking", "fountain", "marketplace", "outdoor_seating", "bicycle_parking", "grave_yard"),
+    "landuse": ("construction", "railway", "basin", "reservoir", "flowerbed"),
+    "man_made": ("pier", "bridge", "pontoon"),
+    "public_transport": ("platform",), "railway": ("platform",), "waterway": ("riverbank", "dock"),
+}  # fmt: skip
+_MOST = 700  # plants that no map has, in a world
+
+
+def climate(frame: LocalFrame, height: HeightField) -> str:
+    """What kind of plants grow here: by latitude, the Mediterranean and California by their boxes, and altitude."""
+    lat = abs(frame.lat)
+    if lat < 25.0:
+        return "tropical"
+    if float(np.median(height.heights)) > 600.0:
+        return "alpine"
+    if lat > 57.0:
+        return "boreal"
+    warm = (35.0 < frame.lat < 44.2 and -10.0 < frame.lon < 37.0) or (32 < frame.lat < 38.5 and -125 < frame.lon < -114)
+    return "mediterranean" if warm or lat < 32.0 else "temperate"
+
+
+def tree_wish(key: str, tags: Tags, xy: NDArray[np.float64], seed: int, zone: str, *, wild: bool = False) -> Wish:
+    """A tree with the model, and the size, its tags and place suggest; `wild` ones grow as in woods."""
+    random = rng(seed, "tree", key)
+    name = _model(tags, xy, seed, random, zone, wild)
+    wide, _, tall = street_models()[name].size
+    scale = float(random.uniform(0.82, 1.15))
+    height, crown = metres(tags.get("height")), metres(tags.get("diameter_crown"))
+    girth = metres(tags.get("circumference"))
+    if girth and girth > 20:  # centimetres, whatever the wiki says
+        girth /= 100
+    if height:
+        if crown and "genus" not in tags and "species" not in tags and name not in _PALMS:
+            name = _by_shape(name, crown / height)
+            tall = street_models()[name].size[2]
+        scale = height / tall
+    elif crown:
+        scale = crown / wide
+    elif girth:
+        scale = 25.0 * (1.0 - math.exp(-2.5 * girth / math.pi)) / tall
+    return Wish(key, name, xy, None, float(np.clip(scale, 0.35, 2.0)))
+
+
+def _by_shape(name: str, ratio: float) -> str:
+    """The model of the same leaves whose crown is as wide for its height as measured."""
+    leaves = _NEEDLES if name in _NEEDLES else ("tree_lime", "tree_lime_tall", "tree_maple", "tree_poplar", "tree_oak")
+    models = street_models()
+    return min(leaves, key=lambda n: abs(math.log(max(models[n].size[0] / models[n].size[2], 0.05) / max(ratio, 0.05))))
+
+
+def _genus(tags: Tags) -> str | None:
+    for key in ("genus", "species", "taxon"):
+        genus = tags.get(key, "").split(" ")[0].lower()
+        if genus in _GENERA:
+            return genus
+    for key, value in tags.items():
+        if key.split(":")[0] in ("species", "taxon", "genus") or key == "name":
+            for word in value.lower().replace("-", " ").split():
+                for known, genus in _NAMES.items():
+                    if word == known or (len(known) > 4 and word.endswith(known)):
+                        return genus
+    return None
+
+
+def _model(tags: Tags, xy: NDArray[np.float64], seed: int, random: np.random.Generator, zone: str, wild: bool) -> str:
+    genus = _genus(tags)
+    if genus == "pinus" and zone == "mediterranean":
+        return "tree_stone_pine"
+    if genus == "populus" and "tremula" in tags.get("species", ""):
+        return "tree_birch"
+    if genus is not None:
+        return _GENERA[genus]
+    leaves = tags.get("leaf_type", tags.get("wood", ""))
+    if leaves == "palm":
+        return _PALMS[int(random.integers(len(_PALMS)))]
+    mix = _MIXES[zone][1 if wild else 0]
+    if leaves in ("needleleaved", "coniferous"):
+        mix = tuple(n for n in _MIXES[zone][1] if n in _NEEDLES) or ("tree_spruce",)
+    elif leaves in ("broadleaved", "deciduous"):
+        evergreen = tags.get("leaf_cycle") == "evergreen" and zone in ("mediterranean", "tropical")
+        mix = ("tree_oak", "tree_olive") if evergreen else tuple(n for n in mix if n not in (*_NEEDLES, *_PALMS))
+        mix = mix or ("tree_oak",)
+    if not wild and random.random() < 0.78:
+        # Neighbours in a street are of one kind, mostly.
+        local = rng(seed, "species", int(xy[0] // 60) + 10_000, int(xy[1] // 60) + 10_000)
+        return mix[int(local.integers(len(mix)))]
+    return mix[int(random.integers(len(mix)))]
+
+
+def row_wishes(osm: OsmData, seed: int, zone: str) -> list[Wish]:
+    """Trees of tree rows: as many as mapped, else one every eight metres; the row has one species."""
+    found: list[Wish] = []
+    mapped = [node.xy for node in osm.nodes if node.tags.get("natural") == "tree"]
+    near = shapely.STRtree(shapely.points(mapped)) if mapped else None
+    for way in osm.ways:
+        if way.tags.get("natural") != "tree_row":
+            continue
+        line = shapely.LineString(way.line)
+        count = max(2, round(line.length / 8.0) + 1)
+        name = tree_wish(f"w{way.id}", way.tags, way.line[0], seed, zone).prototype
+        for k, d in enumerate(np.linspace(0, line.length, count)):
+            point = line.interpolate(d)
+            if near is not None and len(near.query(point, predicate="dwithin", distance=3.0)):
+                continue
+            wish = tree_wish(f"w{way.id}.{k}", way.tags, np.array(point.coords[0]), seed, zone)
+            wish.prototype = name
+            found.append(wish)
+    return found
+
+
+def spread(
+    ground: BaseGeometry, room: float, most: int, random: np.random.Generator, *, least: float = 0.72
+) -> NDArray[np.float64]:
+    """Points of blue noise in an area, shape ``(n, 2)``: none nearer to another than `least` times its room's side."""
+    count = min(int(ground.area / room + random.random()), most)
+    if count <= 0:
+        return np.zeros((0, 2))
+    apart = least * math.sqrt(room)
+    x0, y0, x1, y1 = ground.bounds
+    share = max(ground.area / max((x1 - x0) * (y1 - y0), 1e-9), 0.02)
+    tries = random.uniform((x0, y0), (x1, y1), (min(int(9 * count / share) + 8, 60_000), 2))
+    shapely.prepare(ground)
+    tries = tries[shapely.contains_xy(ground, tries[:, 0], tries[:, 1])]
+    taken: dict[tuple[int, int], list[tuple[float, float]]] = {}
+    out: list[tuple[float, float]] = []
+    for x, y in tries.tolist():
+        i, j = math.floor(x / apart), math.floor(y / apart)
+        around = (p for a in (i - 1, i, i + 1) for b in (j - 1, j, j + 1) for p in taken.get((a, b), ()))
+        if any((x - px) ** 2 + (y - py) ** 2 < apart * apart for px, py in around):
+            continue
+        taken.setdefault((i, j), []).append((x, y))
+        out.append((x, y))
+        if len(out) == count:
+            break
+    return np.array(out).reshape(-1, 2)
+
+
+def _use(area: OsmArea) -> str | None:
+    """What is planted in an area, a key of `_ROOM` or ``scrub``."""
+    tags = area.tags
+    if tags.get("natural") in ("wood", "scrub", "shrubbery"):
+        return "wood" if tags["natural"] == "wood" else "scrub"
+    for key in ("landuse", "leisure"):
+        if tags.get(key) in _ROOM and "building" not in tags:
+            return tags[key]
+    return None
+
+
+def planted_wishes(
+    osm: OsmData, carriageway: BaseGeometry, openings: BaseGeometry, half: float, seed: int, zone: str
+) -> list[Wish]:
+    """Trees of woods, parks, gardens and cemeteries, shrubs of scrub, where only the area is mapped, off the ways."""
+    window = shapely.box(-half, -half, half, half)
+    bare = [
+        area.polygon
+        for area in osm.areas
+        if any(area.tags.get(key) in values for key, values in _BARE.items()) and area.tags.get("layer", "0") == "0"
+    ]
+    solid = [area.polygon for area in osm.areas if "building" in area.tags or "building:part" in area.tags]
+    keep_off = shapely.union_all(
+        [
+            *(shapely.buffer(shapely.intersection(p, window), 1.0) for p in bare),
+            *(shapely.buffer(shapely.intersection(p, window), 2.2) for p in solid if p.intersects(window)),
+            shapely.buffer(openings, 0.8),
+            shapely.buffer(carriageway, 1.6),
+        ]
+    )
+    mapped = [node.xy for node in osm.nodes if node.tags.get("natural") == "tree"]
+    trees = shapely.points(np.array(mapped).reshape(-1, 2))
+    done: BaseGeometry = shapely.Polygon()
+    found: list[tuple[float, Wish]] = []
+    order = {"wood": 0, "forest": 0, "scrub": 1, "orchard": 1}
+    for area in sorted(osm.areas, key=lambda a: order.get(_use(a) or "", 2)):
+        use = _use(area)
+        if use is None or area.polygon.area < 12.0:
+            continue
+        ground = shapely.difference(shapely.difference(shapely.intersection(area.polygon, window), keep_off), done)
+        if ground.is_empty:
+            continue
+        done = shapely.union(done, ground)
+        random = rng(seed, "scatter", area.id)
+        if use == "scrub":
+            for k, xy in enumerate(spread(ground, _SHRUB_ROOM, 160, random, least=0.6)):
+                name = ("shrub", "shrub_tall", "shrub_tall")[int(random.integers(3))]
+                wish = Wish(f"{area.id}.{k}", name, xy, None, float(random.uniform(0.75, 1.3)), reach=0.0)
+                found.append((float(random.random()), wish))
+            continue
+        wild = use in ("wood", "forest", "nature_reserve")
+        there = int(shapely.contains(area.polygon, trees).sum()) if len(trees) else 0
+        if not wild and there > 0.3 * ground.area / _ROOM[use]:
+            continue  # somebody mapped them
+        for k, xy in enumerate(spread(ground, _ROOM[use], 260, random)):
+            wish = tree_wish(f"{area.id}.{k}", area.tags, xy, seed, zone, wild=wild)
+            if use == "orchard":
+                wish.prototype, wish.scale = "tree_fruit", 1.0
+            wish.reach = 0.0
+            found.append((float(random.random()), wish))
+        if use in ("park", "garden", "cemetery"):
+            for k, xy in enumerate(spread(ground, 2.2 * _ROOM[use] if use == "park" else 70.0, 40, random)):
+                name = ("shrub", "shrub_tall", "shrub_flowering")[int(random.integers(3))]
+                wish = Wish(f"{area.id}.s{k}", name, xy, None, float(random.uniform(0.8, 1.2)), reach=0.0)
+                found.append((float(random.random()), wish))
+    if len(found) <= _MOST:
+        return [wish for _, wish in found]
+    # Every area is thinned alike.
+    limit = sorted(rank for rank, _ in found)[_MOST]
+    return [wish for rank, wish in found if rank < limit]

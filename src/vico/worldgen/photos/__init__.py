@@ -1,0 +1,1 @@
+"""Photos on surfaces: baking from photogrammetry, filling, sharpening, and the street-view chain."""

@@ -1,0 +1,219 @@
+"""Photos on the walls: baked from a tile mesh, painted from the street, missing parts filled in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vico.errors import InputError
+from vico.geo.street_images import StreetImage
+from vico.geo.tile_mesh import TileMesh
+from vico.world.folder import World
+from vico.world.heights import HeightField
+from vico.world.mesh import Surface
+from vico.worldgen.photos.atlas import Atlas, coverage, repacked, textured
+from vico.worldgen.photos.baking import bake
+from vico.worldgen.photos.daylight import sun_in, without_sun
+from vico.worldgen.photos.enhance import Inpainter, Upscaler, evened, inpainted, padded, upscaled
+from vico.worldgen.photos.sight import Sight
+from vico.worldgen.photos.streetview import StreetviewReport, reproject
+from vico.worldgen.photos.streetview_photo import Photographer
+
+INPAINTERS = ("exemplar", "patchmatch", "diffusion", "none")
+UPSCALERS = ("none", "sharpen", "realesrgan", "diffusion")
+
+#: Makes a world that is being built visible to whoever matches photos with it.
+Studio = Callable[[World], Photographer]
+
+
+@dataclass(frozen=True)
+class Texturing:
+    """How photos come onto the walls.
+
+    Attributes
+    ----------
+    texel
+        Side of a texel, metres.
+    inpaint
+        What fills texels that no photo shows: one of `INPAINTERS`; with ``none`` they stay grey.
+    upscale
+        What makes texels finer: one of `UPSCALERS`.
+    model
+        For ``diffusion``: a folder with the model, or its name on a hub.
+    even
+        Whether the light of the day the photos were made is taken out of them.
+    """
+
+    texel: float = 0.10
+    inpaint: str = "exemplar"
+    upscale: str = "none"
+    model: str = ""
+    even: bool = True
+
+    def __post_init__(self) -> None:
+        if not 0.01 <= self.texel <= 2.0:
+            raise InputError(f"texel: {self.texel:g} m; it must lie within 0.01..2 m")
+        if self.inpaint not in INPAINTERS:
+            raise InputError(f"inpaint: no method {self.inpaint!r}; there are {', '.join(INPAINTERS)}")
+        if self.upscale not in UPSCALERS:
+            raise InputError(f"upscale: no method {self.upscale!r}; there are {', '.join(UPSCALERS)}")
+        if "diffusion" in (self.inpaint, self.upscale) and not self.model:
+            raise InputError("diffusion: say which model: a folder, or its name on a hub")
+
+
+@dataclass(frozen=True)
+class Painted:
+    """Walls and roofs that wear photos where there are any, and what was done.
+
+    Attributes
+    ----------
+    walls, roofs
+        On the materials ``atlas_K`` where photos are, without the pages themselves; else as they were.
+    atlas
+        The pages and their charts.
+    counts
+        Numbers for the stage's report.
+    """
+
+    walls: list[Surface]
+    roofs: list[Surface]
+    atlas: Atlas
+    counts: dict[str, int]
+
+    def surfaces(self) -> tuple[list[Surface], list[Surface]]:
+        """Walls and roofs with the pages as their textures."""
+        return textured(self.walls, self.atlas), textured(self.roofs, self.atlas)
+
+
+def painted_from_tiles(
+    walls: Sequence[Surface], roofs: Sequence[Surface], mesh: TileMesh, *, texel: float, least: float = 0.0
+) -> Painted:
+    """Bake the colours of a tile mesh onto walls and roofs; holes stay unknown.
+
+    With `least`, faces that photos cover less than that share of get their procedural facade back at once, as by
+    `kept_where_photographed`: only where no street photos are to come, and then in less memory than afterwards.
+    """
+    baked = bake(walls, roofs, mesh, texel=texel)
+    known = sum(int(mask.sum()) for mask in baked.atlas.known)
+    inside = sum(int(mask.sum()) for mask in baked.atlas.inside)
+    counts = {
+        "pages": len(baked.atlas.pages),
+        "charts": len(baked.atlas.charts),
+        "pieces": baked.pieces,
+        "texels": inside,
+        "texels_known": known,
+    }
+    painted = Painted(baked.walls, baked.roofs, baked.atlas, counts)
+    return kept_where_photographed(walls, roofs, painted, least=least) if least > 0.0 else painted
+
+
+def painted_as_built(walls: Sequence[Surface], roofs: Sequence[Surface], *, texel: float) -> Painted:
+    """Put the procedural facades themselves on pages, all unknown: what street photos are painted over."""
+    own = painted_from_tiles(walls, roofs, mesh_of([*walls, *roofs]), texel=texel)
+    atlas = replace(own.atlas, known=tuple(np.zeros_like(mask) for mask in own.atlas.known))
+    return replace(own, atlas=atlas)
+
+
+def painted_from_street(
+    painted: Painted,
+    images: Sequence[StreetImage],
+    height: HeightField,
+    *,
+    others: Sequence[Surface],
+    photograph: Photographer,
+) -> tuple[Painted, StreetviewReport]:
+    """Paint street photos over what is on the pages.
+
+    `others` are surfaces that hide walls beside these: the ground. The report has what became of each photo.
+    """
+    sight = _sight_of([*painted.walls, *painted.roofs, *others])
+    atlas, report = reproject(painted.atlas, images, photograph, sight, ground=height)
+    known = sum(int(mask.sum()) for mask in atlas.known)
+    return replace(painted, atlas=atlas, counts={**painted.counts, "texels_known": known}), report
+
+
+def kept_where_photographed(
+    walls: Sequence[Surface], roofs: Sequence[Surface], painted: Painted, *, least: float
+) -> Painted:
+    """Give faces that photos hardly cover their procedural facade back; `walls` and `roofs` as before painting."""
+    if not len(painted.atlas.charts) or bool((coverage(painted.atlas) >= least).all()):
+        return painted
+    new_walls, new_roofs, atlas = repacked(walls, roofs, painted.atlas, least=least)
+    return replace(painted, walls=new_walls, roofs=new_roofs, atlas=atlas)
+
+
+def enhanced(painted: Painted, how: Texturing) -> Painted:
+    """Fill what no photo shows, and make the texels finer if asked to."""
+    # One copy for all the steps: the pages of a district fill half a gigabyte.
+    atlas = replace(painted.atlas, pages=tuple(page.copy() for page in painted.atlas.pages))
+    counts = dict(painted.counts)
+    if how.even and atlas.charts:
+        sight = _sight_of([*painted.walls, *painted.roofs])
+        sun = sun_in(atlas, sight)
+        if sun is None:
+            atlas = evened(atlas, over=True)
+        else:
+            atlas = without_sun(atlas, sun, sight, over=True)
+            counts["sun_azimuth"] = round(sun.azimuth)
+            counts["sun_height"] = round(sun.height)
+    if how.inpaint != "none":
+        atlas = inpainted(atlas, inpainter=_inpainter(how), over=True)
+        counts["texels_filled"] = sum(
+            int((inside & ~known).sum()) for inside, known in zip(atlas.inside, atlas.known, strict=True)
+        )
+    upscaler = _upscaler(how)
+    if upscaler is not None:
+        atlas = upscaled(atlas, upscaler=upscaler)
+    return replace(painted, atlas=padded(atlas, over=True), counts=counts)
+
+
+def mesh_of(surfaces: Sequence[Surface]) -> TileMesh:
+    """Surfaces as one mesh that can be baked from."""
+    textures: list[np.ndarray[tuple[int, ...], np.dtype[np.uint8]]] = []
+    index: dict[int, int] = {}
+    texture_of, triangles, first = [], [], 0
+    for surface in surfaces:
+        picture = surface.material.texture
+        number = -1
+        if picture is not None:
+            if id(picture) not in index:
+                index[id(picture)] = len(textures)
+                textures.append(np.ascontiguousarray(picture[..., :3]))
+            number = index[id(picture)]
+        texture_of.append(np.full(len(surface.triangles), number, np.int32))
+        triangles.append(surface.triangles.astype(np.int32) + np.int32(first))
+        first += len(surface.positions)
+    return TileMesh(
+        np.concatenate([s.positions for s in surfaces]).astype(np.float64),
+        np.concatenate(triangles),
+        np.concatenate([s.uv for s in surfaces]).astype(np.float32),
+        np.concatenate(texture_of),
+        tuple(textures),
+        np.concatenate([s.colour for s in surfaces]),
+    )
+
+
+def _sight_of(surfaces: Sequence[Surface]) -> Sight:
+    corners = np.concatenate([s.positions[s.triangles] for s in surfaces]).reshape(-1, 3)
+    return Sight(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
+
+
+def _inpainter(how: Texturing) -> Inpainter | None:
+    from vico.worldgen.photos import enhance_plugins as plugins
+
+    if how.inpaint == "patchmatch":
+        return plugins.PatchMatchFill()
+    return plugins.DiffusionInpainter(how.model) if how.inpaint == "diffusion" else None
+
+
+def _upscaler(how: Texturing) -> Upscaler | None:
+    from vico.worldgen.photos import enhance_plugins as plugins
+    from vico.worldgen.photos.enhance_sharpen import BackProjection
+
+    if how.upscale == "sharpen":
+        return BackProjection()
+    if how.upscale == "realesrgan":
+        return plugins.RealEsrgan()
+    return plugins.DiffusionUpscaler(how.model) if how.upscale == "diffusion" else None

@@ -1,0 +1,1 @@
+"""Places: shops, homes, offices and the doors they are entered by."""

@@ -1,0 +1,169 @@
+"""Places of a world: what they are for, which building they are in, and the door they are entered by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import shapely
+
+from vico.geo.osm import OsmData
+from vico.geo.places import FoundPlace
+from vico.world.heights import HeightField
+from vico.world.model import Building, Category, Dropped, Entrance, Place, Roads, Transit
+from vico.world.routing import Router
+from vico.world.walkable import WalkableMap
+from vico.worldgen.places.doors import Finder
+from vico.worldgen.places.found import compared
+from vico.worldgen.places.names import Streets, unused
+from vico.worldgen.places.osm import named_places
+
+_LARGE_HOUSE = 4000.0  # square metres of floor above which a house has two stairways
+_HOMES_WANTED, _MOST_HOMES = 60, 240
+
+
+def places_from_osm(
+    osm: OsmData,
+    *,
+    buildings: Sequence[Building],
+    walkable: WalkableMap,
+    height: HeightField,
+    roads: Roads,
+    transit: Transit | None = None,
+    found: Sequence[FoundPlace] = (),
+) -> tuple[list[Place], list[Entrance], list[Dropped]]:
+    """Find the places of a map, the buildings they are in, and their entrances.
+
+    Parameters
+    ----------
+    osm
+        The map, local metres.
+    buildings
+        Buildings with footprints.
+    walkable
+        Where people can walk; entrances are reachable on it.
+    height
+        Ground heights.
+    roads
+        Named streets, for the addresses of homes.
+    transit
+        Stops and stations, which become places of their own with the same ids.
+    found
+        Places of other sources: they confirm, refine or close the map's places, and add those it lacks. Of sources
+        whose content may not be kept (Google) nothing but ids and what is decided here gets into the result.
+
+    Returns
+    -------
+    places, entrances, dropped
+        Places in the order of the map, then homes, then transit; what was left out, with the reason.
+    """
+    finder = Finder(osm, buildings, walkable, height)
+    streets = Streets(finder, roads)
+    mapped = named_places(osm)
+    told = compared(mapped, found)
+    dropped: list[Dropped] = list(told.dropped)
+    places: list[Place] = []
+    seen: set[tuple[str, str | None]] = set()
+    for named in [*mapped, *told.added]:
+        reason = "closed, as another source says" if named.id in told.closed else finder.misfit(named)
+        if reason is None:
+            named = told.refined.get(named.id, named)
+            if not named.name:
+                named = streets.invented(named)
+            place = finder.outdoors(named) if finder.is_outdoors(named) else finder.indoors(named)
+            if isinstance(place, Place):
+                key = (place.name.casefold(), place.building or f"{place.category}")
+                if key in seen:
+                    reason = "mapped twice"
+                else:
+                    seen.add(key)
+                    places.append(place)
+            else:
+                reason = place
+        if reason is not None:
+            label = f"{named.kind} {named.name!r}" if named.name else named.kind
+            dropped.append(Dropped(id=named.id, reason=f"{label}: {reason}"))
+    places += _homes(finder, streets)
+    if transit is not None:
+        places += _transit_places(transit, walkable, height, dropped)
+    return places, finder.entrances, dropped
+
+
+def _homes(finder: Finder, streets: Streets) -> list[Place]:
+    """Apartments in residential buildings, a place for each stairway; more buildings count where these are few."""
+    used: set[str] = set()
+    homes: list[Place] = []
+
+    def add(building: Building, shape: shapely.Polygon) -> None:
+        floor = shape.area * max(building.levels, 1)
+        tags = finder.tags_of(building)
+        address = streets.addresses.get(building.id)
+        for k in range(2 if floor > _LARGE_HOUSE else 1):
+            door = finder.building_door(building, k)
+            if door is None:
+                return
+            if address:
+                name = f"Apartments, {address}"
+            elif tags.get("name"):
+                name = f"Apartments, {tags['name']}"
+            else:
+                street = streets.nearest(door.position[:2])
+                name = f"Apartments on {street}" if street else "Apartments"
+            homes.append(
+                Place(
+                    id=f"{building.id}.home{k}",
+                    name=unused(name, used),
+                    category=Category.ACCOMMODATION,
+                    kind="apartments",
+                    building=building.id,
+                    entrance=door.id,
+                    position=finder.ground(door.approach),
+                )
+            )
+
+    rest: list[tuple[Building, shapely.Polygon]] = []
+    houses: list[tuple[Building, shapely.Polygon]] = []
+    for building, shape in zip(finder.buildings, finder.shapes, strict=True):
+        if shape.area < 45.0 or building.height < 2.4 or not finder.in_window(shape):
+            continue
+        if building.use == "residential":
+            houses.append((building, shape))
+        elif building.use in ("commercial", "retail", "office", "other") and building.levels >= 3 and shape.area > 150:
+            rest.append((building, shape))
+    # In a quarter of small houses not every one needs rooms: an even share of them has.
+    stride = max(1, -(-len(houses) // _MOST_HOMES))
+    for building, shape in houses[::stride]:
+        add(building, shape)
+    # Over shops and offices of old towns people live too.
+    for building, shape in rest:
+        if len(homes) >= _HOMES_WANTED:
+            break
+        add(building, shape)
+    return homes
+
+
+def _transit_places(
+    transit: Transit, walkable: WalkableMap, height: HeightField, dropped: list[Dropped]
+) -> list[Place]:
+    router = Router(walkable)
+    places: list[Place] = []
+    rows = [(s.id, s.name, "bus_stop", s.wait) for s in transit.stops]
+    rows += [(b.id, b.name, "bicycle_rental", b.position) for b in transit.bike_stations]
+    for key, name, kind, position in rows:
+        spot = router.nearest_walkable(position[:2], within=6.0)
+        if spot is None:
+            dropped.append(Dropped(id=key, reason=f"{kind} {name!r}: can't be reached on foot"))
+            continue
+        x, y = round(float(spot[0]), 3), round(float(spot[1]), 3)
+        z = round(float(height((x, y))), 3)
+        places.append(
+            Place(
+                id=key,
+                name=name,
+                category=Category.TRANSIT,
+                kind=kind,
+                building=None,
+                entrance=None,
+                position=(x, y, z),
+            )
+        )
+    return places

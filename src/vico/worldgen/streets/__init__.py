@@ -1,0 +1,1 @@
+"""Streets of the map and the road network made of them."""

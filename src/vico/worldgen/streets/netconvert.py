@@ -1,0 +1,269 @@
+"""The lane-level road network: SUMO's netconvert, run on cleaned streets as a process of its own."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from shapely.geometry.base import BaseGeometry
+
+from vico.errors import MissingExtraError, VicoError
+from vico.geo.frame import LocalFrame
+from vico.geo.osm import OsmData
+from vico.worldgen.streets.roads import DEFAULTS, SIDEWALK_WIDTH, WALKING, Street, is_traffic_street, streets_from_osm
+from vico.worldgen.streets.sides import keeps_left
+
+_NO_RAIL = (
+    "rail rail_urban rail_electric rail_fast tram drone aircraft scooter container wheelchair subway cable_car ship"
+)
+_OPTIONS = {
+    "offset.disable-normalization": "true",
+    "osm.sidewalks": "true",
+    "osm.turn-lanes": "false",
+    "osm.all-attributes": "false",
+    "crossings.guess": "true",
+    "crossings.guess.speed-threshold": "30",
+    "walkingareas": "true",
+    "default.crossing-width": "3.5",
+    "geometry.remove": "true",
+    "geometry.min-dist": "0.5",
+    "roundabouts.guess": "true",
+    "no-turnarounds.except-deadend": "true",
+    "junctions.join": "true",
+    "junctions.join-dist": "12",
+    "junctions.corner-detail": "4",
+    "junctions.internal-link-detail": "10",
+    "tls.guess-signals": "true",
+    "tls.join": "true",
+    "tls.discard-simple": "true",
+    "output.street-names": "true",
+    "precision": "3",
+    "no-warnings": "true",
+    "xml-validation": "never",
+    "xml-validation.net": "never",
+}
+# netconvert needs under a second for 800 m of a dense city; this only ends a hang.
+_LIMIT_SECONDS = 300
+
+
+class NetconvertError(VicoError, RuntimeError):
+    """netconvert ran, but gave no network."""
+
+
+@dataclass(frozen=True)
+class RoadNetwork:
+    """The bytes of `roads.net.xml` (SUMO) and `roads.xodr` (OpenDRIVE), local metres, free of times and paths."""
+
+    net_xml: bytes
+    xodr: bytes
+
+
+def netconvert_binary() -> Path:
+    """Where netconvert lies in the environment, found without importing the package (it repoints PROJ's data).
+
+    Raises
+    ------
+    MissingExtraError
+        If the package is not installed.
+    """
+    try:
+        files = importlib.metadata.files("eclipse-sumo") or []
+    except importlib.metadata.PackageNotFoundError:
+        files = []
+    name = "netconvert.exe" if sys.platform == "win32" else "netconvert"
+    for file in files:
+        if file.name == name and file.parent.name == "bin" and "sumo" in file.parts:
+            path = Path(str(file.locate()))
+            if path.exists():
+                return path
+    raise MissingExtraError(
+        "road network: netconvert is not installed; type: pip install 'virtual-community[worldgen]'"
+    )
+
+
+def road_network(osm: OsmData, half: float | None = None, *, solids: Sequence[BaseGeometry] = ()) -> RoadNetwork:
+    """Build the lane-level network of a window: lanes, junctions, sidewalks, crossings, signals.
+
+    Parameters
+    ----------
+    osm
+        Map data in local metres.
+    half
+        Half side of the window, metres: every street ends at its edge. The data's own where not given.
+    solids
+        What stands on the ground: passages that it closes are no streets.
+
+    Returns
+    -------
+    RoadNetwork
+        Equal input gives equal bytes; an empty network where the window has no street for people or traffic. Where
+        traffic keeps left (`sides.keeps_left`) so do the lanes: a street's lane 0 is at its left kerb.
+
+    Raises
+    ------
+    MissingExtraError, NetconvertError
+        If netconvert is not installed, or gives no network.
+    """
+    streets = streets_from_osm(osm, half or osm.half, solids)
+    used = [street for street in streets if is_traffic_street(street)]
+    used += [s for s in streets if s.kind == "pedestrian" and s.closed is None]
+    if not used:
+        return empty_network(osm.frame, half or osm.half)
+    binary = netconvert_binary()
+    with tempfile.TemporaryDirectory(prefix="vico-roads-") as folder:
+        work = Path(folder)
+        (work / "streets.osm").write_text(_osm_xml(osm, used), encoding="utf-8")
+        (work / "types.xml").write_text(_types_xml(), encoding="utf-8")
+        command = [
+            str(binary), "--osm-files", "streets.osm", "--type-files", "types.xml", "--proj", osm.frame.proj4,
+            "--output-file", "net.xml", "--opendrive-output", "roads.xodr", 
+            "--lefthand", str(keeps_left(osm)).lower(),
+            *[part for key, value in _OPTIONS.items() for part in (f"--{key}", value)],
+        ]  # fmt: skip
+        environment = {"PATH": os.environ.get("PATH", ""), "LC_ALL": "C", "SUMO_HOME": str(binary.parent.parent)}
+        try:
+            done = subprocess.run(
+                command, cwd=work, env=environment, capture_output=True, timeout=_LIMIT_SECONDS, check=False
+            )
+        except subprocess.TimeoutExpired:
+            raise NetconvertError(f"road network: netconvert did not end within {_LIMIT_SECONDS} s") from None
+        net, xodr = work / "net.xml", work / "roads.xodr"
+        # netconvert's exit status lies when the clip cuts a relation: trust the files, not the code.
+        if not (net.exists() and xodr.exists() and b"</net>" in net.read_bytes()[-64:]):
+            said = done.stderr.decode(errors="replace").strip().splitlines()[-1:] or ["no message"]
+            raise NetconvertError(
+                f"road network: netconvert gave no network ({said[0]}); exit status {done.returncode}"
+            )
+        return RoadNetwork(_plain_net(net.read_bytes()), _plain_xodr(xodr.read_bytes()))
+
+
+def empty_network(frame: LocalFrame, half: float) -> RoadNetwork:
+    """The network of a place without streets (a pedestrian quarter, a campus): valid files with nothing in them.
+
+    netconvert refuses to write one, so this is written here, as SUMO 1.20 and OpenDRIVE 1.4 have it.
+    """
+    west, south, east, north = frame.bbox(half)
+    net = f"""<?xml version="1.0" encoding="UTF-8"?>
+
+<net version="1.20" walkingareas="true" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" \
+xsi:noNamespaceSchemaLocation="http://sumo.dlr.de/xsd/net_file.xsd">
+
+    <location netOffset="0.000,0.000" convBoundary="{-half:.3f},{-half:.3f},{half:.3f},{half:.3f}" \
+origBoundary="{west:.6f},{south:.6f},{east:.6f},{north:.6f}" projParameter="{frame.proj4}"/>
+
+</net>
+"""
+    xodr = f"""<?xml version="1.0" encoding="UTF-8"?>
+
+<OpenDRIVE>
+    <header revMajor="1" revMinor="4" name="" version="1.00" date="" north="{half:.3f}" south="{-half:.3f}" \
+east="{half:.3f}" west="{-half:.3f}">
+        <geoReference>
+ <![CDATA[
+ {frame.proj4}
+]]>
+        </geoReference>
+    </header>
+</OpenDRIVE>
+"""
+    return RoadNetwork(net.encode(), xodr.encode())
+
+
+def _plain_net(content: bytes) -> bytes:
+    """Without the comment that holds the time of generation, the paths and the options."""
+    return re.sub(rb"<!--.*?-->\s*", b"", content, flags=re.DOTALL)
+
+
+def _plain_xodr(content: bytes) -> bytes:
+    """Without the comment, and with a fixed date: equal roads give equal bytes."""
+    content = re.sub(rb"<!--.*?-->\s*", b"", content, flags=re.DOTALL)
+    return re.sub(rb'(<header [^>]*?) date="[^"]*"', rb'\1 date=""', content, count=1)
+
+
+def _types_xml() -> str:
+    """Lane widths and sidewalks as in the road database, so that lanes lie where the ground is painted."""
+    rows = []
+    for rank, (kind, (lanes, width, speed)) in enumerate(reversed(DEFAULTS.items()), start=1):
+        for name in (kind, f"{kind}_link"):
+            rows.append(
+                f'<type id="highway.{name}" numLanes="{lanes}" speed="{speed}" priority="{rank}" oneway="false" '
+                f'width="{width}" sidewalkWidth="{SIDEWALK_WIDTH}" disallow="pedestrian bicycle {_NO_RAIL}"/>'
+            )
+    rows.append(
+        f'<type id="highway.pedestrian" numLanes="1" speed="2.78" priority="1" oneway="true" '
+        f'width="{WALKING["pedestrian"]}" allow="pedestrian"/>'
+    )
+    return "<types>\n" + "\n".join(rows) + "\n</types>\n"
+
+
+def _way_tags(street: Street) -> dict[str, str]:
+    """The tags netconvert reads, all decided; a link keeps its class."""
+    tags = {"highway": street.kind}
+    if street.name:
+        tags["name"] = street.name
+    if not street.drivable:
+        return tags | {"oneway": "yes"}
+    tags |= {
+        "lanes": str(street.forward + street.backward),
+        "oneway": "no" if street.backward else "yes",
+        "maxspeed": f"{street.speed * 3.6:.1f}",
+        "sidewalk": street.sidewalk if street.sidewalk != "none" else "no",
+    }
+    if street.backward:
+        tags |= {"lanes:forward": str(street.forward), "lanes:backward": str(street.backward)}
+    if street.tags.get("junction") in ("roundabout", "circular"):
+        tags["junction"] = "roundabout"
+    if street.access == "bus":
+        tags |= {"access": "no", "bus": "yes"}
+    return tags
+
+
+def _osm_xml(osm: OsmData, streets: list[Street]) -> str:
+    """An OSM file of just these streets."""
+
+    # Parts of a cut way and the edge's new nodes need ids of their own; OSM's end far below these.
+    def way_id(street: Street) -> int:
+        return street.way + street.part * 10**13
+
+    def node_id(node: int) -> int:
+        return node if node > 0 else 10**15 - node
+
+    points: dict[int, np.ndarray] = {}
+    for street in streets:
+        for node, xy in zip(street.nodes, street.line, strict=True):
+            points.setdefault(node_id(node), xy)
+    signals = {n.id for n in osm.nodes if n.tags.get("highway") == "traffic_signals"}
+    ids = sorted(points)
+    lat, lon = osm.frame.to_geodetic(np.array([points[i] for i in ids]))
+    rows = ['<?xml version="1.0" encoding="UTF-8"?>', '<osm version="0.6">']
+    for i, y, x in zip(ids, lat, lon, strict=True):
+        tag = '<tag k="highway" v="traffic_signals"/>' if i in signals else ""
+        rows.append(f'<node id="{i}" lat="{y:.9f}" lon="{x:.9f}">{tag}</node>')
+    for street in sorted(streets, key=way_id):
+        refs = "".join(f'<nd ref="{node_id(n)}"/>' for n in street.nodes)
+        tags = "".join(f"<tag k={quoteattr(k)} v={quoteattr(v)}/>" for k, v in _way_tags(street).items())
+        rows.append(f'<way id="{way_id(street)}">{refs}{tags}</way>')
+    whole = {street.way for street in streets if street.part == 0}
+    for relation in sorted(osm.relations, key=lambda r: r.id):
+        kind = relation.tags.get("restriction", "")
+        kept = [m for m in relation.members if (m[0] == "w" and m[1] in whole) or (m[0] == "n" and m[1] in points)]
+        roles = sorted(m[2] for m in kept)
+        if relation.tags.get("type") == "restriction" and kind[:3] in ("no_", "onl") and roles == ["from", "to", "via"]:
+            members = "".join(
+                f'<member type="{"way" if t == "w" else "node"}" ref="{r}" role={quoteattr(role)}/>'
+                for t, r, role in kept
+            )
+            rows.append(
+                f'<relation id="{relation.id}">{members}<tag k="type" v="restriction"/>'
+                f'<tag k="restriction" v={quoteattr(kind)}/></relation>'
+            )
+    return "\n".join([*rows, "</osm>", ""])

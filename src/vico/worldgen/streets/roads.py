@@ -1,0 +1,402 @@
+"""Streets from OpenStreetMap: the road database, and the cleaned streets the road network is made of."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from vico.geo.osm import OsmData, OsmWay
+from vico.world.model import Dropped, Junction, Road, Roads
+from vico.worldgen.streets.levels import OVER_A_STREET, overpasses
+from vico.worldgen.streets.sides import keeps_left
+from vico.worldgen.streets.streets import on_the_ground
+
+UNDERGROUND = "under the ground: tunnels have mouths, and nobody drives or walks in them"
+THROUGH_A_BUILDING = "leads through a building that stands across it"
+"""Why a road is closed, beside `levels.OVER_A_STREET`."""
+
+_ACROSS = 1.0  # metres of a passage that may lie in walls
+
+# Lanes each way, lane width (m) and speed (m/s) where the map says nothing: urban defaults by class of road.
+DEFAULTS: dict[str, tuple[int, float, float]] = {
+    "motorway": (2, 3.5, 22.2),
+    "trunk": (2, 3.3, 16.7),
+    "primary": (1, 3.2, 13.9),
+    "secondary": (1, 3.2, 13.9),
+    "tertiary": (1, 3.1, 11.1),
+    "unclassified": (1, 3.0, 11.1),
+    "residential": (1, 3.0, 8.3),
+    "living_street": (1, 2.9, 5.6),
+    "busway": (1, 3.2, 11.1),
+    "service": (1, 2.7, 5.6),
+}
+WALKING = {"pedestrian": 4.0, "footway": 2.0, "path": 1.8, "steps": 2.0, "cycleway": 2.5, "track": 2.5}
+SIDEWALK_WIDTH = 2.0
+MAX_LANES_EACH_WAY = 3
+_NO_SIDEWALK = {"motorway", "trunk", "service", "busway"}
+_PRIVATE = {"no", "private", "agricultural", "forestry", "military"}
+_MINOR_SERVICE = {"driveway", "parking_aisle", "drive-through", "emergency_access"}
+
+
+@dataclass(frozen=True)
+class Street:
+    """A drivable or walkable OSM way with everything the map leaves open decided.
+
+    Attributes
+    ----------
+    nodes
+        Node ids along `line`; a new, negative id where the window's edge cuts the way.
+    line
+        Centre line in the direction of travel (reversed ways are turned round), metres, shape ``(n, 2)``.
+    forward, backward
+        Lanes each way; 0 backward on a one-way street, both 0 on a walkway.
+    width
+        Of the carriageway (or of the walkway), metres, without sidewalks.
+    sidewalk
+        none, left, right or both.
+    access
+        all, bus (buses only) or private.
+    closed
+        Why neither traffic nor walkers use it; None for the rest. A way under a roof or through a house
+        (`covered`, `tunnel=building_passage`) lies on the ground and is open, unless the house as built stands across.
+    """
+
+    way: int
+    part: int
+    nodes: list[int]
+    line: NDArray[np.float64]
+    kind: str
+    name: str | None
+    forward: int
+    backward: int
+    width: float
+    speed: float
+    sidewalk: str
+    access: str
+    layer: int
+    tags: dict[str, str]
+    closed: str | None = None
+
+    @property
+    def drivable(self) -> bool:
+        """Whether vehicles may use it."""
+        return self.forward > 0
+
+
+def _number(text: str | None) -> float | None:
+    """The first number of a tag's value, or None."""
+    found = re.match(r"\s*(\d+(?:\.\d+)?)", text or "")
+    return float(found.group(1)) if found else None
+
+
+def _speed(tags: dict[str, str], default: float) -> float:
+    """`maxspeed` in m/s: km/h unless it says mph."""
+    value = _number(tags.get("maxspeed"))
+    if value is None or value <= 0:
+        return default
+    return round(value * (0.44704 if "mph" in tags["maxspeed"] else 1 / 3.6), 2)
+
+
+def _lanes(tags: dict[str, str], kind: str, oneway: bool) -> tuple[int, int]:
+    """Lanes forward and backward."""
+    each = DEFAULTS[kind][0]
+    total = _number(tags.get("lanes"))
+    forward, backward = _number(tags.get("lanes:forward")), _number(tags.get("lanes:backward"))
+    if oneway:
+        return int(min(max(total or forward or each, 1), MAX_LANES_EACH_WAY + 1)), 0
+    if forward is None or backward is None:
+        total = total or 2 * each
+        forward, backward = math.ceil(total / 2), max(math.floor(total / 2), 1)
+    return int(min(max(forward, 1), MAX_LANES_EACH_WAY)), int(min(max(backward, 1), MAX_LANES_EACH_WAY))
+
+
+def _sidewalk(tags: dict[str, str], kind: str) -> str:
+    """Sides with a sidewalk: as mapped, else both in streets people live and shop along."""
+    said = tags.get("sidewalk") or tags.get("sidewalk:both")
+    if said in ("no", "none"):
+        return "none"
+    if said in ("both", "left", "right"):
+        return said
+    sides = [side for side in ("left", "right") if tags.get(f"sidewalk:{side}") in ("yes", "separate")]
+    if sides:
+        return "both" if len(sides) == 2 else sides[0]
+    return "none" if kind in _NO_SIDEWALK else "both"
+
+
+def _access(tags: dict[str, str]) -> str:
+    for key in ("motorcar", "motor_vehicle", "vehicle", "access"):
+        if key in tags:
+            if tags[key] not in _PRIVATE:
+                return "all"
+            return "bus" if tags.get("bus", tags.get("psv")) in ("yes", "designated") else "private"
+    return "all"
+
+
+def _street(way: OsmWay, part: int, nodes: list[int], line: NDArray[np.float64]) -> Street | None:
+    """Decide one way's lanes, width, sidewalks and access; None if it is no street."""
+    tags = way.tags
+    kind = tags.get("highway", "").removesuffix("_link")
+    if tags.get("area") == "yes" or (kind not in DEFAULTS and kind not in WALKING):
+        return None
+    layer = int(_number(tags.get("layer", "0").removeprefix("-")) or 0)
+    layer = -layer if tags.get("layer", "").startswith("-") else layer
+    closed = None if on_the_ground(tags) else UNDERGROUND
+    name = tags.get("name")
+    if kind in WALKING:
+        width = min(_number(tags.get("width")) or WALKING[kind], 8.0)
+        return Street(way.id, part, nodes, line, kind, name, 0, 0, width, 1.4, "none", "all", layer, tags, closed)
+    oneway = tags.get("oneway") in ("yes", "true", "1", "-1") or (
+        tags.get("oneway") != "no" and (kind == "motorway" or tags.get("junction") in ("roundabout", "circular"))
+    )
+    if tags.get("oneway") == "-1":
+        nodes, line = nodes[::-1], line[::-1]
+    _, lane_width, default_speed = DEFAULTS[kind]
+    forward, backward = _lanes(tags, kind, oneway)
+    access = "bus" if kind == "busway" else _access(tags)
+    return Street(
+        way=way.id,
+        part=part,
+        nodes=nodes,
+        line=line,
+        kind=kind,
+        name=name,
+        forward=forward,
+        backward=backward,
+        width=round((forward + backward) * lane_width, 2),
+        speed=_speed(tags, default_speed),
+        sidewalk=_sidewalk(tags, kind),
+        access=access,
+        layer=layer,
+        tags=tags,
+        closed=closed,
+    )
+
+
+def _cut(way: OsmWay, half: float, new_id: int) -> tuple[list[tuple[list[int], NDArray[np.float64]]], int]:
+    """The pieces of a way inside the window; where the edge cuts a segment a new node takes the place of the rest."""
+    inside = np.abs(way.line).max(axis=1) <= half
+    if inside.all():
+        return [(list(way.nodes), way.line)], new_id
+    pieces: list[tuple[list[int], NDArray[np.float64]]] = []
+    nodes: list[int] = []
+    points: list[NDArray[np.float64]] = []
+
+    def close() -> None:
+        nonlocal nodes, points
+        if len(nodes) > 1:
+            pieces.append((nodes, np.array(points)))
+        nodes, points = [], []
+
+    for i in range(len(way.nodes)):
+        if inside[i]:
+            if not nodes and i > 0:
+                nodes, points = [new_id], [_crossing(way.line[i], way.line[i - 1], half)]
+                new_id -= 1
+            nodes.append(way.nodes[i])
+            points.append(way.line[i])
+        elif nodes:
+            nodes.append(new_id)
+            points.append(_crossing(way.line[i - 1], way.line[i], half))
+            new_id -= 1
+            close()
+    close()
+    return pieces, new_id
+
+
+def _crossing(inner: NDArray[np.float64], outer: NDArray[np.float64], half: float) -> NDArray[np.float64]:
+    """Where the segment from a point inside the square to one outside leaves it."""
+    step = outer - inner
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.where(step > 0, (half - inner) / step, np.where(step < 0, (-half - inner) / step, np.inf))
+    return np.asarray(inner + step * float(shares.min()))
+
+
+def streets_from_osm(osm: OsmData, half: float, solids: Sequence[BaseGeometry] = ()) -> list[Street]:
+    """The streets and walkways of a window, cut at its edge.
+
+    Parameters
+    ----------
+    osm
+        Map data in local metres.
+    half
+        Half side of the window, metres.
+    solids
+        What stands on the ground, metres.
+
+    Returns
+    -------
+    list of Street
+        In the order of the file; a way that leaves the window and comes back gives several parts.
+    """
+    streets: list[Street] = []
+    new_id = -1
+    above = overpasses(osm)
+    standing = shapely.STRtree(solids)
+    for way in osm.ways:
+        if "highway" not in way.tags:
+            continue
+        pieces, new_id = _cut(way, half, new_id)
+        for part, (nodes, line) in enumerate(pieces):
+            street = _street(way, part, nodes, line)
+            if street is not None and np.linalg.norm(line[1:] - line[:-1], axis=1).sum() > 0.5:
+                if way.id in above:
+                    street = replace(street, closed=OVER_A_STREET)
+                elif street.closed is None and _is_passage(way.tags) and _blocked(line, standing):
+                    street = replace(street, closed=THROUGH_A_BUILDING)
+                streets.append(street)
+    return _medians_cleared(streets, lefthand=keeps_left(osm))
+
+
+def _is_passage(tags: Mapping[str, str]) -> bool:
+    """Whether a way leads under a roof or through a house."""
+    return tags.get("tunnel") == "building_passage" or tags.get("covered", "no") != "no"
+
+
+def _blocked(line: NDArray[np.float64], standing: shapely.STRtree) -> bool:
+    """Whether something stands across a line, by more than the edges of a passage that is drawn a little off."""
+    path = shapely.LineString(line)
+    across = standing.geometries[standing.query(path, predicate="intersects")]
+    return bool(len(across)) and shapely.intersection(shapely.union_all(across), path).length > _ACROSS
+
+
+def _medians_cleared(streets: list[Street], *, lefthand: bool) -> list[Street]:
+    """Take the unmapped inner sidewalk from the two carriageways of a divided street: between them nobody walks."""
+    oneway = [i for i, s in enumerate(streets) if s.drivable and not s.backward and s.sidewalk == "both"]
+    oneway = [i for i in oneway if not any(key.startswith("sidewalk") for key in streets[i].tags)]
+    if not oneway:
+        return streets
+    lines = [shapely.LineString(streets[i].line) for i in oneway]
+    tree = shapely.STRtree(lines)
+    cleared = list(streets)
+    for i, line in zip(oneway, lines, strict=True):
+        street = streets[i]
+        middle, ahead = line.interpolate(0.5, normalized=True), street.line[-1] - street.line[0]
+        for k in np.sort(tree.query(middle, predicate="dwithin", distance=30.0)):
+            other = streets[oneway[int(k)]]
+            back = other.line[-1] - other.line[0]
+            opposite = float(ahead @ back) < -0.8 * float(np.linalg.norm(ahead) * np.linalg.norm(back))
+            if opposite and other.name == street.name and other.kind == street.kind:
+                cleared[i] = replace(street, sidewalk="left" if lefthand else "right")
+                break
+    return cleared
+
+
+def is_traffic_street(street: Street) -> bool:
+    """Whether public traffic uses a street at ground level: what the road network is made of."""
+    if not street.drivable or street.access == "private" or street.closed is not None:
+        return False
+    if street.kind == "service":
+        return street.access == "bus" or street.tags.get("bus", street.tags.get("psv")) in ("yes", "designated")
+    return True
+
+
+def roads_from_osm(osm: OsmData, half: float | None = None, *, solids: Sequence[BaseGeometry] = ()) -> Roads:
+    """Build the road database: streets and walkways split at junctions, with widths, lanes and sidewalks.
+
+    Parameters
+    ----------
+    osm
+        Map data in local metres.
+    half
+        Half side of the window the roads are cut to, metres; the data's own where not given.
+    solids
+        What stands on the ground, metres: passages that it closes are `closed`.
+
+    Returns
+    -------
+    Roads
+        Junctions are where three or more drivable roads meet; crossings are mapped crossing points on carriageways.
+    """
+    streets = [
+        s
+        for s in streets_from_osm(osm, half or osm.half, solids)
+        if not (s.kind == "service" and s.access == "private")
+    ]
+    meeting: Counter[int] = Counter()
+    for street in streets:
+        meeting.update(street.nodes)
+        if street.nodes[0] == street.nodes[-1]:
+            meeting[street.nodes[0]] += 1
+    roads: list[Road] = []
+    ends: dict[int, list[str]] = defaultdict(list)
+    places: dict[int, tuple[float, float]] = {}
+    for street in streets:
+        start, count = 0, 0
+        for i in range(1, len(street.nodes)):
+            if i < len(street.nodes) - 1 and meeting[street.nodes[i]] < 2:
+                continue
+            road = _road(street, start, i, count)
+            roads.append(road)
+            for k in (start, i):
+                places[street.nodes[k]] = _point(street.line[k])
+                if street.drivable:
+                    ends[street.nodes[k]].append(road.id)
+            start, count = i, count + 1
+    signals = {
+        node.id for node in osm.nodes if node.tags.get("highway") == "traffic_signals" or "traffic_signals" in node.tags
+    }
+    junctions = [
+        Junction(id=f"j{node}", position=places[node], roads=meet, signals=_signalled(places[node], node, signals, osm))
+        for node, meet in ends.items()
+        if len(meet) >= 3
+    ]
+    return Roads(roads=roads, junctions=junctions, crossings=_crossings(osm, streets, half or osm.half))
+
+
+def _road(street: Street, start: int, end: int, count: int) -> Road:
+    return Road(
+        id=f"w{street.way}.{street.part}.{count}",
+        osm_id=street.way,
+        name=street.name,
+        kind=street.kind,
+        line=[_point(p) for p in street.line[start : end + 1]],
+        width=street.width,
+        lanes=street.forward + street.backward,
+        oneway=street.drivable and street.backward == 0,
+        sidewalk=street.sidewalk,
+        speed=street.speed,
+        layer=-1 if street.closed == UNDERGROUND and street.layer >= 0 else street.layer,
+        closed=street.closed,
+    )
+
+
+def closed_roads(roads: Roads) -> list[Dropped]:
+    """The ways that are closed to traffic and walkers, each once, and why."""
+    reasons = {road.osm_id: road.closed for road in roads.roads if road.closed is not None}
+    return [Dropped(id=f"w{way}", reason=reason) for way, reason in sorted(reasons.items())]
+
+
+def _point(xy: NDArray[np.float64] | Sequence[float]) -> tuple[float, float]:
+    return round(float(xy[0]), 3), round(float(xy[1]), 3)
+
+
+def _signalled(place: tuple[float, float], node: int, signals: set[int], osm: OsmData) -> bool:
+    """Whether a junction has signals: on its node, or on an approach within 20 m (as Europe maps them)."""
+    if node in signals:
+        return True
+    return any(math.hypot(n.xy[0] - place[0], n.xy[1] - place[1]) < 20 for n in osm.nodes if n.id in signals)
+
+
+def _crossings(osm: OsmData, streets: list[Street], half: float) -> list[tuple[float, float]]:
+    """Mapped crossing points that lie on a carriageway."""
+    roads = [shapely.LineString(s.line) for s in streets if s.drivable]
+    points = [
+        node.xy
+        for node in osm.nodes
+        if (node.tags.get("highway") == "crossing" or "crossing" in node.tags)
+        and node.tags.get("crossing") != "no"
+        and np.abs(node.xy).max() <= half
+    ]
+    if not roads or not points:
+        return []
+    tree = shapely.STRtree(roads)
+    near = tree.query(shapely.points(np.array(points)), predicate="dwithin", distance=1.0)[0]
+    return [_point(points[i]) for i in sorted(set(near.tolist()))]

@@ -1,0 +1,1 @@
+"""Public transport: lines, stops, routes on the lane graph, timetables, bicycle stations."""

@@ -1,0 +1,407 @@
+"""Public transport: stops, bus lines from timetables, the map or planned, all driveable, and bicycle stations."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+
+from vico.geo.gtfs import Feed
+from vico.geo.osm import OsmData
+from vico.world.heights import HeightField
+from vico.world.lanes import LaneGraph
+from vico.world.model import Dropped, Line, Stop, Transit
+from vico.world.walkways import SIDEWALK, Walkways
+from vico.worldgen.transit.bikes import FIRST_STATION, bike_stations
+from vico.worldgen.transit.drive import BUS_LENGTH, Berth, Drive, Kerbs, merged
+from vico.worldgen.transit.plan import MAX_LOOP, MAX_STOPS, MIN_STOPS, planned_berths, planned_loop
+from vico.worldgen.transit.routes import Pole, Route, routes_from_gtfs, routes_from_osm
+from vico.worldgen.transit.times import (
+    BUS_SPEED,
+    DWELL,
+    FIRST_DEPARTURE,
+    HEADWAY,
+    LAST_DEPARTURE,
+    Timing,
+    line_record,
+    timing,
+)
+
+__all__ = (
+    "BUS_LENGTH",
+    "BUS_SPEED",
+    "DWELL",
+    "FIRST_DEPARTURE",
+    "FIRST_STATION",
+    "FIRST_STOP",
+    "HEADWAY",
+    "LAST_DEPARTURE",
+    "transit_from_osm",
+)
+
+# Entities of stops, at the upper end of the numbers for objects; those of stations follow.
+FIRST_STOP = 90_000
+DOOR_BEHIND_FRONT = 1.3  # metres from a bus's front to the middle of its front door
+
+_REACH = 18.0  # a mapped pole stands this near to the lane it serves, metres
+_FEED_REACH = 30.0  # and one of a timetable, whose places are rougher
+_ILL = 6.0  # metres of drive that a metre off the pole is worth
+_MOST_LINES = 3  # with more the buses of central Helsinki bring its cars to a stand
+_AT_A_STOP = 2  # lines that stop at one place: the third one's buses would wait behind the others'
+_STAGGER = 120  # seconds between the buses of lines that share a stop
+_MOST_NAMES = 3  # of lines that are driven as one
+_LONG_WAIT = 75.0  # seconds for their time that buses may stand where others drive
+
+
+@dataclass(frozen=True)
+class _Chosen:
+    """A line that is driven: its names, its loop, who drives it, the sources' routes it stands for, and its delay.
+
+    `later` is how many seconds after others its first bus leaves, where nobody says when it does.
+    """
+
+    names: tuple[str, ...]
+    route: Route | None
+    loop: tuple[Berth, ...]
+    drive: Drive
+    departures: tuple[int, ...] = ()
+    ids: tuple[str, ...] = ()
+    later: int = 0
+
+    @property
+    def timing(self) -> Timing:
+        """Its round and its times."""
+        return timing(
+            self.loop,
+            self.drive,
+            departures=self.departures,
+            interval=self.route.interval if self.route else None,
+            hours=self.route.hours if self.route else None,
+            later=self.later,
+        )
+
+    @property
+    def timed(self) -> bool:
+        """Whether the sources say when its buses leave the first stop."""
+        return bool(self.departures) or (self.route is not None and self.route.interval is not None)
+
+
+def transit_from_osm(
+    osm: OsmData,
+    lanes: LaneGraph,
+    height: HeightField,
+    *,
+    half: float | None = None,
+    solids: list[shapely.Polygon] | None = None,
+    seed: int = 0,
+    feeds: Sequence[Feed] = (),
+) -> Transit:
+    """Stops, bus lines with a timetable, and bicycle stations of a window.
+
+    Lines are those of the timetable feeds, then those of the map's relations; where neither gives one that can be
+    driven, one is planned over the stops, and stops over the places.
+
+    Parameters
+    ----------
+    osm
+        Map data in local metres: stops, bus routes, bicycle rental.
+    lanes
+        The lane network of the same window; one without lanes gives no stops and no lines.
+    height
+        Ground heights.
+    half
+        Half side of the window, metres; the data's own where not given.
+    solids
+        Building footprints, so that nobody is told to wait inside one.
+    seed
+        Decides what the map leaves open: planned stops, bikes in a station.
+    feeds
+        Timetables of the same window (`vico.geo.gtfs.read_gtfs`).
+
+    Returns
+    -------
+    Transit
+        Lines are closed drives past two stops at least; `left_out` says why a route of the sources is none.
+    """
+    half = half or osm.half
+    kerbs = Kerbs(lanes)
+    mapped = _mapped_berths(osm, kerbs, half)
+    timed, left_out = routes_from_gtfs(feeds)
+    drawn, untold = routes_from_osm(osm, half)
+    known = {route.name for route in timed}
+    left_out += [what for what in untold if not known]
+    routes = timed + [route for route in drawn if route.name not in known]
+    chosen = _driven(routes, kerbs, mapped, left_out)
+    names = "osm" if mapped else "planned"
+    if timed and any(line.route is not None and line.route.origin == "gtfs" for line in chosen):
+        names = "osm and gtfs" if mapped else "gtfs"
+    if all(len(line.loop) < MIN_STOPS for line in chosen):
+        # Routes that only cut a corner of the window take nobody anywhere: a round is planned beside them.
+        planned, source = _planned(osm, kerbs, mapped, half, seed, least=MIN_STOPS if chosen else 2)
+        if planned is not None:
+            chosen = [planned, *chosen]
+            names = source if len(chosen) == 1 or source != "osm" else names
+        elif not chosen:
+            why = "no streets for traffic in the window" if not len(lanes) else "no closed drive past two stops"
+            left_out.append(Dropped(id="bus lines", reason=f"{why}: none is planned"))
+    chosen = _waiting_apart(chosen, left_out)
+    served = [berth for line in chosen for berth in line.loop]
+    kept = list(dict.fromkeys([*mapped, *served]))
+    walks = lanes.walks.clear_of(solids or [])
+    waiting = _Waiting(lanes, walks, height)
+    stops = {
+        berth: Stop(
+            id=f"stop_{k}",
+            entity=FIRST_STOP + k,
+            name=berth.name,
+            wait=waiting.at(berth),
+            lane=lanes.ids[berth.lane],
+            offset=round(berth.offset, 2),
+        )
+        for k, berth in enumerate(kept)
+    }
+    lines = [_record(k, line, stops) for k, line in enumerate(_staggered(chosen))]
+    stations, racks = bike_stations(osm, lanes, walks, height, half, seed)
+    origins = dict.fromkeys("planned" if line.route is None else line.route.origin for line in chosen)
+    return Transit(
+        stops=list(stops.values()),
+        lines=lines,
+        bike_stations=stations,
+        origin={"stops": names, "lines": " and ".join(origins) or "none", "bike_stations": racks},
+        left_out=left_out,
+    )
+
+
+def _planned(
+    osm: OsmData, kerbs: Kerbs, mapped: Sequence[Berth], half: float, seed: int, *, least: int
+) -> tuple[_Chosen | None, str]:
+    """A round over the mapped stops, else over planned ones too, and where its stops come from."""
+    drive = Drive(kerbs.lanes)
+    if loop := planned_loop(drive, mapped):
+        return _Chosen(("Loop 1",), None, tuple(loop), drive), "osm"
+    more = [b for b in planned_berths(osm, kerbs, half, seed) if merged(b, mapped) == b]
+    source = "osm and planned" if mapped else "planned"
+    for few in dict.fromkeys((MIN_STOPS, least)):
+        if loop := planned_loop(drive, [*mapped, *more], least=few):
+            return _Chosen(("Loop 1",), None, tuple(loop), drive), source
+    return None, source
+
+
+def _staggered(chosen: Sequence[_Chosen]) -> list[_Chosen]:
+    """Lines whose first buses leave one after another where they share a stop."""
+    shared = [sum(bool(set(other.loop) & set(line.loop)) for other in chosen[:k]) for k, line in enumerate(chosen)]
+    return [replace(line, later=_STAGGER * count) for line, count in zip(chosen, shared, strict=True)]
+
+
+def _record(number: int, line: _Chosen, stops: dict[Berth, Stop]) -> Line:
+    colour = line.route.colour if line.route else ""
+    return line_record(number, "/".join(line.names), line.timing, line.drive, stops, colour)
+
+
+def _mapped_berths(osm: OsmData, kerbs: Kerbs, half: float) -> list[Berth]:
+    """Berths of the mapped bus stops; two poles that share a berth give one."""
+    places = [(f"n{node.id}", node.xy, node.tags) for node in osm.nodes]
+    places += [
+        (area.id, np.array(area.polygon.centroid.coords[0]), area.tags)
+        for area in osm.areas
+        if area.tags.get("public_transport") == "platform" and not area.polygon.is_empty
+    ]
+    berths: list[Berth] = []
+    for key, xy, tags in places:
+        stop = tags.get("highway") == "bus_stop" or (
+            tags.get("public_transport") == "platform"
+            and tags.get("tram", "no") == "no"
+            and (tags.get("bus") == "yes" or key[0] == "n")
+            and "railway" not in tags
+        )
+        if not stop or np.abs(xy).max() > half:
+            continue
+        near = kerbs.near(xy, _REACH)
+        if near:
+            berth = Berth(key, tags.get("name") or f"Stop {len(berths) + 1}", near[0][1], near[0][2])
+            if merged(berth, berths) == berth:
+                berths.append(berth)
+    return berths
+
+
+def _driven(routes: Sequence[Route], kerbs: Kerbs, mapped: Sequence[Berth], left_out: list[Dropped]) -> list[_Chosen]:
+    """The routes that can be driven as closed rounds, some at most: timetables first, then the longest on the map."""
+    fits: list[tuple[Route, tuple[Berth, ...], Drive, float]] = []
+    for route in routes:
+        fit = _fit(route, kerbs, [*mapped, *(b for _, loop, _, _ in fits for b in loop)])
+        if isinstance(fit, str):
+            left_out.append(Dropped(id=route.id, reason=f"bus {route.name}: {fit}"))
+        else:
+            fits.append((route, *fit))
+
+    ways = [drive.driven(loop) for _, loop, drive, _ in fits]
+
+    def rank(k: int) -> tuple[bool, bool, bool, float, int]:
+        route, loop, _, cost = fits[k]
+        frequent = -float(len(route.departures))
+        return ways[k][1] > 0, route.origin != "gtfs", len(loop) < MIN_STOPS, frequent or cost / len(loop), k
+
+    chosen: list[_Chosen] = []
+    streets: set[int] = set()
+    # First those that share no stop with a better one, so that few lines serve many stops.
+    fresh: dict[int, set[Berth]] = {}
+    for k in sorted(range(len(fits)), key=rank):
+        if not any(stops & set(fits[k][1]) for stops in fresh.values()):
+            fresh[k] = set(fits[k][1])
+    for k in sorted(range(len(fits)), key=lambda k: (rank(k)[:2], k not in fresh, rank(k))):
+        route, loop, drive, _ = fits[k]
+        twin = next((i for i, line in enumerate(chosen) if _goes_along(route, loop, line)), -1)
+        taken = {berth for line in chosen for berth in line.loop}
+        if twin >= 0:
+            # Two lines that share their way through the window are driven as one, with the buses of both.
+            times = sorted({*chosen[twin].departures, *route.departures})
+            line = chosen[twin]
+            names, ids = (*line.names, route.name), (*line.ids, route.id)
+            chosen[twin] = replace(line, names=names, departures=tuple(times), ids=ids)
+        elif ways[k][1] and (streets & ways[k][0] or _gap(route) < _round_seconds(kerbs.lanes, ways[k][0], loop)):
+            # Who turns on the spot reaches into the lane of who comes the other way: both would wait for ever.
+            left_out.append(Dropped(id=route.id, reason=f"bus {route.name}: has to turn where others drive"))
+        elif (
+            len(chosen) < _MOST_LINES
+            and 3 * len(set(loop) - taken) >= len(loop)
+            and max(sum(berth in line.loop for line in chosen) for berth in loop) < _AT_A_STOP
+        ):
+            if ways[k][1]:
+                seconds = _round_seconds(kerbs.lanes, ways[k][0], loop)
+                route = replace(route, interval=max(route.interval or 0, int(seconds)))
+            chosen.append(_Chosen((route.name,), route, loop, drive, route.departures, (route.id,)))
+            streets |= ways[k][0]
+        else:
+            serve = ", ".join("/".join(line.names) for line in chosen if set(loop) & set(line.loop))
+            why = (
+                f"its stops are served by {serve}"
+                if serve
+                else f"{_MOST_LINES} lines are as many as keep the streets of a window moving"
+            )
+            left_out.append(Dropped(id=route.id, reason=f"bus {route.name}: {why}"))
+    return chosen
+
+
+def _goes_along(route: Route, loop: tuple[Berth, ...], line: _Chosen) -> bool:
+    """Whether a route can be driven as one with a chosen line: the same round, or without timetables a part of it."""
+    if len(line.names) >= _MOST_NAMES or bool(route.departures) != bool(line.departures):
+        return False
+    return line.loop == loop or (not line.timed and route.interval is None and set(loop) <= set(line.loop))
+
+
+def _waiting_apart(chosen: Sequence[_Chosen], left_out: list[Dropped]) -> list[_Chosen]:
+    """Lines whose buses can wait for their time, minutes at a stop, in a lane that no other line drives.
+
+    No bus gets past one that stands at the kerb: buses of several lines that wait in one lane hold one another up for
+    a round and more. A line of our own timing starts at such a stop; others' timetables say where theirs do. Most have
+    no long wait (see `times`), and go anywhere.
+    """
+    brief = [line.timing.idle <= _LONG_WAIT for line in chosen]
+    ways = [line.drive.driven(line.loop)[0] for line in chosen]
+
+    def start(k: int, kept: Sequence[int]) -> int:
+        """A stop of line k in a lane of its own among these, with another beside it if there is; -1 if it has none."""
+        others = {lane for i in kept if i != k for lane in ways[i]}
+        loop = chosen[k].loop[:1] if chosen[k].timed else chosen[k].loop
+        own = [n for n, berth in enumerate(loop) if brief[k] or berth.lane not in others]
+        # Cars get past where they may change lanes.
+        return min(own, key=lambda n: chosen[k].drive.lanes.left[loop[n].lane] < 0, default=-1)
+
+    kept: list[int] = []
+    for k in sorted(range(len(chosen)), key=lambda k: (not chosen[k].timed, k)):
+        if all(start(i, [*kept, k]) >= 0 for i in [*kept, k]):
+            kept.append(k)
+            continue
+        why = "its buses and others' would wait for their time in each other's way"
+        for what, name in zip(chosen[k].ids or chosen[k].names, chosen[k].names, strict=True):
+            left_out.append(Dropped(id=what, reason=f"bus {name}: {why}"))
+    firsts = [(chosen[k], start(k, kept)) for k in sorted(kept)]
+    return [replace(line, loop=(*line.loop[first:], *line.loop[:first])) for line, first in firsts]
+
+
+def _gap(route: Route) -> float:
+    """Seconds between two buses of a timetable, in the median; without one they may be as rare as need be."""
+    return float(np.median(np.diff(route.departures))) if len(route.departures) > 1 else math.inf
+
+
+def _round_seconds(lanes: LaneGraph, way: set[int], loop: Sequence[Berth]) -> float:
+    """How long a round takes at most, about: below that between two buses there is but one on the way."""
+    return float(lanes.length[sorted(way)].sum()) / 6.0 + 45.0 * len(loop)
+
+
+def _fit(route: Route, kerbs: Kerbs, known: Sequence[Berth]) -> tuple[tuple[Berth, ...], Drive, float] | str:
+    """A closed drive past a route's stops, there and back, else there and round; why not, if there is none."""
+    drive = Drive(kerbs.lanes, route.way)
+    reach = _FEED_REACH if route.origin == "gtfs" else _REACH
+    by_key = {berth.key: berth for berth in known}
+
+    def choices(poles: Sequence[Pole]) -> list[list[tuple[float, Berth]]]:
+        rows: list[list[tuple[float, Berth]]] = []
+        for pole in poles:
+            berths = kerbs.choices(pole.key, pole.name or "Bus stop", pole.xy, known, reach)
+            own = by_key.get(pole.key)
+            berths = [own, *(b for b in berths if b != own)] if own is not None else berths
+            row = [(_ILL * _ill(kerbs.lanes, berth, pole), berth) for berth in berths]
+            rows.append(row)
+        return rows
+
+    there, back = _in_one_part(kerbs.lanes, choices(route.there), choices(route.back))
+    if len(there) + len(back) < 2:
+        return "fewer than two of its stops lie on streets that buses can go round"
+    best: tuple[float, list[Berth]] = (math.inf, [])
+    for rows in ([*there, *back][:MAX_STOPS], there[:MAX_STOPS], [*back, *there[::-1]][:MAX_STOPS]):
+        loop = list(dict.fromkeys(drive.best_round(rows)[1]))
+        if len(loop) >= 2 and drive.round(loop) < min(MAX_LOOP, best[0]):
+            best = (drive.round(loop), loop)
+            if not drive.driven(loop)[1]:
+                break
+    if not best[1]:
+        return f"no closed drive of {MAX_LOOP / 1000:g} km past its stops"
+    return tuple(best[1]), drive, best[0]
+
+
+def _in_one_part(lanes: LaneGraph, *runs: list[list[tuple[float, Berth]]]) -> list[list[list[tuple[float, Berth]]]]:
+    """The choices on the part of the network, all of whose lanes lead to one another, that serves the most stops.
+
+    The window's edge cuts a network into several such parts.
+    """
+    served: Counter[int] = Counter()
+    for run in runs:
+        for row in run:
+            served.update({int(lanes.component[berth.lane]) for _, berth in row})
+    part = min(served, key=lambda c: (-served[c], c), default=0)
+    kept = [[[pair for pair in row if lanes.component[pair[1].lane] == part] for row in run] for run in runs]
+    return [[row for k, row in enumerate(run) if row and not (k and len(row) == 1 and run[k - 1] == row)]
+            for run in kept]  # fmt: skip
+
+
+def _ill(lanes: LaneGraph, berth: Berth, pole: Pole) -> float:
+    """How ill a berth suits a pole, metres: how far off it is, and ten more where it is on the other side."""
+    x, y, yaw = lanes.at(berth.lane, berth.offset)
+    dx, dy = pole.xy[0] - x, pole.xy[1] - y
+    kerb = (dx * math.sin(yaw) - dy * math.cos(yaw) > 0) != lanes.lefthand
+    return math.hypot(dx, dy) + (0.0 if kerb else 10.0)
+
+
+class _Waiting:
+    """Finds where people wait: on the sidewalk beside the front door."""
+
+    def __init__(self, lanes: LaneGraph, walks: Walkways, height: HeightField) -> None:
+        self._lanes, self._height = lanes, height
+        self._sidewalks = [shapely.LineString(walks.line(int(i))) for i in np.flatnonzero(walks.kind == SIDEWALK)]
+
+    def at(self, berth: Berth) -> tuple[float, float, float]:
+        x, y, yaw = self._lanes.at(berth.lane, berth.offset - DOOR_BEHIND_FRONT)
+        kerb = (self._lanes.width[berth.lane] / 2 + 1.0) * (-1.0 if self._lanes.lefthand else 1.0)
+        xy = np.array([x + math.sin(yaw) * kerb, y - math.cos(yaw) * kerb])
+        if self._sidewalks:
+            away = shapely.distance(self._sidewalks, shapely.Point(xy))
+            best = int(np.argmin(away))
+            if 0.3 < away[best] < 4.0:
+                line = self._sidewalks[best]
+                xy = np.array(line.interpolate(line.project(shapely.Point(xy))).coords[0])
+        return round(float(xy[0]), 3), round(float(xy[1]), 3), round(float(self._height(xy)), 3)
