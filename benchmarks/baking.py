@@ -4,12 +4,20 @@ The mesh is made from a world's own walls and roofs: their procedural look is th
 cut in small triangles, bent, shifted, blurred, without the walls nobody can see, with leaves and cars melted in front.
 
 Run: ``python benchmarks/baking.py WORLD... [--table FILE] [--pictures FOLDER]``; prints a table in markdown.
+
+With ``--district FOLDER [--radius 400] [--threads 1 2]`` it also builds the packaged place as users do, from a tileset
+that is made of it (bumpy, melted, with trees, cars and shadows): minutes, processor seconds, peak memory and size of
+the whole command, once for each number of threads. Truth and tileset are kept in FOLDER for the next run.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
+import os
 import resource
+import sys
+import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,20 +27,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from reporting import machine, publish
+from reporting import machine, publish, vico
 from scipy.ndimage import gaussian_filter
 
 from vico.geo.tile_mesh import TileMesh
-from vico.world.folder import read_world
+from vico.world.folder import read_world, stage_seconds
 from vico.world.mesh import Surface, glb_bytes
 from vico.world.seeds import rng
-from vico.worldgen.atlas import Atlas, textured, unwrap
-from vico.worldgen.baking import Baked, _Expected, _paint, _Photos, bake
-from vico.worldgen.enhance import inpainted, padded, upscaled
-from vico.worldgen.sight import Sight
+from vico.world.threads import WORKERS, workers
+from vico.world.tileset import write_tileset
+from vico.worldgen.packaged import packaged_extract
+from vico.worldgen.photos.atlas import Atlas, textured, unwrap
+from vico.worldgen.photos.baking import Baked, _Expected, _paint, _Photos, bake
+from vico.worldgen.photos.enhance import inpainted, padded, upscaled
+from vico.worldgen.photos.photogrammetry import photogrammetry as from_the_air
+from vico.worldgen.photos.sight import Sight
 
 _PHOTO_TEXEL = 0.12  # metres: what a city's photogrammetry shows
 _EDGE = 4.0  # metres, the longest edge of its triangles
+GOAL_MINUTES, GOAL_GB, GOAL_MB = 10.0, 4.0, 100.0
+_HEAVY = ("buildings", "bake", "enhance", "write")  # stages with work for more than one thread
 
 
 def as_tile_mesh(surfaces: Sequence[Surface]) -> TileMesh:
@@ -216,29 +230,86 @@ def measured(name: str, world: Path, *, texel: float, finer: bool, bent: float, 
     )
 
 
+def district(work: Path, radius: float, threads: Sequence[int]) -> list[str]:
+    """A table of whole builds from a tileset with texels of 10 cm, one line for each number of threads."""
+    place = packaged_extract()
+    where = ["--lat", f"{place.lat}", "--lon", f"{place.lon}", "--radius", f"{radius:g}", "--overpass", "off"]
+    truth, tiles = work / f"truth{radius:g}", work / f"tiles{radius:g}" / "tileset.json"
+    if not (truth / "world.json").exists():
+        vico("world", "build", *where, "--out", str(truth))
+    if not tiles.exists():
+        world = read_world(truth)
+        write_tileset(from_the_air(world), world.frame, tiles.parent)
+    lines = [
+        "",
+        f"## A district from its tileset, radius {radius:g} m, texels of 0.1 m",
+        "",
+        f"The whole command. Goals: {GOAL_MINUTES:g} minutes, {GOAL_GB:g} GB, {GOAL_MB:g} MB. Charts stands for plane",
+        "pieces with photos. A stage's seconds are wall time. Equal digits mean equal meshes, byte for byte.",
+        "",
+        "| threads | min | processor s | peak GB | MB | charts | M texels | "
+        + " | ".join(f"{name} s" for name in _HEAVY)
+        + " | meshes |",
+        "|---|---|---|---|---|---|---|" + "---|" * (len(_HEAVY) + 1),
+    ]
+    for count in threads or [workers()]:
+        os.environ[WORKERS] = str(count)
+        with tempfile.TemporaryDirectory(dir=work) as scratch:
+            out = Path(scratch) / "world"
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
+            child = vico("world", "build", *where, "--seed", "7", "--tiles", str(tiles), "--out", str(out))
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            built = read_world(out)
+            seconds = stage_seconds(built)
+            counts = next(stage.counts for stage in built.manifest.stages if stage.name == "texture")
+            files = [p for p in out.rglob("*") if p.is_file() and ".stages" not in p.relative_to(out).parts]
+            size = sum(p.stat().st_size for p in files) / 1e6
+            meshes = hashlib.sha256()
+            for path in sorted(p for p in files if p.suffix == ".glb"):
+                meshes.update(path.read_bytes())
+        spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        lines.append(
+            f"| {count} | {child.seconds / 60:.1f} | {spent:.0f} | {child.peak_mb / 1e3:.2f} | {size:.0f} "
+            f"| {counts['charts']} | {counts['texels'] / 1e6:.1f} | "
+            + " | ".join(f"{seconds.get(name, 0.0):.0f}" for name in _HEAVY)
+            + f" | {meshes.hexdigest()[:8]} |"
+        )
+        print(lines[-1], file=sys.stderr, flush=True)
+    return lines
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("worlds", type=Path, nargs="+")
+    parser.add_argument("worlds", type=Path, nargs="*")
     parser.add_argument("--table", type=Path)
     parser.add_argument("--pictures", type=Path)
+    parser.add_argument("--district", type=Path, help="folder to build the packaged place in, from a tileset of it")
+    parser.add_argument("--radius", type=float, default=400.0, help="of the district, metres")
+    parser.add_argument(
+        "--threads", type=int, nargs="*", default=[], help="to build the district with, one after another"
+    )
     given = parser.parse_args()
-    lines = [
-        "# Photos onto buildings: bake, in-paint, enlarge",
-        "",
-        machine(),
-        "Made by `python benchmarks/baking.py WORLD... --table benchmarks/results/baking.md`: mocked-up photos of",
-        "each world (bent: 0.1 m waves, 0.4 m shift; exact: neither), CPU seconds, PSNR against the world's own",
-        "look in dB. Finer: back-projection against bicubic enlargement. The peak includes making mesh and truth.",
-        "",
-        "| world | texel, m | buildings | charts | M texels | covered | bake s | in-paint s | enlarge or pad s "
-        "| photos dB | holes dB | finer dB | GLB MB | peak GB |",
-        "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|",
-    ]
+    if not given.worlds and given.district is None:
+        parser.error("name worlds, or a folder with --district")
+    lines = ["# Photos onto buildings: bake, in-paint, enlarge", "", machine()]
+    if given.worlds:
+        lines += [
+            "Made by `python benchmarks/baking.py WORLD... --district FOLDER --table benchmarks/results/baking.md`:",
+            "mocked-up photos of each world (bent: 0.1 m waves, 0.4 m shift; exact: neither), CPU seconds, PSNR",
+            "against the world's own look in dB. Finer: back-projection against bicubic enlargement. The peak",
+            "includes making mesh and truth.",
+            "",
+            "| world | texel, m | buildings | charts | M texels | covered | bake s | in-paint s | enlarge or pad s "
+            "| photos dB | holes dB | finer dB | GLB MB | peak GB |",
+            "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|",
+        ]
     for world in given.worlds:
         for texel, finer, bent in ((0.2, True, 1.0), (0.2, True, 0.0), (0.1, False, 1.0)):
             line = measured(world.name, world, texel=texel, finer=finer, bent=bent, pictures=given.pictures)
             lines.append(line)
             print(line, flush=True)
+    if given.district is not None:
+        lines += district(given.district, given.radius, given.threads)
     publish(lines, given.table)
 
 

@@ -34,16 +34,16 @@ from vico.render.world_scene import scene_of
 from vico.world.folder import World, read_world
 from vico.world.mesh import Surface
 from vico.world.seeds import rng
-from vico.worldgen.atlas import Atlas, textured, unwrap
 from vico.worldgen.packaged import packaged_extract
+from vico.worldgen.photos.atlas import Atlas, textured, unwrap
+from vico.worldgen.photos.sight import Sight
+from vico.worldgen.photos.streetview import reproject
+from vico.worldgen.photos.streetview_mask import View
+from vico.worldgen.photos.streetview_match import SiftMatcher
+from vico.worldgen.photos.streetview_photo import Photographer, StreetviewConfig
+from vico.worldgen.photos.streetview_pose import Pose, correction, relative_pose
+from vico.worldgen.photos.streetview_project import texel_centres
 from vico.worldgen.previews import viewpoints
-from vico.worldgen.sight import Sight
-from vico.worldgen.streetview import reproject
-from vico.worldgen.streetview_mask import View
-from vico.worldgen.streetview_match import SiftMatcher
-from vico.worldgen.streetview_photo import Photographer, StreetviewConfig
-from vico.worldgen.streetview_pose import Pose, correction, relative_pose
-from vico.worldgen.streetview_project import texel_centres
 
 MOVER = 1 << 23
 """Entities from here on are cars and people."""
@@ -78,14 +78,7 @@ def true_pages(atlas: Atlas, surfaces: list[Surface], *, reach: float = 0.03) ->
     uv = np.concatenate([s.uv[s.triangles] for s in surfaces])
     colour = np.concatenate([s.colour[s.triangles] for s in surfaces]).astype(np.float32)
     sight = Sight(corners, np.arange(len(corners)).reshape(-1, 3))
-    small = []
-    for s in surfaces:
-        texture = s.material.texture
-        if texture is None:
-            small.append(np.full((8, 8, 3), 255, np.uint8))
-        else:  # an eighth of the resolution: about the atlas's own
-            h, w = (max(side // 8, 1) for side in texture.shape[:2])
-            small.append(cv2.resize(np.ascontiguousarray(texture[..., :3]), (w, h), interpolation=cv2.INTER_AREA))
+    small = [_reduced(s, atlas.texel) for s in surfaces]
     pages = [page.copy() for page in atlas.pages]
     for chart in atlas.charts:
         inside = atlas.inside[chart.page][chart.box]
@@ -101,12 +94,39 @@ def true_pages(atlas: Atlas, surfaces: list[Surface], *, reach: float = 0.03) ->
         for k in np.unique(owner[tri]).tolist():
             which = owner[tri] == k
             texture = small[k]
-            h, w = texture.shape[:2]
-            rows, columns = ((at[which, c] % 1.0 * n).astype(int) % n for c, n in ((1, h), (0, w)))
-            mine[which] = texture[rows, columns]
+            mine[which] = _between(texture, at[which])
         texels[found] = np.round(mine * tint)
         pages[chart.page][chart.box][inside] = texels
     return tuple(pages)
+
+
+def _reduced(surface: Surface, texel: float) -> NDArray[np.float32]:
+    """A surface's texture, no finer than the atlas: each of its pixels is the mean of about a texel."""
+    texture = surface.material.texture
+    if texture is None:
+        return np.full((1, 1, 3), 255, np.float32)
+    h, w = texture.shape[:2]
+    points, uv = (v[surface.triangles].astype(np.float64) for v in (surface.positions, surface.uv))
+    area = np.linalg.norm(np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]), axis=1)
+    a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    pixels = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) * h * w
+    good = (area > 1e-6) & (pixels > 1e-6)
+    finer = math.sqrt(float(np.median(pixels[good] / area[good]))) * texel if good.any() else 1.0
+    size = tuple(max(round(side / max(finer, 1.0)), 1) for side in (w, h))
+    rgb = np.ascontiguousarray(texture[..., :3])
+    return np.asarray(cv2.resize(rgb, size, interpolation=cv2.INTER_AREA), np.float32)
+
+
+def _between(texture: NDArray[np.float32], at: NDArray[Any]) -> NDArray[np.float32]:
+    """Colours between the pixels of a texture that repeats, shape ``(n, 3)``."""
+    h, w = texture.shape[:2]
+    x, y = at[:, 0] * w - 0.5, at[:, 1] * h - 0.5
+    column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    right, low = (x - column)[:, None], (y - row)[:, None]
+    (c0, c1), (r0, r1) = (column % w, (column + 1) % w), (row % h, (row + 1) % h)
+    upper = texture[r0, c0] * (1 - right) + texture[r0, c1] * right
+    lower = texture[r1, c0] * (1 - right) + texture[r1, c1] * right
+    return np.asarray(upper * (1 - low) + lower * low, np.float32)
 
 
 def aerial(atlas: Atlas, pages: tuple[NDArray[np.uint8], ...], seed: int) -> Atlas:

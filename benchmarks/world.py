@@ -1,6 +1,6 @@
 """How long a world takes to build, stage by stage, and how much memory; how time grows with the radius; other cities.
 
-    python benchmarks/world.py [--radius 400] [-n 3] [--data FOLDER] [--table benchmarks/results/world.md]
+    python benchmarks/world.py [--radius 400] [-n 3] [--data FOLDER] [--keep FOLDER] [--table TABLE]
 
 The packaged place, built anew each time in a process of its own. Stage seconds are wall time, as the world's own
 ``build.json`` tells them; the last lines are the whole command, imports and report included. With ``--data`` (a folder
@@ -13,12 +13,16 @@ from __future__ import annotations
 import argparse
 import json
 import re
+import sys
 import tempfile
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 from reporting import machine, publish, row, vico
 
+from vico.world.check import check_world
+from vico.world.folder import read_world
 from vico.worldgen.packaged import packaged_extract
 
 GOAL = 90.0
@@ -53,15 +57,21 @@ def of_places(data: Path, scratch: Path) -> list[str]:
         "",
         "## Other cities, once each",
         "",
-        "| place | s | peak MB | world MB | buildings (accessible) | places | amenity | natural | transit | faces |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "Findings are those of `vico check world`.",
+        "",
+        "| place | s | peak MB | world MB | buildings (accessible) | places | amenity | natural | transit | faces "
+        "| findings |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for name, words in places_in(data):
         facts, seconds, peak = built(words, scratch / name)
+        findings = check_world(read_world(scratch / name))
+        for finding in findings:
+            print(name, finding, file=sys.stderr)
         lines.append(
             f"| {name} | {seconds:.1f} | {peak:.0f} | {facts['megabytes']:.0f} | {facts['buildings']} "
             f"({facts['accessible_buildings']}) | {facts['places']} | {facts['amenity_objects']} | "
-            f"{facts['natural_objects']} | {facts['transit']} | {facts['collision_faces']} |"
+            f"{facts['natural_objects']} | {facts['transit']} | {facts['collision_faces']} | {len(findings)} |"
         )
     return lines
 
@@ -85,11 +95,12 @@ def main() -> None:
     parser.add_argument("--radius", type=float, default=400.0)
     parser.add_argument("-n", type=int, default=3, help="builds")
     parser.add_argument("--data", type=Path, help="folder with more places")
+    parser.add_argument("--keep", type=Path, help="empty folder to keep the worlds in")
     parser.add_argument("--table", type=Path)
     given = parser.parse_args()
     place, about = packaged_extract(), machine()
     facts, whole, peaks = [], [], []
-    with tempfile.TemporaryDirectory(prefix="vico-") as folder:
+    with nullcontext(given.keep) if given.keep else tempfile.TemporaryDirectory(prefix="vico-") as folder:
         for k in range(given.n):
             where = ["--lat", str(place.lat), "--lon", str(place.lon), "--radius", str(given.radius)]
             child = vico("world", "build", *where, "--out", f"{folder}/{k}", "--json")
