@@ -21,6 +21,7 @@ from PIL import Image
 
 from vico.errors import SchemaError
 from vico.world.files import write_bytes
+from vico.world.products import turned
 from vico.world.threads import in_order
 
 
@@ -120,8 +121,8 @@ class Surface:
     def moved(self, transform: NDArray[Any]) -> Surface:
         """A copy under a rigid (or uniformly scaled) 4x4 transform."""
         matrix = np.asarray(transform, np.float64)
-        positions = self.positions @ matrix[:3, :3].T + matrix[:3, 3]
-        normals = self.normals @ matrix[:3, :3].T
+        positions = turned(self.positions, matrix[:3, :3]) + matrix[:3, 3]
+        normals = turned(self.normals, matrix[:3, :3])
         normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
         return replace(self, positions=positions.astype(np.float32), normals=normals.astype(np.float32))
 

@@ -13,6 +13,7 @@ from vico.sim.physics.engine import Scenery
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.world.objects import Objects
+from vico.world.products import turned
 
 #: Solids that begin higher than this above the ground touch no robot, metres; so do things lower than the second.
 _REACH, _FLAT = 2.0, 0.12
@@ -67,7 +68,7 @@ def _is_convex(surface: Surface) -> bool:
     corners = points[surface.triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.sqrt(np.einsum("ij,ij->i", normal, normal))
-    ahead = points @ normal.T - np.einsum("ij,ij->i", normal, corners[:, 0])
+    ahead = turned(points, normal) - np.einsum("ij,ij->i", normal, corners[:, 0])
     return bool((ahead <= 0.002 * size + 1e-9).all())
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from vico.assets.robots import RobotModel
 from vico.assets.robots_go2 import HIP_X, HIP_Y, SHIN, SIDE, THIGH
 from vico.sim.physics.engine import Base
+from vico.world.products import turned
 
 PERIOD = 0.02
 #: Seconds a cycle lasts and the share of it a foot is on the ground.
@@ -101,7 +102,7 @@ class Trot:
         memory: NDArray[np.float64],
     ) -> NDArray[Any]:
         """Joint angles to hold for the next `PERIOD` seconds; parameters as of the policy's."""
-        local = base.rotation.T @ base.velocity
+        local = turned(base.velocity, base.rotation.T)
         moving = memory[17:20]
         moving += (np.array([local[0], local[1], base.spin[2]]) - moving) * (PERIOD / 0.1)
         roll = math.atan2(base.rotation[2, 1], base.rotation[2, 2])

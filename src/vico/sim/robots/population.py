@@ -24,6 +24,7 @@ from vico.sim.robots.pilot import Pilot, Status, Traffic
 from vico.world.folder import World
 from vico.world.mesh import Surface
 from vico.world.model import FIRST_BODY
+from vico.world.products import turned
 from vico.world.routing import Router
 from vico.world.seeds import rng
 
@@ -410,7 +411,7 @@ class RobotPopulation:
     def camera(self, robot: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Position of a robot's camera, the direction it looks in, and its upward direction, shape ``(3,)`` each."""
         base = self.engine.base(robot)
-        eye = base.position + base.rotation @ np.array(self.models[robot].eye)
+        eye = base.position + turned(self.models[robot].eye, base.rotation)
         return eye, base.rotation[:, 0].copy(), base.rotation[:, 2].copy()
 
     def camera_heights(self) -> NDArray[np.float64]:
@@ -423,7 +424,7 @@ class RobotPopulation:
         for i, model in enumerate(self.models):
             if int(self.entities[i]) == entity and not model.legged:
                 base = self.engine.base(i)
-                return base.position + base.rotation @ np.array([0.0, 0.0, model.height - model.stand])
+                return base.position + turned([0.0, 0.0, model.height - model.stand], base.rotation)
         return None
 
     def observation(self, robot: int) -> dict[str, NDArray[np.float64]]:

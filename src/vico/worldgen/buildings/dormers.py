@@ -6,6 +6,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
+from vico.world.products import dot
 from vico.worldgen.buildings.eaves import Edges, Slope, edges_of, slopes_of
 from vico.worldgen.buildings.outlines_plans import BuildingPlan, PartPlan
 from vico.worldgen.buildings.roof_shapes import Roof
@@ -84,8 +85,8 @@ def dormers(
 
 def _row(part: PartPlan, slope: Slope, edges: Edges, base: float) -> list[PartPlan]:
     out, along = edges.out[slope.edge], edges.along[slope.edge]
-    rise = -float(slope.gradient @ out)
-    sideways = abs(float(slope.gradient @ along))
+    rise = -float(dot(slope.gradient, out))
+    sideways = abs(float(dot(slope.gradient, along)))
     if rise < _GENTLEST or sideways > 0.1 * rise:
         return []
     steep = part.roof.shape in ("mansard", "gambrel") and rise > 1.2

@@ -19,6 +19,7 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo.osm import polygons_of
+from vico.world.products import dot
 from vico.worldgen.buildings.outlines_plans import BuildingPlan, PartPlan
 from vico.worldgen.buildings.roof_shapes import Roof, rings_of
 from vico.worldgen.buildings.solids import Mesh
@@ -124,17 +125,17 @@ def slopes_of(mesh: Mesh, edges: Edges, eaves: float) -> list[Slope]:
     found: dict[tuple[int, float, float, float], list[float]] = {}
     size = np.hypot(*(b - a)[:, :2].T)
     for k in range(len(edges.start)):
-        s = (a[:, :2] - edges.start[k]) @ edges.along[k]
-        t = (b[:, :2] - edges.start[k]) @ edges.along[k]
-        on = (np.abs((a[:, :2] - edges.start[k]) @ edges.out[k]) < _ON_EDGE) & (
-            np.abs((b[:, :2] - edges.start[k]) @ edges.out[k]) < _ON_EDGE
+        s = dot(a[:, :2] - edges.start[k], edges.along[k])
+        t = dot(b[:, :2] - edges.start[k], edges.along[k])
+        on = (np.abs(dot(a[:, :2] - edges.start[k], edges.out[k])) < _ON_EDGE) & (
+            np.abs(dot(b[:, :2] - edges.start[k], edges.out[k])) < _ON_EDGE
         )
         on &= (np.minimum(s, t) > -_ON_EDGE) & (np.maximum(s, t) < edges.length[k] + _ON_EDGE)
         on &= (size > 0.02) & (np.minimum(a[:, 2], b[:, 2]) > eaves - 0.03)
         for j in np.flatnonzero(on).tolist():
             gx, gy = -n[j, 0] / n[j, 2], -n[j, 1] / n[j, 2]
             c = float(a[j, 2] - gx * a[j, 0] - gy * a[j, 1])
-            key = (k, round(float(gx), 2), round(float(gy), 2), round(float(n[j] @ a[j]), 1))
+            key = (k, round(float(gx), 2), round(float(gy), 2), round(float(dot(n[j], a[j])), 1))
             low, high = sorted((float(s[j]), float(t[j])))
             row = found.setdefault(key, [low, high, c, float(gx), float(gy)])
             row[0], row[1] = min(row[0], low), max(row[1], high)
@@ -256,7 +257,7 @@ def _pieces(
         (p, p_out), (q, q_out) = ends
         piece = Polygon([p, p_out, q_out, q])
         # A corner that turns inwards more than the edge is long would turn the piece over.
-        if (q_out - p_out) @ edges.along[k] < 0.05 or not piece.is_valid or piece.area < 0.01:
+        if dot(q_out - p_out, edges.along[k]) < 0.05 or not piece.is_valid or piece.area < 0.01:
             continue
         lowest = float(slope.height(np.array([p_out, q_out])).min()) - thick - base
         over_lane = lowest < _LANE_HEADROOM and len(streets.query(piece, predicate="dwithin", distance=_LANE)) > 0
@@ -272,7 +273,8 @@ def _mitre(edges: Edges, reach: NDArray[np.float64], k: int, other: int) -> NDAr
     straight = edges.out[k] * reach[k]
     if abs(determinant) < 0.3:
         return straight
-    meeting = np.linalg.solve(both, np.array([reach[k], reach[other]]))
+    near, far = reach[k], reach[other]
+    meeting = np.array([near * both[1, 1] - far * both[0, 1], far * both[0, 0] - near * both[1, 0]]) / determinant
     return meeting if np.hypot(*meeting) < 2.2 * reach[k] else straight
 
 

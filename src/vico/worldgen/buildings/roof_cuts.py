@@ -16,6 +16,7 @@ from manifold3d import Manifold
 from numpy.typing import NDArray
 from shapely import Polygon
 
+from vico.world.products import dot
 from vico.worldgen.buildings.roof_profiles import Profile, slope_of
 from vico.worldgen.buildings.roof_shapes import Roof, inradius, prism
 
@@ -124,7 +125,7 @@ def _valley(
     """All above both planes that meet at a reflex corner, between the wedges of its two edges."""
     left = np.array([-before[1], before[0]])
     right = np.array([-after[1], after[0]])
-    cosine = max(float(np.dot(left, right)), -0.9)
+    cosine = max(float(dot(left, right)), -0.9)
     mitre = (left + right) / max(1.0 + cosine, 0.1)
     run = plane.reach
     height, top = plane.start + run * plane.slope, rise + 1.0
@@ -144,7 +145,7 @@ def _gable_ends(polygon: Polygon, rings: list[NDArray[np.float64]]) -> list[list
         side = ring[(i + 1) % n] - ring[i]
         before, after = ring[i] - ring[i - 1], ring[(i + 2) % n] - ring[(i + 1) % n]
         length, lb, la = (math.hypot(*edge) for edge in (side, before, after))
-        parallel = float(np.dot(before, after)) < -0.85 * lb * la
+        parallel = float(dot(before, after)) < -0.85 * lb * la
         turns = before[0] * side[1] - before[1] * side[0] > 0 and side[0] * after[1] - side[1] * after[0] > 0
         marks[0][i] = parallel and bool(turns) and length < 18.0 and length < 1.05 * max(lb, la) and min(lb, la) > 1.5
     for i in range(n):

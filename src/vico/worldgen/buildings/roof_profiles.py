@@ -12,6 +12,7 @@ from manifold3d import CrossSection, Manifold
 from numpy.typing import NDArray
 from shapely import Polygon
 
+from vico.world.products import dot
 from vico.worldgen.buildings.roof_shapes import Roof, prism
 
 Profile = list[tuple[float, float]]
@@ -55,7 +56,7 @@ def box_frame(polygon: Polygon, direction: float | None) -> BoxFrame:
     along = np.array([math.cos(yaw), math.sin(yaw)])
     across = np.array([-along[1], along[0]])
     ring = np.asarray(polygon.exterior.coords)[:, :2]
-    u, v = ring @ along, ring @ across
+    u, v = dot(ring, along), dot(ring, across)
     centre = along * (u.min() + u.max()) / 2 + across * (v.min() + v.max()) / 2
     return BoxFrame(centre, along, float(np.ptp(u)) / 2, float(np.ptp(v)) / 2)
 

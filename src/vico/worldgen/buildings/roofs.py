@@ -18,6 +18,7 @@ from manifold3d import Manifold
 from numpy.typing import NDArray
 from shapely import Polygon
 
+from vico.world.products import dot
 from vico.worldgen.buildings.roof_cuts import sloped_solid
 from vico.worldgen.buildings.roof_profiles import BoxFrame, box_frame, profiled_solid
 from vico.worldgen.buildings.roof_shapes import Roof, prism, rings_of
@@ -103,10 +104,10 @@ def _with_parapet(body: Manifold, polygon: Polygon, eaves: float, height: float)
 def _skillion(rings: list[NDArray[np.float64]], low: float, roof: Roof) -> Manifold:
     yaw = roof.direction if roof.direction is not None else 0.0
     fall = np.array([math.cos(yaw), math.sin(yaw)])
-    reach = [float(v) for ring in rings for v in ring @ fall]
+    reach = [float(v) for ring in rings for v in dot(ring, fall)]
     first, last = min(reach), max(reach)
     body = prism(rings, low, roof.height)
     slope = roof.height / max(last - first, 0.1)
     normal = np.array([-fall[0] * slope, -fall[1] * slope, -1.0])
     # Kept is what lies under the plane z = (last - p.fall) * slope.
-    return body.trim_by_plane(tuple(normal), -last * slope / float(np.linalg.norm(normal)))
+    return body.trim_by_plane(tuple(normal), -last * slope / math.hypot(*normal))

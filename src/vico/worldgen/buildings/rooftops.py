@@ -12,6 +12,7 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo.osm import polygons_of
+from vico.world.products import turned
 from vico.worldgen.buildings.outlines_plans import BuildingPlan, PartPlan
 from vico.worldgen.buildings.roof_shapes import Roof, rings_of
 
@@ -229,4 +230,4 @@ def _main_direction(polygon: Polygon) -> float:
 def _box(centre: NDArray[np.float64], size: NDArray[np.float64], yaw: float) -> Polygon:
     c, s = np.cos(yaw), np.sin(yaw)
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * size / 2
-    return Polygon(corners @ np.array([[c, s], [-s, c]]) + centre)
+    return Polygon(turned(corners, [[c, -s], [s, c]]) + centre)

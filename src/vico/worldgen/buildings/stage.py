@@ -14,6 +14,7 @@ from vico.geo.osm import OsmData, OsmWay, polygons_of
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface
 from vico.world.model import FIRST_BUILDING, Building, Dropped
+from vico.world.products import turned
 from vico.world.seeds import rng
 from vico.worldgen.buildings.details import detailed
 from vico.worldgen.buildings.finishes import FINISHES
@@ -490,7 +491,7 @@ def _edge_of(
         away = middle[faces][:, None, :2] - a[None]
         t = (away * along).sum(-1)
         off = np.abs((away * outward).sum(-1)) + np.maximum(np.maximum(-t, t - length), 0.0)
-        off = np.where(normal[faces][:, :2] @ outward.T > 0.9, off, np.inf)
+        off = np.where(turned(normal[faces][:, :2], outward) > 0.9, off, np.inf)
         best = off.argmin(axis=1)
         good = off[np.arange(len(faces)), best] < 0.06
         result[faces[good]] = edges.first[part] + best[good]

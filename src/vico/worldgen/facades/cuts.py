@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.world.products import dot
+
 
 def cut_at_heights(
     points: NDArray[np.float64], faces: NDArray[np.int64], owner: NDArray[np.int64], heights: NDArray[np.float64]
@@ -148,4 +150,4 @@ def without_needless(
 def _area(points: NDArray[np.float64], row: list[int], normal: NDArray[np.float64]) -> float:
     """Twice a triangle's area, negative where it is turned over."""
     a, b, c = points[row]
-    return float(np.cross(b - a, c - a) @ normal)
+    return float(dot(np.cross(b - a, c - a), normal))

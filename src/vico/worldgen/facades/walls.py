@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.world.mesh import Surface
+from vico.world.products import dot
 from vico.worldgen.facades.textures import BAYS
 
 
@@ -109,7 +110,7 @@ class GroundFloors:
         if not len(mine):
             return None
         out = np.array([math.cos(facing), math.sin(facing)])
-        mine = mine[self._normal[mine][:, :2] @ out > 0.94]
+        mine = mine[dot(self._normal[mine][:, :2], out) > 0.94]
         if not len(mine):
             return None
         normal = self._normal[mine][:, :2]
@@ -122,11 +123,11 @@ class GroundFloors:
         if away[best] > 0.35 or beside[best] > 0.3:
             return None
         n, r = normal[best], right[best]
-        same = (normal @ n > 0.9995) & (self._name[mine] == self._name[mine[best]])
-        same &= np.abs((self._corner[mine][:, :, :2] - self._corner[mine[best], 0, :2]) @ n).max(axis=1) < 0.04
+        same = (dot(normal, n) > 0.9995) & (self._name[mine] == self._name[mine[best]])
+        same &= np.abs(dot(self._corner[mine][:, :, :2] - self._corner[mine[best], 0, :2], n)).max(axis=1) < 0.04
         mine = mine[same]
         corner = self._corner[mine]
-        along = (corner[:, :, :2] - np.array([x, y])) @ r
+        along = dot(corner[:, :, :2] - np.array([x, y]), r)
         return self._joined(mine, corner, along, self._name[mine[0]], n, r, np.array([x, y]))
 
     def _joined(
@@ -168,7 +169,7 @@ class GroundFloors:
         # The height at which v is 0 and 1, from the lowest and the highest corner.
         v0, v1 = float(v.ravel()[z.argmin()]), float(v.ravel()[z.argmax()])
         rise = (top - bottom) / max(v1 - v0, 0.05)
-        start = point + r * low + n * float((corner[seed, 0, :2] - point) @ n)
+        start = point + r * low + n * float(dot(corner[seed, 0, :2] - point, n))
         return Wall(
             material=self._names[name],
             colour=(

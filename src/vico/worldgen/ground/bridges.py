@@ -17,6 +17,7 @@ from shapely.geometry.base import BaseGeometry
 from vico.geo.osm import OsmData, OsmWay
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface, joined
+from vico.world.products import dot
 from vico.worldgen.ground.grading import raised, ramp_slope
 from vico.worldgen.ground.kerbs import KERB
 from vico.worldgen.ground.pavings import LOOKS, Look, coloured, ground_material
@@ -518,7 +519,7 @@ def _end_of(way: OsmWay, here: Floats, inward: Floats) -> BaseGeometry:
     """What is paved about the end of a way that leads straight into a tunnel at `here`."""
     line = way.line if np.hypot(*(way.line[0] - here)) < 0.1 else way.line[::-1]
     out = line[1] - line[0]
-    if float(out @ inward) > -0.7 * float(np.hypot(*out)):
+    if float(dot(out, inward)) > -0.7 * float(np.hypot(*out)):
         return shapely.Point()
     return shapely.Point(here).buffer((_deck_width(way) if "highway" in way.tags else 4.6) / 2 + 3.0)
 

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
+from vico.world.products import turned
+
 Floats = NDArray[np.float64]
 
 _TIE = 3.0  # how much streets side by side keep to each other's height, where the ground counts 1
@@ -92,7 +94,7 @@ class Network:
         for node, others in arms.items():
             ways = self.points[others] - self.points[node]
             ways = ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-9)
-            cosine = ways @ ways.T
+            cosine = turned(ways, ways)
             for a in range(len(others)):
                 met += [(others[a], node, others[b]) for b in range(a + 1, len(others)) if cosine[a, b] < -0.7]
         return np.concatenate([*triples, np.array(met, np.int64).reshape(-1, 3), np.zeros((0, 3), np.int64)])
@@ -219,4 +221,5 @@ class Network:
         tied = (abreast or Abreast.none()).rows(n)
         middle = float(wanted.mean())
         matrix = (bending.T @ bending + pulling.T @ pulling + tied.T @ tied + sparse.diags(weight**2 + 1e-9)).tocsc()
-        return np.asarray(spsolve(matrix, weight**2 * (wanted - middle))) + middle
+        # To a tenth of a millimetre: the last bits of a solver differ from processor to processor.
+        return np.round(np.asarray(spsolve(matrix, weight**2 * (wanted - middle))) + middle, 4)

@@ -119,8 +119,12 @@ def terrain_from_dem(samples: HeightSamples, *, half: float, apron: float = APRO
     cells = math.ceil(2 * reach / _CELL)
     fine = np.linspace(-reach, reach, cells + 1)
     heights = RectBivariateSpline(knots, knots, rough, kx=3, ky=3)(fine, fine)
-    heights = np.clip(heights, rough.min(), rough.max())
-    return HeightField(heights.astype(np.float32), reach)
+    return _field(np.clip(heights, rough.min(), rough.max()), reach)
+
+
+def _field(heights: NDArray[np.float64], reach: float) -> HeightField:
+    """To a tenth of a millimetre: the last bits of a solver differ from processor to processor."""
+    return HeightField(np.round(heights, 4).astype(np.float32), reach)
 
 
 def flat_terrain(*, half: float, apron: float = APRON) -> HeightField:
@@ -218,7 +222,7 @@ def terrain_from_tiles(
     rough = np.clip(rough, level - most, level + most)
     fine = np.linspace(-reach, reach, math.ceil(2 * reach / _CELL) + 1)
     heights = RectBivariateSpline(knots, knots, rough, kx=3, ky=3)(fine, fine)
-    field = HeightField(np.clip(heights, rough.min(), rough.max()).astype(np.float32), reach)
+    field = _field(np.clip(heights, rough.min(), rough.max()), reach)
     off = field(ground[:, :2]) - ground[:, 2]
     report = TileTerrain(
         len(found.points), len(found.points) - len(ground), found.missed, float(np.sqrt((off**2).mean()))

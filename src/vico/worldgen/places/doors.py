@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from vico.geo.osm import OsmData, Tags
 from vico.world.heights import HeightField
 from vico.world.model import Building, Category, Entrance, Place
+from vico.world.products import dot
 from vico.world.routing import Router
 from vico.world.walkable import CROSSING, OPEN, ROADWAY, SIDEWALK, WalkableMap
 from vico.worldgen.places.osm import Named
@@ -232,7 +233,7 @@ class Finder:
         others = np.array(list(taken.values())).reshape(-1, 2)
         if len(others):
             gap = np.linalg.norm(doors.at[:, None] - others[None], axis=2).min(axis=1)
-            alike = (doors.out @ doors.out[best] > 0.7) & (doors.cost < doors.cost[best] + 4.0)
+            alike = (dot(doors.out, doors.out[best]) > 0.7) & (doors.cost < doors.cost[best] + 4.0)
             away = np.where((gap >= _SHOP_GAP) & (away < away[best] + _OWN_DOOR) & alike, away, np.inf)
             best = int(np.argmin(away))
             if not np.isfinite(away[best]):

@@ -15,6 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo.osm import OsmData, OsmWay
 from vico.world.model import Dropped, Junction, Road, Roads
+from vico.world.products import dot
 from vico.worldgen.streets.levels import OVER_A_STREET, overpasses
 from vico.worldgen.streets.sides import keeps_left
 from vico.worldgen.streets.streets import on_the_ground
@@ -282,7 +283,7 @@ def _medians_cleared(streets: list[Street], *, lefthand: bool) -> list[Street]:
         for k in np.sort(tree.query(middle, predicate="dwithin", distance=30.0)):
             other = streets[oneway[int(k)]]
             back = other.line[-1] - other.line[0]
-            opposite = float(ahead @ back) < -0.8 * float(np.linalg.norm(ahead) * np.linalg.norm(back))
+            opposite = float(dot(ahead, back)) < -0.8 * math.hypot(*ahead) * math.hypot(*back)
             if opposite and other.name == street.name and other.kind == street.kind:
                 cleared[i] = replace(street, sidewalk="left" if lefthand else "right")
                 break

@@ -178,7 +178,7 @@ def _way_back(there: Sequence[Pole], others: Sequence[Sequence[Pole]]) -> list[P
             return True
         # It starts where the way there ends, rather than where that starts.
         a, b, c = (np.array(p.xy) for p in (there[0], there[-1], run[0]))
-        return float(np.linalg.norm(c - b)) < float(np.linalg.norm(c - a))
+        return math.hypot(*(c - b)) < math.hypot(*(c - a))
 
     return max((list(run) for run in others if returns(run)), key=lambda run: len(run), default=[])
 
