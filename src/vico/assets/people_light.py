@@ -100,7 +100,7 @@ def _care(body: Body, points: Array, faces: Array, shares: Array) -> tuple[Array
     return care, limit
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _components(faces: Array, count: int) -> Array:
     """A number for each vertex, the same for all that hang together."""
     owner = np.arange(count)
@@ -122,7 +122,7 @@ def _components(faces: Array, count: int) -> Array:
     return owner
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _layered(corners: Array, layer: Array) -> Array:
     """Which triangles lie closely over or under a triangle of another layer."""
     count = len(corners)
@@ -178,7 +178,7 @@ def _hidden(points: Array, faces: Array, shares: Array) -> NDArray[np.bool_]:
     return _covered(corners, normals, low, high, order, tallest, carried)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _covered(
     corners: Array, normals: Array, low: Array, high: Array, order: Array, tallest: float, carried: Array
 ) -> Array:
@@ -316,7 +316,7 @@ def _cost(
     return factor * (total + area[u] * (colour + change + 1e-3 * length))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _collapse(
     points: Array,
     faces: Array,

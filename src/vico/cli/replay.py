@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
 from vico.cli.output import progress_bars
 from vico.errors import MissingFileError
 from vico.render import render_top_down
@@ -12,7 +16,7 @@ from vico.sim.recording import read_run
 from vico.viewer.demo_film import write_demo_film
 from vico.viewer.from_run import recording_of
 from vico.viewer.replay import write_replay
-from vico.world.folder import read_world
+from vico.world.folder import World, read_world
 
 _PICTURE = 1200  # pixels along a side of the ground picture
 
@@ -33,7 +37,7 @@ def replay(path: Path, *, film: bool = True, world: Path | None = None) -> int:
     recording = recording_of(run)
     with progress_bars() as report:
         report("ground picture", 0, 1)
-        picture = render_top_down(scene_of(place, rooms=False), place.half, _PICTURE)
+        picture = _from_above(place, folder)
         report("ground picture", 1, 1)
         report("replay page", 0, 1)
         write_replay(path / "replay.html", recording, place, picture=picture)
@@ -44,3 +48,12 @@ def replay(path: Path, *, film: bool = True, world: Path | None = None) -> int:
             report("film", 1, 1)
     print(path / "replay.html")
     return 0
+
+
+def _from_above(world: World, folder: Path) -> NDArray[np.uint8]:
+    """The picture the world was built with; taken now where it was built without pictures."""
+    kept = folder / "previews" / "above.png"
+    if kept.is_file():
+        with Image.open(kept) as image:
+            return np.asarray(image.convert("RGB"))
+    return render_top_down(scene_of(world, rooms=False), world.half, _PICTURE)

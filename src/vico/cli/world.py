@@ -15,22 +15,26 @@ from numpy.typing import NDArray
 
 from vico.cli.output import check_output, print_json, print_table, progress_bars
 from vico.world.folder import World, read_world, stage_seconds
+from vico.world.threads import in_order
 from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
 from vico.worldgen.photos.streetview_photo import Photographer
 from vico.worldgen.photos.texturing import Texturing
 from vico.worldgen.pipeline import build_world, extract_centre, rebuild_world
-from vico.worldgen.previews import Viewpoint
+from vico.worldgen.previews import Overhead, Viewpoint
 from vico.worldgen.sources import Sources
 
 
-def photograph(world: World, views: Sequence[Viewpoint]) -> Iterator[NDArray[np.uint8]]:
-    """Take street-level pictures with our own renderer."""
+def photograph(world: World, views: Sequence[Viewpoint | Overhead]) -> Iterator[NDArray[np.uint8]]:
+    """Take pictures with our own renderer."""
     from vico.render.cameras import Cameras
-    from vico.render.frames import render
+    from vico.render.frames import render, render_top_down
     from vico.render.world_scene import scene_of
 
     scene = scene_of(world, rooms=False)
-    for view in views:
+
+    def take(view: Viewpoint | Overhead) -> NDArray[np.uint8]:
+        if isinstance(view, Overhead):
+            return render_top_down(scene, world.half, view.side)
         cameras = Cameras(
             np.array([view.position]),
             np.array([view.forward]),
@@ -38,7 +42,10 @@ def photograph(world: World, views: Sequence[Viewpoint]) -> Iterator[NDArray[np.
             width=view.width,
             height=view.height,
         )
-        yield render(scene, cameras, depth=False, segmentation=False, samples=2).rgb[0]
+        return render(scene, cameras, depth=False, segmentation=False, samples=2, threads=1).rgb[0]
+
+    scene.light()
+    yield from in_order(take, views)
 
 
 def build(

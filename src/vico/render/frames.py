@@ -23,6 +23,8 @@ from vico.render.shadows import cast_moving, is_disturbed
 from vico.world.mesh import Material, Surface
 
 _MOVING_SHADOW_METRES = 70.0
+# Squares along a side of a picture from above.
+_SQUARES = 8
 _View = tuple[NDArray[np.float64], int, int]
 _EMPTY_U8, _EMPTY_F32, _EMPTY_I32 = np.zeros(0, np.uint8), np.zeros(0, np.float32), np.zeros(0, np.int32)
 
@@ -199,13 +201,18 @@ def render_top_down(scene: Scene, half: float, pixels: int, *, samples: int = 2)
     less than a thousandth of `half`.
     """
     height = 50.0 * max(half, 10.0) + 200.0
+    # In squares that threads share, each from straight above its own middle.
+    step = -(-pixels // _SQUARES)
+    metre = pixels / (2 * half)
+    corners = np.array([(x, y) for y in range(0, pixels, step) for x in range(0, pixels, step)])
+    middles = (corners + step / 2) / metre - half
     cameras = Cameras(
-        np.array([[0.0, 0.0, height]]),
-        np.array([[0.0, 0.0, -1.0]]),
+        np.column_stack([middles[:, 0], -middles[:, 1], np.full(len(corners), height)]),
+        np.tile([0.0, 0.0, -1.0], (len(corners), 1)),
         up=(0.0, 1.0, 0.0),
-        fov_y=float(2 * np.arctan(half / height)),
-        width=pixels,
-        height=pixels,
+        fov_y=float(2 * np.arctan(step / metre / 2 / height)),
+        width=step,
+        height=step,
         near=height - 3000.0 if height > 4000.0 else 1.0,
         far=height + 3000.0,
     )
@@ -213,10 +220,18 @@ def render_top_down(scene: Scene, half: float, pixels: int, *, samples: int = 2)
     numbers = light.numbers.copy()
     numbers[15] = 0.0
     clear = light._replace(numbers=numbers)
-    picture = np.empty((pixels * samples, pixels * samples, 3), np.uint8)
-    _take(scene, _view(scene, cameras, 0, samples), clear, picture, _EMPTY_F32, _EMPTY_I32)
-    blocks = picture.reshape(pixels, samples, pixels, samples, 3).astype(np.float32)
-    return np.round(blocks.mean(axis=(1, 3))).astype(np.uint8)
+    picture = np.empty((pixels, pixels, 3), np.uint8)
+
+    def take(k: int) -> None:
+        x, y = corners[k]
+        square = np.empty((step * samples, step * samples, 3), np.uint8)
+        _take(scene, _view(scene, cameras, k, samples), clear, square, _EMPTY_F32, _EMPTY_I32)
+        blocks = square.reshape(step, samples, step, samples, 3).astype(np.float32)
+        place = picture[y : y + step, x : x + step]
+        place[:] = np.round(blocks.mean(axis=(1, 3))).astype(np.uint8)[: place.shape[0], : place.shape[1]]
+
+    _for_each(take, len(corners), None)
+    return picture
 
 
 def warm_up() -> None:

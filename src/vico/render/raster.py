@@ -458,12 +458,14 @@ def draw(arrays: Any, view: Any, buffers: Any, width: int, height: int) -> int:
     drawn_codes, base, firsts, slots = buffers.drawn, buffers.base, buffers.level, buffers.slot
     xs, ys, zs = mesh.x, mesh.y, mesh.z
     near = np.float32(view[16])
+    # Larger pictures take longer to look over.
+    patience = max(1, width * height // 65536)
     drawn, number, since, asked = 0, 1, 0, 0
     ids = np.empty(3, np.int64)
     for k in range(found):
         entry = ordered[k]
         # Few triangles may hide much (a room's walls), so questions asked count, too.
-        if since > _RENEW or (since > 0 and asked > _ASKED):
+        if since > _RENEW * patience or (since > 0 and asked > _ASKED * patience):
             renew_tiles(keys, tiles, blocks, strip, width, height)
             since, asked = 0, 0
         asked += 1
@@ -496,7 +498,7 @@ def draw(arrays: Any, view: Any, buffers: Any, width: int, height: int) -> int:
             else:
                 avatar = code - clusters - instances
                 set_box(matrix, avatar_low[avatar], avatar_high[avatar], box)
-            if since > _RENEW:
+            if since > _RENEW * patience:
                 renew_tiles(keys, tiles, blocks, strip, width, height)
                 since, asked = 0, 0
             if is_hidden(box, view, tiles, blocks, width, height):

@@ -90,17 +90,21 @@ class Drawn:
     entity: NDArray[np.int32]
 
 
-class Subsystem(Protocol):
-    """What the loop asks of traffic, transit, avatars and robots."""
+class HasBodies(Protocol):
+    """Who takes up room."""
+
+    def bodies(self) -> Bodies:
+        """Where everything is now."""
+
+
+class Subsystem(HasBodies, Protocol):
+    """What the loop asks of traffic, transit and robots."""
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Every number that decides the future, random state among them: what is hashed and saved."""
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Go back to what `arrays` held."""
-
-    def bodies(self) -> Bodies:
-        """Where everything is now."""
 
     def advance(self, dt: float, obstacles: Bodies) -> None:
         """Move on by `dt` seconds without touching anything of one's own or of `obstacles`."""

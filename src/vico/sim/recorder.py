@@ -57,7 +57,7 @@ class ViewFilm:
         self._stream.time_base = Fraction(1, RATE)
         # One thread and no look-ahead: the films must not fight the simulation for cores.
         self._stream.codec_context.thread_count = 1
-        self._stream.options = {"crf": "27", "preset": "superfast", "tune": "zerolatency"}
+        self._stream.options = {"crf": "27", "preset": "ultrafast", "tune": "zerolatency"}
         # A whole frame every 20 steps, and nowhere else: viewers take those as stills without decoding the rest.
         self._stream.options |= {"g": str(KEY), "sc_threshold": "0"}
 

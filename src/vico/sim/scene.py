@@ -22,6 +22,7 @@ from vico.sim.state import Vehicle
 from vico.world.folder import World
 from vico.world.mesh import Surface
 from vico.world.seeds import rng
+from vico.world.threads import in_order
 
 # The sun moves slowly: the light is set anew this often, seconds.
 _LIGHT_EVERY = 60.0
@@ -99,7 +100,8 @@ class SceneEyes:
         # Which of the shared looks come, and in which order, is the run's; no two alike before all have come.
         order = rng(sim.config.seed, "looks").permutation(PASSERS_BY)
         looks += [passer_by(int(order[k % PASSERS_BY])) for k in range(len(strangers) + len(walkers))]
-        bodies = [body_of(look) for look in looks]
+        made = dict(zip(dict.fromkeys(looks), in_order(body_of, dict.fromkeys(looks)), strict=True))
+        bodies = [made[look] for look in looks]
         self._crowd: Crowd = crowd_of(bodies, [*entities, *walkers])
         names = [*stage.people.names, *(f"pedestrian_{k}" for k in range(len(walkers)))]
         style = [

@@ -18,7 +18,7 @@ from vico.errors import InputError
 from vico.sim import moves, rides, spawn, systems
 from vico.sim.actions import Command, Refusal, check
 from vico.sim.avatars import Avatars, free_ground
-from vico.sim.bodies import ASSISTANT, KINDS, RESIDENT
+from vico.sim.bodies import ASSISTANT, KINDS, RESIDENT, Bodies, HasBodies
 from vico.sim.config import DAY, SUBSTEP, SUBSTEPS, SimConfig
 from vico.sim.effects import perform
 from vico.sim.events import Event, Events
@@ -144,19 +144,23 @@ class Simulation:
         stage.avatars.begin()
         self._act(actions, troubles or {})
         watch.lap("actions")
+        crowd = _Crowd(stage)
         for k in range(SUBSTEPS):
             if stage.traffic is not None:
-                stage.traffic.advance(SUBSTEP, stage.obstacles(without=stage.traffic))
+                stage.traffic.advance(SUBSTEP, crowd.others(stage.traffic))
+                crowd.moved(stage.traffic)
                 watch.lap("traffic")
             if stage.transit is not None:
-                stage.transit.advance(SUBSTEP, stage.obstacles(without=stage.transit))
+                stage.transit.advance(SUBSTEP, crowd.others(stage.transit))
+                crowd.moved(stage.transit)
                 watch.lap("transit")
-            others = stage.obstacles(without=stage.avatars)
-            stage.avatars.advance(SUBSTEP, others, share=1.0 / (SUBSTEPS - k))
+            stage.avatars.advance(SUBSTEP, crowd.others(stage.avatars), share=1.0 / (SUBSTEPS - k))
             rides.follow(stage)
+            crowd.moved(stage.avatars)
             watch.lap("avatars")
             if stage.robots is not None:
-                stage.robots.advance(SUBSTEP, stage.obstacles(without=stage.robots))
+                stage.robots.advance(SUBSTEP, crowd.others(stage.robots))
+                crowd.moved(stage.robots)
                 watch.lap("robots")
         moves.follow_hands(stage)
         self._note_collisions()
@@ -439,6 +443,19 @@ class Simulation:
         if unknown:
             raise InputError(f"observe: nobody is called {unknown[0]!r}; there are {', '.join(names)}")
         return [names.index(name) for name in self.config.observe]
+
+
+class _Crowd:
+    """Everybody's bodies during a step; an owner's are asked for again only when they have moved."""
+
+    def __init__(self, stage: Stage) -> None:
+        self._bodies = {id(owner): owner.bodies() for owner in stage.owners()}
+
+    def moved(self, owner: HasBodies) -> None:
+        self._bodies[id(owner)] = owner.bodies()
+
+    def others(self, owner: HasBodies) -> Bodies:
+        return Bodies.joined([bodies for key, bodies in self._bodies.items() if key != id(owner)])
 
 
 class _StopWatch:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.sim.avatars import Avatars
-from vico.sim.bodies import Bodies, Subsystem
+from vico.sim.bodies import Bodies, HasBodies, Subsystem
 from vico.sim.events import Events
 from vico.sim.indoor import DOOR_REACH, INNER_DOOR_REACH, Indoor, near_door
 from vico.sim.state import Goods, People, Vehicle
@@ -122,8 +122,11 @@ class Stage:
 
     def obstacles(self, *, without: object = None) -> Bodies:
         """Every body outdoors, except those of one owner."""
-        owners: Sequence[Any] = (self.traffic, self.transit, self.avatars, self.robots)
-        return Bodies.joined([o.bodies() for o in owners if o is not None and o is not without])
+        return Bodies.joined([o.bodies() for o in self.owners() if o is not without])
+
+    def owners(self) -> list[HasBodies]:
+        """Who has bodies: traffic, transit, avatars, robots; those of them that there are."""
+        return [o for o in (self.traffic, self.transit, self.avatars, self.robots) if o is not None]
 
     def position_of(self, name: str) -> NDArray[np.float64] | None:
         """Where an agent is, shape ``(3,)``."""

@@ -44,5 +44,8 @@ def turned(points: ArrayLike, matrix: ArrayLike) -> NDArray[np.float64]:
     -------
     (..., n)
     """
-    points = np.asarray(points)
-    return np.stack([dot(points, row) for row in np.asarray(matrix)], axis=-1)
+    points, matrix = np.asarray(points), np.asarray(matrix)
+    total: NDArray[np.float64] = points[..., 0, None] * matrix[:, 0]
+    for k in range(1, matrix.shape[1]):
+        total += points[..., k, None] * matrix[:, k]
+    return total

@@ -15,7 +15,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import osmium
+from numpy.typing import NDArray
 from PIL import Image
 
 from vico.errors import InputError, MissingFileError, OutputExistsError, SchemaError
@@ -24,10 +26,11 @@ from vico.geo.osm import checked_extract
 from vico.world.files import read_json, write_json
 from vico.world.folder import World, read_world, seal
 from vico.world.model import Manifest
+from vico.world.threads import for_each
 from vico.worldgen.evidence import gather
 from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
 from vico.worldgen.photos.texturing import Studio, Texturing
-from vico.worldgen.previews import Photograph, map_picture, viewpoints
+from vico.worldgen.previews import Overhead, Photograph, map_picture, viewpoints
 from vico.worldgen.recipe import make_world
 from vico.worldgen.report import write_report
 from vico.worldgen.sources import Sources
@@ -261,6 +264,12 @@ def _pictures(world: World, folder: Path, photograph: Photograph | None) -> dict
         return {"maps": 1, "views": 0}
     views = viewpoints(world, count=8)
     (folder / "previews").mkdir(exist_ok=True)
-    for k, frame in enumerate(photograph(world, views)):
-        Image.fromarray(frame).save(folder / "previews" / f"view_{k}.png")
+    names = ["above", *(f"view_{k}" for k in range(len(views)))]
+    frames = photograph(world, [Overhead(), *views])
+
+    def save(taken: tuple[str, NDArray[np.uint8]]) -> None:
+        name, frame = taken
+        Image.fromarray(frame).save(folder / "previews" / f"{name}.png")
+
+    for_each(save, zip(names, frames, strict=True))
     return {"maps": 1, "views": len(views)}

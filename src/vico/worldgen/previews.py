@@ -53,8 +53,15 @@ class Viewpoint:
     height: int = 540
 
 
+@dataclass(frozen=True)
+class Overhead:
+    """The whole square of a world from straight above, north up; side in pixels."""
+
+    side: int = 1200
+
+
 #: Takes pictures of a world from viewpoints: RGB, uint8, shape ``(height, width, 3)`` each.
-Photograph = Callable[[World, Sequence[Viewpoint]], Iterable[NDArray[np.uint8]]]
+Photograph = Callable[[World, Sequence[Viewpoint | Overhead]], Iterable[NDArray[np.uint8]]]
 
 
 @njit(cache=True)

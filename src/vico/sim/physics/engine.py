@@ -14,7 +14,7 @@ from vico.sim.bodies import ASSISTANT, KINDS, PEDESTRIAN, RESIDENT, Bodies
 from vico.world.heights import HeightField
 
 #: Seconds a frame of physics lasts.
-FRAME = 0.01
+FRAME = 0.02
 #: By kind of body: True for those who are discs.
 IS_PERSON = np.isin(np.arange(len(KINDS)), (RESIDENT, ASSISTANT, PEDESTRIAN))
 
@@ -89,8 +89,8 @@ class PhysicsEngine(Protocol):
     def surround(self, obstacles: Bodies, dt: float) -> None:
         """Say which bodies are near: they arrive at their positions `dt` seconds from now, at their velocities."""
 
-    def step(self, frames: int = 1) -> None:
-        """Move on by some frames with the servos as they are."""
+    def step(self, frames: int = 1, *, careful: bool = False) -> None:
+        """Move on by some frames with the servos as they are; with smaller steps where bodies lie and throw limbs."""
 
     def links(self, robot: int) -> NDArray[np.float64]:
         """Poses of the links, in the order of the model's `shapes`, shape ``(n, 4, 4)``."""

@@ -32,7 +32,8 @@ _KERB_CELL = 0.5
 #: Kinematic bodies are this much larger than what they stand for: soft contact never lets the real ones overlap.
 _SKIN = 0.03
 _PARKED = -500.0
-_SUBSTEPS = 2
+#: Steps of a frame, and of one in which smaller ones are asked for.
+_STEPS, _CAREFUL_STEPS = 3, 4
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 _SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 #: Solids whose tops are lower than this above the ground are met by feet and wheels as well as bumpers, metres.
@@ -249,14 +250,16 @@ class MujocoEngine:
         self._left = dt
         self._data.mocap_pos[self._mocap] = self._from
 
-    def step(self, frames: int = 1) -> None:
+    def step(self, frames: int = 1, *, careful: bool = False) -> None:
         """Move on by some frames; surrounding bodies move first."""
+        steps = _CAREFUL_STEPS if careful else _STEPS
+        self._model.opt.timestep = FRAME / steps
         if self._left > 0.0:
             self._from += self._pace * (FRAME * frames)
             self._left -= FRAME * frames
             self._data.mocap_pos[self._mocap] = self._from
         self._forget()
-        mujoco.mj_step(self._model, self._data, _SUBSTEPS * frames)
+        mujoco.mj_step(self._model, self._data, steps * frames)
         said, _SAID[:] = _SAID[:], ()
         if not math.isfinite(float(np.add.reduce(self._qvel))):
             why = f" ({said[0]})" if said else ""
@@ -351,7 +354,7 @@ def _standing(height: HeightField, model: RobotModel, place: NDArray[np.float64]
 
 
 def _set_options(spec: Any) -> None:
-    spec.option.timestep = FRAME / _SUBSTEPS
+    spec.option.timestep = FRAME / _STEPS
     # Servo damping is integrated implicitly: stable for light legs.
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     # Robots never sleep; what never moves does, and its poses are not computed again at every step.

@@ -261,10 +261,12 @@ class RobotPopulation:
             self._decide(
                 robot, dt, Traffic.around(everyone, int(self.entities[robot]), self._position(robot), SIGHT + 4)
             )
+        # Limbs thrown about, by a controller of somebody's own or to get up, need smaller steps than wheels and gaits.
+        careful = bool(np.any(self.status == _FALLEN_STATUS) or np.any(self.mode == _MOTORS))
         for _ in range(frames // ticks):
             for robot in range(len(self)):
                 self._drive(robot)
-            self.engine.step(ticks)
+            self.engine.step(ticks, careful=careful)
         self._bodies = None
         for robot in range(len(self)):
             self._watch_falls(robot, dt)
