@@ -32,6 +32,8 @@ DESTINATION_RADIUS = 3.0
 SOURCE_RADIUS = 8.0
 # Errands stay in the neighbourhood, so that six of them can be done on foot in 1500 s by somebody who plans well.
 REACH = 160.0
+# Middles of regions are told, positions of things are not: none lies in a middle, metres.
+_OFF_MIDDLE = 0.4
 
 
 def generate_delivery(
@@ -54,16 +56,20 @@ def generate_delivery(
     for index in range(SUBTASKS):
         indoors = bool(chance.random() < 0.5)
         count = 1 + int(chance.random() < 0.3)
-        sources = _candidates(surroundings, chance, indoors=indoors, radius=SOURCE_RADIUS)
+        sources = _untold(_candidates(surroundings, chance, indoors=indoors, radius=SOURCE_RADIUS), objects)
         source = sources[choose("Where do the things lie?", [r.name for r in sources])]
         targets = _candidates(surroundings, chance, indoors=bool(chance.random() < 0.6), radius=DESTINATION_RADIUS)
-        targets = [r for r in targets if np.hypot(*np.subtract(r.centre[:2], source.centre[:2])) > 20.0]
+        targets = [
+            r for r in _untold(targets, objects) if np.hypot(*np.subtract(r.centre[:2], source.centre[:2])) > 20.0
+        ]
         if not targets:
             raise EmptyInputError(f"delivery: nothing lies 20 m or more from {source.name}; use a larger world")
         destination = targets[choose("Where are the things brought to?", [r.name for r in targets])]
         kinds = [str(k) for k in chance.permutation(sorted(GOODS))[:CANDIDATES]]
         kind = kinds[choose(f"What is carried from {source.name} to {destination.name}?", kinds)]
-        things = [_thing(world, surroundings, chance, kind, source, taken, index, k) for k in range(count)]
+        told = [region for errand in subtasks for region in (errand.source, errand.destination)]
+        told += [source, destination]
+        things = [_thing(world, surroundings, chance, kind, told, taken, index, k) for k in range(count)]
         objects += things
         what = " and ".join(GOODS[t.kind].described(t.colour) for t in things)
         subtasks.append(
@@ -129,6 +135,12 @@ def _candidates(
     return places if (indoors and places) or not outdoors else outdoors
 
 
+def _untold(regions: list[Region], objects: list[TaskObject]) -> list[Region]:
+    """Regions in whose middle, which is told, no thing lies."""
+    lying = np.array([thing.position[:2] for thing in objects]).reshape(-1, 2)
+    return [r for r in regions if (np.hypot(*(lying - r.centre[:2]).T) >= _OFF_MIDDLE).all()] or regions
+
+
 def _at(region: Region) -> str:
     return region.name if region.kind == "place" else f"outdoors at {region.name}"
 
@@ -138,12 +150,13 @@ def _thing(
     surroundings: Surroundings,
     chance: np.random.Generator,
     kind: str,
-    source: Region,
+    told: list[Region],
     taken: set[str],
     index: int,
     number: int,
 ) -> TaskObject:
-    """A thing with a name no other thing of the episode has, laid down in the source."""
+    """A thing with a name no other thing of the episode has, laid down in the source: the last region but one told."""
+    source = told[-2]
     free = [c for c in COLOURS if f"{c} {kind}" not in taken]
     colour = free[int(chance.integers(len(free)))]
     taken.add(f"{colour} {kind}")
@@ -154,10 +167,15 @@ def _thing(
         chosen, container = surfaces[int(chance.integers(len(surfaces)))]
         position, room = _on(container, chosen, kind, chance), chosen.id
     else:
-        x, y = world.walkable.random_point(
-            chance, classes=(OPEN, SIDEWALK), near=source.centre, radius=SOURCE_RADIUS, clearance=0.5
-        )
-        position = (float(x), float(y), float(world.height(np.array([x, y]))))
+        middles = np.array([region.centre[:2] for region in told])
+        for _ in range(100):
+            spot = world.walkable.random_point(
+                chance, classes=(OPEN, SIDEWALK), near=source.centre, radius=SOURCE_RADIUS, clearance=0.5
+            )
+            if np.hypot(*(middles - spot).T).min() >= _OFF_MIDDLE:
+                break
+        x, y = spot
+        position = (float(x), float(y), float(world.height(spot)))
     return TaskObject(
         id=f"object_{index}_{number}",
         kind=kind,
