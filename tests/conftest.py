@@ -10,11 +10,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import settings
 
 from command_line import vico
 from vico.community import build_community, write_community
 from vico.world.folder import World, read_world
 from vico.worldgen.pipeline import build_world
+
+# The same examples in every run; HYPOTHESIS_PROFILE=search draws others.
+settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.register_profile("search", deadline=None)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeatable"))
 
 os.environ["VICO_OVERPASS"] = "off"  # tests ask no server but their own
 

@@ -38,6 +38,14 @@ def test_a_hole_stays_a_hole_and_the_edge_is_reached() -> None:
     assert region_above(-values, 5.0, low=0.0, cell=2.0).is_empty
 
 
+def test_values_that_hardly_leave_the_level_close_the_border() -> None:
+    values = np.full((6, 6), -1.8e-286)
+    values[4, :2] = 9.5e-85, 1.0
+    region = region_above(values, 0.0, low=0.0, cell=1.0)
+    assert region.is_valid
+    assert region.covers(shapely.Point(1, 4))
+
+
 @given(arrays(np.float64, (6, 6), elements=st.floats(-3.0, 3.0)), st.sampled_from([-1.0, 0.0, 0.5]))
 def test_points_of_the_grid_lie_on_their_side(values: np.ndarray, level: float) -> None:
     region = region_above(values, level, low=0.0, cell=1.0)

@@ -36,7 +36,7 @@ def region_above(values: Floats, level: float, *, low: float, cell: float) -> Ba
     grid and is computed once: the pieces of border meet exactly, and `polygonize` closes them.
     """
     z = np.pad(np.pad(np.asarray(values, np.float64), 1, mode="edge") - level, 1, constant_values=-1.0)
-    z[z == 0.0] = -1e-12  # no border runs through a point of the grid
+    z[np.abs(z) < 1e-12] = -1e-12  # no border runs through a point of the grid
     z[1:-1, 1:-1] = np.clip(z[1:-1, 1:-1], -1e6, 1e6)
     n = len(z)
     axis: Floats = low + (np.arange(n, dtype=np.float64) - 2.0) * cell
