@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import json
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from command_line import vico
 from vico.cli import bench, doctor
 from vico.sim.recording import read_run
+from vico.world.folder import read_world
+from vico.worldgen.report import report_page
 
 # The least that the two verbs promise to tell.
 WORLD_KEYS = {
@@ -165,3 +173,40 @@ def test_every_benchmark_is_a_script_that_explains_itself() -> None:
         assert done.returncode == 0, done.stderr
         assert f"benchmarks/{name}.py" in done.stdout
         assert "--table" in done.stdout
+
+
+def test_the_page_takes_the_picture_the_world_was_built_with(
+    helsinki_run: tuple[Path, dict[str, Any]],
+    helsinki_path: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    run, world = tmp_path / "run", tmp_path / "world"
+    shutil.copytree(helsinki_run[0], run)
+    shutil.copytree(helsinki_path, world)
+    (world / "previews").mkdir()
+    kept = world / "previews" / "above.png"
+    Image.new("RGB", (40, 40), (250, 10, 200)).save(kept)
+    assert vico("replay", run, "--world", world, "--no-film") == 0
+    page = (run / "replay.html").read_text()
+    assert any(_is_flat(picture, (250, 10, 200)) for picture in re.findall(r"data:image/webp;base64,([^\"']+)", page))
+    kept.write_bytes(kept.read_bytes()[:50])
+    assert vico("replay", run, "--world", world, "--no-film") == 2
+    assert "not a readable picture" in capsys.readouterr().err
+
+
+def _is_flat(encoded: str, colour: tuple[int, int, int]) -> bool:
+    """Whether a picture is of one colour, save for the losses of its encoding."""
+    with Image.open(io.BytesIO(base64.b64decode(encoded))) as picture:
+        return bool(np.abs(np.asarray(picture.convert("RGB")).astype(int) - colour).max() < 40)
+
+
+def test_the_report_shows_the_square_once_and_its_streets_apart(tmp_path: Path, helsinki_path: Path) -> None:
+    world = tmp_path / "world"
+    shutil.copytree(helsinki_path, world)
+    (world / "previews").mkdir()
+    for name in ("above", "view_0"):
+        Image.new("RGB", (4, 4)).save(world / "previews" / f"{name}.png")
+    page = report_page(read_world(world))
+    assert page.count("previews/above.png") == 1
+    assert re.findall(r"<a href='(previews/[^']*)'", page) == ["previews/view_0.png"]

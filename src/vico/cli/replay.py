@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from vico.cli.output import progress_bars
-from vico.errors import MissingFileError
+from vico.errors import MissingFileError, SchemaError
 from vico.render import render_top_down
 from vico.render.world_scene import scene_of
 from vico.sim.recording import read_run
@@ -17,8 +17,7 @@ from vico.viewer.demo_film import write_demo_film
 from vico.viewer.from_run import recording_of
 from vico.viewer.replay import write_replay
 from vico.world.folder import World, read_world
-
-_PICTURE = 1200  # pixels along a side of the ground picture
+from vico.worldgen.previews import Overhead
 
 
 def replay(path: Path, *, film: bool = True, world: Path | None = None) -> int:
@@ -54,6 +53,9 @@ def _from_above(world: World, folder: Path) -> NDArray[np.uint8]:
     """The picture the world was built with; taken now where it was built without pictures."""
     kept = folder / "previews" / "above.png"
     if kept.is_file():
-        with Image.open(kept) as image:
-            return np.asarray(image.convert("RGB"))
-    return render_top_down(scene_of(world, rooms=False), world.half, _PICTURE)
+        try:
+            with Image.open(kept, formats=("PNG",)) as image:
+                return np.asarray(image.convert("RGB"))
+        except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+            raise SchemaError(f"{kept}: not a readable picture ({error}); build the world anew") from None
+    return render_top_down(scene_of(world, rooms=False), world.half, Overhead().side)

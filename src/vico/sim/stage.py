@@ -120,9 +120,9 @@ class Stage:
         index = self.place_index.get(place_id)
         return None if index is None else self.world.places[index]
 
-    def obstacles(self, *, without: object = None) -> Bodies:
-        """Every body outdoors, except those of one owner."""
-        return Bodies.joined([o.bodies() for o in self.owners() if o is not without])
+    def obstacles(self) -> Bodies:
+        """Every body outdoors."""
+        return Bodies.joined([owner.bodies() for owner in self.owners()])
 
     def owners(self) -> list[HasBodies]:
         """Who has bodies: traffic, transit, avatars, robots; those of them that there are."""

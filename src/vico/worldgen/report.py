@@ -40,7 +40,7 @@ def report_page(world: World) -> str:
     """Return the page, HTML; its pictures are the world's own files, by relative path."""
     manifest = world.manifest
     origin, side = manifest.origin, 2 * manifest.half
-    views = sorted(p.relative_to(world.file(".")).as_posix() for p in world.file(".").glob("previews/*.png"))
+    views = sorted(p.relative_to(world.file(".")).as_posix() for p in world.file(".").glob("previews/view_*.png"))
     seconds = stage_seconds(world)
     parts = [
         "<!doctype html><html lang=en><meta charset=utf-8>",
@@ -51,6 +51,8 @@ def report_page(world: World) -> str:
         f"{escape(manifest.producer)}; built in {sum(seconds.values()):.1f} s</p>",
         "<img src='map.png' alt='The world from above: streets, buildings, places and bus lines'>",
     ]
+    if world.file("previews/above.png").is_file():
+        parts.append("<img src='previews/above.png' alt='The whole square from straight above, rendered' loading=lazy>")
     if views:
         pictures = "".join(
             f"<a href='{escape(v)}'><img src='{escape(v)}' alt='A street seen at eye height' loading=lazy></a>"

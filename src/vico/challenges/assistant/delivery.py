@@ -34,6 +34,7 @@ SOURCE_RADIUS = 8.0
 REACH = 160.0
 # Middles of regions are told, positions of things are not: none lies in a middle, metres.
 _OFF_MIDDLE = 0.4
+_TRIES = 100
 
 
 def generate_delivery(
@@ -57,6 +58,8 @@ def generate_delivery(
         indoors = bool(chance.random() < 0.5)
         count = 1 + int(chance.random() < 0.3)
         sources = _untold(_candidates(surroundings, chance, indoors=indoors, radius=SOURCE_RADIUS), objects)
+        if not sources:
+            raise EmptyInputError("delivery: a thing lies in the middle of every region there is; use a larger world")
         source = sources[choose("Where do the things lie?", [r.name for r in sources])]
         targets = _candidates(surroundings, chance, indoors=bool(chance.random() < 0.6), radius=DESTINATION_RADIUS)
         targets = [
@@ -68,8 +71,8 @@ def generate_delivery(
         kinds = [str(k) for k in chance.permutation(sorted(GOODS))[:CANDIDATES]]
         kind = kinds[choose(f"What is carried from {source.name} to {destination.name}?", kinds)]
         told = [region for errand in subtasks for region in (errand.source, errand.destination)]
-        told += [source, destination]
-        things = [_thing(world, surroundings, chance, kind, told, taken, index, k) for k in range(count)]
+        middles = np.array([region.centre[:2] for region in (*told, source, destination)])
+        things = [_thing(world, surroundings, chance, kind, source, middles, taken, index, k) for k in range(count)]
         objects += things
         what = " and ".join(GOODS[t.kind].described(t.colour) for t in things)
         subtasks.append(
@@ -138,7 +141,7 @@ def _candidates(
 def _untold(regions: list[Region], objects: list[TaskObject]) -> list[Region]:
     """Regions in whose middle, which is told, no thing lies."""
     lying = np.array([thing.position[:2] for thing in objects]).reshape(-1, 2)
-    return [r for r in regions if (np.hypot(*(lying - r.centre[:2]).T) >= _OFF_MIDDLE).all()] or regions
+    return [r for r in regions if (np.hypot(*(lying - r.centre[:2]).T) >= _OFF_MIDDLE).all()]
 
 
 def _at(region: Region) -> str:
@@ -150,13 +153,13 @@ def _thing(
     surroundings: Surroundings,
     chance: np.random.Generator,
     kind: str,
-    told: list[Region],
+    source: Region,
+    middles: np.ndarray,
     taken: set[str],
     index: int,
     number: int,
 ) -> TaskObject:
-    """A thing with a name no other thing of the episode has, laid down in the source: the last region but one told."""
-    source = told[-2]
+    """A thing with a name no other thing of the episode has, laid down in the source, in none of the middles."""
     free = [c for c in COLOURS if f"{c} {kind}" not in taken]
     colour = free[int(chance.integers(len(free)))]
     taken.add(f"{colour} {kind}")
@@ -167,13 +170,14 @@ def _thing(
         chosen, container = surfaces[int(chance.integers(len(surfaces)))]
         position, room = _on(container, chosen, kind, chance), chosen.id
     else:
-        middles = np.array([region.centre[:2] for region in told])
-        for _ in range(100):
+        for _ in range(_TRIES):
             spot = world.walkable.random_point(
                 chance, classes=(OPEN, SIDEWALK), near=source.centre, radius=SOURCE_RADIUS, clearance=0.5
             )
             if np.hypot(*(middles - spot).T).min() >= _OFF_MIDDLE:
                 break
+        else:
+            raise EmptyInputError(f"delivery: at {source.name} things can lie in its middle only; use a larger world")
         x, y = spot
         position = (float(x), float(y), float(world.height(spot)))
     return TaskObject(
