@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import json
+import weakref
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ from command_line import vico
 from vico.errors import InputError, MissingFileError
 from vico.world.folder import read_world
 from vico.worldgen import recipe
+from vico.worldgen.ground.terrain import flat_terrain
 from vico.worldgen.pipeline import build_world, rebuild_world
 from vico.worldgen.stages import Stages
 
@@ -45,6 +48,15 @@ def test_a_later_stage_is_kept_when_an_earlier_one_gives_the_same_again(tmp_path
         value = stages.run("first", double, [1, 2])
         assert stages.run("second", double, value) == [4, 8]
     assert stages.kept == ["second"]
+
+
+def test_what_nobody_needs_any_more_is_let_go(tmp_path: Path) -> None:
+    stages = Stages(tmp_path)
+    for again in (flat_terrain(half=50.0), stages.run("terrain", flat_terrain, half=50.0)):
+        held = weakref.ref(stages.given(again, "its digest"))
+        del again
+    gc.collect()
+    assert held() is None
 
 
 def test_a_torn_product_is_made_anew(tmp_path: Path) -> None:

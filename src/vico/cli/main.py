@@ -159,8 +159,8 @@ def world_build_many(
 ) -> int:
     """Build a table of places side by side.
 
-    The table is CSV: name,lat,lon and, where wanted, osm,radius,dem,tiles,gtfs,places,photos,seed. Worlds that are
-    there are kept, those that fail are told at the end (exit 1) and do not stop the others.
+    The table is CSV: name,lat,lon and, where wanted, osm,radius,dem,tiles,gtfs,places,photos,layouts,things,seed.
+    Worlds that are there are kept, those that fail are told at the end (exit 1) and do not stop the others.
 
     Example: vico world build-many places.csv --out worlds --workers 4
 

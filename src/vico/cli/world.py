@@ -143,7 +143,7 @@ def build_table(
     with progress_bars() as report:
         report("places", 0, len(rows))
         for outcome in build_many(
-            rows, out, locate=locate, photograph=photograph, workers=workers, force=force, ray=ray
+            rows, out, locate=locate, photograph=photograph, studio=studio, workers=workers, force=force, ray=ray
         ):
             outcomes.append(outcome)
             report("places", len(outcomes), len(rows))

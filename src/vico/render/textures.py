@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from vico.errors import InputError
 from vico.world.mesh import Material
+from vico.world.threads import for_each
 
 LEVELS = 13  # up to 4096 texels a side
 CUTOUT, DOUBLE_SIDED = 1, 2
+_STRIP = 256  # rows, even
 
 
 class Textures(NamedTuple):
@@ -47,9 +50,7 @@ def pack_textures(materials: Sequence[Material]) -> Textures:
     size = np.zeros((n, 3), np.int32)
     flags = np.zeros(n, np.uint8)
     emission = np.zeros(n, np.float32)
-    textures = {id(m.texture): m.texture.shape[:2] for m in materials if m.texture is not None}
-    # One array from the start: joining the levels at the end would take the memory of a photographed city twice.
-    texels = np.full(1 + sum(_texel_count(*sides) for sides in textures.values()), 0xFFFFFFFF, np.uint32)
+    texels = np.full(1 + sum(_texel_count(*sides) for sides in _shapes(materials)), 0xFFFFFFFF, np.uint32)
     position = 1
     known: dict[int, int] = {}
     for index, material in enumerate(materials):
@@ -57,24 +58,25 @@ def pack_textures(materials: Sequence[Material]) -> Textures:
         emission[index] = material.emission
         if material.texture is None:
             continue
-        if id(material.texture) in known:
-            same = known[id(material.texture)]
+        same = known.setdefault(id(material.texture), index)
+        if same != index:
             start[index], size[index] = start[same], size[same]
             continue
-        known[id(material.texture)] = index
-        levels = _mip_levels(material)
-        height, width = levels[0].shape[:2]
-        size[index] = width.bit_length() - 1, height.bit_length() - 1, len(levels)
-        for k in range(LEVELS):
-            if k < len(levels):
-                level = levels[k].astype(np.uint32)
-                packed = level[..., 0] | level[..., 1] << 8 | level[..., 2] << 16 | level[..., 3] << 24
-                texels[position : position + packed.size] = packed.ravel()
-                start[index, k] = position
-                position += packed.size
-            else:
-                start[index, k] = start[index, k - 1]
-    return Textures(texels[:position], start, size, flags, emission)
+        height, width = _sides(*material.texture.shape[:2])
+        size[index] = width.bit_length() - 1, height.bit_length() - 1, max(height, width).bit_length()
+        start[index] = position + _level_starts(height, width)
+        position += _texel_count(height, width)
+
+    def fill(index: int) -> None:
+        _write_levels(materials[index], texels, start[index])
+
+    for_each(fill, known.values())
+    return Textures(texels, start, size, flags, emission)
+
+
+def _shapes(materials: Sequence[Material]) -> list[tuple[int, int]]:
+    """Sides of the finest levels of all textures, each texture once."""
+    return [_sides(*t.shape[:2]) for t in {id(m.texture): m.texture for m in materials}.values() if t is not None]
 
 
 def _sides(height: int, width: int) -> tuple[int, int]:
@@ -83,13 +85,24 @@ def _sides(height: int, width: int) -> tuple[int, int]:
     return tall, wide
 
 
+def _level_sizes(height: int, width: int) -> list[int]:
+    """Texels of each level of a texture with these sides."""
+    return [max(height >> k, 1) * max(width >> k, 1) for k in range(max(height, width).bit_length())]
+
+
 def _texel_count(height: int, width: int) -> int:
     """Texels of all levels of a texture."""
-    height, width = _sides(height, width)
-    return sum(max(height >> k, 1) * max(width >> k, 1) for k in range(max(height, width).bit_length()))
+    return sum(_level_sizes(height, width))
 
 
-def _mip_levels(material: Material) -> list[NDArray[np.uint8]]:
+def _level_starts(height: int, width: int) -> NDArray[np.int64]:
+    """Where the levels begin after the first texel; levels past the last repeat it."""
+    starts = np.cumsum([0, *_level_sizes(height, width)[:-1]])
+    return np.concatenate([starts, np.full(LEVELS - len(starts), starts[-1])])
+
+
+def _write_levels(material: Material, texels: NDArray[np.uint32], start: NDArray[np.int64]) -> None:
+    """Write a texture and its coarser levels where each starts."""
     pixels = material.texture
     if pixels is None or pixels.ndim != 3 or pixels.shape[2] not in (3, 4) or pixels.dtype != np.uint8:
         raise InputError(f"material {material.name}: a texture must be uint8 of shape (h, w, 3) or (h, w, 4)")
@@ -98,30 +111,71 @@ def _mip_levels(material: Material) -> list[NDArray[np.uint8]]:
         pixels = np.asarray(Image.fromarray(pixels).resize((width, height), Image.Resampling.LANCZOS))
     if pixels.shape[2] == 3:
         pixels = np.concatenate([pixels, np.full((*pixels.shape[:2], 1), 255, np.uint8)], axis=2)
-    levels = [pixels]
-    # Averages are taken in (roughly) linear light, and where alpha means holes of opaque texels only, so that leaves
-    # keep their colour.
-    light: NDArray[Any] = (pixels[..., :3].astype(np.float32) / 255) ** 2
-    alpha: NDArray[Any] = pixels[..., 3].astype(np.float32) / 255
-    opaque = float((alpha >= 0.5).mean())
-    while max(light.shape[:2]) > 1 and len(levels) < LEVELS:
-        weight = np.maximum(alpha, 1e-3) if material.cutout else np.ones_like(alpha)
-        total = _halved(weight)
-        light = _halved(light * weight[..., None]) / total[..., None]
-        alpha = _halved(alpha)
-        coverage: NDArray[Any] = alpha
+    finest = np.ascontiguousarray(pixels).view("<u4").ravel()
+    texels[start[0] : start[0] + finest.size] = finest
+    opaque = float((pixels[..., 3] >= 128).mean())
+    light, alpha = None, None
+    for first in start[1 : max(height, width).bit_length()]:
+        if light is None or alpha is None:
+            # In strips of rows: as numbers a page of photos would take a gigabyte.
+            strips = [_coarser(*_linear(pixels[k : k + _STRIP]), material.cutout) for k in range(0, height, _STRIP)]
+            light, alpha = (np.concatenate(parts) for parts in zip(*strips, strict=True))
+        else:
+            light, alpha = _coarser(light, alpha, material.cutout)
+        gain = 1.0
         if material.cutout:
             # Holes must keep their share of the area, or foliage thins out with distance.
             limit = float(np.quantile(alpha, 1 - opaque)) if 0 < opaque < 1 else 0.5
-            coverage = np.clip(alpha * (0.5 / max(limit, 1e-3)), 0, 1)
-        colour = np.sqrt(np.clip(light, 0, 1)) * 255
-        levels.append(np.round(np.concatenate([colour, coverage[..., None] * 255], axis=2)).astype(np.uint8))
-    return levels
+            gain = 0.5 / max(limit, 1e-3)
+        _pack(light, alpha, np.float32(gain), texels[first:])
 
 
-def _halved(values: NDArray[Any]) -> NDArray[Any]:
-    for axis in (0, 1):
-        if values.shape[axis] > 1:
-            even, odd = (slice(None),) * axis + (slice(0, None, 2),), (slice(None),) * axis + (slice(1, None, 2),)
-            values = (values[even] + values[odd]) / 2
-    return values
+_LINEAR = np.square(np.arange(256, dtype=np.float32) / np.float32(255))
+
+
+def _linear(pixels: NDArray[np.uint8]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Colour in (roughly) linear light, and alpha."""
+    return _LINEAR[pixels[..., :3]], pixels[..., 3].astype(np.float32) / np.float32(255)
+
+
+@numba.njit(cache=True, nogil=True)
+def _coarser(light, alpha, cutout):  # type: ignore[no-untyped-def]
+    """Halve a level: averages in linear light; where alpha means holes of opaque texels alone: leaves keep theirs."""
+    tall, wide = min(alpha.shape[0], 2), min(alpha.shape[1], 2)
+    height, width = alpha.shape[0] // tall, alpha.shape[1] // wide
+    new_light = np.empty((height, width, 3), np.float32)
+    new_alpha = np.empty((height, width), np.float32)
+    half = np.float32(0.5)
+    for i in range(height):
+        for j in range(width):
+            # A side of one texel meets itself.
+            i0, j0 = i * tall, j * wide
+            i1, j1 = i0 + tall - 1, j0 + wide - 1
+            a, b, c, d = alpha[i0, j0], alpha[i1, j0], alpha[i0, j1], alpha[i1, j1]
+            new_alpha[i, j] = ((a + b) * half + (c + d) * half) * half
+            if cutout:
+                least = np.float32(1e-3)
+                a, b, c, d = max(a, least), max(b, least), max(c, least), max(d, least)
+            else:
+                a = b = c = d = np.float32(1.0)
+            weight = ((a + b) * half + (c + d) * half) * half
+            for k in range(3):
+                first = (light[i0, j0, k] * a + light[i1, j0, k] * b) * half
+                second = (light[i0, j1, k] * c + light[i1, j1, k] * d) * half
+                new_light[i, j, k] = (first + second) * half / weight
+    return new_light, new_alpha
+
+
+@numba.njit(cache=True, nogil=True)
+def _pack(light, alpha, gain, texels):  # type: ignore[no-untyped-def]
+    """Write a level as packed sRGB texels; `gain` multiplies alpha."""
+    zero, one, most = np.float32(0.0), np.float32(1.0), np.float32(255.0)
+    k = 0
+    for i in range(alpha.shape[0]):
+        for j in range(alpha.shape[1]):
+            texel = np.uint32(np.rint(min(max(alpha[i, j] * gain, zero), one) * most)) << np.uint32(24)
+            for c in range(3):
+                value = np.uint32(np.rint(np.sqrt(min(max(light[i, j, c], zero), one)) * most))
+                texel |= value << np.uint32(8 * c)
+            texels[k] = texel
+            k += 1

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import csv
 import multiprocessing
+import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from vico.errors import InputError, MissingExtraError, MissingFileError, SchemaError, VicoError
+from vico.world import threads
 from vico.world.folder import read_world, stage_seconds
+from vico.worldgen.photos.texturing import Studio
 from vico.worldgen.pipeline import build_world
 from vico.worldgen.previews import Photograph
 from vico.worldgen.sources import SERVICES, Sources
 
 _MOST_BYTES = 16 << 20
+_THINGS = ("", "procedural", "installed")
 
 
 @dataclass(frozen=True)
@@ -32,6 +37,8 @@ class PlaceRow:
     gtfs: str = ""
     places: str = ""
     photos: str = ""
+    layouts: str = ""
+    things: str = ""
     seed: int = 0
 
 
@@ -105,10 +112,14 @@ def _row(content: dict[str, str], path: Path, line: int) -> PlaceRow:
             gtfs=_beside(text.get("gtfs", ""), path),
             places=_beside(text.get("places", ""), path),
             photos=_beside(text.get("photos", ""), path),
+            layouts=_beside(text.get("layouts", ""), path),
+            things=text.get("things", ""),
             seed=int(text.get("seed") or PlaceRow.seed),
         )
     except ValueError as error:
         raise SchemaError(f"{path}:{line}: {name}: {error}") from None
+    if row.things not in _THINGS:
+        raise SchemaError(f"{path}:{line}: {name}: things {row.things!r}; give procedural or installed, or nothing")
     if not (-90 <= row.lat <= 90 and -180 <= row.lon <= 180):
         raise SchemaError(f"{path}:{line}: {name}: {row.lat}, {row.lon} is not on Earth")
     return row
@@ -125,6 +136,7 @@ def build_many(
     *,
     locate: Locate,
     photograph: Photograph | None = None,
+    studio: Studio | None = None,
     workers: int = 1,
     force: bool = False,
     ray: bool = False,
@@ -141,6 +153,8 @@ def build_many(
         Finds a map for a place without a file: latitude, longitude, half side to a path.
     photograph
         Takes the street-level pictures; a function of a module, as other processes must find it.
+    studio
+        Renders unfinished worlds, which places with street photos need; a function of a module, too.
     workers
         How many processes side by side (not used with `ray`).
     force
@@ -160,20 +174,40 @@ def build_many(
     """
     if workers < 1:
         raise InputError(f"workers: {workers}; at least one is needed")
+    how: dict[str, Any] = {
+        "out": Path(out).absolute(),
+        "locate": locate,
+        "photograph": photograph,
+        "studio": studio,
+        "force": force,
+    }
     if ray:
-        yield from _with_ray(rows, out, locate, photograph, force)
+        yield from _with_ray(rows, how)
         return
-    if workers == 1:
+    workers = min(workers, len(rows))
+    if workers <= 1:
         for row in rows:
-            yield build_one(row, out, locate, photograph, force)
+            yield build_one(row, **how)
         return
-    # Fresh processes: a fork of one with compiled code and threads in it may hang.
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        for done in as_completed([pool.submit(build_one, row, out, locate, photograph, force) for row in rows]):
+    # Fresh processes: a fork of one with compiled code and threads in it may hang. They share the processors.
+    pool = ProcessPoolExecutor(
+        workers,
+        mp_context=multiprocessing.get_context("spawn"),
+        initializer=_use_threads,
+        initargs=(max(1, threads.workers() // workers),),
+    )
+    with pool:
+        for done in as_completed([pool.submit(build_one, row, **how) for row in rows]):
             yield done.result()
 
 
-def build_one(row: PlaceRow, out: Path, locate: Locate, photograph: Photograph | None, force: bool) -> Outcome:
+def _use_threads(count: int) -> None:
+    os.environ[threads.WORKERS] = str(count)
+
+
+def build_one(
+    row: PlaceRow, *, out: Path, locate: Locate, photograph: Photograph | None, studio: Studio | None, force: bool
+) -> Outcome:
     """Build one place; bad input becomes an outcome, so that it does not end the others."""
     folder = Path(out) / row.name
     try:
@@ -187,6 +221,8 @@ def build_one(row: PlaceRow, out: Path, locate: Locate, photograph: Photograph |
             photos=row.photos or None,
             places=tuple(p for p in row.places.split(";") if p),
             gtfs=tuple(Path(p) for p in row.gtfs.split(";") if p),
+            layouts=Path(row.layouts) if row.layouts else None,
+            installed_things=row.things == "installed",
         )
         manifest = build_world(
             sources,
@@ -197,6 +233,7 @@ def build_one(row: PlaceRow, out: Path, locate: Locate, photograph: Photograph |
             out=folder,
             force=force,
             photograph=photograph,
+            studio=studio,
         )
     except (VicoError, OSError) as error:
         return Outcome(row.name, "failed", reason=str(error))
@@ -204,9 +241,7 @@ def build_one(row: PlaceRow, out: Path, locate: Locate, photograph: Photograph |
     return Outcome(row.name, "built", counts["buildings"], counts["places"], round(seconds, 2))
 
 
-def _with_ray(
-    rows: Sequence[PlaceRow], out: Path, locate: Locate, photograph: Photograph | None, force: bool
-) -> Iterator[Outcome]:
+def _with_ray(rows: Sequence[PlaceRow], how: dict[str, Any]) -> Iterator[Outcome]:
     try:
         import ray
     except ImportError:
@@ -214,7 +249,7 @@ def _with_ray(
     if not ray.is_initialized():
         ray.init(include_dashboard=False, log_to_driver=False)
     task = ray.remote(build_one)
-    waiting = [task.remote(row, Path(out).absolute(), locate, photograph, force) for row in rows]
+    waiting = [task.remote(row, **how) for row in rows]
     while waiting:
         done, waiting = ray.wait(waiting)
         yield from ray.get(done)

@@ -168,6 +168,7 @@ def build_world(
         studio=studio,
         author=author,
     )
+    del given  # the mesh of a photographed city is large, and so are its pictures
     with stages.timed("previews"):
         counts = _pictures(world, folder, photograph)
     stages.report("previews", counts)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import time
+import weakref
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -70,11 +71,16 @@ class Stages:
         self._folder = folder
         self._again = set(again)
         self._progress = progress
-        self._digests: dict[int, tuple[Any, str]] = {}
+        self._digests: dict[int, tuple[Callable[[], Any], str]] = {}
 
     def given(self, value: T, digest: str) -> T:
         """Make an input known by a digest of its own (of the file it was read from), and return it."""
-        self._digests[id(value)] = (value, digest)
+        try:
+            # Known as long as somebody holds it: the meshes and photos of a district would fill gigabytes.
+            self._digests[id(value)] = weakref.ref(value), digest
+        except TypeError:
+            if not isinstance(value, tuple):  # tuples are taken apart: none is the input of a stage
+                self._digests[id(value)] = lambda: value, digest
         return value
 
     def run(self, name: str, function: Callable[..., T], *inputs: Any, **options: Any) -> T:
@@ -144,4 +150,4 @@ class Stages:
 
     def _digest(self, value: Any) -> str:
         known = self._digests.get(id(value))
-        return known[1] if known is not None and known[0] is value else digest_of(value)
+        return known[1] if known is not None and known[0]() is value else digest_of(value)
