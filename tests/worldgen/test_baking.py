@@ -111,6 +111,21 @@ def test_a_car_before_a_hole_in_the_photograph_is_no_wall() -> None:
     assert not (colours[known] == (180, 30, 30)).all(axis=1).any()
 
 
+@pytest.mark.parametrize("reach", [0.5, 1.2])
+def test_a_foot_rounded_off_into_the_ground_does_not_paint_the_wall(reach: float) -> None:
+    mesh = photographed(0.0)
+    upper = mesh.positions.copy()
+    upper[:2, 2] = 1.0
+    ground = (230, 90, 40)
+    slope = with_box(replace(mesh, positions=upper), (0.0, -reach, 0.0), (12.0, -reach, 1.0), ground)
+    corners = slope.positions.copy()
+    corners[6:, 1] = 0.0  # the panel leans on the wall
+    colours, known = painted(bake([wall()], [], replace(slope, positions=corners), texel=0.125, page=256))
+    assert known[9:-1, 1:-1].all()
+    assert not known[:7].any()
+    assert not (colours[known] == ground).all(axis=1).any()
+
+
 def test_equal_inputs_give_equal_bytes_and_entities_stay_apart() -> None:
     mesh = photographed(0.0)
     first, second = (bake([wall(), wall(y=-30, entity=6)], [], mesh, page=256) for _ in range(2))

@@ -24,10 +24,12 @@ from vico.worldgen.photos.sight import Sight
 
 _BATCH = 1 << 17  # texels at a time: about 30 MB of temporaries a thread
 _COARSE = 0.5  # metres
-_AGREES = 0.4  # least cosine between the normals of wall and photographed surface
+_AGREES = 0.75  # least cosine between the normals of wall and photographed surface
 _STANDS_OFF = 0.6  # metres out of the photographed wall from which a thing is no longer part of it
 _BEHIND = 0.9  # metres behind the photographed wall from which the second ray starts
 _LOW = 2.6  # metres above a wall's foot up to which what stands off it is a car or a person
+_FOOT = 1.5  # metres above a wall's foot up to which photogrammetry rounds it off into the ground
+_LEANS = 0.3  # sine of the slope that tells it does, and shows the ground's colours
 _GREEN, _GREENER = 26.0, 18.0  # excess green (2g - r - b) of leaves, and how much more than the wall's own
 _DARK, _DARKER = 14.0, 0.15  # luminance of holes in the photographs, and their share of the wall's own
 _FRINGE = 2  # texels around leaves that they still colour
@@ -337,7 +339,13 @@ def _paint(
         colour = photos(triangle[take], u[take], v[take], whose, right, up)
         height = row[take] * side[whose]
         reject, fringe = _oddities(
-            colour, off[take], wall[whose], height, expected.luminance[whose], expected.green[whose]
+            colour,
+            off[take],
+            wall[whose],
+            photos.normal[triangle[take], 2],
+            height,
+            expected.luminance[whose],
+            expected.green[whose],
         )
         odd[page][y[take[fringe]], x[take[fringe]]] = True
         keep = take[~reject]
@@ -390,18 +398,20 @@ def _oddities(
     colour: NDArray[np.uint8],
     off: NDArray[np.bool_],
     wall: NDArray[np.bool_],
+    slope: NDArray[np.float64],
     height: NDArray[np.float64],
     luminance: NDArray[np.float64],
     green: NDArray[np.float64],
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which colours are not the wall's own (leaves, cars, holes), and which of these stain their neighbours."""
+    """Which colours are not the wall's own (leaves, cars, ground, holes), and which of these stain their neighbours."""
     r, g, b = (colour[:, k].astype(np.float32) for k in range(3))
     excess = 2 * g - r - b
     light = 0.299 * r + 0.587 * g + 0.114 * b
     leaves = wall & (excess > _GREEN) & (excess > green + _GREENER)
     hole = (light < _DARK) & (light < _DARKER * luminance)
     obstacle = wall & off & (height < _LOW) & (luminance > 0)  # the coarse bake doesn't know yet what stands off
-    return leaves | hole | obstacle, leaves | obstacle
+    ground = wall & (height < _FOOT) & (slope > _LEANS)
+    return leaves | hole | obstacle | ground, leaves | obstacle
 
 
 @numba.njit(cache=True, nogil=True)
