@@ -48,8 +48,6 @@ def building_solid(polygon: Polygon, low: float, eaves: float, roof: Roof) -> Ma
     -----
     OSM wiki, Simple 3D Buildings and Key:roof:shape.
     """
-    # Here and not above: these modules need this one's types.
-
     rings = rings_of(polygon)
     if roof.shape == "flat":
         body = prism(rings, low, eaves)

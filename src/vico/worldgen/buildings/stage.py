@@ -16,6 +16,7 @@ from vico.world.mesh import Material, Surface
 from vico.world.model import FIRST_BUILDING, Building, Dropped
 from vico.world.products import turned
 from vico.world.seeds import rng
+from vico.world.threads import in_order
 from vico.worldgen.buildings.details import detailed
 from vico.worldgen.buildings.finishes import FINISHES
 from vico.worldgen.buildings.outlines import BuildingPlan, PartPlan, building_plans
@@ -433,10 +434,11 @@ def _dressed(
                 v = np.clip(v, 0.004, 0.996)
             uv = np.stack([u, v], axis=-1)
         _pile(walls, label_of, chosen, corner, uv, colours[mine], entity)
-    return (
-        [walls[name].surface(material(name)) for name in sorted(walls)],
-        [roofs[name].surface(material(name)) for name in sorted(roofs)],
-    )
+
+    def surfaces(piles: dict[str, _Pile]) -> list[Surface]:
+        return list(in_order(lambda name: piles[name].surface(material(name)), sorted(piles)))
+
+    return surfaces(walls), surfaces(roofs)
 
 
 def _phases(edges: _Edges, plans: list[BuildingPlan], seed: int) -> NDArray[np.float64]:

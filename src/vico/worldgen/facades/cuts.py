@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.world.products import dot
-
 
 def cut_at_heights(
     points: NDArray[np.float64], faces: NDArray[np.int64], owner: NDArray[np.int64], heights: NDArray[np.float64]
@@ -118,6 +116,7 @@ def without_needless(
     for k in np.flatnonzero(wanted[faces].any(axis=1)).tolist():
         for v in triangles[k]:
             around.setdefault(v, set()).add(k)
+    spots, facing = points.tolist(), normal.tolist()
     for v in candidates.tolist():
         mine = around[v]
         ring = {w for k in mine for w in triangles[k] if w != v}
@@ -132,7 +131,7 @@ def without_needless(
                 continue
             kept = [k for k in mine if k not in gone]
             moved = [[w if u == v else u for u in triangles[k]] for k in kept]
-            if any(_area(points, row, normal[k]) < 1e-6 for row, k in zip(moved, kept, strict=True)):
+            if any(_area([spots[u] for u in row], facing[k]) < 1e-6 for row, k in zip(moved, kept, strict=True)):
                 continue
             for k in gone:
                 for u in triangles.pop(k):
@@ -147,7 +146,9 @@ def without_needless(
     return np.array(list(triangles.values()), np.int64).reshape(-1, 3), owner[kept_faces]
 
 
-def _area(points: NDArray[np.float64], row: list[int], normal: NDArray[np.float64]) -> float:
+def _area(corners: list[list[float]], normal: list[float]) -> float:
     """Twice a triangle's area, negative where it is turned over."""
-    a, b, c = points[row]
-    return float(dot(np.cross(b - a, c - a), normal))
+    a, b, c = corners
+    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    return (uy * vz - uz * vy) * normal[0] + (uz * vx - ux * vz) * normal[1] + (ux * vy - uy * vx) * normal[2]
