@@ -472,11 +472,12 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="vico-") as temporary:
         work = given.work or Path(temporary)
         work.mkdir(parents=True, exist_ok=True)
+        words = ["FOLDER" if word in (str(given.work), str(given.pictures)) else word for word in sys.argv[1:]]
         lines = [
             "# How worlds look: baking, enhancement, street photos",
             "",
             machine(),
-            f"Made by `python benchmarks/appearance.py {' '.join(sys.argv[1:])}` in one go.",
+            f"Made by `python benchmarks/appearance.py {' '.join(words)}` in one go.",
             "",
         ]
         publish([*lines, *measure(work, given)], given.table)

@@ -31,7 +31,7 @@ from vico.worldgen.packaged import packaged_extract
 GOAL = 90.0
 RADII = (200, 300, 400, 500, 600)
 REPEATED = (600, 800)
-APART = 1200.0  # metres between the copies of a map that is repeated: as wide as the extracts are
+APART = 1200.0  # metres between the copies of a map that is repeated
 
 
 def places_in(data: Path) -> list[tuple[str, list[str]]]:
@@ -88,7 +88,7 @@ def of_radii(data: Path, scratch: Path) -> list[str]:
         "",
         "## Time against size: Helsinki",
         "",
-        "Repeated: the extract (1.2 km wide) four times, two by two, as none covers 1.6 km.",
+        "Repeated: the extract four times, two by two, 1.2 km apart, fields between: none covers 1.6 km.",
         "",
         "| radius m | map | s | s per ha | peak MB | world MB | buildings | places | faces |",
         "|---|---|---|---|---|---|---|---|---|",
@@ -148,11 +148,14 @@ def main() -> None:
             peaks.append(child.peak_mb)
         more = of_radii(given.data, Path(folder)) + of_places(given.data, Path(folder)) if given.data else []
     last = facts[-1]
+    how = "vico bench world --table benchmarks/results/world.md"
+    if given.data:
+        how = f"python benchmarks/world.py -n {given.n} --data DATA --table benchmarks/results/world.md"
     lines = [
         "# World: seconds a stage",
         "",
         about,
-        "Made by `vico bench world --table benchmarks/results/world.md`.",
+        f"Made by `{how}`.",
         "",
         f"{place.name}, {2 * given.radius:.0f} m x {2 * given.radius:.0f} m: {last['buildings']} buildings, "
         f"{last['places']} places, {last['roads']} roads, {last['indoor_objects']} things indoors; "

@@ -126,6 +126,24 @@ def test_a_foot_rounded_off_into_the_ground_does_not_paint_the_wall(reach: float
     assert not (colours[known] == ground).all(axis=1).any()
 
 
+def test_an_edge_rounded_off_is_forgotten_but_a_roof_where_the_map_has_a_wall_is_not() -> None:
+    mesh = photographed(0.0)
+    lower = mesh.positions.copy()
+    lower[2:, 2] = 3.0  # the wall ends at 3 m,
+    roof = (150, 40, 30)
+    sloped = with_box(replace(mesh, positions=lower), (0.0, 0.0, 3.0), (12.0, 0.0, 8.0), roof)
+    corners = sloped.positions.copy()
+    corners[6:, 1] = 5.0  # and a roof of 45 degrees begins
+    colours, known = painted(bake([wall()], [], replace(sloped, positions=corners), texel=0.125, page=256))
+    rows = np.arange(64) * 0.125
+    assert known[rows < 2.8][1:, 1:-1].all()
+    assert not known[(rows > 3.1) & (rows < 4.0)].any()
+    kept = (rows > 4.4) & (rows < 4.8)
+    assert known[kept][:, 1:-1].all()
+    assert (colours[kept][:, 1:-1] == roof).all()
+    assert not known[rows > 5.1].any()  # beyond the cage
+
+
 def test_equal_inputs_give_equal_bytes_and_entities_stay_apart() -> None:
     mesh = photographed(0.0)
     first, second = (bake([wall(), wall(y=-30, entity=6)], [], mesh, page=256) for _ in range(2))

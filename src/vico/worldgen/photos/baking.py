@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numba
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
 
 from vico.errors import EmptyInputError, InputError
 from vico.geo.tile_mesh import TileMesh
@@ -24,7 +25,9 @@ from vico.worldgen.photos.sight import Sight
 
 _BATCH = 1 << 17  # texels at a time: about 30 MB of temporaries a thread
 _COARSE = 0.5  # metres
-_AGREES = 0.75  # least cosine between the normals of wall and photographed surface
+_AGREES = 0.4  # least cosine between the normals of wall and photographed surface
+_MELTED = 0.75  # below this cosine it may be an edge that photogrammetry has rounded off,
+_EDGE = 1.2  # metres: if it lies so near to what agrees better
 _STANDS_OFF = 0.6  # metres out of the photographed wall from which a thing is no longer part of it
 _BEHIND = 0.9  # metres behind the photographed wall from which the second ray starts
 _LOW = 2.6  # metres above a wall's foot up to which what stands off it is a car or a person
@@ -309,6 +312,7 @@ def _paint(
     wall = np.abs(normal[:, 2]) < 0.5
     side = np.linalg.norm(up, axis=1)
     odd = [np.zeros(known.shape, np.bool_) for known in atlas.known]
+    loose = [np.zeros(known.shape, np.bool_) for known in atlas.known]
     total = sum(int(np.count_nonzero(inside)) for inside in atlas.inside)
 
     def paint(batch: _Batch) -> tuple[int, int]:
@@ -319,7 +323,8 @@ def _paint(
         rays = len(chart)
         triangle, u, v = hits.triangle, hits.u, hits.v
         offset = cage - hits.distance
-        good = _agree(triangle, photos.normal, chart, normal)
+        agrees = _agreement(triangle, photos.normal, chart, normal)
+        good = agrees >= _AGREES
         off = good & (offset - stand > _STANDS_OFF)
         again = np.flatnonzero(~good | off)
         if len(again):
@@ -328,8 +333,10 @@ def _paint(
             most = min(_BEHIND + _STANDS_OFF, 2 * cage)
             second = sight.first(centre[again] + start[:, None] * outward, outward, most=most)
             rays += len(again)
-            found = _agree(second.triangle, photos.normal, chart[again], normal)
+            better = _agreement(second.triangle, photos.normal, chart[again], normal)
+            found = better >= _AGREES
             use = again[found]
+            agrees[use] = better[found]
             triangle[use], u[use], v[use] = second.triangle[found], second.u[found], second.v[found]
             offset[use] = start[found] + second.distance[found]
             good[use], off[use] = True, False
@@ -351,6 +358,7 @@ def _paint(
         keep = take[~reject]
         atlas.pages[page][y[keep], x[keep]] = colour[~reject]
         atlas.known[page][y[keep], x[keep]] = True
+        loose[page][y[keep], x[keep]] = agrees[keep] < _MELTED
         if offsets is not None:
             offsets[page][y[keep], x[keep]] = offset[keep]
         return rays, len(chart)
@@ -365,7 +373,23 @@ def _paint(
     for mask, known in zip(odd, atlas.known, strict=True):
         if mask.any():
             _forget_near(mask, known)
+    _forget_melted(atlas, loose)
     return rays
+
+
+def _forget_melted(atlas: Atlas, loose: Sequence[NDArray[np.bool_]]) -> None:
+    """Forget what leans away from a chart near to what does not: edges that are melted into roof, ground or neighbour.
+
+    A surface that leans all over (a roof where the map has a wall) stays: its colours are what is there.
+    """
+    size = 2 * round(_EDGE / atlas.texel) + 1
+    for chart in atlas.charts:
+        leans = loose[chart.page][chart.box]
+        if leans.any():
+            known = atlas.known[chart.page][chart.box]
+            upright = known & ~leans
+            if upright.any():
+                known &= ~(leans & maximum_filter(upright, size=size))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -383,15 +407,15 @@ def _texels(chart, column, row, origin, right, up, normal, expected):  # type: i
 
 
 @numba.njit(cache=True, nogil=True)
-def _agree(triangle, normals, chart, normal):  # type: ignore[no-untyped-def]
-    """Whether what was hit faces the chart's way."""
-    agree = np.zeros(len(triangle), np.bool_)
+def _agreement(triangle, normals, chart, normal):  # type: ignore[no-untyped-def]
+    """Cosine between the normals of what was hit and of the chart; -1 where nothing was."""
+    cosine = np.full(len(triangle), -1.0)
     for n in range(len(triangle)):
         t = triangle[n]
         if t >= 0:
             a, b = normals[t], normal[chart[n]]
-            agree[n] = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] >= _AGREES
-    return agree
+            cosine[n] = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return cosine
 
 
 def _oddities(
