@@ -126,6 +126,17 @@ def test_a_foot_rounded_off_into_the_ground_does_not_paint_the_wall(reach: float
     assert not (colours[known] == ground).all(axis=1).any()
 
 
+def test_a_steep_slope_keeps_its_foot() -> None:
+    def leaning(points: np.ndarray) -> np.ndarray:
+        return points + points[:, 2:] * (0.0, 0.5, 0.0)  # 27 degrees: it looks up more than a rounded foot does
+
+    upright = wall()
+    slope = Surface.from_triangles(leaning(upright.positions.astype(np.float64)), upright.triangles, entity=5)
+    mesh = photographed(0.0)
+    _, known = painted(bake([slope], [], replace(mesh, positions=leaning(mesh.positions)), texel=0.125, page=256))
+    assert known[1:-1, 1:-1].all()
+
+
 def test_an_edge_rounded_off_is_forgotten_but_a_roof_where_the_map_has_a_wall_is_not() -> None:
     mesh = photographed(0.0)
     lower = mesh.positions.copy()

@@ -14,6 +14,7 @@ from vico.errors import InputError, MissingFileError
 from vico.world.folder import read_world
 from vico.worldgen import recipe
 from vico.worldgen.ground.terrain import flat_terrain
+from vico.worldgen.many import read_place_table
 from vico.worldgen.pipeline import build_world, rebuild_world
 from vico.worldgen.stages import Stages
 
@@ -52,9 +53,9 @@ def test_a_later_stage_is_kept_when_an_earlier_one_gives_the_same_again(tmp_path
 
 def test_what_nobody_needs_any_more_is_let_go(tmp_path: Path) -> None:
     stages = Stages(tmp_path)
-    for again in (flat_terrain(half=50.0), stages.run("terrain", flat_terrain, half=50.0)):
-        held = weakref.ref(stages.given(again, "its digest"))
-        del again
+    height = stages.run("terrain", flat_terrain, half=50.0)
+    held = weakref.ref(height)
+    del height
     gc.collect()
     assert held() is None
 
@@ -150,6 +151,13 @@ def test_many_places_are_built_side_by_side_and_a_bad_one_stops_nobody(
     assert [o["state"] for o in json.loads(capsys.readouterr().out)["places"]] == ["kept", "failed", "kept"]
 
 
+def test_a_table_names_layouts_and_things_beside_it(tmp_path: Path) -> None:
+    (tmp_path / "places.csv").write_text("name,lat,lon,layouts,things\na,1,2,plans,installed\nb,3,4,,\n")
+    first, second = read_place_table(tmp_path / "places.csv")
+    assert (first.layouts, first.things) == (str(tmp_path / "plans"), "installed")
+    assert (second.layouts, second.things) == ("", "")
+
+
 @pytest.mark.parametrize(
     ("text", "why"),
     [
@@ -160,6 +168,7 @@ def test_many_places_are_built_side_by_side_and_a_bad_one_stops_nobody(
         ("name,lat,lon\na,91,2\n", "not on Earth"),
         ("name,lat,lon\na,1,2\na,3,4\n", "named twice"),
         ("name,lat,lon,colour\na,1,2,red\n", "unknown columns colour"),
+        ("name,lat,lon,things\na,1,2,gold\n", "give procedural or installed"),
     ],
 )
 def test_a_bad_table_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, why: str) -> None:

@@ -50,6 +50,7 @@ def pack_textures(materials: Sequence[Material]) -> Textures:
     size = np.zeros((n, 3), np.int32)
     flags = np.zeros(n, np.uint8)
     emission = np.zeros(n, np.float32)
+    # One array from the start: joining the levels at the end would take the memory of a photographed city twice.
     texels = np.full(1 + sum(_texel_count(*sides) for sides in _shapes(materials)), 0xFFFFFFFF, np.uint32)
     position = 1
     known: dict[int, int] = {}

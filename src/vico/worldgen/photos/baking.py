@@ -32,7 +32,7 @@ _STANDS_OFF = 0.6  # metres out of the photographed wall from which a thing is n
 _BEHIND = 0.9  # metres behind the photographed wall from which the second ray starts
 _LOW = 2.6  # metres above a wall's foot up to which what stands off it is a car or a person
 _FOOT = 1.5  # metres above a wall's foot up to which photogrammetry rounds it off into the ground
-_LEANS = 0.3  # sine of the slope that tells it does, and shows the ground's colours
+_LEANS = 0.3  # how much more it looks up there than the wall does (z of the normals): it shows the ground's colours
 _GREEN, _GREENER = 26.0, 18.0  # excess green (2g - r - b) of leaves, and how much more than the wall's own
 _DARK, _DARKER = 14.0, 0.15  # luminance of holes in the photographs, and their share of the wall's own
 _FRINGE = 2  # texels around leaves that they still colour
@@ -349,7 +349,7 @@ def _paint(
             colour,
             off[take],
             wall[whose],
-            photos.normal[triangle[take], 2],
+            photos.normal[triangle[take], 2] - normal[whose, 2],
             height,
             expected.luminance[whose],
             expected.green[whose],
@@ -422,7 +422,7 @@ def _oddities(
     colour: NDArray[np.uint8],
     off: NDArray[np.bool_],
     wall: NDArray[np.bool_],
-    slope: NDArray[np.float64],
+    lean: NDArray[np.float64],
     height: NDArray[np.float64],
     luminance: NDArray[np.float64],
     green: NDArray[np.float64],
@@ -434,7 +434,7 @@ def _oddities(
     leaves = wall & (excess > _GREEN) & (excess > green + _GREENER)
     hole = (light < _DARK) & (light < _DARKER * luminance)
     obstacle = wall & off & (height < _LOW) & (luminance > 0)  # the coarse bake doesn't know yet what stands off
-    ground = wall & (height < _FOOT) & (slope > _LEANS)
+    ground = wall & (height < _FOOT) & (lean > _LEANS)
     return leaves | hole | obstacle | ground, leaves | obstacle
 
 
