@@ -4,7 +4,7 @@ BIN := .venv/bin
 DEMO ?= out/demo
 SEED ?= 0
 
-.PHONY: demo test check bench clean
+.PHONY: demo test check docs wheel bench clean
 
 .venv/demo: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not ((3, 11) <= sys.version_info[:2] < (3, 14)))' \
@@ -14,7 +14,7 @@ SEED ?= 0
 	@touch $@
 
 .venv/dev: .venv/demo
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[worldgen,photos,usd,dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[worldgen,photos,usd,docs,dev]'
 	@touch $@
 
 # Bodies and robots with real meshes, from the packages that ship them. Compiled code is warmed once, here.
@@ -30,10 +30,24 @@ demo: .venv/assets
 test: .venv/dev
 	$(BIN)/python -m pytest
 
-check: .venv/dev
+# The Khronos glTF validator, for a test; without npm that test is skipped.
+.venv/gltf:
+	@if command -v npm > /dev/null; then npm install --silent --prefix .venv/gltf gltf-validator@2.0.0-dev.3.10; \
+	  else echo "no npm: worlds' meshes are not held against the glTF validator"; fi
+
+check: .venv/dev .venv/gltf
 	$(BIN)/ruff format --no-cache --check .
 	$(BIN)/ruff check --no-cache .
 	$(BIN)/mypy
+	$(BIN)/python scripts/api_reference.py out/api
+
+# The API reference, a page a module: out/api/index.html.
+docs: .venv/dev
+	$(BIN)/python scripts/api_reference.py out/api
+
+# The wheel, installed into an empty environment and used there.
+wheel: .venv/dev
+	$(BIN)/python scripts/try_wheel.py
 
 bench: .venv/assets .venv/dev
 	for what in world render sim memory; do $(BIN)/vico bench $$what --table benchmarks/results/$$what.md; done

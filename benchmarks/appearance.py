@@ -1,7 +1,7 @@
 """How a world looks in the street, with and without each photo stage, against the known place that was photographed.
 
-    python benchmarks/appearance.py [--radius 150] [--photos 40] [--views 50] [--aerial 0.25] [--work FOLDER]
-                                    [--table FILE] [--pictures FOLDER]
+    PYTHONPATH=tests python benchmarks/appearance.py [--radius 150] [--photos 40] [--views 50] [--aerial 0.25]
+                                                    [--work FOLDER] [--table FILE] [--pictures FOLDER]
 
 The known place is the packaged one, with the facades of one seed. A synthetic photogrammetry tileset and street photos
 with wrong poses are made of it. The place is then built again with another seed by `build_world` as users would:
@@ -38,23 +38,23 @@ from PIL import Image, ImageDraw, ImageFont
 from reporting import machine, publish
 from scipy.ndimage import gaussian_filter
 
-from vico.cli.world import studio
-from vico.geo.street_images import heading_of, looking
+from photogrammetry.aerial import Photogrammetry, photogrammetry
+from photogrammetry.tileset import write_tileset
+from vico.geo.street_images.model import heading_of, looking
 from vico.render import Cameras, Scene, render
 from vico.render.world_scene import scene_of
+from vico.seeds import rng
 from vico.world.folder import World, read_world
-from vico.world.seeds import rng
-from vico.world.tileset import write_tileset
 from vico.world.walkable import SIDEWALK
+from vico.worldgen.facts.sight import Sight
 from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.photos.daylight import sun_in, without_sun
-from vico.worldgen.photos.photogrammetry import Photogrammetry, photogrammetry
-from vico.worldgen.photos.sight import Sight
-from vico.worldgen.photos.streetview import StreetviewReport
-from vico.worldgen.photos.streetview_pose import Correction, Pose, correction
+from vico.worldgen.photos.streetview.pose import Correction, Pose, correction
+from vico.worldgen.photos.streetview.reprojection import StreetviewReport
 from vico.worldgen.photos.texturing import Painted, Texturing
 from vico.worldgen.pipeline import STAGES, build_world
 from vico.worldgen.product import read_product
+from vico.worldgen.request import BuildOptions
 from vico.worldgen.sources import Sources
 
 EYE = 1.6
@@ -102,7 +102,13 @@ def known_place(work: Path, radius: float, photos: int, *, aerial: float = 0.25)
     truth = work / "truth"
     if not (truth / "world.json").exists():
         build_world(
-            Sources(place.path), lat=place.lat, lon=place.lon, half=radius, seed=TRUE_SEED, out=truth, keep_stages=False
+            Sources(place.path),
+            lat=place.lat,
+            lon=place.lon,
+            half=radius,
+            seed=TRUE_SEED,
+            out=truth,
+            options=BuildOptions(keep_stages=False, previews=False),
         )
     world = read_world(truth)
     if not (work / "tiles" / "tileset.json").exists():
@@ -116,7 +122,7 @@ def known_place(work: Path, radius: float, photos: int, *, aerial: float = 0.25)
 
 
 def _street_photos(world: World, folder: Path, count: int) -> None:
-    """A folder of photos as a phone's: JPEG, position and angles in a file, all of it somewhat wrong."""
+    """Write a folder of photos as a phone makes them: JPEG, position and angles in a file, all somewhat wrong."""
     from streetview import WIDE as PHOTO_WIDE
     from streetview import photographer_of, photos_of, street_life, true_cameras
 
@@ -175,8 +181,7 @@ def build(work: Path, name: str, radius: float, *, whole_map: bool) -> None:
         seed=SEED,
         out=work / name,
         force=True,
-        texturing=variant.texturing,
-        studio=studio,
+        options=BuildOptions(texturing=variant.texturing, previews=False),
     )
     cost = {
         "cpu": time.process_time() - start,
@@ -186,7 +191,7 @@ def build(work: Path, name: str, radius: float, *, whole_map: bool) -> None:
 
 
 def spots(world: World, scene: Scene, count: int, seed: int) -> list[Pose]:
-    """Views on pavements of the middle of a world that show facades: near enough, and not only these."""
+    """Choose views on pavements of the middle of a world that show facades: near enough, and not only these."""
     random = rng(seed, "views")
     walkable = world.walkable
     cells = np.argwhere(walkable.cls == SIDEWALK)[:, ::-1]
@@ -273,7 +278,7 @@ def cell(values: Sequence[float], digits: int) -> str:
 
 
 def appearance(names: Sequence[str], figures: dict[str, list[dict[str, float]]], count: int) -> list[str]:
-    """The table of all variants."""
+    """Lay out the table of all variants."""
     lines = [
         f"Median (quartiles) over {count} views. PSNR in dB and SSIM: more is better; FLIP: less is better.",
         "",
@@ -295,7 +300,7 @@ def appearance(names: Sequence[str], figures: dict[str, list[dict[str, float]]],
 
 
 def costs(work: Path, names: Sequence[str]) -> list[str]:
-    """What each variant took."""
+    """Tabulate what each variant took."""
     lines = [
         "| world | " + " | ".join(f"{stage}, s" for stage in _STAGES) + " | all stages, s | processor, s | peak, GB "
         "| world, MB | pages | texels | of photos |",
@@ -388,8 +393,9 @@ def texels(truth: World, before: Painted, after: Painted) -> list[str]:
 def against(
     pages: Sequence[Any], true: Sequence[Any], where: Sequence[Any], charts: Sequence[Any], texel: float
 ) -> tuple[float, float, float]:
-    """PSNR with each wall's colours scaled to the true ones' (a photo can't tell a dark wall from a dark day), and the
-    correlation of what is finer than half a metre, and than two.
+    """Compare pages with the true ones: PSNR, and the correlation of what is finer than half a metre, and than two.
+
+    PSNR is with each wall's colours scaled to the true ones' (a photo can't tell a dark wall from a dark day).
     """
     error, fine, broad, count = 0.0, 0.0, 0.0, 0
     for chart in charts:
@@ -477,14 +483,14 @@ def main() -> None:
             "# How worlds look: baking, enhancement, street photos",
             "",
             machine(),
-            f"Made by `python benchmarks/appearance.py {' '.join(words)}` in one go.",
+            f"Made by `PYTHONPATH=tests python benchmarks/appearance.py {' '.join(words)}` in one go.",
             "",
         ]
         publish([*lines, *measure(work, given)], given.table)
 
 
 def conditions(given: argparse.Namespace) -> list[str]:
-    """What the worlds are built from, and what that makes of the figures."""
+    """Say what the worlds are built from, and what that makes of the figures."""
     lines = [
         f"Aerial photos have {given.aerial:g} m a pixel on walls; the tiles are melted and bumpy, and show the "
         "place where the street photos do.",
@@ -505,7 +511,7 @@ def conditions(given: argparse.Namespace) -> list[str]:
 
 
 def yardstick(true: Sequence[tuple[Any, ...]], buildings: NDArray[np.int64]) -> list[str]:
-    """What the figures say of pictures whose fault is known."""
+    """Tabulate what the figures say of pictures whose fault is known."""
     faults = {
         "moved aside by 3 pixels": lambda rgb: np.roll(rgb, 3, axis=1),
         "blurred by 2 pixels": lambda rgb: np.round(gaussian_filter(rgb.astype(np.float32), (2, 2, 0))).astype(

@@ -3,7 +3,8 @@
 The mesh is made from a world's own walls and roofs: their procedural look is the truth. It is what such meshes are:
 cut in small triangles, bent, shifted, blurred, without the walls nobody can see, with leaves and cars melted in front.
 
-Run: ``python benchmarks/baking.py WORLD... [--table FILE] [--pictures FOLDER]``; prints a table in markdown.
+Run: ``PYTHONPATH=tests python benchmarks/baking.py WORLD... [--table FILE] [--pictures FOLDER]``; prints a table in
+markdown.
 
 With ``--district FOLDER [--radius 400] [--threads 1 2]`` it also builds the packaged place as users do, from a tileset
 that is made of it (bumpy, melted, with trees, cars and shadows): minutes, processor seconds, peak memory and size of
@@ -30,18 +31,18 @@ from PIL import Image
 from reporting import machine, publish, vico
 from scipy.ndimage import gaussian_filter
 
-from vico.geo.tile_mesh import TileMesh
+from photogrammetry.aerial import photogrammetry as from_the_air
+from photogrammetry.tileset import write_tileset
+from vico.geo.tiles3d.mesh import TileMesh
+from vico.seeds import rng
+from vico.threads import WORKERS, workers
 from vico.world.folder import read_world, stage_seconds
 from vico.world.mesh import Surface, glb_bytes
-from vico.world.seeds import rng
-from vico.world.threads import WORKERS, workers
-from vico.world.tileset import write_tileset
+from vico.worldgen.facts.sight import Sight
 from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.photos.atlas import Atlas, textured, unwrap
 from vico.worldgen.photos.baking import Baked, _Expected, _paint, _Photos, bake
-from vico.worldgen.photos.enhance import inpainted, padded, upscaled
-from vico.worldgen.photos.photogrammetry import photogrammetry as from_the_air
-from vico.worldgen.photos.sight import Sight
+from vico.worldgen.photos.enhance.steps import inpainted, padded, upscaled
 
 _PHOTO_TEXEL = 0.12  # metres: what a city's photogrammetry shows
 _EDGE = 4.0  # metres, the longest edge of its triangles
@@ -79,7 +80,7 @@ def as_tile_mesh(surfaces: Sequence[Surface]) -> TileMesh:
 
 
 def truth_of(atlas: Atlas, mesh: TileMesh) -> tuple[NDArray[np.uint8], ...]:
-    """What the pages would be if the photos were perfect, by charts of the exact mesh."""
+    """Return what the pages would be if the photos were perfect, by charts of the exact mesh."""
     pages = tuple(page.copy() for page in atlas.pages)
     known = tuple(np.zeros_like(mask) for mask in atlas.known)
     exact = replace(atlas, pages=pages, known=known)
@@ -88,7 +89,7 @@ def truth_of(atlas: Atlas, mesh: TileMesh) -> tuple[NDArray[np.uint8], ...]:
 
 
 def photogrammetry(walls: Sequence[Surface], roofs: Sequence[Surface], *, seed: int, bent: float = 1.0) -> TileMesh:
-    """A photogrammetry mesh of buildings: small bent triangles, blurred colours, holes, leaves and cars in front."""
+    """Make a photogrammetry mesh of buildings: small bent triangles, blurred colours, holes, leaves, cars in front."""
     random = rng(seed, "photogrammetry")
     new_walls, new_roofs, atlas = unwrap(walls, roofs, texel=_PHOTO_TEXEL, page=2048)
     exact = as_tile_mesh([*walls, *roofs])
@@ -231,7 +232,7 @@ def measured(name: str, world: Path, *, texel: float, finer: bool, bent: float, 
 
 
 def district(work: Path, radius: float, threads: Sequence[int]) -> list[str]:
-    """A table of whole builds from a tileset with texels of 10 cm, one line for each number of threads."""
+    """Tabulate whole builds from a tileset with texels of 10 cm, one line for each number of threads."""
     place = packaged_extract()
     where = ["--lat", f"{place.lat}", "--lon", f"{place.lon}", "--radius", f"{radius:g}", "--overpass", "off"]
     truth, tiles = work / f"truth{radius:g}", work / f"tiles{radius:g}" / "tileset.json"
@@ -294,7 +295,8 @@ def main() -> None:
     lines = ["# Photos onto buildings: bake, in-paint, enlarge", "", machine()]
     if given.worlds:
         lines += [
-            "Made by `python benchmarks/baking.py WORLD... --district FOLDER --table benchmarks/results/baking.md`:",
+            "Made by `PYTHONPATH=tests python benchmarks/baking.py WORLD... --district FOLDER",
+            "--table benchmarks/results/baking.md`:",
             "mocked-up photos of each world (bent: 0.1 m waves, 0.4 m shift; exact: neither), CPU seconds, PSNR",
             "against the world's own look in dB. Finer: back-projection against bicubic enlargement. The peak",
             "includes making mesh and truth.",

@@ -9,7 +9,7 @@ import osmium
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from vico.world.seeds import rng
+from vico.seeds import rng
 
 LOOKS = (
     "building:levels", "building:min_level", "building:levels:underground", "building:part", "building:colour",

@@ -24,15 +24,15 @@ from PIL import Image
 from vico.assets.shapes import ball, box, cylinder, lathe, pose_matrix
 from vico.render import Cameras, Scene, render
 from vico.render.world_scene import scene_of
+from vico.seeds import rng
 from vico.world.folder import read_world
 from vico.world.mesh import Material, Surface, joined
-from vico.world.seeds import rng
 
 EYE = 1.6
 
 
 def facade_texture(seed: int) -> NDArray[np.uint8]:
-    """A 64 x 64 bay of wall with a window; row 0 is at the bottom."""
+    """Paint a 64 x 64 bay of wall with a window; row 0 is at the bottom."""
     generator = np.random.default_rng(seed)
     tile = np.full((64, 64, 3), 225.0)
     tile += generator.normal(0, 5, (64, 64, 1))
@@ -45,7 +45,7 @@ def facade_texture(seed: int) -> NDArray[np.uint8]:
 
 
 def ground_texture(seed: int, level: float, colour: tuple[float, float, float]) -> NDArray[np.uint8]:
-    """A noisy 128 x 128 tile."""
+    """Paint a noisy 128 x 128 tile."""
     noise = np.random.default_rng(seed).normal(0, 9, (128, 128, 1))
     return np.clip((level + noise) * np.array(colour), 0, 255).astype(np.uint8)
 
@@ -58,7 +58,7 @@ def grid_quad(
     uv: tuple[float, float],
     **options: object,
 ) -> Surface:
-    """A rectangle cut into cells; it faces along x up."""
+    """Make a rectangle cut into cells; it faces along x up."""
     n, m = cells
     s, t = np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, m + 1))
     points = corner + s[..., None] * along + t[..., None] * up
@@ -178,7 +178,7 @@ def house(
     entity: int,
     tint: NDArray[np.uint8],
 ) -> list[Surface]:
-    """A box with windows on its four sides."""
+    """Make a box with windows on its four sides."""
     height, bays = floors * 3.2, max(int(side / 3), 1)
     corners = [low + np.array(step) * side for step in ((0, 0), (1, 0), (1, 1), (0, 1))]
     walls = [
@@ -206,7 +206,7 @@ def house(
     return [*walls, top]
 
 
-class Crowd:
+class WalkingFigures:
     """Bodies of about 1,200 triangles each (ellipsoids for torso, head and limbs) that walk to and fro."""
 
     def __init__(self, places: list[NDArray[np.float64]]) -> None:
@@ -259,7 +259,9 @@ def street_cameras(points: list[NDArray[np.float64]], count: int, **options: obj
     return Cameras(position, forward, **options)  # type: ignore[arg-type]
 
 
-def timed(scene: Scene, cameras: Cameras, crowd: Crowd, frames: int, *, rgb: bool = True) -> NDArray[np.float64]:
+def timed(
+    scene: Scene, cameras: Cameras, figures: WalkingFigures, frames: int, *, rgb: bool = True
+) -> NDArray[np.float64]:
     """Processor milliseconds of each picture, one thread."""
     singles = [
         Cameras(cameras.position[k : k + 1], cameras.forward[k : k + 1], width=cameras.width, height=cameras.height)
@@ -267,7 +269,7 @@ def timed(scene: Scene, cameras: Cameras, crowd: Crowd, frames: int, *, rgb: boo
     ]
     times = []
     for step in range(frames):
-        crowd.set(scene, step)
+        figures.set(scene, step)
         for camera in singles:
             start = time.thread_time()
             render(scene, camera, threads=1, rgb=rgb)
@@ -275,61 +277,68 @@ def timed(scene: Scene, cameras: Cameras, crowd: Crowd, frames: int, *, rgb: boo
     return np.array(times)
 
 
-def wall(scene: Scene, cameras: Cameras, crowd: Crowd, frames: int, threads: int) -> NDArray[np.float64]:
+def wall(scene: Scene, cameras: Cameras, figures: WalkingFigures, frames: int, threads: int) -> NDArray[np.float64]:
     """Wall milliseconds a picture in batches of all cameras."""
     times = []
     for step in range(frames):
-        crowd.set(scene, step)
+        figures.set(scene, step)
         start = time.perf_counter()
         render(scene, cameras, threads=threads)
         times.append((time.perf_counter() - start) * 1000 / len(cameras))
     return np.array(times)
 
 
-def measure(folder: Path | None, frames: int, pictures: Path | None) -> list[str]:
-    """Lines of the report on the synthetic city or on a world folder."""
-    start = time.perf_counter()
+def scene_to_measure(folder: Path | None) -> tuple[str, Scene, list[NDArray[np.float64]], int]:
+    """Return name, scene, street points and static triangles of the synthetic city or of a world folder."""
     if folder is None:
-        scene, points, triangles = synthetic_city()
-        name = "synthetic city"
-    else:
-        world = read_world(folder)
-        scene = scene_of(world)
-        generator = rng(3, "render benchmark")
-        points = []
-        for _ in range(60):
-            xy = world.walkable.random_point(generator)
-            points.append(np.array([xy[0], xy[1], float(world.height(xy))]))
-        triangles = len(scene.arrays.mesh.triangle)
-        name = world.manifest.name
+        return "synthetic city", *synthetic_city()
+    world = read_world(folder)
+    scene = scene_of(world)
+    generator = rng(3, "render benchmark")
+    points = []
+    for _ in range(60):
+        xy = world.walkable.random_point(generator)
+        points.append(np.array([xy[0], xy[1], float(world.height(xy))]))
+    return world.manifest.name, scene, points, len(scene.arrays.mesh.triangle)
+
+
+def save_pictures(folder: Path, name: str, scene: Scene, cameras: Cameras) -> None:
+    """Write a sheet of all the views and the first four of them in wide."""
+    folder.mkdir(parents=True, exist_ok=True)
+    small = render(scene, cameras)
+    sheet = np.concatenate([np.concatenate(list(small.rgb[r * 5 : r * 5 + 5]), axis=1) for r in range(3)])
+    Image.fromarray(sheet).save(folder / f"{name} sheet.png")
+    for k in range(4):
+        wide = Cameras(cameras.position[k : k + 1], cameras.forward[k : k + 1], width=960, height=540, fov_y=1.2)
+        Image.fromarray(render(scene, wide, samples=2).rgb[0]).save(folder / f"{name} {k}.png")
+
+
+def measure(folder: Path | None, frames: int, pictures: Path | None) -> list[str]:
+    """Return the lines of the report on the synthetic city or on a world folder."""
+    start = time.perf_counter()
+    name, scene, points, triangles = scene_to_measure(folder)
     built = time.perf_counter() - start
-    crowd = Crowd([p + np.array([4.0, 0.5 * (k % 3), 0.0]) for k, p in enumerate(points[:15])])
-    crowd.set(scene, 0)
+    figures = WalkingFigures([p + np.array([4.0, 0.5 * (k % 3), 0.0]) for k, p in enumerate(points[:15])])
+    figures.set(scene, 0)
     cameras = street_cameras(points, 15)
     start = time.perf_counter()
     scene.light()
     lit = time.perf_counter() - start
     render(scene, cameras)
     if pictures:
-        pictures.mkdir(parents=True, exist_ok=True)
-        small = render(scene, cameras)
-        sheet = np.concatenate([np.concatenate(list(small.rgb[r * 5 : r * 5 + 5]), axis=1) for r in range(3)])
-        Image.fromarray(sheet).save(pictures / f"{name} sheet.png")
-        for k in range(4):
-            wide = Cameras(cameras.position[k : k + 1], cameras.forward[k : k + 1], width=960, height=540, fov_y=1.2)
-            Image.fromarray(render(scene, wide, samples=2).rgb[0]).save(pictures / f"{name} {k}.png")
+        save_pictures(pictures, name, scene, cameras)
     rows = [
-        ("RGB + depth + segmentation, processor time", timed(scene, cameras, crowd, frames)),
-        ("depth + segmentation, processor time", timed(scene, cameras, crowd, frames, rgb=False)),
-        ("batch of 15, 1 thread, wall time a picture", wall(scene, cameras, crowd, frames, 1)),
-        ("batch of 15, 2 threads, wall time a picture", wall(scene, cameras, crowd, frames, 2)),
+        ("RGB + depth + segmentation, processor time", timed(scene, cameras, figures, frames)),
+        ("depth + segmentation, processor time", timed(scene, cameras, figures, frames, rgb=False)),
+        ("batch of 15, 1 thread, wall time a picture", wall(scene, cameras, figures, frames, 1)),
+        ("batch of 15, 2 threads, wall time a picture", wall(scene, cameras, figures, frames, 2)),
     ]
     lines = [
         f"## {name}",
         "",
-        f"{triangles:,} static triangles, {int(scene.arrays.counts[1]):,} placed objects, {len(crowd.triangles):,} "
-        f"triangles in 15 moving avatars; 256 x 256 pixels, 15 street-level cameras, sun shadows. "
-        f"Scene ready in {built:.1f} s, light and shadow map in {lit:.2f} s.",
+        f"{triangles:,} static triangles, {int(scene.arrays.counts['static_instances']):,} placed objects, "
+        f"{len(figures.triangles):,} triangles in 15 moving avatars; 256 x 256 pixels, 15 street-level cameras, sun "
+        f"shadows. Scene ready in {built:.1f} s, light and shadow map in {lit:.2f} s.",
         "",
         "| what | median ms | p5 | p95 | n |",
         "|---|---|---|---|---|",
@@ -365,7 +374,7 @@ def main() -> None:
 
 
 def processor() -> str:
-    """What the machine says its processor is."""
+    """Return what the machine says its processor is."""
     try:
         for line in Path("/proc/cpuinfo").read_text().splitlines():
             if line.startswith("model name"):

@@ -26,7 +26,7 @@ class Child:
 
 
 def machine() -> str:
-    """The machine and the versions that decide the figures; no names of folders."""
+    """Name the machine and the versions that decide the figures; no names of folders."""
     model = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
@@ -59,7 +59,7 @@ def vico(*arguments: str) -> Child:
 
 
 def row(name: str, values: Sequence[float], digits: int) -> str:
-    """A line of a table: median, least and greatest of n measurements."""
+    """Format a line of a table: median, least and greatest of n measurements."""
     low, high, middle = min(values), max(values), statistics.median(values)
     return f"| {name} | {middle:.{digits}f} | {low:.{digits}f} | {high:.{digits}f} | {len(values)} |"
 

@@ -17,11 +17,11 @@ from pathlib import Path
 import numpy as np
 from reporting import machine
 
+from vico.agents.gather import Gatherer
 from vico.agents.schedule import followers_of
 from vico.community import read_community
 from vico.community.model import Community
 from vico.sim.config import SimConfig
-from vico.sim.gather import Gatherer
 from vico.sim.simulation import Simulation
 from vico.world.folder import World, read_world
 from vico.world.public import PublicMap
@@ -40,7 +40,7 @@ def measure(world: World, community: Community, config: SimConfig, steps: int) -
             sim.metrics.seconds.clear()
         began, spent = time.perf_counter(), time.process_time()
         gathered = agents.gather(observations, infos)
-        result = sim.step(gathered.actions, gathered.troubles)
+        result = sim.step(gathered.actions, gathered.agent_faults)
         observations, infos = result.observations, result.infos
         if step >= _WARM:
             cpu.append(1000 * (time.process_time() - spent))

@@ -27,23 +27,23 @@ from reporting import machine, publish, row, vico
 from vico.assets.people import body_of, passer_by
 from vico.assets.vehicles import vehicle_prototypes
 from vico.geo.frame import LocalFrame
-from vico.geo.street_images import StreetImage, looking, pinhole
-from vico.geo.street_images_folder import FolderImages
+from vico.geo.street_images.folder import FolderImages
+from vico.geo.street_images.model import StreetImage, looking, pinhole
 from vico.render import Cameras, Lighting, Scene, render
 from vico.render.world_scene import scene_of
+from vico.seeds import rng
 from vico.world.folder import World, read_world
 from vico.world.mesh import Surface
-from vico.world.seeds import rng
+from vico.worldgen.facts.sight import Sight
 from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.photos.atlas import Atlas, textured, unwrap
-from vico.worldgen.photos.sight import Sight
-from vico.worldgen.photos.streetview import reproject
-from vico.worldgen.photos.streetview_mask import View
-from vico.worldgen.photos.streetview_match import SiftMatcher
-from vico.worldgen.photos.streetview_photo import Photographer, StreetviewConfig
-from vico.worldgen.photos.streetview_pose import Pose, correction, relative_pose
-from vico.worldgen.photos.streetview_project import texel_centres
-from vico.worldgen.previews import viewpoints
+from vico.worldgen.photos.streetview.masks import PhotoView
+from vico.worldgen.photos.streetview.matching import SiftMatcher
+from vico.worldgen.photos.streetview.photo import Photographer, StreetviewConfig
+from vico.worldgen.photos.streetview.pose import Pose, correction, relative_pose
+from vico.worldgen.photos.streetview.projection import texel_centres
+from vico.worldgen.photos.streetview.reprojection import reproject
+from vico.worldgen.previews.viewpoints import viewpoints
 
 MOVER = 1 << 23
 """Entities from here on are cars and people."""
@@ -55,7 +55,7 @@ TEXEL = 0.1
 
 
 def photographer_of(scene: Scene, *, samples: int = 1) -> Photographer:
-    """Takes pictures of a scene with pinhole cameras whose principal point is the middle."""
+    """Return a photographer of a scene: pinhole cameras whose principal point is the middle."""
 
     def photograph(
         position: NDArray[np.float64], rotation: NDArray[np.float64], intrinsics: NDArray[np.float64], w: int, h: int
@@ -69,7 +69,7 @@ def photographer_of(scene: Scene, *, samples: int = 1) -> Photographer:
 
 
 def true_pages(atlas: Atlas, surfaces: list[Surface], *, reach: float = 0.03) -> tuple[NDArray[np.uint8], ...]:
-    """The atlas's pages in the colours that the surfaces have: their textures times their vertex colours.
+    """Paint the atlas's pages in the colours that the surfaces have: their textures times their vertex colours.
 
     Surfaces may stand `reach` metres before the atlas's walls, and at least 0.17 m behind; grey (128) where none are.
     """
@@ -101,7 +101,7 @@ def true_pages(atlas: Atlas, surfaces: list[Surface], *, reach: float = 0.03) ->
 
 
 def _reduced(surface: Surface, texel: float) -> NDArray[np.float32]:
-    """A surface's texture, no finer than the atlas: each of its pixels is the mean of about a texel."""
+    """Reduce a surface's texture to the atlas's fineness: each of its pixels is the mean of about a texel."""
     texture = surface.material.texture
     if texture is None:
         return np.full((1, 1, 3), 255, np.float32)
@@ -130,7 +130,7 @@ def _between(texture: NDArray[np.float32], at: NDArray[Any]) -> NDArray[np.float
 
 
 def aerial(atlas: Atlas, pages: tuple[NDArray[np.uint8], ...], seed: int) -> Atlas:
-    """The atlas as seen from the air: blurred (0.2 m standard deviation), in other colours, noisy; all of it known."""
+    """Return the atlas as seen from the air: blurred (0.2 m standard deviation), recoloured, noisy; all of it known."""
     random = rng(seed, "aerial texture")
     made = [page.copy() for page in atlas.pages]
     for chart in atlas.charts:
@@ -142,7 +142,7 @@ def aerial(atlas: Atlas, pages: tuple[NDArray[np.uint8], ...], seed: int) -> Atl
 
 
 def street_life(world: World, cameras: list[Pose], seed: int) -> tuple[Scene, int]:
-    """The known world in the afternoon, with cars and people before most cameras; and how many there are."""
+    """Put cars and people before most cameras of the known world in the afternoon; return how many there are too."""
     random = rng(seed, "street life")
     models = vehicle_prototypes()
     names = [name for name in sorted(models) if name != "bicycle"]
@@ -311,7 +311,7 @@ def measure(world: World, count: int, seed: int, pictures: Path | None) -> list[
     lines += _movers(recorder.masks, [movers[k] for k in accepted], pictures)
     lines += [f"Processor time: {spent / count:.1f} s a photo, renders and projection included.", ""]
     if pictures is not None:
-        _sheet(pictures, world, photos, report, result, model, new_walls, new_roofs, cameras)
+        _sheet(pictures, world, photos, result, model, new_walls, new_roofs, cameras)
     return lines
 
 
@@ -319,11 +319,11 @@ class _Watched:
     """The default configuration, with a look at what its detector masks."""
 
     def __init__(self, config: StreetviewConfig) -> None:
-        self.masks: list[tuple[View, NDArray[np.bool_]]] = []
+        self.masks: list[tuple[PhotoView, NDArray[np.bool_]]] = []
         self._movers = config.movers
         self.config = replace(config, movers=self)
 
-    def mask(self, view: View) -> NDArray[np.bool_]:
+    def mask(self, view: PhotoView) -> NDArray[np.bool_]:
         assert self._movers is not None
         found = self._movers.mask(view)
         self.masks.append((view, found))
@@ -331,7 +331,7 @@ class _Watched:
 
 
 def _movers(
-    masks: list[tuple[View, NDArray[np.bool_]]], true: list[NDArray[np.bool_]], pictures: Path | None
+    masks: list[tuple[PhotoView, NDArray[np.bool_]]], true: list[NDArray[np.bool_]], pictures: Path | None
 ) -> list[str]:
     caught = missed = false = still = 0
     for k, ((view, found), moving) in enumerate(zip(masks, true, strict=True)):
@@ -387,14 +387,13 @@ def _sheet(
     folder: Path,
     world: World,
     photos: Any,
-    report: Any,
     result: Atlas,
     model: Atlas,
     walls: Any,
     roofs: Any,
     cameras: Any,
 ) -> None:
-    """The model before and after from the first cameras, beside the photos."""
+    """Write a sheet of the model before and after from the first cameras, beside the photos."""
     takes = []
     for atlas in (model, result):
         layers = {

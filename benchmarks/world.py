@@ -29,6 +29,17 @@ from vico.world.folder import read_world
 from vico.worldgen.packaged import packaged_extract
 
 GOAL = 90.0
+# Averages of the paper's scenes (its tables "Average counts of object categories per scene", "Averaged number of
+# annotated elements per scene" and, for faces, the one of visual fidelity), and which of our counts stands beside each.
+PAPER_OBJECTS = (("amenity objects", 133, "amenity_objects"), ("natural objects", 357, "natural_objects"),
+                 ("transit objects", 9, "transit"))  # fmt: skip
+PAPER_ELEMENTS = (
+    ("buildings", 53, "accessible_buildings"), ("places", 85, "places"), ("roads", 473, "roads"),
+    ("junctions", 76, "junctions"), ("restaurants (food)", 25, "food"), ("stores", 21, "store"),
+    ("accommodation", 16, "accommodation"), ("transit", 9, "transit"), ("offices", 8, "office"),
+    ("entertainment", 5, "entertainment"), ("open places", 1, "open"),
+    ("faces of the mesh (ours: for collision)", 376_000, "collision_faces"),
+)  # fmt: skip
 RADII = (200, 300, 400, 500, 600)
 REPEATED = (600, 800)
 APART = 1200.0  # metres between the copies of a map that is repeated
@@ -56,8 +67,28 @@ def built(words: list[str], out: Path) -> tuple[dict[str, Any], float, float]:
     return json.loads(child.output), child.seconds, child.peak_mb
 
 
-def of_places(data: Path, scratch: Path) -> list[str]:
-    """A table of every place, once each."""
+def beside_the_paper(facts: dict[str, Any], others: Sequence[dict[str, Any]]) -> list[str]:
+    """Return the paper's two tables of scenes beside the packaged place and, where there are any, the other cities."""
+    lines = []
+    for title, rows in (("objects", PAPER_OBJECTS), ("annotated elements", PAPER_ELEMENTS)):
+        head = f"| {title} | paper, mean of its scenes | {facts['name']} |"
+        head += f" mean of {len(others)} other cities | least | greatest |" if others else ""
+        lines += ["", f"## The paper's table of {title}, a scene", "", head, "|---" * (head.count("|") - 1) + "|"]
+        for label, theirs, key in rows:
+            line = f"| {label} | {theirs:,} | {_count(facts, key):,} |"
+            if others:
+                counts = [_count(other, key) for other in others]
+                line += f" {np.mean(counts):,.0f} | {min(counts):,} | {max(counts):,} |"
+            lines.append(line)
+    return lines
+
+
+def _count(facts: dict[str, Any], key: str) -> int:
+    return int(facts[key]) if key in facts else int(facts["places_by_type"].get(key, 0))
+
+
+def of_places(data: Path, scratch: Path, seen: list[dict[str, Any]]) -> list[str]:
+    """Return a table of every place, once each; what each says of itself is added to `seen`."""
     lines = [
         "",
         "## Other cities, once each",
@@ -70,6 +101,7 @@ def of_places(data: Path, scratch: Path) -> list[str]:
     ]
     for name, words in places_in(data):
         facts, seconds, peak = built(words, scratch / name)
+        seen.append(facts)
         findings = check_world(read_world(scratch / name))
         for finding in findings:
             print(name, finding, file=sys.stderr)
@@ -146,8 +178,10 @@ def main() -> None:
             facts.append(json.loads(child.output))
             whole.append(child.seconds)
             peaks.append(child.peak_mb)
-        more = of_radii(given.data, Path(folder)) + of_places(given.data, Path(folder)) if given.data else []
+        others: list[dict[str, Any]] = []
+        more = of_radii(given.data, Path(folder)) + of_places(given.data, Path(folder), others) if given.data else []
     last = facts[-1]
+    more = beside_the_paper(last, others) + more
     how = "vico bench world --table benchmarks/results/world.md"
     if given.data:
         how = f"python benchmarks/world.py -n {given.n} --data DATA --table benchmarks/results/world.md"

@@ -22,9 +22,9 @@ from vico.geo.frame import LocalFrame
 MARGIN = 100.0
 
 
-def clip(source: Path, frame: LocalFrame, reach: float, out: Path) -> tuple[int, int, int]:
-    """Write the clip; return how many nodes, ways and relations it has."""
-    west, south, east, north = frame.bbox(reach)
+def members_to_keep(source: Path, bbox: tuple[float, float, float, float]) -> tuple[set[int], set[int], set[int]]:
+    """Return the nodes, ways and relations that the clip keeps; `bbox` is west, south, east, north, degrees."""
+    west, south, east, north = bbox
     inside: set[int] = set()
     way_nodes: dict[int, list[int]] = {}
     touched: set[int] = set()
@@ -42,14 +42,20 @@ def clip(source: Path, frame: LocalFrame, reach: float, out: Path) -> tuple[int,
             relations[thing.id] = [(member.type, member.ref) for member in thing.members]
             if thing.tags.get("type") == "multipolygon":
                 polygons.add(thing.id)
-    ways = set(touched)
-    kept: set[int] = set()
-    for number, members in relations.items():
-        if any((kind == "w" and ref in touched) or (kind == "n" and ref in inside) for kind, ref in members):
-            kept.add(number)
-            if number in polygons:
-                ways.update(ref for kind, ref in members if kind == "w" and ref in way_nodes)
-    nodes = inside.union(*(way_nodes[number] for number in ways))
+    kept = {
+        number
+        for number, members in relations.items()
+        if any((kind == "w" and ref in touched) or (kind == "n" and ref in inside) for kind, ref in members)
+    }
+    rings = {ref for number in kept & polygons for kind, ref in relations[number] if kind == "w" and ref in way_nodes}
+    ways = touched | rings
+    return inside.union(*(way_nodes[number] for number in ways)), ways, kept
+
+
+def clip(source: Path, frame: LocalFrame, reach: float, out: Path) -> tuple[int, int, int]:
+    """Write the clip; return how many nodes, ways and relations it has."""
+    west, south, east, north = frame.bbox(reach)
+    nodes, ways, kept = members_to_keep(source, (west, south, east, north))
     header = osmium.io.Header()
     header.set("generator", "vico scripts/clip_place.py")
     header.add_box(osmium.osm.Box(west, south, east, north))

@@ -14,11 +14,11 @@ from vico.community import read_community
 from vico.render import Cameras
 from vico.render.film import read_film
 from vico.sim.config import SimConfig
-from vico.sim.scene import SceneEyes
+from vico.sim.scene import SceneRenderer
 from vico.sim.simulation import Simulation
 from vico.world.folder import read_world
 from vico.world.public import PublicMap
-from vico.worldgen.previews import viewpoints
+from vico.worldgen.previews.viewpoints import viewpoints
 
 WIDTH, HEIGHT = 1280, 640
 
@@ -44,14 +44,14 @@ def main() -> None:
         observations, infos = result.observations, result.infos
 
     views = viewpoints(world, count=120)
-    bodies = sim.stage.obstacles()
+    bodies = sim.state.obstacles()
     order = sorted(views, key=lambda view: -liveliness(view, bodies))
-    eyes = SceneEyes(sim)
+    renderer = SceneRenderer(sim)
     view = order[arguments.pick]
     camera = Cameras(
         np.array([view.position]), np.array([view.forward]), fov_y=np.radians(50.0), width=WIDTH, height=HEIGHT
     )
-    picture = Image.fromarray(eyes.photograph(sim.stage, camera, samples=3)[0])
+    picture = Image.fromarray(renderer.render_cameras(sim.state, camera, samples=3)[0])
     picture.save(arguments.out / "street.png", optimize=True)
 
     plan = Image.open(arguments.demo / "world" / "map.png").convert("RGB")

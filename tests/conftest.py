@@ -16,6 +16,7 @@ from command_line import vico
 from vico.community import build_community, write_community
 from vico.world.folder import World, read_world
 from vico.worldgen.pipeline import build_world
+from vico.worldgen.request import BuildOptions
 
 # The same examples in every run; HYPOTHESIS_PROFILE=search draws others.
 settings.register_profile("repeatable", derandomize=True, deadline=None)
@@ -32,7 +33,7 @@ SHARED = Path(__file__).parents[2] / "shared" / "data"
 def helsinki_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with 300 m x 300 m of central Helsinki, built from the packaged extract."""
     out = tmp_path_factory.mktemp("worlds") / "helsinki"
-    build_world(EXTRACT, lat=60.1690, lon=24.9435, half=150.0, seed=0, out=out)
+    build_world(EXTRACT, lat=60.1690, lon=24.9435, half=150.0, seed=0, out=out, options=BuildOptions(previews=False))
     return out
 
 

@@ -12,6 +12,7 @@ from vico.geo.osm import OsmData, polygons_of, read_osm
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph, read_lanes
 from vico.world.model import Transit
+from vico.worldgen.facts.site import site_facts
 from vico.worldgen.streets.netconvert import RoadNetwork, road_network
 from vico.worldgen.transit.stage import transit_from_osm
 
@@ -48,7 +49,7 @@ def lanes_of(network: RoadNetwork) -> LaneGraph:
 def road_city(path: Path = EXTRACT, lat: float = 60.1690, lon: float = 24.9435, half: float = HALF) -> RoadCity:
     """Roads, lanes and transit of 800 m x 800 m; central Helsinki where nothing else is asked for."""
     osm = read_osm(path, LocalFrame(lat, lon), half)
-    network = road_network(osm)
+    network = road_network(site_facts(osm))
     lanes = lanes_of(network)
     solids = [
         polygon
@@ -56,5 +57,5 @@ def road_city(path: Path = EXTRACT, lat: float = 60.1690, lon: float = 24.9435, 
         if area.tags.get("building", "no") != "no"
         for polygon in polygons_of(area.polygon)
     ]
-    transit = transit_from_osm(osm, lanes, HeightField.flat(half), solids=solids)
+    transit = transit_from_osm(site_facts(osm), lanes, HeightField.flat(half), solids=solids)
     return RoadCity(osm, network, lanes, transit, solids)

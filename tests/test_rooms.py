@@ -7,29 +7,39 @@ import pytest
 
 SOURCE = Path(__file__).parents[1] / "src" / "vico"
 
+# What lies below all rooms: single modules, and the room `io`, which uses nothing of ours but these.
+GROUND = {"errors", "version", "seeds", "threads", "exact", "rules", "clock"}
+
 # Room -> the rooms (or single modules) of ours it may import. docs/architecture.md explains the order.
 ALLOWED = {
-    "geo": set(),
-    "world": {"geo.frame"},
-    "assets": {"world"},
-    "llm": set(),
-    "worldgen": {"geo", "world", "assets", "llm"},
-    "community": {"world", "llm"},
-    "render": {"world", "assets"},
-    "sim": {"world", "community", "render", "assets"},
+    "io": set(),
+    "geo": {"io"},
+    "world": {"geo.frame", "geo.overlay", "io"},
+    "assets": {"world", "io"},
+    "llm": {"io"},
+    "worldgen": {"geo", "world", "assets", "render", "llm", "io"},
+    "community": {"world", "llm", "io"},
+    "render": {"world", "assets", "io"},
+    "sim": {"world", "community", "render", "assets", "io"},
     "envs": {"sim", "world", "community"},
     "agents": {
         "envs",
         "world.public",
         "world.routing",
         "world.walkable",
-        "world.seeds",
         "world.model",
         "world.heights",
     },
-    "challenges": {"envs", "agents", "community", "world", "assets"},
+    "challenges": {"envs", "agents", "community", "world", "assets", "io"},
 }
-OPEN = {"viewer", "cli"}
+OPEN = {"viewer", "cli"}  # and the front door, api.py
+
+# What the stages of world generation share -> what of it that may import. A stage knows these and no other stage.
+SHARED = {
+    "facts": set(),
+    "texture_canvas": set(),
+    "facades": {"facts", "texture_canvas"},
+}
 
 
 def imported(path: Path) -> list[str]:
@@ -41,20 +51,64 @@ def imported(path: Path) -> list[str]:
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}:{node.lineno}: relative import; write the full name"
             module = node.module or ""
-            names += [f"{module}.{alias.name}" for alias in node.names] if module == "vico" else [module]
+            package = (SOURCE.parent / module.replace(".", "/")).is_dir()
+            names += [f"{module}.{alias.name}" for alias in node.names] if package else [module]
     return [name.removeprefix("vico.") for name in names if name.startswith("vico.")]
 
 
 @pytest.mark.parametrize("room", sorted(ALLOWED))
 def test_a_room_imports_only_lower_rooms(room: str) -> None:
-    allowed = ALLOWED[room] | {room, "errors"}
+    allowed = ALLOWED[room] | {room} | GROUND
     faults = [
         f"{path.relative_to(SOURCE)} imports vico.{name}"
         for path in sorted((SOURCE / room).rglob("*.py"))
         for name in imported(path)
-        if name != "__version__" and not any(name == a or name.startswith(f"{a}.") for a in allowed)
+        if not any(name == a or name.startswith(f"{a}.") for a in allowed)
     ]
     assert faults == []
+
+
+def parts_of_worldgen() -> list[str]:
+    """Folders and modules that stages share, and the stages' folders."""
+    return sorted(SHARED.keys() | {path.parent.name for path in (SOURCE / "worldgen").glob("*/__init__.py")})
+
+
+@pytest.mark.parametrize("part", parts_of_worldgen())
+def test_a_stage_knows_no_other_stage(part: str) -> None:
+    allowed = SHARED.get(part, SHARED.keys()) | {part}
+    folder = SOURCE / "worldgen" / part
+    files = sorted(folder.rglob("*.py")) if folder.is_dir() else [folder.with_suffix(".py")]
+    faults = [
+        f"{path.relative_to(SOURCE)} imports vico.{name}"
+        for path in files
+        for name in imported(path)
+        if name.startswith("worldgen") and not any(f"{name}.".startswith(f"worldgen.{a}.") for a in allowed)
+    ]
+    assert files
+    assert faults == []
+
+
+def test_no_circle_of_imports() -> None:
+    modules = {
+        ".".join(path.relative_to(SOURCE).with_suffix("").parts).removesuffix(".__init__"): path
+        for path in sorted(SOURCE.rglob("*.py"))
+    }
+    unvisited = set(modules)
+    circles: list[str] = []
+
+    def visit(name: str, chain: tuple[str, ...]) -> None:
+        if name in chain:
+            circles.append(" -> ".join((*chain[chain.index(name) :], name)))
+        if name not in unvisited:
+            return
+        unvisited.discard(name)
+        for other in dict.fromkeys(imported(modules[name])):
+            if other in modules:
+                visit(other, (*chain, name))
+
+    for name in modules:
+        visit(name, ())
+    assert circles == []
 
 
 def test_every_room_has_a_floor() -> None:
@@ -65,3 +119,31 @@ def test_every_room_has_a_floor() -> None:
 def test_modules_stay_readable() -> None:
     long = {str(p.relative_to(SOURCE)): n for p in SOURCE.rglob("*.py") if (n := len(p.read_text().splitlines())) > 700}
     assert long == {}
+
+
+def test_what_lies_below_all_rooms_imports_only_its_like() -> None:
+    faults = [f"{name} imports vico.{used}" for name in sorted(GROUND) for used in imported(SOURCE / f"{name}.py")]
+    assert [fault for fault in faults if fault.rpartition("vico.")[2] not in GROUND] == []
+
+
+_OVERLAYS = {"intersection", "difference", "union", "union_all", "unary_union", "symmetric_difference", "buffer"} | {
+    "polygonize", "make_valid", "set_precision", "simplify", "offset_curve",
+}  # fmt: skip
+# Overlays of what is our own: lines between grid points that already meet, a table of countries.
+_EXACT = {"geo/overlay.py", "worldgen/ground/contours.py", "worldgen/facts/driving_side.py"}
+
+
+def test_geometry_from_outside_is_overlaid_by_one_module() -> None:
+    found = {
+        f"{path.relative_to(SOURCE)}:{node.lineno}: shapely.{node.func.attr}"
+        for room in ("geo", "world", "worldgen")
+        for path in sorted((SOURCE / room).rglob("*.py"))
+        if path.relative_to(SOURCE).as_posix() not in _EXACT
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Attribute)
+        and node.func.attr in _OVERLAYS
+        and isinstance(node.func.value, ast.Name)
+        and node.func.value.id == "shapely"
+    }
+    assert found == set(), "use vico.geo.overlay: plain overlays fail on outlines that nearly coincide"

@@ -21,6 +21,10 @@ class OutputExistsError(VicoError, FileExistsError):
     """The output folder holds something already; `--force` replaces it."""
 
 
+class OutputError(VicoError, OSError):
+    """Something cannot be written: the disk is full, the folder is gone or another process's, or rights are missing."""
+
+
 class SchemaError(VicoError, ValueError):
     """A file is of another schema, version or owner than the one expected."""
 

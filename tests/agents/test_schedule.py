@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import toy_city
+from vico.agents.gather import Gatherer
 from vico.agents.schedule import followers_of, stays_of
 from vico.sim.config import SimConfig
 from vico.sim.events import Event
-from vico.sim.gather import Gatherer
 from vico.sim.simulation import Simulation
 from vico.world.public import PublicMap
 
@@ -26,7 +26,7 @@ def live(
     events: list[Event] = []
     for _ in range(steps):
         gathered = agents.gather(observations, infos)
-        assert gathered.troubles == {}
+        assert gathered.agent_faults == {}
         result = sim.step(gathered.actions)
         observations, infos = result.observations, result.infos
         events += result.events
@@ -69,7 +69,7 @@ def test_a_person_in_the_way_is_walked_around() -> None:
     config = SimConfig(start=8 * 3600 - 5, assistants=1, observe=())
     sim = Simulation(toy_city.world(), toy_city.community(), config)
     # Right on the straight line from the café's door to the shop's.
-    sim.place_agent("assistant_0", (0.0, 3.9))
+    sim.scenario.place_agent("assistant_0", (0.0, 3.9))
     agents = Gatherer(followers_of(toy_city.community(), PublicMap.from_world(sim.world)))
     observations, infos = sim.observe()
     for _ in range(120):
@@ -77,7 +77,7 @@ def test_a_person_in_the_way_is_walked_around() -> None:
         observations, infos = result.observations, result.infos
     places: list[Any] = [observations[name]["state"]["place"] for name in ("resident_0", "resident_1")]
     assert places == [toy_city.SHOP, toy_city.SHOP]
-    assert np.allclose(sim.stage.people.position[3, :2], [0.0, 3.9], atol=0.3)
+    assert np.allclose(sim.state.people.position[3, :2], [0.0, 3.9], atol=0.3)
 
 
 def test_each_stay_knows_when_to_set_out() -> None:
@@ -87,3 +87,22 @@ def test_each_stay_knows_when_to_set_out() -> None:
         (0.0, 0.0, toy_city.CAFE),
         (28800.0, 28920.0, toy_city.SHOP),
     ]
+
+
+def test_words_do_not_decide_what_a_resident_does() -> None:
+    def actions(activity: str) -> list[str]:
+        people = toy_city.community().residents[:1]
+        item = people[0].schedule[0].model_copy(update={"activity": activity, "tag": "work", "type": "main"})
+        resident = people[0].model_copy(update={"schedule": [item]})
+        community = toy_city.community().model_copy(update={"residents": [resident], "relations": [], "groups": []})
+        sim = Simulation(toy_city.world(), community, SimConfig(start=8 * 3600 - 300, observe=()))
+        follower = followers_of(community, PublicMap.from_world(sim.world))["resident_0"]
+        taken = []
+        for _ in range(60):
+            observations, infos = sim.observe()
+            action = follower.act(observations["resident_0"], infos["resident_0"])
+            taken.append(str(action["type"]))
+            sim.step({"resident_0": action})
+        return taken
+
+    assert actions("Treat patients and run a coffee round") == actions("Sort papers")

@@ -7,9 +7,9 @@ import pytest
 
 from vico.agents.assistant.skills import turn_to
 from vico.agents.wayfinding import Walker
+from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.public import PublicMap
-from vico.world.seeds import rng
 from vico.world.walkable import BLOCKED, OPEN, WalkableMap
 
 HALF = 40.0
@@ -46,7 +46,7 @@ class Point:
 
 def walk(walker: Walker, body: Point, goal: tuple[float, float], limit: int) -> int:
     for step in range(limit):
-        status = {"action_status": "collision" if body.collided else "ok", "action_reason": "stopped by a car"}
+        status = {"action_status": "collision" if body.collided else "ok", "action_code": "hit_body"}
         action = walker.towards(goal, 1.0, {"pose": body.pose, "state": status}, {"entities": {}})
         if action is None:
             return step

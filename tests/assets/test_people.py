@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vico.assets import people_anny
 from vico.assets.people import (
     BOTTOMS,
     HAIR,
@@ -17,18 +16,19 @@ from vico.assets.people import (
     TOPS,
     Appearance,
     J,
+    anny,
     body_of,
     random_appearance,
 )
-from vico.assets.people_decimate import cut, decimated, open_loops
+from vico.assets.people.cutting import cut, decimated, open_loops
 from vico.errors import InputError, MissingExtraError
-from vico.world.seeds import rng
+from vico.seeds import rng
 
 SOURCES = [
     "procedural",
     pytest.param(
         "anny",
-        marks=pytest.mark.skipif(not people_anny.available(), reason="no baked bodies: vico assets install people"),
+        marks=pytest.mark.skipif(not anny.available(), reason="no baked bodies: vico assets install people"),
     ),
 ]
 CROWD = [random_appearance(rng(0, "crowd", k)) for k in range(12)]
@@ -139,7 +139,7 @@ def test_without_data_the_best_body_is_our_own(tmp_path: object, monkeypatch: py
 @pytest.mark.parametrize("detail", ["full", "light"])
 def test_the_same_look_gives_the_same_bytes_in_a_fresh_process(detail: str, tmp_path: Path) -> None:
     program = (
-        "import hashlib; from vico.assets.people import *; from vico.world.seeds import rng;"
+        "import hashlib; from vico.assets.people import *; from vico.seeds import rng;"
         f"b = body_of(random_appearance(rng(0, 'crowd', 3)), source='procedural', detail={detail!r});"
         "print(hashlib.sha256(b.vertices.tobytes() + b.normals.tobytes() + b.colour.tobytes()).hexdigest())"
     )

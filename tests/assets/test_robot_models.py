@@ -9,9 +9,9 @@ import trimesh
 
 from vico.assets.packages import installed
 from vico.assets.robots import BUMPER, robot_model, robot_names
-from vico.assets.robots_decimate import decimated, shaded
-from vico.assets.robots_onnx import dense_layers
-from vico.assets.robots_packs import GO2_PACKAGE, HUSKY_PACKAGE
+from vico.assets.robots.onnx import dense_layers
+from vico.assets.robots.packs import GO2_PACKAGE, HUSKY_PACKAGE
+from vico.assets.robots.simplify import decimated, shaded
 from vico.errors import InputError, SchemaError
 from vico.world.mesh import Surface
 

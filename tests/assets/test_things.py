@@ -15,9 +15,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from vico.assets import things
 from vico.assets.packages import FetchError, IntegrityError
-from vico.assets.things import (
+from vico.assets.things import pack as things
+from vico.assets.things.archive import COLLECTIONS, archives
+from vico.assets.things.fit import OURS, StandIn
+from vico.assets.things.obj import read_obj
+from vico.assets.things.pack import (
     available_things,
     baked_things,
     credits_of,
@@ -25,11 +28,8 @@ from vico.assets.things import (
     our_models,
     read_things,
 )
-from vico.assets.things_archive import COLLECTIONS, archives
-from vico.assets.things_fit import OURS, Piece
-from vico.assets.things_obj import read_obj
-from vico.assets.things_table import STAND_INS
-from vico.assets.things_thin import textured_again, thinned
+from vico.assets.things.simplify import textured_again, thinned
+from vico.assets.things.stand_ins import STAND_INS
 from vico.errors import MissingExtraError, MissingFileError, SchemaError
 
 BOX = """mtllib box.mtl
@@ -91,7 +91,7 @@ def _forgotten() -> object:
         kept.cache_clear()
 
 
-def _choose(monkeypatch: pytest.MonkeyPatch, **pieces: tuple[Piece, ...]) -> None:
+def _choose(monkeypatch: pytest.MonkeyPatch, **pieces: tuple[StandIn, ...]) -> None:
     monkeypatch.setattr(things, "STAND_INS", pieces)
 
 
@@ -190,7 +190,7 @@ def test_a_picture_stays_in_its_place_on_a_thinned_surface() -> None:
 
 def test_a_model_fills_ours_and_looks_our_way(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pack = _pack(empty_cache / "pack")
-    _choose(monkeypatch, wardrobe=(Piece("S", "box", _digest(pack)[:20]),))
+    _choose(monkeypatch, wardrobe=(StandIn("S", "box", _digest(pack)[:20]),))
     said: list[str] = []
     fetch_things(pack, say=said.append)
     ours = our_models()["wardrobe"].bounds
@@ -213,14 +213,14 @@ def test_a_model_fills_ours_and_looks_our_way(empty_cache: Path, monkeypatch: py
 
 def test_the_same_pack_bakes_to_the_same_bytes(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pack = _pack(empty_cache / "pack")
-    _choose(monkeypatch, chair=(Piece("S", "box", ""), Piece(OURS, "chair", "", box=(1, 0, 0, 1, 0, 0))))
+    _choose(monkeypatch, chair=(StandIn("S", "box", ""), StandIn(OURS, "chair", "", box=(1, 0, 0, 1, 0, 0))))
     first = fetch_things(pack).read_bytes()
     assert fetch_things(pack, force=True).read_bytes() == first
 
 
 def test_another_model_than_the_one_tried_is_left_out(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pack = _pack(empty_cache / "pack")
-    _choose(monkeypatch, chair=(Piece("S", "box", "0123"),), sofa=(Piece("S", "box", ""),))
+    _choose(monkeypatch, chair=(StandIn("S", "box", "0123"),), sofa=(StandIn("S", "box", ""),))
     said: list[str] = []
     fetch_things(pack, say=said.append)
     assert read_things()[0].keys() == {"sofa"}
@@ -229,7 +229,7 @@ def test_another_model_than_the_one_tried_is_left_out(empty_cache: Path, monkeyp
 
 def test_a_damaged_cache_is_told_and_baked_anew(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pack = _pack(empty_cache / "pack")
-    _choose(monkeypatch, sofa=(Piece("S", "box", ""),))
+    _choose(monkeypatch, sofa=(StandIn("S", "box", ""),))
     baked = fetch_things(pack)
     baked.write_bytes(baked.read_bytes()[:-9])
     read_things.cache_clear()

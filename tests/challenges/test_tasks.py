@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import toy_city
-from vico.assets.goods import COLOURS, GOODS
+from vico.assets.models.movable import movable_colours, movable_kinds
 from vico.challenges.assistant.choose import CANDIDATES
 from vico.challenges.assistant.delivery import SOURCE_RADIUS, SUBTASKS, delivered, generate_delivery
 from vico.challenges.assistant.model import Task, read_task, write_task
@@ -42,7 +42,7 @@ def test_every_episode_has_six_errands_over_things_with_names_of_their_own(tasks
         assert len(task.subtasks) == SUBTASKS
         assert len({thing.name for thing in task.objects}) == len(task.objects)
         assert sorted(i for s in task.subtasks for i in s.objects) == sorted(thing.id for thing in task.objects)
-        assert all(thing.kind in GOODS and thing.colour in COLOURS for thing in task.objects)
+        assert all(thing.kind in movable_kinds() and thing.colour in movable_colours() for thing in task.objects)
 
 
 def test_choices_are_made_among_nine(tasks: list[Task]) -> None:

@@ -309,3 +309,13 @@ def test_a_fresh_process_prints_no_traceback_either(tmp_path: Path) -> None:
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "vico: missing.osm: no such file; give an OpenStreetMap extract (.osm or .osm.pbf)\n"
     assert contents(tmp_path) == []
+
+
+def test_a_language_model_that_is_not_named_is_said_before_anything_is_built(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("VICO_LLM_BASE_URL", "OPENAI_BASE_URL", "VICO_LLM_MODEL"):
+        monkeypatch.delenv(name, raising=False)
+    said = refused(capsys, "world", "build", *HERE, "--radius", 60, "--layout-llm", "--out", tmp_path / "w")
+    assert "set VICO_LLM_BASE_URL" in said
+    assert contents(tmp_path) == []

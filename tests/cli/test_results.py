@@ -158,11 +158,21 @@ def test_bench_says_where_benchmarks_are_to_be_had(
 def test_bench_world_measures_every_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = tmp_path / "results" / "world.md"
     assert bench.bench("world", table=table, json=True, options=("--radius", "60", "-n", "1")) == 0
-    seconds, memory = printed(capsys)["tables"]
+    seconds, memory, objects, elements = printed(capsys)["tables"]
     stages = {row["stage"]: float(row["median s"]) for row in seconds["rows"]}
     assert stages.keys() >= {"map", "buildings", "roads", "previews", "total"}
     assert stages["whole command"] > stages["total"] > stages["buildings"] > 0
     assert float(memory["rows"][0]["median MB"]) > 100
+    # The averages that the paper gives for its scenes stand beside the counts of this one.
+    theirs = "paper, mean of its scenes"
+    assert {row["objects"]: row[theirs] for row in objects["rows"]} == {
+        "amenity objects": "133",
+        "natural objects": "357",
+        "transit objects": "9",
+    }
+    roads = next(row for row in elements["rows"] if row["annotated elements"] == "roads")
+    assert roads[theirs] == "473"
+    assert int(roads["helsinki"]) > 0
     assert "/" not in table.read_text().split("Made by")[0].replace("x86/64", "")
 
 

@@ -13,8 +13,10 @@ import pytest
 
 from toytown import PLACES, make_world
 from vico.assets import people
-from vico.community import Community, build_community, check_community, digest_of, procedural_author, seconds_of
-from vico.community.names import FEMALE, LAST, MALE
+from vico.clock import seconds_of_day
+from vico.community import Community, build_community, check_community, digest_of, procedural_author
+from vico.community.catalogue import names as known_names
+from vico.community.model import ItemType
 from vico.errors import EmptyInputError, InputError
 from vico.world.folder import World
 from vico.world.model import Category
@@ -40,7 +42,12 @@ def test_names_are_unique(town: World) -> None:
 
 
 def test_name_lists_hold_no_name_twice() -> None:
-    assert [name for names in (FEMALE, MALE, LAST) for name, n in Counter(names).items() if n > 1] == []
+    assert [
+        name
+        for names in (known_names().female, known_names().male, known_names().last)
+        for name, n in Counter(names).items()
+        if n > 1
+    ] == []
 
 
 def test_occupations_are_varied(community: Community) -> None:
@@ -76,7 +83,7 @@ def test_groups_are_three_to_six_for_fifteen_people(town: World) -> None:
 def test_meetings_bring_all_members_to_one_place_at_one_time(community: Community) -> None:
     people_by_id = community.resident_by_id
     for group in community.groups:
-        middle = (seconds_of(group.start) + seconds_of(group.end)) // 2
+        middle = (seconds_of_day(group.start) + seconds_of_day(group.end)) // 2
         assert {people_by_id[m].item_at(middle).place for m in group.members} == {group.place}
 
 
@@ -87,7 +94,7 @@ def test_people_leave_home_at_different_times(community: Community) -> None:
 
 def test_everybody_sleeps_six_hours_and_eats_twice(community: Community) -> None:
     for r in community.residents:
-        asleep = sum(seconds_of(i.end) - seconds_of(i.start) for i in r.schedule if i.type == "sleep")
+        asleep = sum(seconds_of_day(i.end) - seconds_of_day(i.start) for i in r.schedule if i.type == "sleep")
         assert asleep >= 6 * 3600 - 60, r.name
         assert sum(i.type == "meal" for i in r.schedule) >= 2, r.name
 
@@ -96,7 +103,9 @@ def test_workers_spend_six_hours_at_their_workplace(town: World) -> None:
     for r in build_community(town, residents=40, seed=3).residents:
         if r.workplace is None or r.occupation.startswith("student"):
             continue
-        hours = sum(seconds_of(i.end) - seconds_of(i.start) for i in r.schedule if i.place == r.workplace) / 3600
+        hours = (
+            sum(seconds_of_day(i.end) - seconds_of_day(i.start) for i in r.schedule if i.place == r.workplace) / 3600
+        )
         assert hours >= 5.5, (r.name, r.occupation, hours)
 
 
@@ -186,3 +195,15 @@ def test_homes_are_dwellings_for_all_but_guests(town: World, community: Communit
     }
     assert kinds == {"apartments"}
     assert {town.place_by_id[r.home].category for r in community.residents} == {Category.ACCOMMODATION}
+
+
+def test_nobody_is_called_a_night_owl_who_rises_early_nor_an_early_riser_who_sleeps_in(town: World) -> None:
+    words: Counter[str] = Counter()
+    for seed in range(6):
+        for resident in procedural_author(town, residents=15, seed=seed).residents:
+            word = resident.lifestyle.split(";")[0]
+            rises = min(seconds_of_day(item.end) for item in resident.schedule if item.type is ItemType.SLEEP)
+            words[word] += 1
+            assert (word == "Early riser") == (rises <= 6.5 * 3600), (resident.name, word, rises)
+            assert word not in ("Night owl", "Works late and sleeps in") or rises >= 7.5 * 3600, (resident.name, word)
+    assert words.keys() >= {"Early riser", "Keeps regular hours", "Night owl"}

@@ -10,7 +10,7 @@ import pytest
 from toytown import make_world
 from vico.community import Community, digest_of, read_community, read_manifest, write_community
 from vico.errors import MissingFileError, OutputExistsError, SchemaError
-from vico.world.files import sha256_of
+from vico.io.files import sha256_of
 from vico.world.folder import World
 
 

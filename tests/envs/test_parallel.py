@@ -14,9 +14,9 @@ import toy_city
 import vico
 from vico.agents.base import RandomAgent
 from vico.envs import CommunityEnv
-from vico.envs.spaces import AVATAR_ACTIONS, short_form
+from vico.envs.spaces import short_form
 from vico.errors import InputError, MissingFileError
-from vico.sim.actions import Command, parse
+from vico.sim.actions import PEOPLE_ACTIONS, Command, parse
 
 
 def env(*, seed: int = 0, max_steps: int = 300, observe: str = "none", image: int = 32) -> CommunityEnv:
@@ -102,12 +102,12 @@ def test_every_sampled_action_is_well_formed() -> None:
     space = environment.action_space("assistant_0")
     space.seed(0)
     places = [place.id for place in environment.public_map.places]
-    people = environment.sim.stage.people.names
+    people = environment.sim.state.people.names
     bad = []
     for _ in range(300):
         action = space.sample()
         verdict = parse(short_form(action, places, people))
-        if not isinstance(verdict, Command) and AVATAR_ACTIONS[int(action["type"])] != "communicate":
+        if not isinstance(verdict, Command) and PEOPLE_ACTIONS[int(action["type"])] != "communicate":
             bad.append(verdict)
     assert bad == []
 
@@ -138,8 +138,8 @@ def test_setup_places_things_and_people_at_each_reset() -> None:
     environment = CommunityEnv(
         toy_city.world(),
         None,
-        env().config,
-        setup=lambda sim: sim.place_agent("assistant_0", (10.0, -20.0)),
+        spec=env().spec,
+        setup=lambda sim: sim.scenario.place_agent("assistant_0", (10.0, -20.0)),
     )
     for seed in (0, 1):
         observations, _ = environment.reset(seed=seed)

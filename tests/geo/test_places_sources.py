@@ -14,16 +14,16 @@ from hypothesis import strategies as st
 from http_server import Answer, Request, serve
 from vico.errors import InputError, MissingFileError, SchemaError, SourceError, VicoError
 from vico.geo.frame import LocalFrame
-from vico.geo.places_google import GooglePlaces, google_key
-from vico.geo.places_overture import OverturePlaces
-from vico.geo.web import Web
+from vico.geo.places.google import GooglePlaces, google_key
+from vico.geo.places.overture import OverturePlaces
+from vico.io.http import HttpClient
 
 FRAME = LocalFrame(60.1678, 24.9424)
 KEY = "AIza-test-key-4711"
 
 
 def _google(base: str, tmp_path: Path, api: str, **options: Any) -> GooglePlaces:
-    web = Web(cache=tmp_path / "cache", sleep=lambda _: None)
+    web = HttpClient(cache=tmp_path / "cache", sleep=lambda _: None)
     return GooglePlaces(KEY, web, api=api, address=f"{base}/places", sleep=lambda _: None, **options)
 
 
@@ -129,7 +129,7 @@ def test_the_key_comes_from_the_environment_only() -> None:
     max_leaves=8,
 ))  # fmt: skip
 def test_nonsense_from_google_is_left_out(row: Any, tmp_path: Path) -> None:
-    source = GooglePlaces(KEY, Web(), api="new")
+    source = GooglePlaces(KEY, HttpClient(), api="new")
     if isinstance(row, dict):
         place = source._place(row, FRAME, 400.0)
         assert place is None or (place.id.startswith("google:") and max(map(abs, place.xy)) <= 400.0)

@@ -12,8 +12,8 @@ from PIL import Image
 
 from vico.errors import EmptyInputError, MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
-from vico.geo.street_images import decoded, heading_of, looking, pinhole, spread, turned, undistorted
-from vico.geo.street_images_folder import FolderImages
+from vico.geo.street_images.folder import FolderImages
+from vico.geo.street_images.model import decoded, heading_of, looking, pinhole, spread, turned, undistorted
 
 HERE = LocalFrame(60.169, 24.9435)
 ANGLES = st.floats(-3.1, 3.1)

@@ -13,9 +13,9 @@ from PIL import Image
 
 from vico.errors import SchemaError
 from vico.geo.frame import LocalFrame
-from vico.geo.street_images import StreetImage, looking, pinhole
-from vico.geo.street_images_folder import FolderImages
-from vico.geo.street_images_panorama import VIEWS, cut
+from vico.geo.street_images.folder import FolderImages
+from vico.geo.street_images.model import StreetImage, looking, pinhole
+from vico.geo.street_images.panorama import VIEWS, cut
 
 HERE = LocalFrame(60.169, 24.9435)
 

@@ -13,10 +13,10 @@ from PIL import Image
 from http_server import Answer, Request, serve
 from vico.errors import InputError, SchemaError, SourceError
 from vico.geo.frame import LocalFrame
-from vico.geo.street_images import looking
-from vico.geo.street_images_google import GoogleStreetView
-from vico.geo.street_images_mapillary import FIELDS, Mapillary, boxes, images_in
-from vico.geo.web import Web
+from vico.geo.street_images.google import GoogleStreetView
+from vico.geo.street_images.mapillary import FIELDS, Mapillary, boxes, images_in
+from vico.geo.street_images.model import looking
+from vico.io.http import HttpClient
 
 HERE = LocalFrame(60.169, 24.9435)
 TOKEN = "MLY|1234|secret-of-the-user"
@@ -92,7 +92,7 @@ def test_mapillary_photos_come_page_by_page_and_bad_ones_are_told() -> None:
         return Answer(200, jpeg()[:300] if path.endswith("/5.jpg") else jpeg())
 
     with serve(mapillary(listed, picture)) as base:
-        source = Mapillary(TOKEN, Web(retries=0), address=base)
+        source = Mapillary(TOKEN, HttpClient(retries=0), address=base)
         photos = {p.id: p for p in source.near(HERE, 100.0, most=9)}
     assert sorted(photos) == ["1", "7"]
     reasons = dict(source.refused)
@@ -117,7 +117,7 @@ def test_at_most_as_many_photos_as_asked_for_are_fetched() -> None:
 
     with serve(mapillary(lambda _: Answer(200, json.dumps({"data": [entry(k, base) for k in range(9)]}).encode()),
                          picture)) as base:  # fmt: skip
-        assert len(list(Mapillary(TOKEN, Web(retries=0), address=base).near(HERE, 100.0, most=3))) == 3
+        assert len(list(Mapillary(TOKEN, HttpClient(retries=0), address=base).near(HERE, 100.0, most=3))) == 3
     assert len(fetched) == 3
 
 
@@ -126,7 +126,7 @@ def test_an_expired_token_is_told_with_its_cure_and_without_itself() -> None:
         serve(mapillary(lambda _: Answer(200, b"{}"), lambda _: Answer(404))) as base,
         pytest.raises(SourceError, match="MAPILLARY_TOKEN") as told,
     ):
-        list(Mapillary("MLY|old-and-expired", Web(retries=0), address=base).near(HERE, 100.0, most=3))
+        list(Mapillary("MLY|old-and-expired", HttpClient(retries=0), address=base).near(HERE, 100.0, most=3))
     assert "old-and-expired" not in str(told.value)
 
 
@@ -147,7 +147,7 @@ def test_a_full_page_without_a_next_one_is_asked_again_in_quarters() -> None:
         return Answer(200, json.dumps({"data": rows}).encode())
 
     with serve(mapillary(listed, lambda _: Answer(200, jpeg()))) as base:
-        list(Mapillary(TOKEN, Web(retries=0), address=base).near(HERE, 100.0, most=1))
+        list(Mapillary(TOKEN, HttpClient(retries=0), address=base).near(HERE, 100.0, most=1))
     assert len(asked) == 5
     whole = math.prod(np.subtract(asked[0][2:], asked[0][:2]))
     assert sum(math.prod(np.subtract(box[2:], box[:2])) for box in asked[1:]) == pytest.approx(whole, rel=1e-3)
@@ -167,11 +167,14 @@ def test_a_place_on_the_date_line_is_asked_for_on_both_sides() -> None:
         return Answer(200, b'{"data": []}')
 
     with serve(handler) as base:
-        assert list(Mapillary(TOKEN, Web(retries=0), address=base).near(LocalFrame(0.0, 180.0), 300.0, most=3)) == []
+        assert (
+            list(Mapillary(TOKEN, HttpClient(retries=0), address=base).near(LocalFrame(0.0, 180.0), 300.0, most=3))
+            == []
+        )
     assert [box[0] < box[2] for box in asked] == [True, True]
     assert {box[2] for box in asked} >= {180.0}
     with pytest.raises(InputError, match="pole"):
-        list(Mapillary(TOKEN, Web(retries=0)).near(LocalFrame(90.0, 0.0), 300.0, most=3))
+        list(Mapillary(TOKEN, HttpClient(retries=0)).near(LocalFrame(90.0, 0.0), 300.0, most=3))
 
 
 def test_panoramas_are_cut_into_photos() -> None:
@@ -188,7 +191,7 @@ def test_panoramas_are_cut_into_photos() -> None:
         return Answer(200, packed.getvalue())
 
     with serve(mapillary(listed, picture)) as base:
-        source = Mapillary(TOKEN, Web(retries=0), address=base)
+        source = Mapillary(TOKEN, HttpClient(retries=0), address=base)
         photos = list(source.near(HERE, 100.0, most=9))
     assert [photo.id for photo in photos] == ["1/0", "1/60", "1/120", "1/180", "1/240", "1/300"]
     assert all(photo.intrinsics[0, 0] == pytest.approx(160 / (2 * np.pi)) for photo in photos)
@@ -207,9 +210,9 @@ def test_the_documented_shape_of_an_answer_is_read(shared_data: Path) -> None:
 
 def test_a_source_needs_its_key() -> None:
     with pytest.raises(InputError, match="MAPILLARY_TOKEN"):
-        Mapillary(" ", Web())
+        Mapillary(" ", HttpClient())
     with pytest.raises(InputError, match="GOOGLE_MAPS_API_KEY"):
-        GoogleStreetView("", Web())
+        GoogleStreetView("", HttpClient())
 
 
 def google(request: Request) -> Answer:
@@ -230,7 +233,7 @@ def google(request: Request) -> Answer:
 def test_google_views_are_cut_at_headings_and_nothing_is_kept(tmp_path: Path) -> None:
     with serve(lambda r: google(Request(r.method, r.path.rstrip("/"), r.query, r.headers, r.body))) as base:
         points = np.array([[0.0, 0.0], [0.0, 40.0], [60.0, 0.0]])
-        source = GoogleStreetView(KEY, Web(cache=tmp_path / "cache", retries=0), points=points, address=base)
+        source = GoogleStreetView(KEY, HttpClient(cache=tmp_path / "cache", retries=0), points=points, address=base)
         photos = list(source.near(HERE, 100.0, most=9))
     assert [p.id.split("@")[1] for p in photos] == ["0", "90", "270"] * 2
     assert not (tmp_path / "cache").exists()
@@ -246,11 +249,11 @@ def test_google_views_are_cut_at_headings_and_nothing_is_kept(tmp_path: Path) ->
 def test_a_refused_google_key_ends_the_search_in_one_sentence() -> None:
     body = b'{"status": "REQUEST_DENIED", "error_message": "The provided API key is invalid."}'
     with serve(lambda _: Answer(200, body)) as base, pytest.raises(SourceError, match="API key is invalid") as told:
-        list(GoogleStreetView(KEY, Web(retries=0), address=base).near(HERE, 50.0, most=3))
+        list(GoogleStreetView(KEY, HttpClient(retries=0), address=base).near(HERE, 50.0, most=3))
     assert KEY not in str(told.value)
 
 
 def test_google_metadata_of_another_shape_is_refused() -> None:
     for body in (b"<html>", b"[]", b"{}", b'{"status": "OK"}', b'{"status": "OK", "location": {"lat": NaN, "lng": 1}}'):
         with serve(lambda _, body=body: Answer(200, body)) as base, pytest.raises(SchemaError):
-            list(GoogleStreetView(KEY, Web(retries=0), address=base).near(HERE, 50.0, most=3))
+            list(GoogleStreetView(KEY, HttpClient(retries=0), address=base).near(HERE, 50.0, most=3))

@@ -15,10 +15,10 @@ from tile_files import at_place, b3dm, box, cmpt, ecef, enu_axes, glb, square
 from vico.errors import EmptyInputError, InputError, MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
 from vico.geo.gltf import read_gltf
-from vico.geo.tile_mesh import TileMesh
-from vico.geo.tiles3d import TileLimits, TileReport, credits_of, read_tileset, welded
-from vico.geo.tiles3d_content import read_tile_file
-from vico.geo.tiles3d_volumes import ECEF, Window, boxes_touch
+from vico.geo.tiles3d.content import read_tile_file
+from vico.geo.tiles3d.mesh import TileMesh
+from vico.geo.tiles3d.reader import TileLimits, TileReport, credits_of, read_tileset, welded
+from vico.geo.tiles3d.volumes import ECEF, TileWindow, boxes_touch
 
 FRAME = LocalFrame(60.169, 24.9435)
 PLACE = at_place(60.169, 24.9435)
@@ -373,7 +373,7 @@ def test_welding_leaves_the_inside_of_a_tile_alone() -> None:
 
 
 def test_regions_touch_the_window_on_the_ellipsoid() -> None:
-    window = Window.of(LocalFrame(10.0, 179.999), 500.0, ECEF)
+    window = TileWindow.of(LocalFrame(10.0, 179.999), 500.0, ECEF)
     east_of_the_date_line = [np.radians(v) for v in (-179.9999, 9.99, -179.99, 10.01)]
     over_it = [np.radians(v) for v in (179.9, 9.0, -179.9, 11.0)]
     elsewhere = [np.radians(v) for v in (-179.9, 9.99, -179.8, 10.01)]

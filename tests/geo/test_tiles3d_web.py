@@ -11,9 +11,9 @@ from http_server import Answer, Request, serve
 from tile_files import at_place, box, ecef, enu_axes, glb, square
 from vico.errors import InputError, SchemaError, SourceError
 from vico.geo.frame import LocalFrame
-from vico.geo.tiles3d import read_tileset
-from vico.geo.tiles3d_source import GOOGLE_KEY, tile_source
-from vico.geo.web import Web
+from vico.geo.tiles3d.reader import read_tileset
+from vico.geo.tiles3d.source import GOOGLE_KEY, tile_source
+from vico.io.http import HttpClient
 
 FRAME = LocalFrame(60.169, 24.9435)
 KEY, SESSION = "AIza-not-a-key", "CJ2-not-a-session"
@@ -94,8 +94,10 @@ class Google:
 def test_key_and_session_are_repeated_and_credits_gathered(tmp_path: Path) -> None:
     google = Google()
     with serve(google) as base:
-        web = Web(cache=tmp_path / "cache", retries=0)
-        mesh, report = read_tileset(f"{base}/v1/3dtiles/root.json", FRAME, 200.0, error=4.0, web=web, key=KEY)
+        web = HttpClient(cache=tmp_path / "cache", retries=0)
+        mesh, report = read_tileset(
+            tile_source(f"{base}/v1/3dtiles/root.json", web=web, key=KEY), FRAME, 200.0, error=4.0
+        )
     assert report.read == 3
     assert report.left_out == ()
     assert len(mesh.triangles) == 6
@@ -107,7 +109,9 @@ def test_key_and_session_are_repeated_and_credits_gathered(tmp_path: Path) -> No
 def test_nothing_of_googles_is_kept(tmp_path: Path) -> None:
     with serve(Google()) as base:
         read_tileset(
-            f"{base}/v1/3dtiles/root.json", FRAME, 200.0, web=Web(cache=tmp_path / "cache", retries=0), key=KEY
+            tile_source(f"{base}/v1/3dtiles/root.json", web=HttpClient(cache=tmp_path / "cache", retries=0), key=KEY),
+            FRAME,
+            200.0,
         )
     assert list(tmp_path.rglob("*")) == []
 
@@ -116,7 +120,9 @@ def test_a_tile_that_fails_is_left_out_and_its_parent_shown_and_no_key_is_told()
     google = Google()
     google.broken["/v1/3dtiles/datasets/CgA/files/1.glb"] = Answer(404, f"gone: {KEY} {SESSION}".encode())
     with serve(google) as base:
-        mesh, report = read_tileset(f"{base}/v1/3dtiles/root.json?key={KEY}", FRAME, 200.0, web=Web(retries=0))
+        mesh, report = read_tileset(
+            tile_source(f"{base}/v1/3dtiles/root.json?key={KEY}", web=HttpClient(retries=0)), FRAME, 200.0
+        )
     assert len(mesh.triangles) == 2
     assert mesh.attributions == ("Google",)
     assert [name for name, _ in report.left_out] == ["/v1/3dtiles/datasets/CgA/files/1.glb"]
@@ -130,14 +136,18 @@ def test_a_silent_tile_is_left_out() -> None:
     path = "/v1/3dtiles/datasets/CgA/files/0.glb"
     google.broken[path] = Answer(200, b"x" * 64, {"Content-Length": "1000"}, cut=10)
     with serve(google) as base:
-        _, report = read_tileset(f"{base}/v1/3dtiles/root.json", FRAME, 200.0, web=Web(retries=0, timeout=1.0), key=KEY)
+        _, report = read_tileset(
+            tile_source(f"{base}/v1/3dtiles/root.json", web=HttpClient(retries=0, timeout=1.0), key=KEY), FRAME, 200.0
+        )
     assert report.read == 1
     assert report.left_out[0][0] == path
 
 
 def test_a_wrong_key_ends_in_a_sentence_without_it() -> None:
     with serve(Google()) as base, pytest.raises(SourceError, match="check the key") as caught:
-        read_tileset(f"{base}/v1/3dtiles/root.json", FRAME, 200.0, web=Web(retries=0), key="AIza-another")
+        read_tileset(
+            tile_source(f"{base}/v1/3dtiles/root.json", web=HttpClient(retries=0), key="AIza-another"), FRAME, 200.0
+        )
     assert "AIza-another" not in str(caught.value)
 
 
@@ -156,7 +166,7 @@ def test_the_key_of_the_environment_goes_to_google_alone(monkeypatch: pytest.Mon
         return Answer(404)
 
     with serve(other) as base, pytest.raises(SourceError):
-        read_tileset(f"{base}/v1/3dtiles/root.json", FRAME, 200.0, web=Web(retries=0))
+        read_tileset(tile_source(f"{base}/v1/3dtiles/root.json", web=HttpClient(retries=0)), FRAME, 200.0)
     assert seen == [{}]
 
 
@@ -178,8 +188,8 @@ def test_an_ordinary_server_is_asked_with_its_own_query_and_kept(tmp_path: Path)
 
     with serve(answer) as base:
         for _ in range(2):
-            web = Web(cache=tmp_path, retries=0)
-            mesh, _ = read_tileset(f"{base}/city/tileset.json?token=abc", FRAME, 200.0, web=web)
+            web = HttpClient(cache=tmp_path, retries=0)
+            mesh, _ = read_tileset(tile_source(f"{base}/city/tileset.json?token=abc", web=web), FRAME, 200.0)
     assert len(mesh.triangles) == 2
     assert asked == [("/city/tileset.json", {"token": "abc"}), ("/city/t/a.glb", {"token": "abc", "v": "2"})]
 
@@ -196,11 +206,13 @@ def test_a_tileset_can_not_send_us_to_another_host(uri: str) -> None:
         return Answer(200, glb(*square(0, 0, 5, 40)))
 
     with serve(answer) as base:
-        _, report = read_tileset(f"{base}/tileset.json", FRAME, 200.0, error=1.0, web=Web(retries=0))
+        _, report = read_tileset(
+            tile_source(f"{base}/tileset.json", web=HttpClient(retries=0)), FRAME, 200.0, error=1.0
+        )
     assert report.read == 1
     assert "another host" in report.left_out[0][1]
 
 
 def test_a_page_instead_of_a_tileset_says_so() -> None:
     with serve(lambda _: Answer(200, b"<html></html>")) as base, pytest.raises(SchemaError, match="no 3D tile"):
-        read_tileset(f"{base}/tileset.json", FRAME, 200.0, web=Web(retries=0))
+        read_tileset(tile_source(f"{base}/tileset.json", web=HttpClient(retries=0)), FRAME, 200.0)

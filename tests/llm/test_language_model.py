@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from http_server import Answer, Request, serve
 from llm_server import KEY, Script, model_server, refuses, says
 from vico.errors import InputError, LlmBudgetError, LlmReplyError, MissingFileError, SchemaError, SourceError
-from vico.llm import Budget, Endpoint, LanguageModel, system, user
+from vico.llm import Budget, Connection, Endpoint, LanguageModel, Sampling, system, user
 
 
 class Shop(BaseModel):
@@ -36,13 +36,18 @@ MESSAGES = [system("You invent shops."), user("Invent one.")]
 
 
 def model(base: str, **options: Any) -> LanguageModel:
-    options = {"timeout": 5.0, "sleep": lambda seconds: None, **options}
-    return LanguageModel(Endpoint(base, "tiny", key=KEY, price=(1.0, 2.0)), **options)
+    sampling = Sampling(
+        **{name: options.pop(name) for name in ("seed", "temperature", "max_tokens") if name in options}
+    )
+    sent = {"timeout": 5.0, "sleep": lambda seconds: None}
+    sent |= {name: options.pop(name) for name in ("timeout", "retries", "sleep") if name in options}
+    endpoint = Endpoint(base, "tiny", key=KEY, price=(1.0, 2.0))
+    return LanguageModel(endpoint, sampling=sampling, connection=Connection(**sent), **options)
 
 
 def test_a_record_comes_back_with_what_it_took() -> None:
     with model_server(Script(says(GOOD, read=1000, written=500), key=KEY)) as (base, script):
-        reply = model(base, seed=3, temperature=0.5, most_tokens=900).ask(MESSAGES, Shop)
+        reply = model(base, seed=3, temperature=0.5, max_tokens=900).ask(MESSAGES, Shop)
     assert reply.value == KULMA
     assert reply.attempts == 1
     assert (reply.usage.calls, reply.usage.read, reply.usage.written) == (1, 1000, 500)
@@ -146,7 +151,7 @@ def test_options_that_a_server_refuses_are_left_out() -> None:
         return says(GOOD)
 
     with serve(strict) as base:
-        assert model(f"{base}/v1", temperature=0.1, most_tokens=50).ask(MESSAGES, Shop).value == KULMA
+        assert model(f"{base}/v1", temperature=0.1, max_tokens=50).ask(MESSAGES, Shop).value == KULMA
 
 
 def test_a_busy_or_failing_server_is_asked_again_after_as_long_as_it_says() -> None:

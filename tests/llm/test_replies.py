@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import BaseModel, Field
 
+from vico.io.http.exchange import retry_after
 from vico.llm.replies import read, response_format
-from vico.llm.transport import _asked_wait
 
 
 class Point(BaseModel):
@@ -69,7 +69,7 @@ def test_a_schema_without_fixed_names_is_not_called_strict() -> None:
 def test_a_wait_that_is_no_time_is_ignored(said: str) -> None:
     headers = Message()
     headers["Retry-After"] = said
-    assert _asked_wait(headers) is None
+    assert retry_after(headers) is None
 
 
 def test_a_date_to_wait_for_is_held_against_the_servers_clock() -> None:
@@ -77,4 +77,4 @@ def test_a_date_to_wait_for_is_held_against_the_servers_clock() -> None:
     now = datetime.datetime(2001, 2, 3, 4, 5, 6, tzinfo=datetime.UTC)
     headers["Date"] = format_datetime(now, usegmt=True)
     headers["Retry-After"] = format_datetime(now + datetime.timedelta(seconds=90), usegmt=True)
-    assert _asked_wait(headers) == 90.0
+    assert retry_after(headers) == 90.0

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from vico.assets.shapes import ball, box, pose_matrix
 from vico.errors import InputError
-from vico.render import Cameras, Frames, Scene, Stills, render
+from vico.render import Cameras, Frames, Scene, ViewCache, render
 from vico.world.mesh import Material, Surface, joined
 
 
@@ -92,7 +92,7 @@ def test_terrain_under_the_camera_has_no_gaps_at_the_near_plane() -> None:
     points = np.stack([x.ravel(), y.ravel(), z.ravel()], 1)
     scene = Scene([Surface.from_triangles(points, faces, entity=1)])
     for k in range(8):
-        # Eyes just above the ground, looking steeply down: most triangles cross the near plane.
+        # ObservationRenderer just above the ground, looking steeply down: most triangles cross the near plane.
         eye = np.array([[0.31 * k, 0.17 * k, 0.6 * np.sin(0.3 * 0.31 * k) * np.cos(0.4 * 0.17 * k) + 0.12]])
         seen = render(scene, Cameras(eye, np.array([[0.6, 0.1 * k, -1.0]]), near=0.05), rgb=False)
         assert (seen.segmentation == 1).all()
@@ -120,50 +120,50 @@ def test_a_camera_in_a_closed_room_sees_only_the_room() -> None:
 
 
 def test_a_view_of_a_room_is_repeated_while_nothing_in_it_can_have_changed() -> None:
-    scene, stills = _room(), Stills()
+    scene, cache = _room(), ViewCache()
     cameras = Cameras(np.array([[-2.0, 0.5, -20.0], [40.0, 0, 2]]), np.array([[1.0, 0, -0.2], [-1.0, 0, 0]]))
 
     def look(x: float, y: float) -> Frames:
         pose = np.eye(4)
         pose[:3, 3] = x, y, -21.5
         scene.set_rigid([scene.names["ball"]], pose[None], [7])
-        seen = render(scene, cameras, before=stills)
+        seen = render(scene, cameras, cache=cache)
         fresh = render(scene, cameras)
         for name in ("rgb", "depth", "segmentation"):
             assert np.array_equal(getattr(seen, name), getattr(fresh, name))
         return seen
 
     look(60.0, 0.0)
-    assert stills.repeated == 0
+    assert cache.hits == 0
     look(61.0, 0.0)  # in the next room but five
-    assert stills.repeated == 1
+    assert cache.hits == 1
     assert 7 in look(1.0, 0.5).segmentation[0]  # it comes in
-    assert stills.repeated == 1
+    assert cache.hits == 1
     look(1.1, 0.5)
     look(60.0, 0.0)
-    assert stills.repeated == 1
+    assert cache.hits == 1
     assert 7 not in look(60.0, 0.0).segmentation[0]
-    assert stills.repeated == 2
+    assert cache.hits == 2
     scene.place(
         ["ball"], np.array([[1.0, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, -21.5], [0, 0, 0, 1]])[None], [8], indoor=True
     )
     assert 8 in look(60.0, 0.0).segmentation[0]  # something is put there
-    assert stills.repeated == 2
+    assert cache.hits == 2
 
 
-def test_colours_that_come_later_are_the_same() -> None:
-    scene, stills = _room(), Stills()
+def test_deferred_rgb_is_the_same() -> None:
+    scene, cache = _room(), ViewCache(defer_rgb=True)
     pose = np.eye(4)
     pose[:3, 3] = 30.0, 1.0, 0.0
     scene.set_rigid([scene.names["ball"]], pose[None], [7])
     cameras = Cameras(np.array([[-2.0, 0.5, -20.0], [40.0, 0, 2]]), np.array([[1.0, 0, -0.2], [-1.0, 0, 0]]))
     at_once = render(scene, cameras)
     for k in range(3):
-        later = render(scene, cameras, before=stills, colours_later=True)
+        later = render(scene, cameras, cache=cache)
         assert np.array_equal(later.depth, at_once.depth)
         assert np.array_equal(later.segmentation, at_once.segmentation)
-        assert len(later.later) == (2 if k == 0 else 1)  # the room's view is repeated
-        later.finish()
+        assert len(later.pending) == (2 if k == 0 else 1)  # the room's view is repeated
+        later.wait()
         assert np.array_equal(later.rgb, at_once.rgb)
 
 

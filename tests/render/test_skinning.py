@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 from vico.assets.people import JOINTS, PARENTS, J, body_of, random_appearance
-from vico.render.skinning import crowd_of, rotation_matrix, skin
-from vico.world.seeds import rng
+from vico.render.skinning import batch_bodies, rotation_matrix, skin
+from vico.seeds import rng
 
 BODIES = [body_of(random_appearance(rng(2, "skinned", k)), source="procedural") for k in range(3)]
-CROWD = crowd_of(BODIES, [11, 12, 13])
+CROWD = batch_bodies(BODIES, [11, 12, 13])
 N = len(BODIES)
 REST = np.zeros((N, len(JOINTS), 3), np.float32)
 NOWHERE, AHEAD = np.zeros((N, 3)), np.zeros(N)
@@ -88,7 +88,7 @@ def test_every_vertex_carries_its_owner_s_entity() -> None:
 
 
 def test_a_crowd_of_nobody_is_empty() -> None:
-    empty = crowd_of([], [])
+    empty = batch_bodies([], [])
     vertices, normals = skin(
         empty, np.zeros((0, 55, 3), np.float32), np.zeros((0, 3), np.float32), np.zeros((0, 3)), np.zeros(0)
     )

@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from vico.assets.people import J, body_of, random_appearance
 from vico.errors import InputError
-from vico.render.skinning import crowd_of, skin
+from vico.render.skinning import batch_bodies, skin
+from vico.seeds import rng
 from vico.sim.animation import CLIPS, clip_index, hand_frames, hand_position, pose, stride_length, style_of
-from vico.world.seeds import rng
 
 LOOKS = [random_appearance(rng(5, "walker", k)) for k in range(6)]
 BODIES = [body_of(look, source="procedural") for look in LOOKS]
-CROWD = crowd_of(BODIES, range(1, len(BODIES) + 1))
+CROWD = batch_bodies(BODIES, range(1, len(BODIES) + 1))
 STYLE = np.stack(
     [style_of(b, rng(5, "manner", k), age=look.age) for k, (b, look) in enumerate(zip(BODIES, LOOKS, strict=True))]
 )
@@ -37,7 +37,7 @@ def feet(person: int, side: str) -> NDArray[np.int64]:
 
 @pytest.mark.parametrize(("clip", "speed"), [("walk", 0.3), ("walk", 1.0), ("walk", 1.8), ("carry", 1.0), ("run", 2.5)])
 def test_a_planted_foot_stays_within_two_centimetres_while_the_body_moves_on(clip: str, speed: float) -> None:
-    stride = stride_length(np.full(N, clip_index(clip)), np.full(N, speed), STYLE[:, 12])
+    stride = stride_length(np.full(N, clip_index(clip)), np.full(N, speed), STYLE["height"])
     # The left foot is flat on the ground in this part of its stance.
     duty = 0.36 if clip == "run" else 0.62
     start, end = 0.2 * duty, 0.5 * duty
@@ -168,7 +168,7 @@ def test_an_unknown_motion_is_refused_with_the_known_ones() -> None:
 
 
 def test_nobody_is_posed_without_fuss() -> None:
-    rotations, offsets = pose(np.zeros(0, int), np.zeros(0), np.zeros(0), np.zeros((0, STYLE.shape[1])))
+    rotations, offsets = pose(np.zeros(0, int), np.zeros(0), np.zeros(0), np.zeros(0, STYLE.dtype))
     assert rotations.shape == (0, 55, 3)
     assert offsets.shape == (0, 3)
 

@@ -27,25 +27,25 @@ def run_at(sim: Simulation, name: str, distance: float, steps: int) -> list[str]
 
 @pytest.mark.parametrize("distance", [0.3, 1.0, 2.5])
 def test_a_wall_stops_a_walk_just_before_it(sim: Simulation, distance: float) -> None:
-    sim.place_agent("assistant_0", (0.0, 0.0), yaw=np.pi / 2)
+    sim.scenario.place_agent("assistant_0", (0.0, 0.0), yaw=np.pi / 2)
     statuses = run_at(sim, "assistant_0", distance, 20)
     south = toy_city.HOUSE[1]
     assert statuses[-1] == "collision"
-    assert south - RADIUS - 0.6 < sim.stage.people.position[0, 1] <= south - RADIUS
+    assert south - RADIUS - 0.6 < sim.state.people.position[0, 1] <= south - RADIUS
 
 
 def test_nobody_runs_through_somebody(sim: Simulation) -> None:
-    sim.place_agent("assistant_0", (-10.0, -15.0))
-    sim.place_agent("assistant_1", (-6.0, -15.0))
+    sim.scenario.place_agent("assistant_0", (-10.0, -15.0))
+    sim.scenario.place_agent("assistant_1", (-6.0, -15.0))
     run_at(sim, "assistant_0", 2.5, 4)
-    gap = sim.stage.people.position[1, 0] - sim.stage.people.position[0, 0]
+    gap = sim.state.people.position[1, 0] - sim.state.people.position[0, 0]
     assert 2 * RADIUS <= gap < 2 * RADIUS + 0.01
-    assert sim.stage.people.contact[0] == sim.stage.people.entity[1]
+    assert sim.state.people.contact[0] == sim.state.people.entity[1]
 
 
 def test_two_who_walk_at_each_other_both_stop_and_say_so(sim: Simulation) -> None:
-    sim.place_agent("assistant_0", (-1.5, -15.0))
-    sim.place_agent("assistant_1", (1.5, -15.0), yaw=np.pi)
+    sim.scenario.place_agent("assistant_0", (-1.5, -15.0))
+    sim.scenario.place_agent("assistant_1", (1.5, -15.0), yaw=np.pi)
     ahead = {"type": "move_forward", "distance": 1.0}
     for _ in range(3):
         result = sim.step({"assistant_0": ahead, "assistant_1": ahead})
@@ -55,45 +55,45 @@ def test_two_who_walk_at_each_other_both_stop_and_say_so(sim: Simulation) -> Non
 
 def test_a_crowd_that_walks_about_at_random_never_overlaps(sim: Simulation) -> None:
     for i in range(4):
-        sim.place_agent(f"assistant_{i}", (i % 2 * 1.5, -15.0 + i // 2 * 1.5))
+        sim.scenario.place_agent(f"assistant_{i}", (i % 2 * 1.5, -15.0 + i // 2 * 1.5))
     chance = np.random.default_rng(0)
     for _ in range(300):
         turn = {"type": "turn_left", "degrees": float(chance.uniform(0, 360))}
         step = {"type": "move_forward", "distance": float(chance.uniform(0, 2.5))}
         sim.step({f"assistant_{i}": turn if chance.random() < 0.5 else step for i in range(4)})
-        assert overlaps(sim.stage.people.position, RADIUS) == []
-        walls = sim.world.walkable.clearance_at(sim.stage.people.position[:, :2])
+        assert overlaps(sim.state.people.position, RADIUS) == []
+        walls = sim.world.walkable.clearance_at(sim.state.people.position[:, :2])
         assert walls.min() >= RADIUS
 
 
 def test_feet_stay_on_sloping_ground(sim: Simulation) -> None:
-    sim.place_agent("assistant_0", (-20.0, -15.0))
+    sim.scenario.place_agent("assistant_0", (-20.0, -15.0))
     run_at(sim, "assistant_0", 2.5, 10)
-    x, y, z = sim.stage.people.position[0]
+    x, y, z = sim.state.people.position[0]
     assert x > 0.0
     assert z == pytest.approx(float(sim.world.height((x, y))))
 
 
 def test_furniture_and_walls_of_a_room_stop_people(sim: Simulation) -> None:
-    sim.place_agent("assistant_0", (-5.0, 3.9), yaw=np.pi / 2)
+    sim.scenario.place_agent("assistant_0", (-5.0, 3.9), yaw=np.pi / 2)
     sim.step({"assistant_0": {"type": "enter", "place": toy_city.CAFE}})
     run_at(sim, "assistant_0", 1.0, 8)
-    room = int(sim.stage.people.room[0])
-    gap = sim.stage.indoor.gap(room, sim.stage.people.position[0, :2])
+    room = int(sim.state.people.room[0])
+    gap = sim.state.indoor.gap(room, sim.state.people.position[0, :2])
     assert RADIUS <= gap < RADIUS + 0.05
 
 
 def test_the_edge_of_the_map_holds_people_in(sim: Simulation) -> None:
-    sim.place_agent("assistant_0", (30.0, -15.0))
+    sim.scenario.place_agent("assistant_0", (30.0, -15.0))
     statuses = run_at(sim, "assistant_0", 2.5, 8)
     assert statuses[-1] == "collision"
-    assert sim.stage.people.position[0, 0] < toy_city.HALF
+    assert sim.state.people.position[0, 0] < toy_city.HALF
 
 
 def test_running_shows_as_running_and_standing_as_idle(sim: Simulation) -> None:
 
-    sim.place_agent("assistant_0", (-20.0, -15.0))
+    sim.scenario.place_agent("assistant_0", (-20.0, -15.0))
     run_at(sim, "assistant_0", 2.5, 1)
-    running = CLIPS[sim.stage.people.clip[0]]
+    running = CLIPS[sim.state.people.clip[0]]
     sim.step({})
-    assert (running, CLIPS[sim.stage.people.clip[0]]) == ("run", "idle")
+    assert (running, CLIPS[sim.state.people.clip[0]]) == ("run", "idle")

@@ -54,7 +54,7 @@ def hotel() -> World:
 def guest(world: World) -> Simulation:
     """Somebody at the door of the place."""
     sim = Simulation(world, None, SimConfig(assistants=1, observe=(), cars=0, pedestrians=0))
-    sim.place_agent("assistant_0", (-5.0, 4.0), yaw=math.pi / 2)
+    sim.scenario.place_agent("assistant_0", (-5.0, 4.0), yaw=math.pi / 2)
     return sim
 
 
@@ -68,7 +68,7 @@ class Raster:
     """Cells of a room where a body fits, and the steps between them."""
 
     def __init__(self, sim: Simulation, room: Room) -> None:
-        indoor = sim.stage.indoor
+        indoor = sim.state.indoor
         index = indoor.index[room.id]
         reach = max(room.size[:2]) / 2 + CELL
         n = math.ceil(2 * reach / CELL)
@@ -110,7 +110,7 @@ def path(sim: Simulation, room: Room, goal: tuple[float, ...]) -> np.ndarray:
     """Points to a point of the room, on cells where a body fits."""
     key = (id(sim), room.id)
     raster = RASTERS.setdefault(key, Raster(sim, room)) if key not in RASTERS else RASTERS[key]
-    here, there = raster.nearest(sim.stage.people.position[0, :2]), raster.nearest(goal)
+    here, there = raster.nearest(sim.state.people.position[0, :2]), raster.nearest(goal)
     _, before = dijkstra(raster.graph, directed=False, indices=here, return_predecessors=True)
     way = [there]
     while way[-1] != here:
@@ -122,7 +122,7 @@ def path(sim: Simulation, room: Room, goal: tuple[float, ...]) -> np.ndarray:
 def walk(sim: Simulation, room: Room, goal: tuple[float, ...]) -> None:
     """Walk to a point of the room by turning and stepping."""
     line = path(sim, room, goal)
-    people = sim.stage.people
+    people = sim.state.people
     k = 0
     while k < len(line) - 1:
         ahead = next(
@@ -168,7 +168,7 @@ def _visit_everything(sim: Simulation, world: World, *, containers: bool = True)
     def visit(name: str, back: str | None) -> None:
         room = world.room_by_id[name]
         seen.add(name)
-        people = sim.stage.people
+        people = sim.state.people
         if not room.rise:
             floors.add(round(float(people.position[0, 2]), 2))
         for container in room.containers if containers else ():
@@ -194,8 +194,8 @@ def test_on_stairs_one_climbs_step_by_step_and_cannot_reach_the_upper_door_from_
     sim = guest(hotel)
     stairs = next(room for room in hotel.rooms if room.kind == "stairs")
     lower, upper = stairs.doors
-    people = sim.stage.people
-    people.room[0] = sim.stage.indoor.index[stairs.id]
+    people = sim.state.people
+    people.room[0] = sim.state.indoor.index[stairs.id]
     people.place[0] = 0
     people.position[0] = lower.inside
     state = act(sim, type="enter", place=upper.to)
@@ -217,8 +217,8 @@ def test_a_lift_takes_one_to_the_floor_whose_car_is_named_and_to_no_other_room(h
     sim = guest(hotel)
     cars = [room for room in hotel.rooms if room.kind == "lift"]
     assert len(cars) == 3
-    people = sim.stage.people
-    people.room[0] = sim.stage.indoor.index[cars[0].id]
+    people = sim.state.people
+    people.room[0] = sim.state.indoor.index[cars[0].id]
     people.place[0] = 0
     people.position[0] = cars[0].centre
     state = act(sim, type="wait")
@@ -233,8 +233,8 @@ def test_a_lift_takes_one_to_the_floor_whose_car_is_named_and_to_no_other_room(h
 def test_who_follows_a_schedule_finds_the_way_out_of_a_bedroom_upstairs(hotel: World) -> None:
     sim = guest(hotel)
     room = [r for r in hotel.rooms if r.kind == "hotel_room"][-1]
-    people = sim.stage.people
-    people.room[0] = sim.stage.indoor.index[room.id]
+    people = sim.state.people
+    people.room[0] = sim.state.indoor.index[room.id]
     people.place[0] = 0
     people.position[0] = room.inside
     resident = toy_city.resident(0, "Ann", [toy_city.item("main", "00:00:00", "23:59:59", toy_city.PARK)])

@@ -18,8 +18,8 @@ Seen = tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]
 def sim() -> Simulation:
     """Two assistants three metres apart, one looking at the other."""
     simulation = Simulation(toy_city.world(), toy_city.community(), SimConfig(start=8 * 3600 - 20, assistants=2))
-    simulation.place_agent("assistant_0", (0.0, -15.0), yaw=0.0)
-    simulation.place_agent("assistant_1", (3.0, -15.0), yaw=0.0)
+    simulation.scenario.place_agent("assistant_0", (0.0, -15.0), yaw=0.0)
+    simulation.scenario.place_agent("assistant_1", (3.0, -15.0), yaw=0.0)
     return simulation
 
 
@@ -43,7 +43,7 @@ def test_every_part_has_the_promised_shape_and_type(seen: Seen) -> None:
 
 def test_one_sees_the_other_three_metres_ahead(sim: Simulation, seen: Seen) -> None:
     view = seen[0]["assistant_0"]
-    other = int(sim.stage.people.entity[4])
+    other = int(sim.state.people.entity[4])
     shown = view["segmentation"] == other
     assert shown.sum() > 300
     assert np.median(view["depth"][shown]) == pytest.approx(2.9, abs=0.25)
@@ -56,7 +56,7 @@ def test_one_sees_the_other_three_metres_ahead(sim: Simulation, seen: Seen) -> N
 
 def test_nobody_sees_their_own_body(sim: Simulation, seen: Seen) -> None:
     for i, name in enumerate(sim.agents):
-        assert int(sim.stage.people.entity[i]) not in seen[1][name]["entities"]
+        assert int(sim.state.people.entity[i]) not in seen[1][name]["entities"]
 
 
 def test_a_pixel_with_its_depth_leads_back_to_the_ground(sim: Simulation, seen: Seen) -> None:

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import toy_city
+from vico.agents.gather import Gatherer
 from vico.agents.schedule import followers_of
 from vico.errors import MissingFileError, OutputExistsError, SchemaError
 from vico.render.film import read_film
 from vico.sim.config import SimConfig
-from vico.sim.gather import Gatherer
 from vico.sim.recorder import Recorder, read_run
 from vico.sim.simulation import Simulation
 from vico.world.public import PublicMap

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from vico.assets.packages import installed
-from vico.assets.robots_packs import GO2_PACKAGE
+from vico.assets.robots.packs import GO2_PACKAGE
 from vico.assets.shapes import box
 from vico.errors import InputError
 from vico.sim.bodies import RESIDENT, Bodies
-from vico.sim.robots import RobotPopulation, Status
+from vico.sim.robots import RobotPopulation, RobotStatus
 from vico.sim.robots.gait import leg_angles
 from vico.world.folder import World
 from vico.world.heights import HeightField
@@ -184,7 +184,7 @@ def test_a_robot_stops_for_a_person_in_front_and_goes_on_when_they_leave(kind: s
     robots = RobotPopulation(field(), [kind], [[0, 0, 0]], packs=False)
     robots.drive(0, (0.8, 0, 0))
     run(robots, 10.0, people((6, 0)))
-    assert robots.status[0] == Status.WAITING
+    assert robots.status[0] == RobotStatus.WAITING
     assert 0.3 < gap(robots, people((6, 0))) < 1.0
     assert abs(robots.bodies().velocity[0, 0]) < 0.1
     run(robots, 5.0)
@@ -225,7 +225,7 @@ def test_husky_goes_round_a_house() -> None:
 def test_a_goal_nobody_can_reach_is_refused() -> None:
     walls = [(20, 10, 20, 1), (20, -10, 20, 1), (10, 0, 1, 20), (30, 0, 1, 20)]
     robots = RobotPopulation(field(*walls), ["husky"], [[0, 0, 0]], packs=False)
-    assert not robots.go_to(0, (20, 0)) or np.abs(robots._pilots[0].path[-1] - [20, 0]).max() > 5
+    assert not robots.go_to(0, (20, 0)) or np.abs(robots._followers[0].path[-1] - [20, 0]).max() > 5
 
 
 @pytest.mark.parametrize("packs", PACKS)

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 import toy_city
+from vico.agents.gather import Gatherer
 from vico.agents.schedule import followers_of
 from vico.errors import MissingFileError, SchemaError
 from vico.sim.config import SimConfig
-from vico.sim.gather import Gatherer
 from vico.sim.simulation import Simulation
 from vico.world.public import PublicMap
 

@@ -10,7 +10,7 @@ from road_city import HALF, road_city
 from vico.errors import InputError
 from vico.sim.bodies import RESIDENT, Bodies
 from vico.sim.traffic import Traffic
-from vico.sim.traffic_walkers import place_walker
+from vico.sim.traffic.pedestrians import place_pedestrian
 from vico.world.heights import HeightField
 from vico.world.walkways import SIDEWALK
 
@@ -60,11 +60,11 @@ def test_no_two_bodies_overlap_in_half_an_hour(cars: int, pedestrians: int) -> N
 def test_an_hour_of_dense_traffic_never_gridlocks() -> None:
     traffic = _traffic(120, 200)
     for _ in range(12):
-        before = traffic.fleet.rounds.sum()
+        before = traffic.fleet.laps.sum()
         _run(traffic, 300)
-        assert traffic.fleet.rounds.sum() - before > 30
+        assert traffic.fleet.laps.sum() - before > 30
     # Taken out of a jam: fewer than one in ten of those that drove through.
-    assert traffic.fleet.rescued.sum() < 0.1 * traffic.fleet.rounds.sum()
+    assert traffic.fleet.teleports.sum() < 0.1 * traffic.fleet.laps.sum()
 
 
 @dataclass
@@ -109,7 +109,7 @@ def test_everybody_gets_on_for_an_hour(seed: int) -> None:
     assert seen.moving[:30].mean() > 0.85
     assert seen.moving[30:].mean() > 0.85
     assert seen.overlaps == 0
-    assert traffic.fleet.rescued.sum() < 0.02 * traffic.fleet.rounds.sum()
+    assert traffic.fleet.teleports.sum() < 0.02 * traffic.fleet.laps.sum()
 
 
 def test_two_people_who_meet_between_walls_do_not_stand_there() -> None:
@@ -118,7 +118,7 @@ def test_two_people_who_meet_between_walls_do_not_stand_there() -> None:
     stretch = int(np.argmin(np.where(narrow, traffic.walks.room.sum(axis=1), np.inf)))
     for i, (share, way) in enumerate([(0.4, 1), (0.6, -1)]):
         offset = share * traffic.walks.length[stretch]
-        assert place_walker(traffic._paths, traffic.crowd, i, stretch, offset, way, traffic.shapes, i)
+        assert place_pedestrian(traffic._paths, traffic._walkers, i, stretch, offset, way, traffic.shapes, i)
     assert _watched(traffic, 120).longest.max() < 30.0
 
 
@@ -144,7 +144,7 @@ def test_a_car_stops_for_a_person_in_its_lane() -> None:
     traffic = _traffic(1, 0)
     lane = int(np.argmax(np.where((traffic.lanes.inside < 0) & ~traffic.lanes.buses_only, traffic.lanes.length, 0)))
     traffic.fleet.lane[0], traffic.fleet.offset[0], traffic.fleet.speed[0] = lane, 12.0, 8.0
-    traffic.fleet.planned[0] = 0
+    traffic.fleet.planned_count[0] = 0
     x, y, _ = traffic.lanes.at(lane, 12.0)
     traffic.shapes.x[0], traffic.shapes.y[0] = x, y
     person = _person(*traffic.lanes.at(lane, 60.0)[:2])

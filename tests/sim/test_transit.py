@@ -10,24 +10,24 @@ from vico.assets.vehicles import vehicle_prototypes
 from vico.errors import InputError
 from vico.sim.bodies import Bodies
 from vico.sim.traffic import Traffic
-from vico.sim.transit import DWELL, FARE, TransitSystem, ride_price, traffic_and_transit
+from vico.sim.transit import DWELL, FARE, TransitSystem, plan_buses, ride_price
 from vico.world.heights import HeightField
 
 
 def _systems(cars: int = 20, pedestrians: int = 20) -> tuple[Traffic, TransitSystem]:
-    city = road_city()
-    return traffic_and_transit(
+    city, second = road_city(), 8 * 3600.0
+    plan = plan_buses(city.transit, city.lanes, second)
+    traffic = Traffic(
         city.lanes,
-        city.transit,
         HeightField.flat(HALF),
         cars=cars,
         pedestrians=pedestrians,
         seed=3,
         first_entity=1_000_000,
-        first_bike=1_100_000,
-        second=8 * 3600.0,
+        buses=plan.bus_routes,
         solids=city.solids,
     )
+    return traffic, TransitSystem(city.transit, traffic, plan, second=second, first_bike=1_100_000)
 
 
 def _advance(traffic: Traffic, transit: TransitSystem) -> None:

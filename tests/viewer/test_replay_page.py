@@ -14,7 +14,7 @@ import pytest
 
 from vico.sim.recording import read_run
 from vico.viewer.from_run import recording_of
-from vico.viewer.recording import Event, Recording
+from vico.viewer.recording import RecordedEvent, Recording
 from vico.viewer.replay import UNIT, page_data, write_replay
 from vico.world.folder import World
 
@@ -71,7 +71,7 @@ def test_no_name_can_break_out_of_the_page(recording: Recording, helsinki: World
     evil = '</script><script>alert(1)</script><!-- \u2028 & \\" é'
     name = next(iter(recording.people))
     people = recording.people | {name: recording.people[name] | {"name": evil, "about": evil}}
-    events = [Event(1, "message", name, evil, (0.0, 0.0))]
+    events = [RecordedEvent(1, "message", name, evil, (0.0, 0.0))]
     write_replay(tmp_path / "r.html", replace(recording, people=people, events=events), helsinki)
     plain = tmp_path / "plain.html"
     write_replay(plain, recording, helsinki)

@@ -3,12 +3,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from vico.seeds import rng
+from vico.threads import WORKERS
 from vico.world.mesh import Material, Surface, glb_bytes, read_glb, write_glb
-from vico.world.seeds import rng
-from vico.world.threads import WORKERS
 
 
 def corners(surface: Surface) -> list[np.ndarray]:
@@ -33,13 +33,21 @@ def patchwork(count: int, kinds: int, seed: int) -> Surface:
     )
 
 
+def whole(surface: Surface) -> Surface:
+    """The triangles whose corners lie in three places: the others can't be seen and are not written."""
+    places = surface.positions[surface.triangles]
+    sides = [(places[:, k] != places[:, k - 1]).any(axis=1) for k in range(3)]
+    return replace(surface, triangles=surface.triangles[np.all(sides, axis=0)])
+
+
 @settings(max_examples=20, deadline=None)
 @given(st.integers(2, 2000), st.integers(1, 500), st.integers(0, 2**32 - 1))
 def test_equal_vertices_are_written_once_and_no_corner_changes(
     tmp_path_factory: pytest.TempPathFactory, count: int, kinds: int, seed: int
 ) -> None:
     path = tmp_path_factory.getbasetemp() / "patchwork.glb"
-    given_ = patchwork(count, kinds, seed)
+    given_ = whole(patchwork(count, kinds, seed))
+    assume(len(given_.triangles))
     write_glb(path, {"all": [given_]})
     (back,) = read_glb(path)["all"]
     for was, is_ in zip(corners(given_), corners(back), strict=True):
@@ -52,6 +60,7 @@ def test_small_surfaces_have_short_indices(tmp_path: Path) -> None:
     for count, size in ((60_000, 2), (70_000, 4)):
         surface = patchwork(count, count, 0)
         surface = replace(surface, positions=rng(1, "places").random((count, 3)).astype(np.float32))  # none are equal
+        surface = whole(surface)
         write_glb(tmp_path / "a.glb", {"all": [surface]})
         indices = (tmp_path / "a.glb").stat().st_size - 40 * count
         assert size <= indices / surface.triangles.size < size + 0.05

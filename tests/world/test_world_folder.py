@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from vico.errors import MissingFileError, SchemaError
-from vico.world.folder import LAYERS, World, read_records, read_world
+from vico.world.folder import LAYERS, World, read_records, read_world, seal
 from vico.world.model import VERSION, Place
 
 
@@ -70,3 +70,12 @@ def test_a_truncated_file_is_refused_by_name(copy: Path, name: str) -> None:
 def test_entities_are_unique_and_named(helsinki: World) -> None:
     things = len(helsinki.buildings) + len(helsinki.rooms) + len(helsinki.objects)
     assert len(helsinki.entities) >= things
+
+
+@pytest.mark.parametrize("name", ["terrain.npz", "meshes/roofs.glb", "roads.net.xml"])
+def test_a_world_that_lost_a_file_while_it_was_built_is_not_finished(helsinki: World, copy: Path, name: str) -> None:
+    (copy / "world.json").unlink()
+    (copy / name).unlink()
+    with pytest.raises(MissingFileError, match=f"{name}: taken away while the world was built"):
+        seal(copy, helsinki.manifest, seconds={})
+    assert not (copy / "world.json").exists()

@@ -81,7 +81,7 @@ def test_filled_cells_are_those_whose_centres_lie_inside(corners: list[tuple[flo
 
 def test_a_stroke_closes_exactly_the_cells_within_its_radius() -> None:
     grid = np.zeros((40, 40), np.uint8)
-    stroke(grid, np.array([-3.0]), np.array([-2.0]), np.array([4.0]), np.array([5.0]), 0.3, 10.0, 0.5, 1)
+    stroke(grid, np.array([[-3.0, -2.0]]), np.array([[4.0, 5.0]]), 0.3, 10.0, 0.5, 1)
     axis = (np.arange(40) + 0.5) * 0.5 - 10.0
     x, y = np.meshgrid(axis, axis)
     away = shapely.distance(shapely.points(x, y), shapely.LineString([(-3, -2), (4, 5)]))

@@ -7,22 +7,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import Polygon
 
+from stages_alone import buildings_of
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData
-from vico.world.seeds import rng
-from vico.world.solid_checks import coplanar_overlaps, open_edges
-from vico.worldgen.buildings.dormers import dormers
-from vico.worldgen.buildings.eaves import eaves, edges_of, slopes_of
-from vico.worldgen.buildings.finishes import FINISHES
-from vico.worldgen.buildings.outlines_plans import BuildingPlan, PartPlan
+from vico.seeds import rng
+from vico.world.check.solids import coplanar_overlaps, open_edges
 from vico.worldgen.buildings.projections import projections, water_tank
-from vico.worldgen.buildings.roof_shapes import Roof
+from vico.worldgen.buildings.roofs.dormers import dormers
+from vico.worldgen.buildings.roofs.eaves import eaves, edges_of, slopes_of
 from vico.worldgen.buildings.solids import Mesh, Seat, part_mesh
-from vico.worldgen.buildings.stage import buildings_from_osm
 from vico.worldgen.buildings.storeys import storeys_of
+from vico.worldgen.facades.catalogue import styles
 from vico.worldgen.facades.cuts import cut_at_heights, without_needless
-from vico.worldgen.facades.looks import Look, look_of, told_apart
-from vico.worldgen.facades.textures import _PAINTERS
+from vico.worldgen.facades.looks import FacadeStyle, look_of, told_apart
+from vico.worldgen.facades.textures.materials import PAINTERS
+from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
+from vico.worldgen.facts.outlines.roof_shapes import Roof
 from vico.worldgen.ground.terrain import flat_terrain
 
 NO_STREETS = shapely.STRtree([])
@@ -52,7 +52,7 @@ def volume(mesh: Mesh) -> float:
     return float(np.einsum("ni,ni->n", a, np.cross(b, c)).sum() / 6.0)
 
 
-def look(wall: str, region: str) -> Look:
+def look(wall: str, region: str) -> FacadeStyle:
     tags = {"building:material": {"wall_brick": "brick"}.get(wall, "")}
     made = look_of("residential", tags, levels=5, area=300.0, region=region, random=rng(0, "look"))
     return made.__class__(**{**made.__dict__, "wall": wall, "bay": 3.0, "hall": False})
@@ -215,9 +215,9 @@ def test_tanks_stand_on_high_flat_american_roofs_alone() -> None:
 
 
 def test_every_finish_names_materials_there_are() -> None:
-    for name, finish in FINISHES.items():
+    for name, finish in styles().finishes.items():
         named = {finish.side, finish.under, finish.picture or finish.side, finish.cover or finish.side}
-        assert named <= set(_PAINTERS), name
+        assert named <= set(PAINTERS), name
 
 
 def test_a_cut_wall_keeps_closed_with_the_fewest_triangles() -> None:
@@ -254,7 +254,7 @@ def test_a_building_s_own_draws_do_not_hang_on_who_else_is_there() -> None:
                          {"building": "apartments", "building:levels": "4", "roof:shape": "gabled"})
                  for k in range(count)]  # fmt: skip
         osm = OsmData(LocalFrame(49.4, 8.7), 150.0, 120.0, [], [], areas, [])
-        result = buildings_from_osm(osm, flat_terrain(half=150.0), seed=1)
+        result = buildings_of(osm, flat_terrain(half=150.0), seed=1)
         found = {}
         for record in result.records:
             rows = []

@@ -13,14 +13,15 @@ import shapely
 import trimesh
 from shapely import Polygon
 
+from stages_alone import buildings_of
 from vico.geo.elevation import read_elevation
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, read_osm
+from vico.seeds import rng
 from vico.world.model import FIRST_BUILDING
-from vico.world.seeds import rng
-from vico.worldgen.buildings.outlines import building_plans
 from vico.worldgen.buildings.solids import convex_pieces
-from vico.worldgen.buildings.stage import BuildingsResult, buildings_from_osm
+from vico.worldgen.buildings.stage import BuildingsResult
+from vico.worldgen.facts.outlines.buildings import building_plans
 from vico.worldgen.ground.terrain import flat_terrain, terrain_from_dem
 
 PLACE = Path(str(resources.files("vico") / "data" / "helsinki.osm.pbf"))
@@ -34,7 +35,7 @@ def osm() -> OsmData:
 
 @pytest.fixture(scope="module")
 def built(osm: OsmData) -> BuildingsResult:
-    return buildings_from_osm(osm, flat_terrain(half=HALF), seed=0)
+    return buildings_of(osm, flat_terrain(half=HALF), seed=0)
 
 
 def welded(built: BuildingsResult, entity: int) -> trimesh.Trimesh:
@@ -84,7 +85,7 @@ def test_footprints_are_valid_and_anticlockwise(built: BuildingsResult) -> None:
 
 
 def test_solids_of_neighbours_do_not_overlap(built: BuildingsResult, osm: OsmData) -> None:
-    plans, _ = building_plans(osm, seed=0)
+    plans = building_plans(osm, seed=0).plans
     shapes = [part.polygon for plan in plans for part in plan.parts if part.low == 0]
     owner = [plan.id for plan in plans for part in plan.parts if part.low == 0]
     left, right = shapely.STRtree(shapes).query(shapes, predicate="overlaps")
@@ -97,7 +98,7 @@ def test_solids_of_neighbours_do_not_overlap(built: BuildingsResult, osm: OsmDat
 
 
 def test_tagged_levels_decide_the_height(osm: OsmData, built: BuildingsResult) -> None:
-    plans = {plan.id: plan for plan in building_plans(osm, seed=0)[0]}
+    plans = {plan.id: plan for plan in building_plans(osm, seed=0).plans}
     tagged = [
         r
         for r in built.records
@@ -137,7 +138,7 @@ def test_collision_bodies_are_convex_closed_and_few(built: BuildingsResult) -> N
 
 
 def test_collision_bodies_fill_the_walls(built: BuildingsResult, osm: OsmData) -> None:
-    plans, _ = building_plans(osm, seed=0)
+    plans = building_plans(osm, seed=0).plans
     wanted = sum(part.polygon.area * (part.eaves - part.low) for plan in plans for part in plan.parts)
     solid = sum(trimesh.Trimesh(s.positions, s.triangles, process=False).volume for s in built.collision)
     assert solid == pytest.approx(wanted, rel=0.12)
@@ -156,7 +157,7 @@ def test_walls_reach_below_the_lowest_ground_on_a_slope(shared_data: Path) -> No
     place = shared_data / "places" / "monaco"
     frame = LocalFrame(43.73384, 7.41813)
     terrain = terrain_from_dem(read_elevation(place / "dem_srtm.tif", frame, 120.0), half=120.0)
-    result = buildings_from_osm(read_osm(place / "monaco.osm.pbf", frame, 120.0), terrain, seed=0)
+    result = buildings_of(read_osm(place / "monaco.osm.pbf", frame, 120.0), terrain, seed=0)
     assert result.watertight == len(result.records)
     lowest = {
         entity: min(float(s.positions[s.entity == entity, 2].min()) for s in result.walls if (s.entity == entity).any())
@@ -173,10 +174,10 @@ from importlib import resources
 from pathlib import Path
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import read_osm
-from vico.worldgen.buildings.stage import buildings_from_osm
+from stages_alone import buildings_of
 from vico.worldgen.ground.terrain import flat_terrain
 osm = read_osm(Path(str(resources.files("vico") / "data" / "helsinki.osm.pbf")), LocalFrame(60.1690, 24.9435), 120.0)
-built = buildings_from_osm(osm, flat_terrain(half=120.0), seed=SEED)
+built = buildings_of(osm, flat_terrain(half=120.0), seed=SEED)
 digest = hashlib.sha256(repr(built.records).encode())
 for s in (*built.walls, *built.roofs, *built.collision):
     for array in (s.positions, s.normals, s.uv, s.colour, s.entity, s.triangles):
@@ -189,7 +190,8 @@ print(digest.hexdigest())
 
 def digest_of(seed: int, kernels: str = "") -> str:
     code = _DIGEST.replace("SEED", str(seed))
-    env = os.environ | ({"OPENBLAS_CORETYPE": kernels} if kernels else {})
+    tests = str(Path(__file__).parents[1])
+    env = os.environ | {"PYTHONPATH": tests} | ({"OPENBLAS_CORETYPE": kernels} if kernels else {})
     return subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=env
     ).stdout.strip()

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from vico.world.mesh import Surface
+from vico.worldgen.facts.sight import Sight
 from vico.worldgen.photos.atlas import Atlas, unwrap
 from vico.worldgen.photos.daylight import sun_in, without_sun
-from vico.worldgen.photos.sight import Sight
-from vico.worldgen.photos.streetview_project import texel_centres
+from vico.worldgen.photos.streetview.projection import texel_centres
 
 SUN = np.array([np.sin(np.radians(140)), np.cos(np.radians(140)), 1.0]) / np.sqrt(2)
 

@@ -12,6 +12,7 @@ import shapely
 from vico.world.check import check_world
 from vico.world.folder import read_world
 from vico.worldgen.pipeline import build_world
+from vico.worldgen.request import BuildOptions
 
 _A, _F = 6378137.0, 1 / 298.257223563  # WGS 84
 _E2 = _F * (2 - _F)
@@ -88,7 +89,14 @@ _SLOW = pytest.mark.slow
 )
 def test_a_world_is_right_where_longitude_is_not(lat: float, lon: float, tmp_path: Path) -> None:
     out = tmp_path / "world"
-    build_world(_map(tmp_path / "end.osm", lat, lon), lat=lat, lon=lon, half=60.0, out=out, keep_stages=False)
+    build_world(
+        _map(tmp_path / "end.osm", lat, lon),
+        lat=lat,
+        lon=lon,
+        half=60.0,
+        out=out,
+        options=BuildOptions(keep_stages=False, previews=False),
+    )
     world = read_world(out)
     built = {building.name: shapely.Polygon(building.footprint[0]) for building in world.buildings}
     assert set(built) == set(_HOUSES)

@@ -6,11 +6,11 @@ from PIL import Image
 from scipy.ndimage import gaussian_filter
 
 from vico.errors import InputError
-from vico.world.seeds import rng
+from vico.seeds import rng
 from vico.worldgen.photos.atlas import Atlas, Chart
-from vico.worldgen.photos.enhance import evened, inpainted, padded, upscaled
-from vico.worldgen.photos.enhance_fill import exemplar_fill, pull_push
-from vico.worldgen.photos.enhance_sharpen import BackProjection
+from vico.worldgen.photos.enhance.back_projection import BackProjection
+from vico.worldgen.photos.enhance.exemplar import exemplar_fill, pull_push
+from vico.worldgen.photos.enhance.steps import evened, inpainted, padded, upscaled
 
 
 def facade(height: int = 96, width: int = 160) -> np.ndarray:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from vico.errors import InputError, MissingExtraError, SchemaError
-from vico.world.seeds import rng
-from vico.worldgen.photos.enhance_plugins import DiffusionInpainter, DiffusionUpscaler, PatchMatchFill, RealEsrgan
+from vico.seeds import rng
+from vico.worldgen.photos.enhance.plugins import DiffusionInpainter, DiffusionUpscaler, PatchMatchFill, RealEsrgan
 
 
 def holed() -> tuple[np.ndarray, np.ndarray]:

@@ -5,21 +5,17 @@ import math
 import numpy as np
 import pytest
 
-from vico.world.seeds import rng
-from vico.worldgen.buildings.roof_shapes import Roof
-from vico.worldgen.buildings.roofs import building_solid
+from vico.seeds import rng
+from vico.worldgen.buildings.roofs.solid import building_solid
+from vico.worldgen.facades.catalogue import region_of
 from vico.worldgen.facades.cuts import cut_at_heights
-from vico.worldgen.facades.looks import (
-    bay_coordinates,
-    bays,
-    colour_of,
-    family_of,
-    look_of,
-    region_of,
-    storey_coordinates,
-    year_of,
-)
-from vico.worldgen.facades.textures import _PAINTERS, BAYS, STOREYS, material
+from vico.worldgen.facades.families import family_of
+from vico.worldgen.facades.looks import look_of
+from vico.worldgen.facades.sheets import bay_coordinates, bays, storey_coordinates
+from vico.worldgen.facades.tags import colour_of, year_of
+from vico.worldgen.facades.textures.materials import PAINTERS, material
+from vico.worldgen.facades.textures.walls import BAYS, STOREYS
+from vico.worldgen.facts.outlines.roof_shapes import Roof
 
 
 def test_a_wall_holds_a_whole_number_of_bays() -> None:
@@ -52,7 +48,7 @@ def test_a_cut_leaves_every_edge_with_its_counterpart() -> None:
     assert all((b, a) in edges for a, b in edges)
 
 
-@pytest.mark.parametrize("name", sorted(_PAINTERS))
+@pytest.mark.parametrize("name", sorted(PAINTERS))
 def test_textures_have_sides_of_powers_of_two_and_something_to_see(name: str) -> None:
     texture = material(name).texture
     assert texture is not None
@@ -71,12 +67,12 @@ def test_textures_are_painted_alike_each_time() -> None:
 
 
 def test_a_city_needs_few_materials_but_has_many_families() -> None:
-    families = [name for name in _PAINTERS if name.startswith("wall_") and "back" not in name]
+    families = [name for name in PAINTERS if name.startswith("wall_") and "back" not in name]
     assert len(families) >= 14
-    assert sum(name.startswith(("wall", "ground_", "blank", "roof", "door")) for name in _PAINTERS) <= 48
+    assert sum(name.startswith(("wall", "ground_", "blank", "roof", "door")) for name in PAINTERS) <= 48
 
 
-@pytest.mark.parametrize("name", sorted(n for n in _PAINTERS if n.startswith("wall_") and "shed" not in n))
+@pytest.mark.parametrize("name", sorted(n for n in PAINTERS if n.startswith("wall_") and "shed" not in n))
 def test_some_windows_of_every_family_are_lit_at_night_and_most_of_the_wall_is_not(name: str) -> None:
     painted = material(name)
     assert painted.texture is not None
@@ -167,7 +163,7 @@ def test_every_family_has_all_its_materials_in_every_region() -> None:
             use, {}, levels=int(random.integers(1, 20)), area=float(random.uniform(20, 900)), region=region,
             random=rng(k, "look"),
         )  # fmt: skip
-        assert {look.wall, look.ground, look.blank, look.roof, look.back} <= set(_PAINTERS)
+        assert {look.wall, look.ground, look.blank, look.roof, look.back} <= set(PAINTERS)
         assert 2.0 < look.bay < 6.0
 
 

@@ -9,7 +9,8 @@ import pytest
 from vico.world.mesh import Surface
 from vico.world.model import Building, Category, Entrance, Place
 from vico.worldgen.facades.fronts import street_fronts
-from vico.worldgen.facades.textures import BAYS, material
+from vico.worldgen.facades.textures.materials import material
+from vico.worldgen.facades.textures.walls import BAYS
 from vico.worldgen.facades.walls import GroundFloors
 
 _FACING = math.radians(-60.0)

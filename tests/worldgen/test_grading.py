@@ -8,20 +8,24 @@ import numpy as np
 import pytest
 import shapely
 
+from stages_alone import ground_of
 from vico.geo.elevation import read_elevation
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, OsmWay, read_osm
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
-from vico.worldgen.buildings.partition import ground_partition, water_pieces
-from vico.worldgen.ground.bridges import decks_of, portal_feet, portals_of
-from vico.worldgen.ground.grading import graded, open_water, standing_outlines
+from vico.worldgen.facts.ground_kinds import ground_partition, water_pieces
+from vico.worldgen.facts.levels import CLEARANCE, OVER_A_STREET, overpasses, passages
+from vico.worldgen.facts.outlines.buildings import building_plans
+from vico.worldgen.facts.site import site_facts
+from vico.worldgen.facts.streets import StreetPolygons
+from vico.worldgen.ground.bridges.decks import decks_of
+from vico.worldgen.ground.bridges.portals import portal_feet, portals_of
+from vico.worldgen.ground.grading import graded, open_water
 from vico.worldgen.ground.kerbs import KERB, lowered_kerbs
-from vico.worldgen.ground.stage import ground_from_osm
 from vico.worldgen.ground.terrain import flat_terrain, terrain_from_dem
-from vico.worldgen.streets.levels import CLEARANCE, OVER_A_STREET, overpasses, passages
+from vico.worldgen.streets.polygons import road_polygons
 from vico.worldgen.streets.roads import is_traffic_street, roads_from_osm, streets_from_osm
-from vico.worldgen.streets.streets import StreetPolygons, road_polygons
 
 PLACE = Path(str(resources.files("vico") / "data" / "helsinki.osm.pbf"))
 HALF = 120.0
@@ -35,12 +39,12 @@ def osm() -> OsmData:
 
 @pytest.fixture(scope="module")
 def streets(osm: OsmData) -> StreetPolygons:
-    return road_polygons(osm, standing_outlines(osm, seed=0))
+    return road_polygons(site_facts(osm), building_plans(osm, seed=0).standing())
 
 
 @pytest.fixture(scope="module")
 def level(osm: OsmData, streets: StreetPolygons) -> HeightField:
-    return graded(flat_terrain(half=HALF), osm, streets)
+    return graded(flat_terrain(half=HALF), site_facts(osm), streets)
 
 
 def drawn(surfaces: list[Surface], count: int = 3000) -> np.ndarray:
@@ -66,7 +70,7 @@ def test_level_ground_stays_level_but_for_kerbs_and_waters(
 ) -> None:
     assert level.heights.size == 4
     points = np.random.default_rng(1).uniform(-HALF, HALF, (20_000, 2))
-    water = shapely.union_all(water_pieces(osm, streets, shapely.box(-HALF, -HALF, HALF, HALF)))
+    water = shapely.union_all(water_pieces(site_facts(osm), streets, shapely.box(-HALF, -HALF, HALF, HALF)))
     dry = ~shapely.contains_xy(shapely.buffer(water, 1.0), points[:, 0], points[:, 1])
     heights = level(points[dry])
     assert heights.min() >= -KERB - 1e-6
@@ -87,7 +91,7 @@ def test_kerbs_are_lowered_where_people_cross(streets: StreetPolygons, level: He
 
 
 def test_drawn_ground_and_height_field_agree(osm: OsmData, streets: StreetPolygons, level: HeightField) -> None:
-    points = drawn(ground_from_osm(osm, level, HALF, streets))
+    points = drawn(ground_of(osm, level, streets))
     away = points[:, 2] - level(points[:, :2])
     edge = shapely.distance(shapely.points(points[:, :2]), shapely.boundary(streets.carriageway))
     mouths = shapely.buffer(shapely.union_all(portal_feet(portals_of(osm, streets))), 0.1)
@@ -100,8 +104,8 @@ def test_streets_of_a_mountain_town_are_level_across(shared_data: Path) -> None:
     frame, folder = LocalFrame(42.50745, 1.52536), shared_data / "places" / "andorra"
     osm = read_osm(folder / "andorra.osm.pbf", frame, HALF)
     rough = terrain_from_dem(read_elevation(folder / "dem_srtm.tif", frame, HALF), half=HALF)
-    streets = road_polygons(osm)
-    field = graded(rough, osm, streets)
+    streets = road_polygons(site_facts(osm))
+    field = graded(rough, site_facts(osm), streets)
     tilts = []
     for street in streets.streets:
         line = shapely.LineString(street.line)
@@ -112,7 +116,7 @@ def test_streets_of_a_mountain_town_are_level_across(shared_data: Path) -> None:
                 tilts.append(abs(float(field.smooth(here + side) - field.smooth(here - side))) / (street.width - 1.0))
     assert len(tilts) > 100
     assert np.percentile(tilts, 85) < 0.03
-    for water in open_water(field, water_pieces(osm, streets, shapely.box(-HALF, -HALF, HALF, HALF))):
+    for water in open_water(field, water_pieces(site_facts(osm), streets, shapely.box(-HALF, -HALF, HALF, HALF))):
         bank = shapely.get_coordinates(water.polygon.exterior)
         assert np.median(field.smooth(bank) - water.level(bank)) > 0.1
 
@@ -135,15 +139,15 @@ def crossroads() -> OsmData:
 
 def test_a_bridge_over_a_street_is_high_and_left_out_of_the_traffic(crossroads: OsmData) -> None:
     assert overpasses(crossroads) == {3}
-    streets = road_polygons(crossroads)
-    field = graded(flat_terrain(half=HALF), crossroads, streets)
-    (deck,) = decks_of(crossroads, field)
+    streets = road_polygons(site_facts(crossroads))
+    field = graded(flat_terrain(half=HALF), site_facts(crossroads), streets)
+    (deck,) = decks_of(site_facts(crossroads), field)
     over = np.abs(deck.line[:, 0]) < 4.0
     assert (deck.z[over] - deck.slab - field.smooth(deck.line[over])).min() > CLEARANCE - 0.2
     assert abs(deck.z[0] - float(field.smooth(deck.line[0]))) < 0.3
-    used = [s.way for s in streets_from_osm(crossroads, HALF) if is_traffic_street(s)]
+    used = [s.way for s in streets_from_osm(site_facts(crossroads)) if is_traffic_street(s)]
     assert used == [1, 2, 4]
-    closed = {road.osm_id: road.closed for road in roads_from_osm(crossroads).roads}
+    closed = {road.osm_id: road.closed for road in roads_from_osm(site_facts(crossroads)).roads}
     assert closed[3] == OVER_A_STREET
     assert closed[1] is None
 
@@ -153,23 +157,23 @@ def test_a_bridge_over_nothing_mapped_is_the_ground(crossroads: OsmData) -> None
     assert overpasses(alone) == frozenset()
     assert passages(alone, frozenset()) == []
     middle = shapely.Point(0, 0)
-    assert road_polygons(alone).carriageway.contains(middle)
+    assert road_polygons(site_facts(alone)).carriageway.contains(middle)
 
 
 def test_a_place_without_streets_has_a_ground(osm: OsmData) -> None:
     empty = replace(osm, ways=[w for w in osm.ways if "highway" not in w.tags and "railway" not in w.tags])
-    streets = road_polygons(empty)
-    field = graded(flat_terrain(half=HALF), empty, streets)
-    assert sum(len(s.triangles) for s in ground_from_osm(empty, field, HALF, streets)) > 100
+    streets = road_polygons(site_facts(empty))
+    field = graded(flat_terrain(half=HALF), site_facts(empty), streets)
+    assert sum(len(s.triangles) for s in ground_of(empty, field, streets)) > 100
     window = shapely.box(-HALF, -HALF, HALF, HALF)
-    pieces = ground_partition(empty, streets, window)
+    pieces = ground_partition(site_facts(empty), streets, window)
     assert sum(p.area for shapes in pieces.values() for p in shapes) == pytest.approx(window.area, rel=1e-3)
 
 
 def test_ramps_of_a_bridge_over_a_street_climb_gently(crossroads: OsmData) -> None:
-    streets = road_polygons(crossroads, [])
-    field = graded(flat_terrain(half=180.0), crossroads, streets)
-    (deck,) = decks_of(crossroads, field)
+    streets = road_polygons(site_facts(crossroads), [])
+    field = graded(flat_terrain(half=180.0), site_facts(crossroads), streets)
+    (deck,) = decks_of(site_facts(crossroads), field)
     x = np.arange(-150.0, 150.0, 3.0)
     ground = field.smooth(np.stack([x, np.zeros_like(x)], axis=1))
     ramp = np.abs(x) > 42.0
@@ -181,8 +185,8 @@ def test_ramps_of_a_bridge_over_a_street_climb_gently(crossroads: OsmData) -> No
 def test_a_footway_beside_a_bridge_lies_as_high_and_has_no_parapet_between(crossroads: OsmData) -> None:
     beside = _way(9, [40, 50], [(-40, 6.6), (40, 6.6)], highway="footway", bridge="yes", layer="1")
     osm = replace(crossroads, ways=[*crossroads.ways, beside])
-    field = graded(flat_terrain(half=180.0), osm, road_polygons(osm, []))
-    road, walk = sorted(decks_of(osm, field), key=lambda deck: deck.way.id)
+    field = graded(flat_terrain(half=180.0), site_facts(osm), road_polygons(site_facts(osm), []))
+    road, walk = sorted(decks_of(site_facts(osm), field), key=lambda deck: deck.way.id)
     middle = np.abs(walk.line[:, 0]) < 30.0
     level = np.interp(walk.line[middle, 0], road.line[:, 0], road.z)
     assert np.abs(walk.z[middle] - level).max() < 0.35
@@ -205,9 +209,11 @@ def test_water_flows_on_below_a_bridge_without_a_hole(shared_data: Path) -> None
     frame = LocalFrame(42.507297, 1.527672)
     place = shared_data / "places" / "andorra"
     osm = read_osm(place / "andorra.osm.pbf", frame, 60.0, need_buildings=False)
-    streets = road_polygons(osm, [])
-    field = graded(terrain_from_dem(read_elevation([place / "dem_srtm.tif"], frame, 60.0), half=60.0), osm, streets)
-    surfaces = ground_from_osm(osm, field, 60.0, streets)
+    streets = road_polygons(site_facts(osm), [])
+    field = graded(
+        terrain_from_dem(read_elevation([place / "dem_srtm.tif"], frame, 60.0), half=60.0), site_facts(osm), streets
+    )
+    surfaces = ground_of(osm, field, streets)
     (water,) = (s for s in surfaces if s.material.name == "ground_water")
     corners = water.positions[water.triangles].astype(np.float64)
     flow = shapely.union_all(shapely.buffer(shapely.polygons(corners[..., :2]), 0.02))

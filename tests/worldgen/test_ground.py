@@ -7,14 +7,18 @@ import numpy as np
 import pytest
 import shapely
 
+from stages_alone import ground_of
 from vico.geo.elevation import HeightSamples, read_elevation
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, OsmWay, read_osm
 from vico.world.mesh import Surface
 from vico.world.model import ENTITY_GREEN, ENTITY_GROUND, ENTITY_ROAD
-from vico.worldgen.ground.stage import ground_from_osm, ground_partition, sea_polygons
+from vico.worldgen.facts.ground_kinds import ground_partition, sea_polygons
+from vico.worldgen.facts.site import site_facts
+from vico.worldgen.facts.streets import StreetPolygons, carriageway_width, lane_count
+from vico.worldgen.facts.tags import number
 from vico.worldgen.ground.terrain import flat_terrain, terrain_from_dem
-from vico.worldgen.streets.streets import StreetPolygons, carriageway_width, lane_count, number, road_polygons
+from vico.worldgen.streets.polygons import road_polygons
 
 PLACE = Path(str(resources.files("vico") / "data" / "helsinki.osm.pbf"))
 HALF = 110.0
@@ -28,12 +32,12 @@ def osm() -> OsmData:
 
 @pytest.fixture(scope="module")
 def streets(osm: OsmData) -> StreetPolygons:
-    return road_polygons(osm)
+    return road_polygons(site_facts(osm))
 
 
 @pytest.fixture(scope="module")
 def ground(osm: OsmData, streets: StreetPolygons) -> list[Surface]:
-    return ground_from_osm(osm, flat_terrain(half=HALF), HALF, streets)
+    return ground_of(osm, flat_terrain(half=HALF), streets)
 
 
 def plan_area(surface: Surface) -> float:
@@ -92,13 +96,13 @@ def test_crossings_lie_across_carriageways(streets: StreetPolygons) -> None:
 
 def test_nothing_is_paved_under_buildings(osm: OsmData) -> None:
     solids = [shapely.box(-30, -30, 30, 30)]
-    cleared = road_polygons(osm, solids)
+    cleared = road_polygons(site_facts(osm), solids)
     assert shapely.intersection(cleared.sidewalk, solids[0]).area < 0.1
     assert shapely.intersection(cleared.pedestrian, solids[0]).area < 0.1
 
 
 def test_the_partition_covers_the_window_once(osm: OsmData, streets: StreetPolygons) -> None:
-    pieces = ground_partition(osm, streets, WINDOW)
+    pieces = ground_partition(site_facts(osm), streets, WINDOW)
     total = sum(shape.area for shapes in pieces.values() for shape in shapes)
     assert total == pytest.approx(WINDOW.area, rel=1e-4)
     assert shapely.union_all([shape for shapes in pieces.values() for shape in shapes]).area == pytest.approx(
@@ -135,7 +139,7 @@ def test_the_ground_follows_a_hill(osm: OsmData, streets: StreetPolygons) -> Non
     x, y = (v.ravel() for v in np.meshgrid(side, side))
     hill = 30 * np.exp(-(x**2 + y**2) / 150**2) + 0.05 * x
     terrain = terrain_from_dem(HeightSamples(np.stack([x, y, hill], 1), 25.0, "hill", ""), half=HALF)
-    for surface in ground_from_osm(osm, terrain, HALF, streets):
+    for surface in ground_of(osm, terrain, streets):
         middle = surface.positions[surface.triangles].mean(axis=1).astype(np.float64)
         above = middle[:, 2] - terrain(middle[:, :2])
         if surface.material.name == "paint":
@@ -168,7 +172,7 @@ def test_monaco_s_harbour_is_water(shared_data: Path) -> None:
     terrain = terrain_from_dem(
         read_elevation(shared_data / "places" / "monaco" / "dem_srtm.tif", frame, 250.0), half=250
     )
-    pieces = ground_partition(osm, road_polygons(osm), shapely.box(-250, -250, 250, 250))
+    pieces = ground_partition(site_facts(osm), road_polygons(site_facts(osm)), shapely.box(-250, -250, 250, 250))
     harbour = [shape for shape in pieces["water"] if shape.area > 5_000]
     assert sum(shape.area for shape in harbour) > 20_000
     assert all(abs(terrain(np.asarray(shape.representative_point().coords[0]))) < 8.0 for shape in harbour)

@@ -3,12 +3,12 @@
 import numpy as np
 import shapely
 
-from vico.worldgen.ground.conform import Plan, conforming
+from vico.worldgen.ground.conform import PlanMesh, conforming
 from vico.worldgen.ground.drape import triangulated
 from vico.worldgen.ground.thinning import thinned
 
 
-def area_of(plan: Plan) -> float:
+def area_of(plan: PlanMesh) -> float:
     a, b, c = (plan.corners[plan.triangles[:, k]] for k in range(3))
     return float(((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]).sum() / 2)
 

@@ -7,19 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vico.assets.furniture import furniture_models
-from vico.assets.furniture_small import small_models
-from vico.assets.goods import GOODS
+from vico.assets.models.files import DATA, read_models
+from vico.assets.models.furniture import furniture_models
+from vico.assets.models.movable import movable_kinds
+from vico.rules import REACH
+from vico.world.check.indoors import walkable_inside
 from vico.world.folder import World
-from vico.world.indoor_checks import walkable_inside
 from vico.world.model import FIRST_FURNITURE, Category, Entrance
 from vico.worldgen.indoor.floorplans import FLATS, OUTSIDE, USES, sketch_of
-from vico.worldgen.indoor.layouts import REACH, plan_of, uses
+from vico.worldgen.indoor.layouts import plan_of, uses
 from vico.worldgen.indoor.rooms import rooms_of_plan
 from vico.worldgen.indoor.stage import furnish
 from vico.worldgen.indoor.uses import use_of
 
-SMALL = {model.name for model in small_models()}
+SMALL = set(read_models(DATA / "indoor" / "small_things.toml"))
 
 
 def test_every_place_in_a_building_has_rooms(helsinki: World) -> None:
@@ -140,7 +141,7 @@ def test_small_things_are_no_goods_and_stop_nobody(helsinki: World) -> None:
     small = np.isin(objects.prototype, sorted(SMALL))
     assert small.sum() > 1000
     assert not objects.solid[small].any()
-    assert not set(objects.kind[small].tolist()) & set(GOODS)
+    assert not set(objects.kind[small].tolist()) & set(movable_kinds())
 
 
 def test_containers_are_within_reach(helsinki: World) -> None:

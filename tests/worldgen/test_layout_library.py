@@ -14,8 +14,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from vico.errors import InputError, MissingFileError, SchemaError, VicoError
+from vico.world.check.indoors import walkable_inside
 from vico.world.folder import World
-from vico.world.indoor_checks import walkable_inside
 from vico.world.model import Category
 from vico.worldgen.indoor.layout_library import (
     Layout,

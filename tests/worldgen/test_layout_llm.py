@@ -13,9 +13,9 @@ import pytest
 from http_server import Answer, Request, serve
 from llm_server import Script, model_server, refuses, says
 from vico.errors import SourceError
-from vico.llm import Budget, Endpoint, LanguageModel
+from vico.llm import Budget, Connection, Endpoint, LanguageModel, Sampling
+from vico.world.check.indoors import walkable_inside
 from vico.world.folder import World
-from vico.world.indoor_checks import walkable_inside
 from vico.world.model import Place
 from vico.worldgen.indoor.layout_library import Layout, findings_of
 from vico.worldgen.indoor.layout_llm import EXAMPLE, LlmLayoutAuthor, furnish_drawn
@@ -37,8 +37,8 @@ def small(use: str) -> str:
 
 
 def author_at(base: str, *, workers: int = 1, **options: Any) -> LlmLayoutAuthor:
-    options = {"timeout": 5.0, "sleep": lambda seconds: None, "retries": 1, **options}
-    return LlmLayoutAuthor(LanguageModel(Endpoint(base, "tiny"), **options), workers=workers)
+    connection = Connection(timeout=5.0, retries=1, sleep=lambda seconds: None)
+    return LlmLayoutAuthor(LanguageModel(Endpoint(base, "tiny"), connection=connection, **options), workers=workers)
 
 
 @pytest.fixture
@@ -150,7 +150,7 @@ def test_a_stage_knows_its_author_and_keeps_what_was_drawn(helsinki: World, pubs
     assert (again.rooms, still_left) == (first.rooms, left)
     assert len(left) == 1
     with pytest.raises(SourceError, match="nobody listens"):
-        built(author_at(base, temperature=0.9))
+        built(author_at(base, sampling=Sampling(temperature=0.9)))
 
 
 def test_branches_of_a_chain_in_rooms_of_one_size_share_a_plan(helsinki: World, pubs: list[Place]) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from vico.assets.street import street_models
+from vico.assets.models.street import street_models
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, OsmNode, OsmWay
 from vico.world.folder import World

@@ -6,7 +6,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vico.assets.street import street_models
+from vico.assets.models.street import street_models
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, OsmNode, OsmWay
 from vico.world.heights import HeightField

@@ -8,12 +8,13 @@ import pytest
 import shapely
 from shapely import MultiPolygon, Polygon
 
+from stages_alone import buildings_of
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, OsmWay
-from vico.worldgen.buildings.outlines import building_plans
-from vico.worldgen.buildings.outlines_parts import bearing_of
-from vico.worldgen.buildings.outlines_plans import RULES, BuildingPlan
-from vico.worldgen.buildings.stage import buildings_from_osm
+from vico.worldgen.buildings.stage import buildings_from_plans
+from vico.worldgen.facts.outlines.buildings import building_plans
+from vico.worldgen.facts.outlines.parts import bearing_of
+from vico.worldgen.facts.outlines.plans import RULES, BuildingPlan
 from vico.worldgen.ground.terrain import flat_terrain
 
 Things = list[tuple[Polygon | MultiPolygon, Mapping[str, str]]]
@@ -29,11 +30,11 @@ def town(things: Things, streets: list[list[tuple[float, float]]] | None = None)
 
 
 def planned(things: Things, **more: list[list[tuple[float, float]]]) -> dict[str, BuildingPlan]:
-    return {plan.id: plan for plan in building_plans(town(things, **more), seed=0)[0]}
+    return {plan.id: plan for plan in building_plans(town(things, **more), seed=0).plans}
 
 
 def reasons(things: Things) -> dict[str, str]:
-    return {item.id: item.reason for item in building_plans(town(things), seed=0)[1]}
+    return {item.id: item.reason for item in building_plans(town(things), seed=0).dropped}
 
 
 def test_what_is_no_building_here_is_left_out_with_its_reason() -> None:
@@ -80,13 +81,13 @@ def test_an_outline_that_begins_above_its_parts_leaves_nothing_upside_down() -> 
     ]
     plan = planned(things)["w1"]
     assert all(part.eaves > part.low for part in plan.parts)
-    result = buildings_from_osm(town(things), flat_terrain(half=100), seed=0)
+    result = buildings_of(town(things), flat_terrain(half=100), seed=0)
     assert result.watertight == len(result.records) == 1
 
 
 def test_a_hole_of_a_multipolygon_stays_open() -> None:
     ring = Polygon(shapely.box(0, 0, 40, 30).exterior.coords, [shapely.box(12, 10, 28, 20).exterior.coords])
-    built = buildings_from_osm(town([(ring, {"building": "yes"})]), flat_terrain(half=100.0), seed=0)
+    built = buildings_of(town([(ring, {"building": "yes"})]), flat_terrain(half=100.0), seed=0)
     assert len(built.records[0].footprint) == 2
     assert built.watertight == 1
 
@@ -128,17 +129,16 @@ def test_nothing_known_anywhere_is_the_town_s_usual_height() -> None:
 
 def test_rules_are_counted() -> None:
     osm = town([(shapely.box(0, 0, 9, 9), {"building": "yes", "height": "7"})])
-    assert buildings_from_osm(osm, flat_terrain(half=100.0), seed=0).rules == {"height tag": 1}
+    assert buildings_of(osm, flat_terrain(half=100.0), seed=0).rules == {"height tag": 1}
 
 
 def test_plans_can_be_changed_before_they_are_built() -> None:
     from dataclasses import replace
 
-    def raised(plans: list[BuildingPlan]) -> list[BuildingPlan]:
-        return [replace(p, parts=[replace(part, eaves=33.0) for part in p.parts]) for p in plans]
-
     osm = town([(shapely.box(0, 0, 9, 9), {"building": "yes", "roof:shape": "flat"})])
-    built = buildings_from_osm(osm, flat_terrain(half=100.0), seed=0, fit=raised)
+    decided = building_plans(osm, seed=0)
+    raised = [replace(p, parts=[replace(part, eaves=33.0) for part in p.parts]) for p in decided.plans]
+    built = buildings_from_plans(replace(decided, plans=raised), osm, flat_terrain(half=100.0), seed=0)
     assert built.records[0].height == pytest.approx(33.0, abs=1.1)
 
 
@@ -188,6 +188,15 @@ def test_a_bridge_between_two_houses_over_a_street_stays_up() -> None:
         streets=[[(3, -30), (3, 40)]],
     )
     assert plans["w3"].parts[0].low == pytest.approx(8.0)
+
+
+@pytest.mark.parametrize("low", ["0.4", "1.95"])
+def test_nothing_hangs_where_nobody_could_walk_below(low: str) -> None:
+    fixed = {"building": "yes", "height": "9", "min_height": low}
+    plans = planned(
+        [(shapely.box(0, 0, 10, 10), {"building": "yes", "height": "9"}), (shapely.box(10, 0, 14, 10), fixed)]
+    )
+    assert plans["w2"].parts[0].low == 0.0
 
 
 def test_a_part_tagged_a_little_too_high_is_let_down_on_what_it_rests_on() -> None:

@@ -8,24 +8,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from photogrammetry.aerial import Photogrammetry, photogrammetry
+from photogrammetry.surface_net import surface_net
+from photogrammetry.tile_view import tile_surfaces
+from photogrammetry.tileset import write_tileset
 from vico.errors import EmptyInputError, InputError
 from vico.geo.osm import OsmData, read_osm
-from vico.geo.tile_mesh import TileMesh
-from vico.geo.tiles3d import read_tileset
+from vico.geo.tiles3d.mesh import TileMesh
+from vico.geo.tiles3d.reader import read_tileset
+from vico.seeds import rng
 from vico.world.folder import World, read_world
 from vico.world.heights import HeightField
-from vico.world.seeds import rng
-from vico.world.tileset import write_tileset
-from vico.worldgen.buildings.fitting import buildings_on_tiles, fit_to_tiles, settled
-from vico.worldgen.buildings.outlines import BuildingPlan, building_plans
+from vico.worldgen.buildings.fitting.nudging import fit_to_tiles, plans_on_tiles, settled
 from vico.worldgen.buildings.solids import leaky, seat_of, solid_meshes
+from vico.worldgen.buildings.stage import buildings_from_plans
+from vico.worldgen.facts.outlines.buildings import building_plans
+from vico.worldgen.facts.outlines.plans import BuildingPlan
+from vico.worldgen.facts.sight import Sight
 from vico.worldgen.ground.terrain import terrain_from_tiles
 from vico.worldgen.ground.tile_ground import on_ground
-from vico.worldgen.photos.photogrammetry import Photogrammetry, photogrammetry
-from vico.worldgen.photos.sight import Sight
-from vico.worldgen.photos.surface_net import surface_net
-from vico.worldgen.photos.tile_view import tile_surfaces
 from vico.worldgen.pipeline import build_world
+from vico.worldgen.request import BuildOptions
+from vico.worldgen.sources import Sources
 
 EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
 HALF = 80.0
@@ -189,7 +193,7 @@ def tops(plans: list[BuildingPlan], ground: HeightField) -> np.ndarray:
 
 def test_wrong_heights_are_mended(helsinki_tiles: TileMesh, map_of_helsinki: OsmData) -> None:
     ground = HeightField.flat(200.0)
-    plans, _ = building_plans(map_of_helsinki, seed=0)
+    plans = building_plans(map_of_helsinki, seed=0).plans
     plans = [plans[k] for k in measurable(plans)]
     by = rng(0, "wrong").choice([-3.2, 3.2, 6.4], len(plans))
     wrong = [
@@ -209,7 +213,7 @@ def test_wrong_heights_are_mended(helsinki_tiles: TileMesh, map_of_helsinki: Osm
 
 def test_shifted_footprints_are_moved_back(helsinki_tiles: TileMesh, map_of_helsinki: OsmData) -> None:
     ground = HeightField.flat(200.0)
-    plans, _ = building_plans(map_of_helsinki, seed=0)
+    plans = building_plans(map_of_helsinki, seed=0).plans
     by = np.array([1.1, -0.7, 0.0])
     moved = replace(helsinki_tiles, positions=helsinki_tiles.positions + by)
     fitted, report = fit_to_tiles(plans, moved, ground)
@@ -229,14 +233,14 @@ def test_where_the_tiles_show_no_building_none_is_changed(map_of_helsinki: OsmDa
         corner, np.array([[0, 1, 2], [0, 2, 3]], np.int32), np.zeros((4, 2), np.float32), np.full(2, -1, np.int32), (),
         np.full((4, 3), 255, np.uint8),
     )  # fmt: skip
-    plans, _ = building_plans(map_of_helsinki, seed=0)
+    plans = building_plans(map_of_helsinki, seed=0).plans
     fitted, report = fit_to_tiles(plans, bare, HeightField.flat(200.0))
     assert all(new is old for new, old in zip(fitted, plans, strict=True))
     assert report.counts()["the tiles show no building"] > 0.9 * len(plans)
 
 
 def test_a_city_model_without_ground_is_lowered_onto_the_terrain(map_of_helsinki: OsmData) -> None:
-    plans, _ = building_plans(map_of_helsinki, seed=0)
+    plans = building_plans(map_of_helsinki, seed=0).plans
     ground = HeightField(np.array([[5.0, 9.0], [5.0, 9.0]], np.float32), 200.0)
     solid = solid_meshes(plans, [seat_of(plan, ground) for plan in plans])
     count = len(solid.points)
@@ -253,7 +257,9 @@ def test_a_city_model_without_ground_is_lowered_onto_the_terrain(map_of_helsinki
 
 
 def test_buildings_on_tiles_are_closed(helsinki_tiles: TileMesh, map_of_helsinki: OsmData) -> None:
-    built, report = buildings_on_tiles(map_of_helsinki, HeightField.flat(200.0), helsinki_tiles, seed=0)
+    flat = HeightField.flat(200.0)
+    fitted, report = plans_on_tiles(building_plans(map_of_helsinki, seed=0), helsinki_tiles, flat)
+    built = buildings_from_plans(fitted, map_of_helsinki, flat, seed=0)
     assert len(report.fits) == len(built.records)
     assert built.watertight == len(built.records)
 
@@ -266,7 +272,14 @@ def test_monaco_is_found_again_in_its_own_photogrammetry(shared_data: Path, tmp_
     pytest.importorskip("DracoPy", reason="Draco is an extra")
     place = shared_data / "places" / "monaco"
     extract = place / "monaco.osm.pbf"
-    build_world(extract, lat=43.73384, lon=7.41813, half=150.0, dem=place / "dem_srtm.tif", out=tmp_path / "w")
+    build_world(
+        Sources(extract, dem=(place / "dem_srtm.tif",)),
+        lat=43.73384,
+        lon=7.41813,
+        half=150.0,
+        out=tmp_path / "w",
+        options=BuildOptions(previews=False),
+    )
     world = read_world(tmp_path / "w")
     config = Photogrammetry(texel=0.6)
     write_tileset(photogrammetry(world, config), world.frame, tmp_path / "t", levels=config.levels)
@@ -277,7 +290,7 @@ def test_monaco_is_found_again_in_its_own_photogrammetry(shared_data: Path, tmp_
     off = field(spots) - world.height(spots)
     assert np.sqrt((off**2).mean()) < 0.4
     assert np.quantile(np.abs(off), 0.99) < 1.5
-    plans, _ = building_plans(osm, seed=0)
+    plans = building_plans(osm, seed=0).plans
     _, report = fit_to_tiles(plans, mesh, field)
     assert report.after < 0.45
     assert report.after < report.before

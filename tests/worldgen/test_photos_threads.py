@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vico.geo.tile_mesh import TileMesh
+from vico.geo.tiles3d.mesh import TileMesh
+from vico.seeds import rng
+from vico.threads import WORKERS
 from vico.world.mesh import Surface, glb_bytes
-from vico.world.seeds import rng
-from vico.world.threads import WORKERS
 from vico.worldgen.photos import baking
 from vico.worldgen.photos.texturing import (
     Texturing,

@@ -9,28 +9,30 @@ from vico.errors import EmptyInputError, InputError, MissingFileError, OutputExi
 from vico.world.folder import World, read_world
 from vico.worldgen import recipe
 from vico.worldgen.pipeline import build_world, extract_centre
+from vico.worldgen.request import BuildOptions
+from vico.worldgen.sources import Sources
 
 EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
 CENTRE = {"lat": 60.1690, "lon": 24.9435}
 
 
 def test_the_same_input_and_seed_give_the_same_bytes(tmp_path: Path) -> None:
-    first = build_world(EXTRACT, **CENTRE, half=60, seed=3, out=tmp_path / "a")
-    second = build_world(EXTRACT, **CENTRE, half=60, seed=3, out=tmp_path / "b")
+    first = build_world(EXTRACT, **CENTRE, half=60, seed=3, out=tmp_path / "a", options=BuildOptions(previews=False))
+    second = build_world(EXTRACT, **CENTRE, half=60, seed=3, out=tmp_path / "b", options=BuildOptions(previews=False))
     assert first.files == second.files
     assert (tmp_path / "a" / "world.json").read_bytes() == (tmp_path / "b" / "world.json").read_bytes()
 
 
 def test_another_seed_gives_another_world(tmp_path: Path) -> None:
-    first = build_world(EXTRACT, **CENTRE, half=60, seed=3, out=tmp_path / "a")
-    second = build_world(EXTRACT, **CENTRE, half=60, seed=4, out=tmp_path / "b")
+    first = build_world(EXTRACT, **CENTRE, half=60, seed=3, out=tmp_path / "a", options=BuildOptions(previews=False))
+    second = build_world(EXTRACT, **CENTRE, half=60, seed=4, out=tmp_path / "b", options=BuildOptions(previews=False))
     assert first.files["meshes/buildings.glb"] != second.files["meshes/buildings.glb"]
 
 
 def test_an_existing_folder_is_refused_and_left_alone(helsinki_path: Path) -> None:
     before = (helsinki_path / "world.json").read_bytes()
     with pytest.raises(OutputExistsError, match="--force"):
-        build_world(EXTRACT, **CENTRE, half=60, out=helsinki_path)
+        build_world(EXTRACT, **CENTRE, half=60, out=helsinki_path, options=BuildOptions(previews=False))
     assert (helsinki_path / "world.json").read_bytes() == before
 
 
@@ -41,7 +43,7 @@ def test_force_replaces_the_folder_and_what_a_killed_build_left(tmp_path: Path) 
     partial = tmp_path / "world.partial"
     partial.mkdir()
     (partial / "rubbish").write_text("left by a killed build")
-    build_world(EXTRACT, **CENTRE, half=60, out=out, force=True)
+    build_world(EXTRACT, **CENTRE, half=60, out=out, force=True, options=BuildOptions(previews=False))
     assert sorted(p.name for p in tmp_path.iterdir()) == ["world"]
     assert not (out / "old.txt").exists()
 
@@ -54,7 +56,7 @@ def test_an_interrupted_build_leaves_no_world_but_its_finished_stages(
 
     monkeypatch.setattr(recipe, "places_from_osm", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "world")
+        build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "world", options=BuildOptions(previews=False))
     assert not (tmp_path / "world").exists()
     left = {p.name for p in (tmp_path / "world.partial").iterdir()}
     assert {"terrain.npz", "roads.json", "roads.net.xml", "walkable.npz"} <= left
@@ -83,14 +85,14 @@ def test_no_file_holds_a_time_or_a_path_of_this_machine(helsinki_path: Path, tmp
 
 def test_a_place_without_buildings_is_refused_and_nothing_is_left(tmp_path: Path) -> None:
     with pytest.raises(EmptyInputError):
-        build_world(EXTRACT, lat=10.0, lon=10.0, half=60, out=tmp_path / "world")
+        build_world(EXTRACT, lat=10.0, lon=10.0, half=60, out=tmp_path / "world", options=BuildOptions(previews=False))
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("half", [0.0, -5.0, float("nan"), 1e6])
 def test_a_radius_that_makes_no_sense_is_refused(tmp_path: Path, half: float) -> None:
     with pytest.raises(InputError, match="radius"):
-        build_world(EXTRACT, **CENTRE, half=half, out=tmp_path / "world")
+        build_world(EXTRACT, **CENTRE, half=half, out=tmp_path / "world", options=BuildOptions(previews=False))
 
 
 def test_the_middle_of_the_packaged_extract_is_central_helsinki() -> None:
@@ -115,5 +117,6 @@ def test_other_cities_build_and_pass_the_check(
 
     folder = shared_data / "places" / name
     out = tmp_path / name
-    build_world(folder / f"{name}.osm.pbf", lat=lat, lon=lon, half=300, dem=folder / dem if dem else None, out=out)
+    sources = Sources(folder / f"{name}.osm.pbf", dem=(folder / dem,) if dem else ())
+    build_world(sources, lat=lat, lon=lon, half=300, out=out, options=BuildOptions(previews=False))
     assert check_world(read_world(out)) == []

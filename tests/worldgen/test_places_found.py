@@ -13,12 +13,13 @@ from hypothesis import strategies as st
 from conftest import EXTRACT
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, read_osm
-from vico.geo.places import FoundPlace
+from vico.geo.places.model import FoundPlace
 from vico.world.folder import World
 from vico.world.model import Category, Dropped, Entrance, Place
+from vico.worldgen.facts.named_places import NamedPlace, named_places
+from vico.worldgen.facts.site import site_facts
 from vico.worldgen.places.found import compared, likeness
 from vico.worldgen.places.kinds import meaning_of
-from vico.worldgen.places.osm import Named, named_places
 from vico.worldgen.places.stage import places_from_osm
 
 
@@ -35,7 +36,12 @@ def _found(name: str, xy: tuple[float, float], kind: str = "coffee_shop", **more
 def _placed(osm: OsmData, world: World, found: list[FoundPlace]) -> tuple[list[Place], list[Entrance], dict[str, str]]:
     dropped: list[Dropped]
     places, doors, dropped = places_from_osm(
-        osm, buildings=world.buildings, walkable=world.walkable, height=world.height, roads=world.roads, found=found
+        site_facts(osm),
+        buildings=world.buildings,
+        walkable=world.walkable,
+        height=world.height,
+        roads=world.roads,
+        found=found,
     )
     return places, doors, {what.id: what.reason for what in dropped}
 
@@ -111,7 +117,7 @@ def test_shops_of_a_street_have_doors_of_their_own(osm: OsmData, helsinki: World
 
 
 def test_a_vague_kind_is_refined() -> None:
-    shop = Named("n1", "Kauppa Virta", Category.STORE, "shop", np.zeros(2), {}, None)
+    shop = NamedPlace("n1", "Kauppa Virta", Category.STORE, "shop", np.zeros(2), {}, None)
     told = compared([shop], [_found("Kauppa Virta", (1.0, 1.0), "shoe_store")])
     assert told.refined["n1"].kind == "shoes"
 

@@ -113,7 +113,7 @@ def test_a_damaged_file_is_told_never_read_wrong(tmp_path_factory: pytest.TempPa
         assert back == value  # the flipped bit lay in the key, which no content depends on
 
 
-@pytest.mark.parametrize("name", ["os:system", "vico.cli.main:app", "vico.world.files:write_bytes", "vico.x:Y"])
+@pytest.mark.parametrize("name", ["os:system", "vico.cli.main:app", "vico.io.files:write_bytes", "vico.x:Y"])
 def test_a_file_can_name_nothing_but_our_records(tmp_path: Path, name: str) -> None:
     tree = json.dumps({"data": name, "value": {}}).encode()
     small = pa.Codec("zstd").compress(tree, asbytes=True)

@@ -11,7 +11,9 @@ from road_city import HALF, PLACES, lanes_of, road_city
 from vico.errors import MissingExtraError
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, OsmWay
-from vico.worldgen.streets.levels import OVER_A_STREET
+from vico.worldgen.facts.driving_side import drives_left, keeps_left
+from vico.worldgen.facts.levels import OVER_A_STREET
+from vico.worldgen.facts.site import site_facts
 from vico.worldgen.streets.netconvert import netconvert_binary, road_network
 from vico.worldgen.streets.roads import (
     THROUGH_A_BUILDING,
@@ -21,17 +23,16 @@ from vico.worldgen.streets.roads import (
     roads_from_osm,
     streets_from_osm,
 )
-from vico.worldgen.streets.sides import drives_left, keeps_left
 
 
 def test_no_road_leaves_the_window() -> None:
-    roads = roads_from_osm(road_city().osm)
+    roads = roads_from_osm(site_facts(road_city().osm))
     reach = max(abs(v) for road in roads.roads for point in road.line for v in point)
     assert reach <= HALF + 1e-3
 
 
 def test_every_junction_joins_three_drivable_roads_at_its_place() -> None:
-    roads = roads_from_osm(road_city().osm)
+    roads = roads_from_osm(site_facts(road_city().osm))
     lines = {road.id: road.line for road in roads.roads}
     for junction in roads.junctions:
         assert len(junction.roads) >= 3
@@ -41,20 +42,20 @@ def test_every_junction_joins_three_drivable_roads_at_its_place() -> None:
 
 def test_central_helsinki_has_the_junctions_the_map_shows() -> None:
     # 157 junctions of drivable ways in the map (driveways and car parks among them), a third of them private.
-    assert 80 <= len(roads_from_osm(road_city().osm).junctions) <= 160
+    assert 80 <= len(roads_from_osm(site_facts(road_city().osm)).junctions) <= 160
 
 
 def test_reversed_oneways_run_in_the_direction_of_travel() -> None:
     osm = road_city().osm
     way = next(w for w in osm.ways if w.tags.get("oneway") == "yes" and w.tags.get("highway") == "residential")
     turned = replace(way, tags=way.tags | {"oneway": "-1"})
-    (street,) = streets_from_osm(replace(osm, ways=[turned]), 10_000.0)
+    (street,) = streets_from_osm(site_facts(replace(osm, half=10_000.0, ways=[turned])))
     assert street.nodes == way.nodes[::-1]
 
 
 def test_equal_input_gives_equal_network_bytes() -> None:
     city = road_city()
-    assert road_network(city.osm) == city.network
+    assert road_network(site_facts(city.osm)) == city.network
 
 
 def test_network_files_hold_neither_time_nor_path() -> None:
@@ -65,7 +66,7 @@ def test_network_files_hold_neither_time_nor_path() -> None:
 
 
 def test_a_window_without_streets_has_a_network_without_lanes() -> None:
-    network = road_network(replace(road_city().osm, ways=[]))
+    network = road_network(site_facts(replace(road_city().osm, ways=[])))
     assert len(lanes_of(network)) == 0
     assert b"<OpenDRIVE>" in network.xodr
 
@@ -105,9 +106,9 @@ def test_ways_are_closed_for_a_reason_that_the_report_names() -> None:
         _street(6, [(20, 60), (90, 60)], layer="-1"),
     )
     house = shapely.box(-60, 10, -40, 30)
-    open_ = [street.way for street in streets_from_osm(osm, 150.0, [house]) if is_traffic_street(street)]
+    open_ = [street.way for street in streets_from_osm(site_facts(osm), [house]) if is_traffic_street(street)]
     assert open_ == [1, 4]
-    assert {d.id: d.reason for d in closed_roads(roads_from_osm(osm, solids=[house]))} == {
+    assert {d.id: d.reason for d in closed_roads(roads_from_osm(site_facts(osm), solids=[house]))} == {
         "w2": THROUGH_A_BUILDING,
         "w3": UNDERGROUND,
         "w5": OVER_A_STREET,
@@ -137,7 +138,7 @@ def test_the_country_of_addresses_goes_before_the_coarse_map() -> None:
 @pytest.mark.parametrize(("country", "side"), [("GB", -1.0), ("FI", 1.0)])
 def test_oncoming_lanes_lie_on_the_side_the_country_says(country: str, side: float) -> None:
     osm = _map(_street(1, [(-90, 0), (90, 0)], lanes="4"), _street(2, [(0, -90), (0, 90)]), country=country)
-    lanes = lanes_of(road_network(osm))
+    lanes = lanes_of(road_network(site_facts(osm)))
     assert lanes.lefthand is (country == "GB")
     east = [k for k in np.flatnonzero(lanes.inside < 0) if lanes.line(k)[-1, 0] - lanes.line(k)[0, 0] > 20]
     assert east
@@ -152,7 +153,7 @@ def test_a_bridge_over_water_is_open_to_traffic_walkers_and_buses(shared_data: P
     city = road_city(shared_data / "places" / "andorra" / "andorra.osm.pbf", 42.50745, 1.52536)
     lanes, walks = city.lanes, city.lanes.walks
     bridge = 225345368  # Pont Prat de la Creu over the Valira
-    assert bridge not in {road.osm_id for road in roads_from_osm(city.osm).roads if road.closed}
+    assert bridge not in {road.osm_id for road in roads_from_osm(site_facts(city.osm)).roads if road.closed}
     deck = shapely.LineString(next(way.line for way in city.osm.ways if way.id == bridge)).buffer(6, cap_style="flat")
     over = {
         lanes.ids[k]

@@ -3,14 +3,14 @@
 import numpy as np
 import shapely
 
+from stages_alone import buildings_of
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData
-from vico.world.seeds import rng
-from vico.world.solid_checks import coplanar_overlaps
-from vico.worldgen.buildings.outlines_plans import BuildingPlan, PartPlan
-from vico.worldgen.buildings.roof_shapes import Roof
+from vico.seeds import rng
+from vico.world.check.solids import coplanar_overlaps
 from vico.worldgen.buildings.rooftops import cornices, posts, rooftop_parts
-from vico.worldgen.buildings.stage import buildings_from_osm
+from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
+from vico.worldgen.facts.outlines.roof_shapes import Roof
 from vico.worldgen.ground.terrain import flat_terrain
 
 
@@ -66,7 +66,7 @@ def test_a_street_of_stacked_and_touching_houses_has_no_flickering_faces() -> No
         stair = shapely.box(12 * k + 4, 4, 12 * k + 8, 14)
         areas.append(OsmArea(f"w{k + 50}", stair, {"building:part": "yes", "height": "22", "min_height": "6"}))
     osm = OsmData(LocalFrame(50.0, 8.0), 100.0, 60.0, [], [], areas, [])
-    built = buildings_from_osm(osm, flat_terrain(half=100.0), seed=0)
+    built = buildings_of(osm, flat_terrain(half=100.0), seed=0)
     assert built.watertight == 6
     corners = np.concatenate([s.positions[s.triangles] for s in (*built.walls, *built.roofs)])
     assert coplanar_overlaps(corners).flickering == 0

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vico.errors import EmptyInputError, InputError, MissingExtraError
-from vico.worldgen.photos.sight import Sight
+from vico.worldgen.facts.sight import Sight
 
 SQUARE = np.array([(0, 0, 2), (4, 0, 2), (4, 4, 2), (0, 4, 2)], np.float64), np.array([(0, 1, 2), (0, 2, 3)])
 

@@ -16,6 +16,7 @@ from vico.worldgen import recipe
 from vico.worldgen.ground.terrain import flat_terrain
 from vico.worldgen.many import read_place_table
 from vico.worldgen.pipeline import build_world, rebuild_world
+from vico.worldgen.request import BuildOptions
 from vico.worldgen.stages import Stages
 
 EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
@@ -70,33 +71,35 @@ def test_a_torn_product_is_made_anew(tmp_path: Path) -> None:
 
 
 def test_a_stopped_build_goes_on_and_gives_the_same_world(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "whole", keep_stages=False)
+    whole = build_world(
+        EXTRACT, **CENTRE, half=60, out=tmp_path / "whole", options=BuildOptions(keep_stages=False, previews=False)
+    )
     ran: list[str] = []
 
     def stop(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    real = recipe.buildings_from_osm
+    real = recipe.buildings_from_plans
 
     def counted(*inputs: object, **options: object) -> object:
         ran.append("buildings")
         return real(*inputs, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(recipe, "buildings_from_osm", counted)
+    monkeypatch.setattr(recipe, "buildings_from_plans", counted)
     with monkeypatch.context() as patch:
         patch.setattr(recipe, "furnish", stop)
         with pytest.raises(KeyboardInterrupt):
-            build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w")
-    resumed = build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w")
+            build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w", options=BuildOptions(previews=False))
+    resumed = build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w", options=BuildOptions(previews=False))
     assert ran == ["buildings"]
     assert resumed.files == whole.files
     assert resumed == whole
 
 
 def test_one_stage_runs_alone_and_changes_nothing_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    built = build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w")
+    built = build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w", options=BuildOptions(previews=False))
     ran: list[str] = []
-    for name in ("buildings_from_osm", "objects_from_osm", "ground_from_osm", "furnish"):
+    for name in ("buildings_from_plans", "objects_from_osm", "ground_from_osm", "furnish"):
         real = getattr(recipe, name)
 
         def counted(*inputs: object, name: str = name, real: object = real, **options: object) -> object:
@@ -114,7 +117,7 @@ def test_one_stage_runs_alone_and_changes_nothing_else(tmp_path: Path, monkeypat
 def test_a_stage_is_not_run_alone_when_its_sources_are_gone(tmp_path: Path) -> None:
     extract = tmp_path / "map.osm.pbf"
     extract.write_bytes(EXTRACT.read_bytes())
-    build_world(extract, **CENTRE, half=60, out=tmp_path / "w")
+    build_world(extract, **CENTRE, half=60, out=tmp_path / "w", options=BuildOptions(previews=False))
     extract.unlink()
     with pytest.raises(MissingFileError, match="it is gone"):
         rebuild_world(tmp_path / "w", ["objects"])

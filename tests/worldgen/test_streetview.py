@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 
 from vico.errors import InputError, MissingExtraError
-from vico.geo.street_images import StreetImage, looking, pinhole, turned
-from vico.geo.street_images_panorama import cut
+from vico.geo.street_images.model import StreetImage, looking, pinhole, turned
+from vico.geo.street_images.panorama import cut
 from vico.render import Cameras, Scene, render
+from vico.seeds import rng
 from vico.world.mesh import Surface
-from vico.world.seeds import rng
+from vico.worldgen.facts.sight import Sight
 from vico.worldgen.photos.atlas import Atlas, textured, unwrap
-from vico.worldgen.photos.sight import Sight
-from vico.worldgen.photos.streetview import reproject
-from vico.worldgen.photos.streetview_blend import Layer, paint_chart
-from vico.worldgen.photos.streetview_mask import LanguageGroundedMovers, StandingDifferences, View
-from vico.worldgen.photos.streetview_match import LoftrMatcher, Matches, SiftMatcher, XfeatMatcher
-from vico.worldgen.photos.streetview_paint import FastMarching, Patches, colour_curve, lab_of, rgb_of
-from vico.worldgen.photos.streetview_photo import Photographer, StreetviewConfig, above_ground
-from vico.worldgen.photos.streetview_pose import Pose, correction
-from vico.worldgen.photos.streetview_project import Shot
+from vico.worldgen.photos.streetview.blending import Blending, Layer, paint_chart
+from vico.worldgen.photos.streetview.masks import LanguageGroundedMovers, PhotoView, StandingDifferences
+from vico.worldgen.photos.streetview.matching import LoftrMatcher, Matches, SiftMatcher, XfeatMatcher
+from vico.worldgen.photos.streetview.painting import FastMarching, Patches, colour_curve, lab_of, rgb_of
+from vico.worldgen.photos.streetview.photo import Photographer, StreetviewConfig, above_ground
+from vico.worldgen.photos.streetview.pose import Pose, correction
+from vico.worldgen.photos.streetview.projection import Shot
+from vico.worldgen.photos.streetview.reprojection import reproject
 from vico.worldgen.product import digest_of
 
 cv2 = pytest.importorskip("cv2", reason="OpenCV is the extra photos")
@@ -192,7 +192,7 @@ def test_what_stands_in_the_street_is_masked_and_not_painted_on_the_wall() -> No
     above = above_ground(depth, TRUE, LENS, lambda xy: np.zeros(len(xy)))
     assert np.nanmin(above) == pytest.approx(0.0, abs=0.02)
     _, _, entity = photographer(s.true, things)(TRUE.position, TRUE.rotation, LENS, WIDTH, HEIGHT)
-    found = StandingDifferences().mask(View(photo(extra=things).picture, render_, depth, above, LENS[0, 0]))
+    found = StandingDifferences().mask(PhotoView(photo(extra=things).picture, render_, depth, above, LENS[0, 0]))
     moving = entity == 999
     wall = above > 0.3
     assert (found & moving & wall).sum() > 0.9 * (moving & wall).sum()
@@ -223,10 +223,8 @@ def test_a_camera_that_sees_a_speck_of_a_wall_leaves_it_as_it_is() -> None:
     shot = Shot("a", photo().picture, masked, TRUE, LENS, depth)
     flat = colour_curve(lab_of(photo().picture[:20, :20].reshape(-1, 3)), np.tile(np.float32([50, 0, 0]), (9, 1)))
     for k, chart in enumerate(s.model.charts):
-        colour, _, given, _ = paint_chart(
-            s.model, k, [Layer(shot, flat, np.zeros(3))], s.sight,
-            farthest=60.0, steepest=1.3, feather=0.5, unshade=1.0,
-        )  # fmt: skip
+        how = Blending(farthest=60.0, steepest=1.3, feather=0.5, unshade=1.0)
+        colour, _, given, _ = paint_chart(s.model, k, [Layer(shot, flat, np.zeros(3))], s.sight, how)
         assert given == [0]
         assert (colour == s.model.pages[chart.page][chart.box]).all()
 
@@ -328,7 +326,7 @@ def test_plug_ins_say_what_to_install(tmp_path: Path, monkeypatch: pytest.Monkey
         with pytest.raises(MissingExtraError, match="pip install"):
             matcher.match(picture, picture, reach)
     with pytest.raises(MissingExtraError, match="pip install"):
-        LanguageGroundedMovers("a", "b").mask(View(picture, picture, reach, reach, 50.0))
+        LanguageGroundedMovers("a", "b").mask(PhotoView(picture, picture, reach, reach, 50.0))
 
 
 def test_a_configuration_and_a_report_can_be_kept_as_a_stage_s_product() -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from vico.errors import MissingFileError
-from vico.world.seeds import rng
-from vico.worldgen.photos.streetview_mask import LanguageGroundedMovers, View
-from vico.worldgen.photos.streetview_match import LoftrMatcher, XfeatMatcher
+from vico.seeds import rng
+from vico.worldgen.photos.streetview.masks import LanguageGroundedMovers, PhotoView
+from vico.worldgen.photos.streetview.matching import LoftrMatcher, XfeatMatcher
 
 pytest.importorskip("cv2", reason="OpenCV is the extra photos")
 torch = pytest.importorskip("torch", reason="torch is not installed")
@@ -17,7 +17,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
 
 PICTURE = rng(0, "picture").integers(0, 255, (96, 128, 3)).astype(np.uint8)
 REACH = np.full((96, 128), 12.0, np.float32)
-VIEW = View(PICTURE, PICTURE, np.full((96, 128), 9.0, np.float32), np.ones((96, 128), np.float32), 90.0)
+VIEW = PhotoView(PICTURE, PICTURE, np.full((96, 128), 9.0, np.float32), np.ones((96, 128), np.float32), 90.0)
 
 
 def test_loftr_reads_a_checkpoint_and_keeps_to_the_reach(tmp_path: Path) -> None:

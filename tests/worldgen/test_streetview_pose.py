@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vico.geo.street_images import looking, pinhole, turned
-from vico.world.seeds import rng
-from vico.worldgen.photos.streetview_match import Matches
-from vico.worldgen.photos.streetview_pose import Pose, correction, fit_pose, lifted, projected, se3_norm
+from vico.geo.street_images.model import looking, pinhole, turned
+from vico.seeds import rng
+from vico.worldgen.photos.streetview.matching import Matches
+from vico.worldgen.photos.streetview.pose import Pose, correction, fit_pose, lifted, projected, se3_norm
 
 pytest.importorskip("cv2", reason="OpenCV is the extra photos")
 

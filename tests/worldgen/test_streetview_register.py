@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vico.geo.street_images import looking
-from vico.world.seeds import rng
+from vico.geo.street_images.model import looking
+from vico.seeds import rng
 from vico.worldgen.photos.atlas import Chart
-from vico.worldgen.photos.streetview_pose import Pose
-from vico.worldgen.photos.streetview_register import agreement, nudge_of
+from vico.worldgen.photos.streetview.pose import Pose
+from vico.worldgen.photos.streetview.registration import agreement, nudge_of
 
 cv2 = pytest.importorskip("cv2", reason="OpenCV is the extra photos")
 

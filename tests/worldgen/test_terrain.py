@@ -6,7 +6,7 @@ import numpy as np
 
 from vico.geo.elevation import HeightSamples, read_elevation
 from vico.geo.frame import LocalFrame
-from vico.world.seeds import rng
+from vico.seeds import rng
 from vico.worldgen.ground.terrain import flat_terrain, is_outlier, terrain_from_dem
 
 

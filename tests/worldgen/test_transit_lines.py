@@ -16,6 +16,7 @@ from vico.sim.transit import DWELL, departure, plan_buses
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.model import Line, Transit
+from vico.worldgen.facts.site import site_facts
 from vico.worldgen.streets.netconvert import empty_network
 from vico.worldgen.transit.routes import interval_of, routes_from_osm
 from vico.worldgen.transit.stage import transit_from_osm
@@ -48,7 +49,7 @@ def _driveable(transit: Transit, lanes: LaneGraph) -> None:
         assert line.departures[0] >= 0
         assert line.departures[-1] <= DAY
     plan = plan_buses(transit, lanes, 8 * 3600.0)
-    assert len(plan.buses) >= len(transit.lines)
+    assert len(plan.line_of_bus) >= len(transit.lines)
 
 
 def _feed(city: RoadCity, lines: int = 2) -> Feed:
@@ -69,7 +70,7 @@ def _feed(city: RoadCity, lines: int = 2) -> Feed:
 
 def test_timetables_come_before_the_map_and_keep_names_colours_and_departures() -> None:
     city = road_city()
-    transit = transit_from_osm(city.osm, city.lanes, FLAT, solids=city.solids, feeds=[_feed(city)])
+    transit = transit_from_osm(site_facts(city.osm), city.lanes, FLAT, solids=city.solids, feeds=[_feed(city)])
     _driveable(transit, city.lanes)
     line = transit.lines[0]
     # Two routes over the same stops are driven as one line with the buses of both.
@@ -85,7 +86,7 @@ def test_timetables_come_before_the_map_and_keep_names_colours_and_departures() 
 
 def test_buses_leave_when_the_timetable_says() -> None:
     city = road_city()
-    transit = transit_from_osm(city.osm, city.lanes, FLAT, solids=city.solids, feeds=[_feed(city)])
+    transit = transit_from_osm(site_facts(city.osm), city.lanes, FLAT, solids=city.solids, feeds=[_feed(city)])
     line = transit.lines[0]
     assert departure(line, 1) == line.departures[1]
     assert departure(line, len(line.departures)) == line.departures[0] + DAY
@@ -130,7 +131,7 @@ def test_without_lanes_there_are_no_lines_but_a_reason_and_racks() -> None:
     city = road_city()
     bare = replace(city.osm, ways=[w for w in city.osm.ways if w.tags.get("highway") == "footway"])
     lanes = lanes_of(empty_network(bare.frame, HALF))
-    transit = transit_from_osm(bare, lanes, FLAT)
+    transit = transit_from_osm(site_facts(bare), lanes, FLAT)
     assert (transit.stops, transit.lines) == ([], [])
     assert transit.left_out[-1].reason == "no streets for traffic in the window: none is planned"
     assert transit.bike_stations
@@ -150,7 +151,7 @@ def test_heidelberg_drives_by_its_timetable(shared_data: Path) -> None:
     folder = shared_data / "places" / "heidelberg"
     city = road_city(folder / "heidelberg.osm.pbf", *CITIES["heidelberg"])
     feed = read_gtfs(folder / "gtfs_rnv_2016.zip", city.osm.frame, HALF)
-    transit = transit_from_osm(city.osm, city.lanes, FLAT, solids=city.solids, feeds=[feed])
+    transit = transit_from_osm(site_facts(city.osm), city.lanes, FLAT, solids=city.solids, feeds=[feed])
     _driveable(transit, city.lanes)
     by_name = {line.name: line for line in transit.lines}
     assert by_name.keys() & {"33", "35"}
@@ -174,7 +175,7 @@ def test_buses_drive_about_rather_than_wait_for_their_time() -> None:
 def test_buses_with_a_long_wait_stand_in_lanes_that_no_other_line_drives() -> None:
     city = road_city()
     rare = [replace(r, tags={**r.tags, "interval": "02:00"}) for r in city.osm.relations]
-    transit = transit_from_osm(replace(city.osm, relations=rare), city.lanes, FLAT, solids=city.solids)
+    transit = transit_from_osm(site_facts(replace(city.osm, relations=rare)), city.lanes, FLAT, solids=city.solids)
     lane_of = {stop.id: stop.lane for stop in transit.stops}
     waiting = [line for line in transit.lines if _idle(line) > 60.0]
     assert waiting

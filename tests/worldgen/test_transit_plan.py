@@ -11,6 +11,7 @@ from road_city import HALF, PLACES, road_city
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.model import Line, Transit
+from vico.worldgen.facts.site import site_facts
 from vico.worldgen.transit.stage import BUS_LENGTH, transit_from_osm
 
 
@@ -91,14 +92,14 @@ def test_without_mapped_stops_a_line_is_planned() -> None:
         areas=[],
         relations=[],
     )
-    transit = transit_from_osm(bare, city.lanes, HeightField.flat(HALF))
+    transit = transit_from_osm(site_facts(bare), city.lanes, HeightField.flat(HALF))
     assert transit.origin["stops"] == "planned"
     _check(transit, city.lanes)
 
 
 def test_equal_input_gives_equal_transit() -> None:
     city = road_city()
-    again = transit_from_osm(city.osm, city.lanes, HeightField.flat(HALF), solids=city.solids)
+    again = transit_from_osm(site_facts(city.osm), city.lanes, HeightField.flat(HALF), solids=city.solids)
     assert again == city.transit
 
 

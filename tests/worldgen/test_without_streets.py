@@ -12,6 +12,7 @@ from vico.world.check import check_world
 from vico.world.folder import World, read_world
 from vico.world.model import Category
 from vico.worldgen.pipeline import build_world
+from vico.worldgen.request import BuildOptions
 
 _DEGREE = 111_200.0  # metres of a degree at the equator, where the campus lies
 
@@ -60,7 +61,7 @@ def _campus(path: Path) -> Path:
 def campus(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, World]:
     folder = tmp_path_factory.mktemp("campus")
     out = folder / "world"
-    build_world(_campus(folder), lat=0.0, lon=0.0, half=50.0, seed=0, out=out)
+    build_world(_campus(folder), lat=0.0, lon=0.0, half=50.0, seed=0, out=out, options=BuildOptions(previews=False))
     return out, read_world(out)
 
 

@@ -6,8 +6,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from vico.seeds import rng
 from vico.world.public import PublicMap
-from vico.world.seeds import rng
 
 Action = dict[str, Any]
 Observation = dict[str, Any]
@@ -61,7 +61,7 @@ def heading(observation: Observation) -> float:
 
 
 def wrapped(angle: float) -> float:
-    """The same direction within -pi..pi."""
+    """Return the same direction within -pi..pi."""
     return float((angle + np.pi) % (2 * np.pi) - np.pi)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from vico.agents.base import Action, Info, Observation
 from vico.agents.wayfinding import distance_to
+from vico.clock import DAY
 
 # People greet within this distance, metres, and not twice within this time, seconds.
 GREETING_DISTANCE = 6.0
@@ -119,7 +120,7 @@ class Conversation:
 
     def _greetings(self, person: Acquaintance, time: float, errand: str) -> list[str]:
         other = person.first_name
-        hour = time % 86_400 / 3600
+        hour = time % DAY / 3600
         hello = "Good morning" if hour < 11 else "Hello" if hour < 18 else "Good evening"
         lines = [
             f"{hello}, {other}! I'm {errand}. And you?",

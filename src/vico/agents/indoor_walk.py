@@ -42,7 +42,7 @@ class IndoorWalker:
 
 
 def _straight(position: NDArray[np.float64], route: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The last point of a route that one step reaches without cutting a corner."""
+    """Return the last point of a route that one step reaches without cutting a corner."""
     aim: NDArray[np.float64] = route[0]
     for k in range(1, len(route)):
         way = route[k] - position

@@ -12,10 +12,10 @@ from vico.agents.base import Action, Info, Observation
 from vico.agents.conversation import Acquaintance, Conversation, Speaker
 from vico.agents.indoor_walk import IndoorWalker
 from vico.agents.wayfinding import Walker
+from vico.clock import DAY, seconds_of_day
+from vico.seeds import rng
 from vico.world.public import PublicMap, PublicPlace
-from vico.world.seeds import rng
 
-DAY = 86_400
 WALK, BRISK, RUN = 1.0, 1.5, 2.4
 # Time kept in hand for corners, crossings and doors: a share of the way, and seconds.
 _SLACK_SHARE, _SLACK = 0.15, 20.0
@@ -24,7 +24,10 @@ _OPEN_REACH = 3.0
 _EAT_EVERY = 6
 # Those who came out for a walk or a run stay within this distance of the place, metres.
 _STROLL = 30.0
-_ON_FOOT = ("walk", "stroll", "run ", "jog", "fresh air", "look around")
+_STROLLING = ("leisure", "visit")
+_RUNNING = ("exercise",)
+_EATING = ("meal_home", "meal_out")
+_STROLL_SPEED, _RUN_SPEED = 0.9, 1.9
 
 
 class Item(Protocol):
@@ -33,6 +36,10 @@ class Item(Protocol):
     @property
     def type(self) -> str:
         """sleep, meal, main or commute."""
+
+    @property
+    def tag(self) -> str | None:
+        """What it is about, as `vico.community.model.ActivityTag` has it; None if nobody said."""
 
     @property
     def start(self) -> str:
@@ -61,27 +68,29 @@ class Scheduled(Speaker, Protocol):
 
 @dataclass(frozen=True)
 class Stay:
-    """To be at a place by `due`, and to set out at `leave`, seconds of the day."""
+    """To be at a place by `due`, and to set out at `leave`, seconds of the day; `tag` says what for."""
 
     leave: float
     due: float
     type: str
+    tag: str
     activity: str
     place: str
 
 
 def stays_of(schedule: Iterable[Item], known: Mapping[str, object]) -> list[Stay]:
-    """The stays of a day, each with the time to set out for it; items without a place on the map are left out."""
+    """Return the stays of a day, each with the time to set out; items without a place on the map are left out."""
     stays: list[Stay] = []
     leave: float | None = None
     for item in schedule:
         if str(item.type) == "commute":
-            leave = _seconds(item.start) if leave is None else leave
+            leave = seconds_of_day(item.start) if leave is None else leave
             continue
         if item.place is None or item.place not in known:
             continue
-        due = _seconds(item.start)
-        stays.append(Stay(due if leave is None else leave, due, str(item.type), item.activity, item.place))
+        due = seconds_of_day(item.start)
+        when = due if leave is None else leave
+        stays.append(Stay(when, due, str(item.type), str(item.tag or ""), item.activity, item.place))
         leave = None
     return stays
 
@@ -133,9 +142,16 @@ class ScheduleFollower:
         self._arrived: Stay | None = None
         self._stroll: tuple[float, float] | None = None
         self._pause = 0
+        # The type of the last action that was asked for.
+        self._asked = ""
 
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the action for the coming second."""
+        action = self._decide(observation, info)
+        self._asked = str(action["type"])
+        return action
+
+    def _decide(self, observation: Observation, info: Info) -> Action:
         self._tick += 1
         state = observation["state"]
         self._posture = state["posture"]
@@ -176,8 +192,7 @@ class ScheduleFollower:
         if self._arrived != stay:
             self._arrived, self._stroll, self._pause = stay, None, 0
             self._walker.stop()
-        words = stay.activity.lower()
-        if place.building is not None or not any(word in words for word in _ON_FOOT):
+        if place.building is not None or stay.tag not in (*_STROLLING, *_RUNNING):
             return self._live(stay)
         up = self._get_up()
         if up is not None:
@@ -188,7 +203,7 @@ class ScheduleFollower:
         if self._stroll is None:
             spot = self._map.walkable.random_point(self._rng, near=place.position[:2], radius=_STROLL)
             self._stroll = (float(spot[0]), float(spot[1]))
-        pace = BRISK + 0.4 if "run" in words else 0.9
+        pace = _RUN_SPEED if stay.tag in _RUNNING else _STROLL_SPEED
         action = self._walker.towards(self._stroll, pace, observation, info)
         if action is None:
             self._stroll, self._pause = None, int(self._rng.integers(3, 15))
@@ -197,10 +212,9 @@ class ScheduleFollower:
 
     def _live(self, stay: Stay) -> Action:
         """Do what one came for."""
-        words = stay.activity.lower()
         if stay.type == "sleep":
             return self._become("lying")
-        if stay.type == "meal" or any(word in words for word in ("eat", "coffee", "lunch", "breakfast", "dinner")):
+        if stay.type == "meal" or stay.tag in _EATING:
             if self._posture != "sitting":
                 return self._become("sitting")
             if self._tick % _EAT_EVERY == 0:
@@ -250,7 +264,8 @@ class ScheduleFollower:
     def _walk(self, observation: Observation, info: Info, stay: Stay, place: PublicPlace) -> Action:
         self._arrived = None
         state = observation["state"]
-        if place.id in state["accessible_places"] and state["action_reason"].find("enter") < 0:
+        turned_away = self._asked == "enter" and state["action_status"] == "refused"
+        if place.id in state["accessible_places"] and not turned_away:
             return {"type": "enter", "place": place.id}
         goal = (float(place.position[0]), float(place.position[1]))
         left = self._walker.remaining(observation["pose"])
@@ -289,13 +304,8 @@ def followers_of(community: Any, public_map: PublicMap, *, seed: int = 0) -> dic
     }
 
 
-def _seconds(clock: str) -> int:
-    hours, minutes, seconds = clock.split(":")
-    return int(hours) * 3600 + int(minutes) * 60 + int(seconds)
-
-
 def _errand(stay: Stay, place: PublicPlace, there: bool) -> str:
-    """What one is about, to follow "I'm "."""
+    """Return what one is about, to follow "I'm "."""
     doing = stay.activity.split(": ")[-1]
     doing = doing[:1].lower() + doing[1:]
     home = place.kind == "apartments"

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.base import Action, Info, Observation, heading, wrapped
+from vico.rules import ReasonCode, code_name
 from vico.world.public import PublicMap
 from vico.world.walkable import CROSSING, ROADWAY
 
@@ -21,6 +22,7 @@ _DRIFT = 0.12
 _CAR_NEAR, _PATIENCE = 9.0, 8
 # Radius of what is taken to be closed where one keeps being stopped, and its growth each time, metres.
 _BLOCK, _GROW = 0.5, 0.4
+_HIT_SOLID = code_name(ReasonCode.HIT_SOLID)
 
 
 class Walker:
@@ -151,7 +153,7 @@ class Walker:
         position, yaw = observation["pose"][:2], heading(observation)
         self._blocked += 1
         self._aside = []
-        solid = "solid" in observation["state"]["action_reason"]
+        solid = observation["state"]["action_code"] == _HIT_SOLID
         if self._blocked == 1 and not solid:
             self._aside = [{"type": "wait"}] * int(self._rng.integers(1, 3))
             return

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.shapes import Colour
-from vico.world.mesh import Material, Surface
+from vico.seeds import rng
+from vico.world.mesh import Material, Surface, surface_of_quads
 from vico.world.model import LANDING
-from vico.world.seeds import rng
 
+#: Height from one floor of a place to the next, metres.
+RISE = 3.2
 DOOR_HEIGHT = 2.1
 WALL_HEIGHT = 2.7
 THICK = 0.1  # metres between the faces of a wall
@@ -70,7 +72,7 @@ class Inside:
 
 @cache
 def floor_material(kind: str) -> Material:
-    """A floor's texture, one of `FLOORS`; near white, to be tinted."""
+    """Make a floor's texture, one of `FLOORS`; near white, to be tinted."""
     random = rng(0, "floor", kind)
     side = 128
     picture = np.full((side, side), 225.0)
@@ -118,7 +120,7 @@ def floor_material(kind: str) -> Material:
 
 @cache
 def wall_material(kind: str) -> Material:
-    """A wall's texture, one of `WALLS`, from the floor (v = 0) to the ceiling (v = 1); near white, to be tinted."""
+    """Make a wall's texture, one of `WALLS`, from the floor (v = 0) to the ceiling (v = 1); near white."""
     random = rng(0, "wall", kind)
     side = 128
     picture = np.full((side, side, 3), 240.0)
@@ -152,7 +154,7 @@ def wall_material(kind: str) -> Material:
 
 @cache
 def window_material() -> Material:
-    """A window in its frame: sky, and the houses across the street; it shines."""
+    """Make a window in its frame: sky, and the houses across the street; it shines."""
     random = rng(0, "window")
     picture = np.zeros((128, 128, 3))
     up = np.linspace(0, 1, 128)[:, None, None]
@@ -177,7 +179,7 @@ def window_material() -> Material:
 
 @cache
 def door_material() -> Material:
-    """A panelled entrance door in its frame."""
+    """Make a panelled entrance door in its frame."""
     picture = np.full((128, 64, 3), (124, 80, 54), np.float64)
     picture[:, :5] = picture[:, 59:] = picture[123:] = (232, 228, 218)
     for low, high in ((8, 56), (68, 114)):
@@ -206,7 +208,7 @@ class _Quads:
         v: _Vector,
         uv: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0),
     ) -> None:
-        """A rectangle from `origin` along `u` and `v`; its front is where u x v points."""
+        """Add a rectangle from `origin` along `u` and `v`; its front is where u x v points."""
         self._rows.setdefault(material.name, (material, []))[1].append((*origin, *u, *v, *uv, *colour, entity))
 
     def surfaces(self) -> list[Surface]:
@@ -215,23 +217,11 @@ class _Quads:
         for material, rows in self._rows.values():
             a = np.array(rows, np.float64)
             origin, u, v = a[:, 0:3], a[:, 3:6], a[:, 6:9]
-            points = np.stack([origin, origin + u, origin + u + v, origin + v], axis=1).reshape(-1, 3)
+            points = np.stack([origin, origin + u, origin + u + v, origin + v], axis=1)
             normal = np.cross(u, v)
             normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-            uv = np.stack([a[:, [9, 10]], a[:, [11, 10]], a[:, [11, 12]], a[:, [9, 12]]], axis=1).reshape(-1, 2)
-            base = 4 * np.arange(len(a), dtype=np.int32)[:, None]
-            faces = np.concatenate([base + np.array([0, 1, 2]), base + np.array([0, 2, 3])], axis=1).reshape(-1, 3)
-            found.append(
-                Surface(
-                    points.astype(np.float32),
-                    np.repeat(normal, 4, axis=0).astype(np.float32),
-                    uv.astype(np.float32),
-                    np.repeat(a[:, 13:16], 4, axis=0).astype(np.uint8),
-                    np.repeat(a[:, 16], 4).astype(np.int32),
-                    faces.astype(np.int32),
-                    material,
-                )
-            )
+            uv = np.stack([a[:, [9, 10]], a[:, [11, 10]], a[:, [11, 12]], a[:, [9, 12]]], axis=1)
+            found.append(surface_of_quads(points, normal, uv, colour=a[:, 13:16], entity=a[:, 16], material=material))
         return found
 
 
@@ -240,7 +230,7 @@ _LAMP: Colour = (255, 252, 242)
 
 
 def shell(rooms: Sequence[Inside]) -> list[Surface]:
-    """The rooms' surfaces, one a material, in the frame the rooms are given in."""
+    """Return the rooms' surfaces, one a material, in the frame the rooms are given in."""
     quads = _Quads()
     for room in rooms:
         if room.rise:
@@ -358,7 +348,7 @@ def _reveal(
     high: NDArray[np.float64],
     out: NDArray[np.float64],
 ) -> None:
-    """The thickness of a wall around a doorway."""
+    """Draw the thickness of a wall around a doorway."""
     plain = Material("room_frame")
     quads.add(plain, room.entity, _FRAME, origin + out, -out, high)
     quads.add(plain, room.entity, _FRAME, origin + wide, out, high)

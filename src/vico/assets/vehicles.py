@@ -142,7 +142,7 @@ def _quads(corners: NDArray[np.float64] | Sequence[Sequence[Sequence[float]]], c
 
 
 def _mirrored(surface: Surface) -> Surface:
-    """The same on the other side of the x axis."""
+    """Return the same on the other side of the x axis."""
     flip = np.array([1, -1, 1], np.float32)
     return Surface(
         surface.positions * flip, surface.normals * flip, surface.uv, surface.colour, surface.entity,
@@ -151,7 +151,7 @@ def _mirrored(surface: Surface) -> Surface:
 
 
 def _loft(rings: NDArray[np.float64], colour: Colour) -> Surface:
-    """A closed skin over rings of equal size, shape (k, m, 3), that run counter-clockwise seen from the last one."""
+    """Make a closed skin over rings, shape (k, m, 3), that run counter-clockwise seen from the last one."""
     k, m, _ = rings.shape
     faces = []
     for a in range(k - 1):
@@ -165,7 +165,7 @@ def _loft(rings: NDArray[np.float64], colour: Colour) -> Surface:
 
 
 def _disc(centre: tuple[float, float, float], radius: float, colour: Colour, sides: int = 12) -> Surface:
-    """A disc that faces +y."""
+    """Make a disc that faces +y."""
     angles = np.linspace(0, 2 * np.pi, sides, endpoint=False)
     ring = np.column_stack([np.cos(angles) * radius, np.zeros(sides), np.sin(angles) * radius]) + centre
     faces = [(0, i + 1, i) for i in range(1, sides - 1)]
@@ -173,7 +173,7 @@ def _disc(centre: tuple[float, float, float], radius: float, colour: Colour, sid
 
 
 def _wheel(x: float, y: float, radius: float, width: float = 0.22) -> list[Surface]:
-    """A wheel whose outer side faces +y at `y`."""
+    """Make a wheel whose outer side faces +y at `y`."""
     angles = np.linspace(0, 2 * np.pi, 14, endpoint=False)
     circle = np.column_stack([np.cos(angles), np.zeros(14), np.sin(angles)])
     centre = np.array([x, 0.0, radius])
@@ -193,7 +193,7 @@ def _wheel(x: float, y: float, radius: float, width: float = 0.22) -> list[Surfa
 
 
 def _arch(x: float, y: float, radius: float, sill: float) -> Surface:
-    """The dark opening around a wheel on the side that faces +y."""
+    """Make the dark opening around a wheel on the side that faces +y."""
     angles = np.linspace(0, np.pi, 9)
     points = [(x + np.cos(a) * radius, y, max(sill, radius * 0.86 + np.sin(a) * radius)) for a in angles]
     ring = np.array([*points, (x - radius, y, sill), (x + radius, y, sill)])
@@ -206,7 +206,7 @@ def _both_sides(parts: Sequence[Surface]) -> list[Surface]:
 
 
 def car(kind: str, paint: Colour) -> Surface:
-    """A car.
+    """Make a car.
 
     Parameters
     ----------
@@ -235,17 +235,17 @@ def car(kind: str, paint: Colour) -> Surface:
 
 
 def _panel(x0: float, x1: float, y: float, z0: float, z1: float, colour: Colour = _TRIM) -> Surface:
-    """An upright rectangle that faces +y."""
+    """Make an upright rectangle that faces +y."""
     return _quads([[(x1, y, z0), (x0, y, z0), (x0, y, z1), (x1, y, z1)]], colour)
 
 
 def _front(x: float, half: float, z0: float, z1: float, colour: Colour) -> Surface:
-    """An upright rectangle across the vehicle that faces forward, or backward where `half` is negative."""
+    """Make an upright rectangle across the vehicle that faces forward, or backward where `half` is negative."""
     return _quads([[(x, -half, z0), (x, half, z0), (x, half, z1), (x, -half, z1)]], colour)
 
 
 def _body(build: _Build, paint: Colour) -> Surface:
-    """The body below the windows: a skin over sections with rounded shoulders and sills."""
+    """Make the body below the windows: a skin over sections with rounded shoulders and sills."""
     rings = []
     for x, low, top, half in build.lower:
         shoulder = top - min(0.14, (top - low) * 0.3)
@@ -257,7 +257,7 @@ def _body(build: _Build, paint: Colour) -> Surface:
 
 
 def _cabin(build: _Build, paint: Colour) -> list[Surface]:
-    """The greenhouse: a painted frame with glass a finger's breadth proud of it."""
+    """Make the greenhouse: a painted frame with glass a finger's breadth proud of it."""
     rear, front, wide, low = build.base
     back, fore, narrow, top = build.roof
     crown = top - 0.05
@@ -285,7 +285,7 @@ def _glass(
     a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64],
     margin: float, sill: float,
 ) -> Surface:  # fmt: skip
-    """A pane within the quadrilateral a-b (bottom), c-d (top), inset by margins and set a little outward."""
+    """Make a pane within the quadrilateral a-b (bottom), c-d (top), inset by margins and set a little outward."""
     width = max(float(np.linalg.norm(b - a)), 1e-6)
     high = max(float(np.linalg.norm(d - a)), 1e-6)
     u, v0, v1 = min(margin / width, 0.4), min(sill / high, 0.4), 1 - min(margin / high, 0.4)
@@ -327,7 +327,7 @@ def _fittings(build: _Build, paint: Colour) -> list[Surface]:
 
 
 def mirrored(surface: Surface) -> Surface:
-    """The same with left and right exchanged."""
+    """Return the same with left and right exchanged."""
     other = np.array([1.0, -1.0, 1.0], np.float32)
     return replace(
         surface,
@@ -338,7 +338,7 @@ def mirrored(surface: Surface) -> Surface:
 
 
 def bus(paint: Colour = (0, 114, 178), sign: Colour = (246, 170, 30)) -> Surface:
-    """A 12 m low-floor city bus with three doors on its right side and a lit line sign."""
+    """Make a 12 m low-floor city bus with three doors on its right side and a lit line sign."""
     length, width, height = BUS_SIZE
     x1, x0, half = length / 2, -length / 2, width / 2
     white: Colour = (236, 238, 238)
@@ -395,7 +395,7 @@ def bus(paint: Colour = (0, 114, 178), sign: Colour = (246, 170, 30)) -> Surface
 
 
 def _tube(a: Sequence[float], b: Sequence[float], radius: float, colour: Colour, sides: int = 5) -> Surface:
-    """A straight tube between two points."""
+    """Make a straight tube between two points."""
     start, end = np.asarray(a, np.float64), np.asarray(b, np.float64)
     axis = (end - start) / np.linalg.norm(end - start)
     other = np.array([0.0, 1.0, 0.0]) if abs(axis[1]) < 0.9 else np.array([1.0, 0.0, 0.0])
@@ -408,7 +408,7 @@ def _tube(a: Sequence[float], b: Sequence[float], radius: float, colour: Colour,
 
 
 def bicycle(paint: Colour = (255, 200, 0)) -> Surface:
-    """A city bicycle with mudguards and a basket."""
+    """Make a city bicycle with mudguards and a basket."""
     radius, rear, front = 0.34, -0.54, 0.54
     parts: list[Surface] = []
     angles = np.linspace(0, 2 * np.pi, 17)

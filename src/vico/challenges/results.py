@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from vico.world.files import write_bytes, write_json
+from vico.io.files import write_bytes, write_json
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,13 @@ from typing import Literal
 from rich.console import Console
 from rich.table import Table
 
-from vico.assets.packages import FetchError, Package, cache_folder, fetch, installed
-from vico.assets.people_anny import available, baked_file
-from vico.assets.people_bake import PEOPLE, bake
+from vico.assets.packages import FetchError, Package, fetch, installed
+from vico.assets.people.anny import available, baked_file
+from vico.assets.people.bake import PEOPLE, bake
 from vico.assets.robots import robot_model, robot_names, robot_packages
-from vico.assets.things import PACK, available_things, credits_of, fetch_things, read_things
+from vico.assets.things.pack import PACK, available_things, credits_of, fetch_things, read_things
 from vico.cli.output import print_json
+from vico.io.cache import cache_folder
 
 Pack = Literal["people", "robots", "things", "all"]
 
@@ -85,7 +86,7 @@ def status(*, json: bool = False) -> int:
 
 
 def _things() -> list[dict[str, object]]:
-    """A row for each collection of things, or one that says there is none."""
+    """Return a row for each collection of things, or one that says there is none."""
     if not available_things():
         rest = "Things are our own models."
         return [

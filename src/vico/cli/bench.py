@@ -74,7 +74,7 @@ def _prepare(here: Path, parts: tuple[str, ...]) -> None:
     place = packaged_extract()
     with redirect_stdout(io.StringIO()):
         if "world" in parts:
-            world.build(Sources(place.path), out=here / "world", lat=place.lat, lon=place.lon, half=place.half)
+            world.build(Sources(place.path), out=here / "world", centre=(place.lat, place.lon), half=place.half)
         if "people" in parts:
             community.build(here / "world", out=here / "people", residents=RESIDENTS, seed=0, force=False, json=False)
 

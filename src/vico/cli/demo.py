@@ -12,6 +12,7 @@ from vico.cli import community as community_verb
 from vico.cli import replay as replay_verb
 from vico.cli import run as run_verb
 from vico.cli import world as world_verb
+from vico.cli.options import RunOptions
 from vico.cli.output import check_output
 from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.sources import Sources
@@ -32,11 +33,11 @@ def demo(out: Path, *, seed: int = 0, force: bool = False) -> int:
     for folder in (world, people, run):
         shutil.rmtree(folder, ignore_errors=True)
     console.rule("1 of 4: the world")
-    world_verb.build(Sources(extract.path), out=world, lat=extract.lat, lon=extract.lon, half=extract.half, seed=seed)
+    world_verb.build(Sources(extract.path), out=world, centre=(extract.lat, extract.lon), half=extract.half, seed=seed)
     console.rule("2 of 4: its people")
     community_verb.build(world, out=people, residents=15, seed=seed, force=False, json=False)
     console.rule("3 of 4: half an hour of their morning")
-    run_verb.run(world, people, out=run, seed=seed)
+    run_verb.run(RunOptions(world, people, out=run, seed=seed))
     console.rule("4 of 4: something to look at")
     replay_verb.replay(run, film=True)
     unfinished.unlink()

@@ -33,7 +33,7 @@ _BASE = (
 
 
 @dataclass(frozen=True)
-class Finding:
+class Diagnosis:
     """One thing looked at. `needed` tells whether the default install works without it."""
 
     what: str
@@ -43,29 +43,29 @@ class Finding:
     mend: str = ""
 
 
-def _python() -> Finding:
+def _python() -> Diagnosis:
     ok = (3, 11) <= sys.version_info[:2] < (3, 14)
-    return Finding("Python", ok, True, platform.python_version(), "install Python 3.11, 3.12 or 3.13")
+    return Diagnosis("Python", ok, True, platform.python_version(), "install Python 3.11, 3.12 or 3.13")
 
 
-def _package(name: str, *, needed: bool, mend: str) -> Finding:
+def _package(name: str, *, needed: bool, mend: str) -> Diagnosis:
     try:
-        return Finding(name, True, needed, importlib.metadata.version(name))
+        return Diagnosis(name, True, needed, importlib.metadata.version(name))
     except importlib.metadata.PackageNotFoundError:
-        return Finding(name, False, needed, "not installed", mend)
+        return Diagnosis(name, False, needed, "not installed", mend)
 
 
-def _memory() -> Finding:
+def _memory() -> Diagnosis:
     gigabytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9
-    return Finding("memory", gigabytes >= 4, True, f"{gigabytes:.1f} GB", "4 GB are needed for an 800 m world")
+    return Diagnosis("memory", gigabytes >= 4, True, f"{gigabytes:.1f} GB", "4 GB are needed for an 800 m world")
 
 
-def _disk() -> Finding:
+def _disk() -> Diagnosis:
     free = shutil.disk_usage(Path.cwd()).free / 1e9
-    return Finding("free disk", free >= 1, True, f"{free:.1f} GB", "free 1 GB")
+    return Diagnosis("free disk", free >= 1, True, f"{free:.1f} GB", "free 1 GB")
 
 
-def _film() -> Finding:
+def _film() -> Diagnosis:
     """Write a film of four frames for real: a codec that is listed may still fail to open."""
     import numpy as np
 
@@ -76,11 +76,11 @@ def _film() -> Finding:
         try:
             write_film(path, (np.full((64, 64, 3), i * 60, np.uint8) for i in range(4)), rate=4)
         except (OSError, ValueError) as error:
-            return Finding("film encoder", False, True, str(error), "pip install --force-reinstall av")
-        return Finding("film encoder", True, True, f"{path.stat().st_size} bytes written")
+            return Diagnosis("film encoder", False, True, str(error), "pip install --force-reinstall av")
+        return Diagnosis("film encoder", True, True, f"{path.stat().st_size} bytes written")
 
 
-def _frame() -> Finding:
+def _frame() -> Diagnosis:
     """Render one frame on the CPU, as every observation is."""
     import numpy as np
 
@@ -90,17 +90,17 @@ def _frame() -> Finding:
     scene = Scene([box((1, 1, 1), (5, 0, 0)).of_entity(7)], {})
     frames = render(scene, Cameras(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0]])))
     seen = int((frames.segmentation == 7).sum())
-    return Finding("renderer", seen > 0, True, f"a box covers {seen} pixels", "report this as a bug, with this table")
+    return Diagnosis("renderer", seen > 0, True, f"a box covers {seen} pixels", "report this as a bug, with this table")
 
 
-def findings() -> list[Finding]:
+def findings() -> list[Diagnosis]:
     """Look at everything; nothing is changed."""
     pip = "pip install virtual-community"
     found = [_python(), *(_package(name, needed=True, mend=pip) for name in _BASE)]
     found.append(
         _package("eclipse-sumo", needed=False, mend="pip install 'virtual-community[worldgen]' to build worlds")
     )
-    checks: list[Callable[[], Finding]] = [_memory, _disk, _frame, _film]
+    checks: list[Callable[[], Diagnosis]] = [_memory, _disk, _frame, _film]
     return found + [check() for check in checks]
 
 

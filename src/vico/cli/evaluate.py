@@ -2,53 +2,38 @@
 
 from __future__ import annotations
 
-import shutil
-from pathlib import Path
-
 from rich.console import Console
 from rich.markdown import Markdown
 
 from vico.agents.assistant import METHODS
 from vico.challenges.assistant.runner import evaluate
 from vico.challenges.results import markdown_table, write_results
+from vico.cli.options import AssistantOptions
 from vico.cli.output import check_output, print_json, progress_bars
 from vico.errors import InputError
+from vico.io.folders import new_folder
 from vico.world.folder import read_world
 
 
-def assistant(
-    *,
-    worlds: list[Path],
-    out: Path,
-    category: str,
-    method: str,
-    assistants: int,
-    seeds: int,
-    steps: int,
-    force: bool,
-    json: bool,
-) -> int:
-    """Run the episodes; leave the tasks, ``results.json`` and ``results.md`` in `out`."""
+def assistant(options: AssistantOptions) -> int:
+    """Run the episodes; leave the tasks, ``results.json`` and ``results.md`` in ``options.out``."""
+    worlds, out, method, assistants = options.worlds, options.out, options.method, options.assistants
+    seeds, steps = options.seeds, options.steps
     if method not in METHODS:
         raise InputError(f"eval: no method called {method!r}; there are {', '.join(sorted(METHODS))}")
     if not 1 <= assistants <= 2:
         raise InputError(f"eval: {assistants} assistants; the tasks are for 1 or 2")
     if seeds < 1 or steps < 1 or not worlds:
         raise InputError("eval: needs at least one world, one seed and one step")
-    check_output(out, *worlds, force=force)
+    check_output(out, *worlds, force=options.force)
     places = [read_world(path) for path in worlds]
-    partial = out.with_name(f".{out.name}.partial")
-    shutil.rmtree(partial, ignore_errors=True)
-    partial.mkdir(parents=True)
-    with progress_bars() as report:
-        episodes = evaluate(
-            places, method=method, assistants=assistants, seeds=seeds, steps=steps, folder=partial, progress=report
-        )
-    condensed = write_results(partial, episodes)
-    if out.exists():
-        shutil.rmtree(out) if out.is_dir() else out.unlink()
-    partial.rename(out)
-    if json:
+    with new_folder(out, force=options.force) as folder:
+        with progress_bars() as report:
+            episodes = evaluate(
+                places, method=method, assistants=assistants, seeds=seeds, steps=steps, folder=folder, progress=report
+            )
+        condensed = write_results(folder, episodes)
+    if options.json:
         print_json(condensed)
     else:
         Console().print(Markdown(markdown_table([condensed])))

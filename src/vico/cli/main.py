@@ -1,12 +1,14 @@
 """The `vico` command: one verb a capability.
 
 Exit codes: 0 done, 1 found wanting (a check failed), 2 bad input (one sentence on stderr, no traceback).
-Results go to stdout, progress to stderr. Each verb imports what it needs when it runs, so `vico --help` is quick.
+Results go to stdout, progress and warnings to stderr; `vico --verbose VERB` tells more there, `vico --quiet VERB` less.
+Each verb imports what it needs when it runs, so `vico --help` is quick.
 """
 
 from __future__ import annotations
 
 import errno
+import logging
 import os
 import sys
 from pathlib import Path
@@ -16,10 +18,14 @@ import tyro
 from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
-from vico import __version__
-from vico.errors import InputError, VicoError
+from vico.cli.options import AssistantOptions, CommaSeparated, RunOptions, WorldBuildOptions
+from vico.errors import VicoError
+from vico.version import __version__
 
-Comma = Annotated[str, tyro.conf.arg(metavar="A,B,...")]
+# The fields of a record are options of the verb itself, not of a part of it.
+FLAT = tyro.conf.arg(name="")
+
+_VERBOSITY = {"--verbose": logging.INFO, "--quiet": logging.ERROR}
 
 app = SubcommandApp()
 world = SubcommandApp()
@@ -29,43 +35,8 @@ evaluation = SubcommandApp()
 assets = SubcommandApp()
 
 
-def _pair(text: str, what: str) -> tuple[float, float]:
-    try:
-        first, second = (float(part) for part in text.split(","))
-    except ValueError:
-        raise InputError(f"{what}: {text!r} is not LAT,LON; write for example 60.1690,24.9435") from None
-    return first, second
-
-
 @world.command(name="build")
-def world_build(
-    out: Path,
-    osm: Path | None = None,
-    lat: float | None = None,
-    lon: float | None = None,
-    center: Annotated[str | None, tyro.conf.arg(metavar="LAT,LON")] = None,
-    radius: float = 400.0,
-    dem: tuple[Path, ...] = (),
-    tiles: str | None = None,
-    photos: str | None = None,
-    places: tuple[str, ...] = (),
-    gtfs: tuple[Path, ...] = (),
-    layouts: Path | None = None,
-    things: Literal["procedural", "installed"] = "procedural",
-    overpass: str | None = None,
-    refresh: bool = False,
-    texel: float = 0.10,
-    inpaint: Literal["exemplar", "patchmatch", "diffusion", "none"] = "exemplar",
-    upscale: Literal["none", "sharpen", "realesrgan", "diffusion"] = "none",
-    model: str = "",
-    layout_llm: bool = False,
-    llm_calls: int | None = None,
-    llm_tokens: int | None = None,
-    llm_cost: float | None = None,
-    seed: int = 0,
-    force: bool = False,
-    json: bool = False,
-) -> int:
+def world_build(options: Annotated[WorldBuildOptions, FLAT]) -> int:
     """Make a world from OpenStreetMap data. A build that was killed goes on where it stopped.
 
     Example: vico world build --lat 60.1690 --lon 24.9435 --out helsinki
@@ -73,64 +44,14 @@ def world_build(
     Example: vico world build --lat 48.8530 --lon 2.3499 --out paris
 
     Example: vico world build --osm monaco.osm.pbf --center 43.7338,7.4181 --dem srtm.tif --out monaco
-
-    Args:
-        out: Folder to make; refused if it exists, unless --force.
-        osm: Map extract, .osm or .osm.pbf, plain or packed. Without it the packaged extract is used if it covers the
-            window, else an Overpass server is asked.
-        lat: Latitude of the window's centre, degrees.
-        lon: Longitude of the window's centre, degrees.
-        center: Both in one. Without any, the middle of the extract.
-        radius: Half the window's side, metres.
-        dem: Elevation: GeoTIFF, .hgt or packed .hgt; one or several that cover the window. Flat ground without.
-        tiles: Photogrammetry: path or address of a tileset.json. Ground, heights and walls are taken from it.
-        photos: Street pictures: a folder with poses, or "mapillary" (MAPILLARY_TOKEN in the environment).
-        places: Further places: Overture GeoParquet files, or "google" (your key in the environment).
-        gtfs: Timetables: zipped GTFS feeds.
-        layouts: Folder of room layouts to choose from.
-        things: Whose models street furniture and furniture wear: our own, or those of `vico assets install things`.
-        overpass: Address of the Overpass server, or "off"; else the environment's VICO_OVERPASS, else the public one.
-        refresh: Ask the server even if its answer is in the cache.
-        texel: Side of a texel of photographed walls, metres.
-        inpaint: What fills parts of walls that no photo shows.
-        upscale: What makes photographed walls finer.
-        model: For "diffusion": a folder with the model, or its name on a hub.
-        layout_llm: A language model draws floor plans (VICO_LLM_BASE_URL, VICO_LLM_MODEL, VICO_LLM_KEY).
-        llm_calls: Most calls to it.
-        llm_tokens: Most tokens.
-        llm_cost: Most dollars, at the prices of VICO_LLM_PRICE.
-        seed: Decides what the map leaves open.
-        force: Replace what is in the output folder; stages whose inputs did not change are kept.
-        json: Print the result as JSON.
     """
     from vico.cli import world as verb
-    from vico.worldgen.photos.texturing import Texturing
-    from vico.worldgen.sources import Sources
 
-    if center is not None:
-        if lat is not None or lon is not None:
-            raise InputError("world build: give --center or --lat and --lon, not both")
-        lat, lon = _pair(center, "--center")
-    if (lat is None) != (lon is None):
-        raise InputError("world build: --lat and --lon go together")
-    if osm is None:
-        osm = verb.locate(lat, lon, radius, overpass=overpass, refresh=refresh)
-    sources = Sources(
-        osm,
-        dem=dem,
-        tiles=tiles,
-        photos=photos,
-        places=places,
-        gtfs=gtfs,
-        layouts=layouts,
-        installed_things=things == "installed",
-    )
-    how = Texturing(texel=texel, inpaint=inpaint, upscale=upscale, model=model)
-    return verb.build(sources, out=out, lat=lat, lon=lon, half=radius, seed=seed, texturing=how, force=force, json=json)
+    return verb.build_as_asked(options)
 
 
 @world.command(name="rebuild")
-def world_rebuild(path: Positional[Path], stage: Comma, layout_llm: bool = False, json: bool = False) -> int:
+def world_rebuild(path: Positional[Path], stage: CommaSeparated, layout_llm: bool = False, json: bool = False) -> int:
     """Run stages of a world again, and whatever depends on what they change.
 
     Example: vico world rebuild helsinki --stage objects,indoor
@@ -272,56 +193,16 @@ def check_community(path: Positional[Path], world: Path | None = None, json: boo
 
 
 @app.command(name="run")
-def run(
-    world: Positional[Path],
-    community: Positional[Path],
-    out: Path,
-    start: str = "08:00",
-    steps: int = 1800,
-    robots: Comma = "husky,go2",
-    cars: int = 30,
-    pedestrians: int = 30,
-    observe: Comma = "all",
-    seed: int = 0,
-    force: bool = False,
-    json: bool = False,
-) -> int:
+def run(options: Annotated[RunOptions, FLAT]) -> int:
     """Simulate a community: residents follow their schedules among robots, traffic and transit.
 
     Example: vico run helsinki people --start 08:00 --steps 1800 --out morning
 
     Example: vico run helsinki people --observe none --robots none --out fast
-
-    Args:
-        world: World folder.
-        community: Community folder, made for that world.
-        out: Folder to record into; refused if it exists, unless --force.
-        start: Time of day, HH:MM or HH:MM:SS.
-        steps: Seconds to simulate.
-        robots: Names, separated by commas; none for no robots.
-        cars: How many cars drive around.
-        pedestrians: How many people nobody plays walk around.
-        observe: Whose views are rendered: all, none, or names separated by commas.
-        seed: Decides everything that is left to chance.
-        force: Replace what is in the output folder.
-        json: Print the metrics as JSON.
     """
     from vico.cli import run as verb
 
-    return verb.run(
-        world,
-        community,
-        out=out,
-        start=start,
-        steps=steps,
-        robots=robots,
-        cars=cars,
-        pedestrians=pedestrians,
-        observe=observe,
-        seed=seed,
-        force=force,
-        json=json,
-    )
+    return verb.run(options)
 
 
 @app.command(name="replay")
@@ -355,45 +236,14 @@ def demo(out: Path = Path("out/demo"), seed: int = 0, force: bool = False) -> in
 
 
 @evaluation.command(name="assistant")
-def evaluate_assistant(
-    worlds: list[Path],
-    out: Path,
-    category: Literal["delivery"] = "delivery",
-    method: str = "heuristic",
-    assistants: int = 1,
-    seeds: int = 3,
-    steps: int = 1500,
-    force: bool = False,
-    json: bool = False,
-) -> int:
+def evaluate_assistant(options: Annotated[AssistantOptions, FLAT]) -> int:
     """Judge a planner on the community assistant tasks.
 
     Example: vico eval assistant --category delivery --method heuristic --worlds helsinki monaco --seeds 3 --out results
-
-    Args:
-        worlds: World folders; one episode for each world and seed.
-        out: Folder for tasks and results; refused if it exists, unless --force.
-        category: What is asked for.
-        method: Planner: random or heuristic.
-        assistants: How many assistants work together.
-        seeds: Episodes a world, seeded 0, 1, ...
-        steps: Seconds an episode may last.
-        force: Replace what is in the output folder.
-        json: Print the results as JSON.
     """
     from vico.cli import evaluate as verb
 
-    return verb.assistant(
-        worlds=worlds,
-        out=out,
-        category=category,
-        method=method,
-        assistants=assistants,
-        seeds=seeds,
-        steps=steps,
-        force=force,
-        json=json,
-    )
+    return verb.assistant(options)
 
 
 @assets.command(name="install")
@@ -473,16 +323,24 @@ app.command(evaluation, name="eval", help="Judge agents on a challenge.")
 
 
 def _sentence(error: OSError) -> str:
-    """What the operating system refused, where, and what to do about it."""
+    """Say what the operating system refused, where, and what to do about it."""
     where = f"{error.filename}: " if error.filename is not None else ""
     if error.errno == errno.ENOSPC:
         return f"{where}no space left on the disk; free some, or choose another --out"
     return f"{where}{(error.strerror or str(error)).lower()}; give a path that can be read and written"
 
 
+def _configure_logging(given: list[str]) -> list[str]:
+    """Let warnings of the library go to stderr, more or less with `_VERBOSITY` before the verb; return the rest."""
+    level = _VERBOSITY.get(given[0]) if given else None
+    logging.basicConfig(format="vico: %(message)s")
+    logging.getLogger("vico").setLevel(logging.WARNING if level is None else level)
+    return given if level is None else given[1:]
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; never a traceback for bad input."""
-    given = sys.argv[1:] if arguments is None else arguments
+    given = _configure_logging(sys.argv[1:] if arguments is None else arguments)
     if given == ["--version"]:
         print(__version__)
         return

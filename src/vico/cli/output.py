@@ -15,7 +15,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from vico.errors import InputError, OutputExistsError
+from vico.errors import InputError
+from vico.io.folders import check_replaceable
 
 Report = Callable[[str, int, int], None]
 
@@ -83,11 +84,12 @@ def check_output(out: Path, *inputs: Path, force: bool) -> None:
     ------
     OutputExistsError
         If there is something, and `force` is not given.
+    OutputError
+        If another process is writing it.
     InputError
         If nothing can be written there; or if `force` would delete an input, the current folder or the home folder.
     """
-    if not force and out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise OutputExistsError(f"{out}: exists already; choose another --out, or replace it with --force")
+    check_replaceable(out, force=force)
     ground = out.absolute().parent
     while not ground.exists() and ground != ground.parent:
         ground = ground.parent

@@ -17,7 +17,7 @@ from vico.viewer.demo_film import write_demo_film
 from vico.viewer.from_run import recording_of
 from vico.viewer.replay import write_replay
 from vico.world.folder import World, read_world
-from vico.worldgen.previews import Overhead
+from vico.worldgen.previews.viewpoints import Overhead
 
 
 def replay(path: Path, *, film: bool = True, world: Path | None = None) -> int:
@@ -50,7 +50,7 @@ def replay(path: Path, *, film: bool = True, world: Path | None = None) -> int:
 
 
 def _from_above(world: World, folder: Path) -> NDArray[np.uint8]:
-    """The picture the world was built with; taken now where it was built without pictures."""
+    """Return the picture the world was built with; taken now where it was built without pictures."""
     kept = folder / "previews" / "above.png"
     if kept.is_file():
         try:

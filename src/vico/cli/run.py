@@ -3,88 +3,74 @@
 from __future__ import annotations
 
 import json as jsonlib
-import shutil
 import sys
 from pathlib import Path
 from typing import Any
 
+from vico.agents.gather import Gatherer
 from vico.agents.schedule import followers_of
+from vico.cli.options import RunOptions
 from vico.cli.output import check_output, print_json, print_table, progress_bars
+from vico.clock import seconds_of_day
 from vico.community import read_community
 from vico.errors import InputError, OutputExistsError
-from vico.sim.config import SimConfig, seconds_of_day
-from vico.sim.gather import Gatherer
-from vico.sim.recorder import Recorder, is_being_recorded
+from vico.io.files import read_json
+from vico.io.folders import remove
+from vico.sim.config import SimConfig
+from vico.sim.recorder import Recorder
 from vico.sim.simulation import Simulation
-from vico.world.files import read_json
 from vico.world.folder import World, read_world
 from vico.world.public import PublicMap
 
 
-def run(
-    world: Path,
-    community: Path,
-    *,
-    out: Path,
-    start: str = "08:00",
-    steps: int = 1800,
-    robots: str = "husky,go2",
-    cars: int = 30,
-    pedestrians: int = 30,
-    observe: str = "all",
-    seed: int = 0,
-    force: bool = False,
-    json: bool = False,
-) -> int:
-    """Simulate residents who follow their schedules; record the run into `out`.
+def run(options: RunOptions) -> int:
+    """Simulate residents who follow their schedules; record the run into ``options.out``.
 
     Raises
     ------
     InputError
         If a number or a name is not usable, or the community belongs to another world.
     OutputExistsError
-        If `out` holds something and `force` is not given.
+        If the output folder holds something and ``options.force`` is not given.
     """
+    steps, out = options.steps, options.out
     if steps < 1:
         raise InputError(f"run: --steps {steps}; it has to be 1 or more")
-    if is_being_recorded(out):
-        raise OutputExistsError(f"{out}: a run is being recorded there right now; stop it, or --out another folder")
-    cut_short = None if force else _cut_short(out)
-    check_output(out, world, community, force=force or cut_short is not None)
+    cut_short = None if options.force else _cut_short(out)
+    check_output(out, options.world, options.community, force=options.force or cut_short is not None)
     config = SimConfig(
-        seed=seed,
-        start=seconds_of_day(start),
-        robots=_names(robots),
+        seed=options.seed,
+        start=seconds_of_day(options.start),
+        robots=_names(options.robots),
         errands=True,
-        cars=cars,
-        pedestrians=pedestrians,
-        observe=None if observe == "all" else _names(observe),
+        cars=options.cars,
+        pedestrians=options.pedestrians,
+        observe=None if options.observe == "all" else _names(options.observe),
     )
-    place = read_world(world)
-    people = read_community(community, place)
+    place = read_world(options.world)
+    people = read_community(options.community, place)
     if cut_short is not None:
         _restart(out, cut_short, config, place)
     with progress_bars() as report:
         report("setting the scene", 0, 1)
         # Residents act on depth, segmentation and what they hear; only the recorder looks at colours.
-        sim = Simulation(place, people, config, colours_later=True)
-        agents = Gatherer(followers_of(people, PublicMap.from_world(place), seed=seed))
+        sim = Simulation(place, people, config, defer_rgb=True)
+        agents = Gatherer(followers_of(people, PublicMap.from_world(place), seed=options.seed))
         observations, infos = sim.observe()
         report("setting the scene", 1, 1)
         # Only now: whatever is wrong with the input has been said, and nothing was replaced for nothing.
-        if out.exists():
-            shutil.rmtree(out) if out.is_dir() else out.unlink()
-        sources = {"world": str(world.resolve()), "community": str(community.resolve())}
+        remove(out)
+        sources = {"world": str(options.world.resolve()), "community": str(options.community.resolve())}
         with Recorder(out, sim, sources=sources, wanted=steps) as recorder:
             recorder.begin(observations)
             for step in range(steps):
                 gathered = agents.gather(observations, infos)
-                result = sim.step(gathered.actions, gathered.troubles)
+                result = sim.step(gathered.actions, gathered.agent_faults)
                 observations, infos = result.observations, result.infos
                 recorder.write(result)
                 report("simulating", step + 1, steps)
             metrics = recorder.close()
-    if json:
+    if options.json:
         print_json(metrics)
     else:
         shown = {name: value for name, value in metrics.items() if not isinstance(value, dict)}
@@ -93,7 +79,7 @@ def run(
 
 
 def _cut_short(out: Path) -> dict[str, Any] | None:
-    """What the manifest of an unfinished run in `out` says; empty if it had none yet, None if there is no such run."""
+    """Return the manifest of an unfinished run in `out`; empty if it had none yet, None if there is no such run."""
     if not out.is_dir():
         return None
     names = [path.name for path in out.iterdir()]

@@ -13,7 +13,8 @@ import numpy as np
 
 from vico.assets.people import PASSERS_BY, body_of, passer_by
 from vico.cli import community, replay, run, world
-from vico.sim.robots.navigation import room_to_turn
+from vico.cli.options import RunOptions
+from vico.sim.robots.navigation import NEIGHBOUR, room_to_turn
 from vico.world.walkable import fill_polygon
 from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.sources import Sources
@@ -30,14 +31,14 @@ def warm_up() -> int:
     place = packaged_extract()
     with tempfile.TemporaryDirectory(prefix="vico-") as folder, redirect_stdout(io.StringIO()):
         here = Path(folder)
-        world.build(Sources(place.path), out=here / "world", lat=place.lat, lon=place.lon, half=_RADIUS)
+        world.build(Sources(place.path), out=here / "world", centre=(place.lat, place.lon), half=_RADIUS)
         community.build(here / "world", out=here / "people", residents=6, seed=0, force=False, json=False)
-        run.run(here / "world", here / "people", out=here / "run", steps=60, cars=5, pedestrians=5)
+        run.run(RunOptions(here / "world", here / "people", out=here / "run", steps=60, cars=5, pedestrians=5))
         replay.replay(here / "run", film=True)
     # What so small a place and so short a time may not need: ramps of bridges, a robot that turns on the spot.
-    ring, nobody = np.array([0.5, 2.5, 1.5]), np.zeros(0)
+    ring = np.array([0.5, 2.5, 1.5])
     fill_polygon(np.zeros((4, 4), np.float32), ring, ring[::-1].copy(), np.array([0, 3]), 2.0, 1.0, 0.5)
-    room_to_turn(0.0, 0.0, 1.0, np.zeros((0, 3)), nobody, nobody, nobody, np.zeros(0, bool))
+    room_to_turn(0.0, 0.0, 1.0, np.zeros(0, NEIGHBOUR))
     for look in range(PASSERS_BY):
         body_of(passer_by(look))  # kept in the cache
     print(f"compiled and tried in {time.perf_counter() - began:.0f} s", file=sys.stderr)

@@ -2,68 +2,38 @@
 
 from __future__ import annotations
 
-import math
 import os
 import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from collections.abc import Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from vico.cli.options import WorldBuildOptions
 from vico.cli.output import check_output, print_json, print_table, progress_bars
 from vico.world.folder import World, read_world, stage_seconds
-from vico.world.threads import in_order
 from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor
-from vico.worldgen.photos.streetview_photo import Photographer
 from vico.worldgen.photos.texturing import Texturing
 from vico.worldgen.pipeline import build_world, extract_centre, rebuild_world
-from vico.worldgen.previews import Overhead, Viewpoint
+from vico.worldgen.request import BuildOptions
 from vico.worldgen.sources import Sources
 
-
-def photograph(world: World, views: Sequence[Viewpoint | Overhead]) -> Iterator[NDArray[np.uint8]]:
-    """Take pictures with our own renderer."""
-    from vico.render.cameras import Cameras
-    from vico.render.frames import render, render_top_down
-    from vico.render.world_scene import scene_of
-
-    scene = scene_of(world, rooms=False)
-
-    def take(view: Viewpoint | Overhead) -> NDArray[np.uint8]:
-        if isinstance(view, Overhead):
-            return render_top_down(scene, world.half, view.side)
-        cameras = Cameras(
-            np.array([view.position]),
-            np.array([view.forward]),
-            fov_y=view.fov_y,
-            width=view.width,
-            height=view.height,
-        )
-        return render(scene, cameras, depth=False, segmentation=False, samples=2, threads=1).rgb[0]
-
-    scene.light()
-    yield from in_order(take, views)
+_DEFAULTS = BuildOptions()
 
 
 def build(
     sources: Sources,
     *,
     out: Path,
-    lat: float | None = None,
-    lon: float | None = None,
+    centre: tuple[float, float] | None = None,
     half: float = 400.0,
     seed: int = 0,
-    texturing: Texturing | None = None,
-    author: LlmLayoutAuthor | None = None,
+    options: BuildOptions = _DEFAULTS,
     force: bool = False,
     json: bool = False,
 ) -> int:
-    """Build a world; without a centre around the map's middle."""
-    if lat is None or lon is None:
-        lat, lon = extract_centre(sources.osm)
+    """Build a world; without a centre (latitude and longitude) around the map's middle."""
+    lat, lon = centre or extract_centre(sources.osm)
     check_output(out, *sources.files(), force=force)
     with progress_bars() as report:
         build_world(
@@ -74,43 +44,62 @@ def build(
             seed=seed,
             out=out,
             force=force,
-            progress=report,
-            photograph=photograph,
-            texturing=texturing,
-            studio=studio,
-            author=author,
+            options=replace(options, progress=report),
         )
-    if author is not None:
-        print(f"language model: {author.model.budget.spent}", file=sys.stderr)
+    if options.author is not None:
+        print(f"language model: {options.author.model.budget.spent}", file=sys.stderr)
     return info(out, json=json)
 
 
+def build_as_asked(options: WorldBuildOptions) -> int:
+    """Build the world that the command line asks for, from a map that is found if none is given."""
+    centre, osm = options.centre(), options.osm
+    if osm is None:
+        lat, lon = centre or (None, None)
+        osm = locate(lat, lon, options.radius, overpass=options.overpass, refresh=options.refresh)
+    sources = Sources(
+        osm,
+        dem=options.dem,
+        tiles=options.tiles,
+        photos=options.photos,
+        places=options.places,
+        gtfs=options.gtfs,
+        layouts=options.layouts,
+        installed_things=options.things == "installed",
+    )
+    how = Texturing(
+        texel=options.texel,
+        inpaint=options.inpaint,
+        upscale=options.upscale,
+        model=options.model,
+        matcher=options.matcher,
+        matcher_weights=options.matcher_weights,
+        mask=options.mask,
+        mask_detector=options.mask_detector,
+        mask_segmenter=options.mask_segmenter,
+    )
+    author = None
+    if options.layout_llm:
+        author = layout_author(options.llm_calls, options.llm_tokens, options.llm_cost)
+    return build(
+        sources,
+        out=options.out,
+        centre=centre,
+        half=options.radius,
+        seed=options.seed,
+        options=BuildOptions(texturing=how, author=author),
+        force=options.force,
+        json=options.json,
+    )
+
+
 def layout_author(calls: int | None, tokens: int | None, cost: float | None) -> LlmLayoutAuthor:
-    """The language model that the environment names, as an author of floor plans."""
-    from vico.geo.web import cache_folder
+    """Return the language model that the environment names, as an author of floor plans."""
+    from vico.io.cache import cache_folder
     from vico.llm import Budget, LanguageModel
 
     budget = Budget(calls=calls, tokens=tokens, cost=cost)
     return LlmLayoutAuthor(LanguageModel.from_environment(cache=cache_folder() / "llm", budget=budget))
-
-
-def studio(world: World) -> Photographer:
-    """Take pictures of an unfinished world with pinhole cameras whose principal point is the middle."""
-    from vico.render.cameras import Cameras
-    from vico.render.frames import render
-    from vico.render.world_scene import scene_of
-
-    scene = scene_of(world, rooms=False)
-
-    def take(
-        position: NDArray[np.float64], rotation: NDArray[np.float64], intrinsics: NDArray[np.float64], w: int, h: int
-    ) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.int32]]:
-        fov = 2 * math.atan(h / 2 / intrinsics[1, 1])
-        camera = Cameras(position[None], rotation[2][None], up=-rotation[1], fov_y=fov, width=w, height=h)
-        frames = render(scene, camera, samples=1)
-        return frames.rgb[0], frames.depth[0], frames.segmentation[0]
-
-    return take
 
 
 def locate(
@@ -128,7 +117,7 @@ def locate(
 def rebuild(path: Path, stages: Sequence[str], *, author: LlmLayoutAuthor | None = None, json: bool = False) -> int:
     """Run stages of a world again."""
     with progress_bars() as report:
-        rebuild_world(path, stages, progress=report, photograph=photograph, studio=studio, author=author)
+        rebuild_world(path, stages, progress=report, author=author)
     return info(path, json=json)
 
 
@@ -142,9 +131,7 @@ def build_table(
     outcomes = []
     with progress_bars() as report:
         report("places", 0, len(rows))
-        for outcome in build_many(
-            rows, out, locate=locate, photograph=photograph, studio=studio, workers=workers, force=force, ray=ray
-        ):
+        for outcome in build_many(rows, out, locate=locate, workers=workers, force=force, ray=ray):
             outcomes.append(outcome)
             report("places", len(outcomes), len(rows))
     order = {row.name: k for k, row in enumerate(rows)}
@@ -160,7 +147,7 @@ def build_table(
 
 
 def facts(world: World) -> dict[str, Any]:
-    """What `world info` tells."""
+    """Return what `world info` tells."""
     manifest = world.manifest
     seconds = stage_seconds(world)
     return {

@@ -3,7 +3,7 @@
 from vico.community.author import Author, build_community, procedural_author
 from vico.community.folder import digest_of, read_community, read_manifest, world_of, write_community
 from vico.community.model import (
-    Appearance,
+    ActivityTag,
     Community,
     CommunityManifest,
     Group,
@@ -12,33 +12,33 @@ from vico.community.model import (
     Relation,
     RelationKind,
     Resident,
+    ResidentAppearance,
     ScheduleItem,
-    clock_of,
-    seconds_of,
 )
-from vico.community.validator import Finding, check_community
+from vico.community.tags import with_tags
+from vico.community.validator import CommunityFinding, check_community
 
 __all__ = [
-    "Appearance",
+    "ActivityTag",
     "Author",
     "Community",
+    "CommunityFinding",
     "CommunityManifest",
-    "Finding",
     "Group",
     "ItemType",
     "Personality",
     "Relation",
     "RelationKind",
     "Resident",
+    "ResidentAppearance",
     "ScheduleItem",
     "build_community",
     "check_community",
-    "clock_of",
     "digest_of",
     "procedural_author",
     "read_community",
     "read_manifest",
-    "seconds_of",
+    "with_tags",
     "world_of",
     "write_community",
 ]

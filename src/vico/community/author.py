@@ -8,20 +8,22 @@ from typing import Protocol
 
 import numpy as np
 
-from vico import __version__
+from vico.clock import clock_of
 from vico.community.biography import Biographer, lifestyle_of
-from vico.community.ground import Ground
 from vico.community.groups import Meeting, form_groups
-from vico.community.model import Appearance, Community, Group, Resident, WorldIdentity, clock_of
-from vico.community.people import Household, Sketch, Wardrobe, draw_character, draw_households
+from vico.community.model import Community, Group, Resident, ResidentAppearance, WorldIdentity
+from vico.community.people import Household, ResidentDraft, Wardrobe, draw_character, draw_households
+from vico.community.place_index import PlaceIndex
 from vico.community.relations import draw_relations
 from vico.community.schedules import DayWriter
-from vico.community.validator import Finding, check_community
+from vico.community.tags import with_tags
+from vico.community.validator import CommunityFinding, check_community
 from vico.community.work import assign_homes, assign_work, employers, study_places
 from vico.errors import EmptyInputError, InputError
+from vico.seeds import rng
+from vico.version import __version__
 from vico.world.folder import World
 from vico.world.model import Category
-from vico.world.seeds import rng
 
 #: A Monday; the day of a community is one of the five from it on.
 FIRST_DAY = date(2025, 6, 2)
@@ -36,7 +38,7 @@ class Author(Protocol):
     used up.
     """
 
-    def __call__(self, world: World, *, residents: int, seed: int, findings: Sequence[Finding]) -> Community:
+    def __call__(self, world: World, *, residents: int, seed: int, findings: Sequence[CommunityFinding]) -> Community:
         """Write a draft for `world`, mending `findings`."""
 
 
@@ -68,9 +70,9 @@ def build_community(
     if residents < 1:
         raise InputError(f"community build: {residents} residents; ask for at least 1")
     write: Author = procedural_author if author is None else author
-    findings: list[Finding] = []
+    findings: list[CommunityFinding] = []
     for _ in range(max(1, tries)):
-        draft = write(world, residents=residents, seed=seed, findings=findings)
+        draft = with_tags(write(world, residents=residents, seed=seed, findings=findings), world.places)
         findings = check_community(draft, world)
         if not findings:
             return draft
@@ -82,7 +84,7 @@ def build_community(
 
 
 def procedural_author(
-    world: World, *, residents: int = 15, seed: int = 0, findings: Sequence[Finding] = ()
+    world: World, *, residents: int = 15, seed: int = 0, findings: Sequence[CommunityFinding] = ()
 ) -> Community:
     """Write a community by rule and by chance, without any language model.
 
@@ -95,25 +97,25 @@ def procedural_author(
         If the world has no homes, or nowhere to meet.
     """
     day = FIRST_DAY + timedelta(days=int(rng(seed, "community", "day").integers(5)))
-    ground = Ground(world, day.weekday())
+    index = PlaceIndex(world, day.weekday())
     problem: EmptyInputError | None = None
     # Few people or few places may leave somebody who is never free with others: other jobs, another try.
     for attempt in range(len(findings and [0]), 12):
         try:
-            return _draft(ground, residents, seed, attempt, day)
+            return _draft(index, residents, seed, attempt, day)
         except EmptyInputError as error:
             problem = problem or error
     assert problem is not None
     raise problem
 
 
-def _draft(ground: Ground, count: int, seed: int, attempt: int, day: date) -> Community:
+def _draft(index: PlaceIndex, count: int, seed: int, attempt: int, day: date) -> Community:
     def stream(name: str) -> np.random.Generator:
         return rng(seed, "community", name, attempt)
 
-    world = ground.world
-    _, rooms = ground.homes()
-    if not ground.places([c for c in Category if c not in (Category.ACCOMMODATION, Category.TRANSIT)]):
+    world = index.world
+    _, rooms = index.homes()
+    if not index.places([c for c in Category if c not in (Category.ACCOMMODATION, Category.TRANSIT)]):
         raise EmptyInputError(
             f"community: world {world.manifest.name!r} has no reachable place but homes and stops: nowhere to "
             "work or to meet; build a world with a larger --radius"
@@ -121,46 +123,46 @@ def _draft(ground: Ground, count: int, seed: int, attempt: int, day: date) -> Co
     households = draw_households(
         stream("people"),
         count,
-        students=bool(study_places(ground)),
+        students=bool(study_places(index)),
         guests=bool(rooms),
-        workers=bool(employers(ground)),
+        workers=bool(employers(index)),
     )
-    sketches = [s for h in households for s in h.members]
+    drafts = [s for h in households for s in h.members]
     uses: dict[str, int] = {}
-    for sketch in sketches:
-        draw_character(rng(seed, "community", "character", attempt, sketch.id), sketch, uses)
-    assign_homes(stream("homes"), ground, households)
-    assign_work(stream("work"), ground, sketches)
-    meetings = form_groups(stream("groups"), ground, sketches)
-    schedules, haunts = DayWriter(stream("days"), ground).write(households, meetings)
-    relations = draw_relations(stream("relations"), ground, households, meetings, day.year)
-    biographer = Biographer(stream("biographies"), ground)
+    for draft in drafts:
+        draw_character(rng(seed, "community", "character", attempt, draft.id), draft, uses)
+    assign_homes(stream("homes"), index, households)
+    assign_work(stream("work"), index, drafts)
+    meetings = form_groups(stream("groups"), index, drafts)
+    schedules, frequented = DayWriter(stream("days"), index).write(households, meetings)
+    relations = draw_relations(stream("relations"), index, households, meetings, day.year)
+    biographer = Biographer(stream("biographies"), index)
     looks = _looks(stream("looks"), households)
-    spawns = ground.spawn_points([s.home for s in sketches])
+    spawns = index.spawn_points([s.home for s in drafts])
     people = []
-    for sketch, spawn in zip(sketches, spawns, strict=True):
-        chance = rng(seed, "community", "details", attempt, sketch.id)
-        mine = [m for m in meetings if any(x is sketch for x in m.members)]
-        assert sketch.personality is not None
+    for draft, spawn in zip(drafts, spawns, strict=True):
+        chance = rng(seed, "community", "details", attempt, draft.id)
+        mine = [m for m in meetings if any(x is draft for x in m.members)]
+        assert draft.personality is not None
         people.append(
             Resident(
-                id=sketch.id,
-                name=f"{sketch.first} {sketch.last}",
-                age=sketch.age,
-                gender="female" if sketch.gender == "female" else "male",
-                appearance=looks[sketch.id],
-                occupation=sketch.occupation,
-                values=sketch.values,
-                personality=sketch.personality,
-                hobbies=[h.name for h in sketch.hobbies],
-                lifestyle=lifestyle_of(chance, sketch),
-                biography=biographer.write(sketch, households[sketch.household], mine),
-                cash=_cash(chance, sketch),
-                home=sketch.home,
-                workplace=sketch.workplace,
-                known_places=_known(ground, sketch, haunts[sketch.id], mine),
+                id=draft.id,
+                name=f"{draft.first} {draft.last}",
+                age=draft.age,
+                gender="female" if draft.gender == "female" else "male",
+                appearance=looks[draft.id],
+                occupation=draft.occupation,
+                values=draft.values,
+                personality=draft.personality,
+                hobbies=[h.name for h in draft.hobbies],
+                lifestyle=lifestyle_of(chance, draft, schedules[draft.id]),
+                biography=biographer.write(draft, households[draft.household], mine),
+                cash=_cash(chance, draft),
+                home=draft.home,
+                workplace=draft.workplace,
+                known_places=_known(index, draft, frequented[draft.id], mine),
                 spawn=spawn,
-                schedule=schedules[sketch.id],
+                schedule=schedules[draft.id],
             )
         )
     return Community(
@@ -175,33 +177,33 @@ def _draft(ground: Ground, count: int, seed: int, attempt: int, day: date) -> Co
     )
 
 
-def _looks(chance: np.random.Generator, households: Sequence[Household]) -> dict[str, Appearance]:
+def _looks(chance: np.random.Generator, households: Sequence[Household]) -> dict[str, ResidentAppearance]:
     wardrobe = Wardrobe(chance)
-    looks: dict[str, Appearance] = {}
+    looks: dict[str, ResidentAppearance] = {}
     for household in households:
-        for k, sketch in enumerate(household.members):
+        for k, draft in enumerate(household.members):
             related = household.kind in ("parent", "siblings") and k > 0
-            looks[sketch.id] = wardrobe.look_of(sketch, looks[household.members[0].id] if related else None)
+            looks[draft.id] = wardrobe.look_of(draft, looks[household.members[0].id] if related else None)
     return looks
 
 
-def _cash(chance: np.random.Generator, sketch: Sketch) -> int:
+def _cash(chance: np.random.Generator, draft: ResidentDraft) -> int:
     pay = {
-        "worker": sketch.job.pay if sketch.job else 0.4,
+        "worker": draft.job.pay if draft.job else 0.4,
         "freelancer": 0.45,
         "student": 0.1,
         "retired": 0.35,
         "guest": 0.6,
     }
-    level = 120 + 620 * pay[sketch.status] + 2 * (sketch.age - 18)
+    level = 120 + 620 * pay[draft.status] + 2 * (draft.age - 18)
     return int(np.clip(round(float(chance.normal(level, 90))), 100, 1000))
 
 
-def _known(ground: Ground, sketch: Sketch, haunts: Sequence[str], mine: Sequence[Meeting]) -> list[str]:
+def _known(index: PlaceIndex, draft: ResidentDraft, frequented: Sequence[str], mine: Sequence[Meeting]) -> list[str]:
     """Where they go, where they meet, where their hobbies could take them, and what they pass on their own street."""
-    known = [sketch.home, *([sketch.workplace] if sketch.workplace else []), *haunts, *(m.place.id for m in mine)]
-    near = sorted(ground.places(), key=lambda p: (round(ground.metres(sketch.home, p.id), 3), p.id))
-    for hobby in sketch.hobbies:
+    known = [draft.home, *([draft.workplace] if draft.workplace else []), *frequented, *(m.place.id for m in mine)]
+    near = sorted(index.places(), key=lambda p: (round(index.metres(draft.home, p.id), 3), p.id))
+    for hobby in draft.hobbies:
         known += [p.id for p in near if p.kind in hobby.kinds][:2]
     for category in (Category.FOOD, Category.STORE, Category.OPEN, Category.TRANSIT):
         known += [p.id for p in near if p.category is category][:3]
@@ -225,4 +227,4 @@ def _groups(meetings: Sequence[Meeting]) -> list[Group]:
     ]
 
 
-__all__ = ["Author", "Finding", "Sketch", "build_community", "procedural_author"]
+__all__ = ["Author", "CommunityFinding", "ResidentDraft", "build_community", "procedural_author"]

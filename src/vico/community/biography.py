@@ -6,43 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vico.community.ground import GUEST_KINDS, Ground, kind_of
+from vico.clock import seconds_of_day
+from vico.community.catalogue import basic_values, biography_sentences, ways_of_life
 from vico.community.groups import Meeting
-from vico.community.jobs import FREELANCE, GUESTS, RETIRED
-from vico.community.people import Household, Sketch
+from vico.community.model import ItemType, ScheduleItem
+from vico.community.people import Household, ResidentDraft
+from vico.community.place_index import GUEST_KINDS, PlaceIndex, kind_of
 from vico.community.relations import describe_household
-from vico.community.tastes import VALUES
 from vico.world.model import Place
 
-_SAYS = {v.name: v.says for v in VALUES}
-
-_LINKS = (
-    "Friends call {her} {traits}; {she} {says}.",
-    "{Traits}, {she} {says}.",
-    "Those who know {him} call {him} {traits}, and add that {she} {says}.",
-    "By nature {traits}, {she} {says}.",
-    "People tend to find {him} {traits}, and {first} {says}.",
-    "Neighbours describe {him} as {traits}; {she} {says}.",
-)
-_GROUPS = (
-    "{When} {she} meets the {group} at {place}.",
-    "{She} rarely misses the {group} at {place}.",
-    "{She} has been with the {group} at {place} from the start.",
-    "The {group} at {place} is a fixed point of {her} week.",
-    "{She} joined the {group} at {place} on a friend's dare and stayed.",
-    "A poster at {place} brought {him} to the {group}.",
-    "When the {group} gathers at {place}, {she} is there.",
-    "{She} found {her} way into this quarter through the {group} at {place}.",
-    "{Her} chair at the {group} in {place} is never empty for long.",
-)
-_HOBBIES = (
-    "{She} likes {hobbies}.",
-    "Free hours go to {hobbies}.",
-    "What is left of the day belongs to {hobbies}.",
-    "Ask {him} about {hobbies}, and bring time.",
-    "On days off it is {hobbies}.",
-    "{Her} evenings are for {hobbies}.",
-)
+# When one rises early, rises late, and goes to bed late, seconds of the day.
+_EARLY_RISE, _LATE_RISE, _LATE_TO_BED = 6 * 3600 + 1800, 7 * 3600 + 1800, 23 * 3600
 
 
 class Biographer:
@@ -54,11 +28,13 @@ class Biographer:
         Decides the turns of phrase.
     """
 
-    def __init__(self, rng: np.random.Generator, ground: Ground) -> None:
+    def __init__(self, rng: np.random.Generator, index: PlaceIndex) -> None:
         self._rng = rng
-        self._ground = ground
+        self._index = index
         self._decks: dict[tuple[str, ...], list[str]] = {}
         self._told: set[str] = set()
+        self._sentences = biography_sentences()
+        self._says = {value.name: value.says for value in basic_values()}
 
     def _turn(self, phrases: tuple[str, ...]) -> str:
         deck = self._decks.setdefault(phrases, [])
@@ -68,25 +44,27 @@ class Biographer:
 
     def _name(self, place: str | None) -> str:
         assert place is not None
-        return self._ground.place_by_id[place].name
+        return self._index.place_by_id[place].name
 
-    def write(self, sketch: Sketch, household: Household, groups: Sequence[Meeting]) -> str:
+    def write(self, draft: ResidentDraft, household: Household, groups: Sequence[Meeting]) -> str:
         """Write three to five sentences about somebody."""
-        him = "her" if sketch.gender == "female" else "him"
+        him = "her" if draft.gender == "female" else "him"
         words = {
-            "first": sketch.first,
-            "she": sketch.she,
-            "She": sketch.she.capitalize(),
-            "her": sketch.her,
-            "Her": sketch.her.capitalize(),
+            "first": draft.first,
+            "she": draft.she,
+            "She": draft.she.capitalize(),
+            "her": draft.her,
+            "Her": draft.her.capitalize(),
             "him": him,
         }
-        traits = join(sketch.character.traits)
-        hobbies = join([h.name for h in sketch.hobbies])
-        sentences = [self._work(sketch), self._home(sketch, household, words)]
-        link = self._turn(_LINKS).replace("call {her}", "call {him}")
+        traits = join(draft.character.traits)
+        hobbies = join([h.name for h in draft.hobbies])
+        sentences = [self._work(draft), self._home(draft, household, words)]
+        link = self._turn(self._sentences.character).replace("call {her}", "call {him}")
         sentences.append(
-            link.format(**words, traits=traits, Traits=traits.capitalize(), says=self._turn(_SAYS[sketch.values[0]]))
+            link.format(
+                **words, traits=traits, Traits=traits.capitalize(), says=self._turn(self._says[draft.values[0]])
+            )
         )
         if groups:
             group = groups[0]
@@ -96,21 +74,21 @@ class Biographer:
             name = group.circle.name
             told = ""
             # The deck comes round again with many people: never the same words about the same group.
-            for _ in range(2 * len(_GROUPS)):
-                told = self._turn(_GROUPS).format(
+            for _ in range(2 * len(self._sentences.group)):
+                told = self._turn(self._sentences.group).format(
                     **words, group=name[0].lower() + name[1:], place=group.place.name, When=when
                 )
                 if told not in self._told:
                     break
             self._told.add(told)
             sentences.append(told)
-        sentences.append(self._turn(_HOBBIES).format(**words, hobbies=hobbies))
+        sentences.append(self._turn(self._sentences.hobbies).format(**words, hobbies=hobbies))
         return " ".join(sentences)
 
-    def _work(self, sketch: Sketch) -> str:
-        name, she = f"{sketch.first} {sketch.last}", sketch.she
-        if sketch.status == "worker":
-            assert sketch.job is not None
+    def _work(self, draft: ResidentDraft) -> str:
+        name, she = f"{draft.first} {draft.last}", draft.she
+        if draft.status == "worker":
+            assert draft.job is not None
             first = self._turn(
                 (
                     "{name}, {age}, is {job} at {place}; {she} {root}.",
@@ -119,10 +97,10 @@ class Biographer:
                 )
             )
             return first.format(
-                name=name, age=sketch.age, job=with_article(sketch.occupation), place=self._name(sketch.workplace),
-                she=she, root=sketch.job.root,
+                name=name, age=draft.age, job=with_article(draft.occupation), place=self._name(draft.workplace),
+                she=she, root=draft.job.root,
             )  # fmt: skip
-        if sketch.status == "student":
+        if draft.status == "student":
             first = self._turn(
                 (
                     "{name}, {age}, studies {subject} at {place}.",
@@ -130,20 +108,20 @@ class Biographer:
                     "{name}, a {age}-year-old student of {subject}, spends most weekdays at {place}.",
                 )
             ).replace("a 18", "an 18")
-            return first.format(name=name, age=sketch.age, subject=sketch.subject, place=self._name(sketch.workplace))
-        if sketch.status == "retired":
-            told = next(text for title, text in RETIRED if title == sketch.subject)
-            return f"{name}, {sketch.age}, a {sketch.occupation}, {told}."
-        if sketch.status == "freelancer":
-            told = next(f[3] for f in FREELANCE if f[0] == sketch.occupation)
-            return f"{name}, {sketch.age}, works from home as {with_article(sketch.occupation)} and {told}."
-        told = next(g[1] for g in GUESTS if g[0] == sketch.occupation)
-        return f"{name}, {sketch.age}, is {with_article(sketch.occupation)} who {told}."
+            return first.format(name=name, age=draft.age, subject=draft.subject, place=self._name(draft.workplace))
+        if draft.status == "retired":
+            told = next(former.told for former in ways_of_life().retired if former.title == draft.subject)
+            return f"{name}, {draft.age}, a {draft.occupation}, {told}."
+        if draft.status == "freelancer":
+            told = next(f.root for f in ways_of_life().freelancer if f.title == draft.occupation)
+            return f"{name}, {draft.age}, works from home as {with_article(draft.occupation)} and {told}."
+        told = next(g.purpose for g in ways_of_life().guest if g.title == draft.occupation)
+        return f"{name}, {draft.age}, is {with_article(draft.occupation)} who {told}."
 
-    def _home(self, sketch: Sketch, household: Household, words: dict[str, str]) -> str:
-        place = self._ground.place_by_id[sketch.home]
+    def _home(self, draft: ResidentDraft, household: Household, words: dict[str, str]) -> str:
+        place = self._index.place_by_id[draft.home]
         where = address(place)
-        company = describe_household(household, sketch, {"mates": "flatmates"})
+        company = describe_household(household, draft, {"mates": "flatmates"})
         if kind_of(place) in GUEST_KINDS:
             return f"{words['She']} has a room {where}{' ' + company if company else ''}."
         if company:
@@ -174,27 +152,38 @@ def address(place: Place) -> str:
     )
 
 
-def lifestyle_of(rng: np.random.Generator, sketch: Sketch) -> str:
-    """How somebody lives, in a sentence."""
-    rhythm = "Early riser" if sketch.early > 0.68 else "Night owl" if sketch.early < 0.36 else "Keeps regular hours"
-    if sketch.shift and sketch.shift[0] >= 12 * 60:
-        rhythm = "Works late and sleeps in"
+def rhythm_of(day: Sequence[ScheduleItem], *, works_late: bool = False) -> str:
+    """Return the word for when somebody rises and goes to bed, as their day has it."""
+    sleep = [item for item in day if item.type is ItemType.SLEEP]
+    rises = min(seconds_of_day(item.end) for item in sleep)
+    # Who lies down after midnight has one stretch of sleep, in the morning: the evening before was a long one.
+    up_late = max(seconds_of_day(item.start) for item in sleep) >= _LATE_TO_BED or seconds_of_day(sleep[0].start) > 0
+    if rises <= _EARLY_RISE:
+        return "Early riser"
+    if rises >= _LATE_RISE and up_late:
+        return "Works late and sleeps in" if works_late else "Night owl"
+    return "Keeps regular hours"
+
+
+def lifestyle_of(rng: np.random.Generator, draft: ResidentDraft, day: Sequence[ScheduleItem]) -> str:
+    """Return how somebody lives, in a sentence that their day agrees with."""
+    rhythm = rhythm_of(day, works_late=draft.shift is not None and draft.shift[0] >= 12 * 60)
     ways = []
-    if any(h.active for h in sketch.hobbies):
+    if any(h.active for h in draft.hobbies):
         ways.append("stays fit")
-    if "hedonism" in sketch.values:
+    if "hedonism" in draft.values:
         ways.append("eats out with pleasure")
-    elif any(h.name in ("cooking", "baking bread") for h in sketch.hobbies):
+    elif any(h.name in ("cooking", "baking bread") for h in draft.hobbies):
         ways.append("cooks from scratch")
-    if "security" in sketch.values:
+    if "security" in draft.values:
         ways.append("spends carefully")
-    if "universalism" in sketch.values:
+    if "universalism" in draft.values:
         ways.append(str(rng.choice(["buys second-hand", "eats little meat", "mends rather than replaces"])))
-    if sketch.character.extraversion > 0.66:
+    if draft.character.extraversion > 0.66:
         ways.append("is seldom alone")
-    elif sketch.character.extraversion < 0.42:
+    elif draft.character.extraversion < 0.42:
         ways.append("needs an hour alone every day")
-    spare = ["walks everywhere", "likes a tidy flat" if sketch.status != "guest" else "travels light", 
+    spare = ["walks everywhere", "likes a tidy flat" if draft.status != "guest" else "travels light", 
              "reads the news on paper",
              "goes by bus when it rains", "drinks a lot of coffee", "keeps the phone in another room"]  # fmt: skip
     for k in rng.permutation(len(spare)):

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from vico.community.ground import Ground
+from vico.clock import clock_of
 from vico.community.hours import Span
-from vico.community.model import ItemType, ScheduleItem, clock_of
+from vico.community.model import ActivityTag, ItemType, ScheduleItem
+from vico.community.place_index import PlaceIndex
 
 MIDNIGHT = 24 * 60
 
@@ -18,8 +19,10 @@ class Block:
 
     Attributes
     ----------
-    tag
+    role
         What it is to the planner: sleep, work, lunch, group, outing, home, ...
+    tag
+        What it is about, where the role does not say.
     """
 
     start: int
@@ -27,7 +30,8 @@ class Block:
     type: ItemType
     activity: str
     place: str
-    tag: str
+    role: str
+    tag: ActivityTag | None = None
 
 
 class Day:
@@ -35,20 +39,20 @@ class Day:
 
     Parameters
     ----------
-    ground
+    index
         Gives the walks.
     home
         Place id.
     """
 
-    def __init__(self, ground: Ground, home: str) -> None:
-        self.ground = ground
+    def __init__(self, index: PlaceIndex, home: str) -> None:
+        self.index = index
         self.home = home
         self.blocks: list[Block] = []
 
     def walk(self, a: str, b: str) -> int | None:
-        """Minutes to allow for the walk between two places; None if there is no way."""
-        return self.ground.minutes(a, b)
+        """Return the minutes to allow for the walk between two places; None if there is no way."""
+        return self.index.minutes(a, b)
 
     def fits(self, start: int, end: int, place: str) -> bool:
         """Whether something from `start` to `end` at `place` fits between what is there."""
@@ -80,7 +84,7 @@ class Day:
         return True
 
     def starts(self, place: str, minutes: int, window: Span, spans: Sequence[Span], *, step: int = 5) -> list[int]:
-        """Starts within `window` at which `minutes` at `place` should fit in the day and in its opening hours.
+        """Return the starts within `window` at which `minutes` at `place` fit in the day and its opening hours.
 
         Walks are estimated here; `add` asks for the routes.
         """
@@ -90,11 +94,11 @@ class Day:
             if before is not None:
                 if before.end >= high:
                     break
-                low = max(low, before.end + self.ground.estimate(before.place, place))
+                low = max(low, before.end + self.index.estimate(before.place, place))
             if after is not None:
                 if min(high, after.start) - low < minutes:
                     continue
-                high = min(high, after.start - self.ground.estimate(place, after.place))
+                high = min(high, after.start - self.index.estimate(place, after.place))
             first = -(-low // step) * step
             found += [
                 s for s in range(first, high - minutes + 1, step) if any(a <= s and s + minutes <= b for a, b in spans)
@@ -102,14 +106,15 @@ class Day:
         return found
 
     def items(self) -> list[ScheduleItem]:
-        """The schedule, walks put in. The blocks must leave no time but for the walks."""
+        """Return the schedule, walks put in. The blocks must leave no time but for the walks."""
         items: list[ScheduleItem] = []
         for before, block in zip([None, *self.blocks], self.blocks, strict=False):
-            place = self.ground.place_by_id[block.place]
+            place = self.index.place_by_id[block.place]
             if before is not None and before.end < block.start:
                 items.append(
                     ScheduleItem(
                         type=ItemType.COMMUTE,
+                        tag=ActivityTag.COMMUTE,
                         start=clock_of(before.end * 60),
                         end=clock_of(block.start * 60),
                         activity="Walk home" if block.place == self.home else f"Walk to {place.name}",
@@ -120,6 +125,7 @@ class Day:
             items.append(
                 ScheduleItem(
                     type=block.type,
+                    tag=block.tag or self._tag(block),
                     start=clock_of(block.start * 60),
                     end=clock_of(block.end * 60),
                     activity=block.activity,
@@ -128,3 +134,10 @@ class Day:
                 )
             )
         return items
+
+    def _tag(self, block: Block) -> ActivityTag:
+        """Return what a block is about by its role in the plan."""
+        if block.type is ItemType.MEAL:
+            return ActivityTag.MEAL_HOME if block.place == self.home else ActivityTag.MEAL_OUT
+        tags = {"sleep": ActivityTag.SLEEP, "work": ActivityTag.WORK, "group": ActivityTag.GROUP}
+        return tags.get(block.role, ActivityTag.LEISURE)

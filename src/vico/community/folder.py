@@ -13,8 +13,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import shutil
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TypeVar
@@ -22,8 +20,10 @@ from typing import TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from vico.community.model import SCHEMA, VERSION, Community, CommunityManifest, Group, Relation, Resident
+from vico.community.tags import with_tags
 from vico.errors import MissingFileError, OutputExistsError, SchemaError
-from vico.world.files import read_json, write_bytes, write_json
+from vico.io.files import read_json, write_bytes, write_json
+from vico.io.folders import check_replaceable, new_folder
 from vico.world.folder import World
 from vico.world.model import Record
 
@@ -39,7 +39,7 @@ def _rows(records: Sequence[Record]) -> bytes:
 
 
 def _contents(community: Community) -> tuple[dict[str, bytes], bytes]:
-    """The bytes of the parts, and of the manifest."""
+    """Return the bytes of the parts, and of the manifest."""
     lists: tuple[Sequence[Record], ...] = (community.residents, community.groups, community.relations)
     parts = {name: _rows(records) for name, records in zip(_PARTS, lists, strict=True)}
     manifest = CommunityManifest(
@@ -81,31 +81,18 @@ def write_community(
         If `path` exists and `force` is not given, or holds anything but a community.
     """
     path = Path(path)
+    check_replaceable(path, force=force)
     if path.exists() or path.is_symlink():
-        if not force:
-            raise OutputExistsError(f"{path}: exists already; choose another --out, or replace it with --force")
         strangers = sorted(p.name for p in path.iterdir() if p.name not in _FILES) if path.is_dir() else [path.name]
         if strangers:
             raise OutputExistsError(f"{path}: holds {strangers[0]!r}, which no community does; choose another --out")
     parts, manifest = _contents(community)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    fresh = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
-    try:
-        fresh.chmod(0o755)
+    with new_folder(path, force=force) as fresh:
         for name, content in parts.items():
             write_bytes(fresh / name, content)
         if world is not None:
             write_json(fresh / "origin.json", {"world": os.path.relpath(Path(world).resolve(), path.resolve())})
         write_bytes(fresh / "community.json", manifest)
-        if path.exists():
-            old = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
-            os.replace(path, old / "old")
-            os.replace(fresh, path)
-            shutil.rmtree(old)
-        else:
-            os.replace(fresh, path)
-    finally:
-        shutil.rmtree(fresh, ignore_errors=True)
     return CommunityManifest.model_validate_json(manifest)
 
 
@@ -163,7 +150,7 @@ def read_community(path: Path, world: World | None = None) -> Community:
             f"{path}: made for world {manifest.world.name!r} ({manifest.world.digest[:12]}), not for "
             f"{world.manifest.name!r} ({world.digest[:12]}); give that world, or build a community for this one"
         )
-    return Community(
+    community = Community(
         producer=manifest.producer,
         author=manifest.author,
         seed=manifest.seed,
@@ -173,6 +160,8 @@ def read_community(path: Path, world: World | None = None) -> Community:
         groups=_records(path / "groups.json", Group, manifest),
         relations=_records(path / "relations.json", Relation, manifest),
     )
+    # Folders of earlier versions, and days that a language model wrote, may say nothing about what an item is about.
+    return with_tags(community, () if world is None else world.places)
 
 
 def world_of(path: Path) -> Path | None:

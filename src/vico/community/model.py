@@ -10,28 +10,16 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, ConfigDict, Field, with_config
 from typing_extensions import TypedDict  # pydantic needs this one before Python 3.12
 
+from vico.clock import DAY, clock_of
 from vico.world.model import Point2, Record
 
 SCHEMA = "vico.community"
 VERSION = 1
 
-DAY = 86_400
 LAST = "23:59:59"
 WEEKDAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")
 
 _CLOCK = re.compile(r"([01]\d|2[0-3]):([0-5]\d):([0-5]\d)")
-
-
-def seconds_of(clock: str) -> int:
-    """Seconds of the day of ``HH:MM:SS``."""
-    hours, minutes, seconds = clock.split(":")
-    return int(hours) * 3600 + int(minutes) * 60 + int(seconds)
-
-
-def clock_of(seconds: int) -> str:
-    """``HH:MM:SS`` of a second of the day; the day's end gives 23:59:59, the last second there is."""
-    seconds = min(seconds, DAY - 1)
-    return f"{seconds // 3600:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}"
 
 
 def _is_clock(text: str) -> str:
@@ -55,11 +43,29 @@ class ItemType(StrEnum):
     COMMUTE = "commute"
 
 
+class ActivityTag(StrEnum):
+    """What a schedule item is about, for programs; the activity says it in words for people."""
+
+    SLEEP = "sleep"
+    MEAL_HOME = "meal_home"
+    MEAL_OUT = "meal_out"
+    WORK = "work"
+    STUDY = "study"
+    EXERCISE = "exercise"
+    SHOP = "shop"
+    VISIT = "visit"
+    LEISURE = "leisure"
+    GROUP = "group"
+    COMMUTE = "commute"
+
+
 class ScheduleItem(Record):
     """A stretch of a resident's day.
 
     Attributes
     ----------
+    tag
+        What it is about. None where the author did not say; `vico.community.tags.with_tags` fills it in.
     start, end
         ``HH:MM:SS``; the next item starts when this one ends; the last one ends 23:59:59.
     place, building
@@ -67,6 +73,7 @@ class ScheduleItem(Record):
     """
 
     type: ItemType
+    tag: ActivityTag | None = None
     start: Clock
     end: Clock
     activity: Annotated[str, Field(min_length=1)]
@@ -75,7 +82,7 @@ class ScheduleItem(Record):
 
 
 @with_config(ConfigDict(extra="forbid"))
-class Appearance(TypedDict):
+class ResidentAppearance(TypedDict):
     """How a resident looks: the fields of `vico.assets.people.Appearance`, which makes a body of them.
 
     A plain dictionary with checked keys, so that it can be handed to `Appearance.from_dict` as it is.
@@ -132,7 +139,7 @@ class Resident(Record):
     name: Annotated[str, Field(min_length=3)]
     age: Annotated[int, Field(ge=0, le=110)]
     gender: Literal["female", "male"]
-    appearance: Appearance
+    appearance: ResidentAppearance
     occupation: str
     values: list[str]
     personality: Personality
@@ -152,7 +159,7 @@ class Resident(Record):
         return self.name.split()[0]
 
     def item_at(self, seconds: int) -> ScheduleItem:
-        """The schedule item of a second of the day; at a boundary, the one that starts."""
+        """Return the schedule item of a second of the day; at a boundary, the one that starts."""
         clock = clock_of(seconds % DAY)
         return next((item for item in reversed(self.schedule) if item.start <= clock), self.schedule[0])
 
@@ -249,7 +256,7 @@ class Community(Record):
         return {r.id: r for r in self.residents}
 
     def groups_of(self, resident: str) -> list[Group]:
-        """Groups a resident belongs to."""
+        """Return the groups a resident belongs to."""
         return [g for g in self.groups if resident in g.members]
 
     def relations_of(self, resident: str) -> list[Relation]:

@@ -8,14 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from pydantic import TypeAdapter
 
-from vico.community.jobs import Job
-from vico.community.model import Appearance, Colour, Personality
+from vico.community.catalogue import Hobby, Job, basic_values, hobbies, trait_words
+from vico.community.model import Colour, Personality, ResidentAppearance
 from vico.community.names import NameBook
-from vico.community.tastes import HOBBIES, TRAITS, VALUES, Hobby
 
 
 @dataclass
-class Sketch:
+class ResidentDraft:
     """A resident in the making.
 
     Attributes
@@ -74,7 +73,7 @@ class Household:
     """People who share a home, and what they are to each other."""
 
     kind: str
-    members: list[Sketch]
+    members: list[ResidentDraft]
     home: str = ""
 
 
@@ -127,11 +126,11 @@ def draw_households(
             weights[k] = weight * (max(room, 0.02) if room < 1 else room**0.5)
         choice = int(rng.choice(len(_HOUSEHOLDS), p=weights / weights.sum()))
         kind, _, members = _HOUSEHOLDS[choice]
-        sketches = _members(rng, kind, members, len(found), people)
+        drafts = _members(rng, kind, members, len(found), people)
         for m in members:
             quota[m] -= 1
         people += len(members)
-        found.append(Household(kind, sketches))
+        found.append(Household(kind, drafts))
     _name(rng, found)
     return found
 
@@ -148,7 +147,7 @@ def _age(rng: np.random.Generator, status: str, kind: str) -> int:
     return round(float(rng.triangular(low, mode, high)))
 
 
-def _members(rng: np.random.Generator, kind: str, members: str, household: int, first: int) -> list[Sketch]:
+def _members(rng: np.random.Generator, kind: str, members: str, household: int, first: int) -> list[ResidentDraft]:
     statuses = [_STATUS[m] for m in members]
     ages = [_age(rng, status, kind) for status in statuses]
     genders = [("female", "male")[int(rng.integers(2))] for _ in members]
@@ -168,7 +167,7 @@ def _members(rng: np.random.Generator, kind: str, members: str, household: int, 
     elif kind == "flatmates" and "student" in statuses:
         ages = [int(rng.integers(19, 26)) if s == "student" else int(rng.integers(22, 28)) for s in statuses]
     return [
-        Sketch(f"resident_{first + k}", gender, age, status, household)
+        ResidentDraft(f"resident_{first + k}", gender, age, status, household)
         for k, (gender, age, status) in enumerate(zip(genders, ages, statuses, strict=True))
     ]
 
@@ -178,12 +177,12 @@ def _name(rng: np.random.Generator, households: Sequence[Household]) -> None:
     for household in households:
         family = book.family()
         shared = household.kind in ("parent", "siblings") or (household.kind == "couple" and rng.random() < 0.5)
-        for k, sketch in enumerate(household.members):
-            full = book.full(sketch.gender, family if shared or k == 0 else book.family())
-            sketch.first, sketch.last = full.split(" ", 1)
+        for k, draft in enumerate(household.members):
+            full = book.full(draft.gender, family if shared or k == 0 else book.family())
+            draft.first, draft.last = full.split(" ", 1)
 
 
-def draw_character(rng: np.random.Generator, sketch: Sketch, uses: dict[str, int]) -> None:
+def draw_character(rng: np.random.Generator, draft: ResidentDraft, uses: dict[str, int]) -> None:
     """Give somebody a personality, values and hobbies that go together.
 
     Parameters
@@ -192,7 +191,7 @@ def draw_character(rng: np.random.Generator, sketch: Sketch, uses: dict[str, int
         How often each hobby has been given so far; common ones become less likely. Updated.
     """
     five = np.clip(rng.normal(0.55, 0.19, 5), 0.05, 0.95)
-    five[1] = min(0.95, five[1] + (0.08 if sketch.age > 45 else 0.0))
+    five[1] = min(0.95, five[1] + (0.08 if draft.age > 45 else 0.0))
     five[4] = max(0.05, five[4] - 0.1)
     names = ("openness", "conscientiousness", "extraversion", "agreeableness", "neuroticism")
     scores = {name: round(float(v), 2) for name, v in zip(names, five, strict=True)}
@@ -200,25 +199,27 @@ def draw_character(rng: np.random.Generator, sketch: Sketch, uses: dict[str, int
     order = sorted(names, key=lambda name: (-abs(scores[name] - 0.5), name))
     traits = []
     for name in order[: 2 + int(rng.integers(2))]:
-        high, low = TRAITS[name]
-        words = high if scores[name] >= 0.5 else low
+        words = trait_words()[name].high if scores[name] >= 0.5 else trait_words()[name].low
         traits.append(words[int(rng.integers(len(words)))])
-    sketch.personality = Personality(**scores, traits=traits)
-    weights = np.array([max(0.15, 0.5 + sum(w * (scores[t] - 0.5) * 3 for t, w in v.likes)) for v in VALUES])
-    picks = rng.choice(len(VALUES), 3, replace=False, p=weights / weights.sum())
-    sketch.values = [VALUES[int(k)].name for k in picks]
-    low_age, high_age = np.array([h.ages for h in HOBBIES]).T
-    fits = np.array([h.weight for h in HOBBIES]) * (low_age <= sketch.age) * (sketch.age <= high_age)
-    for k, hobby in enumerate(HOBBIES):
+    draft.personality = Personality(**scores, traits=traits)
+    values, pastimes = basic_values(), hobbies()
+    weights = np.array(
+        [max(0.15, 0.5 + sum(w * (scores[t] - 0.5) * 3 for t, w in value.leans.items())) for value in values]
+    )
+    picks = rng.choice(len(values), 3, replace=False, p=weights / weights.sum())
+    draft.values = [values[int(k)].name for k in picks]
+    low_age, high_age = np.array([h.ages for h in pastimes]).T
+    fits = np.array([h.weight for h in pastimes]) * (low_age <= draft.age) * (draft.age <= high_age)
+    for k, hobby in enumerate(pastimes):
         fits[k] *= 0.35 ** uses.get(hobby.name, 0)
         fits[k] *= max(0.1, 1 + sum((scores[t] - 0.5) * 2.5 for t in hobby.traits))
-        fits[k] *= 1.8 if set(hobby.values) & set(sketch.values) else 1.0
-    picks = rng.choice(len(HOBBIES), 2 + int(rng.random() < 0.55), replace=False, p=fits / fits.sum())
-    sketch.hobbies = [HOBBIES[int(k)] for k in picks]
-    for hobby in sketch.hobbies:
+        fits[k] *= 1.8 if set(hobby.values) & set(draft.values) else 1.0
+    picks = rng.choice(len(pastimes), 2 + int(rng.random() < 0.55), replace=False, p=fits / fits.sum())
+    draft.hobbies = [pastimes[int(k)] for k in picks]
+    for hobby in draft.hobbies:
         uses[hobby.name] = uses.get(hobby.name, 0) + 1
-    lark = 0.35 + 0.4 * (scores["conscientiousness"] - 0.5) + (sketch.age - 40) / 90
-    sketch.early = float(np.clip(rng.normal(lark + 0.15, 0.18), 0, 1))
+    lark = 0.35 + 0.4 * (scores["conscientiousness"] - 0.5) + (draft.age - 40) / 90
+    draft.early = float(np.clip(rng.normal(lark + 0.15, 0.18), 0, 1))
 
 
 # Skin, and the weights of African, Asian and European features that go with it.
@@ -255,7 +256,7 @@ _SHOE_COLOURS: tuple[Colour, ...] = (
     (150, 54, 48),
     (70, 84, 110),
 )
-_LOOKS = TypeAdapter(Appearance)
+_LOOKS = TypeAdapter(ResidentAppearance)
 _FORMAL = {
     "lawyer",
     "consular officer",
@@ -280,7 +281,7 @@ class Wardrobe:
     def _colour(self, options: Sequence[Colour]) -> Colour:
         return options[int(self._rng.integers(len(options)))]
 
-    def look_of(self, sketch: Sketch, like: Appearance | None = None) -> Appearance:
+    def look_of(self, draft: ResidentDraft, like: ResidentAppearance | None = None) -> ResidentAppearance:
         """Draw the looks of somebody.
 
         Parameters
@@ -288,7 +289,7 @@ class Wardrobe:
         like
             A blood relative, whose features they share.
         """
-        rng, female, age = self._rng, sketch.gender == "female", sketch.age
+        rng, female, age = self._rng, draft.gender == "female", draft.age
         kind = int(rng.choice(len(_ANCESTRY), p=[a[0] for a in _ANCESTRY]))
         _, ancestry, skins = _ANCESTRY[kind]
         skin = self._colour(skins)
@@ -311,7 +312,7 @@ class Wardrobe:
         if not self._tops:
             self._tops = [_TOP_COLOURS[int(k)] for k in rng.permutation(len(_TOP_COLOURS))]
         colour = self._tops.pop()
-        formal = sketch.occupation in _FORMAL
+        formal = draft.occupation in _FORMAL
         if formal:
             top, under = self._pick(["suit", "jacket"], [3, 1]), colour
             colour, bottom_colour = self._colour(_DARK), (44, 46, 52)
@@ -333,7 +334,7 @@ class Wardrobe:
                 bottom = "leggings"
             shoes = self._pick(["trainers", "shoes", "boots", "sandals"], [2 if age < 45 else 0.9, 1.4, 1, 0.15])
             shoe = self._colour(_SHOE_COLOURS)
-        fitness = 0.15 if any(h.active for h in sketch.hobbies) else 0.0
+        fitness = 0.15 if any(h.active for h in draft.hobbies) else 0.0
         return _LOOKS.validate_python(
             dict(  # noqa: C408 (reads better than quoted keys)
                 gender=0.0 if female else 1.0,

@@ -11,9 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vico.community.ground import SPAWN_GAP, Ground
+from vico.clock import seconds_of_day
 from vico.community.jobs import job_of, jobs_at, works_at
-from vico.community.model import LAST, Community, ItemType, Resident, ScheduleItem, seconds_of
+from vico.community.model import LAST, Community, ItemType, Resident, ScheduleItem
+from vico.community.place_index import SPAWN_GAP, PlaceIndex
+from vico.community.tags import TAGS_OF_TYPE
 from vico.community.work import STUDY_KINDS
 from vico.world.folder import World
 from vico.world.model import Category, Place
@@ -29,7 +31,7 @@ _SPARE = 10 * 60
 
 
 @dataclass(frozen=True)
-class Finding:
+class CommunityFinding:
     """Something wrong.
 
     Attributes
@@ -47,7 +49,7 @@ class Finding:
     mend: str
 
 
-def check_community(community: Community, world: World) -> list[Finding]:
+def check_community(community: Community, world: World) -> list[CommunityFinding]:
     """Check that a community is grounded in a world.
 
     Checks that it was made for this world; names and ids are unique; homes are accommodation; workplaces employ the
@@ -63,7 +65,7 @@ def check_community(community: Community, world: World) -> list[Finding]:
     """
     if community.world.digest != world.digest:
         return [
-            Finding(
+            CommunityFinding(
                 "world.digest",
                 f"the community was made for world {community.world.name!r} ({community.world.digest[:12]}), not for "
                 f"this one, {world.manifest.name!r} ({world.digest[:12]})",
@@ -71,20 +73,20 @@ def check_community(community: Community, world: World) -> list[Finding]:
             )
         ]
     if not community.residents:
-        return [Finding("residents", "nobody lives here", "write at least one resident")]
-    return _Check(community, Ground(world, community.date.weekday())).run()
+        return [CommunityFinding("residents", "nobody lives here", "write at least one resident")]
+    return _Check(community, PlaceIndex(world, community.date.weekday())).run()
 
 
 class _Check:
-    def __init__(self, community: Community, ground: Ground) -> None:
+    def __init__(self, community: Community, index: PlaceIndex) -> None:
         self.community = community
-        self.ground = ground
-        self.found: list[Finding] = []
+        self.index = index
+        self.found: list[CommunityFinding] = []
 
     def say(self, where: str, what: str, mend: str) -> None:
-        self.found.append(Finding(where, what, mend))
+        self.found.append(CommunityFinding(where, what, mend))
 
-    def run(self) -> list[Finding]:
+    def run(self) -> list[CommunityFinding]:
         self.unique()
         for resident in self.community.residents:
             self.person(resident)
@@ -96,10 +98,10 @@ class _Check:
 
     def place(self, where: str, place_id: str) -> Place | None:
         """Look a place up; say so if it doesn't exist or can't be reached."""
-        place = self.ground.place_by_id.get(place_id)
+        place = self.index.place_by_id.get(place_id)
         if place is None:
             self.say(where, f"there is no place {place_id!r} in this world", "use the id of a place of the world")
-        elif not self.ground.reachable(place):
+        elif not self.index.reachable(place):
             self.say(where, f"{place.name} ({place_id}) can't be reached on foot", "choose another place")
             return None
         return place
@@ -189,6 +191,9 @@ class _Check:
                     f"it starts at {item.start}, but the item before ends at {items[k - 1].end}",
                     "let each item start when the one before ends",
                 )
+            if item.tag is not None and item.tag not in TAGS_OF_TYPE[item.type]:
+                tags = ", ".join(sorted(TAGS_OF_TYPE[item.type]))
+                self.say(where, f"its tag {item.tag} does not go with its type {item.type}", f"take one of {tags}")
             if item.type is ItemType.COMMUTE:
                 self.commute(r, k, where)
             else:
@@ -204,11 +209,11 @@ class _Check:
             self.say(where, "a commute is not between two stays", "put commutes between things to do, one each")
             return
         a, b = items[k - 1].place, items[k + 1].place
-        if a not in self.ground.place_by_id or b not in self.ground.place_by_id or a is None or b is None:
+        if a not in self.index.place_by_id or b not in self.index.place_by_id or a is None or b is None:
             return  # said already
-        needed = self.ground.seconds(a, b)
+        needed = self.index.seconds(a, b)
         given = _length(item)
-        names = f"from {self.ground.place_by_id[a].name} to {self.ground.place_by_id[b].name}"
+        names = f"from {self.index.place_by_id[a].name} to {self.index.place_by_id[b].name}"
         if math.isinf(needed):
             self.say(where, f"there is no way {names}", "choose a place that can be reached")
         elif given < needed:
@@ -223,9 +228,9 @@ class _Check:
             )
 
     def joined(self, before: ScheduleItem, item: ScheduleItem, where: str) -> None:
-        places = self.ground.place_by_id
+        places = self.index.place_by_id
         a, b = before.place, item.place
-        if a in places and b in places and a is not None and b is not None and not self.ground.same_spot(a, b):
+        if a in places and b in places and a is not None and b is not None and not self.index.same_spot(a, b):
             self.say(
                 where,
                 f"nobody gets from {places[a].name} to {places[b].name} in no time",
@@ -243,11 +248,11 @@ class _Check:
             self.say(where, f"building {item.building!r} is not that of {place.name}", f"write {place.building!r}")
         if item.type is ItemType.SLEEP and place.category is not Category.ACCOMMODATION:
             self.say(where, f"{place.name} is no place to sleep", "sleep at home")
-        spans = self.ground.given_hours(place)
+        spans = self.index.given_hours(place)
         if spans is None or place.id == r.home:
             return
         margin = _STAFF_MARGIN * 60 if place.id == r.workplace else 0
-        start, end = seconds_of(item.start), seconds_of(item.end)
+        start, end = seconds_of_day(item.start), seconds_of_day(item.end)
         if not any(a * 60 - margin <= start and end <= b * 60 + margin for a, b in spans):
             self.say(
                 where,
@@ -297,7 +302,7 @@ class _Check:
                 self.say("relations", f"{count} relations join {pair[0]} and {pair[1]}", "keep one, the closest")
 
     def spawns(self) -> None:
-        residents, walkable = self.community.residents, self.ground.world.walkable
+        residents, walkable = self.community.residents, self.index.world.walkable
         points = np.array([r.spawn for r in residents], float)
         reachable = walkable.is_connected(points)
         for r, ok in zip(residents, reachable.tolist(), strict=True):
@@ -313,7 +318,7 @@ class _Check:
 
 
 def _length(item: ScheduleItem) -> int:
-    return seconds_of(item.end) + (1 if item.end == LAST else 0) - seconds_of(item.start)
+    return seconds_of_day(item.end) + (1 if item.end == LAST else 0) - seconds_of_day(item.start)
 
 
 def _works_without_place(occupation: str) -> bool:

@@ -8,10 +8,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vico.community.ground import Ground, kind_of
+from vico.community.catalogue import Job, trades, ways_of_life
 from vico.community.hours import Span
-from vico.community.jobs import FREELANCE, GUESTS, JOBS, RETIRED, STUDIES, Job, jobs_at
-from vico.community.people import Household, Sketch
+from vico.community.jobs import jobs_at
+from vico.community.people import Household, ResidentDraft
+from vico.community.place_index import PlaceIndex, kind_of
 from vico.world.model import Category, Place
 
 #: Where students study. `workplace` of a student is one of these.
@@ -22,9 +23,9 @@ _BEFORE, _AFTER = 45, 30
 _LATEST = 23 * 60 + 30
 
 
-def assign_homes(rng: np.random.Generator, ground: Ground, households: Sequence[Household]) -> None:
+def assign_homes(rng: np.random.Generator, index: PlaceIndex, households: Sequence[Household]) -> None:
     """Give each household a home: guests a room, all others a dwelling; the emptiest first, at times a neighbour's."""
-    dwellings, rooms = ground.homes()
+    dwellings, rooms = index.homes()
     taken: Counter[str] = Counter()
     for household in households:
         options = (rooms or dwellings) if household.kind == "guest" else (dwellings or rooms)
@@ -43,20 +44,20 @@ def assign_homes(rng: np.random.Generator, ground: Ground, households: Sequence[
             member.home = home.id
 
 
-def employers(ground: Ground) -> list[Place]:
+def employers(index: PlaceIndex) -> list[Place]:
     """Places where people work on the day: somebody's trade, and not closed."""
     return [
         p
-        for p in ground.places()
+        for p in index.places()
         if p.category is not Category.TRANSIT
         and jobs_at(p)
-        and any(min(end, 24 * 60) - max(start, 6 * 60) >= 4 * 60 for start, end in ground.hours(p))
+        and any(min(end, 24 * 60) - max(start, 6 * 60) >= 4 * 60 for start, end in index.hours(p))
     ]
 
 
-def study_places(ground: Ground) -> list[Place]:
+def study_places(index: PlaceIndex) -> list[Place]:
     """Places where students study, open on the day."""
-    found = [p for p in ground.places() if kind_of(p) in STUDY_KINDS and _long_enough(ground.hours(p))]
+    found = [p for p in index.places() if kind_of(p) in STUDY_KINDS and _long_enough(index.hours(p))]
     return [p for p in found if kind_of(p) != "library"] or found
 
 
@@ -64,39 +65,41 @@ def _long_enough(spans: Sequence[Span]) -> bool:
     return any(start <= 11 * 60 and end >= 16 * 60 for start, end in spans)
 
 
-def assign_work(rng: np.random.Generator, ground: Ground, sketches: Sequence[Sketch]) -> None:
+def assign_work(rng: np.random.Generator, index: PlaceIndex, drafts: Sequence[ResidentDraft]) -> None:
     """Give everybody an occupation, and a workplace and hours to those who have one."""
     offers: dict[str, list[Place]] = {}
-    trades: dict[str, Job] = {}
-    for place in employers(ground):
+    offered: dict[str, Job] = {}
+    for place in employers(index):
         for job in jobs_at(place):
             offers.setdefault(job.title, []).append(place)
-            trades[job.title] = job
-    titles = [t for t in [*(j.title for j in JOBS), *sorted(set(trades) - {j.title for j in JOBS})] if t in trades]
-    study = study_places(ground)
+            offered[job.title] = job
+    known = [job.title for job in trades()]
+    titles = [title for title in [*known, *sorted(set(offered) - set(known))] if title in offered]
+    ways = ways_of_life()
+    study = study_places(index)
     held: Counter[str] = Counter()
     staff: Counter[str] = Counter()
     late = 0
-    for sketch in sketches:
-        if sketch.status == "worker":
-            late += _hire(rng, ground, sketch, [trades[t] for t in titles], offers, held, staff, late)
-        elif sketch.status == "student":
+    for draft in drafts:
+        if draft.status == "worker":
+            late += _hire(rng, index, draft, [offered[t] for t in titles], offers, held, staff, late)
+        elif draft.status == "student":
             place = study[int(rng.integers(len(study)))]
-            options = ["music"] if kind_of(place) == "music_school" else list(STUDIES)
-            sketch.subject = _rare(rng, options, held)
-            sketch.occupation = f"student of {sketch.subject}"
-            sketch.workplace = place.id
+            options = ["music"] if kind_of(place) == "music_school" else list(ways.subjects)
+            draft.subject = _rare(rng, options, held)
+            draft.occupation = f"student of {draft.subject}"
+            draft.workplace = place.id
             start = int(rng.choice([8 * 60 + 15, 8 * 60 + 30, 9 * 60 + 15, 10 * 60 + 15]))
-            opens = min(s for s, e in ground.hours(place) if e >= 16 * 60)
+            opens = min(s for s, e in index.hours(place) if e >= 16 * 60)
             start = max(start, 5 * math.ceil(opens / 5))
-            sketch.shift = (start, start + 5 * int(rng.integers(60, 73)))
-        elif sketch.status == "freelancer":
-            sketch.occupation = _rare(rng, [f[0] for f in FREELANCE], held)
-        elif sketch.status == "retired":
-            sketch.subject = _rare(rng, [r[0] for r in RETIRED], held)
-            sketch.occupation = f"retired {sketch.subject}"
+            draft.shift = (start, start + 5 * int(rng.integers(60, 73)))
+        elif draft.status == "freelancer":
+            draft.occupation = _rare(rng, [f.title for f in ways.freelancer], held)
+        elif draft.status == "retired":
+            draft.subject = _rare(rng, [r.title for r in ways.retired], held)
+            draft.occupation = f"retired {draft.subject}"
         else:
-            sketch.occupation = _rare(rng, [g[0] for g in GUESTS], held)
+            draft.occupation = _rare(rng, [g.title for g in ways.guest], held)
 
 
 def _rare(rng: np.random.Generator, options: Sequence[str], held: Counter[str]) -> str:
@@ -109,8 +112,8 @@ def _rare(rng: np.random.Generator, options: Sequence[str], held: Counter[str]) 
 
 def _hire(
     rng: np.random.Generator,
-    ground: Ground,
-    sketch: Sketch,
+    index: PlaceIndex,
+    draft: ResidentDraft,
     jobs: Sequence[Job],
     offers: dict[str, list[Place]],
     held: Counter[str],
@@ -123,22 +126,22 @@ def _hire(
         low, high = job.ages
         # Half the weight of a trade is its share of the places; the square root keeps the many shops from crowding out.
         weights[k] = job.weight * len(offers[job.title]) ** 0.5 * 0.07 ** held[job.title]
-        weights[k] *= 1.0 if low <= sketch.age <= high else 1e-6
+        weights[k] *= 1.0 if low <= draft.age <= high else 1e-6
         weights[k] *= 0.25**late if job.shift == "evening" else 1.0
         weights[k] *= 1.4 if job.shift in ("office", "bank", "school", "health") else 1.0
     job = jobs[int(rng.choice(len(jobs), p=weights / weights.sum()))]
-    places = [p for p in offers[job.title] if p.id != sketch.home] or offers[job.title]
+    places = [p for p in offers[job.title] if p.id != draft.home] or offers[job.title]
     # Some work where somebody of the community works already: that makes colleagues.
     w = np.array([0.02 if staff[p.id] > 2 else 1 + 0.9 * len(places) * (staff[p.id] > 0) for p in places])
     place = places[int(rng.choice(len(places), p=w / w.sum()))]
     held[job.title] += 1
     staff[place.id] += 1
-    sketch.job, sketch.occupation, sketch.workplace = job, job.title, place.id
-    start, end = _shift(rng, job.shift, ground.hours(place))
+    draft.job, draft.occupation, draft.workplace = job, job.title, place.id
+    start, end = _shift(rng, job.shift, index.hours(place))
     if end > 22 * 60:  # home before midnight, however far
-        end = min(end, 23 * 60 + 40 - (ground.minutes(place.id, sketch.home) or 0)) // 5 * 5
-    sketch.shift = start, end
-    return sketch.shift[1] > 21 * 60
+        end = min(end, 23 * 60 + 40 - (index.minutes(place.id, draft.home) or 0)) // 5 * 5
+    draft.shift = start, end
+    return draft.shift[1] > 21 * 60
 
 
 def _five(minutes: float) -> int:

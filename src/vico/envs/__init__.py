@@ -1,6 +1,21 @@
-"""How other people's code drives the simulation: PettingZoo environments and their spaces."""
+"""How other people's code drives the simulation: PettingZoo and Gymnasium environments, their spaces and checks."""
 
+from vico.envs.check import EnvFinding, check_env
 from vico.envs.parallel import CommunityEnv, make
+from vico.envs.registry import register_ids
+from vico.envs.single import SingleAgentEnv
+from vico.envs.spec import EnvSpec
 from vico.sim.simulation import Simulation
 
-__all__ = ["CommunityEnv", "Simulation", "make"]
+register_ids()
+
+__all__ = [
+    "CommunityEnv",
+    "EnvFinding",
+    "EnvSpec",
+    "Simulation",
+    "SingleAgentEnv",
+    "check_env",
+    "make",
+    "register_ids",
+]

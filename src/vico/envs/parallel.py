@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from gymnasium import spaces
@@ -15,13 +15,14 @@ from pettingzoo import ParallelEnv
 from vico.community import read_community
 from vico.community.model import Community
 from vico.envs.spaces import action_space, observation_space, robot_space, short_form
+from vico.envs.spec import EnvOptions, EnvSpec
 from vico.errors import InputError
-from vico.sim.config import SimConfig, seconds_of_day
+from vico.seeds import rng
+from vico.sim.actions import AgentFault
 from vico.sim.events import Event
-from vico.sim.simulation import Simulation, Trouble
+from vico.sim.simulation import Simulation
 from vico.world.folder import World, read_world
 from vico.world.public import PublicMap
-from vico.world.seeds import rng
 
 Setup = Callable[[Simulation], None]
 
@@ -31,38 +32,36 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
 
     Agents are called ``resident_0``, ``assistant_0``, ``robot_0`` and so on. Observations and actions are described
     in `vico.envs.spaces`. There is no reward of its own (0 for everybody): tasks judge the state. An episode ends,
-    truncated, after `max_steps` steps.
+    truncated, after ``spec.max_steps`` steps.
 
     Parameters
     ----------
     world, community
         What to simulate.
-    config
-        See `SimConfig`; `reset(seed=...)` replaces its seed.
-    max_steps
-        Length of an episode, steps of one second.
+    spec
+        Everything else; `reset(seed=...)` replaces its seed.
     setup
         Called with the fresh simulation at each reset: to add objects and place agents.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "name": "vico/community-v0", "is_parallelizable": True}  # noqa: RUF012
+    metadata = {"render_modes": ["rgb_array"], "name": "vico/Community-v0", "is_parallelizable": True}  # noqa: RUF012
     render_mode = "rgb_array"
 
     def __init__(
         self,
         world: World,
         community: Community | None = None,
-        config: SimConfig | None = None,
         *,
-        max_steps: int = 1500,
+        spec: EnvSpec | None = None,
         setup: Setup | None = None,
     ) -> None:
-        if max_steps < 1:
-            raise InputError(f"env: max_steps is {max_steps}; it has to be 1 or more")
+        self.spec = spec or EnvSpec()
+        if self.spec.max_steps < 1:
+            raise InputError(f"env: max_steps is {self.spec.max_steps}; it has to be 1 or more")
         self.world = world
         self.community = community
-        self.config = config or SimConfig()
-        self.max_steps = max_steps
+        self.config = self.spec.config
+        self.max_steps = self.spec.max_steps
         self.public_map = PublicMap.from_world(world)
         self.events: list[Event] = []
         self._setup = setup
@@ -77,8 +76,8 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         self._observation_spaces = {
             name: observation_space(self.config.image if name in seeing else None) for name in self.possible_agents
         }
-        people = self.sim.stage.people.names
-        robots = self.sim.stage.robots
+        people = self.sim.state.people.names
+        robots = self.sim.state.robots
         self._action_spaces: dict[str, spaces.Dict] = {
             name: action_space(len(self._places), len(people), world.half) for name in people
         }
@@ -128,7 +127,7 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         return observations, infos
 
     def step(
-        self, actions: Mapping[str, Any], troubles: Mapping[str, Trouble] | None = None
+        self, actions: Mapping[str, Any], agent_faults: Mapping[str, AgentFault] | None = None
     ) -> tuple[
         dict[str, dict[str, Any]], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
     ]:
@@ -139,9 +138,9 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         if not self.agents:
             raise InputError("env: the episode is over (or has not begun); call reset() before step()")
         short = {
-            name: short_form(action, self._places, self.sim.stage.people.names) for name, action in actions.items()
+            name: short_form(action, self._places, self.sim.state.people.names) for name, action in actions.items()
         }
-        result = self.sim.step(short, troubles)
+        result = self.sim.step(short, agent_faults)
         over = self.sim.metrics.steps >= self.max_steps
         names = self.agents
         if over:
@@ -158,7 +157,7 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         )
 
     def render(self) -> NDArray[np.uint8]:
-        """What the seeing agents see, side by side, uint8, shape ``(image, k * image, 3)``."""
+        """Return what the seeing agents see, side by side, uint8, shape ``(image, k * image, 3)``."""
         pictures = [view["rgb"] for view in self._views.values() if "rgb" in view]
         if not pictures:
             raise InputError("env: nobody's views are rendered; make the env with observe='all', and reset it")
@@ -175,8 +174,8 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
 
     def _fresh(self, seed: int) -> Simulation:
         previous = getattr(self, "_simulation", None)
-        eyes = previous.made_eyes if previous is not None else None
-        simulation = Simulation(self.world, self.community, replace(self.config, seed=seed), eyes=eyes)
+        renderer = previous.existing_renderer if previous is not None else None
+        simulation = Simulation(self.world, self.community, replace(self.config, seed=seed), renderer=renderer)
         if self._setup is not None:
             self._setup(simulation)
         return simulation
@@ -191,48 +190,44 @@ def make(
     world: World | Path | str,
     community: Community | Path | str | None = None,
     *,
-    seed: int = 0,
-    start: str = "08:00",
-    residents: int | None = None,
-    assistants: int = 0,
-    robots: tuple[str, ...] = (),
-    cars: int = 0,
-    pedestrians: int = 0,
-    transit: bool = True,
-    observe: str | tuple[str, ...] = "all",
-    image: int = 256,
-    max_steps: int = 1500,
     setup: Setup | None = None,
+    **options: Unpack[EnvOptions],
 ) -> CommunityEnv:
     """Make an environment from a world and a community, or from their folders.
 
     Parameters
     ----------
-    start
-        Time of day, ``HH:MM`` or ``HH:MM:SS``.
-    observe
-        Whose views are rendered: ``"all"``, ``"none"``, or names.
     setup
         Called with the fresh `Simulation` at each reset.
+    options
+        `seed`, `start`, `residents`, `assistants`, `robots`, `errands`, `cars`, `pedestrians`, `transit`, `observe`,
+        `image` and `max_steps`, as `vico.envs.spec.EnvSpec` has them.
 
     Raises
     ------
     InputError
         If the community belongs to another world, or a name or number is not usable.
     """
-    place = world if isinstance(world, World) else read_world(Path(world))
-    people = community if community is None or isinstance(community, Community) else read_community(Path(community))
-    seeing = {"all": None, "none": ()}.get(observe, (observe,)) if isinstance(observe, str) else tuple(observe)
-    config = SimConfig(
-        seed=seed,
-        start=seconds_of_day(start),
-        residents=residents,
-        assistants=assistants,
-        robots=tuple(robots),
-        cars=cars,
-        pedestrians=pedestrians,
-        transit=transit,
-        observe=seeing,
-        image=image,
-    )
-    return CommunityEnv(place, people, config, max_steps=max_steps, setup=setup)
+    spec = EnvSpec.of(world, community, options)
+    return CommunityEnv(_world(world), _community(community), spec=spec, setup=setup)
+
+
+def make_from_spec(spec: EnvSpec, *, setup: Setup | None = None) -> CommunityEnv:
+    """Make an environment from a spec that names its folders.
+
+    Raises
+    ------
+    InputError
+        If it names no world: it was made of one in memory.
+    """
+    if spec.world is None:
+        raise InputError("env: the spec names no folder of a world; set it with dataclasses.replace(spec, world=...)")
+    return CommunityEnv(_world(spec.world), _community(spec.community), spec=spec, setup=setup)
+
+
+def _world(source: World | Path | str) -> World:
+    return source if isinstance(source, World) else read_world(Path(source))
+
+
+def _community(source: Community | Path | str | None) -> Community | None:
+    return source if source is None or isinstance(source, Community) else read_community(Path(source))

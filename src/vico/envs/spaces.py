@@ -1,9 +1,9 @@
 """Spaces: what an observation looks like, and actions as plain numbers for learners.
 
 Actions may be given in two forms. The short one names the action and its fields, as in
-``{"type": "move_forward", "distance": 1.0}`` (see `vico.sim.actions.FIELDS`). The other is an element of
-`action_space`: ``type`` is the action's number in `vico.sim.actions.ACTIONS`, and every field is there, whether the
-action uses it or not.
+``{"type": "move_forward", "distance": 1.0}``. The other is an element of `action_space`: ``type`` is the action's
+number in `vico.sim.actions.PEOPLE_ACTIONS`, and every slot is there, whether the action uses it or not. Which slot each
+field of an action is read from stands in the table of actions, `vico.sim.actions.ACTIONS`.
 """
 
 from __future__ import annotations
@@ -13,15 +13,11 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
 
-from vico.sim.actions import ACTIONS, EARSHOT, LONGEST_TEXT
-from vico.sim.avatars import RUN_SPEED
+from vico.rules import LONGEST_TEXT
+from vico.sim.actions import ACTIONS, PEOPLE_ACTIONS
+from vico.sim.actions.fields import Field
 
-#: `amount` counts in these: metres to move, degrees to turn, metres to be heard.
-FULL_TURN = 180.0
-#: `control` is for robots only.
-AVATAR_ACTIONS = tuple(kind for kind in ACTIONS if kind != "control")
 _PHRASES = ("Hello!", "Good morning.", "Excuse me.", "Thank you.", "See you later.", "Do you need help?")
 
 
@@ -120,7 +116,7 @@ def _number(low: float, high: float, *shape: int, dtype: Any = np.float64) -> sp
 
 
 def observation_space(image: int | None) -> spaces.Dict:
-    """The space of an agent's observations; without pictures where `image` (their side, pixels) is None."""
+    """Return the space of an agent's observations; without pictures where `image` (their side, pixels) is None."""
     far, entity = 1e7, 2**31 - 1
     point = ListSpace(NumberSpace(-far, far))
     message = spaces.Dict(
@@ -144,6 +140,7 @@ def observation_space(image: int | None) -> spaces.Dict:
             "doors": ListSpace(spaces.Dict({"to": TextSpace(64), "position": point})),
             "posture": TextSpace(16),
             "action_status": TextSpace(16),
+            "action_code": TextSpace(32),
             "action_reason": TextSpace(1000),
         }
     )
@@ -164,7 +161,7 @@ def observation_space(image: int | None) -> spaces.Dict:
 
 
 def action_space(places: int, people: int, half: float) -> spaces.Dict:
-    """The space of an avatar's actions: the number of the action, and every field an action may have.
+    """Return the space of an avatar's actions: the number of the action, and every field an action may have.
 
     Parameters
     ----------
@@ -175,7 +172,7 @@ def action_space(places: int, people: int, half: float) -> spaces.Dict:
     """
     return spaces.Dict(
         {
-            "type": spaces.Discrete(len(AVATAR_ACTIONS)),
+            "type": spaces.Discrete(len(PEOPLE_ACTIONS)),
             "amount": _number(0.0, 1.0, dtype=np.float32),
             "target": _number(-half, half, 3, dtype=np.float32),
             "hand": spaces.Discrete(2),
@@ -189,14 +186,14 @@ def action_space(places: int, people: int, half: float) -> spaces.Dict:
 
 
 def robot_space(size: int) -> spaces.Dict:
-    """The space of a robot's actions: its control vector, each number -1..1."""
+    """Return the space of a robot's actions: its control vector, each number -1..1."""
     return spaces.Dict({"vector": _number(-1.0, 1.0, size, dtype=np.float32)})
 
 
 def short_form(action: Any, places: Sequence[str], people: Sequence[str]) -> Any:
     """Translate an element of `action_space` into the short form; anything else is passed on as it is.
 
-    `amount` is a share: of 2.5 m for a move, of 180 degrees for a turn, of 10 m for a message.
+    `amount` is a share of the field's `scale`: of 2.5 m for a move, of 180 degrees for a turn, of 10 m for a message.
     """
     if not isinstance(action, Mapping):
         return action
@@ -206,35 +203,24 @@ def short_form(action: Any, places: Sequence[str], people: Sequence[str]) -> Any
     if isinstance(action["type"], str):
         return action
     try:
-        kind = AVATAR_ACTIONS[int(action["type"])]
-        return {"type": kind} | _FIELDS.get(kind, _no_fields)(action, places, people)
+        kind = PEOPLE_ACTIONS[int(action["type"])]
+        fields = ACTIONS[kind].fields.items()
+        return {"type": kind} | {name: _read(field, action, places, people) for name, field in fields if field.slot}
     except (KeyError, IndexError, TypeError, ValueError):
         # It is refused where all actions are judged, with the reason.
         return action
 
 
-def _no_fields(action: Mapping[str, Any], places: Sequence[str], people: Sequence[str]) -> dict[str, Any]:
-    return {}
-
-
-def _amount(action: Mapping[str, Any]) -> float:
-    return float(np.asarray(action["amount"], np.float64).reshape(-1)[0])
-
-
-def _point(action: Mapping[str, Any]) -> list[float]:
-    target: NDArray[np.float64] = np.asarray(action["target"], np.float64)
-    return [float(value) for value in target]
-
-
-_FIELDS = {
-    "move_forward": lambda a, places, people: {"distance": _amount(a) * RUN_SPEED},
-    "turn_left": lambda a, places, people: {"degrees": _amount(a) * FULL_TURN},
-    "turn_right": lambda a, places, people: {"degrees": _amount(a) * FULL_TURN},
-    "look_at": lambda a, places, people: {"target": _point(a)},
-    "pick": lambda a, places, people: {"hand": int(a["hand"]), "object": int(a["entity"])},
-    "put": lambda a, places, people: {"hand": int(a["hand"])},
-    "hand_over": lambda a, places, people: {"hand": int(a["hand"]), "agent": people[int(a["agent"])]},
-    "enter": lambda a, places, people: {"place": places[int(a["place"])]},
-    "communicate": lambda a, places, people: {"text": a["text"], "range": max(0.1, _amount(a) * EARSHOT)},
-    "task_complete": lambda a, places, people: {"index": int(a["index"])},
-}
+def _read(field: Field, action: Mapping[str, Any], places: Sequence[str], people: Sequence[str]) -> Any:
+    """Read a field of an action from its slot of the learner's action."""
+    assert field.slot is not None
+    raw = action[field.slot]
+    if field.slot == "amount":
+        value = float(np.asarray(raw, np.float64).reshape(-1)[0]) * field.scale
+        return value if field.least is None else max(field.least, value)
+    if field.slot == "target":
+        return [float(value) for value in np.asarray(raw, np.float64)]
+    if field.slot == "text":
+        return raw
+    number = int(raw)
+    return {"place": places, "agent": people}[field.slot][number] if field.slot in ("place", "agent") else number

@@ -162,7 +162,7 @@ def _pixels(
 
 
 def _cut(path: Path, raster: Raster, frame: LocalFrame, reach: float) -> _Cut | None:
-    """The part of a raster that lies in the window, its heights checked; None where there is none."""
+    """Return the part of a raster that lies in the window, its heights checked; None where there is none."""
     to_raster = Transformer.from_crs("EPSG:4326", raster.crs, always_xy=True)
     side = np.linspace(-reach, reach, 9)
     lat, lon = frame.to_geodetic(np.array([(x, y) for x in side for y in side]))
@@ -231,7 +231,7 @@ def _averaged(heights: NDArray[np.float64], step: int) -> NDArray[np.float64]:
 
 
 def _coverage(cuts: Sequence[_Cut], frame: LocalFrame, half: float) -> float:
-    """The share of the window that some file has pixels for, void or not."""
+    """Return the share of the window that some file has pixels for, void or not."""
     side = np.linspace(-half, half, 33)
     probes = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
     lat, lon = frame.to_geodetic(probes)

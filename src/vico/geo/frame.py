@@ -48,7 +48,7 @@ class LocalFrame:
     @property
     def proj4(self) -> str:
         """The projection as a PROJ string."""
-        return f"+proj=tmerc +lat_0={self.lat!r} +lon_0={self.lon!r} +k=1 +ellps=WGS84 +units=m +no_defs"
+        return f"+proj=tmerc +lat_0={float(self.lat)!r} +lon_0={float(self.lon)!r} +k=1 +ellps=WGS84 +units=m +no_defs"
 
     @cached_property
     def _transformer(self) -> Transformer:

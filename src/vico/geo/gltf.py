@@ -136,7 +136,7 @@ def read_gltf(data: bytes, where: str, *, resource: Callable[[str], bytes] | Non
 
 
 def _document(data: bytes) -> tuple[dict[str, Any], bytes | None]:
-    """The JSON and the binary chunk."""
+    """Return the JSON and the binary chunk."""
     if data[:4] != b"glTF":
         document = json.loads(data)
         if not isinstance(document, dict):
@@ -223,7 +223,7 @@ class _Reader:
         return GltfScene(tuple(parts), tuple(self.textures), credit if isinstance(credit, str) else "", middle)
 
     def _entry(self, name: str, index: int) -> dict[str, Any]:
-        """An entry of one of the document's lists; negative numbers name nothing."""
+        """Return an entry of one of the document's lists; negative numbers name nothing."""
         if not isinstance(index, int) or index < 0:
             raise GltfFault(f"names {name}[{index}], which is not there; export it anew")
         entry = self.document[name][index]
@@ -357,7 +357,7 @@ class _Reader:
         return self.buffers[index]
 
     def _view(self, index: int) -> tuple[memoryview, int]:
-        """The bytes of a buffer view, and its stride (0: packed)."""
+        """Return the bytes of a buffer view, and its stride (0: packed)."""
         view = self._entry("bufferViews", index)
         for name in view.get("extensions", {}):
             if "meshopt" in name:
@@ -369,7 +369,7 @@ class _Reader:
         return memoryview(buffer)[start : start + size], int(view.get("byteStride", 0))
 
     def _accessor(self, index: int) -> NDArray[Any]:
-        """An accessor's values, normalised ones as float."""
+        """Return an accessor's values, normalised ones as float."""
         accessor = self._entry("accessors", index)
         kind = _COMPONENTS[accessor["componentType"]]
         width = _WIDTHS[accessor["type"]]
@@ -437,7 +437,7 @@ _WANTED = {"POSITION", "COLOR_0", "TEXCOORD_0", "TEXCOORD_1", "TEXCOORD_2", "TEX
 
 
 def _matrix(node: dict[str, Any]) -> NDArray[np.float64]:
-    """A node's own transform."""
+    """Return a node's own transform."""
     if "matrix" in node:
         return np.asarray(node["matrix"], np.float64).reshape(4, 4).T
     matrix = np.eye(4)

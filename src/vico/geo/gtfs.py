@@ -272,7 +272,7 @@ class _Reader:
             yield line.replace("\0", "")
 
     def _rows(self, name: str, needed: Sequence[str], wanted: Sequence[str] = ()) -> Iterator[list[str]]:
-        """The named columns of a table, row by row; empty texts for optional columns that it lacks."""
+        """Return the named columns of a table, row by row; empty texts for optional columns that it lacks."""
         if name not in self.members:
             return
         info = self.members[name]
@@ -411,7 +411,7 @@ class _Reader:
         return days
 
     def _day(self, trips: dict[str, _Trip], day: date | None) -> date | None:
-        """The day asked for, else the weekday with the most trips; None where there are no trips at all."""
+        """Return the day asked for, else the weekday with the most trips; None where there are no trips at all."""
         self._days = self._services({trip.service for trip in trips.values()})
         load: Counter[date] = Counter()
         for service, count in Counter(trip.service for trip in trips.values()).items():
@@ -532,7 +532,7 @@ def _timed(trip: _Trip) -> str | None:
 
 
 def _within(trip: _Trip, stops: Collection[str]) -> list[Call]:
-    """The longest run of calls in the window."""
+    """Return the longest run of calls in the window."""
     best: list[Call] = []
     run: list[Call] = []
     for call in [*trip.calls, None]:

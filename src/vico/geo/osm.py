@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from vico.errors import EmptyInputError, InputError, MissingFileError, SchemaError
+from vico.geo import overlay
 from vico.geo.frame import LocalFrame
 from vico.geo.outlines import check_size, is_scribble, mended, simplified
-from vico.geo.outlines import polygons_of as polygons_of
+from vico.geo.overlay import OverlayError
+from vico.geo.overlay import polygons_of as polygons_of
 
 Tags = dict[str, str]
 
@@ -154,12 +156,12 @@ def _multipolygon(outer: Iterable[NDArray[np.float64]], inner: Iterable[NDArray[
         rings = [part for part in shapely.get_parts(merged) if part.is_ring]
         # Rings that touch in a node merge into nothing closed: polygonize finds them, at a higher price.
         if len(rings) < len(shapely.get_parts(merged)):
-            return shapely.union_all(shapely.get_parts(shapely.polygonize(shapely.get_parts(shapely.node(merged)))))
-        return shapely.union_all([mended(Polygon(ring))[0] for ring in rings])
+            return overlay.union_all(overlay.polygonize([merged]))
+        return overlay.union_all([mended(Polygon(ring))[0] for ring in rings])
 
     shape = filled(outer)
     holes = filled(inner)
-    return shape if holes.is_empty else shapely.difference(shape, holes)
+    return shape if holes.is_empty else overlay.difference(shape, holes)
 
 
 def checked_extract(path: Path) -> Path:
@@ -315,39 +317,26 @@ def read_osm(
 
 def _assembled(reader: _Reader, half: float, margin: float, digest: str) -> OsmData:
     """Turn rows of degrees into lines, areas and relations in metres."""
-    frame, reach = reader.frame, reader.reach
-    nodes: list[OsmNode] = []
-    if reader.node_rows:
-        places = frame.to_enu([row[1] for row in reader.node_rows], [row[2] for row in reader.node_rows])
-        inside = np.all(np.abs(places) <= reach, axis=1).tolist()
-        nodes = [
-            OsmNode(row[0], xy, row[3]) for row, xy, kept in zip(reader.node_rows, places, inside, strict=True) if kept
-        ]
-    lines = _lines(reader)
+    reach = reader.reach
+    nodes = _nodes(reader)
     window = shapely.box(-reach, -reach, reach, reach)
     shapely.prepare(window)
     ways: list[OsmWay] = []
     areas: list[OsmArea] = []
     broken: list[tuple[str, str]] = []
     by_id: dict[int, tuple[NDArray[np.float64], Tags]] = {}
-    for (way_id, refs, _, _, tags, near), line in zip(reader.way_rows, lines, strict=True):
+    for (way_id, refs, _, _, tags, near), line in zip(reader.way_rows, _lines(reader), strict=True):
         by_id[way_id] = (line, tags)
         if not near or not tags:
             continue
-        closed = len(refs) > 3 and refs[0] == refs[-1]
-        if closed and means_area(tags):
-            polygon, fault = mended(Polygon(line))
-            if polygon.is_empty:
-                broken.append((f"w{way_id}", fault or "area without extent"))
-            elif window.intersects(polygon):
-                if fault:
-                    broken.append((f"w{way_id}", fault))
-                if way_id in reader.partial:
-                    broken.append((f"w{way_id}", f"{reader.partial[way_id]} of its nodes are not in the file"))
-                areas.append(_plain(OsmArea(f"w{way_id}", polygon, tags), broken))
-                ways.append(OsmWay(way_id, refs, line, closed, tags))
+        way = OsmWay(way_id, refs, line, len(refs) > 3 and refs[0] == refs[-1], tags)
+        if way.closed and means_area(tags):
+            area = _area_of_way(way, window, reader.partial.get(way_id, 0), broken)
+            if area is not None:
+                areas.append(_plain(area, broken))
+                ways.append(way)
         elif np.isfinite(line).all() and window.intersects(shapely.LineString(line)):
-            ways.append(OsmWay(way_id, refs, line, closed, tags))
+            ways.append(way)
     kept = {("w", way.id) for way in ways} | {("n", node.id) for node in nodes}
     relations: list[OsmRelation] = []
     for relation in reader.relations:
@@ -360,12 +349,47 @@ def _assembled(reader: _Reader, half: float, margin: float, digest: str) -> OsmD
                 areas.append(_plain(area, broken))
         if any((kind, ref) in kept for kind, ref, _ in relation.members):
             relations.append(relation)
-    newest = None
+    return OsmData(reader.frame, half, margin, nodes, ways, areas, relations, digest, _newest(reader), broken)
+
+
+def _nodes(reader: _Reader) -> list[OsmNode]:
+    """Return the tagged nodes within reach, projected in one call."""
+    if not reader.node_rows:
+        return []
+    places = reader.frame.to_enu([row[1] for row in reader.node_rows], [row[2] for row in reader.node_rows])
+    inside = np.all(np.abs(places) <= reader.reach, axis=1).tolist()
+    rows = zip(reader.node_rows, places, inside, strict=True)
+    return [OsmNode(row[0], xy, row[3]) for row, xy, kept in rows if kept]
+
+
+def _newest(reader: _Reader) -> str | None:
+    """Return the time of the newest object, else of the file, as its header states it; None where neither is told."""
     if reader.newest > 0:
-        newest = np.datetime_as_string(np.datetime64(int(reader.newest), "s")) + "Z"
-    elif _STAMP.fullmatch(reader.stamp):
-        newest = reader.stamp
-    return OsmData(frame, half, margin, nodes, ways, areas, relations, digest, newest, broken)
+        return str(np.datetime_as_string(np.datetime64(int(reader.newest), "s"))) + "Z"
+    return reader.stamp if _STAMP.fullmatch(reader.stamp) else None
+
+
+def _area_of_way(way: OsmWay, window: shapely.Polygon, missing: int, broken: list[tuple[str, str]]) -> OsmArea | None:
+    """Return the area inside a closed way; None where it has none, or none in the window.
+
+    Parameters
+    ----------
+    missing
+        How many of its nodes are not in the file.
+    broken
+        Told what is wrong with it.
+    """
+    polygon, fault = mended(Polygon(way.line))
+    if polygon.is_empty:
+        broken.append((f"w{way.id}", fault or "area without extent"))
+        return None
+    if not window.intersects(polygon):
+        return None
+    if fault:
+        broken.append((f"w{way.id}", fault))
+    if missing:
+        broken.append((f"w{way.id}", f"{missing} of its nodes are not in the file"))
+    return OsmArea(f"w{way.id}", polygon, way.tags)
 
 
 def _lines(reader: _Reader) -> list[NDArray[np.float64]]:
@@ -378,7 +402,7 @@ def _lines(reader: _Reader) -> list[NDArray[np.float64]]:
 
 
 def _plain(area: OsmArea, broken: list[tuple[str, str]]) -> OsmArea:
-    """The area; a building's outline without more corners than walls and roofs can be made for."""
+    """Return the area; a building's outline without more corners than walls and roofs can be made for."""
     if "building" not in area.tags and "building:part" not in area.tags:
         return area
     shape, what = simplified(area.polygon)
@@ -391,7 +415,7 @@ def _plain(area: OsmArea, broken: list[tuple[str, str]]) -> OsmArea:
 def _area_of(
     relation: OsmRelation, ways: Mapping[int, tuple[NDArray[np.float64], Tags]], broken: list[tuple[str, str]]
 ) -> OsmArea | None:
-    """The multipolygon's area; None where it has no meaning as one, or none of its rings is complete."""
+    """Return the multipolygon's area; None where it has no meaning as one, or none of its rings is complete."""
     members = [(ref, role) for kind, ref, role in relation.members if kind == "w" and ref in ways]
     outer = [ways[ref][0] for ref, role in members if role != "inner"]
     inner = [ways[ref][0] for ref, role in members if role == "inner"]
@@ -407,7 +431,11 @@ def _area_of(
     if is_scribble(outer) or is_scribble(inner):
         broken.append((f"r{relation.id}", "its rings cross too often to mean an area; left out"))
         return None
-    shape = _multipolygon(outer, inner)
+    try:
+        shape = _multipolygon(outer, inner)
+    except OverlayError as error:
+        broken.append((f"r{relation.id}", f"its rings can't be made into an area ({error})"))
+        return None
     parts = polygons_of(shape)
     if not parts:
         broken.append((f"r{relation.id}", "multipolygon without a complete ring (cut by the extract)"))

@@ -14,25 +14,14 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from vico.errors import SchemaError
+from vico.geo import overlay
+from vico.geo.overlay import OverlayError, polygons_of
 
 #: A building with more corners than this is simplified: OpenStreetMap allows 2,000 nodes a way.
 MOST_CORNERS = 1000
 # Mending takes time that grows with the third power of the crossings: 200 random corners take seconds, 2,000 days.
 _MOST_CROSSINGS = 200
 _FREE, _MOST_RATIO = 64 << 20, 60  # real extracts unpack to 3 (pbf) to 20 times (XML) their size
-
-
-def polygons_of(shape: shapely.Geometry, least: float = 0.0) -> list[Polygon]:
-    """The polygons within any geometry that are larger than `least` square metres."""
-    parts = shapely.get_parts(shape)
-    found: list[Polygon] = []
-    for part in parts:
-        if isinstance(part, Polygon):
-            if part.area > least:
-                found.append(part)
-        elif hasattr(part, "geoms"):
-            found += polygons_of(part, least)
-    return found
 
 
 def is_scribble(lines: list[NDArray[np.float64]]) -> bool:
@@ -74,26 +63,34 @@ def _apart(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def mended(polygon: Polygon) -> tuple[Polygon | MultiPolygon, str | None]:
-    """The polygonal part of a possibly self-crossing outline, and what was wrong with it."""
+    """Return the polygonal part of a possibly self-crossing outline, and what was wrong with it."""
     if not np.isfinite(shapely.get_coordinates(polygon)).all():
         return Polygon(), "outline with points too far away"
     if polygon.is_valid:
-        return polygon, None
+        return _rounded(polygon), None
     if is_scribble([np.asarray(polygon.exterior.coords)]):
         return Polygon(), "outline crosses itself too often to mean an area; left out"
-    parts = polygons_of(shapely.make_valid(polygon))
+    parts = polygons_of(_rounded(overlay.mended(polygon)))
     if not parts:
         return Polygon(), "area without extent"
     what = f"outline crosses or touches itself; kept as {len(parts)} part{'s' * (len(parts) > 1)}"
     return (parts[0] if len(parts) == 1 else MultiPolygon(parts)), what
 
 
+def _rounded(shape: Polygon | MultiPolygon) -> Polygon | MultiPolygon:
+    """Round a shape to the grid of all overlays, so that whatever is cut from it meets it exactly; else empty it."""
+    try:
+        return overlay.on_grid(shape)
+    except OverlayError:
+        return Polygon()
+
+
 def simplified(shape: Polygon | MultiPolygon) -> tuple[Polygon | MultiPolygon, str | None]:
-    """A shape of at most `MOST_CORNERS` corners, as near to the given one as that allows, and what was done."""
+    """Return a shape of at most `MOST_CORNERS` corners, as near to the given one as that allows, and what was done."""
     corners = shapely.get_num_coordinates(shape)
     tolerance = 0.05
     while shapely.get_num_coordinates(shape) > MOST_CORNERS and tolerance < 100.0:
-        shape, tolerance = shapely.simplify(shape, tolerance, preserve_topology=True), tolerance * 2
+        shape, tolerance = overlay.simplify(shape, tolerance), tolerance * 2
     left = shapely.get_num_coordinates(shape)
     return shape, f"outline of {corners:,} corners; simplified to {left:,}" if left < corners else None
 
@@ -129,7 +126,7 @@ def check_size(path: Path) -> None:
 
 
 def _pbf_size(file: BinaryIO, most: int) -> int:
-    """What the blocks of a PBF file say they unpack to, bytes; what is broken is left for the reader to say."""
+    """Return what the blocks of a PBF file say they unpack to, bytes; what is broken is left for the reader to say."""
     size = 0
     while size <= most and len(length := file.read(4)) == 4:
         header = file.read(min(int.from_bytes(length, "big"), 1 << 16))

@@ -6,7 +6,6 @@ import json
 import math
 import os
 import re
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -19,7 +18,9 @@ import osmium
 
 from vico.errors import EmptyInputError, InputError, SourceError
 from vico.geo.frame import LocalFrame
-from vico.geo.web import Web, cache_folder
+from vico.io.cache import cache_folder
+from vico.io.files import new_file
+from vico.io.http import Backoff, HttpClient
 
 #: Where to ask unless `VICO_OVERPASS` or an argument says otherwise.
 ENDPOINT = "https://overpass-api.de/api/interpreter"
@@ -30,8 +31,8 @@ _SECONDS, _MEMORY = 180, 512 << 20  # what a query may take on the server; its o
 _MOST_HALF = 10_000.0
 _MOST_ANSWER = 512 << 20
 _DEEPEST = 3  # splits: 64 pieces at most
-_TRIES = 4
-_FIRST_WAIT, _MOST_QUEUE = 5.0, 300.0
+_BACKOFF = Backoff(retries=3, first=5.0)
+_MOST_QUEUE = 300.0
 _TOO_MUCH = re.compile(r"timed out|out of memory|run out|maxsize", re.IGNORECASE)
 _BUSY = re.compile(r"too busy|dispatcher|rate_limited|try again", re.IGNORECASE)
 # The public servers give each address two slots.
@@ -87,7 +88,7 @@ class Overpass:
         endpoint: str | None = None,
         *,
         cache: Path | None = None,
-        web: Web | None = None,
+        web: HttpClient | None = None,
         refresh: bool = False,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
@@ -95,7 +96,7 @@ class Overpass:
         self.endpoint = chosen if chosen.endswith("/interpreter") else f"{chosen}/interpreter"
         self.cache = cache_folder() / "maps" if cache is None else Path(cache)
         self.refresh = refresh
-        self._web = web or Web(timeout=_SECONDS + 20.0, pause=1.0, sleep=sleep)
+        self._web = web or HttpClient(timeout=_SECONDS + 20.0, pause=1.0, sleep=sleep)
         self._sleep = sleep
 
     def fetch(self, lat: float, lon: float, half: float) -> Path:
@@ -160,20 +161,20 @@ class Overpass:
 
     def _answer(self, boxes: list[Box]) -> _Answer:
         """One query's answer, asked for again where the server was busy."""
-        for attempt in range(_TRIES):
+        for attempt in range(_BACKOFF.retries + 1):
             with _SLOTS:
                 self._wait_for_a_slot()
                 try:
                     body = self._web.post(
-                        self.endpoint, data={"data": query(boxes)}, keep=False, most=_MOST_ANSWER, valid=None
+                        self.endpoint, data={"data": query(boxes)}, cached=False, max_bytes=_MOST_ANSWER
                     )
                     return parsed(body)
                 except _BusyError as error:
-                    if attempt == _TRIES - 1:
-                        raise SourceError(f"{self.endpoint}: {error}, {_TRIES} times; try again later") from None
+                    if attempt == _BACKOFF.retries:
+                        raise SourceError(f"{self.endpoint}: {error}, {attempt + 1} times; try again later") from None
                 except InputError as error:
                     raise SourceError(f"{self.endpoint}: {error}; is it the interpreter of Overpass?") from None
-            self._sleep(_FIRST_WAIT * 2.0**attempt)
+            self._sleep(_BACKOFF.wait(attempt))
         raise AssertionError("the last try returns or raises")
 
     def _wait_for_a_slot(self) -> None:
@@ -181,7 +182,9 @@ class Overpass:
         waited = 0.0
         while True:
             try:
-                page = self._web.get(f"{self.endpoint.removesuffix('interpreter')}status", keep=False, most=1 << 20)
+                page = self._web.get(
+                    f"{self.endpoint.removesuffix('interpreter')}status", cached=False, max_bytes=1 << 20
+                )
             except SourceError as error:
                 if error.status is None:
                     raise  # no such host, or nobody there: the query would fare no better
@@ -218,7 +221,7 @@ def query(boxes: Iterable[Box]) -> str:
 
 
 def quarters(box: Box) -> list[Box]:
-    """The four quarters of a box of (west, south, east, north) degrees."""
+    """Return the four quarters of a box of (west, south, east, north) degrees."""
     west, south, east, north = box
     x, y = round((west + east) / 2, 7), round((south + north) / 2, 7)
     return [(west, south, x, y), (x, south, east, y), (west, y, x, north), (x, y, east, north)]
@@ -282,7 +285,7 @@ def _whole(value: object) -> bool:
 
 
 def _fault(element: Any) -> str | None:
-    """What is wrong with an element, if anything."""
+    """Return what is wrong with an element, if anything."""
     if not isinstance(element, dict):
         return "it is no object"
     kind, number = element.get("type"), element.get("id")
@@ -329,7 +332,9 @@ def write_extract(path: Path, elements: Iterable[Mapping[str, Any]], *, boxes: I
     Raises
     ------
     SourceError
-        If the format can't hold them (a tag longer than OpenStreetMap allows), or the folder can't be written.
+        If the format can't hold them (a tag longer than OpenStreetMap allows).
+    OutputError
+        If the folder can't be written.
     """
     header = osmium.io.Header()
     header.set("generator", "vico")
@@ -337,19 +342,14 @@ def write_extract(path: Path, elements: Iterable[Mapping[str, Any]], *, boxes: I
     for west, south, east, north in boxes:
         header.add_box(osmium.osm.Box(west, south, east, north))
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".overpass.") as folder:
-            temporary = Path(folder) / "extract.osm.pbf"
-            writer = osmium.SimpleWriter(str(temporary), header=header)
+        with new_file(path) as temporary:
+            writer = osmium.SimpleWriter(str(temporary), header=header, overwrite=True)
             try:
                 for element in elements:
                     _write(writer, element)
             finally:
                 writer.close()
-            with temporary.open("rb+") as file:
-                os.fsync(file.fileno())
-            os.replace(temporary, path)
-    except (RuntimeError, ValueError, OSError) as error:
+    except (RuntimeError, ValueError) as error:
         raise SourceError(f"{path}: the map data can't be written ({error})") from None
 
 
@@ -366,6 +366,6 @@ def _write(writer: osmium.SimpleWriter, element: Mapping[str, Any]) -> None:
 
 
 def _rounded(box: Box) -> Box:
-    """The box in OpenStreetMap's own steps of 1e-7 degrees, grown to them."""
+    """Return the box in OpenStreetMap's own steps of 1e-7 degrees, grown to them."""
     west, south, east, north = (value * 1e7 for value in box)
     return math.floor(west) / 1e7, math.floor(south) / 1e7, math.ceil(east) / 1e7, math.ceil(north) / 1e7

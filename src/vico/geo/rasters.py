@@ -186,7 +186,7 @@ class _Tiff:
         return found
 
     def _block(self, file: io.BufferedReader, index: int, row: int) -> NDArray[np.float64]:
-        """The heights of one strip or tile."""
+        """Return the heights of one strip or tile."""
         high, wide = self.block
         rows = high if self.tiled else min(high, self.shape[0] - row * high)
         if self.counts[index] == 0 or self.offsets[index] == 0:
@@ -347,7 +347,7 @@ def _affine(tags: dict[int, object], path: Path) -> NDArray[np.float64]:
 
 
 def _geo_keys(directory: object) -> dict[int, int]:
-    """The short values of a GeoKeyDirectory."""
+    """Return the short values of a GeoKeyDirectory."""
     values = np.asarray(directory, np.int64).ravel()
     rows = values[4 : 4 + (len(values) - 4) // 4 * 4].reshape(-1, 4) if len(values) >= 8 else np.zeros((0, 4), np.int64)
     return {int(key): int(value) for key, place, _, value in rows if place == 0}

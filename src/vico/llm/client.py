@@ -4,28 +4,46 @@ from __future__ import annotations
 
 import os
 import threading
-import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from pydantic import BaseModel
 
 from vico.errors import InputError, LlmReplyError
+from vico.io.http import Backoff, with_retries
 from vico.llm.budget import Budget, Usage
 from vico.llm.endpoint import Endpoint
 from vico.llm.messages import Message, checked, tokens_of, user
-from vico.llm.recording import Answer, Cache, Recorder, Replay, digest_of, recorded_endpoint
+from vico.llm.recording import Answer, Cache, CallRecorder, Replay, digest_of, recorded_endpoint
 from vico.llm.replies import Check, instruction, plain, read, response_format
-from vico.llm.transport import Transport, Trouble, post
+from vico.llm.transport import Connection, RequestError, post
 
 T = TypeVar("T", bound=BaseModel)
 
-_FIRST_WAIT, _MOST_WAIT, _MOST_ASKED = 1.0, 60.0, 300.0  # seconds: back-off from, to; longest Retry-After obeyed
 _REFUSED = (400, 415, 422, 501)  # may be meant for a part of the request that we can do without
 _MOST_QUOTED = 20_000  # characters of a bad reply that are shown to the model again
 _CUT = "the reply breaks off because it is too long: say it with fewer words and numbers"
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How a model is to answer; sent along if given, and left out where the server refuses it.
+
+    Attributes
+    ----------
+    seed
+        Makes answers repeatable on servers that can.
+    temperature
+        0 = always the likeliest token; the server's own if None.
+    max_tokens
+        Longest answer, tokens; the server's own limit if None.
+    """
+
+    seed: int | None = None
+    temperature: float | None = None
+    max_tokens: int | None = None
 
 
 @dataclass(frozen=True)
@@ -62,18 +80,10 @@ class LanguageModel:
         File to which every answer is appended as a line of JSON.
     replay
         Such a file: all answers come from it, in order for each request, and no connection is opened.
-    timeout
-        Seconds until an answer has to be there.
-    retries
-        How often a request is sent again after 429, 5xx, a silence or a broken connection.
-    seed, temperature
-        Sent along if given, and left out where the server refuses them.
-    most_tokens
-        Longest answer, tokens; the server's own limit if None.
-    transport
-        Sends a request; replace it to use another HTTP client.
-    sleep
-        Waits; tests replace it.
+    sampling
+        How the model is to answer.
+    connection
+        How requests are sent.
     """
 
     def __init__(
@@ -84,25 +94,19 @@ class LanguageModel:
         budget: Budget | None = None,
         record: Path | None = None,
         replay: Path | None = None,
-        timeout: float = 120.0,
-        retries: int = 4,
-        seed: int | None = None,
-        temperature: float | None = None,
-        most_tokens: int | None = None,
-        transport: Transport = post,
-        sleep: Callable[[float], None] = time.sleep,
+        sampling: Sampling = Sampling(),
+        connection: Connection | None = None,
     ) -> None:
         self.endpoint = endpoint
         self.budget = budget or Budget()
         if self.budget.cost is not None and endpoint.price is None and replay is None:
             raise InputError("budget: the cost can be limited only where prices are known; set VICO_LLM_PRICE")
-        self.timeout, self.retries = timeout, retries
-        self._options = {"seed": seed, "temperature": temperature, "max_tokens": most_tokens}
+        self.connection = connection or Connection()
+        self._options = asdict(sampling)
         self._cache = Cache(cache) if cache is not None else None
-        self._recorder = Recorder(record, endpoint) if record is not None else None
+        self._recorder = CallRecorder(record, endpoint) if record is not None else None
         self._replay = Replay(replay) if replay is not None else None
         self._refused: set[str] = set()
-        self._transport, self._sleep = transport, sleep
         self._lock = threading.Lock()
 
     @classmethod
@@ -194,7 +198,7 @@ class LanguageModel:
         raise _unusable(self.endpoint, what, findings, answer.text)
 
     def _kept(self, said: list[Message], reply: type[T], check: Check[T] | None) -> Reply[T] | None:
-        """The reply in the cache, if it is still good."""
+        """Return the reply in the cache, if it is still good."""
         if self._cache is None or self._replay is not None:
             return None
         request = self._whole(said, reply)
@@ -208,18 +212,18 @@ class LanguageModel:
 
     @staticmethod
     def _repair(text: str, findings: Sequence[str], reply: type[BaseModel]) -> list[Message]:
-        """What is said after a bad reply: that reply alone, so that requests don't grow from round to round."""
+        """Return what is said after a bad reply: that reply alone, so that requests don't grow from round to round."""
         listed = "\n".join(f"- {finding}" for finding in findings)
         turns = [user(f"This can't be used:\n{listed}\nMend it. {instruction(reply)}")]
         return [{"role": "assistant", "content": text[:_MOST_QUOTED]}, *turns] if text.strip() else turns
 
     def _whole(self, said: Sequence[Message], reply: type[BaseModel]) -> dict[str, Any]:
-        """The request with all its parts, whatever a server refuses of them: cache and recordings go by it."""
+        """Return the request with all its parts, whatever a server refuses of them: cache and recordings go by it."""
         request = {"model": self.endpoint.model, "messages": list(said), "response_format": response_format(reply)}
         return request | {name: value for name, value in self._options.items() if value is not None}
 
     def _request(self, said: Sequence[Message], reply: type[BaseModel]) -> dict[str, Any]:
-        """The request, without what the server refuses."""
+        """Return the request, without what the server refuses."""
         request = self._whole(said, reply)
         if self._part(reply) in self._refused:
             del request["response_format"]
@@ -233,11 +237,11 @@ class LanguageModel:
 
     @staticmethod
     def _part(reply: type[BaseModel]) -> str:
-        """A record's schema, by digest: servers refuse some schemas and take others."""
+        """Return a record's schema, by digest: servers refuse some schemas and take others."""
         return f"response_format {digest_of(response_format(reply))[:16]}"
 
     def _answer(self, turns: Sequence[Message], reply: type[BaseModel]) -> Answer:
-        """A server's answer, of any kind, within the budget."""
+        """Return a server's answer, of any kind, within the budget."""
         if self._replay is not None:
             free = self._replay.cached(self._whole(turns, reply))
             if free is not None:
@@ -253,7 +257,7 @@ class LanguageModel:
         return answer
 
     def _told(self, turns: Sequence[Message], reply: type[BaseModel]) -> Answer:
-        """The answer, asked for without what the server turns out to refuse."""
+        """Return the answer, asked for without what the server turns out to refuse."""
         if self._replay is not None:
             return self._replay.answer(self._whole(turns, reply))
         tried: set[str] = set()
@@ -262,11 +266,11 @@ class LanguageModel:
             try:
                 answer = self._read_answer(self._sent(request), tokens_of(turns))
                 break
-            except Trouble as trouble:
-                part = self._to_leave_out(trouble, request, reply)
+            except RequestError as error:
+                part = self._to_leave_out(error, request, reply)
                 if part is None or part in tried:
                     self._forget(tried)
-                    raise trouble.error(self.endpoint, 1) from None
+                    raise error.for_people(self.endpoint) from None
                 tried.add(part)
                 with self._lock:
                     self._refused.add(part)
@@ -282,36 +286,36 @@ class LanguageModel:
         with self._lock:
             self._refused -= tried
 
-    def _to_leave_out(self, trouble: Trouble, request: Mapping[str, Any], reply: type[BaseModel]) -> str | None:
+    def _to_leave_out(self, error: RequestError, request: Mapping[str, Any], reply: type[BaseModel]) -> str | None:
         """Which part of a refused request to do without, or None."""
-        if trouble.status not in _REFUSED or trouble.parameter.startswith("messages"):
+        if error.status not in _REFUSED or error.parameter.startswith("messages"):
             return None
         for name in ("temperature", "seed", "max_tokens"):
-            if name in request and (trouble.parameter == name or f"'{name}'" in str(trouble)):
+            if name in request and (error.parameter == name or f"'{name}'" in str(error)):
                 return name
         return self._part(reply) if "response_format" in request else None
 
     def _sent(self, request: dict[str, Any]) -> dict[str, Any]:
-        """The answer to a request that is sent as often as it takes."""
-        for attempt in range(self.retries + 1):
-            try:
-                return self._transport(self.endpoint, request, self.timeout)
-            except Trouble as trouble:
-                wait = min(_FIRST_WAIT * 2.0**attempt, _MOST_WAIT) if trouble.wait is None else trouble.wait
-                if not trouble.passing and trouble.status in _REFUSED:
-                    raise
-                if not trouble.passing or attempt == self.retries or wait > _MOST_ASKED:
-                    raise trouble.error(self.endpoint, attempt + 1) from None
-                self._sleep(wait)
-        raise AssertionError("the last try returns or raises")
+        """Return the answer to a request that is sent as often as it takes."""
+        how = self.connection
+        try:
+            return with_retries(
+                lambda: (how.transport or post)(self.endpoint, request, how.timeout),
+                backoff=Backoff(how.retries),
+                sleep=how.sleep,
+            )
+        except RequestError as error:
+            if not error.transient and error.status in _REFUSED:
+                raise
+            raise error.for_people(self.endpoint) from None
 
     def _read_answer(self, content: Mapping[str, Any], asked: int) -> Answer:
-        """The parts of a completion that we use; anything else in it is ignored."""
+        """Return the parts of a completion that we use; anything else in it is ignored."""
         choices = content.get("choices")
         choice = choices[0] if isinstance(choices, list) and choices else None
         message = choice.get("message") if isinstance(choice, dict) else None
         if not isinstance(choice, dict) or not isinstance(message, dict):
-            raise Trouble("its answer is no chat completion: is VICO_LLM_BASE_URL the address up to /v1?")
+            raise RequestError("its answer is no chat completion: is VICO_LLM_BASE_URL the address up to /v1?")
         text = message.get("content")
         if isinstance(text, list):  # parts, as some servers send them
             text = "".join(str(p.get("text", "")) for p in text if isinstance(p, dict) and p.get("type") == "text")

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
-import tempfile
 import threading
 from collections import defaultdict, deque
 from collections.abc import Mapping, Sequence
@@ -17,6 +15,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from vico.errors import InputError, MissingFileError, SchemaError
+from vico.io.files import write_bytes, write_errors
 from vico.llm.budget import Usage
 from vico.llm.endpoint import Endpoint
 
@@ -58,7 +57,7 @@ def digest_of(request: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-class Recorder:
+class CallRecorder:
     """Appends a line a call to a file; of pictures the digest alone. No key gets in: requests hold none."""
 
     def __init__(self, path: Path, endpoint: Endpoint) -> None:
@@ -74,18 +73,15 @@ class Recorder:
 
     def _append(self, line: _Line) -> None:
         text = json.dumps(line.model_dump(), ensure_ascii=True)
-        with self._lock:
-            try:
-                self.path.parent.mkdir(parents=True, exist_ok=True)
-                with self.path.open("a", encoding="ascii") as file:
-                    file.write(text + "\n")
-                    file.flush()
-            except OSError as error:
-                raise InputError(f"{self.path}: the recording can't be written ({error.strerror})") from None
+        with self._lock, write_errors(self.path):
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            with self.path.open("a", encoding="ascii") as file:
+                file.write(text + "\n")
+                file.flush()
 
 
 def _shown(value: Any) -> Any:
-    """A request with its pictures' bytes replaced by their digest: the recording is for eyes, too."""
+    """Return a request with its pictures' bytes replaced by their digest: the recording is for eyes, too."""
     if isinstance(value, str):
         return _DATA.sub(lambda m: m[1] + hashlib.sha256(m[0].encode()).hexdigest(), value)
     if isinstance(value, Mapping):
@@ -137,13 +133,13 @@ class Replay:
         self._answers[line.digest].append((Answer(line.text, line.finish, line.refusal, usage), line.cached))
 
     def cached(self, request: Mapping[str, Any]) -> Answer | None:
-        """The next answer to a request if it came from the cache then, and so cost nothing; else None."""
+        """Return the next answer to a request if it came from the cache then, and so cost nothing; else None."""
         with self._lock:
             waiting = self._answers.get(digest_of(request))
             return waiting.popleft()[0] if waiting and waiting[0][1] else None
 
     def answer(self, request: Mapping[str, Any]) -> Answer:
-        """The next answer to a request.
+        """Return the next answer to a request.
 
         Raises
         ------
@@ -163,7 +159,7 @@ class Replay:
 
 
 def recorded_endpoint(path: Path) -> Endpoint:
-    """The endpoint a recording was made with, without its key: enough to replay it.
+    """Return the endpoint a recording was made with, without its key: enough to replay it.
 
     Raises
     ------
@@ -186,7 +182,7 @@ class Cache:
         return self.folder / name[:2] / f"{name}.json"
 
     def text(self, path: Path) -> str | None:
-        """The text kept at a place; None if there is none, or it is damaged, so that it is asked for anew."""
+        """Return the text kept at a place; None if there is none, or it is damaged, so that it is asked for anew."""
         try:
             kept = json.loads(path.read_bytes())
         except (OSError, ValueError, RecursionError):
@@ -199,20 +195,7 @@ class Cache:
 
         Raises
         ------
-        InputError
+        OutputError
             If the folder can't be written.
         """
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".")
-            try:
-                with os.fdopen(handle, "w", encoding="ascii") as file:
-                    json.dump({"text": text}, file, ensure_ascii=True)
-                    file.flush()
-                    os.fsync(file.fileno())
-                os.replace(temporary, path)
-            except BaseException:
-                Path(temporary).unlink(missing_ok=True)
-                raise
-        except OSError as error:
-            raise InputError(f"{self.folder}: a model's answer can't be kept there ({error.strerror})") from None
+        write_bytes(path, json.dumps({"text": text}, ensure_ascii=True).encode())

@@ -38,14 +38,14 @@ def schema_of(reply: type[BaseModel]) -> dict[str, Any]:
 
 
 def response_format(reply: type[BaseModel]) -> dict[str, Any]:
-    """The request's ``response_format``; strict where the schema allows it, that is, where all fields have names."""
+    """Return the request's ``response_format``; strict where the schema allows it: where all fields have names."""
     schema, strict = _tightened(schema_of(reply))
     name = re.sub(r"[^A-Za-z0-9_-]", "_", reply.__name__.strip("_"))[:60] or "reply"
     return {"type": "json_schema", "json_schema": {"name": name, "schema": schema, "strict": strict}}
 
 
 def _tightened(schema: Any) -> tuple[Any, bool]:
-    """A schema in the subset that servers enforce: every property required, none beyond them; and whether it is."""
+    """Return a schema in the subset that servers enforce (all properties required, no others), and whether it is."""
     if isinstance(schema, list):
         made = [_tightened(item) for item in schema]
         return [item for item, _ in made], all(strict for _, strict in made)
@@ -118,12 +118,12 @@ def _finding(error: Any) -> str:
 
 
 def plain(words: str) -> str:
-    """A model's words as one line without control characters, fit for an error message."""
+    """Return a model's words as one line without control characters, fit for an error message."""
     return " ".join("".join(c if c.isprintable() else " " for c in words).split())[:400]
 
 
 def _objects(text: str) -> tuple[list[str], str | None]:
-    """The JSON objects in a text that lie in no other, in order; and where the first one breaks, if it does."""
+    """Return the JSON objects in a text that lie in no other, in order; and where the first one breaks, if it does."""
     found: list[str] = []
     broken: str | None = None
     decoder = json.JSONDecoder()

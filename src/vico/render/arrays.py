@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.render.fill import PAD
 from vico.render.geometry import Clusters, Mesh
-from vico.render.pixels import REAL_FIELDS, STRIDE, WHOLE_FIELDS
+from vico.render.records import BOX, MODEL_VIEW, TRIANGLE_SETUP
 from vico.render.textures import Textures
 
+# Spare keys behind a picture's last pixel: `fill` works in blocks.
+PAD = 8
 # Pixels along a tile of the coarse depth buffer, and tiles along a block of the coarser one above it.
 TILE, BLOCK = 8, 4
-# Triangles whose numbers the shader keeps at hand.
-RECORDS = 2048
+# Triangles whose setup the shader keeps at hand; a power of two.
+SETUPS = 2048
 OUTDOORS, INDOORS, ANYWHERE = 0, 1, 2
 # Static instances that are looked at together.
-CROWD = 48
+INSTANCE_GROUP = 48
+# Rows of `Buffers.vertex`: camera frame, metres; picture, pixels; 1 / metres.
+VIEW_X, VIEW_Y, VIEW_Z, SCREEN_X, SCREEN_Y, INVERSE_DEPTH = range(6)
+# The shader's queue: places for pixels, and from one field to the next. Runs are laid down in blocks of `RUN`, over the
+# end, too. See `vico.render.shading.pixels` for the fields.
+QUEUE, RUN = 256, 8
+STRIDE = QUEUE + 2 * RUN
+REAL_FIELDS, WHOLE_FIELDS = 23, 14
 
 
 class Prototypes(NamedTuple):
@@ -27,30 +35,30 @@ class Prototypes(NamedTuple):
     Attributes
     ----------
     low, high
-        Bounds in model space, float32, shape ``(p, 3)``.
+        Bounds in model space, metres, float32, shape ``(p, 3)``.
     levels
-        First triangle, end, first vertex, end of each level of detail, finest first, int32, shape ``(p, 3, 4)``.
+        Each level of detail, finest first, `SPAN`, shape ``(p, 3)``.
     pixels
-        A level is used below this size on screen, float32, shape ``(p, 3)``.
+        A level is used below this size on screen, pixels, float32, shape ``(p, 3)``.
     """
 
     low: NDArray[np.float32]
     high: NDArray[np.float32]
-    levels: NDArray[np.int32]
+    levels: NDArray[np.void]
     pixels: NDArray[np.float32]
 
 
-class Groups(NamedTuple):
-    """Neighbours among the static instances, `CROWD` at a time, shape ``(g, ...)``.
+class InstanceGroups(NamedTuple):
+    """Neighbours among the static instances, `INSTANCE_GROUP` at a time, shape ``(g, ...)``.
 
     Attributes
     ----------
     low, high
-        Corners of a box around them, float32.
+        Corners of a box around them, world metres, float32.
     where
         OUTDOORS or INDOORS if all are, else ANYWHERE, uint8.
     radius
-        Of the largest bounding sphere among them, float32.
+        Of the largest bounding sphere among them, metres, float32.
     """
 
     low: NDArray[np.float32]
@@ -65,11 +73,15 @@ class Instances(NamedTuple):
     Attributes
     ----------
     matrix
-        Upper three rows of the model-to-world transform, float32, shape ``(n, 12)``.
+        Upper three rows of the model-to-world transform, metres, float32, shape ``(n, 3, 4)``.
+    prototype
+        Row of `Prototypes`, int32, shape ``(n,)``.
+    entity
+        Id in segmentation images where the prototype's triangles have none, int32, shape ``(n,)``.
     where
-        OUTDOORS, INDOORS or ANYWHERE, uint8.
+        OUTDOORS, INDOORS or ANYWHERE, uint8, shape ``(n,)``.
     sphere
-        Centre and radius of a bounding sphere in the world, float32, shape ``(n, 4)``.
+        Bounding sphere in the world, `SPHERE`, shape ``(n,)``.
     groups
         Of the static ones.
     """
@@ -78,20 +90,40 @@ class Instances(NamedTuple):
     prototype: NDArray[np.int32]
     entity: NDArray[np.int32]
     where: NDArray[np.uint8]
-    sphere: NDArray[np.float32]
-    groups: Groups
+    sphere: NDArray[np.void]
+    groups: InstanceGroups
 
 
-class Avatars(NamedTuple):
-    """Posed bodies: bounds, and first triangle, end, first vertex, end."""
+class PosedAvatars(NamedTuple):
+    """Posed bodies.
+
+    Attributes
+    ----------
+    low, high
+        Bounds, world metres, float32, shape ``(a, 3)``.
+    span
+        Triangles and vertices of each, `SPAN`, shape ``(a,)``.
+    """
 
     low: NDArray[np.float32]
     high: NDArray[np.float32]
-    span: NDArray[np.int32]
+    span: NDArray[np.void]
 
 
-class Arrays(NamedTuple):
-    """A whole scene for the compiled code. `counts`: instances (all), static instances, avatars."""
+class SceneArrays(NamedTuple):
+    """A whole scene for the compiled code.
+
+    *Items* are what is drawn as one; their codes count clusters first, then instances, then avatars.
+
+    Attributes
+    ----------
+    mesh, textures, clusters, prototypes, instances, avatars
+        See there.
+    cluster_where
+        OUTDOORS or INDOORS, uint8, shape ``(c,)``.
+    counts
+        A `COUNTS` record.
+    """
 
     mesh: Mesh
     textures: Textures
@@ -99,26 +131,58 @@ class Arrays(NamedTuple):
     cluster_where: NDArray[np.uint8]
     prototypes: Prototypes
     instances: Instances
-    avatars: Avatars
-    counts: NDArray[np.int64]
+    avatars: PosedAvatars
+    counts: Any
 
 
 class Buffers(NamedTuple):
-    """Scratch memory of one thread."""
+    """Scratch memory of one thread, for pictures of one size.
+
+    Attributes
+    ----------
+    keys
+        Inverse depth and triangle number of each pixel (see `vico.render.visibility.fill`), uint64, ``(h * w + PAD,)``.
+    tiles, blocks
+        Bits of the inverse of the farthest depth in each tile, and in each block of tiles, uint32.
+    strip
+        One row of keys, uint64, shape ``(w,)``.
+    vertex
+        Vertices of one item; rows as named above, float32, shape ``(6, most)``.
+    model_view, box
+        `MODEL_VIEW` and `BOX` of one item.
+    candidate, bucket, ordered
+        What may be in view, its distance as a small number, and the same nearest first, int32.
+    drawn
+        Codes of the items that were drawn, int32.
+    base
+        First triangle number (from 1 up) of each drawn item, then the end, int64.
+    first_triangle
+        Row of the mesh of each drawn item's first triangle, int32.
+    slot
+        Where in `drawn` an item is, -1: nowhere, int32.
+    sun, contact
+        What moving things leave of the sun and of the light at the ground, 0..1, float32, shape ``(h * w,)``.
+    real, whole
+        Fields of the shader's queue, float32 and uint32.
+    sky_real, sky_whole
+        The same for pixels that show the sky.
+    setup, setup_number
+        `TRIANGLE_SETUP` and number of triangles lately shaded, shape ``(SETUPS,)``.
+    """
 
     keys: NDArray[np.uint64]
     tiles: NDArray[np.uint32]
     blocks: NDArray[np.uint32]
     strip: NDArray[np.uint64]
     vertex: NDArray[np.float32]
-    matrix: NDArray[np.float32]
-    box: NDArray[np.float64]
-    code: NDArray[np.int32]
+    model_view: Any
+    box: Any
+    candidate: NDArray[np.int32]
     bucket: NDArray[np.int32]
     ordered: NDArray[np.int32]
     drawn: NDArray[np.int32]
     base: NDArray[np.int64]
-    level: NDArray[np.int32]
+    first_triangle: NDArray[np.int32]
     slot: NDArray[np.int32]
     sun: NDArray[np.float32]
     contact: NDArray[np.float32]
@@ -126,42 +190,53 @@ class Buffers(NamedTuple):
     whole: NDArray[np.uint32]
     sky_real: NDArray[np.float32]
     sky_whole: NDArray[np.uint32]
-    record: NDArray[np.float64]
-    record_single: NDArray[np.float32]
-    record_whole: NDArray[np.int32]
+    setup: NDArray[np.void]
+    setup_number: NDArray[np.int32]
+
+    def fit(self, scene: SceneArrays, width: int, height: int) -> bool:
+        """Return whether they are of this picture's size and large enough for the scene."""
+        if len(self.strip) != width or len(self.sun) != width * height:
+            return False
+        return len(self.candidate) >= _item_count(scene) and self.vertex.shape[1] >= _most_vertices(scene)
 
 
-def buffers_for(arrays: Arrays, width: int, height: int) -> Buffers:
-    """Scratch memory for pictures of this size."""
-    items = len(arrays.cluster_where) + len(arrays.instances.entity) + len(arrays.avatars.span) + 1
-    spans = (arrays.clusters.span, arrays.prototypes.levels.reshape(-1, 4), arrays.avatars.span)
-    most = max(int((s[:, 3] - s[:, 2]).max(initial=1)) for s in spans)
-    pixels = width * height
+def buffers_for(scene: SceneArrays, width: int, height: int) -> Buffers:
+    """Return scratch memory for pictures of this size."""
+    items, pixels = _item_count(scene), width * height
     tiles = ((width + TILE - 1) // TILE) * ((height + TILE - 1) // TILE)
     side = TILE * BLOCK
     blocks = ((width + side - 1) // side) * ((height + side - 1) // side)
     return Buffers(
-        np.zeros(pixels + PAD, np.uint64),
-        np.zeros(tiles, np.uint32),
-        np.zeros(blocks, np.uint32),
-        np.zeros(width, np.uint64),
-        np.zeros((6, most), np.float32),
-        np.zeros(16, np.float32),
-        np.zeros(16, np.float64),
-        np.zeros(items, np.int32),
-        np.zeros(items, np.int32),
-        np.zeros(items, np.int32),
-        np.zeros(items, np.int32),
-        np.zeros(items + 1, np.int64),
-        np.zeros(items, np.int32),
-        np.full(items, -1, np.int32),
-        np.ones(pixels, np.float32),
-        np.ones(pixels, np.float32),
-        np.zeros(REAL_FIELDS * STRIDE, np.float32),
-        np.zeros(WHOLE_FIELDS * STRIDE, np.uint32),
-        np.zeros(REAL_FIELDS * STRIDE, np.float32),
-        np.zeros(WHOLE_FIELDS * STRIDE, np.uint32),
-        np.zeros((RECORDS, 16), np.float64),
-        np.zeros((RECORDS, 32), np.float32),
-        np.zeros((RECORDS, 4), np.int32),
+        keys=np.zeros(pixels + PAD, np.uint64),
+        tiles=np.zeros(tiles, np.uint32),
+        blocks=np.zeros(blocks, np.uint32),
+        strip=np.zeros(width, np.uint64),
+        vertex=np.zeros((6, _most_vertices(scene)), np.float32),
+        model_view=np.zeros(1, MODEL_VIEW)[0],
+        box=np.zeros(1, BOX)[0],
+        candidate=np.zeros(items, np.int32),
+        bucket=np.zeros(items, np.int32),
+        ordered=np.zeros(items, np.int32),
+        drawn=np.zeros(items, np.int32),
+        base=np.zeros(items + 1, np.int64),
+        first_triangle=np.zeros(items, np.int32),
+        slot=np.full(items, -1, np.int32),
+        sun=np.ones(pixels, np.float32),
+        contact=np.ones(pixels, np.float32),
+        real=np.zeros(REAL_FIELDS * STRIDE, np.float32),
+        whole=np.zeros(WHOLE_FIELDS * STRIDE, np.uint32),
+        sky_real=np.zeros(REAL_FIELDS * STRIDE, np.float32),
+        sky_whole=np.zeros(WHOLE_FIELDS * STRIDE, np.uint32),
+        setup=np.zeros(SETUPS, TRIANGLE_SETUP),
+        setup_number=np.zeros(SETUPS, np.int32),
     )
+
+
+def _item_count(scene: SceneArrays) -> int:
+    return len(scene.cluster_where) + len(scene.instances.entity) + len(scene.avatars.span) + 1
+
+
+def _most_vertices(scene: SceneArrays) -> int:
+    """Return how many vertices the largest item has."""
+    spans = (scene.clusters.span, scene.prototypes.levels.reshape(-1), scene.avatars.span)
+    return max(int((s["end_vertex"] - s["first_vertex"]).max(initial=1)) for s in spans)

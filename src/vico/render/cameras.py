@@ -29,6 +29,8 @@ class Cameras:
         Pixels.
     near, far
         Depths between which things are seen, metres.
+    hidden_entity
+        Entity that a camera does not see (the body that carries it), 0 for none, int32, one value or shape ``(k,)``.
 
     Notes
     -----
@@ -45,6 +47,7 @@ class Cameras:
     height: int = 256
     near: float = 0.05
     far: float = 600.0
+    hidden_entity: ArrayLike = 0
 
     def __post_init__(self) -> None:
         position = np.atleast_2d(np.asarray(self.position, np.float64))
@@ -55,6 +58,8 @@ class Cameras:
             raise InputError(
                 f"cameras: position {position.shape} and forward {forward.shape} differ; both must be (k, 3)"
             )
+        hidden = np.broadcast_to(np.asarray(self.hidden_entity, np.int32), len(position))
+        object.__setattr__(self, "hidden_entity", hidden)
         if not (np.isfinite(position).all() and np.isfinite(forward).all()):
             raise InputError("cameras: a position or forward vector is not finite")
         if not (np.linalg.norm(forward, axis=1) > 1e-9).all():

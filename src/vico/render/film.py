@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Iterable, Iterator
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import EmptyInputError, InputError
+from vico.io.files import write_errors
 
 
 class FilmWriter:
@@ -46,7 +48,8 @@ class FilmWriter:
         if self._container is None:
             self._open(frame.shape[0], frame.shape[1])
         image = av.VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgb24")
-        self._container.mux(self._stream.encode(image))
+        with write_errors(self.path):
+            self._container.mux(self._stream.encode(image))
         self.frames += 1
 
     def _open(self, height: int, width: int) -> None:
@@ -77,7 +80,8 @@ class FilmWriter:
     def discard(self) -> None:
         """Give the film up; nothing stays on disk."""
         if self._container is not None:
-            self._container.close()
+            with suppress(OSError):
+                self._container.close()
             self._container = None
         self._temporary.unlink(missing_ok=True)
 
@@ -87,9 +91,11 @@ class FilmWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if kind is None:
-            self.close()
-        else:
+        try:
+            if kind is None:
+                with write_errors(self.path):
+                    self.close()
+        finally:
             self.discard()
 
 

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import InputError
+from vico.render.records import NEVER_CULLED, NORMAL_CONE, SPAN, TRIANGLE, VERTEX
 from vico.world.mesh import Surface
 
 CLUSTER = 160
 # Clusters that follow each other are neighbours: so many share a bounding box that is tested first.
-GROUP = 16
+CLUSTER_GROUP = 16
 _NORMAL_METRES = 10.0
+# Columns of `Soup.attributes`.
+_NORMAL, _U, _V, _COLOUR = slice(0, 3), 3, 4, slice(5, 8)
 
 
 class Mesh(NamedTuple):
@@ -24,27 +27,39 @@ class Mesh(NamedTuple):
     Attributes
     ----------
     x, y, z
-        Positions, float32, one array an axis so that transforming them is straight-line vector code.
-    corner
-        The same position, normal, uv and linear colour of a vertex side by side (one or two cache lines for the
-        shader), float32, shape ``(v, 12)``.
+        Positions, metres (world, or a prototype's own frame), float32, shape ``(v,)``: one array an axis so that
+        transforming them is straight-line vector code.
+    vertex
+        The same positions with everything else of a vertex beside them, `VERTEX`, shape ``(v,)``.
     triangle
-        Vertex numbers and material, int32, shape ``(t, 4)``.
+        `TRIANGLE`, shape ``(t,)``.
     entity
-        Of a triangle; 0: the instance's. int32, shape ``(t,)``.
+        Id of a triangle in segmentation images; 0: the instance's. int32, shape ``(t,)``.
     """
 
     x: NDArray[np.float32]
     y: NDArray[np.float32]
     z: NDArray[np.float32]
-    corner: NDArray[np.float32]
-    triangle: NDArray[np.int32]
+    vertex: NDArray[np.void]
+    triangle: NDArray[np.void]
     entity: NDArray[np.int32]
 
 
 @dataclass(frozen=True)
 class Soup:
-    """Surfaces put together: a `Mesh` before clustering, and the material numbers it uses."""
+    """Surfaces put together: a `Mesh` before clustering.
+
+    Attributes
+    ----------
+    position
+        Metres, float32, shape ``(v, 3)``.
+    attributes
+        Normal, uv and linear colour, float32, shape ``(v, 8)``.
+    triangles
+        Vertex numbers, int32, shape ``(t, 3)``.
+    material, entity
+        Of each triangle, int32, shape ``(t,)``.
+    """
 
     position: NDArray[np.float32]
     attributes: NDArray[np.float32]
@@ -59,14 +74,24 @@ class Soup:
 
 
 class Clusters(NamedTuple):
-    """Bounds and ranges, shape ``(c, ...)``: `low`, `high` corners; `cone` mean normal and the cosine-like limit of
-    backface culling (2: never); `span` first triangle, end, first vertex, end; the corners of each `GROUP` of them.
+    """Triangles that lie together and are culled together.
+
+    Attributes
+    ----------
+    low, high
+        Corners of their bounding boxes, world metres, float32, shape ``(c, 3)``.
+    cone
+        Where their faces look, `NORMAL_CONE`, shape ``(c,)``.
+    span
+        `SPAN`, shape ``(c,)``.
+    group_low, group_high
+        Corners of a box around each `CLUSTER_GROUP` of them, world metres, float32.
     """
 
     low: NDArray[np.float32]
     high: NDArray[np.float32]
-    cone: NDArray[np.float32]
-    span: NDArray[np.int32]
+    cone: NDArray[np.void]
+    span: NDArray[np.void]
     group_low: NDArray[np.float32]
     group_high: NDArray[np.float32]
 
@@ -107,24 +132,33 @@ def soup_of(surfaces: Sequence[Surface], materials: Sequence[int], linear: NDArr
 
 
 def mesh_of(soup: Soup) -> Mesh:
-    """The arrays of a soup, in its order."""
-    corner = np.zeros((len(soup.position), 12), np.float32)
-    corner[:, :3], corner[:, 3:11] = soup.position, soup.attributes
+    """Return the arrays of a soup, in its order."""
+    vertex = np.zeros(len(soup.position), VERTEX)
+    vertex["position"], vertex["normal"] = soup.position, soup.attributes[:, _NORMAL]
+    vertex["u"], vertex["v"] = soup.attributes[:, _U], soup.attributes[:, _V]
+    vertex["colour"] = soup.attributes[:, _COLOUR]
     x, y, z = (np.ascontiguousarray(soup.position[:, k]) for k in range(3))
-    triangle = np.ascontiguousarray(np.concatenate([soup.triangles, soup.material[:, None]], axis=1))
-    return Mesh(x, y, z, corner, triangle, soup.entity)
+    triangle = np.zeros(len(soup.triangles), TRIANGLE)
+    triangle["vertices"], triangle["material"] = soup.triangles, soup.material
+    return Mesh(x, y, z, vertex, triangle, soup.entity)
 
 
 def joined_meshes(parts: Sequence[Mesh]) -> Mesh:
-    """One mesh of several, vertex numbers shifted."""
+    """Return one mesh of several, vertex numbers shifted."""
     shifts = np.cumsum([0, *(len(part.x) for part in parts[:-1])])
     triangles = []
     for part, shift in zip(parts, shifts, strict=True):
         triangle = part.triangle.copy()
-        triangle[:, :3] += np.int32(shift)
+        triangle["vertices"] += np.int32(shift)
         triangles.append(triangle)
-    x, y, z, corner = (np.concatenate([part[k] for part in parts]) for k in range(4))
-    return Mesh(x, y, z, corner, np.concatenate(triangles), np.concatenate([part.entity for part in parts]))
+    return Mesh(
+        np.concatenate([part.x for part in parts]),
+        np.concatenate([part.y for part in parts]),
+        np.concatenate([part.z for part in parts]),
+        np.concatenate([part.vertex for part in parts]),
+        np.concatenate(triangles),
+        np.concatenate([part.entity for part in parts]),
+    )
 
 
 def clustered(soup: Soup, double_sided: NDArray[np.bool_]) -> tuple[Soup, Clusters]:
@@ -164,10 +198,10 @@ def clustered(soup: Soup, double_sided: NDArray[np.bool_]) -> tuple[Soup, Cluste
         soup.material[order],
         soup.entity[order],
     )
-    span = np.stack([bounds[:-1], bounds[1:], vertex_bounds[:-1], vertex_bounds[1:]], axis=1).astype(np.int32)
+    span = spans(bounds[:-1], bounds[1:], vertex_bounds[:-1], vertex_bounds[1:])
     if not number:
-        none = np.zeros((0, 4), np.float32)
-        return sorted_soup, grouped(none[:, :3], none[:, :3], none, np.zeros((0, 4), np.int32))
+        none = np.zeros((0, 3), np.float32)
+        return sorted_soup, grouped(none, none, np.zeros(0, NORMAL_CONE), span)
     low = np.minimum.reduceat(sorted_soup.position, vertex_bounds[:-1])
     high = np.maximum.reduceat(sorted_soup.position, vertex_bounds[:-1])
     turned = normal[order]
@@ -178,30 +212,39 @@ def clustered(soup: Soup, double_sided: NDArray[np.bool_]) -> tuple[Soup, Cluste
     both = np.logical_or.reduceat(double_sided[soup.material[order]], starts)
     usable = (spread > 0.1) & ~both
     # A cluster faces away if the view direction lies within 90 degrees minus the cone's half angle of its axis.
-    limit = np.where(usable, np.sqrt(np.maximum(1 - spread * spread, 0)) + 1e-3, 2.0)
-    cone = np.concatenate([mean, limit[:, None]], axis=1).astype(np.float32)
+    cone = np.zeros(number, NORMAL_CONE)
+    cone["x"], cone["y"], cone["z"] = mean.T
+    cone["limit"] = np.where(usable, np.sqrt(np.maximum(1 - spread * spread, 0)) + 1e-3, NEVER_CULLED)
     return sorted_soup, grouped(low, high, cone, span)
 
 
+def spans(first_triangle: Any, end_triangle: Any, first_vertex: Any, end_vertex: Any) -> NDArray[np.void]:
+    """Return a `SPAN` array of its columns."""
+    span = np.zeros(len(first_triangle), SPAN)
+    span["first_triangle"], span["end_triangle"] = first_triangle, end_triangle
+    span["first_vertex"], span["end_vertex"] = first_vertex, end_vertex
+    return span
+
+
 def grouped(
-    low: NDArray[np.float32], high: NDArray[np.float32], cone: NDArray[np.float32], span: NDArray[np.int32]
+    low: NDArray[np.float32], high: NDArray[np.float32], cone: NDArray[np.void], span: NDArray[np.void]
 ) -> Clusters:
-    """Clusters with the bounds of their groups."""
+    """Return clusters with the bounds of their groups."""
     if not len(low):
         return Clusters(low.copy(), high.copy(), cone, span, low.copy(), high.copy())
-    starts = np.arange(0, len(low), GROUP)
+    starts = np.arange(0, len(low), CLUSTER_GROUP)
     return Clusters(low, high, cone, span, np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts))
 
 
 def simplified(soup: Soup, cell: float) -> Soup | None:
-    """A coarser copy by vertex clustering on a grid; None where it would lose too much of the shape to be worth it.
+    """Return a coarser copy by vertex clustering on a grid; None where it would lose too much of the shape.
 
     Thin parts (poles, frames) collapse under clustering: a copy that keeps less than 70 % of the area is refused.
     """
     grid = np.floor((soup.position - soup.position.min(axis=0)) / cell).astype(np.int64)
     key = (grid[:, 0] << 40) + (grid[:, 1] << 20) + grid[:, 2]
     # Vertices on the two sides of a sharp edge stay apart, or their normals would cancel.
-    facing = np.round(soup.attributes[:, :3]).astype(np.int64) + 1
+    facing = np.round(soup.attributes[:, _NORMAL]).astype(np.int64) + 1
     key = key * 27 + facing[:, 0] * 9 + facing[:, 1] * 3 + facing[:, 2]
     _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
     _, place = np.unique(key // 27, return_inverse=True)

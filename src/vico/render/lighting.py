@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.world.seeds import rng
+from vico.seeds import rng
 
 Colour = tuple[float, float, float]
 SKY_STEPS = 512
@@ -58,7 +58,7 @@ class Lighting:
     def at(
         cls, seconds_of_day: float, lat: float = 50.0, *, day: int = 172, clouds: float = 0.45, fog: float = 1600.0
     ) -> Lighting:
-        """The light at a (solar) time of day.
+        """Return the light at a (solar) time of day.
 
         Parameters
         ----------
@@ -101,7 +101,7 @@ class Lighting:
 
 
 def sun_direction(seconds_of_day: float, lat: float, day: int = 172) -> Colour:
-    """Unit vector to the sun, ENU, from the usual declination and hour-angle formulas (Cooper 1969)."""
+    """Return the unit vector to the sun, ENU, from the usual declination and hour-angle formulas (Cooper 1969)."""
     declination = np.radians(23.45) * np.sin(2 * np.pi * (284 + day) / 365)
     hour = (seconds_of_day / 86400.0 - 0.5) * 2 * np.pi
     phi = np.radians(lat)
@@ -125,38 +125,13 @@ def _scaled(a: Colour, factor: float) -> Colour:
 
 
 def unit(vector: Colour) -> NDArray[np.float64]:
-    """The vector's direction."""
+    """Return the vector's direction."""
     array = np.asarray(vector, np.float64)
     return array / max(float(np.linalg.norm(array)), 1e-12)
 
 
-def light_numbers(light: Lighting) -> NDArray[np.float32]:
-    """Everything the shader reads that is a single number; see `shade` for the order."""
-    sun, shadow = unit(light.sun_direction), unit(light.shadow_direction or light.sun_direction)
-    numbers = np.zeros(48, np.float32)
-    numbers[0:3] = sun
-    numbers[3:6] = np.asarray(light.sun_colour) * light.exposure
-    ambient, bounce = np.asarray(light.ambient) * light.exposure, np.asarray(light.bounce) * light.exposure
-    # ambient + n.z * tilt is the sky above and the lit ground below, seen by a surface of that tilt.
-    numbers[6:9] = (ambient + bounce) / 2
-    numbers[9:12] = (ambient - bounce) / 2
-    numbers[12:15] = np.asarray(light.horizon) * light.exposure
-    numbers[15] = 1.0 / max(light.fog, 1.0)
-    numbers[16] = light.lamps * 1.6
-    numbers[17] = light.clouds
-    numbers[18:21] = shadow
-    # Light that turns the corner from the sun's side, so that walls in shade do not all look alike.
-    level = np.hypot(sun[0], sun[1])
-    side = sun[:2] / level if level > 1e-6 else np.zeros(2)
-    numbers[21:23] = 0.22 * side * float(ambient.mean())
-    cloud = (np.asarray(light.ambient) * 1.05 + np.asarray(light.sun_colour) * 0.16) * light.exposure
-    numbers[23:26] = cloud
-    numbers[26:29] = cloud * 0.60
-    return numbers
-
-
 def sky_table(light: Lighting) -> NDArray[np.float32]:
-    """Linear sky colours by elevation, shape ``(SKY_STEPS, 3)``.
+    """Return linear sky colours by elevation, shape ``(SKY_STEPS, 3)``.
 
     Row i is the sine of elevation ``s * abs(s)`` with s from -1 to 1: fine steps at the horizon.
     """
@@ -172,7 +147,7 @@ def sky_table(light: Lighting) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=1)
 def tone_table() -> NDArray[np.uint8]:
-    """From linear light (0..TONE_RANGE in TONE_STEPS steps) to sRGB bytes, with a soft shoulder."""
+    """Return the table from linear light (0..TONE_RANGE in TONE_STEPS steps) to sRGB bytes, with a soft shoulder."""
     x = np.arange(TONE_STEPS) * (TONE_RANGE / (TONE_STEPS - 1))
     # Straight up to 0.55, then an exponential shoulder of matching slope: midtones keep their colour.
     knee = 0.55
@@ -183,14 +158,14 @@ def tone_table() -> NDArray[np.uint8]:
 
 @lru_cache(maxsize=1)
 def linear_table() -> NDArray[np.float32]:
-    """Linear light of the 256 sRGB byte values."""
+    """Return the linear light of the 256 sRGB byte values."""
     c = np.arange(256) / 255
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
 @lru_cache(maxsize=1)
 def cloud_map() -> NDArray[np.uint8]:
-    """A tiling height map of clouds, shape ``(256, 256)``: five octaves of periodic value noise, equalised."""
+    """Return a tiling height map of clouds, shape ``(256, 256)``: five octaves of periodic value noise, equalised."""
     size = 256
     generator = rng(20, "clouds")
     total = np.zeros((size, size))

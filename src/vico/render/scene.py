@@ -6,16 +6,29 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from vico.errors import InputError
-from vico.render.arrays import ANYWHERE, CROWD, INDOORS, OUTDOORS, Arrays, Avatars, Groups, Instances, Prototypes
-from vico.render.geometry import Mesh, Soup, clustered, grouped, joined_meshes, mesh_of, simplified, soup_of
-from vico.render.lighting import Lighting, cloud_map, light_numbers, linear_table, sky_table, tone_table, unit
-from vico.render.shade import SKY_SIZE, Light, paint_sky
-from vico.render.shadows import relief_map, shadow_map
-from vico.render.textures import DOUBLE_SIDED, pack_textures
+from vico.render.arrays import (
+    ANYWHERE,
+    INDOORS,
+    INSTANCE_GROUP,
+    OUTDOORS,
+    InstanceGroups,
+    Instances,
+    PosedAvatars,
+    Prototypes,
+    SceneArrays,
+)
+from vico.render.compiled import kernel
+from vico.render.geometry import Mesh, Soup, clustered, grouped, joined_meshes, mesh_of, simplified, soup_of, spans
+from vico.render.lighting import Lighting, cloud_map, linear_table, sky_table, tone_table, unit
+from vico.render.records import COUNTS, ROOM, SPAN, SPHERE
+from vico.render.shading.light import Light, ReliefMap, ShadowMap
+from vico.render.shading.sky import SKY_SIZE, paint_sky
+from vico.render.shadows.maps import relief_map, shadow_map
+from vico.render.textures import pack_textures
+from vico.render.uniforms import Record, light_uniforms
 from vico.world.mesh import Material, Surface
 
 # A level of detail is left for the next coarser one below these sizes on screen, pixels.
@@ -66,11 +79,9 @@ class Scene:
         # Avatars have no texture: their colour is in the vertices.
         self._skin = materials.number(Material("vico skin"))
         textures = pack_textures(materials.entries)
-        both = (textures.flags & DOUBLE_SIDED) != 0
-        outside, outer = clustered(outside, both)
-        inside, inner = clustered(inside, both)
-        triangles, vertices = len(outside.triangles), len(outside.position)
-        inner.span[:] += np.array([triangles, triangles, vertices, vertices], np.int32)
+        outside, outer = clustered(outside, textures.double_sided)
+        inside, inner = clustered(inside, textures.double_sided)
+        _shift(inner.span, len(outside.triangles), len(outside.position))
         clusters = grouped(
             np.concatenate([outer.low, inner.low]),
             np.concatenate([outer.high, inner.high]),
@@ -79,60 +90,34 @@ class Scene:
         )
         where = np.full(len(clusters.span), OUTDOORS, np.uint8)
         where[len(outer.span) :] = INDOORS
-        meshes = [mesh_of(outside), mesh_of(inside)]
-        triangles, vertices = triangles + len(inside.triangles), vertices + len(inside.position)
-        levels = np.zeros((len(models), 3, 4), np.int32)
-        bounds = np.zeros((2, len(models), 3), np.float32)
-        pixels = np.tile(np.array(_LEVEL_PIXELS, np.float32), (len(models), 1))
-        for k, soup in enumerate(model_soups):
-            if not len(soup.triangles):
-                continue
-            bounds[:, k] = soup.position.min(axis=0), soup.position.max(axis=0)
-            size = float(np.linalg.norm(bounds[1, k] - bounds[0, k]))
-            for level in range(3):
-                coarse: Soup | None = soup
-                if level:
-                    coarse = simplified(soup, max(size * _LEVEL_CELLS[level - 1], 1e-6))
-                    if coarse is None:
-                        levels[k, level] = levels[k, level - 1]
-                        continue
-                assert coarse is not None
-                counts = len(coarse.triangles), len(coarse.position)
-                levels[k, level] = triangles, triangles + counts[0], vertices, vertices + counts[1]
-                triangles, vertices = triangles + counts[0], vertices + counts[1]
-                meshes.append(mesh_of(coarse))
-        mesh = joined_meshes(meshes)
+        surfaces = joined_meshes([mesh_of(outside), mesh_of(inside)])
+        placeable, model_meshes = _prototypes(model_soups)
+        _shift(placeable.levels, len(surfaces.triangle), len(surfaces.x))
+        mesh = joined_meshes([surfaces, *model_meshes])
         self.names = {name: k for k, name in enumerate(models)}
         self.version = 0  # of all that stays where it is
-        self.rooms = np.zeros((0, 7)) if rooms is None else np.asarray(rooms, np.float64).reshape(-1, 7)
+        self.rooms = _rooms(np.zeros((0, 7)) if rooms is None else np.asarray(rooms, np.float64).reshape(-1, 7))
         self._static_size = len(mesh.triangle), len(mesh.x)
         self._lighting = lighting or Lighting()
         self._light: Light | None = None
         self._shadow_key: tuple[float, ...] | None = None
-        self._shadow: tuple[NDArray[np.uint16], NDArray[np.float32]] | None = None
-        self._relief: tuple[NDArray[np.float32], NDArray[np.float32]] | None = None
+        self._shadow: ShadowMap | None = None
+        self._relief: ReliefMap | None = None
         self._low = outer.low.min(axis=0).astype(np.float64) if len(outer.low) else np.zeros(3)
         self._high = outer.high.max(axis=0).astype(np.float64) if len(outer.high) else np.ones(3)
         empty = Instances(
-            np.zeros((0, 12), np.float32),
+            np.zeros((0, 3, 4), np.float32),
             np.zeros(0, np.int32),
             np.zeros(0, np.int32),
             np.zeros(0, np.uint8),
-            np.zeros((0, 4), np.float32),
+            np.zeros(0, SPHERE),
             _NO_GROUPS,
         )
         self._placed = self._spacious = empty
         # The mesh and the arrays whose triangles and colours it holds.
         self._clothed: tuple[Any, ...] | None = None
-        self.arrays = Arrays(
-            mesh,
-            textures,
-            clusters,
-            where,
-            Prototypes(bounds[0], bounds[1], levels, pixels),
-            empty,
-            _no_avatars(),
-            np.zeros(3, np.int64),
+        self.arrays = SceneArrays(
+            mesh, textures, clusters, where, placeable, empty, _no_avatars(), np.zeros(1, COUNTS)[0]
         )
 
     @property
@@ -179,8 +164,8 @@ class Scene:
         outdoors = ~inside
         if outdoors.any():
             # Shadows must reach what stands up from the static surfaces, too.
-            self._low = np.minimum(self._low, rows[outdoors][:, [3, 7, 11]].min(axis=0))
-            self._high = np.maximum(self._high, rows[outdoors][:, [3, 7, 11]].max(axis=0) + np.array([0, 0, 12.0]))
+            self._low = np.minimum(self._low, rows[outdoors][:, :, 3].min(axis=0))
+            self._high = np.maximum(self._high, rows[outdoors][:, :, 3].max(axis=0) + np.array([0, 0, 12.0]))
         self._light = self._shadow = self._relief = None
         self.version += 1
 
@@ -219,7 +204,7 @@ class Scene:
         if not vertex_count or not triangle_count:
             self._replace(avatars=_no_avatars())
             self._clothed = None
-            self.arrays.counts[2] = 0
+            self.arrays.counts["avatars"] = 0
             return
         first_triangle, first_vertex = self._static_size
         mesh = self.arrays.mesh
@@ -237,13 +222,13 @@ class Scene:
         posed = np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(normals, np.float32)
         if not _pose_avatars(mesh, *posed, first_vertex, span, low, high):
             raise InputError("scene: a vertex of an avatar is not finite")
-        self._replace(avatars=Avatars(low, high, span))
-        self.arrays.counts[2] = len(span)
+        self._replace(avatars=PosedAvatars(low, high, span))
+        self.arrays.counts["avatars"] = len(span)
 
     def _clothe(
         self, mesh: Mesh, triangles: NDArray[np.int32], colour: NDArray[np.uint8], entity: NDArray[np.int32]
-    ) -> NDArray[np.int32]:
-        """Write what of the avatars no pose changes; returns each body's range of triangles and vertices."""
+    ) -> NDArray[np.void]:
+        """Write what of the avatars no pose changes; return each body's `SPAN`."""
         first_triangle, first_vertex = self._static_size
         topology = np.ascontiguousarray(triangles, np.int32)
         owner = np.ascontiguousarray(entity, np.int32)
@@ -253,19 +238,19 @@ class Scene:
         starts = np.concatenate([[0], change])
         ends = np.append(starts[1:], len(topology))
         vertices = slice(first_vertex, first_vertex + len(owner))
-        mesh.corner[vertices, 6:8] = 0.0
-        mesh.corner[vertices, 8:11] = linear_table()[colour]
+        own = mesh.vertex[vertices]
+        own["u"] = own["v"] = 0.0
+        own["colour"] = linear_table()[colour]
         faces = slice(first_triangle, first_triangle + len(topology))
-        mesh.triangle[faces, :3] = topology + np.int32(first_vertex)
-        mesh.triangle[faces, 3] = self._skin
+        mesh.triangle[faces]["vertices"] = topology + np.int32(first_vertex)
+        mesh.triangle[faces]["material"] = self._skin
         mesh.entity[faces] = owner[topology[:, 0]]
         least = np.minimum.reduceat(topology.min(axis=1), starts)
         most = np.maximum.reduceat(topology.max(axis=1), starts)
-        span = [first_triangle + starts, first_triangle + ends, first_vertex + least, first_vertex + most + 1]
-        return np.stack(span, axis=1).astype(np.int32)
+        return spans(first_triangle + starts, first_triangle + ends, first_vertex + least, first_vertex + most + 1)
 
     def light(self) -> Light:
-        """The tables the shader reads, made anew where the light or the static scene has changed."""
+        """Return the tables the shader reads, made anew where the light or the static scene has changed."""
         if self._light is None:
             light = self._lighting
             sun = unit(light.shadow_direction or light.sun_direction)
@@ -278,18 +263,19 @@ class Scene:
             if self._relief is None:
                 side = float((high - low)[:2].max())
                 self._relief = relief_map(self.arrays, low, high, int(np.clip(side / _RELIEF_METRES, 16, 768)), 4.5)
-            numbers, tone = light_numbers(light), tone_table()
+            uniforms, tone = light_uniforms(light), tone_table()
             sky = np.zeros(SKY_SIZE * SKY_SIZE, np.uint32)
-            paint_sky(numbers, sky_table(light), cloud_map(), tone, sky)
-            self._light = Light(numbers, tone, sky, *self._shadow, *self._relief)
+            paint_sky(uniforms, sky_table(light), cloud_map(), tone, sky)
+            self._light = Light(uniforms, tone, sky, self._shadow, self._relief)
         return self._light
 
-    def room_of(self, position: NDArray[np.float64]) -> int:
-        """Number of the room that holds a point, or -1."""
-        return int(_room_of(self.rooms, float(position[0]), float(position[1]), float(position[2])))
+    def room_of(self, position: NDArray[np.float64]) -> Record | None:
+        """Return the `ROOM` that holds a point, or None."""
+        number = int(_room_of(self.rooms, float(position[0]), float(position[1]), float(position[2])))
+        return self.rooms[number] if number >= 0 else None
 
     def _moving(self) -> Instances:
-        moving = slice(int(self.arrays.counts[1]), int(self.arrays.counts[0]))
+        moving = slice(int(self.arrays.counts["static_instances"]), int(self.arrays.counts["instances"]))
         all_of = self.arrays.instances
         return Instances(
             all_of.matrix[moving],
@@ -307,14 +293,14 @@ class Scene:
         entity: NDArray[np.int32],
         where: NDArray[np.uint8],
     ) -> Instances:
-        """Placed prototypes with their bounding spheres."""
+        """Return placed prototypes with their bounding spheres."""
         low, high = self.arrays.prototypes.low[number], self.arrays.prototypes.high[number]
-        matrices = rows.reshape(-1, 3, 4)
-        centre = np.einsum("nij,nj->ni", matrices[:, :, :3], (low + high) / 2) + matrices[:, :, 3]
-        scale = np.linalg.norm(matrices[:, :, :3], axis=1).max(axis=1) if len(rows) else np.zeros(0)
+        centre = np.einsum("nij,nj->ni", rows[:, :, :3], (low + high) / 2) + rows[:, :, 3]
+        scale = np.linalg.norm(rows[:, :, :3], axis=1).max(axis=1) if len(rows) else np.zeros(0)
+        sphere = np.zeros(len(rows), SPHERE)
+        sphere["x"], sphere["y"], sphere["z"] = centre.T
         # A hair more than exact, for the rounding.
-        radius = np.linalg.norm(high - low, axis=1) / 2 * scale * 1.001
-        sphere = np.concatenate([centre, radius[:, None]], axis=1).astype(np.float32)
+        sphere["radius"] = np.linalg.norm(high - low, axis=1) / 2 * scale * 1.001
         return Instances(rows, number, entity, where, sphere, _NO_GROUPS)
 
     def _set_instances(self, moving: Instances) -> None:
@@ -330,22 +316,10 @@ class Scene:
             moving.entity,
         )
         all_of.where[rows], all_of.sphere[rows] = moving.where, moving.sphere
-        self.arrays.counts[0], self.arrays.counts[1] = fixed + count, fixed
+        self.arrays.counts["instances"], self.arrays.counts["static_instances"] = fixed + count, fixed
 
-    def _replace(
-        self, *, mesh: Mesh | None = None, instances: Instances | None = None, avatars: Avatars | None = None
-    ) -> None:
-        a = self.arrays
-        self.arrays = Arrays(
-            mesh or a.mesh,
-            a.textures,
-            a.clusters,
-            a.cluster_where,
-            a.prototypes,
-            instances or a.instances,
-            avatars or a.avatars,
-            a.counts,
-        )
+    def _replace(self, **changed: Mesh | Instances | PosedAvatars) -> None:
+        self.arrays = self.arrays._replace(**changed)  # type: ignore[arg-type]
 
 
 class _Materials:
@@ -362,8 +336,48 @@ class _Materials:
         return self._known[id(material)]
 
 
-def _no_avatars() -> Avatars:
-    return Avatars(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), np.zeros((0, 4), np.int32))
+def _rooms(boxes: NDArray[np.float64]) -> NDArray[np.void]:
+    """Return `ROOM` records of rows in their order."""
+    rooms = np.zeros(len(boxes), ROOM)
+    for name, column in zip(ROOM.fields or (), boxes.T, strict=True):
+        rooms[name] = column
+    return rooms
+
+
+def _shift(span: NDArray[np.void], triangles: int, vertices: int) -> None:
+    """Make room for triangles and vertices before those of `SPAN` records."""
+    span["first_triangle"] += triangles
+    span["end_triangle"] += triangles
+    span["first_vertex"] += vertices
+    span["end_vertex"] += vertices
+
+
+def _prototypes(soups: Sequence[Soup]) -> tuple[Prototypes, list[Mesh]]:
+    """Return models with their levels of detail, and the meshes of these one behind the other."""
+    levels = np.zeros((len(soups), len(_LEVEL_PIXELS)), SPAN)
+    bounds = np.zeros((2, len(soups), 3), np.float32)
+    pixels = np.tile(np.array(_LEVEL_PIXELS, np.float32), (len(soups), 1))
+    meshes: list[Mesh] = []
+    triangles, vertices = 0, 0
+    for k, soup in enumerate(soups):
+        if not len(soup.triangles):
+            continue
+        bounds[:, k] = soup.position.min(axis=0), soup.position.max(axis=0)
+        size = float(np.linalg.norm(bounds[1, k] - bounds[0, k]))
+        for level in range(len(_LEVEL_PIXELS)):
+            coarse = soup if level == 0 else simplified(soup, max(size * _LEVEL_CELLS[level - 1], 1e-6))
+            if coarse is None:
+                levels[k, level] = levels[k, level - 1]
+                continue
+            end_triangle, end_vertex = triangles + len(coarse.triangles), vertices + len(coarse.position)
+            levels[k, level] = triangles, end_triangle, vertices, end_vertex
+            triangles, vertices = end_triangle, end_vertex
+            meshes.append(mesh_of(coarse))
+    return Prototypes(bounds[0], bounds[1], levels, pixels), meshes
+
+
+def _no_avatars() -> PosedAvatars:
+    return PosedAvatars(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), np.zeros(0, SPAN))
 
 
 def _joined(a: Instances, b: Instances) -> Instances:
@@ -385,29 +399,33 @@ def _with_spare(a: Instances, spare: int) -> Instances:
     return Instances(wide(a.matrix), wide(a.prototype), wide(a.entity), wide(a.where), wide(a.sphere), a.groups)
 
 
-_NO_GROUPS = Groups(
+_NO_GROUPS = InstanceGroups(
     np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), np.zeros(0, np.uint8), np.zeros(0, np.float32)
 )
 
 
-def _groups_of(where: NDArray[np.uint8], sphere: NDArray[np.float32]) -> Groups:
+def _groups_of(where: NDArray[np.uint8], sphere: NDArray[np.void]) -> InstanceGroups:
     if not len(where):
         return _NO_GROUPS
-    starts = np.arange(0, len(where), CROWD)
-    radius = sphere[:, 3:]
+    starts = np.arange(0, len(where), INSTANCE_GROUP)
+    centre, radius = _centres(sphere), sphere["radius"]
     # A hair more than exact, for the rounding of sums in single precision.
-    low = np.minimum.reduceat(sphere[:, :3] - radius, starts) - np.float32(0.001)
-    high = np.maximum.reduceat(sphere[:, :3] + radius, starts) + np.float32(0.001)
+    low = np.minimum.reduceat(centre - radius[:, None], starts) - np.float32(0.001)
+    high = np.maximum.reduceat(centre + radius[:, None], starts) + np.float32(0.001)
     least, most = np.minimum.reduceat(where, starts), np.maximum.reduceat(where, starts)
     mixed = np.where(least == most, least, np.uint8(ANYWHERE)).astype(np.uint8)
-    return Groups(low, high, mixed, np.maximum.reduceat(radius[:, 0], starts))
+    return InstanceGroups(low, high, mixed, np.maximum.reduceat(radius, starts))
+
+
+def _centres(sphere: NDArray[np.void]) -> NDArray[np.float32]:
+    return np.stack([sphere["x"], sphere["y"], sphere["z"]], axis=1)
 
 
 def _neighbours_together(a: Instances) -> Instances:
-    """The same things in another order: outdoors, then indoors, each along a curve that fills space."""
+    """Return the same things in another order: outdoors, then indoors, each along a curve that fills space."""
     if not len(a.entity):
         return a
-    centre = a.sphere[:, :3].astype(np.float64)
+    centre = _centres(a.sphere).astype(np.float64)
     cell = np.floor((centre - centre.min(axis=0)) / max(float(np.ptp(centre, axis=0).max()), 1e-6) * 1023.0)
     code = np.zeros(len(cell), np.int64)
     for bit in range(10):
@@ -423,7 +441,7 @@ def _rows(transforms: ArrayLike, count: int) -> NDArray[np.float32]:
         raise InputError(f"scene: transforms of shape {matrices.shape}; expected ({count}, 4, 4)")
     if not np.isfinite(matrices).all():
         raise InputError("scene: a transform is not finite")
-    return np.ascontiguousarray(matrices[:, :3].reshape(count, 12))
+    return np.ascontiguousarray(matrices[:, :3])
 
 
 def _entities(values: ArrayLike, count: int) -> NDArray[np.int32]:
@@ -434,7 +452,7 @@ def _entities(values: ArrayLike, count: int) -> NDArray[np.int32]:
 
 
 def _with_room(mesh: Mesh, used: tuple[int, int], vertices: int, triangles: int) -> Mesh:
-    """A copy of the static part with space for avatars behind it."""
+    """Return a copy of the static part with space for avatars behind it."""
     t, v = used
 
     def grown(values: NDArray[Any], keep: int, extra: int) -> NDArray[Any]:
@@ -444,38 +462,40 @@ def _with_room(mesh: Mesh, used: tuple[int, int], vertices: int, triangles: int)
         grown(mesh.x, v, vertices),
         grown(mesh.y, v, vertices),
         grown(mesh.z, v, vertices),
-        grown(mesh.corner, v, vertices),
+        grown(mesh.vertex, v, vertices),
         grown(mesh.triangle, t, triangles),
         grown(mesh.entity, t, triangles),
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _room_of(rooms: NDArray[np.float64], x: float, y: float, z: float) -> int:
+@kernel
+def _room_of(rooms: NDArray[np.void], x: float, y: float, z: float) -> int:
+    """Return the number of the room that holds a point, or -1."""
     for k in range(len(rooms)):
-        dx, dy, dz = x - rooms[k, 0], y - rooms[k, 1], z - rooms[k, 2]
-        if not -0.05 <= dz <= rooms[k, 5]:
+        room = rooms[k]
+        dx, dy, dz = x - room.x, y - room.y, z - room.z
+        if not -0.05 <= dz <= room.height:
             continue
-        if dx * dx + dy * dy > (rooms[k, 3] ** 2 + rooms[k, 4] ** 2) * 1.01:
+        if dx * dx + dy * dy > (room.half_length**2 + room.half_width**2) * 1.01:
             continue
-        c, s = np.cos(rooms[k, 6]), np.sin(rooms[k, 6])
-        if abs(dx * c + dy * s) <= rooms[k, 3] and abs(dy * c - dx * s) <= rooms[k, 4]:
+        c, s = np.cos(room.yaw), np.sin(room.yaw)
+        if abs(dx * c + dy * s) <= room.half_length and abs(dy * c - dx * s) <= room.half_width:
             return k
     return -1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _pose_avatars(
     mesh: Mesh,
     vertices: NDArray[np.float32],
     normals: NDArray[np.float32],
     first_vertex: int,
-    span: NDArray[np.int32],
+    span: NDArray[np.void],
     low: NDArray[np.float32],
     high: NDArray[np.float32],
 ) -> bool:
-    """Write positions, normals and bounds; False if a position is not finite."""
-    xs, ys, zs, corners = mesh.x, mesh.y, mesh.z, mesh.corner
+    """Write positions, normals and bounds; return False if a position is not finite."""
+    xs, ys, zs, records = mesh.x, mesh.y, mesh.z, mesh.vertex
     total = np.float32(0.0)
     for i in range(len(vertices)):
         k = first_vertex + i
@@ -483,14 +503,15 @@ def _pose_avatars(
         xs[k], ys[k], zs[k] = x, y, z
         # Zero for finite numbers, else none.
         total += (x - x) + (y - y) + (z - z)
-        corner = corners[k]
-        corner[0], corner[1], corner[2] = x, y, z
-        corner[3], corner[4], corner[5] = normals[i, 0], normals[i, 1], normals[i, 2]
+        position, normal = records[k].position, records[k].normal
+        position[0], position[1], position[2] = x, y, z
+        normal[0], normal[1], normal[2] = normals[i, 0], normals[i, 1], normals[i, 2]
     for body in range(len(span)):
+        first, end = span[body].first_vertex, span[body].end_vertex
         for axis in range(3):
             line = xs if axis == 0 else (ys if axis == 1 else zs)
-            smallest = largest = line[span[body, 2]]
-            for v in range(span[body, 2], span[body, 3]):
+            smallest = largest = line[first]
+            for v in range(first, end):
                 smallest, largest = min(smallest, line[v]), max(largest, line[v])
             low[body, axis], high[body, axis] = smallest, largest
     return bool(total == 0.0)

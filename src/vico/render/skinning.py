@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from vico.assets.people import PARENTS, Body
+from vico.assets.people import PARENTS, SkinnedBody
 
 
 @dataclass(frozen=True)
-class Crowd:
-    """Bodies laid end to end; index = the avatar's stable order. Made once by `crowd_of`.
+class BodyBatch:
+    """Bodies laid end to end; index = the avatar's stable order. Made once by `batch_bodies`.
 
     Attributes
     ----------
@@ -24,13 +24,13 @@ class Crowd:
     triangle_starts
         The same for triangles.
     vertices, normals, weight_joints, weights, colour
-        As in `Body`, concatenated.
+        As in `SkinnedBody`, concatenated.
     triangles
         int32, indices into the concatenation.
     entity
         Of each vertex, int32.
     rest_joints, joints, frames
-        As in `Body`, stacked, shape ``(n, 55, ...)``.
+        As in `SkinnedBody`, stacked, shape ``(n, 55, ...)``.
     """
 
     starts: NDArray[np.int32]
@@ -50,7 +50,7 @@ class Crowd:
         return len(self.starts) - 1
 
 
-def crowd_of(bodies: Sequence[Body], entities: Sequence[int]) -> Crowd:
+def batch_bodies(bodies: Sequence[SkinnedBody], entities: Sequence[int]) -> BodyBatch:
     """Lay bodies end to end for `skin`; `entities` are their ids in segmentation images."""
     starts = np.cumsum([0, *(len(body.vertices) for body in bodies)]).astype(np.int32)
     triangle_starts = np.cumsum([0, *(len(body.triangles) for body in bodies)]).astype(np.int32)
@@ -64,7 +64,7 @@ def crowd_of(bodies: Sequence[Body], entities: Sequence[int]) -> Crowd:
         return np.ascontiguousarray(np.stack(parts) if parts else np.zeros((0, 55, *shape)), np.float32)
 
     triangles = [body.triangles + start for body, start in zip(bodies, starts[:-1], strict=True)]
-    return Crowd(
+    return BodyBatch(
         starts,
         triangle_starts,
         together("vertices", 3, np.float32),
@@ -81,7 +81,7 @@ def crowd_of(bodies: Sequence[Body], entities: Sequence[int]) -> Crowd:
 
 
 def skin(
-    crowd: Crowd,
+    batch: BodyBatch,
     rotations: NDArray[np.float32],
     offsets: NDArray[np.float32],
     positions: NDArray[np.float64],
@@ -91,7 +91,7 @@ def skin(
 
     Parameters
     ----------
-    crowd
+    batch
         The bodies.
     rotations
         Axis-angle of each joint relative to its parent, T-pose = 0, radians, float32, shape ``(n, 55, 3)``.
@@ -105,27 +105,27 @@ def skin(
     Returns
     -------
     vertices, normals
-        World, float32, shape ``(crowd.starts[-1], 3)``.
+        World, float32, shape ``(batch.starts[-1], 3)``.
     """
-    vertices = np.empty_like(crowd.vertices)
-    normals = np.empty_like(crowd.normals)
-    _skin(
-        crowd.starts,
-        crowd.vertices,
-        crowd.normals,
-        crowd.weight_joints,
-        crowd.weights,
-        crowd.rest_joints,
-        crowd.joints,
-        crowd.frames,
-        PARENTS,
+    vertices = np.empty_like(batch.vertices)
+    normals = np.empty_like(batch.normals)
+    bodies = _Bodies(
+        batch.starts,
+        batch.vertices,
+        batch.normals,
+        batch.weight_joints,
+        batch.weights,
+        batch.rest_joints,
+        batch.joints,
+        batch.frames,
+    )
+    poses = _Poses(
         np.ascontiguousarray(rotations, np.float32),
         np.ascontiguousarray(offsets, np.float32),
         np.ascontiguousarray(positions, np.float64),
         np.ascontiguousarray(yaws, np.float64),
-        vertices,
-        normals,
     )
+    _skin(bodies, poses, PARENTS, vertices, normals)
     return vertices, normals
 
 
@@ -173,73 +173,100 @@ def forward_kinematics(
                 )
 
 
+class _Bodies(NamedTuple):
+    """Arrays of a `BodyBatch` that skinning reads."""
+
+    starts: NDArray[np.int32]
+    vertices: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    weight_joints: NDArray[np.int32]
+    weights: NDArray[np.float32]
+    rest_joints: NDArray[np.float32]
+    joints: NDArray[np.float32]
+    frames: NDArray[np.float32]
+
+
+class _Poses(NamedTuple):
+    """How everybody stands, and where; see `skin`."""
+
+    rotations: NDArray[np.float32]
+    offsets: NDArray[np.float32]
+    positions: NDArray[np.float64]
+    yaws: NDArray[np.float64]
+
+
 # fastmath is safe here: pictures come of it, never state.
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
-def _skin(
-    starts: NDArray[Any],
-    vertices: NDArray[Any],
-    normals: NDArray[Any],
-    weight_joints: NDArray[Any],
-    weights: NDArray[Any],
-    rest_joints: NDArray[Any],
-    joints: NDArray[Any],
-    frames: NDArray[Any],
-    parents: NDArray[Any],
-    rotations: NDArray[Any],
-    offsets: NDArray[Any],
-    positions: NDArray[Any],
-    yaws: NDArray[Any],
-    out_vertices: NDArray[Any],
-    out_normals: NDArray[Any],
-) -> None:
-    for i in range(len(yaws)):
-        count = len(parents)
+_fast: Any = njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+_fast_inlined: Any = njit(cache=True, nogil=True, fastmath=True, error_model="numpy", forceinline=True)
+
+
+@_fast
+def _skin(bodies: Any, poses: Any, parents: Any, out_vertices: Any, out_normals: Any) -> None:
+    count = len(parents)
+    starts = bodies.starts
+    for i in range(len(poses.yaws)):
         turned = np.empty((count, 3, 3), np.float64)
         placed = np.empty((count, 3), np.float64)
-        forward_kinematics(rotations[i], joints[i], parents, offsets[i], turned, placed)
-        # One 3x4 matrix a joint, from the mesh's rest pose straight to the world.
-        bones = np.empty((count, 12), np.float32)
-        cosine, sine = np.cos(yaws[i]), np.sin(yaws[i])
+        forward_kinematics(poses.rotations[i], bodies.joints[i], parents, poses.offsets[i], turned, placed)
+        bones = np.empty((count, 3, 4), np.float32)
+        rest_joints, frames, position = bodies.rest_joints[i], bodies.frames[i], poses.positions[i]
+        cosine, sine = np.cos(poses.yaws[i]), np.sin(poses.yaws[i])
         for j in range(count):
-            for c in range(3):
-                x = turned[j, 0, 0] * frames[i, j, 0, c] + turned[j, 0, 1] * frames[i, j, 1, c]
-                x += turned[j, 0, 2] * frames[i, j, 2, c]
-                y = turned[j, 1, 0] * frames[i, j, 0, c] + turned[j, 1, 1] * frames[i, j, 1, c]
-                y += turned[j, 1, 2] * frames[i, j, 2, c]
-                z = turned[j, 2, 0] * frames[i, j, 0, c] + turned[j, 2, 1] * frames[i, j, 1, c]
-                z += turned[j, 2, 2] * frames[i, j, 2, c]
-                bones[j, c] = cosine * x - sine * y
-                bones[j, 4 + c] = sine * x + cosine * y
-                bones[j, 8 + c] = z
-            px, py, pz = placed[j, 0], placed[j, 1], placed[j, 2]
-            x0, y0, z0 = rest_joints[i, j, 0], rest_joints[i, j, 1], rest_joints[i, j, 2]
-            bones[j, 3] = (
-                cosine * px - sine * py + positions[i, 0] - (bones[j, 0] * x0 + bones[j, 1] * y0 + bones[j, 2] * z0)
-            )
-            bones[j, 7] = (
-                sine * px + cosine * py + positions[i, 1] - (bones[j, 4] * x0 + bones[j, 5] * y0 + bones[j, 6] * z0)
-            )
-            bones[j, 11] = pz + positions[i, 2] - (bones[j, 8] * x0 + bones[j, 9] * y0 + bones[j, 10] * z0)
-        m = np.empty(12, np.float32)
-        for v in range(starts[i], starts[i + 1]):
-            w = weights[v, 0]
-            j = weight_joints[v, 0]
-            for k in range(12):
-                m[k] = w * bones[j, k]
-            for s in range(1, 4):
-                w = weights[v, s]
-                if w == 0:
-                    break
-                j = weight_joints[v, s]
-                for k in range(12):
-                    m[k] += w * bones[j, k]
-            x, y, z = vertices[v, 0], vertices[v, 1], vertices[v, 2]
-            out_vertices[v, 0] = m[0] * x + m[1] * y + m[2] * z + m[3]
-            out_vertices[v, 1] = m[4] * x + m[5] * y + m[6] * z + m[7]
-            out_vertices[v, 2] = m[8] * x + m[9] * y + m[10] * z + m[11]
-            x, y, z = normals[v, 0], normals[v, 1], normals[v, 2]
-            nx = m[0] * x + m[1] * y + m[2] * z
-            ny = m[4] * x + m[5] * y + m[6] * z
-            nz = m[8] * x + m[9] * y + m[10] * z
-            scale = np.float32(1) / np.sqrt(nx * nx + ny * ny + nz * nz + np.float32(1e-20))
-            out_normals[v, 0], out_normals[v, 1], out_normals[v, 2] = nx * scale, ny * scale, nz * scale
+            _set_bone(turned[j], frames[j], cosine, sine, bones[j])
+            _set_origin(bones[j], placed[j], rest_joints[j], position, cosine, sine)
+        _blend_vertices(bodies, bones, starts[i], starts[i + 1], out_vertices, out_normals)
+
+
+@_fast_inlined
+def _set_bone(turned: Any, frame: Any, cosine: float, sine: float, bone: Any) -> None:
+    """Write the rotation of a joint from the mesh's rest pose straight to the world."""
+    for c in range(3):
+        x = turned[0, 0] * frame[0, c] + turned[0, 1] * frame[1, c]
+        x += turned[0, 2] * frame[2, c]
+        y = turned[1, 0] * frame[0, c] + turned[1, 1] * frame[1, c]
+        y += turned[1, 2] * frame[2, c]
+        z = turned[2, 0] * frame[0, c] + turned[2, 1] * frame[1, c]
+        z += turned[2, 2] * frame[2, c]
+        bone[0, c] = cosine * x - sine * y
+        bone[1, c] = sine * x + cosine * y
+        bone[2, c] = z
+
+
+@_fast_inlined
+def _set_origin(bone: Any, placed: Any, rest: Any, position: Any, cosine: float, sine: float) -> None:
+    """Write the translation of a joint, so that its rest position comes to where it is `placed`."""
+    px, py, pz = placed[0], placed[1], placed[2]
+    x0, y0, z0 = rest[0], rest[1], rest[2]
+    bone[0, 3] = cosine * px - sine * py + position[0] - (bone[0, 0] * x0 + bone[0, 1] * y0 + bone[0, 2] * z0)
+    bone[1, 3] = sine * px + cosine * py + position[1] - (bone[1, 0] * x0 + bone[1, 1] * y0 + bone[1, 2] * z0)
+    bone[2, 3] = pz + position[2] - (bone[2, 0] * x0 + bone[2, 1] * y0 + bone[2, 2] * z0)
+
+
+@_fast_inlined
+def _blend_vertices(bodies: Any, bones: Any, first: int, end: int, out_vertices: Any, out_normals: Any) -> None:
+    """Move one person's vertices and normals, each by the mean of its joints' transforms."""
+    weights, weight_joints, vertices, normals = bodies.weights, bodies.weight_joints, bodies.vertices, bodies.normals
+    m = np.empty((3, 4), np.float32)
+    for v in range(first, end):
+        w, j = weights[v, 0], weight_joints[v, 0]
+        for r in range(3):
+            for c in range(4):
+                m[r, c] = w * bones[j, r, c]
+        for s in range(1, 4):
+            w = weights[v, s]
+            if w == 0:
+                break
+            j = weight_joints[v, s]
+            for r in range(3):
+                for c in range(4):
+                    m[r, c] += w * bones[j, r, c]
+        x, y, z = vertices[v, 0], vertices[v, 1], vertices[v, 2]
+        out_vertices[v, 0] = m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3]
+        out_vertices[v, 1] = m[1, 0] * x + m[1, 1] * y + m[1, 2] * z + m[1, 3]
+        out_vertices[v, 2] = m[2, 0] * x + m[2, 1] * y + m[2, 2] * z + m[2, 3]
+        x, y, z = normals[v, 0], normals[v, 1], normals[v, 2]
+        nx = m[0, 0] * x + m[0, 1] * y + m[0, 2] * z
+        ny = m[1, 0] * x + m[1, 1] * y + m[1, 2] * z
+        nz = m[2, 0] * x + m[2, 1] * y + m[2, 2] * z
+        scale = np.float32(1) / np.sqrt(nx * nx + ny * ny + nz * nz + np.float32(1e-20))
+        out_normals[v, 0], out_normals[v, 1], out_normals[v, 2] = nx * scale, ny * scale, nz * scale

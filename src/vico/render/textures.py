@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from vico.errors import InputError
+from vico.render.records import CUTOUT, DOUBLE_SIDED, MATERIAL
+from vico.threads import for_each
 from vico.world.mesh import Material
-from vico.world.threads import for_each
 
 LEVELS = 13  # up to 4096 texels a side
-CUTOUT, DOUBLE_SIDED = 1, 2
 _STRIP = 256  # rows, even
 
 
@@ -27,44 +27,45 @@ class Textures(NamedTuple):
     texels
         ``r | g << 8 | b << 16 | a << 24``, uint32.
     start
-        First texel of a material's mip level, shape ``(m, LEVELS)``; levels past the last repeat it.
-    size
-        log2 of the width and the height of level 0, then the number of levels (0: no texture), shape ``(m, 3)``.
-    flags
-        Bits `CUTOUT` and `DOUBLE_SIDED`, shape ``(m,)``.
-    emission
-        Shape ``(m,)``.
+        First texel of a material's mip level, int64, shape ``(m, LEVELS)``; levels past the last repeat it.
+    materials
+        `MATERIAL`, shape ``(m,)``.
     """
 
     texels: NDArray[np.uint32]
     start: NDArray[np.int64]
-    size: NDArray[np.int32]
-    flags: NDArray[np.uint8]
-    emission: NDArray[np.float32]
+    materials: NDArray[np.void]
+
+    @property
+    def double_sided(self) -> NDArray[np.bool_]:
+        """Which materials are seen from both sides, shape ``(m,)``."""
+        return (self.materials["flags"] & DOUBLE_SIDED) != 0
 
 
 def pack_textures(materials: Sequence[Material]) -> Textures:
     """Lay the textures of all materials out for the shader."""
     n = max(len(materials), 1)
     start = np.zeros((n, LEVELS), np.int64)
-    size = np.zeros((n, 3), np.int32)
-    flags = np.zeros(n, np.uint8)
-    emission = np.zeros(n, np.float32)
+    records = np.zeros(n, MATERIAL)
     # One array from the start: joining the levels at the end would take the memory of a photographed city twice.
     texels = np.full(1 + sum(_texel_count(*sides) for sides in _shapes(materials)), 0xFFFFFFFF, np.uint32)
     position = 1
     known: dict[int, int] = {}
     for index, material in enumerate(materials):
-        flags[index] = CUTOUT * material.cutout | DOUBLE_SIDED * material.double_sided
-        emission[index] = material.emission
+        record = records[index]
+        record["flags"] = CUTOUT * material.cutout | DOUBLE_SIDED * material.double_sided
+        record["emission"] = material.emission
         if material.texture is None:
             continue
         same = known.setdefault(id(material.texture), index)
         if same != index:
-            start[index], size[index] = start[same], size[same]
+            start[index] = start[same]
+            for name in ("log2_width", "log2_height", "levels"):
+                record[name] = records[same][name]
             continue
         height, width = _sides(*material.texture.shape[:2])
-        size[index] = width.bit_length() - 1, height.bit_length() - 1, max(height, width).bit_length()
+        record["log2_width"], record["log2_height"] = width.bit_length() - 1, height.bit_length() - 1
+        record["levels"] = max(height, width).bit_length()
         start[index] = position + _level_starts(height, width)
         position += _texel_count(height, width)
 
@@ -72,7 +73,7 @@ def pack_textures(materials: Sequence[Material]) -> Textures:
         _write_levels(materials[index], texels, start[index])
 
     for_each(fill, known.values())
-    return Textures(texels, start, size, flags, emission)
+    return Textures(texels, start, records)
 
 
 def _shapes(materials: Sequence[Material]) -> list[tuple[int, int]]:

@@ -8,19 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.rules import ActionStatus, ReasonCode
 from vico.sim.animation import CLIPS, stride_length
 from vico.sim.bodies import Bodies
-from vico.sim.collisions import sweep
+from vico.sim.collisions import IN_BUS, OBSTACLE, AvatarBodies, SolidMap, sweep
 from vico.sim.indoor import Indoor
-from vico.sim.state import RADIUS, RIDER_REACH, People, Posture, Status, Vehicle
+from vico.sim.state import RADIUS, RIDER_REACH, People, Posture, Vehicle
 from vico.world.heights import HeightField
 from vico.world.walkable import WalkableMap
 
 CLIP = {name: i for i, name in enumerate(CLIPS)}
 
-WALK_SPEED = 1.0
-RUN_SPEED = 2.5
-BIKE_SPEED = 3.0
 _CYCLES_PER_SECOND = 0.5
 
 
@@ -38,12 +36,16 @@ class Avatars:
     def __init__(self, people: People, indoor: Indoor, walkable: WalkableMap, height: HeightField) -> None:
         self.people = people
         self._indoor = indoor
-        self._clearance = np.ascontiguousarray(walkable.clearance)
         self._walkable = walkable
         self._height = height
         # A room may be missing altogether, but numba wants arrays of the right shape.
-        self._rooms = indoor.boxes if len(indoor.boxes) else np.zeros((1, 5))
-        self._start = indoor.furniture_start if len(indoor.boxes) else np.zeros(2, np.int64)
+        self._solids = SolidMap(
+            np.ascontiguousarray(walkable.clearance),
+            walkable.half,
+            indoor.boxes if len(indoor.boxes) else np.zeros((1, 5)),
+            indoor.furniture,
+            indoor.furniture_start if len(indoor.boxes) else np.zeros(2, np.int64),
+        )
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Everything that decides what avatars do next."""
@@ -64,14 +66,15 @@ class Avatars:
         p.turn_left[:] = 0.0
         p.move_speed[:] = 0.0
         p.velocity[:] = 0.0
-        p.status[:] = Status.OK
+        p.status[:] = ActionStatus.OK
         p.contact[:] = 0
         p.reason[:] = ""
+        p.reason_code[:] = ReasonCode.NONE
         p.action_clip[:] = -1
 
     def space(self) -> NDArray[np.int32]:
-        """The room each avatar is in, -1 outdoors, -2 in a bus: only those of one space can touch."""
-        return np.where(self.people.vehicle == Vehicle.BUS, -2, self.people.room).astype(np.int32)
+        """Return the room each avatar is in, `OUTDOORS` or `IN_BUS`: only those of one space can touch."""
+        return np.where(self.people.vehicle == Vehicle.BUS, IN_BUS, self.people.room).astype(np.int32)
 
     def reach(self) -> NDArray[np.float64]:
         """How far an avatar's body stretches fore and aft of its centre: wheels, for riders."""
@@ -97,18 +100,14 @@ class Avatars:
             turn = p.turn_left * share
             distance = np.minimum(p.move_left, p.move_speed * dt)
             before = p.position[:, :2].copy()
-            outdoors, disc = _boxes(obstacles)
-            moved, contact = sweep(
-                distance, turn, p.position, p.yaw, self.reach(), self.space(), p.entity, RADIUS,
-                self._clearance, self._walkable.half, self._rooms, self._indoor.furniture, self._start,
-                outdoors, disc, obstacles.entity,
-            )  # fmt: skip
+            avatars = AvatarBodies(p.position, p.yaw, self.reach(), self.space(), p.entity)
+            moved, contact = sweep(distance, turn, avatars, self._solids, _obstacles(obstacles))
             hit = contact != 0
             p.turn_left -= turn
             p.move_left -= moved
             p.move_left[hit | (p.move_left < 1e-9)] = 0.0
             p.turn_left[hit] = 0.0
-            p.status[hit] = Status.COLLISION
+            p.status[hit] = ActionStatus.COLLISION
             p.contact[hit] = contact[hit]
             p.velocity[:] = (p.position[:, :2] - before) / dt
             self.settle(np.flatnonzero(moved > 0.0))
@@ -144,14 +143,13 @@ class Avatars:
         p.phase %= 1.0
 
 
-def _boxes(bodies: Bodies) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Outlines for the sweep: ``x, y, yaw, half_length, half_width``, and which of them are discs."""
-    rows = (
-        np.column_stack([bodies.position[:, :2], bodies.yaw, bodies.half_length, bodies.half_width])
-        if len(bodies)
-        else np.zeros((0, 5))
-    )
-    return rows, bodies.round
+def _obstacles(bodies: Bodies) -> NDArray[np.void]:
+    """Return bodies as the sweep takes them, dtype `OBSTACLE`."""
+    records = np.empty(len(bodies), OBSTACLE)
+    records["x"], records["y"], records["yaw"] = bodies.position[:, 0], bodies.position[:, 1], bodies.yaw
+    records["half_length"], records["half_width"] = bodies.half_length, bodies.half_width
+    records["entity"], records["disc"] = bodies.entity, bodies.disc
+    return records
 
 
 def free_ground(
@@ -198,4 +196,4 @@ def clearances(point: NDArray[Any], bodies: Bodies) -> NDArray[np.float64]:
     outside = np.hypot(np.maximum(u, 0.0), np.maximum(v, 0.0))
     box = np.where((u > 0.0) | (v > 0.0), outside, np.maximum(u, v))
     disc = np.hypot(d[:, 0], d[:, 1]) - bodies.half_length
-    return np.where(bodies.round, disc, box)
+    return np.where(bodies.disc, disc, box)

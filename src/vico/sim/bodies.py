@@ -13,6 +13,8 @@ from vico.world.mesh import Surface
 
 KINDS = ("resident", "assistant", "robot", "car", "bus", "bicycle", "pedestrian", "object")
 RESIDENT, ASSISTANT, ROBOT, CAR, BUS, BICYCLE, PEDESTRIAN, OBJECT = range(len(KINDS))
+#: By kind: whether it is a person.
+IS_PERSON = np.isin(np.arange(len(KINDS)), (RESIDENT, ASSISTANT, PEDESTRIAN))
 
 
 @dataclass(frozen=True)
@@ -49,13 +51,17 @@ class Bodies:
         return len(self.entity)
 
     @property
-    def round(self) -> NDArray[np.bool_]:
+    def person(self) -> NDArray[np.bool_]:
+        """Which bodies are people, on foot or on bicycles."""
+        return IS_PERSON[self.kind]
+
+    @property
+    def disc(self) -> NDArray[np.bool_]:
         """Which bodies are discs of radius `half_length`: people on foot. The rest are rectangles."""
-        person = (self.kind == RESIDENT) | (self.kind == ASSISTANT) | (self.kind == PEDESTRIAN)
-        return np.asarray(person & (self.half_length == self.half_width), bool)
+        return np.asarray(self.person & (self.half_length == self.half_width), bool)
 
     def where(self, chosen: NDArray[Any]) -> Bodies:
-        """The bodies a mask or an index array picks."""
+        """Return the bodies a mask or an index array picks."""
         return Bodies(*(getattr(self, name)[chosen] for name in self.__dataclass_fields__))
 
     @classmethod
@@ -82,6 +88,8 @@ class Drawn:
     ----------
     transforms
         Model to world, float32, shape ``(n, 4, 4)``.
+    entity
+        Entity number of each, as in the label image, int32, shape ``(n,)``.
     """
 
     prototypes: list[str]
@@ -110,7 +118,7 @@ class Subsystem(HasBodies, Protocol):
         """Move on by `dt` seconds without touching anything of one's own or of `obstacles`."""
 
     def draw(self) -> Drawn:
-        """What to draw, by prototype."""
+        """Return what to draw, by prototype."""
 
     def prototypes(self) -> dict[str, list[Surface]]:
-        """The shapes `draw` refers to."""
+        """Return the shapes `draw` refers to."""

@@ -8,20 +8,98 @@ ends at the obstacle. Someone who already touches something may move if that mak
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+
+from vico.sim.state import RADIUS
 
 STRIDE = 0.05
 WALL = -1
 # The map promises 0.3 m of free room at the centre of a free cell. Clearance interpolated to 0.27 m means at most
 # 0.05 m off such a centre towards something solid: the 0.25 m of a body.
 MAP_ROOM = 0.27
+#: Spaces that are no rooms: the street, and buses, whose riders take no room.
+OUTDOORS, IN_BUS = -1, -2
+#: Columns of boxes: centre (metres), heading (radians), half sides (metres).
+BOX_X, BOX_Y, BOX_YAW, BOX_HALF_LENGTH, BOX_HALF_WIDTH = range(5)
 _FAR = 1e9
+_HALVINGS = 6  # of the last stride
 
 Array = NDArray[Any]
+
+
+class SolidMap(NamedTuple):
+    """What never moves.
+
+    Attributes
+    ----------
+    clearance, half
+        Free room around each cell of the walkable map, metres, shape ``(cells, cells)``, and half the map's side.
+    rooms
+        Boxes, float64, shape ``(rooms, 5)``.
+    furniture, furniture_start
+        Boxes, room by room: those of room ``r`` are ``furniture[furniture_start[r]:furniture_start[r + 1]]``.
+    """
+
+    clearance: Array
+    half: float
+    rooms: Array
+    furniture: Array
+    furniture_start: Array
+
+
+class AvatarBodies(NamedTuple):
+    """The avatars, arrays of shape ``(n,)``.
+
+    Attributes
+    ----------
+    position
+        Metres, shape ``(n, 3)``.
+    yaw
+        Heading, radians.
+    reach
+        How far the body reaches fore and aft of its centre disc, metres: wheels, for riders.
+    space
+        Room each is in, `OUTDOORS` or `IN_BUS`: only those of one space can touch.
+    entity
+        Their entities.
+    """
+
+    position: Array
+    yaw: Array
+    reach: Array
+    space: Array
+    entity: Array
+
+
+#: An avatar while it is moved: pose (metres, radians), see `AvatarBodies`, and its number.
+AVATAR = np.dtype(
+    [
+        ("x", np.float64),
+        ("y", np.float64),
+        ("yaw", np.float64),
+        ("reach", np.float64),
+        ("space", np.int64),
+        ("entity", np.int64),
+        ("index", np.int64),
+    ]
+)
+#: A body outdoors that is no avatar: pose, half sides (metres; the radius of a disc), whether it is a disc, entity.
+OBSTACLE = np.dtype(
+    [
+        ("x", np.float64),
+        ("y", np.float64),
+        ("yaw", np.float64),
+        ("half_length", np.float64),
+        ("half_width", np.float64),
+        ("entity", np.int64),
+        ("disc", np.bool_),
+    ],
+    align=True,
+)
 
 
 @njit(cache=True)
@@ -56,15 +134,19 @@ def box_gap(x: float, y: float, bx: float, by: float, yaw: float, half_length: f
 
 
 @njit(cache=True)
-def room_gap(x: float, y: float, room: Array) -> float:
-    """Distance from a point to the nearest wall of a room ``(cx, cy, yaw, half_x, half_y)``; negative outside."""
-    return -box_gap(x, y, room[0], room[1], room[2], room[3], room[4])
+def gap_to(x: float, y: float, box: Array) -> float:
+    """Signed distance from a point to a box, one row of columns `BOX_X` and on, metres; negative inside."""
+    return box_gap(x, y, box[BOX_X], box[BOX_Y], box[BOX_YAW], box[BOX_HALF_LENGTH], box[BOX_HALF_WIDTH])
 
 
 @njit(cache=True)
-def _gap_between(
-    x: float, y: float, yaw: float, reach: float, ox: float, oy: float, oyaw: float, oreach: float
-) -> float:
+def room_gap(x: float, y: float, room: Array) -> float:
+    """Distance from a point to the nearest wall of a room, a box; negative outside."""
+    return -gap_to(x, y, room)
+
+
+@njit(cache=True)
+def _gap_between(x: float, y: float, yaw: float, reach: float, other: Any) -> float:
     """Smallest distance between the disc centres of two avatars (one disc, or three in a row for a rider)."""
     best = _FAR
     for a in range(-1, 2):
@@ -72,159 +154,183 @@ def _gap_between(
             continue
         ax, ay = x + a * reach * math.cos(yaw), y + a * reach * math.sin(yaw)
         for b in range(-1, 2):
-            if b != 0 and oreach == 0.0:
+            if b != 0 and other.reach == 0.0:
                 continue
-            bx, by = ox + b * oreach * math.cos(oyaw), oy + b * oreach * math.sin(oyaw)
+            bx, by = other.x + b * other.reach * math.cos(other.yaw), other.y + b * other.reach * math.sin(other.yaw)
             best = min(best, math.hypot(ax - bx, ay - by))
     return best
 
 
 @njit(cache=True)
-def blocker(
-    i: int,
-    x: float,
-    y: float,
-    yaw: float,
-    position: Array,
-    yaws: Array,
-    reach: Array,
-    space: Array,
-    entity: Array,
-    radius: float,
-    clearance: Array,
-    half: float,
-    rooms: Array,
-    furniture: Array,
-    furniture_start: Array,
-    others: Array,
-    other_disc: Array,
-    other_entity: Array,
-) -> int:
-    """Entity that keeps avatar `i` from standing at a point; `WALL` for walls, edges and furniture, 0 if free.
+def _is_too_close(gap: float, was: float) -> bool:
+    """Return whether a gap to an obstacle is too small, and no wider than it was."""
+    return gap < RADIUS and gap <= was
 
-    `space` is -2 for who takes no room (bus riders), -1 outdoors, else the room's index. `others` holds
-    ``x, y, yaw, half_length, half_width`` of the outdoor bodies that are no avatars.
-    """
-    x0, y0, yaw0 = position[i, 0], position[i, 1], yaws[i]
-    for k in range(-1, 2):
-        if k != 0 and reach[i] == 0.0:
+
+@njit(cache=True)
+def _obstacle_gap(x: float, y: float, other: Any) -> float:
+    """Return the distance from a point to a body outdoors, metres."""
+    if other.disc:
+        return math.hypot(other.x - x, other.y - y) - other.half_length
+    return box_gap(x, y, other.x, other.y, other.yaw, other.half_length, other.half_width)
+
+
+@njit(cache=True)
+def _blocker_outdoors(x: float, y: float, from_x: float, from_y: float, solids: SolidMap, others: Array) -> int:
+    """Return the entity that keeps a disc from going from one point to another in the street; `WALL`, or 0 if free."""
+    gap = map_gap(x, y, solids.clearance, solids.half)
+    if gap < MAP_ROOM and gap <= map_gap(from_x, from_y, solids.clearance, solids.half):
+        return WALL
+    for other in others:
+        dx, dy = other.x - x, other.y - y
+        far = other.half_length + other.half_width + RADIUS
+        if dx * dx + dy * dy > far * far:
             continue
-        px, py = x + k * reach[i] * math.cos(yaw), y + k * reach[i] * math.sin(yaw)
-        qx, qy = x0 + k * reach[i] * math.cos(yaw0), y0 + k * reach[i] * math.sin(yaw0)
-        if space[i] == -1:
-            gap = map_gap(px, py, clearance, half)
-            if gap < MAP_ROOM and gap <= map_gap(qx, qy, clearance, half):
-                return WALL
-            for j in range(others.shape[0]):
-                dx, dy = others[j, 0] - px, others[j, 1] - py
-                far = others[j, 3] + others[j, 4] + radius
-                if dx * dx + dy * dy > far * far:
-                    continue
-                if other_disc[j]:
-                    gap = math.sqrt(dx * dx + dy * dy) - others[j, 3]
-                    was = math.hypot(others[j, 0] - qx, others[j, 1] - qy) - others[j, 3]
-                else:
-                    gap = box_gap(px, py, others[j, 0], others[j, 1], others[j, 2], others[j, 3], others[j, 4])
-                    was = box_gap(qx, qy, others[j, 0], others[j, 1], others[j, 2], others[j, 3], others[j, 4])
-                if gap < radius and gap <= was:
-                    return int(other_entity[j])
-        elif space[i] >= 0:
-            room = space[i]
-            gap = room_gap(px, py, rooms[room])
-            if gap < radius and gap <= room_gap(qx, qy, rooms[room]):
-                return WALL
-            for f in range(furniture_start[room], furniture_start[room + 1]):
-                b = furniture[f]
-                gap = box_gap(px, py, b[0], b[1], b[2], b[3], b[4])
-                if gap < radius and gap <= box_gap(qx, qy, b[0], b[1], b[2], b[3], b[4]):
-                    return WALL
-    for j in range(position.shape[0]):
-        if j == i or space[j] != space[i] or space[j] == -2:
-            continue
-        near = 2.0 * radius + reach[i] + reach[j]
-        dx, dy = position[j, 0] - x, position[j, 1] - y
-        if dx * dx + dy * dy > near * near:
-            continue
-        gap = _gap_between(x, y, yaw, reach[i], position[j, 0], position[j, 1], yaws[j], reach[j])
-        if gap < 2.0 * radius and gap <= _gap_between(
-            x0, y0, yaw0, reach[i], position[j, 0], position[j, 1], yaws[j], reach[j]
-        ):
-            return int(entity[j])
+        if other.disc:
+            gap = math.sqrt(dx * dx + dy * dy) - other.half_length
+        else:
+            gap = _obstacle_gap(x, y, other)
+        if _is_too_close(gap, _obstacle_gap(from_x, from_y, other)):
+            return int(other.entity)
     return 0
 
 
 @njit(cache=True)
-def sweep(
-    distance: Array,
-    turn: Array,
-    position: Array,
-    yaws: Array,
-    reach: Array,
-    space: Array,
-    entity: Array,
-    radius: float,
-    clearance: Array,
-    half: float,
-    rooms: Array,
-    furniture: Array,
-    furniture_start: Array,
-    others: Array,
-    other_disc: Array,
-    other_entity: Array,
-) -> tuple[Array, Array]:
+def _blocker_in_room(x: float, y: float, from_x: float, from_y: float, room: int, solids: SolidMap) -> int:
+    """Return `WALL` if a wall or furniture keeps a disc from going from one point to another in a room, 0 if free."""
+    gap = room_gap(x, y, solids.rooms[room])
+    if _is_too_close(gap, room_gap(from_x, from_y, solids.rooms[room])):
+        return WALL
+    for f in range(solids.furniture_start[room], solids.furniture_start[room + 1]):
+        gap = gap_to(x, y, solids.furniture[f])
+        if _is_too_close(gap, gap_to(from_x, from_y, solids.furniture[f])):
+            return WALL
+    return 0
+
+
+@njit(cache=True)
+def _blocking_avatar(me: Any, x: float, y: float, yaw: float, avatars: Array) -> int:
+    """Return the entity of the avatar that keeps avatar `me` from standing at a pose, 0 if none does."""
+    for other in avatars:
+        if other.index == me.index or other.space != me.space or other.space == IN_BUS:
+            continue
+        near = 2.0 * RADIUS + me.reach + other.reach
+        dx, dy = other.x - x, other.y - y
+        if dx * dx + dy * dy > near * near:
+            continue
+        gap = _gap_between(x, y, yaw, me.reach, other)
+        if gap < 2.0 * RADIUS and gap <= _gap_between(me.x, me.y, me.yaw, me.reach, other):
+            return int(other.entity)
+    return 0
+
+
+@njit(cache=True)
+def blocker(me: Any, x: float, y: float, yaw: float, avatars: Array, solids: SolidMap, others: Array) -> int:
+    """Entity that keeps avatar `me` from standing at a pose; `WALL` for walls, edges and furniture, 0 if free."""
+    hit = 0
+    for k in range(-1, 2):
+        if k != 0 and me.reach == 0.0:
+            continue
+        px, py = x + k * me.reach * math.cos(yaw), y + k * me.reach * math.sin(yaw)
+        qx, qy = me.x + k * me.reach * math.cos(me.yaw), me.y + k * me.reach * math.sin(me.yaw)
+        if me.space == OUTDOORS:
+            hit = _blocker_outdoors(px, py, qx, qy, solids, others)
+        elif me.space >= 0:
+            hit = _blocker_in_room(px, py, qx, qy, me.space, solids)
+        if hit != 0:
+            break
+    return hit if hit != 0 else _blocking_avatar(me, x, y, yaw, avatars)
+
+
+@njit(cache=True)
+def _turn(me: Any, angle: float, avatars: Array, solids: SolidMap, others: Array) -> int:
+    """Turn an avatar if its body has room to; return the entity that is in the way, 0 for none."""
+    yaw = me.yaw + angle
+    yaw = yaw - 2.0 * math.pi * math.floor((yaw + math.pi) / (2.0 * math.pi))
+    hit = 0
+    if me.reach > 0.0:
+        hit = blocker(me, me.x, me.y, yaw, avatars, solids, others)
+    if hit == 0:
+        me.yaw = yaw
+    return hit
+
+
+@njit(cache=True)
+def _walk_ahead(
+    me: Any, distance: float, contact: int, avatars: Array, solids: SolidMap, others: Array
+) -> tuple[float, int]:
+    """Move an avatar ahead as far as the way is free.
+
+    Parameters
+    ----------
+    contact
+        Entity that its turn touched, 0 for none: then it goes a few strides at most.
+
+    Returns
+    -------
+    tuple
+        Metres, and the entity that was touched last, 0 for none.
+    """
+    cx, cy = math.cos(me.yaw), math.sin(me.yaw)
+    free, step = 0.0, min(distance, STRIDE)
+    halvings = 0
+    # Whole strides while the way is free, then halves: `free` metres are known to be clear.
+    while free < distance - 1e-12:
+        x, y = me.x + cx * step, me.y + cy * step
+        hit = blocker(me, x, y, me.yaw, avatars, solids, others)
+        if hit == 0:
+            me.x, me.y = x, y
+            free += step
+            step = min(step, distance - free)
+        else:
+            contact = hit
+            step *= 0.5
+        if contact != 0:
+            halvings += 1
+            if halvings > _HALVINGS:
+                break
+    return free, contact
+
+
+@njit(cache=True)
+def _avatar_records(avatars: AvatarBodies) -> Array:
+    records = np.empty(len(avatars.yaw), AVATAR)
+    for i in range(len(records)):
+        one = records[i]
+        one.x, one.y, one.yaw = avatars.position[i, 0], avatars.position[i, 1], avatars.yaw[i]
+        one.reach, one.space = avatars.reach[i], avatars.space[i]
+        one.entity, one.index = avatars.entity[i], i
+    return records
+
+
+@njit(cache=True)
+def sweep(distance: Array, turn: Array, bodies: AvatarBodies, solids: SolidMap, others: Array) -> tuple[Array, Array]:
     """Turn, then move every avatar ahead as far as the way is free, one after the other.
 
     Parameters
     ----------
     distance, turn
-        Metres and radians wanted, shape ``(n,)``. `position` (n, 3) and `yaws` (n,) are changed in place.
+        Metres and radians wanted, shape ``(n,)``.
+    bodies
+        The avatars; their positions and yaws are changed in place.
+    others
+        Bodies outdoors that are no avatars, dtype `OBSTACLE`.
 
     Returns
     -------
     tuple
         Metres moved, float64, and the entity that stopped each (0: nobody, `WALL`), int64; shape ``(n,)``.
     """
-    n = position.shape[0]
-    moved = np.zeros(n)
-    contact = np.zeros(n, np.int64)
-    for i in range(n):
+    moved = np.zeros(len(distance))
+    contact = np.zeros(len(distance), np.int64)
+    avatars = _avatar_records(bodies)
+    for i in range(len(distance)):
+        me = avatars[i]
         if turn[i] != 0.0:
-            yaw = yaws[i] + turn[i]
-            yaw = yaw - 2.0 * math.pi * math.floor((yaw + math.pi) / (2.0 * math.pi))
-            hit = 0
-            if reach[i] > 0.0:
-                hit = blocker(
-                    i, position[i, 0], position[i, 1], yaw, position, yaws, reach, space, entity, radius,
-                    clearance, half, rooms, furniture, furniture_start, others, other_disc, other_entity,
-                )  # fmt: skip
-            if hit != 0:
-                contact[i] = hit
-            else:
-                yaws[i] = yaw
-        if distance[i] <= 0.0 or space[i] == -2:
-            continue
-        cx, cy = math.cos(yaws[i]), math.sin(yaws[i])
-        free, step = 0.0, min(distance[i], STRIDE)
-        halvings = 0
-        # Whole strides while the way is free, then halves: `free` metres are known to be clear.
-        while free < distance[i] - 1e-12:
-            x, y = position[i, 0] + cx * step, position[i, 1] + cy * step
-            hit = blocker(
-                i, x, y, yaws[i], position, yaws, reach, space, entity, radius,
-                clearance, half, rooms, furniture, furniture_start, others, other_disc, other_entity,
-            )  # fmt: skip
-            if hit == 0:
-                position[i, 0], position[i, 1] = x, y
-                free += step
-                step = min(step, distance[i] - free)
-            else:
-                contact[i] = hit
-                step *= 0.5
-            if contact[i] != 0:
-                halvings += 1
-                if halvings > 6:
-                    break
-        moved[i] = free
+            contact[i] = _turn(me, turn[i], avatars, solids, others)
+        if distance[i] > 0.0 and me.space != IN_BUS:
+            moved[i], contact[i] = _walk_ahead(me, distance[i], contact[i], avatars, solids, others)
+        bodies.position[i, 0], bodies.position[i, 1], bodies.yaw[i] = me.x, me.y, me.yaw
     return moved, contact
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from vico.clock import DAY
 from vico.errors import InputError
 
-DAY = 86_400
 SUBSTEPS = 10
 SUBSTEP = 0.1
 
@@ -64,27 +63,5 @@ class SimConfig:
             raise InputError(f"simulation: images of {self.image} pixels are out of range; take 16..1024, such as 256")
 
     def record(self) -> dict[str, Any]:
-        """The configuration as it goes into `run.json`."""
+        """Return the configuration as it goes into `run.json`."""
         return asdict(self)
-
-
-def seconds_of_day(text: str) -> int:
-    """Return the second of the day that ``HH:MM`` or ``HH:MM:SS`` names.
-
-    Raises
-    ------
-    InputError
-        If the text is no time of day.
-    """
-    match = re.fullmatch(r"(\d{1,2}):(\d{2})(?::(\d{2}))?", text)
-    if match:
-        hours, minutes, seconds = (int(part or 0) for part in match.groups())
-        if hours < 24 and minutes < 60 and seconds < 60:
-            return hours * 3600 + minutes * 60 + seconds
-    raise InputError(f"{text!r} is no time of day; write HH:MM or HH:MM:SS, for example 08:00")
-
-
-def clock(second: float) -> str:
-    """Write a second of the day as ``HH:MM:SS``; days after the first start again at midnight."""
-    whole = int(second) % DAY
-    return f"{whole // 3600:02d}:{whole // 60 % 60:02d}:{whole % 60:02d}"

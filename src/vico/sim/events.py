@@ -106,15 +106,15 @@ class Events:
         x, y, z = (float(value) for value in position[:3])
         self.log.append(Event(self.step, self.time, kind, agent, text, (x, y, z), data))
 
-    def say(self, speaker: str, text: str, position: NDArray[Any], hearers: list[str]) -> None:
+    def say(self, speaker: str, text: str, position: NDArray[Any], listeners: list[str]) -> None:
         """Deliver a message: those who hear it find it in their next observation."""
-        self.add("message", speaker, text, position, hearers=hearers)
+        self.add("message", speaker, text, position, hearers=listeners)
         said = Message(self.time, speaker, text, self.log[-1].position)
-        for name in hearers:
+        for name in listeners:
             self.heard[name].append(said)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """The messages in the air, as bytes: they are part of what the next observation holds."""
+        """Return the messages in the air, as bytes: they are part of what the next observation holds."""
         heard = {name: [m.record() for m in messages] for name, messages in self.heard.items() if messages}
         text = json.dumps(heard, sort_keys=True, ensure_ascii=False)
         return {"heard": np.frombuffer(text.encode(), np.uint8)}

@@ -15,8 +15,6 @@ from vico.sim.state import RADIUS
 from vico.world.model import Entrance, Place, Room
 from vico.world.objects import Objects
 
-DOOR_REACH = 2.0
-INNER_DOOR_REACH = 1.0
 _LEVEL = 0.5  # metres a door may lie above or below who goes through it
 
 
@@ -211,7 +209,7 @@ def _doors(rooms: Sequence[Room], places: Sequence[Place], index: dict[str, int]
 
 
 def entrance_of(place: Place, entrances: dict[str, Entrance]) -> Entrance | None:
-    """The door people use for a place; None for open places."""
+    """Return the door people use for a place; None for open places."""
     return entrances.get(place.entrance) if place.entrance else None
 
 

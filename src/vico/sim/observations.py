@@ -10,9 +10,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.rules import ActionStatus, code_name
 from vico.sim.moves import eye_height
-from vico.sim.stage import Stage
-from vico.sim.state import Posture, Status, Vehicle
+from vico.sim.simulation_state import SimulationState
+from vico.sim.state import Posture, Vehicle
 
 Observation = dict[str, Any]
 
@@ -21,14 +22,20 @@ VEHICLE_NAMES = {Vehicle.NONE: "", Vehicle.BUS: "bus", Vehicle.BIKE: "bike"}
 
 @dataclass(frozen=True)
 class Views:
-    """Pictures of one step, in the order of the agents asked for.
+    """Pictures of one step, in the order of the cameras asked for.
 
     Attributes
     ----------
-    rgb, depth, segmentation
-        Shapes ``(k, h, w, 3)`` uint8, ``(k, h, w)`` float32 metres, ``(k, h, w)`` int32 entities.
-    extrinsics, intrinsics
-        World to camera, ``(k, 4, 4)``; camera matrix, ``(3, 3)``.
+    rgb
+        sRGB, uint8, shape ``(k, h, w, 3)``.
+    depth
+        Metres along the optical axis, 0 where nothing is hit, float32, shape ``(k, h, w)``.
+    segmentation
+        Entity ids, 0 where nothing is hit, int32, shape ``(k, h, w)``.
+    extrinsics
+        World (ENU metres) to camera (x right, y down, z forward), float64, shape ``(k, 4, 4)``.
+    intrinsics
+        Camera matrix, pixels, the same for all, float64, shape ``(3, 3)``.
     """
 
     rgb: NDArray[np.uint8]
@@ -38,47 +45,57 @@ class Views:
     intrinsics: NDArray[np.float64]
 
 
-class Eyes(Protocol):
-    """Whoever can render views: takes poses ``(k, 6)`` and the entities whose bodies stay out of each."""
+class ObservationRenderer(Protocol):
+    """Renders what agents see; a simulation makes the usual one itself."""
 
-    def look(self, stage: Stage, poses: NDArray[np.float64], own: NDArray[np.int32]) -> Views:
-        """Render one view a pose, in one call."""
+    def render(self, state: SimulationState, poses: NDArray[np.float64], own: NDArray[np.int32]) -> Views:
+        """Render one view for each pose in one call.
+
+        Parameters
+        ----------
+        state
+            The state to render.
+        poses
+            Optical centres (ENU metres) and unit vectors along the optical axes, float64, shape ``(k, 6)``.
+        own
+            Entity of the body that each view leaves out (the viewer's own), int32, shape ``(k,)``.
+        """
 
     def names(self, entities: Sequence[int]) -> dict[int, dict[str, str]]:
-        """Kind and name of entities that can be seen."""
+        """Return kind and name of entities that can be seen."""
 
-    def under_way(self) -> Callable[[], None]:
-        """What to call, from any thread, to wait for the colours of the last look."""
+    def rgb_waiter(self) -> Callable[[], None]:
+        """Return what to call, from any thread, to wait for the RGB of the last `render`."""
 
-    def moved_to(self, sim: Any) -> Eyes:
-        """The same for another simulation, with as much of the scene as can be kept."""
+    def rebind(self, sim: Any) -> ObservationRenderer:
+        """Return a renderer of another simulation that keeps as much of the scene as it can."""
 
 
-def poses(stage: Stage) -> NDArray[np.float64]:
-    """Eyes of every agent: x, y, z and the unit vector they look along, float64, shape ``(n, 6)``.
+def poses(state: SimulationState) -> NDArray[np.float64]:
+    """Return every agent's x, y, z (ENU metres) and the unit vector it looks along, float64, shape ``(n, 6)``.
 
     x, y, z is where the agent stands (feet); the camera is `camera_height` above.
     """
-    p = stage.people
+    p = state.people
     facing = np.column_stack([np.cos(p.yaw) * np.cos(p.pitch), np.sin(p.yaw) * np.cos(p.pitch), np.sin(p.pitch)])
     mine = np.column_stack([p.position, facing])
-    if stage.robots is None:
+    if state.robots is None:
         return mine
-    robots = stage.robots.bodies()
+    robots = state.robots.bodies()
     ahead = np.column_stack([np.cos(robots.yaw), np.sin(robots.yaw), np.zeros(len(robots))])
     return np.vstack([mine, np.column_stack([robots.position, ahead])])
 
 
-def camera_heights(stage: Stage) -> NDArray[np.float64]:
-    """Height of every agent's camera above its position, metres."""
-    mine = eye_height(stage)
-    return mine if stage.robots is None else np.concatenate([mine, stage.robots.camera_heights()])
+def camera_heights(state: SimulationState) -> NDArray[np.float64]:
+    """Return the height of every agent's camera above its position, metres."""
+    mine = eye_height(state)
+    return mine if state.robots is None else np.concatenate([mine, state.robots.camera_heights()])
 
 
 def observe(
-    stage: Stage, seeing: Sequence[int], eyes: Eyes | None
+    state: SimulationState, seeing: Sequence[int], renderer: ObservationRenderer | None
 ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
-    """Observations and infos of all agents; those in `seeing` get pictures, rendered in one call.
+    """Return observations and infos of all agents; those in `seeing` get pictures, rendered in one call.
 
     Returns
     -------
@@ -87,29 +104,29 @@ def observe(
         see; ``pose``, ``events``, ``state`` for everybody), and info by name (``entities``: kind and name of what is
         in view, by entity).
     """
-    names = stage.names
-    stances = poses(stage)
+    names = state.names
+    stances = poses(state)
     found: dict[str, Observation] = {}
     infos: dict[str, dict[str, Any]] = {}
     for i, name in enumerate(names):
         found[name] = {
             "pose": stances[i].copy(),
-            "events": [message.record() for message in stage.events.heard[name]],
-            "state": state_of(i, stage),
+            "events": [message.record() for message in state.events.heard[name]],
+            "state": state_of(i, state),
         }
-        infos[name] = {"entities": {}}
-    if eyes is None or not len(seeing):
+        infos[name] = {"entities": {}, "action_code": found[name]["state"]["action_code"]}
+    if renderer is None or not len(seeing):
         return found, infos
     order = list(seeing)
     cameras = stances[order].copy()
-    cameras[:, 2] += camera_heights(stage)[order]
-    own = [int(stage.people.entity[i]) for i in order if i < len(stage.people)]
-    if stage.robots is not None:
-        robots = stage.robots.bodies().entity
+    cameras[:, 2] += camera_heights(state)[order]
+    own = [int(state.people.entity[i]) for i in order if i < len(state.people)]
+    if state.robots is not None:
+        robots = state.robots.bodies().entity
         own = [
-            int(stage.people.entity[i]) if i < len(stage.people) else int(robots[i - len(stage.people)]) for i in order
+            int(state.people.entity[i]) if i < len(state.people) else int(robots[i - len(state.people)]) for i in order
         ]
-    views = eyes.look(stage, cameras, np.array(own, np.int32))
+    views = renderer.render(state, cameras, np.array(own, np.int32))
     for k, i in enumerate(order):
         found[names[i]] |= {
             "rgb": views.rgb[k],
@@ -119,7 +136,7 @@ def observe(
             "intrinsics": views.intrinsics,
         }
         seen = _distinct(views.segmentation[k])
-        infos[names[i]]["entities"] = eyes.names(seen)
+        infos[names[i]]["entities"] = renderer.names(seen)
     return found, infos
 
 
@@ -131,16 +148,16 @@ def _distinct(image: NDArray[np.int32]) -> list[int]:
     return [int(v) for v in values if v > 0]
 
 
-def state_of(i: int, stage: Stage) -> dict[str, Any]:
-    """The state part of an agent's observation; empty strings and 0 stand for "none".
+def state_of(i: int, state: SimulationState) -> dict[str, Any]:
+    """Return the state part of an agent's observation; empty strings and 0 stand for "none".
 
     ``doors`` lists the ways out of the room one is in (empty outdoors); ``posture`` is standing, sitting or lying.
     """
-    common: Mapping[str, Any] = {"time": float(stage.second)}
-    p = stage.people
+    common: Mapping[str, Any] = {"time": float(state.second)}
+    p = state.people
     if i >= len(p):
-        assert stage.robots is not None
-        reason = stage.robots.reasons[i - len(p)]
+        assert state.robots is not None
+        reason = state.robots.reasons[i - len(p)]
         return {
             **common,
             "cash": 0.0,
@@ -153,10 +170,11 @@ def state_of(i: int, stage: Stage) -> dict[str, Any]:
             "doors": [],
             "posture": "standing",
             "action_status": "refused" if reason else "ok",
+            "action_code": code_name(state.robots.reason_codes[i - len(p)]),
             "action_reason": reason,
         }
-    room = stage.indoor.rooms[p.room[i]] if p.room[i] >= 0 else None
-    place = stage.world.places[p.place[i]] if p.place[i] >= 0 else None
+    room = state.indoor.rooms[p.room[i]] if p.room[i] >= 0 else None
+    place = state.world.places[p.place[i]] if p.place[i] >= 0 else None
     return {
         **common,
         "cash": round(float(p.cash[i]), 2),
@@ -165,14 +183,15 @@ def state_of(i: int, stage: Stage) -> dict[str, Any]:
         "building": room.building if room else "",
         "room": room.id if room else "",
         "place": place.id if place else "",
-        "accessible_places": stage.accessible_places(i),
-        "doors": stage.doors_of(i),
+        "accessible_places": state.accessible_places(i),
+        "doors": state.doors_of(i),
         "posture": Posture(int(p.posture[i])).name.lower(),
-        "action_status": Status(int(p.status[i])).name.lower(),
+        "action_status": ActionStatus(int(p.status[i])).name.lower(),
+        "action_code": code_name(int(p.reason_code[i])),
         "action_reason": str(p.reason[i]),
     }
 
 
 def facing_of(yaw: float, pitch: float) -> tuple[float, float, float]:
-    """Unit vector of a gaze."""
+    """Return the unit vector of a gaze, ENU; radians."""
     return math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), math.sin(pitch)

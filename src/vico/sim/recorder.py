@@ -12,13 +12,13 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import resource
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
@@ -30,13 +30,14 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from vico import __version__
-from vico.errors import OutputExistsError
+from vico.errors import OutputError, OutputExistsError
+from vico.io.files import write_bytes, write_errors, write_json
+from vico.io.folders import FolderLock, folder_errors
 from vico.sim.bodies import KINDS, Bodies
 from vico.sim.events import Event
 from vico.sim.recording import SCHEMA, VERSION, Run, read_run
 from vico.sim.simulation import Simulation, StepResult
-from vico.world.files import write_bytes, write_json
+from vico.version import __version__
 
 PART = 60
 RATE = 10
@@ -72,18 +73,6 @@ class ViewFilm:
         self._container.close()
 
 
-def is_being_recorded(path: Path) -> bool:
-    """Whether a living process records into this run folder."""
-    try:
-        with (path / "events.jsonl").open("rb") as events:
-            fcntl.flock(events, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except (FileNotFoundError, NotADirectoryError):
-        return False
-    return False
-
-
 class Recorder:
     """Records a simulation, step by step.
 
@@ -107,7 +96,10 @@ class Recorder:
     def __init__(self, out: Path, sim: Simulation, *, sources: Mapping[str, str], wanted: int) -> None:
         if out.exists() and any(out.iterdir()):
             raise OutputExistsError(f"{out}: the folder is not empty; give another, or --force")
-        out.mkdir(parents=True, exist_ok=True)
+        with write_errors(out):
+            out.mkdir(parents=True, exist_ok=True)
+        # Held as long as this process lives, so that nobody takes the run for one that was killed.
+        self._lock = FolderLock(out)
         self.out, self.sim, self.wanted = out, sim, wanted
         self._sources = dict(sources)
         self._rows: list[list[NDArray[Any]]] = []
@@ -120,37 +112,39 @@ class Recorder:
         self._film_crew = ThreadPoolExecutor(1, "films")
         self._filming: Future[None] | None = None
         self._events = (out / "events.jsonl").open("a", encoding="utf-8")
-        # Held as long as this process lives, so that nobody takes the run for one that was killed.
-        fcntl.flock(self._events, fcntl.LOCK_EX | fcntl.LOCK_NB)
         self._bodies = _Cast(sim)
         self._write_manifest("running")
 
     def begin(self, observations: Mapping[str, Mapping[str, Any]]) -> None:
         """Record the state before the first step, and what is seen then."""
-        self._take(0, observations)
+        with self._errors():
+            self._take(0, observations)
 
     def write(self, result: StepResult) -> None:
         """Record a step."""
         self._hash = result.hash
-        self._take(self.sim.metrics.steps, result.observations)
-        self._write_events(result.events)
-        if self.sim.metrics.steps % PART == 0:
-            self._flush()
-            self._write_manifest("running")
+        with self._errors():
+            self._take(self.sim.metrics.steps, result.observations)
+            self._write_events(result.events)
+            if self.sim.metrics.steps % PART == 0:
+                self._flush()
+                self._write_manifest("running")
 
     def close(self, status: str = "complete") -> dict[str, Any]:
         """Finish the run and return its metrics."""
-        if self._steps:
-            self._flush()
-        self._finish_filming()
-        self._film_crew.shutdown()
-        for film in self._films.values():
-            film.close()
-        self._films = {}
-        self._events.close()
-        metrics = self.metrics()
-        write_json(self.out / "metrics.json", metrics)
-        self._write_manifest(status)
+        with self._errors(), ExitStack() as closed:
+            closed.callback(self._lock.release)
+            closed.callback(self._events.close)
+            if self._steps:
+                self._flush()
+            self._finish_filming()
+            self._film_crew.shutdown()
+            for film in self._films.values():
+                film.close()
+            self._films = {}
+            metrics = self.metrics()
+            write_json(self.out / "metrics.json", metrics)
+            self._write_manifest(status)
         return metrics
 
     def __enter__(self) -> Recorder:
@@ -159,11 +153,14 @@ class Recorder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if not self._events.closed:
+        if self._events.closed:
+            return
+        # What cannot be written any more was said by the error that ended the block.
+        with suppress(OutputError) if isinstance(error, OutputError) else nullcontext():
             self.close("complete" if kind is None else "stopped")
 
     def metrics(self) -> dict[str, Any]:
-        """Counts and seconds so far; see `docs/formats.md`."""
+        """Return counts and seconds so far; see `docs/formats.md`."""
         sim = self.sim
         wall = time.perf_counter() - self._began
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -182,20 +179,27 @@ class Recorder:
             "seconds_by_phase": {name: round(value, 3) for name, value in counts.seconds.items()},
         }
 
+    @contextmanager
+    def _errors(self) -> Iterator[None]:
+        """Make one sentence of a full disk; of a folder that was taken away, too, instead of making it anew."""
+        with folder_errors(self.out):
+            self._lock.confirm()
+            yield
+
     def _take(self, step: int, observations: Mapping[str, Mapping[str, Any]]) -> None:
         rows = self._bodies.rows(step)
         self._rows.append(rows)
-        self._steps.append((step, self.sim.stage.second, self._hash))
+        self._steps.append((step, self.sim.state.second, self._hash))
         watch = time.perf_counter()
         self._finish_filming()
         pictures = {name: seen["rgb"] for name, seen in observations.items() if "rgb" in seen}
         if pictures:
-            self._filming = self._film_crew.submit(self._film, pictures, self.sim.colours())
+            self._filming = self._film_crew.submit(self._film, pictures, self.sim.rgb_waiter())
         seconds = self.sim.metrics.seconds
         seconds["films"] = seconds.get("films", 0.0) + time.perf_counter() - watch
 
-    def _film(self, pictures: Mapping[str, NDArray[np.uint8]], colours: Callable[[], None]) -> None:
-        colours()
+    def _film(self, pictures: Mapping[str, NDArray[np.uint8]], wait: Callable[[], None]) -> None:
+        wait()
         for name, picture in pictures.items():
             if name not in self._films:
                 self._films[name] = ViewFilm(self.out / "views" / f"{name}.mp4", picture.shape[0])
@@ -258,9 +262,9 @@ class _Cast:
         self._sim = sim
         self.agents: list[dict[str, Any]] = []
         self.entries: list[dict[str, Any]] = []
-        stage = sim.stage
-        for i, name in enumerate(stage.people.names):
-            entity = int(stage.people.entity[i])
+        state = sim.state
+        for i, name in enumerate(state.people.names):
+            entity = int(state.people.entity[i])
             person = sim.residents[i] if i < len(sim.residents) else None
             self.agents.append(
                 {
@@ -271,11 +275,11 @@ class _Cast:
                     "person": None if person is None else _person(person, sim),
                 }
             )
-        if stage.robots is not None:
-            bodies = stage.robots.bodies()
+        if state.robots is not None:
+            bodies = state.robots.bodies()
             self.agents += [
                 {"name": name, "kind": "robot", "entity": int(entity), "resident": None, "person": None}
-                for name, entity in zip(stage.robots.names, bodies.entity, strict=True)
+                for name, entity in zip(state.robots.names, bodies.entity, strict=True)
             ]
         for bodies in self._bodies():
             for k in range(len(bodies)):
@@ -291,26 +295,26 @@ class _Cast:
                         ],
                     }
                 )
-        for k, entity in enumerate(stage.goods.entity):
-            size = [round(float(value), 3) for value in stage.goods.size[k]]
-            self.entries.append({"entity": int(entity), "kind": "object", "name": stage.goods.names[k], "size": size})
+        for k, entity in enumerate(state.objects.entity):
+            size = [round(float(value), 3) for value in state.objects.size[k]]
+            self.entries.append({"entity": int(entity), "kind": "object", "name": state.objects.names[k], "size": size})
 
     def _bodies(self) -> list[Bodies]:
-        stage = self._sim.stage
-        everyone = stage.people.bodies_of(np.arange(len(stage.people)))
-        return [everyone] + [s.bodies() for s in (stage.robots, stage.traffic, stage.transit) if s is not None]
+        state = self._sim.state
+        everyone = state.people.bodies_of(np.arange(len(state.people)))
+        return [everyone] + [s.bodies() for s in (state.robots, state.traffic, state.transit) if s is not None]
 
     def rows(self, step: int) -> list[NDArray[Any]]:
-        """The columns of one step, in the order of `_COLUMNS`."""
-        stage = self._sim.stage
-        bodies, goods = Bodies.joined(self._bodies()), stage.goods
-        entity = np.concatenate([bodies.entity, goods.entity])
-        position = np.vstack([bodies.position, goods.position]).astype(np.float32)
+        """Return the columns of one step, in the order of `_COLUMNS`."""
+        state = self._sim.state
+        bodies, objects = Bodies.joined(self._bodies()), state.objects
+        entity = np.concatenate([bodies.entity, objects.entity])
+        position = np.vstack([bodies.position, objects.position]).astype(np.float32)
         clip = np.full(len(entity), -1, np.int16)
         status = np.full(len(entity), -1, np.int8)
-        clip[: len(stage.people)] = stage.people.clip
-        status[: len(stage.people)] = stage.people.status
-        yaw = np.concatenate([bodies.yaw, goods.yaw]).astype(np.float32)
+        clip[: len(state.people)] = state.people.clip
+        status[: len(state.people)] = state.people.status
+        yaw = np.concatenate([bodies.yaw, objects.yaw]).astype(np.float32)
         steps = np.full(len(entity), step, np.int32)
         return [steps, entity, position[:, 0], position[:, 1], position[:, 2], yaw, clip, status]
 
@@ -342,4 +346,4 @@ def _write_table(path: Path, table: pa.Table) -> None:
     write_bytes(path, sink.getvalue().to_pybytes())
 
 
-__all__ = ["Recorder", "Run", "ViewFilm", "is_being_recorded", "read_run"]
+__all__ = ["Recorder", "Run", "ViewFilm", "read_run"]

@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from vico.errors import EmptyInputError, MissingFileError, SchemaError
-from vico.world.files import read_json
+from vico.io.files import read_json
 
 SCHEMA = "vico.run"
 VERSION = 1
@@ -36,7 +36,7 @@ class Run:
         By step and body, float32, shapes ``(s, n, 3)`` and ``(s, n)``; NaN where a body was not there.
     clip, status
         By step and body, shape ``(s, n)``; -1 where a body has none. Clips are indices into
-        `vico.sim.avatars.CLIPS`, statuses values of `vico.sim.state.Status`.
+        `vico.sim.avatars.CLIPS`, statuses values of `vico.rules.ActionStatus`.
     events
         As in ``events.jsonl``, those of recorded steps only.
     """

@@ -1,28 +1,29 @@
-"""The run as the renderer sees it: the world's meshes once, and everything that moves anew in every step."""
+"""Pictures of a simulation: the world's meshes are set once, everything that moves anew in every step."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.people import PASSERS_BY, Appearance, body_of, passer_by
+from vico.clock import DAY
 from vico.community.model import Resident
-from vico.render import Cameras, Frames, Lighting, Stills, render
-from vico.render.skinning import Crowd, crowd_of, skin
+from vico.render import Cameras, Frames, Lighting, ViewCache, render
+from vico.render.skinning import BodyBatch, batch_bodies, skin
 from vico.render.world_scene import scene_of
-from vico.sim.animation import clip_index, hand_frames, pose, stride_length, style_of
+from vico.seeds import rng
+from vico.sim.animation import STYLE, clip_index, hand_frames, pose, stride_length, style_of
 from vico.sim.bodies import Drawn
-from vico.sim.config import DAY, SimConfig
+from vico.sim.config import SimConfig
 from vico.sim.observations import Views
-from vico.sim.stage import Stage
+from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Vehicle
+from vico.threads import in_order
 from vico.world.folder import World
 from vico.world.mesh import Surface
-from vico.world.seeds import rng
-from vico.world.threads import in_order
 
 # The sun moves slowly: the light is set anew this often, seconds.
 _LIGHT_EVERY = 60.0
@@ -30,7 +31,31 @@ _LIGHT_EVERY = 60.0
 _AWAY = np.array([0.0, 0.0, -1000.0])
 
 
-class Seen(Protocol):
+class _Motion(NamedTuple):
+    """How people move, one row a person.
+
+    Attributes
+    ----------
+    clip
+        Motion numbers (`clip_index`), int64.
+    phase
+        Place in the cycle, 0..1 and on, float64.
+    speed
+        Over the ground, metres a second, float64.
+    position
+        Feet, ENU metres, float64, shape ``(n, 3)``.
+    yaw
+        Radians, counter-clockwise from east, float64.
+    """
+
+    clip: NDArray[np.int64]
+    phase: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    position: NDArray[np.float64]
+    yaw: NDArray[np.float64]
+
+
+class RenderedSimulation(Protocol):
     """What the renderer asks of a simulation."""
 
     @property
@@ -42,11 +67,11 @@ class Seen(Protocol):
         """What the run is asked to be."""
 
     @property
-    def colours_later(self) -> bool:
-        """Whether `look` may return before RGB is there."""
+    def defer_rgb(self) -> bool:
+        """Whether `render` may return before RGB is there."""
 
     @property
-    def stage(self) -> Stage:
+    def state(self) -> SimulationState:
         """Everybody and everything, as it is now."""
 
     @property
@@ -61,122 +86,108 @@ class Seen(Protocol):
         """Kind and name of an entity."""
 
 
-class SceneEyes:
-    """Renders what agents see.
+class SceneRenderer:
+    """The `ObservationRenderer` of a running simulation: its world's meshes, and all that moves set anew each time.
 
     Parameters
     ----------
     sim
-        The simulation to look at, complete with its loose things.
+        The simulation to render, complete with its movable objects.
     """
 
-    def __init__(self, sim: Seen) -> None:
+    def __init__(self, sim: RenderedSimulation) -> None:
         self._image = sim.config.image
         self._frames: Frames | None = None
         self._scene = scene_of(sim.world, prototypes=_shapes(sim))
         self._attach(sim)
 
-    def moved_to(self, sim: Seen) -> SceneEyes:
-        """Eyes for another simulation: with this scene, where it has all that is to be seen, else with a new one."""
+    def rebind(self, sim: RenderedSimulation) -> SceneRenderer:
+        """Return a renderer of another simulation: with this scene if it has all that is to be seen, else a new one."""
         known = set(_shapes(sim)) <= set(self._scene.names)
         if sim.world is not self._sim.world or not known or sim.config.image != self._image:
-            return SceneEyes(sim)
+            return SceneRenderer(sim)
         self._attach(sim)
         return self
 
-    def _attach(self, sim: Seen) -> None:
+    def _attach(self, sim: RenderedSimulation) -> None:
         self._sim = sim
         self._lit = -1.0
-        self.finish()
-        self._stills = Stills()
-        self._people(sim)
+        self.wait()
+        self._cache = ViewCache(defer_rgb=sim.defer_rgb)
+        self._load_bodies(sim)
 
-    def _people(self, sim: Seen) -> None:
-        stage = sim.stage
+    def _load_bodies(self, sim: RenderedSimulation) -> None:
+        """Make everybody's body and what tells their movements apart."""
+        state = sim.state
         looks = [Appearance.from_dict(r.appearance) for r in sim.residents]
-        strangers = stage.people.names[len(looks) :]
-        entities = stage.people.entity.tolist()
-        walkers = stage.traffic.walkers.entity.tolist() if stage.traffic is not None else []
+        strangers = state.people.names[len(looks) :]
+        entities = state.people.entity.tolist()
+        walkers = state.traffic.walkers.entity.tolist() if state.traffic is not None else []
         # Which of the shared looks come, and in which order, is the run's; no two alike before all have come.
         order = rng(sim.config.seed, "looks").permutation(PASSERS_BY)
         looks += [passer_by(int(order[k % PASSERS_BY])) for k in range(len(strangers) + len(walkers))]
         made = dict(zip(dict.fromkeys(looks), in_order(body_of, dict.fromkeys(looks)), strict=True))
         bodies = [made[look] for look in looks]
-        self._crowd: Crowd = crowd_of(bodies, [*entities, *walkers])
-        names = [*stage.people.names, *(f"pedestrian_{k}" for k in range(len(walkers)))]
+        self._bodies: BodyBatch = batch_bodies(bodies, [*entities, *walkers])
+        names = [*state.people.names, *(f"pedestrian_{k}" for k in range(len(walkers)))]
         style = [
             style_of(body, rng(sim.config.seed, "manner", name), age=look.age)
             for body, name, look in zip(bodies, names, looks, strict=True)
         ]
-        self._style = np.stack(style) if style else np.zeros((0, 1), np.float32)
+        self._style = np.stack(style) if style else np.zeros(0, STYLE)
         self._height = np.array([body.height for body in bodies], np.float64)
 
-    def look(self, stage: Stage, poses: NDArray[np.float64], own: NDArray[np.int32]) -> Views:
-        """Render one view a pose, in one call; each without the body that is its own."""
-        self.finish()
-        self._light(stage)
-        self._set_people_and_things(stage)
-        cameras = Cameras(poses[:, :3], poses[:, 3:], width=self._image, height=self._image)
-        later = self._sim.colours_later
-        frames = render(self._scene, cameras, without=own, before=self._stills, colours_later=later)
-        self._frames = frames if later else None
+    def render(self, state: SimulationState, poses: NDArray[np.float64], own: NDArray[np.int32]) -> Views:
+        """Render one view for each pose in one call; see `ObservationRenderer.render`."""
+        self.wait()
+        self._set_light(state)
+        self._set_moving(state)
+        side = self._image
+        cameras = Cameras(poses[:, :3], poses[:, 3:], width=side, height=side, hidden_entity=own)
+        frames = render(self._scene, cameras, cache=self._cache)
+        self._frames = frames if self._cache.defer_rgb else None
         return Views(frames.rgb, frames.depth, frames.segmentation, cameras.extrinsics, cameras.intrinsics)
 
-    def finish(self) -> None:
-        """Wait for colours that are still being worked on."""
+    def wait(self) -> None:
+        """Wait for RGB that is still being worked on."""
         if self._frames is not None:
-            self._frames.finish()
+            self._frames.wait()
             self._frames = None
 
-    def under_way(self) -> Callable[[], None]:
-        """What to call, from any thread, to wait for the colours of the last look."""
-        return self._frames.finish if self._frames is not None else _nothing
+    def rgb_waiter(self) -> Callable[[], None]:
+        """Return what to call, from any thread, to wait for the RGB of the last `render`."""
+        return self._frames.wait if self._frames is not None else _nothing
 
-    def photograph(self, stage: Stage, cameras: Cameras, *, samples: int = 2) -> NDArray[np.uint8]:
-        """Take stills with any cameras, smoothed by `samples` squared; uint8, shape ``(k, h, w, 3)``."""
-        self.finish()
-        self._light(stage)
-        self._set_people_and_things(stage)
+    def render_cameras(self, state: SimulationState, cameras: Cameras, *, samples: int = 2) -> NDArray[np.uint8]:
+        """Render any cameras, RGB only, smoothed by `samples` squared; uint8, shape ``(k, h, w, 3)``."""
+        self.wait()
+        self._set_light(state)
+        self._set_moving(state)
         return render(self._scene, cameras, depth=False, segmentation=False, samples=samples).rgb
 
     def names(self, entities: Sequence[int]) -> dict[int, dict[str, str]]:
-        """Kind and name of entities."""
+        """Return kind and name of entities."""
         return {entity: self._sim.entity(entity) for entity in entities}
 
-    def _light(self, stage: Stage) -> None:
-        moment = stage.second // _LIGHT_EVERY
+    def _set_light(self, state: SimulationState) -> None:
+        moment = state.second // _LIGHT_EVERY
         if moment != self._lit:
             self._lit = moment
             origin = self._sim.world.manifest.origin
             self._scene.lighting = Lighting.at(moment * _LIGHT_EVERY % DAY, origin.lat)
 
-    def _set_people_and_things(self, stage: Stage) -> None:
-        p = stage.people
-        speed = np.hypot(p.velocity[:, 0], p.velocity[:, 1])
-        clip, phase, yaw = p.clip.astype(np.int64), p.phase.copy(), p.yaw.copy()
-        position = p.position.copy()
-        position[p.vehicle == Vehicle.BUS] += _AWAY
-        if stage.traffic is not None:
-            walkers = stage.traffic.walkers
-            pace, walked = stage.traffic.gait
-            height = self._height[len(p) :]
-            moving = pace > 0.05
-            clips = np.where(moving, clip_index("walk"), clip_index("idle"))
-            stride = np.where(moving, stride_length(clips, pace, height), 2.0)
-            # People at rest breathe by the clock, each at their own time.
-            at_rest = stage.second * 0.5 + np.arange(len(pace)) * 0.37
-            clip = np.concatenate([clip, clips])
-            phase = np.concatenate([phase, np.where(moving, walked / stride, at_rest) % 1.0])
-            speed = np.concatenate([speed, pace])
-            position = np.vstack([position, walkers.position])
-            yaw = np.concatenate([yaw, walkers.yaw])
-        rotations, offsets = pose(clip, phase, speed, self._style)
-        crowd = self._crowd
-        vertices, normals = skin(crowd, rotations, offsets, position, yaw)
-        self._scene.set_skinned(vertices, normals, crowd.triangles, crowd.colour, crowd.entity)
-        drawn = [s.draw() for s in (stage.traffic, stage.transit, stage.robots) if s is not None]
-        if len(stage.goods):
-            drawn.append(self._goods(stage, rotations, offsets))
+    def _set_moving(self, state: SimulationState) -> None:
+        """Put everything that moves where it is now."""
+        motion = _motion_of_agents(state)
+        if state.traffic is not None:
+            motion = _joined_motion(motion, self._motion_of_pedestrians(state))
+        rotations, offsets = pose(motion.clip, motion.phase, motion.speed, self._style)
+        bodies = self._bodies
+        vertices, normals = skin(bodies, rotations, offsets, motion.position, motion.yaw)
+        self._scene.set_skinned(vertices, normals, bodies.triangles, bodies.colour, bodies.entity)
+        drawn = [s.draw() for s in (state.traffic, state.transit, state.robots) if s is not None]
+        if len(state.objects):
+            drawn.append(self._objects(state, rotations, offsets))
         index = [np.array([self._scene.names[d.prototypes[i]] for i in d.index], np.int32) for d in drawn]
         self._scene.set_rigid(
             _joined(index, (0,), np.int32),
@@ -184,37 +195,64 @@ class SceneEyes:
             _joined([d.entity for d in drawn], (0,), np.int32),
         )
 
-    def _goods(self, stage: Stage, rotations: NDArray[np.float32], offsets: NDArray[np.float32]) -> Drawn:
-        """Loose things: where they lie, or hanging from the hand that holds them."""
-        goods, p = stage.goods, stage.people
-        names = sorted(set(goods.prototypes))
-        transforms = np.zeros((len(goods), 4, 4))
-        c, s = np.cos(goods.yaw), np.sin(goods.yaw)
+    def _motion_of_pedestrians(self, state: SimulationState) -> _Motion:
+        """Return how the pedestrians of the traffic move: they walk, or stand and breathe."""
+        assert state.traffic is not None
+        walkers = state.traffic.walkers
+        speed, walked = state.traffic.gait
+        height = self._height[len(state.people) :]
+        moving = speed > 0.05
+        clip = np.where(moving, clip_index("walk"), clip_index("idle"))
+        stride = np.where(moving, stride_length(clip, speed, height), 2.0)
+        # People at rest breathe by the clock, each at their own time.
+        at_rest = state.second * 0.5 + np.arange(len(speed)) * 0.37
+        phase = np.where(moving, walked / stride, at_rest) % 1.0
+        return _Motion(clip, phase, speed, walkers.position, walkers.yaw)
+
+    def _objects(self, state: SimulationState, rotations: NDArray[np.float32], offsets: NDArray[np.float32]) -> Drawn:
+        """Return the movable objects: where they lie, or hanging from the hand that holds them."""
+        objects, p = state.objects, state.people
+        names = sorted(set(objects.prototypes))
+        transforms = np.zeros((len(objects), 4, 4))
+        c, s = np.cos(objects.yaw), np.sin(objects.yaw)
         transforms[:, 0, 0], transforms[:, 0, 1] = c, -s
         transforms[:, 1, 0], transforms[:, 1, 1] = s, c
         transforms[:, 2, 2] = transforms[:, 3, 3] = 1.0
-        transforms[:, :3, 3] = goods.position
-        held = np.flatnonzero(goods.hand >= 0)
+        transforms[:, :3, 3] = objects.position
+        held = np.flatnonzero(objects.hand >= 0)
         if len(held):
-            palms = hand_frames(self._crowd.joints[: len(p)], rotations[: len(p)], offsets[: len(p)])
+            palms = hand_frames(self._bodies.joints[: len(p)], rotations[: len(p)], offsets[: len(p)])
             for k in held:
-                i = int(np.flatnonzero(p.entity == goods.holder[k])[0])
-                x, y, z = palms[i, goods.hand[k], :3, 3]
+                i = int(np.flatnonzero(p.entity == objects.holder[k])[0])
+                x, y, z = palms[i, objects.hand[k], :3, 3]
                 cy, sy = np.cos(p.yaw[i]), np.sin(p.yaw[i])
-                hanging = z - goods.size[k, 2]
+                hanging = z - objects.size[k, 2]
                 transforms[k, :3, 3] = p.position[i] + np.array([cy * x - sy * y, sy * x + cy * y, hanging])
-        index = np.array([names.index(name) for name in goods.prototypes], np.int32)
-        return Drawn(names, index, transforms.astype(np.float32), goods.entity)
+        index = np.array([names.index(name) for name in objects.prototypes], np.int32)
+        return Drawn(names, index, transforms.astype(np.float32), objects.entity)
+
+
+def _motion_of_agents(state: SimulationState) -> _Motion:
+    """Return how residents and assistants move; who rides behind a bus's windows is put out of sight."""
+    p = state.people
+    speed = np.hypot(p.velocity[:, 0], p.velocity[:, 1])
+    position = p.position.copy()
+    position[p.vehicle == Vehicle.BUS] += _AWAY
+    return _Motion(p.clip.astype(np.int64), p.phase.copy(), speed, position, p.yaw.copy())
+
+
+def _joined_motion(a: _Motion, b: _Motion) -> _Motion:
+    return _Motion(*(np.concatenate(pair) for pair in zip(a, b, strict=True)))
 
 
 def _nothing() -> None:
     pass
 
 
-def _shapes(sim: Seen) -> dict[str, Sequence[Surface]]:
-    """Every shape that moves in a run, by name."""
+def _shapes(sim: RenderedSimulation) -> dict[str, Sequence[Surface]]:
+    """Return every shape that moves in a run, by name."""
     shapes: dict[str, Sequence[Surface]] = {}
-    for system in (sim.stage.traffic, sim.stage.transit, sim.stage.robots):
+    for system in (sim.state.traffic, sim.state.transit, sim.state.robots):
         if system is not None:
             shapes |= system.prototypes()
     return shapes | dict(sim.shapes)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Mapping
+import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import MissingFileError, SchemaError
-from vico.world.files import write_bytes
+from vico.io.files import write_bytes
+from vico.version import __version__
 
 SCHEMA = "vico.snapshot"
 VERSION = 1
 
 
 def state_hash(arrays: Mapping[str, NDArray[Any]]) -> str:
-    """BLAKE2b-128 over names, types, shapes and bytes of all arrays, in the order given; hex."""
+    """Return BLAKE2b-128 over names, types, shapes and bytes of all arrays, in the order given; hex."""
     digest = hashlib.blake2b(digest_size=16)
     for name, array in arrays.items():
         digest.update(f"{name}|{array.dtype.str}|{array.shape}|".encode())
@@ -28,14 +30,36 @@ def state_hash(arrays: Mapping[str, NDArray[Any]]) -> str:
 
 
 def copied(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """A copy that later steps leave alone."""
+    """Return a copy that later steps leave alone."""
     return {name: np.array(array, copy=True) for name, array in arrays.items()}
 
 
-def part(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArray[Any]]:
-    """The arrays whose names start with ``prefix.``, without it."""
+def arrays_of(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArray[Any]]:
+    """Return the arrays whose names start with ``prefix.``, without it."""
     head = prefix + "."
     return {name[len(head) :]: array for name, array in arrays.items() if name.startswith(head)}
+
+
+def identity(config: Mapping[str, Any], world: str, residents: Sequence[str], objects: Sequence[str]) -> str:
+    """Hash what decides how a simulation runs on from a state: version, configuration, world, people and objects.
+
+    Parameters
+    ----------
+    config
+        Record of the configuration.
+    world
+        Digest of the world.
+    residents, objects
+        Names, in their order.
+    """
+    what = {
+        "version": __version__,
+        "config": config,
+        "world": world,
+        "community": list(residents),
+        "objects": list(objects),
+    }
+    return hashlib.sha256(json.dumps(what, sort_keys=True, default=str).encode()).hexdigest()
 
 
 def write_snapshot(path: Path, arrays: Mapping[str, NDArray[Any]], *, owner: str) -> None:

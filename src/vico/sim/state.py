@@ -1,4 +1,4 @@
-"""The state of everyone who can be played and of every loose thing, as arrays addressed by stable indices."""
+"""The state of all avatars and movable objects, as arrays addressed by stable indices."""
 
 from __future__ import annotations
 
@@ -19,26 +19,12 @@ FIRST_ASSISTANT = 1_010_000
 FIRST_ROBOT = 1_020_000
 FIRST_TRAFFIC = 1_100_000
 FIRST_BIKE = 1_200_000
-FIRST_GOODS = 1_900_000
+FIRST_OBJECT = 1_900_000
 
 RADIUS = 0.25
 # People look a little down while they walk, radians.
 LEVEL_GAZE = -0.1
 REASON_LENGTH = 240
-
-# How far a hand reaches along the ground, and above the feet, metres.
-REACH = 1.5
-REACH_UP = 2.2
-
-
-class Status(IntEnum):
-    """How the last action went."""
-
-    OK = 0
-    COLLISION = 1
-    REFUSED = 2
-    LATE = 3
-    FAILED = 4
 
 
 class Vehicle(IntEnum):
@@ -90,32 +76,55 @@ class ArrayState:
 
 @dataclass
 class People(ArrayState):
-    """Avatars: residents first, then assistants.
+    """Avatars: residents first, then assistants. Row ``i`` of every array is the agent ``names[i]``.
 
     Attributes
     ----------
+    names
+        Names of the agents, ``resident_0`` and on.
+    entity
+        Entity numbers, int32, shape ``(n,)``.
+    kind
+        Index into `vico.sim.bodies.KINDS`, int8, shape ``(n,)``.
+    height
+        Body height, metres, float64, shape ``(n,)``.
     position
-        Centre of the feet, metres, float64, shape ``(n, 3)``.
+        Centre of the feet, ENU metres, float64, shape ``(n, 3)``.
     yaw, pitch
-        Where the eyes look, radians, float64, shape ``(n,)``; the body turns with the yaw only.
+        Direction of the gaze, radians: counter-clockwise from east, and up from the horizon; float64, shape ``(n,)``.
+        The body turns with the yaw only.
+    velocity
+        Over the ground in the last sub-step, ENU metres a second, float64, shape ``(n, 2)``.
     move_left, move_speed
-        Metres still to walk in this step, and metres a second.
+        Metres still to walk in this step, and metres a second, float64, shape ``(n,)``.
     turn_left
-        Radians still to turn in this step; positive is counter-clockwise.
+        Radians still to turn in this step, counter-clockwise positive, float64, shape ``(n,)``.
     clip, phase
-        Index into the animation's clips, and where in it (cycles).
+        Index into `vico.sim.animation.CLIPS`, int16, and the position in that clip, cycles 0..1, float64; shape
+        ``(n,)``.
     action_clip
-        Clip that the last action asked for, -1 for none: it outlasts the motion until the next action.
+        Clip that the last action asked for, -1 for none, int16, shape ``(n,)``: it outlasts the motion until the next
+        action.
+    posture
+        A `Posture`, int8, shape ``(n,)``.
     room, place
-        Index of the room and place the avatar is in, -1 outdoors.
-    vehicle, vehicle_entity, vehicle_yaw
-        What it rides on, and which way that was heading when last looked at.
+        Index of the room and place the avatar is in, -1 outdoors, int32, shape ``(n,)``.
+    vehicle, vehicle_entity
+        A `Vehicle`, int8, and the entity number of the one ridden (0 for none), int32; shape ``(n,)``.
+    vehicle_yaw
+        Heading of the bus at the last sub-step, radians, float64, shape ``(n,)``.
     held
         Entities in the left and right hand, 0 for none, int32, shape ``(n, 2)``.
+    cash
+        Money left, float64, shape ``(n,)``.
+    status
+        A `vico.rules.ActionStatus`: how the last action went, int8, shape ``(n,)``.
     contact
-        Entity that stopped the last motion; -1 for a wall, the map's edge or furniture, 0 for nothing.
-    reason
-        Why the last action was refused, late or failed; "" if it was not.
+        Entity that stopped the last motion; -1 for a wall, the map's edge or furniture, 0 for nothing; int32, shape
+        ``(n,)``.
+    reason, reason_code
+        Why the last action was stopped, refused, late or failed: in words ("" if it was not), and as a
+        `vico.rules.ReasonCode`, int16; shape ``(n,)``.
     """
 
     names: list[str]
@@ -143,6 +152,7 @@ class People(ArrayState):
     status: NDArray[np.int8]
     contact: NDArray[np.int32]
     reason: NDArray[np.str_]
+    reason_code: NDArray[np.int16]
 
     @classmethod
     def standing(cls, names: list[str], kinds: list[int], entities: list[int]) -> Self:
@@ -174,6 +184,7 @@ class People(ArrayState):
             status=np.zeros(n, np.int8),
             contact=np.zeros(n, np.int32),
             reason=np.full(n, "", f"<U{REASON_LENGTH}"),
+            reason_code=np.zeros(n, np.int16),
         )
 
     def __len__(self) -> int:
@@ -207,21 +218,27 @@ RIDER_REACH = 0.6
 
 
 @dataclass
-class Goods(ArrayState):
-    """Loose things to carry.
+class MovableObjects(ArrayState):
+    """Movable objects: things that people carry. Row ``k`` of every array is the object ``names[k]``.
 
     Attributes
     ----------
+    names
+        What agents see them called.
     prototypes
         Name of the shape each is drawn with.
-    position, yaw
-        Centre of the bottom, metres; follows the hand while held.
+    entity
+        Entity numbers, int32, shape ``(m,)``.
+    position
+        Centre of the bottom, ENU metres, float64, shape ``(m, 3)``; follows the hand while held.
+    yaw
+        Counter-clockwise from east, radians, float64, shape ``(m,)``.
     holder
-        Entity of who or what carries it (an avatar or a robot's deck), 0 for nobody.
+        Entity of who or what carries it (an avatar or a robot's deck), 0 for nobody, int32, shape ``(m,)``.
     hand
-        0 left, 1 right, -1 if not in a hand.
+        0 left, 1 right, -1 if not in a hand, int8, shape ``(m,)``.
     room
-        Index of the room it lies in, -1 outdoors.
+        Index of the room it lies in, -1 outdoors, int32, shape ``(m,)``.
     size
         Extents of its box, metres, float64, shape ``(m, 3)``.
     """
@@ -238,7 +255,7 @@ class Goods(ArrayState):
 
     @classmethod
     def none(cls) -> Self:
-        """No goods."""
+        """No objects."""
         return cls(
             [],
             [],
@@ -255,15 +272,15 @@ class Goods(ArrayState):
         return len(self.names)
 
     def index(self, entity: int) -> int:
-        """Index of an entity, -1 if it is none of the goods."""
+        """Index of an entity, -1 if it is none of the objects."""
         found = np.flatnonzero(self.entity == entity)
         return int(found[0]) if len(found) else -1
 
     def add(
         self, name: str, prototype: str, position: NDArray[np.float64], room: int, size: NDArray[np.float64], yaw: float
     ) -> int:
-        """Add one lying thing; returns its entity."""
-        entity = FIRST_GOODS + len(self)
+        """Add one object that lies somewhere; return its entity number."""
+        entity = FIRST_OBJECT + len(self)
         self.names.append(name)
         self.prototypes.append(prototype)
         self.entity = np.append(self.entity, np.int32(entity))

@@ -7,15 +7,15 @@ import shapely
 from numpy.typing import NDArray
 
 from vico.errors import InputError
+from vico.seeds import rng
 from vico.sim.avatars import clearances
 from vico.sim.bodies import Bodies
 from vico.sim.config import SimConfig
 from vico.sim.robots import RobotPopulation
 from vico.sim.state import FIRST_BIKE, FIRST_ROBOT, FIRST_TRAFFIC
 from vico.sim.traffic import Traffic
-from vico.sim.transit import TransitSystem, traffic_and_transit
+from vico.sim.transit import BusPlan, TransitSystem, plan_buses
 from vico.world.folder import World
-from vico.world.seeds import rng
 
 # Robots start where there is this much free ground, and this far from everybody, metres.
 _ROBOT_ROOM = 1.0
@@ -24,22 +24,11 @@ _ROBOT_APART = 1.5
 
 def traffic_and_transit_of(world: World, config: SimConfig) -> tuple[Traffic | None, TransitSystem | None]:
     """Cars and pedestrians, buses and bicycles; None for what nobody asked for, or the world has not."""
-    transit = config.transit and bool(world.transit.lines or world.transit.bike_stations)
-    if transit:
-        return traffic_and_transit(
-            world.lanes,
-            world.transit,
-            world.height,
-            cars=config.cars,
-            pedestrians=config.pedestrians,
-            seed=config.seed,
-            first_entity=FIRST_TRAFFIC,
-            first_bike=FIRST_BIKE,
-            second=float(config.start),
-            solids=solids_of(world),
-        )
-    if not config.cars and not config.pedestrians:
+    second = float(config.start)
+    has_transit = config.transit and bool(world.transit.lines or world.transit.bike_stations)
+    if not has_transit and not config.cars and not config.pedestrians:
         return None, None
+    plan = plan_buses(world.transit, world.lanes, second) if has_transit else BusPlan()
     traffic = Traffic(
         world.lanes,
         world.height,
@@ -47,9 +36,12 @@ def traffic_and_transit_of(world: World, config: SimConfig) -> tuple[Traffic | N
         pedestrians=config.pedestrians,
         seed=config.seed,
         first_entity=FIRST_TRAFFIC,
+        buses=plan.bus_routes,
         solids=solids_of(world),
     )
-    return traffic, None
+    if not has_transit:
+        return traffic, None
+    return traffic, TransitSystem(world.transit, traffic, plan, second=second, first_bike=FIRST_BIKE)
 
 
 def solids_of(world: World) -> list[shapely.Polygon]:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.clock import DAY, seconds_of_day
 from vico.community.model import ItemType, ScheduleItem
-from vico.sim.config import DAY, seconds_of_day
-from vico.sim.stage import Stage
+from vico.sim.simulation_state import SimulationState
 from vico.sim.state import ArrayState
 
 # Somebody who comes up to a minute after the hour is not called late.
@@ -38,7 +38,7 @@ class Whereabouts:
 
 
 def appointments(schedule: Sequence[ScheduleItem], places: dict[str, int]) -> list[Appointment]:
-    """The stays of a day, neighbours at one place joined, travel left out."""
+    """Return the stays of a day, neighbours at one place joined, travel left out."""
     stays: list[Appointment] = []
     for item in schedule:
         if item.type is ItemType.COMMUTE or item.place is None or item.place not in places:
@@ -113,25 +113,25 @@ class Punctuality(ArrayState):
             np.zeros(n, np.int64),
         )
 
-    def watch(self, stage: Stage) -> None:
+    def watch(self, state: SimulationState) -> None:
         """Note arrivals and failures to arrive, as events and in the counts."""
-        second = stage.second % DAY
+        second = state.second % DAY
         for i in range(len(self.following)):
             k = int(self.following[i])
             if k >= self.start[i + 1]:
                 continue
             index = int(self.place[k])
-            place = stage.world.places[index]
-            name, position = stage.people.names[i], stage.people.position[i]
+            place = state.world.places[index]
+            name, position = state.people.names[i], state.people.position[i]
             is_late = second > self.due[k] + GRACE
             if is_late and not self.told[i]:
                 self.told[i] = True
                 self.late[i] += 1
-                stage.events.add("late", name, f"is late for {place.name}", position, place=place.id)
-            if self._is_there(i, index, stage):
+                state.events.add("late", name, f"is late for {place.name}", position, place=place.id)
+            if self._is_there(i, index, state):
                 behind = float(second - self.due[k])
                 self.arrivals[i] += 1
-                stage.events.add(
+                state.events.add(
                     "arrival", name, f"arrives at {place.name}", position, place=place.id, seconds_late=behind
                 )
             elif second <= self.until[k]:
@@ -139,9 +139,9 @@ class Punctuality(ArrayState):
             self.following[i] += 1
             self.told[i] = False
 
-    def _is_there(self, i: int, index: int, stage: Stage) -> bool:
-        place = stage.world.places[index]
+    def _is_there(self, i: int, index: int, state: SimulationState) -> bool:
+        place = state.world.places[index]
         if place.rooms:
-            return bool(stage.people.place[i] == index)
-        away = np.hypot(*(stage.people.position[i, :2] - np.array(place.position[:2])))
-        return bool(stage.people.room[i] < 0 and away <= OPEN_REACH)
+            return bool(state.people.place[i] == index)
+        away = np.hypot(*(state.people.position[i, :2] - np.array(place.position[:2])))
+        return bool(state.people.room[i] < 0 and away <= OPEN_REACH)

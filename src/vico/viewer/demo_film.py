@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from vico.clock import seconds_of_day
 from vico.render.film import read_film, write_film
+from vico.threads import in_order
 from vico.viewer.map_picture import MapPicture
 from vico.viewer.recording import Recording
 from vico.world.folder import World
-from vico.world.threads import in_order
 
 WIDTH, HEIGHT = 1280, 720
 RATE = 16
@@ -89,7 +90,7 @@ def _most_alive(recording: Recording, count: int) -> list[str]:
 
 
 def _furnish(stage: Image.Image, recording: Recording, world: World, base: MapPicture) -> None:
-    """What never moves: legend, scale bar, north, attribution."""
+    """Draw what never moves: legend, scale bar, north, attribution."""
     draw = ImageDraw.Draw(stage)
     present = [kind for kind in _LABELS if any(body.kind == kind for body in recording.bodies)]
     draw.rounded_rectangle((8, HEIGHT - 34, 40 + 108 * len(present), HEIGHT - 8), 5, fill=_PAPER)
@@ -148,14 +149,16 @@ def _draw_view(
         frame.paste(Image.fromarray(image).resize((_TILE, _TILE), Image.Resampling.BILINEAR), (x, y))
     person = recording.people[name]
     now = recording.start + step
-    doing = next((s["activity"] for s in person["schedule"] if _second(s["start"]) <= now <= _second(s["end"])), "")
+    doing = next(
+        (s["activity"] for s in person["schedule"] if seconds_of_day(s["start"]) <= now <= seconds_of_day(s["end"])), ""
+    )
     draw = ImageDraw.Draw(frame)
     draw.text((x, y + _TILE + 3), f"{number + 1}  {person['name']}, {person['role']}"[:40], _INK, _font(14))
     draw.text((x, y + _TILE + 21), doing[:44], _SOFT, _font(13))
 
 
 def _draw_talk(frame: Image.Image, recording: Recording, step: int) -> None:
-    """The last things said."""
+    """Draw the last things said."""
     said = [e for e in recording.events if e.kind == "message" and step - 180 <= e.step <= step][-3:]
     draw = ImageDraw.Draw(frame)
     for k, event in enumerate(said):
@@ -163,8 +166,3 @@ def _draw_talk(frame: Image.Image, recording: Recording, step: int) -> None:
         y = HEIGHT - 86 + 28 * k
         line = f"{name.split()[0]}: {event.text}"
         draw.text((_LEFT, y), line if len(line) < 78 else line[:77] + "…", _INK, _font(14))
-
-
-def _second(clock: str) -> int:
-    hours, minutes, seconds = (int(part) for part in clock.split(":"))
-    return hours * 3600 + minutes * 60 + seconds

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from vico.sim.recording import Run
-from vico.viewer.recording import Body, Event, Recording
+from vico.viewer.recording import RecordedBody, RecordedEvent, Recording
 
 # Told by the map and the schedule already, or only of use to developers.
 _SILENT = {"refused", "collision"}
@@ -17,12 +17,12 @@ def recording_of(run: Run) -> Recording:
     """Read what the page and the film show out of a run."""
     by_entity = {agent["entity"]: agent["name"] for agent in run.manifest["agents"]}
     bodies = [
-        Body(b["entity"], b["kind"], b["name"], b["size"][0], b["size"][1], by_entity.get(b["entity"]))
+        RecordedBody(b["entity"], b["kind"], b["name"], b["size"][0], b["size"][1], by_entity.get(b["entity"]))
         for b in run.manifest["bodies"]
     ]
     shown = {body.entity: body.name for body in bodies}
     events = [
-        Event(e["step"], e["kind"], e["agent"], e["text"], (e["x"], e["y"]))
+        RecordedEvent(e["step"], e["kind"], e["agent"], e["text"], (e["x"], e["y"]))
         for e in run.events
         if e["kind"] not in _SILENT
     ]

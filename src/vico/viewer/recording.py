@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 
 @dataclass(frozen=True)
-class Body:
+class RecordedBody:
     """Something that moves; `agent` is the agent's name, None for traffic."""
 
     entity: int
@@ -23,7 +23,7 @@ class Body:
 
 
 @dataclass(frozen=True)
-class Event:
+class RecordedEvent:
     """Something that happened: `step` seconds after the start."""
 
     step: int
@@ -52,8 +52,8 @@ class Recording:
     path: Path
     start: int
     tracks: NDArray[np.float32]
-    bodies: list[Body]
-    events: list[Event]
+    bodies: list[RecordedBody]
+    events: list[RecordedEvent]
     people: dict[str, dict[str, Any]]
     views: dict[str, Path]
     metrics: dict[str, Any]

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from vico.io.files import write_bytes
 from vico.render.film import read_key_frames
+from vico.threads import in_order
 from vico.viewer.recording import Recording
-from vico.world.files import write_bytes
 from vico.world.folder import World
-from vico.world.threads import in_order
 
 UNIT = 0.02  # metres a track unit, at best: 16 bits reach 655 m; wider runs have larger units
 _HIDDEN = -32768
@@ -94,7 +94,7 @@ def _tracks(tracks: NDArray[np.float32], unit: float) -> str:
 
 
 def _pictures(film: Path | None) -> list[tuple[int, str]]:
-    """A picture every 20 s: views are filmed with a whole frame that often (`vico.sim.recorder`)."""
+    """Return a picture every 20 s: views are filmed with a whole frame that often (`vico.sim.recorder`)."""
     return [] if film is None else [(step, _uri(frame, 60)) for step, frame in read_key_frames(film)]
 
 

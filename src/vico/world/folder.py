@@ -30,11 +30,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from vico import __version__
 from vico.errors import MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
+from vico.io.files import read_json, sha256_of, write_bytes, write_json
+from vico.version import __version__
 from vico.world import model
-from vico.world.files import read_json, sha256_of, write_bytes, write_json
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface, read_glb
 from vico.world.model import Building, Entrance, Manifest, Place, Record, Roads, Room, Transit
@@ -319,8 +319,31 @@ def read_terrain(path: Path) -> HeightField:
 
 
 def manifest_bytes(manifest: Manifest) -> bytes:
-    """The bytes of ``world.json``."""
+    """Return the bytes of ``world.json``."""
     return (json.dumps(manifest.model_dump(mode="json"), indent=1, sort_keys=True, ensure_ascii=False) + "\n").encode()
+
+
+#: Files that every world has.
+REQUIRED = (
+    "terrain.npz",
+    "walkable.npz",
+    "buildings.json",
+    "entrances.json",
+    "places.json",
+    "rooms.json",
+    "objects.parquet",
+    "roads.json",
+    "roads.net.xml",
+    "roads.xodr",
+    "transit.json",
+    "meshes/ground.glb",
+    "meshes/buildings.glb",
+    "meshes/roofs.glb",
+    "meshes/rooms.glb",
+    "meshes/collision.glb",
+    "meshes/prototypes.glb",
+    "map.png",
+)
 
 
 def world_files(folder: Path) -> list[str]:
@@ -332,8 +355,16 @@ def world_files(folder: Path) -> list[str]:
 
 
 def seal(folder: Path, manifest: Manifest, *, seconds: dict[str, float]) -> Manifest:
-    """Finish a world: hash every file, then write ``build.json`` and, last, ``world.json``."""
+    """Finish a world: hash every file, then write ``build.json`` and, last, ``world.json``.
+
+    Raises
+    ------
+    MissingFileError
+        If a file that every world has is not there: it was taken away while the others were written.
+    """
     files = {name: sha256_of(folder / name) for name in world_files(folder)}
+    if gone := [name for name in REQUIRED if name not in files]:
+        raise MissingFileError(f"{folder / gone[0]}: taken away while the world was built; build it anew")
     sealed = manifest.model_copy(update={"files": files})
     write_json(
         folder / "build.json",

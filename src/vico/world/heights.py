@@ -65,7 +65,7 @@ class HeightField:
 
     @classmethod
     def flat(cls, half: float, height: float = 0.0) -> HeightField:
-        """A level field."""
+        """Return a level field."""
         return cls(np.full((2, 2), height, np.float32), half)
 
     def __call__(self, xy: ArrayLike) -> NDArray[np.float64]:
@@ -106,7 +106,7 @@ class HeightField:
         return found.reshape(points.shape[:-1])
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """The field as named arrays, for a file."""
+        """Return the field as named arrays, for a file."""
         found: dict[str, NDArray[Any]] = {"heights": self.heights, "half": np.array(self.half, np.float64)}
         if self.steps is not None:
             found |= {"edge": self.steps.edge, "low": self.steps.low, "high": self.steps.high}
@@ -114,7 +114,7 @@ class HeightField:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> HeightField:
-        """The field of `arrays`; ValueError or KeyError where they make none."""
+        """Return the field of `arrays`; ValueError or KeyError where they make none."""
         heights = np.ascontiguousarray(arrays["heights"], np.float32)
         if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.shape[0] < 2:
             raise ValueError(f"heights of shape {heights.shape}, not square")

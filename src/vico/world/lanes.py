@@ -133,7 +133,7 @@ class LaneGraph:
     def nearest(
         self, xy: ArrayLike, among: NDArray[np.bool_] | None = None, reach: float = 60.0
     ) -> tuple[int, float, float] | None:
-        """The street lane whose centre line is nearest to a point.
+        """Return the street lane whose centre line is nearest to a point.
 
         Parameters
         ----------
@@ -237,7 +237,7 @@ def read_lanes(path: Path) -> LaneGraph:
 
 
 def _clean_line(text: str) -> Floats:
-    """A shape without doubled points; a lane of no length gets a centimetre along x so that it has a direction."""
+    """Return a shape without doubled points; a lane of no length gets a centimetre along x: a direction."""
     line = np.array([[float(v) for v in pair.split(",")[:2]] for pair in text.split()])
     keep = np.concatenate([[True], np.linalg.norm(np.diff(line, axis=0), axis=1) > 1e-6])
     line = line[keep]
@@ -302,7 +302,7 @@ def _csr(pairs: list[tuple[int, int]], n: int) -> tuple[Ints, Ints]:
 
 
 def _junction_of(lane: _Lane, junctions: dict[str, int]) -> int:
-    """Number of the junction whose part a lane is: edges inside junction J are called ":J_k"."""
+    """Return the number of the junction whose part a lane is: edges inside junction J are called ":J_k"."""
     return junctions[lane.edge[1:].rsplit("_", 1)[0]]
 
 
@@ -381,41 +381,13 @@ def _zones(
     junctions: int,
     crossed: set[int],
 ) -> Ints:
-    """Cluster number of every lane that needs a junction's token; bends and lane drops without crossings need none."""
-    lines = [shapely.LineString(lane.line) for lane in driven]
-    within: dict[int, list[int]] = defaultdict(list)
-    for i, j in enumerate(inside):
-        if j >= 0:
-            within[int(j)].append(i)
-    enters: dict[int, set[int]] = defaultdict(set)
-    for a, b in pairs:
-        if inside[b] >= 0 and inside[a] < 0:
-            enters[b].add(a)
-    # The edges of a street's two directions are "123" and "-123" (with "#k" for its parts).
-    arms: dict[int, set[str]] = defaultdict(set)
-    for a, b in pairs:
-        for lane, other in ((a, b), (b, a)):
-            if inside[lane] >= 0 and inside[other] < 0:
-                arms[int(inside[lane])].add(driven[other].edge.lstrip("-"))
-    controlled = np.zeros(junctions, bool)
-    for j, members in within.items():
-        controlled[j] = (
-            j in crossed
-            or len(arms[j]) >= 3
-            or any(
-                enters[a] != enters[b] and shapely.distance(lines[a], lines[b]) < 1.9
-                for k, a in enumerate(members)
-                for b in members[k + 1 :]
-            )
-        )
-    parent = list(range(junctions))
+    """Return the cluster of every lane that needs a junction's token, -1 for the others, int32, shape ``(n,)``.
 
-    def root(j: int) -> int:
-        while parent[j] != j:
-            parent[j] = parent[parent[j]]
-            j = parent[j]
-        return j
-
+    Bends and lane drops without crossings need none. Controlled junctions joined by a street shorter than
+    `CLUSTER_GAP` are one cluster, and that street is part of it.
+    """
+    controlled = _controlled_junctions(driven, inside, pairs, junctions, crossed)
+    clusters = _DisjointSets(junctions)
     comes = {b: int(inside[a]) for a, b in pairs if inside[a] >= 0}
     goes = {a: int(inside[b]) for a, b in pairs if inside[b] >= 0}
     bridges: list[tuple[int, int]] = []
@@ -423,17 +395,68 @@ def _zones(
         start, end = comes.get(i, -1), goes.get(i, -1)
         between = inside[i] < 0 and start >= 0 and end >= 0
         if between and length[i] < CLUSTER_GAP and controlled[start] and controlled[end]:
-            parent[max(root(start), root(end))] = min(root(start), root(end))
+            clusters.join(start, end)
             bridges.append((i, start))
-    roots = sorted({root(j) for j in range(junctions) if controlled[j]})
+    roots = sorted({clusters.root(j) for j in range(junctions) if controlled[j]})
     number = {r: k for k, r in enumerate(roots)}
     zone = np.full(len(driven), -1, np.int32)
     for i, j in enumerate(inside):
         if j >= 0 and controlled[j]:
-            zone[i] = number[root(int(j))]
+            zone[i] = number[clusters.root(int(j))]
     for i, j in bridges:
-        zone[i] = number[root(j)]
+        zone[i] = number[clusters.root(j)]
     return zone
+
+
+def _controlled_junctions(
+    driven: list[_Lane], inside: Ints, pairs: list[tuple[int, int]], junctions: int, crossed: set[int]
+) -> NDArray[np.bool_]:
+    """Return which junctions need a token: those with crossings, three arms, or lanes that conflict."""
+    within: dict[int, list[int]] = defaultdict(list)
+    for i, j in enumerate(inside):
+        if j >= 0:
+            within[int(j)].append(i)
+    enters: dict[int, set[int]] = defaultdict(set)
+    # The edges of a street's two directions are "123" and "-123" (with "#k" for its parts).
+    arms: dict[int, set[str]] = defaultdict(set)
+    for a, b in pairs:
+        if inside[b] >= 0 and inside[a] < 0:
+            enters[b].add(a)
+        for lane, other in ((a, b), (b, a)):
+            if inside[lane] >= 0 and inside[other] < 0:
+                arms[int(inside[lane])].add(driven[other].edge.lstrip("-"))
+    controlled = np.zeros(junctions, bool)
+    for j, members in within.items():
+        controlled[j] = j in crossed or len(arms[j]) >= 3 or _have_conflict(driven, members, enters)
+    return controlled
+
+
+def _have_conflict(driven: list[_Lane], members: list[int], enters: dict[int, set[int]]) -> bool:
+    """Return whether two of a junction's lanes come from different lanes and pass closer than a car is wide."""
+    lines = [shapely.LineString(driven[i].line) for i in members]
+    return any(
+        enters[a] != enters[b] and shapely.distance(lines[k], lines[k + 1 + m]) < 1.9
+        for k, a in enumerate(members)
+        for m, b in enumerate(members[k + 1 :])
+    )
+
+
+class _DisjointSets:
+    """Numbers in sets that can be joined; the least number stands for its set."""
+
+    def __init__(self, count: int) -> None:
+        self._parent = list(range(count))
+
+    def root(self, j: int) -> int:
+        parent = self._parent
+        while parent[j] != j:
+            parent[j] = parent[parent[j]]
+            j = parent[j]
+        return j
+
+    def join(self, a: int, b: int) -> None:
+        a, b = self.root(a), self.root(b)
+        self._parent[max(a, b)] = min(a, b)
 
 
 def _walks(lanes: list[_Lane], links: list[dict[str, str]], junctions: dict[str, int]) -> Walkways:

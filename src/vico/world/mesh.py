@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from vico.errors import SchemaError
-from vico.world.files import write_bytes
-from vico.world.products import turned
-from vico.world.threads import in_order
+from vico.exact import apply_matrix
+from vico.io.files import write_bytes
+from vico.threads import in_order
 
 
 @dataclass(frozen=True)
@@ -119,21 +119,66 @@ class Surface:
         )
 
     def moved(self, transform: NDArray[Any]) -> Surface:
-        """A copy under a rigid (or uniformly scaled) 4x4 transform."""
+        """Return a copy under a rigid (or uniformly scaled) 4x4 transform."""
         matrix = np.asarray(transform, np.float64)
-        positions = turned(self.positions, matrix[:3, :3]) + matrix[:3, 3]
-        normals = turned(self.normals, matrix[:3, :3])
+        positions = apply_matrix(self.positions, matrix[:3, :3]) + matrix[:3, 3]
+        normals = apply_matrix(self.normals, matrix[:3, :3])
         normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
         return replace(self, positions=positions.astype(np.float32), normals=normals.astype(np.float32))
 
     def of_entity(self, entity: int) -> Surface:
-        """A copy that belongs to one entity."""
+        """Return a copy that belongs to one entity."""
         return replace(self, entity=np.full(len(self.positions), entity, np.int32))
 
     def tinted(self, colour: tuple[int, int, int]) -> Surface:
-        """A copy whose vertex colours are multiplied by `colour` / 255."""
+        """Return a copy whose vertex colours are multiplied by `colour` / 255."""
         product = self.colour.astype(np.uint16) * np.asarray(colour, np.uint16) // 255
         return replace(self, colour=product.astype(np.uint8))
+
+
+def surface_of_quads(
+    corners: NDArray[Any],
+    normals: NDArray[Any],
+    uv: NDArray[Any],
+    *,
+    colour: NDArray[Any] | tuple[int, int, int],
+    entity: NDArray[Any] | int,
+    material: Material,
+    by_halves: bool = False,
+) -> Surface:
+    """Make a surface of flat quadrilaterals, each with four vertices of its own.
+
+    Parameters
+    ----------
+    corners
+        Counter-clockwise seen from outside, shape ``(n, 4, 3)``.
+    normals
+        Of unit length, shape ``(n, 3)``.
+    uv
+        Texture coordinates of the corners, shape ``(n, 4, 2)``.
+    colour
+        sRGB: one for all, ``(n, 3)`` for each quad, or ``(4 * n, 3)`` for each corner.
+    entity
+        One for all, or shape ``(n,)``.
+    by_halves
+        List the first triangles of all quads before the second ones, instead of quad by quad.
+    """
+    count = len(corners)
+    first = 4 * np.arange(count, dtype=np.int32)[:, None]
+    halves = [first + np.array([0, 1, 2], np.int32), first + np.array([0, 2, 3], np.int32)]
+    triangles = np.concatenate(halves, axis=0 if by_halves else 1).reshape(-1, 3)
+    colours = np.asarray(colour, np.uint8)
+    if colours.shape == (count, 3):
+        colours = np.repeat(colours, 4, axis=0)
+    return Surface(
+        np.asarray(corners, np.float32).reshape(-1, 3),
+        np.repeat(np.asarray(normals, np.float32), 4, axis=0),
+        np.asarray(uv, np.float32).reshape(-1, 2),
+        np.ascontiguousarray(np.broadcast_to(colours, (4 * count, 3))),
+        np.broadcast_to(np.repeat(np.asarray(entity, np.int32), 4 if np.ndim(entity) else 1), 4 * count).copy(),
+        triangles,
+        material,
+    )
 
 
 def joined(surfaces: Iterable[Surface]) -> list[Surface]:
@@ -165,6 +210,7 @@ _FLOAT, _UINT, _USHORT, _UBYTE = 5126, 5125, 5123, 5121
 # Of JPEG: 40 dB on walls, 37 on roofs; photogrammetry itself is 20 dB off. 84 saves a seventh and costs 1 dB.
 _PHOTO_QUALITY = 88
 _PNG_LEVEL = 6  # an eighth smaller than 4; 9 takes six times as long for another twelfth
+_UNIT = 1e-3  # by how much a normal's length may differ from 1
 _FEW = 256  # vertices that are not worth a search for equal ones
 _SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
@@ -208,7 +254,7 @@ class _Buffer:
 def glb_bytes(layers: dict[str, Sequence[Surface]]) -> bytes:
     """Pack named groups of surfaces (one node each) into a binary glTF 2.0 file with its textures inside.
 
-    Equal vertices of a surface are written once.
+    Equal vertices of a surface are written once, triangles that have two corners in one place not at all.
     """
     buffer = _Buffer()
     materials: list[dict[str, Any]] = []
@@ -222,7 +268,7 @@ def glb_bytes(layers: dict[str, Sequence[Surface]]) -> bytes:
     pictures = dict(zip(used, in_order(_picture, used.values()), strict=True))
     for name, surfaces in layers.items():
         primitives = []
-        for surface in map(_welded, surfaces):
+        for surface in (_welded(_sound(given)) for given in surfaces):
             if not len(surface.triangles):
                 continue
             material = surface.material
@@ -275,8 +321,31 @@ def glb_bytes(layers: dict[str, Sequence[Surface]]) -> bytes:
     return b"".join([struct.pack("<III", 0x46546C67, 2, 12 + sum(map(len, parts))), *parts])
 
 
+def _sound(surface: Surface) -> Surface:
+    """Return the same surface as glTF wants it: triangles with three corners, normals of length 1."""
+    a, b, c = (surface.positions[surface.triangles[:, k]] for k in range(3))
+    collapsed = (a == b).all(axis=1) | (b == c).all(axis=1) | (c == a).all(axis=1)
+    if collapsed.any():
+        surface = replace(surface, triangles=surface.triangles[~collapsed])
+    wrong = np.abs(np.linalg.norm(surface.normals, axis=1) - 1.0) > _UNIT
+    if not wrong.any():
+        return surface
+    # What has no normal, as a corner of triangles without area alone, takes that of its triangles, else looks up.
+    corners = surface.positions[surface.triangles].astype(np.float64)
+    facing = np.zeros(surface.positions.shape)
+    for k in range(3):
+        np.add.at(
+            facing, surface.triangles[:, k], np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        )
+    given = surface.normals.astype(np.float64)
+    found = np.where((np.linalg.norm(given, axis=1) > _UNIT)[:, None], given, facing)
+    length = np.linalg.norm(found, axis=1, keepdims=True)
+    found = np.where(length > 1e-12, found / np.maximum(length, 1e-12), (0.0, 0.0, 1.0))
+    return replace(surface, normals=np.where(wrong[:, None], found, surface.normals).astype(np.float32))
+
+
 def _welded(surface: Surface) -> Surface:
-    """The same surface with equal vertices once, in the order first met."""
+    """Return the same surface with equal vertices once, in the order first met."""
     count = len(surface.positions)
     if count < _FEW:
         return surface
@@ -305,7 +374,7 @@ def _welded(surface: Surface) -> Surface:
 
 
 def _picture(material: Material) -> tuple[bytes, str] | None:
-    """A material's texture as a file, and that file's type."""
+    """Return a material's texture as a file, and that file's type."""
     if material.texture is None:
         return None
     packed = io.BytesIO()

@@ -56,6 +56,12 @@ class Source(Record):
     sha256: str | None = None
 
 
+FAILED = "can't be made"
+"""How the reason begins where an object's geometry is at fault."""
+FAULT = "can't be made, by a fault of the program"
+"""How the reason begins where an object brought out a fault of the program."""
+
+
 class Dropped(Record):
     """Something the input had and the world has not, with the reason."""
 

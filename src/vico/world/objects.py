@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from vico.errors import MissingFileError, SchemaError
-from vico.world.files import write_bytes
+from vico.io.files import write_bytes
 
 GROUPS = ("amenity", "natural", "transit", "indoor")
 
@@ -124,7 +124,7 @@ class Objects:
         return cls(**{field.name: np.concatenate([getattr(p, field.name) for p in listed]) for field in fields(cls)})
 
     def where(self, chosen: NDArray[Any]) -> Objects:
-        """The rows that a mask or an index array picks."""
+        """Return the rows that a mask or an index array picks."""
         return Objects(**{field.name: getattr(self, field.name)[chosen] for field in fields(self)})
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -19,6 +19,31 @@ _BERTH = 0.6
 _SNAP = 6.0  # metres a start or goal may lie off what can be walked on
 _STRAIGHT, _DIAGONAL = 10, 14  # 10 : 14 for 1 : sqrt 2; a cost unit is a thousandth of a cell on sidewalk
 _RING = 32768  # circular buckets; more than the largest change of f along an edge (14 * 500 + 14 * 100)
+
+# Directions 0 to 3 lead east, west, north and south, 4 to 7 diagonally.
+_FIRST_DIAGONAL = 4
+
+
+class _Work(NamedTuple):
+    """Working memory of a search, a value for each cell, shape ``(cells,)``.
+
+    Attributes
+    ----------
+    g
+        Least cost from the start found so far, int64; valid where `stamp` is of this search.
+    stamp
+        In which search the cell was last seen (an even number), plus 1 where `g` is final. int32.
+    after, before
+        Neighbours in the list of the cell's bucket, -1 for none, int32.
+    parent
+        Direction of the step that led here, int8.
+    """
+
+    g: NDArray[np.int64]
+    stamp: NDArray[np.int32]
+    after: NDArray[np.int32]
+    before: NDArray[np.int32]
+    parent: NDArray[np.int8]
 
 
 @njit(cache=True)
@@ -41,25 +66,50 @@ def _link(node, key, head, after, before):  # type: ignore[no-untyped-def]
     head[key] = node
 
 
+@njit(cache=True, inline="always")
+def _step(direction):  # type: ignore[no-untyped-def]
+    """Return the step in x and y to the neighbour in a direction."""
+    if direction >= _FIRST_DIAGONAL:
+        return 1 if direction % 2 == 0 else -1, 1 if direction < 6 else -1
+    if direction < 2:
+        return 1 - 2 * direction, 0
+    return 0, 5 - 2 * direction
+
+
+@njit(cache=True, inline="always")
+def _may_step(cost, width, height, cell, direction):  # type: ignore[no-untyped-def]
+    """Return whether a step ends on an open cell, and cuts no corner if it is diagonal."""
+    step_x, step_y = _step(direction)
+    nx, ny = cell % width + step_x, cell // width + step_y
+    if nx < 0 or ny < 0 or nx >= width or ny >= height or cost[ny * width + nx] == 0:
+        return False
+    return direction < _FIRST_DIAGONAL or (cost[cell + step_x] != 0 and cost[cell + step_y * width] != 0)
+
+
+@njit(cache=True, inline="always")
+def _least_cost(x, y, goal_x, goal_y):  # type: ignore[no-untyped-def]
+    """Return the cost between two cells if all were sidewalk without walls: what A* goes by; 0 without a goal."""
+    if goal_x < 0:
+        return 0
+    dx, dy = abs(x - goal_x), abs(y - goal_y)
+    return 100 * (_STRAIGHT * max(dx, dy) + (_DIAGONAL - _STRAIGHT) * min(dx, dy))
+
+
 @njit(cache=True)
-def _search(cost, blocked, start, goal, use_goal, g, stamp, generation, after, before, parent):  # type: ignore[no-untyped-def]
-    """A* (or Dijkstra from `start` without a goal) over cells with circular buckets. Returns True if goal was met."""
-    n = cost.shape[1]
-    rows = cost.shape[0]
+def _search(cost, work, start, goal, generation):  # type: ignore[no-untyped-def]
+    """Run A* from `start`, or Dijkstra where `goal` is -1, with circular buckets; return whether the goal was met.
+
+    `work.stamp` becomes `generation` where a cell was seen, `generation` + 1 where its cost is final.
+    """
+    g, stamp, parent, after, before = work.g, work.stamp, work.parent, work.after, work.before
+    height, width = cost.shape
     flat = cost.ravel()
-    extra = blocked.ravel()
-    checks = extra.size == flat.size
     head = np.full(_RING, -1, np.int32)
-    gx, gy = goal % n, goal // n
-    sx, sy = start % n, start // n
-    h = 0
-    if use_goal:
-        dx, dy = abs(sx - gx), abs(sy - gy)
-        h = 100 * (_STRAIGHT * max(dx, dy) + (_DIAGONAL - _STRAIGHT) * min(dx, dy))
+    goal_x, goal_y = (goal % width, goal // width) if goal >= 0 else (-1, -1)
     g[start] = 0
-    stamp[start] = generation  # odd generation + 1 marks a closed cell
+    stamp[start] = generation
     parent[start] = -1
-    level = h
+    level = _least_cost(start % width, start // width, goal_x, goal_y)
     _link(start, level % _RING, head, after, before)
     left = 1
     while left > 0:
@@ -69,76 +119,46 @@ def _search(cost, blocked, start, goal, use_goal, g, stamp, generation, after, b
         _unlink(node, level % _RING, head, after, before)
         left -= 1
         stamp[node] = generation + 1
-        if use_goal and node == goal:
+        if node == goal:
             return True
-        cx, cy = node % n, node // n
-        here = flat[node]
-        for k in range(8):
-            if k < 4:
-                ox = 1 - k if k < 2 else 0
-                if k == 1:
-                    ox = -1
-                oy = 0 if k < 2 else (1 if k == 2 else -1)
-                step = _STRAIGHT
-            else:
-                ox = 1 if k % 2 == 0 else -1
-                oy = 1 if k < 6 else -1
-                step = _DIAGONAL
-            x, y = cx + ox, cy + oy
-            if x < 0 or y < 0 or x >= n or y >= rows:
+        x, y = node % width, node // width
+        for direction in range(8):
+            step_x, step_y = _step(direction)
+            other = node + step_y * width + step_x
+            if not _may_step(flat, width, height, node, direction) or stamp[other] == generation + 1:
                 continue
-            other = y * n + x
-            there = flat[other]
-            if there == 0 or stamp[other] == generation + 1:
-                continue
-            if checks and extra[other]:
-                continue
-            if k >= 4:
-                side, along = cy * n + x, y * n + cx
-                if flat[side] == 0 or flat[along] == 0:
-                    continue
-                if checks and (extra[side] or extra[along]):
-                    continue
-            value = g[node] + step * (np.int64(here) + np.int64(there)) // 2
-            h = 0
-            if use_goal:
-                dx, dy = abs(x - gx), abs(y - gy)
-                h = 100 * (_STRAIGHT * max(dx, dy) + (_DIAGONAL - _STRAIGHT) * min(dx, dy))
+            length = _STRAIGHT if direction < _FIRST_DIAGONAL else _DIAGONAL
+            value = g[node] + length * (np.int64(flat[node]) + np.int64(flat[other])) // 2
+            rest = _least_cost(x + step_x, y + step_y, goal_x, goal_y)
             if stamp[other] == generation:
                 if value >= g[other]:
                     continue
-                _unlink(other, (g[other] + h) % _RING, head, after, before)
+                _unlink(other, (g[other] + rest) % _RING, head, after, before)
             else:
                 stamp[other] = generation
                 left += 1
             g[other] = value
-            parent[other] = k
-            _link(other, (value + h) % _RING, head, after, before)
+            parent[other] = direction
+            _link(other, (value + rest) % _RING, head, after, before)
     return False
 
 
 @njit(cache=True)
-def _backtrack(parent, start, goal, n):  # type: ignore[no-untyped-def]
-    length = 1
+def _backtrack(parent, start, goal, width):  # type: ignore[no-untyped-def]
+    """Return the cells from `start` to `goal`, by the direction each was entered in."""
+    count = 1
     node = goal
-    for turn in range(2):
-        cells = np.empty(length if turn else 0, np.int64)
-        node, count = goal, 0
-        while True:
-            if turn:
-                cells[length - 1 - count] = node
-            count += 1
-            if node == start:
-                break
-            k = parent[node]
-            if k < 4:
-                ox = 1 if k == 0 else (-1 if k == 1 else 0)
-                oy = 0 if k < 2 else (1 if k == 2 else -1)
-            else:
-                ox = 1 if k % 2 == 0 else -1
-                oy = 1 if k < 6 else -1
-            node -= oy * n + ox
-        length = count
+    while node != start:
+        step_x, step_y = _step(parent[node])
+        node -= step_y * width + step_x
+        count += 1
+    cells = np.empty(count, np.int64)
+    node = goal
+    for k in range(count - 1, 0, -1):
+        cells[k] = node
+        step_x, step_y = _step(parent[node])
+        node -= step_y * width + step_x
+    cells[0] = start
     return cells
 
 
@@ -174,7 +194,7 @@ def _straight_cost(cost, clearance, blocked, checks, x0, y0, x1, y1):  # type: i
 
 @njit(cache=True)
 def _pull(cost, clearance, blocked, checks, points, g):  # type: ignore[no-untyped-def]
-    """Indices of the points to keep: straight walks that cost no more than the grid's path between their ends."""
+    """Return the points to keep (indices): straight walks that cost no more than the grid's path between their ends."""
     count = len(points)
     keep = np.empty(count, np.int64)
     keep[0] = 0
@@ -250,11 +270,13 @@ class Router:
         self._cost = np.ascontiguousarray(cost, np.int32)
         self._free = self._cost > 0
         cells = cost.size
-        self._g = np.zeros(cells, np.int64)
-        self._stamp = np.zeros(cells, np.int32)
-        self._after = np.zeros(cells, np.int32)
-        self._before = np.zeros(cells, np.int32)
-        self._parent = np.zeros(cells, np.int8)
+        self._work = _Work(
+            g=np.zeros(cells, np.int64),
+            stamp=np.zeros(cells, np.int32),
+            after=np.zeros(cells, np.int32),
+            before=np.zeros(cells, np.int32),
+            parent=np.zeros(cells, np.int8),
+        )
         self._generation = 0
         self._nothing = np.zeros((0, 0), np.bool_)
 
@@ -287,17 +309,18 @@ class Router:
             Corner points from start to goal, shape ``(k, 2)``, ``k >= 1``; None if there is no way.
         """
         a, b = np.asarray(start, np.float64)[:2], np.asarray(goal, np.float64)[:2]
-        extra = self._nothing if blocked is None else np.ascontiguousarray(blocked)
-        free = self._free if blocked is None else self._free & ~extra
+        cost = self._cost if blocked is None else np.where(blocked, np.int32(0), self._cost)
+        free = self._free if blocked is None else cost > 0
         first, last = self._nearest_cell(a, free, _SNAP), self._nearest_cell(b, free, _SNAP)
         if first < 0 or last < 0:
             return None
-        if not self._run(first, last, extra, use_goal=True):
+        if not self._run(cost, first, last):
             return None
         n = self.walkable.n
-        cells = _backtrack(self._parent, first, last, n)
+        cells = _backtrack(self._work.parent, first, last, n)
         points = np.column_stack([cells % n, cells // n]) + 0.5
-        g = self._g[cells]
+        g = self._work.g[cells]
+        extra = self._nothing if blocked is None else np.ascontiguousarray(blocked)
         kept = _pull(self._cost, self._clearance, extra, blocked is not None, points, g)
         route = points[kept] * self.walkable.cell - self.walkable.half
         # The exact ends, where they lie in the cells the search began and ended in.
@@ -318,34 +341,20 @@ class Router:
 
     def distance_field(self, goal: ArrayLike, *, blocked: NDArray[np.bool_] | None = None) -> NDArray[np.float32]:
         """Cost of the walk from every cell to `goal`, in metres of sidewalk; float32, shape ``(n, n)``; inf: no way."""
-        extra = self._nothing if blocked is None else np.ascontiguousarray(blocked)
-        free = self._free if blocked is None else self._free & ~extra
+        cost = self._cost if blocked is None else np.where(blocked, np.int32(0), self._cost)
+        free = self._free if blocked is None else cost > 0
         first = self._nearest_cell(np.asarray(goal, np.float64)[:2], free, _SNAP)
         shape = self._cost.shape
         if first < 0:
             return np.full(shape, np.inf, np.float32)
-        self._run(first, first, extra, use_goal=False)
+        self._run(cost, first, -1)
         metre = self.walkable.cell / (100 * _STRAIGHT)
-        reached = self._stamp == self._generation + 1
-        return np.where(reached, self._g * metre, np.inf).astype(np.float32).reshape(shape)
+        reached = self._work.stamp == self._generation + 1
+        return np.where(reached, self._work.g * metre, np.inf).astype(np.float32).reshape(shape)
 
-    def _run(self, first: int, last: int, extra: NDArray[np.bool_], *, use_goal: bool) -> bool:
+    def _run(self, cost: NDArray[np.int32], first: int, last: int) -> bool:
         self._generation += 2
-        return bool(
-            _search(
-                self._cost,
-                extra,
-                first,
-                last,
-                use_goal,
-                self._g,
-                self._stamp,
-                self._generation,
-                self._after,
-                self._before,
-                self._parent,
-            )
-        )
+        return bool(_search(cost, self._work, first, last, self._generation))
 
     def _flat(self, xy: NDArray[Any]) -> int:
         ix, iy = self.walkable.cell_of(xy)

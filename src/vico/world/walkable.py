@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from vico.errors import InputError, MissingFileError, SchemaError
-from vico.world.files import write_bytes
+from vico.io.files import write_bytes
 
 BLOCKED, OPEN, SIDEWALK, CROSSING, ROADWAY = range(5)
 CLASS_NAMES = ("blocked", "open", "sidewalk", "crossing", "roadway")
@@ -125,7 +125,7 @@ class WalkableMap:
         radius: float | None = None,
         clearance: float = BODY,
     ) -> NDArray[np.float64]:
-        """A random reachable point, ENU metres, shape ``(2,)``.
+        """Return a random reachable point, ENU metres, shape ``(2,)``.
 
         Parameters
         ----------
@@ -211,15 +211,16 @@ def fill_polygon(grid, xs, ys, starts, half, cell, value):  # type: ignore[no-un
 
 
 @njit(cache=True)
-def stroke(grid, x0, y0, x1, y1, radius, half, cell, value):  # type: ignore[no-untyped-def]
-    """Set the cells whose centres lie within `radius` of each of the segments (x0, y0)-(x1, y1)."""
+def stroke(grid, start, end, radius, half, cell, value):  # type: ignore[no-untyped-def]
+    """Set the cells whose centres lie within `radius` of a segment; `start`, `end`: metres, shape ``(k, 2)``."""
     n = grid.shape[0]
-    for k in range(len(x0)):
-        i0 = max(0, int(np.ceil((min(x0[k], x1[k]) - radius + half) / cell - 0.5)))
-        i1 = min(n - 1, int(np.floor((max(x0[k], x1[k]) + radius + half) / cell - 0.5)))
-        j0 = max(0, int(np.ceil((min(y0[k], y1[k]) - radius + half) / cell - 0.5)))
-        j1 = min(n - 1, int(np.floor((max(y0[k], y1[k]) + radius + half) / cell - 0.5)))
-        dx, dy = x1[k] - x0[k], y1[k] - y0[k]
+    for k in range(len(start)):
+        x0, y0, x1, y1 = start[k, 0], start[k, 1], end[k, 0], end[k, 1]
+        i0 = max(0, int(np.ceil((min(x0, x1) - radius + half) / cell - 0.5)))
+        i1 = min(n - 1, int(np.floor((max(x0, x1) + radius + half) / cell - 0.5)))
+        j0 = max(0, int(np.ceil((min(y0, y1) - radius + half) / cell - 0.5)))
+        j1 = min(n - 1, int(np.floor((max(y0, y1) + radius + half) / cell - 0.5)))
+        dx, dy = x1 - x0, y1 - y0
         square = dx * dx + dy * dy
         for j in range(j0, j1 + 1):
             y = (j + 0.5) * cell - half
@@ -227,7 +228,7 @@ def stroke(grid, x0, y0, x1, y1, radius, half, cell, value):  # type: ignore[no-
                 x = (i + 0.5) * cell - half
                 t = 0.0
                 if square > 0.0:
-                    t = min(1.0, max(0.0, ((x - x0[k]) * dx + (y - y0[k]) * dy) / square))
-                ex, ey = x - x0[k] - t * dx, y - y0[k] - t * dy
+                    t = min(1.0, max(0.0, ((x - x0) * dx + (y - y0) * dy) / square))
+                ex, ey = x - x0 - t * dx, y - y0 - t * dy
                 if ex * ex + ey * ey < radius * radius:
                     grid[j, i] = value

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from vico.geo import overlay
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
@@ -100,8 +102,8 @@ class Walkways:
             if nearest[i] >= _BODY + 0.05:
                 rows.append(row)
             elif row.kind == SIDEWALK:
-                near = shapely.union_all([shapely.buffer(tree.geometries[k], _BODY + 0.06) for k in solid[which == i]])
-                for part in shapely.get_parts(lines[i].difference(near)):
+                near = overlay.union_all(overlay.buffer(tree.geometries[solid[which == i]], _BODY + 0.06), grid=None)
+                for part in shapely.get_parts(overlay.difference(lines[i], near, grid=None)):
                     if part.length < SHORTEST:
                         continue
                     line = np.asarray(part.coords)
@@ -119,7 +121,7 @@ class Walkways:
         return _packed(rows)
 
     def without(self, dropped: NDArray[np.bool_]) -> Walkways:
-        """A copy without some stretches."""
+        """Return a copy without some stretches."""
         return _packed(
             [
                 _Row(
@@ -184,7 +186,7 @@ def walkways_of(
         for i, (name, crossing, line, width, junction) in enumerate(ways)
     ]
     for place, outline, touching in corners:
-        area = shapely.make_valid(shapely.Polygon(outline)) if len(outline) > 2 else shapely.Polygon()
+        area = overlay.mended(shapely.Polygon(outline)) if len(outline) > 2 else shapely.Polygon()
         for k, (a, side_a) in enumerate(touching):
             for b, side_b in touching[k + 1 :]:
                 i, j = number[a], number[b]
@@ -204,8 +206,8 @@ def _distances(lines: NDArray[np.object_], solids: NDArray[np.object_]) -> Float
     """Metres from each line to its solid on the left and on the right, shape ``(n, 2)``; inf where it is not there."""
     out = np.full((len(lines), 2), np.inf)
     for k, side in enumerate((_NEAR, -_NEAR)):
-        strips = shapely.buffer(lines, side, cap_style="flat", join_style="mitre", single_sided=True)
-        parts = shapely.intersection(shapely.make_valid(strips), solids)
+        strips = overlay.buffer(lines, side, cap_style="flat", join_style="mitre", single_sided=True)
+        parts = overlay.crossing(overlay.mended(strips), solids, grid=None)
         there = ~shapely.is_empty(parts)
         out[there, k] = shapely.distance(lines[there], parts[there])
     # Round the ends a solid is beside neither way of going on.
@@ -247,12 +249,12 @@ def _packed(rows: list[_Row]) -> Walkways:
 
 
 def _path_within(area: shapely.Geometry, start: Floats, end: Floats) -> Floats:
-    """The shortest way between two points that stays in an area; straight where the area is degenerate."""
+    """Return the shortest way between two points that stays in an area; straight where the area is degenerate."""
     straight = np.array([start, end])
-    grown = area.buffer(0.15)
+    grown = overlay.buffer(area, 0.15)
     if area.is_empty or grown.covers(shapely.LineString(straight)):
         return straight
-    inner = area.buffer(-_BODY)
+    inner = overlay.buffer(area, -_BODY)
     rings = [np.asarray(p.exterior.coords)[:-1] for p in shapely.get_parts(inner) if isinstance(p, shapely.Polygon)]
     if not rings or not any(len(ring) for ring in rings):
         return straight

@@ -12,16 +12,18 @@ from vico.geo.elevation import HeightSamples, read_elevation
 from vico.geo.frame import LocalFrame
 from vico.geo.gtfs import Feed, read_gtfs
 from vico.geo.osm import OsmData, read_osm
-from vico.geo.places import FoundPlace
-from vico.geo.places_google import GooglePlaces, google_key
-from vico.geo.places_overture import OverturePlaces
-from vico.geo.street_images import StreetImage, StreetImages
-from vico.geo.street_images_folder import FolderImages
-from vico.geo.street_images_mapillary import Mapillary
-from vico.geo.tile_mesh import TileMesh
-from vico.geo.tiles3d import read_tileset
-from vico.geo.web import Web, cache_folder
-from vico.world.files import sha256_of
+from vico.geo.places.google import GooglePlaces, google_key
+from vico.geo.places.model import FoundPlace
+from vico.geo.places.overture import OverturePlaces
+from vico.geo.street_images.folder import FolderImages
+from vico.geo.street_images.mapillary import Mapillary
+from vico.geo.street_images.model import StreetImage, StreetImages
+from vico.geo.tiles3d.mesh import TileMesh
+from vico.geo.tiles3d.reader import read_tileset
+from vico.geo.tiles3d.source import tile_source
+from vico.io.cache import cache_folder
+from vico.io.files import sha256_of
+from vico.io.http import HttpClient
 from vico.world.model import Dropped, Source
 from vico.worldgen.product import digest_of
 from vico.worldgen.sources import Sources
@@ -138,7 +140,11 @@ def gather(sources: Sources, frame: LocalFrame, half: float, stages: Stages) -> 
 
 def _tiles(source: str, frame: LocalFrame, half: float, stages: Stages, credits: list[Source]) -> TileMesh:
     mesh, report = read_tileset(
-        source, frame, half, error=_TILE_ERROR, margin=_TILE_MARGIN, web=Web(cache=cache_folder() / "tiles")
+        tile_source(source, web=HttpClient(cache=cache_folder() / "tiles")),
+        frame,
+        half,
+        error=_TILE_ERROR,
+        margin=_TILE_MARGIN,
     )
     stages.given(mesh, digest_of(mesh))
     dropped = [Dropped(id=uri, reason=reason) for uri, reason in report.left_out]
@@ -156,7 +162,7 @@ def _photos(source: str, frame: LocalFrame, half: float, stages: Stages, credits
         token = os.environ.get("MAPILLARY_TOKEN")
         if not token:
             raise InputError("photos: set MAPILLARY_TOKEN in the environment to your access token of mapillary.com")
-        reader = Mapillary(token, Web(cache=cache_folder() / "photos"))
+        reader = Mapillary(token, HttpClient(cache=cache_folder() / "photos"))
     else:
         reader = FolderImages(Path(source))
     images = list(reader.near(frame, half, most=_MOST_PHOTOS))
@@ -175,7 +181,7 @@ def _places(
     files = [Path(name) for name in names if name != "google"]
     readers: list[OverturePlaces | GooglePlaces] = [OverturePlaces(files)] if files else []
     if "google" in names:
-        readers.append(GooglePlaces(google_key(), Web()))
+        readers.append(GooglePlaces(google_key(), HttpClient()))
     found: list[FoundPlace] = []
     dropped: list[Dropped] = []
     for reader in readers:
@@ -192,5 +198,5 @@ def _places(
 
 
 def _file_name(source: str) -> str:
-    """The last part of a path or address, without a query: it may hold a key."""
+    """Return the last part of a path or address, without a query: it may hold a key."""
     return source.split("?")[0].rstrip("/").rsplit("/", 1)[-1]

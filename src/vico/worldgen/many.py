@@ -11,12 +11,10 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from vico import threads
 from vico.errors import InputError, MissingExtraError, MissingFileError, SchemaError, VicoError
-from vico.world import threads
 from vico.world.folder import read_world, stage_seconds
-from vico.worldgen.photos.texturing import Studio
 from vico.worldgen.pipeline import build_world
-from vico.worldgen.previews import Photograph
 from vico.worldgen.sources import SERVICES, Sources
 
 _MOST_BYTES = 16 << 20
@@ -135,8 +133,6 @@ def build_many(
     out: Path,
     *,
     locate: Locate,
-    photograph: Photograph | None = None,
-    studio: Studio | None = None,
     workers: int = 1,
     force: bool = False,
     ray: bool = False,
@@ -150,11 +146,8 @@ def build_many(
     out
         Parent folder of the worlds.
     locate
-        Finds a map for a place without a file: latitude, longitude, half side to a path.
-    photograph
-        Takes the street-level pictures; a function of a module, as other processes must find it.
-    studio
-        Renders unfinished worlds, which places with street photos need; a function of a module, too.
+        Finds a map for a place without a file: latitude, longitude, half side to a path. A function of a module, as
+        other processes must find it.
     workers
         How many processes side by side (not used with `ray`).
     force
@@ -177,8 +170,6 @@ def build_many(
     how: dict[str, Any] = {
         "out": Path(out).absolute(),
         "locate": locate,
-        "photograph": photograph,
-        "studio": studio,
         "force": force,
     }
     if ray:
@@ -205,9 +196,7 @@ def _use_threads(count: int) -> None:
     os.environ[threads.WORKERS] = str(count)
 
 
-def build_one(
-    row: PlaceRow, *, out: Path, locate: Locate, photograph: Photograph | None, studio: Studio | None, force: bool
-) -> Outcome:
+def build_one(row: PlaceRow, *, out: Path, locate: Locate, force: bool) -> Outcome:
     """Build one place; bad input becomes an outcome, so that it does not end the others."""
     folder = Path(out) / row.name
     try:
@@ -232,8 +221,6 @@ def build_one(
             seed=row.seed,
             out=folder,
             force=force,
-            photograph=photograph,
-            studio=studio,
         )
     except (VicoError, OSError) as error:
         return Outcome(row.name, "failed", reason=str(error))

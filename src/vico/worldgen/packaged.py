@@ -23,7 +23,7 @@ class Extract:
 
 
 def packaged_extract() -> Extract:
-    """The one place that comes with the package: central Helsinki (ODbL, (c) OpenStreetMap contributors)."""
+    """Return the one place that comes with the package: central Helsinki (ODbL, (c) OpenStreetMap contributors)."""
     path = Path(str(files("vico").joinpath("data/helsinki.osm.pbf")))
     if not path.exists():
         raise MissingFileError(f"{path}: the packaged map extract is missing; reinstall virtual-community")

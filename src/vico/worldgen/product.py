@@ -26,8 +26,8 @@ from shapely.errors import ShapelyError
 from shapely.geometry.base import BaseGeometry
 
 from vico.errors import SchemaError
-from vico.world.files import write_bytes
-from vico.world.threads import in_order
+from vico.io.files import write_bytes
+from vico.threads import in_order
 
 _MAGIC = b"vicoprod"
 _MOST_BLOB = 2 << 30
@@ -157,7 +157,7 @@ def _type_of(name: str) -> Any:
 
 
 def packed(value: Any) -> tuple[bytes, list[bytes | memoryview]]:
-    """The tree of a product as JSON, and its blobs."""
+    """Return the tree of a product as JSON, and its blobs."""
     writer = _Writer()
     tree = json.dumps(writer.tree(value), separators=(",", ":"), ensure_ascii=False).encode()
     return tree, writer.blobs

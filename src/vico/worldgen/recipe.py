@@ -1,46 +1,42 @@
-"""The order of the stages: from a map to a world. Each line is one call into a module that knows no other stage."""
+"""The order of the stages: from a map to a world. Each is one call into a folder that knows no other stage."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import shapely
-from shapely.geometry.base import BaseGeometry
 
-from vico import __version__
-from vico.assets.things import credits_of, our_models, read_things
-from vico.errors import EmptyInputError, InputError
+from vico.assets.things.pack import read_things
+from vico.errors import EmptyInputError
 from vico.geo.elevation import HeightSamples
 from vico.geo.osm import OsmData
-from vico.geo.street_images import StreetImage
-from vico.geo.tile_mesh import TileMesh
-from vico.world.files import sha256_of, write_bytes
-from vico.world.folder import World, write_record, write_records, write_terrain
+from vico.geo.street_images.model import StreetImage
+from vico.geo.tiles3d.mesh import TileMesh
+from vico.io.files import sha256_of
+from vico.world.folder import World
 from vico.world.heights import HeightField
-from vico.world.lanes import read_lanes
-from vico.world.mesh import Surface, write_glb
-from vico.world.model import Dropped, Manifest, Origin, Source, Transit
-from vico.world.objects import Objects, write_objects
-from vico.world.walkable import WalkableMap, write_walkable
-from vico.worldgen.buildings.fitting import buildings_on_tiles, settled
-from vico.worldgen.buildings.outlines import building_plans
-from vico.worldgen.buildings.stage import BuildingsResult, buildings_from_osm
+from vico.world.mesh import Surface
+from vico.world.model import Building, Dropped, Entrance, Place
+from vico.worldgen.buildings.fitting.nudging import plans_on_tiles, settled
+from vico.worldgen.buildings.stage import BuildingsResult, buildings_from_plans
 from vico.worldgen.evidence import Evidence
 from vico.worldgen.facades.fronts import street_fronts
-from vico.worldgen.ground.bridges import pier_feet, portal_feet, portals_of
-from vico.worldgen.ground.grading import graded, standing_outlines
-from vico.worldgen.ground.stage import ground_from_osm, mapped_areas
+from vico.worldgen.facts.outlines.buildings import building_plans
+from vico.worldgen.facts.outlines.plans import BuildingPlans
+from vico.worldgen.facts.site import SiteFacts, site_facts
+from vico.worldgen.ground.bridges.stage import bridges_of
+from vico.worldgen.ground.grading import graded
+from vico.worldgen.ground.stage import ground_from_osm
 from vico.worldgen.ground.terrain import flat_terrain, terrain_from_dem, terrain_from_tiles
-from vico.worldgen.ground.walkable import walkable_map
-from vico.worldgen.indoor.layout_llm import LlmLayoutAuthor, furnish_drawn
-from vico.worldgen.indoor.stage import furnish
+from vico.worldgen.ground.walkable import walkable_from_site
+from vico.worldgen.indoor.layout_llm import furnish_drawn
+from vico.worldgen.indoor.stage import Indoors, furnish
+from vico.worldgen.objects.models import models_of
 from vico.worldgen.objects.stage import objects_from_osm
+from vico.worldgen.photos.streetview.renders import photographer_of
 from vico.worldgen.photos.texturing import (
-    Studio,
     Texturing,
     enhanced,
     kept_where_photographed,
@@ -49,240 +45,134 @@ from vico.worldgen.photos.texturing import (
     painted_from_tiles,
 )
 from vico.worldgen.places.stage import places_from_osm
-from vico.worldgen.sources import Sources
+from vico.worldgen.request import WorldRequest
 from vico.worldgen.stages import Stages
 from vico.worldgen.streets.netconvert import road_network
-from vico.worldgen.streets.roads import closed_roads, roads_from_osm
-from vico.worldgen.streets.streets import StreetPolygons, road_polygons
+from vico.worldgen.streets.polygons import road_polygons
+from vico.worldgen.streets.roads import roads_from_osm
 from vico.worldgen.transit.stage import transit_from_osm
+from vico.worldgen.transit.waiting import waiting_off_the_road
+from vico.worldgen.writing import Layers, WorldParts, WorldWriter, faces, manifest_of
 
 # Faces that photos cover less than this share of keep their facade.
 _LEAST_COVERED = 0.3
-_BARRIER_KINDS = ("fence", "wall", "guard_rail", "hedge")
 
 
-def make_world(
-    given: Evidence,
-    *,
-    half: float,
-    seed: int,
-    folder: Path,
-    sources: Sources,
-    stages: Stages,
-    texturing: Texturing,
-    studio: Studio | None,
-    author: LlmLayoutAuthor | None,
-) -> World:
+def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: Stages) -> World:
     """Run every stage between the sources and the pictures, and write the world's files into `folder`."""
-    stand_ins = read_things()[0] if sources.installed_things else {}
-    data, tiles = given.data, given.tiles
-    if tiles is not None:
-        height, raised = stages.run("terrain", _ground_of_tiles, data, given.samples, tiles, half=half, seed=seed)
-        if raised:
-            tiles = replace(tiles, positions=tiles.positions + np.array([0.0, 0.0, raised]))
-    elif given.samples is None:
-        height = stages.run("terrain", flat_terrain, half=half)
-    else:
-        height = stages.run("terrain", terrain_from_dem, given.samples, half=half)
+    if request.sources.installed_things:
+        read_things()  # refuses before anything is built if they are not installed
+    seed, run, write = request.seed, stages.run, WorldWriter(folder, stages)
+
+    site = _site(evidence.data, stages)
+    plans = run("plans", building_plans, site.osm, seed=seed)
+    bare, tiles = _terrain(evidence, plans, request.half, stages)
     # Kerbs lie at the borders of the streets, so both come from the same polygons, and before anything stands on them.
-    streets = stages.run("streets", _streets, data, seed=seed)
-    height = stages.run("grading", graded, height, data, streets)
-    write_terrain(folder / "terrain.npz", height)
-    flat = given.samples is None and tiles is None
-    stages.report("terrain", {"cells": int(height.heights.shape[0] - 1) ** 2, "flat": int(flat)})
+    streets = run("streets", road_polygons, site, plans.standing())
+    height = run("grading", graded, bare, site, streets)
+    write.terrain(height, flat=evidence.samples is None and tiles is None)
+    bridges = run("bridges", bridges_of, site, height, streets)
 
-    if tiles is None:
-        built = stages.run("buildings", buildings_from_osm, data, height, seed=seed)
-    else:
-        built, fits = stages.run("buildings", buildings_on_tiles, data, height, tiles, seed=seed)
+    if tiles is not None:
+        plans, fits = run("fit", plans_on_tiles, plans, tiles, height)
         stages.report("fit", fits.counts())
-    solids = _standing(built, height)
-    solids += [*pier_feet(data, height, streets), *portal_feet(portals_of(data, streets))]
+    built = run("buildings", buildings_from_plans, plans, site.osm, height, seed=seed)
+    solids = stages.digested([*built.standing(height), *bridges.feet])
 
-    roads = stages.run("roads", roads_from_osm, data, half, solids=solids)
-    write_record(folder / "roads.json", roads)
-    network = stages.run("network", road_network, data, half, solids=solids)
-    write_bytes(folder / "roads.net.xml", network.net_xml)
-    write_bytes(folder / "roads.xodr", network.xodr)
-    lanes = stages.given(read_lanes(folder / "roads.net.xml"), sha256_of(folder / "roads.net.xml"))
-    drivable = [road for road in roads.roads if road.lanes > 0]
-    stages.report(
-        "roads",
-        {
-            "roads": len(roads.roads),
-            "drivable_roads": len(drivable),
-            "junctions": len(roads.junctions),
-            "crossings": len(roads.crossings),
-            "lanes": len(lanes),
-        },
-        [
-            *([] if len(lanes) else [Dropped(id="roads", reason="no street for traffic in the window")]),
-            *closed_roads(roads),
-        ],
-    )
+    roads = run("roads", roads_from_osm, site, solids=solids)
+    lanes = write.streets(roads, run("network", road_network, site, solids=solids))
+    feeds = list(evidence.feeds)
+    mapped = run("transit", transit_from_osm, site, lanes, height, solids=solids, seed=seed, feeds=feeds)
+    transit = waiting_off_the_road(mapped, streets, height)
+    write.transit(transit)
 
-    transit = stages.run(
-        "transit", transit_from_osm, data, lanes, height, half=half, solids=solids, seed=seed, feeds=list(given.feeds)
-    )
-    transit = _off_the_road(transit, streets, height)
-    write_record(folder / "transit.json", transit)
-    stages.report(
-        "transit",
-        {"stops": len(transit.stops), "lines": len(transit.lines), "bike_stations": len(transit.bike_stations)},
-        transit.left_out,
-    )
-
-    footways = _footways(streets)
-    outdoors, dropped = stages.run(
+    outdoors, dropped = run(
         "objects",
         objects_from_osm,
-        data,
+        site.osm,
         solids=solids,
         carriageway=streets.carriageway,
-        openings=footways,
+        openings=streets.footways(),
         height=height,
         transit=transit,
-        half=half,
-        seed=seed,
         lanes=lanes,
+        seed=seed,
     )
-    barrier = np.isin(outdoors.kind, _BARRIER_KINDS)
-    object_counts = {
-        "amenity_objects": int(((outdoors.group == "amenity") & ~barrier).sum()),
-        "natural_objects": int(((outdoors.group == "natural") & ~barrier).sum()),
-        "barrier_pieces": int(barrier.sum()),
-        "kinds": len(np.unique(outdoors.kind)),
-    }
-    stages.report("objects", object_counts, dropped)
+    write.outdoors(outdoors, dropped)
+    walkable = run("walkable", walkable_from_site, site, streets, solids, outdoors)
+    write.walkable(walkable)
 
-    walkable = stages.run("walkable", _walkable, data, half, solids, streets, footways, outdoors)
-    write_walkable(folder / "walkable.npz", walkable)
-    free = int((walkable.cls > 0).sum())
-    stages.report("walkable", {"free_cells": free, "connected_cells": int(walkable.connected.sum())})
-
-    places, entrances, dropped = stages.run(
+    places, entrances, dropped = run(
         "places",
         places_from_osm,
-        data,
+        site,
         buildings=built.records,
         walkable=walkable,
         height=height,
         roads=roads,
         transit=transit,
-        found=list(given.found),
+        found=list(evidence.found),
     )
-    open_ids = {entrance.building for entrance in entrances}
-    buildings = [b.model_copy(update={"accessible": b.id in open_ids}) for b in built.records]
-    write_records(folder / "buildings.json", buildings)
-    write_records(folder / "entrances.json", entrances)
-    stages.report(
-        "buildings",
-        {
-            "buildings": len(buildings),
-            "accessible_buildings": len(open_ids),
-            "watertight_buildings": built.watertight,
-            "collision_faces": built.collision_faces,
-        },
-        built.dropped,
-    )
+    buildings = write.buildings(built, entrances)
     stages.report("places", {"places": len(places), "entrances": len(entrances)}, dropped)
+    indoors, undrawn = _furnished(places, entrances, buildings, height, request, stages)
+    write.indoors(indoors, undrawn)
+    objects = write.objects(outdoors, indoors)
 
-    if sources.layouts is not None:
-        files = sorted(sources.layouts.glob("*.json"))
-        stages.given(sources.layouts, " ".join(f"{path.name} {sha256_of(path)}" for path in files))
-    inside = {
-        "buildings": buildings,
-        "height": height,
-        "seed": seed,
-        "entrances": entrances,
-        "library": sources.layouts,
-    }
-    undrawn: list[Dropped] = []
-    if author is None:
-        indoors = stages.run("indoor", furnish, places, **inside)
-    else:
-        stages.given(author, author.digest)
-        indoors, undrawn = stages.run("indoor", furnish_drawn, places, author=author, **inside)
-    write_records(folder / "places.json", indoors.places)
-    write_records(folder / "rooms.json", indoors.rooms)
-    objects = Objects.joined([outdoors, indoors.furniture])
-    write_objects(folder / "objects.parquet", objects)
-    counts = {"rooms": len(indoors.rooms), "indoor_objects": len(indoors.furniture)}
-    stages.report("indoor", counts, undrawn)
-
-    ground = stages.run("ground", ground_from_osm, data, height, half, streets, standing=solids)
-    stages.report("ground", {"faces": _faces(ground)})
+    ground = run("ground", ground_from_osm, site, height, streets, bridges, standing=solids)
+    stages.report("ground", {"faces": faces(ground)})
     fronts = street_fronts(indoors.places, entrances, buildings, built.walls, seed=seed)
     stages.report("fronts", fronts.counts)
-    models, credits = _models(objects, stand_ins)
-    parts: dict[str, Any] = {
-        "height": height,
-        "buildings": buildings,
-        "places": indoors.places,
-        "entrances": entrances,
-        "rooms": indoors.rooms,
-        "objects": objects,
-        "roads": roads,
-        "transit": transit,
-        "walkable": walkable,
-        "lanes": lanes,
-        "models": models,
-    }
-    manifest = Manifest(
-        producer=f"vico {__version__}",
-        name=sources.osm.name.removesuffix(".pbf").removesuffix(".osm"),
-        origin=Origin(lat=data.frame.lat, lon=data.frame.lon),
-        half=half,
-        bbox=tuple(round(v, 7) for v in data.frame.bbox(half)),
-        seed=seed,
-        sources=[*given.credits, *credits],
-        stages=[],
-        counts={},
-        places_by_type={},
-        files={},
-    )
-    layers = {
-        "ground": ground,
-        "buildings": [*built.walls, *fronts.surfaces],
-        "roofs": built.roofs,
-        "rooms": indoors.surfaces,
-        "collision": built.collision,
-    }
-    if tiles is not None or given.images:
-        seen = World(manifest, folder, layers=layers, **parts)
-        walls, roofs = _painted(given.images, tiles, built, seen, texturing=texturing, stages=stages, studio=studio)
-        layers |= {"buildings": [*walls, *fronts.surfaces], "roofs": roofs}
-    with stages.timed("write"):
-        _write_meshes(folder, layers, len(fronts.surfaces), models)
-    stages.report("write", {name: _faces(surfaces) for name, surfaces in layers.items()})
 
-    counts = {
-        "buildings": len(buildings),
-        "accessible_buildings": len(open_ids),
-        "watertight_buildings": built.watertight,
-        "collision_faces": built.collision_faces,
-        "places": len(indoors.places),
-        "entrances": len(entrances),
-        "rooms": len(indoors.rooms),
-        "roads": len(drivable),
-        "walkways": len(roads.roads) - len(drivable),
-        "junctions": len(roads.junctions),
-        "crossings": len(roads.crossings),
-        **object_counts,
-        "indoor_objects": len(indoors.furniture),
-        "transit": len(transit.stops) + len(transit.lines) + len(transit.bike_stations),
-    }
-    by_type = dict.fromkeys(sorted({p.category.value for p in indoors.places}), 0)
-    for place in indoors.places:
-        by_type[place.category.value] += 1
-    manifest = manifest.model_copy(update={"counts": counts, "places_by_type": by_type})
-    return World(manifest, folder, layers=layers, **parts)
+    models, credits = models_of(objects, installed=request.sources.installed_things)
+    parts = WorldParts(
+        height=height,
+        buildings=buildings,
+        places=indoors.places,
+        entrances=entrances,
+        rooms=indoors.rooms,
+        objects=objects,
+        roads=roads,
+        transit=transit,
+        walkable=walkable,
+        lanes=lanes,
+        models=models,
+    )
+    layers = Layers(ground, built.walls, fronts.surfaces, built.roofs, indoors.surfaces, built.collision)
+    manifest = manifest_of(request, evidence, parts, stages, credits)
+    if tiles is not None or evidence.images:
+        seen = parts.world(manifest, folder, layers)
+        walls, roofs = _painted(evidence.images, tiles, built, seen, request.texturing, stages)
+        layers = replace(layers, walls=walls, roofs=roofs)
+    write.meshes(layers, models)
+    return parts.world(manifest, folder, layers)
+
+
+def _site(data: OsmData, stages: Stages) -> SiteFacts:
+    """Read the facts of the site off its map; they are known by the map's own digest."""
+    with stages.timed("facts"):
+        return stages.given(site_facts(data), f"facts {stages.digest(data)}")
+
+
+def _terrain(
+    evidence: Evidence, plans: BuildingPlans, half: float, stages: Stages
+) -> tuple[HeightField, TileMesh | None]:
+    """Make the bare ground of whatever tells heights; the tile mesh, if there is one, is raised to stand on it."""
+    tiles = evidence.tiles
+    if tiles is None and evidence.samples is None:
+        return stages.run("terrain", flat_terrain, half=half), None
+    if tiles is None:
+        return stages.run("terrain", terrain_from_dem, evidence.samples, half=half), None
+    height, raised = stages.run("terrain", _ground_of_tiles, evidence.data, evidence.samples, tiles, plans, half=half)
+    if raised:
+        tiles = replace(tiles, positions=tiles.positions + np.array([0.0, 0.0, raised]))
+    return height, tiles
 
 
 def _ground_of_tiles(
-    data: OsmData, samples: HeightSamples | None, mesh: TileMesh, *, half: float, seed: int
+    data: OsmData, samples: HeightSamples | None, mesh: TileMesh, plans: BuildingPlans, *, half: float
 ) -> tuple[HeightField, float]:
-    """The ground, and by how much the tile mesh has to be raised to stand on it.
+    """Make the ground, and tell by how much the tile mesh has to be raised to stand on it.
 
     An elevation file that is given goes before the mesh's own ground; a mesh of buildings alone has none.
     """
@@ -293,8 +183,33 @@ def _ground_of_tiles(
             height = flat_terrain(half=half)
     else:
         height = terrain_from_dem(samples, half=half)
-    plans, _ = building_plans(data, seed=seed)
-    return height, settled(mesh, plans, height)[1]
+    return height, settled(mesh, plans.plans, height)[1]
+
+
+def _furnished(
+    places: list[Place],
+    entrances: list[Entrance],
+    buildings: list[Building],
+    height: HeightField,
+    request: WorldRequest,
+    stages: Stages,
+) -> tuple[Indoors, list[Dropped]]:
+    """Give places their rooms: from the library, drawn by the request's author, or by rules."""
+    library, author = request.sources.layouts, request.author
+    if library is not None:
+        files = sorted(library.glob("*.json"))
+        stages.given(library, " ".join(f"{path.name} {sha256_of(path)}" for path in files))
+    inside = {
+        "buildings": buildings,
+        "height": height,
+        "seed": request.seed,
+        "entrances": entrances,
+        "library": library,
+    }
+    if author is None:
+        return stages.run("indoor", furnish, places, **inside), []
+    stages.given(author, author.digest)
+    return stages.run("indoor", furnish_drawn, places, author=author, **inside)
 
 
 def _painted(
@@ -302,23 +217,17 @@ def _painted(
     tiles: TileMesh | None,
     built: BuildingsResult,
     world: World,
-    *,
-    texturing: Texturing,
+    how: Texturing,
     stages: Stages,
-    studio: Studio | None,
 ) -> tuple[list[Surface], list[Surface]]:
-    """Walls and roofs that wear photos where there are any."""
+    """Make walls and roofs that wear photos where there are any."""
     if tiles is not None:
         # Where street photos may still come, hardly covered faces wait for them.
         least = 0.0 if images else _LEAST_COVERED
-        painted = stages.run(
-            "bake", painted_from_tiles, built.walls, built.roofs, tiles, texel=texturing.texel, least=least
-        )
+        painted = stages.run("bake", painted_from_tiles, built.walls, built.roofs, tiles, texel=how.texel, least=least)
     else:
-        painted = stages.run("bake", painted_as_built, built.walls, built.roofs, texel=texturing.texel)
-    if images and studio is None:
-        raise InputError("photos: nobody is here to render what they are matched with; pass a studio")
-    if images and studio is not None:
+        painted = stages.run("bake", painted_as_built, built.walls, built.roofs, texel=how.texel)
+    if images:
         walls, roofs = painted.surfaces()
         layers = {"ground": world.surfaces("ground"), "buildings": walls, "roofs": roofs}
         seen = World(world.manifest, world.path, layers=layers, objects=world.objects, models=world.prototypes())
@@ -329,105 +238,11 @@ def _painted(
             list(images),
             world.height,
             others=world.surfaces("ground"),
-            photograph=studio(seen),
+            photograph=photographer_of(seen),
+            how=how,
         )
         stages.report("streetview", report.counts, report.dropped)
     painted = kept_where_photographed(built.walls, built.roofs, painted, least=_LEAST_COVERED)
-    painted = stages.run("enhance", enhanced, painted, texturing)
+    painted = stages.run("enhance", enhanced, painted, how)
     stages.report("texture", painted.counts)
     return painted.surfaces()
-
-
-def _streets(data: OsmData, *, seed: int) -> StreetPolygons:
-    return road_polygons(data, standing_outlines(data, seed=seed))
-
-
-def _standing(built: BuildingsResult, height: HeightField) -> list[BaseGeometry]:
-    """What of the buildings stands in people's way: convex pieces that begin lower than a person is tall."""
-    solids: list[BaseGeometry] = []
-    for body in built.collision:
-        points = np.asarray(body.positions, np.float64)
-        ring = points[: len(points) // 2]
-        if float(ring[0, 2]) < float(height(ring[:, :2]).max()) + 2.2:
-            solids.append(shapely.Polygon(ring[:, :2]))
-    return solids
-
-
-def _off_the_road(transit: Transit, streets: StreetPolygons, height: HeightField) -> Transit:
-    """Move waiting places from the carriageway to the pavement within 5 m: streets may be wider than their lanes."""
-    pavement = shapely.buffer(shapely.union_all([streets.sidewalk, streets.pedestrian]), -0.7)
-    if pavement.is_empty:
-        return transit
-    shapely.prepare(streets.carriageway)
-    stops = []
-    for stop in transit.stops:
-        here = shapely.Point(stop.wait[:2])
-        if streets.carriageway.contains(here):
-            x, y = shapely.shortest_line(here, pavement).coords[-1]
-            if here.distance(shapely.Point(x, y)) <= 5.0:
-                wait = (round(x, 3), round(y, 3), round(float(height((x, y))), 3))
-                stop = stop.model_copy(update={"wait": wait})
-        stops.append(stop)
-    return transit.model_copy(update={"stops": stops})
-
-
-def _footways(streets: StreetPolygons) -> BaseGeometry:
-    """Where walkers walk."""
-    return shapely.union_all(
-        [streets.sidewalk, streets.pedestrian, streets.path, streets.steps, streets.cycleway, streets.crossing]
-    )
-
-
-def _walkable(
-    data: OsmData,
-    half: float,
-    solids: list[BaseGeometry],
-    streets: StreetPolygons,
-    footways: BaseGeometry,
-    objects: Objects,
-) -> WalkableMap:
-    ground = mapped_areas(data, shapely.box(-half, -half, half, half))
-    return walkable_map(
-        half=half,
-        solids=solids,
-        roadway=shapely.union_all([streets.carriageway, streets.parking, *ground["ballast"]]),
-        sidewalk=footways,
-        crossing=streets.crossing,
-        water=shapely.union_all(ground["water"]),
-        objects=objects,
-    )
-
-
-def _faces(surfaces: Iterable[Surface]) -> int:
-    return sum(len(surface.triangles) for surface in surfaces)
-
-
-def _models(
-    objects: Objects, stand_ins: Mapping[str, Sequence[Surface]]
-) -> tuple[dict[str, Sequence[Surface]], list[Source]]:
-    """The models of what stands in the world, and whom to thank for those that are not ours."""
-    used = set(objects.prototype.tolist())
-    models: dict[str, Sequence[Surface]] = {
-        name: list(stand_ins.get(name, model.surfaces)) for name, model in our_models().items() if name in used
-    }
-    foreign = [name for name in models if name in stand_ins]
-    credits = [
-        Source(kind="things", name=c.collection, licence=c.licence, attribution=c.words, sha256=read_things()[2])
-        for c in (credits_of(foreign) if foreign else ())
-    ]
-    return models, credits
-
-
-def _write_meshes(
-    folder: Path, layers: dict[str, list[Surface]], fronts: int, models: dict[str, Sequence[Surface]]
-) -> None:
-    """Write the layers; the last `fronts` of the buildings' surfaces stand before their walls."""
-    meshes = folder / "meshes"
-    buildings = layers["buildings"]
-    walls, doors = buildings[: len(buildings) - fronts], buildings[len(buildings) - fronts :]
-    write_glb(meshes / "ground.glb", {"ground": layers["ground"]})
-    write_glb(meshes / "buildings.glb", {"walls": walls, "doors": doors})
-    write_glb(meshes / "roofs.glb", {"roofs": layers["roofs"]})
-    write_glb(meshes / "rooms.glb", {"rooms": layers["rooms"]})
-    write_glb(meshes / "collision.glb", {f"part_{k}": [body] for k, body in enumerate(layers["collision"])})
-    write_glb(meshes / "prototypes.glb", models)

@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from html import escape
 
-from vico.world.files import write_bytes
+from vico.io.files import write_bytes
 from vico.world.folder import World, stage_seconds
 from vico.world.model import Dropped, StageReport
 

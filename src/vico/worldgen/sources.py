@@ -45,8 +45,8 @@ class Sources:
 
     def __post_init__(self) -> None:
         for what, value, reader in (
-            ("tiles", self.tiles, "vico.geo.tiles3d.read_tileset"),
-            ("photos", self.photos, "vico.geo.street_images_google.GoogleStreetView"),
+            ("tiles", self.tiles, "vico.geo.tiles3d.reader.read_tileset"),
+            ("photos", self.photos, "vico.geo.street_images.google.GoogleStreetView"),
         ):
             if value == "google":
                 raise InputError(

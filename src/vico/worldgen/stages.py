@@ -18,27 +18,36 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeVar
 
-from vico import __version__
 from vico.errors import SchemaError
+from vico.io.data_files import VARIABLE
+from vico.version import __version__
 from vico.world.model import Dropped, StageReport
 from vico.worldgen.product import digest_of, read_head, read_product, write_product
 
 Progress = Callable[[str, int, int], None]
 T = TypeVar("T")
 
-_ROOMS = ("geo", "world", "assets", "worldgen", "llm")
+_CODE = ("*.py", *(f"{room}/**/*.py" for room in ("io", "geo", "world", "assets", "render", "worldgen", "llm")))
+_DATA = ("data/**/*.toml",)
 SUFFIX = ".stage"
 
 
-@cache
 def code_digest() -> str:
-    """SHA-256 of the code that builds worlds: another version of it may make other products from the same inputs."""
+    """Return the SHA-256 of the code and data that build worlds: another version may make others of the same inputs."""
+    return _code_digest(os.environ.get(VARIABLE, ""))
+
+
+@cache
+def _code_digest(own_data: str) -> str:
     root = Path(__file__).parents[1]
     total = sha256(__version__.encode())
-    for room in _ROOMS:
-        for path in sorted((root / room).rglob("*.py")):
+    for pattern in (*_CODE, *_DATA):
+        for path in sorted(root.glob(pattern)):
             total.update(path.relative_to(root).as_posix().encode())
             total.update(path.read_bytes())
+    for path in sorted(Path(own_data).rglob("*.toml")) if own_data else []:
+        total.update(path.relative_to(own_data).as_posix().encode())
+        total.update(path.read_bytes())
     return total.hexdigest()
 
 
@@ -83,6 +92,15 @@ class Stages:
                 self._digests[id(value)] = lambda: value, digest
         return value
 
+    def digested(self, value: T) -> T:
+        """Take the digest of a value that is the input of several stages, once, and return the value."""
+        return self.given(value, digest_of(value))
+
+    def digest(self, value: Any) -> str:
+        """Return the digest of an input: as it is known by, else of its content."""
+        known = self._digests.get(id(value))
+        return known[1] if known is not None and known[0]() is value else digest_of(value)
+
     def run(self, name: str, function: Callable[..., T], *inputs: Any, **options: Any) -> T:
         """Run a stage, or read what it made from the same inputs before.
 
@@ -109,6 +127,10 @@ class Stages:
         """Record what a stage made and left out."""
         self.reports.append(StageReport(name=name, counts=counts, dropped=list(dropped)))
 
+    def counts(self, name: str) -> dict[str, int]:
+        """Return what a stage reported."""
+        return next(report.counts for report in self.reports if report.name == name)
+
     def sweep(self) -> None:
         """Remove products of stages that this build did not have."""
         if self._folder is not None and self._folder.is_dir():
@@ -123,11 +145,11 @@ class Stages:
     def _product(self, name: str, function: Callable[..., T], inputs: tuple[Any, ...], options: dict[str, Any]) -> T:
         if self._folder is None:
             return function(*inputs, **options)
-        what = {key: self._digest(value) for key, value in sorted(options.items()) if not callable(value)}
+        what = {key: self.digest(value) for key, value in sorted(options.items()) if not callable(value)}
         parts = [
             name,
             code_digest(),
-            *(self._digest(value) for value in inputs),
+            *(self.digest(value) for value in inputs),
             *(f"{k}={v}" for k, v in what.items()),
         ]
         key = sha256("\n".join(parts).encode()).hexdigest()
@@ -141,13 +163,9 @@ class Stages:
         return self.given(value, write_product(path, value, key=key))
 
     def _read(self, path: Path, key: str) -> tuple[Any, str] | None:
-        """The product, if it was made under this key and is whole: a torn one is simply made anew."""
+        """Read the product, if it was made under this key and is whole: a torn one is simply made anew."""
         try:
             return read_product(path) if read_head(path)[0] == key else None
         except SchemaError:
             os.unlink(path)
             return None
-
-    def _digest(self, value: Any) -> str:
-        known = self._digests.get(id(value))
-        return known[1] if known is not None and known[0]() is value else digest_of(value)

@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any
 
 from vico.agents.assistant.heuristic import HeuristicDelivery
 from vico.agents.assistant.random_planner import RandomPlanner
+from vico.agents.base import Agent
 from vico.errors import InputError
 from vico.world.public import PublicMap
-
-
-class Planner(Protocol):
-    """Turns what an assistant observes into its next action."""
-
-    def act(self, observation: Mapping[str, Any], info: Mapping[str, Any]) -> dict[str, Any]:
-        """Return one action for one observation."""
-
 
 METHODS: dict[str, type[HeuristicDelivery] | type[RandomPlanner]] = {
     "random": RandomPlanner,
@@ -26,7 +18,7 @@ METHODS: dict[str, type[HeuristicDelivery] | type[RandomPlanner]] = {
 
 def make_planner(
     method: str, instructions: list[dict[str, Any]], public_map: PublicMap, *, seed: int, number: int = 0, of: int = 1
-) -> Planner:
+) -> Agent:
     """Make a planner by name.
 
     Parameters

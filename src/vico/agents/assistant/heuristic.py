@@ -18,10 +18,10 @@ from collections.abc import Callable, Mapping
 from enum import IntEnum
 from typing import Any, ClassVar
 
-from vico.agents.assistant.skills import GRASP, Action, Body, LookAround, View
+from vico.agents.assistant.skills import GRASP, Action, AssistantSkills, LookAround, ObservationView
 from vico.agents.perception import Sighting
+from vico.seeds import rng
 from vico.world.public import PublicMap
-from vico.world.seeds import rng
 
 SEARCH_ROUNDS = 3
 
@@ -54,7 +54,7 @@ class HeuristicDelivery:
         self, instructions: list[dict[str, Any]], public_map: PublicMap, *, seed: int, number: int = 0, of: int = 1
     ) -> None:
         self.errands = instructions[number::of]
-        self.body = Body(public_map, rng(seed, "heuristic", number))
+        self.skills = AssistantSkills(public_map, rng(seed, "heuristic", number))
         self.state = State.GOTO_SOURCE if self.errands else State.FINISHED
         self._current = 0
         self._search: LookAround | None = None
@@ -73,8 +73,8 @@ class HeuristicDelivery:
 
     def act(self, observation: Mapping[str, Any], info: Mapping[str, Any]) -> Action:
         """Return one action for one observation."""
-        view = View(observation, info.get("entities", {}))
-        self.body.notice(view)
+        view = ObservationView(observation, info.get("entities", {}))
+        self.skills.notice(view)
         for _ in range(12):  # a chain of states that are done at once, each at most once or twice
             before = self.state
             action = self._STEPS[self.state](self, view)
@@ -86,14 +86,14 @@ class HeuristicDelivery:
     def _wanted(self, thing: Sighting) -> bool:
         return thing.name in self.errand["objects"] and thing.name not in self._picked
 
-    def _goto_source(self, view: View) -> Action | None:
-        action = self.body.go_to(view, self.errand["source"])
+    def _goto_source(self, view: ObservationView) -> Action | None:
+        action = self.skills.go_to(view, self.errand["source"])
         if action is None:
-            self._search = LookAround(self.body, self._wanted, self.errand["source"])
+            self._search = LookAround(self.skills, self._wanted, self.errand["source"])
             self.state = State.SEARCH
         return action
 
-    def _look(self, view: View) -> Action | None:
+    def _look(self, view: ObservationView) -> Action | None:
         assert self._search is not None
         action = self._search.act(view)
         if action is not None:
@@ -108,21 +108,21 @@ class HeuristicDelivery:
         elif self._rounds >= SEARCH_ROUNDS:
             self._next_errand()
         else:
-            self._search = LookAround(self.body, self._wanted, self.errand["source"])
+            self._search = LookAround(self.skills, self._wanted, self.errand["source"])
             return {"type": "wait"}
         return None
 
-    def _navigate(self, view: View) -> Action | None:
+    def _navigate(self, view: ObservationView) -> Action | None:
         assert self._target is not None
         # What is in view again is placed better from nearer.
         self._target = next((t for t in view.things if t.entity == self._target.entity), self._target)
-        action = self.body.approach(view, self._target.position, near=self._near)
+        action = self.skills.approach(view, self._target.position, near=self._near)
         if action is not None and self._steps_here < 60:
             return action
         self.state = State.PICK
         return None
 
-    def _pick(self, view: View) -> Action | None:
+    def _pick(self, view: ObservationView) -> Action | None:
         assert self._target is not None
         if self._picking:
             name, self._picking = self._picking, ""
@@ -134,7 +134,7 @@ class HeuristicDelivery:
                 return None
             else:
                 self.state = State.SEARCH
-                self._search = LookAround(self.body, self._wanted, self.errand["source"])
+                self._search = LookAround(self.skills, self._wanted, self.errand["source"])
                 return {"type": "wait"}
         left = [name for name in self.errand["objects"] if name not in self._picked]
         if not left or all(view.held):
@@ -149,17 +149,17 @@ class HeuristicDelivery:
             self.state = State.NAVIGATE
             return None
         # More is wanted from here: one look around before carrying off what is in hand.
-        self._search = LookAround(self.body, self._wanted, self.errand["source"])
+        self._search = LookAround(self.skills, self._wanted, self.errand["source"])
         self.state = State.SEARCH
         return None
 
-    def _goto_destination(self, view: View) -> Action | None:
-        action = self.body.go_to(view, self.errand["destination"])
+    def _goto_destination(self, view: ObservationView) -> Action | None:
+        action = self.skills.go_to(view, self.errand["destination"])
         if action is None:
             self.state = State.DROP
         return action
 
-    def _drop(self, view: View) -> Action | None:
+    def _drop(self, view: ObservationView) -> Action | None:
         full = [hand for hand, entity in enumerate(view.held) if entity]
         if full:
             if view.refused and self._steps_here > 0:
@@ -182,7 +182,7 @@ class HeuristicDelivery:
         self._target = None
         self.state = State.GOTO_SOURCE if self._current < len(self.errands) else State.COMPLETE
 
-    def _complete(self, view: View) -> Action | None:
+    def _complete(self, view: ObservationView) -> Action | None:
         if self._reported < len(self.errands):
             index = int(self.errands[self._reported]["index"])
             self._reported += 1
@@ -190,10 +190,10 @@ class HeuristicDelivery:
         self.state = State.FINISHED
         return None
 
-    def _finished(self, view: View) -> Action | None:
+    def _finished(self, view: ObservationView) -> Action | None:
         return {"type": "wait"}
 
-    _STEPS: ClassVar[dict[State, Callable[[HeuristicDelivery, View], Action | None]]] = {
+    _STEPS: ClassVar[dict[State, Callable[[HeuristicDelivery, ObservationView], Action | None]]] = {
         State.GOTO_SOURCE: _goto_source,
         State.SEARCH: _look,
         State.NAVIGATE: _navigate,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from vico.agents.assistant.skills import GRASP, Action, Body, LookAround, View
+from vico.agents.assistant.skills import GRASP, Action, AssistantSkills, LookAround, ObservationView
 from vico.agents.perception import Sighting
+from vico.seeds import rng
 from vico.world.public import PublicMap
-from vico.world.seeds import rng
 
 # Longest time for one high-level action, steps: a drawn one may be impossible.
 PATIENCE = 300
@@ -21,7 +21,7 @@ class RandomPlanner:
         self, instructions: list[dict[str, Any]], public_map: PublicMap, *, seed: int, number: int = 0, of: int = 1
     ) -> None:
         self.errands = instructions
-        self.body = Body(public_map, rng(seed, "random planner, feet", number))
+        self.skills = AssistantSkills(public_map, rng(seed, "random planner, feet", number))
         self._random = rng(seed, "random planner", number)
         self._plan = ""
         self._region: Mapping[str, Any] = {}
@@ -33,8 +33,8 @@ class RandomPlanner:
 
     def act(self, observation: Mapping[str, Any], info: Mapping[str, Any]) -> Action:
         """Return one action for one observation."""
-        view = View(observation, info.get("entities", {}))
-        self.body.notice(view)
+        view = ObservationView(observation, info.get("entities", {}))
+        self.skills.notice(view)
         self._age += 1
         for _ in range(8):
             action = self._continue(view)
@@ -43,24 +43,24 @@ class RandomPlanner:
             self._draw(view)
         return {"type": "wait"}
 
-    def _draw(self, view: View) -> None:
+    def _draw(self, view: ObservationView) -> None:
         errand = self.errands[int(self._random.integers(len(self.errands)))]
         self._plan = ("go", "search", "pick", "put", "complete")[int(self._random.integers(5))]
         self._age = 0
         self._region = errand["source" if self._random.random() < 0.5 else "destination"]
-        self._search = LookAround(self.body, lambda thing: thing.kind == "object", None)
+        self._search = LookAround(self.skills, lambda thing: thing.kind == "object", None)
         things = [thing for thing in view.things if thing.kind == "object" and thing.entity not in view.held]
         self._target = things[int(self._random.integers(len(things)))] if things else None
         self._index = int(errand["index"])
         self._done = False
 
-    def _continue(self, view: View) -> Action | None:
+    def _continue(self, view: ObservationView) -> Action | None:
         if self._plan == "go":
-            return self.body.go_to(view, self._region)
+            return self.skills.go_to(view, self._region)
         if self._plan == "search" and self._search is not None:
             return self._search.act(view)
         if self._plan == "pick" and self._target is not None and 0 in view.held and not self._done:
-            step = self.body.approach(view, self._target.position, near=GRASP)
+            step = self.skills.approach(view, self._target.position, near=GRASP)
             if step is not None:
                 return step
             self._done = True

@@ -30,7 +30,7 @@ GRASP = 1.15  # metres from a thing at which one stops to pick it up; arms reach
 
 
 @dataclass(frozen=True)
-class View:
+class ObservationView:
     """One observation with its info, under short names."""
 
     observation: Mapping[str, Any]
@@ -83,7 +83,7 @@ class View:
         return math.hypot(x, y)
 
 
-class Body:
+class AssistantSkills:
     """The skills of one assistant, with what it remembers of rooms.
 
     Parameters
@@ -101,7 +101,7 @@ class Body:
         self._trail: list[str] = []
         self._tries = 0
 
-    def notice(self, view: View) -> None:
+    def notice(self, view: ObservationView) -> None:
         """Take in a new observation: the room's depth, and the way one came."""
         room = view.room
         if room is None:
@@ -118,13 +118,13 @@ class Body:
         if view.collided:
             grid.bump(view.pose[:2] + view.pose[3:5] * 0.45)
 
-    def _grid(self, view: View) -> DepthGrid:
+    def _grid(self, view: ObservationView) -> DepthGrid:
         room = str(view.room)
         if room not in self._grids:
             self._grids[room] = DepthGrid(view.pose[:2])
         return self._grids[room]
 
-    def go_to(self, view: View, region: Mapping[str, Any]) -> Action | None:
+    def go_to(self, view: ObservationView, region: Mapping[str, Any]) -> Action | None:
         """Go to a region of a task: into the place, or to the middle of the spot outdoors."""
         if region["kind"] == "place":
             return self.go_inside(view, str(region["place"]))
@@ -132,7 +132,7 @@ class Body:
             return self.leave(view)
         return self.walk_to(view, region["centre"], near=1.0)
 
-    def go_inside(self, view: View, place_id: str) -> Action | None:
+    def go_inside(self, view: ObservationView, place_id: str) -> Action | None:
         """Go into a place by its entrance."""
         if view.place == place_id:
             return None
@@ -147,7 +147,7 @@ class Body:
         self._tries = 0
         return self.walk_to(view, place.position, near=0.3) or {"type": "wait"}
 
-    def leave(self, view: View) -> Action | None:
+    def leave(self, view: ObservationView) -> Action | None:
         """Leave the building, room by room, the way one came."""
         doors: Sequence[Mapping[str, Any]] = view.state["doors"]
         out = next((door for door in doors if door["to"] == OUTSIDE), None)
@@ -157,7 +157,7 @@ class Body:
         back = self._trail[-2] if len(self._trail) > 1 else str(doors[0]["to"])
         return self.go_through(view, back)
 
-    def go_through(self, view: View, room: str) -> Action | None:
+    def go_through(self, view: ObservationView, room: str) -> Action | None:
         """Go through the door to a neighbouring room; None once there."""
         if view.room == room:
             return None
@@ -167,7 +167,7 @@ class Body:
         step = self.walk_indoors(view, door["position"], near=INNER_DOOR_REACH)
         return step or {"type": "enter", "place": room}
 
-    def walk_indoors(self, view: View, target: ArrayLike, *, near: float) -> Action | None:
+    def walk_indoors(self, view: ObservationView, target: ArrayLike, *, near: float) -> Action | None:
         """Walk within a room around what depth images showed; None once within `near` metres of the target."""
         if view.away(target) <= near:
             return None
@@ -185,7 +185,7 @@ class Body:
             return turn_action(turn)
         return {"type": "move_forward", "distance": max(min(1.0, view.away(aim)), 0.1)}
 
-    def approach(self, view: View, position: ArrayLike, *, near: float) -> Action | None:
+    def approach(self, view: ObservationView, position: ArrayLike, *, near: float) -> Action | None:
         """Walk up to a point, indoors or out; None once within `near` metres."""
         if view.away(position) <= near:
             return None
@@ -193,7 +193,7 @@ class Body:
             return self.walk_indoors(view, position, near=near)
         return self.walk_to(view, position, near=near)
 
-    def walk_to(self, view: View, point: ArrayLike, *, near: float) -> Action | None:
+    def walk_to(self, view: ObservationView, point: ArrayLike, *, near: float) -> Action | None:
         """Walk outdoors on the public map; None once within `near` metres, or where no way leads nearer."""
         if view.away(point) <= near:
             self._walker.stop()
@@ -209,7 +209,7 @@ def turn_to(pose: NDArray[np.float64], target: ArrayLike) -> float:
 
 
 def turn_action(radians: float) -> Action:
-    """The action that turns by an angle, counter-clockwise positive."""
+    """Return the action that turns by an angle, counter-clockwise positive."""
     return {"type": "turn_left" if radians >= 0 else "turn_right", "degrees": abs(math.degrees(radians))}
 
 
@@ -237,8 +237,10 @@ class LookAround:
         Where to look; None for wherever one is.
     """
 
-    def __init__(self, body: Body, wanted: Callable[[Sighting], bool], region: Mapping[str, Any] | None) -> None:
-        self.body = body
+    def __init__(
+        self, skills: AssistantSkills, wanted: Callable[[Sighting], bool], region: Mapping[str, Any] | None
+    ) -> None:
+        self.skills = skills
         self.wanted = wanted
         self.turns = 0
         self.found: Sighting | None = None
@@ -250,9 +252,9 @@ class LookAround:
             middle = np.asarray(region["centre"], np.float64)[:2]
             reach = 0.6 * max(float(region["radius"]), 3.0)
             ring = [middle + reach * np.array([math.cos(a), math.sin(a)]) for a in (0.0, 1.57, 3.14, 4.71)]
-            self._spots = [spot for spot in ring if body.map.walkable.is_connected(spot)]
+            self._spots = [spot for spot in ring if skills.map.walkable.is_connected(spot)]
 
-    def act(self, view: View) -> Action | None:
+    def act(self, view: ObservationView) -> Action | None:
         """Return the next action; None when something was found (see `found`) or everything was looked at."""
         self.found = next((thing for thing in view.things if self.wanted(thing)), None)
         if self.found is not None:
@@ -262,10 +264,10 @@ class LookAround:
             return {"type": "turn_left", "degrees": 85.0}
         return self._elsewhere(view)
 
-    def _elsewhere(self, view: View) -> Action | None:
+    def _elsewhere(self, view: ObservationView) -> Action | None:
         if view.room is None:
             while self._spots:
-                step = self.body.approach(view, self._spots[0], near=1.0)
+                step = self.skills.approach(view, self._spots[0], near=1.0)
                 self._walked += 1
                 if step is not None and self._walked < 20:
                     return step
@@ -277,7 +279,7 @@ class LookAround:
         if view.room not in self._rooms_done:
             middle = self._room_middle(view)
             self._walked += 1
-            step = self.body.walk_indoors(view, middle, near=0.8) if self._walked < 12 else None
+            step = self.skills.walk_indoors(view, middle, near=0.8) if self._walked < 12 else None
             if step is not None:
                 return step
             self._rooms_done.add(view.room)
@@ -289,7 +291,7 @@ class LookAround:
         onward = self._next_room(view.room)
         if onward is None:
             return None
-        step = self.body.go_through(view, onward)
+        step = self.skills.go_through(view, onward)
         self._walked += 1
         if step is not None and step["type"] == "enter":
             self.turns = 4 if onward in self._rooms_done else 0  # no second look at what was seen
@@ -302,7 +304,7 @@ class LookAround:
         return step
 
     def _next_room(self, here: str) -> str | None:
-        """The neighbour through which the nearest room lies that was not looked at; None if all were."""
+        """Return the neighbour through which the nearest room lies that was not looked at; None if all were."""
         first: dict[str, str] = {name: name for name in self._ways[here]}
         queue = list(first)
         while queue:
@@ -316,7 +318,7 @@ class LookAround:
         return None
 
     @staticmethod
-    def _room_middle(view: View) -> NDArray[np.float64]:
+    def _room_middle(view: ObservationView) -> NDArray[np.float64]:
         """Middle of the doors' side and what is seen of the floor: a spot from which more of the room is in view."""
         depth = np.asarray(view.observation["depth"])
         ahead = float(np.median(depth[depth > 0])) if bool((depth > 0).any()) else 1.0

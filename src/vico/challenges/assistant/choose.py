@@ -25,7 +25,7 @@ Chooser = Callable[[str, Sequence[str]], int]
 
 
 def seeded_chooser(rng: np.random.Generator) -> Chooser:
-    """The offline chooser: any candidate, with equal chances."""
+    """Return the offline chooser: any candidate, with equal chances."""
     return lambda question, candidates: int(rng.integers(len(candidates)))
 
 

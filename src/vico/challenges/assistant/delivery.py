@@ -15,14 +15,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from vico.assets.goods import COLOURS, GOODS
+from vico.assets.models.movable import movable_colours, movable_kinds
 from vico.challenges.assistant.choose import CANDIDATES, Chooser, Surroundings, seeded_chooser
 from vico.challenges.assistant.model import Region, Start, StateView, Subtask, Task, TaskObject
 from vico.errors import EmptyInputError
+from vico.seeds import rng
 from vico.world.folder import World
 from vico.world.model import Container, Point3, Room
 from vico.world.routing import Router
-from vico.world.seeds import rng
 from vico.world.walkable import OPEN, SIDEWALK
 
 SUBTASKS = 6
@@ -68,13 +68,14 @@ def generate_delivery(
         if not targets:
             raise EmptyInputError(f"delivery: nothing lies 20 m or more from {source.name}; use a larger world")
         destination = targets[choose("Where are the things brought to?", [r.name for r in targets])]
-        kinds = [str(k) for k in chance.permutation(sorted(GOODS))[:CANDIDATES]]
+        kinds = [str(k) for k in chance.permutation(sorted(movable_kinds()))[:CANDIDATES]]
         kind = kinds[choose(f"What is carried from {source.name} to {destination.name}?", kinds)]
         told = [region for errand in subtasks for region in (errand.source, errand.destination)]
         middles = np.array([region.centre[:2] for region in (*told, source, destination)])
-        things = [_thing(world, surroundings, chance, kind, source, middles, taken, index, k) for k in range(count)]
+        names = [f"object_{index}_{k}" for k in range(count)]
+        things = [_thing(surroundings, chance, kind, source, middles, taken, name) for name in names]
         objects += things
-        what = " and ".join(GOODS[t.kind].described(t.colour) for t in things)
+        what = " and ".join(movable_kinds()[t.kind].described(t.colour) for t in things)
         subtasks.append(
             Subtask(
                 index=index,
@@ -119,7 +120,7 @@ def _inside(region: Region, name: str, state: StateView, world: World) -> bool:
 
 
 def _start(world: World, router: Router, chance: np.random.Generator) -> tuple[np.ndarray, Surroundings]:
-    """A free spot with enough places around it, away from the map's edge."""
+    """Return a free spot with enough places around it, away from the map's edge."""
     for _ in range(20):
         start = world.walkable.random_point(chance, near=(0.0, 0.0), radius=0.75 * world.half, clearance=0.75)
         try:
@@ -149,39 +150,25 @@ def _at(region: Region) -> str:
 
 
 def _thing(
-    world: World,
     surroundings: Surroundings,
     chance: np.random.Generator,
     kind: str,
     source: Region,
     middles: np.ndarray,
     taken: set[str],
-    index: int,
-    number: int,
+    name: str,
 ) -> TaskObject:
-    """A thing with a name no other thing of the episode has, laid down in the source, in none of the middles."""
-    free = [c for c in COLOURS if f"{c} {kind}" not in taken]
+    """Return a thing with a name no other thing of the episode has, laid down in the source, in none of the middles."""
+    free = [c for c in movable_colours() if f"{c} {kind}" not in taken]
     colour = free[int(chance.integers(len(free)))]
     taken.add(f"{colour} {kind}")
     room: str | None = None
     if source.kind == "place":
-        rooms = [surroundings.rooms[i] for i in world.place_by_id[str(source.place)].rooms]
-        surfaces = [(r, c) for r in rooms for c in r.containers]
-        chosen, container = surfaces[int(chance.integers(len(surfaces)))]
-        position, room = _on(container, chosen, kind, chance), chosen.id
+        position, room = _spot_indoors(surroundings, chance, kind, source)
     else:
-        for _ in range(_TRIES):
-            spot = world.walkable.random_point(
-                chance, classes=(OPEN, SIDEWALK), near=source.centre, radius=SOURCE_RADIUS, clearance=0.5
-            )
-            if np.hypot(*(middles - spot).T).min() >= _OFF_MIDDLE:
-                break
-        else:
-            raise EmptyInputError(f"delivery: at {source.name} things can lie in its middle only; use a larger world")
-        x, y = spot
-        position = (float(x), float(y), float(world.height(spot)))
+        position = _spot_outdoors(surroundings.world, chance, source, middles)
     return TaskObject(
-        id=f"object_{index}_{number}",
+        id=name,
         kind=kind,
         colour=colour,
         name=f"{colour} {kind}",
@@ -191,11 +178,33 @@ def _thing(
     )
 
 
+def _spot_indoors(
+    surroundings: Surroundings, chance: np.random.Generator, kind: str, source: Region
+) -> tuple[Point3, str]:
+    """Return a spot on one of a place's surfaces, and the id of its room."""
+    rooms = [surroundings.rooms[i] for i in surroundings.world.place_by_id[str(source.place)].rooms]
+    surfaces = [(r, c) for r in rooms for c in r.containers]
+    room, container = surfaces[int(chance.integers(len(surfaces)))]
+    return _on(container, room, kind, chance), room.id
+
+
+def _spot_outdoors(world: World, chance: np.random.Generator, source: Region, middles: np.ndarray) -> Point3:
+    """Return a free, reachable spot of a region that lies in none of the middles that are told."""
+    for _ in range(_TRIES):
+        spot = world.walkable.random_point(
+            chance, classes=(OPEN, SIDEWALK), near=source.centre, radius=SOURCE_RADIUS, clearance=0.5
+        )
+        if np.hypot(*(middles - spot).T).min() >= _OFF_MIDDLE:
+            x, y = spot
+            return (float(x), float(y), float(world.height(spot)))
+    raise EmptyInputError(f"delivery: at {source.name} things can lie in its middle only; use a larger world")
+
+
 def _on(container: Container, room: Room, kind: str, chance: np.random.Generator) -> Point3:
-    """A spot on a surface; on the floor, where somebody can stand, so that furniture never buries the thing."""
+    """Return a spot on a surface; on the floor, where somebody can stand, so that furniture never buries the thing."""
     if container.kind == "floor":
         return (container.reach[0], container.reach[1], room.centre[2])
-    margin = max(GOODS[kind].size[:2]) / 2
+    margin = max(movable_kinds()[kind].size[:2]) / 2
     half = np.maximum(np.asarray(container.size) / 2 - margin, 0.0)
     u, v = chance.uniform(-half, half)
     c, s = np.cos(container.yaw), np.sin(container.yaw)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from vico.errors import SchemaError
-from vico.world.files import read_json, write_json
+from vico.io.files import read_json, write_json
 from vico.world.model import Point2, Point3, Record
 
 SCHEMA = "vico.task"
@@ -98,7 +98,7 @@ class Task(Record):
     subtasks: list[Subtask]
 
     def instructions(self) -> list[dict[str, Any]]:
-        """What the assistants are told: no position of any object, no candidates."""
+        """Return what the assistants are told: no position of any object, no candidates."""
         names = {thing.id: thing.name for thing in self.objects}
         return [
             {

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from vico.agents.assistant import Planner, make_planner
+from vico.agents.assistant import make_planner
+from vico.agents.base import Agent
 from vico.agents.schedule import followers_of
-from vico.assets.goods import GOODS, good_prototype, good_surfaces
+from vico.assets.models.movable import movable_kinds, movable_prototype, movable_surfaces
 from vico.challenges.assistant.delivery import delivered, generate_delivery
-from vico.challenges.assistant.model import Task, write_task
+from vico.challenges.assistant.model import StateView, Task, write_task
 from vico.challenges.results import EpisodeResult
 from vico.community import build_community
 from vico.community.model import Community
@@ -29,32 +26,6 @@ CARS, PEDESTRIANS = 30, 30
 Progress = Callable[[str, int, int], None]
 
 
-@dataclass
-class TrueState:
-    """The evaluator's look at the simulation; agents never get it."""
-
-    simulation: Simulation
-
-    def _index(self, name: str) -> int:
-        return self.simulation.stage.goods.names.index(name)
-
-    def object_position(self, name: str) -> NDArray[np.float64]:
-        """See `StateView`."""
-        position: NDArray[np.float64] = self.simulation.stage.goods.position[self._index(name)]
-        return position
-
-    def object_room(self, name: str) -> str | None:
-        """See `StateView`."""
-        room = int(self.simulation.stage.goods.room[self._index(name)])
-        return None if room < 0 else self.simulation.stage.indoor.rooms[room].id
-
-    def object_holder(self, name: str) -> str | None:
-        """See `StateView`."""
-        goods = self.simulation.stage.goods
-        holder = int(goods.holder[self._index(name)])
-        return None if holder == 0 else self.simulation.entity(holder)["name"]
-
-
 class Judge:
     """Keeps the verdicts of one episode.
 
@@ -62,7 +33,7 @@ class Judge:
     `done_at` tells when what was judged a success had last become true.
     """
 
-    def __init__(self, task: Task, world: World, state: TrueState) -> None:
+    def __init__(self, task: Task, world: World, state: StateView) -> None:
         self.task, self.world, self.state = task, world, state
         # The simulation knows things by the names agents hear; the rule by their ids.
         names = {thing.id: thing.name for thing in task.objects}
@@ -78,7 +49,7 @@ class Judge:
                 self.since[k] = (self.since[k] if self.since[k] is not None else step) if done else None
 
     def report(self, index: int) -> None:
-        """An assistant says that a subtask is done."""
+        """Take an assistant's word that a subtask is done."""
         if 0 <= index < len(self.verdicts) and self.verdicts[index] is None:
             self.verdicts[index] = self.since[index] is not None
 
@@ -131,12 +102,12 @@ def run_episode(
         setup=lambda simulation: _set_up(simulation, task),
     )
     observations, infos = env.reset(seed=task.seed)
-    planners: dict[str, Planner] = {
+    planners: dict[str, Agent] = {
         name: make_planner(method, task.instructions(), env.public_map, seed=task.seed, number=i, of=count)
         for i, name in enumerate(names)
     }
     followers = followers_of(community, env.public_map, seed=task.seed)
-    judge = Judge(task, world, TrueState(env.sim))
+    judge = Judge(task, world, env.sim.ground_truth)
     judge.watch(0)
     steps = 0
     while env.agents and not judge.over:
@@ -160,17 +131,17 @@ def _for_size(number: int, world: World) -> int:
 
 def _set_up(simulation: Simulation, task: Task) -> None:
     for thing in task.objects:
-        simulation.add_object(
+        simulation.scenario.add_object(
             thing.name,
-            good_prototype(thing.kind, thing.colour),
-            good_surfaces(thing.kind, thing.colour),
+            movable_prototype(thing.kind, thing.colour),
+            movable_surfaces(thing.kind, thing.colour),
             thing.position,
             room=thing.room or "",
-            size=GOODS[thing.kind].size,
+            size=movable_kinds()[thing.kind].size,
             yaw=thing.yaw,
         )
     for i, start in enumerate(task.assistants):
-        simulation.place_agent(f"assistant_{i}", (*start.position, 0.0), yaw=start.yaw)
+        simulation.scenario.place_agent(f"assistant_{i}", (*start.position, 0.0), yaw=start.yaw)
 
 
 def _result(task: Task, method: str, judge: Judge, env: CommunityEnv, steps: int, seconds: float) -> EpisodeResult:

@@ -10,17 +10,15 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.sim.bodies import ASSISTANT, KINDS, PEDESTRIAN, RESIDENT, Bodies
+from vico.sim.bodies import Bodies
 from vico.world.heights import HeightField
 
-#: Seconds a frame of physics lasts.
+#: Seconds a frame of physics lasts: fifty a second, five in a sub-step of the simulation.
 FRAME = 0.02
-#: By kind of body: True for those who are discs.
-IS_PERSON = np.isin(np.arange(len(KINDS)), (RESIDENT, ASSISTANT, PEDESTRIAN))
 
 
 @dataclass(frozen=True)
-class Scenery:
+class StaticScene:
     """Everything that never moves.
 
     Attributes
@@ -53,7 +51,7 @@ class Base:
         Base to world, shape ``(3, 3)``.
     velocity
         Metres a second in the world's frame, shape ``(3,)``.
-    spin
+    angular_velocity_body
         Radians a second in the base's own frame, shape ``(3,)``.
     quaternion
         The rotation as w, x, y, z.
@@ -62,7 +60,7 @@ class Base:
     position: NDArray[np.float64]
     rotation: NDArray[np.float64]
     velocity: NDArray[np.float64]
-    spin: NDArray[np.float64]
+    angular_velocity_body: NDArray[np.float64]
     quaternion: NDArray[np.float64]
 
     @property
@@ -72,7 +70,7 @@ class Base:
 
 
 class PhysicsEngine(Protocol):
-    """Robots among fixed scenery and kinematic bodies. Robots are addressed by their index.
+    """Robots among fixed scene and kinematic bodies. Robots are addressed by their index.
 
     What is there is fixed when the engine is built; `arrays` and `restore` give exact snapshots.
     """
@@ -86,10 +84,10 @@ class PhysicsEngine(Protocol):
     def command(self, robot: int, targets: NDArray[np.float64], gains: tuple[float, float] | None = None) -> None:
         """Set what the servos follow from now on; legs' servos also take a stiffness and a damping with it."""
 
-    def surround(self, obstacles: Bodies, dt: float) -> None:
+    def set_dynamic_obstacles(self, obstacles: Bodies, dt: float) -> None:
         """Say which bodies are near: they arrive at their positions `dt` seconds from now, at their velocities."""
 
-    def step(self, frames: int = 1, *, careful: bool = False) -> None:
+    def step(self, frames: int = 1, *, extra_substeps: bool = False) -> None:
         """Move on by some frames with the servos as they are; with smaller steps where bodies lie and throw limbs."""
 
     def links(self, robot: int) -> NDArray[np.float64]:

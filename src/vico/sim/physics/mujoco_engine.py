@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from vico.assets.robots import BUMP, TOUCH, RobotModel
 from vico.errors import InputError, SchemaError, VicoError
 from vico.sim.bodies import Bodies
-from vico.sim.physics.engine import FRAME, IS_PERSON, Base, Scenery
+from vico.sim.physics.engine import FRAME, Base, StaticScene
 from vico.world.heights import HeightField
 
 #: Bodies within this distance of a robot can be met, metres.
@@ -32,8 +32,8 @@ _KERB_CELL = 0.5
 #: Kinematic bodies are this much larger than what they stand for: soft contact never lets the real ones overlap.
 _SKIN = 0.03
 _PARKED = -500.0
-#: Steps of a frame, and of one in which smaller ones are asked for.
-_STEPS, _CAREFUL_STEPS = 3, 4
+#: MuJoCo's steps in a frame (1/150 s each), and in one for which extra sub-steps are asked (1/200 s).
+_SUBSTEPS, _EXTRA_SUBSTEPS = 3, 4
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 _SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 #: Solids whose tops are lower than this above the ground are met by feet and wheels as well as bumpers, metres.
@@ -74,7 +74,7 @@ class MujocoEngine:
 
     Parameters
     ----------
-    scenery
+    scene
         What never moves.
     models, places
         The robots, and where each stands at first: x, y, yaw, shape ``(n, 3)``.
@@ -84,7 +84,7 @@ class MujocoEngine:
 
     def __init__(
         self,
-        scenery: Scenery,
+        scene: StaticScene,
         models: Sequence[RobotModel],
         places: NDArray[np.float64],
         *,
@@ -98,19 +98,19 @@ class MujocoEngine:
         self._people, self._vehicles = people, vehicles
         spec = mujoco.MjSpec()
         _set_options(spec)
-        _add_scenery(spec, scenery)
+        _add_scene(spec, scene)
         _add_stock(spec, people, vehicles)
         for index, (model, place) in enumerate(zip(models, places, strict=True)):
             robot = mujoco.MjSpec.from_string(model.mjcf)
             _set_options(robot)
             root = robot.body("base")
             root.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER
-            root.pos, root.quat = _standing(scenery.height, model, place)
+            root.pos, root.quat = _standing(scene.height, model, place)
             spec.attach(robot, prefix=f"r{index}/", frame=spec.worldbody.add_frame())
         self._model = spec.compile()
         self._data = mujoco.MjData(self._model)
         self._qpos, self._qvel = self._data.qpos, self._data.qvel
-        self._place_scenery()
+        self._place_scene()
         self._index()
         for index, model in enumerate(self._robots):
             self._data.qpos[self._angle[index]] = model.rest
@@ -157,7 +157,7 @@ class MujocoEngine:
         self._bases: list[Base | None] = [None] * len(self._robots)
         self._kinematics_of = -1.0
 
-    def _place_scenery(self) -> None:
+    def _place_scene(self) -> None:
         """Compute the poses of all that never moves, which steps leave out."""
         flags = self._model.opt.enableflags
         self._model.opt.enableflags = flags & ~_SLEEP
@@ -204,8 +204,8 @@ class MujocoEngine:
         self._model.actuator_biasprm[motors, 1] = -stiffness
         self._model.actuator_biasprm[motors, 2] = -damping
 
-    def surround(self, obstacles: Bodies, dt: float) -> None:
-        """Take bodies near robots out of the stock, the nearest first; pilots alone mind the rest."""
+    def set_dynamic_obstacles(self, obstacles: Bodies, dt: float) -> None:
+        """Take bodies near robots out of the stock, the nearest first; followers alone mind the rest."""
         self._park_all()
         if not len(obstacles):
             return
@@ -213,7 +213,7 @@ class MujocoEngine:
         gap = _gaps(obstacles.position, obstacles.half_length, obstacles.half_width, centres)
         if gap.min() >= NEAR:
             return
-        person = IS_PERSON[obstacles.kind]
+        person = obstacles.person
         for first, count, chosen in ((0, self._people, person), (self._people, self._vehicles, ~person)):
             near = np.flatnonzero(chosen & (gap < NEAR))
             near = near[np.lexsort((obstacles.entity[near], gap[near]))][:count]
@@ -250,9 +250,9 @@ class MujocoEngine:
         self._left = dt
         self._data.mocap_pos[self._mocap] = self._from
 
-    def step(self, frames: int = 1, *, careful: bool = False) -> None:
+    def step(self, frames: int = 1, *, extra_substeps: bool = False) -> None:
         """Move on by some frames; surrounding bodies move first."""
-        steps = _CAREFUL_STEPS if careful else _STEPS
+        steps = _EXTRA_SUBSTEPS if extra_substeps else _SUBSTEPS
         self._model.opt.timestep = FRAME / steps
         if self._left > 0.0:
             self._from += self._pace * (FRAME * frames)
@@ -310,7 +310,7 @@ class MujocoEngine:
                 "physics: the saved state belongs to other robots or surroundings; start with the same ones"
             )
         mujoco.mj_resetData(self._model, self._data)
-        self._place_scenery()
+        self._place_scene()
         mujoco.mj_setState(self._model, self._data, state, _STATE)
         self._set_gains(self._legs, np.asarray(arrays["stiffness"]), np.asarray(arrays["damping"]))
         sizes = np.asarray(arrays["stock_size"])
@@ -329,7 +329,7 @@ class MujocoEngine:
 
 
 def _run_of(indices: NDArray[Any]) -> slice | NDArray[Any]:
-    """A slice where indices follow each other: reading it is much faster."""
+    """Return a slice where indices follow each other: reading it is much faster."""
     first = int(indices[0])
     run = np.array_equal(indices, np.arange(first, first + len(indices)))
     return slice(first, first + len(indices)) if run else indices.copy()
@@ -354,7 +354,7 @@ def _standing(height: HeightField, model: RobotModel, place: NDArray[np.float64]
 
 
 def _set_options(spec: Any) -> None:
-    spec.option.timestep = FRAME / _STEPS
+    spec.option.timestep = FRAME / _SUBSTEPS
     # Servo damping is integrated implicitly: stable for light legs.
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     # Robots never sleep; what never moves does, and its poses are not computed again at every step.
@@ -365,7 +365,7 @@ def _set_options(spec: Any) -> None:
     spec.option.impratio = 3.0
 
 
-def _add_scenery(spec: Any, scenery: Scenery) -> None:
+def _add_scene(spec: Any, scene: StaticScene) -> None:
     """Ground and low solids as one body, tall solids as the world's own.
 
     Bodies whose bits do not match are passed over as a whole: feet and wheels are never compared with walls, which
@@ -376,10 +376,10 @@ def _add_scenery(spec: Any, scenery: Scenery) -> None:
     both = {"contype": TOUCH | BUMP, "conaffinity": TOUCH | BUMP}
 
     def owner(top: float, foot: NDArray[np.float64]) -> tuple[Any, dict[str, int]]:
-        low = top - float(scenery.height(foot).max()) < _LOW
+        low = top - float(scene.height(foot).max()) < _LOW
         return (ground, both) if low else (spec.worldbody, bump)
 
-    heights, half = _grid(scenery)
+    heights, half = _grid(scene)
     low, high = float(heights.min()), float(heights.max())
     if high - low < 1e-4:
         ground.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[half, half, 1.0], pos=[0, 0, low], **touch)
@@ -393,7 +393,7 @@ def _add_scenery(spec: Any, scenery: Scenery) -> None:
             userdata=((heights - low) / (high - low)).astype(np.float32).ravel().tolist(),
         )
         ground.add_geom(type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="ground", pos=[0, 0, low], **touch)
-    for index, points in enumerate(scenery.hulls):
+    for index, points in enumerate(scene.hulls):
         middle = (points.min(axis=0) + points.max(axis=0)) / 2
         spec.add_mesh(
             name=f"hull{index}",
@@ -402,17 +402,17 @@ def _add_scenery(spec: Any, scenery: Scenery) -> None:
         )
         body, bits = owner(float(points[:, 2].max()), points[:, :2])
         body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"hull{index}", pos=middle.tolist(), **bits)
-    for x, y, z, yaw, a, b, c in scenery.boxes.tolist():
+    for x, y, z, yaw, a, b, c in scene.boxes.tolist():
         body, bits = owner(z + c, np.array([x, y]))
         turn = [np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]
         body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[a, b, c], pos=[x, y, z], quat=turn, **bits)
-    for x, y, z, radius, length in scenery.pillars.tolist():
+    for x, y, z, radius, length in scene.pillars.tolist():
         body, bits = owner(z + length, np.array([x, y]))
         body.add_geom(type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[radius, length, 0], pos=[x, y, z], **bits)
 
 
-def _grid(scenery: Scenery) -> tuple[NDArray[np.float64], float]:
-    field = scenery.height
+def _grid(scene: StaticScene) -> tuple[NDArray[np.float64], float]:
+    field = scene.height
     if field.heights.shape[0] != field.heights.shape[1]:
         raise InputError("physics: the height field has to be square")
     if field.steps is None:

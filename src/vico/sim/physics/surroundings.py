@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from vico.sim.physics.engine import Scenery
+from vico.exact import apply_matrix
+from vico.sim.physics.engine import StaticScene
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.world.objects import Objects
-from vico.world.products import turned
 
 #: Solids that begin higher than this above the ground touch no robot, metres; so do things lower than the second.
 _REACH, _FLAT = 2.0, 0.12
@@ -22,7 +22,7 @@ _STEMS = {"tree": 0.25, "palm": 0.25, "street_lamp": 0.1, "lamp": 0.1, "traffic_
 
 
 class Ground(Protocol):
-    """What `scenery_of` asks of a world."""
+    """What `static_scene_of` asks of a world."""
 
     @property
     def height(self) -> HeightField:
@@ -61,18 +61,18 @@ def convex_parts(surface: Surface) -> list[NDArray[np.float64]]:
 
 
 def _is_convex(surface: Surface) -> bool:
-    """True for one closed convex solid of one entity: no point lies before any of its faces."""
+    """Return whether it is one closed convex solid of one entity: no point lies before any of its faces."""
     if len(surface.triangles) > 200 or surface.entity.min() != surface.entity.max():
         return False
     points = surface.positions.astype(np.float64)
     corners = points[surface.triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.sqrt(np.einsum("ij,ij->i", normal, normal))
-    ahead = turned(points, normal) - np.einsum("ij,ij->i", normal, corners[:, 0])
+    ahead = apply_matrix(points, normal) - np.einsum("ij,ij->i", normal, corners[:, 0])
     return bool((ahead <= 0.002 * size + 1e-9).all())
 
 
-def scenery_of(world: Ground) -> Scenery:
+def static_scene_of(world: Ground) -> StaticScene:
     """Everything of a world that robots can touch.
 
     Convex solids of the layer ``collision`` that reach down to where robots are, and solid objects outdoors: stems as
@@ -86,7 +86,7 @@ def scenery_of(world: Ground) -> Scenery:
             if not flat and points[:, 2].min() < float(height(points[:, :2]).max()) + _REACH:
                 hulls.append(points)
     boxes, pillars = _objects(world.objects, height)
-    return Scenery(height, tuple(hulls), boxes, pillars)
+    return StaticScene(height, tuple(hulls), boxes, pillars)
 
 
 def _objects(objects: Objects, height: HeightField) -> tuple[NDArray[Any], NDArray[Any]]:

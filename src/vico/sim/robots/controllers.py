@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
-from vico.assets.robots_go2 import GAIT_GAINS, POLICY_GAINS
-from vico.assets.robots_husky import RADIUS, TRACK
+from vico.assets.robots.go2 import GAIT_GAINS, POLICY_GAINS
+from vico.assets.robots.husky import RADIUS, TRACK
 from vico.sim.physics.engine import Base
 from vico.sim.robots.gait import BODY, Trot, leg_angles
 from vico.sim.robots.policy import WalkingPolicy
@@ -33,7 +33,7 @@ class Controller(Protocol):
         """Stiffness and damping the servos need for the targets just given; None: always the same."""
 
     def targets(self, base: Base, angles: Vector, speeds: Vector, command: Vector, memory: Vector) -> Vector:
-        """What the servos follow for the next `PERIOD` seconds.
+        """Return what the servos follow for the next `PERIOD` seconds.
 
         Parameters
         ----------
@@ -53,46 +53,83 @@ def _approach(values, goal, step):  # type: ignore[no-untyped-def]
         values[k] += min(max(goal[k] - values[k], -step[k]), step[k])
 
 
+class TrimSettings(NamedTuple):
+    """How a command is corrected by the integral of what is missing of it; vx, vy, wz.
+
+    Attributes
+    ----------
+    gain
+        Correction a second for each unit that is missing, 1/s, shape ``(3,)``.
+    limit
+        Largest correction, m/s and rad/s, shape ``(3,)``.
+    smoothing
+        Seconds over which the motion is smoothed.
+    """
+
+    gain: Vector
+    limit: Vector
+    smoothing: float
+
+
+#: What a trim remembers: smoothed motion, correction (3 + 3).
+_TRIM_SIZE = 6
+_SMOOTHED, _CORRECTION = 0, 3
+
+
+def _trim(gain: tuple[float, float, float], limit: tuple[float, float, float], smoothing: float) -> TrimSettings:
+    return TrimSettings(np.array(gain), np.array(limit), smoothing)
+
+
 @njit(cache=True)
-def _trimmed(gain, limit, smooth, rotation, velocity, spin, command, memory):  # type: ignore[no-untyped-def]
-    """Correct a command by the integral of what is missing of it; `memory` is smoothed motion, then correction."""
+def _planar_motion(rotation, velocity, angular_velocity_body):  # type: ignore[no-untyped-def]
+    """Return vx, vy, wz in the base's frame."""
     out = np.empty(3)
-    share = PERIOD / (smooth + PERIOD)
-    for k in range(3):
-        if k < 2:
-            moving = rotation[0, k] * velocity[0] + rotation[1, k] * velocity[1] + rotation[2, k] * velocity[2]
-        else:
-            moving = spin[2]
-        memory[k] += (moving - memory[k]) * share
-        memory[3 + k] += gain[k] * (command[k] - memory[k]) * PERIOD
-        memory[3 + k] = min(max(memory[3 + k], -limit[k]), limit[k])
-        out[k] = command[k] + memory[3 + k]
+    for k in range(2):
+        out[k] = rotation[0, k] * velocity[0] + rotation[1, k] * velocity[1] + rotation[2, k] * velocity[2]
+    out[2] = angular_velocity_body[2]
     return out
 
 
+def _motion_of(base: Base) -> Vector:
+    found: Vector = _planar_motion(base.rotation, base.velocity, base.angular_velocity_body)
+    return found
+
+
 @njit(cache=True)
-def _skid(gain, limit, smooth, slew, top, rotation, velocity, spin, command, memory):  # type: ignore[no-untyped-def]
-    """Wheel speeds, rad/s; `memory` is the command as far as it was let through, then that of `_trimmed`."""
-    _approach(memory[:3], command, slew)
+def _trimmed(trim, motion, command, memory):  # type: ignore[no-untyped-def]
+    """Return a command corrected by the integral of what is missing of it."""
+    out = np.empty(3)
+    share = PERIOD / (trim.smoothing + PERIOD)
+    for k in range(3):
+        smoothed, correction = _SMOOTHED + k, _CORRECTION + k
+        memory[smoothed] += (motion[k] - memory[smoothed]) * share
+        memory[correction] += trim.gain[k] * (command[k] - memory[smoothed]) * PERIOD
+        memory[correction] = min(max(memory[correction], -trim.limit[k]), trim.limit[k])
+        out[k] = command[k] + memory[correction]
+    return out
+
+
+#: What a controller remembers of its command: as far as it was let through.
+_COMMAND = slice(0, 3)
+#: What comes after that in the memory of wheels.
+_WHEELS_TRIM = slice(3, 3 + _TRIM_SIZE)
+
+
+@njit(cache=True)
+def _skid(trim, slew, top, motion, command, memory):  # type: ignore[no-untyped-def]
+    """Return wheel speeds, rad/s."""
+    wanted_now, trim_memory = memory[_COMMAND], memory[_WHEELS_TRIM]
+    _approach(wanted_now, command, slew)
     out = np.zeros(4)
-    if not command.any() and not memory[:3].any():  # brakes
-        memory[3:] = 0.0
+    if not command.any() and not wanted_now.any():  # brakes
+        trim_memory[:] = 0.0
         return out
-    wanted = _trimmed(gain, limit, smooth, rotation, velocity, spin, memory[:3], memory[3:])
+    wanted = _trimmed(trim, motion, wanted_now, trim_memory)
     for k in range(4):
         side = -1.0 if k % 2 == 0 else 1.0
         speed = (wanted[0] + side * wanted[2] * TRACK * SKID) / RADIUS
         out[k] = min(max(speed, -top[k]), top[k])
     return out
-
-
-class _Trim:
-    """What `_trimmed` goes by. Memory: smoothed motion, correction (3 + 3)."""
-
-    size = 6
-
-    def __init__(self, gain: tuple[float, float, float], limit: tuple[float, float, float], smooth: float) -> None:
-        self.settings = (np.array(gain), np.array(limit), smooth)
 
 
 class SkidSteer:
@@ -103,8 +140,8 @@ class SkidSteer:
 
     def __init__(self, model: RobotModel) -> None:
         self._limit = np.array(model.upper, np.float64)
-        self._trim = _Trim((2.0, 0.0, 2.0), (0.4, 0.0, 1.0), 0.1)
-        self.memory = 3 + _Trim.size
+        self._trim = _trim((2.0, 0.0, 2.0), (0.4, 0.0, 1.0), 0.1)
+        self.memory = _WHEELS_TRIM.stop
 
     def gains(self, memory: Vector) -> tuple[float, float] | None:
         """Wheels' servos have one stiffness."""
@@ -112,10 +149,15 @@ class SkidSteer:
 
     def targets(self, base: Base, angles: Vector, speeds: Vector, command: Vector, memory: Vector) -> Vector:
         """Wheel speeds, rad/s."""
-        found: Vector = _skid(
-            *self._trim.settings, self.slew, self._limit, base.rotation, base.velocity, base.spin, command, memory
-        )
+        found: Vector = _skid(self._trim, self.slew, self._limit, _motion_of(base), command, memory)
         return found
+
+
+#: What legs remember after the command: seconds without one, the joint angles held, the trim, and the gait's memory.
+_LEGS_IDLE = 3
+_LEGS_HELD = slice(4, 16)
+_LEGS_TRIM = slice(16, 16 + _TRIM_SIZE)
+_LEGS_GAIT = _LEGS_TRIM.stop
 
 
 class Legs:
@@ -128,32 +170,33 @@ class Legs:
     def __init__(self, model: RobotModel) -> None:
         self._learned = model.policy is not None
         self._gait: WalkingPolicy | Trot = WalkingPolicy(model) if model.policy else Trot(model)
-        self._trim = _Trim((1.0, 1.0, 1.5), (0.35, 0.25, 0.5), 0.3)
+        self._trim = _trim((1.0, 1.0, 1.5), (0.35, 0.25, 0.5), 0.3)
         if model.policy:
             self.rest = model.rest
         else:
             self.rest = np.concatenate([leg_angles(0.0, s * 0.0955, -BODY, s) for s in (1.0, -1.0, 1.0, -1.0)])
-        self.memory = 3 + 1 + 12 + _Trim.size + self._gait.memory
+        self.memory = _LEGS_GAIT + self._gait.memory
 
     def gains(self, memory: Vector) -> tuple[float, float] | None:
         """Soft where the policy expects it, stiff to stand and for our own gait."""
-        return POLICY_GAINS if self._learned and memory[3] <= self.patience else GAIT_GAINS
+        return POLICY_GAINS if self._learned and memory[_LEGS_IDLE] <= self.patience else GAIT_GAINS
 
     def targets(self, base: Base, angles: Vector, speeds: Vector, command: Vector, memory: Vector) -> Vector:
         """Joint angles, rad."""
-        wanted, held, trim, gait = memory[:3], memory[4:16], memory[16:22], memory[22:]
+        wanted, held = memory[_COMMAND], memory[_LEGS_HELD]
+        trim, gait = memory[_LEGS_TRIM], memory[_LEGS_GAIT:]
         _approach(wanted, command, self.slew)
-        memory[3] = 0.0 if command.any() or wanted.any() else memory[3] + PERIOD
-        if memory[3] > self.patience or not held.any():
+        memory[_LEGS_IDLE] = 0.0 if command.any() or wanted.any() else memory[_LEGS_IDLE] + PERIOD
+        if memory[_LEGS_IDLE] > self.patience or not held.any():
             # From where the legs are, not from where softer servos were told to be: that would make it jump.
             if gait.any() or not held.any():
                 held[:] = angles
-                memory[3] = self.patience + PERIOD
+                memory[_LEGS_IDLE] = self.patience + PERIOD
             trim[:] = 0.0
             gait[:] = 0.0
             _approach(held, self.rest, self.ease)
             return held.copy()
-        trimmed = _trimmed(*self._trim.settings, base.rotation, base.velocity, base.spin, wanted, trim)
+        trimmed = _trimmed(self._trim, _motion_of(base), wanted, trim)
         held[:] = self._gait.targets(base, angles, speeds, trimmed, gait)
         return held.copy()
 
@@ -169,7 +212,7 @@ _TRY, _PUSH, _PULL = 3.0, 0.5, 2.06
 
 
 def getting_up(lying: float, base: Base, rest: Vector) -> Vector | None:
-    """What a fallen robot's legs do `lying` seconds after it fell; None once it should stand.
+    """Return what a fallen robot's legs do `lying` seconds after it fell; None once it should stand.
 
     It draws its legs in. On its belly it rises. On its back or side it throws the legs out against the ground, again
     and again, sides in turn.

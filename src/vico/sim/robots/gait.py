@@ -15,9 +15,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
-from vico.assets.robots_go2 import HIP_X, HIP_Y, SHIN, SIDE, THIGH
+from vico.assets.robots.go2 import HIP_X, HIP_Y, SHIN, SIDE, THIGH
+from vico.exact import apply_matrix
 from vico.sim.physics.engine import Base
-from vico.world.products import turned
 
 PERIOD = 0.02
 #: Seconds a cycle lasts and the share of it a foot is on the ground.
@@ -28,9 +28,9 @@ BODY, LIFT = 0.27, 0.055
 
 @njit(cache=True)
 def leg_angles(x, y, z, side):  # type: ignore[no-untyped-def]
-    """Angles (hip, thigh, calf) that bring a foot to x, y, z in the frame of its hip; `side` is 1 left, -1 right.
+    """Return the angles (hip, thigh, calf) that bring a foot to x, y, z in the frame of its hip.
 
-    Points out of reach are brought to the nearest length the leg has.
+    `side` is 1 on the left, -1 on the right. Points out of reach are brought to the nearest length the leg has.
     """
     across = np.sqrt(max(y * y + z * z - SIDE * SIDE, 1e-6))
     hip = np.arctan2(z, y) + np.arctan2(across, side * SIDE)
@@ -44,6 +44,11 @@ def leg_angles(x, y, z, side):  # type: ignore[no-untyped-def]
     return hip, np.arctan2(-x, across) + lean, calf
 
 
+#: What the gait remembers: the phase; for each leg the foot's x, y and where it left the ground; the smoothed motion.
+_PHASE, _FEET, _FOOT_SIZE, _MOTION, _MEMORY = 0, 1, 4, 17, 20
+_FOOT_X, _FOOT_Y, _LIFTED_X, _LIFTED_Y = range(4)
+
+
 @njit(cache=True)
 def trot(memory, command, moving, roll, pitch, roll_rate, pitch_rate, dt):  # type: ignore[no-untyped-def]
     """Advance the feet by `dt` and return the twelve joint angles.
@@ -51,22 +56,23 @@ def trot(memory, command, moving, roll, pitch, roll_rate, pitch_rate, dt):  # ty
     `memory` holds the phase, then for every leg the foot's x, y and where it left the ground (x, y). `command` and
     `moving` are vx, vy, wz wanted and measured.
     """
-    memory[0] = (memory[0] + dt / CYCLE) % 1.0
+    memory[_PHASE] = (memory[_PHASE] + dt / CYCLE) % 1.0
     out = np.empty(12)
     hold = STANCE * CYCLE
     for leg in range(4):
         front = 1.0 if leg < 2 else -1.0
         side = 1.0 if leg % 2 == 0 else -1.0
         hx, hy = front * HIP_X, side * (HIP_Y + SIDE)
-        at = 1 + 4 * leg
-        phase = (memory[0] + (0.0 if leg == 0 or leg == 3 else 0.5)) % 1.0
+        first = _FEET + _FOOT_SIZE * leg
+        foot = memory[first : first + _FOOT_SIZE]
+        phase = (memory[_PHASE] + (0.0 if leg == 0 or leg == 3 else 0.5)) % 1.0
         vx, vy = command[0] - command[2] * hy, command[1] + command[2] * hx
         mx, my = moving[0] - moving[2] * hy, moving[1] + moving[2] * hx
         z = -BODY
         if phase < STANCE:
-            memory[at] -= vx * dt
-            memory[at + 1] -= vy * dt
-            memory[at + 2], memory[at + 3] = memory[at], memory[at + 1]
+            foot[_FOOT_X] -= vx * dt
+            foot[_FOOT_Y] -= vy * dt
+            foot[_LIFTED_X], foot[_LIFTED_Y] = foot[_FOOT_X], foot[_FOOT_Y]
             # Stretch where the body sinks, give way where it rises.
             z += 0.5 * (hy * roll - hx * pitch) + 0.03 * (hy * roll_rate - hx * pitch_rate)
         else:
@@ -76,10 +82,10 @@ def trot(memory, command, moving, roll, pitch, roll_rate, pitch_rate, dt):  # ty
             goal_x = min(max(goal_x, -0.16), 0.16)
             goal_y = min(max(goal_y, -0.10), 0.10)
             blend = s * s * (3.0 - 2.0 * s)
-            memory[at] = memory[at + 2] + (goal_x - memory[at + 2]) * blend
-            memory[at + 1] = memory[at + 3] + (goal_y - memory[at + 3]) * blend
+            foot[_FOOT_X] = foot[_LIFTED_X] + (goal_x - foot[_LIFTED_X]) * blend
+            foot[_FOOT_Y] = foot[_LIFTED_Y] + (goal_y - foot[_LIFTED_Y]) * blend
             z += LIFT * np.sin(np.pi * s)
-        hip, thigh, calf = leg_angles(memory[at], memory[at + 1] + side * SIDE, z, side)
+        hip, thigh, calf = leg_angles(foot[_FOOT_X], foot[_FOOT_Y] + side * SIDE, z, side)
         out[3 * leg], out[3 * leg + 1], out[3 * leg + 2] = hip, thigh, calf
     return out
 
@@ -88,7 +94,7 @@ class Trot:
     """Our own gait for a model without a policy."""
 
     #: Phase, the feet, and the body's motion smoothed over a step.
-    memory = 1 + 16 + 3
+    memory = _MEMORY
 
     def __init__(self, model: RobotModel) -> None:
         self._model = model
@@ -102,10 +108,19 @@ class Trot:
         memory: NDArray[np.float64],
     ) -> NDArray[Any]:
         """Joint angles to hold for the next `PERIOD` seconds; parameters as of the policy's."""
-        local = turned(base.velocity, base.rotation.T)
-        moving = memory[17:20]
-        moving += (np.array([local[0], local[1], base.spin[2]]) - moving) * (PERIOD / 0.1)
+        local = apply_matrix(base.velocity, base.rotation.T)
+        moving = memory[_MOTION:_MEMORY]
+        moving += (np.array([local[0], local[1], base.angular_velocity_body[2]]) - moving) * (PERIOD / 0.1)
         roll = math.atan2(base.rotation[2, 1], base.rotation[2, 2])
         pitch = -math.asin(min(max(base.rotation[2, 0], -1.0), 1.0))
-        wanted = trot(memory, command, moving, roll, pitch, float(base.spin[0]), float(base.spin[1]), PERIOD)
+        wanted = trot(
+            memory,
+            command,
+            moving,
+            roll,
+            pitch,
+            float(base.angular_velocity_body[0]),
+            float(base.angular_velocity_body[1]),
+            PERIOD,
+        )
         return np.clip(wanted, self._model.lower, self._model.upper)

@@ -10,14 +10,42 @@ from numba import njit
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
+from vico.sim.bodies import Bodies
 
 Array = NDArray[Any]
+
+#: Somebody near a robot: pose, half sides (the radius of a disc), velocity (ENU), whether it is a disc; metres, m/s.
+NEIGHBOUR = np.dtype(
+    [
+        ("x", np.float64),
+        ("y", np.float64),
+        ("yaw", np.float64),
+        ("half_length", np.float64),
+        ("half_width", np.float64),
+        ("vx", np.float64),
+        ("vy", np.float64),
+        ("disc", np.bool_),
+    ],
+    align=True,
+)
 #: Metres a robot leaves to whoever is ahead, and to the side.
 GAP, SIDE_GAP = 0.6, 0.15
 #: Metres a second squared it brakes with; metres it looks ahead at most; seconds others' motion is foreseen.
 BRAKE, SIGHT, FORESIGHT = 0.8, 5.0, 3.0
 #: Seconds the rest of a robot takes to follow its nose.
 FOLLOW = 1.5
+
+
+def neighbours_of(bodies: Bodies, own: int, position: Array, reach: float) -> NDArray[np.void]:
+    """Return those within `reach` metres of a position, without the entity `own`, dtype `NEIGHBOUR`."""
+    away = np.hypot(*(bodies.position[:, :2] - position[:2]).T)
+    near = bodies.where(np.flatnonzero((away - bodies.half_length < reach) & (bodies.entity != own)))
+    found = np.empty(len(near), NEIGHBOUR)
+    found["x"], found["y"], found["yaw"] = near.position[:, 0], near.position[:, 1], near.yaw
+    found["half_length"], found["half_width"] = near.half_length, near.half_width
+    found["vx"], found["vy"] = near.velocity[:, 0], near.velocity[:, 1]
+    found["disc"] = near.person
+    return found
 
 
 @njit(cache=True)
@@ -65,25 +93,43 @@ def path_length(path):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _gap(x, y, bx, by, yaw, a, b, disc):  # type: ignore[no-untyped-def]
-    """Distance from a point to a body: disc, or oriented rectangle; negative inside."""
-    if disc:
-        return math.hypot(x - bx, y - by) - b
-    c, s = math.cos(yaw), math.sin(yaw)
-    u = abs(c * (x - bx) + s * (y - by)) - a
-    v = abs(-s * (x - bx) + c * (y - by)) - b
+def _gap(x, y, ox, oy, other):  # type: ignore[no-untyped-def]
+    """Return the distance from a point to a neighbour that is at (ox, oy); negative inside a rectangle."""
+    if other.disc:
+        return math.hypot(x - ox, y - oy) - other.half_width
+    c, s = math.cos(other.yaw), math.sin(other.yaw)
+    u = abs(c * (x - ox) + s * (y - oy)) - other.half_length
+    v = abs(-s * (x - ox) + c * (y - oy)) - other.half_width
     if u > 0.0 and v > 0.0:
         return math.hypot(u, v)
     return max(u, v)
 
 
 @njit(cache=True)
-def free_ahead(x, y, yaw, speed, half_length, half_width, path, along, position, turn, half_l, half_w, velocity, disc):  # type: ignore[no-untyped-def]
-    """Metres the nose can go along the way before it comes too near anybody, and who that is (-1: nobody).
+def _least_gap(x, y, other, seconds):  # type: ignore[no-untyped-def]
+    """Return how near a neighbour that goes straight on comes to a point within some seconds, metres."""
+    gap = 1e9
+    for wait in range(int(seconds / 0.5) + 1):
+        later = 0.5 * wait
+        gap = min(gap, _gap(x, y, other.x + other.vx * later, other.y + other.vy * later, other))
+    return gap
+
+
+@njit(cache=True)
+def free_ahead(x, y, yaw, speed, outline, path, along, others):  # type: ignore[no-untyped-def]
+    """Return the metres the nose can go along the way before it comes too near anybody, and who that is (-1: nobody).
 
     The robot is followed along its path at `speed`, everybody else along a straight line at their velocity for
     `FORESIGHT` seconds. Without a path (its length is 0) it is taken to go straight on.
+
+    Parameters
+    ----------
+    outline
+        Half the robot's length and half its width, metres.
+    others
+        Who is near, dtype `NEIGHBOUR`.
     """
+    half_length, half_width = outline
     total = path_length(path) if len(path) > 1 else 0.0
     reach = half_width + SIDE_GAP
     nose = half_length - half_width
@@ -95,16 +141,11 @@ def free_ahead(x, y, yaw, speed, half_length, half_width, path, along, position,
             cx, cy = point_at(path, along + s + nose)
         else:
             cx, cy = x + (nose + s) * math.cos(yaw), y + (nose + s) * math.sin(yaw)
-        for k in range(len(position)):
-            gap = 1e9
+        for k in range(len(others)):
             # The place has to be free from now until the rest of the robot has followed.
-            for wait in range(int((t + FOLLOW) / 0.5) + 1):
-                later = 0.5 * wait
-                ox, oy = position[k, 0] + velocity[k, 0] * later, position[k, 1] + velocity[k, 1] * later
-                gap = min(gap, _gap(cx, cy, ox, oy, turn[k], half_l[k], half_w[k], disc[k]))
-            if gap < reach:
+            if _least_gap(cx, cy, others[k], t + FOLLOW) < reach:
                 # Whoever is abreast or behind already is nobody to stop for.
-                front = (position[k, 0] - x) * math.cos(yaw) + (position[k, 1] - y) * math.sin(yaw)
+                front = (others[k].x - x) * math.cos(yaw) + (others[k].y - y) * math.sin(yaw)
                 if s > 0.0 or front > half_length * 0.5:
                     return s, k
         s += 0.1
@@ -112,12 +153,12 @@ def free_ahead(x, y, yaw, speed, half_length, half_width, path, along, position,
 
 
 @njit(cache=True)
-def room_to_turn(x, y, radius, position, turn, half_l, half_w, disc):  # type: ignore[no-untyped-def]
-    """True if nobody stands within `radius` of x, y."""
-    for k in range(len(position)):
-        if _gap(x, y, position[k, 0], position[k, 1], turn[k], half_l[k], half_w[k], disc[k]) < radius:
-            return False
-    return True
+def room_to_turn(x, y, radius, others):  # type: ignore[no-untyped-def]
+    """Return whether nobody stands within `radius` of x, y."""
+    is_free = True
+    for other in others:
+        is_free = is_free and _gap(x, y, other.x, other.y, other) >= radius
+    return is_free
 
 
 def towards(model: RobotModel, x: float, y: float, yaw: float, path: Array, along: float, free: float) -> Array:

@@ -32,18 +32,29 @@ def _dense(inputs, weights, bias, last):  # type: ignore[no-untyped-def]
     return out
 
 
+#: Where the parts of the policy's observation begin: angular velocity, gravity and command (3 each), joint angles
+#: relative to the pose at rest, joint speeds and the last action (12 each).
+_ANGULAR_VELOCITY, _GRAVITY, _COMMAND, _ANGLES, _SPEEDS, _ACTION, _OBSERVED = 0, 3, 6, 9, 21, 33, 45
+
+
 @njit(cache=True)
-def _evaluate(layers, order, rest, scale, spin, rotation, command, angles, speeds, memory):  # type: ignore[no-untyped-def]
-    """Joint targets in the model's order; `memory` becomes the action."""
-    seen = np.empty(45)
+def _observation(angular_velocity_body, rotation, command, angles, speeds, action, order, rest):  # type: ignore[no-untyped-def]
+    """Return what the policy sees, scaled, shape ``(45,)``."""
+    seen = np.empty(_OBSERVED)
     for k in range(3):
-        seen[k] = spin[k] * _SPIN
-        seen[3 + k] = -rotation[2, k]
-        seen[6 + k] = command[k]
+        seen[_ANGULAR_VELOCITY + k] = angular_velocity_body[k] * _SPIN
+        seen[_GRAVITY + k] = -rotation[2, k]
+        seen[_COMMAND + k] = command[k]
     for k in range(12):
-        seen[9 + k] = angles[order[k]] - rest[k]
-        seen[21 + k] = speeds[order[k]] * _JOINT_SPEED
-        seen[33 + k] = memory[k]
+        seen[_ANGLES + k] = angles[order[k]] - rest[k]
+        seen[_SPEEDS + k] = speeds[order[k]] * _JOINT_SPEED
+        seen[_ACTION + k] = action[k]
+    return seen
+
+
+@njit(cache=True)
+def _evaluate(layers, seen, order, rest, scale, memory):  # type: ignore[no-untyped-def]
+    """Return joint targets in the model's order; `memory` becomes the action."""
     x = np.minimum(np.maximum(seen, -_LIMIT), _LIMIT).astype(np.float32)
     for index in range(len(layers)):
         x = _dense(x, layers[index][0], layers[index][1], index == len(layers) - 1)
@@ -95,7 +106,6 @@ class WalkingPolicy:
             The last action, shape ``(12,)``; updated in place.
         """
         p = self._policy
-        found: NDArray[Any] = _evaluate(
-            self._layers, p.order, p.rest, p.scale, base.spin, base.rotation, command, angles, speeds, memory
-        )
+        seen = _observation(base.angular_velocity_body, base.rotation, command, angles, speeds, memory, p.order, p.rest)
+        found: NDArray[Any] = _evaluate(self._layers, seen, p.order, p.rest, p.scale, memory)
         return found

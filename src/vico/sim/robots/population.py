@@ -12,21 +12,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vico.assets.robots import robot_model
-from vico.assets.robots_go2 import GAIT_GAINS, POLICY_GAINS
+from vico.assets.robots.go2 import GAIT_GAINS, POLICY_GAINS
 from vico.errors import InputError, SchemaError
+from vico.exact import apply_matrix
+from vico.seeds import rng
 from vico.sim.bodies import ROBOT, Bodies, Drawn
 from vico.sim.physics import MujocoEngine, PhysicsEngine
 from vico.sim.physics.engine import FRAME, Base
-from vico.sim.physics.surroundings import scenery_of
+from vico.sim.physics.surroundings import static_scene_of
 from vico.sim.robots.controllers import PERIOD, controller_for, getting_up
-from vico.sim.robots.navigation import GAP, SIGHT
-from vico.sim.robots.pilot import Pilot, Status, Traffic
+from vico.sim.robots.navigation import GAP, SIGHT, neighbours_of
+from vico.sim.robots.path_follower import PathFollower, RobotStatus
 from vico.world.folder import World
 from vico.world.mesh import Surface
 from vico.world.model import FIRST_BODY
-from vico.world.products import turned
 from vico.world.routing import Router
-from vico.world.seeds import rng
 
 _REASON = 240
 #: Cosine of the tilt at which a robot counts as fallen, and seconds it has to last.
@@ -35,7 +35,7 @@ _FALLEN, _FALL_TIME = 0.7, 0.3
 _GIVE_UP = 30.0
 _SPAWN_ROOM, _SPAWN_APART = 1.0, 3.0
 # What the states' arrays hold: members of an enumeration are slow to look up in the control loop.
-_FALLEN_STATUS = int(Status.FALLEN)
+_FALLEN_STATUS = int(RobotStatus.FALLEN)
 
 
 class Mode(IntEnum):
@@ -49,7 +49,13 @@ _IDLE, _VELOCITY, _MOTORS, _ROUTE = (int(mode) for mode in Mode)
 
 @dataclass(frozen=True)
 class RobotEvent:
-    """Something that happened to a robot: `kind` is arrived, blocked, fallen, recovered or lost."""
+    """Something that happened to a robot: `kind` is arrived, blocked, fallen, recovered or lost.
+
+    Attributes
+    ----------
+    position
+        Of the robot's base when it is asked, world frame, metres, float64, shape ``(3,)``.
+    """
 
     robot: int
     kind: str
@@ -110,12 +116,13 @@ class RobotPopulation:
         places = self._spawns() if spawns is None else np.asarray(spawns, np.float64)
         if places.shape != (len(kinds), 3):
             raise InputError(f"robots: {len(kinds)} robots need as many spawns of x, y, yaw, not {places.shape}")
-        self.engine: PhysicsEngine = MujocoEngine(scenery_of(world), self.models, places)
+        self.engine: PhysicsEngine = MujocoEngine(static_scene_of(world), self.models, places)
         self._controllers = [controller_for(model) for model in self.models]
         n, memory = len(kinds), max((c.memory for c in self._controllers), default=0)
         self.mode = np.zeros(n, np.int8)
         self.status = np.zeros(n, np.int8)
         self.reasons = [""] * n
+        self.reason_codes = [0] * n
         self._memory = np.zeros((n, memory))
         self._vector = np.zeros((n, 12))
         self._velocity = np.zeros((n, 3))
@@ -123,7 +130,7 @@ class RobotPopulation:
         self._errand = np.zeros(n, np.int64)
         self._rest = np.zeros(n)
         self._pending: list[tuple[int, int]] = []
-        self._pilots = [Pilot(model) for model in self.models]
+        self._followers = [PathFollower(model) for model in self.models]
         self._bodies: Bodies | None = None
 
     def __len__(self) -> int:
@@ -187,15 +194,15 @@ class RobotPopulation:
         points = np.ascontiguousarray(path, np.float64)
         if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not np.isfinite(points).all():
             raise InputError(f"follow: a path is two or more finite points x, y, not {points.shape}")
-        self._pilots[robot].begin(points)
+        self._followers[robot].begin(points)
         self._set_mode(robot, Mode.ROUTE)
 
     def _set_mode(self, robot: int, mode: Mode) -> None:
         self.mode[robot] = mode
-        if self.status[robot] != Status.FALLEN:
-            self.status[robot] = Status.IDLE if mode == Mode.IDLE else Status.MOVING
+        if self.status[robot] != RobotStatus.FALLEN:
+            self.status[robot] = RobotStatus.IDLE if mode == Mode.IDLE else RobotStatus.MOVING
         if mode != Mode.ROUTE:
-            self._pilots[robot].end()
+            self._followers[robot].end()
 
     # Ways.
 
@@ -210,10 +217,10 @@ class RobotPopulation:
     def _narrow(self) -> list[NDArray[np.bool_]]:
         """Cells too narrow for each robot."""
         clearance = self.world.walkable.clearance
-        return [clearance < pilot.room for pilot in self._pilots]
+        return [clearance < follower.room for follower in self._followers]
 
     def _way(self, robot: int, goal: NDArray[np.float64], closed: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """A way that keeps clear of discs (x, y, radius), or None."""
+        """Return a way that keeps clear of discs (x, y, radius), or None."""
         walkable = self.world.walkable
         blocked = self._narrow[robot]
         if len(closed):
@@ -255,18 +262,18 @@ class RobotPopulation:
             raise InputError(f"robots: {dt} s is no multiple of {PERIOD} s")
         if not len(self):
             return
-        self.engine.surround(obstacles, dt)
+        self.engine.set_dynamic_obstacles(obstacles, dt)
         everyone = Bodies.joined([obstacles, self.bodies()])
         for robot in range(len(self)):
             self._decide(
-                robot, dt, Traffic.around(everyone, int(self.entities[robot]), self._position(robot), SIGHT + 4)
+                robot, dt, neighbours_of(everyone, int(self.entities[robot]), self._position(robot), SIGHT + 4)
             )
         # Limbs thrown about, by a controller of somebody's own or to get up, need smaller steps than wheels and gaits.
-        careful = bool(np.any(self.status == _FALLEN_STATUS) or np.any(self.mode == _MOTORS))
+        extra_substeps = bool(np.any(self.status == _FALLEN_STATUS) or np.any(self.mode == _MOTORS))
         for _ in range(frames // ticks):
             for robot in range(len(self)):
                 self._drive(robot)
-            self.engine.step(ticks, careful=careful)
+            self.engine.step(ticks, extra_substeps=extra_substeps)
         self._bodies = None
         for robot in range(len(self)):
             self._watch_falls(robot, dt)
@@ -274,31 +281,31 @@ class RobotPopulation:
     def _position(self, robot: int) -> NDArray[np.float64]:
         return self.engine.base(robot).position
 
-    def _decide(self, robot: int, dt: float, others: Traffic) -> None:
+    def _decide(self, robot: int, dt: float, others: NDArray[np.void]) -> None:
         """Set the velocity to follow until the next decision."""
         mode, velocity = self.mode[robot], self._velocity[robot]
         velocity[:] = 0.0
         if self.status[robot] == _FALLEN_STATUS:
             return
         base = self.engine.base(robot)
-        pilot = self._pilots[robot]
+        follower = self._followers[robot]
         if mode == _VELOCITY:
             velocity[:] = self._vector[robot, :3]
-            if velocity[0] > 0.0 and pilot.free(base, others, float(velocity[0]))[0] < GAP:
+            if velocity[0] > 0.0 and follower.free(base, others, float(velocity[0]))[0] < GAP:
                 velocity[0] = 0.0
-                self.status[robot] = Status.WAITING
+                self.status[robot] = RobotStatus.WAITING
             else:
-                self.status[robot] = Status.MOVING
+                self.status[robot] = RobotStatus.MOVING
         elif mode == _ROUTE:
-            velocity[:] = pilot.steer(base, others, dt)
-            self.status[robot] = pilot.status
-            if pilot.wants_detour:
-                path = self._way(robot, pilot.path[-1], pilot.closed(base, others))
-                pilot.detoured(path)
-            if pilot.status in (Status.ARRIVED, Status.BLOCKED):
-                self._note(robot, "arrived" if pilot.status == Status.ARRIVED else "blocked")
+            velocity[:] = follower.steer(base, others, dt)
+            self.status[robot] = follower.status
+            if follower.wants_detour:
+                path = self._way(robot, follower.path[-1], follower.closed(base, others))
+                follower.detoured(path)
+            if follower.status in (RobotStatus.ARRIVED, RobotStatus.BLOCKED):
+                self._note(robot, "arrived" if follower.status == RobotStatus.ARRIVED else "blocked")
                 self.mode[robot] = Mode.IDLE
-                pilot.end()
+                follower.end()
                 self._rest[robot] = 0.0
         elif mode == _IDLE and self.errands:
             self._rest[robot] += dt
@@ -336,31 +343,31 @@ class RobotPopulation:
         if not fallen:
             self._lying[robot] = self._lying[robot] + dt if upright < _FALLEN else 0.0
             if self._lying[robot] > _FALL_TIME:
-                self.status[robot] = Status.FALLEN
+                self.status[robot] = RobotStatus.FALLEN
                 self._lying[robot] = 0.0
                 self._note(robot, "fallen")
             return
         model = self.models[robot]
         if upright > 0.95 and (not model.legged or self._stands(robot)):
-            self.status[robot] = Status.MOVING if self.mode[robot] != Mode.IDLE else Status.IDLE
+            self.status[robot] = RobotStatus.MOVING if self.mode[robot] != Mode.IDLE else RobotStatus.IDLE
             self._lying[robot] = 0.0
             self._note(robot, "recovered")
         elif self._lying[robot] - dt <= _GIVE_UP < self._lying[robot]:
             self._note(robot, "lost")
 
     def _stands(self, robot: int) -> bool:
-        """True at the end of an attempt to get up that brought a robot onto its feet."""
+        """Return whether it is the end of an attempt to get up that brought a robot onto its feet."""
         model, base = self.models[robot], self.engine.base(robot)
         high = base.position[2] - float(self.world.height(base.position)) > 0.6 * model.stand
         bent = float(np.abs(self.engine.joints(robot)[0] - model.rest).max())
-        calm = np.abs(base.spin).max() < 0.5
+        calm = np.abs(base.angular_velocity_body).max() < 0.5
         return bool(high and calm and bent < 0.4 and getting_up(float(self._lying[robot]), base, model.rest) is None)
 
     def _note(self, robot: int, kind: str) -> None:
         self._pending.append((robot, _KINDS.index(kind)))
 
     def events(self) -> list[RobotEvent]:
-        """What happened since this was last asked."""
+        """Return what happened since this was last asked."""
         found = [RobotEvent(robot, _KINDS[kind], self._position(robot)) for robot, kind in self._pending]
         self._pending.clear()
         return found
@@ -413,7 +420,7 @@ class RobotPopulation:
     def camera(self, robot: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Position of a robot's camera, the direction it looks in, and its upward direction, shape ``(3,)`` each."""
         base = self.engine.base(robot)
-        eye = base.position + turned(self.models[robot].eye, base.rotation)
+        eye = base.position + apply_matrix(self.models[robot].eye, base.rotation)
         return eye, base.rotation[:, 0].copy(), base.rotation[:, 2].copy()
 
     def camera_heights(self) -> NDArray[np.float64]:
@@ -426,11 +433,11 @@ class RobotPopulation:
         for i, model in enumerate(self.models):
             if int(self.entities[i]) == entity and not model.legged:
                 base = self.engine.base(i)
-                return base.position + turned([0.0, 0.0, model.height - model.stand], base.rotation)
+                return base.position + apply_matrix([0.0, 0.0, model.height - model.stand], base.rotation)
         return None
 
     def observation(self, robot: int) -> dict[str, NDArray[np.float64]]:
-        """What a robot feels of itself.
+        """Return what a robot feels of itself.
 
         Returns
         -------
@@ -446,14 +453,14 @@ class RobotPopulation:
             "joint_velocity": np.array(speeds),
             "base_pose": np.concatenate([base.position, base.quaternion]),
             "base_velocity": base.velocity.copy(),
-            "imu": np.concatenate([base.spin, -base.rotation[2]]),
+            "imu": np.concatenate([base.angular_velocity_body, -base.rotation[2]]),
         }
 
     # State.
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Every number that decides the future."""
-        paths = [pilot.path for pilot in self._pilots]
+        paths = [follower.path for follower in self._followers]
         return {
             **{f"engine_{key}": value for key, value in self.engine.arrays().items()},
             "mode": self.mode.copy(),
@@ -464,10 +471,11 @@ class RobotPopulation:
             "errand": self._errand.copy(),
             "rest": self._rest.copy(),
             "pending": np.array(self._pending, np.int64).reshape(-1, 2),
-            "pilots": np.array([pilot.numbers() for pilot in self._pilots]).reshape(len(self), -1),
+            "followers": np.array([follower.numbers() for follower in self._followers]).reshape(len(self), -1),
             "path_ends": np.cumsum([len(path) for path in paths], dtype=np.int64),
             "paths": np.concatenate([np.zeros((0, 2)), *paths]),
             "reasons": np.array(self.reasons, f"<U{_REASON}"),
+            "reason_codes": np.array(self.reason_codes, np.int16),
         }
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
@@ -484,7 +492,8 @@ class RobotPopulation:
         self._rest[:] = arrays["rest"]
         self._pending = [(int(a), int(b)) for a, b in arrays["pending"]]
         starts = np.concatenate([[0], arrays["path_ends"]]).astype(int)
-        for i, pilot in enumerate(self._pilots):
-            pilot.restore(arrays["paths"][starts[i] : starts[i + 1]], arrays["pilots"][i])
+        for i, follower in enumerate(self._followers):
+            follower.restore(arrays["paths"][starts[i] : starts[i + 1]], arrays["followers"][i])
         self.reasons = [str(reason) for reason in arrays["reasons"]]
+        self.reason_codes = [int(code) for code in arrays["reason_codes"]]
         self._bodies = None

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from vico.errors import InputError, OutputExistsError
+from vico.errors import InputError
+from vico.io.files import write_bytes
+from vico.io.folders import new_folder
 from vico.world.exports.geojson import write_geojson
 from vico.world.exports.gltf import write_gltf
 from vico.world.exports.mjcf import write_mjcf
 from vico.world.exports.usd import write_usd
-from vico.world.files import write_bytes
 from vico.world.folder import World
 
 Writer = Callable[..., dict[str, int]]
@@ -69,21 +68,8 @@ def export_world(world: World, to: str, out: Path, *, rooms: bool = False, force
     if to not in FORMATS:
         raise InputError(f"export: no format {to!r}; there are {', '.join(FORMATS)}")
     out = Path(out)
-    if out.exists() and not force and (not out.is_dir() or any(out.iterdir())):
-        raise OutputExistsError(f"{out}: exists already; choose another folder, or add --force to replace it")
-    out.parent.mkdir(parents=True, exist_ok=True)
-    folder = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
-    try:
+    with new_folder(out, force=force) as folder:
         counts = FORMATS[to](world, folder, rooms=rooms)
         lines = [f"{source.attribution} ({source.licence})" for source in world.manifest.sources]
         write_bytes(folder / "CREDITS.txt", ("\n".join(lines) + "\n").encode())
-        folder.chmod(0o755)
-        if out.is_dir():
-            shutil.rmtree(out)
-        elif out.exists():
-            out.unlink()
-        folder.rename(out)
-    except BaseException:
-        shutil.rmtree(folder, ignore_errors=True)
-        raise
     return counts

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.geo.frame import LocalFrame
-from vico.world.files import write_bytes
+from vico.io.files import write_bytes
 from vico.world.folder import World
 
 Feature = dict[str, Any]

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vico.world.files import write_bytes
+from vico.io.files import write_bytes
 from vico.world.folder import World
 from vico.world.mesh import Surface, glb_bytes
 
@@ -57,7 +57,7 @@ def write_gltf(world: World, folder: Path, *, rooms: bool) -> dict[str, int]:
 
 
 def _entities(world: World) -> dict[str, int]:
-    """Building ids and the numbers that the vertex attribute ``_ENTITY`` holds for them."""
+    """Return building ids and the numbers that the vertex attribute ``_ENTITY`` holds for them."""
     return {building.id: building.entity for building in world.buildings}
 
 

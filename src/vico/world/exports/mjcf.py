@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from vico.world.files import write_bytes
+from vico.io.files import write_bytes
 from vico.world.folder import World
 from vico.world.mesh import Surface, joined
 

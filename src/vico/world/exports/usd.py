@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image
 
 from vico.errors import MissingExtraError
-from vico.world.files import write_bytes
+from vico.io.files import write_bytes
 from vico.world.folder import World
 from vico.world.mesh import Material, Surface
 

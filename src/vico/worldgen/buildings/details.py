@@ -10,14 +10,15 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from vico.world.seeds import rng
-from vico.worldgen.buildings.dormers import dormers
-from vico.worldgen.buildings.eaves import eaves
-from vico.worldgen.buildings.outlines_plans import BuildingPlan, PartPlan
+from vico.geo import overlay
+from vico.seeds import rng
 from vico.worldgen.buildings.projections import projections, water_tank
+from vico.worldgen.buildings.roofs.dormers import dormers
+from vico.worldgen.buildings.roofs.eaves import eaves
 from vico.worldgen.buildings.rooftops import cornices, posts, rooftop_parts
 from vico.worldgen.buildings.solids import Mesh
-from vico.worldgen.facades.looks import Look
+from vico.worldgen.facades.looks import FacadeStyle
+from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
 
 _LANE = 3.2  # metres from a street's centre line over which nothing hangs
 
@@ -25,7 +26,7 @@ _LANE = 3.2  # metres from a street's centre line over which nothing hangs
 def detailed(
     plans: Sequence[BuildingPlan],
     meshes: Sequence[list[Mesh]],
-    looks: Sequence[Look],
+    looks: Sequence[FacadeStyle],
     bases: Sequence[float],
     fronts: Sequence[list[NDArray[np.bool_]]],
     streets: shapely.STRtree,
@@ -50,7 +51,7 @@ def detailed(
     streets
         Centre lines of streets.
     region
-        As `facades.looks.region_of` says.
+        As `facades.catalogue.region_of` says.
     seed
         Decides what is there; each building's draws are its own.
     """
@@ -75,7 +76,7 @@ def detailed(
             base: float = base,
             theirs: list[tuple[PartPlan, int]] = theirs,
         ) -> bool:
-            inner = shapely.buffer(box, -0.06, join_style="mitre")
+            inner = overlay.buffer(box, -0.06, join_style="mitre")
             if len(streets.query(inner, predicate="dwithin", distance=_LANE)):
                 return False
             near = [rows[j] for j in tree.query(box, predicate="dwithin", distance=0.3).tolist()]

@@ -10,11 +10,14 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from vico.worldgen.buildings.eaves import Edges, edges_of
-from vico.worldgen.buildings.outlines_plans import BuildingPlan, PartPlan
-from vico.worldgen.buildings.roof_shapes import Roof
+from vico.geo import overlay
+from vico.worldgen.buildings.roofs.eaves import Edges, edges_of
 from vico.worldgen.buildings.storeys import Storeys, storeys_of
-from vico.worldgen.facades.looks import Look
+from vico.worldgen.facades.catalogue import styles
+from vico.worldgen.facades.looks import FacadeStyle
+from vico.worldgen.facades.records import RegionalStyle
+from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
+from vico.worldgen.facts.outlines.roof_shapes import Roof
 
 _LEAST_HEIGHT = 2.9  # metres under whatever hangs over a pavement
 _MOST = 40  # pieces a building
@@ -34,7 +37,7 @@ class _Wall:
         return float(self.edges.length[self.k])
 
     def box(self, s0: float, s1: float, d0: float, d1: float) -> Polygon:
-        """A rectangle before the wall; side, front and side come first, the edge at the wall last."""
+        """Return a rectangle before the wall; side, front and side come first, the edge at the wall last."""
         start, along, out = self.edges.start[self.k], self.edges.along[self.k], self.edges.out[self.k]
         corners = [(s0, d0), (s0, d1), (s1, d1), (s1, d0)]
         return Polygon([start + along * s + out * d for s, d in corners])
@@ -42,7 +45,7 @@ class _Wall:
 
 def projections(
     plan: BuildingPlan,
-    look: Look,
+    look: FacadeStyle,
     fronts: list[NDArray[np.bool_]],
     free: Callable[[Polygon, float, float], bool],
     region: str,
@@ -59,7 +62,7 @@ def projections(
     free
         Whether nothing stands in an outline between two heights above the building's base.
     region
-        As `facades.looks.region_of` says.
+        As `facades.catalogue.region_of` says.
     random
         The building's own stream.
 
@@ -68,7 +71,8 @@ def projections(
     list of PartPlan
         Heights above the building's base.
     """
-    maker = _MAKERS.get(look.wall)
+    customs = styles().region(region)
+    maker = _MAKERS.get(styles().families[look.wall].hangs)
     share = float(random.random())
     if maker is None or plan.use in ("garage", "industrial", "religious"):
         return []
@@ -84,7 +88,7 @@ def projections(
             count = max(round(float(edges.length[k]) / look.bay), 1)
             wall = _Wall(edges, k, storeys, float(edges.length[k]) / count)
             hung = list(made)  # pieces of one wall belong together; those of others are in the way
-            for pieces in maker(wall, share, region, random):
+            for pieces in maker(wall, share, customs, random):
                 box, low, high = pieces[0][0], pieces[0][1], max(piece[2] for piece in pieces)
                 crossed = any(
                     low < other.eaves + 0.3 and high + 0.3 > other.low and other.polygon.distance(box) < 0.2
@@ -115,14 +119,14 @@ def _balcony(wall: _Wall, s0: float, s1: float, floor: float, deep: float, rail:
     return [(wall.box(s0, s1, 0.0, deep + 0.017), floor - 0.2, floor + 1.05, rail)]
 
 
-def _running(wall: _Wall, share: float, region: str, random: np.random.Generator) -> list[_Pieces]:
+def _running(wall: _Wall, share: float, region: RegionalStyle, random: np.random.Generator) -> list[_Pieces]:
     """Homes of the last decades: balconies in every other bay, or right along where the sun shines."""
     rail = "rail_glass" if share < 0.55 else "rail_iron"
     made: list[_Pieces] = []
     if wall.length < 4.0:
         return made
     bays = round(wall.length / wall.bay)
-    right_along = region == "southern" or share < 0.3
+    right_along = region.balconies_right_along or share < 0.3
     for k in range(int(wall.storeys.count)):
         floor = wall.storeys.floor(k)
         if right_along:
@@ -133,8 +137,8 @@ def _running(wall: _Wall, share: float, region: str, random: np.random.Generator
     return made
 
 
-def _iron(wall: _Wall, share: float, region: str, random: np.random.Generator) -> list[_Pieces]:
-    """A Paris house: one running balcony on the second and one on the last floor."""
+def _iron(wall: _Wall, share: float, region: RegionalStyle, random: np.random.Generator) -> list[_Pieces]:
+    """Return the balconies of a Paris house: one running balcony on the second and one on the last floor."""
     count = int(wall.storeys.count)
     if wall.length < 4.0 or count < 3:
         return []
@@ -143,10 +147,10 @@ def _iron(wall: _Wall, share: float, region: str, random: np.random.Generator) -
     ]
 
 
-def _southern(wall: _Wall, share: float, region: str, random: np.random.Generator) -> list[_Pieces]:
-    """A small iron balcony before a window here and there."""
+def _southern(wall: _Wall, share: float, region: RegionalStyle, random: np.random.Generator) -> list[_Pieces]:
+    """Return a small iron balcony before a window here and there."""
     made: list[_Pieces] = []
-    if region != "southern" or wall.length < 4.0:
+    if not region.small_balconies or wall.length < 4.0:
         return made
     for k in range(int(wall.storeys.count)):
         for i in range(round(wall.length / wall.bay)):
@@ -158,8 +162,8 @@ def _southern(wall: _Wall, share: float, region: str, random: np.random.Generato
     return made
 
 
-def _alpine(wall: _Wall, share: float, region: str, random: np.random.Generator) -> list[_Pieces]:
-    """A wooden balcony along the whole front, on every upper floor or the highest."""
+def _alpine(wall: _Wall, share: float, region: RegionalStyle, random: np.random.Generator) -> list[_Pieces]:
+    """Return a wooden balcony along the whole front, on every upper floor or the highest."""
     count = int(wall.storeys.count)
     if not 5.0 < wall.length < 26.0:
         return []
@@ -170,10 +174,10 @@ def _alpine(wall: _Wall, share: float, region: str, random: np.random.Generator)
     return made
 
 
-def _escape(wall: _Wall, share: float, region: str, random: np.random.Generator) -> list[_Pieces]:
-    """New York's iron fire escapes: a landing at every floor before two windows, steps between."""
+def _escape(wall: _Wall, share: float, region: RegionalStyle, random: np.random.Generator) -> list[_Pieces]:
+    """Return iron fire escapes as in New York: a landing at every floor before two windows, steps between."""
     count = int(wall.storeys.count)
-    if region != "american" or not 3 <= count <= 7 or wall.length < 5.0 or share > 0.85:
+    if not region.fire_escapes or not 3 <= count <= 7 or wall.length < 5.0 or share > 0.85:
         return []
     made: list[_Pieces] = []
     towers = 1 if wall.length < 18.0 else 2 if wall.length < 36.0 else 3
@@ -193,25 +197,24 @@ def _escape(wall: _Wall, share: float, region: str, random: np.random.Generator)
     return made
 
 
-_MAKERS: dict[str, Callable[[_Wall, float, str, np.random.Generator], list[_Pieces]]] = {
-    "wall_balconies": _running,
-    "wall_french": _iron,
-    "wall_shuttered": _southern,
-    "wall_alpine": _alpine,
-    "wall_tenement": _escape,
-    "wall_tenement_buff": _escape,
+_MAKERS: dict[str, Callable[[_Wall, float, RegionalStyle, np.random.Generator], list[_Pieces]]] = {
+    "balconies": _running,
+    "french_balconies": _iron,
+    "small_balconies": _southern,
+    "wooden_balconies": _alpine,
+    "fire_escapes": _escape,
 }
 
 
 def water_tank(plan: BuildingPlan, region: str, random: np.random.Generator) -> list[PartPlan]:
-    """A wooden water tank on four legs, on flat roofs of American houses of five storeys and more."""
+    """Return a wooden water tank on four legs, on flat roofs of American houses of five storeys and more."""
     draw = random.random(4)
-    if region != "american" or plan.use in ("garage", "religious", "industrial"):
+    if not styles().region(region).water_tanks or plan.use in ("garage", "religious", "industrial"):
         return []
     part = max(plan.parts, key=lambda part: part.top)
     if part.roof.shape != "flat" or not 6 <= plan.levels <= 22 or part.polygon.area < 200.0 or draw[0] > 0.6:
         return []
-    inner = shapely.buffer(part.polygon, -3.2)
+    inner = overlay.buffer(part.polygon, -3.2)
     if inner.is_empty:
         return []
     west, south, east, north = inner.bounds

@@ -11,25 +11,15 @@ from numpy.typing import NDArray
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from vico.exact import apply_matrix
+from vico.geo import overlay
 from vico.geo.osm import polygons_of
-from vico.world.products import turned
-from vico.worldgen.buildings.outlines_plans import BuildingPlan, PartPlan
-from vico.worldgen.buildings.roof_shapes import Roof, rings_of
+from vico.worldgen.facades.catalogue import styles
+from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
+from vico.worldgen.facts.outlines.roof_shapes import Roof, rings_of
 
-_CORNICE_WALLS = (
-    "wall_classic", "wall_stone", "wall_brick", "wall_plain", "wall_arched", "wall_french", "wall_tenement",
-    "wall_tenement_buff", "wall_loft",
-)  # fmt: skip
-# How deep below the eaves and how far out a cornice is, metres: pressed tin on tenements, stone elsewhere.
-_CORNICES = {
-    "wall_tenement": (0.75, 0.5),
-    "wall_tenement_buff": (0.75, 0.5),
-    "wall_arched": (0.55, 0.42),
-    "wall_french": (0.5, 0.45),
-}
-_TINS = ("cornice_tin_cream", "cornice_tin_green", "cornice_tin_brown")
 _CHIMNEYED = ("hipped", "gabled", "half-hipped", "mansard", "gambrel", "hipped-and-gabled")
-_CORNICE, _CORNICE_ABOVE = (0.42, 0.32), 0.03
+_CORNICE_ABOVE = 0.03
 _POST = 0.24  # metres: side of a post
 _POST_EVERY = 6.0
 _ROADWAY = 3.6  # metres from a street's centre line that stay free of posts
@@ -58,7 +48,7 @@ def rooftop_parts(plan: BuildingPlan, random: np.random.Generator) -> list[PartP
         if bare or (part.low > 0.0 and part.roof.shape != "flat"):
             continue
         above = [other.polygon for other in plan.parts if other is not part and other.top > part.eaves + 0.3]
-        free = shapely.difference(part.polygon, shapely.union_all(above)) if above else part.polygon
+        free = overlay.difference(part.polygon, overlay.union_all(above)) if above else part.polygon
         if part.roof.shape == "flat":
             made += _penthouses(part, free, random)
         elif part.roof.shape in _CHIMNEYED and plan.use in ("residential", "hotel", "commercial", "civic"):
@@ -100,19 +90,20 @@ def cornices(
     of_part: dict[int, list[tuple[BaseGeometry, float, float]]] = {}
     for k, (part, p) in enumerate(rows):
         bare = part.roof.shape == "flat" and part.roof.height <= 0.0
-        if walls[p] not in _CORNICE_WALLS or part.levels < 2 or bare or part.polygon.area < 50.0 or part.eaves < 4.5:
+        family = styles().families[walls[p]]
+        if family.cornice == "none" or part.levels < 2 or bare or part.polygon.area < 50.0 or part.eaves < 4.5:
             continue
-        if walls[p] in ("wall_brick", "wall_plain") and part.roof.shape != "flat":
+        if family.cornice == "under_flat_roofs" and part.roof.shape != "flat":
             continue
-        deep, out = _CORNICES.get(walls[p], _CORNICE)
+        deep, out = family.cornice_size
         low, high = bases[p] + part.eaves - deep, bases[p] + part.eaves + _CORNICE_ABOVE
-        outline = shapely.simplify(part.polygon, 0.2)
-        outer = shapely.buffer(outline, out, join_style="mitre", mitre_limit=1.6)
+        outline = overlay.simplify(part.polygon, 0.2)
+        outer = overlay.buffer(outline, out, join_style="mitre", mitre_limit=1.6)
         # Against the wall, not into it: an inner face would come to lie in the plane of some other wall.
-        shape: BaseGeometry = shapely.difference(outer, part.polygon)
+        shape: BaseGeometry = overlay.difference(outer, part.polygon)
         edges = shown[k]
         if edges is not None and not edges.all():
-            shape = shapely.intersection(shape, _before(part.polygon, edges, out + 0.01))
+            shape = overlay.intersection(shape, _before(part.polygon, edges, out + 0.01))
             if shape.is_empty:
                 continue
         taken: list[BaseGeometry] = []
@@ -123,30 +114,29 @@ def cornices(
             taken += [ledge for ledge, bottom, top in of_part.get(j, []) if top > low - 0.02 and bottom < high + 0.02]
         if taken:
             # A finger's breadth clear of them, so that no two faces lie in one plane.
-            shape = shapely.difference(shape, shapely.buffer(shapely.union_all(taken), 0.012, join_style="mitre"))
+            shape = overlay.difference(shape, overlay.buffer(overlay.union_all(taken), 0.012, join_style="mitre"))
         # An opening takes away what is thinner than a hand.
-        core = shapely.buffer(shape, -0.04, join_style="mitre")
-        shape = shapely.intersection(shapely.buffer(core, 0.045, join_style="mitre", mitre_limit=2.0), shape)
+        core = overlay.buffer(shape, -0.04, join_style="mitre")
+        shape = overlay.intersection(overlay.buffer(core, 0.045, join_style="mitre", mitre_limit=2.0), shape)
         kept = polygons_of(shape, 0.12)
-        tin = walls[p].startswith("wall_tenement")
-        finish = _TINS[zlib.crc32(plans[p].id.encode()) % len(_TINS)] if tin else "cornice"
+        finish = family.cornice_finishes[zlib.crc32(plans[p].id.encode()) % len(family.cornice_finishes)]
         of_part[k] = [(ledge, low, high) for ledge in kept]
         made[p] += [_solid(ledge, low - bases[p], high - bases[p], finish) for ledge in kept]
     return made
 
 
 def _before(polygon: Polygon, chosen: NDArray[np.bool_], out: float) -> BaseGeometry:
-    """What lies before the chosen edges of an outline."""
+    """Return what lies before the chosen edges of an outline."""
     rings = rings_of(polygon)
     start = np.concatenate(rings)
     end = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
     lines = shapely.linestrings(np.stack([start[chosen], end[chosen]], axis=1))
-    merged = shapely.line_merge(shapely.union_all(lines))
-    return shapely.buffer(merged, out, cap_style="flat", join_style="mitre", mitre_limit=1.7)
+    merged = shapely.line_merge(overlay.union_all(lines))
+    return overlay.buffer(merged, out, cap_style="flat", join_style="mitre", mitre_limit=1.7)
 
 
 def posts(plan: BuildingPlan, streets: shapely.STRtree) -> list[PartPlan]:
-    """What holds up the canopies of a building: posts inside their corners and along their edges.
+    """Return what holds up the canopies of a building: posts inside their corners and along their edges.
 
     Parameters
     ----------
@@ -165,10 +155,10 @@ def posts(plan: BuildingPlan, streets: shapely.STRtree) -> list[PartPlan]:
         if part.levels > 0 or part.low < 1.5 or part.polygon.area < 4.0:
             continue
         others = [other.polygon for other in plan.parts if other is not part and other.low < part.low - 0.5]
-        standing = shapely.union_all(others) if others else None
-        inside = polygons_of(shapely.buffer(part.polygon, -0.5, join_style="mitre"), 0.01)
+        standing = overlay.union_all(others) if others else None
+        inside = polygons_of(overlay.buffer(part.polygon, -0.5, join_style="mitre"), 0.01)
         for shape in inside or [part.polygon]:
-            ring = shapely.segmentize(shapely.simplify(shape, 0.4).exterior, _POST_EVERY)
+            ring = shapely.segmentize(overlay.simplify(shape, 0.4).exterior, _POST_EVERY)
             for x, y in rings_of(Polygon(ring))[0]:
                 foot = shapely.box(x - _POST / 2, y - _POST / 2, x + _POST / 2, y + _POST / 2)
                 if standing is not None and standing.distance(foot) < 1.0:
@@ -183,7 +173,7 @@ def posts(plan: BuildingPlan, streets: shapely.STRtree) -> list[PartPlan]:
 
 def _penthouses(part: PartPlan, free: BaseGeometry, random: np.random.Generator) -> list[PartPlan]:
     """Lift and plant rooms: one for every 700 m2 of flat roof or so, well inside."""
-    room = max(polygons_of(shapely.buffer(free, -4.0)), key=lambda shape: shape.area, default=None)
+    room = max(polygons_of(overlay.buffer(free, -4.0)), key=lambda shape: shape.area, default=None)
     if part.polygon.area < 180.0 or room is None:
         return []
     made: list[PartPlan] = []
@@ -191,7 +181,7 @@ def _penthouses(part: PartPlan, free: BaseGeometry, random: np.random.Generator)
         if len(made) >= min(int(part.polygon.area / 700.0) + 1, 4):
             break
         box = _box(_spot(room, at), size, _main_direction(part.polygon))
-        if free.contains(shapely.buffer(box, 1.0)) and not any(box.intersects(m.polygon) for m in made):
+        if free.contains(overlay.buffer(box, 1.0)) and not any(box.intersects(m.polygon) for m in made):
             made.append(_solid(box, part.eaves - 0.2, part.eaves + float(random.uniform(1.6, 3.0)), "penthouse"))
     return made
 
@@ -199,7 +189,7 @@ def _penthouses(part: PartPlan, free: BaseGeometry, random: np.random.Generator)
 def _chimneys(part: PartPlan, free: BaseGeometry, random: np.random.Generator) -> list[PartPlan]:
     # Towards the ridge: a chimney at the eaves would have to stand free as high as the roof.
     inset = max(1.2, 0.65 * part.polygon.area / part.polygon.exterior.length)
-    room = max(polygons_of(shapely.buffer(free, -inset)), key=lambda shape: shape.area, default=None)
+    room = max(polygons_of(overlay.buffer(free, -inset)), key=lambda shape: shape.area, default=None)
     if room is None:
         return []
     made: list[PartPlan] = []
@@ -230,4 +220,4 @@ def _main_direction(polygon: Polygon) -> float:
 def _box(centre: NDArray[np.float64], size: NDArray[np.float64], yaw: float) -> Polygon:
     c, s = np.cos(yaw), np.sin(yaw)
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * size / 2
-    return Polygon(turned(corners, [[c, -s], [s, c]]) + centre)
+    return Polygon(apply_matrix(corners, [[c, -s], [s, c]]) + centre)

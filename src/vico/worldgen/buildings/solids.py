@@ -10,13 +10,14 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
+from vico.geo import overlay
 from vico.geo.osm import polygons_of
+from vico.world.check.solids import open_edges
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface
-from vico.world.solid_checks import open_edges
-from vico.worldgen.buildings.outlines_plans import BuildingPlan, PartPlan
-from vico.worldgen.buildings.roof_shapes import rings_of
-from vico.worldgen.buildings.roofs import building_solid
+from vico.worldgen.buildings.roofs.solid import building_solid
+from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
+from vico.worldgen.facts.outlines.roof_shapes import rings_of
 
 _SKIRT = 0.3  # metres the walls reach below the lowest ground, so that no gap shows
 
@@ -59,7 +60,7 @@ class SolidMesh:
 
 
 def part_mesh(part: PartPlan, seat: Seat) -> Mesh:
-    """The solid of a part on its seat; without faces where nothing comes of it."""
+    """Return the solid of a part on its seat; without faces where nothing comes of it."""
     if part.mesh is not None:
         return part.mesh[0] + (0.0, 0.0, seat.base), part.mesh[1]
     low, eaves = heights_of(part, seat)
@@ -110,7 +111,7 @@ def collision_bodies(part: PartPlan, seat: Seat, entity: int) -> list[Surface]:
     low, eaves = heights_of(part, seat)
     top = eaves + (part.roof.height if part.roof.shape == "flat" else 0.5 * part.roof.height)
     bodies: list[Surface] = []
-    for shape in polygons_of(shapely.simplify(part.polygon, 0.25), 0.5):
+    for shape in polygons_of(overlay.simplify(part.polygon, 0.25), 0.5):
         for ring in convex_pieces(shape):
             n = len(ring)
             points = np.concatenate([np.c_[ring, np.full(n, low)], np.c_[ring, np.full(n, top)]])

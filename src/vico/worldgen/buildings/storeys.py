@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vico.worldgen.buildings.outlines_plans import BuildingPlan, PartPlan
-from vico.worldgen.facades.textures import STOREYS
+from vico.worldgen.facades.textures.walls import STOREYS
+from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
 
 _HIGH_GROUND = ("retail", "commercial", "office", "civic", "hotel")
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -98,52 +100,73 @@ def without_needless(
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     size = np.linalg.norm(normal, axis=1)
     normal /= np.maximum(size, 1e-12)[:, None]
-    candidates = np.arange(first, len(points))
+    candidates = _within_flat_walls(points, faces, normal, first)
     if not len(candidates):
         return faces, owner
+    wanted = np.zeros(len(points), bool)
+    wanted[candidates] = True
+    near = np.unique(faces[wanted[faces].any(axis=1)])
+    wanted[near] = True
+    fan = _Fan(dict(enumerate(faces.tolist())), {}, points.tolist(), normal.tolist())
+    for k in np.flatnonzero(wanted[faces].any(axis=1)).tolist():
+        for v in fan.triangles[k]:
+            fan.around.setdefault(v, set()).add(k)
+    for v in candidates.tolist():
+        ring = fan.ring(v)
+        for w in sorted(ring):
+            if fan.spots[w][2] == fan.spots[v][2] and fan.drawn_into(v, w, ring):
+                break
+    kept_faces = np.array(list(fan.triangles), np.int64)
+    return np.array(list(fan.triangles.values()), np.int64).reshape(-1, 3), owner[kept_faces]
+
+
+def _within_flat_walls(
+    points: NDArray[np.float64], faces: NDArray[np.int64], normal: NDArray[np.float64], first: int
+) -> NDArray[np.int64]:
+    """Return the points from `first` on all of whose faces lie in one plane."""
+    candidates = np.arange(first, len(points))
     low, high = np.full((len(points), 3), np.inf), np.full((len(points), 3), -np.inf)
     for k in range(3):
         np.minimum.at(low, faces[:, k], normal)
         np.maximum.at(high, faces[:, k], normal)
     flat = (high[candidates] - low[candidates]).max(axis=1) < 1e-5
-    candidates = candidates[flat & np.isfinite(low[candidates, 0])]
-    triangles: dict[int, list[int]] = dict(enumerate(faces.tolist()))
-    around: dict[int, set[int]] = {}
-    wanted = np.zeros(len(points), bool)
-    wanted[candidates] = True
-    near = np.unique(faces[wanted[faces].any(axis=1)])
-    wanted[near] = True
-    for k in np.flatnonzero(wanted[faces].any(axis=1)).tolist():
-        for v in triangles[k]:
-            around.setdefault(v, set()).add(k)
-    spots, facing = points.tolist(), normal.tolist()
-    for v in candidates.tolist():
-        mine = around[v]
-        ring = {w for k in mine for w in triangles[k] if w != v}
-        for w in sorted(ring):
-            if points[w, 2] != points[v, 2]:
-                continue
-            gone = [k for k in mine if w in triangles[k]]
-            if len(gone) != 2:
-                continue
-            beyond = {u for k in around[w] for u in triangles[k]} - {w}
-            if len(beyond & ring - {v}) != 2:  # else two sheets would be glued together
-                continue
-            kept = [k for k in mine if k not in gone]
-            moved = [[w if u == v else u for u in triangles[k]] for k in kept]
-            if any(_area([spots[u] for u in row], facing[k]) < 1e-6 for row, k in zip(moved, kept, strict=True)):
-                continue
-            for k in gone:
-                for u in triangles.pop(k):
-                    if u != v:
-                        around[u].discard(k)
-            for k, row in zip(kept, moved, strict=True):
-                triangles[k] = row
-                around[w].add(k)
-            around[v] = set()
-            break
-    kept_faces = np.array(list(triangles), np.int64)
-    return np.array(list(triangles.values()), np.int64).reshape(-1, 3), owner[kept_faces]
+    return candidates[flat & np.isfinite(low[candidates, 0])]
+
+
+@dataclass
+class _Fan:
+    """Triangles by number while points are taken out; which are around each point, where points are, and normals."""
+
+    triangles: dict[int, list[int]]
+    around: dict[int, set[int]]
+    spots: list[list[float]]
+    facing: list[list[float]]
+
+    def ring(self, v: int) -> set[int]:
+        """Return the points that share a triangle with one."""
+        return {w for k in self.around[v] for w in self.triangles[k] if w != v}
+
+    def drawn_into(self, v: int, w: int, ring: set[int]) -> bool:
+        """Draw a point into one of its ring, if that leaves the mesh closed and no face turned over."""
+        mine = self.around[v]
+        gone = [k for k in mine if w in self.triangles[k]]
+        if len(gone) != 2:
+            return False
+        if len(self.ring(w) & ring - {v}) != 2:  # else two sheets would be glued together
+            return False
+        kept = [k for k in mine if k not in gone]
+        moved = [[w if u == v else u for u in self.triangles[k]] for k in kept]
+        if any(_area([self.spots[u] for u in row], self.facing[k]) < 1e-6 for row, k in zip(moved, kept, strict=True)):
+            return False
+        for k in gone:
+            for u in self.triangles.pop(k):
+                if u != v:
+                    self.around[u].discard(k)
+        for k, row in zip(kept, moved, strict=True):
+            self.triangles[k] = row
+            self.around[w].add(k)
+        self.around[v] = set()
+        return True
 
 
 def _area(corners: list[list[float]], normal: list[float]) -> float:

@@ -10,9 +10,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from vico.seeds import rng
 from vico.world.mesh import Surface
 from vico.world.model import Building, Category, Entrance, Place
-from vico.world.seeds import rng
 from vico.worldgen.facades.pieces import Face, Pieces, Rgb, bare, cell_uv, is_bare
 from vico.worldgen.facades.signs import Board, Boards, colours_of, paint_boards
 from vico.worldgen.facades.walls import GroundFloors, Wall
@@ -130,7 +130,7 @@ def _has_board(place: Place) -> bool:
 
 
 def _kind(building: Building, names: Sequence[Place]) -> str:
-    """What kind of entrance this is: shop, hotel, hall, office, church, gate, house or stairs."""
+    """Return what kind of entrance this is: shop, hotel, hall, office, church, gate, house or stairs."""
     if building.use == "religious":
         return "church"
     categories = {place.category for place in names}
@@ -260,7 +260,7 @@ class _Front:
         self.face.panel(s - half, s + half, self.z - 0.05, self.z + height, d, uv=cell_uv(cell), colour=colour)
 
     def _surround(self, height: float, colour: Rgb, *, wide: float = 0.26, deep: float = 0.16) -> None:
-        """Posts, a lintel and a step of stone."""
+        """Add posts, a lintel and a step of stone."""
         s, half, z = self.spot.s, self.width / 2, self.z
         for left, right in ((s - half - wide, s - half), (s + half, s + half + wide)):
             self.face.slab(left, right, z - 0.3, z + height, deep, colour=colour, cell="stone", under=False)
@@ -321,7 +321,7 @@ class _Front:
         return self.boards.materials[board.page].name
 
     def _board(self, board: Board, s: float, z: float, most: float, high: float, d: float) -> None:
-        """A board with its lower edge's middle at a point, made smaller where it is too long."""
+        """Add a board with its lower edge's middle at a point, made smaller where it is too long."""
         wide = board.aspect * high
         if wide > most:
             high *= most / wide
@@ -330,7 +330,7 @@ class _Front:
         self.counts["signs"] += 1
 
     def _hotel(self) -> None:
-        """A wide glazed door under a canopy that carries the name."""
+        """Add a wide glazed door under a canopy that carries the name."""
         s, z = self.spot.s, self.z
         height = min(2.5, max(self.top - z - 0.7, 2.05))
         self._door("hotel", height, 0.05)
@@ -361,7 +361,7 @@ class _Front:
         self._plates(height)
 
     def _shop(self) -> None:
-        """A shop front over whole bays: door, windows, risers, posts, and a fascia with the name."""
+        """Add a shop front over whole bays: door, windows, risers, posts, and a fascia with the name."""
         spot, wall, random = self.spot, self.spot.wall, self.random
         assert wall is not None
         self.counts["shop_fronts"] += 1
@@ -373,7 +373,7 @@ class _Front:
             self.z + 2.95, self.z + 3.6)  # fmt: skip
         low = max(low, self.z + 2.25)
         high = min(max(high, low + 0.5), self.top - 0.04)
-        ground: Rgb = boards[0].ground if boards else colours_of(lead)[0]
+        ground: Rgb = boards[0].ground if boards else colours_of(lead).ground
         dark = sum(ground) < 420
         paint: Rgb = ground if dark else (60, 60, 62)
         a, b, z, face = spot.a + 0.04, spot.b - 0.04, self.z, self.face
@@ -410,7 +410,7 @@ class _Front:
         self._projecting(boards, shops, a, b, low, high)
 
     def _names(self, boards: Sequence[Board], a: float, b: float, low: float, high: float) -> None:
-        """The names on the fascia, side by side."""
+        """Add the names on the fascia, side by side."""
         count = min(len(boards), max(int((b - a) / 1.5), 1), 3)
         step = (b - a) / max(count, 1)
         for k in range(count):
@@ -430,7 +430,7 @@ class _Front:
     def _projecting(
         self, boards: Sequence[Board], shops: Sequence[Place], a: float, b: float, low: float, high: float
     ) -> None:
-        """A sign at a right angle to the wall: a pharmacy's cross, or a short name."""
+        """Add a sign at a right angle to the wall: a pharmacy's cross, or a short name."""
         side = a + 0.1 if self.random.random() < 0.5 else b - 0.1
         z = high - 0.1
         if any(shop.kind in ("pharmacy", "chemist") for shop in shops):
@@ -455,6 +455,6 @@ def _dim(colour: Rgb, factor: float) -> Rgb:
 
 
 def _lift(colour: Rgb) -> Rgb:
-    """A cloth is brighter than a painted board."""
+    """Return an awning's colour: a cloth is brighter than a painted board."""
     r, g, b = (min(round(c * 1.15 + 26), 255) for c in colour)
     return r, g, b

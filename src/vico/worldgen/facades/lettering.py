@@ -83,7 +83,7 @@ def _ascii(character: str) -> bool:
 
 
 def _parts(character: str) -> tuple[str, str] | None:
-    """A letter as an ASCII one and its accents."""
+    """Return a letter as an ASCII one and its accents."""
     if _ascii(character):
         return character, ""
     if character in _CROSSED:
@@ -97,7 +97,7 @@ def _parts(character: str) -> tuple[str, str] | None:
 
 
 def spelled(text: str) -> str | None:
-    """The text in characters that can be drawn, or None if some can't.
+    """Return the text in characters that can be drawn, or None if some can't.
 
     Names in Greek or Cyrillic come back in capitals; typographic signs as their plain cousins.
     """

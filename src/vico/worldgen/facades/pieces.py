@@ -8,11 +8,12 @@ from functools import cache
 
 import numpy as np
 
-from vico.world.mesh import Material, Surface
+from vico.world.mesh import Material, Surface, surface_of_quads
 from vico.world.model import Entrance
-from vico.worldgen.facades.textures import BAYS, material
-from vico.worldgen.facades.textures_doors import CELLS
-from vico.worldgen.facades.textures_grounds import BARE, PIER, PIER_ELSE
+from vico.worldgen.facades.textures.doors import CELLS
+from vico.worldgen.facades.textures.ground_floors import BARE, PIER, PIER_ELSE
+from vico.worldgen.facades.textures.materials import material
+from vico.worldgen.facades.textures.walls import BAYS
 from vico.worldgen.facades.walls import Wall
 
 Rgb = tuple[int, int, int]
@@ -63,20 +64,15 @@ class Pieces:
         """One surface a material, by name."""
         made = []
         for name in sorted(self._corners):
-            quads = np.asarray(self._corners[name], np.float32)
-            n = len(quads)
             uv = np.asarray(self._uv[name], np.float32)
-            square = np.stack([uv[:, [0, 1]], uv[:, [2, 1]], uv[:, [2, 3]], uv[:, [0, 3]]], axis=1)
-            faces = np.array([(0, 1, 2), (0, 2, 3)], np.int32)[None] + 4 * np.arange(n, dtype=np.int32)[:, None, None]
             made.append(
-                Surface(
-                    quads.reshape(-1, 3),
-                    np.repeat(np.asarray(self._normals[name], np.float32), 4, axis=0),
-                    square.reshape(-1, 2),
-                    np.repeat(np.asarray(self._colours[name], np.uint8), 4, axis=0),
-                    np.repeat(np.asarray(self._entities[name], np.int32), 4),
-                    faces.reshape(-1, 3),
-                    self.materials.get(name) or _stuff(name),
+                surface_of_quads(
+                    np.asarray(self._corners[name], np.float32),
+                    np.asarray(self._normals[name], np.float32),
+                    np.stack([uv[:, [0, 1]], uv[:, [2, 1]], uv[:, [2, 3]], uv[:, [0, 3]]], axis=1),
+                    colour=np.asarray(self._colours[name], np.uint8),
+                    entity=np.asarray(self._entities[name], np.int32),
+                    material=self.materials.get(name) or _stuff(name),
                 )
             )
         return made
@@ -104,7 +100,7 @@ class Face:
         return cls(pieces, entity, (entrance.position[0], entrance.position[1]), (-s, c), (c, s))
 
     def at(self, s: float, z: float, d: float) -> tuple[float, float, float]:
-        """The point in world coordinates."""
+        """Return the point in world coordinates."""
         return (
             self.start[0] + self.right[0] * s + self.out[0] * d,
             self.start[1] + self.right[1] * s + self.out[1] * d,
@@ -114,7 +110,7 @@ class Face:
     def panel(
         self, s0: float, s1: float, z0: float, z1: float, d: float, *, uv: Uv, colour: Rgb, stuff: str = "doors"
     ) -> None:
-        """An upright quad that faces away from the wall."""
+        """Add an upright quad that faces away from the wall."""
         corners = [self.at(s0, z0, d), self.at(s1, z0, d), self.at(s1, z1, d), self.at(s0, z1, d)]
         self.pieces.add(stuff, corners, (*self.out, 0.0), uv, colour, self.entity)
 
@@ -129,25 +125,24 @@ class Face:
         colour: Rgb,
         cell: str = "paint",
         under: bool = True,
-        back: float = 0.0,
     ) -> None:
-        """A box that stands out of the wall by `d`: front, sides, top and, if asked for, underside."""
+        """Add a box that stands out of the wall by `d`: front, sides, top and, if asked for, underside."""
         uv, rx, ry = cell_uv(cell), *self.right
         self.panel(s0, s1, z0, z1, d, uv=uv, colour=colour)
         for s, sign in ((s0, -1.0), (s1, 1.0)):
-            near, far = (back, d) if sign < 0 else (d, back)
+            near, far = (0.0, d) if sign < 0 else (d, 0.0)
             corners = [self.at(s, z0, near), self.at(s, z0, far), self.at(s, z1, far), self.at(s, z1, near)]
             self.pieces.add("doors", corners, (rx * sign, ry * sign, 0.0), uv, colour, self.entity)
-        top = [self.at(s0, z1, d), self.at(s1, z1, d), self.at(s1, z1, back), self.at(s0, z1, back)]
+        top = [self.at(s0, z1, d), self.at(s1, z1, d), self.at(s1, z1, 0.0), self.at(s0, z1, 0.0)]
         self.pieces.add("doors", top, (0.0, 0.0, 1.0), uv, colour, self.entity)
         if under:
-            low = [self.at(s0, z0, back), self.at(s1, z0, back), self.at(s1, z0, d), self.at(s0, z0, d)]
+            low = [self.at(s0, z0, 0.0), self.at(s1, z0, 0.0), self.at(s1, z0, d), self.at(s0, z0, d)]
             self.pieces.add("doors", low, (0.0, 0.0, -1.0), uv, colour, self.entity)
 
     def slope(
         self, s0: float, s1: float, low: tuple[float, float], high: tuple[float, float], *, uv: Uv, colour: Rgb
     ) -> None:
-        """A slanting cloth with both its faces; `low` and `high` are height and distance of its edges."""
+        """Add a slanting cloth with both its faces; `low` and `high` are height and distance of its edges."""
         corners = [self.at(s0, *low), self.at(s1, *low), self.at(s1, *high), self.at(s0, *high)]
         rise, depth = high[0] - low[0], low[1] - high[1]
         size = math.hypot(rise, depth)
@@ -157,7 +152,7 @@ class Face:
         self.pieces.add("doors", [corners[1], corners[0], corners[3], corners[2]], below, uv, colour, self.entity)
 
     def plate(self, s: float, z0: float, z1: float, d0: float, d1: float, *, uv: Uv, stuff: str) -> None:
-        """A board that sticks out of the wall at a right angle, readable from both sides."""
+        """Add a board that sticks out of the wall at a right angle, readable from both sides."""
         rx, ry = self.right
         for sign in (1.0, -1.0):
             near, far = (d1, d0) if sign > 0 else (d0, d1)

@@ -11,27 +11,11 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from vico.world.mesh import Material
-from vico.world.model import Category, Place
+from vico.world.model import Place
+from vico.worldgen.facades.catalogue import styles
 from vico.worldgen.facades.lettering import lettered, letters_width, spelled
+from vico.worldgen.facades.records import BoardColours, Rgb, SignTrade
 
-Rgb = tuple[int, int, int]
-
-# Board and letters, by trade; the last ones suit anything.
-_STYLES: dict[str, tuple[tuple[Rgb, Rgb], ...]] = {
-    "food": (
-        ((122, 36, 34), (250, 236, 206)), ((38, 58, 48), (240, 222, 170)), ((46, 40, 36), (244, 214, 150)),
-        ((236, 226, 206), (112, 40, 34)), ((160, 84, 38), (255, 244, 222)), ((28, 30, 34), (248, 248, 246)),
-    ),
-    "store": (
-        ((34, 46, 76), (246, 246, 248)), ((28, 30, 32), (248, 248, 246)), ((246, 246, 244), (36, 38, 42)),
-        ((66, 30, 52), (244, 230, 236)), ((30, 74, 76), (238, 248, 246)), ((196, 48, 44), (255, 250, 244)),
-        ((232, 224, 208), (58, 50, 42)), ((228, 186, 60), (40, 34, 30)),
-    ),
-    "health": (((244, 248, 246), (20, 124, 72)), ((20, 110, 66), (248, 252, 250))),
-    "office": (((58, 66, 76), (240, 242, 244)), ((196, 198, 200), (36, 40, 46)), ((30, 56, 92), (240, 244, 250))),
-    "stay": (((46, 34, 30), (236, 204, 140)), ((28, 44, 66), (240, 224, 176))),
-    "fun": (((56, 24, 66), (252, 224, 120)), ((24, 26, 32), (244, 92, 92)), ((20, 40, 70), (250, 250, 250))),
-}  # fmt: skip
 _ROW, _FONT, _PAGE, _MOST_PAGES = 48, 30, 2048, 2
 _MOST_BOARDS = 6000
 
@@ -68,26 +52,22 @@ class Boards:
     mute: tuple[str, ...]
 
 
-def trade_of(place: Place) -> str:
-    """What kind of sign suits a place."""
-    if place.kind in ("pharmacy", "clinic", "doctors", "dentist", "hospital", "chemist", "optician"):
-        return "health"
-    return {
-        Category.FOOD: "food",
-        Category.STORE: "store",
-        Category.OFFICE: "office",
-        Category.ACCOMMODATION: "stay",
-    }.get(place.category, "fun")
+def trade_of(place: Place) -> SignTrade:
+    """Return what kind of sign suits a place: by its kind, else by its category, else the last."""
+    trades = list(styles().trades.values())
+    of_kind = [trade for trade in trades if place.kind in trade.kinds]
+    of_category = [trade for trade in trades if trade.category == place.category]
+    return (of_kind or of_category or trades)[-1]
 
 
-def colours_of(place: Place) -> tuple[Rgb, Rgb]:
-    """Board and letters: of a chain the same everywhere, since they hang on the name alone."""
-    styles = _STYLES[trade_of(place)]
-    return styles[zlib.crc32(place.name.encode()) % len(styles)]
+def colours_of(place: Place) -> BoardColours:
+    """Return the colours of a place's board: of a chain the same everywhere, since they hang on the name alone."""
+    boards = trade_of(place).boards
+    return boards[zlib.crc32(place.name.encode()) % len(boards)]
 
 
 def board_text(place: Place) -> str | None:
-    """What a place's board says, shortened to fit; None where its letters can't be drawn."""
+    """Return what a place's board says, shortened to fit; None where its letters can't be drawn."""
     text = spelled(place.name)
     if text is None:
         return None
@@ -111,7 +91,8 @@ def paint_boards(places: Sequence[Place]) -> Boards:
         if text is None:
             mute.append(place.id)
             continue
-        wanted.setdefault((text, *colours_of(place)), []).append(place.id)
+        colours = colours_of(place)
+        wanted.setdefault((text, colours.ground, colours.letters), []).append(place.id)
     if not wanted:
         return Boards({}, (), tuple(mute))
     for share in (1.0, 0.75, 0.5, 0.375, 0.25):

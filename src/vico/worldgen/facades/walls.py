@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.exact import dot
 from vico.world.mesh import Surface
-from vico.world.products import dot
-from vico.worldgen.facades.textures import BAYS
+from vico.worldgen.facades.textures.walls import BAYS
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Wall:
         return min(max((z - self.low) / max(self.high - self.low, 1e-6), 0.004), 0.996)
 
     def bay_edges(self, a: float, b: float) -> tuple[float, float]:
-        """The stretch grown to whole bays, kept on the wall."""
+        """Return the stretch grown to whole bays, kept on the wall."""
         phase = self.first - math.floor(self.first)
         left = (math.floor(a / self.bay + phase + 0.02) - phase) * self.bay
         right = (math.ceil(b / self.bay + phase - 0.02) - phase) * self.bay
@@ -104,7 +104,7 @@ class GroundFloors:
         self._entity = entity[self._order]
 
     def at(self, entity: int, x: float, y: float, facing: float) -> Wall | None:
-        """The wall of a building on which a point lies; None where it has no ground floor with a picture there."""
+        """Return the wall of a building on which a point lies; None where no ground floor has a picture there."""
         low, high = np.searchsorted(self._entity, [entity, entity + 1])
         mine = self._order[low:high]
         if not len(mine):

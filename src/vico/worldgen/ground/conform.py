@@ -19,7 +19,7 @@ _ON_EDGE = 0.0015  # metres from an edge within which a corner lies on it
 
 
 @dataclass(frozen=True)
-class Plan:
+class PlanMesh:
     """Triangles in plan that share their corners.
 
     Attributes
@@ -49,7 +49,7 @@ class Plan:
         return mine[np.unique(tree.query(middle, predicate="dwithin", distance=2 * _ON_EDGE)[0])]
 
 
-def conforming(parts: list[tuple[Floats, Ints]], extra: Floats | None = None) -> Plan:
+def conforming(parts: list[tuple[Floats, Ints]], extra: Floats | None = None) -> PlanMesh:
     """Join triangulated pieces that lie side by side.
 
     Parameters
@@ -61,7 +61,7 @@ def conforming(parts: list[tuple[Floats, Ints]], extra: Floats | None = None) ->
 
     Returns
     -------
-    Plan
+    PlanMesh
         Where a corner of one triangle lies on another's edge, that one is parted there.
     """
     offsets = np.cumsum([0, *(len(flat) for flat, _ in parts)])
@@ -84,7 +84,7 @@ def conforming(parts: list[tuple[Floats, Ints]], extra: Floats | None = None) ->
     triangles, piece = _parted(corners, triangles, piece, added)
     turn = _turn(corners, triangles)
     kept = turn > 1e-9
-    return Plan(corners, triangles[kept], piece[kept])
+    return PlanMesh(corners, triangles[kept], piece[kept])
 
 
 def _turn(corners: Floats, triangles: Ints) -> Floats:

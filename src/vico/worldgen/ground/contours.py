@@ -11,7 +11,7 @@ Floats = NDArray[np.float64]
 
 
 def region_above(values: Floats, level: float, *, low: float, cell: float) -> BaseGeometry:
-    """The region where values that are linear between points exceed a level.
+    """Return the region where values that are linear between points exceed a level.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def _corner(z: Floats, axis: Floats, i: int, j: int) -> tuple[Floats, Floats]:
 
 
 def _borders(corners: tuple[tuple[Floats, Floats], ...]) -> list[Floats]:
-    """The piece of border through each triangle that has one, shape ``(k, 2, 2)``, by the corner it cuts off."""
+    """Find the piece of border through each triangle that has one, shape ``(k, 2, 2)``, by the corner it cuts off."""
     found = []
     for k in range(3):
         (p, zp), (q, zq), (r, zr) = (corners[(k + m) % 3] for m in range(3))

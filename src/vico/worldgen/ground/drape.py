@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from vico.geo import overlay
 from vico.geo.osm import polygons_of
 from vico.world.heights import HeightField
 from vico.worldgen.ground.halving import halved
@@ -145,7 +146,7 @@ class Grid:
 
 def _within(areas: Sequence[BaseGeometry], grown: float, n: int, low: float, cell: float) -> NDArray[np.bool_]:
     """Which of a grid's squares have their middles within areas that are grown (or shrunk)."""
-    shapes = shapely.buffer(np.array(list(areas), object), grown, quad_segs=1)
+    shapes = overlay.buffer(np.array(list(areas), object), grown, quad_segs=1)
     return filled([polygon for shape in shapes for polygon in polygons_of(shape)], n, -(low + cell / 2), cell)
 
 

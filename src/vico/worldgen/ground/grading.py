@@ -18,14 +18,16 @@ from scipy.spatial import cKDTree
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from vico.geo import overlay
 from vico.geo.osm import OsmData, polygons_of
 from vico.world.heights import HeightField
-from vico.worldgen.buildings.outlines import building_plans
-from vico.worldgen.buildings.partition import water_pieces
+from vico.worldgen.facts.ground_kinds import water_pieces
+from vico.worldgen.facts.levels import ON_FOOT, Passage
+from vico.worldgen.facts.site import SiteFacts
+from vico.worldgen.facts.streets import StreetPolygons, carriageway_width
+from vico.worldgen.facts.tags import is_bridge, on_the_ground
 from vico.worldgen.ground.kerbs import Water, steps_field
 from vico.worldgen.ground.profiles import Network
-from vico.worldgen.streets.levels import ON_FOOT, Passage, is_bridge, overpasses, passages
-from vico.worldgen.streets.streets import StreetPolygons, carriageway_width, on_the_ground
 
 Floats = NDArray[np.float64]
 
@@ -42,21 +44,15 @@ _SMALL, _BASIN = 2500.0, 150.0  # square metres
 _STEP_CELL, _STEP_CELL_LARGE, _LARGE = 0.5, 1.0, 700.0
 
 
-def standing_outlines(osm: OsmData, *, seed: int) -> list[BaseGeometry]:
-    """Footprints of what stands on the ground: parts of buildings that begin lower than a person is tall, metres."""
-    plans, _ = building_plans(osm, seed=seed)
-    return [part.polygon for plan in plans for part in plan.parts if part.low < 2.2]
-
-
-def graded(height: HeightField, osm: OsmData, streets: StreetPolygons) -> HeightField:
+def graded(height: HeightField, site: SiteFacts, streets: StreetPolygons) -> HeightField:
     """Grade the ground to the streets and waters of a map.
 
     Parameters
     ----------
     height
         The ground as an elevation model has it; its `steps` are not kept.
-    osm
-        The map.
+    site
+        The map and its facts.
     streets
         `road_polygons` of it: kerbs come to lie at the borders of these.
 
@@ -65,9 +61,9 @@ def graded(height: HeightField, osm: OsmData, streets: StreetPolygons) -> Height
     HeightField
         Over the same square. Level ground stays level but for kerbs, banks and the ramps of bridges over streets.
     """
-    base = _levelled(replace(height, steps=None), osm, streets)
+    base = _levelled(replace(height, steps=None), site)
     window = shapely.box(-height.half, -height.half, height.half, height.half)
-    waters = open_water(base, water_pieces(osm, streets, window), piped_waters(osm))
+    waters = open_water(base, water_pieces(site, streets, window), piped_waters(site.osm))
     cell = _STEP_CELL if height.half < _LARGE else _STEP_CELL_LARGE
     return replace(base, steps=steps_field(base, streets, waters, cell=cell))
 
@@ -77,9 +73,9 @@ def is_level(height: HeightField) -> bool:
     return height.heights.size == 4 or float(np.ptp(height.heights)) < 0.01
 
 
-def _levelled(height: HeightField, osm: OsmData, streets: StreetPolygons) -> HeightField:
-    """The smooth ground with its streets, stairs and pitches."""
-    above = overpasses(osm)
+def _levelled(height: HeightField, site: SiteFacts) -> HeightField:
+    """Return the smooth ground with its streets, stairs and pitches."""
+    osm, above = site.osm, site.levels.above
     if is_level(height) and not above:
         return height
     lines, weights, widths, decks, slopes = _lines(osm, above)
@@ -100,7 +96,7 @@ def _levelled(height: HeightField, osm: OsmData, streets: StreetPolygons) -> Hei
     streets_alone = [row for row, deck, width in zip(network.rows, decks, widths, strict=True) if not deck and width]
     beside = network.abreast(wide, streets_alone, _WALL_ROOM)
     found = network.levelled(wanted, weight, length=_SMOOTH, spacing=_SPACING, abreast=beside)
-    needs = passages(osm, above)
+    needs = site.levels.passages
     if needs:
         rows = [row for row, deck in zip(network.rows, decks, strict=True) if deck]
         high, least = raised(network.points, np.unique(np.concatenate(rows)), found, needs, height)
@@ -132,7 +128,7 @@ def raised(
 
 
 def ramp_slope(tags: Mapping[str, str]) -> float:
-    """The steepest a way is built where the ground does not ask for it: streets climb less than stairs."""
+    """Return the steepest slope of a way where the ground does not ask for more: streets climb less than stairs."""
     kind = tags.get("highway")
     if kind is None:
         return 0.03
@@ -180,7 +176,7 @@ def _lines(
 def _blended(
     height: HeightField, network: Network, found: Floats, wide: Floats, covers: NDArray[np.bool_]
 ) -> HeightField:
-    """The field with the network's heights in and beside its streets."""
+    """Blend the network's heights into the field, in and beside its streets."""
     count = max(math.ceil(2 * height.half / _CELL), height.heights.shape[0] - 1)
     axis = np.linspace(-height.half, height.half, count + 1)
     at = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
@@ -242,7 +238,7 @@ def _pitches(height: HeightField, osm: OsmData) -> HeightField:
     for area in osm.areas:
         if area.tags.get("leisure") != "pitch" or not 60.0 < area.polygon.area < 20_000.0:
             continue
-        west, south, east, north = shapely.buffer(area.polygon, 10.0).bounds
+        west, south, east, north = overlay.buffer(area.polygon, 10.0).bounds
         i0, i1 = (min(max(round((v + height.half) / cell), 0), n - 1) for v in (west, east))
         j0, j1 = (min(max(round((v + height.half) / cell), 0), n - 1) for v in (south, north))
         if i1 - i0 < 2 or j1 - j0 < 2:
@@ -271,7 +267,7 @@ def piped_waters(osm: OsmData) -> list[BaseGeometry]:
 
 
 def open_water(height: HeightField, pieces: Sequence[Polygon], piped: Sequence[BaseGeometry] = ()) -> list[Water]:
-    """The waters of a map with their surfaces: level, or as gently sloped as their banks.
+    """Return the waters of a map with their surfaces: level, or as gently sloped as their banks.
 
     Parameters
     ----------
@@ -284,7 +280,7 @@ def open_water(height: HeightField, pieces: Sequence[Polygon], piped: Sequence[B
     """
     if not pieces:
         return []
-    whole = shapely.buffer(shapely.union_all(shapely.buffer([*pieces, *piped], 12.0, quad_segs=2)), -11.5, quad_segs=2)
+    whole = overlay.buffer(overlay.union_all(overlay.buffer([*pieces, *piped], 12.0, quad_segs=2)), -11.5, quad_segs=2)
     bodies = polygons_of(whole)
     tree = shapely.STRtree(bodies)
     shores: dict[int, tuple[Floats, Floats, float]] = {}
@@ -302,7 +298,7 @@ def open_water(height: HeightField, pieces: Sequence[Polygon], piped: Sequence[B
 def _shore(height: HeightField, body: Polygon) -> tuple[Floats, Floats, float]:
     """Points of a water's banks, their heights, and how far below them the surface lies."""
     reach = height.half - 1.0
-    inside = shapely.intersection(body, shapely.box(-reach, -reach, reach, reach))
+    inside = overlay.intersection(body, shapely.box(-reach, -reach, reach, reach))
     spacing = min(max(body.exterior.length / 200.0, 2.0), 12.0)
     shore = shapely.get_coordinates(
         shapely.segmentize(inside.boundary if not inside.is_empty else body.boundary, spacing)

@@ -8,6 +8,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from vico.geo import overlay
+
 Floats = NDArray[np.float64]
 
 _STRAIGHT = 1e-8  # square metres: corners that turn the other way by less are straight
@@ -44,7 +46,7 @@ def halved(polygons: NDArray[np.object_], middle: Floats, axis: int) -> tuple[ND
         for out, side in ((below, 2 + axis), (beyond, axis)):
             cut = box.copy()
             cut[:, side] = middle[hard]
-            out[hard] = shapely.intersection(polygons[hard], shapely.box(*cut.T))
+            out[hard] = overlay.intersection(polygons[hard], shapely.box(*cut.T), grid=None)
     return below, beyond
 
 
@@ -86,7 +88,7 @@ class _Rings:
         return np.asarray(clear & (crossings == 2))
 
     def clipped(self, middle: Floats, axis: int, side: float) -> NDArray[np.object_]:
-        """What of rings lies before a line, or beyond it, in one piece (Sutherland and Hodgman, 1974)."""
+        """Clip rings to what lies before a line, or beyond it, in one piece (Sutherland and Hodgman, 1974)."""
         at = middle[self.row]
         away, away_after = side * (self.a[:, axis] - at), side * (self.b[:, axis] - at)
         crosses = away * away_after < 0.0

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from shapely import MultiLineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from vico.geo import overlay
 from vico.geo.osm import polygons_of
 from vico.world.heights import EDGE_RANGE, HeightField, Steps
 from vico.world.walkable import fill_polygon
-from vico.worldgen.buildings.roof_shapes import rings_of
-from vico.worldgen.streets.streets import Crossing, StreetPolygons
+from vico.worldgen.facts.outlines.roof_shapes import rings_of
+from vico.worldgen.facts.streets import Crossing, StreetPolygons
 
 KERB = 0.12
 """Metres a sidewalk lies above the carriageway."""
@@ -75,7 +76,7 @@ def _soft_least(xy, shore, banks, out):  # type: ignore[no-untyped-def]
 
 
 def lowered_kerbs(crossings: Iterable[Crossing]) -> MultiLineString:
-    """The stretches of kerb at both ends of crossings, metres."""
+    """Return the stretches of kerb at both ends of crossings, metres."""
     lines = []
     for crossing in crossings:
         a, b = np.array(crossing.start), np.array(crossing.end)
@@ -86,9 +87,9 @@ def lowered_kerbs(crossings: Iterable[Crossing]) -> MultiLineString:
 
 
 def lower_side(streets: StreetPolygons, waters: Sequence[Polygon]) -> BaseGeometry:
-    """What lies below its surroundings, carriageways and water: its outline is where kerbs and banks are."""
-    shapes = [streets.carriageway, *shapely.set_precision(np.array(list(waters), object), _GRID)]
-    return shapely.union_all(shapes, grid_size=_GRID)
+    """Return what lies below its surroundings, carriageways and water: its outline is where kerbs and banks are."""
+    shapes = [streets.carriageway, *overlay.on_grid(np.array(list(waters), object), grid=_GRID)]
+    return overlay.union_all(shapes, grid=_GRID)
 
 
 def steps_field(smooth: HeightField, streets: StreetPolygons, waters: Sequence[Water], *, cell: float) -> Steps | None:
@@ -123,7 +124,7 @@ def steps_field(smooth: HeightField, streets: StreetPolygons, waters: Sequence[W
     sunk[filled(polygons_of(streets.sunken), n, half, cell)] = 0.0
     low = np.full((n, n), -KERB)
     # Only on drives the carriageway comes up: beyond the kerbs its height has nobody to mind it, and stays even.
-    drives = polygons_of(shapely.buffer(shapely.difference(streets.carriageway, streets.sunken), 1.2, quad_segs=2))
+    drives = polygons_of(overlay.buffer(overlay.difference(streets.carriageway, streets.sunken), 1.2, quad_segs=2))
     rising = filled(drives, n, half, cell) & ~filled(polygons_of(streets.sunken), n, half, cell)
     low[rising] = (-KERB * np.clip(1.0 - sunk / _FADE, 0.0, 1.0))[rising]
     ramp = _near(lowered_kerbs(streets.crossings), n, half, cell, RAMP)
@@ -133,7 +134,7 @@ def steps_field(smooth: HeightField, streets: StreetPolygons, waters: Sequence[W
         owner = np.full((n, n), -1.0, np.float32)
         for own in (False, True):
             for k, water in enumerate(waters):
-                beyond = shapely.simplify(shapely.buffer(water.polygon, 2 * cell, quad_segs=2), 0.2)
+                beyond = overlay.simplify(overlay.buffer(water.polygon, 2 * cell, quad_segs=2), 0.2)
                 _fill(owner, [water.polygon] if own else polygons_of(beyond), half, cell, float(k))
         owner[filled(polygons_of(streets.carriageway), n, half, cell)] = -1.0
         for k, water in enumerate(waters):

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from vico.geo import overlay
 from vico.geo.osm import polygons_of
-from vico.worldgen.streets.streets import LANE_WIDTH, Crossing, Street, StreetPolygons
+from vico.worldgen.facts.streets import LANE_WIDTH, Crossing, Street, StreetPolygons
 
 _STRIPE, _STRIPE_PERIOD = 0.5, 1.0  # of a zebra, metres along the walk
 _DASH, _DASH_PERIOD = 3.0, 6.0
@@ -78,8 +79,8 @@ def road_markings(
     middles: list[NDArray[np.float64]] = []
     for street in streets.streets:
         for offset, between_directions in _lane_lines(street):
-            line = shapely.offset_curve(LineString(street.line), offset) if offset else LineString(street.line)
-            free = shapely.difference(line, breaks)
+            line = overlay.offset_curve(LineString(street.line), offset) if offset else LineString(street.line)
+            free = overlay.difference(line, breaks)
             target = middles if between_directions and yellow else dashes
             for piece in shapely.get_parts(free):
                 if isinstance(piece, LineString) and piece.length > _DASH:
@@ -88,7 +89,7 @@ def road_markings(
     for line in (*streets.rails, *tracks):
         for side in (-0.5, 0.5):
             rails += _ribbon(_divided(line, longest), side * _GAUGE, 0.09)
-    painted = streets.steps if stepped is None else shapely.difference(streets.steps, shapely.buffer(stepped, 0.1))
+    painted = streets.steps if stepped is None else overlay.difference(streets.steps, overlay.buffer(stepped, 0.1))
     treads = [quad for shape in polygons_of(painted, 0.5) for quad in _treads(shape)]
     lanes, edges, bays = _kerbside(streets, breaks, longest)
     bays += [quad for shape in streets.parking.geoms for quad in _car_park(shape)]
@@ -131,7 +132,7 @@ def _zebra(start: tuple[float, float], end: tuple[float, float], width: float) -
 
 
 def _crossing(crossing: Crossing) -> list[NDArray[np.float64]]:
-    """A crossing's paint by its kind."""
+    """Paint a crossing by its kind."""
     bars = _zebra(crossing.start, crossing.end, crossing.width)
     if crossing.marking == "zebra" or not bars:
         return bars
@@ -168,7 +169,7 @@ def _stop_lines(streets: StreetPolygons, left_driving: bool) -> list[NDArray[np.
             street, line = streets.streets[int(k)], lines[int(k)]
             if street.kind == "service" or not (crossing.signals or street.kind in _LINED):
                 continue
-            place = float(line.project(shapely.intersection(walk, line).centroid))
+            place = float(line.project(overlay.crossing(walk, line).centroid))
             for ahead in (1.0,) if street.oneway else (1.0, -1.0):
                 at = place - ahead * (crossing.width / 2 + 1.1)
                 if not 0.5 < at < line.length - 0.5:
@@ -215,8 +216,8 @@ def _kerbside(
 
 
 def _free_pieces(street: Street, offset: float, breaks: BaseGeometry) -> list[LineString]:
-    line = shapely.offset_curve(LineString(street.line), offset)
-    free = shapely.get_parts(shapely.difference(line, breaks))
+    line = overlay.offset_curve(LineString(street.line), offset)
+    free = shapely.get_parts(overlay.difference(line, breaks))
     return [piece for piece in free if isinstance(piece, LineString) and piece.length > _DASH]
 
 
@@ -235,7 +236,7 @@ def _car_park(shape: Polygon) -> list[NDArray[np.float64]]:
     if depth > 31.0:
         for middle in np.arange(16.5, depth - 16.0, 16.0):
             rows += [(float(middle), 5.0), (float(middle), -5.0)]
-    inner = shapely.buffer(shape, -0.3)
+    inner = overlay.buffer(shape, -0.3)
     shapely.prepare(inner)
     found: list[NDArray[np.float64]] = []
     for start, reach in rows:
@@ -248,7 +249,7 @@ def _car_park(shape: Polygon) -> list[NDArray[np.float64]]:
 
 
 def pitch_lines(shape: Polygon, sport: str) -> list[NDArray[np.float64]]:
-    """The lines of a sports field, fitted into its outline; empty for sports without."""
+    """Lay out the lines of a sports field, fitted into its outline; empty for sports without."""
     box = shapely.minimum_rotated_rectangle(shape)
     if not isinstance(box, Polygon) or shape.area < 0.75 * box.area or shape.area < 80.0:
         return []
@@ -326,12 +327,12 @@ def _junction_zones(streets: StreetPolygons) -> BaseGeometry:
             share = [street.width] if k in (0, len(street.line) - 1) else [street.width, street.width]
             ends.setdefault(key, []).extend(share)
     zones = [
-        shapely.buffer(shapely.Point(point), max(widths) / 2 + 3.0, quad_segs=3)
+        overlay.buffer(shapely.Point(point), max(widths) / 2 + 3.0, quad_segs=3)
         for point, widths in ends.items()
         if len(widths) >= 3
     ]
-    zones += [shapely.buffer(crossing.polygon, 1.2, join_style="mitre") for crossing in streets.crossings]
-    return shapely.union_all(zones)
+    zones += [overlay.buffer(crossing.polygon, 1.2, join_style="mitre") for crossing in streets.crossings]
+    return overlay.union_all(zones)
 
 
 def _divided(line: NDArray[np.float64], longest: float | None) -> NDArray[np.float64]:
@@ -353,7 +354,7 @@ def _dashes(line: LineString, *, solid: bool, longest: float | None) -> list[NDA
 
 
 def _ribbon(line: NDArray[np.float64], offset: float, width: float) -> list[NDArray[np.float64]]:
-    """A strip along a polyline, `offset` to its left, mitred at the bends."""
+    """Make a strip along a polyline, `offset` to its left, mitred at the bends."""
     along = np.diff(line, axis=0)
     length = np.hypot(*along.T)
     keep = np.concatenate([[True], length > 1e-6])
@@ -371,7 +372,7 @@ def _ribbon(line: NDArray[np.float64], offset: float, width: float) -> list[NDAr
 
 
 def _treads(shape: Polygon) -> list[NDArray[np.float64]]:
-    """The edges of steps: thin lines across the longer side of a flight."""
+    """Draw the edges of steps: thin lines across the longer side of a flight."""
     box = np.asarray(shapely.minimum_rotated_rectangle(shape).exterior.coords)
     if len(box) < 5 or shape.area < 0.55 * shapely.minimum_rotated_rectangle(shape).area:
         return []
@@ -386,7 +387,7 @@ def _treads(shape: Polygon) -> list[NDArray[np.float64]]:
     quads = []
     for place in np.arange(0.3, length - 0.2, 0.36):
         line = LineString([box[0] + along * place, box[0] + along * place + v])
-        for piece in shapely.get_parts(shapely.intersection(line, shape)):
+        for piece in shapely.get_parts(overlay.intersection(line, shape)):
             if isinstance(piece, LineString) and piece.length > 0.5:
                 quads += _ribbon(np.asarray(piece.coords), 0.0, 0.05)
     return quads

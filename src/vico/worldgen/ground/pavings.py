@@ -9,17 +9,17 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.seeds import rng
 from vico.world.mesh import Material
 from vico.world.model import ENTITY_GREEN, ENTITY_GROUND, ENTITY_ROAD, ENTITY_WATER
-from vico.world.seeds import rng
-from vico.worldgen.facades.textures_canvas import Canvas, periodic_noise
+from vico.worldgen.texture_canvas import Canvas, periodic_noise
 
 Rgb = tuple[int, int, int]
 Picture = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
-class Look:
+class GroundStyle:
     """How a kind of ground looks: material, metres a texture covers, tint, entity, strength of its large patches."""
 
     material: str
@@ -29,35 +29,35 @@ class Look:
     patches: float = 0.05
 
 
-_ASPHALT = Look("ground_asphalt", 12.0, (255, 255, 255), ENTITY_ROAD, 0.08)
-LOOKS: dict[str, Look] = {
+_ASPHALT = GroundStyle("ground_asphalt", 12.0, (255, 255, 255), ENTITY_ROAD, 0.08)
+LOOKS: dict[str, GroundStyle] = {
     "carriageway": _ASPHALT,
-    "parking": Look("ground_asphalt", 12.0, (255, 250, 242), ENTITY_ROAD, 0.10),
-    "cycleway": Look("ground_asphalt", 12.0, (255, 196, 176), ENTITY_ROAD, 0.05),
-    "kerb": Look("ground_concrete", 6.0, (214, 211, 206), ENTITY_GROUND, 0.03),
-    "sidewalk": Look("ground_slabs", 4.0, (240, 240, 238), ENTITY_GROUND, 0.06),
-    "tactile": Look("ground_tactile", 1.2, (255, 255, 255), ENTITY_GROUND, 0.0),
-    "pedestrian": Look("ground_setts", 3.2, (255, 246, 236), ENTITY_GROUND, 0.07),
-    "steps": Look("ground_concrete", 6.0, (206, 200, 192), ENTITY_GROUND, 0.03),
-    "path": Look("ground_gravel", 5.0, (255, 246, 228), ENTITY_GROUND, 0.07),
-    "playground": Look("ground_rubber", 4.0, (196, 120, 92), ENTITY_GROUND, 0.04),
-    "ballast": Look("ground_gravel", 5.0, (150, 140, 132), ENTITY_GROUND, 0.06),
-    "court": Look("ground_rubber", 4.0, (92, 128, 150), ENTITY_GROUND, 0.02),
-    "clay": Look("ground_rubber", 4.0, (190, 104, 74), ENTITY_GROUND, 0.03),
-    "turf": Look("ground_turf", 24.0, (255, 255, 255), ENTITY_GREEN, 0.03),
-    "concrete": Look("ground_concrete", 6.0, (230, 228, 222), ENTITY_GROUND, 0.06),
-    "sand": Look("ground_sand", 5.0, (255, 255, 255), ENTITY_GROUND, 0.06),
-    "gravel": Look("ground_gravel", 5.0, (232, 222, 204), ENTITY_GROUND, 0.07),
-    "garden": Look("ground_grass", 11.0, (236, 255, 226), ENTITY_GREEN, 0.16),
-    "grass": Look("ground_grass", 11.0, (255, 255, 255), ENTITY_GREEN, 0.13),
-    "woods": Look("ground_forest", 9.0, (255, 255, 255), ENTITY_GREEN, 0.18),
-    "farmland": Look("ground_furrows", 8.0, (255, 255, 255), ENTITY_GREEN, 0.12),
-    "earth": Look("ground_earth", 7.0, (255, 255, 255), ENTITY_GROUND, 0.12),
-    "water": Look("ground_water", 18.0, (255, 255, 255), ENTITY_WATER, 0.05),
-    "yard": Look("ground_slabs", 5.0, (204, 204, 203), ENTITY_GROUND, 0.10),
-    "field": Look("ground_grass", 11.0, (240, 236, 206), ENTITY_GREEN, 0.16),
-    "wall": Look("ground_blocks", 3.0, (214, 208, 200), ENTITY_GROUND, 0.05),
-    "quay": Look("ground_blocks", 4.0, (176, 172, 166), ENTITY_GROUND, 0.05),
+    "parking": GroundStyle("ground_asphalt", 12.0, (255, 250, 242), ENTITY_ROAD, 0.10),
+    "cycleway": GroundStyle("ground_asphalt", 12.0, (255, 196, 176), ENTITY_ROAD, 0.05),
+    "kerb": GroundStyle("ground_concrete", 6.0, (214, 211, 206), ENTITY_GROUND, 0.03),
+    "sidewalk": GroundStyle("ground_slabs", 4.0, (240, 240, 238), ENTITY_GROUND, 0.06),
+    "tactile": GroundStyle("ground_tactile", 1.2, (255, 255, 255), ENTITY_GROUND, 0.0),
+    "pedestrian": GroundStyle("ground_setts", 3.2, (255, 246, 236), ENTITY_GROUND, 0.07),
+    "steps": GroundStyle("ground_concrete", 6.0, (206, 200, 192), ENTITY_GROUND, 0.03),
+    "path": GroundStyle("ground_gravel", 5.0, (255, 246, 228), ENTITY_GROUND, 0.07),
+    "playground": GroundStyle("ground_rubber", 4.0, (196, 120, 92), ENTITY_GROUND, 0.04),
+    "ballast": GroundStyle("ground_gravel", 5.0, (150, 140, 132), ENTITY_GROUND, 0.06),
+    "court": GroundStyle("ground_rubber", 4.0, (92, 128, 150), ENTITY_GROUND, 0.02),
+    "clay": GroundStyle("ground_rubber", 4.0, (190, 104, 74), ENTITY_GROUND, 0.03),
+    "turf": GroundStyle("ground_turf", 24.0, (255, 255, 255), ENTITY_GREEN, 0.03),
+    "concrete": GroundStyle("ground_concrete", 6.0, (230, 228, 222), ENTITY_GROUND, 0.06),
+    "sand": GroundStyle("ground_sand", 5.0, (255, 255, 255), ENTITY_GROUND, 0.06),
+    "gravel": GroundStyle("ground_gravel", 5.0, (232, 222, 204), ENTITY_GROUND, 0.07),
+    "garden": GroundStyle("ground_grass", 11.0, (236, 255, 226), ENTITY_GREEN, 0.16),
+    "grass": GroundStyle("ground_grass", 11.0, (255, 255, 255), ENTITY_GREEN, 0.13),
+    "woods": GroundStyle("ground_forest", 9.0, (255, 255, 255), ENTITY_GREEN, 0.18),
+    "farmland": GroundStyle("ground_furrows", 8.0, (255, 255, 255), ENTITY_GREEN, 0.12),
+    "earth": GroundStyle("ground_earth", 7.0, (255, 255, 255), ENTITY_GROUND, 0.12),
+    "water": GroundStyle("ground_water", 18.0, (255, 255, 255), ENTITY_WATER, 0.05),
+    "yard": GroundStyle("ground_slabs", 5.0, (204, 204, 203), ENTITY_GROUND, 0.10),
+    "field": GroundStyle("ground_grass", 11.0, (240, 236, 206), ENTITY_GREEN, 0.16),
+    "wall": GroundStyle("ground_blocks", 3.0, (214, 208, 200), ENTITY_GROUND, 0.05),
+    "quay": GroundStyle("ground_blocks", 4.0, (176, 172, 166), ENTITY_GROUND, 0.05),
 }
 """The kinds of `ground_partition`, and walls."""
 
@@ -74,7 +74,7 @@ _COVERS: dict[str, tuple[str, float, Rgb]] = {
 }
 
 
-def look_of(kind: str) -> Look:
+def look_of(kind: str) -> GroundStyle:
     """How a kind of `ground_partition` looks, its paving included."""
     base, _, paving = kind.partition(":")
     look = LOOKS[base]
@@ -85,7 +85,7 @@ def look_of(kind: str) -> Look:
         return look
     if base == "sidewalk" and paving == "asphalt":
         tint = (255, 252, 248)
-    return Look(material, tile, tint, look.entity, look.patches)
+    return GroundStyle(material, tile, tint, look.entity, look.patches)
 
 
 def patches(xy: NDArray[np.float64], strength: float, seed: int = 7) -> NDArray[np.float64]:
@@ -114,7 +114,7 @@ def _patch_field(seed: int) -> NDArray[np.float64]:
     return rng(seed, "ground", "patches").uniform(-1.0, 1.0, (256, 256))
 
 
-def coloured(look: Look, xy: NDArray[np.float64]) -> NDArray[np.uint8]:
+def coloured(look: GroundStyle, xy: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Vertex colours of a kind of ground, shape ``(n, 3)``."""
     colour = np.asarray(look.tint, np.float64) * patches(xy, look.patches)
     return np.clip(np.round(colour), 0, 255).astype(np.uint8)
@@ -229,7 +229,7 @@ def _grass(random: np.random.Generator) -> Picture:
 
 
 def _turf(random: np.random.Generator) -> Picture:
-    """A mown pitch in stripes of six metres."""
+    """Paint a mown pitch in stripes of six metres."""
     canvas = Canvas(512, 512, (88, 124, 62), random)
     for k in range(4):
         canvas.shade(k * 128, 0, (k + 1) * 128, 512, 1.05 if k % 2 else 0.95)
@@ -324,5 +324,5 @@ _PAINTERS: dict[str, Callable[[np.random.Generator], Picture]] = {
 
 @cache
 def ground_material(name: str) -> Material:
-    """The material of that name."""
+    """Paint the ground material of that name."""
     return Material(name, _PAINTERS[name](rng(0, "ground", name)))

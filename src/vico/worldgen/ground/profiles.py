@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from vico.world.products import turned
+from vico.exact import apply_matrix
 
 Floats = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ class Network:
         for node, others in arms.items():
             ways = self.points[others] - self.points[node]
             ways = ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-9)
-            cosine = turned(ways, ways)
+            cosine = apply_matrix(ways, ways)
             for a in range(len(others)):
                 met += [(others[a], node, others[b]) for b in range(a + 1, len(others)) if cosine[a, b] < -0.7]
         return np.concatenate([*triples, np.array(met, np.int64).reshape(-1, 3), np.zeros((0, 3), np.int64)])

@@ -17,26 +17,26 @@ from scipy import ndimage
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from vico.geo import overlay
 from vico.geo.osm import OsmData, polygons_of
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface, joined
 from vico.world.model import ENTITY_GROUND, ENTITY_ROAD
-from vico.worldgen.buildings.partition import ground_partition, mapped_areas, sea_polygons
-from vico.worldgen.ground.bridges import bridge_surfaces, portal_surfaces, spans_over_water
-from vico.worldgen.ground.conform import Plan, conforming
+from vico.worldgen.facts.ground_kinds import ground_partition, mapped_areas
+from vico.worldgen.facts.site import SiteFacts
+from vico.worldgen.facts.streets import Crossing, StreetPolygons
+from vico.worldgen.facts.tags import on_the_ground
+from vico.worldgen.ground.bridges.decks import spans_over_water
+from vico.worldgen.ground.bridges.stage import Bridges
+from vico.worldgen.ground.conform import PlanMesh, conforming
 from vico.worldgen.ground.contours import region_above
 from vico.worldgen.ground.drape import CLOSE, NEAR, ROUGH, Curtain, Grid, Heights, curtain, triangulated
 from vico.worldgen.ground.grading import is_level, open_water, piped_waters
 from vico.worldgen.ground.kerbs import RAMP, Water, lowered_kerbs
 from vico.worldgen.ground.markings import Quads, pitch_lines, road_markings
-from vico.worldgen.ground.pavings import LOOKS, Look, coloured, ground_material, look_of
+from vico.worldgen.ground.pavings import LOOKS, GroundStyle, coloured, ground_material, look_of
 from vico.worldgen.ground.stairs import flights_of
 from vico.worldgen.ground.thinning import thinned
-from vico.worldgen.streets.levels import overpasses
-from vico.worldgen.streets.sides import keeps_left
-from vico.worldgen.streets.streets import Crossing, StreetPolygons, on_the_ground
-
-__all__ = ["ground_from_osm", "ground_partition", "mapped_areas", "sea_polygons", "terrain_normals"]
 
 _UNDERLAY, _UNDERLAY_SLOPED = 0.5, 3.0  # metres below: shows through nothing but the hairlines between two surfaces
 _UNDER_STAIRS = 0.3
@@ -54,10 +54,10 @@ _LONG = 12.0
 
 
 def ground_from_osm(
-    osm: OsmData,
+    site: SiteFacts,
     terrain: HeightField,
-    half: float,
     streets: StreetPolygons,
+    bridges: Bridges,
     *,
     standing: Sequence[BaseGeometry] = (),
     apron: float = 40.0,
@@ -66,14 +66,14 @@ def ground_from_osm(
 
     Parameters
     ----------
-    osm
-        The extract.
+    site
+        The map and its facts.
     terrain
         What the ground is draped on, as `graded` made it from the same streets.
-    half
-        Half side of the world's square, metres.
     streets
-        `streets.road_polygons` of the same extract.
+        `road_polygons` of the same map.
+    bridges
+        `bridges_of` the same streets and terrain.
     standing
         Footprints of the buildings as they were built, where they stand on the ground: nobody sees what lies well
         within them, and it is not drawn.
@@ -85,14 +85,15 @@ def ground_from_osm(
     list of Surface
         One a material, for the layer "ground"; entities tell ground, road, water and green apart.
     """
-    reach = half + apron
+    osm = site.osm
+    reach = osm.half + apron
     window = shapely.box(-reach, -reach, reach, reach)
-    pieces = ground_partition(osm, streets, window)
+    pieces = ground_partition(site, streets, window)
     level = is_level(terrain)
     waters = open_water(terrain, pieces.get("water", []), piped_waters(osm)) if terrain.steps is not None else []
-    flights = flights_of(osm, terrain, streets.steps)
+    flights = flights_of(site, terrain, streets.steps)
     laid = _laid(pieces, terrain, waters, reach, hidden=_hidden(osm, standing), stairs=flights.area)
-    wet = shapely.union_all([water.polygon for water in waters])
+    wet = overlay.union_all([water.polygon for water in waters])
     exact: list[BaseGeometry] = [
         shape for name, shapes in pieces.items() if name.partition(":")[0] in _PAVED for shape in shapes
     ]
@@ -110,23 +111,22 @@ def ground_from_osm(
     surfaces = [
         _covered(plan, number, piece, terrain) for number, piece in enumerate(laid) if (plan.piece == number).any()
     ]
-    under = _under_bridges(osm, wet, window) if waters else []
-    dry = shapely.difference(window, shapely.buffer(shapely.union_all([wet, *under]), 0.6, quad_segs=1))
+    under = _under_bridges(site, wet, window) if waters else []
+    dry = overlay.difference(window, overlay.buffer(overlay.union_all([wet, *under]), 0.6, quad_segs=1))
     surfaces += _underlay(dry, terrain, reach)
     if terrain.steps is not None:
         surfaces += _kerbs(plan, laid, streets, terrain, reach)
         surfaces += _banks(under, waters, plan, laid, terrain, window)
         surfaces += _tactile(streets, terrain, window)
     surfaces += flights.surfaces()
-    surfaces += bridge_surfaces(osm, terrain, streets, window)
-    surfaces += portal_surfaces(osm, terrain, streets, window)
+    surfaces += bridges.surfaces(site, terrain, streets, window)
     quads = road_markings(
         streets,
         window,
         yellow=osm.frame.lon < -30.0,
-        tracks=_tracks(osm),
+        tracks=_tracks(site),
         longest=None if level else 3.0,
-        left_driving=keeps_left(osm),
+        left_driving=site.left_driving,
         stepped=flights.area,
     )
     quads += _fields(osm, window)
@@ -135,7 +135,7 @@ def ground_from_osm(
     return joined(surfaces)
 
 
-def _thinned(plan: Plan, laid: Sequence[_Piece], terrain: HeightField) -> Plan:
+def _thinned(plan: PlanMesh, laid: Sequence[_Piece], terrain: HeightField) -> PlanMesh:
     """Leave out what the drawn ground doesn't need."""
     used = np.array([0 if piece.carriageway else 2 if piece.water >= 0 else 1 for piece in laid], np.int64)
     natural = np.array([piece.natural for piece in laid], bool)
@@ -148,7 +148,7 @@ class _Piece:
     """Polygons of one look at heights of their own; `water` is the number of the water they are."""
 
     shapes: list[Polygon]
-    look: Look
+    look: GroundStyle
     heights: Heights
     carriageway: bool = False
     water: int = -1
@@ -164,7 +164,7 @@ def _laid(
     hidden: BaseGeometry,
     stairs: BaseGeometry,
 ) -> list[_Piece]:
-    """What is laid on the ground: the partition, walls where it is too steep to be bare, no paving on hillsides."""
+    """Lay the pieces of the ground: the partition, walls where it is too steep to be bare, no paving on hillsides."""
     steep, sloping = _slopes(terrain, reach)
     laid: list[_Piece] = []
     walls: list[Polygon] = []
@@ -180,7 +180,7 @@ def _laid(
             shapes = _without(shapes, steep)
         if name == "yard" and not sloping.is_empty:
             # A strip too narrow for a lawn stays as it is.
-            wide = [shape for shape in _within(shapes, sloping) if not shapely.buffer(shape, -_NARROW).is_empty]
+            wide = [shape for shape in _within(shapes, sloping) if not overlay.buffer(shape, -_NARROW).is_empty]
             hills += wide
             shapes = _without(shapes, shapely.MultiPolygon(wide))
         if name == "steps":
@@ -208,10 +208,10 @@ def _slopes(terrain: HeightField, reach: float) -> tuple[BaseGeometry, BaseGeome
     found = []
     for spread, most, close in ((0.3, _STEEP, 1.2), (2.0, _SLOPING, 4.0)):
         north, east = np.gradient(ndimage.gaussian_filter(z, spread, mode="nearest"), cell)
-        bent = shapely.simplify(region_above(np.hypot(north, east), most, low=float(axis[0]), cell=cell), 0.1)
-        opened = shapely.buffer(shapely.buffer(bent, close, quad_segs=3), -2 * close, quad_segs=3)
-        rounded = shapely.simplify(shapely.buffer(opened, close, quad_segs=3), 0.15)
-        found.append(shapely.set_precision(rounded, 0.001))
+        bent = overlay.simplify(region_above(np.hypot(north, east), most, low=float(axis[0]), cell=cell), 0.1)
+        opened = overlay.buffer(overlay.buffer(bent, close, quad_segs=3), -2 * close, quad_segs=3)
+        rounded = overlay.simplify(overlay.buffer(opened, close, quad_segs=3), 0.15)
+        found.append(overlay.on_grid(rounded, grid=0.001))
     steep, sloping = found
     return steep, sloping
 
@@ -221,7 +221,7 @@ def _ends_of_kerbs(streets: StreetPolygons) -> NDArray[np.float64]:
     lowered = lowered_kerbs(streets.crossings)
     outline = shapely.boundary(streets.carriageway)
     found = [
-        shapely.intersection(shapely.boundary(shapely.buffer(lowered, away, quad_segs=6)), outline)
+        overlay.intersection(shapely.boundary(overlay.buffer(lowered, away, quad_segs=6)), outline)
         for away in (0.05, RAMP)
     ]
     points = shapely.get_parts(shapely.get_parts(found))
@@ -229,7 +229,7 @@ def _ends_of_kerbs(streets: StreetPolygons) -> NDArray[np.float64]:
 
 
 def _underlay(dry: BaseGeometry, terrain: HeightField, reach: float) -> list[Surface]:
-    """What shows through hairlines between surfaces instead of the sky."""
+    """Make what shows through hairlines between surfaces instead of the sky."""
     below = _UNDERLAY if is_level(terrain) else _UNDERLAY_SLOPED
     flat, faces = triangulated(Grid.of(terrain, reach, ROUGH).cut([dry]))
     if not len(faces):
@@ -248,18 +248,18 @@ def _hidden(osm: OsmData, standing: Sequence[BaseGeometry]) -> BaseGeometry:
         and not any(key in area.tags for key in ("min_height", "building:min_level"))
         and on_the_ground(area.tags)
     ]
-    deep = shapely.buffer(np.array(built, object), -1.5, join_style="mitre")
-    mapped = shapely.union_all(deep[~shapely.is_empty(deep)], grid_size=0.01)
+    deep = overlay.buffer(np.array(built, object), -1.5, join_style="mitre")
+    mapped = overlay.union_all(deep[~shapely.is_empty(deep)], grid=0.01)
     # Not every building of the map is built whole, or at all: people walk on what is left of its ground.
-    whole = shapely.union_all(shapely.make_valid(np.array(list(standing), object)), grid_size=0.01)
-    both = shapely.intersection(mapped, shapely.buffer(whole, -1.5, join_style="mitre"), grid_size=0.01)
+    whole = overlay.union_all(overlay.mended(np.array(list(standing), object)), grid=0.01)
+    both = overlay.intersection(mapped, overlay.buffer(whole, -1.5, join_style="mitre"), grid=0.01)
     return shapely.MultiPolygon(polygons_of(both))
 
 
-def _tracks(osm: OsmData) -> list[NDArray[np.float64]]:
+def _tracks(site: SiteFacts) -> list[NDArray[np.float64]]:
     """Railways at ground level, cut where a street's bridge lies over them."""
-    above = overpasses(osm)
-    spans = spans_over_water(osm)
+    osm, above = site.osm, site.levels.above
+    spans = spans_over_water(site)
     found = []
     for way in osm.ways:
         tags = way.tags
@@ -269,13 +269,13 @@ def _tracks(osm: OsmData) -> list[NDArray[np.float64]]:
             continue
         line: BaseGeometry = shapely.LineString(way.line)
         if tags.get("bridge", "no") == "no":
-            line = shapely.difference(line, spans)
+            line = overlay.difference(line, spans)
         found += [np.asarray(part.coords) for part in shapely.get_parts(line) if part.geom_type == "LineString"]
     return [line for line in found if len(line) > 1]
 
 
 def _fields(osm: OsmData, window: Polygon) -> list[Quads]:
-    """The lines of sports fields."""
+    """Lay out the lines of sports fields."""
     lines = [
         quad
         for area in osm.areas
@@ -287,11 +287,11 @@ def _fields(osm: OsmData, window: Polygon) -> list[Quads]:
 
 
 def _without(shapes: Sequence[Polygon], area: BaseGeometry) -> list[Polygon]:
-    return polygons_of(shapely.difference(shapely.MultiPolygon(list(shapes)), area), 0.02)
+    return polygons_of(overlay.difference(shapely.MultiPolygon(list(shapes)), area), 0.02)
 
 
 def _within(shapes: Sequence[Polygon], area: BaseGeometry) -> list[Polygon]:
-    return polygons_of(shapely.intersection(shapely.MultiPolygon(list(shapes)), area), 0.02)
+    return polygons_of(overlay.intersection(shapely.MultiPolygon(list(shapes)), area), 0.02)
 
 
 def _surface(
@@ -299,7 +299,7 @@ def _surface(
     z: NDArray[np.float64],
     normals: NDArray[np.float64],
     faces: NDArray[np.int64],
-    look: Look,
+    look: GroundStyle,
     uv: NDArray[np.float64] | None = None,
 ) -> Surface:
     return Surface.from_triangles(
@@ -313,7 +313,7 @@ def _surface(
     )
 
 
-def _covered(plan: Plan, number: int, piece: _Piece, terrain: HeightField) -> Surface:
+def _covered(plan: PlanMesh, number: int, piece: _Piece, terrain: HeightField) -> Surface:
     """Lay a piece of the plan on its heights."""
     flat, faces = _used(plan.corners, plan.triangles[plan.piece == number])
     z = piece.heights(flat)
@@ -334,12 +334,12 @@ def _covered(plan: Plan, number: int, piece: _Piece, terrain: HeightField) -> Su
 
 
 def _used(flat: NDArray[np.float64], faces: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """The points that triangles use, numbered anew."""
+    """Keep the points that triangles use, numbered anew."""
     kept, index = np.unique(faces, return_inverse=True)
     return flat[kept], index.reshape(-1, 3)
 
 
-def _hung(found: Curtain, look: Look, tile: float | None = None) -> list[Surface]:
+def _hung(found: Curtain, look: GroundStyle, tile: float | None = None) -> list[Surface]:
     if not len(found.triangles):
         return []
     return [
@@ -389,7 +389,7 @@ def _faced_lines(shapes: Iterable[BaseGeometry], low: Heights, high: Heights, sp
     return lines
 
 
-def _chains(plan: Plan, edges: NDArray[np.int64], reach: float) -> list[BaseGeometry]:
+def _chains(plan: PlanMesh, edges: NDArray[np.int64], reach: float) -> list[BaseGeometry]:
     """Edges of the plan joined to lines; those on the rim of what is drawn are left out."""
     pieces = plan.corners[edges]
     rim = np.abs(pieces).max(axis=2).min(axis=1) > reach - 0.01
@@ -400,32 +400,32 @@ def _chains(plan: Plan, edges: NDArray[np.int64], reach: float) -> list[BaseGeom
 
 
 def _kerbs(
-    plan: Plan, laid: Sequence[_Piece], streets: StreetPolygons, terrain: HeightField, reach: float
+    plan: PlanMesh, laid: Sequence[_Piece], streets: StreetPolygons, terrain: HeightField, reach: float
 ) -> list[Surface]:
-    """The faces of kerb stones: between the very corners of what lies on both sides."""
+    """Make the faces of kerb stones: between the very corners of what lies on both sides."""
     numbers = np.array([k for k, piece in enumerate(laid) if piece.carriageway], np.int64)
     lines = _chains(plan, plan.border(numbers, shapely.boundary(streets.carriageway))[:, ::-1], reach)
     return _hung(curtain(lines, terrain.lower, terrain.upper, least=0.004), LOOKS["kerb"])
 
 
-def _under_bridges(osm: OsmData, wet: BaseGeometry, window: Polygon) -> list[Polygon]:
+def _under_bridges(site: SiteFacts, wet: BaseGeometry, window: Polygon) -> list[Polygon]:
     """Water that goes on under bridges, beside what of it is in sight (`wet`).
 
     What a bridge carries is wider than its ways: pavements and strips between two carriageways hide water too. Some
     maps call what flows under a bridge a tunnel.
     """
-    shapes = [*mapped_areas(osm, window)["water"], *piped_waters(osm)]
-    below = shapely.union_all([shapely.set_precision(shape, 0.001) for shape in shapes])
-    hidden = shapely.difference(shapely.intersection(below, window), shapely.buffer(wet, 0.001))
-    spans = spans_over_water(osm)
-    beneath = shapely.intersection(hidden, shapely.buffer(spans, _OVERHANG, quad_segs=2))
+    shapes = [*mapped_areas(site, window)["water"], *piped_waters(site.osm)]
+    below = overlay.union_all([overlay.on_grid(shape, grid=0.001) for shape in shapes])
+    hidden = overlay.difference(overlay.intersection(below, window), overlay.buffer(wet, 0.001))
+    spans = spans_over_water(site)
+    beneath = overlay.intersection(hidden, overlay.buffer(spans, _OVERHANG, quad_segs=2))
     return [shape for shape in polygons_of(beneath, 1.0) if shape.intersects(spans)]
 
 
 def _banks(
     under: Sequence[Polygon],
     waters: Sequence[Water],
-    plan: Plan,
+    plan: PlanMesh,
     laid: Sequence[_Piece],
     terrain: HeightField,
     window: Polygon,
@@ -435,9 +435,9 @@ def _banks(
     if not waters:
         return found
     tree = shapely.STRtree([water.polygon for water in waters])
-    dry = shapely.union_all([water.polygon for water in waters])
+    dry = overlay.union_all([water.polygon for water in waters])
     outline = shapely.boundary(dry)
-    over_spans = shapely.buffer(shapely.union_all(under), _AT_EDGE)
+    over_spans = overlay.buffer(overlay.union_all(under), _AT_EDGE)
     for number, piece in enumerate(laid):
         if piece.water < 0:
             continue
@@ -453,7 +453,7 @@ def _banks(
         found.append(_surface(flat, water.level(flat), np.asarray(up), faces, LOOKS["water"]))
         found.append(_surface(flat, terrain.smooth(flat) - _SLAB, -np.asarray(up), faces[:, ::-1], LOOKS["kerb"]))
         edges = _faced_lines([shape], water.level, terrain.smooth, 3.0)
-        _, walls = _sorted_by(edges, shapely.buffer(dry, _AT_EDGE))
+        _, walls = _sorted_by(edges, overlay.buffer(dry, _AT_EDGE))
         found += _hung(
             curtain(walls, _below(water.level, 0.3), lambda xy: terrain.smooth(xy) - _SLAB + 0.02),
             LOOKS["quay"],
@@ -482,7 +482,7 @@ def _sorted_by(lines: Sequence[BaseGeometry], area: BaseGeometry) -> tuple[list[
 
 def _tactile(streets: StreetPolygons, terrain: HeightField, window: Polygon) -> list[Surface]:
     """Ribbed slabs on the pavement before painted crossings."""
-    pavement = shapely.union_all([streets.sidewalk, streets.pedestrian])
+    pavement = overlay.union_all([streets.sidewalk, streets.pedestrian])
     shapely.prepare(pavement)
     quads: list[NDArray[np.float64]] = []
     for crossing in streets.crossings:
@@ -511,7 +511,7 @@ def _slabs_at(crossing: Crossing, pavement: BaseGeometry) -> list[NDArray[np.flo
 
 
 def terrain_normals(terrain: HeightField, xy: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit normals of the smooth ground at points, by central differences over a metre."""
+    """Return unit normals of the smooth ground at points, by central differences over a metre."""
     east, north = np.array([0.5, 0.0]), np.array([0.0, 0.5])
     dx = terrain.smooth(xy + east) - terrain.smooth(xy - east)
     dy = terrain.smooth(xy + north) - terrain.smooth(xy - north)
@@ -519,7 +519,7 @@ def terrain_normals(terrain: HeightField, xy: NDArray[np.float64]) -> NDArray[np
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True), np.float64)
 
 
-def _painted(quads: Quads, terrain: HeightField, *, lift: float, look: Look | None = None) -> Surface:
+def _painted(quads: Quads, terrain: HeightField, *, lift: float, look: GroundStyle | None = None) -> Surface:
     """Paint and rails: quads a little above the ground."""
     corners = quads.corners.reshape(-1, 2)
     n = len(quads.corners)

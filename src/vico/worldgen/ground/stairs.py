@@ -10,12 +10,12 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from vico.geo.osm import OsmData
+from vico.geo import overlay
 from vico.world.heights import HeightField
-from vico.world.mesh import Surface
+from vico.world.mesh import Surface, surface_of_quads
+from vico.worldgen.facts.site import SiteFacts
+from vico.worldgen.facts.tags import number, on_the_ground
 from vico.worldgen.ground.pavings import LOOKS, coloured, ground_material
-from vico.worldgen.streets.levels import overpasses
-from vico.worldgen.streets.streets import number, on_the_ground
 
 Floats = NDArray[np.float64]
 
@@ -44,40 +44,33 @@ class Flights:
     normals: Floats
 
     def surfaces(self) -> list[Surface]:
-        """The faces with their texture."""
-        n = len(self.quads)
-        if not n:
+        """Return the faces with their texture."""
+        if not len(self.quads):
             return []
         look = LOOKS["steps"]
-        positions = self.quads.reshape(-1, 3)
-        normals = np.repeat(self.normals, 4, axis=0)
-        first = 4 * np.arange(n)[:, None]
-        upright = np.abs(normals[:, 2]) < 0.5
-        uv = np.where(
-            upright[:, None],
-            np.stack([positions[:, 0] + positions[:, 1], positions[:, 2]], axis=1),
-            positions[:, :2],
-        )
-        shade = np.where(upright, 0.86, 1.0)[:, None]
+        plan, up = self.quads[..., :2], self.quads[..., 2]
+        upright = np.abs(self.normals[:, 2]) < 0.5
+        uv = np.where(upright[:, None, None], np.stack([plan[..., 0] + plan[..., 1], up], axis=2), plan)
+        shade = np.repeat(np.where(upright, 0.86, 1.0), 4)[:, None]
         return [
-            Surface.from_triangles(
-                positions,
-                np.concatenate([first + np.array([0, 1, 2]), first + np.array([0, 2, 3])]),
-                colour=np.clip(coloured(look, positions[:, :2]) * shade, 0, 255).astype(np.uint8),
+            surface_of_quads(
+                self.quads,
+                self.normals,
+                uv / look.tile,
+                colour=np.clip(coloured(look, plan.reshape(-1, 2)) * shade, 0, 255).astype(np.uint8),
                 entity=look.entity,
-                uv=uv / look.tile,
-                normals=normals,
                 material=ground_material(look.material),
+                by_halves=True,
             )
         ]
 
 
-def flights_of(osm: OsmData, terrain: HeightField, where: BaseGeometry) -> Flights:
+def flights_of(site: SiteFacts, terrain: HeightField, where: BaseGeometry) -> Flights:
     """Build the stairs of a map.
 
     Parameters
     ----------
-    osm
+    site
         The map: ways with ``highway=steps``.
     terrain
         The graded ground, which rises along them.
@@ -89,36 +82,36 @@ def flights_of(osm: OsmData, terrain: HeightField, where: BaseGeometry) -> Fligh
     Flights
         Treads lie within half a step of the ground.
     """
-    above = overpasses(osm)
+    above = site.levels.above
     shapely.prepare(where)
     quads: list[Floats] = []
     normals: list[Floats] = []
     areas: list[BaseGeometry] = []
     reach = terrain.half - 1.0
-    for way in osm.ways:
+    for way in site.osm.ways:
         tags = way.tags
         if tags.get("highway") != "steps" or not on_the_ground(tags) or way.id in above or way.closed:
             continue
         line = shapely.LineString(way.line)
         width = min(max(number(tags.get("width")) or _WIDTH, 1.2), 12.0)
-        for piece in shapely.get_parts(shapely.intersection(line, where)):
+        for piece in shapely.get_parts(overlay.intersection(line, where)):
             if piece.geom_type != "LineString" or piece.length < 0.8 or np.abs(piece.bounds).max() > reach:
                 continue
             run = _rising(np.asarray(piece.coords), terrain)
             faces = list(_flight(*run, width)) if run is not None else []
             if faces and run is not None:
-                areas.append(shapely.buffer(shapely.LineString(run[0]), width / 2, cap_style="flat"))
+                areas.append(overlay.buffer(shapely.LineString(run[0]), width / 2, cap_style="flat"))
                 quads += [quad for quad, _ in faces]
                 normals += [normal for _, normal in faces]
     return Flights(
-        shapely.union_all(areas) if areas else shapely.MultiPolygon(),
+        overlay.union_all(areas) if areas else shapely.MultiPolygon(),
         np.stack(quads) if quads else np.zeros((0, 4, 3)),
         np.stack(normals) if normals else np.zeros((0, 3)),
     )
 
 
 def _rising(line: Floats, terrain: HeightField) -> tuple[Floats, Floats] | None:
-    """The stretch of a line that rises all along, as points every decimetre, upwards, and their heights."""
+    """Find the stretch of a line that rises all along, as points every decimetre, upwards, and their heights."""
     path = shapely.LineString(line)
     places = np.linspace(0.0, path.length, max(int(path.length / 0.1), 4) + 1)
     points = shapely.get_coordinates(shapely.line_interpolate_point(path, places))

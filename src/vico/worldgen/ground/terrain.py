@@ -13,10 +13,10 @@ from scipy.spatial import cKDTree
 from vico.errors import EmptyInputError
 from vico.geo.elevation import HeightSamples
 from vico.geo.osm import OsmData
-from vico.geo.tile_mesh import TileMesh
+from vico.geo.tiles3d.mesh import TileMesh
 from vico.world.heights import HeightField
+from vico.worldgen.facts.sight import Sight
 from vico.worldgen.ground.tile_ground import ground_samples, on_ground
-from vico.worldgen.photos.sight import Sight
 
 APRON = 60.0
 """Metres the height field goes on beyond the world's square, so that what crosses the edge stands on something."""
@@ -128,7 +128,7 @@ def _field(heights: NDArray[np.float64], reach: float) -> HeightField:
 
 
 def flat_terrain(*, half: float, apron: float = APRON) -> HeightField:
-    """A level field at height 0."""
+    """Make a level field at height 0."""
     return HeightField.flat(half + apron)
 
 

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from shapely.geometry.base import BaseGeometry
 
+from vico.geo import overlay
 from vico.geo.osm import OsmData
-from vico.worldgen.photos.sight import Sight
-from vico.worldgen.streets.streets import on_the_ground
+from vico.worldgen.facts.sight import Sight
+from vico.worldgen.facts.tags import on_the_ground
 
 _STEP = 2.0  # metres between samples along a street
 _ASIDE = (0.0, -1.8, 1.8)  # metres from a street's centre line: cars stand farther out
@@ -102,7 +103,7 @@ def _raised(tags: dict[str, str]) -> bool:
 
 
 def _covered(osm: OsmData, square: BaseGeometry) -> list[BaseGeometry]:
-    """What hides the ground from above: buildings, bridges, and water, whose surface no photo can place."""
+    """Find what hides the ground from above: buildings, bridges, and water, whose surface no photo can place."""
     hiding: list[BaseGeometry] = []
     for area in osm.areas:
         tags = area.tags
@@ -112,7 +113,7 @@ def _covered(osm: OsmData, square: BaseGeometry) -> list[BaseGeometry]:
             hiding.append(area.polygon)
     for way in osm.ways:
         if way.tags.get("highway") and len(way.line) >= 2 and way.tags.get("bridge", "no") != "no":
-            hiding.append(shapely.buffer(shapely.LineString(way.line), 4.0, cap_style="flat"))
+            hiding.append(overlay.buffer(shapely.LineString(way.line), 4.0, cap_style="flat"))
     return hiding
 
 
@@ -184,7 +185,7 @@ def on_ground(points: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def _near_low(points: NDArray[np.float64], good: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The samples that lie on the low ground of the good ones around them."""
+    """Mark the samples that lie on the low ground of the good ones around them."""
     base, spread = _low_plane(points[good], points, _NEIGHBOURS)
     above = points[:, 2] - base
     over = above > np.clip(3.0 * spread, _STICKS_OUT, _MOST_STICKS_OUT)

@@ -9,6 +9,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from vico.geo import overlay
 from vico.geo.osm import polygons_of
 from vico.world.objects import Objects
 from vico.world.walkable import (
@@ -22,6 +23,26 @@ from vico.world.walkable import (
     fill_polygon,
     stroke,
 )
+from vico.worldgen.facts.ground_kinds import mapped_areas
+from vico.worldgen.facts.site import SiteFacts
+from vico.worldgen.facts.streets import StreetPolygons
+
+
+def walkable_from_site(
+    site: SiteFacts, streets: StreetPolygons, solids: Sequence[BaseGeometry], objects: Objects
+) -> WalkableMap:
+    """Decide where people can walk, from what was made of a map: streets, what stands on the ground, things."""
+    half = site.osm.half
+    ground = mapped_areas(site, shapely.box(-half, -half, half, half))
+    return walkable_map(
+        half=half,
+        solids=solids,
+        roadway=overlay.union_all([streets.carriageway, streets.parking, *ground["ballast"]], grid=None),
+        sidewalk=streets.footways(),
+        crossing=streets.crossing,
+        water=overlay.union_all(ground["water"], grid=None),
+        objects=objects,
+    )
 
 
 def walkable_map(
@@ -86,7 +107,5 @@ def _block(grid: NDArray[np.uint8], polygons: Sequence[shapely.Polygon], half: f
     _fill(grid, polygons, half, cell, BLOCKED)
     for polygon in polygons:
         for ring in _rings(polygon):
-            after = np.roll(ring, -1, axis=0)
-            x0, y0 = np.ascontiguousarray(ring[:, 0]), np.ascontiguousarray(ring[:, 1])
-            x1, y1 = np.ascontiguousarray(after[:, 0]), np.ascontiguousarray(after[:, 1])
-            stroke(grid, x0, y0, x1, y1, BODY, half, cell, BLOCKED)
+            start = np.ascontiguousarray(ring)
+            stroke(grid, start, np.roll(start, -1, axis=0), BODY, half, cell, BLOCKED)

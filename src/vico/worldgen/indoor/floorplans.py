@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from vico.assets.furniture_public import RISE
+from vico.assets.interior import RISE
 from vico.worldgen.indoor.furnishing import Furnishing
 
 CEILING = 2.7
@@ -136,7 +136,7 @@ Composer = Callable[["_Draft", float, float, int], None]
 
 
 def _front(main: str, backs: Sequence[Cell], deep: float, *, height: float = CEILING, lift: bool = False) -> Composer:
-    """A large room at the street, rooms for the staff behind it."""
+    """Return a large room at the street, rooms for the staff behind it."""
 
     def compose(d: _Draft, w: float, h: float, storeys: int) -> None:
         back = max(deep, CORE[1]) if storeys > 1 else deep
@@ -153,7 +153,7 @@ def _front(main: str, backs: Sequence[Cell], deep: float, *, height: float = CEI
 def _entry(
     hall: str, main: str, deep: float, *, height: float = CEILING, side: str | None = None, after: str | None = None
 ) -> Composer:
-    """A hall at the street, the large room behind it; perhaps a side room, perhaps one more room beyond."""
+    """Return a hall at the street, the large room behind it; perhaps a side room, perhaps one more room beyond."""
 
     def compose(d: _Draft, w: float, h: float, storeys: int) -> None:
         beyond = 3.4 if after else 0.0
@@ -181,7 +181,7 @@ def _spine(
     hall_width: float = 5.0,
     lift: bool = True,
 ) -> Composer:
-    """A lobby, then a corridor with rooms on both sides; the same on every floor above."""
+    """Return a lobby, then a corridor with rooms on both sides; the same on every floor above."""
 
     def compose(d: _Draft, w: float, h: float, storeys: int) -> None:
         up = CORE[1] if storeys > 1 else round((h - _CORRIDOR) / 2, 1)
@@ -442,7 +442,7 @@ def _extent(use: str, size: int) -> tuple[float, float]:
 
 
 def sketch_of(use: str, size: int = 0, storeys: int = 1, *, mirrored: bool = False) -> Sketch:
-    """The bare plan of a use.
+    """Return the bare plan of a use.
 
     Parameters
     ----------

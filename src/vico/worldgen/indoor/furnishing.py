@@ -1,7 +1,7 @@
 """Furnishing a room: pieces against walls, in sets and in rows, with free doors, free fronts and a way to everything.
 
-A `Canvas` is a room while it is being furnished, in its own frame (origin at the middle of the floor, x east, y north
-of the plan). Every solid piece is taken back if it cuts off a door. Walls are numbered 0 east, 1 north, 2 west,
+A `RoomDraft` is a room while it is being furnished, in its own frame (origin at the middle of the floor, x east, y
+north of the plan). Every solid piece is taken back if it cuts off a door. Walls are numbered 0 east, 1 north, 2 west,
 3 south.
 """
 
@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from vico.assets.furniture import furniture_models
-from vico.assets.model import Model
+from vico.assets.models.furniture import furniture_models
+from vico.assets.models.model import Model
 
 GRID = 0.1
 BODY = 0.3  # bodies are 0.25 m; the rest is for the raster
@@ -57,7 +57,7 @@ class Opening:
         return (self.at, y if self.side == NORTH else -y)
 
 
-class Canvas:
+class RoomDraft:
     """A room that is being furnished.
 
     Parameters
@@ -132,7 +132,7 @@ class Canvas:
         return self._strip(door.side, door.at, max(_DOOR_CLEAR[0], door.width + 0.1), 0.0, _DOOR_CLEAR[1])
 
     def _strip(self, side: int, at: float, width: float, start: float, deep: float) -> Box:
-        """A rectangle before a wall: its middle along the wall, width, and from where to where off the wall."""
+        """Return a rectangle before a wall: its middle along the wall, width, and from where to where off the wall."""
         a, b = at - width / 2, at + width / 2
         x, y = self.size[0] / 2, self.size[1] / 2
         if side == EAST:

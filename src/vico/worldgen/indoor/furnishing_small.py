@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vico.assets.furniture import furniture_models
-from vico.assets.model import Top
+from vico.assets.models.furniture import furniture_models
+from vico.assets.models.model import Top
 from vico.worldgen.indoor.furnishing import Furnishing
 
 _GAP = 0.02

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol
@@ -26,15 +26,15 @@ from typing import Annotated, Any, Literal, Protocol
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from vico.assets.furniture import furniture_models
 from vico.assets.interior import FLOORS, THICK, WALLS
+from vico.assets.models.furniture import furniture_models
 from vico.errors import InputError, MissingFileError, SchemaError
-from vico.world.indoor_checks import walkable_inside
+from vico.seeds import rng
+from vico.world.check.indoors import walkable_inside
 from vico.world.model import Category, Place
-from vico.world.seeds import rng
 from vico.worldgen.indoor.floorplans import OUTSIDE, Sketch, SketchDoor, SketchRoom
 from vico.worldgen.indoor.furnishing import Furnishing
-from vico.worldgen.indoor.layouts import RECIPES, Plan, furnished, uses
+from vico.worldgen.indoor.layouts import RECIPES, FloorPlan, furnished, uses
 from vico.worldgen.indoor.rooms import rooms_of_plan
 
 SCHEMA = "vico.layout"
@@ -64,7 +64,9 @@ class LayoutPiece(_Strict):
     @model_validator(mode="after")
     def _known(self) -> LayoutPiece:
         if self.model not in furniture_models():
-            raise ValueError(f"there is no furniture called {self.model!r}; see vico.assets.furniture.furniture_models")
+            raise ValueError(
+                f"there is no furniture called {self.model!r}; see vico.assets.models.furniture.furniture_models"
+            )
         return self
 
 
@@ -108,7 +110,7 @@ class Layout(_Strict):
         return self.size[0] * self.size[1]
 
     def sketch(self) -> Sketch:
-        """The same as a bare plan, the room with the way out first."""
+        """Return the same as a bare plan, the room with the way out first."""
         order = sorted(range(len(self.rooms)), key=lambda i: not self._leads_out(self.rooms[i].id))
         number = {self.rooms[i].id: k for k, i in enumerate(order)} | {"outside": OUTSIDE}
         rooms = tuple(_sketch_room(self.rooms[i]) for i in order)
@@ -119,7 +121,7 @@ class Layout(_Strict):
             doors.append(SketchDoor(a, b, (door.at[0], door.at[1]), 0, door.width))
         return Sketch(self.use or self.category or "", (self.size[0], self.size[1]), rooms, tuple(doors))
 
-    def plan(self, seed: int) -> Plan:
+    def plan(self, seed: int) -> FloorPlan:
         """Furnish it."""
         chance = rng(seed, "layout", self.name)
         return furnished(self.sketch(), chance, int(chance.integers(4)))
@@ -158,7 +160,7 @@ def layout_schema() -> dict[str, Any]:
 
 
 def layout_guide() -> str:
-    """The rules a layout has to keep, in words, for an author."""
+    """Return the rules a layout has to keep, in words, for an author."""
     return (
         "Rooms are rectangles [x0, y0, x1, y1] in metres that lie within the size and do not overlap; neighbours "
         "share a wall. Every room can be reached through doors from the one door to 'outside', which lies on the "
@@ -202,69 +204,115 @@ def _well_formed(text: str | bytes, where: str) -> Layout:
 
 
 def findings_of(layout: Layout) -> list[str]:
-    """What keeps a layout from being built, one sentence each, by field; empty if nothing does."""
+    """Return what keeps a layout from being built, one sentence each, by field; empty if nothing does."""
     wrong = _plan_findings(layout)
     return wrong or _furniture_findings(layout)
 
 
 def _plan_findings(layout: Layout) -> list[str]:
-    wrong: list[str] = []
+    """Check the plan without its furniture; doors are looked at once the rooms are right."""
+    wrong = [*_purpose_findings(layout), *_rooms_findings(layout)]
+    return wrong or [*_doors_findings(layout), *_ways_out_findings(layout), *_unreachable_rooms(layout)]
+
+
+def _purpose_findings(layout: Layout) -> Iterator[str]:
     if (layout.use is None) == (layout.category is None):
-        wrong.append("use: give either use or category, not both and not neither")
+        yield "use: give either use or category, not both and not neither"
     if layout.use is not None and layout.use not in (*uses(), "flat"):
-        wrong.append(f"use: {layout.use!r} is none of flat, {', '.join(uses())}")
-    names = [room.id for room in layout.rooms]
-    w, h = layout.size
+        yield f"use: {layout.use!r} is none of flat, {', '.join(uses())}"
+
+
+def _rooms_findings(layout: Layout) -> Iterator[str]:
     for k, room in enumerate(layout.rooms):
-        x0, y0, x1, y1 = room.rect
         here = f"rooms.{k} ({room.id})"
-        if room.id == "outside" or names.index(room.id) != k:
-            wrong.append(f"{here}.id: ids have to differ, and none may be 'outside'")
-        if room.kind not in _KINDS and room.furniture is None:
-            wrong.append(
-                f"{here}.kind: nothing is known of {room.kind!r}; give its furniture, or one of {', '.join(_KINDS)}"
-            )
-        if x1 - x0 < _LEAST_ROOM or y1 - y0 < _LEAST_ROOM:
-            wrong.append(f"{here}.rect: it is {x1 - x0:.2f} x {y1 - y0:.2f} m; {_LEAST_ROOM} m is the least")
-        if x0 < -1e-6 or y0 < -1e-6 or x1 > w + 1e-6 or y1 > h + 1e-6:
-            wrong.append(f"{here}.rect: it leaves the plan of {w:g} x {h:g} m")
-        for j in range(k):
-            a = layout.rooms[j].rect
-            if x0 < a[2] - 0.01 and a[0] < x1 - 0.01 and y0 < a[3] - 0.01 and a[1] < y1 - 0.01:
-                wrong.append(f"{here}.rect: it overlaps rooms.{j} ({layout.rooms[j].id})")
-    if wrong:
-        return wrong
+        before = layout.rooms[:k]
+        yield from _id_findings(here, room, before)
+        yield from _kind_findings(here, room)
+        yield from _size_findings(here, room)
+        yield from _extent_findings(here, room, layout.size)
+        yield from _overlap_findings(here, room, before)
+
+
+def _id_findings(here: str, room: LayoutRoom, before: Sequence[LayoutRoom]) -> Iterator[str]:
+    if room.id == "outside" or any(room.id == other.id for other in before):
+        yield f"{here}.id: ids have to differ, and none may be 'outside'"
+
+
+def _kind_findings(here: str, room: LayoutRoom) -> Iterator[str]:
+    if room.kind not in _KINDS and room.furniture is None:
+        yield f"{here}.kind: nothing is known of {room.kind!r}; give its furniture, or one of {', '.join(_KINDS)}"
+
+
+def _size_findings(here: str, room: LayoutRoom) -> Iterator[str]:
+    x0, y0, x1, y1 = room.rect
+    if x1 - x0 < _LEAST_ROOM or y1 - y0 < _LEAST_ROOM:
+        yield f"{here}.rect: it is {x1 - x0:.2f} x {y1 - y0:.2f} m; {_LEAST_ROOM} m is the least"
+
+
+def _extent_findings(here: str, room: LayoutRoom, size: Sequence[float]) -> Iterator[str]:
+    x0, y0, x1, y1 = room.rect
+    w, h = size
+    if x0 < -1e-6 or y0 < -1e-6 or x1 > w + 1e-6 or y1 > h + 1e-6:
+        yield f"{here}.rect: it leaves the plan of {w:g} x {h:g} m"
+
+
+def _overlap_findings(here: str, room: LayoutRoom, before: Sequence[LayoutRoom]) -> Iterator[str]:
+    x0, y0, x1, y1 = room.rect
+    for j, other in enumerate(before):
+        a = other.rect
+        if x0 < a[2] - 0.01 and a[0] < x1 - 0.01 and y0 < a[3] - 0.01 and a[1] < y1 - 0.01:
+            yield f"{here}.rect: it overlaps rooms.{j} ({other.id})"
+
+
+def _doors_findings(layout: Layout) -> Iterator[str]:
     rooms = {room.id: room for room in layout.rooms}
-    links: dict[str, set[str]] = {name: set() for name in [*names, "outside"]}
     for k, door in enumerate(layout.doors):
         here = f"doors.{k}"
-        one, two = door.between
-        lost = [name for name in (one, two) if name != "outside" and name not in rooms]
-        if lost or one == two:
-            wrong.append(
-                f"{here}.between: there is no room {lost[0]!r}" if lost else f"{here}.between: twice the same room"
-            )
-            continue
-        links[one].add(two)
-        links[two].add(one)
-        for name in (one, two):
-            if name != "outside" and not _on_wall(rooms[name].rect, door):
-                wrong.append(
-                    f"{here}.at: {door.at} with {door.width:g} m is not on a wall of {name!r}, clear of its ends"
-                )
-        if "outside" in (one, two) and not _on_wall([0.0, 0.0, w, h], door):
-            wrong.append(f"{here}.at: {door.at} leads outside, but is not on the plan's edge")
+        unlinked = list(_between_findings(here, door, rooms))
+        yield from unlinked or _door_place_findings(here, door, rooms, layout.size)
+
+
+def _between_findings(here: str, door: LayoutDoor, rooms: Mapping[str, LayoutRoom]) -> Iterator[str]:
+    """Say that a door does not join two rooms of the plan, or one of them and the outdoors."""
+    lost = [name for name in door.between if name != "outside" and name not in rooms]
+    if lost:
+        yield f"{here}.between: there is no room {lost[0]!r}"
+    elif door.between[0] == door.between[1]:
+        yield f"{here}.between: twice the same room"
+
+
+def _door_place_findings(
+    here: str, door: LayoutDoor, rooms: Mapping[str, LayoutRoom], size: Sequence[float]
+) -> Iterator[str]:
+    for name in door.between:
+        if name != "outside" and not _on_wall(rooms[name].rect, door):
+            yield f"{here}.at: {door.at} with {door.width:g} m is not on a wall of {name!r}, clear of its ends"
+    if "outside" in door.between and not _on_wall([0.0, 0.0, *size], door):
+        yield f"{here}.at: {door.at} leads outside, but is not on the plan's edge"
+
+
+def _ways_out_findings(layout: Layout) -> Iterator[str]:
     out = sum("outside" in door.between for door in layout.doors)
     if out != 1:
-        wrong.append(f"doors: {out} of them lead outside; exactly one has to")
+        yield f"doors: {out} of them lead outside; exactly one has to"
+
+
+def _unreachable_rooms(layout: Layout) -> Iterator[str]:
+    names = [room.id for room in layout.rooms]
+    links: dict[str, set[str]] = {name: set() for name in [*names, "outside"]}
+    for door in layout.doors:
+        one, two = door.between
+        if one in links and two in links:
+            links[one].add(two)
+            links[two].add(one)
     seen, queue = {"outside"}, ["outside"]
     while queue:
-        for name in sorted(links[queue.pop()]):
-            if name not in seen:
-                seen.add(name)
-                queue.append(name)
-    wrong += [f"rooms.{k} ({name}): no door leads there" for k, name in enumerate(names) if name not in seen]
-    return wrong
+        fresh = links[queue.pop()] - seen
+        seen |= fresh
+        queue.extend(fresh)
+    for k, name in enumerate(names):
+        if name not in seen:
+            yield f"rooms.{k} ({name}): no door leads there"
 
 
 def _on_wall(rect: Sequence[float], door: LayoutDoor) -> bool:
@@ -305,7 +353,7 @@ def _furniture_findings(layout: Layout) -> list[str]:
     return wrong or _blocked(plan)
 
 
-def _blocked(plan: Plan) -> list[str]:
+def _blocked(plan: FloorPlan) -> list[str]:
     rooms, objects = rooms_of_plan(plan)
     return [f"{f.where}: {f.what}" for f in walkable_inside(rooms, objects)]
 
@@ -317,7 +365,7 @@ class Library:
     layouts: tuple[Layout, ...]
 
     def nearest(self, use: str, category: Category, area: float, chance: np.random.Generator) -> Layout | None:
-        """The layout that fits a place best; None if none is for its use or category.
+        """Return the layout that fits a place best; None if none is for its use or category.
 
         Layouts of the use itself come before those of the category. Among those not larger than `area` the largest
         wins (else the smallest there is); between layouts within a tenth of its area chance decides.

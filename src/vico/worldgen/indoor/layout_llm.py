@@ -136,7 +136,7 @@ class LlmLayoutAuthor:
         return plans
 
     def _drawn(self, request: LayoutRequest) -> tuple[Layout | None, str]:
-        """A plan, or why there is none."""
+        """Return a plan, or why there is none."""
         if self._over is not None:
             return None, self._over
         try:
@@ -263,7 +263,7 @@ def _messages(request: LayoutRequest) -> list[Message]:
 
 
 def _briefing() -> str:
-    """What does not depend on the place."""
+    """Return what does not depend on the place."""
     schema = layout_schema()
     pieces = "; ".join(
         f"{name} {one['size'][0]:g} x {one['size'][1]:g}{'' if one['solid'] else ' flat'}"

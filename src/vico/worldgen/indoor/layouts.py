@@ -11,23 +11,23 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
-from vico.assets.furniture import furniture_models
-from vico.assets.furniture_public import RISE
-from vico.assets.interior import DOOR_HEIGHT, HEAD, SHOP_SILL, SILL, THICK, Inside, WallOpening, shell
+from vico.assets.interior import DOOR_HEIGHT, HEAD, RISE, SHOP_SILL, SILL, THICK, Inside, WallOpening, shell
+from vico.assets.models.furniture import furniture_models
+from vico.rules import REACH
+from vico.seeds import rng
 from vico.world.mesh import Surface
 from vico.world.model import LANDING
-from vico.world.seeds import rng
 from vico.worldgen.indoor.floorplans import OUTSIDE, USES, Sketch, SketchRoom, sketch_of
-from vico.worldgen.indoor.furnishing import EAST, GRID, NORTH, SOUTH, STEP_IN, WEST, Canvas, Furnishing, Opening
+from vico.worldgen.indoor.furnishing import EAST, GRID, NORTH, SOUTH, STEP_IN, WEST, Furnishing, Opening, RoomDraft
 from vico.worldgen.indoor.furnishing_public import PUBLIC
 from vico.worldgen.indoor.furnishing_rooms import ROOMS
 from vico.worldgen.indoor.furnishing_small import Dressed, dressed
-from vico.worldgen.indoor.looks import LOOKS, PALETTES, PLAIN, Look
+from vico.worldgen.indoor.looks import LOOKS, PALETTES, PLAIN, RoomStyle
 
-REACH = 1.5
 _MOST_CHAIRS = 3  # containers of this kind a room
 _LARGEST_TOP = 24  # containers a room
 RECIPES = {**ROOMS, **PUBLIC}
@@ -35,7 +35,7 @@ VARIANTS = 4
 
 
 @dataclass(frozen=True)
-class Spot:
+class ContainerPlan:
     """A container of a plan: kind, index of its furniture (-1: the floor), centre, size, yaw, and the reach point."""
 
     kind: str
@@ -66,7 +66,7 @@ class RoomPlan:
     rise: float
     doors: tuple[DoorPlan, ...]
     items: tuple[Furnishing, ...]
-    spots: tuple[Spot, ...]
+    spots: tuple[ContainerPlan, ...]
 
     @property
     def links(self) -> tuple[int, ...]:
@@ -75,7 +75,7 @@ class RoomPlan:
 
 
 @dataclass(frozen=True)
-class Plan:
+class FloorPlan:
     """Rooms of a place, the one with the way out first; `shell` holds indices of rooms as entities."""
 
     use: str
@@ -91,13 +91,13 @@ def uses() -> list[str]:
 
 
 @cache
-def plan_of(use: str, size: int = 0, storeys: int = 1, variant: int = 0) -> Plan:
-    """The furnished plan of a use; variants differ in handedness, colours and furniture."""
+def plan_of(use: str, size: int = 0, storeys: int = 1, variant: int = 0) -> FloorPlan:
+    """Return the furnished plan of a use; variants differ in handedness, colours and furniture."""
     sketch = sketch_of(use, size, storeys, mirrored=variant % 2 == 1)
     return furnished(sketch, rng(0, "plan", use, size, storeys, variant), variant)
 
 
-def furnished(sketch: Sketch, chance: np.random.Generator, variant: int = 0) -> Plan:
+def furnished(sketch: Sketch, chance: np.random.Generator, variant: int = 0) -> FloorPlan:
     """Give a sketch walls, doors, windows, furniture, containers and small things."""
     w, h = sketch.size
     boxes = [_inner(room) for room in sketch.rooms]
@@ -109,21 +109,21 @@ def furnished(sketch: Sketch, chance: np.random.Generator, variant: int = 0) -> 
         x0, y0, x1, y1 = boxes[i]
         cx, cy, z = round((x0 + x1) / 2 - w / 2, 3), round((y0 + y1) / 2 - h / 2, 3), round(room.storey * RISE, 3)
         size = (round(x1 - x0, 3), round(y1 - y0, 3))
-        mine = sorted(openings[i], key=lambda o: -1 if o[0] == OUTSIDE else order[o[0]])
+        mine = sorted(openings[i], key=lambda way: -1 if way.to == OUTSIDE else order[way.to])
         look = LOOKS.get(room.kind, PLAIN)
         windows = _windows(sketch, room, size, mine, street=look.street) if look.daylight else []
-        canvas = Canvas(size, [o[1] for o in mine if not o[3]], windows, chance)
+        draft = RoomDraft(size, [way.opening for way in mine if not way.lift], windows, chance)
         if room.items is not None:
             items = list(room.items)
         elif room.rise:
             items = [Furnishing("stair_wall", *_turned(-LANDING / 2, 0.0, room.facing), room.facing * math.pi / 2)]
         elif room.kind == "lift":
-            items = [Furnishing("lift_panel", *_lift_panel(canvas))]
+            items = [Furnishing("lift_panel", *_lift_panel(draft))]
         else:
-            RECIPES[room.kind](canvas)
-            items = canvas.items
+            RECIPES[room.kind](draft)
+            items = draft.items
         dress = dressed(room.kind, items, chance) if room.kind not in ("stairs", "lift") else Dressed((), {})
-        spots = _spots(room, canvas, items, dress) if room.kind not in ("stairs", "lift") else ()
+        spots = _spots(room, draft, items, dress) if room.kind not in ("stairs", "lift") else ()
         rooms.append(
             RoomPlan(
                 kind=room.kind,
@@ -134,10 +134,7 @@ def furnished(sketch: Sketch, chance: np.random.Generator, variant: int = 0) -> 
                 ),
                 yaw=room.facing * math.pi / 2 if room.rise else 0.0,
                 rise=room.rise,
-                doors=tuple(
-                    _door_plan(sketch, room, canvas, other, opening, low, ride, (cx, cy, z))
-                    for other, opening, low, ride in mine
-                ),
+                doors=tuple(_door_plan(way, draft, (cx, cy, z)) for way in mine),
                 items=tuple(
                     replace(i, x=round(i.x + cx, 3), y=round(i.y + cy, 3), z=round(i.z + z, 3))
                     for i in (*items, *dress.things)
@@ -145,27 +142,28 @@ def furnished(sketch: Sketch, chance: np.random.Generator, variant: int = 0) -> 
                 spots=tuple(_shifted(spot, cx, cy, z) for spot in spots),
             )
         )
-        insides.append(
-            _inside(
-                i, room, look, (cx, cy, z), size, mine, windows, variant, rooms[-1].doors[0].to if mine else OUTSIDE
-            )
-        )
-    return Plan(sketch.use, tuple(rooms), sketch.size, round(sketch.height, 3), tuple(shell(insides)))
+        insides.append(_inside(i, room, look, (cx, cy, z), size, mine, windows, variant))
+    return FloorPlan(sketch.use, tuple(rooms), sketch.size, round(sketch.height, 3), tuple(shell(insides)))
 
 
 def _inner(room: SketchRoom) -> tuple[float, float, float, float]:
-    """A room's rectangle within its walls."""
+    """Return a room's rectangle within its walls."""
     x0, y0, x1, y1 = room.box
     half = THICK / 2
     return round(x0 + half, 3), round(y0 + half, 3), round(x1 - half, 3), round(y1 - half, 3)
 
 
-#: Of a room's way out: room it leads to, the opening, its height above the room's floor, and whether it is a lift's.
-_Way = tuple[int, Opening, float, bool]
+class _Doorway(NamedTuple):
+    """A way out of a room: the room it leads to, its opening, its height above the room's floor, whether a lift's."""
+
+    to: int
+    opening: Opening
+    low: float
+    lift: bool
 
 
-def _doorways(sketch: Sketch, boxes: Sequence[tuple[float, float, float, float]]) -> list[list[_Way]]:
-    found: list[list[_Way]] = [[] for _ in boxes]
+def _doorways(sketch: Sketch, boxes: Sequence[tuple[float, float, float, float]]) -> list[list[_Doorway]]:
+    found: list[list[_Doorway]] = [[] for _ in boxes]
     for door in sketch.doors:
         for mine, other in ((door.a, door.b), (door.b, door.a)):
             if mine == OUTSIDE:
@@ -177,7 +175,7 @@ def _doorways(sketch: Sketch, boxes: Sequence[tuple[float, float, float, float]]
             side = min(gaps, key=lambda k: gaps[k])
             at = round(y - cy if side in (EAST, WEST) else x - cx, 3)
             low = round((door.storey - sketch.rooms[mine].storey) * RISE, 3) if not door.lift else 0.0
-            found[mine].append((other, Opening(side, at, door.width), low, door.lift))
+            found[mine].append(_Doorway(other, Opening(side, at, door.width), low, door.lift))
     return found
 
 
@@ -199,14 +197,14 @@ def _from_the_street(sketch: Sketch) -> list[int]:
 
 
 def _windows(
-    sketch: Sketch, room: SketchRoom, size: tuple[float, float], ways: Sequence[_Way], *, street: bool
+    sketch: Sketch, room: SketchRoom, size: tuple[float, float], ways: Sequence[_Doorway], *, street: bool
 ) -> list[Opening]:
     """Windows in the walls that are the house's own, some 3 m apart, clear of doors; shops have them at the street."""
     x0, y0, x1, y1 = room.box
     w, h = sketch.size
     outer = {EAST: abs(x1 - w) < 0.01, NORTH: abs(y1 - h) < 0.01, WEST: x0 < 0.01, SOUTH: y0 < 0.01}
     wide = 2.2 if street else 1.6
-    way_out = next((opening.side for to, opening, _, _ in ways if to == OUTSIDE), SOUTH)
+    way_out = next((way.opening.side for way in ways if way.to == OUTSIDE), SOUTH)
     found = []
     for side, is_outer in outer.items():
         length = size[1] if side in (EAST, WEST) else size[0]
@@ -215,7 +213,8 @@ def _windows(
         count = max(1, int(length / (wide + 0.7 if street else 3.0)))
         for k in range(count):
             at = round(((k + 0.5) / count - 0.5) * length, 2)
-            if all(o.side != side or abs(o.at - at) > (o.width + wide) / 2 + 0.15 for _, o, _, _ in ways):
+            doors = (way.opening for way in ways)
+            if all(o.side != side or abs(o.at - at) > (o.width + wide) / 2 + 0.15 for o in doors):
                 found.append(Opening(side, at, wide))
     return found
 
@@ -225,47 +224,37 @@ def _turned(u: float, v: float, turn: int) -> tuple[float, float]:
     return round(c * u - s * v, 3), round(s * u + c * v, 3)
 
 
-def _lift_panel(canvas: Canvas) -> tuple[float, float, float]:
+def _lift_panel(draft: RoomDraft) -> tuple[float, float, float]:
     """Opposite the door of the car."""
-    side = canvas.far
-    x, y = Opening(side, 0.0, 1.0).point(canvas.size, 0.02)
+    side = draft.far
+    x, y = Opening(side, 0.0, 1.0).point(draft.size, 0.02)
     return round(x, 3), round(y, 3), round(math.remainder((side + 2) * math.pi / 2, 2 * math.pi), 5)
 
 
-def _door_plan(
-    sketch: Sketch,
-    room: SketchRoom,
-    canvas: Canvas,
-    other: int,
-    opening: Opening,
-    low: float,
-    ride: bool,
-    centre: tuple[float, float, float],
-) -> DoorPlan:
+def _door_plan(way: _Doorway, draft: RoomDraft, centre: tuple[float, float, float]) -> DoorPlan:
     cx, cy, z = centre
-    x, y = opening.point(canvas.size)
-    ix, iy = opening.point(canvas.size, STEP_IN)
-    if ride:
-        x, y = Opening(canvas.far, 0.0, 1.0).point(canvas.size, 0.3)
+    x, y = way.opening.point(draft.size)
+    ix, iy = way.opening.point(draft.size, STEP_IN)
+    if way.lift:
+        x, y = Opening(draft.far, 0.0, 1.0).point(draft.size, 0.3)
         ix = iy = 0.0
-    z = round(z + low, 3)
-    return DoorPlan(other, (round(cx + x, 3), round(cy + y, 3), z), (round(cx + ix, 3), round(cy + iy, 3), z))
+    z = round(z + way.low, 3)
+    return DoorPlan(way.to, (round(cx + x, 3), round(cy + y, 3), z), (round(cx + ix, 3), round(cy + iy, 3), z))
 
 
 def _inside(
     index: int,
     room: SketchRoom,
-    look: Look,
+    look: RoomStyle,
     centre: tuple[float, float, float],
     size: tuple[float, float],
-    ways: Sequence[_Way],
+    ways: Sequence[_Doorway],
     windows: Sequence[Opening],
     variant: int,
-    first: int,
 ) -> Inside:
     parts = []
-    for other, opening, low, ride in ways:
-        if ride:
+    for other, opening, low, lift in ways:
+        if lift:
             continue
         kind = "entrance" if other == OUTSIDE else "door"
         parts.append(WallOpening(opening.side, opening.at, opening.width, low, low + DOOR_HEIGHT, kind, index < other))
@@ -287,7 +276,7 @@ def _inside(
     )
 
 
-def _shifted(spot: Spot, x: float, y: float, z: float) -> Spot:
+def _shifted(spot: ContainerPlan, x: float, y: float, z: float) -> ContainerPlan:
     a, b, c = spot.centre
     return replace(
         spot,
@@ -296,20 +285,22 @@ def _shifted(spot: Spot, x: float, y: float, z: float) -> Spot:
     )
 
 
-def _spots(room: SketchRoom, canvas: Canvas, items: Sequence[Furnishing], dress: Dressed) -> tuple[Spot, ...]:
-    """The containers of a room that can be reached from its door."""
+def _spots(
+    room: SketchRoom, draft: RoomDraft, items: Sequence[Furnishing], dress: Dressed
+) -> tuple[ContainerPlan, ...]:
+    """Return the containers of a room that can be reached from its door."""
     models = furniture_models()
-    size = canvas.size
+    size = draft.size
     if room.items is not None:
-        canvas.block_all(items)
-    rows, columns = np.nonzero(canvas.reachable())
+        draft.block_all(items)
+    rows, columns = np.nonzero(draft.reachable())
     if not len(rows):
         return ()
     px = (columns + 0.5) * GRID - size[0] / 2
     py = (rows + 0.5) * GRID - size[1] / 2
-    home = canvas.doors[0].point(size, STEP_IN)
+    home = draft.doors[0].point(size, STEP_IN)
     spots = [
-        Spot(
+        ContainerPlan(
             "floor",
             -1,
             (0.0, 0.0, 0.0),
@@ -337,7 +328,7 @@ def _spots(room: SketchRoom, canvas: Canvas, items: Sequence[Furnishing], dress:
         best = around[near[int(np.argmin(middle[near]))]]
         chairs += top.kind == "chair"
         spots.append(
-            Spot(
+            ContainerPlan(
                 top.kind,
                 k,
                 (round(cx, 3), round(cy, 3), round(top.height + item.z, 3)),

@@ -12,14 +12,14 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from vico.assets.furniture import furniture_models
-from vico.assets.model import Model
+from vico.assets.models.furniture import furniture_models
+from vico.assets.models.model import Model
 from vico.assets.shapes import pose_matrix
 from vico.world.mesh import Surface, joined
 from vico.world.model import FIRST_FURNITURE, FIRST_ROOM, Category, Container, Doorway, Place, Room
 from vico.world.objects import Objects
 from vico.worldgen.indoor.floorplans import OUTSIDE
-from vico.worldgen.indoor.layouts import Plan, RoomPlan, Spot
+from vico.worldgen.indoor.layouts import ContainerPlan, FloorPlan, RoomPlan
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Slot:
         return np.column_stack([(self.x + c * u - s * v).ravel(), (self.y + s * u + c * v).ravel()])
 
 
-def assembled(places: Sequence[Place], slots: dict[int, tuple[Slot, Plan]]) -> Indoors:
+def assembled(places: Sequence[Place], slots: dict[int, tuple[Slot, FloorPlan]]) -> Indoors:
     """Rooms, objects and surfaces of places whose plans have their slots, by index of place."""
     rooms: list[Room] = []
     rows: list[dict[str, Any]] = []
@@ -100,8 +100,8 @@ def assembled(places: Sequence[Place], slots: dict[int, tuple[Slot, Plan]]) -> I
     return Indoors(furnished, rooms, Objects.from_rows(rows), joined(surfaces))
 
 
-def rooms_of_plan(plan: Plan, place: str = "plan") -> tuple[list[Room], Objects]:
-    """A plan's rooms and objects in its own frame, to look at or to check before it is put anywhere."""
+def rooms_of_plan(plan: FloorPlan, place: str = "plan") -> tuple[list[Room], Objects]:
+    """Return a plan's rooms and objects in its own frame, to look at or to check before it is put anywhere."""
     slot = Slot(0.0, 0.0, 0.0, 0.0, plan.size, plan.height)
     alone = Place(id=place, name=place, category=Category.OPEN, kind=plan.use, building=None, entrance=None,
                   position=(0.0, 0.0, 0.0))  # fmt: skip
@@ -173,7 +173,7 @@ def _room(
     )
 
 
-def _container(spot: Spot, n: int, room: str, slot: Slot, entity: int, first: int) -> Container:
+def _container(spot: ContainerPlan, n: int, room: str, slot: Slot, entity: int, first: int) -> Container:
     return Container(
         id=f"{room}.{spot.kind}{n}",
         entity=entity if spot.item < 0 else first + spot.item,

@@ -11,13 +11,14 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from vico.assets.furniture_public import RISE
+from vico.assets.interior import RISE
+from vico.geo import overlay
+from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.model import Building, Category, Entrance, Place
-from vico.world.seeds import rng
 from vico.worldgen.indoor.floorplans import FLATS, USES, area_of
 from vico.worldgen.indoor.layout_library import LayoutAuthor, Library, authored, read_library
-from vico.worldgen.indoor.layouts import VARIANTS, Plan, plan_of
+from vico.worldgen.indoor.layouts import VARIANTS, FloorPlan, plan_of
 from vico.worldgen.indoor.rooms import Indoors, Slot, assembled
 from vico.worldgen.indoor.uses import use_of
 
@@ -53,7 +54,7 @@ class _Ground:
 
     def take(self, slot: Slot) -> bool:
         """Claim a slot if it is free."""
-        room = slot.shape.buffer(_GAP / 2, join_style="mitre")
+        room = overlay.buffer(slot.shape, _GAP / 2, join_style="mitre")
         low, high = slot.z - _GAP / 2, slot.z + slot.height + _GAP / 2
         cells = list(self._around(room))
         for cell in cells:
@@ -119,7 +120,7 @@ def furnish(
         if place.building is not None:
             wanted[place.building].append(k)
     ground = _Ground()
-    slots: dict[int, tuple[Slot, Plan]] = {}
+    slots: dict[int, tuple[Slot, FloorPlan]] = {}
     for building in buildings:
         if building.id in wanted:
             count = len(wanted[building.id])
@@ -147,8 +148,8 @@ def _unnamed(places: Sequence[Place], buildings: Sequence[Building], entrances: 
 
 def _plan(
     place: Place, building: Building, count: int, seed: int, shelf: Library | None, author: LayoutAuthor | None
-) -> Plan:
-    """The plan of a place: from the library, from the author, else by its use and its part of the house."""
+) -> FloorPlan:
+    """Return the plan of a place: from the library, from the author, else by its use and its part of the house."""
     chance = rng(seed, "rooms", place.id)
     use = use_of(place.category, place.kind)
     area = shapely.Polygon(building.footprint[0], building.footprint[1:]).area
@@ -183,8 +184,8 @@ def _storeys(use: str, levels: int, share: float) -> int:
 
 
 def _stacked(
-    building: Building, wanted: list[tuple[int, Plan]], height: HeightField, ground: _Ground
-) -> Iterator[tuple[int, Slot, Plan]]:
+    building: Building, wanted: list[tuple[int, FloorPlan]], height: HeightField, ground: _Ground
+) -> Iterator[tuple[int, Slot, FloorPlan]]:
     """Slots for a building's plans: side by side in rows along its longer side, then the next storey down."""
     shape = shapely.Polygon(building.footprint[0], building.footprint[1:])
     centre, yaw, extent = _frame(shape)
@@ -192,7 +193,7 @@ def _stacked(
     down = 0.0
     waiting = list(wanted)
     while waiting:
-        rest: list[tuple[int, Plan]] = []
+        rest: list[tuple[int, FloorPlan]] = []
         u, v, row, layer = 0.0, 0.0, 0.0, 0.0
         for k, plan in waiting:
             w, h = plan.size

@@ -10,7 +10,8 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from vico.assets.street import street_models
+from vico.assets.models.street import street_models
+from vico.geo import overlay
 from vico.geo.osm import OsmData, Tags
 from vico.worldgen.objects.wishes import Wish, metres, number
 
@@ -33,7 +34,7 @@ _IN_ROWS = {"bollard": ("bollard", 1.7), "block": ("block", 2.4), "planter": ("p
 
 
 def _model(tags: Tags) -> str | None:
-    """The model of a line by kind, material and height."""
+    """Name the model of a line by kind, material and height."""
     name = _BARRIERS.get(tags.get("barrier", ""))
     tall = metres(tags.get("height"))
     if name == "fence":
@@ -56,9 +57,9 @@ def barrier_wishes(osm: OsmData, carriageway: BaseGeometry, openings: BaseGeomet
     lines = [(f"w{way.id}", way.line, way.tags) for way in osm.ways if "area" not in way.tags]
     hedges = [area for area in osm.areas if area.tags.get("barrier") == "hedge" and area.tags.get("area") == "yes"]
     drawn = {area.id for area in hedges}
-    gaps = [shapely.buffer(openings, 0.3), shapely.buffer(carriageway, 0.3)]
-    gaps += [shapely.buffer(shapely.Point(xy), 1.3) for xy in gates]
-    through = shapely.union_all(gaps)
+    gaps = [overlay.buffer(openings, 0.3), overlay.buffer(carriageway, 0.3)]
+    gaps += [overlay.buffer(shapely.Point(xy), 1.3) for xy in gates]
+    through = overlay.union_all(gaps, grid=None)
     shapely.prepare(through)
     found: list[Wish] = []
     for key, line, tags in lines:
@@ -76,7 +77,7 @@ def barrier_wishes(osm: OsmData, carriageway: BaseGeometry, openings: BaseGeomet
             continue
         tall = metres(tags.get("height"))
         height = 1.0 if tall is None else float(np.clip(tall / street_models()[name].size[2], 0.55, 1.5))
-        pieces = shapely.get_parts(shapely.difference(shapely.LineString(line).simplify(0.15), through))
+        pieces = shapely.get_parts(overlay.difference(shapely.LineString(line).simplify(0.15), through))
         k = 0
         for piece in pieces:
             for a, b in zip(piece.coords[:-1], piece.coords[1:], strict=True):
@@ -124,7 +125,7 @@ def _row(
 
 
 def _blocks(key: str, shape: BaseGeometry, tall: float | None) -> list[Wish]:
-    """A hedge mapped as an area: blocks of a metre along its longer side."""
+    """Fill a hedge mapped as an area with blocks of a metre along its longer side."""
     box = shapely.oriented_envelope(shape)
     corners = np.array(box.exterior.coords[:3]) if box.geom_type == "Polygon" else np.zeros((3, 2))
     first, second = corners[1] - corners[0], corners[2] - corners[1]

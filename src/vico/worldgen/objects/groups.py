@@ -9,8 +9,9 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from vico.geo import overlay
 from vico.geo.osm import OsmArea, OsmData
-from vico.world.seeds import rng
+from vico.seeds import rng
 from vico.worldgen.objects.kinds import on_the_ground, thing_of
 from vico.worldgen.objects.trees import spread
 from vico.worldgen.objects.wishes import Wish
@@ -21,7 +22,7 @@ _LARGE = 2500.0  # square metres: what is larger is no single thing
 
 
 def group_wishes(osm: OsmData, openings: BaseGeometry, half: float, seed: int, *, where: str = "") -> list[Wish]:
-    """What stands in mapped areas."""
+    """Wish for what stands in mapped areas."""
     found: list[Wish] = []
     played = [n.xy for n in osm.nodes if "playground" in n.tags]
     for area in osm.areas:
@@ -38,7 +39,7 @@ def group_wishes(osm: OsmData, openings: BaseGeometry, half: float, seed: int, *
             names = ("cafe_parasol", "cafe_table") if tags.get("leisure") else ("picnic_table", "picnic_table")
             found += _grid(area, names, (3.1, 3.1), 24, random)
         elif tags.get("landuse") == "flowerbed" or tags.get("garden:type") == "flower_bed":
-            inner = shapely.buffer(area.polygon, -0.35)
+            inner = overlay.buffer(area.polygon, -0.35)
             name = _BEDS[int(random.integers(3))]
             for k, xy in enumerate(spread(inner, 1.7, 60, random, least=0.98)):
                 found.append(Wish(f"{area.id}.{k}", name, xy, float(random.uniform(-np.pi, np.pi)), 0.8, reach=0.0))
@@ -59,11 +60,11 @@ def _middle(area: OsmArea) -> NDArray[np.float64]:
 
 def _narrow(area: OsmArea) -> bool:
     """Whether a market is but a widening of streets, which must stay open."""
-    return bool(shapely.buffer(area.polygon, -6.0).is_empty)
+    return bool(overlay.buffer(area.polygon, -6.0).is_empty)
 
 
 def _single(area: OsmArea, seed: int, where: str) -> list[Wish]:
-    """An area that is one thing."""
+    """Wish for an area that is one thing."""
     size = float(area.polygon.area)
     name = thing_of(area.tags, where=where, random=rng(seed, "thing", area.id))
     if name is None or size > _LARGE or name in ("toilets", "fuel_pump") or name.startswith("sign"):
@@ -124,11 +125,11 @@ def _grid(
     middle = np.array(area.polygon.centroid.coords[0])
     reach = float(shapely.minimum_bounding_radius(area.polygon))
     n = int(reach // min(step)) + 1
-    inner = shapely.buffer(area.polygon, -0.5 * min(step) * 0.8)
+    inner = overlay.buffer(area.polygon, -0.5 * min(step) * 0.8)
     if inner.is_empty:
         inner = area.polygon
     if keep is not None:
-        inner = shapely.difference(inner, keep)
+        inner = overlay.difference(inner, keep)
     shapely.prepare(inner)
     found: list[Wish] = []
     for j in range(-n, n + 1):
@@ -146,7 +147,7 @@ def _playground(area: OsmArea, played: list[NDArray[np.float64]], random: np.ran
     shape = area.polygon
     if any(shape.contains(shapely.Point(xy)) for xy in played):
         return []
-    spots = spread(shapely.buffer(shape, -1.6), 30.0, 9, random, least=0.85)
+    spots = spread(overlay.buffer(shape, -1.6), 30.0, 9, random, least=0.85)
     if not len(spots):
         return [Wish(area.id, "springy", _middle(area))]
     names = ["play_tower" if shape.area > 60 else "slide", *np.array(_PLAY)[random.permutation(len(_PLAY))].tolist()]

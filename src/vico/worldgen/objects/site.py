@@ -11,13 +11,15 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from vico.geo import overlay
+
 WAY = 0.9  # metres that a person, a pram or a wheelchair needs to get past
 _AROUND = 1.04  # the corners of buffers of so few sides lie no nearer than their radius
 _RUN = 12  # segments of an outline that are looked at together
 _CELL = 8.0
 
 
-class Region:
+class PreparedArea:
     """A large area that many small things ask about.
 
     Parameters
@@ -41,18 +43,18 @@ class Region:
         return bool(self.shape.is_empty)
 
     def to_edge(self, point: shapely.Point) -> shapely.LineString:
-        """The shortest line from a point to the outline."""
+        """Return the shortest line from a point to the outline."""
         k = self._runs.query_nearest(point, all_matches=False)
         return shapely.shortest_line(point, self._runs.geometries[int(k[0])])
 
     def edges(self, around: BaseGeometry) -> list[BaseGeometry]:
-        """The pieces of the outline within a small area, each in one piece."""
+        """Return the pieces of the outline within a small area, each in one piece."""
         found = self._runs.geometries[np.sort(self._runs.query(around, predicate="intersects"))]
-        return _pieces(shapely.intersection(found, around)) if len(found) else []
+        return _pieces(overlay.intersection(found, around)) if len(found) else []
 
 
 def _pieces(lines: Sequence[BaseGeometry]) -> list[BaseGeometry]:
-    return list(shapely.get_parts(shapely.union_all(lines)))
+    return list(shapely.get_parts(overlay.union_all(lines)))
 
 
 @dataclass(frozen=True)
@@ -90,8 +92,8 @@ class Site:
     ) -> None:
         self.shapes = list(solids)
         self.solids = shapely.STRtree(self.shapes)
-        self.carriageway = Region(carriageway)
-        self.openings = Region(openings)
+        self.carriageway = PreparedArea(carriageway)
+        self.openings = PreparedArea(openings)
         self.half = half
         self._lanes = shapely.STRtree(list(lanes))
         self._placed: dict[tuple[int, int], list[_Placed]] = {}
@@ -134,9 +136,9 @@ class Site:
         """
         if not shapely.intersects(self.openings.shape, foot):
             return False
-        around = shapely.buffer(foot, _AROUND * WAY, quad_segs=3)
+        around = overlay.buffer(foot, _AROUND * WAY, quad_segs=3)
         near: list[BaseGeometry] = [
-            shapely.intersection(self.shapes[k], around)
+            overlay.intersection(self.shapes[k], around)
             for k in np.sort(self.solids.query(around, predicate="intersects")).tolist()
         ]
         near += [other.foot for other in self._near(around) if other.foot.intersects(around)]
@@ -146,7 +148,7 @@ class Site:
     def twin(self, kind: str, foot: shapely.Polygon, gap: float) -> bool:
         """Whether a thing of this kind stands nearer than `gap` metres."""
         return any(
-            other.kind == kind and other.foot.dwithin(foot, gap) for other in self._near(shapely.buffer(foot, gap))
+            other.kind == kind and other.foot.dwithin(foot, gap) for other in self._near(overlay.buffer(foot, gap))
         )
 
     def claim(self, kind: str, foot: shapely.Polygon, *, piece: bool = False) -> None:

@@ -16,14 +16,16 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from vico.assets.model import Model
-from vico.assets.street import street_models
+from vico.assets.models.model import Model
+from vico.assets.models.street import street_models
+from vico.geo import overlay
 from vico.geo.osm import OsmData
+from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.model import FIRST_OBJECT, Dropped, Transit
 from vico.world.objects import FEET, Objects
-from vico.world.seeds import rng
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.objects.barriers import barrier_wishes, gate_yaws
 from vico.worldgen.objects.groups import group_wishes
 from vico.worldgen.objects.kinds import region, thing_of
@@ -52,7 +54,6 @@ def objects_from_osm(
     height: HeightField,
     transit: Transit | None = None,
     lanes: LaneGraph | None = None,
-    half: float | None = None,
     seed: int = 0,
 ) -> tuple[Objects, list[Dropped]]:
     """Place the street objects, trees and barriers of a map.
@@ -73,8 +74,6 @@ def objects_from_osm(
         Stops and bicycle stations to put poles and docks at; their objects carry the entities of the records.
     lanes
         Lanes that vehicles follow; what they sweep is kept free too, where it leaves `carriageway`.
-    half
-        Half the side of the world, metres; the map's own where not given.
     seed
         Decides facings, sizes and species that the map leaves open.
 
@@ -84,7 +83,7 @@ def objects_from_osm(
         By rank, and in the map's order; what found no room within reach, with the reason. What was planted only to
         fill an area, and found no room, is no loss and not listed.
     """
-    half = half or osm.half
+    half = osm.half
     models = street_models()
     site = Site(solids=solids, carriageway=carriageway, lanes=_swept(lanes), openings=openings, half=half)
     zone, where = climate(osm.frame, height), region(osm.frame)
@@ -100,9 +99,10 @@ def objects_from_osm(
     for wishes, listed in lots:
         for wish in wishes:
             if np.abs(wish.xy).max() < half:
-                reason = _settle(wish, models[wish.prototype], site, seed, rows)
-                if reason is not None and listed:
-                    dropped.append(Dropped(id=wish.id, reason=reason))
+                with expendable(wish.id, dropped):
+                    reason = _settle(wish, models[wish.prototype], site, seed, rows)
+                    if reason is not None and listed:
+                        dropped.append(Dropped(id=wish.id, reason=reason))
     next_entity = FIRST_OBJECT
     for row in rows:
         if row["entity"] is None:
@@ -113,13 +113,13 @@ def objects_from_osm(
 
 
 def _swept(lanes: LaneGraph | None) -> list[BaseGeometry]:
-    """What vehicles sweep on each lane between junctions."""
+    """Return what vehicles sweep on each lane between junctions."""
     if lanes is None or not len(lanes):
         return []
     driven = np.flatnonzero(lanes.inside < 0)
     lines = [shapely.LineString(lanes.line(int(k))[:, :2]) for k in driven]
     widths = np.maximum(lanes.width[driven] / 2 - _SWEPT, 0.1)
-    return list(shapely.buffer(np.array(lines, object), widths, cap_style="flat")) if lines else []
+    return list(overlay.buffer(np.array(lines, object), widths, cap_style="flat")) if lines else []
 
 
 def _settle(wish: Wish, model: Model, site: Site, seed: int, rows: list[dict[str, Any]]) -> str | None:
@@ -170,7 +170,7 @@ def _settle(wish: Wish, model: Model, site: Site, seed: int, rows: list[dict[str
 def _room(
     wish: Wish, wide: float, deep: float, yaw: float, reach: float, site: Site, keeps_way: bool
 ) -> tuple[tuple[NDArray[np.float64], shapely.Polygon] | None, str | None]:
-    """The nearest free spot and the foot there, or None and why there is none where the wish is."""
+    """Find the nearest free spot and the foot there, or None and why there is none where the wish is."""
     foot = _rectangles(wish.xy[None], wide, deep, yaw)[0]
     if wish.piece:
         core = _rectangles(wish.xy[None], wide * 0.5, deep * 0.5, yaw)[0]
@@ -276,7 +276,7 @@ def _fitting_scale(wish: Wish, model: Model, site: Site) -> float:
 
 
 def _point_wishes(osm: OsmData, seed: int, zone: str, where: str) -> list[Wish]:
-    """Mapped points."""
+    """Wish for what is mapped as points."""
     found: list[Wish] = []
     gates = gate_yaws(osm)
     for node in osm.nodes:
@@ -327,7 +327,7 @@ def _transit_wishes(transit: Transit | None, carriageway: BaseGeometry) -> list[
 
 
 def _towards(xy: NDArray[np.float64], shape: BaseGeometry) -> NDArray[np.float64] | None:
-    """The nearest point of a shape within 20 m, if it lies elsewhere."""
+    """Return the nearest point of a shape within 20 m, if it lies elsewhere."""
     if shape.is_empty:
         return None
     line = shapely.shortest_line(shapely.Point(xy), shape)

@@ -9,11 +9,12 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from vico.assets.street import street_models
+from vico.assets.models.street import street_models
+from vico.geo import overlay
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, Tags
+from vico.seeds import rng
 from vico.world.heights import HeightField
-from vico.world.seeds import rng
 from vico.worldgen.objects.wishes import Wish, metres
 
 _GENERA = {
@@ -97,7 +98,7 @@ _MOST = 700  # plants that no map has, in a world
 
 
 def climate(frame: LocalFrame, height: HeightField) -> str:
-    """What kind of plants grow here: by latitude, the Mediterranean and California by their boxes, and altitude."""
+    """Say what kind of plants grow here: by latitude, the Mediterranean and California by their boxes, and altitude."""
     lat = abs(frame.lat)
     if lat < 25.0:
         return "tropical"
@@ -110,7 +111,7 @@ def climate(frame: LocalFrame, height: HeightField) -> str:
 
 
 def tree_wish(key: str, tags: Tags, xy: NDArray[np.float64], seed: int, zone: str, *, wild: bool = False) -> Wish:
-    """A tree with the model, and the size, its tags and place suggest; `wild` ones grow as in woods."""
+    """Wish for a tree with the model and the size its tags and place suggest; `wild` ones grow as in woods."""
     random = rng(seed, "tree", key)
     name = _model(tags, xy, seed, random, zone, wild)
     wide, _, tall = street_models()[name].size
@@ -132,7 +133,7 @@ def tree_wish(key: str, tags: Tags, xy: NDArray[np.float64], seed: int, zone: st
 
 
 def _by_shape(name: str, ratio: float) -> str:
-    """The model of the same leaves whose crown is as wide for its height as measured."""
+    """Name the model of the same leaves whose crown is as wide for its height as measured."""
     leaves = _NEEDLES if name in _NEEDLES else ("tree_lime", "tree_lime_tall", "tree_maple", "tree_poplar", "tree_oak")
     models = street_models()
     return min(leaves, key=lambda n: abs(math.log(max(models[n].size[0] / models[n].size[2], 0.05) / max(ratio, 0.05))))
@@ -226,7 +227,7 @@ def spread(
 
 
 def _use(area: OsmArea) -> str | None:
-    """What is planted in an area, a key of `_ROOM` or ``scrub``."""
+    """Say what is planted in an area, a key of `_ROOM` or ``scrub``."""
     tags = area.tags
     if tags.get("natural") in ("wood", "scrub", "shrubbery"):
         return "wood" if tags["natural"] == "wood" else "scrub"
@@ -247,12 +248,12 @@ def planted_wishes(
         if any(area.tags.get(key) in values for key, values in _BARE.items()) and area.tags.get("layer", "0") == "0"
     ]
     solid = [area.polygon for area in osm.areas if "building" in area.tags or "building:part" in area.tags]
-    keep_off = shapely.union_all(
+    keep_off = overlay.union_all(
         [
-            *(shapely.buffer(shapely.intersection(p, window), 1.0) for p in bare),
-            *(shapely.buffer(shapely.intersection(p, window), 2.2) for p in solid if p.intersects(window)),
-            shapely.buffer(openings, 0.8),
-            shapely.buffer(carriageway, 1.6),
+            *(overlay.buffer(overlay.intersection(p, window), 1.0) for p in bare),
+            *(overlay.buffer(overlay.intersection(p, window), 2.2) for p in solid if p.intersects(window)),
+            overlay.buffer(openings, 0.8),
+            overlay.buffer(carriageway, 1.6),
         ]
     )
     mapped = [node.xy for node in osm.nodes if node.tags.get("natural") == "tree"]
@@ -264,10 +265,10 @@ def planted_wishes(
         use = _use(area)
         if use is None or area.polygon.area < 12.0:
             continue
-        ground = shapely.difference(shapely.difference(shapely.intersection(area.polygon, window), keep_off), done)
+        ground = overlay.difference(overlay.difference(overlay.intersection(area.polygon, window), keep_off), done)
         if ground.is_empty:
             continue
-        done = shapely.union(done, ground)
+        done = overlay.union(done, ground)
         random = rng(seed, "scatter", area.id)
         if use == "scrub":
             for k, xy in enumerate(spread(ground, _SHRUB_ROOM, 160, random, least=0.6)):

@@ -50,13 +50,13 @@ class Wish:
 
 
 def number(text: str | None) -> float | None:
-    """The first number of a tag's value, if it begins with one."""
+    """Read the first number of a tag's value, if it begins with one."""
     found = re.match(r"\s*(-?\d+(?:[.,]\d+)?)", text or "")
     return float(found.group(1).replace(",", ".")) if found else None
 
 
 def metres(text: str | None) -> float | None:
-    """A length: metres, or feet and inches where the value says so."""
+    """Read a length: metres, or feet and inches where the value says so."""
     value = number(text)
     if value is None or text is None:
         return None

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -17,11 +18,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
 from vico.errors import EmptyInputError, InputError
-from vico.geo.tile_mesh import TileMesh
+from vico.geo.tiles3d.mesh import TileMesh
+from vico.threads import in_order
 from vico.world.mesh import Surface
-from vico.world.threads import in_order
+from vico.worldgen.facts.sight import Sight
 from vico.worldgen.photos.atlas import Atlas, Chart, coverage, unwrap
-from vico.worldgen.photos.sight import Sight
 
 _BATCH = 1 << 17  # texels at a time: about 30 MB of temporaries a thread
 _COARSE = 0.5  # metres
@@ -164,6 +165,24 @@ def _scale(coarse: Chart, fine: Chart) -> tuple[float, float, float]:
     return 1.0, ratio, ratio
 
 
+class _Skin(NamedTuple):
+    """The mesh that photos are looked up in: its points, triangles, texture coordinates and colours of points."""
+
+    positions: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+    uv: NDArray[np.float32]
+    colour: NDArray[np.uint8]
+
+
+class _Hits(NamedTuple):
+    """Where rays met the mesh: the triangle, two barycentric weights, and the chart whose texel looked."""
+
+    triangle: NDArray[np.int32]
+    u: NDArray[np.float32]
+    v: NDArray[np.float32]
+    chart: NDArray[np.int64]
+
+
 class _Photos:
     """The mesh's colours, ready to be looked up."""
 
@@ -192,23 +211,22 @@ class _Photos:
     ) -> NDArray[np.uint8]:
         """Colours at points of triangles, each averaged over a texel of its chart (sides by chart); ``(n, 3)``."""
         out = np.zeros((len(triangle), 3), np.uint8)
+        hits, skin = _Hits(triangle, u, v, chart), _Skin(self.positions, self.triangles, self.uv, self.colour)
         which = self.texture_of[triangle]
         order = np.argsort(which, kind="stable")
         first = np.flatnonzero(np.diff(which[order], prepend=np.int32(-2)))
         white = np.full((1, 1, 3), 255, np.uint8)
         for start, stop in zip(first, [*first[1:], len(order)][: len(first)], strict=True):
             texture = self.textures[which[order[start]]] if which[order[start]] >= 0 else white
-            _fetch(
-                texture, order[start:stop], triangle, u, v, chart, right, up,
-                self.positions, self.triangles, self.uv, self.colour, out,
-            )  # fmt: skip
+            _fetch(texture, order[start:stop], hits, right, up, skin, out)
         return out
 
 
 @numba.njit(cache=True, nogil=True)
-def _fetch(  # type: ignore[no-untyped-def]
-    texture, chosen, triangle, u, v, chart, rights, ups, positions, triangles, uv, colour, out
-):
+def _fetch(texture, chosen, hits, rights, ups, skin, out):  # type: ignore[no-untyped-def]
+    """Write the texture's colours at chosen hits, each averaged over a texel of its chart."""
+    triangle, u, v, chart = hits.triangle, hits.u, hits.v, hits.chart
+    positions, triangles, uv, colour = skin.positions, skin.triangles, skin.uv, skin.colour
     height, width = texture.shape[:2]
     total = np.zeros(3)
     for n in chosen:

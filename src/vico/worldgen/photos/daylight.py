@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from vico.world.threads import for_each, in_order
+from vico.threads import for_each, in_order
+from vico.worldgen.facts.sight import Sight
 from vico.worldgen.photos.atlas import Atlas, Chart
-from vico.worldgen.photos.sight import Sight
 
 _SAMPLES = 6  # a side of the grid on each wall that the sun is sought with
 _LEAST_SAMPLES = 200
@@ -151,7 +151,7 @@ def without_sun(atlas: Atlas, sun: Sun, sight: Sight, *, over: bool = False) -> 
 
 
 def _brightness(atlas: Atlas) -> tuple[NDArray[np.float64], ...]:
-    """Samples of the walls' photos: places, normals, median luminance of the surroundings, and whose wall it is."""
+    """Sample the walls' photos: places, normals, median luminance of the surroundings, and whose wall it is."""
     points, normals, light, entity = [], [], [], []
     for chart in atlas.charts:
         if abs(float(chart.normal[2])) >= 0.5:
@@ -193,7 +193,7 @@ def _shine(
 
 
 def _chart_shine(chart: Chart, sun: Sun, sight: Sight) -> NDArray[np.float32]:
-    """The same for all texels of a chart, shape ``(height, width)``, with soft edges."""
+    """Return the same for all texels of a chart, shape ``(height, width)``, with soft edges."""
     cosine = float(chart.normal @ sun.direction)
     if cosine <= 0.0:
         return np.zeros((chart.height, chart.width), np.float32)

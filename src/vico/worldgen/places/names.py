@@ -10,11 +10,11 @@ import shapely
 
 from vico.geo.osm import Tags
 from vico.world.model import Roads
+from vico.worldgen.facts.named_places import NamedPlace
 from vico.worldgen.places.doors import MATCH, Finder
-from vico.worldgen.places.osm import Named
 
 
-class Streets:
+class StreetAddresses:
     """Street names and house numbers."""
 
     def __init__(self, finder: Finder, roads: Roads) -> None:
@@ -32,8 +32,8 @@ class Streets:
         """Name of the street nearest to a point, None where no street has one."""
         return self._named[int(self._tree.nearest(shapely.Point(xy)))][0] if self._named else None
 
-    def invented(self, named: Named) -> Named:
-        """The place with a name of our making: what it is, and the address of the building it is in."""
+    def invented(self, named: NamedPlace) -> NamedPlace:
+        """Give a place a name of our making: what it is, and the address of the building it is in."""
         what = named.kind.replace("_", " ").capitalize()
         at = self._finder.building_at(named.xy, MATCH)
         if at is None:
@@ -46,7 +46,7 @@ class Streets:
 
 
 def unused(name: str, used: set[str]) -> str:
-    """The name, or the name with the first free letter or number."""
+    """Return the name, or the name with the first free letter or number."""
     candidates = [name, *(f"{name} {letter}" for letter in "BCDEFGHJKLMN"), *(f"{name} {k}" for k in range(14, 999))]
     chosen = next(candidate for candidate in candidates if candidate not in used)
     used.add(chosen)

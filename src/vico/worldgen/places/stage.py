@@ -6,23 +6,22 @@ from collections.abc import Sequence
 
 import shapely
 
-from vico.geo.osm import OsmData
-from vico.geo.places import FoundPlace
+from vico.geo.places.model import FoundPlace
 from vico.world.heights import HeightField
 from vico.world.model import Building, Category, Dropped, Entrance, Place, Roads, Transit
 from vico.world.routing import Router
 from vico.world.walkable import WalkableMap
+from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.places.doors import Finder
 from vico.worldgen.places.found import compared
-from vico.worldgen.places.names import Streets, unused
-from vico.worldgen.places.osm import named_places
+from vico.worldgen.places.names import StreetAddresses, unused
 
 _LARGE_HOUSE = 4000.0  # square metres of floor above which a house has two stairways
 _HOMES_WANTED, _MOST_HOMES = 60, 240
 
 
 def places_from_osm(
-    osm: OsmData,
+    site: SiteFacts,
     *,
     buildings: Sequence[Building],
     walkable: WalkableMap,
@@ -35,8 +34,8 @@ def places_from_osm(
 
     Parameters
     ----------
-    osm
-        The map, local metres.
+    site
+        The map and its facts.
     buildings
         Buildings with footprints.
     walkable
@@ -44,7 +43,7 @@ def places_from_osm(
     height
         Ground heights.
     roads
-        Named streets, for the addresses of homes.
+        NamedPlace streets, for the addresses of homes.
     transit
         Stops and stations, which become places of their own with the same ids.
     found
@@ -56,9 +55,9 @@ def places_from_osm(
     places, entrances, dropped
         Places in the order of the map, then homes, then transit; what was left out, with the reason.
     """
-    finder = Finder(osm, buildings, walkable, height)
-    streets = Streets(finder, roads)
-    mapped = named_places(osm)
+    finder = Finder(site.osm, buildings, walkable, height)
+    streets = StreetAddresses(finder, roads)
+    mapped = site.named
     told = compared(mapped, found)
     dropped: list[Dropped] = list(told.dropped)
     places: list[Place] = []
@@ -88,7 +87,7 @@ def places_from_osm(
     return places, finder.entrances, dropped
 
 
-def _homes(finder: Finder, streets: Streets) -> list[Place]:
+def _homes(finder: Finder, streets: StreetAddresses) -> list[Place]:
     """Apartments in residential buildings, a place for each stairway; more buildings count where these are few."""
     used: set[str] = set()
     homes: list[Place] = []

@@ -19,8 +19,15 @@ from shapely.geometry.base import BaseGeometry
 from vico.errors import MissingExtraError, VicoError
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData
-from vico.worldgen.streets.roads import DEFAULTS, SIDEWALK_WIDTH, WALKING, Street, is_traffic_street, streets_from_osm
-from vico.worldgen.streets.sides import keeps_left
+from vico.worldgen.facts.site import SiteFacts
+from vico.worldgen.streets.roads import (
+    DEFAULTS,
+    SIDEWALK_WIDTH,
+    WALKING,
+    NetworkStreet,
+    is_traffic_street,
+    streets_from_osm,
+)
 
 _NO_RAIL = (
     "rail rail_urban rail_electric rail_fast tram drone aircraft scooter container wheelchair subway cable_car ship"
@@ -90,15 +97,13 @@ def netconvert_binary() -> Path:
     )
 
 
-def road_network(osm: OsmData, half: float | None = None, *, solids: Sequence[BaseGeometry] = ()) -> RoadNetwork:
+def road_network(site: SiteFacts, *, solids: Sequence[BaseGeometry] = ()) -> RoadNetwork:
     """Build the lane-level network of a window: lanes, junctions, sidewalks, crossings, signals.
 
     Parameters
     ----------
-    osm
-        Map data in local metres.
-    half
-        Half side of the window, metres: every street ends at its edge. The data's own where not given.
+    site
+        The map and its facts; every street ends at the edge of its window.
     solids
         What stands on the ground: passages that it closes are no streets.
 
@@ -106,18 +111,19 @@ def road_network(osm: OsmData, half: float | None = None, *, solids: Sequence[Ba
     -------
     RoadNetwork
         Equal input gives equal bytes; an empty network where the window has no street for people or traffic. Where
-        traffic keeps left (`sides.keeps_left`) so do the lanes: a street's lane 0 is at its left kerb.
+        traffic keeps left so do the lanes: a street's lane 0 is at its left kerb.
 
     Raises
     ------
     MissingExtraError, NetconvertError
         If netconvert is not installed, or gives no network.
     """
-    streets = streets_from_osm(osm, half or osm.half, solids)
+    osm = site.osm
+    streets = streets_from_osm(site, solids)
     used = [street for street in streets if is_traffic_street(street)]
     used += [s for s in streets if s.kind == "pedestrian" and s.closed is None]
     if not used:
-        return empty_network(osm.frame, half or osm.half)
+        return empty_network(osm.frame, osm.half)
     binary = netconvert_binary()
     with tempfile.TemporaryDirectory(prefix="vico-roads-") as folder:
         work = Path(folder)
@@ -126,7 +132,7 @@ def road_network(osm: OsmData, half: float | None = None, *, solids: Sequence[Ba
         command = [
             str(binary), "--osm-files", "streets.osm", "--type-files", "types.xml", "--proj", osm.frame.proj4,
             "--output-file", "net.xml", "--opendrive-output", "roads.xodr", 
-            "--lefthand", str(keeps_left(osm)).lower(),
+            "--lefthand", str(site.left_driving).lower(),
             *[part for key, value in _OPTIONS.items() for part in (f"--{key}", value)],
         ]  # fmt: skip
         environment = {"PATH": os.environ.get("PATH", ""), "LC_ALL": "C", "SUMO_HOME": str(binary.parent.parent)}
@@ -147,7 +153,7 @@ def road_network(osm: OsmData, half: float | None = None, *, solids: Sequence[Ba
 
 
 def empty_network(frame: LocalFrame, half: float) -> RoadNetwork:
-    """The network of a place without streets (a pedestrian quarter, a campus): valid files with nothing in them.
+    """Make the network of a place without streets (a pedestrian quarter, a campus): valid files with nothing in them.
 
     netconvert refuses to write one, so this is written here, as SUMO 1.20 and OpenDRIVE 1.4 have it.
     """
@@ -205,8 +211,8 @@ def _types_xml() -> str:
     return "<types>\n" + "\n".join(rows) + "\n</types>\n"
 
 
-def _way_tags(street: Street) -> dict[str, str]:
-    """The tags netconvert reads, all decided; a link keeps its class."""
+def _way_tags(street: NetworkStreet) -> dict[str, str]:
+    """Return the tags netconvert reads, all decided; a link keeps its class."""
     tags = {"highway": street.kind}
     if street.name:
         tags["name"] = street.name
@@ -227,11 +233,11 @@ def _way_tags(street: Street) -> dict[str, str]:
     return tags
 
 
-def _osm_xml(osm: OsmData, streets: list[Street]) -> str:
-    """An OSM file of just these streets."""
+def _osm_xml(osm: OsmData, streets: list[NetworkStreet]) -> str:
+    """Write an OSM file of just these streets."""
 
     # Parts of a cut way and the edge's new nodes need ids of their own; OSM's end far below these.
-    def way_id(street: Street) -> int:
+    def way_id(street: NetworkStreet) -> int:
         return street.way + street.part * 10**13
 
     def node_id(node: int) -> int:

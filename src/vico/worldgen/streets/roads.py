@@ -13,12 +13,13 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from vico.exact import dot
+from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
 from vico.world.model import Dropped, Junction, Road, Roads
-from vico.world.products import dot
-from vico.worldgen.streets.levels import OVER_A_STREET, overpasses
-from vico.worldgen.streets.sides import keeps_left
-from vico.worldgen.streets.streets import on_the_ground
+from vico.worldgen.facts.levels import OVER_A_STREET
+from vico.worldgen.facts.site import SiteFacts
+from vico.worldgen.facts.tags import on_the_ground
 
 UNDERGROUND = "under the ground: tunnels have mouths, and nobody drives or walks in them"
 THROUGH_A_BUILDING = "leads through a building that stands across it"
@@ -48,7 +49,7 @@ _MINOR_SERVICE = {"driveway", "parking_aisle", "drive-through", "emergency_acces
 
 
 @dataclass(frozen=True)
-class Street:
+class NetworkStreet:
     """A drivable or walkable OSM way with everything the map leaves open decided.
 
     Attributes
@@ -93,7 +94,7 @@ class Street:
 
 
 def _number(text: str | None) -> float | None:
-    """The first number of a tag's value, or None."""
+    """Read the first number of a tag's value, or None."""
     found = re.match(r"\s*(\d+(?:\.\d+)?)", text or "")
     return float(found.group(1)) if found else None
 
@@ -141,7 +142,7 @@ def _access(tags: dict[str, str]) -> str:
     return "all"
 
 
-def _street(way: OsmWay, part: int, nodes: list[int], line: NDArray[np.float64]) -> Street | None:
+def _street(way: OsmWay, part: int, nodes: list[int], line: NDArray[np.float64]) -> NetworkStreet | None:
     """Decide one way's lanes, width, sidewalks and access; None if it is no street."""
     tags = way.tags
     kind = tags.get("highway", "").removesuffix("_link")
@@ -153,7 +154,9 @@ def _street(way: OsmWay, part: int, nodes: list[int], line: NDArray[np.float64])
     name = tags.get("name")
     if kind in WALKING:
         width = min(_number(tags.get("width")) or WALKING[kind], 8.0)
-        return Street(way.id, part, nodes, line, kind, name, 0, 0, width, 1.4, "none", "all", layer, tags, closed)
+        return NetworkStreet(
+            way.id, part, nodes, line, kind, name, 0, 0, width, 1.4, "none", "all", layer, tags, closed
+        )
     oneway = tags.get("oneway") in ("yes", "true", "1", "-1") or (
         tags.get("oneway") != "no" and (kind == "motorway" or tags.get("junction") in ("roundabout", "circular"))
     )
@@ -162,7 +165,7 @@ def _street(way: OsmWay, part: int, nodes: list[int], line: NDArray[np.float64])
     _, lane_width, default_speed = DEFAULTS[kind]
     forward, backward = _lanes(tags, kind, oneway)
     access = "bus" if kind == "busway" else _access(tags)
-    return Street(
+    return NetworkStreet(
         way=way.id,
         part=part,
         nodes=nodes,
@@ -182,7 +185,7 @@ def _street(way: OsmWay, part: int, nodes: list[int], line: NDArray[np.float64])
 
 
 def _cut(way: OsmWay, half: float, new_id: int) -> tuple[list[tuple[list[int], NDArray[np.float64]]], int]:
-    """The pieces of a way inside the window; where the edge cuts a segment a new node takes the place of the rest."""
+    """Cut a way to its pieces inside the window; where the edge cuts a segment a new node replaces the rest."""
     inside = np.abs(way.line).max(axis=1) <= half
     if inside.all():
         return [(list(way.nodes), way.line)], new_id
@@ -220,15 +223,13 @@ def _crossing(inner: NDArray[np.float64], outer: NDArray[np.float64], half: floa
     return np.asarray(inner + step * float(shares.min()))
 
 
-def streets_from_osm(osm: OsmData, half: float, solids: Sequence[BaseGeometry] = ()) -> list[Street]:
-    """The streets and walkways of a window, cut at its edge.
+def streets_from_osm(site: SiteFacts, solids: Sequence[BaseGeometry] = ()) -> list[NetworkStreet]:
+    """Return the streets and walkways of a window, cut at its edge.
 
     Parameters
     ----------
-    osm
-        Map data in local metres.
-    half
-        Half side of the window, metres.
+    site
+        The map and its facts.
     solids
         What stands on the ground, metres.
 
@@ -237,23 +238,22 @@ def streets_from_osm(osm: OsmData, half: float, solids: Sequence[BaseGeometry] =
     list of Street
         In the order of the file; a way that leaves the window and comes back gives several parts.
     """
-    streets: list[Street] = []
+    streets: list[NetworkStreet] = []
     new_id = -1
-    above = overpasses(osm)
     standing = shapely.STRtree(solids)
-    for way in osm.ways:
+    for way in site.osm.ways:
         if "highway" not in way.tags:
             continue
-        pieces, new_id = _cut(way, half, new_id)
+        pieces, new_id = _cut(way, site.osm.half, new_id)
         for part, (nodes, line) in enumerate(pieces):
             street = _street(way, part, nodes, line)
             if street is not None and np.linalg.norm(line[1:] - line[:-1], axis=1).sum() > 0.5:
-                if way.id in above:
+                if way.id in site.levels.above:
                     street = replace(street, closed=OVER_A_STREET)
                 elif street.closed is None and _is_passage(way.tags) and _blocked(line, standing):
                     street = replace(street, closed=THROUGH_A_BUILDING)
                 streets.append(street)
-    return _medians_cleared(streets, lefthand=keeps_left(osm))
+    return _medians_cleared(streets, lefthand=site.left_driving)
 
 
 def _is_passage(tags: Mapping[str, str]) -> bool:
@@ -265,10 +265,10 @@ def _blocked(line: NDArray[np.float64], standing: shapely.STRtree) -> bool:
     """Whether something stands across a line, by more than the edges of a passage that is drawn a little off."""
     path = shapely.LineString(line)
     across = standing.geometries[standing.query(path, predicate="intersects")]
-    return bool(len(across)) and shapely.intersection(shapely.union_all(across), path).length > _ACROSS
+    return bool(len(across)) and overlay.common_length(overlay.union_all(across), path) > _ACROSS
 
 
-def _medians_cleared(streets: list[Street], *, lefthand: bool) -> list[Street]:
+def _medians_cleared(streets: list[NetworkStreet], *, lefthand: bool) -> list[NetworkStreet]:
     """Take the unmapped inner sidewalk from the two carriageways of a divided street: between them nobody walks."""
     oneway = [i for i, s in enumerate(streets) if s.drivable and not s.backward and s.sidewalk == "both"]
     oneway = [i for i in oneway if not any(key.startswith("sidewalk") for key in streets[i].tags)]
@@ -290,7 +290,7 @@ def _medians_cleared(streets: list[Street], *, lefthand: bool) -> list[Street]:
     return cleared
 
 
-def is_traffic_street(street: Street) -> bool:
+def is_traffic_street(street: NetworkStreet) -> bool:
     """Whether public traffic uses a street at ground level: what the road network is made of."""
     if not street.drivable or street.access == "private" or street.closed is not None:
         return False
@@ -299,15 +299,13 @@ def is_traffic_street(street: Street) -> bool:
     return True
 
 
-def roads_from_osm(osm: OsmData, half: float | None = None, *, solids: Sequence[BaseGeometry] = ()) -> Roads:
+def roads_from_osm(site: SiteFacts, *, solids: Sequence[BaseGeometry] = ()) -> Roads:
     """Build the road database: streets and walkways split at junctions, with widths, lanes and sidewalks.
 
     Parameters
     ----------
-    osm
-        Map data in local metres.
-    half
-        Half side of the window the roads are cut to, metres; the data's own where not given.
+    site
+        The map and its facts.
     solids
         What stands on the ground, metres: passages that it closes are `closed`.
 
@@ -316,11 +314,8 @@ def roads_from_osm(osm: OsmData, half: float | None = None, *, solids: Sequence[
     Roads
         Junctions are where three or more drivable roads meet; crossings are mapped crossing points on carriageways.
     """
-    streets = [
-        s
-        for s in streets_from_osm(osm, half or osm.half, solids)
-        if not (s.kind == "service" and s.access == "private")
-    ]
+    osm = site.osm
+    streets = [s for s in streets_from_osm(site, solids) if not (s.kind == "service" and s.access == "private")]
     meeting: Counter[int] = Counter()
     for street in streets:
         meeting.update(street.nodes)
@@ -349,10 +344,10 @@ def roads_from_osm(osm: OsmData, half: float | None = None, *, solids: Sequence[
         for node, meet in ends.items()
         if len(meet) >= 3
     ]
-    return Roads(roads=roads, junctions=junctions, crossings=_crossings(osm, streets, half or osm.half))
+    return Roads(roads=roads, junctions=junctions, crossings=_crossings(osm, streets))
 
 
-def _road(street: Street, start: int, end: int, count: int) -> Road:
+def _road(street: NetworkStreet, start: int, end: int, count: int) -> Road:
     return Road(
         id=f"w{street.way}.{street.part}.{count}",
         osm_id=street.way,
@@ -370,7 +365,7 @@ def _road(street: Street, start: int, end: int, count: int) -> Road:
 
 
 def closed_roads(roads: Roads) -> list[Dropped]:
-    """The ways that are closed to traffic and walkers, each once, and why."""
+    """Return the ways that are closed to traffic and walkers, each once, and why."""
     reasons = {road.osm_id: road.closed for road in roads.roads if road.closed is not None}
     return [Dropped(id=f"w{way}", reason=reason) for way, reason in sorted(reasons.items())]
 
@@ -386,15 +381,15 @@ def _signalled(place: tuple[float, float], node: int, signals: set[int], osm: Os
     return any(math.hypot(n.xy[0] - place[0], n.xy[1] - place[1]) < 20 for n in osm.nodes if n.id in signals)
 
 
-def _crossings(osm: OsmData, streets: list[Street], half: float) -> list[tuple[float, float]]:
-    """Mapped crossing points that lie on a carriageway."""
+def _crossings(osm: OsmData, streets: list[NetworkStreet]) -> list[tuple[float, float]]:
+    """Find mapped crossing points that lie on a carriageway."""
     roads = [shapely.LineString(s.line) for s in streets if s.drivable]
     points = [
         node.xy
         for node in osm.nodes
         if (node.tags.get("highway") == "crossing" or "crossing" in node.tags)
         and node.tags.get("crossing") != "no"
-        and np.abs(node.xy).max() <= half
+        and np.abs(node.xy).max() <= osm.half
     ]
     if not roads or not points:
         return []

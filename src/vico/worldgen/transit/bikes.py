@@ -9,12 +9,13 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from vico.geo.osm import OsmData
+from vico.geo import overlay
+from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.model import BikeStation
-from vico.world.seeds import rng
 from vico.world.walkways import SIDEWALK, Walkways
+from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.transit.plan import k_means, where_people_go
 
 FIRST_STATION = 95_000
@@ -28,22 +29,23 @@ _FOOTWAYS = ("pedestrian", "footway", "living_street", "path", "cycleway")
 
 
 def bike_stations(
-    osm: OsmData, lanes: LaneGraph, walks: Walkways, height: HeightField, half: float, seed: int
+    site: SiteFacts, lanes: LaneGraph, walks: Walkways, height: HeightField, seed: int
 ) -> tuple[list[BikeStation], str]:
     """Rental stations and where they come from (osm, planned)."""
+    osm = site.osm
     random = rng(seed, "transit", "bikes")
     found: list[tuple[NDArray[np.float64], str, int]] = []
     places = [(n.xy, n.tags) for n in osm.nodes]
     places += [(np.array(a.polygon.centroid.coords[0]), a.tags) for a in osm.areas if not a.polygon.is_empty]
     for xy, tags in places:
-        if tags.get("amenity") == "bicycle_rental" and np.abs(xy).max() <= half - 5.0:
+        if tags.get("amenity") == "bicycle_rental" and np.abs(xy).max() <= osm.half - 5.0:
             size = re.match(r"\d{1,4}", tags.get("capacity", ""))
             capacity = int(np.clip(int(size.group()) if size else _CAPACITY, 2, 60))
             found.append((_off_the_lanes(lanes, xy), tags.get("name") or f"Bike station {len(found) + 1}", capacity))
     origin = "osm"
     if not found:
         origin = "planned"
-        found = [(xy, f"Bike station {k + 1}", _CAPACITY) for k, xy in enumerate(_planned(osm, walks, half, seed))]
+        found = [(xy, f"Bike station {k + 1}", _CAPACITY) for k, xy in enumerate(_planned(site, walks, seed))]
     stations = [
         BikeStation(
             id=f"bikes_{k}",
@@ -58,8 +60,9 @@ def bike_stations(
     return stations, origin
 
 
-def _planned(osm: OsmData, walks: Walkways, half: float, seed: int) -> list[NDArray[np.float64]]:
+def _planned(site: SiteFacts, walks: Walkways, seed: int) -> list[NDArray[np.float64]]:
     """Points of long stretches of sidewalk (of footways where there is none), nearest to where people go."""
+    osm, half = site.osm, site.osm.half
     stretches = [shapely.LineString(walks.line(int(i))) for i in np.flatnonzero(walks.kind == SIDEWALK)]
     stretches = [line for line in stretches if line.length > 15.0]
     if not stretches:
@@ -67,8 +70,8 @@ def _planned(osm: OsmData, walks: Walkways, half: float, seed: int) -> list[NDAr
         for way in osm.ways:
             if way.tags.get("highway") in _FOOTWAYS and len(way.line) > 1:
                 # Beside the way, not on it.
-                beside = shapely.offset_curve(shapely.LineString(way.line), -_ASIDE)
-                stretches += [part for part in shapely.get_parts(beside.intersection(window))
+                beside = overlay.offset_curve(shapely.LineString(way.line), -_ASIDE)
+                stretches += [part for part in shapely.get_parts(overlay.intersection(beside, window))
                               if part.geom_type == "LineString" and part.length > 15.0]  # fmt: skip
     if not stretches:
         return []
@@ -78,7 +81,7 @@ def _planned(osm: OsmData, walks: Walkways, half: float, seed: int) -> list[NDAr
     )
     spots = spots[np.abs(spots).max(axis=1) < half - 5.0]
     count = int(np.clip(round((2 * half) ** 2 / _EACH), _FEWEST, _MOST))
-    wanted = where_people_go(osm, half)
+    wanted = where_people_go(site)
     chosen: list[NDArray[np.float64]] = []
     for centre in k_means(wanted if len(wanted) else spots, count, rng(seed, "transit", "racks")):
         away = np.hypot(*(spots - centre).T)
@@ -90,7 +93,7 @@ def _planned(osm: OsmData, walks: Walkways, half: float, seed: int) -> list[NDAr
 
 
 def _off_the_lanes(lanes: LaneGraph, xy: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A rack's place, moved from the carriageway onto the kerb where the map has it on the street."""
+    """Move a rack from the carriageway onto the kerb where the map has it on the street."""
     for _ in range(6):
         near = lanes.nearest(xy, among=np.ones(len(lanes), bool), reach=8.0)
         if near is None:

@@ -54,7 +54,7 @@ class Kerbs:
         self.lines = np.array([shapely.LineString(lanes.line(int(i))) for i in self.numbers], object)
 
     def offset_on(self, lane: int, offset: float) -> float:
-        """The nearest resting place at which the whole bus stands on the lane."""
+        """Return the nearest resting place at which the whole bus stands on the lane."""
         return float(np.clip(offset, BUS_LENGTH + 2.0, self.lanes.length[lane] - 3.0))
 
     def near(self, xy: ArrayLike, reach: float) -> list[tuple[float, int, float]]:
@@ -86,7 +86,7 @@ class Kerbs:
 
 
 def merged(berth: Berth, known: Iterable[Berth]) -> Berth:
-    """The known berth that this one would overlap, else this one: two poles that share a berth are one stop."""
+    """Return the known berth that this one would overlap, else this one: two poles that share a berth are one stop."""
     for other in known:
         if other.lane == berth.lane and abs(other.offset - berth.offset) <= _BERTH_GAP:
             return other
@@ -138,13 +138,13 @@ class Drive:
                 self._reach[lane], self._before[lane] = reach[k], before[k]
 
     def costs_from(self, lane: int) -> NDArray[np.float64]:
-        """What it costs to come from the start of a lane to the start of each other one."""
+        """Return what it costs to come from the start of a lane to the start of each other one."""
         if lane not in self._reach:
             self.prepare([Berth("", "", lane, 0.0)])
         return self._reach[lane]
 
     def costs_to(self, lane: int) -> NDArray[np.float64]:
-        """What it costs to come to the start of a lane from the start of each other one."""
+        """Return what it costs to come to the start of a lane from the start of each other one."""
         if lane not in self._towards:
             self._towards[lane] = np.asarray(dijkstra(self._graph.T, indices=lane))
         return self._towards[lane]
@@ -160,7 +160,7 @@ class Drive:
         return math.inf if last < 0 else float(self._reach[a.lane][last] + self.cost[last]) - a.offset + b.offset
 
     def _last(self, lane: int) -> int:
-        """The best lane to come back to a lane from, -1 if there is no way back."""
+        """Find the best lane to come back to a lane from, -1 if there is no way back."""
         before = self.lanes.preceding(lane)
         if not len(before):
             return -1
@@ -191,7 +191,7 @@ class Drive:
         return {berth.lane for berth in loop} | set(lanes), int(self.uturn[lanes].sum())
 
     def best_round(self, choices: Sequence[Sequence[tuple[float, Berth]]]) -> tuple[float, list[Berth]]:
-        """The cheapest closed drive that serves one berth of each choice, in order.
+        """Find the cheapest closed drive that serves one berth of each choice, in order.
 
         Parameters
         ----------

@@ -8,9 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.geo.osm import OsmData
-from vico.world.seeds import rng
-from vico.worldgen.places.osm import named_places
+from vico.seeds import rng
+from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.transit.drive import BUS_LENGTH, Berth, Drive, Kerbs
 
 MIN_STOPS, MAX_STOPS = 4, 12
@@ -21,17 +20,17 @@ _FEW = 12  # fewer named places than this say little about where people go: buil
 _APART = 60.0  # metres between two stops of a planned line
 
 
-def where_people_go(osm: OsmData, half: float) -> NDArray[np.float64]:
+def where_people_go(site: SiteFacts) -> NDArray[np.float64]:
     """Places that people go to, metres, shape ``(n, 2)``: the named ones; every building where these are few."""
-    points = [named.xy for named in named_places(osm)]
+    points = [named.xy for named in site.named]
     if len(points) < _FEW:
         points += [
             np.array(area.polygon.representative_point().coords[0])
-            for area in osm.areas
+            for area in site.osm.areas
             if area.tags.get("building", "no") != "no" and not area.polygon.is_empty
         ]
     xy = np.array(points).reshape(-1, 2)
-    return xy[np.abs(xy).max(axis=1, initial=0.0) < half]
+    return xy[np.abs(xy).max(axis=1, initial=0.0) < site.osm.half]
 
 
 def k_means(xy: NDArray[np.float64], count: int, random: np.random.Generator) -> NDArray[np.float64]:
@@ -51,7 +50,7 @@ def k_means(xy: NDArray[np.float64], count: int, random: np.random.Generator) ->
     return middles
 
 
-def planned_berths(osm: OsmData, kerbs: Kerbs, half: float, seed: int) -> list[Berth]:
+def planned_berths(site: SiteFacts, kerbs: Kerbs, seed: int) -> list[Berth]:
     """Eight stops: k-means over where people go, each at the nearest kerb that buses can reach."""
     lanes = kerbs.lanes
     spots = [
@@ -62,7 +61,7 @@ def planned_berths(osm: OsmData, kerbs: Kerbs, half: float, seed: int) -> list[B
     if not spots:
         return []
     xy = lanes.at([lane for lane, _ in spots], [offset for _, offset in spots])[:, :2]
-    wanted = where_people_go(osm, half)
+    wanted = where_people_go(site)
     if len(wanted) < _PLANNED:
         wanted = xy
     centres = k_means(wanted, _PLANNED, rng(seed, "transit", "stops"))

@@ -184,7 +184,7 @@ def _way_back(there: Sequence[Pole], others: Sequence[Sequence[Pole]]) -> list[P
 
 
 def _spots(osm: OsmData) -> dict[str, tuple[str, tuple[float, float], int, bool]]:
-    """What stops are mapped as: name, place, rank (a platform before a pole before a stop position), whether one."""
+    """List what stops are mapped as: name, place, rank (platform before pole before stop position), whether one."""
     spots: dict[str, tuple[str, tuple[float, float], int, bool]] = {}
     for node in osm.nodes:
         name, rank, is_stop = _spot(node.tags)
@@ -208,7 +208,7 @@ def _spot(tags: Tags) -> tuple[str, int, bool]:
 def _runs(
     relation: OsmRelation, spots: dict[str, tuple[str, tuple[float, float], int, bool]], half: float
 ) -> list[list[Pole]]:
-    """Stops of a relation in order; two runs where an old relation has both directions in it."""
+    """List the stops of a relation in order; two runs where an old relation has both directions in it."""
     both: tuple[list[tuple[Pole, int]], list[tuple[Pole, int]]] = ([], [])
     split = any(role.startswith(("forward", "backward")) and "stop" in role for *_, role in relation.members)
     for kind, member, role in relation.members:
@@ -262,7 +262,7 @@ def interval_of(tags: Tags) -> int | None:
 
 
 def _hours(tags: Tags) -> tuple[int, int] | None:
-    """The first span of hours that the map gives, seconds of the day."""
+    """Read the first span of hours that the map gives, seconds of the day."""
     match = _HOURS.search(tags.get("opening_hours") or tags.get("service_times") or tags.get("hours") or "")
     if match is None:
         return None

@@ -16,6 +16,7 @@ from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.model import Dropped, Line, Stop, Transit
 from vico.world.walkways import SIDEWALK, Walkways
+from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.transit.bikes import FIRST_STATION, bike_stations
 from vico.worldgen.transit.drive import BUS_LENGTH, Berth, Drive, Kerbs, merged
 from vico.worldgen.transit.plan import MAX_LOOP, MAX_STOPS, MIN_STOPS, planned_berths, planned_loop
@@ -91,30 +92,27 @@ class _Chosen:
 
 
 def transit_from_osm(
-    osm: OsmData,
+    site: SiteFacts,
     lanes: LaneGraph,
     height: HeightField,
     *,
-    half: float | None = None,
     solids: list[shapely.Polygon] | None = None,
     seed: int = 0,
     feeds: Sequence[Feed] = (),
 ) -> Transit:
-    """Stops, bus lines with a timetable, and bicycle stations of a window.
+    """Plan stops, bus lines with a timetable, and bicycle stations of a window.
 
     Lines are those of the timetable feeds, then those of the map's relations; where neither gives one that can be
     driven, one is planned over the stops, and stops over the places.
 
     Parameters
     ----------
-    osm
-        Map data in local metres: stops, bus routes, bicycle rental.
+    site
+        The map and its facts: stops, bus routes, bicycle rental, places.
     lanes
         The lane network of the same window; one without lanes gives no stops and no lines.
     height
         Ground heights.
-    half
-        Half side of the window, metres; the data's own where not given.
     solids
         Building footprints, so that nobody is told to wait inside one.
     seed
@@ -127,11 +125,11 @@ def transit_from_osm(
     Transit
         Lines are closed drives past two stops at least; `left_out` says why a route of the sources is none.
     """
-    half = half or osm.half
+    osm = site.osm
     kerbs = Kerbs(lanes)
-    mapped = _mapped_berths(osm, kerbs, half)
+    mapped = _mapped_berths(osm, kerbs)
     timed, left_out = routes_from_gtfs(feeds)
-    drawn, untold = routes_from_osm(osm, half)
+    drawn, untold = routes_from_osm(osm, osm.half)
     known = {route.name for route in timed}
     left_out += [what for what in untold if not known]
     routes = timed + [route for route in drawn if route.name not in known]
@@ -141,7 +139,7 @@ def transit_from_osm(
         names = "osm and gtfs" if mapped else "gtfs"
     if all(len(line.loop) < MIN_STOPS for line in chosen):
         # Routes that only cut a corner of the window take nobody anywhere: a round is planned beside them.
-        planned, source = _planned(osm, kerbs, mapped, half, seed, least=MIN_STOPS if chosen else 2)
+        planned, source = _planned(site, kerbs, mapped, seed, least=MIN_STOPS if chosen else 2)
         if planned is not None:
             chosen = [planned, *chosen]
             names = source if len(chosen) == 1 or source != "osm" else names
@@ -165,7 +163,7 @@ def transit_from_osm(
         for k, berth in enumerate(kept)
     }
     lines = [_record(k, line, stops) for k, line in enumerate(_staggered(chosen))]
-    stations, racks = bike_stations(osm, lanes, walks, height, half, seed)
+    stations, racks = bike_stations(site, lanes, walks, height, seed)
     origins = dict.fromkeys("planned" if line.route is None else line.route.origin for line in chosen)
     return Transit(
         stops=list(stops.values()),
@@ -177,13 +175,13 @@ def transit_from_osm(
 
 
 def _planned(
-    osm: OsmData, kerbs: Kerbs, mapped: Sequence[Berth], half: float, seed: int, *, least: int
+    site: SiteFacts, kerbs: Kerbs, mapped: Sequence[Berth], seed: int, *, least: int
 ) -> tuple[_Chosen | None, str]:
-    """A round over the mapped stops, else over planned ones too, and where its stops come from."""
+    """Plan a round over the mapped stops, else over planned ones too, and say where its stops come from."""
     drive = Drive(kerbs.lanes)
     if loop := planned_loop(drive, mapped):
         return _Chosen(("Loop 1",), None, tuple(loop), drive), "osm"
-    more = [b for b in planned_berths(osm, kerbs, half, seed) if merged(b, mapped) == b]
+    more = [b for b in planned_berths(site, kerbs, seed) if merged(b, mapped) == b]
     source = "osm and planned" if mapped else "planned"
     for few in dict.fromkeys((MIN_STOPS, least)):
         if loop := planned_loop(drive, [*mapped, *more], least=few):
@@ -202,7 +200,7 @@ def _record(number: int, line: _Chosen, stops: dict[Berth, Stop]) -> Line:
     return line_record(number, "/".join(line.names), line.timing, line.drive, stops, colour)
 
 
-def _mapped_berths(osm: OsmData, kerbs: Kerbs, half: float) -> list[Berth]:
+def _mapped_berths(osm: OsmData, kerbs: Kerbs) -> list[Berth]:
     """Berths of the mapped bus stops; two poles that share a berth give one."""
     places = [(f"n{node.id}", node.xy, node.tags) for node in osm.nodes]
     places += [
@@ -218,7 +216,7 @@ def _mapped_berths(osm: OsmData, kerbs: Kerbs, half: float) -> list[Berth]:
             and (tags.get("bus") == "yes" or key[0] == "n")
             and "railway" not in tags
         )
-        if not stop or np.abs(xy).max() > half:
+        if not stop or np.abs(xy).max() > osm.half:
             continue
         near = kerbs.near(xy, _REACH)
         if near:
@@ -229,7 +227,7 @@ def _mapped_berths(osm: OsmData, kerbs: Kerbs, half: float) -> list[Berth]:
 
 
 def _driven(routes: Sequence[Route], kerbs: Kerbs, mapped: Sequence[Berth], left_out: list[Dropped]) -> list[_Chosen]:
-    """The routes that can be driven as closed rounds, some at most: timetables first, then the longest on the map."""
+    """Choose some routes that can be driven as closed rounds: timetables first, then the longest on the map."""
     fits: list[tuple[Route, tuple[Berth, ...], Drive, float]] = []
     for route in routes:
         fit = _fit(route, kerbs, [*mapped, *(b for _, loop, _, _ in fits for b in loop)])
@@ -304,7 +302,7 @@ def _waiting_apart(chosen: Sequence[_Chosen], left_out: list[Dropped]) -> list[_
     ways = [line.drive.driven(line.loop)[0] for line in chosen]
 
     def start(k: int, kept: Sequence[int]) -> int:
-        """A stop of line k in a lane of its own among these, with another beside it if there is; -1 if it has none."""
+        """Choose line k's stop in a lane of its own among these, best with a lane beside it; -1 if it has none."""
         others = {lane for i in kept if i != k for lane in ways[i]}
         loop = chosen[k].loop[:1] if chosen[k].timed else chosen[k].loop
         own = [n for n, berth in enumerate(loop) if brief[k] or berth.lane not in others]
@@ -334,7 +332,7 @@ def _round_seconds(lanes: LaneGraph, way: set[int], loop: Sequence[Berth]) -> fl
 
 
 def _fit(route: Route, kerbs: Kerbs, known: Sequence[Berth]) -> tuple[tuple[Berth, ...], Drive, float] | str:
-    """A closed drive past a route's stops, there and back, else there and round; why not, if there is none."""
+    """Find a closed drive past a route's stops, there and back, else there and round; say why not if there is none."""
     drive = Drive(kerbs.lanes, route.way)
     reach = _FEED_REACH if route.origin == "gtfs" else _REACH
     by_key = {berth.key: berth for berth in known}
@@ -365,7 +363,7 @@ def _fit(route: Route, kerbs: Kerbs, known: Sequence[Berth]) -> tuple[tuple[Bert
 
 
 def _in_one_part(lanes: LaneGraph, *runs: list[list[tuple[float, Berth]]]) -> list[list[list[tuple[float, Berth]]]]:
-    """The choices on the part of the network, all of whose lanes lead to one another, that serves the most stops.
+    """Keep the choices on the part of the network, all lanes of which lead to one another, that serves the most stops.
 
     The window's edge cuts a network into several such parts.
     """

@@ -165,7 +165,7 @@ def _metres(drive: Drive, start: Berth, leg: Sequence[int], end: Berth) -> float
 
 
 def _way_about(drive: Drive, start: Berth, leg: list[int], end: Berth, rest: float) -> list[int]:
-    """The leg from the last stop to the first, longer by nearly `rest` seconds where the streets allow it."""
+    """Return the leg from the last stop to the first, longer by nearly `rest` seconds where the streets allow it."""
     base = _seconds(drive, start, leg, end)
     bends: list[Berth] = []
     best = leg

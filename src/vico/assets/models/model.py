@@ -1,0 +1,102 @@
+"""A thing that worlds are furnished with: its shape, what it is, and what can lie on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.world.mesh import Surface, joined
+
+
+@dataclass(frozen=True)
+class Top:
+    """A surface of a model that things can lie on.
+
+    Attributes
+    ----------
+    kind
+        Kind of container: sofa, table, chair, desk or bed.
+    height
+        Above the foot, metres.
+    size
+        Extent along x and y, metres.
+    centre
+        Its middle, from the model's origin, metres.
+    """
+
+    kind: str
+    height: float
+    size: tuple[float, float]
+    centre: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Model:
+    """A prototype: origin at the middle of its foot, z up, +x forward (the side people use it from), metres.
+
+    Attributes
+    ----------
+    name
+        Name of the prototype, unique.
+    kind
+        What it is.
+    group
+        amenity, natural, transit or indoor.
+    solid
+        Whether bodies are stopped by it.
+    foot
+        Extent along x and y of the part that stands in people's way, metres; None: the whole outline.
+    top
+        What things can lie on, if anything.
+    build
+        Makes its surfaces; called once, when they are first asked for.
+    """
+
+    name: str
+    kind: str
+    group: str
+    build: Callable[[], list[Surface]]
+    solid: bool = True
+    foot: tuple[float, float] | None = None
+    top: Top | None = None
+
+    @cached_property
+    def surfaces(self) -> list[Surface]:
+        """Its shape, one surface a material."""
+        return self.build()
+
+    @cached_property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lowest and highest corner, float64, shape ``(2, 3)``."""
+        points = np.concatenate([surface.positions for surface in self.surfaces])
+        return np.array([points.min(0), points.max(0)], np.float64)
+
+    @cached_property
+    def size(self) -> tuple[float, float, float]:
+        """Extent along x, y, z of the box around the origin that holds the model, metres."""
+        low, high = self.bounds
+        x, y = 2 * max(-low[0], high[0]), 2 * max(-low[1], high[1])
+        return round(float(x), 3), round(float(y), 3), round(float(high[2]), 3)
+
+    @property
+    def triangles(self) -> int:
+        """How many triangles it has."""
+        return sum(len(surface.triangles) for surface in self.surfaces)
+
+
+def model(
+    name: str,
+    parts: Iterable[Surface],
+    *,
+    kind: str | None = None,
+    group: str = "amenity",
+    solid: bool = True,
+    foot: tuple[float, float] | None = None,
+) -> Model:
+    """Collect the parts of a thing; parts of one material become one surface."""
+    surfaces = joined(parts)
+    return Model(name, kind or name, group, lambda: surfaces, solid, foot)

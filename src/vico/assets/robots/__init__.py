@@ -1,0 +1,25 @@
+"""Robots: what physics, control and drawing need to know of each."""
+
+from vico.assets.robots.catalogue import (
+    BUMP,
+    BUMPER,
+    FOOT_CONTACT,
+    TOUCH,
+    PolicyNetwork,
+    RobotModel,
+    robot_model,
+    robot_names,
+    robot_packages,
+)
+
+__all__ = [
+    "BUMP",
+    "BUMPER",
+    "FOOT_CONTACT",
+    "TOUCH",
+    "PolicyNetwork",
+    "RobotModel",
+    "robot_model",
+    "robot_names",
+    "robot_packages",
+]

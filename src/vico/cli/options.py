@@ -1,0 +1,235 @@
+"""Options of the verbs that have many, as records: parsed by the command line, taken by the verb's module."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+from tyro.conf import Positional
+
+from vico.errors import InputError
+
+CommaSeparated = Annotated[str, tyro.conf.arg(metavar="A,B,...")]
+
+
+@dataclass(frozen=True)
+class WorldBuildOptions:
+    """What `vico world build` is asked for.
+
+    Attributes
+    ----------
+    out
+        Folder to make; refused if it exists, unless --force.
+    osm
+        Map extract, .osm or .osm.pbf, plain or packed. Without it the packaged extract is used if it covers the
+        window, else an Overpass server is asked.
+    lat
+        Latitude of the window's centre, degrees.
+    lon
+        Longitude of the window's centre, degrees.
+    center
+        Both in one. Without any, the middle of the extract.
+    radius
+        Half the window's side, metres.
+    dem
+        Elevation: GeoTIFF, .hgt or packed .hgt; one or several that cover the window. Flat ground without.
+    tiles
+        Photogrammetry: path or address of a tileset.json. Ground, heights and walls are taken from it.
+    photos
+        Street pictures: a folder with poses, or "mapillary" (MAPILLARY_TOKEN in the environment).
+    places
+        Further places: Overture GeoParquet files, or "google" (your key in the environment).
+    gtfs
+        Timetables: zipped GTFS feeds.
+    layouts
+        Folder of room layouts to choose from.
+    things
+        Whose models street furniture and furniture wear: our own, or those of `vico assets install things`.
+    overpass
+        Address of the Overpass server, or "off"; else the environment's VICO_OVERPASS, else the public one.
+    refresh
+        Ask the server even if its answer is in the cache.
+    texel
+        Side of a texel of photographed walls, metres.
+    inpaint
+        What fills parts of walls that no photo shows.
+    upscale
+        What makes photographed walls finer.
+    model
+        For "diffusion": a folder with the model, or its name on a hub.
+    matcher
+        What finds the points that a street photo and a render of the world have in common.
+    matcher_weights
+        For "loftr": its checkpoint file.
+    mask
+        What finds people and vehicles in street photos: what the render does not show, or what the words for them
+        mean to a detector.
+    mask_detector
+        For "grounded": a folder with a Grounding DINO model.
+    mask_segmenter
+        For "grounded": a folder with a Segment Anything model.
+    layout_llm
+        A language model draws floor plans (VICO_LLM_BASE_URL, VICO_LLM_MODEL, VICO_LLM_KEY).
+    llm_calls
+        Most calls to it.
+    llm_tokens
+        Most tokens.
+    llm_cost
+        Most dollars, at the prices of VICO_LLM_PRICE.
+    seed
+        Decides what the map leaves open.
+    force
+        Replace what is in the output folder; stages whose inputs did not change are kept.
+    json
+        Print the result as JSON.
+    """
+
+    out: Path
+    osm: Path | None = None
+    lat: float | None = None
+    lon: float | None = None
+    center: Annotated[str | None, tyro.conf.arg(metavar="LAT,LON")] = None
+    radius: float = 400.0
+    dem: tuple[Path, ...] = ()
+    tiles: str | None = None
+    photos: str | None = None
+    places: tuple[str, ...] = ()
+    gtfs: tuple[Path, ...] = ()
+    layouts: Path | None = None
+    things: Literal["procedural", "installed"] = "procedural"
+    overpass: str | None = None
+    refresh: bool = False
+    texel: float = 0.10
+    inpaint: Literal["exemplar", "patchmatch", "diffusion", "none"] = "exemplar"
+    upscale: Literal["none", "sharpen", "realesrgan", "diffusion"] = "none"
+    model: str = ""
+    matcher: Literal["sift", "xfeat", "loftr"] = "sift"
+    matcher_weights: str = ""
+    mask: Literal["differences", "grounded"] = "differences"
+    mask_detector: str = ""
+    mask_segmenter: str = ""
+    layout_llm: bool = False
+    llm_calls: int | None = None
+    llm_tokens: int | None = None
+    llm_cost: float | None = None
+    seed: int = 0
+    force: bool = False
+    json: bool = False
+
+    def centre(self) -> tuple[float, float] | None:
+        """Return latitude and longitude of the window's centre, degrees; None for the extract's middle.
+
+        Raises
+        ------
+        InputError
+            If the centre is given twice, by half, or not as two numbers.
+        """
+        if self.center is not None:
+            if self.lat is not None or self.lon is not None:
+                raise InputError("world build: give --center or --lat and --lon, not both")
+            return lat_lon(self.center, "--center")
+        if self.lat is None and self.lon is None:
+            return None
+        if self.lat is None or self.lon is None:
+            raise InputError("world build: --lat and --lon go together")
+        return self.lat, self.lon
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """What `vico run` is asked for.
+
+    Attributes
+    ----------
+    world
+        World folder.
+    community
+        Community folder, made for that world.
+    out
+        Folder to record into; refused if it exists, unless --force.
+    start
+        Time of day, HH:MM or HH:MM:SS.
+    steps
+        Seconds to simulate.
+    robots
+        Names, separated by commas; none for no robots.
+    cars
+        How many cars drive around.
+    pedestrians
+        How many people nobody plays walk around.
+    observe
+        Whose views are rendered: all, none, or names separated by commas.
+    seed
+        Decides everything that is left to chance.
+    force
+        Replace what is in the output folder.
+    json
+        Print the metrics as JSON.
+    """
+
+    world: Positional[Path]
+    community: Positional[Path]
+    out: Path
+    start: str = "08:00"
+    steps: int = 1800
+    robots: CommaSeparated = "husky,go2"
+    cars: int = 30
+    pedestrians: int = 30
+    observe: CommaSeparated = "all"
+    seed: int = 0
+    force: bool = False
+    json: bool = False
+
+
+@dataclass(frozen=True)
+class AssistantOptions:
+    """What `vico eval assistant` is asked for.
+
+    Attributes
+    ----------
+    worlds
+        World folders; one episode for each world and seed.
+    out
+        Folder for tasks and results; refused if it exists, unless --force.
+    category
+        What is asked for.
+    method
+        Planner: random or heuristic.
+    assistants
+        How many assistants work together.
+    seeds
+        Episodes a world, seeded 0, 1, ...
+    steps
+        Seconds an episode may last.
+    force
+        Replace what is in the output folder.
+    json
+        Print the results as JSON.
+    """
+
+    worlds: list[Path]
+    out: Path
+    category: Literal["delivery"] = "delivery"
+    method: str = "heuristic"
+    assistants: int = 1
+    seeds: int = 3
+    steps: int = 1500
+    force: bool = False
+    json: bool = False
+
+
+def lat_lon(text: str, option: str) -> tuple[float, float]:
+    """Return the two numbers of ``LAT,LON``.
+
+    Raises
+    ------
+    InputError
+        If it is anything else; the message names the option.
+    """
+    try:
+        lat, lon = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"{option}: {text!r} is not LAT,LON; write for example 60.1690,24.9435") from None
+    return lat, lon

@@ -1,0 +1,169 @@
+"""What an author and the validator need to know of a world: which places can be reached, how far, and when."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from vico.community.hours import Span, open_spans, usual_spans
+from vico.errors import EmptyInputError
+from vico.world.folder import World
+from vico.world.model import Category, Place, Point2
+from vico.world.routing import Router
+from vico.world.walkable import CROSSING, ROADWAY
+
+#: Accommodation in which people stay for a while, not for good.
+GUEST_KINDS = frozenset({"hotel", "hostel", "motel", "guest_house", "apartment", "chalet", "alpine_hut"})
+
+#: Distance that spawn points keep from each other, metres.
+SPAWN_GAP = 2.0
+
+# A place that people can reach has its position on the walkable map, or a step beside it.
+_REACH = 2.0
+
+
+# Routes already found, for as long as their world is in use: the author's and the validator's are the same.
+_ROUTES: WeakKeyDictionary[World, dict[tuple[str, str], float]] = WeakKeyDictionary()
+
+
+class PlaceIndex:
+    """A world as its community knows it. Routes are found once and kept.
+
+    Parameters
+    ----------
+    world
+        Where people are to live.
+    weekday
+        0 Monday .. 6 Sunday: the day whose opening hours count.
+    """
+
+    def __init__(self, world: World, weekday: int) -> None:
+        self.world = world
+        self.weekday = weekday
+        self.router = Router(world.walkable)
+        self.place_by_id = {p.id: p for p in world.places}
+        self.buildings = {b.id: b for b in world.buildings}
+        self._seconds = _ROUTES.setdefault(world, {})
+        self._reachable: dict[str, bool] = {}
+
+    def reachable(self, place: Place) -> bool:
+        """Whether a place can be reached on foot from the map's edge."""
+        if place.id not in self._reachable:
+            found = self.router.nearest_walkable(place.position[:2], within=_REACH)
+            self._reachable[place.id] = found is not None
+        return self._reachable[place.id]
+
+    def places(self, categories: Iterable[Category] = tuple(Category)) -> list[Place]:
+        """Reachable places of some categories, in the world's order."""
+        wanted = set(categories)
+        return [p for p in self.world.places if p.category in wanted and self.reachable(p)]
+
+    def homes(self) -> tuple[list[Place], list[Place]]:
+        """Dwellings, then places for guests.
+
+        Raises
+        ------
+        EmptyInputError
+            If there is no reachable accommodation at all.
+        """
+        found = self.places([Category.ACCOMMODATION])
+        if not found:
+            raise EmptyInputError(
+                f"community: world {self.world.manifest.name!r} has no reachable accommodation among its "
+                f"{len(self.world.places)} places; build a world with a larger --radius"
+            )
+        return (
+            [p for p in found if kind_of(p) not in GUEST_KINDS],
+            [p for p in found if kind_of(p) in GUEST_KINDS],
+        )
+
+    def same_spot(self, a: str, b: str) -> bool:
+        """Whether two places need no way between them: the same place, or places of one building."""
+        if a == b:
+            return True
+        building = self.place_by_id[a].building
+        return building is not None and building == self.place_by_id[b].building
+
+    def seconds(self, a: str, b: str) -> float:
+        """Seconds on foot from one place to another, at 1 m/s; infinite if there is no way; 0 within a building."""
+        if self.same_spot(a, b):
+            return 0.0
+        if (a, b) not in self._seconds:
+            start, goal = self.place_by_id[a].position, self.place_by_id[b].position
+            self._seconds[a, b] = self.router.seconds(start[:2], goal[:2])
+        return self._seconds[a, b]
+
+    def minutes(self, a: str, b: str) -> int | None:
+        """Minutes to allow for the walk between two places; None if there is no way.
+
+        A twentieth and twenty seconds more than the route takes (doors, others on the pavement), in whole minutes.
+        """
+        seconds = self.seconds(a, b)
+        if seconds == 0:
+            return 0
+        return None if math.isinf(seconds) else math.ceil((seconds * 1.05 + 20) / 60)
+
+    def estimate(self, a: str, b: str) -> int:
+        """Minutes that a walk may take, before a route is asked for: streets are half as long again as the bee line."""
+        return 0 if self.same_spot(a, b) else math.ceil((self.metres(a, b) * 1.5 + 45) / 60)
+
+    def metres(self, a: str, b: str) -> float:
+        """Metres between two places as the crow flies: enough to tell near from far."""
+        p, q = self.place_by_id[a].position, self.place_by_id[b].position
+        return math.hypot(p[0] - q[0], p[1] - q[1])
+
+    def given_hours(self, place: Place) -> list[Span] | None:
+        """When the place says it is open on the day, minutes; None if it doesn't say, or not in a form we read."""
+        return None if place.opening_hours is None else open_spans(place.opening_hours, self.weekday)
+
+    def hours(self, place: Place) -> list[Span]:
+        """When a place is open on the day, minutes: what it says, else what is usual for its kind."""
+        given = self.given_hours(place)
+        return usual_spans(kind_of(place), place.category) if given is None else given
+
+    def spawn_points(self, homes: list[str]) -> list[Point2]:
+        """Return a free spot by each home: reachable, off the carriageway, at least `SPAWN_GAP` from all others.
+
+        Parameters
+        ----------
+        homes
+            Place ids; one may occur several times.
+
+        Raises
+        ------
+        EmptyInputError
+            If there is no room near a home.
+        """
+        walkable = self.world.walkable
+        standing = walkable.connected & (walkable.cls != ROADWAY) & (walkable.cls != CROSSING)
+        taken = np.empty((0, 2))
+        for home in homes:
+            centre = np.asarray(self.place_by_id[home].position[:2])
+            for reach in (12.0, 40.0, 120.0):
+                low, high = walkable.cell_of([centre - reach, centre + reach])
+                window = standing[low[1] : high[1] + 1, low[0] : high[0] + 1]
+                iy, ix = np.nonzero(window)
+                points = walkable.centre_of(np.column_stack([ix + low[0], iy + low[1]]))
+                if len(taken) and len(points):
+                    gaps = np.linalg.norm(points[:, None] - taken[None], axis=2).min(axis=1)
+                    points = points[gaps >= SPAWN_GAP]
+                if len(points):
+                    break
+            else:
+                raise EmptyInputError(
+                    f"community: no room to stand within 120 m of {self.place_by_id[home].name!r} ({home}); "
+                    "ask for fewer residents"
+                )
+            # The distance in whole millimetres first, then the position: ties break the same way everywhere.
+            far = np.rint(np.linalg.norm(points - centre, axis=1) * 1000)
+            best = points[np.lexsort((points[:, 0], points[:, 1], far))[0]]
+            taken = np.vstack([taken, best])
+        return [(float(x), float(y)) for x, y in taken]
+
+
+def kind_of(place: Place) -> str:
+    """Return the place's kind, of several (``nightclub;restaurant``) the first, in lower case."""
+    return place.kind.split(";")[0].strip().lower()

@@ -1,0 +1,165 @@
+"""Whether an environment keeps its promises: the parallel contract, its spaces, repeatability, refusals, endings."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pettingzoo import ParallelEnv
+
+_BAD_ACTION = {"type": "no such action"}
+
+
+@dataclass(frozen=True)
+class EnvFinding:
+    """A promise that is not kept.
+
+    Attributes
+    ----------
+    promise
+        ``contract``, ``space``, ``repeatable``, ``refusal`` or ``ending``.
+    where
+        Agent and step.
+    what
+        What is wrong, with the values.
+    """
+
+    promise: str
+    where: str
+    what: str
+
+
+def check_env(env: ParallelEnv[str, Any, Any], *, seed: int = 0, max_steps: int = 2000) -> list[EnvFinding]:
+    """Play two episodes of one seed with sampled actions, and look whether the environment keeps its promises.
+
+    Parameters
+    ----------
+    env
+        Ours, or one around it. It is reset, and left where the second episode ended.
+    seed
+        Of the episodes and of the actions.
+    max_steps
+        An episode that is not over by then is left there; that is no finding.
+
+    Returns
+    -------
+    list of EnvFinding
+        What is wrong; nothing if all promises are kept. Of one kind for one agent the first is enough.
+    """
+    found: dict[tuple[str, str], EnvFinding] = {}
+    digests: list[list[str]] = []
+    for _ in range(2):
+        steps: list[str] = []
+        for finding in _episode(env, seed, max_steps, steps):
+            found.setdefault((finding.promise, finding.where.split(",")[0]), finding)
+        digests.append(steps)
+    first, second = digests
+    if first != second:
+        at = next(
+            (k for k, (a, b) in enumerate(zip(first, second, strict=False)) if a != b), min(len(first), len(second))
+        )
+        what = f"two episodes of seed {seed} differ from step {at} on; draw chance from the seed alone"
+        found["repeatable", ""] = EnvFinding("repeatable", f"step {at}", what)
+    return list(found.values())
+
+
+def _episode(env: ParallelEnv[str, Any, Any], seed: int, max_steps: int, digests: list[str]) -> Iterator[EnvFinding]:
+    observations, infos = env.reset(seed=seed)
+    yield from _check_agents(env)
+    agents = list(env.agents)
+    if set(agents) != set(observations) or set(agents) != set(infos):
+        yield EnvFinding("contract", "reset", "observations and infos are not those of `agents`; give one each")
+    yield from _check_observations(env, observations, "reset")
+    digests.append(_digest(observations, infos))
+    for k, name in enumerate(env.possible_agents):
+        env.action_space(name).seed(seed + k)
+    gone: set[str] = set()
+    for step in range(1, max_steps + 1):
+        if not agents:
+            return
+        # Once, everybody asks for what there is not: it has to be refused, and told.
+        bad = step == 1
+        actions = {name: dict(_BAD_ACTION) if bad else env.action_space(name).sample() for name in agents}
+        result = env.step(actions)
+        yield from _check_step(env, agents, result, step)
+        observations, _, ended, cut, infos = result
+        if bad:
+            yield from _check_refusals(observations)
+        gone |= {name for name in agents if ended.get(name) or cut.get(name)}
+        back = sorted(gone & set(env.agents))
+        if back:
+            yield EnvFinding("ending", f"{back[0]}, step {step}", "ended and is among `agents` again; leave it out")
+        digests.append(_digest(observations, infos))
+        agents = list(env.agents)
+
+
+def _check_agents(env: ParallelEnv[str, Any, Any]) -> Iterator[EnvFinding]:
+    names = list(env.possible_agents)
+    if not names or len(set(names)) != len(names):
+        yield EnvFinding("contract", "possible_agents", f"{names}: names have to be there, each once")
+    if not set(env.agents) <= set(names):
+        yield EnvFinding("contract", "agents", "somebody is not among possible_agents; list all there")
+    for name in names:
+        same = env.observation_space(name) is env.observation_space(name)
+        if not same or env.action_space(name) is not env.action_space(name):
+            yield EnvFinding("contract", name, "its spaces are made anew each time; return the same objects")
+
+
+def _check_step(
+    env: ParallelEnv[str, Any, Any], agents: list[str], result: tuple[Any, ...], step: int
+) -> Iterator[EnvFinding]:
+    observations, rewards, ended, cut, _ = result
+    for part, content in zip(("observations", "rewards", "terminations", "truncations", "infos"), result, strict=True):
+        if set(content) != set(agents):
+            yield EnvFinding("contract", f"{part}, step {step}", "not those who acted; give one for each of them")
+    for name, reward in rewards.items():
+        if not np.isfinite(reward):
+            yield EnvFinding("contract", f"{name}, step {step}", f"its reward is {reward}; give a finite number")
+    for name in ended:
+        flags = (ended[name], cut.get(name))
+        if not all(isinstance(flag, (bool, np.bool_)) for flag in flags):
+            yield EnvFinding("contract", f"{name}, step {step}", f"its flags are {flags}; give True or False")
+    yield from _check_observations(env, observations, f"step {step}")
+
+
+def _check_observations(
+    env: ParallelEnv[str, Any, Any], observations: Mapping[str, Any], when: str
+) -> Iterator[EnvFinding]:
+    for name, seen in observations.items():
+        if not env.observation_space(name).contains(seen):
+            yield EnvFinding("space", f"{name}, {when}", "its observation is not in its observation space")
+
+
+def _check_refusals(observations: Mapping[str, Any]) -> Iterator[EnvFinding]:
+    for name, seen in observations.items():
+        state = seen.get("state", {})
+        told = state.get("action_status") == "refused" and state.get("action_code") and state.get("action_reason")
+        if not told:
+            status = state.get("action_status")
+            yield EnvFinding("refusal", name, f"a bad action is {status!r}; refuse it with a code and a reason")
+
+
+def _digest(observations: Mapping[str, Any], infos: Mapping[str, Any]) -> str:
+    """Hash what everybody was given: the state's hash where infos have it, and observations."""
+    digest = hashlib.blake2b(digest_size=16)
+    for name in sorted(observations):
+        digest.update(f"{name}|{infos.get(name, {}).get('hash', '')}|".encode())
+        _feed(digest, observations[name])
+    return digest.hexdigest()
+
+
+def _feed(digest: Any, value: Any) -> None:
+    if isinstance(value, Mapping):
+        for key in sorted(value):
+            digest.update(f"{key}:".encode())
+            _feed(digest, value[key])
+    elif isinstance(value, np.ndarray):
+        digest.update(f"{value.dtype.str}{value.shape}".encode() + np.ascontiguousarray(value).tobytes())
+    else:
+        digest.update(repr(value).encode())
+
+
+__all__ = ["EnvFinding", "check_env"]

@@ -1,0 +1,23 @@
+"""Environments by id: ``gymnasium.make("vico/Community-v0", ...)`` and PettingZoo's registry where it has one."""
+
+from __future__ import annotations
+
+import gymnasium
+import pettingzoo
+
+#: One agent among residents (Gymnasium), and everybody at once (PettingZoo, parallel).
+ID = "vico/Community-v0"
+
+
+def register_ids() -> None:
+    """Register the environments; once is enough, and more does no harm.
+
+    Both take a world's folder as `world` and a community's as `community`, and the options of
+    `vico.envs.spec.EnvSpec`.
+    """
+    if ID not in gymnasium.registry:
+        # The checks of Gymnasium's own wrapper would refuse the short form of actions.
+        gymnasium.register(ID, entry_point="vico.agents.single:make_single", disable_env_checker=True)
+    registry = getattr(pettingzoo, "parallel_registry", None)
+    if registry is not None and ID not in registry:
+        pettingzoo.register("parallel", ID, entry_point="vico.envs.parallel:make")

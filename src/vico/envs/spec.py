@@ -1,0 +1,154 @@
+"""What an environment is made from, as a record that goes to JSON and back."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any, TypedDict
+
+from pydantic import TypeAdapter, ValidationError
+
+from vico.clock import seconds_of_day
+from vico.errors import InputError, SchemaError
+from vico.sim.config import SimConfig
+
+SCHEMA = "vico.env"
+VERSION = 1
+
+
+class EnvOptions(TypedDict, total=False):
+    """Options of an environment, beside its world and community; see `EnvSpec`."""
+
+    seed: int
+    start: str
+    residents: int | None
+    assistants: int
+    robots: tuple[str, ...]
+    errands: bool
+    cars: int
+    pedestrians: int
+    transit: bool
+    observe: str | tuple[str, ...]
+    image: int
+    max_steps: int
+
+
+@dataclass(frozen=True)
+class EnvSpec:
+    """What an environment is made from.
+
+    Attributes
+    ----------
+    world, community
+        Folders, if the environment was made from folders; a community of None is nobody.
+    seed
+        Decides the first episode.
+    start
+        Time of day, ``HH:MM`` or ``HH:MM:SS``.
+    residents
+        How many of the community's residents take part; None for all.
+    assistants
+        Avatars under test, without home or schedule.
+    robots
+        Model names; robot ``i`` is the agent ``robot_i``.
+    errands
+        Robots that nobody controls go from place to place.
+    cars, pedestrians
+        Vehicles and people nobody plays.
+    transit
+        Whether buses and bicycles are there.
+    observe
+        Whose views are rendered: ``"all"``, ``"none"``, or names.
+    image
+        Side of the square images, pixels.
+    max_steps
+        Length of an episode, steps of one second.
+    """
+
+    world: str | None = None
+    community: str | None = None
+    seed: int = 0
+    start: str = "08:00"
+    residents: int | None = None
+    assistants: int = 0
+    robots: tuple[str, ...] = ()
+    errands: bool = False
+    cars: int = 0
+    pedestrians: int = 0
+    transit: bool = True
+    observe: str | tuple[str, ...] = "all"
+    image: int = 256
+    max_steps: int = 1500
+
+    @classmethod
+    def of(cls, world: Any, community: Any, options: EnvOptions) -> EnvSpec:
+        """Make a spec from what `make` is given; worlds and communities in memory have no folder to name.
+
+        Raises
+        ------
+        InputError
+            If an option is not known.
+        """
+        known = [field.name for field in fields(cls)]
+        unknown = [name for name in options if name not in known]
+        if unknown:
+            raise InputError(f"env: there is no option {unknown[0]!r}; options are {', '.join(known)}")
+        return cls(_folder(world), _folder(community), **options)
+
+    @property
+    def config(self) -> SimConfig:
+        """The simulation's configuration."""
+        return SimConfig(
+            seed=self.seed,
+            start=seconds_of_day(self.start),
+            residents=self.residents,
+            assistants=self.assistants,
+            robots=tuple(self.robots),
+            errands=self.errands,
+            cars=self.cars,
+            pedestrians=self.pedestrians,
+            transit=self.transit,
+            observe=self._observers(),
+            image=self.image,
+        )
+
+    def _observers(self) -> tuple[str, ...] | None:
+        if isinstance(self.observe, str):
+            return {"all": None, "none": ()}.get(self.observe, (self.observe,))
+        return tuple(self.observe)
+
+    def to_json(self) -> str:
+        """Return the spec as JSON text."""
+        return json.dumps({"schema_name": SCHEMA, "version": VERSION} | asdict(self), indent=1)
+
+    @classmethod
+    def from_json(cls, text: str) -> EnvSpec:
+        """Read what `to_json` wrote.
+
+        Raises
+        ------
+        SchemaError
+            If it is no such text, of another version, or a field is unknown or not usable.
+        """
+        try:
+            content = json.loads(text)
+        except json.JSONDecodeError as error:
+            raise SchemaError(f"env spec: not JSON ({error}); write it with EnvSpec.to_json") from None
+        found = (content.pop("schema_name", None), content.pop("version", None)) if isinstance(content, dict) else None
+        if found != (SCHEMA, VERSION):
+            raise SchemaError(f"env spec: not {SCHEMA} version {VERSION}; write it with EnvSpec.to_json")
+        known = {field.name for field in fields(cls)}
+        unknown = sorted(set(content) - known)
+        if unknown:
+            raise SchemaError(f"env spec: {unknown[0]}: no such field; fields are {', '.join(sorted(known))}")
+        try:
+            return TypeAdapter(cls).validate_python(content)
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(str(part) for part in first["loc"])
+            raise SchemaError(f"env spec: {where}: {first['msg']}") from None
+
+
+def _folder(source: Any) -> str | None:
+    return str(source) if isinstance(source, (str, Path)) else None

@@ -1,0 +1,225 @@
+"""Folders that appear whole or not at all, and that one process at a time writes.
+
+Whoever writes into a folder holds a lock on it (`flock` on the folder itself: no lock file is left behind, and the
+system lets go of it when the process ends, however it ends). Whoever wants to replace the folder is refused meanwhile.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from vico.errors import OutputError, OutputExistsError, VicoError
+from vico.io.files import reason_of, write_errors
+
+_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO)
+
+
+class FolderLock:
+    """The exclusive right to write into a folder, which is there already; held until `release`.
+
+    Parameters
+    ----------
+    folder
+        The folder.
+    name
+        What to call it in errors; `folder` itself if None.
+
+    Raises
+    ------
+    OutputError
+        If another process (or another lock of this one) holds it, or the folder cannot be opened.
+    """
+
+    def __init__(self, folder: Path, *, name: Path | None = None) -> None:
+        self.folder, self.name = folder, name or folder
+        with write_errors(self.name):
+            self._handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            with write_errors(self.name):
+                _lock(self._handle, self.name)
+            self.confirm()
+        except BaseException:
+            self.release()
+            raise
+
+    def confirm(self) -> None:
+        """Make sure that the folder is still the one that was locked.
+
+        Raises
+        ------
+        OutputError
+            If it was deleted, moved or replaced since.
+        """
+        held = os.fstat(self._handle)
+        try:
+            there = os.stat(self.folder)
+        except OSError:
+            there = None
+        if there is None or (there.st_ino, there.st_dev) != (held.st_ino, held.st_dev):
+            raise OutputError(
+                f"{self.name}: {self.folder} was taken away while it was written; give the same command again"
+            )
+
+    def release(self) -> None:
+        """Let others write; nothing happens if that was done before."""
+        if self._handle >= 0:
+            os.close(self._handle)
+            self._handle = -1
+
+    def __enter__(self) -> FolderLock:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+
+def _lock(handle: int, name: Path) -> None:
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise OutputError(
+            f"{name}: another process is writing it right now; stop that one, or choose another folder"
+        ) from None
+
+
+def is_being_written(folder: Path) -> bool:
+    """Return whether a living process holds the lock of a folder."""
+    try:
+        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(handle)
+    return False
+
+
+def check_replaceable(out: Path, *, force: bool) -> None:
+    """Make sure that an output folder may be made, or replaced.
+
+    Raises
+    ------
+    OutputExistsError
+        If it holds something and `force` is not given.
+    OutputError
+        If another process is writing it.
+    """
+    if not force and (out.exists() or out.is_symlink()) and (not out.is_dir() or any(out.iterdir())):
+        raise OutputExistsError(f"{out}: exists already; choose another --out, or replace it with --force")
+    if is_being_written(out):
+        raise OutputError(f"{out}: another process is writing it right now; stop that one, or choose another folder")
+
+
+@contextmanager
+def new_folder(out: Path, *, force: bool = False, work: Path | None = None) -> Iterator[Path]:
+    """Yield a locked folder that takes the name of `out` when the block ends well.
+
+    Parameters
+    ----------
+    out
+        Folder to make; its parents are made, too.
+    force
+        Replace what is there.
+    work
+        Neighbour of `out` to work in. It is kept when the block fails, so that work can go on there the next time,
+        unless it is empty. Without, the work is done in an unnamed neighbour that goes away when the block fails.
+
+    Raises
+    ------
+    OutputExistsError
+        If `out` holds something and `force` is not given.
+    OutputError
+        If another process writes `out` or `work`, the disk is full, the folder is taken away while it is written, or
+        rights are missing. What was at `out` is then still there.
+    """
+    check_replaceable(out, force=force)
+    made = [path for path in (*([work] if work else []), *out.parents) if not path.exists()]
+    with write_errors(out):
+        out.parent.mkdir(parents=True, exist_ok=True)
+        if work is None:
+            folder = Path(tempfile.mkdtemp(prefix=f".{out.name}.", dir=out.parent))
+            folder.chmod(0o755)
+        else:
+            folder = work
+            folder.mkdir(exist_ok=True)
+    with FolderLock(folder, name=out) as lock:
+        try:
+            with folder_errors(folder, name=out):
+                yield folder
+                lock.confirm()
+                put_in_place(folder, out)
+        except BaseException:
+            if work is None:
+                shutil.rmtree(folder, ignore_errors=True)
+            for path in made:
+                with suppress(OSError):
+                    path.rmdir()  # works on empty folders alone: what was made here and not filled
+            raise
+
+
+@contextmanager
+def folder_errors(folder: Path, *, name: Path | None = None) -> Iterator[None]:
+    """Turn an `OSError` of the block that is about the disk, or about a path in `folder`, into an `OutputError`.
+
+    Parameters
+    ----------
+    name
+        What to call the folder in errors; `folder` itself if None.
+    """
+    try:
+        yield
+    except VicoError:
+        raise
+    except OSError as error:
+        path = Path(os.fsdecode(error.filename)) if isinstance(error.filename, str | bytes) else None
+        if error.errno not in _DISK and (path is None or not path.is_relative_to(folder)):
+            raise
+        raise OutputError(f"{name or folder}: cannot be written: {reason_of(error)}") from None
+
+
+def put_in_place(folder: Path, out: Path) -> None:
+    """Give a finished folder the name `out`; what was there goes once the new one has it.
+
+    Raises
+    ------
+    OutputError
+        If another process is writing what is at `out`, or it cannot be replaced.
+    """
+    with write_errors(out):
+        if not (out.exists() or out.is_symlink()):
+            os.replace(folder, out)
+            return
+        old = out.with_name(f".{out.name}.old-{os.getpid()}")
+        if out.is_dir() and not out.is_symlink():
+            with FolderLock(out):
+                _swap(folder, out, old)
+        else:
+            _swap(folder, out, old)
+        remove(old)
+
+
+def _swap(folder: Path, out: Path, old: Path) -> None:
+    os.replace(out, old)
+    try:
+        os.replace(folder, out)
+    except BaseException:
+        os.replace(old, out)
+        raise
+
+
+def remove(path: Path) -> None:
+    """Delete a file, a link or a whole folder; nothing happens where there is none."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)

@@ -1,0 +1,14 @@
+"""How the renderer's kernels are compiled: cached, without the interpreter's lock, with C's rules for division.
+
+An `inlined` function costs nothing where it is called: the compiler puts its body there. Rules that one loop applies to
+every pixel, triangle or instance are such functions.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import njit
+
+kernel: Any = njit(cache=True, nogil=True, error_model="numpy")
+inlined: Any = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)

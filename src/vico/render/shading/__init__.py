@@ -1,0 +1,1 @@
+"""Which colour a pixel gets: texture, sun, sky light, lamps, haze; and the sky itself."""

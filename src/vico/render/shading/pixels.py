@@ -1,0 +1,293 @@
+"""Colours of many pixels at a time: texture, sun, sky light and haze.
+
+`vico.render.shading.shade` lays pixels into a queue, one field behind the other; here a full queue is worked off in
+short loops over all of its places, which the compiler turns into vector code. Only loads from tables, which it can't,
+are loops of their own. Everything is single precision: colours need no more.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.render.arrays import QUEUE, STRIDE
+from vico.render.compiled import inlined, kernel
+from vico.render.lighting import TONE_RANGE, TONE_STEPS
+
+# Fields, float32: texture coordinates in texels and their step between samples; colour; normal; position; share of the
+# sky that is seen; light of its own; shares of the sun and the sky that moving things leave.
+U, V, SU, SV, RED, GREEN, BLUE, NX, NY, NZ, X, Y, Z, SKY, SHINE, SUN, AROUND = (k * STRIDE for k in range(17))
+_F, _G, _A, _B, _LEVEL, _LIT = (k * STRIDE for k in range(17, 23))
+# Fields, uint32: first texel, columns and rows of the texture's level, and the pixel.
+START, COLUMNS, ROWS, PIXEL = (k * STRIDE for k in range(4))
+_I0, _I1, _I2, _I3, _T0, _T1, _T2, _T3, _PAIR, _MIDDLE = (k * STRIDE for k in range(4, 14))
+
+
+class PixelQueue(NamedTuple):
+    """Fields of pixels that wait for their colour, one behind the other.
+
+    Attributes
+    ----------
+    real, whole
+        float32 and uint32, shape ``(fields * STRIDE,)``.
+    """
+
+    real: NDArray[np.float32]
+    whole: NDArray[np.uint32]
+
+
+class MovingShadows(NamedTuple):
+    """What things that move leave of the light of each pixel; see `cast_moving`.
+
+    Attributes
+    ----------
+    sun, contact
+        0..1, float32, shape ``(h * w,)``.
+    any
+        Whether there are any; else the arrays hold nothing.
+    """
+
+    sun: NDArray[np.float32]
+    contact: NDArray[np.float32]
+    any: bool
+
+
+_ZERO, _HALF, _ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)
+_TINY = np.float32(1e-12)
+_TONE_SCALE = np.float32((TONE_STEPS - 1) / TONE_RANGE)
+_TONE_LAST = np.float32(TONE_STEPS - 1)
+# sRGB to linear light as a polynomial of the byte / 255: off by less than 0.003.
+_P1, _P2, _P3 = np.float32(0.012522878), np.float32(0.682171111), np.float32(0.305306011)
+
+
+@kernel
+def look_up(texels: Any, real: Any, whole: Any, along: Any) -> None:
+    """Look texels up, bilinear and repeating: red and blue (16 bits up), green and alpha (16 bits up), times 256.
+
+    Four weights that add up to 256 multiply two channels at once.
+    """
+    for i in range(QUEUE):
+        x, y = real[U + i] + along * real[SU + i], real[V + i] + along * real[SV + i]
+        floor_x, floor_y = np.floor(x), np.floor(y)
+        real[_F + i], real[_G + i] = x - floor_x, y - floor_y
+        whole[_I0 + i], whole[_I1 + i] = np.int32(floor_x), np.int32(floor_y)
+    for i in range(QUEUE):
+        columns = whole[COLUMNS + i]
+        left, right = whole[_I0 + i] & (columns - 1), (whole[_I0 + i] + 1) & (columns - 1)
+        rows = whole[ROWS + i]
+        upper = whole[START + i] + (whole[_I1 + i] & (rows - 1)) * columns
+        lower = whole[START + i] + ((whole[_I1 + i] + 1) & (rows - 1)) * columns
+        whole[_I0 + i], whole[_I1 + i] = upper + left, upper + right
+        whole[_I2 + i], whole[_I3 + i] = lower + left, lower + right
+    for i in range(QUEUE):
+        whole[_T0 + i] = texels[whole[_I0 + i]]
+        whole[_T1 + i] = texels[whole[_I1 + i]]
+        whole[_T2 + i] = texels[whole[_I2 + i]]
+        whole[_T3 + i] = texels[whole[_I3 + i]]
+    for i in range(QUEUE):
+        f, g = np.int32(real[_F + i] * np.float32(256.0)), np.int32(real[_G + i] * np.float32(256.0))
+        wd = np.int32((f * g) >> 8)
+        wb, wc = np.int32(f - wd), np.int32(g - wd)
+        wa = np.int32(256 - f - wc)
+        a, b, c, d = whole[_T0 + i], whole[_T1 + i], whole[_T2 + i], whole[_T3 + i]
+        whole[_PAIR + i] = (a & 0xFF00FF) * wa + (b & 0xFF00FF) * wb + (c & 0xFF00FF) * wc + (d & 0xFF00FF) * wd
+        whole[_MIDDLE + i] = (
+            ((a >> 8) & 0xFF00FF) * wa
+            + ((b >> 8) & 0xFF00FF) * wb
+            + ((c >> 8) & 0xFF00FF) * wc
+            + ((d >> 8) & 0xFF00FF) * wd
+        )
+
+
+@kernel
+def sample_albedo(texels: Any, real: Any, whole: Any, taps: int) -> None:
+    """Multiply the colours of all places by their textures: the mean of `taps` samples along each one's step.
+
+    A texture's alpha says how much of a place's own light is on.
+    """
+    if taps == 0:
+        return
+    share = np.float32(1.0 / taps)
+    factor = np.float32(1.0 / (256.0 * 255.0)) * share
+    for i in range(QUEUE):
+        real[_A + i], real[_B + i], real[_LEVEL + i], real[_LIT + i] = _ZERO, _ZERO, _ZERO, _ZERO
+    for tap in range(taps):
+        look_up(texels, real, whole, (np.float32(tap) + _HALF) * share - _HALF)
+        for i in range(QUEUE):
+            pair, middle = whole[_PAIR + i], whole[_MIDDLE + i]
+            real[_A + i] += np.float32(np.int32(pair & 0xFFFF))
+            real[_B + i] += np.float32(np.int32(middle & 0xFFFF))
+            real[_LIT + i] += np.float32(np.int32(middle >> 16))
+            real[_LEVEL + i] += np.float32(np.int32(pair >> 16))
+    for i in range(QUEUE):
+        r, g, b = real[_A + i] * factor, real[_B + i] * factor, real[_LEVEL + i] * factor
+        real[RED + i] *= r * (_P1 + r * (_P2 + r * _P3))
+        real[GREEN + i] *= g * (_P1 + g * (_P2 + g * _P3))
+        real[BLUE + i] *= b * (_P1 + b * (_P2 + b * _P3))
+        real[SHINE + i] *= real[_LIT + i] * factor
+
+
+@kernel
+def sun_visibility(light: Any, shadow: Any, real: Any, whole: Any) -> None:
+    """Leave in `real[_F:]` how much of the sun every place gets: its slope, and shadows.
+
+    Static shadows are four comparisons around a position of the shadow map, blended.
+    """
+    if face_sun(light, real) <= _ZERO:
+        return
+    _project_on_shadow_map(shadow.matrix, np.int32(shadow.closeness.shape[0]), real, whole)
+    size = shadow.closeness.shape[0]
+    flat = shadow.closeness.reshape(-1)
+    for i in range(QUEUE):
+        at = whole[_I0 + i]
+        below = at + np.uint32(size)
+        whole[_T0 + i], whole[_T1 + i] = flat[at], flat[at + np.uint32(1)]
+        whole[_T2 + i], whole[_T3 + i] = flat[below], flat[below + np.uint32(1)]
+    for i in range(QUEUE):
+        a, b, level = real[_A + i], real[_B + i], real[_LEVEL + i]
+        t0, t1 = np.float32(np.int32(whole[_T0 + i])), np.float32(np.int32(whole[_T1 + i]))
+        t2, t3 = np.float32(np.int32(whole[_T2 + i])), np.float32(np.int32(whole[_T3 + i]))
+        low = (_ONE - a if t0 <= level else _ZERO) + (a if t1 <= level else _ZERO)
+        high = (_ONE - a if t2 <= level else _ZERO) + (a if t3 <= level else _ZERO)
+        real[_F + i] *= (low + b * (high - low)) * real[SUN + i]
+
+
+@inlined
+def face_sun(light: Any, real: Any) -> Any:
+    """Leave in `real[_F:]` the cosine of the sun's slope on every place, 0 where it is behind; return the largest."""
+    sun_x, sun_y, sun_z = light.sun_x, light.sun_y, light.sun_z
+    most = _ZERO
+    for i in range(QUEUE):
+        facing = max(real[NX + i] * sun_x + real[NY + i] * sun_y + real[NZ + i] * sun_z, _ZERO)
+        real[_F + i] = facing
+        most = max(most, facing)
+    return most
+
+
+@inlined
+def _project_on_shadow_map(frame: Any, size: Any, real: Any, whole: Any) -> None:
+    """Leave every place's texel in `whole[_I0:]`, its share of the next ones and its closeness to the sun in `real`."""
+    f00, f01, f02, f03 = frame[0, 0], frame[0, 1], frame[0, 2], frame[0, 3] - _HALF
+    f10, f11, f12, f13 = frame[1, 0], frame[1, 1], frame[1, 2], frame[1, 3] - _HALF
+    f20, f21, f22, f23 = frame[2, 0], frame[2, 1], frame[2, 2], frame[2, 3]
+    rim = np.float32(size - 1)
+    # A little off the surface, or it would shade itself.
+    off = np.float32(0.2)
+    for i in range(QUEUE):
+        px, py, pz = (
+            real[X + i] + off * real[NX + i],
+            real[Y + i] + off * real[NY + i],
+            real[Z + i] + off * real[NZ + i],
+        )
+        u = f00 * px + f01 * py + f02 * pz + f03
+        v = f10 * px + f11 * py + f12 * pz + f13
+        level = f20 * px + f21 * py + f22 * pz + f23
+        ok = (u >= _ZERO) & (v >= _ZERO) & (u < rim) & (v < rim) & (real[_F + i] > _ZERO)
+        u, v = u if ok else _ZERO, v if ok else _ZERO
+        floor_u, floor_v = np.floor(u), np.floor(v)
+        real[_A + i], real[_B + i] = u - floor_u, v - floor_v
+        real[_LEVEL + i] = level if ok else np.float32(1e9)
+        whole[_I0 + i] = np.int32(floor_v) * size + np.int32(floor_u)
+
+
+@kernel
+def light_outdoors(light: Any, camera: Any, real: Any, whole: Any) -> None:
+    """Light places by sun, sky and haze: leave rows of the tone table in `whole`."""
+    vx, vy, vz = np.float32(camera.x), np.float32(camera.y), np.float32(camera.z)
+    sun_x, sun_y, sun_z = light.sun_x, light.sun_y, light.sun_z
+    sun_red, sun_green, sun_blue = light.sun_red, light.sun_green, light.sun_blue
+    ambient_red, ambient_green, ambient_blue = light.ambient_red, light.ambient_green, light.ambient_blue
+    tilt_red, tilt_green, tilt_blue = light.tilt_red, light.tilt_green, light.tilt_blue
+    haze_red, haze_green, haze_blue = light.haze_red, light.haze_green, light.haze_blue
+    haze_per_metre, side_x, side_y = light.haze_per_metre, light.side_x, light.side_y
+    green_shine, blue_shine = np.float32(0.86), np.float32(0.62)
+    for i in range(QUEUE):
+        gx, gy, gz = real[X + i] - vx, real[Y + i] - vy, real[Z + i] - vz
+        length = np.sqrt(gx * gx + gy * gy + gz * gz)
+        haze = length * haze_per_metre
+        clear = _ONE / (_ONE + haze * (_ONE + haze * (_HALF + haze * np.float32(0.1666))))
+        haze = _ONE - clear
+        toward = max((gx * sun_x + gy * sun_y + gz * sun_z) / max(length, _TINY), _ZERO)
+        glow = np.float32(0.10) * toward * toward * toward
+        nz, share = real[NZ + i], real[SKY + i] * real[AROUND + i]
+        side = real[NX + i] * side_x + real[NY + i] * side_y
+        facing, shine = real[_F + i], real[SHINE + i]
+        red = real[RED + i] * (facing * sun_red + (ambient_red + nz * tilt_red + side) * share + shine)
+        green = real[GREEN + i] * (
+            facing * sun_green + (ambient_green + nz * tilt_green + side) * share + shine * green_shine
+        )
+        blue = real[BLUE + i] * (
+            facing * sun_blue + (ambient_blue + nz * tilt_blue + side) * share + shine * blue_shine
+        )
+        # Zero comes first below: compared so, what is no number (a wall seen edge-on) turns into 0, a valid row.
+        red = (haze * (haze_red + glow * sun_red) + clear * red) * _TONE_SCALE
+        green = (haze * (haze_green + glow * sun_green) + clear * green) * _TONE_SCALE
+        blue = (haze * (haze_blue + glow * sun_blue) + clear * blue) * _TONE_SCALE
+        whole[_I0 + i] = np.int32(min(max(_ZERO, red), _TONE_LAST))
+        whole[_I1 + i] = np.int32(min(max(_ZERO, green), _TONE_LAST))
+        whole[_I2 + i] = np.int32(min(max(_ZERO, blue), _TONE_LAST))
+
+
+@kernel
+def light_room(camera: Any, real: Any, whole: Any) -> None:
+    """Light places by a lamp under the ceiling's middle, corners dimmer: leave rows of the tone table in `whole`."""
+    cx, cy, cz = np.float32(camera.room_x), np.float32(camera.room_y), np.float32(camera.room_z)
+    length, width = np.float32(camera.room_half_length), np.float32(camera.room_half_width)
+    height = np.float32(camera.room_height)
+    c, s = np.float32(camera.room_cos), np.float32(camera.room_sin)
+    lamp_height = np.float32(0.92) * height
+    fall = np.float32(2.0) / (length * length + width * width + np.float32(6.0))
+    for i in range(QUEUE):
+        px, py, pz = real[X + i] - cx, real[Y + i] - cy, real[Z + i] - cz
+        nx, ny, nz = real[NX + i], real[NY + i], real[NZ + i]
+        lz = lamp_height - pz
+        squared = px * px + py * py + lz * lz
+        facing = (lz * nz - px * nx - py * ny) / np.sqrt(squared + np.float32(1e-6))
+        lamp = np.float32(0.62) * max(facing, _ZERO) / (_ONE + squared * fall)
+        a, b = length - abs(px * c + py * s), width - abs(py * c - px * s)
+        up = min(pz, height - pz)
+        # Distance to the second nearest of floor, ceiling and walls: small in edges and corners.
+        second = max(max(min(a, b), min(max(a, b), up)), _ZERO)
+        corner = _ONE - np.float32(0.30) / (_ONE + second * second * np.float32(9.0))
+        bright = (np.float32(0.36) + np.float32(0.05) * nz + np.float32(0.03) * nx + lamp) * corner
+        bright *= (np.float32(0.4) + np.float32(0.6) * real[AROUND + i]) * _TONE_SCALE
+        whole[_I0 + i] = np.int32(min(max(_ZERO, real[RED + i] * bright * np.float32(1.04)), _TONE_LAST))
+        whole[_I1 + i] = np.int32(min(max(_ZERO, real[GREEN + i] * bright), _TONE_LAST))
+        whole[_I2 + i] = np.int32(min(max(_ZERO, real[BLUE + i] * bright * np.float32(0.93)), _TONE_LAST))
+
+
+@kernel
+def finish(light: Any, camera: Any, texels: Any, queue: Any, moving: Any, count: int, taps: int, out: Any) -> None:
+    """Colour the first `count` places of the queue and write their pixels; `out` has one dimension."""
+    real, whole, tone = queue.real, queue.whole, light.tone
+    if moving.any:
+        sun, contact = moving.sun, moving.contact
+        for i in range(QUEUE):
+            pixel = whole[PIXEL + i]
+            real[SUN + i], real[AROUND + i] = sun[pixel], contact[pixel]
+    sample_albedo(texels, real, whole, taps)
+    if camera.indoors:
+        light_room(camera, real, whole)
+    else:
+        sun_visibility(light.uniforms, light.shadow, real, whole)
+        light_outdoors(light.uniforms, camera, real, whole)
+    for i in range(count):
+        pixel = whole[PIXEL + i] * np.uint32(3)
+        out[pixel] = tone[whole[_I0 + i]]
+        out[pixel + np.uint32(1)] = tone[whole[_I1 + i]]
+        out[pixel + np.uint32(2)] = tone[whole[_I2 + i]]
+
+
+@kernel
+def finish_sky(sky: Any, queue: Any, count: int, out: Any) -> None:
+    """Write the first `count` places of the sky's queue."""
+    real, whole = queue.real, queue.whole
+    look_up(sky, real, whole, _ZERO)
+    for i in range(count):
+        pixel = whole[PIXEL + i] * np.uint32(3)
+        pair = whole[_PAIR + i]
+        out[pixel] = np.uint8((pair >> 8) & 0xFF)
+        out[pixel + np.uint32(1)] = np.uint8((whole[_MIDDLE + i] >> 8) & 0xFF)
+        out[pixel + np.uint32(2)] = np.uint8(pair >> 24)

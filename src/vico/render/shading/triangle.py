@@ -1,0 +1,119 @@
+"""What the shader works out once for a triangle."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from vico.render.compiled import inlined, kernel
+from vico.render.records import DOUBLE_SIDED, FLAT_NORMAL, PLAIN_COLOUR, TWO_SIDED
+from vico.render.visibility.culling import set_instance_view, set_world_view
+from vico.render.visibility.draw import item_of
+
+
+@kernel
+def set_up_triangle(scene: Any, camera: Any, buffers: Any, drawn: int, number: int, setup: Any) -> None:
+    """Write the `TRIANGLE_SETUP` of a triangle number."""
+    item = item_of(buffers.base, drawn, number)
+    code = buffers.drawn[item]
+    triangle = scene.mesh.triangle[buffers.first_triangle[item] + number - buffers.base[item]]
+    vertex, ids = scene.mesh.vertex, triangle.vertices
+    a, b, c = vertex[ids[0]], vertex[ids[1]], vertex[ids[2]]
+    clusters = len(scene.cluster_where)
+    is_instance = clusters <= code < clusters + scene.counts.instances
+    if is_instance:
+        set_instance_view(scene.instances.matrix[code - clusters], camera, buffers.model_view)
+    else:
+        set_world_view(camera, buffers.model_view)
+    _set_planes(a, b, c, buffers.model_view, camera, setup)
+    setup.u, setup.v = c.u, c.v
+    setup.first_u, setup.first_v = a.u - c.u, a.v - c.v
+    setup.second_u, setup.second_v = b.u - c.u, b.v - c.v
+    plain = _set_colours(a, b, c, setup.colour)
+    flat = _set_normals(a, b, c, setup.normal)
+    if is_instance:
+        _turn_normals(scene.instances.matrix[code - clusters], setup.normal)
+    _finish_normals(setup.normal, flat)
+    material = scene.textures.materials[triangle.material]
+    setup.emission = material.emission
+    setup.texture_width = 1 << material.log2_width
+    setup.texture_height = 1 << material.log2_height
+    setup.material = triangle.material
+    both = material.flags & DOUBLE_SIDED != 0
+    setup.flags = (FLAT_NORMAL if flat else 0) | (PLAIN_COLOUR if plain else 0) | (TWO_SIDED if both else 0)
+
+
+@inlined
+def _in_camera(vertex: Any, model_view: Any) -> Any:
+    """Return a vertex in the camera's frame, metres."""
+    m, origin, position = model_view.matrix, model_view.origin, vertex.position
+    x, y, z = float(position[0]) - origin[0], float(position[1]) - origin[1], float(position[2]) - origin[2]
+    return (
+        m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3],
+        m[1, 0] * x + m[1, 1] * y + m[1, 2] * z + m[1, 3],
+        m[2, 0] * x + m[2, 1] * y + m[2, 2] * z + m[2, 3],
+    )
+
+
+@inlined
+def _set_planes(a: Any, b: Any, c: Any, model_view: Any, camera: Any, setup: Any) -> None:
+    """Write inverse depth and the corners' weights as planes over the picture."""
+    ax, ay, az = _in_camera(a, model_view)
+    bx, by, bz = _in_camera(b, model_view)
+    cx, cy, cz = _in_camera(c, model_view)
+    # A ray's share in a corner is its product with the normal of the plane through the eye and the opposite edge.
+    e0x, e0y, e0z = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+    e1x, e1y, e1z = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
+    e2x, e2y, e2z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    setup.volume = ax * e0x + ay * e0y + az * e0z
+    pixel = 1.0 / camera.focal
+    u, v = (0.5 - camera.centre_x) * pixel, (0.5 - camera.centre_y) * pixel
+    ex, ey, ez = e0x + e1x + e2x, e0y + e1y + e2y, e0z + e1z + e2z
+    setup.inverse_column, setup.inverse_row, setup.inverse_start = ex * pixel, ey * pixel, ex * u + ey * v + ez
+    setup.first_column, setup.first_row, setup.first_start = e0x * pixel, e0y * pixel, e0x * u + e0y * v + e0z
+    setup.second_column, setup.second_row, setup.second_start = e1x * pixel, e1y * pixel, e1x * u + e1y * v + e1z
+
+
+@inlined
+def _set_colours(a: Any, b: Any, c: Any, colour: Any) -> bool:
+    """Write the third corner's colour and the others' differences; return whether there are none."""
+    plain = True
+    for channel in range(3):
+        c0, c1, c2 = a.colour[channel], b.colour[channel], c.colour[channel]
+        colour[0, channel], colour[1, channel], colour[2, channel] = c2, c0 - c2, c1 - c2
+        plain = plain and c0 == c2 and c1 == c2
+    return plain
+
+
+@inlined
+def _set_normals(a: Any, b: Any, c: Any, normal: Any) -> bool:
+    """Write the third, first and second corner's normals; return whether they are one."""
+    flat = True
+    for axis in range(3):
+        n0, n1, n2 = a.normal[axis], b.normal[axis], c.normal[axis]
+        normal[0, axis], normal[1, axis], normal[2, axis] = n2, n0, n1
+        flat = flat and n0 == n2 and n1 == n2
+    return flat
+
+
+@inlined
+def _turn_normals(transform: Any, normal: Any) -> None:
+    """Turn normals from an instance's model to the world."""
+    for k in range(3):
+        a, b, c = normal[k, 0], normal[k, 1], normal[k, 2]
+        for axis in range(3):
+            normal[k, axis] = transform[axis, 0] * a + transform[axis, 1] * b + transform[axis, 2] * c
+
+
+@inlined
+def _finish_normals(normal: Any, flat: bool) -> None:
+    """Make one normal a unit vector, or three the third and the others' differences."""
+    if flat:
+        a, b, c = normal[0, 0], normal[0, 1], normal[0, 2]
+        scale = np.float32(1.0) / max(np.sqrt(a * a + b * b + c * c), np.float32(1e-12))
+        normal[0, 0], normal[0, 1], normal[0, 2] = a * scale, b * scale, c * scale
+    else:
+        for axis in range(3):
+            normal[1, axis] -= normal[0, axis]
+            normal[2, axis] -= normal[0, axis]

@@ -1,0 +1,72 @@
+"""What the kernels read of a camera and of the light of a moment: one record each."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from vico.render.cameras import Cameras
+from vico.render.lighting import Lighting, unit
+from vico.render.records import CAMERA_UNIFORMS, LIGHT_UNIFORMS
+
+# A `numpy.void`: one element of a structured array, its fields by name.
+Record = Any
+
+# Texture samples a pixel on slanted surfaces: of a quick picture, and of one to look at.
+_QUICK_TAPS, _FINE_TAPS = 2, 4
+
+
+def camera_uniforms(cameras: Cameras, k: int, samples: int, room: Record | None) -> Record:
+    """Return the `CAMERA_UNIFORMS` of one camera, whose picture has `samples` rows and columns for each pixel.
+
+    `room` is the `ROOM` that it is in.
+    """
+    camera = np.zeros(1, CAMERA_UNIFORMS)[0]
+    camera["x"], camera["y"], camera["z"] = cameras.position[k]
+    right, down, forward = cameras.rotation[k]
+    camera["right_x"], camera["right_y"], camera["right_z"] = right
+    camera["down_x"], camera["down_y"], camera["down_z"] = down
+    camera["forward_x"], camera["forward_y"], camera["forward_z"] = forward
+    width, height = cameras.width * samples, cameras.height * samples
+    camera["width"], camera["height"] = width, height
+    camera["focal"] = cameras.intrinsics[0, 0] * samples
+    camera["centre_x"], camera["centre_y"] = width / 2, height / 2
+    camera["near"], camera["far"] = cameras.near, cameras.far
+    camera["hidden_entity"] = np.asarray(cameras.hidden_entity)[k]
+    camera["most_taps"] = _QUICK_TAPS if samples == 1 else _FINE_TAPS
+    if room is not None:
+        camera["indoors"] = 1
+        for name in ("x", "y", "z", "half_length", "half_width", "height"):
+            camera[f"room_{name}"] = room[name]
+        camera["room_cos"], camera["room_sin"] = np.cos(room["yaw"]), np.sin(room["yaw"])
+    return camera
+
+
+def light_uniforms(light: Lighting) -> Record:
+    """Return the `LIGHT_UNIFORMS` of a moment."""
+    sun, shadow = unit(light.sun_direction), unit(light.shadow_direction or light.sun_direction)
+    uniforms = np.zeros(1, LIGHT_UNIFORMS)[0]
+    uniforms["sun_x"], uniforms["sun_y"], uniforms["sun_z"] = sun
+    uniforms["shadow_x"], uniforms["shadow_y"], uniforms["shadow_z"] = shadow
+    _set_colour(uniforms, "sun", np.asarray(light.sun_colour) * light.exposure)
+    ambient, bounce = np.asarray(light.ambient) * light.exposure, np.asarray(light.bounce) * light.exposure
+    # ambient + n.z * tilt is the sky above and the lit ground below, seen by a surface of that tilt.
+    _set_colour(uniforms, "ambient", (ambient + bounce) / 2)
+    _set_colour(uniforms, "tilt", (ambient - bounce) / 2)
+    _set_colour(uniforms, "haze", np.asarray(light.horizon) * light.exposure)
+    uniforms["haze_per_metre"] = 1.0 / max(light.fog, 1.0)
+    uniforms["lamp_exposure"] = light.lamps * 1.6
+    uniforms["cloud_cover"] = light.clouds
+    # Light that turns the corner from the sun's side, so that walls in shade do not all look alike.
+    level = np.hypot(sun[0], sun[1])
+    side = sun[:2] / level if level > 1e-6 else np.zeros(2)
+    uniforms["side_x"], uniforms["side_y"] = 0.22 * side * float(ambient.mean())
+    cloud = (np.asarray(light.ambient) * 1.05 + np.asarray(light.sun_colour) * 0.16) * light.exposure
+    _set_colour(uniforms, "cloud_lit", cloud)
+    _set_colour(uniforms, "cloud_shade", cloud * 0.60)
+    return uniforms
+
+
+def _set_colour(uniforms: Record, name: str, colour: Any) -> None:
+    uniforms[f"{name}_red"], uniforms[f"{name}_green"], uniforms[f"{name}_blue"] = colour

@@ -1,0 +1,1 @@
+"""Which triangle is seen in which pixel: culling, rasterising, depth and entities."""

@@ -1,0 +1,96 @@
+"""The rules of a body that everybody may know: speeds, reach, and the codes that tell how an action went."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+#: Metres a second.
+WALK_SPEED = 1.0
+RUN_SPEED = 2.5
+BIKE_SPEED = 3.0
+
+#: How far a hand reaches along the ground, and above the feet, metres.
+REACH = 1.5
+REACH_UP = 2.2
+
+#: How near one has to be to go through an entrance, and through a door between rooms, metres.
+DOOR_REACH = 2.0
+INNER_DOOR_REACH = 1.0
+
+#: How far a voice carries, metres, and how long a message may be, characters.
+EARSHOT = 10.0
+LONGEST_TEXT = 1000
+
+
+class ActionStatus(IntEnum):
+    """How the last action went. Observations give the name in lower case, as ``action_status``."""
+
+    OK = 0
+    COLLISION = 1
+    REFUSED = 2
+    LATE = 3
+    FAILED = 4
+
+
+class ReasonCode(IntEnum):
+    """Why the last action went as it did. Observations give the name in lower case, as ``action_code``."""
+
+    NONE = 0
+
+    # The motion was stopped.
+    HIT_SOLID = 1
+    HIT_BODY = 2
+
+    # The agent did not act.
+    AGENT_LATE = 10
+    AGENT_FAILED = 11
+
+    # Refused: the form of the action.
+    NOT_AN_ACTION = 20
+    UNKNOWN_TYPE = 21
+    UNKNOWN_FIELD = 22
+    MISSING_FIELD = 23
+    BAD_VALUE = 24
+    OUT_OF_RANGE = 25
+    WRONG_SIZE = 26
+    FOR_ROBOTS_ONLY = 27
+    FOR_PEOPLE_ONLY = 28
+
+    # Refused: the state of one's own body.
+    ASLEEP = 40
+    SEATED = 41
+    IN_BUS = 42
+    ON_BIKE = 43
+    NOT_SEATED = 44
+    NOT_ASLEEP = 45
+    HAND_FULL = 46
+    HAND_EMPTY = 47
+    INDOORS = 48
+    OUTDOORS = 49
+    NOT_RIDING = 50
+    RIDING_ALREADY = 51
+    NO_MONEY = 52
+
+    # Refused: what the action is about.
+    SELF = 60
+    UNKNOWN_AGENT = 61
+    UNKNOWN_PLACE = 62
+    UNKNOWN_TARGET = 63
+    NOT_PORTABLE = 64
+    HELD_ALREADY = 65
+    ELSEWHERE = 66
+    TOO_FAR = 67
+    TOO_HIGH_OR_LOW = 68
+    NO_DIRECTION = 69
+    NO_DOOR = 70
+    FULL = 71
+    BLOCKED = 72
+    NO_FREE_SPOT = 73
+    NO_VEHICLE = 74
+    NO_TRANSIT = 75
+    MOVING = 76
+
+
+def code_name(code: int) -> str:
+    """Return the name of a reason code as observations give it; "" for none."""
+    return ReasonCode(code).name.lower() if code else ""

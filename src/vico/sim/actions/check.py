@@ -1,0 +1,115 @@
+"""Judging actions: form, actor, situation, range, and the action's own rule. Never raises and changes nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from vico.rules import ReasonCode
+from vico.sim.actions.fields import FORMS, short
+from vico.sim.actions.model import ActionType, Actors, Command, Refusal, Situation
+from vico.sim.actions.table import ACTIONS, ROBOT_ACTIONS
+from vico.sim.simulation_state import SimulationState
+from vico.sim.state import Posture, Vehicle
+
+
+def check(action: object, agent: int, state: SimulationState) -> Command | Refusal:
+    """Judge an action in the light of the state.
+
+    Parameters
+    ----------
+    action
+        Anything at all; good ones are mappings with ``type`` and the fields of that entry of `ACTIONS`.
+    agent
+        Index into ``state.names``.
+
+    Returns
+    -------
+    Command or Refusal
+        What to do, or why not.
+    """
+    command = parse(action)
+    if isinstance(command, Refusal):
+        return command
+    kind, people = ACTIONS[command.kind], len(state.people)
+    is_robot = agent >= people
+    refusal = (
+        _refuse_actor(kind, is_robot=is_robot)
+        or (None if is_robot else _refuse_situation(kind, agent, state))
+        or _refuse_range(command)
+        or kind.check(command.values, agent - people if is_robot else agent, state)
+    )
+    return refusal or command
+
+
+def parse(action: object) -> Command | Refusal:
+    """Judge the form of an action alone: its type, its fields and their types."""
+    if not isinstance(action, Mapping):
+        sentence = f"an action is a dict with a 'type', not {type(action).__name__}"
+        return Refusal(ReasonCode.NOT_AN_ACTION, sentence)
+    kind = action.get("type")
+    if not isinstance(kind, str) or kind not in ACTIONS:
+        sentence = f"unknown action type {short(kind)}; types are {', '.join(ACTIONS)}"
+        return Refusal(ReasonCode.UNKNOWN_TYPE, sentence)
+    expected = ACTIONS[kind].fields
+    odd = [short(name) for name in action if name != "type" and name not in expected]
+    if odd:
+        known = ", ".join(expected) or "none"
+        return Refusal(ReasonCode.UNKNOWN_FIELD, f"{kind}: unknown field {odd[0]}; its fields are: {known}")
+    values: dict[str, Any] = {}
+    for name, field in expected.items():
+        if name not in action or (action[name] is None and not field.required):
+            if field.required:
+                return Refusal(ReasonCode.MISSING_FIELD, f"{kind}: field {name!r} is missing")
+            continue
+        value = field.read(action[name])
+        if value is None:
+            sentence = f"{kind}: {name} has to be {FORMS[field.kind]}, not {short(action[name])}"
+            return Refusal(ReasonCode.BAD_VALUE, sentence)
+        values[name] = value
+    return Command(kind, values)
+
+
+def _refuse_actor(kind: ActionType, *, is_robot: bool) -> Refusal | None:
+    """Refuse what robots alone, or people alone, can do."""
+    if is_robot and Actors.ROBOTS not in kind.actors:
+        sentence = f"{kind.name}: robots take {' and '.join(sorted(ROBOT_ACTIONS))}"
+        return Refusal(ReasonCode.FOR_PEOPLE_ONLY, sentence)
+    if not is_robot and Actors.PEOPLE not in kind.actors:
+        sentence = f"{kind.name} is for robots; avatars move with move_forward, turn_left and turn_right"
+        return Refusal(ReasonCode.FOR_ROBOTS_ONLY, sentence)
+    return None
+
+
+class _Bar(NamedTuple):
+    """A situation that rules actions out, its code, and what to say."""
+
+    situation: Situation
+    code: ReasonCode
+    sentence: str
+
+
+_ASLEEP = _Bar(Situation.ASLEEP, ReasonCode.ASLEEP, "asleep; wake first")
+_SEATED = _Bar(Situation.SEATED, ReasonCode.SEATED, "seated; stand first")
+_IN_BUS = _Bar(Situation.IN_BUS, ReasonCode.IN_BUS, "in a bus; exit_bus first")
+_ON_BIKE = _Bar(Situation.ON_BIKE, ReasonCode.ON_BIKE, "on a bicycle; exit_bike first")
+
+
+def _refuse_situation(kind: ActionType, i: int, state: SimulationState) -> Refusal | None:
+    """Refuse what can't be done asleep, seated, in a bus or on a bicycle."""
+    posture = {Posture.LYING: _ASLEEP, Posture.SITTING: _SEATED}.get(Posture(int(state.people.posture[i])))
+    vehicle = {Vehicle.BUS: _IN_BUS, Vehicle.BIKE: _ON_BIKE}.get(Vehicle(int(state.people.vehicle[i])))
+    for bar in (posture, vehicle):
+        if bar is not None and bar.situation not in kind.when:
+            return Refusal(bar.code, f"{kind.name}: {bar.sentence}")
+    return None
+
+
+def _refuse_range(command: Command) -> Refusal | None:
+    """Refuse numbers out of their field's bounds."""
+    for name, value in command.values.items():
+        field = ACTIONS[command.kind].fields[name]
+        if not field.in_range(value):
+            sentence = f"{command.kind}: {name} {value:g} is out of range; {field.range}"
+            return Refusal(ReasonCode.OUT_OF_RANGE, sentence)
+    return None

@@ -1,0 +1,117 @@
+"""Going into places, from room to room, and out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vico.rules import DOOR_REACH, INNER_DOOR_REACH, ReasonCode
+from vico.sim.actions.fields import Field, short
+from vico.sim.actions.model import ActionType, Refusal, Values
+from vico.sim.indoor import near_door
+from vico.sim.moves import place_in_room, put_outdoors, spot_outside
+from vico.sim.simulation_state import SimulationState
+
+#: A door that lies further up or down than this is on another level, metres.
+_LEVEL = 0.5
+
+
+def check_enter(values: Values, i: int, state: SimulationState) -> Refusal | None:
+    """Judge going in: through an entrance from the street, through a door from a room."""
+    p, name = state.people, values["place"]
+    refusal = _refuse_inner_door(name, i, state) if p.room[i] >= 0 else _refuse_entrance(name, i, state)
+    if refusal is not None:
+        return refusal
+    room = _room_behind(name, i, state)
+    anchor = state.indoor.arrival(room, int(p.room[i]) if p.room[i] >= 0 else -1)
+    if state.indoor.free_spot(room, anchor, state.people_in(room)) is None:
+        return Refusal(ReasonCode.FULL, "enter: it is full")
+    return None
+
+
+def _refuse_inner_door(name: str, i: int, state: SimulationState) -> Refusal | None:
+    p = state.people
+    room = state.indoor.index.get(name)
+    if room is None:
+        sentence = f"enter: {short(name)} is no room of this building; exit first to enter another place"
+        return Refusal(ReasonCode.UNKNOWN_PLACE, sentence)
+    door = next((d for d in state.indoor.doors[p.room[i]] if d.to == room), None)
+    if door is None:
+        return Refusal(ReasonCode.NO_DOOR, f"enter: no door leads from here to {name}")
+    if near_door(p.position[i], door, INNER_DOOR_REACH):
+        return None
+    up = door.position[2] - float(p.position[i, 2])
+    if abs(up) > _LEVEL:
+        way = "up" if up > 0 else "down"
+        sentence = f"enter: the door to {name} is {abs(up):.1f} m further {way}; take the stairs"
+        return Refusal(ReasonCode.TOO_HIGH_OR_LOW, sentence)
+    return Refusal(ReasonCode.TOO_FAR, f"enter: the door to {name} is farther than {INNER_DOOR_REACH:g} m away")
+
+
+def _refuse_entrance(name: str, i: int, state: SimulationState) -> Refusal | None:
+    place = state.place(name)
+    if place is None:
+        return Refusal(ReasonCode.UNKNOWN_PLACE, f"enter: no place has the id {short(name)}")
+    if place.entrance is None or not place.rooms:
+        return Refusal(ReasonCode.NO_DOOR, f"enter: {place.name} is in the open; there is nothing to enter")
+    away = float(np.hypot(*(state.doors[state.place_index[name]] - state.people.position[i, :2])))
+    if away <= DOOR_REACH:
+        return None
+    sentence = f"enter: the entrance of {place.name} is {away:.1f} m away; {DOOR_REACH:g} m or less is needed"
+    return Refusal(ReasonCode.TOO_FAR, sentence)
+
+
+def _room_behind(name: str, i: int, state: SimulationState) -> int:
+    if state.people.room[i] >= 0:
+        return state.indoor.index[name]
+    place = state.place(name)
+    assert place is not None
+    return state.indoor.index[place.rooms[0]]
+
+
+def enter(values: Values, i: int, state: SimulationState) -> None:
+    """Go through an entrance, or through the door to the next room."""
+    p, indoor = state.people, state.indoor
+    outdoors = p.room[i] < 0
+    room = _room_behind(values["place"], i, state)
+    place_in_room(i, room, state, near=indoor.arrival(room, -1 if outdoors else int(p.room[i])))
+    if outdoors:
+        name = state.world.places[state.place_index[values["place"]]].name
+        state.events.add("enter", p.names[i], f"enters {name}", p.position[i], place=values["place"])
+
+
+def check_exit(values: Values, i: int, state: SimulationState) -> Refusal | None:
+    """Judge going out: by a door of this room that leads outdoors."""
+    p = state.people
+    if p.room[i] < 0:
+        return Refusal(ReasonCode.OUTDOORS, "exit: already outdoors")
+    door = next((d for d in state.indoor.doors[p.room[i]] if d.to < 0), None)
+    if door is None:
+        return Refusal(ReasonCode.NO_DOOR, "exit: no door of this room leads outdoors")
+    if not near_door(p.position[i], door, DOOR_REACH):
+        return Refusal(ReasonCode.TOO_FAR, f"exit: the door is farther than {DOOR_REACH:g} m away")
+    if spot_outside(i, state) is None:
+        return Refusal(ReasonCode.BLOCKED, "exit: somebody stands in front of the door")
+    return None
+
+
+def leave(values: Values, i: int, state: SimulationState) -> None:
+    """Go out of the building, and look away from it."""
+    p = state.people
+    place = state.world.places[int(p.place[i])]
+    spot = spot_outside(i, state)
+    assert spot is not None
+    assert place.entrance is not None
+    put_outdoors(i, spot, state.entrances[place.entrance].facing, state)
+    state.events.add("exit", p.names[i], f"leaves {place.name}", p.position[i], place=place.id)
+
+
+DOORS = (
+    ActionType(
+        "enter",
+        "Go into a place (its id) by an entrance within 2 m, or into the next room (its id) by a door within 1 m.",
+        enter,
+        check_enter,
+        {"place": Field("name", slot="place")},
+    ),
+    ActionType("exit", "Go out of the building by a door within 2 m.", leave, check_exit),
+)

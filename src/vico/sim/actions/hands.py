@@ -1,0 +1,280 @@
+"""Picking up, putting down, handing over."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.rules import REACH, REACH_UP, ReasonCode
+from vico.sim.actions.fields import Field, short
+from vico.sim.actions.model import ActionType, Refusal, Situation, Values
+from vico.sim.collisions import box_gap
+from vico.sim.moves import follow_hands, gesture
+from vico.sim.simulation_state import SimulationState
+from vico.world.model import Container
+
+_AHEAD = (0.55, 0.45, 0.7, 0.9)
+# Containers are searched for a free spot at this pitch, metres.
+_PITCH = 0.1
+
+
+@dataclass(frozen=True)
+class PlacementPoint:
+    """Where a thing comes to lie.
+
+    Attributes
+    ----------
+    point
+        World frame, metres, float64, shape ``(3,)``.
+    carrier
+        The entity that carries the thing there; 0: the ground, a floor or furniture.
+    """
+
+    point: NDArray[np.float64]
+    carrier: int = 0
+
+
+def check_pick(values: Values, i: int, state: SimulationState) -> Refusal | None:
+    """Judge picking up: a free hand, and something to carry within reach."""
+    p, objects = state.people, state.objects
+    hand = values["hand"]
+    if p.held[i, hand]:
+        return Refusal(ReasonCode.HAND_FULL, f"pick: hand {hand} holds {int(p.held[i, hand])} already")
+    k = objects.index(values["object"])
+    if k < 0:
+        return Refusal(ReasonCode.NOT_PORTABLE, f"pick: {values['object']} is nothing that can be carried")
+    if objects.hand[k] >= 0:
+        return Refusal(ReasonCode.HELD_ALREADY, f"pick: {objects.names[k]} is in somebody's hand")
+    return _refuse_out_of_reach(k, i, state)
+
+
+def _refuse_out_of_reach(k: int, i: int, state: SimulationState) -> Refusal | None:
+    p, what, point = state.people, state.objects.names[k], state.objects.position[k]
+    if int(state.objects.room[k]) != p.room[i]:
+        return Refusal(ReasonCode.ELSEWHERE, f"pick: {what} is not in here")
+    away = math.hypot(point[0] - p.position[i, 0], point[1] - p.position[i, 1])
+    if away > REACH:
+        return Refusal(ReasonCode.TOO_FAR, f"pick: {what} is {away:.1f} m away; reach is {REACH} m")
+    if not -0.5 <= point[2] - p.position[i, 2] <= REACH_UP:
+        return Refusal(ReasonCode.TOO_HIGH_OR_LOW, f"pick: {what} is too high or too low to reach")
+    return None
+
+
+def pick(values: Values, i: int, state: SimulationState) -> None:
+    """Take a thing into a hand."""
+    p, objects = state.people, state.objects
+    k = objects.index(values["object"])
+    _hold(k, i, values["hand"], state)
+    gesture("pick", i, state)
+    state.events.add("pick", p.names[i], f"picks up {objects.names[k]}", p.position[i], object=int(objects.entity[k]))
+
+
+def check_put(values: Values, i: int, state: SimulationState) -> Refusal | None:
+    """Judge putting down: something in the hand, and a spot for it."""
+    hand = values["hand"]
+    if not state.people.held[i, hand]:
+        return Refusal(ReasonCode.HAND_EMPTY, f"put: hand {hand} is empty")
+    spot = put_down(values.get("target"), i, hand, state)
+    return spot if isinstance(spot, Refusal) else None
+
+
+def put(values: Values, i: int, state: SimulationState) -> None:
+    """Put down what a hand holds."""
+    p, objects = state.people, state.objects
+    spot = put_down(values.get("target"), i, values["hand"], state)
+    assert isinstance(spot, PlacementPoint)
+    k = objects.index(int(p.held[i, values["hand"]]))
+    p.held[i, values["hand"]] = 0
+    objects.hand[k] = -1
+    objects.holder[k] = spot.carrier
+    objects.position[k] = spot.point
+    objects.room[k] = p.room[i]
+    gesture("put", i, state)
+    state.events.add(
+        "put", p.names[i], f"puts down {objects.names[k]}", objects.position[k], object=int(objects.entity[k])
+    )
+
+
+def check_hand_over(values: Values, i: int, state: SimulationState) -> Refusal | None:
+    """Judge handing over: something in the hand, and somebody near with a free one."""
+    p = state.people
+    hand = values["hand"]
+    if not p.held[i, hand]:
+        return Refusal(ReasonCode.HAND_EMPTY, f"hand_over: hand {hand} is empty")
+    if values["agent"] not in p.names:
+        return Refusal(ReasonCode.UNKNOWN_AGENT, f"hand_over: nobody is called {short(values['agent'])}")
+    j = p.names.index(values["agent"])
+    if j == i:
+        return Refusal(ReasonCode.SELF, "hand_over: that is yourself")
+    if not state.same_space(i, j):
+        return Refusal(ReasonCode.ELSEWHERE, f"hand_over: {p.names[j]} is not in here")
+    away = float(np.hypot(*(p.position[i, :2] - p.position[j, :2])))
+    if away > REACH:
+        return Refusal(ReasonCode.TOO_FAR, f"hand_over: {p.names[j]} is {away:.1f} m away; reach is {REACH} m")
+    if p.held[j].all():
+        return Refusal(ReasonCode.HAND_FULL, f"hand_over: {p.names[j]} has no free hand")
+    return None
+
+
+def hand_over(values: Values, i: int, state: SimulationState) -> None:
+    """Give what a hand holds to somebody's free hand, the left one first."""
+    p, objects = state.people, state.objects
+    j = p.names.index(values["agent"])
+    k = objects.index(int(p.held[i, values["hand"]]))
+    p.held[i, values["hand"]] = 0
+    _hold(k, j, 0 if not p.held[j, 0] else 1, state)
+    gesture("reach", i, state)
+    state.events.add(
+        "hand_over",
+        p.names[i],
+        f"hands {objects.names[k]} to {p.names[j]}",
+        p.position[i],
+        object=int(objects.entity[k]),
+        to=p.names[j],
+    )
+
+
+def _hold(k: int, i: int, hand: int, state: SimulationState) -> None:
+    p, objects = state.people, state.objects
+    p.held[i, hand] = objects.entity[k]
+    objects.holder[k] = p.entity[i]
+    objects.hand[k] = hand
+    follow_hands(state)
+
+
+def put_down(target: Any, i: int, hand: int, state: SimulationState) -> PlacementPoint | Refusal:
+    """Find where a thing would come to lie.
+
+    Parameters
+    ----------
+    target
+        Entity of a container or of a robot with a deck, a point, or None for the ground ahead.
+
+    Returns
+    -------
+    PlacementPoint or Refusal
+        The spot, or why there is none.
+    """
+    p = state.people
+    k = state.objects.index(int(p.held[i, hand]))
+    size = state.objects.size[k]
+    if target is None:
+        return _ahead(i, size, state)
+    if isinstance(target, tuple):
+        return _at_point(target, i, state)
+    room = int(p.room[i])
+    if room >= 0:
+        for container in state.indoor.rooms[room].containers:
+            if container.entity == target:
+                return _on(container, i, k, state)
+    if state.robots is not None:
+        deck = state.robots.deck(target)
+        if deck is not None:
+            return _on_deck(target, deck, i, state)
+    return Refusal(ReasonCode.UNKNOWN_TARGET, f"put: {target} is nothing here that a thing can be put on")
+
+
+def _ahead(i: int, size: NDArray[np.float64], state: SimulationState) -> PlacementPoint | Refusal:
+    p = state.people
+    c, s = math.cos(p.yaw[i]), math.sin(p.yaw[i])
+    for ahead in _AHEAD:
+        x, y = p.position[i, 0] + ahead * c, p.position[i, 1] + ahead * s
+        if p.room[i] < 0:
+            if state.world.walkable.class_at((x, y)) > 0:
+                return PlacementPoint(np.array([x, y, float(state.world.height((x, y)))]))
+        elif state.indoor.gap(int(p.room[i]), (x, y)) >= min(size[0], size[1]) / 2:
+            return PlacementPoint(np.array([x, y, state.indoor.floor_at(int(p.room[i]), (x, y))]))
+    return Refusal(ReasonCode.NO_FREE_SPOT, "put: no free ground ahead; turn, or name a target")
+
+
+def _at_point(point: tuple[float, ...], i: int, state: SimulationState) -> PlacementPoint | Refusal:
+    p = state.people
+    x, y, z = point
+    away = math.hypot(x - p.position[i, 0], y - p.position[i, 1])
+    if away > REACH:
+        return Refusal(ReasonCode.TOO_FAR, f"put: the point is {away:.1f} m away; reach is {REACH} m")
+    room = int(p.room[i])
+    if room >= 0:
+        if not state.indoor.holds(room, (x, y, state.indoor.floor_at(room, (x, y)))):
+            return Refusal(ReasonCode.ELSEWHERE, "put: the point is outside this room")
+        height = state.indoor.support(room, (x, y))
+    else:
+        if state.world.walkable.class_at((x, y)) == 0:
+            return Refusal(ReasonCode.BLOCKED, "put: something solid is at that point")
+        height = float(state.world.height((x, y)))
+    if not height - 0.5 <= z <= height + REACH_UP:
+        return Refusal(ReasonCode.TOO_HIGH_OR_LOW, f"put: the point is not above the surface there ({height:.2f} m)")
+    return PlacementPoint(np.array([x, y, height]))
+
+
+def _on(container: Container, i: int, k: int, state: SimulationState) -> PlacementPoint | Refusal:
+    """Free spot of a container's top nearest to the person, apart from what lies there already."""
+    p, objects = state.people, state.objects
+    x, y, z = container.centre
+    half = np.array(container.size) / 2
+    person = p.position[i]
+    gap = box_gap(person[0], person[1], x, y, container.yaw, half[0], half[1])
+    if gap > REACH:
+        return Refusal(ReasonCode.TOO_FAR, f"put: the {container.kind} is {gap:.1f} m away; reach is {REACH} m")
+    if z - person[2] > REACH_UP:
+        return Refusal(ReasonCode.TOO_HIGH_OR_LOW, f"put: the {container.kind} is too high")
+    margin = np.minimum(half * 0.9, np.hypot(objects.size[k, 0], objects.size[k, 1]) / 2)
+    u = np.linspace(-half[0] + margin[0], half[0] - margin[0], max(1, int(2 * (half[0] - margin[0]) / _PITCH) + 1))
+    v = np.linspace(-half[1] + margin[1], half[1] - margin[1], max(1, int(2 * (half[1] - margin[1]) / _PITCH) + 1))
+    grid = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
+    c, s = math.cos(container.yaw), math.sin(container.yaw)
+    spots = np.column_stack([x + c * grid[:, 0] - s * grid[:, 1], y + s * grid[:, 0] + c * grid[:, 1]])
+    away = np.hypot(*(spots - person[:2]).T)
+    lying = (objects.hand < 0) & (objects.room == p.room[i])
+    lying &= np.abs(objects.position[:, 2] - z) < 0.3
+    radius = np.hypot(objects.size[:, 0], objects.size[:, 1]) / 2
+    for index in np.argsort(away, kind="stable"):
+        if away[index] > REACH:
+            break
+        clear = np.hypot(*(objects.position[lying, :2] - spots[index]).T) >= radius[lying] + radius[k]
+        on_floor_below = container.kind == "floor" and state.indoor.gap(int(p.room[i]), spots[index]) < radius[k]
+        if clear.all() and not on_floor_below:
+            return PlacementPoint(np.array([*spots[index], z]))
+    return Refusal(ReasonCode.NO_FREE_SPOT, f"put: no free spot on the {container.kind} within reach")
+
+
+def _on_deck(entity: int, deck: NDArray[np.float64], i: int, state: SimulationState) -> PlacementPoint | Refusal:
+    away = math.hypot(deck[0] - state.people.position[i, 0], deck[1] - state.people.position[i, 1])
+    if state.people.room[i] >= 0 or away > REACH:
+        return Refusal(ReasonCode.TOO_FAR, f"put: the deck is {away:.1f} m away; reach is {REACH} m")
+    return PlacementPoint(np.asarray(deck, np.float64)[:3].copy(), carrier=int(entity))
+
+
+_HAND = Field("hand", slot="hand")
+_WHEN = Situation.ON_FOOT | Situation.SEATED
+
+HANDS = (
+    ActionType(
+        "pick",
+        "Take an object within 1.5 m into a free hand; a hand holds one.",
+        pick,
+        check_pick,
+        {"hand": _HAND, "object": Field("integer", slot="entity")},
+        when=_WHEN,
+    ),
+    ActionType(
+        "put",
+        "Put down what a hand holds: on a container, on a robot's deck, at a point, or on the ground ahead.",
+        put,
+        check_put,
+        {"hand": _HAND, "target": Field("target", required=False)},
+        when=_WHEN,
+    ),
+    ActionType(
+        "hand_over",
+        "Give what a hand holds to somebody within 1.5 m.",
+        hand_over,
+        check_hand_over,
+        {"hand": _HAND, "agent": Field("name", slot="agent")},
+        when=_WHEN,
+    ),
+)

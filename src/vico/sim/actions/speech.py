@@ -1,0 +1,47 @@
+"""Saying something: to those near, and to whoever judges the task."""
+
+from __future__ import annotations
+
+from vico.rules import EARSHOT
+from vico.sim.actions.fields import Field
+from vico.sim.actions.model import ActionType, Situation, Values
+from vico.sim.moves import gesture
+from vico.sim.simulation_state import SimulationState
+
+
+def communicate(values: Values, i: int, state: SimulationState) -> None:
+    """Say something to everybody near in the same space."""
+    p = state.people
+    listeners = state.listeners(i, values.get("range", EARSHOT))
+    state.events.say(p.names[i], values["text"], p.position[i], listeners)
+    gesture("talk", i, state)
+
+
+def task_complete(values: Values, i: int, state: SimulationState) -> None:
+    """Report a task as done."""
+    p, index = state.people, values["index"]
+    state.events.add("task_complete", p.names[i], f"reports task {index} done", p.position[i], index=index)
+
+
+_RANGE = Field(
+    "number", required=False, low=0.0, high=EARSHOT, above_low=True, unit="m", slot="amount", scale=EARSHOT, least=0.1
+)
+
+SPEECH = (
+    ActionType(
+        "communicate",
+        "Say something to everybody within a range in the same space.",
+        communicate,
+        fields={"text": Field("text", slot="text"), "range": _RANGE},
+        when=Situation.AWAKE,
+    ),
+)
+REPORTS = (
+    ActionType(
+        "task_complete",
+        "Report a task as done, by its index.",
+        task_complete,
+        fields={"index": Field("integer", low=0, slot="index")},
+        when=Situation.ANY,
+    ),
+)

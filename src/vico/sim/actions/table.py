@@ -1,0 +1,33 @@
+"""The table of all actions. A new one is an entry in the tuple of its group's module; nothing else lists actions."""
+
+from __future__ import annotations
+
+from vico.sim.actions.doors import DOORS
+from vico.sim.actions.fields import FORMS
+from vico.sim.actions.hands import HANDS
+from vico.sim.actions.model import ActionType, Actors
+from vico.sim.actions.motion import MOTION
+from vico.sim.actions.posture import POSTURE
+from vico.sim.actions.robots import ROBOTS
+from vico.sim.actions.speech import REPORTS, SPEECH
+from vico.sim.actions.vehicles import VEHICLES
+
+_ALL = (*MOTION, *HANDS, *DOORS, *VEHICLES, *SPEECH, *POSTURE, *REPORTS, *ROBOTS)
+
+#: Every action by name, in the order of their numbers in a learner's action.
+ACTIONS: dict[str, ActionType] = {action.name: action for action in _ALL}
+#: Names of the actions that people may do, and robots.
+PEOPLE_ACTIONS = tuple(action.name for action in _ALL if Actors.PEOPLE in action.actors)
+ROBOT_ACTIONS = tuple(action.name for action in _ALL if Actors.ROBOTS in action.actors)
+
+
+def actions_markdown() -> str:
+    """Return the table of all actions for the documentation: name, fields with ranges, what it does."""
+    lines = ["| type | fields | what it does |", "|---|---|---|"]
+    for action in ACTIONS.values():
+        fields = "; ".join(
+            f"`{name}`{'' if field.required else ' (optional)'}: {field.range or FORMS[field.kind]}"
+            for name, field in action.fields.items()
+        )
+        lines.append(f"| `{action.name}` | {fields} | {action.summary} |")
+    return "\n".join(lines) + "\n"

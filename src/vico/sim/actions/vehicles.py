@@ -1,0 +1,108 @@
+"""Getting on and off buses and bicycles; `vico.sim.rides` carries who rides."""
+
+from __future__ import annotations
+
+from vico.rules import ReasonCode
+from vico.sim import rides
+from vico.sim.actions.model import ActionType, Refusal, Situation, Values
+from vico.sim.simulation_state import SimulationState
+from vico.sim.state import Vehicle
+from vico.sim.transit import BIKE_REACH, CAPACITY, DOOR_REACH, FARE
+
+_NO_TRANSIT = "this run has no transit"
+
+
+def check_enter_bus(values: Values, i: int, state: SimulationState) -> Refusal | None:
+    """Judge boarding: a bus that stands with a door near, a seat, the fare."""
+    transit, p = state.transit, state.people
+    if transit is None:
+        return Refusal(ReasonCode.NO_TRANSIT, f"enter_bus: {_NO_TRANSIT}")
+    refusal = _refuse_unless_on_foot_outdoors("enter_bus", i, state)
+    if refusal is not None:
+        return refusal
+    bus = transit.bus_at(p.position[i])
+    if bus is None:
+        return Refusal(ReasonCode.NO_VEHICLE, f"enter_bus: no bus stands with a door within {DOOR_REACH:g} m")
+    if transit.aboard[bus] >= CAPACITY:
+        return Refusal(ReasonCode.FULL, "enter_bus: the bus is full")
+    if p.cash[i] < FARE:
+        return Refusal(ReasonCode.NO_MONEY, f"enter_bus: the fare is {FARE:g}, and you have {p.cash[i]:.2f}")
+    return None
+
+
+def check_exit_bus(values: Values, i: int, state: SimulationState) -> Refusal | None:
+    """Judge getting off: at a stop, with free ground at a door."""
+    transit = state.transit
+    if transit is None:
+        return Refusal(ReasonCode.NO_TRANSIT, f"exit_bus: {_NO_TRANSIT}")
+    if state.people.vehicle[i] != Vehicle.BUS:
+        return Refusal(ReasonCode.NOT_RIDING, "exit_bus: not in a bus")
+    bus = rides.bus_of(i, state, transit)
+    if transit.stopped_at(bus) is None:
+        return Refusal(ReasonCode.MOVING, "exit_bus: the bus is moving")
+    if rides.spot_beside(bus, state, transit) is None:
+        return Refusal(ReasonCode.NO_FREE_SPOT, "exit_bus: no free ground at the doors")
+    return None
+
+
+def check_enter_bike(values: Values, i: int, state: SimulationState) -> Refusal | None:
+    """Judge mounting: a free bicycle near, and room to ride off."""
+    transit = state.transit
+    if transit is None:
+        return Refusal(ReasonCode.NO_TRANSIT, f"enter_bike: {_NO_TRANSIT}")
+    refusal = _refuse_unless_on_foot_outdoors("enter_bike", i, state)
+    if refusal is not None:
+        return refusal
+    bike = transit.bike_at(state.people.position[i])
+    if bike is None:
+        return Refusal(ReasonCode.NO_VEHICLE, f"enter_bike: no free bicycle within {BIKE_REACH:g} m")
+    if rides.room_to_ride(i, bike, state, transit) is None:
+        return Refusal(ReasonCode.NO_FREE_SPOT, "enter_bike: no room to get on here")
+    return None
+
+
+def check_exit_bike(values: Values, i: int, state: SimulationState) -> Refusal | None:
+    """Judge dismounting."""
+    if state.transit is None:
+        return Refusal(ReasonCode.NO_TRANSIT, f"exit_bike: {_NO_TRANSIT}")
+    if state.people.vehicle[i] != Vehicle.BIKE:
+        return Refusal(ReasonCode.NOT_RIDING, "exit_bike: not on a bicycle")
+    return None
+
+
+def _refuse_unless_on_foot_outdoors(kind: str, i: int, state: SimulationState) -> Refusal | None:
+    if state.people.vehicle[i] != Vehicle.NONE:
+        return Refusal(ReasonCode.RIDING_ALREADY, f"{kind}: riding already")
+    if state.people.room[i] >= 0:
+        return Refusal(ReasonCode.INDOORS, f"{kind}: go outdoors first")
+    return None
+
+
+VEHICLES = (
+    ActionType(
+        "enter_bus",
+        "Board a bus that stands with a door near; the fare is 2.",
+        lambda values, i, state: rides.board(i, state),
+        check_enter_bus,
+    ),
+    ActionType(
+        "exit_bus",
+        "Get off the bus at a stop.",
+        lambda values, i, state: rides.alight(i, state),
+        check_exit_bus,
+        when=Situation.ON_FOOT | Situation.IN_BUS,
+    ),
+    ActionType(
+        "enter_bike",
+        "Get on a free bicycle within 2 m.",
+        lambda values, i, state: rides.mount(i, state),
+        check_enter_bike,
+    ),
+    ActionType(
+        "exit_bike",
+        "Get off the bicycle, and pay: 0.2 a started minute, 20 more away from a station.",
+        lambda values, i, state: rides.dismount(i, state),
+        check_exit_bike,
+        when=Situation.ON_FOOT | Situation.ON_BIKE,
+    ),
+)

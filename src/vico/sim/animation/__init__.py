@@ -1,0 +1,13 @@
+"""How people move: a library of procedural motions on the 55 joints, computed for everybody in one call.
+
+A motion is a function of a phase in 0..1 (one cycle; two steps when walking), so it can be stopped, resumed, replayed
+and stretched. Gaits are driven from the feet: a planted foot stays where it is while the body passes over it, legs
+follow by two-bone inverse kinematics, the pelvis rides as high as the legs allow. The caller advances the phase by
+distance / `stride_length`, so feet never slide.
+"""
+
+from vico.sim.animation.names import CLIPS, clip_index
+from vico.sim.animation.posing import hand_frames, hand_position, pose, stride_length
+from vico.sim.animation.style import STYLE, style_of
+
+__all__ = ["CLIPS", "STYLE", "clip_index", "hand_frames", "hand_position", "pose", "stride_length", "style_of"]

@@ -1,0 +1,224 @@
+"""Limbs and trunk of a body, moved one at a time. Compiled.
+
+Signs, in the body's axes (x forward, y left, z up): turning about +y leans forward or points toes down; about +x
+lowers the right side; about +z turns left. Arms lie along y in the T-pose, so an arm is lowered about x, swung about
+y, and its elbow bends about z.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from vico.assets.people import PARENTS, J
+from vico.render.skinning import rotation_matrix
+from vico.sim.animation.rotations import (
+    Array,
+    X,
+    Y,
+    Z,
+    axis_angle,
+    compose,
+    cross,
+    relative_rotation,
+    rotate,
+    rotation_about,
+    two_bone_ik,
+)
+
+LEFT, RIGHT = 0, 1
+# +1 on the left, -1 on the right.
+SIGN = (1.0, -1.0)
+
+
+def _pair(name: str) -> tuple[int, int]:
+    """Return the numbers of a joint on the left and on the right."""
+    return J[f"left_{name}"], J[f"right_{name}"]
+
+
+PELVIS, SPINE1, SPINE2, SPINE3, NECK, HEAD = (J[n] for n in ("pelvis", "spine1", "spine2", "spine3", "neck", "head"))
+HIP, KNEE, ANKLE, FOOT = _pair("hip"), _pair("knee"), _pair("ankle"), _pair("foot")
+SHOULDER, ELBOW, WRIST = _pair("shoulder"), _pair("elbow"), _pair("wrist")
+# Five fingers of three joints each follow one another; the thumb comes last.
+FIRST_FINGER, FINGER_COUNT, THUMB = _pair("index1"), 5, 4
+
+
+class BodyPose(NamedTuple):
+    """One person while they are posed.
+
+    Attributes
+    ----------
+    local
+        Rotation of each joint relative to its parent, shape ``(55, 3, 3)``; written.
+    shift
+        Of the pelvis from its place in the T-pose, body frame, metres, shape ``(3,)``; written.
+    joints
+        In the T-pose, body frame, metres, shape ``(55, 3)``.
+    style
+        A `STYLE` record.
+    """
+
+    local: NDArray[np.float64]
+    shift: NDArray[np.float64]
+    joints: NDArray[np.float64]
+    style: Any
+
+
+@njit(cache=True)
+def curl_fingers(body: Any, side: int, curl: float, thumb: float) -> None:
+    """Bring the fingers together and curl each of their joints; radians."""
+    local, joints = body.local, body.joints
+    sign, base = -SIGN[side], FIRST_FINGER[side]
+    for finger in range(FINGER_COUNT):
+        first = base + 3 * finger
+        along = joints[first + 1] - joints[first]
+        spread = np.arctan2(along[X], abs(along[Y]))
+        share, bend = (0.8, curl) if finger < THUMB else (0.35, thumb)
+        local[first] = compose(rotation_about(Z, -sign * share * spread), rotation_about(X, sign * 0.8 * bend))
+        for k in range(1, 3):
+            local[first + k] = rotation_about(X, sign * bend)
+
+
+@njit(cache=True)
+def grip(body: Any, side: int, curl: float) -> None:
+    """Close a hand around something."""
+    curl_fingers(body, side, curl, 0.6 * curl)
+
+
+@njit(cache=True)
+def hang_arm(local: Array, side: int, off: float, swing: float, bend: float, twist: float) -> None:
+    """Hang an arm: `off` the body sideways, `swing` forward, elbow `bend`, palm `twist`ed backward; radians."""
+    sign = SIGN[side]
+    lowered = compose(rotation_about(X, -sign * (0.5 * np.pi - off)), rotation_about(Y, twist))
+    local[SHOULDER[side]] = compose(rotation_about(Y, -swing), lowered)
+    local[ELBOW[side]] = rotation_about(Z, -sign * bend)
+
+
+@njit(cache=True)
+def _joint_in_body(body: Any, joint: int) -> tuple[Any, Any]:
+    """Return where a joint is and how its parent is turned, by following the chain from the pelvis."""
+    local, shift, joints = body.local, body.shift, body.joints
+    chain = np.empty(12, np.int64)
+    count, j = 0, joint
+    while j > 0:
+        chain[count] = j
+        count += 1
+        j = PARENTS[j]
+    turned = local[PELVIS].copy()
+    place = joints[PELVIS] + shift
+    previous = 0
+    for k in range(count - 1, -1, -1):
+        j = chain[k]
+        place = place + rotate(turned, joints[j] - joints[previous])
+        if k > 0:
+            turned = compose(turned, local[j])
+        previous = j
+    return place, turned
+
+
+@njit(cache=True)
+def reach(body: Any, side: int, goal: Array, pole: Array) -> None:
+    """Bring a wrist to a point of the body's frame, the elbow towards `pole`."""
+    local, joints = body.local, body.joints
+    shoulder, elbow, wrist = SHOULDER[side], ELBOW[side], WRIST[side]
+    start, parent = _joint_in_body(body, shoulder)
+    first = np.sqrt(((joints[elbow] - joints[shoulder]) ** 2).sum())
+    second = np.sqrt(((joints[wrist] - joints[elbow]) ** 2).sum())
+    upper, lower, hinge = two_bone_ik(start, goal, pole, first, second)
+    sign = SIGN[side]
+    # The left elbow bends about -z, the right one about +z.
+    up = hinge * -sign
+    arm, forearm = np.empty((3, 3)), np.empty((3, 3))
+    arm[:, 1], arm[:, 2] = upper * sign, up
+    arm[:, 0] = cross(arm[:, 1].copy(), up)
+    forearm[:, 1], forearm[:, 2] = lower * sign, up
+    forearm[:, 0] = cross(forearm[:, 1].copy(), up)
+    local[shoulder] = relative_rotation(parent, arm)
+    local[elbow] = relative_rotation(arm, forearm)
+    local[wrist] = rotation_about(X, 0.0)
+
+
+@njit(cache=True)
+def reach_by(body: Any, side: int, goal: Array, pole: Array, share: float) -> None:
+    """Go a share of the way from the arm's present pose to reaching a point, joint by joint."""
+    local = body.local
+    shoulder, elbow = local[SHOULDER[side]].copy(), local[ELBOW[side]].copy()
+    reach(body, side, goal, pole)
+    local[SHOULDER[side]] = _part_way(shoulder, local[SHOULDER[side]], share)
+    local[ELBOW[side]] = _part_way(elbow, local[ELBOW[side]], share)
+
+
+@njit(cache=True)
+def _part_way(a: Array, b: Array, share: float) -> NDArray[Any]:
+    """Return the rotation that is a share of the way from one to another."""
+    way, step = np.empty(3), np.empty((3, 3))
+    axis_angle(relative_rotation(a, b), way)
+    rotation_matrix(way * share, step)
+    return compose(a, step)
+
+
+@njit(cache=True)
+def place_foot(body: Any, side: int, ankle: Array, pitch: float, out: float, toes: float) -> None:
+    """Bring an ankle to a point; the foot pitched toes down, turned out, its toes bent up; radians."""
+    local, shift, joints = body.local, body.shift, body.joints
+    hip, knee = HIP[side], KNEE[side]
+    sign = SIGN[side]
+    start = joints[PELVIS] + shift + rotate(local[PELVIS], joints[hip] - joints[PELVIS])
+    first = np.sqrt(((joints[knee] - joints[hip]) ** 2).sum())
+    second = np.sqrt(((joints[ANKLE[side]] - joints[knee]) ** 2).sum())
+    pole = np.array([1.0, sign * np.sin(out), 0.0])
+    upper, lower, hinge = two_bone_ik(start, ankle, pole, first, second)
+    thigh, shin = np.empty((3, 3)), np.empty((3, 3))
+    # Knees bend backward about +y: the hinge turns the thigh into the shin.
+    thigh[:, 1], thigh[:, 2] = hinge, -upper
+    thigh[:, 0] = cross(hinge, -upper)
+    shin[:, 1], shin[:, 2] = hinge, -lower
+    shin[:, 0] = cross(hinge, -lower)
+    foot = compose(rotation_about(Z, sign * out), rotation_about(Y, pitch))
+    local[hip] = relative_rotation(local[PELVIS], thigh)
+    local[knee] = relative_rotation(thigh, shin)
+    local[ANKLE[side]] = relative_rotation(shin, foot)
+    local[FOOT[side]] = rotation_about(Y, -toes)
+
+
+@njit(cache=True)
+def highest_pelvis(body: Any, side: int, ankle: Array, stretch: float) -> float:
+    """Return how far up the pelvis may shift for a leg to reach its ankle, metres."""
+    local, shift, joints = body.local, body.shift, body.joints
+    length = np.sqrt(((joints[KNEE[side]] - joints[HIP[side]]) ** 2).sum())
+    length = stretch * (length + np.sqrt(((joints[ANKLE[side]] - joints[KNEE[side]]) ** 2).sum()))
+    hip = joints[PELVIS] + shift + rotate(local[PELVIS], joints[HIP[side]] - joints[PELVIS])
+    dx, dy = ankle[X] - hip[X], ankle[Y] - hip[Y]
+    up = np.sqrt(max(length * length - dx * dx - dy * dy, 0.01))
+    return ankle[Z] + up - hip[Z] + shift[Z]
+
+
+@njit(cache=True)
+def bend_trunk(local: Array, lean: float, roll: float, yaw: float, nod: float, stoop: float) -> None:
+    """Bend the spine: lean forward, roll to the right, turn left; the head stays level but for `nod`."""
+    third = compose(rotation_about(Z, yaw / 3), compose(rotation_about(X, roll / 3), rotation_about(Y, lean / 3)))
+    local[SPINE1] = third
+    local[SPINE2] = third
+    local[SPINE3] = compose(third, rotation_about(Y, 0.6 * stoop))
+    local[NECK] = rotation_about(Y, 0.15 * stoop - 0.4 * lean)
+    back = compose(rotation_about(Y, -0.6 * lean - 0.75 * stoop + nod), rotation_about(X, -0.7 * roll))
+    local[HEAD] = compose(back, rotation_about(Z, -0.8 * yaw))
+
+
+@njit(cache=True)
+def stand_on_feet(body: Any, lifts: Array) -> None:
+    """Stand on both feet wherever the pelvis is; `lifts` raises each foot, metres."""
+    shift, joints, style = body.shift, body.joints, body.style
+    high = 0.0
+    ankles = np.empty((2, 3))
+    for side in range(2):
+        ankles[side, X] = joints[ANKLE[side], X] + (0.02 if side == 0 else -0.02) * style.asymmetry
+        ankles[side, Y] = joints[ANKLE[side], Y] * (0.6 + 0.5 * style.foot_spread)
+        ankles[side, Z] = joints[ANKLE[side], Z] + lifts[side]
+        high = min(high, highest_pelvis(body, side, ankles[side], 0.999))
+    shift[Z] = min(shift[Z], high)
+    for side in range(2):
+        place_foot(body, side, ankles[side], min(lifts[side] * 3, 0.5), 1.6 * style.toe_out, 0.0)

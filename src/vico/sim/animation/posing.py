@@ -1,0 +1,138 @@
+"""Poses of everybody: joint rotations by motion and phase, and where the hands are."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from vico.assets.people import JOINTS, PARENTS, J, SkinnedBody
+from vico.render.skinning import forward_kinematics
+from vico.sim.animation.clips import animate
+from vico.sim.animation.limbs import WRIST
+from vico.sim.animation.names import CARRY, RIDE_BIKE, RUN, WALK
+from vico.sim.animation.style import KERNEL_STYLE
+
+_KNUCKLE = (J["left_middle1"], J["right_middle1"])
+
+
+def stride_length(
+    clip: NDArray[Any] | int, speed: NDArray[Any] | float, height: NDArray[Any] | float
+) -> NDArray[np.float64]:
+    """Return the metres one cycle (two steps, or a turn of the cranks) covers.
+
+    Parameters
+    ----------
+    clip
+        Motion numbers, shape ``(n,)``.
+    speed
+        Metres a second over the ground, shape ``(n,)``.
+    height
+        Stature, metres, shape ``(n,)``.
+
+    Returns
+    -------
+    ndarray
+        float64; infinite for motions that do not cover ground (their phase runs with time).
+
+    Notes
+    -----
+    Fitted to Grieve and Gear's relation of stride and speed.
+    """
+    number, v, tall = np.broadcast_arrays(
+        np.asarray(clip), np.asarray(speed, np.float64), np.asarray(height, np.float64)
+    )
+    stride = np.full(number.shape, np.inf)
+    walking = (number == WALK) | (number == CARRY)
+    stride[walking] = (0.727 * tall * np.maximum(v, 0.15) ** 0.45)[walking]
+    running = number == RUN
+    stride[running] = (tall * (0.62 + 0.20 * v))[running]
+    stride[number == RIDE_BIKE] = 4.0
+    return stride
+
+
+def pose(
+    clip: NDArray[Any], phase: NDArray[Any], speed: NDArray[Any], style: NDArray[Any]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Pose everybody.
+
+    Parameters
+    ----------
+    clip
+        Motion numbers (`clip_index`), shape ``(n,)``.
+    phase
+        Where in the cycle, 0..1, shape ``(n,)``. At 0 the left heel strikes; gestures are strongest at 0.5.
+    speed
+        Metres a second over the ground, shape ``(n,)``; the stride follows from it as in `stride_length`.
+    style
+        Of `style_of`, one a person, shape ``(n,)``.
+
+    Returns
+    -------
+    rotations
+        Axis-angle relative to the parent joint, radians, float32, shape ``(n, 55, 3)``, T-pose = 0.
+    offsets
+        Shift of the pelvis from its place in the T-pose, body frame, metres, float32, shape ``(n, 3)``.
+    """
+    numbers = np.ascontiguousarray(clip, np.int64)
+    people = style.astype(KERNEL_STYLE)
+    stride = stride_length(numbers, np.asarray(speed, np.float64), people["height"])
+    rotations = np.zeros((len(numbers), len(JOINTS), 3), np.float32)
+    offsets = np.zeros((len(numbers), 3), np.float32)
+    animate(numbers, np.ascontiguousarray(phase, np.float64), stride, people, rotations, offsets)
+    return rotations, offsets
+
+
+def hand_frames(
+    joints: NDArray[Any], rotations: NDArray[np.float32], offsets: NDArray[np.float32]
+) -> NDArray[np.float64]:
+    """Return where everybody's palms are, to attach what they hold.
+
+    Parameters
+    ----------
+    joints
+        `BodyBatch.joints`, shape ``(n, 55, 3)``.
+    rotations, offsets
+        Of `pose`.
+
+    Returns
+    -------
+    ndarray
+        Left and right palm to body frame, shape ``(n, 2, 4, 4)``; in the T-pose their axes are the body's.
+    """
+    frames = np.zeros((len(rotations), 2, 4, 4))
+    _hands(np.ascontiguousarray(joints, np.float64), rotations, offsets, PARENTS, frames)
+    return frames
+
+
+def hand_position(
+    rotations: NDArray[np.float32], offset: NDArray[np.float32], body: SkinnedBody, hand: int
+) -> NDArray[np.float64]:
+    """Return the middle of one person's palm, body frame, metres, shape ``(3,)``; hand 0 is the left."""
+    return hand_frames(body.joints[None], rotations[None], offset[None])[0, hand, :3, 3]
+
+
+@njit(cache=True)
+def _hands(
+    joints: NDArray[Any],
+    rotations: NDArray[Any],
+    offsets: NDArray[Any],
+    parents: NDArray[Any],
+    frames: NDArray[Any],
+) -> None:
+    """Write the palms' frames."""
+    turned = np.empty((len(parents), 3, 3))
+    placed = np.empty((len(parents), 3))
+    for i in range(len(rotations)):
+        forward_kinematics(rotations[i], joints[i], parents, offsets[i], turned, placed)
+        for hand in range(2):
+            wrist, knuckle = WRIST[hand], _KNUCKLE[hand]
+            for r in range(3):
+                for c in range(3):
+                    frames[i, hand, r, c] = turned[wrist, r, c]
+                # The palm's hollow lies a little below the line from wrist to knuckle.
+                middle = 0.3 * placed[wrist, r] + 0.7 * placed[knuckle, r]
+                frames[i, hand, r, 3] = middle - 0.025 * turned[wrist, r, 2]
+            frames[i, hand, 3, 3] = 1.0

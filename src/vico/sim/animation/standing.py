@@ -1,0 +1,141 @@
+"""Standing still, and everything that is done standing. Compiled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from vico.sim.animation.limbs import (
+    LEFT,
+    PELVIS,
+    RIGHT,
+    SIGN,
+    WRIST,
+    bend_trunk,
+    grip,
+    hang_arm,
+    reach,
+    reach_by,
+    stand_on_feet,
+)
+from vico.sim.animation.names import DRINK, EAT, PICK, PUT, REACH, TALK, TURN, WAVE
+from vico.sim.animation.rotations import X, Y, Z, compose, rotation_about, smoothstep
+
+_TAU = 2 * np.pi
+
+
+@njit(cache=True)
+def stand(body: Any, p: float, clip: int) -> None:
+    """Stand on both feet, and make the gesture of a motion."""
+    _stand_upright(body, p, clip)
+    if clip == TALK:
+        _talk(body, p)
+    elif clip == WAVE:
+        _wave(body, p)
+    elif clip in (PICK, PUT, REACH):
+        _reach_out(body, p, clip)
+    elif clip in (DRINK, EAT):
+        _consume(body, p, clip)
+
+
+@njit(cache=True)
+def _strength(p: float) -> float:
+    """Return how far a gesture has gone, 0..1: most at half the cycle."""
+    return np.sin(np.pi * p) ** 2
+
+
+@njit(cache=True)
+def _stand_upright(body: Any, p: float, clip: int) -> None:
+    """Bear the weight on the feet, breathe, lean and look as the motion asks for; let the arms hang."""
+    local, shift, style = body.local, body.shift, body.style
+    breath = np.sin(_TAU * p)
+    side_lean = (style.asymmetry - 0.5) * 2
+    strength = _strength(p)
+    lifts = np.zeros(2)
+    lean, yaw, nod, crouch = 0.35 * style.trunk_lean, 0.0, 0.0, 0.0
+    shift[Y] = 0.02 * side_lean
+    roll = np.radians(2.0) * side_lean
+    if clip in (PICK, PUT):
+        lean, crouch = lean + 0.75 * strength, 0.16 * style.height * strength
+        nod = 0.25 * strength
+    elif clip == REACH:
+        lean = lean + 0.18 * strength
+    elif clip == TALK:
+        yaw, nod = 0.06 * np.sin(_TAU * p + style.asymmetry), 0.06 * np.sin(2 * _TAU * p)
+    elif clip in (EAT, DRINK):
+        nod = (0.10 if clip == EAT else -0.22) * strength
+    elif clip == TURN:
+        lifts[LEFT] = 0.06 * max(np.sin(_TAU * p), 0.0)
+        lifts[RIGHT] = 0.06 * max(-np.sin(_TAU * p), 0.0)
+        shift[Y] = -0.03 * np.sin(_TAU * p)
+    local[PELVIS] = compose(rotation_about(X, -roll), rotation_about(Y, 0.35 * (lean - 0.35 * style.trunk_lean)))
+    shift[Z] = -0.004 - crouch
+    shift[X] = -0.45 * crouch
+    stand_on_feet(body, lifts)
+    bend_trunk(local, lean + 0.008 * breath, 1.3 * roll, yaw, nod, 0.6 * style.age_share - 0.006 * breath)
+    for side in range(2):
+        swing = 0.04 + 0.02 * SIGN[side] * side_lean
+        hang_arm(local, side, style.arm_abduction + 0.01 * breath, swing, style.elbow_bend, 0.2)
+
+
+@njit(cache=True)
+def _outward(side: int) -> Any:
+    """Return where an elbow points that hangs at ease."""
+    return np.array([-0.3, SIGN[side] * 0.7, -0.6])
+
+
+@njit(cache=True)
+def _talk(body: Any, p: float) -> None:
+    """Beat with the right hand, lively people with both."""
+    tall, asymmetry = body.style.height, body.style.asymmetry
+    out = np.zeros(3)
+    beat, slow = np.sin(2 * _TAU * p + 3 * asymmetry), np.sin(_TAU * p)
+    out[X], out[Y], out[Z] = 0.22 * tall, -0.14 * tall, (0.62 + 0.035 * beat) * tall
+    out[Y] -= 0.03 * tall * slow
+    reach(body, RIGHT, out, _outward(RIGHT))
+    if asymmetry > 0.4:
+        out[X], out[Y], out[Z] = 0.20 * tall, 0.13 * tall, (0.60 - 0.03 * beat) * tall
+        reach(body, LEFT, out, _outward(LEFT))
+    body.local[WRIST[RIGHT]] = rotation_about(Y, -0.5)
+
+
+@njit(cache=True)
+def _wave(body: Any, p: float) -> None:
+    """Raise the right hand and sweep it thrice."""
+    tall = body.style.height
+    out = np.zeros(3)
+    up = smoothstep(3.5 * p) * smoothstep(3.5 * (1 - p))
+    sweep = np.sin(3 * _TAU * p)
+    out[X], out[Y], out[Z] = 0.10 * tall, (-0.20 - 0.045 * sweep) * tall, 0.98 * tall
+    reach_by(body, RIGHT, out, np.array([0.0, -1.0, -0.4]), up)
+    body.local[WRIST[RIGHT]] = rotation_about(X, 0.35 * sweep * up)
+    grip(body, RIGHT, 0.35 * (1 - up))
+
+
+@njit(cache=True)
+def _reach_out(body: Any, p: float, clip: int) -> None:
+    """Reach for something before the body, or on the ground; a hand opens to put and closes to pick."""
+    tall, strength = body.style.height, _strength(p)
+    out = np.zeros(3)
+    level = 0.12 if clip != REACH else 0.66
+    ahead = 0.24 if clip != REACH else 0.33
+    out[X], out[Y], out[Z] = ahead * tall, -0.06 * tall, level * tall
+    reach_by(body, RIGHT, out, _outward(RIGHT), strength)
+    grip(body, RIGHT, 0.35 + 0.55 * (strength if clip == PUT else 1 - strength))
+
+
+@njit(cache=True)
+def _consume(body: Any, p: float, clip: int) -> None:
+    """Bring the right hand to the mouth; who eats holds a plate in the left."""
+    tall, strength = body.style.height, _strength(p)
+    out = np.zeros(3)
+    out[X], out[Y], out[Z] = 0.125 * tall, -0.035 * tall, 0.845 * tall
+    reach_by(body, RIGHT, out, np.array([0.2, -0.6, -1.0]), strength)
+    body.local[WRIST[RIGHT]] = rotation_about(Y, -0.5 * strength)
+    grip(body, RIGHT, 0.85)
+    if clip == EAT:
+        out[X], out[Y], out[Z] = 0.20 * tall, 0.05 * tall, 0.66 * tall
+        reach(body, LEFT, out, _outward(LEFT))
+        grip(body, LEFT, 0.7)

@@ -1,0 +1,87 @@
+"""The state at the start of a run: everybody and everything, from the world, the community and the configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from vico.seeds import rng
+from vico.sim import spawn, systems
+from vico.sim.avatars import Avatars
+from vico.sim.bodies import ASSISTANT, KINDS, RESIDENT
+from vico.sim.config import SimConfig
+from vico.sim.events import Events
+from vico.sim.indoor import Indoor
+from vico.sim.simulation_state import SimulationState
+from vico.sim.state import FIRST_ASSISTANT, FIRST_RESIDENT, FIRST_ROBOT, MovableObjects, People
+from vico.sim.timetable import Appointment
+from vico.world.folder import World
+
+if TYPE_CHECKING:
+    from vico.community.model import Resident
+
+_NOWHERE = 2**30
+
+
+def initial_state(
+    world: World, residents: Sequence[Resident], days: Sequence[Sequence[Appointment]], config: SimConfig
+) -> SimulationState:
+    """Make the state before the first step.
+
+    Parameters
+    ----------
+    residents, days
+        Who takes part, and their appointments: residents start where these put them.
+
+    Raises
+    ------
+    InputError
+        If a robot's model is not known, or there is no free ground for everybody.
+    """
+    people = _people(residents, config)
+    indoor = Indoor.from_world(world.rooms, world.places, world.objects)
+    avatars = Avatars(people, indoor, world.walkable, world.height)
+    events = Events(people.names)
+    state = SimulationState(world, indoor, people, MovableObjects.none(), avatars, events, second=float(config.start))
+    # Nobody has a place yet: until then avatars are nowhere that could be in anybody's way.
+    people.room[:] = _NOWHERE
+    state.traffic, state.transit = systems.traffic_and_transit_of(world, config)
+    state.robots = systems.robots_of(world, config, state.obstacles(), errands=config.errands)
+    state.entities = _entities(state, residents, config)
+    events.names = state.names
+    events.begin(0, state.second)
+    spawn.place_residents(state, days, config.start)
+    for i in range(len(residents), len(people)):
+        spawn.place_anywhere(i, state, rng(config.seed, "spawn", people.names[i]))
+    return state
+
+
+def _people(residents: Sequence[Resident], config: SimConfig) -> People:
+    names = [r.id for r in residents] + [f"assistant_{i}" for i in range(config.assistants)]
+    kinds = [RESIDENT] * len(residents) + [ASSISTANT] * config.assistants
+    entities = [FIRST_RESIDENT + i for i in range(len(residents))]
+    entities += [FIRST_ASSISTANT + i for i in range(config.assistants)]
+    people = People.standing(names, kinds, entities)
+    for i, resident in enumerate(residents):
+        people.cash[i] = float(resident.cash)
+        people.height[i] = resident.appearance["height"]
+    return people
+
+
+def _entities(state: SimulationState, residents: Sequence[Resident], config: SimConfig) -> dict[int, dict[str, str]]:
+    """Kind and name of every body of the run by entity, and the agent's name of those that have one."""
+    found: dict[int, dict[str, str]] = {}
+    for i, (entity, name) in enumerate(zip(state.people.entity.tolist(), state.people.names, strict=True)):
+        kind = "resident" if i < len(residents) else "assistant"
+        shown = residents[i].name if i < len(residents) else name
+        found[entity] = {"kind": kind, "name": shown, "agent": name}
+    for system, kind in ((state.robots, "robot"), (state.traffic, ""), (state.transit, "")):
+        if system is None:
+            continue
+        bodies = system.bodies()
+        for k, entity in enumerate(bodies.entity.tolist()):
+            named = kind or KINDS[int(bodies.kind[k])]
+            found[entity] = {"kind": named, "name": f"{named} {k}"}
+    for k, name in enumerate(state.robots.names if state.robots is not None else []):
+        found[FIRST_ROBOT + k] |= {"name": f"{config.robots[k]} {k}", "agent": name}
+    return found

@@ -1,0 +1,159 @@
+"""Taking one robot along its way: whom to wait for, when to go round, when to give up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.assets.robots import RobotModel
+from vico.sim.physics.engine import Base
+from vico.sim.robots.navigation import (
+    GAP,
+    free_ahead,
+    path_length,
+    progress,
+    room_to_turn,
+    towards,
+)
+
+#: Seconds a robot waits for somebody who stands still before it goes round, and tries to move before it backs off.
+_PATIENCE, _STUCK = 4.0, 2.5
+_BACK_TIME, _BACK_SPEED = 1.5, 0.25
+#: Detours without getting 5 m further after which it gives up.
+_DETOURS = 6
+_NO_PATH = np.zeros((0, 2))
+
+
+class RobotStatus(IntEnum):
+    """How a robot fares."""
+
+    IDLE, MOVING, WAITING, ARRIVED, BLOCKED, FALLEN = range(6)
+
+
+class PathFollower:
+    """Follows a path. All that changes is in `path` and in the numbers of `numbers`."""
+
+    def __init__(self, model: RobotModel) -> None:
+        self._model = model
+        #: Clearance a cell has to have for this robot, metres.
+        self.room = model.half_width + 0.12
+        self.path = _NO_PATH
+        self.status = RobotStatus.IDLE
+        self.wants_detour = False
+        self.begin(_NO_PATH)
+        self.status = RobotStatus.IDLE
+
+    def begin(self, path: NDArray[np.float64]) -> None:
+        """Start on a path."""
+        self.path = np.ascontiguousarray(path)
+        self.along = self.waiting = self.stuck = self.backing = self.marked = 0.0
+        self.detours = 0
+        self.status = RobotStatus.MOVING
+        self.wants_detour = False
+
+    def end(self) -> None:
+        """Forget the path."""
+        self.begin(_NO_PATH)
+        self.status = RobotStatus.IDLE
+
+    def free(self, base: Base, others: NDArray[np.void], speed: float) -> tuple[float, int]:
+        """Metres free ahead, and who is there."""
+        m = self._model
+        x, y = base.position[:2]
+        outline = (m.half_length, m.half_width)
+        return free_ahead(x, y, base.yaw, speed, outline, self.path, self.along, others)
+
+    def steer(self, base: Base, others: NDArray[np.void], dt: float) -> NDArray[np.float64]:
+        """Velocity to follow for the next `dt` seconds; sets `status` and `wants_detour`."""
+        m, (x, y) = self._model, (float(v) for v in base.position[:2])
+        self.wants_detour = False
+        self.along = progress(self.path, self.along, x, y)
+        end = self.path[-1]
+        if path_length(self.path) - self.along < 0.5 and np.hypot(end[0] - x, end[1] - y) < (0.3 if m.legged else 0.4):
+            self.status = RobotStatus.ARRIVED
+            return np.zeros(3)
+        if self.along > self.marked + 5.0:
+            self.marked, self.detours = self.along, 0
+        if self.backing > 0.0:
+            return self._back_off(base, others, dt)
+        speed = float(np.hypot(*base.velocity[:2]))
+        free, who = self.free(base, others, max(speed, 0.3))
+        wanted = towards(m, x, y, base.yaw, self.path, self.along, free)
+        if wanted[0] == 0.0 and wanted[2] != 0.0 and not self._can_turn(x, y, others):
+            wanted = np.zeros(3)
+        if not wanted.any():
+            self._wait(who, others, dt)
+            return wanted
+        self.status, self.waiting = RobotStatus.MOVING, 0.0
+        held = (wanted[0] > 0.15 and speed < 0.04) or (
+            wanted[0] == 0.0 and abs(float(base.angular_velocity_body[2])) < 0.03
+        )
+        self.stuck = self.stuck + dt if held else 0.0
+        if self.stuck > _STUCK:
+            self.stuck, self.backing = 0.0, _BACK_TIME
+        return wanted
+
+    def _can_turn(self, x: float, y: float, others: NDArray[np.void]) -> bool:
+        radius = float(np.hypot(self._model.half_length, self._model.half_width)) + 0.08
+        return bool(room_to_turn(x, y, radius, others))
+
+    def _wait(self, who: int, others: NDArray[np.void], dt: float) -> None:
+        self.status = RobotStatus.WAITING
+        still = who < 0 or float(np.hypot(others["vx"][who], others["vy"][who])) < 0.15
+        self.waiting = self.waiting + dt if still else 0.0
+        if self.waiting > _PATIENCE:
+            self.waiting = 0.0
+            self.backing = _BACK_TIME
+
+    def _back_off(self, base: Base, others: NDArray[np.void], dt: float) -> NDArray[np.float64]:
+        self.status = RobotStatus.MOVING
+        self.backing -= dt
+        if self.backing <= 0.0:
+            self.wants_detour = True
+        behind = replace(base, rotation=-base.rotation)
+        path, self.path = self.path, _NO_PATH
+        free, _ = self.free(behind, others, _BACK_SPEED)
+        self.path = path
+        return np.array([-_BACK_SPEED, 0.0, 0.0]) if free > 0.5 else np.zeros(3)
+
+    def closed(self, base: Base, others: NDArray[np.void]) -> NDArray[np.float64]:
+        """Discs (x, y, radius) a detour keeps out of: those who stand still near, and what is right ahead."""
+        still = np.flatnonzero(np.hypot(others["vx"], others["vy"]) < 0.15)
+        discs = [(one["x"], one["y"], one["half_width"] + self._model.half_width + 0.35) for one in others[still]]
+        ahead = base.position[:2] + base.rotation[:2, 0] * (self._model.half_length + GAP)
+        if not len(still):
+            discs.append((float(ahead[0]), float(ahead[1]), 0.5))
+        return np.array(discs).reshape(-1, 3)
+
+    def detoured(self, path: NDArray[np.float64] | None) -> None:
+        """Take a new way; without one, or after too many, give up or keep waiting."""
+        self.wants_detour = False
+        self.detours += 1
+        if self.detours > _DETOURS:
+            self.status = RobotStatus.BLOCKED
+        elif path is not None:
+            detours = self.detours
+            self.begin(path)
+            self.detours = detours
+
+    def numbers(self) -> list[float]:
+        """Everything it remembers beside its path."""
+        return [
+            self.along,
+            self.waiting,
+            self.stuck,
+            self.backing,
+            self.marked,
+            float(self.detours),
+            float(self.status),
+        ]
+
+    def restore(self, path: NDArray[np.float64], numbers: NDArray[np.float64]) -> None:
+        """Go back to what `path` and `numbers` held."""
+        self.path = np.ascontiguousarray(path, np.float64)
+        self.along, self.waiting, self.stuck, self.backing, self.marked = (float(v) for v in numbers[:5])
+        self.detours, self.status = int(numbers[5]), RobotStatus(int(numbers[6]))
+        self.wants_detour = False

@@ -1,0 +1,126 @@
+"""What a task's author may do to a simulation before its first step, and what its evaluator may ask of it after."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vico.errors import InputError
+from vico.sim import moves
+from vico.sim.avatars import free_ground
+from vico.sim.simulation_state import SimulationState
+from vico.world.mesh import Surface
+
+
+class Scenario:
+    """Adds objects and places agents, before the first step.
+
+    Parameters
+    ----------
+    state
+        Of the simulation; changed in place.
+    """
+
+    def __init__(self, state: SimulationState) -> None:
+        self._state = state
+
+    def add_object(
+        self,
+        name: str,
+        prototype: str,
+        shape: Sequence[Surface],
+        position: ArrayLike,
+        *,
+        room: str = "",
+        size: ArrayLike = (0.3, 0.3, 0.3),
+        yaw: float = 0.0,
+    ) -> int:
+        """Add a movable object.
+
+        Parameters
+        ----------
+        prototype
+            Name of its shape; objects of one shape share it.
+        shape
+            The shape, origin at the middle of its underside, z up.
+        position
+            Where that origin comes to lie, ENU metres.
+        room
+            Id of the room it lies in; "" outdoors.
+        size
+            Extents of its box, metres.
+        yaw
+            Counter-clockwise from east, radians.
+
+        Returns
+        -------
+        int
+            Its entity.
+
+        Raises
+        ------
+        InputError
+            If there is no such room.
+        """
+        state = self._state
+        if room and room not in state.indoor.index:
+            raise InputError(f"add_object: {name}: no room has the id {room!r}")
+        index = state.indoor.index[room] if room else -1
+        spot = np.asarray(position, np.float64)
+        entity = state.objects.add(name, prototype, spot, index, np.asarray(size, np.float64), yaw)
+        state.shapes[prototype] = list(shape)
+        state.entities[entity] = {"kind": "object", "name": name}
+        return entity
+
+    def place_agent(self, name: str, position: ArrayLike, *, yaw: float = 0.0) -> None:
+        """Stand a person on free ground outdoors near a point.
+
+        Raises
+        ------
+        InputError
+            If nobody has the name, or there is no free ground within 8 m.
+        """
+        state = self._state
+        if name not in state.people.names:
+            raise InputError(f"place_agent: nobody is called {name!r}; there are {', '.join(state.people.names)}")
+        i = state.people.names.index(name)
+        near = np.asarray(position, np.float64)
+        spot = free_ground(state.world.walkable, near, state.obstacles_to(i), within=8.0)
+        if spot is None:
+            raise InputError(f"place_agent: {name}: no free ground within 8 m of {np.asarray(position)[:2].tolist()}")
+        moves.put_outdoors(i, spot, yaw, state)
+
+
+class GroundTruth:
+    """Answers an evaluator's questions from the state itself; agents never get it.
+
+    Parameters
+    ----------
+    state
+        Of the simulation.
+    """
+
+    def __init__(self, state: SimulationState) -> None:
+        self._state = state
+
+    def object_position(self, name: str) -> NDArray[np.float64]:
+        """Return where an object is, ENU metres, shape ``(3,)``."""
+        return self._state.objects.position[self._index(name)].copy()
+
+    def object_room(self, name: str) -> str | None:
+        """Return the id of the room an object is in; None outdoors."""
+        room = int(self._state.objects.room[self._index(name)])
+        return self._state.indoor.rooms[room].id if room >= 0 else None
+
+    def object_holder(self, name: str) -> str | None:
+        """Return the name of the agent that carries an object; None if nobody does."""
+        holder = int(self._state.objects.holder[self._index(name)])
+        return self._state.entities[holder]["agent"] if holder else None
+
+    def _index(self, name: str) -> int:
+        names = self._state.objects.names
+        if name not in names:
+            raise InputError(f"no object is called {name!r}; there are {', '.join(names) or 'none'}")
+        return names.index(name)

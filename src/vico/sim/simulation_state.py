@@ -1,0 +1,268 @@
+"""The state of a simulation: everything that changes, beside the world's fixed facts in a quickly looked-up form."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.rules import DOOR_REACH, INNER_DOOR_REACH, ActionStatus, ReasonCode
+from vico.sim.avatars import Avatars
+from vico.sim.bodies import Bodies, HasBodies, Subsystem
+from vico.sim.events import Events
+from vico.sim.indoor import Indoor, near_door
+from vico.sim.snapshot import arrays_of
+from vico.sim.state import REASON_LENGTH, MovableObjects, People, Vehicle
+from vico.sim.transit import TransitSystem
+from vico.world.folder import World
+from vico.world.mesh import Surface
+from vico.world.model import Entrance, Place
+
+
+class HasArrays(Protocol):
+    """A part of the state: hashed, saved and restored as named arrays."""
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Every array by name."""
+
+    def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
+        """Go back to what `arrays` held."""
+
+
+class TrafficSystem(Subsystem, Protocol):
+    """What the rules and the renderer ask of traffic, beside what the loop does."""
+
+    @property
+    def walkers(self) -> Bodies:
+        """The pedestrians alone."""
+
+    @property
+    def gait(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Speed (m/s) and distance walked so far (m) of each pedestrian."""
+
+
+class RobotNote(Protocol):
+    """Something that happened to a robot."""
+
+    @property
+    def robot(self) -> int:
+        """Its index."""
+
+    @property
+    def kind(self) -> str:
+        """arrived, blocked, fallen, ..."""
+
+    @property
+    def position(self) -> NDArray[np.float64]:
+        """Where, ENU metres."""
+
+
+class RobotSystem(Subsystem, Protocol):
+    """What the rules ask of robots, beside what the loop does. Robots are addressed by their index.
+
+    Attributes
+    ----------
+    names
+        Agents' names, ``robot_0`` and on.
+    reasons
+        Why each robot's last action was refused, in words; "" if it was not.
+    reason_codes
+        The same as `vico.rules.ReasonCode`.
+    """
+
+    names: list[str]
+    reasons: list[str]
+    reason_codes: list[int]
+
+    def control_size(self, robot: int) -> int:
+        """How many numbers the robot's control vector has."""
+
+    def command(self, robot: int, vector: NDArray[np.float64]) -> None:
+        """Drive the robot by a control vector until the next one comes."""
+
+    def camera_heights(self) -> NDArray[np.float64]:
+        """Height of each robot's camera above the ground it stands on, metres."""
+
+    def events(self) -> Sequence[RobotNote]:
+        """Return what happened to robots since this was last asked."""
+
+    def deck(self, entity: int) -> NDArray[np.float64] | None:
+        """Middle of the deck of the robot with this entity, ENU metres; None if it has none."""
+
+
+@dataclass
+class SimulationState:
+    """The state of a simulation.
+
+    Attributes
+    ----------
+    world
+        Where it happens; never changes.
+    indoor
+        The world's rooms as arrays; never changes.
+    people, objects
+        Avatars, and the movable objects they carry.
+    avatars
+        Moves `people`.
+    events
+        What happened in the step, and what agents heard.
+    traffic, transit, robots
+        Subsystems with a state of their own; None where a run has none.
+    entities
+        Kind and name of every body of the run by entity number, and the agent's name of those that have one.
+    shapes
+        Shapes of movable objects, by prototype.
+    second
+        Seconds since midnight of the first day.
+    place_index
+        Index of each place in ``world.places`` by id.
+    entrances
+        Entrances by id.
+    doors
+        Entrance of each place, ENU metres, float64, shape ``(places, 2)``; far away for places without one.
+    """
+
+    world: World
+    indoor: Indoor
+    people: People
+    objects: MovableObjects
+    avatars: Avatars
+    events: Events
+    traffic: TrafficSystem | None = None
+    transit: TransitSystem | None = None
+    robots: RobotSystem | None = None
+    second: float = 0.0
+    entities: dict[int, dict[str, str]] = field(default_factory=dict)
+    shapes: dict[str, list[Surface]] = field(default_factory=dict)
+    place_index: dict[str, int] = field(default_factory=dict)
+    entrances: dict[str, Entrance] = field(default_factory=dict)
+    doors: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
+
+    def __post_init__(self) -> None:
+        self.place_index = {place.id: i for i, place in enumerate(self.world.places)}
+        self.entrances = {entrance.id: entrance for entrance in self.world.entrances}
+        far = (1e9, 1e9)
+        doors = [self.entrances[p.entrance].position[:2] if p.entrance else far for p in self.world.places]
+        self.doors = np.array(doors, np.float64).reshape(-1, 2)
+
+    @property
+    def names(self) -> list[str]:
+        """Every agent: people first, then robots."""
+        return self.people.names + (list(self.robots.names) if self.robots is not None else [])
+
+    def place(self, place_id: str) -> Place | None:
+        """Return a place by id; None if there is none."""
+        index = self.place_index.get(place_id)
+        return None if index is None else self.world.places[index]
+
+    def obstacles(self) -> Bodies:
+        """Every body outdoors."""
+        return Bodies.joined([owner.bodies() for owner in self.owners()])
+
+    def owners(self) -> list[HasBodies]:
+        """Who has bodies: traffic, transit, avatars, robots; those of them that there are."""
+        return [o for o in (self.traffic, self.transit, self.avatars, self.robots) if o is not None]
+
+    def position_of(self, agent: int) -> NDArray[np.float64]:
+        """Return where an agent is, ENU metres, shape ``(3,)``; `agent` is its index in `names`."""
+        if agent < len(self.people):
+            return self.people.position[agent]
+        assert self.robots is not None
+        return self.robots.bodies().position[agent - len(self.people)]
+
+    def set_outcome(self, agent: int, status: ActionStatus, code: ReasonCode, reason: str) -> None:
+        """Note how an agent's action went, and why."""
+        if agent < len(self.people):
+            self.people.status[agent] = status
+            self.people.reason[agent] = reason[:REASON_LENGTH]
+            self.people.reason_code[agent] = code
+        elif self.robots is not None:
+            robot = agent - len(self.people)
+            self.robots.reasons[robot] = reason[:REASON_LENGTH]
+            self.robots.reason_codes[robot] = code
+
+    def entity(self, entity: int) -> dict[str, str]:
+        """Return kind and name of an entity of the world or of this run."""
+        return self.entities.get(entity) or self.world.entities.get(entity) or {"kind": "unknown", "name": str(entity)}
+
+    def same_space(self, i: int, j: int) -> bool:
+        """Whether two people are in the same room, the same bus, or both in the street."""
+        p = self.people
+        in_bus = Vehicle.BUS in (p.vehicle[i], p.vehicle[j])
+        if in_bus:
+            return bool(p.vehicle[i] == p.vehicle[j] and p.vehicle_entity[i] == p.vehicle_entity[j])
+        return bool(p.room[i] == p.room[j])
+
+    def listeners(self, i: int, reach: float) -> list[str]:
+        """Agents within `reach` metres of person `i` in the same space, in the order of names."""
+        p = self.people
+        away = np.linalg.norm(p.position - p.position[i], axis=1)
+        heard = [p.names[j] for j in np.flatnonzero(away <= reach) if j != i and self.same_space(i, int(j))]
+        if self.robots is not None and p.room[i] < 0 and p.vehicle[i] != Vehicle.BUS:
+            positions = self.robots.bodies().position
+            near = np.linalg.norm(positions - p.position[i], axis=1) <= reach
+            heard += [name for name, close in zip(self.robots.names, near, strict=True) if close]
+        return heard
+
+    def accessible_places(self, i: int) -> list[str]:
+        """Return what person `i` could enter from where it is: places outdoors, rooms from a room."""
+        p = self.people
+        if p.vehicle[i] != Vehicle.NONE:
+            return []
+        if p.room[i] >= 0:
+            room = int(p.room[i])
+            doors = self.indoor.doors[room]
+            near = [d.to for d in doors if d.to >= 0 and near_door(p.position[i], d, INNER_DOOR_REACH)]
+            return [self.indoor.rooms[to].id for to in near]
+        away = np.hypot(*(self.doors - p.position[i, :2]).T)
+        return [self.world.places[k].id for k in np.flatnonzero(away <= DOOR_REACH) if self.world.places[k].rooms]
+
+    def doors_of(self, i: int) -> list[dict[str, Any]]:
+        """Ways out of the room that person `i` is in: where each leads, and where it is."""
+        room = int(self.people.room[i])
+        if room < 0:
+            return []
+        rooms = self.indoor.rooms
+        return [
+            {"to": "outside" if d.to < 0 else rooms[d.to].id, "position": list(d.position)}
+            for d in self.indoor.doors[room]
+        ]
+
+    def people_in(self, room: int, *, without: int = -1) -> NDArray[np.float64]:
+        """Where people stand in a room, shape ``(k, 3)``."""
+        inside = self.people.room == room
+        if without >= 0:
+            inside[without] = False
+        return self.people.position[inside]
+
+    def obstacles_to(self, i: int) -> Bodies:
+        """Every body outdoors but person `i`'s."""
+        everyone = self.obstacles()
+        return everyone.where(everyone.entity != self.people.entity[i])
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return every array that decides the future, under a name each, in a fixed order; not copied."""
+        found: dict[str, NDArray[Any]] = {"second": np.array([self.second])}
+        for name, part in self._parts().items():
+            found |= {f"{name}.{key}": value for key, value in part.arrays().items()}
+        return found
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go back to what `arrays` held."""
+        self.second = float(arrays["second"][0])
+        for name, part in self._parts().items():
+            part.restore(arrays_of(arrays, name))
+
+    def _parts(self) -> dict[str, HasArrays]:
+        parts: dict[str, HasArrays | None] = {
+            "people": self.people,
+            "objects": self.objects,
+            "events": self.events,
+            "traffic": self.traffic,
+            "transit": self.transit,
+            "robots": self.robots,
+        }
+        return {name: part for name, part in parts.items() if part is not None}

@@ -1,0 +1,5 @@
+"""Cars, buses and pedestrians that nobody plays: who drives where, who yields to whom, all in compiled kernels."""
+
+from vico.sim.traffic.population import Traffic
+
+__all__ = ["Traffic"]

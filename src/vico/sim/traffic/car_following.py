@@ -1,0 +1,145 @@
+"""How fast a vehicle drives: the Intelligent Driver Model behind its leader, limits and stops ahead.
+
+Treiber, Hennecke, Helbing: Congested traffic states in empirical observations and microscopic simulations (2000).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from vico.sim.traffic.leader import NO_GAP
+from vico.sim.traffic.path import footprint
+from vico.sim.traffic.route import NEVER, is_lane_of_stop
+from vico.sim.traffic.state import NONE
+
+COMFORTABLE_BRAKING = 2.0  # m/s^2
+
+_HARD_BRAKING = 8.0  # m/s^2
+_HEADWAY = 1.2  # s
+_JAM_GAP = 1.8  # m kept behind a leader that stands
+_LEAST_GAP = 0.3  # no step leaves less to the leader, m
+_BEFORE_JUNCTION, _BEFORE_LANE_END = 0.6, 1.0  # m kept before a junction that is not granted, and a path's end
+_BEYOND_STOP = 3.0  # m beyond the place where a vehicle stops, others do not count
+_LEAST_SPEED = 0.02  # slower is standing, m/s
+
+
+@njit(cache=True)
+def look_ahead(speed):  # type: ignore[no-untyped-def]
+    """Return how far ahead a vehicle minds what is there: braking distance, headway and a little more, metres."""
+    return speed * speed / (2 * COMFORTABLE_BRAKING) + speed * _HEADWAY + 8.0
+
+
+@njit(cache=True)
+def braking_distance(speed):  # type: ignore[no-untyped-def]
+    """Return the metres a vehicle needs to stop comfortably, and a little more."""
+    return speed * speed / (2 * COMFORTABLE_BRAKING) + 8.0
+
+
+@njit(cache=True)
+def distance_to_stop(vehicle):  # type: ignore[no-untyped-def]
+    """Return the metres to a bus's stop if that is on its lane; `NEVER` otherwise."""
+    is_here = vehicle.stop_route_index >= 0 and vehicle.route_index == vehicle.stop_route_index
+    if vehicle.route >= 0 and is_here and vehicle.stop_offset > vehicle.offset - 1.0:
+        return max(vehicle.stop_offset - vehicle.offset, 0.0)
+    return NEVER
+
+
+@njit(cache=True)
+def desired_speed(net, vehicle):  # type: ignore[no-untyped-def]
+    """Return the speed a vehicle drives at on an empty lane, m/s."""
+    return min(net.lanes[vehicle.lane].speed * vehicle.speed_factor, vehicle.target_speed)
+
+
+@njit(cache=True)
+def stop_and_speed_limit(net, vehicle, look, stop_distance, wanted):  # type: ignore[no-untyped-def]
+    """Return where a vehicle has to stop and how fast it may be now.
+
+    It stops at its bus stop, before a junction it may not enter, and at its path's end; it slows down in time for
+    lower limits ahead.
+
+    Parameters
+    ----------
+    look
+        Metres ahead that count.
+    stop_distance
+        Metres to a bus stop on its own lane, `NEVER` for none.
+    wanted
+        Desired speed on its own lane, m/s.
+
+    Returns
+    -------
+    tuple
+        Metres to where it stops (`NEVER` for nowhere), and the most speed, m/s.
+    """
+    limit_now = wanted
+    ahead = net.lanes[vehicle.lane].length - vehicle.offset
+    stop = stop_distance
+    is_bus = vehicle.route >= 0
+    for k in range(vehicle.planned_count):
+        if stop < NEVER or ahead > look:
+            break
+        lane = vehicle.planned_lanes[k]
+        if net.lanes[lane].junction >= 0 and k >= vehicle.granted_count:
+            stop = max(ahead - _BEFORE_JUNCTION, 0.0)
+            break
+        limit = min(net.lanes[lane].speed * vehicle.speed_factor, vehicle.target_speed if is_bus else wanted)
+        limit_now = min(limit_now, np.sqrt(limit * limit + 2 * COMFORTABLE_BRAKING * max(ahead, 0.0)))
+        if is_lane_of_stop(net, vehicle, k + 1):
+            stop = ahead + vehicle.stop_offset
+        ahead += net.lanes[lane].length
+    if is_bus and stop >= NEVER and ahead < look:
+        stop = max(ahead - _BEFORE_LANE_END, 0.0)  # the route goes on in the lane beside: wait for room to change
+    if stop < NEVER:
+        limit_now = min(limit_now, np.sqrt(2 * COMFORTABLE_BRAKING * stop))
+    return stop, limit_now
+
+
+@njit(cache=True)
+def leader_speed(shapes, leader, view, front):  # type: ignore[no-untyped-def]
+    """Return how fast the leader moves along the path where the vehicle would meet it, m/s; at least 0."""
+    if leader < 0:
+        return 0.0
+    _, _, c, s = footprint(view.path, view.outline, front)
+    return max(shapes.vx[leader] * c + shapes.vy[leader] * s, 0.0)
+
+
+@njit(cache=True)
+def idm_acceleration(speed, desired, greatest, gap, leading):  # type: ignore[no-untyped-def]
+    """Return the Intelligent Driver Model's acceleration, m/s^2.
+
+    Parameters
+    ----------
+    speed, desired
+        The vehicle's own and the one it would like, m/s.
+    greatest
+        Its greatest acceleration, m/s^2.
+    gap, leading
+        Metres to the leader (`NO_GAP` for none) and its speed, m/s.
+    """
+    rate = greatest * (1.0 - (speed / max(desired, 0.1)) ** 4)
+    if gap < NO_GAP:
+        wish = speed * _HEADWAY + speed * (speed - leading) / (2 * np.sqrt(greatest * COMFORTABLE_BRAKING))
+        rate -= greatest * ((_JAM_GAP + max(wish, 0.0)) / max(gap, 0.05)) ** 2
+    return rate
+
+
+@njit(cache=True)
+def next_speed(speed, rate, limit, gap, stop, dt):  # type: ignore[no-untyped-def]
+    """Return the speed after `dt` seconds: the model's, within the limit, short of the leader and of the stop."""
+    new = max(speed + max(rate, -_HARD_BRAKING) * dt, 0.0)
+    if new > limit:
+        new = max(limit, speed - _HARD_BRAKING * dt)
+    if gap < NO_GAP:
+        new = min(new, max(gap - _LEAST_GAP, 0.0) / dt)
+    if stop < NEVER:
+        new = min(new, stop / dt)
+    return new if new >= _LEAST_SPEED else 0.0
+
+
+@njit(cache=True)
+def mind_only_before(stop, gap, leader):  # type: ignore[no-untyped-def]
+    """Return gap and leader; none if it is well beyond where the vehicle stops anyway."""
+    if gap > stop + _BEYOND_STOP:
+        return NO_GAP, NONE
+    return gap, leader

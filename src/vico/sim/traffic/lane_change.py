@@ -1,0 +1,108 @@
+"""Lane changes: cars leave a queue for a lane with fewer vehicles, buses follow their route to the lane beside."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from vico.sim.traffic.leader import ANY_BODY, TOUCH, touched_at
+from vico.sim.traffic.path import PATH_POINT, changing_lane, lane_polyline, point_on_path, project_on_polyline
+from vico.sim.traffic.route import advance_on_route, route_lane
+from vico.sim.traffic.state import NONE
+
+_REAR_GAP, _FRONT_GAP = 7.0, 8.0  # m that have to be free on the other lane behind the front's place and ahead of it
+_VEHICLE_GAP, _PERSON_GAP = 0.1, 0.3  # m kept sideways on the other lane
+_LANE_POINTS = 64
+_QUEUE_GAP, _QUEUE_SPEED = 15.0, 0.5  # m, share of the desired speed: nearer and slower leaders are a queue
+_LEAST_TIME = 6.0  # s between two lane changes of a car
+_LEAST_LANE = 18.0  # m of lane that have to be left for a car to change
+
+
+@njit(cache=True)
+def wants_lane_change(net, vehicle, gap, leading, wanted):  # type: ignore[no-untyped-def]
+    """Return whether a car is in a queue, has not changed lanes lately, and has the room to do it.
+
+    Parameters
+    ----------
+    gap, leading
+        Metres to the vehicle ahead and its speed, m/s.
+    wanted
+        Speed the car would like to drive at, m/s.
+    """
+    is_queued = gap < _QUEUE_GAP and leading < _QUEUE_SPEED * wanted
+    left = net.lanes[vehicle.lane].length - vehicle.offset
+    return is_queued and vehicle.time_since_lane_change > _LEAST_TIME and left > _LEAST_LANE
+
+
+@njit(cache=True)
+def _vehicles_on(fleet, lane):  # type: ignore[no-untyped-def]
+    count = 0
+    for vehicle in fleet:
+        count += vehicle.lane == lane
+    return count
+
+
+@njit(cache=True)
+def change_to_emptier_lane(net, fleet, vehicle, view):  # type: ignore[no-untyped-def]
+    """Move a car to a neighbour lane with fewer vehicles if there is a gap."""
+    lane = vehicle.lane
+    here = _vehicles_on(fleet, lane)
+    for beside in (net.lanes[lane].left, net.lanes[lane].right):
+        is_better = beside >= 0 and not net.lanes[beside].closed and _vehicles_on(fleet, beside) < here
+        if is_better and change_lane(net, vehicle, beside, view):
+            break
+
+
+@njit(cache=True)
+def change_as_route_does(net, vehicle, view):  # type: ignore[no-untyped-def]
+    """Move a bus to the neighbour lane where its route goes on, if it does and there is a gap."""
+    lane = vehicle.lane
+    beside = route_lane(net, vehicle, 1)
+    is_beside = beside == net.lanes[lane].left or beside == net.lanes[lane].right
+    if is_beside and change_lane(net, vehicle, beside, view):
+        advance_on_route(net, vehicle)
+
+
+@njit(cache=True)
+def is_gap_accepted(net, target, offset, lateral_offset, view):  # type: ignore[no-untyped-def]
+    """Return whether nobody is in the way on lane `target`, from a gap behind to the end of the lane change.
+
+    Parameters
+    ----------
+    offset, lateral_offset
+        Where the vehicle is now, seen from that lane: metres along it and to the left of it.
+    """
+    path = lane_polyline(net, target, np.empty(_LANE_POINTS, PATH_POINT))
+    straight = changing_lane(view.outline, 0.0, 0.0)
+    for i in range(9):
+        there = offset - _REAR_GAP + (_REAR_GAP + _FRONT_GAP + view.outline.length) * i / 8
+        if there > net.lanes[target].length:
+            continue
+        if touched_at(path, straight, there, view.nearby, _VEHICLE_GAP, _PERSON_GAP) >= 0:
+            return False
+    swerving = changing_lane(view.outline, lateral_offset, -offset)
+    return touched_at(path, swerving, offset, view.nearby, TOUCH, TOUCH, ANY_BODY) < 0
+
+
+@njit(cache=True)
+def change_lane(net, vehicle, target, view):  # type: ignore[no-untyped-def]
+    """Put a vehicle on a neighbour lane if there is a gap; True if it is there now.
+
+    Its place on the ground changes gradually.
+    """
+    length = vehicle.length
+    is_changing = vehicle.lateral_offset != 0.0
+    if vehicle.granted_count > 0 or is_changing or vehicle.offset < length + 3.0:
+        return False
+    lane = net.lanes[target]
+    x, y, _, _ = point_on_path(view.path, vehicle.offset)
+    offset, lateral_offset = project_on_polyline(net.points, net.along, lane.first_point, lane.end_point, x, y)
+    if offset < length + 2.0 or offset > lane.length - 1.0:
+        return False
+    if not is_gap_accepted(net, target, offset, lateral_offset, view):
+        return False
+    vehicle.lane, vehicle.offset, vehicle.planned_count = target, offset, 0
+    vehicle.lateral_offset, vehicle.lane_change_distance = lateral_offset, 0.0
+    vehicle.time_since_lane_change = 0.0
+    vehicle.previous_lanes[:] = NONE
+    return True

@@ -1,0 +1,189 @@
+"""Whom a vehicle would meet on its path: its leader is the first body its swept outline touches, whatever that is."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from vico.sim.traffic.path import Outline, footprint
+from vico.sim.traffic.shapes import Rectangle, point_to_rectangle, rectangles_overlap
+from vico.sim.traffic.state import NONE
+
+#: A body near a vehicle: centre, heading cosine and sine, half sides (metres), index into `Shapes`, radius of the
+#: circle around it, and whether it is a disc.
+NEARBY_BODY = np.dtype(
+    [
+        ("x", np.float64),
+        ("y", np.float64),
+        ("cos", np.float64),
+        ("sin", np.float64),
+        ("half_length", np.float64),
+        ("half_width", np.float64),
+        ("radius", np.float64),
+        ("body", np.int64),
+        ("disc", np.bool_),
+    ],
+    align=True,
+)
+TOUCH = 0.04  # no move may leave less than this between bodies, m
+NO_GAP = 1e9  # the gap to the leader where there is none
+ANY_BODY = 2**31  # every body's index lies below
+
+_VEHICLE_GAP = 0.1  # sideways distance kept from vehicles that are passed, m
+_NOSE = 0.02  # a vehicle's outline is tested so much longer, m
+_NEAR_PATH = 1.5  # more than a bus's corners leave its path in a bend, m
+_FINE_STEP, _COARSE_STEP, _COARSE_FROM = 1.0, 2.0, 8.0  # steps of the sweep, and from where on it takes the larger, m
+
+
+class VehicleView(NamedTuple):
+    """What a vehicle sees in a step: its path, its outline on it, and the bodies near it.
+
+    Attributes
+    ----------
+    nearby
+        Structured array of `NEARBY_BODY`; positions in the world frame, metres.
+    """
+
+    path: NDArray[np.void]
+    outline: Outline
+    nearby: NDArray[np.void]
+
+
+@njit(cache=True)
+def nearby_bodies(shapes, v, reach, buffer):  # type: ignore[no-untyped-def]
+    """Write the bodies within `reach` metres of body v into `buffer` and return the part of it that is used."""
+    sx, sy, half = shapes.x, shapes.y, shapes.half_length
+    x, y = sx[v], sy[v]
+    n = 0
+    for j in range(len(sx)):
+        dx = sx[j] - x
+        r = reach + half[j]
+        if dx > r or dx < -r or j == v:
+            continue
+        dy = sy[j] - y
+        if dx * dx + dy * dy < r * r:
+            one = buffer[n]
+            one.x, one.y = sx[j], sy[j]
+            one.cos, one.sin = np.cos(shapes.yaw[j]), np.sin(shapes.yaw[j])
+            one.half_length, one.half_width = half[j], shapes.half_width[j]
+            one.radius = half[j] if shapes.disc[j] else np.sqrt(half[j] ** 2 + shapes.half_width[j] ** 2)
+            one.body, one.disc = j, shapes.disc[j]
+            n += 1
+    return buffer[:n]
+
+
+@njit(cache=True)
+def touches(rectangle, one):  # type: ignore[no-untyped-def]
+    """Return whether a rectangle touches a nearby body."""
+    if one.disc:
+        return point_to_rectangle(one.x, one.y, rectangle) <= one.half_length
+    other = Rectangle(one.x, one.y, one.cos, one.sin, one.half_length, one.half_width)
+    return rectangles_overlap(rectangle, other)
+
+
+@njit(cache=True)
+def touched_at(path, outline, front, bodies, vehicle_gap, person_gap, below=ANY_BODY):  # type: ignore[no-untyped-def]
+    """Return the row of the first of `bodies` that a vehicle with its front at s = `front` would touch, or `NONE`.
+
+    Sideways it keeps the given gaps from vehicles and people, metres. Bodies from index `below` on do not count.
+    """
+    cx, cy, c, s = footprint(path, outline, front)
+    length, width = outline.length / 2, outline.half_width
+    reach = length + width + 0.5
+    for k in range(len(bodies)):
+        one = bodies[k]
+        if one.body >= below:
+            continue
+        dx, dy = one.x - cx, one.y - cy
+        r = reach + one.radius
+        if dx * dx + dy * dy > r * r:
+            continue
+        side = person_gap if one.disc else vehicle_gap
+        if touches(Rectangle(cx, cy, c, s, length + _NOSE, width + side), one):
+            return k
+    return NONE
+
+
+@njit(cache=True)
+def _near_path(path, outline, front, reach, one):  # type: ignore[no-untyped-def]
+    """Return whether a body is near the path ahead, and the front's s from which on it may be met."""
+    close = outline.half_width + one.radius + _NEAR_PATH
+    for p in range(len(path) - 1):
+        if path[p + 1].s < front - 2.0:
+            continue
+        if path[p].s > front + reach + 2.0:
+            break
+        ax, ay = path[p].x, path[p].y
+        dx, dy = path[p + 1].x - ax, path[p + 1].y - ay
+        t = ((one.x - ax) * dx + (one.y - ay) * dy) / (dx * dx + dy * dy)
+        # The last stretch goes straight on.
+        t = max(t, 0.0) if p == len(path) - 2 else min(max(t, 0.0), 1.0)
+        ex, ey = one.x - ax - t * dx, one.y - ay - t * dy
+        if ex * ex + ey * ey < close * close:
+            return True, path[p].s + t * (path[p + 1].s - path[p].s) - close - one.radius - 2.0
+    return False, 0.0
+
+
+@njit(cache=True)
+def _sort_by_contact(path, outline, front, bodies):  # type: ignore[no-untyped-def]
+    """Put the bodies whose gap the vehicle keeps already before those it is beside; return the former's number."""
+    cx, cy, c, s = footprint(path, outline, front)
+    apart = 0
+    for k in range(len(bodies)):
+        side = outline.person_gap if bodies[k].disc else _VEHICLE_GAP
+        grown = Rectangle(cx, cy, c, s, outline.length / 2 + _NOSE, outline.half_width + side)
+        if not touches(grown, bodies[k]):
+            if k != apart:
+                spare = bodies[apart : apart + 1].copy()
+                bodies[apart] = bodies[k]
+                bodies[k] = spare[0]
+            apart += 1
+    return apart
+
+
+@njit(cache=True)
+def _gap_to(path, outline, front, low, high, one, person_gap, vehicle_gap):  # type: ignore[no-untyped-def]
+    """Return the metres the front can go before it touches the one body, known to be between `low` and `high`."""
+    for _ in range(4):
+        middle = (low + high) / 2
+        if touched_at(path, outline, front + middle, one, vehicle_gap, person_gap) >= 0:
+            high = middle
+        else:
+            low = middle
+    return low
+
+
+@njit(cache=True)
+def find_leader(view, front, reach, buffer):  # type: ignore[no-untyped-def]
+    """Return the gap to the first body on the path and its index; `NO_GAP` and `NONE` without one within `reach`."""
+    path, outline, nearby = view
+    m = 0
+    start = 1e18
+    for k in range(len(nearby)):
+        near, first_contact = _near_path(path, outline, front, reach, nearby[k])
+        if near:
+            buffer[m] = nearby[k]
+            start = min(start, first_contact)
+            m += 1
+    if m == 0:
+        return NO_GAP, NONE
+    # Who is beside already is no reason to stand: towards them only touching counts.
+    apart = _sort_by_contact(path, outline, front, buffer[:m])
+    ahead, beside = buffer[:apart], buffer[apart:m]
+    person_gap = outline.person_gap
+    x = max(0.0, np.floor(start - front))
+    while x < reach:
+        step = _COARSE_STEP if x >= _COARSE_FROM else _FINE_STEP
+        x += step
+        hit = touched_at(path, outline, front + x, ahead, _VEHICLE_GAP, person_gap)
+        if hit >= 0:
+            one = ahead[hit : hit + 1]
+            return _gap_to(path, outline, front, x - step, x, one, person_gap, _VEHICLE_GAP), one[0].body
+        hit = touched_at(path, outline, front + x, beside, TOUCH, TOUCH) if len(beside) > 0 else NONE
+        if hit >= 0:
+            one = beside[hit : hit + 1]
+            return _gap_to(path, outline, front, x - step, x, one, TOUCH, TOUCH), one[0].body
+    return NO_GAP, NONE

@@ -1,0 +1,163 @@
+"""The network that traffic moves on, made from the world's lanes and walkways."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from vico.sim.traffic.state import LANE, WALKWAY, LaneNetwork, WalkwayNetwork
+from vico.world.lanes import LaneGraph
+from vico.world.walkways import CROSSING, Walkways
+
+_U_TURN = 2.6  # rad
+_BORDER = 6.0  # how far from the outermost point of the streets the map's edge counts as reached, m
+_LEAST_WALK = 60.0  # m of connected sidewalk that are worth walking along
+_CAR_HALF_WIDTH, _CROSSING_MARGIN, _PAST_CROSSING = 0.9, 0.3, 0.5  # m
+
+
+def lane_network(lanes: LaneGraph, walks: Walkways, routes: Sequence[Sequence[int]]) -> LaneNetwork:
+    """Return the lanes as kernels take them.
+
+    Parameters
+    ----------
+    walks
+        Whose crossings lanes run over.
+    routes
+        Lane numbers of each bus route's round.
+    """
+    crossings_first, crossings, cleared = _crossings_of_lanes(lanes, walks)
+    leaves = (lanes.inside < 0) & _at_border(lanes, lanes.first[1:] - 1)
+    n = np.arange(len(lanes))
+    turn = lanes.at(n, lanes.length)[:, 2] - lanes.at(n, 0.0)[:, 2]
+    u_turn = (lanes.inside >= 0) & (np.abs((turn + np.pi) % (2 * np.pi) - np.pi) > _U_TURN)
+    route_first = np.zeros(len(routes) + 1, np.int32)
+    route_first[1:] = np.cumsum([len(route) for route in routes])
+    records = np.zeros(len(lanes), LANE)
+    for name, values in {
+        "first_point": lanes.first[:-1],
+        "end_point": lanes.first[1:],
+        "length": lanes.length,
+        "speed": lanes.speed,
+        "junction": lanes.zone,
+        "inside": lanes.inside,
+        "edge": lanes.edge,
+        "closed": _closed_to_cars(lanes, leaves),
+        "left": lanes.left,
+        "right": lanes.right,
+        "first_next": lanes.next_first[:-1],
+        "end_next": lanes.next_first[1:],
+        "first_crossing": crossings_first[:-1],
+        "end_crossing": crossings_first[1:],
+        "u_turn": u_turn,
+        "leaves": leaves,
+    }.items():
+        records[name] = values
+    return LaneNetwork(
+        lanes=records,
+        points=lanes.points,
+        along=lanes.along,
+        next=lanes.next,
+        crossings=crossings,
+        crossings_cleared=cleared,
+        route_first=route_first,
+        route=np.array([lane for route in routes for lane in route], np.int32),
+    )
+
+
+def walkway_network(walks: Walkways) -> WalkwayNetwork:
+    """Return the walkways as kernels take them."""
+    records = np.zeros(len(walks), WALKWAY)
+    for name, values in {
+        "length": walks.length,
+        "room_left": walks.room[:, 0],
+        "room_right": walks.room[:, 1],
+        "reach_left": walks.reach[:, 0],
+        "reach_right": walks.reach[:, 1],
+        "kind": walks.kind,
+        "start": walks.ends[:, 0],
+        "end": walks.ends[:, 1],
+    }.items():
+        records[name] = values
+    return WalkwayNetwork(records, walks.first, walks.points, walks.along, walks.meeting_first, walks.meeting)
+
+
+def connected_walkways(walks: Walkways) -> Walkways:
+    """Return the walkways without the scraps of sidewalk too small to walk along."""
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    if not len(walks):
+        return walks
+    nodes = len(walks.meeting_first) - 1
+    graph = csr_matrix((np.ones(len(walks), np.int8), (walks.ends[:, 0], walks.ends[:, 1])), shape=(nodes, nodes))
+    _, part = connected_components(graph, directed=False)
+    size = np.bincount(part[walks.ends[:, 0]], weights=walks.length)
+    return walks.without(size[part[walks.ends[:, 0]]] < _LEAST_WALK)
+
+
+def lanes_to_start_on(lanes: LaneGraph, net: LaneNetwork) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Return the lanes cars can stand on at the start, and those they come back in on: where the map begins."""
+    usable = (lanes.inside < 0) & ~net.lanes["closed"] & (np.diff(lanes.next_first) > 0) & (lanes.length > 12.0)
+    usable &= ~net.lanes["leaves"]
+    starts = np.flatnonzero(usable & (lanes.zone < 0))
+    entries = np.flatnonzero(usable & _at_border(lanes, lanes.first[:-1])).astype(np.int32)
+    return starts, entries if len(entries) else starts.astype(np.int32)
+
+
+def _closed_to_cars(lanes: LaneGraph, leaves: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the lanes cars keep off: those of buses, and pockets that lead neither off the map nor back.
+
+    Cars that found the way into such a pocket would gather there.
+    """
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+    n = len(lanes)
+    if not n:
+        return np.zeros(0, bool)
+    a, b = np.repeat(np.arange(n), np.diff(lanes.next_first)), lanes.next
+    driven = ~(lanes.buses_only[a] | lanes.buses_only[b])
+    a, b = a[driven], b[driven]
+    _, part = connected_components(csr_matrix((np.ones(len(a)), (a, b)), shape=(n, n)), connection="strong")
+    streets = part == np.argmax(np.bincount(part, weights=lanes.length * ~lanes.buses_only))
+    # Backwards from one more node, which stands for having got out.
+    out = np.flatnonzero((leaves | streets) & ~lanes.buses_only)
+    starts, ends = np.concatenate([b, np.full(len(out), n)]), np.concatenate([a, out])
+    back = csr_matrix((np.ones(len(starts)), (starts, ends)), shape=(n + 1, n + 1))
+    closed = np.ones(n + 1, bool)
+    closed[breadth_first_order(back, n, return_predecessors=False)] = False
+    return closed[:n]
+
+
+def _at_border(lanes: LaneGraph, point: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Return which points (one a lane) lie where the map cuts the streets off."""
+    reach = np.abs(lanes.points).max(initial=0.0)
+    return np.asarray(np.abs(lanes.points[point]).max(axis=1) > reach - _BORDER)
+
+
+def _crossings_of_lanes(
+    lanes: LaneGraph, walks: Walkways
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
+    """Return where each lane's crossings begin, and `crossings` and `crossings_cleared` of `LaneNetwork`."""
+    crossings = np.flatnonzero(walks.kind == CROSSING)
+    areas = [
+        shapely.LineString(walks.line(int(c))).buffer(walks.width[c] / 2 + _CROSSING_MARGIN, cap_style="square")
+        for c in crossings
+    ]
+    lines = [shapely.LineString(lanes.line(i)) for i in range(len(lanes))]
+    rows: list[list[tuple[int, float]]] = [[] for _ in range(len(lanes))]
+    if areas:
+        tree = shapely.STRtree(areas)
+        for i, line in enumerate(lines):
+            swept = line.buffer(_CAR_HALF_WIDTH, cap_style="flat")
+            for k in np.sort(tree.query(swept, predicate="intersects")).tolist():
+                part = areas[k].intersection(line)
+                ends = [line.project(shapely.Point(p)) for p in shapely.get_coordinates(part)] or [line.length]
+                rows[i].append((int(crossings[k]), max(ends) + _PAST_CROSSING))
+    first = np.zeros(len(lanes) + 1, np.int32)
+    first[1:] = np.cumsum([len(row) for row in rows])
+    flat = [pair for row in rows for pair in row]
+    return first, np.array([c for c, _ in flat], np.int32), np.array([u for _, u in flat], np.float64)

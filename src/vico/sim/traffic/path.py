@@ -1,0 +1,183 @@
+"""The path ahead of a vehicle and its outline along it.
+
+A vehicle's path is laid once a step as a small polyline; following it and sweeping the outline along it then needs
+nothing else.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from vico.sim.traffic.state import NONE, PREVIOUS_LANES
+
+#: A point of a path: x, y (ENU metres) and `s`, metres from the start of the lane the vehicle is on.
+PATH_POINT = np.dtype([("x", np.float64), ("y", np.float64), ("s", np.float64)])
+PATH_POINTS = 768  # points a path can have
+LANE_CHANGE = 12.0  # metres a lane change takes, and the vehicle's length more
+
+_SQUEEZE_AFTER = 6.0  # s stood after which a vehicle squeezes past people at the kerb
+_PERSON_GAP, _SQUEEZE_GAP = 0.3, 0.05  # m kept sideways from people
+
+
+class Outline(NamedTuple):
+    """A vehicle's outline and where it is across its path; metres.
+
+    Attributes
+    ----------
+    length, half_width, overhang, wheelbase
+        As in `VehicleParameters`.
+    lateral_offset
+        Where a lane change under way began, to the left of the path; 0 without one.
+    change_done
+        Metres of that lane change that were done at s = 0 of the path.
+    person_gap
+        Distance kept sideways from people.
+    """
+
+    length: float
+    half_width: float
+    overhang: float
+    wheelbase: float
+    lateral_offset: float
+    change_done: float
+    person_gap: float
+
+
+@njit(cache=True)
+def vehicle_outline(vehicle):  # type: ignore[no-untyped-def]
+    """Return a vehicle's outline on its path."""
+    return Outline(
+        vehicle.length,
+        vehicle.half_width,
+        vehicle.overhang,
+        vehicle.wheelbase,
+        vehicle.lateral_offset,
+        vehicle.lane_change_distance - vehicle.offset,
+        _PERSON_GAP if vehicle.stopped_time < _SQUEEZE_AFTER else _SQUEEZE_GAP,
+    )
+
+
+@njit(cache=True)
+def changing_lane(outline, lateral_offset, change_done):  # type: ignore[no-untyped-def]
+    """Return the outline of the same vehicle with another lane change (none: 0, 0)."""
+    return Outline(
+        outline.length, outline.half_width, outline.overhang, outline.wheelbase,
+        lateral_offset, change_done, outline.person_gap,
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def _append_lane(net, lane, base, path, count):  # type: ignore[no-untyped-def]
+    """Add a lane that starts at s = `base` to the first `count` points of a path; return their number then."""
+    last = path[count - 1].s if count > 0 else -1e18
+    for p in range(net.lanes[lane].first_point, net.lanes[lane].end_point):
+        s = base + net.along[p]
+        if s > last + 1e-6 and count < len(path):
+            path[count].x, path[count].y, path[count].s = net.points[p, 0], net.points[p, 1], s
+            count += 1
+            last = s
+    return count
+
+
+@njit(cache=True)
+def lane_polyline(net, lane, buffer):  # type: ignore[no-untyped-def]
+    """Lay the path along one lane into `buffer` and return the part of it that is used."""
+    return buffer[: _append_lane(net, lane, 0.0, buffer, 0)]
+
+
+@njit(cache=True)
+def path_polyline(net, vehicle, behind, ahead, buffer):  # type: ignore[no-untyped-def]
+    """Lay a vehicle's path, from `behind` metres before its lane's start to `ahead` metres after it, into `buffer`.
+
+    Returns
+    -------
+    ndarray
+        The part of `buffer` that is used, dtype `PATH_POINT`.
+    """
+    k = 0
+    base = 0.0
+    while k < PREVIOUS_LANES and vehicle.previous_lanes[k] != NONE and -base < behind:
+        base -= net.lanes[vehicle.previous_lanes[k]].length
+        k += 1
+    count = 0
+    for back in range(k - 1, -1, -1):
+        lane = vehicle.previous_lanes[back]
+        count = _append_lane(net, lane, base, buffer, count)
+        base += net.lanes[lane].length
+    count = _append_lane(net, vehicle.lane, 0.0, buffer, count)
+    base = net.lanes[vehicle.lane].length
+    for k in range(vehicle.planned_count):
+        if base > ahead:
+            break
+        lane = vehicle.planned_lanes[k]
+        count = _append_lane(net, lane, base, buffer, count)
+        base += net.lanes[lane].length
+    return buffer[:count]
+
+
+@njit(cache=True)
+def point_on_path(path, s):  # type: ignore[no-untyped-def]
+    """Return x, y and the direction (not of unit length) at `s` on a path; beyond its ends, straight on."""
+    a, b = 0, len(path) - 1
+    while b - a > 1:
+        middle = (a + b) // 2
+        if path[middle].s <= s:
+            a = middle
+        else:
+            b = middle
+    dx, dy, size = path[b].x - path[a].x, path[b].y - path[a].y, path[b].s - path[a].s
+    share = (s - path[a].s) / size
+    return path[a].x + dx * share, path[a].y + dy * share, dx, dy
+
+
+@njit(cache=True)
+def _lateral_offset(outline, s):  # type: ignore[no-untyped-def]
+    """Return the metres to the left of its path that a vehicle's point at `s` is, during a lane change."""
+    share = min(max((outline.change_done + s) / (LANE_CHANGE + outline.length), 0.0), 1.0)
+    return outline.lateral_offset * (1.0 - share * share * (3.0 - 2.0 * share))
+
+
+@njit(cache=True)
+def footprint(path, outline, front):  # type: ignore[no-untyped-def]
+    """Return centre x, y and heading cosine, sine of a vehicle whose front is at s = `front`: its axles follow."""
+    a = front - outline.overhang
+    b = a - outline.wheelbase
+    ax, ay, adx, ady = point_on_path(path, a)
+    bx, by, bdx, bdy = point_on_path(path, b)
+    if outline.lateral_offset != 0.0:
+        size = np.sqrt(adx * adx + ady * ady)
+        off = _lateral_offset(outline, a) / size
+        ax, ay = ax - ady * off, ay + adx * off
+        size = np.sqrt(bdx * bdx + bdy * bdy)
+        off = _lateral_offset(outline, b) / size
+        bx, by = bx - bdy * off, by + bdx * off
+    dx, dy = ax - bx, ay - by
+    size = np.sqrt(dx * dx + dy * dy)
+    if size < 1e-6:
+        dx, dy = adx, ady
+        size = np.sqrt(dx * dx + dy * dy)
+    c, s = dx / size, dy / size
+    middle = outline.overhang - outline.length / 2
+    return ax + c * middle, ay + s * middle, c, s
+
+
+@njit(cache=True)
+def project_on_polyline(points, along, begin, end, x, y):  # type: ignore[no-untyped-def]
+    """Return where on the line ``points[begin:end]`` (x, y) is: metres along it, and metres to the left of it."""
+    best, offset, side = 1e18, 0.0, 0.0
+    for p in range(begin, end - 1):
+        ax, ay = points[p, 0], points[p, 1]
+        dx, dy = points[p + 1, 0] - ax, points[p + 1, 1] - ay
+        size2 = dx * dx + dy * dy
+        t = min(max(((x - ax) * dx + (y - ay) * dy) / size2, 0.0), 1.0)
+        ex, ey = x - ax - t * dx, y - ay - t * dy
+        away = ex * ex + ey * ey
+        if away < best:
+            best = away
+            size = np.sqrt(size2)
+            offset = along[p] + t * size
+            side = (dx * (y - ay) - dy * (x - ax)) / size
+    return offset, side

@@ -1,0 +1,348 @@
+"""How pedestrians walk: both ways on sidewalks, round each other, over crossings when they are clear.
+
+Each follows a point that runs a little ahead of it along its walkway, on the right-hand side. Of a few headings around
+that point it takes the one that leads furthest, and makes no step that would touch another body.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from vico.sim.traffic.path import project_on_polyline
+from vico.sim.traffic.random_stream import next_random
+from vico.sim.traffic.shapes import disc_touches, point_to_rectangle, rectangle_of
+from vico.sim.traffic.state import NONE
+from vico.world.lanes import lane_pose
+from vico.world.walkways import CORNER as _CORNER_KIND
+from vico.world.walkways import CROSSING as _CROSSING_KIND
+
+RADIUS = 0.25
+
+_LEAD, _LEAD_WHEN_HINDERED = 0.7, 2.0  # how far ahead the point runs, m: past a vehicle that stands on it
+_HINDERED_AFTER = 3.0  # who has got nowhere for so long looks that far ahead, s
+_SIGHT = 2.2  # how far ahead others are avoided, m
+_TOUCH, _LEAST_GAP = 0.03, 0.005  # no step leaves less, m; the second towards whom one walks away from
+_ASKED_AFTER = 1.5  # a vehicle that has stood so long before somebody is waiting for them to go, s
+_JAMMED_AFTER = 6.0  # who has got nowhere for so long squeezes past, s
+_GAP, _GAP_WHEN_JAMMED = 0.1, 0.04  # kept from others, m
+#: Headings tried, relative to that of the point; the first so many unless nothing has helped for a while.
+_ANGLES = np.array([0.0, -0.35, 0.35, -0.7, 0.7, -1.1, 1.1, -1.6, 1.6, -2.3, 2.3, 3.1])
+_FORWARD = 9
+_CARS_FIRST_AFTER, _CARS_FIRST_UNTIL = 10.0, 12.0  # s waited by a car that goes first then, and by the pedestrian
+_GIVE_UP_CROSSING = 20.0, 10.0  # s waited for a crossing before turning round, and more by `lateral_share`
+_OFF_CROSSING = 1.3  # m walked after which the body is off the crossing
+_TURN_RATE = 4.0  # rad/s
+_STRIDE_AHEAD = 0.4  # m ahead where a heading is tested against the walkway's sides
+_PROGRESS = 1.0  # who is farther from where it was has got on, m
+_STUCK_AFTER, _STUCK_SPREAD = 3.5, 3.0  # s without progress before turning round, and how much that varies
+_CORNER, _CROSSING = int(_CORNER_KIND), int(_CROSSING_KIND)
+
+
+class FollowPoint(NamedTuple):
+    """The point a pedestrian follows, that beside it on the walkway's centre line, and the unit vector to the left."""
+
+    x: float
+    y: float
+    centre_x: float
+    centre_y: float
+    left_x: float
+    left_y: float
+
+
+@njit(cache=True)
+def follow_point(paths, walker):  # type: ignore[no-untyped-def]
+    """Return the point a pedestrian follows."""
+    walkway = walker.walkway
+    offset = min(max(walker.offset, 0.0), paths.walkways[walkway].length)
+    x, y, yaw = lane_pose(paths.first, paths.points, paths.along, walkway, offset)
+    nx, ny = -np.sin(yaw), np.cos(yaw)
+    left, right = paths.walkways[walkway].room_left, paths.walkways[walkway].room_right
+    aside = (left - right) / 2 - walker.direction * walker.lateral_share * (left + right) / 2
+    return FollowPoint(x + nx * aside, y + ny * aside, x, y, nx, ny)
+
+
+@njit(cache=True)
+def _project_on_walkway(paths, walkway, x, y):  # type: ignore[no-untyped-def]
+    """Return the metres along a walkway of its point nearest to (x, y), and how far left of it that is."""
+    begin, end = paths.first[walkway], paths.first[walkway + 1]
+    return project_on_polyline(paths.points, paths.along, begin, end, x, y)
+
+
+@njit(cache=True)
+def _turn_round(paths, walker, x, y):  # type: ignore[no-untyped-def]
+    """Go the other way from here on: the followed point comes back to where the walker is, or it would lead on."""
+    walker.direction = -walker.direction
+    walker.offset, _ = _project_on_walkway(paths, walker.walkway, x, y)
+    walker.crossing_wait = walker.stuck_time = 0.0
+
+
+@njit(cache=True)
+def _is_crossing_at(paths, node):  # type: ignore[no-untyped-def]
+    """Return whether a crossing begins at a meeting point."""
+    for m in range(paths.meeting_first[node], paths.meeting_first[node + 1]):
+        if paths.walkways[paths.meeting[m]].kind == _CROSSING:
+            return True
+    return False
+
+
+@njit(cache=True)
+def _choice_weight(paths, here, option, node):  # type: ignore[no-untyped-def]
+    """Return how likely a walkway is taken at a meeting point: crossings less often, 0 for never."""
+    is_corner = paths.walkways[option].kind == _CORNER
+    if option == here or (is_corner and paths.walkways[here].kind == _CORNER):
+        return 0.0
+    far = paths.walkways[option].start + paths.walkways[option].end - node
+    return 0.5 if is_corner and _is_crossing_at(paths, far) else 1.0
+
+
+@njit(cache=True)
+def choose_next_walkway(paths, walker, node):  # type: ignore[no-untyped-def]
+    """Return where a pedestrian goes on at a meeting point, `NONE` for nowhere."""
+    here = walker.walkway
+    total = 0.0
+    for k in range(paths.meeting_first[node], paths.meeting_first[node + 1]):
+        total += _choice_weight(paths, here, paths.meeting[k], node)
+    if total == 0.0:
+        return NONE
+    pick = next_random(walker) * total
+    for k in range(paths.meeting_first[node], paths.meeting_first[node + 1]):
+        weight = _choice_weight(paths, here, paths.meeting[k], node)
+        if weight > 0.0:
+            pick -= weight
+            if pick <= 0.0:
+                return paths.meeting[k]
+    return NONE
+
+
+@njit(cache=True)
+def must_wait_at_crossing(walker, junctions, crossing, is_asked):  # type: ignore[no-untyped-def]
+    """Return whether a pedestrian lets vehicles go first: those on the crossing, and one that has waited long.
+
+    Nobody waits for the vehicle that stands waiting for them: who is asked to go goes.
+    """
+    cars_first = junctions.vehicle_wait[crossing] > _CARS_FIRST_AFTER and walker.crossing_wait < _CARS_FIRST_UNTIL
+    return (junctions.crossing_busy[crossing] or cars_first) and not is_asked
+
+
+@njit(cache=True)
+def _enter_walkway(paths, walker, junctions, following, node):  # type: ignore[no-untyped-def]
+    """Put the followed point at the start of the next walkway, from meeting point `node`."""
+    walkway = walker.walkway
+    if paths.walkways[following].kind == _CROSSING:
+        walker.crossing_wait = 0.0
+        junctions.walkers_on[following] += 1
+    if paths.walkways[walkway].kind == _CROSSING:
+        if walker.leaving_crossing >= 0:
+            junctions.walkers_on[walker.leaving_crossing] -= 1
+        walker.leaving_crossing, walker.leaving_since = walkway, walker.distance_walked
+    walker.walkway = following
+    if paths.walkways[following].start == node:
+        walker.direction, walker.offset = 1, 0.0
+    else:
+        walker.direction, walker.offset = -1, paths.walkways[following].length
+
+
+@njit(cache=True)
+def advance_follow_point(paths, walker, junctions, is_asked, x, y, dt):  # type: ignore[no-untyped-def]
+    """Move the followed point on until it is far enough ahead; return whether a crossing has to be waited for."""
+    lead = _LEAD_WHEN_HINDERED if walker.jammed_time > _HINDERED_AFTER else _LEAD
+    for _ in range(12):
+        point = follow_point(paths, walker)
+        if (point.x - x) ** 2 + (point.y - y) ** 2 >= lead * lead:
+            return False
+        walkway = walker.walkway
+        offset = walker.offset + walker.direction * 0.12
+        if 0.0 < offset < paths.walkways[walkway].length:
+            walker.offset = offset
+            continue
+        node = paths.walkways[walkway].end if walker.direction > 0 else paths.walkways[walkway].start
+        following = choose_next_walkway(paths, walker, node)
+        if following < 0:
+            walker.direction = -walker.direction
+            walker.offset = min(max(offset, 0.0), paths.walkways[walkway].length)
+            continue
+        is_crossing = paths.walkways[following].kind == _CROSSING
+        if is_crossing and must_wait_at_crossing(walker, junctions, following, is_asked):
+            walker.crossing_wait += dt
+            longest, spread = _GIVE_UP_CROSSING
+            if walker.crossing_wait > longest + spread * walker.lateral_share:
+                _turn_round(paths, walker, x, y)
+            junctions.walker_wait[following] = max(junctions.walker_wait[following], walker.crossing_wait)
+            return True
+        _enter_walkway(paths, walker, junctions, following, node)
+    return False
+
+
+@njit(cache=True)
+def _nearby(shapes, b, buffer):  # type: ignore[no-untyped-def]
+    """Return the indices of the bodies that body b, a walker, may meet."""
+    x, y = shapes.x[b], shapes.y[b]
+    n = 0
+    for j in range(len(shapes.x)):
+        dx, dy = shapes.x[j] - x, shapes.y[j] - y
+        r = _SIGHT + 1.0 + shapes.half_length[j] + shapes.half_width[j]
+        if j != b and dx * dx + dy * dy < r * r:
+            buffer[n] = j
+            n += 1
+    return buffer[:n]
+
+
+@njit(cache=True)
+def _free_distance(x, y, c, s, shapes, near, gap):  # type: ignore[no-untyped-def]
+    """Return the metres a walker can go along a heading before it touches somebody, at most `_SIGHT`."""
+    free = _SIGHT
+    for j in near:
+        dx, dy = shapes.x[j] - x, shapes.y[j] - y
+        if shapes.disc[j]:
+            reach = RADIUS + shapes.half_length[j] + gap
+            ahead = dx * c + dy * s
+            if ahead <= 0.0:
+                continue
+            aside2 = dx * dx + dy * dy - ahead * ahead
+            if aside2 < reach * reach:
+                free = min(free, max(ahead - np.sqrt(reach * reach - aside2), 0.0))
+        else:
+            d = 0.25
+            while d < free:
+                if disc_touches(x + c * d, y + s * d, RADIUS + gap, shapes, j):
+                    free = min(free, d - 0.25)
+                d += 0.25
+    return free
+
+
+@njit(cache=True)
+def _distance(x, y, shapes, j):  # type: ignore[no-untyped-def]
+    """Return the metres from a point to body j: to a disc's middle, to a rectangle's edge."""
+    if shapes.disc[j]:
+        return np.hypot(x - shapes.x[j], y - shapes.y[j])
+    return point_to_rectangle(x, y, rectangle_of(shapes, j))
+
+
+@njit(cache=True)
+def best_heading(x, y, point, walkway, shapes, near, is_jammed):  # type: ignore[no-untyped-def]
+    """Return the heading (rad) that leads furthest towards the followed point, and the metres free along it.
+
+    Headings that lead off the walkway count only on the way back onto it; who is jammed may step off the kerb.
+    """
+    gap = _GAP_WHEN_JAMMED if is_jammed else _GAP
+    straight = np.arctan2(point.y - y, point.x - x)
+    aside = (x - point.centre_x) * point.left_x + (y - point.centre_y) * point.left_y
+    left = walkway.reach_left if is_jammed else walkway.room_left
+    right = walkway.reach_right if is_jammed else walkway.room_right
+    best, best_score, best_free = 0.0, -1.0, 0.0
+    for k in range(len(_ANGLES) if is_jammed else _FORWARD):
+        angle = straight + _ANGLES[k]
+        c, s = np.cos(angle), np.sin(angle)
+        there = aside + _STRIDE_AHEAD * (c * point.left_x + s * point.left_y)
+        most = left if there > 0.0 else right
+        if k > 0 and abs(there) > most + 0.1 and abs(there) >= abs(aside):
+            continue
+        free = _free_distance(x, y, c, s, shapes, near, gap)
+        score = free * ((1.2 if is_jammed else 0.35) + np.cos(_ANGLES[k])) - 0.01 * k
+        if score > best_score:
+            best, best_score, best_free = angle, score, free
+    return best, best_free
+
+
+@njit(cache=True)
+def may_step_to(tx, ty, x, y, shapes, near):  # type: ignore[no-untyped-def]
+    """Return whether a walker at (x, y) may stand at (tx, ty); who is too near already may go away from the other."""
+    for j in near:
+        if disc_touches(tx, ty, RADIUS + _TOUCH, shapes, j):
+            is_leaving = _distance(tx, ty, shapes, j) > _distance(x, y, shapes, j)
+            if not is_leaving or disc_touches(tx, ty, RADIUS + _LEAST_GAP, shapes, j):
+                return False
+    return True
+
+
+@njit(cache=True)
+def _walk(paths, walker, shapes, b, near, is_waiting, dt):  # type: ignore[no-untyped-def]
+    """Take a pedestrian, body b, a step towards its point; return the metres walked."""
+    x, y = shapes.x[b], shapes.y[b]
+    point = follow_point(paths, walker)
+    dx, dy = point.x - x, point.y - y
+    away = np.sqrt(dx * dx + dy * dy)
+    if (is_waiting and away < 0.2) or away <= 1e-6:
+        return 0.0
+    is_jammed = walker.jammed_time > _JAMMED_AFTER
+    heading, free = best_heading(x, y, point, paths.walkways[walker.walkway], shapes, near, is_jammed)
+    speed = walker.preferred_speed * min(1.0, free / 0.6)
+    step = min(speed * dt, away if is_waiting else speed * dt)
+    tx, ty = x + np.cos(heading) * step, y + np.sin(heading) * step
+    if step <= 0.004 or not may_step_to(tx, ty, x, y, shapes, near):
+        return 0.0
+    shapes.x[b], shapes.y[b] = tx, ty
+    turn = (heading - shapes.yaw[b] + np.pi) % (2 * np.pi) - np.pi
+    shapes.yaw[b] += min(max(turn, -_TURN_RATE * dt), _TURN_RATE * dt)
+    shapes.vx[b], shapes.vy[b] = (tx - x) / dt, (ty - y) / dt
+    return step
+
+
+@njit(cache=True)
+def _note_progress(paths, walker, x, y, is_waiting, dt):  # type: ignore[no-untyped-def]
+    """Turn round who gets nowhere, on the spot or to and fro."""
+    ex, ey = x - walker.progress_xy[0], y - walker.progress_xy[1]
+    if is_waiting or ex * ex + ey * ey > _PROGRESS:
+        walker.progress_xy[0], walker.progress_xy[1] = x, y
+        walker.stuck_time = walker.jammed_time = 0.0
+        return
+    walker.stuck_time += dt
+    walker.jammed_time += dt
+    over = walker.stuck_time - _STUCK_AFTER
+    if walker.stuck_time > _STUCK_AFTER and over > _STUCK_SPREAD * next_random(walker):
+        _turn_round(paths, walker, x, y)
+
+
+@njit(cache=True)
+def asked_to_go(fleet, first, n):  # type: ignore[no-untyped-def]
+    """Return which of the `n` walkers from body `first` on a vehicle stands before, waiting for them to go."""
+    asked = np.zeros(n, np.bool_)
+    for vehicle in fleet:
+        if first <= vehicle.blocker < first + n and vehicle.stopped_time > _ASKED_AFTER:
+            asked[vehicle.blocker - first] = True
+    return asked
+
+
+@njit(cache=True)
+def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, dt):  # type: ignore[no-untyped-def]
+    """Advance all pedestrians by `dt` seconds; their bodies follow those of the vehicles in `shapes`."""
+    first = len(fleet)
+    asked = asked_to_go(fleet, first, len(pedestrians))
+    buffer = np.empty(len(shapes.x), np.int64)
+    junctions.walker_wait[:] = 0.0
+    for i in range(len(pedestrians)):
+        walker = pedestrians[i]
+        b = first + i
+        x, y = shapes.x[b], shapes.y[b]
+        near = _nearby(shapes, b, buffer)
+        is_waiting = advance_follow_point(paths, walker, junctions, asked[i], x, y, dt)
+        left = walker.leaving_crossing
+        if left >= 0 and walker.distance_walked - walker.leaving_since > _OFF_CROSSING:
+            junctions.walkers_on[left] -= 1
+            walker.leaving_crossing = NONE
+        if asked[i] and walker.stuck_time > 2.5:
+            _turn_round(paths, walker, x, y)  # it waits for us, and is in our way
+        step = _walk(paths, walker, shapes, b, near, is_waiting, dt)
+        if step == 0.0:
+            shapes.vx[b] = shapes.vy[b] = 0.0
+        walker.speed = step / dt
+        walker.distance_walked += step
+        _note_progress(paths, walker, shapes.x[b], shapes.y[b], is_waiting, dt)
+
+
+@njit(cache=True)
+def place_pedestrian(paths, pedestrians, i, walkway, offset, direction, shapes, b):  # type: ignore[no-untyped-def]
+    """Put pedestrian i, body b, on a walkway if nobody is within half a metre; True if it now stands there."""
+    walker = pedestrians[i]
+    walker.walkway, walker.offset, walker.direction = walkway, offset, direction
+    point = follow_point(paths, walker)
+    for j in range(len(shapes.x)):
+        if j != b and disc_touches(point.x, point.y, RADIUS + 0.5, shapes, j):
+            return False
+    shapes.x[b], shapes.y[b] = point.x, point.y
+    along = np.arctan2(point.left_y, point.left_x)
+    shapes.yaw[b] = along - np.pi / 2 if direction > 0 else along + np.pi / 2
+    return True

@@ -1,0 +1,300 @@
+"""Cars, buses and pedestrians nobody plays: one population on the lane graph, moved by compiled kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from vico.assets.vehicles import CAR_KINDS, mirrored, vehicle_prototypes, vehicle_size
+from vico.errors import InputError
+from vico.seeds import rng
+from vico.sim.bodies import BUS, CAR, PEDESTRIAN, Bodies, Drawn
+from vico.sim.traffic.junctions import mark_busy_crossings
+from vico.sim.traffic.network import connected_walkways, lane_network, lanes_to_start_on, walkway_network
+from vico.sim.traffic.pedestrians import RADIUS, advance_pedestrians, place_pedestrian
+from vico.sim.traffic.route import count_per_street
+from vico.sim.traffic.shapes import Shapes, count_overlaps
+from vico.sim.traffic.state import (
+    NONE,
+    PEDESTRIAN_RECORD,
+    VEHICLE_STATE,
+    BusRoutes,
+    new_fleet,
+    new_junctions,
+    new_pedestrians,
+)
+from vico.sim.traffic.vehicles import advance_vehicles, bring_back, place_vehicle
+from vico.world.heights import HeightField
+from vico.world.lanes import LaneGraph
+from vico.world.mesh import Surface
+from vico.world.walkways import SIDEWALK
+
+PERSON_HEIGHT = 1.72
+# A car that nothing has let move for so long (s) is taken out and comes back in at the map's edge, as SUMO does it.
+PATIENCE = 150.0
+_ENTRY_SPEED = 6.0  # m/s
+_FAR = 1e7  # where bodies are before they have a place, m
+_TRIES = 400  # places tried for a car or pedestrian
+#: Share of each kind of car.
+_SHARE = {"hatchback": 0.3, "sedan": 0.27, "suv": 0.23, "van": 0.12, "taxi": 0.08}
+_CAR_ACCELERATION, _BUS_ACCELERATION = 1.6, 1.1  # m/s^2
+_CAR_SPEED_FACTORS, _BUS_SPEED_FACTOR = (0.85, 1.05), 0.95
+
+
+class Traffic:
+    """Vehicles and pedestrians, as arrays.
+
+    Parameters
+    ----------
+    lanes
+        Where they drive and walk.
+    height
+        Ground heights.
+    cars, pedestrians
+        How many of each.
+    seed
+        Decides who starts where, paces, makes and turns.
+    first_entity
+        Entities are numbered from here: cars, then buses, then pedestrians.
+    buses
+        Their routes and where they start.
+    solids
+        Footprints nobody walks through.
+
+    Attributes
+    ----------
+    fleet, pedestrian_state, junctions, shapes
+        The state; see `vico.sim.traffic.state`.
+
+    Raises
+    ------
+    InputError
+        If there is not enough road or sidewalk for so many.
+    """
+
+    def __init__(
+        self,
+        lanes: LaneGraph,
+        height: HeightField,
+        *,
+        cars: int,
+        pedestrians: int,
+        seed: int,
+        first_entity: int,
+        buses: BusRoutes | None = None,
+        solids: Sequence[shapely.Polygon] = (),
+    ) -> None:
+        buses = buses or BusRoutes()
+        self.lanes, self.height = lanes, height
+        self.cars, self.buses, self.pedestrians = cars, len(buses.buses), pedestrians
+        self.vehicles = self.cars + self.buses
+        self.first_entity = first_entity
+        self.walks = connected_walkways(lanes.walks.clear_of(list(solids)))
+        self._net = lane_network(lanes, self.walks, buses.routes)
+        self._paths = walkway_network(self.walks)
+        self._prototypes = [f"{kind}_{colour}" for kind, colours in CAR_KINDS.items() for colour in colours] + ["bus"]
+        self._vehicles = new_fleet(self.vehicles, seed)
+        self.fleet = self._vehicles.view(np.recarray)
+        self._choose_vehicles(buses, seed)
+        self._bodies: Bodies | None = None  # as they stand since they last moved; asked for by everybody
+        self._walkers = new_pedestrians(pedestrians, seed)
+        self.pedestrian_state = self._walkers.view(np.recarray)
+        self.junctions = new_junctions(lanes.zones, len(self.walks))
+        self.shapes = self._new_shapes()
+        self._street_load = np.zeros(len(lanes.edges), np.int32)
+        starts, self._entries = lanes_to_start_on(lanes, self._net)
+        self._place_buses(buses.starts)
+        self._place_cars(seed, starts)
+        self._place_pedestrians(seed)
+
+    # -- start -------------------------------------------------------------------------------------------------------
+
+    def _choose_vehicles(self, buses: BusRoutes, seed: int) -> None:
+        """Give every vehicle a model and its parameters."""
+        random = rng(seed, "traffic", "makes")
+        shares = np.array(
+            [share for kind, colours in CAR_KINDS.items() for share in [_SHARE[kind] / len(colours)] * len(colours)]
+        )
+        cars, bus_model = random.choice(len(shares), self.cars, p=shares / shares.sum()), len(shares)
+        self.prototype = np.concatenate([cars, np.full(self.buses, bus_model)]).astype(np.int32)
+        sizes = np.array([vehicle_size(name) for name in self._prototypes])[self.prototype].reshape(-1, 5)
+        length, width, self._vehicle_height, overhang, wheelbase = sizes.T.copy()
+        fleet, car, bus = self.fleet, slice(0, self.cars), slice(self.cars, None)
+        fleet.length, fleet.half_width, fleet.overhang, fleet.wheelbase = length, width / 2, overhang, wheelbase
+        fleet.acceleration[car], fleet.acceleration[bus] = _CAR_ACCELERATION, _BUS_ACCELERATION
+        fleet.speed_factor[car] = random.uniform(*_CAR_SPEED_FACTORS, self.cars)
+        fleet.speed_factor[bus] = _BUS_SPEED_FACTOR
+        fleet.route[car], fleet.route[bus] = NONE, buses.buses
+
+    def _new_shapes(self) -> Shapes:
+        n = self.vehicles + self.pedestrians
+        return Shapes(
+            x=np.full(n, _FAR) + np.arange(n) * 100.0,
+            y=np.full(n, _FAR),
+            yaw=np.zeros(n),
+            half_length=np.concatenate([self.fleet.length / 2, np.full(self.pedestrians, RADIUS)]),
+            half_width=np.concatenate([self.fleet.half_width, np.full(self.pedestrians, RADIUS)]),
+            disc=np.arange(n) >= self.vehicles,
+            vx=np.zeros(n),
+            vy=np.zeros(n),
+        )
+
+    def _place_vehicle(self, v: int, lane: int, offset: float, air: float) -> bool:
+        return bool(place_vehicle(self._net, self._vehicles, v, lane, offset, self.shapes, air))
+
+    def _place_buses(self, starts: Sequence[tuple[int, float]]) -> None:
+        for k, (place, offset) in enumerate(starts):
+            v = self.cars + k
+            self.fleet.route_index[v] = place
+            lane = self._net.route[self._net.route_first[self.fleet.route[v]] + place]
+            if not self._place_vehicle(v, lane, offset, 1.0):
+                raise InputError(f"traffic: no room for bus {k} at its stop; run fewer buses on the line")
+
+    def _place_cars(self, seed: int, usable: NDArray[np.int64]) -> None:
+        random = rng(seed, "traffic", "cars")
+        if self.cars and not len(usable):
+            raise InputError("traffic: the world has no street for cars; use --cars 0")
+        share = self.lanes.length[usable] / self.lanes.length[usable].sum() if len(usable) else None
+        for v in range(self.cars):
+            for _ in range(_TRIES):
+                lane = int(random.choice(usable, p=share))
+                low, high = self.fleet.length[v] + 1.0, self.lanes.length[lane] - 1.5
+                if high > low and self._place_vehicle(v, lane, random.uniform(low, high), 2.0):
+                    break
+            else:
+                raise InputError(f"traffic: no room for car {v + 1} of {self.cars}; use fewer, as in --cars {v}")
+
+    def _place_pedestrians(self, seed: int) -> None:
+        random = rng(seed, "traffic", "pedestrians")
+        usable = np.flatnonzero((self.walks.kind == SIDEWALK) & (self.walks.length > 3.0))
+        if self.pedestrians and not len(usable):
+            raise InputError("traffic: the world has no sidewalk; use --pedestrians 0")
+        share = self.walks.length[usable] / self.walks.length[usable].sum() if len(usable) else None
+        for i in range(self.pedestrians):
+            for _ in range(_TRIES):
+                walkway = int(random.choice(usable, p=share))
+                offset, way = random.uniform(0.0, self.walks.length[walkway]), 1 if random.random() < 0.5 else -1
+                if place_pedestrian(
+                    self._paths, self._walkers, i, walkway, offset, way, self.shapes, self.vehicles + i
+                ):
+                    break
+            else:
+                raise InputError(
+                    f"traffic: no room for pedestrian {i + 1} of {self.pedestrians}; use fewer, as in --pedestrians {i}"
+                )
+
+    # -- the subsystem contract --------------------------------------------------------------------------------------
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Every number that decides the future, random streams among them."""
+        return {name: array.copy() for name, array in self._state().items()}
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go back to what `arrays` held."""
+        for name, array in self._state().items():
+            array[...] = arrays[name]
+        self._bodies = None
+
+    def _state(self) -> dict[str, NDArray[Any]]:
+        """Return the arrays of the state by name, not copied."""
+        found = {f"fleet.{field[0]}": self._vehicles[field[0]] for field in VEHICLE_STATE}
+        found |= {f"pedestrians.{field}": self._walkers[field] for field in PEDESTRIAN_RECORD.fields or ()}
+        for name, part in (("junctions", self.junctions), ("shapes", self.shapes)):
+            found |= {f"{name}.{field}": array for field, array in zip(part._fields, part, strict=True)}
+        return found
+
+    def bodies(self) -> Bodies:
+        """Vehicles, then pedestrians."""
+        if self._bodies is None:
+            self._bodies = self._bodies_now()
+        return self._bodies
+
+    def _bodies_now(self) -> Bodies:
+        n = len(self.shapes.x)
+        xy = np.column_stack([self.shapes.x, self.shapes.y])
+        return Bodies(
+            entity=np.arange(self.first_entity, self.first_entity + n, dtype=np.int32),
+            kind=np.repeat(np.array([CAR, BUS, PEDESTRIAN], np.int8), [self.cars, self.buses, self.pedestrians]),
+            position=np.column_stack([xy, self.height(xy)]),
+            yaw=self.shapes.yaw.copy(),
+            half_length=self.shapes.half_length.copy(),
+            half_width=self.shapes.half_width.copy(),
+            height=np.concatenate([self._vehicle_height, np.full(self.pedestrians, PERSON_HEIGHT)]),
+            velocity=np.column_stack([self.shapes.vx, self.shapes.vy]),
+        )
+
+    def advance(self, dt: float, obstacles: Bodies) -> None:
+        """Advance everybody by `dt` seconds; nobody touches anybody, `obstacles` (all other bodies) among them."""
+        mine, others = self.shapes, shapes_of(obstacles)
+        everybody = Shapes(*(np.concatenate([getattr(mine, f), getattr(others, f)]) for f in Shapes._fields))
+        net, fleet, junctions = self._net, self._vehicles, self.junctions
+        mark_busy_crossings(net, fleet, junctions)
+        advance_pedestrians(self._paths, self._walkers, junctions, fleet, everybody, dt)
+        junctions.vehicle_wait[:] = 0.0
+        count_per_street(net, fleet, self._street_load)
+        advance_vehicles(net, fleet, junctions, everybody, self._street_load, dt)
+        bring_back(net, fleet, junctions, everybody, self._entries, _ENTRY_SPEED, PATIENCE)
+        for field in ("x", "y", "yaw", "vx", "vy"):
+            getattr(mine, field)[:] = getattr(everybody, field)[: len(mine.x)]
+        self._bodies = None
+
+    def draw(self) -> Drawn:
+        """Cars and buses; pedestrians are drawn by whoever skins people."""
+        m = self.vehicles
+        c, s = np.cos(self.shapes.yaw[:m]), np.sin(self.shapes.yaw[:m])
+        xy = np.column_stack([self.shapes.x[:m], self.shapes.y[:m]])
+        half = self.fleet.wheelbase / 2
+        along = np.column_stack([c, s]) * half[:, None]
+        # On slopes a vehicle stands on its axles: pitch follows the ground between them.
+        front, back = self.height(xy + along), self.height(xy - along)
+        slope = (front - back) / (2 * half) if m else np.zeros(0)
+        size = np.sqrt(1.0 + slope**2)
+        transforms = np.zeros((m, 4, 4), np.float32)
+        forward = np.column_stack([c / size, s / size, slope / size])
+        left = np.column_stack([-s, c, np.zeros(m)])
+        transforms[:, :3, 0], transforms[:, :3, 1] = forward, left
+        transforms[:, :3, 2] = np.cross(forward, left)
+        transforms[:, :2, 3], transforms[:, 2, 3] = xy, (front + back) / 2
+        transforms[:, 3, 3] = 1.0
+        entity = np.arange(self.first_entity, self.first_entity + m, dtype=np.int32)
+        return Drawn(self._prototypes, self.prototype, transforms, entity)
+
+    def prototypes(self) -> dict[str, list[Surface]]:
+        """Models of the vehicles, by the names `draw` uses."""
+        models = vehicle_prototypes()
+        # Doors open to the kerb.
+        return models | {"bus": [mirrored(part) for part in models["bus"]]} if self.lanes.lefthand else models
+
+    # -- what others ask ---------------------------------------------------------------------------------------------
+
+    @property
+    def walkers(self) -> Bodies:
+        """The pedestrians alone."""
+        return self.bodies().where(np.arange(self.vehicles, len(self.shapes.x)))
+
+    @property
+    def gait(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Speed (m/s) and distance walked so far (m) of each pedestrian: what sets a walking clip's rate and phase."""
+        return self.pedestrian_state.speed.copy(), self.pedestrian_state.distance_walked.copy()
+
+    def overlaps(self, others: Bodies | None = None) -> int:
+        """Return the number of pairs of touching bodies among traffic (and `others`): 0 at all times."""
+        return int(count_overlaps(shapes_of(Bodies.joined([self.bodies(), others or Bodies.none()])), 0.0))
+
+
+def shapes_of(bodies: Bodies) -> Shapes:
+    """Return bodies as the kernels take them."""
+    return Shapes(
+        x=np.ascontiguousarray(bodies.position[:, 0]),
+        y=np.ascontiguousarray(bodies.position[:, 1]),
+        yaw=bodies.yaw,
+        half_length=bodies.half_length,
+        half_width=bodies.half_width,
+        disc=bodies.person,
+        vx=np.ascontiguousarray(bodies.velocity[:, 0]),
+        vy=np.ascontiguousarray(bodies.velocity[:, 1]),
+    )

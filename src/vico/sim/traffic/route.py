@@ -1,0 +1,153 @@
+"""Where vehicles go: cars choose at every junction, buses follow their route."""
+
+from __future__ import annotations
+
+from numba import njit
+
+from vico.sim.traffic.random_stream import next_random
+from vico.sim.traffic.state import NONE, PLANNED_LANES, PREVIOUS_LANES
+
+NEVER = 1e9  # distance to a stop that there is not, m
+STANDING_ROOM = 1.5  # room kept behind a vehicle that has left a junction, m
+_DEAD_END, _JUNCTION_AGAIN, _BEEN_THERE, _TURN_BACK = 4.0, 2.0, 50.0, 1e6  # costs, in vehicles on a street
+
+
+@njit(cache=True)
+def count_per_street(net, fleet, street_load):  # type: ignore[no-untyped-def]
+    """Count the vehicles on each street (one direction) into `street_load`."""
+    street_load[:] = 0
+    for vehicle in fleet:
+        street_load[net.lanes[vehicle.lane].edge] += 1
+
+
+@njit(cache=True)
+def _street_reached_by(net, lane):  # type: ignore[no-untyped-def]
+    """Return the street lane that a lane through junctions leads to."""
+    street = lane
+    for _ in range(6):
+        onward = net.lanes[street].first_next
+        if net.lanes[street].inside < 0 or onward == net.lanes[street].end_next:
+            break
+        street = net.next[onward]
+    return street
+
+
+@njit(cache=True)
+def _is_dead_end(net, street):  # type: ignore[no-untyped-def]
+    """Return whether a street only leads back."""
+    onward = net.lanes[street].first_next
+    return net.lanes[street].end_next == onward + 1 and net.lanes[net.next[onward]].u_turn
+
+
+@njit(cache=True)
+def _lane_cost(net, vehicle, option, street, street_load):  # type: ignore[no-untyped-def]
+    """Return what speaks against taking lane `option` to `street`: vehicles there, and ways that lead nowhere new."""
+    cost = street_load[net.lanes[street].edge] + next_random(vehicle)
+    if _is_dead_end(net, street):
+        cost += _DEAD_END  # only when everywhere else is busy
+    # Out of a junction, not round and round in it, and not back to where the car waits.
+    if net.lanes[street].junction >= 0:
+        cost += _JUNCTION_AGAIN
+    if net.lanes[street].edge == net.lanes[vehicle.lane].edge:
+        cost += _BEEN_THERE
+    for p in range(vehicle.planned_count):
+        if vehicle.planned_lanes[p] == option:
+            cost += _BEEN_THERE
+    if net.lanes[option].u_turn:
+        cost += _TURN_BACK
+    return cost
+
+
+@njit(cache=True)
+def choose_next_lane(net, vehicle, lane, street_load):  # type: ignore[no-untyped-def]
+    """Return the lane a car takes after `lane`: towards the street with fewer vehicles; `NONE` at the map's end."""
+    best, best_cost = NONE, 1e18
+    if net.lanes[lane].leaves:
+        return NONE
+    for k in range(net.lanes[lane].first_next, net.lanes[lane].end_next):
+        option = net.next[k]
+        if net.lanes[option].closed:
+            continue
+        street = _street_reached_by(net, option)
+        if net.lanes[street].closed:
+            continue
+        cost = _lane_cost(net, vehicle, option, street, street_load)
+        if cost < best_cost:
+            best, best_cost = option, cost
+    return best
+
+
+@njit(cache=True)
+def route_lane(net, vehicle, further):  # type: ignore[no-untyped-def]
+    """Return the lane of a bus's route that comes `further` lanes after its own."""
+    route = vehicle.route
+    size = net.route_first[route + 1] - net.route_first[route]
+    return net.route[net.route_first[route] + (vehicle.route_index + further) % size]
+
+
+@njit(cache=True)
+def is_lane_of_stop(net, vehicle, further):  # type: ignore[no-untyped-def]
+    """Return whether it is a bus whose next stop is on the lane that comes `further` lanes after its own."""
+    route = vehicle.route
+    if route < 0:
+        return False
+    size = net.route_first[route + 1] - net.route_first[route]
+    return (vehicle.route_index + further) % size == vehicle.stop_route_index
+
+
+@njit(cache=True)
+def plan_lanes(net, vehicle, street_load, reach):  # type: ignore[no-untyped-def]
+    """Plan lanes until the path is `reach` metres long and ends where it can stand clear of junctions.
+
+    Returns
+    -------
+    bool
+        Whether the path ends there for good: at the map's edge, or where a route goes on in the lane beside.
+    """
+    count = vehicle.planned_count
+    lane = vehicle.lane if count == 0 else vehicle.planned_lanes[count - 1]
+    ahead = net.lanes[vehicle.lane].length - vehicle.offset
+    clear = 1e9
+    for k in range(count):
+        planned = vehicle.planned_lanes[k]
+        ahead += net.lanes[planned].length
+        clear = 0.0 if net.lanes[planned].junction >= 0 else clear + net.lanes[planned].length
+    while vehicle.planned_count < PLANNED_LANES and (ahead < reach or clear < vehicle.length + STANDING_ROOM):
+        if vehicle.route >= 0:
+            following = route_lane(net, vehicle, vehicle.planned_count + 1)
+            if following == net.lanes[lane].left or following == net.lanes[lane].right:
+                return True
+        else:
+            following = choose_next_lane(net, vehicle, lane, street_load)
+            if following < 0:
+                return True
+        vehicle.planned_lanes[vehicle.planned_count] = following
+        vehicle.planned_count += 1
+        ahead += net.lanes[following].length
+        clear = 0.0 if net.lanes[following].junction >= 0 else clear + net.lanes[following].length
+        lane = following
+    return False
+
+
+@njit(cache=True)
+def advance_lane(net, vehicle):  # type: ignore[no-untyped-def]
+    """Step on to the planned lanes that a vehicle's front has reached."""
+    while vehicle.offset > net.lanes[vehicle.lane].length and vehicle.planned_count > 0:
+        vehicle.offset -= net.lanes[vehicle.lane].length
+        for k in range(PREVIOUS_LANES - 1, 0, -1):
+            vehicle.previous_lanes[k] = vehicle.previous_lanes[k - 1]
+        vehicle.previous_lanes[0] = vehicle.lane
+        vehicle.lane = vehicle.planned_lanes[0]
+        for k in range(vehicle.planned_count - 1):
+            vehicle.planned_lanes[k] = vehicle.planned_lanes[k + 1]
+        vehicle.planned_count -= 1
+        vehicle.granted_count = max(vehicle.granted_count - 1, 0)
+        advance_on_route(net, vehicle)
+
+
+@njit(cache=True)
+def advance_on_route(net, vehicle):  # type: ignore[no-untyped-def]
+    """Note that a bus is on the next lane of its route; cars have none."""
+    route = vehicle.route
+    if route >= 0:
+        vehicle.route_index = (vehicle.route_index + 1) % (net.route_first[route + 1] - net.route_first[route])

@@ -1,0 +1,264 @@
+"""What traffic kernels read and write: the network, the vehicles and pedestrians, who is in which junction.
+
+One row a lane, vehicle, junction, walkway or pedestrian, as records of NumPy structured arrays: a kernel's `vehicle`
+is one row of the fleet, `vehicle.speed` its speed. Records cost a kernel nothing to pass on, unlike tuples of arrays.
+Positions are local ENU metres, headings radians counter-clockwise from east. "Distance along a lane" runs from the
+lane's start in metres; a vehicle is where its front is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.seeds import rng
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Records = NDArray[np.void]
+
+PREVIOUS_LANES = 32  # lanes behind a vehicle that are remembered
+PLANNED_LANES = 48  # lanes ahead that can be planned
+HELD_JUNCTIONS = 6  # junctions a vehicle can hold at once
+TOP_SPEED = 13.9  # m/s, whatever the street allows
+NONE = -1  # no lane, junction, route, body: wherever an index may be missing
+
+_F, _I, _B = np.float64, np.int32, np.bool_
+
+#: A lane that vehicles drive.
+LANE = np.dtype(
+    [
+        ("first_point", _I),  # its centre line: points from this one ...
+        ("end_point", _I),  # ... to before this one
+        ("length", _F),  # m
+        ("speed", _F),  # speed limit, m/s
+        ("junction", _I),  # junction cluster that a vehicle on it must hold alone, NONE between junctions
+        ("inside", _I),  # junction it lies in, NONE for street lanes
+        ("edge", _I),  # street (one direction) it belongs to
+        ("closed", _B),  # whether cars keep off
+        ("left", _I),  # neighbour lanes in the same direction, NONE for none
+        ("right", _I),
+        ("first_next", _I),  # lanes that follow it: `next` from here ...
+        ("end_next", _I),  # ... to before here
+        ("first_crossing", _I),  # crossings it runs over: `crossings` from here ...
+        ("end_crossing", _I),  # ... to before here
+        ("u_turn", _B),  # whether it turns back
+        ("leaves", _B),  # whether it ends where the map cuts the street off
+    ],
+    align=True,
+)
+
+#: What does not change about a vehicle.
+VEHICLE_PARAMETERS: list[tuple[Any, ...]] = [
+    ("index", _I),  # its row in the fleet, and its body in `Shapes`
+    ("length", _F),  # of its outline, m
+    ("half_width", _F),  # of its outline, m
+    ("overhang", _F),  # from its front to the front axle, m
+    ("wheelbase", _F),  # between its axles, m
+    ("acceleration", _F),  # greatest, m/s^2
+    ("speed_factor", _F),  # share of the speed limit it drives at
+    ("route", _I),  # bus route it follows, NONE for cars
+]
+
+#: What changes about a vehicle: its state, that is hashed and saved.
+VEHICLE_STATE: list[tuple[Any, ...]] = [
+    ("lane", _I),  # lane its front is on
+    ("offset", _F),  # distance of its front along that lane, m
+    ("speed", _F),  # along its path, m/s
+    ("previous_lanes", _I, (PREVIOUS_LANES,)),  # lanes it came over, the last one first, NONE after them
+    ("planned_lanes", _I, (PLANNED_LANES,)),  # lanes it will take, the next one first
+    ("planned_count", _I),  # how many of them are set
+    ("granted_count", _I),  # how many it may drive without asking: up to the last junction it was let into
+    ("held_junctions", _I, (HELD_JUNCTIONS,)),  # junction clusters it holds, NONE in free slots
+    ("lateral_offset", _F),  # where a lane change under way began, m to the left of the new lane; 0 without one
+    ("lane_change_distance", _F),  # driven since that lane change began, m
+    ("blocker", _I),  # body it stands behind, an index into the step's `Shapes`; NONE while it drives
+    ("target_speed", _F),  # most it drives, m/s: what a bus's timetable asks for
+    ("stopped_time", _F),  # how long it has stood, s; 0 at a bus stop
+    ("junction_wait", _F),  # how long it has stood before a junction it asked for and did not get, s
+    ("queued_junction", _I),  # junction cluster that somebody else has, or has waited longer for; else NONE
+    ("time_since_lane_change", _F),  # s
+    ("route_index", _I),  # buses: position of its lane in its route
+    ("stop_route_index", _I),  # buses: position in its route of the lane with the next stop
+    ("stop_offset", _F),  # buses: the stop's distance along that lane, m
+    ("at_stop", _B),  # buses: whether it stands at its stop with its doors open
+    ("laps", _I),  # cars: how often it has left the map and come back in
+    ("teleports", _I),  # cars: how often it was taken out of a jam and brought back in at the map's edge
+    ("random", np.uint64),  # state of its stream of random numbers
+]
+
+VEHICLE = np.dtype([*VEHICLE_PARAMETERS, *VEHICLE_STATE], align=True)
+
+#: A walkway: a stretch of sidewalk, a crossing or a corner; `Walkways` documents it.
+WALKWAY = np.dtype(
+    [
+        ("length", _F),  # m
+        ("room_left", _F),  # how far a walker's centre may be to the left of the centre line, m
+        ("room_right", _F),  # and to the right
+        ("reach_left", _F),  # the same for who has to get past somebody
+        ("reach_right", _F),
+        ("kind", np.uint8),  # SIDEWALK, CROSSING or CORNER
+        ("start", _I),  # meeting points at its ends
+        ("end", _I),
+    ],
+    align=True,
+)
+
+#: A pedestrian; it follows a point that runs a little ahead of it along its walkway.
+PEDESTRIAN_RECORD = np.dtype(
+    [
+        ("walkway", _I),  # walkway the followed point is on
+        ("offset", _F),  # distance of that point along the walkway, m
+        ("direction", _I),  # 1 along the walkway, -1 against it
+        ("lateral_share", _F),  # how far right of the middle of its room it walks: 0 in the middle, 1 at the edge
+        ("preferred_speed", _F),  # m/s
+        ("speed", _F),  # measured over the last step, m/s
+        ("distance_walked", _F),  # since the start, m
+        ("stuck_time", _F),  # within a metre of `progress_xy` since it last turned round, s
+        ("jammed_time", _F),  # within a metre of `progress_xy`, s
+        ("progress_xy", _F, (2,)),  # where it last got on, m
+        ("crossing_wait", _F),  # how long it has waited for a crossing, s
+        ("leaving_crossing", _I),  # crossing its body may still be on, NONE for none
+        ("leaving_since", _F),  # `distance_walked` when its point left that crossing, m
+        ("random", np.uint64),  # state of its stream of random numbers
+    ],
+    align=True,
+)
+
+
+class LaneNetwork(NamedTuple):
+    """The lanes vehicles drive, in the order of `LaneGraph`, and the routes of the buses; never changes.
+
+    Attributes
+    ----------
+    lanes
+        Dtype `LANE`.
+    points, along
+        Points of the lanes' centre lines, metres, shape ``(p, 2)``, and their distances along their lanes.
+    next
+        Lanes that follow another one, lane by lane.
+    crossings, crossings_cleared
+        Crossings that lanes run over (indices of walkways), lane by lane, and the distance along the lane at which a
+        vehicle's rear has passed each, metres.
+    route_first, route
+        Lanes of bus route ``r``, a closed round: ``route[route_first[r]:route_first[r + 1]]``.
+    """
+
+    lanes: Records
+    points: Floats
+    along: Floats
+    next: Ints
+    crossings: Ints
+    crossings_cleared: Floats
+    route_first: Ints
+    route: Ints
+
+
+class WalkwayNetwork(NamedTuple):
+    """Where pedestrians walk, in the order of `Walkways`; never changes.
+
+    Attributes
+    ----------
+    walkways
+        Dtype `WALKWAY`.
+    first, points, along
+        Walkway ``i``'s centre line is ``points[first[i]:first[i + 1]]``, metres; `along` the distances along it.
+    meeting_first, meeting
+        Walkways at meeting point ``k``: ``meeting[meeting_first[k]:meeting_first[k + 1]]``.
+    """
+
+    walkways: Records
+    first: Ints
+    points: Floats
+    along: Floats
+    meeting_first: Ints
+    meeting: Ints
+
+
+class JunctionState(NamedTuple):
+    """Who is in each junction cluster, and who wants over each crossing.
+
+    Attributes
+    ----------
+    holder
+        Vehicle that has the junction cluster to itself, `NONE` for nobody, int32, shape ``(clusters,)``.
+    walkers_on
+        Pedestrians on each crossing or just off it, int32, shape ``(walkways,)`` as everything about crossings.
+    walker_wait
+        Longest that a pedestrian has waited for it so far, seconds.
+    vehicle_wait
+        Longest that a vehicle which lets pedestrians go first has waited, seconds.
+    longest_wait
+        Longest that a vehicle in the queue for the cluster has waited, seconds, shape ``(clusters,)``.
+    crossing_busy
+        Whether a vehicle is on the crossing or has been let over it.
+    """
+
+    holder: Ints
+    walkers_on: Ints
+    walker_wait: Floats
+    vehicle_wait: Floats
+    longest_wait: Floats
+    crossing_busy: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class BusRoutes:
+    """Where buses drive and start.
+
+    Attributes
+    ----------
+    routes
+        Closed sequences of lane numbers.
+    buses
+        Route of each bus.
+    starts
+        Each bus's position in its route and distance along that lane (metres) at the start.
+    """
+
+    routes: Sequence[Sequence[int]] = field(default_factory=list)
+    buses: Sequence[int] = field(default_factory=list)
+    starts: Sequence[tuple[int, float]] = field(default_factory=list)
+
+
+def new_fleet(n: int, seed: int) -> Records:
+    """Return `n` vehicles, dtype `VEHICLE`, that have no parameters and no place yet."""
+    fleet = np.zeros(n, VEHICLE)
+    fleet["index"] = np.arange(n)
+    for name in ("previous_lanes", "planned_lanes", "held_junctions", "blocker", "queued_junction", "stop_route_index"):
+        fleet[name] = NONE
+    fleet["target_speed"] = TOP_SPEED
+    fleet["random"] = _random_streams(seed, "turns", n)
+    return fleet
+
+
+def new_pedestrians(n: int, seed: int) -> Records:
+    """Return `n` pedestrians, dtype `PEDESTRIAN_RECORD`, that have no place yet."""
+    random = rng(seed, "traffic", "paces")
+    walkers = np.zeros(n, PEDESTRIAN_RECORD)
+    walkers["direction"] = 1
+    walkers["lateral_share"] = random.uniform(0.1, 0.95, n)
+    walkers["preferred_speed"] = random.uniform(1.0, 1.5, n)
+    walkers["leaving_crossing"] = NONE
+    walkers["random"] = _random_streams(seed, "ways", n)
+    return walkers
+
+
+def new_junctions(clusters: int, walkways: int) -> JunctionState:
+    """Return the state of junctions nobody is in and crossings nobody is on."""
+    return JunctionState(
+        holder=np.full(max(clusters, 1), NONE, np.int32),
+        walkers_on=np.zeros(walkways, np.int32),
+        walker_wait=np.zeros(walkways),
+        vehicle_wait=np.zeros(walkways),
+        longest_wait=np.zeros(max(clusters, 1)),
+        crossing_busy=np.zeros(walkways, np.bool_),
+    )
+
+
+def _random_streams(seed: int, name: str, n: int) -> NDArray[np.uint64]:
+    return rng(seed, "traffic", name).integers(0, 2**63, n, dtype=np.uint64)

@@ -1,0 +1,266 @@
+"""How vehicles drive, one step of all of them; the rules are in the modules named after them.
+
+The leader is whatever body a vehicle's own swept outline meets first: vehicles, pedestrians, avatars and robots alike.
+No move is made that would touch another body, so vehicles never overlap whatever the model says.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from vico.sim.traffic.backing_up import vehicles_backing_up
+from vico.sim.traffic.car_following import (
+    braking_distance,
+    desired_speed,
+    distance_to_stop,
+    idm_acceleration,
+    leader_speed,
+    look_ahead,
+    mind_only_before,
+    next_speed,
+    stop_and_speed_limit,
+)
+from vico.sim.traffic.junctions import (
+    hesitates,
+    next_junction_request,
+    note_longest_waits,
+    release_all_junctions,
+    release_junctions,
+    request_junctions,
+)
+from vico.sim.traffic.lane_change import (
+    change_as_route_does,
+    change_to_emptier_lane,
+    wants_lane_change,
+)
+from vico.sim.traffic.leader import NEARBY_BODY, TOUCH, VehicleView, find_leader, nearby_bodies, touched_at, touches
+from vico.sim.traffic.path import (
+    LANE_CHANGE,
+    PATH_POINT,
+    PATH_POINTS,
+    changing_lane,
+    footprint,
+    lane_polyline,
+    path_polyline,
+    vehicle_outline,
+)
+from vico.sim.traffic.random_stream import next_random
+from vico.sim.traffic.route import advance_lane, plan_lanes
+from vico.sim.traffic.shapes import Rectangle
+from vico.sim.traffic.state import NONE
+
+STANDING = 0.1  # slower is standing, m/s
+
+_REVERSE = 0.6  # m/s
+_BLOCKER_GAP = 3.0  # m within which a leader is what a standing vehicle stands before
+_CREEP = 1.0  # a vehicle that is refused a junction waits for it below this speed, m/s
+_OTHER_WAY_AFTER = 15.0  # s of waiting for a junction after which a car looks for another way, every 50 steps
+_BEYOND_JUNCTION, _FAR_REACH = 60.0, 150.0  # m seen beyond a junction that is asked for, and around at most
+
+
+@njit(cache=True)
+def advance_vehicles(net, fleet, junctions, shapes, street_load, dt):  # type: ignore[no-untyped-def]
+    """Advance all vehicles by `dt` seconds, one after the other, each seeing where the ones before it went.
+
+    Parameters
+    ----------
+    net, fleet, junctions, shapes
+        See `vico.sim.traffic.state`; vehicle v is body v of `shapes`.
+    street_load
+        Vehicles on each street, shape ``(streets,)``.
+    """
+    note_longest_waits(fleet, junctions)
+    backs_up = vehicles_backing_up(net, fleet, shapes)
+    buffers = np.empty(len(shapes.x), NEARBY_BODY), np.empty(len(shapes.x), NEARBY_BODY)
+    path_buffer = np.empty(PATH_POINTS, PATH_POINT)
+    for v in range(len(fleet)):
+        vehicle = fleet[v]
+        lane, speed, is_bus = vehicle.lane, vehicle.speed, vehicle.route >= 0
+        look = look_ahead(speed)
+        path_ends = plan_lanes(net, vehicle, street_load, look + vehicle.length + 12.0)
+        if hesitates(net, vehicle):
+            vehicle.granted_count = 0
+            release_junctions(net, junctions, vehicle)
+
+        stop_distance = distance_to_stop(vehicle)
+        request = next_junction_request(net, vehicle, stop_distance, braking_distance(speed), path_ends)
+        view = _look_around(net, vehicle, shapes, request, path_buffer, buffers[0])
+        gap, leader = find_leader(view, vehicle.offset, look, buffers[1])
+        # Who is behind another vehicle does not ask: it would hold the junction that the other one needs.
+        is_behind = 0 <= leader < len(fleet) and gap < request.distance
+        vehicle.queued_junction = NONE
+        is_refused = (
+            request.planned_index >= 0
+            and not is_behind
+            and not request_junctions(net, fleet, junctions, vehicle, request, view)
+        )
+        vehicle.junction_wait = vehicle.junction_wait + dt if is_refused and speed < _CREEP else 0.0
+
+        wanted = desired_speed(net, vehicle)
+        stop, limit = stop_and_speed_limit(net, vehicle, look, stop_distance, wanted)
+        gap, leader = mind_only_before(stop, gap, leader)
+        leading = leader_speed(shapes, leader, view, vehicle.offset + gap)
+        rate = idm_acceleration(speed, wanted, vehicle.acceleration, gap, leading)
+        move = next_speed(speed, rate, limit, gap, stop, dt) * dt
+        move, gap, leader = _move_without_contact(net, vehicle, view, move, gap, leader)
+        vehicle.speed = move / dt
+        if backs_up[v] and move == 0.0:
+            move = _move_back(vehicle, view, dt)
+        if move != 0.0:
+            _move_vehicle(vehicle, shapes, view, move, dt)
+            advance_lane(net, vehicle)
+        else:
+            shapes.vx[v] = shapes.vy[v] = 0.0
+
+        vehicle.blocker = leader if gap < _BLOCKER_GAP and vehicle.speed < STANDING else NONE
+        release_junctions(net, junctions, vehicle)
+        vehicle.time_since_lane_change += dt
+        vehicle.stopped_time = vehicle.stopped_time + dt if vehicle.speed < STANDING else 0.0
+        if is_bus:
+            _arrive_at_stop(vehicle, stop_distance)
+        elif is_refused and _gives_up_waiting(vehicle, dt):
+            vehicle.planned_count = vehicle.granted_count
+
+        # Only on the lane the path was laid for: who has just reached another one can change a step later.
+        if vehicle.lane != lane:
+            continue
+        if is_bus:
+            if not vehicle.at_stop and vehicle.planned_count == 0:
+                change_as_route_does(net, vehicle, view)
+        elif 0 <= leader < len(fleet) and wants_lane_change(net, vehicle, gap, leading, wanted):
+            change_to_emptier_lane(net, fleet, vehicle, view)
+
+
+@njit(cache=True)
+def _look_around(net, vehicle, shapes, request, path_buffer, body_buffer):  # type: ignore[no-untyped-def]
+    """Return what a vehicle sees: its path and the bodies near it, farther where it has to see beyond a junction."""
+    look, length = look_ahead(vehicle.speed), vehicle.length
+    far, reach = look, look + length + 6.0
+    if request.planned_index >= 0:
+        # Who asks has to see the place beyond the junction where it will stand.
+        far = net.lanes[vehicle.lane].length - vehicle.offset
+        for k in range(vehicle.planned_count):
+            far += net.lanes[vehicle.planned_lanes[k]].length
+            is_street = net.lanes[vehicle.planned_lanes[k]].junction < 0
+            if k > request.planned_index and is_street and far > look + _BEYOND_JUNCTION:
+                break
+        far = max(far, look)
+        reach = max(reach, min(far, look + length + _FAR_REACH))
+    path = path_polyline(net, vehicle, length + 3.0, vehicle.offset + far + 4.0, path_buffer)
+    return VehicleView(path, vehicle_outline(vehicle), nearby_bodies(shapes, vehicle.index, reach, body_buffer))
+
+
+@njit(cache=True)
+def _move_without_contact(net, vehicle, view, move, gap, leader):  # type: ignore[no-untyped-def]
+    """Return the move, gap and leader; no move where it would touch a body or leave the planned path."""
+    if vehicle.planned_count == 0:
+        move = min(move, max(net.lanes[vehicle.lane].length - vehicle.offset, 0.0))
+    if move > 0.0:
+        hit = touched_at(view.path, view.outline, vehicle.offset + move, view.nearby, TOUCH, TOUCH)
+        if hit >= 0:
+            return 0.0, 0.0, view.nearby[hit].body
+    return move, gap, leader
+
+
+@njit(cache=True)
+def _move_back(vehicle, view, dt):  # type: ignore[no-untyped-def]
+    """Return the move of a vehicle that backs up, metres; 0 where it would touch a body."""
+    if vehicle.granted_count > 0 or vehicle.offset <= 0.5:
+        return 0.0
+    move = -_REVERSE * dt
+    is_blocked = touched_at(view.path, view.outline, vehicle.offset + move, view.nearby, TOUCH, TOUCH) >= 0
+    return 0.0 if is_blocked else move
+
+
+@njit(cache=True)
+def _move_vehicle(vehicle, shapes, view, move, dt):  # type: ignore[no-untyped-def]
+    """Move a vehicle along its path and put its body there."""
+    x, y, c, s = footprint(view.path, view.outline, vehicle.offset + move)
+    vehicle.offset += move
+    if vehicle.lateral_offset != 0.0 and move > 0.0:
+        # The front's own metres: `outline` keeps what a point of the path had done when the change began.
+        vehicle.lane_change_distance += move
+    v = vehicle.index
+    shapes.vx[v], shapes.vy[v] = (x - shapes.x[v]) / dt, (y - shapes.y[v]) / dt
+    shapes.x[v], shapes.y[v], shapes.yaw[v] = x, y, np.arctan2(s, c)
+    if vehicle.lane_change_distance > LANE_CHANGE + 2.0 + 2 * view.outline.length:
+        vehicle.lateral_offset = 0.0
+
+
+@njit(cache=True)
+def _arrive_at_stop(vehicle, stop_distance):  # type: ignore[no-untyped-def]
+    """Open a bus's doors where it stands at its stop."""
+    if stop_distance < 0.5 and vehicle.speed < STANDING:
+        vehicle.at_stop = True
+    if vehicle.at_stop:
+        vehicle.stopped_time = 0.0
+
+
+@njit(cache=True)
+def _gives_up_waiting(vehicle, dt):  # type: ignore[no-untyped-def]
+    """Return whether a car looks for another way now: a full exit is no reason to wait for ever."""
+    return vehicle.junction_wait > _OTHER_WAY_AFTER and int(vehicle.junction_wait / dt) % 50 == 0
+
+
+@njit(cache=True)
+def place_vehicle(net, fleet, v, lane, offset, shapes, air):  # type: ignore[no-untyped-def]
+    """Put vehicle v on a lane if no other body would be nearer than `air` metres; True if it now stands there."""
+    vehicle = fleet[v]
+    path = lane_polyline(net, lane, np.empty(256, PATH_POINT))
+    outline = changing_lane(vehicle_outline(vehicle), 0.0, 0.0)
+    cx, cy, c, s = footprint(path, outline, offset)
+    before = shapes.x[v], shapes.y[v]
+    shapes.x[v], shapes.y[v] = cx, cy
+    length = vehicle.length
+    grown = Rectangle(cx, cy, c, s, length / 2 + air, vehicle.half_width + 0.3)
+    for one in nearby_bodies(shapes, v, length + air + 1.0, np.empty(len(shapes.x), NEARBY_BODY)):
+        if touches(grown, one):
+            shapes.x[v], shapes.y[v] = before
+            return False
+    vehicle.lane, vehicle.offset, vehicle.planned_count, vehicle.lateral_offset = lane, offset, 0, 0.0
+    vehicle.previous_lanes[:] = NONE
+    vehicle.speed = vehicle.stopped_time = vehicle.junction_wait = 0.0
+    vehicle.time_since_lane_change = vehicle.lane_change_distance = 0.0
+    shapes.yaw[v] = np.arctan2(s, c)
+    shapes.vx[v] = shapes.vy[v] = 0.0
+    return True
+
+
+@njit(cache=True)
+def has_left_map(net, vehicle):  # type: ignore[no-untyped-def]
+    """Return whether a car stands at the end of a lane that leads nowhere."""
+    return vehicle.planned_count == 0 and vehicle.offset >= net.lanes[vehicle.lane].length - 0.3
+
+
+@njit(cache=True)
+def bring_back(net, fleet, junctions, shapes, entries, entry_speed, patience):  # type: ignore[no-untyped-def]
+    """Bring cars that left the map, or stood still for longer than `patience`, back in where the map begins.
+
+    Parameters
+    ----------
+    entries
+        Lanes that begin at the map's edge.
+    entry_speed
+        Of those that left it, m/s.
+    patience
+        Seconds.
+    """
+    for v in range(len(fleet)):
+        vehicle = fleet[v]
+        if vehicle.route >= 0 or len(entries) == 0:
+            continue
+        left = has_left_map(net, vehicle)
+        if not left and vehicle.stopped_time < patience:
+            continue
+        for _ in range(3):
+            entry = entries[min(int(next_random(vehicle) * len(entries)), len(entries) - 1)]
+            start = vehicle.length + 0.2
+            if net.lanes[entry].length > start + 1.0 and place_vehicle(net, fleet, v, entry, start, shapes, 4.0):
+                release_all_junctions(junctions, vehicle)
+                vehicle.speed = entry_speed if left else 0.0
+                if left:
+                    vehicle.laps += 1
+                else:
+                    vehicle.teleports += 1
+                break

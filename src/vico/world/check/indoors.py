@@ -1,0 +1,158 @@
+"""Can one walk indoors? From the door to the street to every room, and in each room to whatever holds things."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from vico.geo import overlay
+from vico.rules import REACH
+from vico.world.check.finding import WorldFinding
+from vico.world.model import Doorway, Room
+from vico.world.objects import Objects
+
+BODY = 0.25
+_SAME_DOOR = 0.5  # metres between the two sides of a doorway
+
+
+def walkable_inside(rooms: Sequence[Room], objects: Objects, *, body: float = BODY) -> list[WorldFinding]:
+    """Prove that people get everywhere indoors.
+
+    Parameters
+    ----------
+    rooms
+        Rooms of any number of places, those of a place in the order of its ``rooms``.
+    objects
+        What stands in them; only solid things are in the way.
+    body
+        Radius of a body, metres.
+
+    Returns
+    -------
+    list of Finding
+        Empty if from the way out of each place a body can walk to every doorway of every room, through it to the room
+        beyond, up and down stairs and lifts, and to every container's reach point.
+
+    Notes
+    -----
+    Exact, not on a raster: the floor less what lies within `body` of walls and solid things, in one piece.
+    """
+    by_room: dict[str, list[int]] = {}
+    for k in np.flatnonzero(np.asarray(objects.solid, bool) & ~objects.outdoors).tolist():
+        by_room.setdefault(str(objects.room[k]), []).append(k)
+    corners = objects.corners()
+    known = {room.id: room for room in rooms}
+    found: list[WorldFinding] = []
+    places: dict[str, list[Room]] = {}
+    for room in rooms:
+        places.setdefault(room.place, []).append(room)
+        found += _room(room, corners[by_room.get(room.id, [])], body)
+        found += _doorways(room, known)
+    for place, mine in places.items():
+        found += _reached(place, mine)
+    return found
+
+
+def floor_space(room: Room, outlines: NDArray[np.float64], body: float = BODY) -> shapely.Geometry:
+    """Where the middle of a body can be: one part, or several that can't be walked between.
+
+    Parameters
+    ----------
+    outlines
+        Corners of the solid things in the room, shape ``(n, 4, 2)``.
+    """
+    c, s = math.cos(room.yaw), math.sin(room.yaw)
+    x, y = room.size[0] / 2 - body, room.size[1] / 2 - body
+    box = shapely.Polygon(
+        [
+            (room.centre[0] + c * u - s * v, room.centre[1] + s * u + c * v)
+            for u, v in ((-x, -y), (x, -y), (x, y), (-x, y))
+        ]
+    )
+    if not len(outlines):
+        return box
+    taken = overlay.union_all(overlay.buffer(shapely.polygons(outlines), body, quad_segs=4), grid=None)
+    return overlay.difference(box, taken, grid=None)
+
+
+def _room(room: Room, outlines: NDArray[np.float64], body: float) -> list[WorldFinding]:
+    parts = shapely.get_parts(floor_space(room, outlines, body))
+    start = shapely.Point(room.inside[:2])
+    home = [part for part in parts if part.distance(start) < 0.02]
+    if not home:
+        return [WorldFinding("room blocked", room.id, "nobody can stand inside its door")]
+    floor = overlay.buffer(home[0], 0.02)
+    found = []
+    for door in room.doors:
+        if not floor.covers(shapely.Point(door.inside[:2])):
+            to = door.to or "the street"
+            found.append(WorldFinding("door blocked", room.id, f"its door to {to} can't be walked to from its way in"))
+    for container in room.containers:
+        if not floor.covers(shapely.Point(container.reach)):
+            found.append(
+                WorldFinding("container blocked", container.id, "its reach point can't be walked to from the door")
+            )
+        if (
+            container.kind != "floor"
+            and _away(container.reach, container.centre, container.size, container.yaw) > REACH
+        ):
+            found.append(WorldFinding("container far", container.id, f"its reach point is more than {REACH} m from it"))
+    return found
+
+
+def _away(
+    point: tuple[float, float], centre: tuple[float, float, float], size: tuple[float, float], yaw: float
+) -> float:
+    c, s = math.cos(yaw), math.sin(yaw)
+    dx, dy = point[0] - centre[0], point[1] - centre[1]
+    u, v = abs(dx * c + dy * s) - size[0] / 2, abs(dy * c - dx * s) - size[1] / 2
+    return math.hypot(max(u, 0.0), max(v, 0.0))
+
+
+def _doorways(room: Room, known: dict[str, Room]) -> list[WorldFinding]:
+    """Doorways lie in their rooms at floor level, and both sides of one agree."""
+    found = []
+    for door in room.doors:
+        floor = room.floor_at(*door.inside[:2])
+        if abs(door.position[2] - floor) > 0.05 or abs(door.inside[2] - floor) > 0.05:
+            found.append(
+                WorldFinding("door level", room.id, f"its door to {door.to or 'the street'} is not at floor level")
+            )
+        if not door.to:
+            continue
+        other = known.get(door.to)
+        back = _door_to(other, room.id) if other is not None else None
+        if back is None:
+            found.append(WorldFinding("door one-sided", room.id, f"its door to {door.to} does not lead back"))
+        elif not _ride(room, other) and math.dist(door.position, back.position) > _SAME_DOOR:
+            found.append(WorldFinding("door apart", room.id, f"the two sides of its door to {door.to} do not meet"))
+    return found
+
+
+def _ride(room: Room, other: Room | None) -> bool:
+    return room.kind == "lift" and other is not None and other.kind == "lift"
+
+
+def _door_to(room: Room, name: str) -> Doorway | None:
+    return next((door for door in room.doors if door.to == name), None)
+
+
+def _reached(place: str, rooms: Sequence[Room]) -> list[WorldFinding]:
+    """Rooms no row of doors leads to from the street."""
+    ways = {room.id: [door.to for door in room.doors if door.to] or list(room.links) for room in rooms}
+    first = next((room for room in rooms if any(not door.to for door in room.doors)), rooms[0])
+    seen, queue = {first.id}, [first.id]
+    while queue:
+        for name in ways.get(queue.pop(), []):
+            if name not in seen:
+                seen.add(name)
+                queue.append(name)
+    return [
+        WorldFinding("room cut off", room.id, f"no row of doors leads there from the entrance of {place}")
+        for room in rooms
+        if room.id not in seen
+    ]

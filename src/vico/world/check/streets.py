@@ -1,0 +1,54 @@
+"""Rules of lanes, junctions and bus lines: what follows one another does so in space."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from vico.world.check.finding import WorldFinding
+from vico.world.folder import World
+
+
+def check_roads(world: World) -> Iterator[WorldFinding]:
+    """Check that lanes follow one another end to end, and most of the network can be driven round."""
+    lanes = world.lanes
+    rows = np.repeat(np.arange(len(lanes)), np.diff(lanes.next_first))
+    ends = lanes.points[lanes.first[rows + 1] - 1]
+    starts = lanes.points[lanes.first[lanes.next]]
+    gap = np.hypot(*(ends - starts).T)
+    for k in np.flatnonzero(gap > 1.0).tolist():
+        yield WorldFinding(
+            "lanes apart", lanes.ids[int(rows[k])], f"{gap[k]:.1f} m from its successor {lanes.ids[int(lanes.next[k])]}"
+        )
+    ids = {road.id for road in world.roads.roads}
+    for junction in world.roads.junctions:
+        for name in junction.roads:
+            if name not in ids:
+                yield WorldFinding("junction road", junction.id, f"there is no road {name}")
+
+
+def check_transit(world: World) -> Iterator[WorldFinding]:
+    """Check that lines drive over lanes that follow one another, past their stops, where people can wait."""
+    lanes, transit = world.lanes, world.transit
+    stops = {stop.id: stop for stop in transit.stops}
+    for stop in transit.stops:
+        if stop.lane not in lanes.index:
+            yield WorldFinding("stop lane", stop.id, f"there is no lane {stop.lane}")
+        elif not 0.0 <= stop.offset <= float(lanes.length[lanes.index[stop.lane]]) + 0.01:
+            yield WorldFinding("stop lane", stop.id, f"{stop.offset} m is beyond the end of {stop.lane}")
+    for line in transit.lines:
+        missing = [name for name in line.lanes if name not in lanes.index]
+        if missing or any(name not in stops for name in line.stops):
+            yield WorldFinding("line lost", line.id, f"unknown lanes or stops: {', '.join(missing[:3]) or 'stops'}")
+            continue
+        numbers = [lanes.index[name] for name in line.lanes]
+        for a, b in zip(numbers, numbers[1:] + numbers[:1], strict=True):
+            beside = b in (int(lanes.left[a]), int(lanes.right[a]))
+            if a != b and b not in lanes.following(a) and not beside:
+                yield WorldFinding("line broken", line.id, f"no way from {lanes.ids[a]} to {lanes.ids[b]}")
+        for name in line.stops:
+            if stops[name].lane not in line.lanes:
+                yield WorldFinding("line misses stop", line.id, f"{name} is not on its way")
+        if len(line.travel) != len(line.stops) + 1 or any(np.diff(line.travel) <= 0):
+            yield WorldFinding("line timetable", line.id, "its times do not increase from stop to stop and back")

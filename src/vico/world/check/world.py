@@ -1,0 +1,126 @@
+"""Is a world what it says it is? Everything a consumer relies on, checked one by one."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.errors import VicoError
+from vico.io.files import sha256_of
+from vico.world.check.buildings import check_buildings_apart, check_buildings_closed, check_buildings_seated, outline_of
+from vico.world.check.finding import WorldFinding
+from vico.world.check.objects import check_clearances, check_objects
+from vico.world.check.places import check_entrances, check_places
+from vico.world.check.rooms import check_containers, check_indoors, check_rooms
+from vico.world.check.streets import check_roads, check_transit
+from vico.world.folder import World, world_files
+from vico.world.model import FAILED, FAULT
+
+MOST_FAILED = 0.05
+"""Share of a stage's objects whose geometry may be at fault."""
+
+_FEW_FAILED = 2  # that a small window may lack whatever their share
+_MADE = {"buildings": ("buildings",), "objects": ("amenity_objects", "natural_objects", "barrier_pieces")}
+
+
+def check_world(world: World) -> list[WorldFinding]:
+    """Check a world.
+
+    Parameters
+    ----------
+    world
+        As read from its folder.
+
+    Returns
+    -------
+    list of Finding
+        Empty if all is well. A file that can't be read is a finding too, and ends the checks that need it.
+    """
+    findings: list[WorldFinding] = []
+    for rule in (
+        check_files,
+        check_buildings_closed,
+        check_buildings_seated,
+        check_buildings_apart,
+        check_entrances,
+        check_places,
+        check_rooms,
+        check_containers,
+        check_indoors,
+        check_objects,
+        check_clearances,
+        check_roads,
+        check_transit,
+        check_entities,
+        check_dropped,
+    ):
+        try:
+            findings += rule(world)
+        except VicoError as error:
+            findings.append(WorldFinding("readable", rule.__name__.removeprefix("check_"), str(error)))
+    return _located(world, findings) if findings else findings
+
+
+def _located(world: World, findings: list[WorldFinding]) -> list[WorldFinding]:
+    """Return the findings with the places of the things they name, as far as the world can be read."""
+    at: dict[str, tuple[float, float]] = {}
+    with contextlib.suppress(VicoError):
+        for building in world.buildings:
+            middle = outline_of(building).representative_point()
+            at[building.id] = (middle.x, middle.y)
+        at |= {door.id: door.position[:2] for door in world.entrances}
+        at |= {place.id: place.position[:2] for place in world.places}
+        for room in world.rooms:
+            at[room.id] = room.centre[:2]
+            at |= {container.id: container.centre[:2] for container in room.containers}
+        at |= dict(zip(world.objects.id.tolist(), world.objects.position[:, :2].tolist(), strict=True))
+        at |= {stop.id: stop.wait[:2] for stop in world.transit.stops}
+        lanes = world.lanes
+        for k, name in enumerate(lanes.ids):
+            at[name] = tuple(lanes.line(k)[0, :2].tolist())
+    found = ((f, at.get(f.where)) for f in findings)
+    return [f._replace(at=(round(float(p[0]), 2), round(float(p[1]), 2))) if p is not None else f for f, p in found]
+
+
+def check_files(world: World) -> Iterator[WorldFinding]:
+    """Check that every file is there, and is what was written."""
+    if world.path is None:
+        return
+    listed = world.manifest.files
+    there = world_files(world.path)
+    for name in sorted(set(listed) - set(there)):
+        yield WorldFinding("file missing", name, "listed in world.json, but not there")
+    for name in sorted(set(there) - set(listed)):
+        yield WorldFinding("file unknown", name, "there, but not listed in world.json")
+    for name in there:
+        if name in listed and sha256_of(world.path / name) != listed[name]:
+            yield WorldFinding("file changed", name, "its SHA-256 is not the one in world.json")
+
+
+def check_entities(world: World) -> Iterator[WorldFinding]:
+    """Check that no two things share a number. Stops' and stations' objects carry their records' own."""
+    numbers: list[NDArray[np.int64]] = [
+        np.array([b.entity for b in world.buildings], np.int64),
+        np.array([r.entity for r in world.rooms], np.int64),
+        world.objects.entity.astype(np.int64),
+    ]
+    every = np.concatenate(numbers)
+    values, counts = np.unique(every, return_counts=True)
+    for number in values[counts > 1].tolist():
+        yield WorldFinding("entity twice", str(number), f"{int(counts[values == number][0])} things have this number")
+
+
+def check_dropped(world: World) -> Iterator[WorldFinding]:
+    """Check that no more than `MOST_FAILED` of what a stage had to make failed, and nothing for a fault of ours."""
+    for stage in world.manifest.stages:
+        for dropped in stage.dropped:
+            if dropped.reason.startswith(FAULT):
+                yield WorldFinding("program fault", dropped.id, f"{stage.name}: {dropped.reason}")
+        failed = sum(dropped.reason.startswith(FAILED) for dropped in stage.dropped)
+        made = max((stage.counts.get(name, 0) for name in _MADE.get(stage.name, ())), default=0)
+        if failed > max(_FEW_FAILED, MOST_FAILED * (failed + made)):
+            what = f"{failed} of {failed + made} can't be made; see the reasons in report.html"
+            yield WorldFinding("much left out", stage.name, what)

@@ -1,0 +1,1 @@
+"""Planned buildings nudged to a photogrammetry mesh: measured, raised, moved."""

@@ -1,0 +1,1 @@
+"""Roofs: their solids by shape, and the eaves and dormers on them."""

@@ -1,0 +1,1 @@
+"""Procedural textures of facades and grounds, painted by bay and storey."""

@@ -1,0 +1,425 @@
+"""Ground floors: eight bays side by side from the pavement to the first floor, in twice the detail of those above."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.worldgen.facades.textures.walls import BAYS
+from vico.worldgen.facades.textures.windows import glass, railing, shutters, window, window_style
+from vico.worldgen.texture_canvas import Canvas, Colour, blocks, bricks, plaster
+
+_PX = 256  # pixels a bay and a ground floor
+_W = BAYS * _PX
+
+BARE = {
+    "ground_shops": "ground_rusticated",
+    "ground_cafes": "ground_rusticated",
+    "ground_lobby": "ground_rusticated",
+    "ground_loft": "ground_rusticated",
+    "ground_gates": "ground_plain",
+}
+"""What stands for bare wall where a sheet has next to none between its windows."""
+PIER = {
+    "ground_shops": 0.05,
+    "ground_cafes": 0.11,
+    "ground_lobby": 0.08,
+    "ground_gates": 0.08,
+    "ground_arcade": 0.18,
+    "ground_loft": 0.07,
+    "ground_brownstone": 0.13,
+    "ground_shuttered": 0.18,
+}
+"""Share of a bay, to either side of its edge, that shows bare wall; elsewhere it is `PIER_ELSE`."""
+PIER_ELSE = 0.22
+
+Picture = NDArray[np.uint8]
+
+
+def _course(canvas: Canvas, colour: Colour, low: float = 240.0) -> None:
+    """Paint the string course under the first floor, and its shadow."""
+    canvas.rect(0, low, _W, _PX, colour)
+    canvas.rect(0, low + 5, _W, low + 7, np.asarray(colour, np.float32) * 0.9)
+    canvas.shade(0, low - 7, _W, low, 0.66)
+
+
+def _soil(canvas: Canvas) -> None:
+    """Splashed and worn near the pavement."""
+    fade = np.linspace(0.8, 1.0, 26, dtype=np.float32)[:, None, None]
+    canvas.pixels[:26] *= fade
+
+
+_GOODS = np.array(
+    [
+        [206, 196, 178], [172, 140, 104], [62, 70, 92], [70, 68, 68], [142, 74, 62], [104, 106, 80], [184, 142, 138],
+        [196, 176, 140], [216, 214, 208], [44, 44, 48], [186, 150, 78], [122, 138, 122], [112, 84, 66], [92, 112, 128],
+    ],
+    np.float32,
+)  # fmt: skip
+"""Colours of what stands in shop windows."""
+
+
+def show_window(
+    canvas: Canvas, x0: float, y0: float, x1: float, y1: float, *, kind: int = 0, lamp: float = 0.9
+) -> None:
+    """Paint a shop window: a lit room with shelves, dummies, tables or posters, dim by day behind the mirrored street.
+
+    Parameters
+    ----------
+    kind
+        0 shelves of goods, 1 dummies on a podium, 2 tables and lamps, 3 counters and posters.
+    lamp
+        How brightly it is lit at night, 0..1.
+    """
+    random = canvas.random
+    a, b, c, d = (round(v) for v in (x0, y0, x1, y1))
+    if c - a < 3 or d - b < 3:
+        return
+    up = np.linspace(0, 1, d - b, dtype=np.float32)[:, None, None]
+    across = np.linspace(0, 1, c - a, dtype=np.float32)[None, :, None]
+    width, height = c - a, d - b
+    # A room: floor, back wall lit from above, ceiling with lamps.
+    warm = np.array([[158, 136, 106], [150, 140, 124], [146, 112, 76], [142, 136, 126]][kind], np.float32)
+    wall = 0.3 + 0.42 * np.clip(1.1 - np.abs(up - 0.66) * 1.9, 0, 1) * (1.0 - 0.35 * np.abs(across - 0.5))
+    canvas.pixels[b:d, a:c] = warm * np.where(up < 0.1, 0.5, np.where(up > 0.86, 0.34, wall))
+    canvas.glow[b:d, a:c] = 255 * lamp
+
+    def thing(x: float, y: float, w: float, h: float, colour: Colour, opacity: float = 0.9) -> None:
+        left, right = max(a + x, a), min(a + x + w, c)
+        view = canvas.pixels[round(b + y) : min(round(b + y + h), d), round(left) : round(right)]
+        view += (np.asarray(colour, np.float32) - view) * opacity
+
+    def goods() -> NDArray[np.float32]:
+        return _GOODS[own[int(random.integers(4))]] * np.float32(random.uniform(0.62, 1.0))
+
+    # A shop has few colours of its own.
+    own = random.choice(len(_GOODS), 4, replace=False)
+    for x in np.arange(0.08, 1.0, max(22 / width, 0.12)) * width:
+        thing(x, 0.9 * height, 5, 2, (255, 246, 220), 1.0)
+    if kind == 0:
+        _shelves(thing, goods, width, height, random)
+    elif kind == 1:
+        thing(0, 0, width, 0.1 * height, (168, 162, 152))
+        thing(0, 0.09 * height, width, 2, (206, 200, 190))
+        for x in np.arange(0.16, 1.0, max(0.36, 58 / width)) * width:
+            cloth = goods()
+            thing(x - 6, 0.1 * height, 4, 0.3 * height, cloth * 0.5)
+            thing(x + 1, 0.1 * height, 4, 0.3 * height, cloth * 0.5)
+            thing(x - 8, 0.36 * height, 15, 0.29 * height, cloth)
+            thing(x - 10, 0.4 * height, 3, 0.24 * height, cloth * 0.8)
+            thing(x + 6, 0.4 * height, 3, 0.24 * height, cloth * 0.8)
+            thing(x - 3, 0.66 * height, 6, 0.08 * height, (196, 176, 158))
+    elif kind == 2:
+        for x in np.arange(0.1, 1.0, max(0.28, 34 / width)) * width:
+            thing(x - 12, 0.28 * height, 26, 3, (112, 82, 58))
+            thing(x, 0.02 * height, 3, 0.26 * height, (58, 46, 38))
+            thing(x - 16, 0.04 * height, 5, 0.38 * height, (50, 42, 38))
+            thing(x + 14, 0.04 * height, 5, 0.38 * height, (50, 42, 38))
+            thing(x - 4, 0.72 * height, 9, 0.06 * height, (252, 226, 170), 1.0)
+            thing(x, 0.78 * height, 1, 0.22 * height, (40, 36, 34))
+    else:
+        x = 4.0
+        while x < width - 12:
+            w, h = float(random.uniform(14, 30)), float(random.uniform(0.08, 0.24)) * height
+            thing(x, 0, w, h, (176, 172, 164), 0.8)
+            thing(x, h - 1.5, w, 1.5, (214, 210, 202))
+            for place in np.arange(x + 2, x + w - 5, 8.0):
+                thing(place, h, float(random.uniform(3, 6)), float(random.uniform(0.05, 0.16)) * height, goods())
+            x += w + float(random.uniform(4, 22))
+        if random.random() < 0.5:
+            left = float(random.uniform(0.1, 0.6)) * width
+            thing(left, 0.42 * height, 0.26 * width, 0.36 * height, goods(), 0.8)
+            for line in (0.5, 0.56, 0.62):
+                thing(left + 0.03 * width, line * height, float(random.uniform(0.08, 0.2)) * width, 2, (226, 222, 214))
+    # By day the street mirrors in the pane: the sky above the roofs opposite, dull facades below.
+    steps = np.sort(random.uniform(0.0, 1.0, 3))
+    roofs = random.uniform(0.45, 0.85, 4).astype(np.float32)[np.searchsorted(steps, across[0, :, 0])][None, :, None]
+    sky = np.clip((up + 0.06 * across - roofs) * 14.0, 0, 1)
+    view = canvas.pixels[b:d, a:c]
+    view += (np.array([84, 82, 82], np.float32) - view) * np.float32(0.16)
+    view += (np.array([150, 168, 188], np.float32) - view) * (0.3 * sky * (0.75 + 0.25 * up))
+    canvas.shade(a, d - 5, c, d, 0.6)
+    canvas.shade(a, b, a + 2, d, 0.7)
+
+
+def _shelves(
+    thing: Callable[..., None],
+    goods: Callable[[], NDArray[np.float32]],
+    width: int,
+    height: int,
+    random: np.random.Generator,
+) -> None:
+    """Shelves up to a man's height, filled in runs of like things."""
+    for level in (0.03, 0.22, 0.41, 0.6):
+        thing(0, level * height - 2, width, 2, (78, 68, 58))
+        x = 2.0
+        while x < width - 6:
+            w, h = float(random.uniform(3, 8)), float(random.uniform(0.07, 0.15)) * height
+            colour = goods()
+            for _ in range(int(random.integers(2, 6))):
+                if x < width - w:
+                    thing(x, level * height, w - 1, h * float(random.uniform(0.9, 1.05)), colour)
+                x += w
+            x += float(random.uniform(0, 6))
+
+
+def _shops(random: np.random.Generator) -> Picture:
+    """Recent shop fronts: panes from knee to fascia between slim piers, all with a board for the name."""
+    canvas = blocks(_PX, _W, random, 32, 64, (158, 155, 150))
+    boards = ((58, 62, 66), (78, 52, 46), (50, 66, 60), (62, 58, 72), (104, 94, 76), (46, 56, 74), (70, 70, 68))
+    for i in range(BAYS):
+        x = i * _PX
+        canvas.rect(x + 14, 14, x + _PX - 14, 234, (48, 48, 50))
+        edges = np.linspace(x + 18, x + _PX - 18, 4 if i % 2 else 3)
+        kind = int(random.integers(4))
+        for left, right in pairwise(edges):
+            show_window(canvas, left + 2, 26, right - 2, 184, kind=kind, lamp=float(random.choice([0.25, 0.6, 0.85])))
+        board = np.asarray(boards[i % len(boards)], np.float32)
+        canvas.rect(x + 12, 190, x + _PX - 12, 230, board)
+        canvas.rect(x + 12, 227, x + _PX - 12, 230, board * 1.25)
+        canvas.shade(x + 14, 183, x + _PX - 14, 190, 0.5)
+    _course(canvas, (206, 202, 196))
+    canvas.rect(0, 0, _W, 12, (112, 108, 104))
+    _soil(canvas)
+    return canvas.texture()
+
+
+def _cafes(random: np.random.Generator) -> Picture:
+    """Older shop fronts in a stone ground floor: piers, panelled stall-risers, fanlights, some with an awning."""
+    canvas = blocks(_PX, _W, random, 32, 64, (206, 201, 193))
+    paints = ((46, 66, 56), (96, 46, 42), (52, 60, 84), (122, 98, 64), (58, 54, 52), (74, 88, 82))
+    for i in range(BAYS):
+        x = i * _PX
+        paint = np.asarray(paints[int(random.integers(len(paints)))], np.float32)
+        canvas.rect(x + 30, 12, x + _PX - 30, 222, paint * 0.85)
+        parts = [(x + 38, x + 124), (x + 132, x + _PX - 38)]
+        kind = int(random.integers(4))
+        lamp = float(random.choice([0.3, 0.65, 0.9]))
+        for left, right in parts:
+            show_window(canvas, left, 58, right, 156, kind=kind, lamp=lamp)
+            glass(canvas, left, 162, right, 184, lively=0.0, lit=lamp)
+            canvas.rect(left, 18, right, 52, paint * 1.15)
+            canvas.shade(left + 6, 23, right - 6, 47, 0.82)
+            canvas.shade(left + 8, 25, right - 8, 45, 1.2)
+        canvas.rect(x + 26, 190, x + _PX - 26, 218, paint)
+        canvas.rect(x + 26, 216, x + _PX - 26, 222, paint * 1.3)
+        canvas.shade(x + 30, 184, x + _PX - 30, 190, 0.55)
+        if i in (2, 5):
+            canvas.rect(x + 24, 152, x + _PX - 24, 190, paint * 1.2)
+            canvas.rect(x + 24, 152, x + _PX - 24, 160, paint * 0.9)
+            canvas.shade(x + 24, 142, x + _PX - 24, 152, 0.6)
+    _course(canvas, (232, 228, 220))
+    canvas.rect(0, 0, _W, 10, (150, 146, 140))
+    _soil(canvas)
+    return canvas.texture()
+
+
+def _rusticated(random: np.random.Generator) -> Picture:
+    """Grooved blocks over a plinth, windows in surrounds with keystones."""
+    canvas = blocks(_PX, _W, random, 32, 128, (226, 223, 217))
+    canvas.rect(0, 0, _W, 34, (158, 154, 150))
+    canvas.shade(0, 34, _W, 37, 0.8)
+    for i in range(BAYS):
+        x = i * _PX + _PX / 2
+        look = window_style("ground_rusticated")
+        window(canvas, x - 46, 78, x + 46, 204, look, lit=0.34)
+        canvas.rect(x - 9, 206, x + 9, 232, (232, 229, 223))
+        canvas.shade(x + 9, 206, x + 12, 232, 0.8)
+        if i % 4 == 2:
+            for bar in range(7):
+                canvas.rect(x - 40 + bar * 13, 80, x - 38 + bar * 13, 202, (62, 62, 62))
+        canvas.rect(x - 16, 10, x + 16, 26, (74, 72, 70))
+    _course(canvas, (236, 233, 227))
+    _soil(canvas)
+    return canvas.texture()
+
+
+def _plain(random: np.random.Generator) -> Picture:
+    """Smooth render over a dark plinth."""
+    canvas = plaster(_PX, _W, random)
+    canvas.rect(0, 0, _W, 40, (168, 164, 158))
+    canvas.shade(0, 40, _W, 42, 0.84)
+    for i in range(BAYS):
+        x = i * _PX + _PX / 2
+        half = (50, 44, 50, 30)[i % 4]
+        look = window_style("ground_plain", columns=2 if half > 30 else 1)
+        window(canvas, x - half, 84, x + half, 200, look, lit=0.36)
+    _course(canvas, (222, 219, 213), 246)
+    _soil(canvas)
+    return canvas.texture()
+
+
+def _shuttered(random: np.random.Generator) -> Picture:
+    """Render with shuttered windows, stone frames and an iron grille now and then."""
+    canvas = plaster(_PX, _W, random, (214, 210, 202))
+    canvas.rect(0, 0, _W, 44, (188, 180, 168))
+    canvas.shade(0, 44, _W, 47, 0.82)
+    for i in range(BAYS):
+        x = i * _PX + _PX / 2
+        look = window_style("ground_shuttered")
+        window(canvas, x - 34, 84, x + 34, 204, look, lit=0.34)
+        if i % 3 == 2:
+            railing(canvas, x - 36, 84, x + 34, 204, (52, 52, 52), gap=9)
+        else:
+            shutters(canvas, x - 34, 84, x + 34, 204, (112, 120, 108), shut=0.2)
+    _course(canvas, (228, 222, 212), 246)
+    _soil(canvas)
+    return canvas.texture()
+
+
+def _brick_ground(random: np.random.Generator) -> Picture:
+    canvas = bricks(_PX, _W, random, 8, 16)
+    canvas.rect(0, 0, _W, 38, (176, 170, 164))
+    canvas.shade(0, 38, _W, 41, 0.8)
+    stone = (222, 216, 204)
+    for i in range(BAYS):
+        x = i * _PX + _PX / 2
+        look = window_style("ground_brick", trim=stone)
+        window(canvas, x - 42, 76, x + 42, 202, look, lit=0.34)
+    _course(canvas, stone, 242)
+    _soil(canvas)
+    return canvas.texture()
+
+
+def _brownstone(random: np.random.Generator) -> Picture:
+    """Paint a high stone basement of brown sandstone below brick."""
+    canvas = blocks(_PX, _W, random, 32, 128, (176, 146, 122))
+    for i in range(BAYS):
+        x = i * _PX + _PX / 2
+        look = window_style("ground_brownstone")
+        for side in (-50, 50):
+            window(canvas, x + side - 28, 74, x + side + 28, 204, look, lit=0.36)
+            if i % 2:
+                for bar in range(5):
+                    canvas.rect(x + side - 24 + bar * 12, 76, x + side - 22 + bar * 12, 202, (48, 48, 48))
+    _course(canvas, (196, 168, 144), 242)
+    canvas.rect(0, 0, _W, 30, (140, 116, 98))
+    _soil(canvas)
+    return canvas.texture()
+
+
+def _boards_ground(random: np.random.Generator) -> Picture:
+    canvas = plaster(_PX, _W, random, (206, 204, 200))
+    for y in range(0, _PX, 14):
+        canvas.pixels[y : y + 2] *= 0.74
+        canvas.pixels[y + 2 : y + 5] *= 0.94
+    canvas.rect(0, 0, _W, 36, (164, 160, 154))
+    for i in range(BAYS):
+        x = i * _PX + _PX / 2
+        look = window_style("ground_boards")  # fmt: skip
+        window(canvas, x - 38, 82, x + 38, 204, look, lit=0.36)
+    canvas.rect(0, 246, _W, _PX, (240, 239, 236))
+    _soil(canvas)
+    return canvas.texture()
+
+
+def _arcade(random: np.random.Generator) -> Picture:
+    canvas = blocks(_PX, _W, random, 32, 64, (206, 203, 198))
+    canvas.rect(0, 0, _W, 30, (156, 152, 148))
+    canvas.shade(0, 30, _W, 33, 0.8)
+    for i in range(BAYS):
+        x = i * _PX + _PX / 2
+        canvas.rect(x - 78, 30, x + 78, 160, (224, 221, 215))
+        canvas.arch(x - 78, 100, x + 78, 236, (224, 221, 215))
+        look = window_style("ground_arcade")
+        window(canvas, x - 62, 36, x + 62, 222, look, lively=0.4, lit=0.4)
+        canvas.rect(x - 9, 216, x + 9, 240, (230, 227, 221))
+    _course(canvas, (230, 227, 221))
+    _soil(canvas)
+    return canvas.texture()
+
+
+def _lobby(random: np.random.Generator) -> Picture:
+    """Paint a glazed office ground floor with columns and lit halls behind."""
+    canvas = blocks(_PX, _W, random, 64, 128, (176, 176, 176))
+    for i in range(BAYS):
+        x = i * _PX
+        canvas.rect(x + 22, 12, x + _PX - 22, 226, (60, 64, 68))
+        lamp = float(random.choice([0.3, 0.6, 0.9]))
+        for k in range(2):
+            left = x + 28 + k * 102
+            show_window(canvas, left, 16, left + 98, 168, kind=3 if i % 3 == 0 else 2, lamp=lamp)
+            glass(canvas, left, 174, left + 98, 220, lively=0.15, lit=lamp)
+    _course(canvas, (150, 152, 154), 232)
+    _soil(canvas)
+    return canvas.texture()
+
+
+def _loft_ground(random: np.random.Generator) -> Picture:
+    """Cast-iron columns before wide panes."""
+    canvas = Canvas(_PX, _W, (196, 190, 180), random)
+    canvas.noise(3, 30)
+    for i in range(BAYS):
+        x = i * _PX
+        canvas.shade(x, 0, x + 8, _PX, 0.86)
+        canvas.shade(x + _PX - 8, 0, x + _PX, _PX, 1.08)
+        canvas.shade(x, 196, x + _PX, 204, 0.84)
+        canvas.rect(x + 20, 14, x + _PX - 20, 200, (74, 72, 70))
+        kind = int(random.integers(4))
+        for k in range(3):
+            left = x + 24 + k * 70
+            show_window(canvas, left, 48, left + 66, 150, kind=kind, lamp=float(random.choice([0.2, 0.8])))
+            glass(canvas, left, 156, left + 66, 196, lively=0.0, lit=0.5)
+    _course(canvas, (206, 200, 190), 230)
+    _soil(canvas)
+    return canvas.texture()
+
+
+def _gates(random: np.random.Generator) -> Picture:
+    canvas = plaster(_PX, _W, random, (214, 212, 208))
+    for i in range(BAYS):
+        x = i * _PX
+        canvas.rect(x + 22, 0, x + _PX - 22, 196, (168, 170, 172))
+        for k in range(9):
+            canvas.shade(x + 22, k * 22, x + _PX - 22, k * 22 + 3, 0.72)
+        canvas.shade(x + 22, 184, x + _PX - 22, 196, 0.6)
+    _soil(canvas)
+    return canvas.texture()
+
+
+def _base(random: np.random.Generator) -> Picture:
+    """Bare blocks over a stepped plinth: below the windows of churches and halls."""
+    canvas = blocks(_PX, _W, random, 32, 64, (204, 198, 186))
+    canvas.rect(0, 0, _W, 44, (184, 178, 166))
+    canvas.shade(0, 44, _W, 47, 1.14)
+    for i in range(BAYS):
+        canvas.shade(i * _PX, 0, i * _PX + 32, _PX, 1.08)
+        canvas.shade(i * _PX + 32, 0, i * _PX + 40, _PX, 0.72)
+        canvas.shade((i + 1) * _PX - 16, 0, (i + 1) * _PX, _PX, 1.05)
+    _soil(canvas)
+    return canvas.texture()
+
+
+def _shed(random: np.random.Generator) -> Picture:
+    """Upright boards and a window with a cross."""
+    canvas = Canvas(_PX // 2, _W // 2, (168, 150, 130), random)
+    canvas.noise(6, 10)
+    for x in range(0, _W // 2, 8):
+        canvas.pixels[:, x : x + 8] *= np.float32(random.normal(1.0, 0.07))
+        canvas.pixels[:, x : x + 1] *= np.float32(0.6)
+    for i in range(0, BAYS, 2):
+        x = i * 128 + 64
+        window(canvas, x - 16, 56, x + 16, 92, window_style("ground_shed"), lit=0.05)
+    return canvas.texture()
+
+
+GROUNDS: dict[str, Callable[[np.random.Generator], Picture]] = {
+    "ground_shops": _shops,
+    "ground_cafes": _cafes,
+    "ground_rusticated": _rusticated,
+    "ground_plain": _plain,
+    "ground_shuttered": _shuttered,
+    "ground_brick": _brick_ground,
+    "ground_brownstone": _brownstone,
+    "ground_boards": _boards_ground,
+    "ground_arcade": _arcade,
+    "ground_lobby": _lobby,
+    "ground_loft": _loft_ground,
+    "ground_gates": _gates,
+    "ground_base": _base,
+    "ground_shed": _shed,
+}
+"""Painters of ground floors by material name."""

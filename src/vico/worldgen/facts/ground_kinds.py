@@ -1,0 +1,267 @@
+"""What kind of ground every spot is: one kind each, decided by the map in an order of precedence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from vico.geo import overlay
+from vico.geo.osm import OsmData, polygons_of
+from vico.worldgen.facts.site import SiteFacts
+from vico.worldgen.facts.streets import PAVINGS, StreetPolygons
+from vico.worldgen.facts.tags import number, on_the_ground
+
+_GRID = 0.001  # metres: overlays on a grid are robust where free ones fail on nearly coincident outlines
+_CURB = 0.22  # width of a kerb's top stone, metres
+
+_GRASS = {"grass", "meadow", "village_green", "recreation_ground", "cemetery", "allotments", "greenfield"}
+_GARDENS = {"garden"}
+_WOODS = {"wood", "scrub", "heath", "forest", "shrubbery", "fell"}
+_PARKS = {"park", "golf_course", "dog_park", "common", "nature_reserve"}
+_FIELDS = {"farmland", "farmyard", "orchard", "vineyard", "plant_nursery"}
+_BARE = {"bare_rock", "scree", "shingle"}
+_WORKS = {"construction", "brownfield", "landfill", "quarry"}
+_SPORTS = {
+    "tennis": "court",
+    "basketball": "court",
+    "netball": "court",
+    "futsal": "court",
+    "multi": "court",
+    "volleyball": "court",
+    "handball": "court",
+    "skateboard": "concrete",
+    "beachvolleyball": "sand",
+    "soccer": "turf",
+    "football": "turf",
+    "american_football": "turf",
+    "rugby": "turf",
+    "cricket": "turf",
+    "hockey": "turf",
+    "field_hockey": "turf",
+    "boules": "gravel",
+}
+_PAVED_KINDS = ("carriageway", "pedestrian", "cycleway", "sidewalk", "path", "parking")
+_RAILS = ("rail", "light_rail", "narrow_gauge")
+
+
+def ground_partition(site: SiteFacts, streets: StreetPolygons, window: Polygon) -> dict[str, list[Polygon]]:
+    """Divide the window among the kinds of ground, in order of precedence.
+
+    Returns
+    -------
+    dict
+        Polygons by kind; together they cover the window, and none overlap. Where the map says what a street or square
+        is paved with, the kind goes on with it: ``sidewalk:setts``.
+    """
+    soft = mapped_areas(site, window)
+    square = _square(streets, soft)
+    paved = overlay.union_all([streets.sidewalk, square, streets.cycleway], grid=_GRID)
+    kerb = overlay.buffer(streets.carriageway, _CURB, quad_segs=2, join_style="mitre")
+    kerb = overlay.difference(overlay.on_grid(kerb, grid=_GRID), streets.carriageway, grid=_GRID)
+    kerb = overlay.intersection(overlay.areas_of(kerb), overlay.areas_of(paved), grid=_GRID)
+    ranked: list[tuple[str, BaseGeometry]] = [
+        ("carriageway", streets.carriageway),
+        ("kerb", kerb),
+        ("steps", streets.steps),
+        ("pedestrian", square),
+        ("cycleway", streets.cycleway),
+        ("sidewalk", streets.sidewalk),
+        ("path", streets.path),
+        ("parking", streets.parking),
+    ]
+    ranked += [(name, overlay.union_all(shapes, grid=_GRID)) for name, shapes in soft.items()]
+    left: BaseGeometry = window
+    result: dict[str, list[Polygon]] = {}
+    for name, shape in ranked:
+        shape = overlay.areas_of(overlay.on_grid(shape, grid=_GRID))
+        mine = polygons_of(overlay.intersection(shape, left, grid=_GRID), 0.02)
+        if mine:
+            result |= _by_paving(name, mine, streets.paved) if name in _PAVED_KINDS else {name: mine}
+            left = overlay.areas_of(overlay.difference(left, shape, grid=_GRID))
+    built = [area.polygon for area in site.osm.areas if area.tags.get("building", "no") != "no"]
+    near = overlay.buffer(overlay.union_all([*built, streets.carriageway], grid=_GRID), 30.0, quad_segs=2)
+    near = overlay.on_grid(near, grid=_GRID)
+    result["yard"] = polygons_of(overlay.intersection(left, near, grid=_GRID), 0.02)
+    result["field"] = polygons_of(overlay.difference(left, near, grid=_GRID), 0.02)
+    return {name: shapes for name, shapes in result.items() if shapes}
+
+
+def _square(streets: StreetPolygons, soft: dict[str, list[BaseGeometry]]) -> BaseGeometry:
+    """Squares without the lawns and ponds within them, which are beds; other greens end where the square begins."""
+    square: BaseGeometry = streets.pedestrian
+    shapely.prepare(square)
+    inner = [
+        bed
+        for name in ("water", "garden", "grass", "woods", "playground")
+        for bed in soft[name]
+        if bed.area < 0.6 * square.area
+        and square.intersects(bed)
+        and overlay.common_area(bed, square) > 0.9 * bed.area > 0.0
+    ]
+    if not inner:
+        return square
+    return overlay.difference(square, overlay.union_all(inner, grid=_GRID), grid=_GRID)
+
+
+def water_pieces(site: SiteFacts, streets: StreetPolygons, window: Polygon) -> list[Polygon]:
+    """Return the waters of `ground_partition` alone."""
+    soft = mapped_areas(site, window)
+    if not soft["water"]:
+        return []
+    water = overlay.areas_of(overlay.union_all(soft["water"], grid=_GRID))
+    taken = [
+        streets.carriageway,
+        _square(streets, soft),
+        streets.steps,
+        streets.cycleway,
+        streets.sidewalk,
+        streets.path,
+        streets.parking,
+    ]
+    near = overlay.union_all([overlay.intersection(overlay.areas_of(shape), water, grid=_GRID) for shape in taken])
+    return polygons_of(overlay.difference(water, overlay.areas_of(near), grid=_GRID), 0.02)
+
+
+def _by_paving(kind: str, shapes: list[Polygon], paved: dict[str, shapely.MultiPolygon]) -> dict[str, list[Polygon]]:
+    """Part a kind's polygons by what they are paved with."""
+    left: BaseGeometry = overlay.areas_of(shapely.MultiPolygon(shapes))
+    parted: dict[str, list[Polygon]] = {}
+    for name in dict.fromkeys(PAVINGS.values()):
+        if name not in paved or left.is_empty:
+            continue
+        mine = polygons_of(overlay.intersection(left, paved[name], grid=_GRID), 0.02)
+        if mine:
+            parted[f"{kind}:{name}"] = mine
+            left = overlay.areas_of(overlay.difference(left, paved[name], grid=_GRID))
+    rest = polygons_of(left, 0.02)
+    return {**({kind: rest} if rest else {}), **parted}
+
+
+def pitch_surface(tags: dict[str, str]) -> str:
+    """Say what a sports pitch is covered with: turf, court, clay, sand, gravel or concrete."""
+    said = tags.get("surface", "")
+    known = {
+        "grass": "turf",
+        "artificial_turf": "turf",
+        "clay": "clay",
+        "sand": "sand",
+        "asphalt": "court",
+        "tartan": "court",
+        "acrylic": "court",
+        "concrete": "concrete",
+        "gravel": "gravel",
+        "fine_gravel": "gravel",
+    }
+    if said in known:
+        return known[said]
+    return _SPORTS.get(tags.get("sport", "").split(";")[0], "gravel" if not tags.get("sport") else "court")
+
+
+def _kind_of(tags: dict[str, str]) -> str | None:
+    """Return the kind of ground an area's tags mean."""
+    landuse, leisure, natural = tags.get("landuse"), tags.get("leisure"), tags.get("natural")
+    if (
+        natural == "water"
+        or tags.get("waterway") in ("riverbank", "dock")
+        or landuse in ("basin", "reservoir")
+        or leisure == "swimming_pool"
+        or tags.get("amenity") == "fountain"
+    ):
+        return "water"
+    if leisure == "playground":
+        return "playground"
+    if natural in ("sand", "beach", "dune") or tags.get("golf") == "bunker":
+        return "sand"
+    if leisure in ("pitch", "track"):
+        return pitch_surface(tags)
+    if natural in _BARE or landuse == "railway":
+        return "ballast"
+    if natural in _WOODS or landuse == "forest":
+        return "woods"
+    if leisure in _GARDENS or landuse == "flowerbed":
+        return "garden"
+    if landuse in _GRASS or leisure in _PARKS or natural in ("grassland", "wetland"):
+        return "grass"
+    if landuse in _FIELDS:
+        return "farmland"
+    return "earth" if landuse in _WORKS else None
+
+
+def mapped_areas(site: SiteFacts, window: Polygon) -> dict[str, list[BaseGeometry]]:
+    """Return mapped areas by kind of ground, in order of precedence."""
+    osm, above = site.osm, site.levels.above
+    order = ("water", "ballast", "playground", "court", "clay", "turf", "concrete", "sand", "gravel", "garden")
+    found: dict[str, list[BaseGeometry]] = {name: [] for name in (*order, "grass", "woods", "farmland", "earth")}
+    for area in osm.areas:
+        tags = area.tags
+        if not on_the_ground(tags) or tags.get("building", "no") != "no":
+            continue
+        kind = _kind_of(tags)
+        if kind:
+            found[kind] += polygons_of(overlay.intersection(area.polygon, window))
+    found["ballast"] += [
+        overlay.buffer(shapely.LineString(way.line), 1.8, cap_style="flat")
+        for way in osm.ways
+        if way.tags.get("railway") in _RAILS and on_the_ground(way.tags) and way.id not in above
+    ]
+    found["water"] += list(_streams(osm, window, found["water"]))
+    # A pond within a park is water, a lawn within a wood is lawn: small before large comes with the kinds' order, but
+    # the sea comes last of the waters and gives way to everything mapped on it (piers, moles).
+    sea = sea_polygons(osm, window)
+    if sea:
+        land = overlay.union_all(
+            [shape for name, shapes in found.items() if name != "water" for shape in shapes], grid=_GRID
+        )
+        found["water"].append(overlay.difference(overlay.union_all(sea), land, grid=_GRID))
+    return found
+
+
+def _streams(osm: OsmData, window: Polygon, mapped: list[BaseGeometry]) -> Iterable[Polygon]:
+    """Rivers, canals and streams that are drawn as lines only."""
+    usual = {"river": 8.0, "canal": 8.0, "stream": 1.6, "drain": 1.0, "ditch": 0.8}
+    known = overlay.union_all([shape for shape in mapped if isinstance(shape, BaseGeometry)], grid=_GRID)
+    for way in osm.ways:
+        tags = way.tags
+        if tags.get("waterway") not in usual or tags.get("tunnel", "no") != "no" or not on_the_ground(tags):
+            continue
+        line = shapely.LineString(way.line)
+        if known.intersects(line) and overlay.common_length(known, line) > 0.3 * line.length:
+            continue
+        width = min(max(number(tags.get("width")) or usual[tags["waterway"]], 0.6), 60.0)
+        strip = overlay.buffer(line, width / 2, cap_style="flat", quad_segs=2)
+        yield from polygons_of(overlay.intersection(strip, window))
+
+
+def sea_polygons(osm: OsmData, window: Polygon) -> list[Polygon]:
+    """Find the sea within the window: what lies right of the coastlines, which OSM draws with land on their left."""
+    coast: list[NDArray[np.float64]] = [way.line for way in osm.ways if way.tags.get("natural") == "coastline"]
+    lines = [shapely.LineString(line) for line in coast]
+    touching = [line for line in lines if shapely.intersects(line, window)]
+    if not touching:
+        return []
+    faces = [
+        face
+        for face in overlay.polygonize([*touching, window.exterior])
+        if overlay.common_area(face, window) > 1.0 and window.contains(face.representative_point())
+    ]
+    starts = np.concatenate([line[:-1] for line in coast])
+    ends = np.concatenate([line[1:] for line in coast])
+    sea: list[Polygon] = []
+    for face in faces:
+        point = np.asarray(face.representative_point().coords[0])
+        along = ends - starts
+        share = np.clip(((point - starts) * along).sum(1) / np.maximum((along**2).sum(1), 1e-9), 0, 1)
+        away = point - (starts + along * share[:, None])
+        distance = np.hypot(*away.T)
+        # Beside a convex corner two segments are equally near; the one the point is most square to decides.
+        near = np.flatnonzero(distance < distance.min() + 1e-6)
+        cross = along[near, 0] * away[near, 1] - along[near, 1] * away[near, 0]
+        cross = cross / np.maximum(np.hypot(*along[near].T), 1e-9)
+        if cross[np.abs(cross).argmax()] < 0:
+            sea.append(face)
+    return sea

@@ -1,0 +1,287 @@
+"""What buildings there are: outlines and parts from OpenStreetMap, with heights, uses and roofs decided.
+
+Facts win; where OpenStreetMap says nothing, type, area and the neighbours decide, then a seeded draw of each
+building's own. Spec section 1, buildings; OSM wiki, Simple 3D Buildings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import Polygon
+
+from vico.geo import overlay
+from vico.geo.osm import OsmArea, OsmData, Tags, polygons_of
+from vico.seeds import rng
+from vico.world.model import Dropped
+from vico.worldgen.facts.expendable import expendable
+from vico.worldgen.facts.outlines.apart import apart, supported, without_slivers
+from vico.worldgen.facts.outlines.heights import STOREY, level_estimates, said_height, said_levels, weighted_median
+from vico.worldgen.facts.outlines.parts import OPEN_KINDS, SMALL_KINDS, part_of
+from vico.worldgen.facts.outlines.plans import BuildingPlan, BuildingPlans, PartPlan
+from vico.worldgen.facts.outlines.roof_shapes import Roof, shape_named
+from vico.worldgen.facts.tags import number
+
+_TOLERANCE = 0.05  # metres of outline detail that is not seen but costs triangles
+_COVERED = 0.85  # share of an outline that parts must cover for the outline to be dropped
+_LEAST_AREA = 2.0  # square metres
+
+_USES = {
+    "residential": "apartments residential house detached terrace semidetached_house dormitory bungalow block villa "
+    "cabin farm houseboat",
+    "hotel": "hotel hostel guest_house",
+    "retail": "retail supermarket kiosk mall shop pavilion department_store market",
+    "office": "office",
+    "commercial": "commercial mixed",
+    "industrial": "industrial warehouse factory hangar manufacture works",
+    "civic": "public civic government townhall embassy library museum theatre cinema courthouse police fire_station "
+    "arts_centre community_centre",
+    "religious": "church cathedral chapel mosque synagogue temple religious monastery shrine",
+    "education": "school university college kindergarten",
+    "health": "hospital clinic",
+    "transport": "train_station station transportation tower bus_station",
+    "garage": "garage garages parking carport",
+}
+_USE_OF = {value: use for use, values in _USES.items() for value in values.split()}
+
+
+def use_of(tags: Mapping[str, str], shops: int, area: float) -> str:
+    """Say what a building is used for, one of `model.Building.use`."""
+    kind = tags.get("building", tags.get("building:part", "yes"))
+    if kind in _USE_OF:
+        return _USE_OF[kind]
+    for key in ("amenity", "tourism", "shop", "office", "historic"):
+        value = tags.get(key)
+        if value in _USE_OF:
+            return _USE_OF[value]
+        if value == "place_of_worship":
+            return "religious"
+        if value and key in ("shop", "office"):
+            return "retail" if key == "shop" else "office"
+    if kind in SMALL_KINDS or kind in OPEN_KINDS or area < 40.0:
+        return "other"
+    return "commercial" if shops >= 5 else "residential"
+
+
+_Row = tuple[str, Polygon, Tags]
+
+
+def _mapped(osm: OsmData, key: str, dropped: list[Dropped]) -> list[_Row]:
+    """Polygons of the areas with `key`, in the order of their ids, one row a connected piece."""
+    square = shapely.box(-osm.half, -osm.half, osm.half, osm.half)
+    rows: list[_Row] = []
+    for area in osm.areas:
+        if area.tags.get(key, "no") == "no" or (key == "building:part" and area.tags.get("building", "no") != "no"):
+            continue
+        reason = _unwanted(area)
+        pieces: list[Polygon] = []
+        if reason is None:
+            whole = area.polygon if area.polygon.is_valid else overlay.mended(area.polygon)
+            pieces = [
+                piece
+                for shape in polygons_of(whole)
+                for piece in polygons_of(overlay.simplify(shape, _TOLERANCE), _LEAST_AREA)
+            ]
+            if not pieces:
+                reason = f"smaller than {_LEAST_AREA:g} m2"
+        if reason is not None:
+            if shapely.intersects(area.polygon, square):
+                dropped.append(Dropped(id=area.id, reason=reason))
+            continue
+        rows += [
+            (area.id if len(pieces) == 1 else f"{area.id}.{k}", piece, area.tags) for k, piece in enumerate(pieces, 1)
+        ]
+    return sorted(rows, key=lambda row: _id_key(row[0]))
+
+
+def _within(osm: OsmData, outlines: list[_Row], parts: list[_Row], dropped: list[Dropped]) -> tuple[list[_Row], ...]:
+    """Outlines whose middle lies within the world's square, and parts that belong to them or lie in it themselves."""
+    square = shapely.box(-osm.half, -osm.half, osm.half, osm.half)
+
+    def inside(row: _Row) -> bool:
+        if square.contains(row[1].centroid):
+            return True
+        if square.intersects(row[1]):
+            dropped.append(Dropped(id=row[0], reason="its middle lies outside the world's square"))
+        return False
+
+    stay = [inside(row) for row in outlines]
+    owner = _owners(outlines, parts)
+    return (
+        [row for row, kept in zip(outlines, stay, strict=True) if kept],
+        [row for row, of in zip(parts, owner, strict=True) if (stay[of] if of >= 0 else inside(row))],
+    )
+
+
+def _unwanted(area: OsmArea) -> str | None:
+    tags = area.tags
+    layer, height, levels = number(tags.get("layer")), number(tags.get("height")), number(tags.get("building:levels"))
+    if tags.get("location") in ("underground", "indoor") or tags.get("tunnel") == "yes":
+        return "underground"
+    if layer is not None and layer < 0:
+        return "below ground (layer < 0)"
+    if height is not None and height <= 0.5:
+        return "no height above ground"
+    if levels is not None and levels <= 0 and (number(tags.get("building:levels:underground")) or 0) > 0:
+        return "underground"
+    return None
+
+
+def _shop_points(osm: OsmData) -> NDArray[np.float64]:
+    """Where shops, restaurants and services are mapped as points."""
+    trade = {"restaurant", "cafe", "bar", "pub", "fast_food", "bank", "pharmacy", "ice_cream", "cinema", "theatre"}
+    points = [n.xy for n in osm.nodes if "shop" in n.tags or n.tags.get("amenity") in trade]
+    return np.array(points).reshape(-1, 2)
+
+
+def building_plans(osm: OsmData, *, seed: int) -> BuildingPlans:
+    """Decide every building of an extract that touches the world's square.
+
+    Parameters
+    ----------
+    osm
+        The extract.
+    seed
+        Decides, building by building, what neither tags nor neighbours do.
+
+    Returns
+    -------
+    BuildingPlans
+        Plans, and what was left out, with reasons.
+    """
+    dropped: list[Dropped] = []
+    outlines, parts = _within(
+        osm, _without_twins(_mapped(osm, "building", dropped), dropped), _mapped(osm, "building:part", dropped), dropped
+    )
+    owner = _owners(outlines, parts)
+    shapes = [row[1] for row in outlines]
+    points = _shop_points(osm)
+    shops = np.zeros(len(outlines), int)
+    if len(points) and shapes:
+        hits = shapely.STRtree(shapes).query(shapely.points(points), predicate="dwithin", distance=1.5)
+        np.add.at(shops, hits[1], 1)
+    tallest, typical = _part_levels(len(outlines), parts, owner)
+    uses = [use_of(tags, int(n), outline.area) for (_, outline, tags), n in zip(outlines, shops, strict=True)]
+    levels, rules = level_estimates(outlines, tallest, typical, uses, osm.frame.lon)
+    flat = _flat_is_usual(outlines, parts, osm.frame.lon)
+    own_parts: dict[int, list[_Row]] = {}
+    for row, of in zip(parts, owner, strict=True):
+        own_parts.setdefault(of, []).append(row)
+    plans: list[BuildingPlan] = []
+    for k, (name, outline, tags) in enumerate(outlines):
+        with expendable(name, dropped):
+            random = rng(seed, "building", name)
+            main = part_of(outline, tags, {}, uses[k], int(levels[k]), flat, random)
+            solids, rule = [main], "height tag" if said_height(tags) else rules[k]
+            if own := own_parts.get(k):
+                solids = [part_of(p, part_tags, tags, uses[k], main.levels, flat, random) for _, p, part_tags in own]
+                if all(said_levels(part_tags) for _, _, part_tags in own) and rule != "height tag":
+                    rule = "parts"
+                solids = _rest_of_outline(main, solids) + solids
+            plans.append(
+                BuildingPlan(
+                    name,
+                    tags.get("name"),
+                    uses[k],
+                    tags,
+                    outline,
+                    max(s.levels for s in solids),
+                    int(shops[k]),
+                    solids,
+                    rule=rule,
+                )
+            )
+    for name, outline, tags in own_parts.get(-1, []):
+        with expendable(name, dropped):
+            random = rng(seed, "building", name)
+            use = use_of(tags, 0, outline.area)
+            part = part_of(outline, tags, {}, use, 3, flat, random)
+            rule = "height tag" if said_height(tags) else "levels tag" if said_levels(tags) else "town"
+            plans.append(BuildingPlan(name, tags.get("name"), use, tags, outline, part.levels, 0, [part], rule=rule))
+    return BuildingPlans(apart(supported(plans, osm), dropped), dropped)
+
+
+def _part_levels(count: int, parts: list[_Row], owner: list[int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """For every outline the most storeys its parts are said to have, and what most of their area has; 0: nothing."""
+    tallest, typical = np.zeros(count, np.int64), np.zeros(count, np.int64)
+    told: dict[int, list[tuple[int, float]]] = {}
+    for (_, polygon, tags), of in zip(parts, owner, strict=True):
+        if of >= 0 and (said := said_levels(tags)):
+            told.setdefault(of, []).append((said, polygon.area))
+    for of, rows in told.items():
+        values, areas = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
+        tallest[of], typical[of] = values.max(), weighted_median(values, areas)
+    return tallest, typical
+
+
+def _rest_of_outline(main: PartPlan, parts: list[PartPlan]) -> list[PartPlan]:
+    """Return what an outline still stands for beside its parts.
+
+    Nothing where parts that stand on the ground cover it. Else what they leave; under parts that begin higher up it
+    ends where those begin.
+    """
+    standing = overlay.union_all([part.polygon for part in parts if part.low <= 0.0], grid=0.001)
+    if overlay.common_area(standing, main.polygon) >= _COVERED * main.polygon.area:
+        return []
+    rest = overlay.areas_of(overlay.difference(main.polygon, standing, grid=0.001))
+    solids: list[PartPlan] = []
+    for part in sorted((p for p in parts if p.low > 2.0 and p.levels > 0), key=lambda p: p.low):
+        under = overlay.intersection(rest, part.polygon)
+        if under.area < 6.0:
+            continue
+        eaves = min(main.eaves, part.low)
+        if eaves > main.low + 0.3:  # else the outline itself begins higher up, and nothing of it is below the part
+            low = replace(main, eaves=eaves, levels=max(round(eaves / STOREY), 1), roof=Roof("flat", 0.0))
+            solids += [replace(low, polygon=piece) for piece in polygons_of(under, 6.0)]
+        rest = overlay.areas_of(overlay.difference(rest, part.polygon, grid=0.001))
+    pieces = [piece for piece in without_slivers(rest, main.polygon) if piece.area > 6.0]
+    return [replace(main, polygon=piece) for piece in pieces] + solids
+
+
+def _id_key(name: str) -> tuple[str, int, int]:
+    number_, _, piece = name[1:].partition(".")
+    return name[0], int(number_), int(piece or 0)
+
+
+def _without_twins(rows: list[_Row], dropped: list[Dropped]) -> list[_Row]:
+    """Leave out outlines that were mapped twice, keeping the one with more to say."""
+    if not rows:
+        return rows
+    shapes = np.array([row[1] for row in rows])
+    left, right = shapely.STRtree(shapes).query(shapes, predicate="intersects")
+    gone: set[int] = set()
+    for i, j in sorted(zip(left.tolist(), right.tolist(), strict=True)):
+        if i >= j or i in gone or j in gone:
+            continue
+        common = overlay.common_area(shapes[i], shapes[j])
+        if common > 0.9 * max(shapes[i].area, shapes[j].area):
+            loser = i if len(rows[i][2]) < len(rows[j][2]) else j
+            gone.add(loser)
+            dropped.append(Dropped(id=rows[loser][0], reason=f"same outline as {rows[i + j - loser][0]}"))
+    return [row for k, row in enumerate(rows) if k not in gone]
+
+
+def _owners(outlines: list[_Row], parts: list[_Row]) -> list[int]:
+    """For every part the outline that holds most of it; -1 where none holds a third."""
+    if not outlines or not parts:
+        return [-1] * len(parts)
+    tree = shapely.STRtree([row[1] for row in outlines])
+    owner: list[int] = []
+    for _, polygon, _ in parts:
+        near = sorted(tree.query(polygon, predicate="intersects").tolist())
+        shared = [(overlay.common_area(outlines[k][1], polygon), -outlines[k][1].area, k) for k in near]
+        best = max(shared, default=(0.0, 0.0, -1))
+        owner.append(best[2] if best[0] > 0.34 * polygon.area else -1)
+    return owner
+
+
+def _flat_is_usual(outlines: list[_Row], parts: list[_Row], lon: float) -> bool:
+    """Whether untagged town roofs are flat here: as the tagged ones are, else as on either side of the Atlantic."""
+    said = [shape for _, _, tags in (*outlines, *parts) if (shape := shape_named(tags.get("roof:shape")))]
+    if len(said) >= 20:
+        return said.count("flat") > 0.5 * len(said)
+    return lon < -30.0

@@ -1,0 +1,37 @@
+"""What the map says of a place that several stages need: decided once, before anything is made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from vico.geo.osm import OsmData
+from vico.worldgen.facts.driving_side import keeps_left
+from vico.worldgen.facts.levels import StreetLevels, street_levels
+from vico.worldgen.facts.named_places import NamedPlace, named_places
+
+
+@dataclass(frozen=True)
+class SiteFacts:
+    """A map and what follows from it alone.
+
+    Attributes
+    ----------
+    osm
+        The map, local metres.
+    levels
+        Which ways pass above a street, and where.
+    left_driving
+        Whether traffic keeps left.
+    named
+        Named places people go to, in the order of the map.
+    """
+
+    osm: OsmData
+    levels: StreetLevels
+    left_driving: bool
+    named: list[NamedPlace]
+
+
+def site_facts(osm: OsmData) -> SiteFacts:
+    """Read the facts of a site off its map."""
+    return SiteFacts(osm, street_levels(osm), keeps_left(osm), named_places(osm))

@@ -1,0 +1,1 @@
+"""Pictures of a finished world: its map, and views at eye height."""

@@ -1,0 +1,64 @@
+"""Write the pictures of a finished world: the map, the square from straight above, and views at eye height."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from vico.render.cameras import Cameras
+from vico.render.frames import render, render_top_down
+from vico.render.world_scene import scene_of
+from vico.threads import for_each, in_order
+from vico.world.folder import World
+from vico.worldgen.previews.maps import map_picture
+from vico.worldgen.previews.viewpoints import Overhead, Viewpoint, viewpoints
+
+_VIEWS = 8
+
+
+def write_previews(world: World, folder: Path, *, views: bool) -> dict[str, int]:
+    """Write ``map.png`` and, with `views`, the rendered pictures of ``previews/``; return how many there are."""
+    map_picture(world).save(folder / "map.png")
+    if not views:
+        return {"maps": 1, "views": 0}
+    spots = viewpoints(world, count=_VIEWS)
+    (folder / "previews").mkdir(exist_ok=True)
+    names = ["above", *(f"view_{k}" for k in range(len(spots)))]
+    frames = render_views(world, [Overhead(), *spots])
+
+    def save(taken: tuple[str, NDArray[np.uint8]]) -> None:
+        name, frame = taken
+        Image.fromarray(frame).save(folder / "previews" / f"{name}.png")
+
+    for_each(save, zip(names, frames, strict=True))
+    return {"maps": 1, "views": len(spots)}
+
+
+def render_views(world: World, views: Sequence[Viewpoint | Overhead]) -> Iterator[NDArray[np.uint8]]:
+    """Render a world from viewpoints.
+
+    Yields
+    ------
+    ndarray
+        RGB, uint8, shape ``(height, width, 3)``, in the order of `views`.
+    """
+    scene = scene_of(world, rooms=False)
+
+    def take(view: Viewpoint | Overhead) -> NDArray[np.uint8]:
+        if isinstance(view, Overhead):
+            return render_top_down(scene, world.half, view.side)
+        cameras = Cameras(
+            np.array([view.position]),
+            np.array([view.forward]),
+            fov_y=view.fov_y,
+            width=view.width,
+            height=view.height,
+        )
+        return render(scene, cameras, depth=False, segmentation=False, samples=2, threads=1).rgb[0]
+
+    scene.light()
+    yield from in_order(take, views)

@@ -1,0 +1,115 @@
+"""Where streets lie: carriageways, sidewalks, crossings and squares as polygons, from OpenStreetMap ways.
+
+OpenStreetMap draws streets as lines. Their widths come from `width`, else from lanes, class and parking lanes. The
+polygons are what the ground is painted by, what walkers may walk on, and where crossings lie, so that all agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import shapely
+from shapely import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from vico.geo import overlay
+from vico.geo.osm import polygons_of
+from vico.worldgen.facts.site import SiteFacts
+from vico.worldgen.facts.streets import StreetPolygons
+from vico.worldgen.streets.crossings import crossings_of
+from vico.worldgen.streets.strips import strips_of
+
+_KERB_RADIUS = 2.0
+_GRID = 0.001  # metres: overlays on a grid are robust where free ones fail on nearly coincident outlines
+
+
+def road_polygons(site: SiteFacts, obstacles: Sequence[BaseGeometry] = ()) -> StreetPolygons:
+    """Turn the streets of an OSM extract into polygons.
+
+    Parameters
+    ----------
+    site
+        The extract, local metres, and which of its ways pass above others.
+    obstacles
+        Footprints of buildings that stand on the ground: no sidewalk or square runs under them, and carriageways
+        only where a way leads through.
+
+    Returns
+    -------
+    StreetPolygons
+        Clipped to the extract's window and margin.
+    """
+    reach = site.osm.half + site.osm.margin
+    window = shapely.box(-reach, -reach, reach, reach)
+    solid = overlay.union_all(overlay.mended(list(obstacles)), grid=_GRID) if len(obstacles) else MultiPolygon()
+    strips = strips_of(site)
+    carriageway = _carriageway(strips.drive, strips.through, solid, window)
+    crossings = crossings_of(site.osm, carriageway, strips.streets, strips.crossings)
+    left = _Unclaimed(overlay.union(carriageway, solid, grid=_GRID), window)
+    steps = left.claim(strips.stairs)
+    # A square that is mapped as an area wins over the sidewalks drawn across it.
+    pedestrian = left.claim(strips.square)
+    cycleway = left.claim(strips.cycle)
+    sidewalk = left.claim(strips.walk)
+    path = left.claim(strips.loose)
+    parking = left.claim(strips.car_park)
+    return StreetPolygons(
+        carriageway=_multi(carriageway),
+        sidewalk=sidewalk,
+        crossing=_multi(overlay.intersection(overlay.union_all([c.polygon for c in crossings]), carriageway)),
+        pedestrian=pedestrian,
+        path=path,
+        cycleway=cycleway,
+        steps=steps,
+        parking=parking,
+        streets=strips.streets,
+        crossings=crossings,
+        rails=strips.rails,
+        sunken=_sunken(strips.kerbed, carriageway),
+        paved={
+            name: _multi(overlay.intersection(_multi(overlay.union_all(shapes, grid=_GRID)), window))
+            for name, shapes in sorted(strips.paved.items())
+        },
+    )
+
+
+def _carriageway(
+    drive: list[BaseGeometry], through: list[BaseGeometry], solid: BaseGeometry, window: Polygon
+) -> MultiPolygon:
+    """Carriageways in one, without what lies under buildings except where a way leads `through`."""
+    # Closing the outline rounds the inner corners of junctions the way kerbs do.
+    carriageway = overlay.union_all(drive, grid=_GRID)
+    carriageway = overlay.buffer(overlay.buffer(carriageway, _KERB_RADIUS, quad_segs=4), -_KERB_RADIUS, quad_segs=4)
+    carriageway = overlay.on_grid(overlay.simplify(carriageway, 0.08), grid=_GRID)
+    if not solid.is_empty:
+        under = overlay.difference(solid, overlay.union_all(through, grid=_GRID), grid=_GRID)
+        carriageway = overlay.difference(carriageway, under, grid=_GRID)
+    return _multi(overlay.intersection(_multi(carriageway), window, grid=_GRID))
+
+
+class _Unclaimed:
+    """Ground that no kind of surface has claimed yet."""
+
+    def __init__(self, taken: BaseGeometry, window: Polygon) -> None:
+        self._taken, self._window = taken, window
+
+    def claim(self, shapes: list[BaseGeometry]) -> MultiPolygon:
+        """Claim what is left of `shapes` beside what was claimed before."""
+        shape = overlay.simplify(overlay.union_all(shapes, grid=_GRID), 0.08)
+        shape = overlay.intersection(overlay.on_grid(shape, grid=_GRID), self._window, grid=_GRID)
+        left = _multi(overlay.difference(_multi(shape), self._taken, grid=_GRID), 0.3)
+        self._taken = overlay.union(self._taken, left, grid=_GRID)
+        return left
+
+
+def _sunken(kerbed: list[BaseGeometry], carriageway: BaseGeometry) -> MultiPolygon:
+    """Return the kerbed part of the carriageways, the rounded corners of their junctions with it."""
+    if not kerbed:
+        return MultiPolygon()
+    shape = overlay.union_all(kerbed, grid=_GRID)
+    shape = overlay.buffer(overlay.buffer(shape, 2 * _KERB_RADIUS, quad_segs=3), -2 * _KERB_RADIUS + 0.1, quad_segs=3)
+    return _multi(overlay.intersection(_multi(overlay.on_grid(shape, grid=_GRID)), carriageway, grid=_GRID))
+
+
+def _multi(shape: BaseGeometry, least: float = 0.05) -> MultiPolygon:
+    return MultiPolygon(polygons_of(shape, least))

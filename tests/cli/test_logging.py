@@ -1,0 +1,37 @@
+"""One logger for the library, set once by the command line."""
+
+import logging
+import subprocess
+import sys
+
+import pytest
+
+SPEAK = """
+import logging
+from vico.cli import main
+main.app.cli = lambda **given: (logging.getLogger("vico.x").{0}("heard"), print(given["args"]))[0]
+main.main({1!r})
+"""
+
+
+@pytest.mark.parametrize(
+    ("level", "option", "heard"),
+    [
+        ("warning", [], True),
+        ("info", [], False),
+        ("info", ["--verbose"], True),
+        ("warning", ["--quiet"], False),
+        ("error", ["--quiet"], True),
+    ],
+)
+def test_what_is_told_on_stderr_is_chosen_before_the_verb(level: str, option: list[str], heard: bool) -> None:
+    code = SPEAK.format(level, [*option, "world"])
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "['world']\n"
+    assert done.stderr == ("vico: heard\n" if heard else "")
+
+
+def test_modules_log_under_their_own_names() -> None:
+    from vico.io.http import retries
+
+    assert retries.log is logging.getLogger("vico.io.http.retries")

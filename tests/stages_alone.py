@@ -1,0 +1,24 @@
+"""Single stages of world generation, run on a map alone with what they need made on the way."""
+
+from __future__ import annotations
+
+from vico.geo.osm import OsmData
+from vico.world.heights import HeightField
+from vico.world.mesh import Surface
+from vico.worldgen.buildings.stage import BuildingsResult, buildings_from_plans
+from vico.worldgen.facts.outlines.buildings import building_plans
+from vico.worldgen.facts.site import site_facts
+from vico.worldgen.facts.streets import StreetPolygons
+from vico.worldgen.ground.bridges.stage import bridges_of
+from vico.worldgen.ground.stage import ground_from_osm
+
+
+def buildings_of(osm: OsmData, terrain: HeightField, *, seed: int) -> BuildingsResult:
+    """The buildings of a map as they are planned, built."""
+    return buildings_from_plans(building_plans(osm, seed=seed), osm, terrain, seed=seed)
+
+
+def ground_of(osm: OsmData, terrain: HeightField, streets: StreetPolygons) -> list[Surface]:
+    """The ground of a map, its bridges with it."""
+    site = site_facts(osm)
+    return ground_from_osm(site, terrain, streets, bridges_of(site, terrain, streets))

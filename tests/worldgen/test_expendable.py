@@ -1,0 +1,72 @@
+"""What fails for one object costs that object alone, and is told."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+import pytest
+import shapely
+
+from vico.errors import InputError
+from vico.geo.overlay import OverlayError
+from vico.world.check import check_world
+from vico.world.folder import World, read_world
+from vico.world.model import Dropped
+from vico.worldgen.buildings import stage
+from vico.worldgen.facts.expendable import expendable
+from vico.worldgen.pipeline import build_world
+
+EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
+
+
+def built_with(error: Exception, share: int, out: Path, monkeypatch: pytest.MonkeyPatch) -> World:
+    """A world in which every `share`-th building can't be seated."""
+    seat_of, count = stage.seat_of, iter(range(10_000))
+
+    def failing(*given: object) -> object:
+        if next(count) % share == 0:
+            raise error
+        return seat_of(*given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(stage, "seat_of", failing)
+    build_world(EXTRACT, lat=60.1690, lon=24.9435, half=60, out=out)
+    return read_world(out)
+
+
+def lost(world: World) -> list[Dropped]:
+    return [d for s in world.manifest.stages for d in s.dropped if d.reason.startswith("can't be made")]
+
+
+def test_a_building_without_geometry_is_left_out_with_its_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world = built_with(OverlayError("side location conflict"), 1000, tmp_path / "w", monkeypatch)
+    (gone,) = lost(world)
+    assert gone.reason == "can't be made: OverlayError: side location conflict"
+    assert gone.id not in world.building_by_id
+    assert world.buildings
+    assert check_world(world) == []
+
+
+def test_a_fault_of_the_program_costs_one_building_and_is_a_finding(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.WARNING):
+        world = built_with(IndexError("list index out of range"), 1000, tmp_path / "w", monkeypatch)
+    (gone,) = lost(world)
+    assert [(f.id, f.where) for f in check_world(world)] == [("program fault", gone.id)]
+    assert "IndexError: list index out of range at test_expendable.py" in gone.reason
+    assert gone.id in caplog.text
+
+
+def test_more_than_a_few_are_a_finding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    world = built_with(shapely.errors.GEOSException("TopologyException"), 1, tmp_path / "w", monkeypatch)
+    assert len(lost(world)) > 2
+    assert [(f.id, f.where) for f in check_world(world)] == [("much left out", "buildings")]
+
+
+def test_what_is_about_the_whole_build_ends_it() -> None:
+    for error in (InputError("no such file"), OSError(28, "No space left on device"), MemoryError()):
+        with pytest.raises(type(error)), expendable("w1", []):
+            raise error
