@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -9,14 +10,17 @@ import numpy as np
 import pytest
 
 from vico.assets.interior import RISE
-from vico.assets.models.files import DATA, read_folder, read_models
+from vico.assets.models.files import read_models
 from vico.assets.models.furniture import furniture_models
+from vico.assets.models.movable import movable_kinds, movable_surfaces
 from vico.assets.models.parts import HERE, copies_of
 from vico.assets.models.schema import BoxPart, GroupPart
 from vico.assets.models.street import street_models
-from vico.errors import MissingFileError, SchemaError
+from vico.errors import InputError, SchemaError
+from vico.io.data_files import PACKAGED
 from vico.world.model import LANDING
 
+DATA = PACKAGED / "models"
 GUIDE = Path(__file__).parents[2] / "docs" / "adding_a_model.md"
 # Extents along x, y, z in metres, read off the models when they became data.
 SIZES = {
@@ -32,17 +36,21 @@ def file_with(tmp_path: Path, model: str, *, head: str = 'group = "amenity"') ->
 
 
 def box(**placed: object) -> BoxPart:
-    return BoxPart.model_validate({"shape": "box", "size": [1, 1, 1], "colour": "oak", **placed})
+    return BoxPart.model_validate_json(json.dumps({"shape": "box", "size": [1, 1, 1], "colour": "oak", **placed}))
 
 
 def places(part: BoxPart | GroupPart) -> list[list[float]]:
     return [[round(float(v), 6) for v in copy.offset] for copy in copies_of(part, HERE)]
 
 
-def test_the_example_of_the_guide_is_a_model(tmp_path: Path) -> None:
+def test_the_example_of_the_guide_is_a_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ours = set(street_models())
     examples = re.findall(r"```toml\n(.*?)```", GUIDE.read_text("utf-8"), re.DOTALL)
-    (tmp_path / "benches.toml").write_text(examples[0])
-    found = street_models(tmp_path)
+    folder = tmp_path / "models" / "outdoor"
+    folder.mkdir(parents=True)
+    (folder / "benches.toml").write_text(examples[0])
+    monkeypatch.setenv("VICO_DATA", str(tmp_path))
+    found = street_models()
     park = found["park_bench"]
     assert park.size == pytest.approx((0.53, 1.6, 0.82), abs=0.001)
     assert park.kind == "bench"
@@ -50,7 +58,7 @@ def test_the_example_of_the_guide_is_a_model(tmp_path: Path) -> None:
     white = found["park_bench_white"]
     assert white.size == park.size
     assert not np.array_equal(white.surfaces[0].colour, park.surfaces[0].colour)
-    assert set(found) - set(street_models()) == {"park_bench", "park_bench_white"}
+    assert set(found) - ours == {"park_bench", "park_bench_white"}
 
 
 @pytest.mark.parametrize(("name", "size"), SIZES.items())
@@ -65,8 +73,8 @@ def test_the_wall_of_a_staircase_is_as_high_and_long_as_the_stairs() -> None:
 
 
 def test_every_colour_and_assembly_of_our_files_is_known() -> None:
-    for folder in ("indoor", "outdoor"):
-        for name, model in read_folder(DATA / folder).items():
+    for models in (street_models(), furniture_models()):
+        for name, model in models.items():
             assert model.triangles > 0, name
 
 
@@ -102,7 +110,7 @@ def test_a_list_of_colours_goes_round_the_copies(tmp_path: Path) -> None:
         ('[model.m]\nparts = [{ shape = "box", size = [1, nan, 1], colour = "oak" }]', "parts.0.box.size.1"),
         ('[model.m]\nkind = "bench"', "model.m: .*either its parts or the model it is like"),
         ('[model.m]\nlike = "n"', "no model 'n'"),
-        ("[model.m\n", "not a TOML file"),
+        ("[model.m\n", "not valid TOML"),
     ],
 )
 def test_a_wrong_entry_is_refused_by_name(tmp_path: Path, model: str, message: str) -> None:
@@ -133,6 +141,28 @@ def test_an_assembly_in_itself_is_refused(tmp_path: Path) -> None:
         _ = read_models(file_with(tmp_path, text))["m"].surfaces
 
 
-def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(MissingFileError, match="nowhere"):
-        street_models(tmp_path / "nowhere")
+def test_a_folder_that_is_not_there_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VICO_DATA", str(tmp_path / "nowhere"))
+    with pytest.raises(InputError, match="nowhere"):
+        street_models()
+
+
+def test_a_thing_to_carry_of_a_users_own_comes_in_our_colours_and_theirs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "models").mkdir()
+    (tmp_path / "models" / "movable_kasse.toml").write_text(
+        """
+        [paints]
+        tuerkis = [40, 170, 170]
+        [object.einkaufskorb]
+        sentence = "ein Einkaufskorb in {colour}"
+        size = [0.3, 0.4, 0.3]
+        parts = [{ shape = "box", size = [0.3, 0.4, 0.3], at = [0, 0, 0.15], colour = "paint" }]
+        """
+    )
+    monkeypatch.setenv("VICO_DATA", str(tmp_path))
+    assert {"einkaufskorb", "backpack"} <= set(movable_kinds())
+    (surface,) = movable_surfaces("einkaufskorb", "tuerkis")
+    assert surface.colour[0].tolist() == [40, 170, 170]
+    assert movable_kinds()["einkaufskorb"].described("tuerkis") == "ein Einkaufskorb in tuerkis"

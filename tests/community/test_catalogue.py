@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -16,24 +15,12 @@ PAGE = Path(__file__).parents[2] / "docs" / "adding_people.md"
 
 
 @pytest.fixture
-def own_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A user's folder of data; what was read before is forgotten, before and after."""
+def own_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A user's folder of data."""
     folder = tmp_path / "community"
     folder.mkdir()
     monkeypatch.setenv("VICO_DATA", str(tmp_path))
-    _forget()
-    yield folder
-    monkeypatch.undo()
-    _forget()
-
-
-def _forget() -> None:
-    from vico.community import jobs
-
-    for module in (catalogue, jobs):
-        for value in vars(module).values():
-            if callable(getattr(value, "cache_clear", None)):
-                value.cache_clear()
+    return folder
 
 
 def test_a_trade_hobby_and_group_of_the_documentation_are_read_beside_ours(own_data: Path) -> None:
@@ -63,11 +50,9 @@ def test_a_set_of_kinds_that_nobody_wrote_is_told(own_data: Path) -> None:
 
 
 def test_a_folder_of_data_that_is_not_there_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    _forget()
     monkeypatch.setenv("VICO_DATA", str(tmp_path / "missing"))
     with pytest.raises(InputError, match="VICO_DATA"):
         catalogue.trades()
-    _forget()
 
 
 def test_every_shift_of_a_trade_is_one_that_days_are_written_for() -> None:

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vico.assets.models.files import DATA, read_models
+from vico.assets.models.files import read_models
 from vico.assets.models.furniture import furniture_models
 from vico.assets.models.movable import movable_kinds
+from vico.io.data_files import PACKAGED
 from vico.rules import REACH
 from vico.world.check.indoors import walkable_inside
 from vico.world.folder import World
@@ -20,7 +21,7 @@ from vico.worldgen.indoor.rooms import rooms_of_plan
 from vico.worldgen.indoor.stage import furnish
 from vico.worldgen.indoor.uses import use_of
 
-SMALL = set(read_models(DATA / "indoor" / "small_things.toml"))
+SMALL = set(read_models(PACKAGED / "models" / "indoor" / "small_things.toml"))
 
 
 def test_every_place_in_a_building_has_rooms(helsinki: World) -> None:

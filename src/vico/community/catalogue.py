@@ -7,7 +7,6 @@ how to add an entry, or to write them in another language.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cache
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar
 
@@ -15,7 +14,7 @@ from pydantic import Field
 
 from vico.community.model import ActivityTag
 from vico.errors import SchemaError
-from vico.io.data_files import DataRecord, data_files, read_record
+from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 from vico.world.model import Category
 
 Ages = tuple[int, int]
@@ -311,7 +310,7 @@ class BiographySentences(DataRecord):
 R = TypeVar("R", bound=DataRecord)
 
 
-@cache
+@cached_data
 def trades() -> tuple[Job, ...]:
     """Return all trades, in the order of the files."""
     return tuple(
@@ -319,13 +318,13 @@ def trades() -> tuple[Job, ...]:
     )
 
 
-@cache
+@cached_data
 def fallback_trades() -> Mapping[Category, Job]:
     """Return who works in a category of places when no trade names the kind of the place."""
     return {job.category: job for _, file in _read("trades", _Trades) for job in file.fallback}
 
 
-@cache
+@cached_data
 def ways_of_life() -> WaysOfLife:
     """Return freelancers, students' subjects, the retired and guests."""
     files = [file for _, file in _read("ways_of_life", WaysOfLife)]
@@ -337,45 +336,45 @@ def ways_of_life() -> WaysOfLife:
     )
 
 
-@cache
+@cached_data
 def basic_values() -> tuple[Value, ...]:
     """Return the basic values."""
     return tuple(value for _, file in _read("character", Character) for value in file.value)
 
 
-@cache
+@cached_data
 def trait_words() -> Mapping[str, TraitWords]:
     """Return the words for high and low scores, by trait."""
     return {name: words for _, file in _read("character", Character) for name, words in file.traits.items()}
 
 
-@cache
+@cached_data
 def hobbies() -> tuple[Hobby, ...]:
     """Return all hobbies, in the order of the files."""
     sets = kind_sets()
     return tuple(_with_kinds(h, sets, path) for path, file in _read("leisure", Leisure) for h in file.hobby)
 
 
-@cache
+@cached_data
 def circles() -> tuple[Circle, ...]:
     """Return all kinds of groups, in the order of the files."""
     sets = kind_sets()
     return tuple(_with_kinds(c, sets, path) for path, file in _read("leisure", Leisure) for c in file.group)
 
 
-@cache
+@cached_data
 def neighbours_circle() -> Circle:
     """Return the group of last resort, for which any place with room will do."""
     return [file.neighbours for _, file in _read("leisure", Leisure) if file.neighbours is not None][-1]
 
 
-@cache
+@cached_data
 def kind_sets() -> Mapping[str, tuple[str, ...]]:
     """Return the sets of kinds of places that hobbies and groups name, by name."""
     return {name: kinds for _, file in _read("leisure", Leisure) for name, kinds in file.kind_sets.items()}
 
 
-@cache
+@cached_data
 def names() -> Names:
     """Return first and last names."""
     files = [file for _, file in _read("names", Names)]
@@ -386,19 +385,19 @@ def names() -> Names:
     )
 
 
-@cache
+@cached_data
 def at_home() -> AtHome:
     """Return what people do at home; a user's file replaces the package's."""
     return _last("at_home", AtHome)
 
 
-@cache
+@cached_data
 def errands() -> Errands:
     """Return errands and outings; a user's file replaces the package's."""
     return _last("errands", Errands)
 
 
-@cache
+@cached_data
 def biography_sentences() -> BiographySentences:
     """Return the sentences of biographies; a user's file replaces the package's."""
     return _last("biography", BiographySentences)

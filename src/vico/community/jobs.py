@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 from vico.community.catalogue import Job, fallback_trades, trades
 from vico.community.place_index import kind_of
+from vico.io.data_files import cached_data
 from vico.world.model import Category, Place
 
 
@@ -33,11 +32,11 @@ def works_at(occupation: str, place: Place) -> bool:
     return job in jobs_at(place)
 
 
-@cache
+@cached_data
 def _by_title() -> dict[str, Job]:
     return {job.title.lower(): job for job in (*trades(), *fallback_trades().values())}
 
 
-@cache
+@cached_data
 def _kinds() -> frozenset[str]:
     return frozenset(kind for job in trades() for kind in job.kinds)

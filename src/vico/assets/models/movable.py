@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from pathlib import Path
 
-from vico.assets.models.files import DATA, GUIDE, read_entries
+from vico.assets.models.files import GUIDE
 from vico.assets.models.parts import Scope, surfaces_of
 from vico.assets.models.schema import MovableEntry, MovableFile
 from vico.assets.shapes import Colour
 from vico.errors import InputError, SchemaError
+from vico.io.data_files import cached_data, data_files, read_record
 from vico.world.mesh import Surface
-
-FILE = DATA / "movable.toml"
 
 
 @dataclass(frozen=True)
@@ -38,20 +38,35 @@ class MovableKind:
         return self.sentence.format(colour=colour).replace("a orange", "an orange")
 
 
-@cache
-def _file() -> MovableFile:
-    return read_entries(FILE, MovableFile)
+@dataclass(frozen=True)
+class _Painted:
+    """An entry, the file it stands in, and that file's own colours."""
+
+    entry: MovableEntry
+    path: Path
+    colours: Mapping[str, Colour]
 
 
-@cache
+@cached_data
+def _files() -> list[tuple[Path, MovableFile]]:
+    return [(path, read_record(path, MovableFile, guide=GUIDE)) for path in data_files("models", "movable")]
+
+
+@cached_data
+def _entries() -> dict[str, _Painted]:
+    return {kind: _Painted(entry, path, file.colours) for path, file in _files() for kind, entry in file.object.items()}
+
+
+@cached_data
 def movable_kinds() -> dict[str, MovableKind]:
-    """Return every kind of thing, by its name."""
-    return {kind: MovableKind(kind, entry.size, entry.sentence) for kind, entry in _file().object.items()}
+    """Return every kind of thing, ours and the user's, by its name."""
+    return {kind: MovableKind(kind, it.entry.size, it.entry.sentence) for kind, it in _entries().items()}
 
 
+@cached_data
 def movable_colours() -> dict[str, Colour]:
     """Return the colours in which each thing comes, sRGB, by name."""
-    return _file().paints
+    return {name: paint for _, file in _files() for name, paint in file.paints.items()}
 
 
 def movable_prototype(kind: str, colour: str) -> str:
@@ -67,22 +82,22 @@ def movable_surfaces(kind: str, colour: str) -> list[Surface]:
     InputError
         If the kind or the colour is not in the catalogue.
     """
-    file = _file()
-    if kind not in file.object:
-        raise InputError(f"goods: no thing called {kind!r}; there are {', '.join(file.object)}")
-    if colour not in file.paints:
-        raise InputError(f"goods: no colour called {colour!r}; there are {', '.join(file.paints)}")
-    return _painted(file.object[kind], file, colour, f"{FILE}: object.{kind}")
+    entries, paints = _entries(), movable_colours()
+    if kind not in entries:
+        raise InputError(f"goods: no thing called {kind!r}; there are {', '.join(entries)}")
+    if colour not in paints:
+        raise InputError(f"goods: no colour called {colour!r}; there are {', '.join(paints)}")
+    it = entries[kind]
+    try:
+        return surfaces_of(it.entry.parts, Scope({**it.colours, **_shades(paints[colour])}, {}))
+    except InputError as error:
+        raise SchemaError(f"{it.path}: object.{kind}: {error}; see {GUIDE}") from None
 
 
-def _painted(entry: MovableEntry, file: MovableFile, colour: str, where: str) -> list[Surface]:
-    r, g, b = file.paints[colour]
-    shades: dict[str, Colour] = {
+def _shades(paint: Colour) -> dict[str, Colour]:
+    r, g, b = paint
+    return {
         "paint": (r, g, b),
         "paint_dark": (r * 2 // 3, g * 2 // 3, b * 2 // 3),
         "paint_light": (min(r + 60, 255), min(g + 60, 255), min(b + 60, 255)),
     }
-    try:
-        return surfaces_of(entry.parts, Scope({**file.colours, **shades}, {}))
-    except InputError as error:
-        raise SchemaError(f"{where}: {error}; {GUIDE}") from None

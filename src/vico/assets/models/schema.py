@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
+
+from vico.io.data_files import DataRecord
 
 Number = Annotated[float, Field(strict=True, ge=-1000.0, le=1000.0, allow_inf_nan=False)]
 Length = Annotated[float, Field(strict=True, gt=0.0, le=100.0, allow_inf_nan=False)]
@@ -22,11 +24,7 @@ ColourSpec = ColourName | Rgb
 Category = Literal["amenity", "natural", "transit", "indoor"]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class _Placed(_Strict):
+class _Placed(DataRecord):
     """Something that stands once or several times in a model.
 
     Attributes
@@ -192,7 +190,7 @@ class AssemblyPart(_Placed):
 
     shape: Literal["assembly"]
     name: str
-    colours: dict[ColourName, ColourSpec] = {}
+    colours: dict[ColourName, ColourSpec] = Field(default_factory=dict)
 
 
 Part = Annotated[
@@ -215,7 +213,7 @@ Part = Annotated[
 Parts = Annotated[list[Part], Field(min_length=1, max_length=200)]
 
 
-class TopEntry(_Strict):
+class TopEntry(DataRecord):
     """A surface things may lie on; see `Top`."""
 
     kind: Literal["sofa", "table", "chair", "desk", "bed"]
@@ -224,14 +222,14 @@ class TopEntry(_Strict):
     centre: Corner = (0.0, 0.0)
 
 
-class Assembly(_Strict):
+class Assembly(DataRecord):
     """Parts that several models of a file use; its own colours may be given anew at each use."""
 
-    colours: dict[ColourName, ColourSpec] = {}
+    colours: dict[ColourName, ColourSpec] = Field(default_factory=dict)
     parts: Parts
 
 
-class ModelEntry(_Strict):
+class ModelEntry(DataRecord):
     """A model, or a variant of one: `like` another, with other colours (and kind, foot and top, if given).
 
     Attributes
@@ -248,7 +246,7 @@ class ModelEntry(_Strict):
     solid: bool | None = None
     foot: tuple[Length, Length] | None = None
     top: TopEntry | None = None
-    colours: dict[ColourName, ColourSpec] = {}
+    colours: dict[ColourName, ColourSpec] = Field(default_factory=dict)
     parts: Parts | None = None
 
     @model_validator(mode="after")
@@ -258,17 +256,17 @@ class ModelEntry(_Strict):
         return self
 
 
-class ModelFile(_Strict):
+class ModelFile(DataRecord):
     """A file of models of one theme: what holds for all of them, its named colours, assemblies and models."""
 
     group: Category
     solid: bool = True
-    colours: dict[ColourName, Rgb] = {}
-    assembly: dict[str, Assembly] = {}
-    model: dict[str, ModelEntry] = {}
+    colours: dict[ColourName, Rgb] = Field(default_factory=dict)
+    assembly: dict[str, Assembly] = Field(default_factory=dict)
+    model: dict[str, ModelEntry] = Field(default_factory=dict)
 
 
-class MovableEntry(_Strict):
+class MovableEntry(DataRecord):
     """A thing people carry: `sentence` names it in instructions ("a {colour} backpack"); `size` is at rest."""
 
     sentence: str
@@ -276,9 +274,9 @@ class MovableEntry(_Strict):
     parts: Parts
 
 
-class MovableFile(_Strict):
+class MovableFile(DataRecord):
     """Things people carry; `paints` are the colours each comes in: ``paint``, ``paint_dark``, ``paint_light``."""
 
-    paints: dict[ColourName, Rgb]
-    colours: dict[ColourName, Rgb] = {}
+    paints: dict[ColourName, Rgb] = Field(default_factory=dict)
+    colours: dict[ColourName, Rgb] = Field(default_factory=dict)
     object: dict[str, MovableEntry]

@@ -5,15 +5,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Protocol, TypeVar
 
 from vico.errors import SchemaError
-from vico.io.data_files import VARIABLE, DataRecord, data_files, read_record
+from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 from vico.worldgen.facades.records import (
     ROOM,
     BlankWall,
@@ -69,6 +67,7 @@ class FacadeStyles:
         return self.ground_floors.get(name) or GroundFloor(name=name)
 
 
+@cached_data
 def styles() -> FacadeStyles:
     """Return what facades can look like: the package's data and the user's (``$VICO_DATA/facades``).
 
@@ -79,39 +78,6 @@ def styles() -> FacadeStyles:
     SchemaError
         If a file can't be used; the message says which, where, and what is wrong.
     """
-    return _read(os.environ.get(VARIABLE, ""))
-
-
-def region_of(lat: float, lon: float) -> str:
-    """Return the name of the region whose building customs are to be expected at a place."""
-    return next(region.name for region in reversed(list(styles().regions.values())) if region.holds(lat, lon))
-
-
-class _Named(Protocol):
-    @property
-    def name(self) -> str: ...
-
-
-N = TypeVar("N", bound=_Named)
-R = TypeVar("R", bound=DataRecord)
-
-
-def _files(kind: str, record: type[R]) -> list[tuple[Path, R]]:
-    return [(path, read_record(path, record)) for path in data_files(ROOM, kind)]
-
-
-def _by_name(entries: Iterable[N]) -> dict[str, N]:
-    """Return entries by name; a later one of the same name comes in the place of the earlier, at the end."""
-    found: dict[str, N] = {}
-    for entry in entries:
-        found.pop(entry.name, None)
-        found[entry.name] = entry
-    return found
-
-
-@cache
-def _read(own: str) -> FacadeStyles:
-    """Read all files; `own` is the user's folder, which `data_files` knows."""
     families, regions, uses = _files("families", FamiliesFile), _files("regions", RegionsFile), _files("uses", UsesFile)
     roofs, signs = [file for _, file in _files("roofs", RoofsFile)], [file for _, file in _files("signs", SignsFile)]
     known = {family.name for _, file in families for family in file.family}
@@ -142,6 +108,33 @@ def _read(own: str) -> FacadeStyles:
         finishes=_by_name(finish for _, file in _files("finishes", FinishesFile) for finish in file.finish),
         trades=_by_name(trade for file in signs for trade in file.trade),
     )
+
+
+def region_of(lat: float, lon: float) -> str:
+    """Return the name of the region whose building customs are to be expected at a place."""
+    return next(region.name for region in reversed(list(styles().regions.values())) if region.holds(lat, lon))
+
+
+class _Named(Protocol):
+    @property
+    def name(self) -> str: ...
+
+
+N = TypeVar("N", bound=_Named)
+R = TypeVar("R", bound=DataRecord)
+
+
+def _files(kind: str, record: type[R]) -> list[tuple[Path, R]]:
+    return [(path, read_record(path, record)) for path in data_files(ROOM, kind)]
+
+
+def _by_name(entries: Iterable[N]) -> dict[str, N]:
+    """Return entries by name; a later one of the same name comes in the place of the earlier, at the end."""
+    found: dict[str, N] = {}
+    for entry in entries:
+        found.pop(entry.name, None)
+        found[entry.name] = entry
+    return found
 
 
 def _check_families(path: Path, file: FamiliesFile) -> None:

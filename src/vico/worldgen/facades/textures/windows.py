@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
-from functools import cache
 from typing import Any
 
 import numpy as np
 
 from vico.errors import SchemaError
-from vico.io.data_files import VARIABLE, data_files, read_record
+from vico.io.data_files import cached_data, data_files, read_record
 from vico.worldgen.facades.records import ROOM, WindowsFile, WindowStyle
 from vico.worldgen.texture_canvas import Canvas, Colour
 
@@ -22,15 +20,14 @@ def window_style(name: str, **changes: Any) -> WindowStyle:
     SchemaError
         If a file of windows can't be used, or none has the name.
     """
-    styles = _styles(os.environ.get(VARIABLE, ""))
+    styles = _styles()
     if name not in styles:
         raise SchemaError(f"windows: no window {name!r} in {ROOM}/windows.toml; there are {', '.join(styles)}")
     return styles[name].model_copy(update=changes)
 
 
-@cache
-def _styles(own: str) -> dict[str, WindowStyle]:
-    """Read all files; `own` is the user's folder, which `data_files` knows."""
+@cached_data
+def _styles() -> dict[str, WindowStyle]:
     files = [read_record(path, WindowsFile) for path in data_files(ROOM, "windows")]
     return {window.name: window for file in files for window in file.window}
 
