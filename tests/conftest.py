@@ -9,11 +9,13 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
+import numba
 import pytest
 from hypothesis import settings
 
 from command_line import vico
 from vico.community import build_community, write_community
+from vico.io.compiled import compiled_folder
 from vico.world.folder import World, read_world
 from vico.worldgen.pipeline import build_world
 from vico.worldgen.request import BuildOptions
@@ -24,6 +26,8 @@ settings.register_profile("search", deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeatable"))
 
 os.environ["VICO_OVERPASS"] = "off"  # tests ask no server but their own
+# A test with a cache folder of its own need not compile everything anew, nor a process that it starts.
+numba.config.CACHE_DIR = os.environ.setdefault("NUMBA_CACHE_DIR", str(compiled_folder()))
 
 EXTRACT = Path(__file__).parents[1] / "src" / "vico" / "data" / "helsinki.osm.pbf"
 SHARED = Path(__file__).parents[2] / "shared" / "data"

@@ -147,3 +147,15 @@ def test_geometry_from_outside_is_overlaid_by_one_module() -> None:
         and node.func.value.id == "shapely"
     }
     assert found == set(), "use vico.geo.overlay: plain overlays fail on outlines that nearly coincide"
+
+
+def test_functions_are_compiled_through_one_module() -> None:
+    found = [
+        f"{path.relative_to(SOURCE)}:{node.lineno}"
+        for path in sorted(SOURCE.rglob("*.py"))
+        if path.relative_to(SOURCE).as_posix() != "io/compiled.py"
+        for node in ast.walk(ast.parse(path.read_text()))
+        if (isinstance(node, ast.Import) and any(alias.name.split(".")[0] == "numba" for alias in node.names))
+        or (isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "numba")
+    ]
+    assert found == [], "use vico.io.compiled: numba's own cache runs old code after an update"

@@ -1,4 +1,4 @@
-"""`vico warm-up`: compile the hot loops once; numba keeps them on disk for every later start."""
+"""`vico warm-up`: compile the hot loops once; they are kept in the cache folder for every later start."""
 
 from __future__ import annotations
 

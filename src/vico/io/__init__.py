@@ -1,1 +1,1 @@
-"""The lowest floor: files and folders written whole or not at all, the cache folder, and the HTTP client."""
+"""The lowest floor: files and folders written whole or not at all, the cache, compiled code, the HTTP client."""

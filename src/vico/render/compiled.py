@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
+from vico.io.compiled import compiled
 
-kernel: Any = njit(cache=True, nogil=True, error_model="numpy")
-inlined: Any = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+kernel: Any = compiled(nogil=True, error_model="numpy")
+inlined: Any = compiled(nogil=True, error_model="numpy", forceinline=True)

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from vico.assets.people import PARENTS, SkinnedBody
+from vico.io.compiled import compiled
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ def skin(
     return vertices, normals
 
 
-@njit(cache=True)
+@compiled
 def rotation_matrix(axis_angle: NDArray[Any], out: NDArray[Any]) -> None:
     """Write the rotation matrix of an axis-angle vector (Rodrigues' formula)."""
     x, y, z = axis_angle[0], axis_angle[1], axis_angle[2]
@@ -144,7 +144,7 @@ def rotation_matrix(axis_angle: NDArray[Any], out: NDArray[Any]) -> None:
     out[2, 0], out[2, 1], out[2, 2] = b * x * z - a * y, b * y * z + a * x, 1 - b * (x * x + y * y)
 
 
-@njit(cache=True)
+@compiled
 def forward_kinematics(
     rotations: NDArray[Any],
     joints: NDArray[Any],
@@ -196,8 +196,8 @@ class _Poses(NamedTuple):
 
 
 # fastmath is safe here: pictures come of it, never state.
-_fast: Any = njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
-_fast_inlined: Any = njit(cache=True, nogil=True, fastmath=True, error_model="numpy", forceinline=True)
+_fast: Any = compiled(nogil=True, fastmath=True, error_model="numpy")
+_fast_inlined: Any = compiled(nogil=True, fastmath=True, error_model="numpy", forceinline=True)
 
 
 @_fast

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from vico.errors import InputError
+from vico.io.compiled import compiled
 from vico.render.records import CUTOUT, DOUBLE_SIDED, MATERIAL
 from vico.threads import for_each
 from vico.world.mesh import Material
@@ -140,7 +140,7 @@ def _linear(pixels: NDArray[np.uint8]) -> tuple[NDArray[np.float32], NDArray[np.
     return _LINEAR[pixels[..., :3]], pixels[..., 3].astype(np.float32) / np.float32(255)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _coarser(light, alpha, cutout):  # type: ignore[no-untyped-def]
     """Halve a level: averages in linear light; where alpha means holes of opaque texels alone: leaves keep theirs."""
     tall, wide = min(alpha.shape[0], 2), min(alpha.shape[1], 2)
@@ -168,7 +168,7 @@ def _coarser(light, alpha, cutout):  # type: ignore[no-untyped-def]
     return new_light, new_alpha
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _pack(light, alpha, gain, texels):  # type: ignore[no-untyped-def]
     """Write a level as packed sRGB texels; `gain` multiplies alpha."""
     zero, one, most = np.float32(0.0), np.float32(1.0), np.float32(255.0)

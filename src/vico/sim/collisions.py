@@ -11,9 +11,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from vico.io.compiled import compiled
 from vico.sim.state import RADIUS
 
 STRIDE = 0.05
@@ -102,7 +102,7 @@ OBSTACLE = np.dtype(
 )
 
 
-@njit(cache=True)
+@compiled
 def map_gap(x: float, y: float, clearance: Array, half: float) -> float:
     """Free room around a point of the walkable map, metres: its clearance, bilinear between the cells' centres.
 
@@ -122,7 +122,7 @@ def map_gap(x: float, y: float, clearance: Array, half: float) -> float:
     return min(edge, south * (1 - fv) + north * fv)
 
 
-@njit(cache=True)
+@compiled
 def box_gap(x: float, y: float, bx: float, by: float, yaw: float, half_length: float, half_width: float) -> float:
     """Signed distance from a point to an oriented rectangle, metres; negative inside."""
     c, s = math.cos(yaw), math.sin(yaw)
@@ -133,19 +133,19 @@ def box_gap(x: float, y: float, bx: float, by: float, yaw: float, half_length: f
     return max(u, v)
 
 
-@njit(cache=True)
+@compiled
 def gap_to(x: float, y: float, box: Array) -> float:
     """Signed distance from a point to a box, one row of columns `BOX_X` and on, metres; negative inside."""
     return box_gap(x, y, box[BOX_X], box[BOX_Y], box[BOX_YAW], box[BOX_HALF_LENGTH], box[BOX_HALF_WIDTH])
 
 
-@njit(cache=True)
+@compiled
 def room_gap(x: float, y: float, room: Array) -> float:
     """Distance from a point to the nearest wall of a room, a box; negative outside."""
     return -gap_to(x, y, room)
 
 
-@njit(cache=True)
+@compiled
 def _gap_between(x: float, y: float, yaw: float, reach: float, other: Any) -> float:
     """Smallest distance between the disc centres of two avatars (one disc, or three in a row for a rider)."""
     best = _FAR
@@ -161,13 +161,13 @@ def _gap_between(x: float, y: float, yaw: float, reach: float, other: Any) -> fl
     return best
 
 
-@njit(cache=True)
+@compiled
 def _is_too_close(gap: float, was: float) -> bool:
     """Return whether a gap to an obstacle is too small, and no wider than it was."""
     return gap < RADIUS and gap <= was
 
 
-@njit(cache=True)
+@compiled
 def _obstacle_gap(x: float, y: float, other: Any) -> float:
     """Return the distance from a point to a body outdoors, metres."""
     if other.disc:
@@ -175,7 +175,7 @@ def _obstacle_gap(x: float, y: float, other: Any) -> float:
     return box_gap(x, y, other.x, other.y, other.yaw, other.half_length, other.half_width)
 
 
-@njit(cache=True)
+@compiled
 def _blocker_outdoors(x: float, y: float, from_x: float, from_y: float, solids: SolidMap, others: Array) -> int:
     """Return the entity that keeps a disc from going from one point to another in the street; `WALL`, or 0 if free."""
     gap = map_gap(x, y, solids.clearance, solids.half)
@@ -195,7 +195,7 @@ def _blocker_outdoors(x: float, y: float, from_x: float, from_y: float, solids: 
     return 0
 
 
-@njit(cache=True)
+@compiled
 def _blocker_in_room(x: float, y: float, from_x: float, from_y: float, room: int, solids: SolidMap) -> int:
     """Return `WALL` if a wall or furniture keeps a disc from going from one point to another in a room, 0 if free."""
     gap = room_gap(x, y, solids.rooms[room])
@@ -208,7 +208,7 @@ def _blocker_in_room(x: float, y: float, from_x: float, from_y: float, room: int
     return 0
 
 
-@njit(cache=True)
+@compiled
 def _blocking_avatar(me: Any, x: float, y: float, yaw: float, avatars: Array) -> int:
     """Return the entity of the avatar that keeps avatar `me` from standing at a pose, 0 if none does."""
     for other in avatars:
@@ -224,7 +224,7 @@ def _blocking_avatar(me: Any, x: float, y: float, yaw: float, avatars: Array) ->
     return 0
 
 
-@njit(cache=True)
+@compiled
 def blocker(me: Any, x: float, y: float, yaw: float, avatars: Array, solids: SolidMap, others: Array) -> int:
     """Entity that keeps avatar `me` from standing at a pose; `WALL` for walls, edges and furniture, 0 if free."""
     hit = 0
@@ -242,7 +242,7 @@ def blocker(me: Any, x: float, y: float, yaw: float, avatars: Array, solids: Sol
     return hit if hit != 0 else _blocking_avatar(me, x, y, yaw, avatars)
 
 
-@njit(cache=True)
+@compiled
 def _turn(me: Any, angle: float, avatars: Array, solids: SolidMap, others: Array) -> int:
     """Turn an avatar if its body has room to; return the entity that is in the way, 0 for none."""
     yaw = me.yaw + angle
@@ -255,7 +255,7 @@ def _turn(me: Any, angle: float, avatars: Array, solids: SolidMap, others: Array
     return hit
 
 
-@njit(cache=True)
+@compiled
 def _walk_ahead(
     me: Any, distance: float, contact: int, avatars: Array, solids: SolidMap, others: Array
 ) -> tuple[float, int]:
@@ -292,7 +292,7 @@ def _walk_ahead(
     return free, contact
 
 
-@njit(cache=True)
+@compiled
 def _avatar_records(avatars: AvatarBodies) -> Array:
     records = np.empty(len(avatars.yaw), AVATAR)
     for i in range(len(records)):
@@ -303,7 +303,7 @@ def _avatar_records(avatars: AvatarBodies) -> Array:
     return records
 
 
-@njit(cache=True)
+@compiled
 def sweep(distance: Array, turn: Array, bodies: AvatarBodies, solids: SolidMap, others: Array) -> tuple[Array, Array]:
     """Turn, then move every avatar ahead as far as the way is free, one after the other.
 

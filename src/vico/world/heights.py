@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
+
+from vico.io.compiled import compiled
 
 EDGE_RANGE = 1.0
 """Metres of distance to an edge that a `Steps` field can tell; int8 127 stands for it."""
@@ -127,7 +128,7 @@ class HeightField:
         return cls(heights, float(arrays["half"]), Steps(edge, low, high))
 
 
-@njit(cache=True)
+@compiled
 def _smooth(heights, half, x, y, out):  # type: ignore[no-untyped-def]
     n = heights.shape[0]
     scale = (n - 1) / (2.0 * half)
@@ -141,7 +142,7 @@ def _smooth(heights, half, x, y, out):  # type: ignore[no-untyped-def]
         out[k] = south * (1.0 - fv) + north * fv
 
 
-@njit(cache=True)
+@compiled
 def _stepped(edge, low, high, half, x, y, which, out):  # type: ignore[no-untyped-def]
     """Add the steps: at the point itself (0), or as if it lay on the lower (2) or upper (3) side."""
     n = edge.shape[0]

@@ -15,10 +15,10 @@ import numpy as np
 import shapely
 from defusedxml.common import DefusedXmlException
 from defusedxml.ElementTree import ParseError, iterparse
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from vico.errors import MissingFileError, SchemaError
+from vico.io.compiled import compiled
 from vico.world.walkways import Walkways, walkways_of
 
 Floats = NDArray[np.float64]
@@ -176,7 +176,7 @@ class LaneGraph:
         return renamed[labels]
 
 
-@njit(cache=True)
+@compiled
 def lane_pose(first, points, along, lane, offset):  # type: ignore[no-untyped-def]
     """x, y, yaw at `offset` metres along a lane; beyond its ends, on along the end's direction."""
     low, high = first[lane], first[lane + 1] - 1
@@ -193,7 +193,7 @@ def lane_pose(first, points, along, lane, offset):  # type: ignore[no-untyped-de
     return points[a, 0] + dx * share, points[a, 1] + dy * share, np.arctan2(dy, dx)
 
 
-@njit(cache=True)
+@compiled
 def _poses(first, points, along, lane, offset):  # type: ignore[no-untyped-def]
     out = np.empty((len(lane), 3))
     for i in range(len(lane)):

@@ -6,9 +6,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from vico.io.compiled import compiled
 from vico.world.walkable import BODY, CROSSING, OPEN, ROADWAY, SIDEWALK, WalkableMap
 
 #: How much longer a metre on each surface counts than on a sidewalk, in hundredths.
@@ -46,7 +46,7 @@ class _Work(NamedTuple):
     parent: NDArray[np.int8]
 
 
-@njit(cache=True)
+@compiled
 def _unlink(node, key, head, after, before):  # type: ignore[no-untyped-def]
     n, p = after[node], before[node]
     if p >= 0:
@@ -57,7 +57,7 @@ def _unlink(node, key, head, after, before):  # type: ignore[no-untyped-def]
         before[n] = p
 
 
-@njit(cache=True)
+@compiled
 def _link(node, key, head, after, before):  # type: ignore[no-untyped-def]
     first = head[key]
     after[node], before[node] = first, -1
@@ -66,7 +66,7 @@ def _link(node, key, head, after, before):  # type: ignore[no-untyped-def]
     head[key] = node
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _step(direction):  # type: ignore[no-untyped-def]
     """Return the step in x and y to the neighbour in a direction."""
     if direction >= _FIRST_DIAGONAL:
@@ -76,7 +76,7 @@ def _step(direction):  # type: ignore[no-untyped-def]
     return 0, 5 - 2 * direction
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _may_step(cost, width, height, cell, direction):  # type: ignore[no-untyped-def]
     """Return whether a step ends on an open cell, and cuts no corner if it is diagonal."""
     step_x, step_y = _step(direction)
@@ -86,7 +86,7 @@ def _may_step(cost, width, height, cell, direction):  # type: ignore[no-untyped-
     return direction < _FIRST_DIAGONAL or (cost[cell + step_x] != 0 and cost[cell + step_y * width] != 0)
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _least_cost(x, y, goal_x, goal_y):  # type: ignore[no-untyped-def]
     """Return the cost between two cells if all were sidewalk without walls: what A* goes by; 0 without a goal."""
     if goal_x < 0:
@@ -95,7 +95,7 @@ def _least_cost(x, y, goal_x, goal_y):  # type: ignore[no-untyped-def]
     return 100 * (_STRAIGHT * max(dx, dy) + (_DIAGONAL - _STRAIGHT) * min(dx, dy))
 
 
-@njit(cache=True)
+@compiled
 def _search(cost, work, start, goal, generation):  # type: ignore[no-untyped-def]
     """Run A* from `start`, or Dijkstra where `goal` is -1, with circular buckets; return whether the goal was met.
 
@@ -143,7 +143,7 @@ def _search(cost, work, start, goal, generation):  # type: ignore[no-untyped-def
     return False
 
 
-@njit(cache=True)
+@compiled
 def _backtrack(parent, start, goal, width):  # type: ignore[no-untyped-def]
     """Return the cells from `start` to `goal`, by the direction each was entered in."""
     count = 1
@@ -162,7 +162,7 @@ def _backtrack(parent, start, goal, width):  # type: ignore[no-untyped-def]
     return cells
 
 
-@njit(cache=True)
+@compiled
 def _straight_cost(cost, clearance, blocked, checks, x0, y0, x1, y1):  # type: ignore[no-untyped-def]
     """Cost of a straight walk between points in cell units, or -1 where there is no room for it."""
     n = cost.shape[0]
@@ -192,7 +192,7 @@ def _straight_cost(cost, clearance, blocked, checks, x0, y0, x1, y1):  # type: i
     return total / steps * length * _STRAIGHT
 
 
-@njit(cache=True)
+@compiled
 def _pull(cost, clearance, blocked, checks, points, g):  # type: ignore[no-untyped-def]
     """Return the points to keep (indices): straight walks that cost no more than the grid's path between their ends."""
     count = len(points)
@@ -230,7 +230,7 @@ def _pull(cost, clearance, blocked, checks, points, g):  # type: ignore[no-untyp
     return keep[:kept]
 
 
-@njit(cache=True)
+@compiled
 def _nearest(free, x, y, reach):  # type: ignore[no-untyped-def]
     """Flat index of the free cell whose centre is nearest to (x, y) in cell units, or -1 within `reach` rings."""
     n = free.shape[0]

@@ -13,11 +13,11 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from vico.errors import InputError, MissingFileError, SchemaError
+from vico.io.compiled import compiled
 from vico.io.files import write_bytes
 
 BLOCKED, OPEN, SIDEWALK, CROSSING, ROADWAY = range(5)
@@ -183,7 +183,7 @@ def read_walkable(path: Path) -> WalkableMap:
         raise SchemaError(f"{path}: not a readable walkable map ({error}); build the world anew") from None
 
 
-@njit(cache=True)
+@compiled
 def fill_polygon(grid, xs, ys, starts, half, cell, value):  # type: ignore[no-untyped-def]
     """Set the cells whose centres lie in a polygon: rings end to end in xs, ys (metres), even-odd rule."""
     n = grid.shape[0]
@@ -210,7 +210,7 @@ def fill_polygon(grid, xs, ys, starts, half, cell, value):  # type: ignore[no-un
                 grid[j, i] = value
 
 
-@njit(cache=True)
+@compiled
 def stroke(grid, start, end, radius, half, cell, value):  # type: ignore[no-untyped-def]
     """Set the cells whose centres lie within `radius` of a segment; `start`, `end`: metres, shape ``(k, 2)``."""
     n = grid.shape[0]

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from vico.assets.people.bake import ANCESTRIES, GENDERS, LEVELS, TARGETS, VERSION
@@ -19,6 +18,7 @@ from vico.assets.people.lofts import BodyPart, merged, strongest, with_normals
 from vico.assets.people.model import JOINTS, Appearance, Colour, J, SkinnedBody, t_pose
 from vico.errors import MissingExtraError
 from vico.io.cache import cache_folder
+from vico.io.compiled import compiled
 
 # Metres that a garment lies off the body: near the skin, and how much more at its far end.
 _TOPS: dict[str, tuple[float, float]] = {
@@ -249,7 +249,7 @@ class _Scan:
         return np.array([self.axis + out * math.cos(angle), out * math.sin(angle), height])
 
 
-@njit(cache=True)
+@compiled
 def _leaving(
     points: NDArray[Any], triangles: NDArray[Any], axis: float, heights: NDArray[Any], angles: NDArray[Any]
 ) -> NDArray[Any]:

@@ -14,10 +14,10 @@ from heapq import heapify, heappop, heappush
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from vico.assets.people.model import JOINTS, J, SkinnedBody
+from vico.io.compiled import compiled
 
 # Triangles of a light body.
 LIGHT = 1900
@@ -100,7 +100,7 @@ def _care(body: SkinnedBody, points: Array, faces: Array, shares: Array) -> tupl
     return care, limit
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _components(faces: Array, count: int) -> Array:
     """Return a number for each vertex, the same for all that hang together."""
     owner = np.arange(count)
@@ -122,7 +122,7 @@ def _components(faces: Array, count: int) -> Array:
     return owner
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _layered(corners: Array, layer: Array) -> Array:
     """Which triangles lie closely over or under a triangle of another layer."""
     count = len(corners)
@@ -148,7 +148,7 @@ def _layered(corners: Array, layer: Array) -> Array:
     return close
 
 
-@njit(cache=True)
+@compiled
 def _over(a: Array, b: Array) -> bool:
     """Whether a corner or the middle of triangle `a` lies within the layers' distance above or below triangle `b`."""
     e, f = b[1] - b[0], b[2] - b[0]
@@ -178,7 +178,7 @@ def _hidden(points: Array, faces: Array, shares: Array) -> NDArray[np.bool_]:
     return _covered(corners, normals, low, high, order, tallest, carried)
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _covered(
     corners: Array, normals: Array, low: Array, high: Array, order: Array, tallest: float, carried: Array
 ) -> Array:
@@ -236,7 +236,7 @@ def _covered(
     return hidden
 
 
-@njit(cache=True)
+@compiled
 def _leaves(start: Array, way: Array, corners: Array, normals: Array, among: Array) -> bool:
     """Whether a ray comes out of one of some triangles, close by (Moeller and Trumbore's test)."""
     for g in among:
@@ -300,7 +300,7 @@ class _Loss(NamedTuple):
     limit: Array  # how far the surface may move here, metres, float64 (n,)
 
 
-@njit(cache=True)
+@compiled
 def _cost(loss: _Loss, u: int, v: int) -> float:
     """Return what is lost if `u` moves to `v`."""
     points, traits, area = loss.points, loss.traits, loss.area
@@ -345,7 +345,7 @@ class _Ring(NamedTuple):
     pairs: Array  # wedges at the vertex that goes, and those that take their place, int64 (8, 2)
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _collapse(loss: _Loss, faces: Array, wedges: Array, target: int) -> Array:
     """Collapse edges in place until `target` triangles are left; returns which are."""
     count, left = len(loss.points), len(faces)
@@ -377,7 +377,7 @@ def _collapse(loss: _Loss, faces: Array, wedges: Array, target: int) -> Array:
     return mesh.alive
 
 
-@njit(cache=True)
+@compiled
 def _chained(faces: Array, wedges: Array, count: int) -> _Corners:
     """Chain the corners at each of `count` vertices."""
     corners = 3 * len(faces)
@@ -392,7 +392,7 @@ def _chained(faces: Array, wedges: Array, count: int) -> _Corners:
     return _Corners(faces, wedges, np.ones(len(faces), np.bool_), head, tail, following)
 
 
-@njit(cache=True)
+@compiled
 def _first_offers(loss: _Loss, faces: Array) -> list[tuple[float, int, int, int, int]]:
     """Return a heap of all collapses: cost, who goes, who stays, and how often each had changed when it was offered."""
     heap = [(0.0, 0, 0, 0, 0)]
@@ -406,13 +406,13 @@ def _first_offers(loss: _Loss, faces: Array) -> list[tuple[float, int, int, int,
     return heap
 
 
-@njit(cache=True)
+@compiled
 def _has(faces: Array, f: int, v: int) -> bool:
     """Whether a triangle has a vertex."""
     return bool(faces[f, 0] == v or faces[f, 1] == v or faces[f, 2] == v)
 
 
-@njit(cache=True)
+@compiled
 def _look_around(mesh: _Corners, ring: _Ring, u: int, v: int, mark: int) -> tuple[int, int]:
     """Mark the neighbours of `u`, and pair its wedges with those of `v` where they share a triangle.
 
@@ -442,7 +442,7 @@ def _look_around(mesh: _Corners, ring: _Ring, u: int, v: int, mark: int) -> tupl
     return shared, known
 
 
-@njit(cache=True)
+@compiled
 def _on_open_edge(mesh: _Corners, ring: _Ring, u: int) -> bool:
     """Whether a neighbour of `u` shares but one triangle with it."""
     corner, found = mesh.head[u], False
@@ -456,7 +456,7 @@ def _on_open_edge(mesh: _Corners, ring: _Ring, u: int) -> bool:
     return found
 
 
-@njit(cache=True)
+@compiled
 def _common_neighbours(mesh: _Corners, ring: _Ring, u: int, v: int, mark: int) -> int:
     """Return how many neighbours of `v` are marked as neighbours of `u`; each is marked as counted."""
     corner, common = mesh.head[v], 0
@@ -472,7 +472,7 @@ def _common_neighbours(mesh: _Corners, ring: _Ring, u: int, v: int, mark: int) -
     return common
 
 
-@njit(cache=True)
+@compiled
 def _star_fits(mesh: _Corners, points: Array, pairs: Array, u: int, v: int) -> bool:
     """Whether every side of a seam at `u` has its like at `v`, and no triangle turns over."""
     corner, fits = mesh.head[u], True
@@ -487,7 +487,7 @@ def _star_fits(mesh: _Corners, points: Array, pairs: Array, u: int, v: int) -> b
     return fits
 
 
-@njit(cache=True)
+@compiled
 def _merge(mesh: _Corners, pairs: Array, u: int, v: int) -> int:
     """Move the corners at `u` to `v`; returns how many triangles vanish."""
     corner, vanished = mesh.head[u], 0
@@ -509,7 +509,7 @@ def _merge(mesh: _Corners, pairs: Array, u: int, v: int) -> int:
     return vanished
 
 
-@njit(cache=True)
+@compiled
 def _offer_around(
     loss: _Loss, mesh: _Corners, heap: list[tuple[float, int, int, int, int]], stamp: Array, v: int
 ) -> None:
@@ -527,7 +527,7 @@ def _offer_around(
         corner = mesh.following[corner]
 
 
-@njit(cache=True)
+@compiled
 def _turns(points: Array, faces: Array, f: int, moved: int, to: int) -> bool:
     """Whether a triangle turns too far, or becomes a sliver, when one corner moves to another vertex."""
     a, b, c = points[faces[f, moved]], points[faces[f, (moved + 1) % 3]], points[faces[f, (moved + 2) % 3]]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from vico.io.compiled import compiled
 from vico.sim.animation.gait import run, walk
 from vico.sim.animation.limbs import BodyPose, curl_fingers
 from vico.sim.animation.names import (
@@ -25,7 +25,7 @@ from vico.sim.animation.seated import ride_bike, sit, sleep, step_up
 from vico.sim.animation.standing import stand
 
 
-@njit(cache=True)
+@compiled
 def animate(clips: Array, phase: Array, stride: Array, style: Array, rotations: Array, offsets: Array) -> None:
     """Write everybody's joint rotations and pelvis shifts; see `vico.sim.animation.pose`."""
     for i in range(len(clips)):
@@ -43,7 +43,7 @@ def animate(clips: Array, phase: Array, stride: Array, style: Array, rotations: 
             offsets[i, r] = body.shift[r]
 
 
-@njit(cache=True)
+@compiled
 def _move(body: Any, clip: int, p: float, stride: float) -> None:
     if clip in (WALK, CARRY):
         walk(body, p, stride, clip == CARRY)

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from vico.io.compiled import compiled
 from vico.sim.animation.limbs import (
     ANKLE,
     FOOT,
@@ -60,21 +60,21 @@ class FootPose(NamedTuple):
     toes: float
 
 
-@njit(cache=True)
+@compiled
 def _on_heel(flat: float, pitch: float, behind: float, tall: float) -> tuple[float, float]:
     """Return the ankle's x and z when the foot, flat at x = `flat`, is pitched about its heel."""
     c, s = np.cos(pitch), np.sin(pitch)
     return flat - behind + c * behind + s * tall, -s * behind + c * tall
 
 
-@njit(cache=True)
+@compiled
 def _on_ball(flat: float, pitch: float, ahead: float, ball: float, tall: float) -> tuple[float, float]:
     """Return the same about the ball of the foot, whose joint is `ahead` of the ankle and `ball` above the floor."""
     c, s = np.cos(pitch), np.sin(pitch)
     return flat + ahead - c * ahead + s * (tall - ball), ball + s * ahead + c * (tall - ball)
 
 
-@njit(cache=True)
+@compiled
 def foot_of_gait(body: Any, side: int, p: float, gait: Any) -> Any:
     """Return one foot of a gait at its own phase (0 = it touches down), a `FootPose`."""
     joints, style, duty, stride, push = body.joints, body.style, gait.duty, gait.stride, gait.push
@@ -115,7 +115,7 @@ def foot_of_gait(body: Any, side: int, p: float, gait: Any) -> Any:
     return FootPose(x, max(z, -low + 0.012 * rise), pitch, toes)
 
 
-@njit(cache=True)
+@compiled
 def walk(body: Any, p: float, stride: float, carrying: bool) -> None:
     """Walk: the pelvis rides as high as the stiffer leg allows, arms swing against the legs or carry something."""
     local, shift, joints, style = body.local, body.shift, body.joints, body.style
@@ -162,7 +162,7 @@ def walk(body: Any, p: float, stride: float, carrying: bool) -> None:
             hang_arm(local, side, style.arm_abduction, forward, bend, 0.15)
 
 
-@njit(cache=True)
+@compiled
 def run(body: Any, p: float, stride: float) -> None:
     """Run: lowest in mid-stance, highest in mid-flight, elbows bent."""
     local, shift, joints, style = body.local, body.shift, body.joints, body.style

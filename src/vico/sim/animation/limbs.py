@@ -10,10 +10,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from vico.assets.people import PARENTS, J
+from vico.io.compiled import compiled
 from vico.render.skinning import rotation_matrix
 from vico.sim.animation.rotations import (
     Array,
@@ -67,7 +67,7 @@ class BodyPose(NamedTuple):
     style: Any
 
 
-@njit(cache=True)
+@compiled
 def curl_fingers(body: Any, side: int, curl: float, thumb: float) -> None:
     """Bring the fingers together and curl each of their joints; radians."""
     local, joints = body.local, body.joints
@@ -82,13 +82,13 @@ def curl_fingers(body: Any, side: int, curl: float, thumb: float) -> None:
             local[first + k] = rotation_about(X, sign * bend)
 
 
-@njit(cache=True)
+@compiled
 def grip(body: Any, side: int, curl: float) -> None:
     """Close a hand around something."""
     curl_fingers(body, side, curl, 0.6 * curl)
 
 
-@njit(cache=True)
+@compiled
 def hang_arm(local: Array, side: int, off: float, swing: float, bend: float, twist: float) -> None:
     """Hang an arm: `off` the body sideways, `swing` forward, elbow `bend`, palm `twist`ed backward; radians."""
     sign = SIGN[side]
@@ -97,7 +97,7 @@ def hang_arm(local: Array, side: int, off: float, swing: float, bend: float, twi
     local[ELBOW[side]] = rotation_about(Z, -sign * bend)
 
 
-@njit(cache=True)
+@compiled
 def _joint_in_body(body: Any, joint: int) -> tuple[Any, Any]:
     """Return where a joint is and how its parent is turned, by following the chain from the pelvis."""
     local, shift, joints = body.local, body.shift, body.joints
@@ -119,7 +119,7 @@ def _joint_in_body(body: Any, joint: int) -> tuple[Any, Any]:
     return place, turned
 
 
-@njit(cache=True)
+@compiled
 def reach(body: Any, side: int, goal: Array, pole: Array) -> None:
     """Bring a wrist to a point of the body's frame, the elbow towards `pole`."""
     local, joints = body.local, body.joints
@@ -141,7 +141,7 @@ def reach(body: Any, side: int, goal: Array, pole: Array) -> None:
     local[wrist] = rotation_about(X, 0.0)
 
 
-@njit(cache=True)
+@compiled
 def reach_by(body: Any, side: int, goal: Array, pole: Array, share: float) -> None:
     """Go a share of the way from the arm's present pose to reaching a point, joint by joint."""
     local = body.local
@@ -151,7 +151,7 @@ def reach_by(body: Any, side: int, goal: Array, pole: Array, share: float) -> No
     local[ELBOW[side]] = _part_way(elbow, local[ELBOW[side]], share)
 
 
-@njit(cache=True)
+@compiled
 def _part_way(a: Array, b: Array, share: float) -> NDArray[Any]:
     """Return the rotation that is a share of the way from one to another."""
     way, step = np.empty(3), np.empty((3, 3))
@@ -160,7 +160,7 @@ def _part_way(a: Array, b: Array, share: float) -> NDArray[Any]:
     return compose(a, step)
 
 
-@njit(cache=True)
+@compiled
 def place_foot(body: Any, side: int, ankle: Array, pitch: float, out: float, toes: float) -> None:
     """Bring an ankle to a point; the foot pitched toes down, turned out, its toes bent up; radians."""
     local, shift, joints = body.local, body.shift, body.joints
@@ -184,7 +184,7 @@ def place_foot(body: Any, side: int, ankle: Array, pitch: float, out: float, toe
     local[FOOT[side]] = rotation_about(Y, -toes)
 
 
-@njit(cache=True)
+@compiled
 def highest_pelvis(body: Any, side: int, ankle: Array, stretch: float) -> float:
     """Return how far up the pelvis may shift for a leg to reach its ankle, metres."""
     local, shift, joints = body.local, body.shift, body.joints
@@ -196,7 +196,7 @@ def highest_pelvis(body: Any, side: int, ankle: Array, stretch: float) -> float:
     return ankle[Z] + up - hip[Z] + shift[Z]
 
 
-@njit(cache=True)
+@compiled
 def bend_trunk(local: Array, lean: float, roll: float, yaw: float, nod: float, stoop: float) -> None:
     """Bend the spine: lean forward, roll to the right, turn left; the head stays level but for `nod`."""
     third = compose(rotation_about(Z, yaw / 3), compose(rotation_about(X, roll / 3), rotation_about(Y, lean / 3)))
@@ -208,7 +208,7 @@ def bend_trunk(local: Array, lean: float, roll: float, yaw: float, nod: float, s
     local[HEAD] = compose(back, rotation_about(Z, -0.8 * yaw))
 
 
-@njit(cache=True)
+@compiled
 def stand_on_feet(body: Any, lifts: Array) -> None:
     """Stand on both feet wherever the pelvis is; `lifts` raises each foot, metres."""
     shift, joints, style = body.shift, body.joints, body.style

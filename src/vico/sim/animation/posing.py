@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from vico.assets.people import JOINTS, PARENTS, J, SkinnedBody
+from vico.io.compiled import compiled
 from vico.render.skinning import forward_kinematics
 from vico.sim.animation.clips import animate
 from vico.sim.animation.limbs import WRIST
@@ -114,7 +114,7 @@ def hand_position(
     return hand_frames(body.joints[None], rotations[None], offset[None])[0, hand, :3, 3]
 
 
-@njit(cache=True)
+@compiled
 def _hands(
     joints: NDArray[Any],
     rotations: NDArray[Any],

@@ -5,15 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from vico.io.compiled import compiled
 
 Array = NDArray[Any]
 # Axes of the body: forward, left, up.
 X, Y, Z = range(3)
 
 
-@njit(cache=True)
+@compiled
 def rotation_about(axis: int, angle: float) -> Array:
     """Return the rotation matrix about `X`, `Y` or `Z`; radians."""
     c, s = np.cos(angle), np.sin(angle)
@@ -24,7 +25,7 @@ def rotation_about(axis: int, angle: float) -> Array:
     return m
 
 
-@njit(cache=True)
+@compiled
 def compose(a: Array, b: Array) -> Array:
     """Return the product of two 3x3 matrices, without a call to BLAS."""
     m = np.empty((3, 3))
@@ -34,7 +35,7 @@ def compose(a: Array, b: Array) -> Array:
     return m
 
 
-@njit(cache=True)
+@compiled
 def relative_rotation(a: Array, b: Array) -> Array:
     """Return rotation `b` as seen from `a`: the inverse of `a` times `b`."""
     m = np.empty((3, 3))
@@ -44,7 +45,7 @@ def relative_rotation(a: Array, b: Array) -> Array:
     return m
 
 
-@njit(cache=True)
+@compiled
 def rotate(a: Array, v: Array) -> Array:
     """Return a 3x3 matrix times a vector."""
     out = np.empty(3)
@@ -53,7 +54,7 @@ def rotate(a: Array, v: Array) -> Array:
     return out
 
 
-@njit(cache=True)
+@compiled
 def cross(a: Array, b: Array) -> Array:
     """Return the cross product of two vectors."""
     out = np.empty(3)
@@ -63,13 +64,13 @@ def cross(a: Array, b: Array) -> Array:
     return out
 
 
-@njit(cache=True)
+@compiled
 def unit(v: Array) -> Array:
     """Return the direction of a vector."""
     return v / max(np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]), 1e-12)
 
 
-@njit(cache=True)
+@compiled
 def axis_angle(m: Array, out: Array) -> None:
     """Write the axis-angle vector of a rotation matrix, through its quaternion (stable at every angle)."""
     trace = m[0, 0] + m[1, 1] + m[2, 2]
@@ -94,7 +95,7 @@ def axis_angle(m: Array, out: Array) -> None:
     out[0], out[1], out[2] = factor * q[1], factor * q[2], factor * q[3]
 
 
-@njit(cache=True)
+@compiled
 def two_bone_ik(start: Array, goal: Array, pole: Array, first: float, second: float) -> tuple[Array, Array, Array]:
     """Bend a limb of two bones to reach a point.
 
@@ -130,14 +131,14 @@ def two_bone_ik(start: Array, goal: Array, pole: Array, first: float, second: fl
     return upper, lower, unit(cross(side, along))
 
 
-@njit(cache=True)
+@compiled
 def smoothstep(x: float) -> float:
     """Return 0 before 0, 1 after 1, and a curve with level ends between."""
     t = min(max(x, 0.0), 1.0)
     return t * t * (3 - 2 * t)
 
 
-@njit(cache=True)
+@compiled
 def hermite(a: float, b: float, slope_a: float, slope_b: float, t: float) -> float:
     """Return the cubic from `a` to `b` over t = 0..1 with the given slopes at the ends."""
     u = t * t

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from vico.io.compiled import compiled
 from vico.sim.animation.limbs import (
     ANKLE,
     FOOT,
@@ -32,7 +32,7 @@ from vico.sim.animation.rotations import X, Y, Z, compose, rotation_about
 _TAU = 2 * np.pi
 
 
-@njit(cache=True)
+@compiled
 def sit(body: Any, p: float) -> None:
     """Sit on a seat of ordinary height behind the feet, hands on the thighs."""
     local, shift, joints, style = body.local, body.shift, body.joints, body.style
@@ -54,7 +54,7 @@ def sit(body: Any, p: float) -> None:
         local[WRIST[side]] = rotation_about(X, -sign * 0.1)
 
 
-@njit(cache=True)
+@compiled
 def sleep(body: Any, p: float) -> None:
     """Lie on the back, head towards -x; the ground is the bed's top."""
     local, shift, joints, style = body.local, body.shift, body.joints, body.style
@@ -75,7 +75,7 @@ def sleep(body: Any, p: float) -> None:
     hang_arm(local, RIGHT, 0.18, 0.05, 0.3, 0.3)
 
 
-@njit(cache=True)
+@compiled
 def ride_bike(body: Any, p: float) -> None:
     """Ride a bicycle that stands at the origin: feet on the pedals, hands on the bar."""
     local, shift, joints, style = body.local, body.shift, body.joints, body.style
@@ -104,7 +104,7 @@ def ride_bike(body: Any, p: float) -> None:
         grip(body, side, 1.0)
 
 
-@njit(cache=True)
+@compiled
 def step_up(body: Any, p: float) -> None:
     """Take one step of ordinary height, a hand on the rail; getting off runs the same way."""
     local, shift, style = body.local, body.shift, body.style

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from vico.io.compiled import compiled
 from vico.sim.animation.limbs import (
     LEFT,
     PELVIS,
@@ -26,7 +26,7 @@ from vico.sim.animation.rotations import X, Y, Z, compose, rotation_about, smoot
 _TAU = 2 * np.pi
 
 
-@njit(cache=True)
+@compiled
 def stand(body: Any, p: float, clip: int) -> None:
     """Stand on both feet, and make the gesture of a motion."""
     _stand_upright(body, p, clip)
@@ -40,13 +40,13 @@ def stand(body: Any, p: float, clip: int) -> None:
         _consume(body, p, clip)
 
 
-@njit(cache=True)
+@compiled
 def _strength(p: float) -> float:
     """Return how far a gesture has gone, 0..1: most at half the cycle."""
     return np.sin(np.pi * p) ** 2
 
 
-@njit(cache=True)
+@compiled
 def _stand_upright(body: Any, p: float, clip: int) -> None:
     """Bear the weight on the feet, breathe, lean and look as the motion asks for; let the arms hang."""
     local, shift, style = body.local, body.shift, body.style
@@ -80,13 +80,13 @@ def _stand_upright(body: Any, p: float, clip: int) -> None:
         hang_arm(local, side, style.arm_abduction + 0.01 * breath, swing, style.elbow_bend, 0.2)
 
 
-@njit(cache=True)
+@compiled
 def _outward(side: int) -> Any:
     """Return where an elbow points that hangs at ease."""
     return np.array([-0.3, SIGN[side] * 0.7, -0.6])
 
 
-@njit(cache=True)
+@compiled
 def _talk(body: Any, p: float) -> None:
     """Beat with the right hand, lively people with both."""
     tall, asymmetry = body.style.height, body.style.asymmetry
@@ -101,7 +101,7 @@ def _talk(body: Any, p: float) -> None:
     body.local[WRIST[RIGHT]] = rotation_about(Y, -0.5)
 
 
-@njit(cache=True)
+@compiled
 def _wave(body: Any, p: float) -> None:
     """Raise the right hand and sweep it thrice."""
     tall = body.style.height
@@ -114,7 +114,7 @@ def _wave(body: Any, p: float) -> None:
     grip(body, RIGHT, 0.35 * (1 - up))
 
 
-@njit(cache=True)
+@compiled
 def _reach_out(body: Any, p: float, clip: int) -> None:
     """Reach for something before the body, or on the ground; a hand opens to put and closes to pick."""
     tall, strength = body.style.height, _strength(p)
@@ -126,7 +126,7 @@ def _reach_out(body: Any, p: float, clip: int) -> None:
     grip(body, RIGHT, 0.35 + 0.55 * (strength if clip == PUT else 1 - strength))
 
 
-@njit(cache=True)
+@compiled
 def _consume(body: Any, p: float, clip: int) -> None:
     """Bring the right hand to the mouth; who eats holds a plate in the left."""
     tall, strength = body.style.height, _strength(p)

@@ -14,11 +14,11 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from vico.assets.robots import BUMP, TOUCH, RobotModel
 from vico.errors import InputError, SchemaError, VicoError
+from vico.io.compiled import compiled
 from vico.sim.bodies import Bodies
 from vico.sim.physics.engine import FRAME, Base, StaticScene
 from vico.world.heights import HeightField
@@ -57,7 +57,7 @@ def _take_note(message: str) -> None:
         _SAID.append(message)
 
 
-@njit(cache=True)
+@compiled
 def _gaps(position, half_length, half_width, centres):  # type: ignore[no-untyped-def]
     """Distance of every body's outline (at least) from the nearest of `centres`, metres."""
     out = np.empty(len(position))

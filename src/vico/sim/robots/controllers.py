@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.assets.robots.go2 import GAIT_GAINS, POLICY_GAINS
 from vico.assets.robots.husky import RADIUS, TRACK
+from vico.io.compiled import compiled
 from vico.sim.physics.engine import Base
 from vico.sim.robots.gait import BODY, Trot, leg_angles
 from vico.sim.robots.policy import WalkingPolicy
@@ -46,7 +46,7 @@ class Controller(Protocol):
         """
 
 
-@njit(cache=True)
+@compiled
 def _approach(values, goal, step):  # type: ignore[no-untyped-def]
     """Bring `values` nearer to `goal`, each by at most its `step`."""
     for k in range(len(values)):
@@ -80,7 +80,7 @@ def _trim(gain: tuple[float, float, float], limit: tuple[float, float, float], s
     return TrimSettings(np.array(gain), np.array(limit), smoothing)
 
 
-@njit(cache=True)
+@compiled
 def _planar_motion(rotation, velocity, angular_velocity_body):  # type: ignore[no-untyped-def]
     """Return vx, vy, wz in the base's frame."""
     out = np.empty(3)
@@ -95,7 +95,7 @@ def _motion_of(base: Base) -> Vector:
     return found
 
 
-@njit(cache=True)
+@compiled
 def _trimmed(trim, motion, command, memory):  # type: ignore[no-untyped-def]
     """Return a command corrected by the integral of what is missing of it."""
     out = np.empty(3)
@@ -115,7 +115,7 @@ _COMMAND = slice(0, 3)
 _WHEELS_TRIM = slice(3, 3 + _TRIM_SIZE)
 
 
-@njit(cache=True)
+@compiled
 def _skid(trim, slew, top, motion, command, memory):  # type: ignore[no-untyped-def]
     """Return wheel speeds, rad/s."""
     wanted_now, trim_memory = memory[_COMMAND], memory[_WHEELS_TRIM]

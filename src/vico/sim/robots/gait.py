@@ -11,12 +11,12 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.assets.robots.go2 import HIP_X, HIP_Y, SHIN, SIDE, THIGH
 from vico.exact import apply_matrix
+from vico.io.compiled import compiled
 from vico.sim.physics.engine import Base
 
 PERIOD = 0.02
@@ -26,7 +26,7 @@ CYCLE, STANCE = 0.36, 0.55
 BODY, LIFT = 0.27, 0.055
 
 
-@njit(cache=True)
+@compiled
 def leg_angles(x, y, z, side):  # type: ignore[no-untyped-def]
     """Return the angles (hip, thigh, calf) that bring a foot to x, y, z in the frame of its hip.
 
@@ -49,7 +49,7 @@ _PHASE, _FEET, _FOOT_SIZE, _MOTION, _MEMORY = 0, 1, 4, 17, 20
 _FOOT_X, _FOOT_Y, _LIFTED_X, _LIFTED_Y = range(4)
 
 
-@njit(cache=True)
+@compiled
 def trot(memory, command, moving, roll, pitch, roll_rate, pitch_rate, dt):  # type: ignore[no-untyped-def]
     """Advance the feet by `dt` and return the twelve joint angles.
 

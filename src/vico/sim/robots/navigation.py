@@ -6,10 +6,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
+from vico.io.compiled import compiled
 from vico.sim.bodies import Bodies
 
 Array = NDArray[Any]
@@ -48,7 +48,7 @@ def neighbours_of(bodies: Bodies, own: int, position: Array, reach: float) -> ND
     return found
 
 
-@njit(cache=True)
+@compiled
 def progress(path, start, x, y):  # type: ignore[no-untyped-def]
     """Metres along `path` of the point nearest to x, y, not before `start` and at most 3 m after it."""
     best, best_gap, at = start, 1e18, 0.0
@@ -69,7 +69,7 @@ def progress(path, start, x, y):  # type: ignore[no-untyped-def]
     return best
 
 
-@njit(cache=True)
+@compiled
 def point_at(path, s):  # type: ignore[no-untyped-def]
     """Point `s` metres along a path (its end beyond that)."""
     at = 0.0
@@ -83,7 +83,7 @@ def point_at(path, s):  # type: ignore[no-untyped-def]
     return path[-1, 0], path[-1, 1]
 
 
-@njit(cache=True)
+@compiled
 def path_length(path):  # type: ignore[no-untyped-def]
     """Metres from the first to the last point."""
     total = 0.0
@@ -92,7 +92,7 @@ def path_length(path):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True)
+@compiled
 def _gap(x, y, ox, oy, other):  # type: ignore[no-untyped-def]
     """Return the distance from a point to a neighbour that is at (ox, oy); negative inside a rectangle."""
     if other.disc:
@@ -105,7 +105,7 @@ def _gap(x, y, ox, oy, other):  # type: ignore[no-untyped-def]
     return max(u, v)
 
 
-@njit(cache=True)
+@compiled
 def _least_gap(x, y, other, seconds):  # type: ignore[no-untyped-def]
     """Return how near a neighbour that goes straight on comes to a point within some seconds, metres."""
     gap = 1e9
@@ -115,7 +115,7 @@ def _least_gap(x, y, other, seconds):  # type: ignore[no-untyped-def]
     return gap
 
 
-@njit(cache=True)
+@compiled
 def free_ahead(x, y, yaw, speed, outline, path, along, others):  # type: ignore[no-untyped-def]
     """Return the metres the nose can go along the way before it comes too near anybody, and who that is (-1: nobody).
 
@@ -152,7 +152,7 @@ def free_ahead(x, y, yaw, speed, outline, path, along, others):  # type: ignore[
     return SIGHT, -1
 
 
-@njit(cache=True)
+@compiled
 def room_to_turn(x, y, radius, others):  # type: ignore[no-untyped-def]
     """Return whether nobody stands within `radius` of x, y."""
     is_free = True

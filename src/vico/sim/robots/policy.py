@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
+from vico.io.compiled import compiled
 from vico.sim.physics.engine import Base
 
 # Scales of the observation and its limit, from the policy's deployment configuration.
@@ -17,7 +17,7 @@ _SPIN, _JOINT_SPEED, _LIMIT = 0.25, 0.05, 100.0
 PERIOD = 0.02
 
 
-@njit(cache=True)
+@compiled
 def _dense(inputs, weights, bias, last):  # type: ignore[no-untyped-def]
     """One layer, summed input by input: vectorised over outputs, and in one order whatever the machine's BLAS."""
     out = bias.copy()
@@ -37,7 +37,7 @@ def _dense(inputs, weights, bias, last):  # type: ignore[no-untyped-def]
 _ANGULAR_VELOCITY, _GRAVITY, _COMMAND, _ANGLES, _SPEEDS, _ACTION, _OBSERVED = 0, 3, 6, 9, 21, 33, 45
 
 
-@njit(cache=True)
+@compiled
 def _observation(angular_velocity_body, rotation, command, angles, speeds, action, order, rest):  # type: ignore[no-untyped-def]
     """Return what the policy sees, scaled, shape ``(45,)``."""
     seen = np.empty(_OBSERVED)
@@ -52,7 +52,7 @@ def _observation(angular_velocity_body, rotation, command, angles, speeds, actio
     return seen
 
 
-@njit(cache=True)
+@compiled
 def _evaluate(layers, seen, order, rest, scale, memory):  # type: ignore[no-untyped-def]
     """Return joint targets in the model's order; `memory` becomes the action."""
     x = np.minimum(np.maximum(seen, -_LIMIT), _LIMIT).astype(np.float32)

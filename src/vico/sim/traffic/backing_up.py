@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from vico.io.compiled import compiled
 
 _BACK_UP_AFTER = 3.0  # s that both have stood
 _ALIKE = 0.85  # cosine of the angle between two headings that count as the same
 _QUEUE = 6  # vehicles behind one another that make room
 
 
-@njit(cache=True)
+@compiled
 def _keep_each_other(vehicle, other):  # type: ignore[no-untyped-def]
     """Return whether both, one behind the other, have stood for a while, and not at a stop."""
     return not other.at_stop and vehicle.stopped_time >= _BACK_UP_AFTER and other.stopped_time >= _BACK_UP_AFTER
 
 
-@njit(cache=True)
+@compiled
 def _gives_way_head_on(net, vehicle, other):  # type: ignore[no-untyped-def]
     """Return whether `other`, of two in each other's way, backs up.
 
@@ -28,7 +29,7 @@ def _gives_way_head_on(net, vehicle, other):  # type: ignore[no-untyped-def]
     return (inside and not other_inside) or (inside == other_inside and (is_shorter or is_later))
 
 
-@njit(cache=True)
+@compiled
 def vehicles_backing_up(net, fleet, shapes):  # type: ignore[no-untyped-def]
     """Return for each vehicle whether it backs up in this step, bool, shape ``(vehicles,)``."""
     backs_up = np.zeros(len(fleet), np.bool_)

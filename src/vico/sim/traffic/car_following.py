@@ -6,8 +6,8 @@ Treiber, Hennecke, Helbing: Congested traffic states in empirical observations a
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from vico.io.compiled import compiled
 from vico.sim.traffic.leader import NO_GAP
 from vico.sim.traffic.path import footprint
 from vico.sim.traffic.route import NEVER, is_lane_of_stop
@@ -24,19 +24,19 @@ _BEYOND_STOP = 3.0  # m beyond the place where a vehicle stops, others do not co
 _LEAST_SPEED = 0.02  # slower is standing, m/s
 
 
-@njit(cache=True)
+@compiled
 def look_ahead(speed):  # type: ignore[no-untyped-def]
     """Return how far ahead a vehicle minds what is there: braking distance, headway and a little more, metres."""
     return speed * speed / (2 * COMFORTABLE_BRAKING) + speed * _HEADWAY + 8.0
 
 
-@njit(cache=True)
+@compiled
 def braking_distance(speed):  # type: ignore[no-untyped-def]
     """Return the metres a vehicle needs to stop comfortably, and a little more."""
     return speed * speed / (2 * COMFORTABLE_BRAKING) + 8.0
 
 
-@njit(cache=True)
+@compiled
 def distance_to_stop(vehicle):  # type: ignore[no-untyped-def]
     """Return the metres to a bus's stop if that is on its lane; `NEVER` otherwise."""
     is_here = vehicle.stop_route_index >= 0 and vehicle.route_index == vehicle.stop_route_index
@@ -45,13 +45,13 @@ def distance_to_stop(vehicle):  # type: ignore[no-untyped-def]
     return NEVER
 
 
-@njit(cache=True)
+@compiled
 def desired_speed(net, vehicle):  # type: ignore[no-untyped-def]
     """Return the speed a vehicle drives at on an empty lane, m/s."""
     return min(net.lanes[vehicle.lane].speed * vehicle.speed_factor, vehicle.target_speed)
 
 
-@njit(cache=True)
+@compiled
 def stop_and_speed_limit(net, vehicle, look, stop_distance, wanted):  # type: ignore[no-untyped-def]
     """Return where a vehicle has to stop and how fast it may be now.
 
@@ -95,7 +95,7 @@ def stop_and_speed_limit(net, vehicle, look, stop_distance, wanted):  # type: ig
     return stop, limit_now
 
 
-@njit(cache=True)
+@compiled
 def leader_speed(shapes, leader, view, front):  # type: ignore[no-untyped-def]
     """Return how fast the leader moves along the path where the vehicle would meet it, m/s; at least 0."""
     if leader < 0:
@@ -104,7 +104,7 @@ def leader_speed(shapes, leader, view, front):  # type: ignore[no-untyped-def]
     return max(shapes.vx[leader] * c + shapes.vy[leader] * s, 0.0)
 
 
-@njit(cache=True)
+@compiled
 def idm_acceleration(speed, desired, greatest, gap, leading):  # type: ignore[no-untyped-def]
     """Return the Intelligent Driver Model's acceleration, m/s^2.
 
@@ -124,7 +124,7 @@ def idm_acceleration(speed, desired, greatest, gap, leading):  # type: ignore[no
     return rate
 
 
-@njit(cache=True)
+@compiled
 def next_speed(speed, rate, limit, gap, stop, dt):  # type: ignore[no-untyped-def]
     """Return the speed after `dt` seconds: the model's, within the limit, short of the leader and of the stop."""
     new = max(speed + max(rate, -_HARD_BRAKING) * dt, 0.0)
@@ -137,7 +137,7 @@ def next_speed(speed, rate, limit, gap, stop, dt):  # type: ignore[no-untyped-de
     return new if new >= _LEAST_SPEED else 0.0
 
 
-@njit(cache=True)
+@compiled
 def mind_only_before(stop, gap, leader):  # type: ignore[no-untyped-def]
     """Return gap and leader; none if it is well beyond where the vehicle stops anyway."""
     if gap > stop + _BEYOND_STOP:

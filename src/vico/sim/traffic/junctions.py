@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from vico.io.compiled import compiled
 from vico.sim.traffic.leader import touched_at
 from vico.sim.traffic.route import NEVER, STANDING_ROOM, is_lane_of_stop
 from vico.sim.traffic.state import HELD_JUNCTIONS, NONE, PREVIOUS_LANES
@@ -63,7 +63,7 @@ class JunctionExit(NamedTuple):
     far: float
 
 
-@njit(cache=True)
+@compiled
 def next_junction_request(net, vehicle, stop_distance, braking_distance, path_ends):  # type: ignore[no-untyped-def]
     """Return the first junction within the braking distance, and before its stop, that a vehicle was not let into."""
     index = NONE
@@ -80,7 +80,7 @@ def next_junction_request(net, vehicle, stop_distance, braking_distance, path_en
     return JunctionRequest(index, distance, path_ends)
 
 
-@njit(cache=True)
+@compiled
 def _find_exit(net, vehicle, request):  # type: ignore[no-untyped-def]
     """Return where a vehicle can stand clear of junctions after those it asks for."""
     s = vehicle.offset + request.distance
@@ -104,19 +104,19 @@ def _find_exit(net, vehicle, request):  # type: ignore[no-untyped-def]
     return JunctionExit(last, k, clear, start, s)
 
 
-@njit(cache=True)
+@compiled
 def _has_to_be_let_out(holder, vehicle):  # type: ignore[no-untyped-def]
     """Return whether vehicle `holder` cannot leave its junction before this one, in its way, has gone."""
     return holder.blocker == vehicle.index and holder.stopped_time > _LET_OUT_AFTER
 
 
-@njit(cache=True)
+@compiled
 def _somebody_waited_longer(junctions, vehicle, junction):  # type: ignore[no-untyped-def]
     """Return whether it is another vehicle's turn."""
     return junctions.longest_wait[junction] > max(vehicle.junction_wait + _QUEUE_LEAD, _QUEUE_LEAST)
 
 
-@njit(cache=True)
+@compiled
 def yields_to_pedestrians(net, junctions, vehicle, lane):  # type: ignore[no-untyped-def]
     """Return whether pedestrians on a crossing of `lane` go first; they are told how long the vehicle has waited."""
     yields = False
@@ -130,14 +130,14 @@ def yields_to_pedestrians(net, junctions, vehicle, lane):  # type: ignore[no-unt
     return yields
 
 
-@njit(cache=True)
+@compiled
 def _exit_is_long_enough(vehicle, request, leave):  # type: ignore[no-untyped-def]
     """Return whether a vehicle fits behind the junctions; where a car leaves the map it need not."""
     leaves_map = request.path_ends and leave.end == vehicle.planned_count and vehicle.route < 0
     return leave.clear >= vehicle.length + STANDING_ROOM or leaves_map
 
 
-@njit(cache=True)
+@compiled
 def _exit_is_free(vehicle, leave, view, vehicles):  # type: ignore[no-untyped-def]
     """Return whether no vehicle is where this one would stand: whoever stands there may stay."""
     if leave.start < 0.0:
@@ -150,7 +150,7 @@ def _exit_is_free(vehicle, leave, view, vehicles):  # type: ignore[no-untyped-de
     return True
 
 
-@njit(cache=True)
+@compiled
 def _way_is_free(vehicle, leave, view, vehicles):  # type: ignore[no-untyped-def]
     """Return whether no vehicle is on the whole way through the junctions."""
     there = vehicle.offset + 0.5
@@ -161,7 +161,7 @@ def _way_is_free(vehicle, leave, view, vehicles):  # type: ignore[no-untyped-def
     return True
 
 
-@njit(cache=True)
+@compiled
 def may_enter_junction(net, fleet, junctions, vehicle, request, leave, view):  # type: ignore[no-untyped-def]
     """Return whether a vehicle may enter the junctions from the requested one up to its exit.
 
@@ -191,7 +191,7 @@ def may_enter_junction(net, fleet, junctions, vehicle, request, leave, view):  #
     return not lets_out or _way_is_free(vehicle, leave, view, len(fleet))
 
 
-@njit(cache=True)
+@compiled
 def _take_junctions(net, junctions, vehicle, request, leave):  # type: ignore[no-untyped-def]
     """Give a vehicle the junctions it asked for; return False if it holds too many already."""
     for k in range(request.planned_index, leave.last):
@@ -210,7 +210,7 @@ def _take_junctions(net, junctions, vehicle, request, leave):  # type: ignore[no
     return True
 
 
-@njit(cache=True)
+@compiled
 def request_junctions(net, fleet, junctions, vehicle, request, view):  # type: ignore[no-untyped-def]
     """Ask for the junctions ahead; return whether the vehicle has them now."""
     leave = _find_exit(net, vehicle, request)
@@ -219,13 +219,13 @@ def request_junctions(net, fleet, junctions, vehicle, request, view):  # type: i
     return _take_junctions(net, junctions, vehicle, request, leave)
 
 
-@njit(cache=True)
+@compiled
 def hesitates(net, vehicle):  # type: ignore[no-untyped-def]
     """Return whether a vehicle was let into a junction but has not got going: then it is in everybody's way."""
     return vehicle.granted_count > 0 and vehicle.stopped_time > _HESITATION and net.lanes[vehicle.lane].junction < 0
 
 
-@njit(cache=True)
+@compiled
 def _is_inside(net, vehicle, junction):  # type: ignore[no-untyped-def]
     """Return whether a vehicle's body is in a junction or may still drive into it."""
     inside = net.lanes[vehicle.lane].junction == junction
@@ -241,7 +241,7 @@ def _is_inside(net, vehicle, junction):  # type: ignore[no-untyped-def]
     return inside
 
 
-@njit(cache=True)
+@compiled
 def release_junctions(net, junctions, vehicle):  # type: ignore[no-untyped-def]
     """Give back the junctions that the vehicle's body has left and that are not granted ahead."""
     for h in range(HELD_JUNCTIONS):
@@ -256,7 +256,7 @@ def release_junctions(net, junctions, vehicle):  # type: ignore[no-untyped-def]
             junctions.holder[junction] = vehicle.index  # the one that was let go first has gone
 
 
-@njit(cache=True)
+@compiled
 def release_all_junctions(junctions, vehicle):  # type: ignore[no-untyped-def]
     """Give back every junction a vehicle holds."""
     for h in range(HELD_JUNCTIONS):
@@ -267,7 +267,7 @@ def release_all_junctions(junctions, vehicle):  # type: ignore[no-untyped-def]
     vehicle.granted_count = 0
 
 
-@njit(cache=True)
+@compiled
 def note_longest_waits(fleet, junctions):  # type: ignore[no-untyped-def]
     """Note how long the first in each junction's queue has waited."""
     junctions.longest_wait[:] = 0.0
@@ -277,7 +277,7 @@ def note_longest_waits(fleet, junctions):  # type: ignore[no-untyped-def]
             junctions.longest_wait[queued] = max(junctions.longest_wait[queued], vehicle.junction_wait)
 
 
-@njit(cache=True)
+@compiled
 def _mark_crossings(net, junctions, lane, rear):  # type: ignore[no-untyped-def]
     """Mark the crossings of a lane that a vehicle with its rear at `rear` metres along it has not passed."""
     for o in range(net.lanes[lane].first_crossing, net.lanes[lane].end_crossing):
@@ -285,7 +285,7 @@ def _mark_crossings(net, junctions, lane, rear):  # type: ignore[no-untyped-def]
             junctions.crossing_busy[net.crossings[o]] = True
 
 
-@njit(cache=True)
+@compiled
 def mark_busy_crossings(net, fleet, junctions):  # type: ignore[no-untyped-def]
     """Mark the crossings that a vehicle is on or has been let over.
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from vico.io.compiled import compiled
 from vico.sim.traffic.leader import ANY_BODY, TOUCH, touched_at
 from vico.sim.traffic.path import PATH_POINT, changing_lane, lane_polyline, point_on_path, project_on_polyline
 from vico.sim.traffic.route import advance_on_route, route_lane
@@ -18,7 +18,7 @@ _LEAST_TIME = 6.0  # s between two lane changes of a car
 _LEAST_LANE = 18.0  # m of lane that have to be left for a car to change
 
 
-@njit(cache=True)
+@compiled
 def wants_lane_change(net, vehicle, gap, leading, wanted):  # type: ignore[no-untyped-def]
     """Return whether a car is in a queue, has not changed lanes lately, and has the room to do it.
 
@@ -34,7 +34,7 @@ def wants_lane_change(net, vehicle, gap, leading, wanted):  # type: ignore[no-un
     return is_queued and vehicle.time_since_lane_change > _LEAST_TIME and left > _LEAST_LANE
 
 
-@njit(cache=True)
+@compiled
 def _vehicles_on(fleet, lane):  # type: ignore[no-untyped-def]
     count = 0
     for vehicle in fleet:
@@ -42,7 +42,7 @@ def _vehicles_on(fleet, lane):  # type: ignore[no-untyped-def]
     return count
 
 
-@njit(cache=True)
+@compiled
 def change_to_emptier_lane(net, fleet, vehicle, view):  # type: ignore[no-untyped-def]
     """Move a car to a neighbour lane with fewer vehicles if there is a gap."""
     lane = vehicle.lane
@@ -53,7 +53,7 @@ def change_to_emptier_lane(net, fleet, vehicle, view):  # type: ignore[no-untype
             break
 
 
-@njit(cache=True)
+@compiled
 def change_as_route_does(net, vehicle, view):  # type: ignore[no-untyped-def]
     """Move a bus to the neighbour lane where its route goes on, if it does and there is a gap."""
     lane = vehicle.lane
@@ -63,7 +63,7 @@ def change_as_route_does(net, vehicle, view):  # type: ignore[no-untyped-def]
         advance_on_route(net, vehicle)
 
 
-@njit(cache=True)
+@compiled
 def is_gap_accepted(net, target, offset, lateral_offset, view):  # type: ignore[no-untyped-def]
     """Return whether nobody is in the way on lane `target`, from a gap behind to the end of the lane change.
 
@@ -84,7 +84,7 @@ def is_gap_accepted(net, target, offset, lateral_offset, view):  # type: ignore[
     return touched_at(path, swerving, offset, view.nearby, TOUCH, TOUCH, ANY_BODY) < 0
 
 
-@njit(cache=True)
+@compiled
 def change_lane(net, vehicle, target, view):  # type: ignore[no-untyped-def]
     """Put a vehicle on a neighbour lane if there is a gap; True if it is there now.
 

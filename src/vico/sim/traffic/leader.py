@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from vico.io.compiled import compiled
 from vico.sim.traffic.path import Outline, footprint
 from vico.sim.traffic.shapes import Rectangle, point_to_rectangle, rectangles_overlap
 from vico.sim.traffic.state import NONE
@@ -52,7 +52,7 @@ class VehicleView(NamedTuple):
     nearby: NDArray[np.void]
 
 
-@njit(cache=True)
+@compiled
 def nearby_bodies(shapes, v, reach, buffer):  # type: ignore[no-untyped-def]
     """Write the bodies within `reach` metres of body v into `buffer` and return the part of it that is used."""
     sx, sy, half = shapes.x, shapes.y, shapes.half_length
@@ -75,7 +75,7 @@ def nearby_bodies(shapes, v, reach, buffer):  # type: ignore[no-untyped-def]
     return buffer[:n]
 
 
-@njit(cache=True)
+@compiled
 def touches(rectangle, one):  # type: ignore[no-untyped-def]
     """Return whether a rectangle touches a nearby body."""
     if one.disc:
@@ -84,7 +84,7 @@ def touches(rectangle, one):  # type: ignore[no-untyped-def]
     return rectangles_overlap(rectangle, other)
 
 
-@njit(cache=True)
+@compiled
 def touched_at(path, outline, front, bodies, vehicle_gap, person_gap, below=ANY_BODY):  # type: ignore[no-untyped-def]
     """Return the row of the first of `bodies` that a vehicle with its front at s = `front` would touch, or `NONE`.
 
@@ -107,7 +107,7 @@ def touched_at(path, outline, front, bodies, vehicle_gap, person_gap, below=ANY_
     return NONE
 
 
-@njit(cache=True)
+@compiled
 def _near_path(path, outline, front, reach, one):  # type: ignore[no-untyped-def]
     """Return whether a body is near the path ahead, and the front's s from which on it may be met."""
     close = outline.half_width + one.radius + _NEAR_PATH
@@ -127,7 +127,7 @@ def _near_path(path, outline, front, reach, one):  # type: ignore[no-untyped-def
     return False, 0.0
 
 
-@njit(cache=True)
+@compiled
 def _sort_by_contact(path, outline, front, bodies):  # type: ignore[no-untyped-def]
     """Put the bodies whose gap the vehicle keeps already before those it is beside; return the former's number."""
     cx, cy, c, s = footprint(path, outline, front)
@@ -144,7 +144,7 @@ def _sort_by_contact(path, outline, front, bodies):  # type: ignore[no-untyped-d
     return apart
 
 
-@njit(cache=True)
+@compiled
 def _gap_to(path, outline, front, low, high, one, person_gap, vehicle_gap):  # type: ignore[no-untyped-def]
     """Return the metres the front can go before it touches the one body, known to be between `low` and `high`."""
     for _ in range(4):
@@ -156,7 +156,7 @@ def _gap_to(path, outline, front, low, high, one, person_gap, vehicle_gap):  # t
     return low
 
 
-@njit(cache=True)
+@compiled
 def find_leader(view, front, reach, buffer):  # type: ignore[no-untyped-def]
     """Return the gap to the first body on the path and its index; `NO_GAP` and `NONE` without one within `reach`."""
     path, outline, nearby = view

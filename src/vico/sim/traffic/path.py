@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from vico.io.compiled import compiled
 from vico.sim.traffic.state import NONE, PREVIOUS_LANES
 
 #: A point of a path: x, y (ENU metres) and `s`, metres from the start of the lane the vehicle is on.
@@ -46,7 +46,7 @@ class Outline(NamedTuple):
     person_gap: float
 
 
-@njit(cache=True)
+@compiled
 def vehicle_outline(vehicle):  # type: ignore[no-untyped-def]
     """Return a vehicle's outline on its path."""
     return Outline(
@@ -60,7 +60,7 @@ def vehicle_outline(vehicle):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True)
+@compiled
 def changing_lane(outline, lateral_offset, change_done):  # type: ignore[no-untyped-def]
     """Return the outline of the same vehicle with another lane change (none: 0, 0)."""
     return Outline(
@@ -69,7 +69,7 @@ def changing_lane(outline, lateral_offset, change_done):  # type: ignore[no-unty
     )  # fmt: skip
 
 
-@njit(cache=True)
+@compiled
 def _append_lane(net, lane, base, path, count):  # type: ignore[no-untyped-def]
     """Add a lane that starts at s = `base` to the first `count` points of a path; return their number then."""
     last = path[count - 1].s if count > 0 else -1e18
@@ -82,13 +82,13 @@ def _append_lane(net, lane, base, path, count):  # type: ignore[no-untyped-def]
     return count
 
 
-@njit(cache=True)
+@compiled
 def lane_polyline(net, lane, buffer):  # type: ignore[no-untyped-def]
     """Lay the path along one lane into `buffer` and return the part of it that is used."""
     return buffer[: _append_lane(net, lane, 0.0, buffer, 0)]
 
 
-@njit(cache=True)
+@compiled
 def path_polyline(net, vehicle, behind, ahead, buffer):  # type: ignore[no-untyped-def]
     """Lay a vehicle's path, from `behind` metres before its lane's start to `ahead` metres after it, into `buffer`.
 
@@ -118,7 +118,7 @@ def path_polyline(net, vehicle, behind, ahead, buffer):  # type: ignore[no-untyp
     return buffer[:count]
 
 
-@njit(cache=True)
+@compiled
 def point_on_path(path, s):  # type: ignore[no-untyped-def]
     """Return x, y and the direction (not of unit length) at `s` on a path; beyond its ends, straight on."""
     a, b = 0, len(path) - 1
@@ -133,14 +133,14 @@ def point_on_path(path, s):  # type: ignore[no-untyped-def]
     return path[a].x + dx * share, path[a].y + dy * share, dx, dy
 
 
-@njit(cache=True)
+@compiled
 def _lateral_offset(outline, s):  # type: ignore[no-untyped-def]
     """Return the metres to the left of its path that a vehicle's point at `s` is, during a lane change."""
     share = min(max((outline.change_done + s) / (LANE_CHANGE + outline.length), 0.0), 1.0)
     return outline.lateral_offset * (1.0 - share * share * (3.0 - 2.0 * share))
 
 
-@njit(cache=True)
+@compiled
 def footprint(path, outline, front):  # type: ignore[no-untyped-def]
     """Return centre x, y and heading cosine, sine of a vehicle whose front is at s = `front`: its axles follow."""
     a = front - outline.overhang
@@ -164,7 +164,7 @@ def footprint(path, outline, front):  # type: ignore[no-untyped-def]
     return ax + c * middle, ay + s * middle, c, s
 
 
-@njit(cache=True)
+@compiled
 def project_on_polyline(points, along, begin, end, x, y):  # type: ignore[no-untyped-def]
     """Return where on the line ``points[begin:end]`` (x, y) is: metres along it, and metres to the left of it."""
     best, offset, side = 1e18, 0.0, 0.0

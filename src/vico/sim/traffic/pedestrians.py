@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from vico.io.compiled import compiled
 from vico.sim.traffic.path import project_on_polyline
 from vico.sim.traffic.random_stream import next_random
 from vico.sim.traffic.shapes import disc_touches, point_to_rectangle, rectangle_of
@@ -52,7 +52,7 @@ class FollowPoint(NamedTuple):
     left_y: float
 
 
-@njit(cache=True)
+@compiled
 def follow_point(paths, walker):  # type: ignore[no-untyped-def]
     """Return the point a pedestrian follows."""
     walkway = walker.walkway
@@ -64,14 +64,14 @@ def follow_point(paths, walker):  # type: ignore[no-untyped-def]
     return FollowPoint(x + nx * aside, y + ny * aside, x, y, nx, ny)
 
 
-@njit(cache=True)
+@compiled
 def _project_on_walkway(paths, walkway, x, y):  # type: ignore[no-untyped-def]
     """Return the metres along a walkway of its point nearest to (x, y), and how far left of it that is."""
     begin, end = paths.first[walkway], paths.first[walkway + 1]
     return project_on_polyline(paths.points, paths.along, begin, end, x, y)
 
 
-@njit(cache=True)
+@compiled
 def _turn_round(paths, walker, x, y):  # type: ignore[no-untyped-def]
     """Go the other way from here on: the followed point comes back to where the walker is, or it would lead on."""
     walker.direction = -walker.direction
@@ -79,7 +79,7 @@ def _turn_round(paths, walker, x, y):  # type: ignore[no-untyped-def]
     walker.crossing_wait = walker.stuck_time = 0.0
 
 
-@njit(cache=True)
+@compiled
 def _is_crossing_at(paths, node):  # type: ignore[no-untyped-def]
     """Return whether a crossing begins at a meeting point."""
     for m in range(paths.meeting_first[node], paths.meeting_first[node + 1]):
@@ -88,7 +88,7 @@ def _is_crossing_at(paths, node):  # type: ignore[no-untyped-def]
     return False
 
 
-@njit(cache=True)
+@compiled
 def _choice_weight(paths, here, option, node):  # type: ignore[no-untyped-def]
     """Return how likely a walkway is taken at a meeting point: crossings less often, 0 for never."""
     is_corner = paths.walkways[option].kind == _CORNER
@@ -98,7 +98,7 @@ def _choice_weight(paths, here, option, node):  # type: ignore[no-untyped-def]
     return 0.5 if is_corner and _is_crossing_at(paths, far) else 1.0
 
 
-@njit(cache=True)
+@compiled
 def choose_next_walkway(paths, walker, node):  # type: ignore[no-untyped-def]
     """Return where a pedestrian goes on at a meeting point, `NONE` for nowhere."""
     here = walker.walkway
@@ -117,7 +117,7 @@ def choose_next_walkway(paths, walker, node):  # type: ignore[no-untyped-def]
     return NONE
 
 
-@njit(cache=True)
+@compiled
 def must_wait_at_crossing(walker, junctions, crossing, is_asked):  # type: ignore[no-untyped-def]
     """Return whether a pedestrian lets vehicles go first: those on the crossing, and one that has waited long.
 
@@ -127,7 +127,7 @@ def must_wait_at_crossing(walker, junctions, crossing, is_asked):  # type: ignor
     return (junctions.crossing_busy[crossing] or cars_first) and not is_asked
 
 
-@njit(cache=True)
+@compiled
 def _enter_walkway(paths, walker, junctions, following, node):  # type: ignore[no-untyped-def]
     """Put the followed point at the start of the next walkway, from meeting point `node`."""
     walkway = walker.walkway
@@ -145,7 +145,7 @@ def _enter_walkway(paths, walker, junctions, following, node):  # type: ignore[n
         walker.direction, walker.offset = -1, paths.walkways[following].length
 
 
-@njit(cache=True)
+@compiled
 def advance_follow_point(paths, walker, junctions, is_asked, x, y, dt):  # type: ignore[no-untyped-def]
     """Move the followed point on until it is far enough ahead; return whether a crossing has to be waited for."""
     lead = _LEAD_WHEN_HINDERED if walker.jammed_time > _HINDERED_AFTER else _LEAD
@@ -176,7 +176,7 @@ def advance_follow_point(paths, walker, junctions, is_asked, x, y, dt):  # type:
     return False
 
 
-@njit(cache=True)
+@compiled
 def _nearby(shapes, b, buffer):  # type: ignore[no-untyped-def]
     """Return the indices of the bodies that body b, a walker, may meet."""
     x, y = shapes.x[b], shapes.y[b]
@@ -190,7 +190,7 @@ def _nearby(shapes, b, buffer):  # type: ignore[no-untyped-def]
     return buffer[:n]
 
 
-@njit(cache=True)
+@compiled
 def _free_distance(x, y, c, s, shapes, near, gap):  # type: ignore[no-untyped-def]
     """Return the metres a walker can go along a heading before it touches somebody, at most `_SIGHT`."""
     free = _SIGHT
@@ -213,7 +213,7 @@ def _free_distance(x, y, c, s, shapes, near, gap):  # type: ignore[no-untyped-de
     return free
 
 
-@njit(cache=True)
+@compiled
 def _distance(x, y, shapes, j):  # type: ignore[no-untyped-def]
     """Return the metres from a point to body j: to a disc's middle, to a rectangle's edge."""
     if shapes.disc[j]:
@@ -221,7 +221,7 @@ def _distance(x, y, shapes, j):  # type: ignore[no-untyped-def]
     return point_to_rectangle(x, y, rectangle_of(shapes, j))
 
 
-@njit(cache=True)
+@compiled
 def best_heading(x, y, point, walkway, shapes, near, is_jammed):  # type: ignore[no-untyped-def]
     """Return the heading (rad) that leads furthest towards the followed point, and the metres free along it.
 
@@ -247,7 +247,7 @@ def best_heading(x, y, point, walkway, shapes, near, is_jammed):  # type: ignore
     return best, best_free
 
 
-@njit(cache=True)
+@compiled
 def may_step_to(tx, ty, x, y, shapes, near):  # type: ignore[no-untyped-def]
     """Return whether a walker at (x, y) may stand at (tx, ty); who is too near already may go away from the other."""
     for j in near:
@@ -258,7 +258,7 @@ def may_step_to(tx, ty, x, y, shapes, near):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True)
+@compiled
 def _walk(paths, walker, shapes, b, near, is_waiting, dt):  # type: ignore[no-untyped-def]
     """Take a pedestrian, body b, a step towards its point; return the metres walked."""
     x, y = shapes.x[b], shapes.y[b]
@@ -281,7 +281,7 @@ def _walk(paths, walker, shapes, b, near, is_waiting, dt):  # type: ignore[no-un
     return step
 
 
-@njit(cache=True)
+@compiled
 def _note_progress(paths, walker, x, y, is_waiting, dt):  # type: ignore[no-untyped-def]
     """Turn round who gets nowhere, on the spot or to and fro."""
     ex, ey = x - walker.progress_xy[0], y - walker.progress_xy[1]
@@ -296,7 +296,7 @@ def _note_progress(paths, walker, x, y, is_waiting, dt):  # type: ignore[no-unty
         _turn_round(paths, walker, x, y)
 
 
-@njit(cache=True)
+@compiled
 def asked_to_go(fleet, first, n):  # type: ignore[no-untyped-def]
     """Return which of the `n` walkers from body `first` on a vehicle stands before, waiting for them to go."""
     asked = np.zeros(n, np.bool_)
@@ -306,7 +306,7 @@ def asked_to_go(fleet, first, n):  # type: ignore[no-untyped-def]
     return asked
 
 
-@njit(cache=True)
+@compiled
 def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, dt):  # type: ignore[no-untyped-def]
     """Advance all pedestrians by `dt` seconds; their bodies follow those of the vehicles in `shapes`."""
     first = len(fleet)
@@ -333,7 +333,7 @@ def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, dt):  # ty
         _note_progress(paths, walker, shapes.x[b], shapes.y[b], is_waiting, dt)
 
 
-@njit(cache=True)
+@compiled
 def place_pedestrian(paths, pedestrians, i, walkway, offset, direction, shapes, b):  # type: ignore[no-untyped-def]
     """Put pedestrian i, body b, on a walkway if nobody is within half a metre; True if it now stands there."""
     walker = pedestrians[i]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from vico.io.compiled import compiled
 
 
-@njit(cache=True)
+@compiled
 def next_random(owner):  # type: ignore[no-untyped-def]
     """Return a number in 0..1 from the stream of a vehicle or pedestrian (splitmix64: one word of state, `random`)."""
     z = owner.random + np.uint64(0x9E3779B97F4A7C15)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from vico.io.compiled import compiled
 from vico.sim.traffic.random_stream import next_random
 from vico.sim.traffic.state import NONE, PLANNED_LANES, PREVIOUS_LANES
 
@@ -12,7 +11,7 @@ STANDING_ROOM = 1.5  # room kept behind a vehicle that has left a junction, m
 _DEAD_END, _JUNCTION_AGAIN, _BEEN_THERE, _TURN_BACK = 4.0, 2.0, 50.0, 1e6  # costs, in vehicles on a street
 
 
-@njit(cache=True)
+@compiled
 def count_per_street(net, fleet, street_load):  # type: ignore[no-untyped-def]
     """Count the vehicles on each street (one direction) into `street_load`."""
     street_load[:] = 0
@@ -20,7 +19,7 @@ def count_per_street(net, fleet, street_load):  # type: ignore[no-untyped-def]
         street_load[net.lanes[vehicle.lane].edge] += 1
 
 
-@njit(cache=True)
+@compiled
 def _street_reached_by(net, lane):  # type: ignore[no-untyped-def]
     """Return the street lane that a lane through junctions leads to."""
     street = lane
@@ -32,14 +31,14 @@ def _street_reached_by(net, lane):  # type: ignore[no-untyped-def]
     return street
 
 
-@njit(cache=True)
+@compiled
 def _is_dead_end(net, street):  # type: ignore[no-untyped-def]
     """Return whether a street only leads back."""
     onward = net.lanes[street].first_next
     return net.lanes[street].end_next == onward + 1 and net.lanes[net.next[onward]].u_turn
 
 
-@njit(cache=True)
+@compiled
 def _lane_cost(net, vehicle, option, street, street_load):  # type: ignore[no-untyped-def]
     """Return what speaks against taking lane `option` to `street`: vehicles there, and ways that lead nowhere new."""
     cost = street_load[net.lanes[street].edge] + next_random(vehicle)
@@ -58,7 +57,7 @@ def _lane_cost(net, vehicle, option, street, street_load):  # type: ignore[no-un
     return cost
 
 
-@njit(cache=True)
+@compiled
 def choose_next_lane(net, vehicle, lane, street_load):  # type: ignore[no-untyped-def]
     """Return the lane a car takes after `lane`: towards the street with fewer vehicles; `NONE` at the map's end."""
     best, best_cost = NONE, 1e18
@@ -77,7 +76,7 @@ def choose_next_lane(net, vehicle, lane, street_load):  # type: ignore[no-untype
     return best
 
 
-@njit(cache=True)
+@compiled
 def route_lane(net, vehicle, further):  # type: ignore[no-untyped-def]
     """Return the lane of a bus's route that comes `further` lanes after its own."""
     route = vehicle.route
@@ -85,7 +84,7 @@ def route_lane(net, vehicle, further):  # type: ignore[no-untyped-def]
     return net.route[net.route_first[route] + (vehicle.route_index + further) % size]
 
 
-@njit(cache=True)
+@compiled
 def is_lane_of_stop(net, vehicle, further):  # type: ignore[no-untyped-def]
     """Return whether it is a bus whose next stop is on the lane that comes `further` lanes after its own."""
     route = vehicle.route
@@ -95,7 +94,7 @@ def is_lane_of_stop(net, vehicle, further):  # type: ignore[no-untyped-def]
     return (vehicle.route_index + further) % size == vehicle.stop_route_index
 
 
-@njit(cache=True)
+@compiled
 def plan_lanes(net, vehicle, street_load, reach):  # type: ignore[no-untyped-def]
     """Plan lanes until the path is `reach` metres long and ends where it can stand clear of junctions.
 
@@ -129,7 +128,7 @@ def plan_lanes(net, vehicle, street_load, reach):  # type: ignore[no-untyped-def
     return False
 
 
-@njit(cache=True)
+@compiled
 def advance_lane(net, vehicle):  # type: ignore[no-untyped-def]
     """Step on to the planned lanes that a vehicle's front has reached."""
     while vehicle.offset > net.lanes[vehicle.lane].length and vehicle.planned_count > 0:
@@ -145,7 +144,7 @@ def advance_lane(net, vehicle):  # type: ignore[no-untyped-def]
         advance_on_route(net, vehicle)
 
 
-@njit(cache=True)
+@compiled
 def advance_on_route(net, vehicle):  # type: ignore[no-untyped-def]
     """Note that a bus is on the next lane of its route; cars have none."""
     route = vehicle.route

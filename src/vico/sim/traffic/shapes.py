@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from vico.io.compiled import compiled
 
 Floats = NDArray[np.float64]
 
@@ -49,7 +50,7 @@ class Rectangle(NamedTuple):
     half_width: float
 
 
-@njit(cache=True)
+@compiled
 def point_to_rectangle(px, py, r):  # type: ignore[no-untyped-def]
     """Return the distance from a point to a rectangle, metres; 0 inside."""
     dx, dy = px - r.x, py - r.y
@@ -60,7 +61,7 @@ def point_to_rectangle(px, py, r):  # type: ignore[no-untyped-def]
     return np.sqrt(u * u + v * v)
 
 
-@njit(cache=True)
+@compiled
 def rectangles_overlap(a, b):  # type: ignore[no-untyped-def]
     """Return whether two rectangles overlap (separating axis theorem)."""
     dx, dy = b.x - a.x, b.y - a.y
@@ -75,7 +76,7 @@ def rectangles_overlap(a, b):  # type: ignore[no-untyped-def]
     return abs(-dx * b.sin + dy * b.cos) <= b.half_width + a.half_length * sin + a.half_width * cos
 
 
-@njit(cache=True)
+@compiled
 def rectangle_of(shapes, j):  # type: ignore[no-untyped-def]
     """Return body j's rectangle."""
     return Rectangle(
@@ -84,7 +85,7 @@ def rectangle_of(shapes, j):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@njit(cache=True)
+@compiled
 def rectangle_touches(rectangle, shapes, j):  # type: ignore[no-untyped-def]
     """Return whether a rectangle touches body j."""
     if shapes.disc[j]:
@@ -92,7 +93,7 @@ def rectangle_touches(rectangle, shapes, j):  # type: ignore[no-untyped-def]
     return rectangles_overlap(rectangle, rectangle_of(shapes, j))
 
 
-@njit(cache=True)
+@compiled
 def disc_touches(x, y, radius, shapes, j):  # type: ignore[no-untyped-def]
     """Return whether a disc touches body j."""
     if shapes.disc[j]:
@@ -102,7 +103,7 @@ def disc_touches(x, y, radius, shapes, j):  # type: ignore[no-untyped-def]
     return point_to_rectangle(x, y, rectangle_of(shapes, j)) <= radius
 
 
-@njit(cache=True)
+@compiled
 def count_overlaps(shapes, margin):  # type: ignore[no-untyped-def]
     """Return the number of pairs of bodies that touch or come nearer than `margin` metres."""
     n = len(shapes.x)

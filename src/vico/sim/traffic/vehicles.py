@@ -7,8 +7,8 @@ No move is made that would touch another body, so vehicles never overlap whateve
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from vico.io.compiled import compiled
 from vico.sim.traffic.backing_up import vehicles_backing_up
 from vico.sim.traffic.car_following import (
     braking_distance,
@@ -59,7 +59,7 @@ _OTHER_WAY_AFTER = 15.0  # s of waiting for a junction after which a car looks f
 _BEYOND_JUNCTION, _FAR_REACH = 60.0, 150.0  # m seen beyond a junction that is asked for, and around at most
 
 
-@njit(cache=True)
+@compiled
 def advance_vehicles(net, fleet, junctions, shapes, street_load, dt):  # type: ignore[no-untyped-def]
     """Advance all vehicles by `dt` seconds, one after the other, each seeing where the ones before it went.
 
@@ -132,7 +132,7 @@ def advance_vehicles(net, fleet, junctions, shapes, street_load, dt):  # type: i
             change_to_emptier_lane(net, fleet, vehicle, view)
 
 
-@njit(cache=True)
+@compiled
 def _look_around(net, vehicle, shapes, request, path_buffer, body_buffer):  # type: ignore[no-untyped-def]
     """Return what a vehicle sees: its path and the bodies near it, farther where it has to see beyond a junction."""
     look, length = look_ahead(vehicle.speed), vehicle.length
@@ -151,7 +151,7 @@ def _look_around(net, vehicle, shapes, request, path_buffer, body_buffer):  # ty
     return VehicleView(path, vehicle_outline(vehicle), nearby_bodies(shapes, vehicle.index, reach, body_buffer))
 
 
-@njit(cache=True)
+@compiled
 def _move_without_contact(net, vehicle, view, move, gap, leader):  # type: ignore[no-untyped-def]
     """Return the move, gap and leader; no move where it would touch a body or leave the planned path."""
     if vehicle.planned_count == 0:
@@ -163,7 +163,7 @@ def _move_without_contact(net, vehicle, view, move, gap, leader):  # type: ignor
     return move, gap, leader
 
 
-@njit(cache=True)
+@compiled
 def _move_back(vehicle, view, dt):  # type: ignore[no-untyped-def]
     """Return the move of a vehicle that backs up, metres; 0 where it would touch a body."""
     if vehicle.granted_count > 0 or vehicle.offset <= 0.5:
@@ -173,7 +173,7 @@ def _move_back(vehicle, view, dt):  # type: ignore[no-untyped-def]
     return 0.0 if is_blocked else move
 
 
-@njit(cache=True)
+@compiled
 def _move_vehicle(vehicle, shapes, view, move, dt):  # type: ignore[no-untyped-def]
     """Move a vehicle along its path and put its body there."""
     x, y, c, s = footprint(view.path, view.outline, vehicle.offset + move)
@@ -188,7 +188,7 @@ def _move_vehicle(vehicle, shapes, view, move, dt):  # type: ignore[no-untyped-d
         vehicle.lateral_offset = 0.0
 
 
-@njit(cache=True)
+@compiled
 def _arrive_at_stop(vehicle, stop_distance):  # type: ignore[no-untyped-def]
     """Open a bus's doors where it stands at its stop."""
     if stop_distance < 0.5 and vehicle.speed < STANDING:
@@ -197,13 +197,13 @@ def _arrive_at_stop(vehicle, stop_distance):  # type: ignore[no-untyped-def]
         vehicle.stopped_time = 0.0
 
 
-@njit(cache=True)
+@compiled
 def _gives_up_waiting(vehicle, dt):  # type: ignore[no-untyped-def]
     """Return whether a car looks for another way now: a full exit is no reason to wait for ever."""
     return vehicle.junction_wait > _OTHER_WAY_AFTER and int(vehicle.junction_wait / dt) % 50 == 0
 
 
-@njit(cache=True)
+@compiled
 def place_vehicle(net, fleet, v, lane, offset, shapes, air):  # type: ignore[no-untyped-def]
     """Put vehicle v on a lane if no other body would be nearer than `air` metres; True if it now stands there."""
     vehicle = fleet[v]
@@ -227,13 +227,13 @@ def place_vehicle(net, fleet, v, lane, offset, shapes, air):  # type: ignore[no-
     return True
 
 
-@njit(cache=True)
+@compiled
 def has_left_map(net, vehicle):  # type: ignore[no-untyped-def]
     """Return whether a car stands at the end of a lane that leads nowhere."""
     return vehicle.planned_count == 0 and vehicle.offset >= net.lanes[vehicle.lane].length - 0.3
 
 
-@njit(cache=True)
+@compiled
 def bring_back(net, fleet, junctions, shapes, entries, entry_speed, patience):  # type: ignore[no-untyped-def]
     """Bring cars that left the map, or stood still for longer than `patience`, back in where the map begins.
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numba import njit
 from numpy.typing import NDArray
 from shapely import MultiLineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import polygons_of
+from vico.io.compiled import compiled
 from vico.world.heights import EDGE_RANGE, HeightField, Steps
 from vico.world.walkable import fill_polygon
 from vico.worldgen.facts.outlines.roof_shapes import rings_of
@@ -61,7 +61,7 @@ class Water:
         return out - self.drop
 
 
-@njit(cache=True)
+@compiled
 def _soft_least(xy, shore, banks, out):  # type: ignore[no-untyped-def]
     """About the lowest bank near each point, smooth from point to point."""
     lowest = banks.min()
@@ -180,7 +180,7 @@ def _near(shape: BaseGeometry, n: int, half: float, cell: float, reach: float) -
     return grid
 
 
-@njit(cache=True)
+@compiled
 def _approach(grid, x0, y0, x1, y1, half, cell, reach):  # type: ignore[no-untyped-def]
     """Lower a grid's values to the distances of its nodes from segments."""
     n = grid.shape[0]

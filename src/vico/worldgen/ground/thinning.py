@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from vico.io.compiled import compiled
 from vico.worldgen.ground.conform import Heights, PlanMesh
 
 _STRAIGHT = 0.004  # metres that a border may bend
@@ -128,7 +128,7 @@ class _Ring(NamedTuple):
     two: NDArray[np.int64]
 
 
-@njit(cache=True)
+@compiled
 def _collapse_corners(mesh, tolerance, turn):  # type: ignore[no-untyped-def]
     """Collapse corners into neighbours where no triangle's height changes by more than its piece's tolerance."""
     ring = _Ring(
@@ -155,7 +155,7 @@ def _collapse_corners(mesh, tolerance, turn):  # type: ignore[no-untyped-def]
             _collapse(mesh, ring, v, best, count, error)
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _gather_star(mesh, ring, v):  # type: ignore[no-untyped-def]
     """Gather the triangles about a corner; returns how many, or -1 if there are too many."""
     first, owner, alive, triangles, chain = mesh.first, mesh.owner, mesh.alive, mesh.triangles, mesh.chain
@@ -173,12 +173,12 @@ def _gather_star(mesh, ring, v):  # type: ignore[no-untyped-def]
     return count
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _has_corner(triangles, t, v):  # type: ignore[no-untyped-def]
     return triangles[t, 0] == v or triangles[t, 1] == v or triangles[t, 2] == v
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _gather_ring(mesh, ring, v, count):  # type: ignore[no-untyped-def]
     """Gather a corner's neighbours, and the pieces on both sides of the edge to each; -1 if there are too many."""
     triangles, piece = mesh.triangles, mesh.piece
@@ -202,7 +202,7 @@ def _gather_ring(mesh, ring, v, count):  # type: ignore[no-untyped-def]
     return size
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _index_of(values, count, wanted):  # type: ignore[no-untyped-def]
     for k in range(count):
         if values[k] == wanted:
@@ -210,7 +210,7 @@ def _index_of(values, count, wanted):  # type: ignore[no-untyped-def]
     return -1
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _border_through(mesh, ring, v, size):  # type: ignore[no-untyped-def]
     """Tell whether a corner may go, and the two neighbours along the straight border it lies on (-1 for none)."""
     near, sides, left, right = ring.near, ring.sides, ring.one, ring.two
@@ -231,7 +231,7 @@ def _border_through(mesh, ring, v, size):  # type: ignore[no-untyped-def]
     return length != 0.0 and abs(cross) <= _STRAIGHT * length, one, two
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _best_neighbour(mesh, tolerance, ring, v, counts, border):  # type: ignore[no-untyped-def]
     """Find the neighbour that a corner is drawn into with the least error, -1 for none; and that error.
 
@@ -254,7 +254,7 @@ def _best_neighbour(mesh, tolerance, ring, v, counts, border):  # type: ignore[n
     return best, least
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _error_after(mesh, tolerance, star, count, move, before):  # type: ignore[no-untyped-def]
     """Error of a corner's triangles once it lies in another (`move` has both), metres; -1 where that can't be."""
     v, u = move
@@ -278,7 +278,7 @@ def _error_after(mesh, tolerance, star, count, move, before):  # type: ignore[no
     return worst + before
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _height_off(xy, z, kind, v, u, b, c):  # type: ignore[no-untyped-def]
     """How far `v` lies off the triangle ``u b c``, 0 beside it; -1 if the triangle is turned over, thin or long."""
     ux, uy = xy[u, 0], xy[u, 1]
@@ -293,7 +293,7 @@ def _height_off(xy, z, kind, v, u, b, c):  # type: ignore[no-untyped-def]
     return 0.0
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _collapse(mesh, ring, v, u, count, error):  # type: ignore[no-untyped-def]
     """Draw a corner into its neighbour `u`."""
     star, triangles, alive = ring.star, mesh.triangles, mesh.alive

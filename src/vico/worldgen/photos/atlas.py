@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numba
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from vico.errors import InputError
+from vico.io.compiled import compiled
 from vico.world.mesh import Material, Surface
 
 _GUTTER = 4  # pixels around a chart: two mip levels before neighbours mix
@@ -348,7 +348,7 @@ def _neighbours(faces: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np
     return start, target[by_source]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _grow(points, normal, order, start, neighbours, charted):  # type: ignore[no-untyped-def]
     """Spread from each seed, the largest first, over faces near its plane."""
     label = np.full(len(points), -1, np.int64)
@@ -435,7 +435,7 @@ def _pack(cells: NDArray[np.int64], page: int) -> NDArray[np.int64]:
     return _skyline(cells, order, page) if len(cells) else np.zeros((0, 3), np.int64)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _skyline(cells, order, page):  # type: ignore[no-untyped-def]
     places = np.zeros((len(cells), 3), np.int64)
     tops = np.zeros((len(cells), page), np.int32)
@@ -496,7 +496,7 @@ def _flattened(
     return flat
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _rasterise(triangles, boxes, inside):  # type: ignore[no-untyped-def]
     """Mark every texel that a triangle touches, within its chart."""
     for t in range(len(triangles)):

@@ -12,13 +12,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
 from vico.errors import EmptyInputError, InputError
 from vico.geo.tiles3d.mesh import TileMesh
+from vico.io.compiled import compiled
 from vico.threads import in_order
 from vico.world.mesh import Surface
 from vico.worldgen.facts.sight import Sight
@@ -222,7 +222,7 @@ class _Photos:
         return out
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _fetch(texture, chosen, hits, rights, ups, skin, out):  # type: ignore[no-untyped-def]
     """Write the texture's colours at chosen hits, each averaged over a texel of its chart."""
     triangle, u, v, chart = hits.triangle, hits.u, hits.v, hits.chart
@@ -410,7 +410,7 @@ def _forget_melted(atlas: Atlas, loose: Sequence[NDArray[np.bool_]]) -> None:
                 known &= ~(leans & maximum_filter(upright, size=size))
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _texels(chart, column, row, origin, right, up, normal, expected):  # type: ignore[no-untyped-def]
     """Centres and normals of texels, and how far out of the plane the photographed surface is expected."""
     centre, out = np.empty((len(chart), 3)), np.empty((len(chart), 3))
@@ -424,7 +424,7 @@ def _texels(chart, column, row, origin, right, up, normal, expected):  # type: i
     return centre, out, stand
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _agreement(triangle, normals, chart, normal):  # type: ignore[no-untyped-def]
     """Cosine between the normals of what was hit and of the chart; -1 where nothing was."""
     cosine = np.full(len(triangle), -1.0)
@@ -456,7 +456,7 @@ def _oddities(
     return leaves | hole | obstacle | ground, leaves | obstacle
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _forget_near(mask, known):  # type: ignore[no-untyped-def]
     height, width = mask.shape
     for y in range(height):

@@ -7,10 +7,10 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from vico.io.compiled import compiled
 from vico.world.folder import World
 from vico.world.model import ENTITY_GREEN, ENTITY_ROAD, ENTITY_WATER, Category
 
@@ -37,7 +37,7 @@ _MARKS: dict[Category, tuple[Rgb, str]] = {
 }
 
 
-@njit(cache=True)
+@compiled
 def _paint(image, corners, colours):  # type: ignore[no-untyped-def]
     """Fill triangles given in pixels, shape (m, 3, 2); where two meet in a pixel's centre the later wins."""
     n = image.shape[0]

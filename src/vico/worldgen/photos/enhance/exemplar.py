@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from vico.io.compiled import compiled
 
 _REACH = 3  # texels from a patch's centre to its border
 _LEVELS = 5
@@ -48,7 +49,7 @@ def pull_push(image: NDArray[np.uint8], known: NDArray[np.bool_]) -> NDArray[np.
     return filled
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _halved(image, known):  # type: ignore[no-untyped-def]
     height, width = image.shape[:2]
     h, w = (height + 1) // 2, (width + 1) // 2
@@ -72,7 +73,7 @@ def _halved(image, known):  # type: ignore[no-untyped-def]
     return small, mask
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _pushed(image, known, coarse):  # type: ignore[no-untyped-def]
     out = image.copy()
     height, width = known.shape
@@ -169,7 +170,7 @@ class _Sources(NamedTuple):
     row: NDArray[np.int64]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _cost(picture, y, x, sy, sx, drift, best):  # type: ignore[no-untyped-def]
     """Mean squared difference of the patches about (y, x) and (sy, sx); gives up above `best`."""
     image, hole, good = picture.image, picture.hole, picture.good
@@ -208,7 +209,7 @@ def _cost(picture, y, x, sy, sx, drift, best):  # type: ignore[no-untyped-def]
     return total / max(weight, 1e-9) + prior
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@compiled(nogil=True, inline="always")
 def _next(state):  # type: ignore[no-untyped-def]
     """SplitMix64: the next state and its random bits."""
     state = state + np.uint64(0x9E3779B97F4A7C15)
@@ -218,12 +219,12 @@ def _next(state):  # type: ignore[no-untyped-def]
     return state, z ^ (z >> np.uint64(31))
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@compiled(nogil=True, inline="always")
 def _may_be_copied(good, y, x):  # type: ignore[no-untyped-def]
     return 0 <= y < good.shape[0] and 0 <= x < good.shape[1] and good[y, x]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _as_coarser(coarse, y, x):  # type: ignore[no-untyped-def]
     """Return the source that the coarser level found for a texel; (-1, -1) for none."""
     if coarse.shape[0]:
@@ -233,7 +234,7 @@ def _as_coarser(coarse, y, x):  # type: ignore[no-untyped-def]
     return -1, -1
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _first_sources(picture, sources, coarse, drift, state):  # type: ignore[no-untyped-def]
     """Return a source for every missing texel to begin with: the coarser level's, else one at random."""
     height, width = picture.hole.shape
@@ -255,7 +256,7 @@ def _first_sources(picture, sources, coarse, drift, state):  # type: ignore[no-u
     return field, state
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _paint(picture, field):  # type: ignore[no-untyped-def]
     for y in range(picture.hole.shape[0]):
         for x in range(picture.hole.shape[1]):
@@ -263,7 +264,7 @@ def _paint(picture, field):  # type: ignore[no-untyped-def]
                 picture.image[y, x] = picture.image[field[y, x, 0], field[y, x, 1]]
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@compiled(nogil=True, inline="always")
 def _beside_a_neighbour_s(picture, field, y, x, step, drift, found):  # type: ignore[no-untyped-def]
     """Return what `found` says, or a better source beside that of the neighbour above (below) or left (right)."""
     sy, sx, best = found
@@ -280,7 +281,7 @@ def _beside_a_neighbour_s(picture, field, y, x, step, drift, found):  # type: ig
     return sy, sx, best
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@compiled(nogil=True, inline="always")
 def _at_random(picture, y, x, drift, state, found):  # type: ignore[no-untyped-def]
     """Return the next state, and `found` or a better source: along the row, where facades repeat; then about it."""
     sy, sx, best = found
@@ -304,7 +305,7 @@ def _at_random(picture, y, x, drift, state, found):  # type: ignore[no-untyped-d
     return state, (sy, sx, best)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _matched(picture, sources, coarse, drift, rounds, seed):  # type: ignore[no-untyped-def]
     """Find a source for every missing texel: from the coarser level, from neighbours, and at random, nearer and nearer.
 
@@ -332,7 +333,7 @@ def _matched(picture, sources, coarse, drift, rounds, seed):  # type: ignore[no-
     return field
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _copied(image, hole, field, start):  # type: ignore[no-untyped-def]
     out = image.copy()
     for y in range(hole.shape[0]):

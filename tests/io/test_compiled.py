@@ -1,0 +1,162 @@
+"""Compiled code is kept between runs, and is never that of sources that have changed."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from vico.io.compiled import source_digest
+
+_RECORDS = """
+from typing import NamedTuple
+
+class Car(NamedTuple):
+    speed: float
+"""
+_RULES = """
+from vico.io.compiled import compiled
+
+LIMIT = 10.0
+
+@compiled
+def slower(speed):
+    return speed - 1.0
+"""
+_DRIVE = """
+from town.rules import LIMIT, slower
+from vico.io.compiled import compiled
+
+@compiled
+def drive(car):
+    return min(slower(car.speed), LIMIT)
+"""
+_RUN = """
+import town.records
+from town.drive import drive
+
+car, = (kind for kind in vars(town.records).values() if isinstance(kind, type) and kind.__module__ == "town.records")
+print(drive(car(8.0)), sum(drive.stats.cache_hits.values()))
+"""
+
+
+@pytest.fixture
+def town(tmp_path: Path) -> Path:
+    """A package of three modules: `drive` compiles in what `rules` holds, and is given records it never names."""
+    package = tmp_path / "town"
+    package.mkdir()
+    for name, text in {"__init__": "", "records": _RECORDS, "rules": _RULES, "drive": _DRIVE}.items():
+        (package / f"{name}.py").write_text(text)
+    return package
+
+
+def run(town: Path, cache: Path | None = None) -> tuple[float, int, str]:
+    """Drive in a fresh process: the speed, how often compiled code was found, and what was said of trouble."""
+    paths = [str(town.parent), *(path for path in sys.path if path)]
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    environment |= {"PYTHONPATH": os.pathsep.join(paths), "VICO_CACHE": str(cache or town.parent / "cache")}
+    done = subprocess.run(
+        [sys.executable, "-B", "-c", _RUN], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    speed, hits = done.stdout.split()
+    return float(speed), int(hits), done.stderr
+
+
+def change(file: Path, old: str, new: str) -> None:
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))
+
+
+def test_a_second_run_finds_what_the_first_compiled(town: Path) -> None:
+    assert run(town)[:2] == (7.0, 0)
+    assert run(town)[:2] == (7.0, 1)
+    assert list(town.glob("**/*.nbi")) == []  # nothing beside the sources
+
+
+def test_a_function_or_constant_of_another_file_that_changes_is_compiled_anew(town: Path) -> None:
+    run(town)
+    change(town / "rules.py", "speed - 1.0", "speed - 2.0")
+    assert run(town)[:2] == (6.0, 0)
+    change(town / "rules.py", "LIMIT = 10.0", "LIMIT = 5.0")
+    assert run(town)[:2] == (5.0, 0)
+
+
+def test_sources_that_are_back_find_their_code(town: Path) -> None:
+    run(town)
+    change(town / "rules.py", "speed - 1.0", "speed - 2.0")
+    run(town)
+    change(town / "rules.py", "speed - 2.0", "speed - 1.0")
+    assert run(town)[:2] == (7.0, 1)
+
+
+def test_a_record_renamed_where_no_import_shows_it_breaks_nothing(town: Path) -> None:
+    run(town)
+    change(town / "records.py", "class Car", "class Vehicle")
+    assert run(town)[:2] == (7.0, 0)
+    assert run(town)[:2] == (7.0, 1)
+
+
+def test_code_cut_off_in_the_writing_is_compiled_anew(town: Path) -> None:
+    run(town)
+    for file in (town.parent / "cache").rglob("*.nb?"):
+        file.write_bytes(file.read_bytes()[:20])
+    assert run(town)[:2] == (7.0, 0)
+
+
+def test_a_cache_folder_that_cannot_be_written_is_said_and_breaks_nothing(town: Path) -> None:
+    taken = town.parent / "taken"
+    taken.write_text("a file where the folder would be")
+    speed, hits, said = run(town, cache=taken)
+    assert (speed, hits) == (7.0, 0)
+    assert said.count("compiled code cannot be kept") == 1
+    assert str(taken) in said
+    assert "VICO_CACHE" in said
+
+
+def test_a_chosen_folder_of_numba_wins(town: Path) -> None:
+    chosen = town.parent / "chosen"
+    paths = os.pathsep.join([str(town.parent), *(path for path in sys.path if path)])
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(chosen), "PYTHONPATH": paths}
+    subprocess.run([sys.executable, "-B", "-c", _RUN], env=environment, check=True, capture_output=True)
+    assert list(chosen.rglob("drive.drive-*.nbi"))
+
+
+def test_folders_of_old_sources_are_swept(town: Path) -> None:
+    cache = town.parent / "cache" / "compiled"
+    for number in range(12):
+        old = cache / f"town.drive-{number:024x}"
+        old.mkdir(parents=True)
+        os.utime(old, (1.6e9 + number,) * 2)
+    fresh = cache / f"town.drive-{'f' * 24}"
+    fresh.mkdir()
+    run(town)
+    folders = {path.name for path in cache.iterdir()}
+    assert fresh.name in folders
+    assert not any(f"town.drive-{number:024x}" in folders for number in range(12))
+    assert len(folders) == 3
+
+
+def test_the_digest_follows_imports_of_packages_and_in_brackets(town: Path) -> None:
+    before = source_digest(town / "drive.py", "town.drive")
+    change(town / "rules.py", "LIMIT = 10.0", "LIMIT = 11.0")
+    assert (after := _fresh_digest(town)) != before
+    change(
+        town / "drive.py", "from town.rules import LIMIT, slower", "from town import (\n    rules,  # of the road\n)"
+    )
+    brackets = _fresh_digest(town)
+    change(town / "rules.py", "LIMIT = 11.0", "LIMIT = 12.0")
+    assert len({before, after, brackets, _fresh_digest(town)}) == 4
+
+
+def _fresh_digest(town: Path) -> str:
+    """As another process would see it: in one process a file is read once."""
+    program = (
+        "import sys; from pathlib import Path; from vico.io.compiled import source_digest as d;"
+        "print(d(Path(sys.argv[1]), 'town.drive'))"
+    )
+    return subprocess.run(
+        [sys.executable, "-c", program, str(town / "drive.py")], check=True, capture_output=True, text=True
+    ).stdout
