@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
+from vico.assets.models.plants import plant_models
 from vico.assets.models.street import street_models
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, OsmNode, OsmWay
@@ -124,7 +125,5 @@ def test_a_model_stands_on_the_ground_and_is_light(name: str) -> None:
 
 
 def test_plants_are_the_same_in_every_build() -> None:
-    first = street_models()["tree_lime"].surfaces
-    street_models.cache_clear()
-    second = street_models()["tree_lime"].surfaces
+    first, second = ({plant.name: plant for plant in plant_models()}["tree_lime"].surfaces for _ in range(2))
     assert all(np.array_equal(a.positions, b.positions) for a, b in zip(first, second, strict=True))

@@ -1,5 +1,8 @@
 """What tags mean: models of mapped things, signs by their codes, trees by species, climate and size."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 import shapely
@@ -7,12 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vico.assets.models.street import street_models
+from vico.errors import SchemaError
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, OsmNode, OsmWay
 from vico.world.heights import HeightField
 from vico.world.objects import Objects
-from vico.worldgen.objects import kinds as objects_kinds
-from vico.worldgen.objects import trees as objects_trees
+from vico.worldgen.objects import catalogue
 from vico.worldgen.objects.kinds import region, sign_of, thing_of
 from vico.worldgen.objects.stage import objects_from_osm
 from vico.worldgen.objects.trees import climate, spread, tree_wish
@@ -41,17 +44,14 @@ def way(number: int, *points: tuple[float, float], **tags: str) -> OsmWay:
     return OsmWay(number, [1000 * number + k for k in range(len(line))], line, False, tags)
 
 
-def test_every_name_that_tags_lead_to_is_a_model() -> None:
-    names = {n for values in objects_kinds._BY_KEY.values() for n in values.values() if n}
-    names |= {n for table in objects_kinds._CODES.values() for n in table.values() if n}
-    names |= {*objects_kinds._ART.values(), *objects_kinds._MEMORIALS.values(), *objects_kinds._WORDS.values()}
-    names |= set(objects_trees._GENERA.values())
-    names |= {n for mixes in objects_trees._MIXES.values() for mix in mixes for n in mix}
-    assert names - set(street_models()) == set()
+def test_every_file_of_ours_names_models_that_stand_outdoors() -> None:
+    for read in (catalogue.kinds, catalogue.signs, catalogue.trees, catalogue.barriers):
+        read()
 
 
 def test_thirty_three_amenities_have_models() -> None:
-    assert len({value for value in objects_kinds._AMENITIES if thing_of({"amenity": value})}) >= 33
+    values = {value for key, models in catalogue.kinds().tables if key == "amenity" for value in models}
+    assert len({value for value in values if thing_of({"amenity": value})}) >= 33
 
 
 @pytest.mark.parametrize(
@@ -91,6 +91,72 @@ def test_signs_are_told_apart_by_their_codes(code: str, name: str | None) -> Non
     assert sign_of(code) == name
 
 
+def own(folder: Path, monkeypatch: pytest.MonkeyPatch, **files: str) -> Path:
+    """Give a user's folder of data about objects."""
+    (folder / "objects").mkdir()
+    for name, text in files.items():
+        (folder / "objects" / f"{name}.toml").write_text(text)
+    monkeypatch.setenv("VICO_DATA", str(folder))
+    return folder / "objects"
+
+
+def test_a_users_kinds_go_before_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    own(
+        tmp_path, monkeypatch,
+        kinds_mine='[tags.amenity]\nbench = "lounger"\npiano = "table_tennis"\n[tags.material]\nstone = "stone"\n',
+        finer_mine='[[finer]]\nof = "lounger"\nwhen = { seats = { over = 3 } }\nmodel = "bench_stone"\n',
+        signs_mine='[codes.NL]\nB7 = "sign_stop"\n[like]\nBE = "NL"\n',
+    )  # fmt: skip
+    assert thing_of({"amenity": "piano"}) == "table_tennis"
+    assert thing_of({"amenity": "bench"}) == "lounger"
+    assert thing_of({"amenity": "bench", "seats": "4"}) == "bench_stone"
+    assert thing_of({"amenity": "waste_basket"}) == "waste_basket"
+    assert sign_of("BE:B7") == "sign_stop"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("kinds", '[tags.amenity]\npiano = "grand_piano"', r"tags\.amenity\.piano: no model 'grand_piano'"),
+        ("finer", '[[finer]]\nof = "bench"\nwhen = { seats = { more = 3 } }\nmodel = ""', r"finer\.0\.when\.seats"),
+        ("finer", '[[finer]]\nof = "bench"\nby = ["seats"]', r"finer\.0: .*either model, or by and models"),
+        ("signs", '[like]\nBE = "NL"', r"like\.BE: 'NL' has no codes"),
+        ("trees", '[names]\n"sakura" = "prunuss"', r"names\.sakura: no genus 'prunuss'"),
+        ("barriers", '[lines]\nmoat = "water"', r"lines\.moat: no model 'water'"),
+    ],
+)
+def test_a_wrong_entry_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, text: str, message: str
+) -> None:
+    folder = own(tmp_path, monkeypatch, **{f"{name}_mine": text})
+    with pytest.raises(SchemaError, match=rf"{re.escape(str(folder))}/{name}_mine\.toml: {message}"):
+        getattr(catalogue, "kinds" if name == "finer" else name)()
+
+
+def test_the_page_s_examples_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "adding_an_object.md").read_text("utf-8")
+    kinds, finer, standing, signs, trees = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    own(tmp_path, monkeypatch, kinds=kinds, finer=finer, standing=standing, signs=signs, trees=trees)
+    models = tmp_path / "models" / "outdoor"
+    models.mkdir(parents=True)
+    part = 'parts = [{ shape = "box", size = [0.7, 1.5, 1.3], at = [0, 0, 0.65], colour = [40, 30, 24] }]'
+    models.joinpath("pianos.toml").write_text(
+        f'group = "amenity"\n[model.street_piano]\n{part}\n[model.street_piano_white]\n{part}\n'
+    )
+    assert thing_of({"amenity": "piano"}) == "street_piano"
+    assert thing_of({"amenity": "piano", "colour": "white"}) == "street_piano_white"
+    assert thing_of({"musical_instrument": "organ"}) is None
+    assert "street_piano" in catalogue.standing().facing_path
+    assert sign_of("NL:B7") == "sign_stop"
+    assert catalogue.trees().names["tilo"] == "tilia"
+    assert catalogue.trees().mixes["mediterranean"].streets[0] == "tree_fruit"
+
+
+def test_a_tree_is_known_by_a_name_in_a_users_language(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    own(tmp_path, monkeypatch, trees_ja='[names]\n"桜" = "prunus"\n')
+    assert wish(**{"species:ja": "桜"})[0] == "tree_blossom"
+
+
 @given(st.text(max_size=30))
 def test_no_sign_code_breaks_anything(code: str) -> None:
     name = sign_of(code)
@@ -118,7 +184,7 @@ def test_trees_are_of_their_species_in_many_languages() -> None:
     assert [name for name, _ in named[:6]] == [
         "tree_oak", "tree_poplar", "tree_spruce", "tree_birch", "tree_lime", "tree_willow",
     ]  # fmt: skip
-    assert named[6][0] in objects_trees._NEEDLES
+    assert named[6][0] in catalogue.trees().needles
 
 
 def test_trees_have_their_mapped_size() -> None:
@@ -139,7 +205,7 @@ def test_palms_grow_in_monaco_and_conifers_in_helsinki() -> None:
     planted = [
         {tree_wish(f"n{k}", {}, np.array([70.0 * k, 0.0]), 0, zone).prototype for k in range(60)} for zone in zones
     ]
-    assert [any(name in objects_trees._PALMS for name in names) for names in planted] == [True, False, False, False]
+    assert [any(name in catalogue.trees().palms for name in names) for names in planted] == [True, False, False, False]
 
 
 def test_blue_noise_keeps_its_distance() -> None:

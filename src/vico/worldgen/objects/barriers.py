@@ -13,32 +13,22 @@ from shapely.geometry.base import BaseGeometry
 from vico.assets.models.street import street_models
 from vico.geo import overlay
 from vico.geo.osm import OsmData, Tags
+from vico.worldgen.objects import catalogue
 from vico.worldgen.objects.wishes import Wish, metres, number
 
 _LONG = 2.0  # metres of line a model covers at scale 1
 _GATES = ("gate", "lift_gate", "swing_gate", "entrance", "kissing_gate", "turnstile", "full-height_turnstile",
           "cycle_barrier", "hampshire_gate", "bump_gate", "motorcycle_barrier", "sally_port")  # fmt: skip
-_BARRIERS = {
-    "fence": "fence", "wall": "wall", "hedge": "hedge", "guard_rail": "guard_rail", "city_wall": "wall_high",
-    "handrail": "handrail", "railing": "fence", "chain": "chain", "jersey_barrier": "jersey_barrier",
-    "cable_barrier": "chain", "hedge_bank": "hedge", "wire_fence": "fence_mesh", "rope": "chain",
-}  # fmt: skip
-_FENCES = {
-    "wood": "fence_wood", "picket": "fence_wood", "split_rail": "fence_wood", "pole": "fence_wood",
-    "paling": "fence_wood", "panel": "fence_panel", "slatted": "fence_panel", "chain_link": "fence_mesh",
-    "wire": "fence_mesh", "mesh": "fence_mesh", "barbed_wire": "fence_mesh", "metal_bars": "fence",
-    "railing": "fence", "construction": "works_fence",
-}  # fmt: skip
 _GAP = 1.2  # metres between the middles of two obstacles in a row that people get through
 _IN_ROWS = {"bollard": ("bollard", 1.7), "block": ("block", 2.4), "planter": ("planter", 2.2)}
 
 
 def _model(tags: Tags) -> str | None:
     """Name the model of a line by kind, material and height."""
-    name = _BARRIERS.get(tags.get("barrier", ""))
+    name = catalogue.barriers().lines.get(tags.get("barrier", ""))
     tall = metres(tags.get("height"))
     if name == "fence":
-        name = _FENCES.get(tags.get("fence_type", tags.get("material", "")), "fence")
+        name = catalogue.barriers().fences.get(tags.get("fence_type", tags.get("material", "")), "fence")
         if name == "fence" and tall is not None and tall > 1.5:
             name = "fence_high"
     elif name == "wall":
@@ -154,7 +144,7 @@ def gate_yaws(osm: OsmData) -> dict[int, float]:
     ways: dict[int, float] = {}
     wanted = {n.id for n in osm.nodes if n.tags.get("barrier") in _GATES}
     for way in osm.ways:
-        fence = way.tags.get("barrier") in _BARRIERS or way.tags.get("barrier") == "retaining_wall"
+        fence = way.tags.get("barrier") in catalogue.barriers().lines or way.tags.get("barrier") == "retaining_wall"
         if not fence and "highway" not in way.tags:
             continue
         for k, node in enumerate(way.nodes):

@@ -27,22 +27,16 @@ from vico.world.model import FIRST_OBJECT, Dropped, Transit
 from vico.world.objects import FEET, Objects
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.objects.barriers import barrier_wishes, gate_yaws
+from vico.worldgen.objects.catalogue import standing
 from vico.worldgen.objects.groups import group_wishes
 from vico.worldgen.objects.kinds import region, thing_of
 from vico.worldgen.objects.site import Site
 from vico.worldgen.objects.trees import climate, planted_wishes, row_wishes, tree_wish
 from vico.worldgen.objects.wishes import Wish, direction
 
-_LANDMARKS = ("subway_entrance", "artwork", "memorial", "monument", "fountain", "kiosk", "shelter", "statue")
-_TWINS = ("bollard", "block")  # of which nobody puts up two a hand's breadth apart
 _TWIN_GAP = 0.3  # metres between two that are one, mapped twice
 _KERB_REACH = 9.0  # signals and signs are mapped on the street's middle
 _SWEPT = 0.36  # metres at each side of a lane that no vehicle's body sweeps, a little less than `vico check` allows
-_AT_KERBS = ("traffic_signals", "bus_stop", "speed_camera", "lift_gate", "sign")
-_ANYHOW = ("tree", "shrub", "stone", "rock", "stump", "flowers")  # no side of theirs is the front
-_LOOK_AT_STREET = ("street_lamp", "lantern", "park_lamp", "bus_stop", "traffic_signals", "bollard", "surveillance",
-                   "sign", "catenary_mast", "traffic_mirror", "speed_camera")  # fmt: skip
-_LOOK_ALONG = ("traffic_signals", "sign", "billboard", "poster_box", "speed_camera")
 
 
 def objects_from_osm(
@@ -132,13 +126,19 @@ def _settle(wish: Wish, model: Model, site: Site, seed: int, rows: list[dict[str
     side = FEET.get(model.kind)
     foot = (side, side) if side is not None else model.size[:2]
     wide, deep = foot[0] * scale, foot[1] * scale
-    if model.kind in _TWINS and site.twin(
+    if model.kind in standing().twins and site.twin(
         model.kind, _rectangles(wish.xy[None], wide, deep, yaw)[0], min(wide, _TWIN_GAP)
     ):
         return f"{model.kind}: mapped twice"
-    reach = _KERB_REACH if model.kind in _AT_KERBS else wish.reach
+    reach = _KERB_REACH if model.kind in standing().at_kerbs else wish.reach
     found, reason = _room(
-        wish, wide, deep, yaw, 0.0 if wish.piece else reach, site, model.solid and model.kind not in _LANDMARKS
+        wish,
+        wide,
+        deep,
+        yaw,
+        0.0 if wish.piece else reach,
+        site,
+        model.solid and model.kind not in standing().landmarks,
     )
     if found is None:
         return f"{model.kind}: {reason}" + (f", and no room within {reach:g} m" if reach and not wish.piece else "")
@@ -216,16 +216,16 @@ def _facing(wish: Wish, site: Site, random: np.random.Generator) -> float:
     point = shapely.Point(wish.xy)
     name = wish.prototype
     free = float(random.uniform(-np.pi, np.pi))
-    if name.startswith(_ANYHOW):
+    if name.startswith(standing().facing_anywhere):
         return free
-    if not name.startswith(_LOOK_AT_STREET):
+    if not name.startswith(standing().facing_street):
         wall = site.solids.query_nearest(point, max_distance=4.0, all_matches=False)
         if len(wall):
             shape = site.shapes[int(wall[0])]
             away = _heading(shapely.shortest_line(shape.boundary, point))
             if away is not None:
                 return away + (math.pi if shape.contains(point) else 0.0)
-    if name.startswith(("bench", "lounger")):
+    if name.startswith(standing().facing_path):
         return _to_path(point, site, free)
     if site.carriageway.is_empty:
         return free
@@ -238,7 +238,7 @@ def _facing(wish: Wish, site: Site, random: np.random.Generator) -> float:
     elif shapely.contains(site.carriageway.shape, point):
         yaw += math.pi
     # Signals look along the street, against those who drive on their side; lamps reach over it.
-    return yaw + math.pi / 2 if name.startswith(_LOOK_ALONG) else yaw
+    return yaw + math.pi / 2 if name.startswith(standing().facing_along) else yaw
 
 
 def _to_path(point: shapely.Point, site: Site, free: float) -> float:
@@ -294,7 +294,7 @@ def _point_wishes(osm: OsmData, seed: int, zone: str, where: str) -> list[Wish]:
         if name is None:
             continue
         wish = Wish(key, name, node.xy, direction(node.tags))
-        if name.startswith(("shrub", "stone", "rock")):
+        if name.startswith(standing().of_any_size):
             wish.scale = float(random.uniform(0.8, 1.25))
         if node.id in gates and wish.yaw is None:
             wish.yaw, wish.reach = gates[node.id], 0.0 if name == "gate" else 3.0

@@ -15,76 +15,9 @@ from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, Tags
 from vico.seeds import rng
 from vico.world.heights import HeightField
+from vico.worldgen.objects.catalogue import trees
 from vico.worldgen.objects.wishes import Wish, metres
 
-_GENERA = {
-    "tilia": "tree_lime", "acer": "tree_maple", "platanus": "tree_plane", "quercus": "tree_oak",
-    "aesculus": "tree_chestnut", "castanea": "tree_chestnut", "juglans": "tree_chestnut", "fagus": "tree_chestnut",
-    "betula": "tree_birch", "alnus": "tree_lime_tall", "populus": "tree_poplar", "picea": "tree_spruce",
-    "pinus": "tree_pine", "abies": "tree_fir", "pseudotsuga": "tree_fir", "larix": "tree_larch",
-    "cedrus": "tree_stone_pine", "taxus": "tree_cypress", "thuja": "tree_cypress", "juniperus": "tree_cypress",
-    "sequoia": "tree_fir", "sequoiadendron": "tree_fir", "metasequoia": "tree_larch", "taxodium": "tree_larch",
-    "cupressus": "tree_cypress", "chamaecyparis": "tree_cypress", "phoenix": "tree_palm_date",
-    "washingtonia": "tree_palm_tall", "trachycarpus": "tree_palm", "chamaerops": "tree_palm_date",
-    "syagrus": "tree_palm_tall", "cocos": "tree_palm_tall", "salix": "tree_willow", "sorbus": "tree_young",
-    "prunus": "tree_blossom", "malus": "tree_fruit", "pyrus": "tree_fruit", "crataegus": "tree_fruit",
-    "magnolia": "tree_blossom", "cercis": "tree_blossom", "lagerstroemia": "tree_blossom", "amelanchier": "tree_fruit",
-    "citrus": "tree_fruit", "ficus": "tree_oak", "olea": "tree_olive", "eucalyptus": "tree_lime_tall",
-    "ulmus": "tree_oak", "zelkova": "tree_oak", "fraxinus": "tree_lime_tall", "carpinus": "tree_lime",
-    "robinia": "tree_lime_tall", "gleditsia": "tree_maple", "ailanthus": "tree_lime_tall", "ginkgo": "tree_lime_tall",
-    "liquidambar": "tree_maple", "liriodendron": "tree_lime_tall", "celtis": "tree_oak", "corylus": "tree_young",
-    "catalpa": "tree_chestnut", "morus": "tree_fruit", "jacaranda": "tree_blossom", "sophora": "tree_maple",
-    "styphnolobium": "tree_maple", "pyracantha": "tree_fruit", "laurus": "tree_olive",
-}  # fmt: skip
-# Common names of the languages of our maps, by what they begin or end with.
-_NAMES = {
-    "linden": "tilia", "lime": "tilia", "linde": "tilia", "tilleul": "tilia", "lehmus": "tilia", "lind": "tilia",
-    "maple": "acer", "ahorn": "acer", "érable": "acer", "vaahtera": "acer", "lönn": "acer", "plane": "platanus",
-    "sycamore": "platanus", "platan": "platanus", "oak": "quercus", "eiche": "quercus", "chêne": "quercus",
-    "tammi": "quercus", "birch": "betula", "birke": "betula", "bouleau": "betula", "koivu": "betula",
-    "björk": "betula", "poplar": "populus", "pappel": "populus", "peuplier": "populus", "poppeli": "populus",
-    "spruce": "picea", "fichte": "picea", "épicéa": "picea", "kuusi": "picea", "pine": "pinus", "kiefer": "pinus",
-    "mänty": "pinus", "tanne": "abies", "sapin": "abies", "cypress": "cupressus", "zypresse": "cupressus",
-    "cyprès": "cupressus", "palm": "phoenix", "willow": "salix", "weide": "salix", "saule": "salix", "paju": "salix",
-    "cherry": "prunus", "kirsche": "prunus", "cerisier": "prunus", "apple": "malus", "apfel": "malus",
-    "pommier": "malus", "chestnut": "aesculus", "kastanie": "aesculus", "marronnier": "aesculus", "olive": "olea",
-    "elm": "ulmus", "ash": "fraxinus", "beech": "fagus", "buche": "fagus", "larch": "larix", "lärche": "larix",
-}  # fmt: skip
-_NEEDLES = ("tree_spruce", "tree_fir", "tree_larch", "tree_pine", "tree_stone_pine", "tree_cypress")
-_PALMS = ("tree_palm", "tree_palm_tall", "tree_palm_date")
-
-# What grows along streets, and in woods; a name that comes twice is twice as common.
-_MIXES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "boreal": (
-        ("tree_lime", "tree_lime", "tree_lime_tall", "tree_maple", "tree_birch", "tree_oak", "tree_young"),
-        ("tree_pine", "tree_pine", "tree_spruce", "tree_spruce", "tree_birch", "tree_birch", "tree_fir"),
-    ),
-    "temperate": (
-        ("tree_lime", "tree_lime_tall", "tree_maple", "tree_maple", "tree_plane", "tree_chestnut", "tree_oak",
-         "tree_birch", "tree_young", "tree_blossom"),
-        ("tree_oak", "tree_oak", "tree_maple", "tree_lime_tall", "tree_chestnut", "tree_birch", "tree_spruce",
-         "tree_pine"),
-    ),
-    "alpine": (
-        ("tree_lime", "tree_maple", "tree_birch", "tree_chestnut", "tree_larch", "tree_fruit", "tree_poplar"),
-        ("tree_spruce", "tree_spruce", "tree_fir", "tree_larch", "tree_pine", "tree_birch"),
-    ),
-    "mediterranean": (
-        ("tree_plane", "tree_plane", "tree_palm_date", "tree_palm", "tree_palm_tall", "tree_stone_pine", "tree_olive",
-         "tree_pollard", "tree_cypress"),
-        ("tree_stone_pine", "tree_stone_pine", "tree_pine", "tree_oak", "tree_cypress", "tree_olive"),
-    ),
-    "tropical": (
-        ("tree_palm", "tree_palm_tall", "tree_palm_date", "tree_oak", "tree_chestnut", "tree_blossom"),
-        ("tree_oak", "tree_chestnut", "tree_lime_tall", "tree_palm", "tree_palm_tall"),
-    ),
-}  # fmt: skip
-
-# Square metres a tree has of its own where an area is planted.
-_ROOM = {
-    "wood": 45.0, "forest": 45.0, "orchard": 60.0, "park": 240.0, "garden": 260.0, "cemetery": 260.0,
-    "village_green": 380.0, "recreation_ground": 500.0, "nature_reserve": 120.0, "dog_park": 320.0,
-}  # fmt: skip
 _SHRUB_ROOM = 7.0
 _BARE = {
     "leisure": ("pitch", "playground", "swimming_pool", "track", "stadium", "sports_centre", "marina"),
@@ -121,7 +54,7 @@ def tree_wish(key: str, tags: Tags, xy: NDArray[np.float64], seed: int, zone: st
     if girth and girth > 20:  # centimetres, whatever the wiki says
         girth /= 100
     if height:
-        if crown and "genus" not in tags and "species" not in tags and name not in _PALMS:
+        if crown and "genus" not in tags and "species" not in tags and name not in trees().palms:
             name = _by_shape(name, crown / height)
             tall = street_models()[name].size[2]
         scale = height / tall
@@ -134,7 +67,8 @@ def tree_wish(key: str, tags: Tags, xy: NDArray[np.float64], seed: int, zone: st
 
 def _by_shape(name: str, ratio: float) -> str:
     """Name the model of the same leaves whose crown is as wide for its height as measured."""
-    leaves = _NEEDLES if name in _NEEDLES else ("tree_lime", "tree_lime_tall", "tree_maple", "tree_poplar", "tree_oak")
+    needles = trees().needles
+    leaves = needles if name in needles else ("tree_lime", "tree_lime_tall", "tree_maple", "tree_poplar", "tree_oak")
     models = street_models()
     return min(leaves, key=lambda n: abs(math.log(max(models[n].size[0] / models[n].size[2], 0.05) / max(ratio, 0.05))))
 
@@ -142,12 +76,12 @@ def _by_shape(name: str, ratio: float) -> str:
 def _genus(tags: Tags) -> str | None:
     for key in ("genus", "species", "taxon"):
         genus = tags.get(key, "").split(" ")[0].lower()
-        if genus in _GENERA:
+        if genus in trees().genera:
             return genus
     for key, value in tags.items():
         if key.split(":")[0] in ("species", "taxon", "genus") or key == "name":
             for word in value.lower().replace("-", " ").split():
-                for known, genus in _NAMES.items():
+                for known, genus in trees().names.items():
                     if word == known or (len(known) > 4 and word.endswith(known)):
                         return genus
     return None
@@ -160,17 +94,19 @@ def _model(tags: Tags, xy: NDArray[np.float64], seed: int, random: np.random.Gen
     if genus == "populus" and "tremula" in tags.get("species", ""):
         return "tree_birch"
     if genus is not None:
-        return _GENERA[genus]
+        return trees().genera[genus]
+    known = trees()
     leaves = tags.get("leaf_type", tags.get("wood", ""))
     if leaves == "palm":
-        return _PALMS[int(random.integers(len(_PALMS)))]
-    mix = _MIXES[zone][1 if wild else 0]
+        return known.palms[int(random.integers(len(known.palms)))]
+    planted = known.mixes[zone]
+    mix = planted.woods if wild else planted.streets
     if leaves in ("needleleaved", "coniferous"):
-        mix = tuple(n for n in _MIXES[zone][1] if n in _NEEDLES) or ("tree_spruce",)
+        mix = tuple(n for n in planted.woods if n in known.needles) or ("tree_spruce",)
     elif leaves in ("broadleaved", "deciduous"):
         evergreen = tags.get("leaf_cycle") == "evergreen" and zone in ("mediterranean", "tropical")
-        mix = ("tree_oak", "tree_olive") if evergreen else tuple(n for n in mix if n not in (*_NEEDLES, *_PALMS))
-        mix = mix or ("tree_oak",)
+        mix = tuple(n for n in mix if n not in (*known.needles, *known.palms))
+        mix = ("tree_oak", "tree_olive") if evergreen else mix or ("tree_oak",)
     if not wild and random.random() < 0.78:
         # Neighbours in a street are of one kind, mostly.
         local = rng(seed, "species", int(xy[0] // 60) + 10_000, int(xy[1] // 60) + 10_000)
@@ -227,12 +163,12 @@ def spread(
 
 
 def _use(area: OsmArea) -> str | None:
-    """Say what is planted in an area, a key of `_ROOM` or ``scrub``."""
+    """Say what is planted in an area, a key of `Trees.room` or ``scrub``."""
     tags = area.tags
     if tags.get("natural") in ("wood", "scrub", "shrubbery"):
         return "wood" if tags["natural"] == "wood" else "scrub"
     for key in ("landuse", "leisure"):
-        if tags.get(key) in _ROOM and "building" not in tags:
+        if tags.get(key) in trees().room and "building" not in tags:
             return tags[key]
     return None
 
@@ -242,6 +178,7 @@ def planted_wishes(
 ) -> list[Wish]:
     """Trees of woods, parks, gardens and cemeteries, shrubs of scrub, where only the area is mapped, off the ways."""
     window = shapely.box(-half, -half, half, half)
+    room = trees().room
     bare = [
         area.polygon
         for area in osm.areas
@@ -257,7 +194,7 @@ def planted_wishes(
         ]
     )
     mapped = [node.xy for node in osm.nodes if node.tags.get("natural") == "tree"]
-    trees = shapely.points(np.array(mapped).reshape(-1, 2))
+    trunks = shapely.points(np.array(mapped).reshape(-1, 2))
     done: BaseGeometry = shapely.Polygon()
     found: list[tuple[float, Wish]] = []
     order = {"wood": 0, "forest": 0, "scrub": 1, "orchard": 1}
@@ -277,17 +214,17 @@ def planted_wishes(
                 found.append((float(random.random()), wish))
             continue
         wild = use in ("wood", "forest", "nature_reserve")
-        there = int(shapely.contains(area.polygon, trees).sum()) if len(trees) else 0
-        if not wild and there > 0.3 * ground.area / _ROOM[use]:
+        there = int(shapely.contains(area.polygon, trunks).sum()) if len(trunks) else 0
+        if not wild and there > 0.3 * ground.area / room[use]:
             continue  # somebody mapped them
-        for k, xy in enumerate(spread(ground, _ROOM[use], 260, random)):
+        for k, xy in enumerate(spread(ground, room[use], 260, random)):
             wish = tree_wish(f"{area.id}.{k}", area.tags, xy, seed, zone, wild=wild)
             if use == "orchard":
                 wish.prototype, wish.scale = "tree_fruit", 1.0
             wish.reach = 0.0
             found.append((float(random.random()), wish))
         if use in ("park", "garden", "cemetery"):
-            for k, xy in enumerate(spread(ground, 2.2 * _ROOM[use] if use == "park" else 70.0, 40, random)):
+            for k, xy in enumerate(spread(ground, 2.2 * room[use] if use == "park" else 70.0, 40, random)):
                 name = ("shrub", "shrub_tall", "shrub_flowering")[int(random.integers(3))]
                 wish = Wish(f"{area.id}.s{k}", name, xy, None, float(random.uniform(0.8, 1.2)), reach=0.0)
                 found.append((float(random.random()), wish))
