@@ -31,6 +31,17 @@ def test_walls_flush_with_each_other_flicker_where_they_overlap() -> None:
     assert found.touching == 0
 
 
+def test_without_those_that_face_each_other_the_flickering_ones_are_the_same() -> None:
+    boxes = [box((0, 0, 0), (4, 5, 6)), box((3, 0, 1), (9, 4, 5)), box((4, 5, 0), (9, 9, 6)), box((0, 5, 0), (4, 9, 8))]
+    every = coplanar_overlaps(np.concatenate(boxes))
+    alone = coplanar_overlaps(np.concatenate(boxes), facing=False)
+    assert every.touching > 0
+    assert every.flickering > 0
+    assert np.array_equal(alone.first, every.first[every.same])
+    assert np.array_equal(alone.second, every.second[every.same])
+    assert np.array_equal(alone.area, every.area[every.same])
+
+
 def test_boxes_apart_have_none() -> None:
     found = coplanar_overlaps(np.concatenate([box((0, 0, 0), (4, 5, 6)), box((5, 0, 0), (9, 5, 6))]))
     assert len(found.first) == 0

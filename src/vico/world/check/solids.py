@@ -9,12 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from numba import njit
 from numpy.typing import NDArray
 
 from vico.geo import overlay
 
 _PLANE = 0.004  # metres within which two faces count as one plane
 _TURN = 0.004  # most difference of their unit normals' components
+_SLACK = 0.002  # metres by which faces may reach over one another's border without being looked at
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,10 @@ class CoplanarPairs:
     area: NDArray[np.float64]
     same: NDArray[np.bool_]
 
+    def chosen(self, which: NDArray[np.bool_]) -> CoplanarPairs:
+        """Some of the pairs; `which` has shape ``(n,)``."""
+        return CoplanarPairs(self.first[which], self.second[which], self.area[which], self.same[which])
+
     @property
     def flickering(self) -> int:
         """Pairs that are seen to flicker."""
@@ -49,7 +55,11 @@ class CoplanarPairs:
 
 
 def coplanar_overlaps(
-    corners: NDArray[np.floating], *, least: float = 0.01, among: NDArray[np.bool_] | None = None
+    corners: NDArray[np.floating],
+    *,
+    least: float = 0.01,
+    among: NDArray[np.bool_] | None = None,
+    facing: bool = True,
 ) -> CoplanarPairs:
     """Find triangles that overlap in one plane.
 
@@ -61,6 +71,9 @@ def coplanar_overlaps(
         Overlaps smaller than this many square metres don't count.
     among
         Triangles to look at, shape ``(n,)``; None: all.
+    facing
+        Whether pairs that face each other are told; without them it is done in half the time, as party walls are most
+        of what lies in one plane.
 
     Returns
     -------
@@ -88,20 +101,29 @@ def coplanar_overlaps(
     pairs: list[NDArray[np.int64]] = []
     for turn in (0.0, 0.5):
         for shift in (0.0, 0.5):
-            key = np.concatenate(
-                [np.floor(plane / (4 * _TURN) + turn), np.floor(offset / (4 * _PLANE) + shift)[:, None]], axis=1
-            ).astype(np.int64)
-            _, bin_, count = np.unique(key, axis=0, return_inverse=True, return_counts=True)
-            pairs.append(_met(points, plane, bin_.ravel(), count))
-    found = np.unique(np.concatenate(pairs), axis=0)
-    first, second = found[:, 0], found[:, 1]
+            steps = [np.floor(plane[:, k] / (4 * _TURN) + turn) for k in range(3)]
+            steps.append(np.floor(offset / (4 * _PLANE) + shift))
+            bin_, count = _binned([*steps, np.zeros(len(kept)) if facing else sign])
+            pairs.append(_met(points, plane, bin_, count))
+    met = np.unique(np.concatenate(pairs))
+    first, second = met // len(kept), met % len(kept)
     away = np.abs(np.einsum("nki,ni->nk", points[second], plane[first]) - offset[first, None]).max(axis=1)
     close = (away < _PLANE) & (np.abs(plane[first] - plane[second]).max(axis=1) < _TURN)
     first, second = first[close], second[close]
-    area = _common(points, plane, first, second)
+    area = _common(points, plane, first, second, least)
     real = area > least
     first, second, area = first[real], second[real], area[real]
     return CoplanarPairs(kept[first], kept[second], area, sign[first] == sign[second])
+
+
+def _binned(values: list[NDArray[np.float64]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Number rows of whole numbers, equal rows alike: the number of each, and how many have each number."""
+    key = np.zeros(len(values[0]), np.int64)
+    for value in values:
+        whole = value.astype(np.int64) - int(value.min())
+        key = key * (int(whole.max()) + 1) + whole
+    _, bin_, count = np.unique(key, return_inverse=True, return_counts=True)
+    return bin_.ravel(), count
 
 
 def _axes(plane: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -116,39 +138,78 @@ def _axes(plane: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.f
 def _met(
     points: NDArray[np.float64], plane: NDArray[np.float64], bin_: NDArray[np.int64], count: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Pairs of a bin whose flat boxes overlap, shape ``(n, 2)``."""
+    """Pairs of a bin whose flat boxes overlap, shape ``(m,)``: the first's index times ``n`` and the second's."""
     members = np.flatnonzero(count[bin_] > 1)
     if not len(members):
-        return np.zeros((0, 2), np.int64)
+        return np.zeros(0, np.int64)
     # Level and steep planes are each laid flat along fixed world axes, the same for all of a bin.
     bins, leader = np.unique(bin_[members], return_index=True)
     of = np.searchsorted(bins, bin_[members])
     across, up = (axis[of] for axis in _axes(plane[members[leader]]))
     u = np.einsum("nki,ni->nk", points[members], across)
     v = np.einsum("nki,ni->nk", points[members], up)
-    reach = max(float(np.ptp(u)), float(np.ptp(v))) + 1.0
-    u = u + (of * reach)[:, None]
-    slack = 0.002
-    boxes = shapely.box(u.min(axis=1) + slack, v.min(axis=1) + slack, u.max(axis=1) - slack, v.max(axis=1) - slack)
-    a, b = shapely.STRtree(boxes).query(boxes)
-    a, b = a[a < b], b[a < b]
-    return np.stack([members[a], members[b]], axis=1)
+    # What is thinner than the slack keeps its place.
+    boxes = np.concatenate([np.sort([at.min(axis=1) + _SLACK, at.max(axis=1) - _SLACK], axis=0) for at in (u, v)])
+    order = np.lexsort((boxes[0], of))
+    a, b = _boxes_met(of[order], boxes[:, order])
+    a, b = members[order[a]], members[order[b]]
+    return np.asarray(np.minimum(a, b) * len(points) + np.maximum(a, b), np.int64)
+
+
+@njit(cache=True)
+def _boxes_met(bin_: NDArray[np.int64], boxes: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of boxes of one bin that overlap; boxes are sorted by bin and then by their first row, u from.
+
+    The rows are u from, u to, v from, v to; shape ``(4, n)``.
+    """
+    count = 0
+    first = np.empty(4 * len(bin_), np.int64)
+    second = np.empty(4 * len(bin_), np.int64)
+    for i in range(len(bin_)):
+        j = i + 1
+        while j < len(bin_) and bin_[j] == bin_[i] and boxes[0, j] <= boxes[1, i]:
+            if boxes[0, i] <= boxes[1, j] and boxes[2, i] <= boxes[3, j] and boxes[2, j] <= boxes[3, i]:
+                if count == len(first):
+                    first = np.concatenate((first, np.empty(count, np.int64)))
+                    second = np.concatenate((second, np.empty(count, np.int64)))
+                first[count], second[count] = i, j
+                count += 1
+            j += 1
+    return first[:count], second[:count]
 
 
 def _common(
-    points: NDArray[np.float64], plane: NDArray[np.float64], first: NDArray[np.int64], second: NDArray[np.int64]
+    points: NDArray[np.float64],
+    plane: NDArray[np.float64],
+    first: NDArray[np.int64],
+    second: NDArray[np.int64],
+    least: float,
 ) -> NDArray[np.float64]:
-    """Area two triangles of a plane share."""
-    if not len(first):
-        return np.zeros(0)
+    """Area two triangles of a plane share; 0 where it is certainly not more than `least`."""
     across, up = _axes(plane[first])
-    shapes = []
-    for which in (first, second):
-        flat = np.stack(
-            [np.einsum("nki,ni->nk", points[which], across), np.einsum("nki,ni->nk", points[which], up)], axis=-1
-        )
-        shapes.append(shapely.polygons(flat))
-    return np.asarray(overlay.common_area(shapes[0], shapes[1]), np.float64)
+    one, two = (
+        np.stack([np.einsum("nki,ni->nk", points[which], across), np.einsum("nki,ni->nk", points[which], up)], axis=-1)
+        for which in (first, second)
+    )
+    area = np.zeros(len(first))
+    near = np.flatnonzero((_most_common(one, two) > least) & (_most_common(two, one) > least))
+    shapes = (shapely.polygons(flat[near]) for flat in (one, two))
+    area[near] = np.asarray(overlay.common_area(*shapes), np.float64)
+    return area
+
+
+def _most_common(one: NDArray[np.float64], two: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Bound the area that pairs of triangles share, by how far the second reaches over each edge of the first.
+
+    What they share lies in a strip along the edge, as deep as that and no longer than the second is wide.
+    """
+    side = np.roll(one, -1, axis=1) - one
+    side /= np.maximum(np.linalg.norm(side, axis=2, keepdims=True), 1e-12)
+    turn = side[:, 0, 0] * side[:, 1, 1] - side[:, 0, 1] * side[:, 1, 0]
+    inward = np.stack([-side[..., 1], side[..., 0]], axis=-1) * np.where(turn < 0, -1.0, 1.0)[:, None, None]
+    depth = np.einsum("neci,nei->nec", two[:, None] - one[:, :, None], inward).max(axis=2).min(axis=1)
+    wide = np.linalg.norm(np.ptp(two, axis=1), axis=1)
+    return np.asarray(np.maximum(depth, 0.0) * wide, np.float64)
 
 
 def open_edges(faces: NDArray[np.integer]) -> NDArray[np.bool_]:
