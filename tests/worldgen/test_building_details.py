@@ -40,7 +40,7 @@ def fringes(
     plans: list[BuildingPlan], *, reach: float = 0.5, streets: shapely.STRtree = NO_STREETS
 ) -> list[list[PartPlan]]:
     meshes = [[part_mesh(part, Seat(-0.3, 0.0)) for part in plan.parts] for plan in plans]
-    return eaves(plans, meshes, [0.0] * len(plans), [reach] * len(plans), ["eaves"] * len(plans), streets)
+    return eaves(plans, meshes, [0.0] * len(plans), [reach] * len(plans), ["eaves"] * len(plans), streets, dropped=[])
 
 
 def mesh_of(part: PartPlan) -> Mesh:

@@ -13,7 +13,7 @@ from vico.geo.overlay import OverlayError
 from vico.world.check import check_world
 from vico.world.folder import World, read_world
 from vico.world.model import Dropped
-from vico.worldgen.buildings import stage
+from vico.worldgen.buildings import drafts
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.pipeline import build_world
 
@@ -22,14 +22,14 @@ EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pb
 
 def built_with(error: Exception, share: int, out: Path, monkeypatch: pytest.MonkeyPatch) -> World:
     """A world in which every `share`-th building can't be seated."""
-    seat_of, count = stage.seat_of, iter(range(10_000))
+    seat_of, count = drafts.seat_of, iter(range(10_000))
 
     def failing(*given: object) -> object:
         if next(count) % share == 0:
             raise error
         return seat_of(*given)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(stage, "seat_of", failing)
+    monkeypatch.setattr(drafts, "seat_of", failing)
     build_world(EXTRACT, lat=60.1690, lon=24.9435, half=60, out=out)
     return read_world(out)
 

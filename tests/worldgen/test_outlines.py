@@ -2,6 +2,8 @@
 
 import math
 from collections.abc import Mapping
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,8 +13,11 @@ from shapely import MultiPolygon, Polygon
 from stages_alone import buildings_of
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, OsmWay
+from vico.geo.overlay import OverlayError
 from vico.worldgen.buildings.stage import buildings_from_plans
+from vico.worldgen.facts.outlines import apart, buildings
 from vico.worldgen.facts.outlines.buildings import building_plans
+from vico.worldgen.facts.outlines.needles import without_needles
 from vico.worldgen.facts.outlines.parts import bearing_of
 from vico.worldgen.facts.outlines.plans import RULES, BuildingPlan
 from vico.worldgen.ground.terrain import flat_terrain
@@ -52,6 +57,30 @@ def test_what_is_no_building_here_is_left_out_with_its_reason() -> None:
     assert said["w3"] == "underground"
     assert "below ground" in said["w4"]
     assert "w5" not in said
+
+
+SPIKED = [
+    # Out to a point and back, outwards and inwards; from corners in the wrong order; to a courtyard.
+    Polygon([(0, 0), (12, 0), (12, 5), (30, 5.0), (12, 5.01), (12, 10), (0, 10)]),
+    Polygon([(0, 0), (12, 0), (12, 5), (3, 5.0), (12, 5.01), (12, 10), (0, 10)]),
+    Polygon([(0, 0), (12, 0), (12, 10.06), (0, 10), (25, 10.08)]).buffer(0),
+    Polygon([(0, 0), (12, 0), (12, 10), (0, 10)], [[(0.002, 5), (6, 5.005), (6, 8), (3, 8), (3, 5.006)]]),
+]
+
+
+@pytest.mark.parametrize("drawn", SPIKED)
+def test_spikes_and_slits_of_an_outline_are_no_walls(drawn: Polygon) -> None:
+    (part,) = planned([(drawn, {"building": "yes"})])["w1"].parts
+    assert abs(part.polygon.area - drawn.area) < 0.2
+    for thin in (-0.05, 0.05):  # nothing of it, and nothing beside it, is thinner than a hand
+        through = part.polygon.buffer(thin, join_style="mitre").buffer(-thin, join_style="mitre")
+        assert through.symmetric_difference(part.polygon).area < 0.01
+
+
+def test_an_outline_without_spikes_stays_as_it_is_drawn() -> None:
+    for drawn in ([(0, 0), (40, 0), (0, 8)], [(0, 0), (20, 0), (20, 0.15), (0, 0.15)]):  # a wedge; a wall
+        polygon = Polygon(drawn)
+        assert without_needles(polygon) is polygon
 
 
 def test_a_building_over_the_edge_with_its_middle_inside_stays_whole() -> None:
@@ -226,3 +255,27 @@ def test_an_outline_its_parts_cover_partly_keeps_the_rest() -> None:
         ]
     )["w1"]
     assert sum(part.polygon.area for part in plan.parts) == pytest.approx(600.0, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("module", "function"), [(apart, "_settled"), (apart, "_beside"), (buildings, "_pieces"), (buildings, "part_of")]
+)
+def test_an_outline_that_cant_be_cut_costs_its_building_alone(
+    module: ModuleType, function: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = getattr(module, function)
+
+    def failing(first: Any, *more: Any) -> Any:
+        polygon = getattr(first, "polygon", first)
+        if polygon.intersects(shapely.Point(5, 5)):
+            raise OverlayError("side location conflict")
+        return made(first, *more)
+
+    monkeypatch.setattr(module, function, failing)
+    levels = {"building": "yes", "building:levels": "5", "building:min_level": "3"}
+    osm = town([(shapely.box(0, 0, 9, 9), levels), (shapely.box(8, 0, 20, 9), {"building": "yes", "height": "30"})])
+    decided = building_plans(osm, seed=0)
+    assert [plan.id for plan in decided.plans] == ["w2"]
+    assert [(entry.id, entry.reason) for entry in decided.dropped] == [
+        ("w1", "can't be made: OverlayError: side location conflict")
+    ]

@@ -24,7 +24,7 @@ def house(west: float, east: float, eaves: float = 10.0) -> BuildingPlan:
 
 def test_cornices_of_a_row_do_not_meet_nor_enter_the_next_house() -> None:
     row = [house(0, 12), house(12, 24), house(24, 36, eaves=16.0)]
-    ledges = cornices(row, ["wall_classic"] * 3, [0.0] * 3)
+    ledges = cornices(row, ["wall_classic"] * 3, [0.0] * 3, dropped=[])
     assert all(ledges)
     shapes = [shapely.union_all([ledge.polygon for ledge in mine]) for mine in ledges]
     assert shapely.intersection(shapes[0], shapes[1]).area == 0.0
@@ -34,7 +34,7 @@ def test_cornices_of_a_row_do_not_meet_nor_enter_the_next_house() -> None:
 
 
 def test_plain_walls_have_no_cornice() -> None:
-    assert cornices([house(0, 12)], ["wall_glass"], [0.0]) == [[]]
+    assert cornices([house(0, 12)], ["wall_glass"], [0.0], dropped=[]) == [[]]
 
 
 def test_a_canopy_stands_on_posts_that_keep_off_the_street() -> None:

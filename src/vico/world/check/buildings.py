@@ -178,6 +178,4 @@ def overlapping_faces(
     whose = np.stack([np.minimum(one, other), np.maximum(one, other)], axis=1)
     keys, index = np.unique(whose, axis=0, return_inverse=True)
     seen = np.bincount(index.ravel(), weights=pairs.area, minlength=len(keys)) >= _SEEN
-    return {
-        (int(keys[k, 0]), int(keys[k, 1])): pairs.chosen(index.ravel() == k) for k in np.flatnonzero(seen).tolist()
-    }
+    return {(int(keys[k, 0]), int(keys[k, 1])): pairs.chosen(index.ravel() == k) for k in np.flatnonzero(seen).tolist()}

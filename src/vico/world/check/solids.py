@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numba import njit
 from numpy.typing import NDArray
 
 from vico.geo import overlay
+from vico.io.compiled import compiled
 
 _PLANE = 0.004  # metres within which two faces count as one plane
 _TURN = 0.004  # most difference of their unit normals' components
@@ -40,7 +40,7 @@ class CoplanarPairs:
     same: NDArray[np.bool_]
 
     def chosen(self, which: NDArray[np.bool_]) -> CoplanarPairs:
-        """Some of the pairs; `which` has shape ``(n,)``."""
+        """Return some of the pairs; `which` has shape ``(n,)``."""
         return CoplanarPairs(self.first[which], self.second[which], self.area[which], self.same[which])
 
     @property
@@ -117,7 +117,7 @@ def coplanar_overlaps(
 
 
 def _binned(values: list[NDArray[np.float64]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Number rows of whole numbers, equal rows alike: the number of each, and how many have each number."""
+    """Give rows of whole numbers a number each, equal rows the same; and count how many have each."""
     key = np.zeros(len(values[0]), np.int64)
     for value in values:
         whole = value.astype(np.int64) - int(value.min())
@@ -156,7 +156,7 @@ def _met(
     return np.asarray(np.minimum(a, b) * len(points) + np.maximum(a, b), np.int64)
 
 
-@njit(cache=True)
+@compiled
 def _boxes_met(bin_: NDArray[np.int64], boxes: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Pairs of boxes of one bin that overlap; boxes are sorted by bin and then by their first row, u from.
 

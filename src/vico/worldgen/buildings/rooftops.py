@@ -14,7 +14,9 @@ from shapely.geometry.base import BaseGeometry
 from vico.exact import apply_matrix
 from vico.geo import overlay
 from vico.geo.osm import polygons_of
+from vico.world.model import Dropped
 from vico.worldgen.facades.catalogue import styles
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
 from vico.worldgen.facts.outlines.roof_shapes import Roof, rings_of
 
@@ -61,6 +63,8 @@ def cornices(
     walls: Sequence[str],
     bases: Sequence[float],
     fronts: Sequence[Sequence[NDArray[np.bool_]] | None] | None = None,
+    *,
+    dropped: list[Dropped],
 ) -> list[list[PartPlan]]:
     """Ledges under the eaves of old-fashioned walls, cut where neighbours stand or have theirs.
 
@@ -74,6 +78,8 @@ def cornices(
         Height of each one's ground floor, metres.
     fronts
         Of each part the edges that have one; None, for a building or for all: every edge.
+    dropped
+        Where it is told whose can't be made.
 
     Returns
     -------
@@ -95,33 +101,36 @@ def cornices(
             continue
         if family.cornice == "under_flat_roofs" and part.roof.shape != "flat":
             continue
-        deep, out = family.cornice_size
-        low, high = bases[p] + part.eaves - deep, bases[p] + part.eaves + _CORNICE_ABOVE
-        outline = overlay.simplify(part.polygon, 0.2)
-        outer = overlay.buffer(outline, out, join_style="mitre", mitre_limit=1.6)
-        # Against the wall, not into it: an inner face would come to lie in the plane of some other wall.
-        shape: BaseGeometry = overlay.difference(outer, part.polygon)
-        edges = shown[k]
-        if edges is not None and not edges.all():
-            shape = overlay.intersection(shape, _before(part.polygon, edges, out + 0.01))
-            if shape.is_empty:
-                continue
-        taken: list[BaseGeometry] = []
-        for j in sorted(tree.query(outer, predicate="dwithin", distance=out + 0.08).tolist()):
-            other, q = rows[j]
-            if j != k and bases[q] + other.top > low - 0.1 and bases[q] + other.low < high:
-                taken.append(other.polygon)
-            taken += [ledge for ledge, bottom, top in of_part.get(j, []) if top > low - 0.02 and bottom < high + 0.02]
-        if taken:
-            # A finger's breadth clear of them, so that no two faces lie in one plane.
-            shape = overlay.difference(shape, overlay.buffer(overlay.union_all(taken), 0.012, join_style="mitre"))
-        # An opening takes away what is thinner than a hand.
-        core = overlay.buffer(shape, -0.04, join_style="mitre")
-        shape = overlay.intersection(overlay.buffer(core, 0.045, join_style="mitre", mitre_limit=2.0), shape)
-        kept = polygons_of(shape, 0.12)
-        finish = family.cornice_finishes[zlib.crc32(plans[p].id.encode()) % len(family.cornice_finishes)]
-        of_part[k] = [(ledge, low, high) for ledge in kept]
-        made[p] += [_solid(ledge, low - bases[p], high - bases[p], finish) for ledge in kept]
+        with expendable(f"{plans[p].id} cornice", dropped):
+            deep, out = family.cornice_size
+            low, high = bases[p] + part.eaves - deep, bases[p] + part.eaves + _CORNICE_ABOVE
+            outline = overlay.simplify(part.polygon, 0.2)
+            outer = overlay.buffer(outline, out, join_style="mitre", mitre_limit=1.6)
+            # Against the wall, not into it: an inner face would come to lie in the plane of some other wall.
+            shape: BaseGeometry = overlay.difference(outer, part.polygon)
+            edges = shown[k]
+            if edges is not None and not edges.all():
+                shape = overlay.intersection(shape, _before(part.polygon, edges, out + 0.01))
+                if shape.is_empty:
+                    continue
+            taken: list[BaseGeometry] = []
+            for j in sorted(tree.query(outer, predicate="dwithin", distance=out + 0.08).tolist()):
+                other, q = rows[j]
+                if j != k and bases[q] + other.top > low - 0.1 and bases[q] + other.low < high:
+                    taken.append(other.polygon)
+                taken += [
+                    ledge for ledge, bottom, top in of_part.get(j, []) if top > low - 0.02 and bottom < high + 0.02
+                ]
+            if taken:
+                # A finger's breadth clear of them, so that no two faces lie in one plane.
+                shape = overlay.difference(shape, overlay.buffer(overlay.union_all(taken), 0.012, join_style="mitre"))
+            # An opening takes away what is thinner than a hand.
+            core = overlay.buffer(shape, -0.04, join_style="mitre")
+            shape = overlay.intersection(overlay.buffer(core, 0.045, join_style="mitre", mitre_limit=2.0), shape)
+            kept = polygons_of(shape, 0.12)
+            finish = family.cornice_finishes[zlib.crc32(plans[p].id.encode()) % len(family.cornice_finishes)]
+            of_part[k] = [(ledge, low, high) for ledge in kept]
+            made[p] += [_solid(ledge, low - bases[p], high - bases[p], finish) for ledge in kept]
     return made
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import mapbox_earcut
@@ -16,10 +17,12 @@ from vico.world.check.solids import open_edges
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface
 from vico.worldgen.buildings.roofs.solid import building_solid
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
 from vico.worldgen.facts.outlines.roof_shapes import rings_of
 
 _SKIRT = 0.3  # metres the walls reach below the lowest ground, so that no gap shows
+_BESIDE = 0.5  # metres by which a part may reach over its building's outline and count as within
 
 
 @dataclass(frozen=True)
@@ -32,11 +35,19 @@ class Seat:
 
 def seat_of(plan: BuildingPlan, terrain: HeightField) -> Seat:
     """Seat a building: walls down to the lowest ground under it, ground floor a little above that on a slope."""
-    outline = np.asarray(shapely.segmentize(plan.outline.exterior, 3.0).coords)[:, :2]
-    ground = terrain(outline)
-    lowest, highest = float(ground.min()), float(ground.max())
+    lowest, highest = _ground_along(plan.outline, terrain)
     base = lowest + min(0.4 * (highest - lowest), 1.5)
+    for part in plan.parts:  # one that stands beside the outline it belongs to may stand lower
+        corners = shapely.points(np.asarray(part.polygon.exterior.coords)[:, :2])
+        if shapely.distance(plan.outline, corners).max() > _BESIDE:
+            lowest = min(lowest, _ground_along(part.polygon, terrain)[0])
     return Seat(lowest - _SKIRT, base)
+
+
+def _ground_along(polygon: Polygon, terrain: HeightField) -> tuple[float, float]:
+    """Return the lowest and the highest ground along an outline, metres."""
+    ground = terrain(np.asarray(shapely.segmentize(polygon.exterior, 3.0).coords)[:, :2])
+    return float(ground.min()), float(ground.max())
 
 
 def heights_of(part: PartPlan, seat: Seat) -> tuple[float, float]:
@@ -76,17 +87,35 @@ def part_mesh(part: PartPlan, seat: Seat) -> Mesh:
     return vertices + np.array([x, y, eaves]), triangles
 
 
-def solid_meshes(plans: list[BuildingPlan], seats: list[Seat], known: list[list[Mesh]] | None = None) -> SolidMesh:
-    """Mesh every solid of every plan, on its seat; `known` are those of the plans' parts."""
+def solid_meshes(plans: Sequence[BuildingPlan], seats: Sequence[Seat]) -> SolidMesh:
+    """Mesh every solid of every plan, on its seat; one that can't be made has no faces."""
+    meshes: list[list[Mesh]] = []
+    for plan, seat in zip(plans, seats, strict=True):
+        meshes.append([])
+        for solid in plan.solids:
+            mesh = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
+            with expendable(plan.id, []):  # the stage that builds it tells
+                mesh = part_mesh(solid, seat)
+            meshes[-1].append(mesh)
+    return joined(meshes)
+
+
+def joined(meshes: Sequence[Sequence[Mesh]]) -> SolidMesh:
+    """Put the solids of buildings into one mesh.
+
+    Parameters
+    ----------
+    meshes
+        The solids of each building.
+    """
     points: list[NDArray[np.float64]] = []
     faces: list[NDArray[np.int64]] = []
     owner: list[NDArray[np.int64]] = []
     plan_of_part: list[int] = []
     broken: list[int] = []
     count = 0
-    for p, (plan, seat) in enumerate(zip(plans, seats, strict=True)):
-        parts = known[p] if known is not None else [part_mesh(part, seat) for part in plan.parts]
-        for vertices, triangles in (*parts, *(part_mesh(part, seat) for part in plan.rooftop)):
+    for p, solids in enumerate(meshes):
+        for vertices, triangles in solids:
             if not len(triangles):
                 broken.append(p)
             points.append(vertices)
@@ -106,8 +135,8 @@ def leaky(mesh: SolidMesh) -> set[int]:
     return set(mesh.broken) | set(mesh.plan_of_part[mesh.part[open_edges(mesh.faces)]].tolist())
 
 
-def collision_bodies(part: PartPlan, seat: Seat, entity: int) -> list[Surface]:
-    """Convex prisms that fill a part's walls, up to half the height of a pitched roof."""
+def collision_bodies(part: PartPlan, seat: Seat) -> list[Surface]:
+    """Convex prisms that fill a part's walls, up to half the height of a pitched roof; of entity 0."""
     low, eaves = heights_of(part, seat)
     top = eaves + (part.roof.height if part.roof.shape == "flat" else 0.5 * part.roof.height)
     bodies: list[Surface] = []
@@ -128,11 +157,7 @@ def collision_bodies(part: PartPlan, seat: Seat, entity: int) -> list[Surface]:
             )
             out = points - points.mean(axis=0)
             normals = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
-            bodies.append(
-                Surface.from_triangles(
-                    points, triangles, normals=normals, entity=entity, material=Material("collision")
-                )
-            )
+            bodies.append(Surface.from_triangles(points, triangles, normals=normals, material=Material("collision")))
     return bodies
 
 

@@ -21,7 +21,9 @@ from shapely.geometry.base import BaseGeometry
 from vico.exact import dot
 from vico.geo import overlay
 from vico.geo.osm import polygons_of
+from vico.world.model import Dropped
 from vico.worldgen.buildings.solids import Mesh
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
 from vico.worldgen.facts.outlines.roof_shapes import Roof, rings_of
 
@@ -151,6 +153,8 @@ def eaves(
     reaches: Sequence[float],
     finishes: Sequence[str],
     streets: shapely.STRtree,
+    *,
+    dropped: list[Dropped],
 ) -> list[list[PartPlan]]:
     """Return the fringes of all pitched roofs.
 
@@ -168,6 +172,8 @@ def eaves(
         The fringe's finish, by building.
     streets
         Centre lines of streets: over them more headroom is kept.
+    dropped
+        Where it is told whose can't be made.
 
     Returns
     -------
@@ -184,37 +190,40 @@ def eaves(
         reach = min(reaches[p], 0.12 * part.polygon.area / max(part.polygon.length / 4.0, 0.1))
         if reach < 0.1 or part.roof.shape not in _SHAPES or part.roof.height < 0.4 or part.polygon.area < 20.0:
             continue
-        top, level = bases[p] + part.top, bases[p] + part.eaves
-        edges = edges_of(part.polygon)
-        slopes = slopes_of(mesh, edges, level)
-        if not slopes or max(float(np.hypot(*slope.gradient)) for slope in slopes) > _STEEPEST:
-            continue
-        near = [j for j in sorted(tree.query(part.polygon, predicate="dwithin", distance=2 * reach).tolist()) if j != k]
-        taken: list[BaseGeometry] = []
-        walls: list[BaseGeometry] = []
-        for j in near:
-            other, q, _ = rows[j]
-            if bases[q] + other.top > level - 1.2 and bases[q] + other.low < top:
-                taken.append(other.polygon)
-                walls.append(other.polygon)
-            if j in standing and standing[j][2] > level - 1.5 and standing[j][1] < top:
-                taken.append(standing[j][0])
-        shared = _shared(edges, walls)
-        thick = 0.13 if reach < 0.5 else 0.2
-        pieces = _pieces(
-            slopes, edges, np.where(shared | (edges.length < _SHORTEST), 0.0, reach), bases[p], streets, thick
-        )
-        solid, outline, lowest = _fringe(pieces, taken, thick)
-        if solid is None:
-            continue
-        standing[k] = (outline, lowest, top)
-        body = solid.to_mesh64()
-        points = np.asarray(body.vert_properties, np.float64)[:, :3] + (*_middle(outline), -bases[p])
-        plan = PartPlan(
-            max(polygons_of(outline), key=lambda shape: shape.area), lowest - bases[p], part.eaves, 0,
-            Roof("flat", 0.0), part.tags, finishes[p],
-        )  # fmt: skip
-        made[p].append(replace(plan, mesh=(points, np.asarray(body.tri_verts, np.int64))))
+        with expendable(f"{plans[p].id} eaves", dropped):
+            top, level = bases[p] + part.top, bases[p] + part.eaves
+            edges = edges_of(part.polygon)
+            slopes = slopes_of(mesh, edges, level)
+            if not slopes or max(float(np.hypot(*slope.gradient)) for slope in slopes) > _STEEPEST:
+                continue
+            near = [
+                j for j in sorted(tree.query(part.polygon, predicate="dwithin", distance=2 * reach).tolist()) if j != k
+            ]
+            taken: list[BaseGeometry] = []
+            walls: list[BaseGeometry] = []
+            for j in near:
+                other, q, _ = rows[j]
+                if bases[q] + other.top > level - 1.2 and bases[q] + other.low < top:
+                    taken.append(other.polygon)
+                    walls.append(other.polygon)
+                if j in standing and standing[j][2] > level - 1.5 and standing[j][1] < top:
+                    taken.append(standing[j][0])
+            shared = _shared(edges, walls)
+            thick = 0.13 if reach < 0.5 else 0.2
+            pieces = _pieces(
+                slopes, edges, np.where(shared | (edges.length < _SHORTEST), 0.0, reach), bases[p], streets, thick
+            )
+            solid, outline, lowest = _fringe(pieces, taken, thick)
+            if solid is None:
+                continue
+            standing[k] = (outline, lowest, top)
+            body = solid.to_mesh64()
+            points = np.asarray(body.vert_properties, np.float64)[:, :3] + (*_middle(outline), -bases[p])
+            plan = PartPlan(
+                max(polygons_of(outline), key=lambda shape: shape.area), lowest - bases[p], part.eaves, 0,
+                Roof("flat", 0.0), part.tags, finishes[p],
+            )  # fmt: skip
+            made[p].append(replace(plan, mesh=(points, np.asarray(body.tri_verts, np.int64))))
     return made
 
 

@@ -28,7 +28,7 @@ _SPANNED = 5.0  # metres of street beneath that make it a passage
 _BARE = Roof("flat", 0.0)
 
 
-def supported(plans: list[BuildingPlan], osm: OsmData) -> list[BuildingPlan]:
+def supported(plans: list[BuildingPlan], osm: OsmData, dropped: list[Dropped]) -> list[BuildingPlan]:
     """Bring down what would hover: mappers give an upper part its first level and forget what is below.
 
     A part that begins above the ground stays where it is if enough of its area rests on other solids, enough of its
@@ -36,6 +36,7 @@ def supported(plans: list[BuildingPlan], osm: OsmData) -> list[BuildingPlan]:
     what it rests on is let down on it. Else it reaches down to the highest solid below, or to the ground.
     """
     parts = [part for plan in plans for part in plan.parts]
+    name = [plan.id for plan in plans for _ in plan.parts]
     raised = [k for k, part in enumerate(parts) if part.low > 0.0 and part.levels > 0]
     if not raised:
         return plans
@@ -44,53 +45,67 @@ def supported(plans: list[BuildingPlan], osm: OsmData) -> list[BuildingPlan]:
     passages = shapely.STRtree(ways)
     settled = list(parts)
     carrying: set[int] = set()
+    failed: set[str] = set()
     # From below upwards, so that what a part rests on has come to rest itself.
     for k in sorted(raised, key=lambda k: (parts[k].low, k)):
-        part = parts[k]
-        near = [j for j in sorted(tree.query(part.polygon, predicate="intersects").tolist()) if j != k]
-        under = [j for j in near if settled[j].low < part.low - 0.3 and settled[j].top > part.low - _GAP]
-        resting = _shared(part.polygon, [settled[j].polygon for j in under])
-        beside = [j for j in near if settled[j].low < part.low - 0.3 and settled[j].top > part.low + 2.0]
-        held = (
-            overlay.common_length(
-                part.polygon.exterior, overlay.buffer(overlay.union_all([settled[j].polygon for j in beside]), 0.1)
-            )
-            if beside
-            else 0.0
-        )
-        if resting >= _RESTING * part.polygon.area:
-            carrying.update(j for j in under if _carries(settled[j], part))
-            tops = [
-                settled[j].eaves
-                for j in under
-                if settled[j].roof.shape == "flat"
-                and overlay.common_area(settled[j].polygon, part.polygon) > 0.2 * part.polygon.area
-            ]
-            if tops and min(tops) < part.low:
-                settled[k] = replace(part, low=min(tops))
+        near = [j for j in sorted(tree.query(parts[k].polygon, predicate="intersects").tolist()) if j != k]
+        crossed = [ways[j] for j in passages.query(parts[k].polygon, predicate="intersects").tolist()]
+        with expendable(name[k], dropped):
+            settled[k], below = _settled(parts[k], [settled[j] for j in near], crossed)
+            carrying.update(near[j] for j in below)
             continue
-        if held >= _HELD * part.polygon.exterior.length:
-            continue
-        crossing = sum(
-            overlay.common_length(ways[j], part.polygon)
-            for j in passages.query(part.polygon, predicate="intersects").tolist()
-        )
-        if crossing >= _SPANNED and held > 0.0:
-            continue
-        below = [
-            settled[j].eaves
-            for j in near
-            if settled[j].eaves < part.low
-            and overlay.common_area(settled[j].polygon, part.polygon) > 0.7 * part.polygon.area
-        ]
-        low = max(below, default=0.0)
-        settled[k] = replace(part, low=low, levels=max(round((part.eaves - low - 0.6) / STOREY), 1))
+        failed.add(name[k])
     # A parapet on what carries another solid would stand in that solid's wall.
     for j in carrying:
         if settled[j].roof.shape == "flat":
             settled[j] = replace(settled[j], roof=_BARE)
     rest = iter(settled)
-    return [replace(plan, parts=_grounded([next(rest) for _ in plan.parts])) for plan in plans]
+    made = [replace(plan, parts=_grounded([next(rest) for _ in plan.parts])) for plan in plans]
+    return [plan for plan in made if plan.id not in failed]
+
+
+def _settled(part: PartPlan, near: list[PartPlan], crossed: list[shapely.LineString]) -> tuple[PartPlan, list[int]]:
+    """Let a part that begins above the ground come to rest, if nothing holds it up there.
+
+    Parameters
+    ----------
+    part
+        The part.
+    near
+        The other solids over or under it or at its walls, settled as far as they lie lower.
+    crossed
+        Streets that pass through its outline.
+
+    Returns
+    -------
+    tuple
+        The part, and the indices in `near` of what carries it.
+    """
+    under = [j for j, other in enumerate(near) if other.low < part.low - 0.3 and other.top > part.low - _GAP]
+    resting = _shared(part.polygon, [near[j].polygon for j in under])
+    if resting >= _RESTING * part.polygon.area:
+        tops = [
+            near[j].eaves
+            for j in under
+            if near[j].roof.shape == "flat"
+            and overlay.common_area(near[j].polygon, part.polygon) > 0.2 * part.polygon.area
+        ]
+        carried = [j for j in under if _carries(near[j], part)]
+        return (replace(part, low=min(tops)) if tops and min(tops) < part.low else part), carried
+    beside = [other for other in near if other.low < part.low - 0.3 and other.top > part.low + 2.0]
+    walls = overlay.buffer(overlay.union_all([other.polygon for other in beside]), 0.1)
+    held = overlay.common_length(part.polygon.exterior, walls) if beside else 0.0
+    if held >= _HELD * part.polygon.exterior.length:
+        return part, []
+    if held > 0.0 and sum(overlay.common_length(way, part.polygon) for way in crossed) >= _SPANNED:
+        return part, []
+    below = [
+        other.eaves
+        for other in near
+        if other.eaves < part.low and overlay.common_area(other.polygon, part.polygon) > 0.7 * part.polygon.area
+    ]
+    low = max(below, default=0.0)
+    return replace(part, low=low, levels=max(round((part.eaves - low - 0.6) / STOREY), 1)), []
 
 
 def _grounded(parts: list[PartPlan]) -> list[PartPlan]:
@@ -147,19 +162,26 @@ def apart(plans: list[BuildingPlan], dropped: list[Dropped]) -> list[BuildingPla
         if rank[j] < rank[i]:
             near.setdefault(i, []).append(j)
     placed: dict[int, list[PartPlan]] = {}
+    failed: set[int] = set()
     for i in order:
         placed[i] = []
+        if rows[i][0] in failed:
+            continue
         with expendable(plans[rows[i][0]].id, dropped):
             pieces = [parts[i]]
             for j in sorted(near.get(i, []), key=lambda j: int(rank[j])):
                 for other in placed[j]:
                     pieces = [piece for mine in pieces for piece in _beside(mine, other)]
             placed[i] = [replace(piece, polygon=tidy(piece.polygon)) for piece in pieces]
+            continue
+        failed.add(rows[i][0])
     result: list[BuildingPlan] = []
     first = 0
-    for plan in plans:
+    for p, plan in enumerate(plans):
         solids = [piece for i in range(first, first + len(plan.parts)) for piece in placed[i]]
         first += len(plan.parts)
+        if p in failed:
+            continue
         if not solids:
             dropped.append(Dropped(id=plan.id, reason="lies within taller buildings"))
             continue

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import Polygon
+from shapely import MultiPolygon, Polygon
 
 from vico.geo import overlay
 from vico.geo.osm import OsmArea, OsmData, Tags, polygons_of
@@ -21,6 +21,7 @@ from vico.world.model import Dropped
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.outlines.apart import apart, supported, without_slivers
 from vico.worldgen.facts.outlines.heights import STOREY, level_estimates, said_height, said_levels, weighted_median
+from vico.worldgen.facts.outlines.needles import without_needles
 from vico.worldgen.facts.outlines.parts import OPEN_KINDS, SMALL_KINDS, part_of
 from vico.worldgen.facts.outlines.plans import BuildingPlan, BuildingPlans, PartPlan
 from vico.worldgen.facts.outlines.roof_shapes import Roof, shape_named
@@ -77,25 +78,29 @@ def _mapped(osm: OsmData, key: str, dropped: list[Dropped]) -> list[_Row]:
     for area in osm.areas:
         if area.tags.get(key, "no") == "no" or (key == "building:part" and area.tags.get("building", "no") != "no"):
             continue
-        reason = _unwanted(area)
         pieces: list[Polygon] = []
-        if reason is None:
-            whole = area.polygon if area.polygon.is_valid else overlay.mended(area.polygon)
-            pieces = [
-                piece
-                for shape in polygons_of(whole)
-                for piece in polygons_of(overlay.simplify(shape, _TOLERANCE), _LEAST_AREA)
-            ]
-            if not pieces:
-                reason = f"smaller than {_LEAST_AREA:g} m2"
-        if reason is not None:
-            if shapely.intersects(area.polygon, square):
+        with expendable(area.id, dropped):
+            reason = _unwanted(area)
+            if reason is None:
+                pieces = _pieces(area.polygon)
+                reason = "" if pieces else f"smaller than {_LEAST_AREA:g} m2"
+            if reason and shapely.intersects(area.polygon, square):
                 dropped.append(Dropped(id=area.id, reason=reason))
-            continue
         rows += [
             (area.id if len(pieces) == 1 else f"{area.id}.{k}", piece, area.tags) for k, piece in enumerate(pieces, 1)
         ]
     return sorted(rows, key=lambda row: _id_key(row[0]))
+
+
+def _pieces(drawn: Polygon | MultiPolygon) -> list[Polygon]:
+    """Return the connected pieces of an outline as drawn: valid, without needless corners, spikes and slits."""
+    whole = drawn if drawn.is_valid else overlay.mended(drawn)
+    return [
+        piece
+        for shape in polygons_of(whole)
+        for simple in polygons_of(overlay.simplify(shape, _TOLERANCE), _LEAST_AREA)
+        for piece in polygons_of(without_needles(simple), _LEAST_AREA)
+    ]
 
 
 def _within(osm: OsmData, outlines: list[_Row], parts: list[_Row], dropped: list[Dropped]) -> tuple[list[_Row], ...]:
@@ -110,10 +115,10 @@ def _within(osm: OsmData, outlines: list[_Row], parts: list[_Row], dropped: list
         return False
 
     stay = [inside(row) for row in outlines]
-    owner = _owners(outlines, parts)
+    owner = _owners(outlines, parts, dropped)
     return (
         [row for row, kept in zip(outlines, stay, strict=True) if kept],
-        [row for row, of in zip(parts, owner, strict=True) if (stay[of] if of >= 0 else inside(row))],
+        [row for k, row in enumerate(parts) if k in owner and (stay[of] if (of := owner[k]) >= 0 else inside(row))],
     )
 
 
@@ -157,7 +162,8 @@ def building_plans(osm: OsmData, *, seed: int) -> BuildingPlans:
     outlines, parts = _within(
         osm, _without_twins(_mapped(osm, "building", dropped), dropped), _mapped(osm, "building:part", dropped), dropped
     )
-    owner = _owners(outlines, parts)
+    owned = _owners(outlines, parts, dropped)
+    parts, owner = [parts[k] for k in owned], list(owned.values())
     shapes = [row[1] for row in outlines]
     points = _shop_points(osm)
     shops = np.zeros(len(outlines), int)
@@ -202,7 +208,7 @@ def building_plans(osm: OsmData, *, seed: int) -> BuildingPlans:
             part = part_of(outline, tags, {}, use, 3, flat, random)
             rule = "height tag" if said_height(tags) else "levels tag" if said_levels(tags) else "town"
             plans.append(BuildingPlan(name, tags.get("name"), use, tags, outline, part.levels, 0, [part], rule=rule))
-    return BuildingPlans(apart(supported(plans, osm), dropped), dropped)
+    return BuildingPlans(apart(supported(plans, osm, dropped), dropped), dropped)
 
 
 def _part_levels(count: int, parts: list[_Row], owner: list[int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -257,25 +263,26 @@ def _without_twins(rows: list[_Row], dropped: list[Dropped]) -> list[_Row]:
     for i, j in sorted(zip(left.tolist(), right.tolist(), strict=True)):
         if i >= j or i in gone or j in gone:
             continue
-        common = overlay.common_area(shapes[i], shapes[j])
-        if common > 0.9 * max(shapes[i].area, shapes[j].area):
-            loser = i if len(rows[i][2]) < len(rows[j][2]) else j
-            gone.add(loser)
-            dropped.append(Dropped(id=rows[loser][0], reason=f"same outline as {rows[i + j - loser][0]}"))
+        with expendable(rows[j][0], dropped):
+            if overlay.common_area(shapes[i], shapes[j]) > 0.9 * max(shapes[i].area, shapes[j].area):
+                loser = i if len(rows[i][2]) < len(rows[j][2]) else j
+                gone.add(loser)
+                dropped.append(Dropped(id=rows[loser][0], reason=f"same outline as {rows[i + j - loser][0]}"))
+            continue
+        gone.add(j)  # it can't be compared
     return [row for k, row in enumerate(rows) if k not in gone]
 
 
-def _owners(outlines: list[_Row], parts: list[_Row]) -> list[int]:
+def _owners(outlines: list[_Row], parts: list[_Row], dropped: list[Dropped]) -> dict[int, int]:
     """For every part the outline that holds most of it; -1 where none holds a third."""
-    if not outlines or not parts:
-        return [-1] * len(parts)
     tree = shapely.STRtree([row[1] for row in outlines])
-    owner: list[int] = []
-    for _, polygon, _ in parts:
-        near = sorted(tree.query(polygon, predicate="intersects").tolist())
-        shared = [(overlay.common_area(outlines[k][1], polygon), -outlines[k][1].area, k) for k in near]
-        best = max(shared, default=(0.0, 0.0, -1))
-        owner.append(best[2] if best[0] > 0.34 * polygon.area else -1)
+    owner: dict[int, int] = {}
+    for part, (name, polygon, _) in enumerate(parts):
+        with expendable(name, dropped):
+            near = sorted(tree.query(polygon, predicate="intersects").tolist())
+            shared = [(overlay.common_area(outlines[k][1], polygon), -outlines[k][1].area, k) for k in near]
+            best = max(shared, default=(0.0, 0.0, -1))
+            owner[part] = best[2] if best[0] > 0.34 * polygon.area else -1
     return owner
 
 
