@@ -190,7 +190,7 @@ def try_window(window: Window, keep: Path | None = None) -> Trial:
         except EmptyInputError as error:
             state, what = "empty", (str(error),)
         except VicoError as error:
-            state, what = "refused", (f"{type(error).__name__}: {error}",)
+            state, what, detail = "refused", (f"{type(error).__name__}: {error}",), traceback.format_exc()
         except Exception as error:  # any: what is looked for
             state, what, detail = "traceback", (_frame(error),), traceback.format_exc()
     return Trial(window, state, what, time.perf_counter() - start, dropped, detail)

@@ -1,8 +1,12 @@
 """Errors a person can act on: each says what went wrong, where, and how to mend it.
 
 Every error of ours derives from `VicoError` and from the builtin it refines, so callers may catch either.
-The command line prints the sentence and exits 2; anything else is a bug and shows its traceback.
+The command line prints the sentence and exits 2. Anything else is a fault of the program: the command line says so in a
+sentence too, and where it happened; `vico --verbose` shows the traceback.
 """
+
+import os
+import traceback
 
 
 class VicoError(Exception):
@@ -33,6 +37,10 @@ class EmptyInputError(VicoError, ValueError):
     """The input was read, but holds nothing to work on."""
 
 
+class StageError(VicoError, RuntimeError):
+    """A stage of a build failed as a whole, for none of its objects in particular; its cause is what failed."""
+
+
 class MissingExtraError(VicoError, ImportError):
     """An optional part is not installed; the message holds the command to type."""
 
@@ -52,3 +60,15 @@ class LlmReplyError(VicoError, ValueError):
 
 class LlmBudgetError(VicoError, RuntimeError):
     """The calls, tokens or money a caller granted are spent."""
+
+
+def sentence_of(error: BaseException) -> str:
+    """Return the kind of an error and the first line of what it says."""
+    said = str(error).strip().splitlines()
+    return f"{type(error).__name__}: {said[0][:200]}" if said else type(error).__name__
+
+
+def line_of(error: BaseException) -> str:
+    """Return the file and line that an error came from."""
+    frames = traceback.extract_tb(error.__traceback__)
+    return f"{os.path.basename(frames[-1].filename)}:{frames[-1].lineno}" if frames else "an unknown line"

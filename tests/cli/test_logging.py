@@ -31,6 +31,30 @@ def test_what_is_told_on_stderr_is_chosen_before_the_verb(level: str, option: li
     assert done.stderr == ("vico: heard\n" if heard else "")
 
 
+FAIL = """
+from vico.cli import main
+def fail(**given):
+    raise {0}
+main.app.cli = fail
+main.main({1!r})
+"""
+
+
+@pytest.mark.parametrize("error", ["IndexError('list index out of range')", "OSError(5, 'Input/output error')"])
+def test_a_fault_of_the_program_is_a_sentence_and_its_traceback_is_for_who_asks(error: str) -> None:
+    said = {}
+    for option in ([], ["--verbose"]):
+        code = FAIL.format(error, [*option, "world"])
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+        assert done.returncode == 2
+        said[bool(option)] = done.stderr
+    (sentence,) = said[False].splitlines()
+    assert sentence.startswith(f"vico: {error.split('(')[0]}: ")
+    assert "a fault of vico; please report it" in sentence
+    assert "Traceback" in said[True]
+    assert sentence in said[True]
+
+
 def test_modules_log_under_their_own_names() -> None:
     from vico.io.http import retries
 

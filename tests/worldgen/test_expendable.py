@@ -68,5 +68,5 @@ def test_more_than_a_few_are_a_finding(tmp_path: Path, monkeypatch: pytest.Monke
 
 def test_what_is_about_the_whole_build_ends_it() -> None:
     for error in (InputError("no such file"), OSError(28, "No space left on device"), MemoryError()):
-        with pytest.raises(type(error)), expendable("w1", []):
+        with pytest.raises(type(error)), expendable("w1"):
             raise error

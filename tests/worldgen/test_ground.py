@@ -13,6 +13,7 @@ from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, OsmWay, read_osm
 from vico.world.mesh import Surface
 from vico.world.model import ENTITY_GREEN, ENTITY_GROUND, ENTITY_ROAD
+from vico.worldgen.facts.expendable import NamedShape
 from vico.worldgen.facts.ground_kinds import ground_partition, sea_polygons
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.facts.streets import StreetPolygons, carriageway_width, lane_count
@@ -95,10 +96,10 @@ def test_crossings_lie_across_carriageways(streets: StreetPolygons) -> None:
 
 
 def test_nothing_is_paved_under_buildings(osm: OsmData) -> None:
-    solids = [shapely.box(-30, -30, 30, 30)]
-    cleared = road_polygons(site_facts(osm), solids)
-    assert shapely.intersection(cleared.sidewalk, solids[0]).area < 0.1
-    assert shapely.intersection(cleared.pedestrian, solids[0]).area < 0.1
+    solid = shapely.box(-30, -30, 30, 30)
+    cleared = road_polygons(site_facts(osm), [NamedShape("w1", solid)])
+    assert shapely.intersection(cleared.sidewalk, solid).area < 0.1
+    assert shapely.intersection(cleared.pedestrian, solid).area < 0.1
 
 
 def test_the_partition_covers_the_window_once(osm: OsmData, streets: StreetPolygons) -> None:

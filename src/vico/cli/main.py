@@ -1,6 +1,7 @@
 """The `vico` command: one verb a capability.
 
-Exit codes: 0 done, 1 found wanting (a check failed), 2 bad input (one sentence on stderr, no traceback).
+Exit codes: 0 done, 1 found wanting (a check failed), 2 bad input or a fault of the program (one sentence on stderr; the
+traceback of a fault shows with `vico --verbose VERB`).
 Results go to stdout, progress and warnings to stderr; `vico --verbose VERB` tells more there, `vico --quiet VERB` less.
 Each verb imports what it needs when it runs, so `vico --help` is quick.
 """
@@ -19,7 +20,7 @@ from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
 from vico.cli.options import AssistantOptions, CommaSeparated, RunOptions, WorldBuildOptions
-from vico.errors import VicoError
+from vico.errors import VicoError, line_of, sentence_of
 from vico.version import __version__
 
 # The fields of a record are options of the verb itself, not of a part of it.
@@ -322,8 +323,22 @@ app.command(assets, name="assets", help="Richer bodies and robots.")
 app.command(evaluation, name="eval", help="Judge agents on a challenge.")
 
 
+_log = logging.getLogger("vico")
+
+
+def _fault(error: Exception) -> str:
+    """Say what went wrong that is not the caller's doing; the traceback goes to the log."""
+    _log.info("where it failed", exc_info=error)
+    return (
+        f"{sentence_of(error)} at {line_of(error)}: a fault of vico; please report it, with what the same command says "
+        "after vico --verbose"
+    )
+
+
 def _sentence(error: OSError) -> str:
     """Say what the operating system refused, where, and what to do about it."""
+    if error.filename is None and error.errno != errno.ENOSPC:
+        return _fault(error)
     where = f"{error.filename}: " if error.filename is not None else ""
     if error.errno == errno.ENOSPC:
         return f"{where}no space left on the disk; free some, or choose another --out"
@@ -339,7 +354,7 @@ def _configure_logging(given: list[str]) -> list[str]:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line; never a traceback for bad input."""
+    """Run the command line; a sentence for whatever goes wrong, never a traceback."""
     given = _configure_logging(sys.argv[1:] if arguments is None else arguments)
     if given == ["--version"]:
         print(__version__)
@@ -359,13 +374,14 @@ def main(arguments: list[str] | None = None) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(141)
     except OSError as error:
-        if error.filename is None and error.errno != errno.ENOSPC:
-            raise
         print(f"vico: {_sentence(error)}", file=sys.stderr)
         sys.exit(2)
     except KeyboardInterrupt:
         print("vico: stopped; what was finished is on disk", file=sys.stderr)
         sys.exit(130)
+    except Exception as error:  # whatever: who runs a command is not who mends the program
+        print(f"vico: {_fault(error)}", file=sys.stderr)
+        sys.exit(2)
     sys.exit(code)
 
 

@@ -162,12 +162,25 @@ def on_grid(shape: Any, *, grid: float = GRID) -> Any:
 
 
 def mended(shape: Any) -> Any:
-    """Return a valid geometry of the same dimension: rings that cross themselves become what they enclose."""
+    """Return a valid geometry of the same dimension: rings that cross themselves become what they enclose.
+
+    Raises
+    ------
+    OverlayError
+        If the engine refuses it; `at` is its index in an array.
+    """
     if isinstance(shape, BaseGeometry):
-        return shape if shape.is_valid else _only(shape, int(shapely.get_dimensions(shape)))
+        try:
+            return shape if shape.is_valid else _only(shape, int(shapely.get_dimensions(shape)))
+        except GEOSException as error:
+            raise _refused("mending", error, shape) from None
     made = np.array(shape, object)
-    for k in np.argwhere(~shapely.is_valid(made)):
-        made[tuple(k)] = mended(made[tuple(k)])
+    for k in np.flatnonzero(~shapely.is_valid(made)).tolist():
+        try:
+            made.flat[k] = mended(made.flat[k])
+        except OverlayError as error:
+            error.at = k
+            raise
     return made
 
 
@@ -272,15 +285,19 @@ def _union_of_each(shapes: Shapes, wanted: int, grid: float | None) -> BaseGeome
             clean.append(_clean(shape, finest))
         except GEOSException as error:
             raise _refused("union", error, shape, at=k) from None
-    kept = [shape for shape in clean if int(shapely.get_dimensions(shape)) == wanted]
+    kept = [(k, shape) for k, shape in enumerate(clean) if int(shapely.get_dimensions(shape)) == wanted]
     for size in (finest, finest * _COARSER):
         try:
-            return shapely.union_all(kept, grid_size=size)
+            return shapely.union_all([shape for _, shape in kept], grid_size=size)
         except GEOSException:
             continue
-    made = kept[0]
-    for shape in kept[1:]:
-        made = _only(_once_more(shapely.union, made, shape, finest), wanted)
+    made = _EMPTY[wanted]
+    for k, shape in kept:
+        try:
+            made = _only(_once_more(shapely.union, made, shape, finest), wanted)
+        except OverlayError as error:
+            error.at = k
+            raise
     return made
 
 

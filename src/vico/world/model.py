@@ -60,6 +60,8 @@ FAILED = "can't be made"
 """How the reason begins where an object's geometry is at fault."""
 FAULT = "can't be made, by a fault of the program"
 """How the reason begins where an object brought out a fault of the program."""
+TRIED = "tried"
+"""Among a stage's counts, where it left something out: of how many objects it was to make something."""
 
 
 class Dropped(Record):

@@ -64,14 +64,17 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
         read_things()  # refuses before anything is built if they are not installed
     seed, run, write = request.seed, stages.run, WorldWriter(folder, stages)
 
-    site = _site(evidence.data, stages)
+    site = _left(_site(evidence.data, stages), stages)
     plans = run("plans", building_plans, site.osm, seed=seed)
     bare, tiles = _terrain(evidence, plans, request.half, stages)
     # Kerbs lie at the borders of the streets, so both come from the same polygons, and before anything stands on them.
     streets = run("streets", road_polygons, site, plans.standing())
+    site = _left(site, stages)
     height = run("grading", graded, bare, site, streets)
+    site = _left(site, stages)
     write.terrain(height, flat=evidence.samples is None and tiles is None)
     bridges = run("bridges", bridges_of, site, height, streets)
+    site = _left(site, stages)
 
     if tiles is not None:
         plans, fits = run("fit", plans_on_tiles, plans, tiles, height)
@@ -83,7 +86,8 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     lanes = write.streets(roads, run("network", road_network, site, solids=solids))
     feeds = list(evidence.feeds)
     mapped = run("transit", transit_from_osm, site, lanes, height, solids=solids, seed=seed, feeds=feeds)
-    transit = waiting_off_the_road(mapped, streets, height)
+    with stages.timed("waiting"):
+        transit = waiting_off_the_road(mapped, streets, height)
     write.transit(transit)
 
     outdoors, dropped = run(
@@ -121,7 +125,8 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
 
     ground = run("ground", ground_from_osm, site, height, streets, bridges, standing=solids)
     stages.report("ground", {"faces": faces(ground)})
-    fronts = street_fronts(indoors.places, entrances, buildings, built.walls, seed=seed)
+    with stages.timed("fronts"):
+        fronts = street_fronts(indoors.places, entrances, buildings, built.walls, seed=seed)
     stages.report("fronts", fronts.counts)
 
     models, credits = models_of(objects, installed=request.sources.installed_things)
@@ -152,6 +157,14 @@ def _site(data: OsmData, stages: Stages) -> SiteFacts:
     """Read the facts of the site off its map; they are known by the map's own digest."""
     with stages.timed("facts"):
         return stages.given(site_facts(data), f"facts {stages.digest(data)}")
+
+
+def _left(site: SiteFacts, stages: Stages) -> SiteFacts:
+    """Return what is left of the site: what a stage could not make, those that follow don't see."""
+    if not stages.lost:
+        return site
+    less = site.without(stages.lost)
+    return stages.given(less, f"{stages.digest(site)} without {' '.join(sorted(stages.lost))}")
 
 
 def _terrain(

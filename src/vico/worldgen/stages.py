@@ -8,28 +8,42 @@ what depends on it, and a stage that is run again by name passes on nothing new 
 
 from __future__ import annotations
 
+import logging
 import os
 import time
 import weakref
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeVar
 
-from vico.errors import SchemaError
+from vico.errors import SchemaError, StageError, VicoError, line_of, sentence_of
+from vico.geo.overlay import OverlayError
 from vico.io.data_files import VARIABLE
 from vico.version import __version__
-from vico.world.model import Dropped, StageReport
+from vico.world.model import TRIED, Dropped, StageReport
+from vico.worldgen.facts.expendable import Losses, listening
 from vico.worldgen.product import digest_of, read_head, read_product, write_product
 
 Progress = Callable[[str, int, int], None]
 T = TypeVar("T")
 
+_log = logging.getLogger(__name__)
 _CODE = ("*.py", *(f"{room}/**/*.py" for room in ("io", "geo", "world", "assets", "render", "worldgen", "llm")))
 _DATA = ("data/**/*.toml",)
 SUFFIX = ".stage"
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """What the file of a stage holds: what it made, what it left out, and of how many objects (0 if nothing)."""
+
+    value: Any
+    dropped: list[Dropped]
+    tried: int
 
 
 def code_digest() -> str:
@@ -71,12 +85,15 @@ class Stages:
         What the stages made and left out.
     kept
         Names of stages whose product was read instead of computed.
+    lost
+        Ids of all objects that stages left out while they made them (see `expendable`).
     """
 
     def __init__(self, folder: Path | None, *, again: Collection[str] = (), progress: Progress | None = None) -> None:
         self.seconds: dict[str, float] = {}
         self.reports: list[StageReport] = []
         self.kept: list[str] = []
+        self.lost: set[str] = set()
         self._folder = folder
         self._again = set(again)
         self._progress = progress
@@ -106,6 +123,11 @@ class Stages:
 
         `inputs` and `options` are passed to `function`; both count towards the key. A callable among the options
         does not: it says how, not what (a progress callback, a picture taker).
+
+        Raises
+        ------
+        StageError
+            If it fails as a whole, for no object in particular.
         """
         self._tell(name, 0)
         start = time.perf_counter()
@@ -119,17 +141,25 @@ class Stages:
         """Time a step that keeps no product: reading the sources, writing files, taking pictures."""
         self._tell(name, 0)
         start = time.perf_counter()
-        yield
+        with _as_a_whole(name) as losses:
+            yield
+        self._report_losses(name, losses.dropped, len(losses.tried))
         self.seconds[name] = time.perf_counter() - start
         self._tell(name, 1)
 
     def report(self, name: str, counts: dict[str, int], dropped: Iterable[Dropped] = ()) -> None:
-        """Record what a stage made and left out."""
+        """Record what a stage made and left out, beside what is recorded of it already."""
+        for k, report in enumerate(self.reports):
+            if report.name == name:
+                both = {**report.counts, **counts}
+                self.reports[k] = StageReport(name=name, counts=both, dropped=[*report.dropped, *dropped])
+                return
         self.reports.append(StageReport(name=name, counts=counts, dropped=list(dropped)))
 
     def counts(self, name: str) -> dict[str, int]:
-        """Return what a stage reported."""
-        return next(report.counts for report in self.reports if report.name == name)
+        """Return how much of what a stage reported."""
+        counts = next(report.counts for report in self.reports if report.name == name)
+        return {what: number for what, number in counts.items() if what != TRIED}
 
     def sweep(self) -> None:
         """Remove products of stages that this build did not have."""
@@ -142,9 +172,18 @@ class Stages:
         if self._progress is not None:
             self._progress(name, done, 1)
 
+    def _report_losses(self, name: str, dropped: list[Dropped], tried: int) -> None:
+        """Record what a stage left out, if anything, and of how many objects."""
+        if dropped:
+            self.lost.update(one.id for one in dropped)
+            self.report(name, {TRIED: tried}, dropped)
+
     def _product(self, name: str, function: Callable[..., T], inputs: tuple[Any, ...], options: dict[str, Any]) -> T:
         if self._folder is None:
-            return function(*inputs, **options)
+            with _as_a_whole(name) as losses:
+                value = function(*inputs, **options)
+            self._report_losses(name, losses.dropped, len(losses.tried))
+            return value
         what = {key: self.digest(value) for key, value in sorted(options.items()) if not callable(value)}
         parts = [
             name,
@@ -155,17 +194,45 @@ class Stages:
         key = sha256("\n".join(parts).encode()).hexdigest()
         path = self._folder / f"{name}{SUFFIX}"
         if name not in self._again and path.exists():
-            kept = self._read(path, key)
-            if kept is not None:
+            known = self._read(path, key)
+            if known is not None:
                 self.kept.append(name)
-                return self.given(*kept)
-        value = function(*inputs, **options)
-        return self.given(value, write_product(path, value, key=key))
+                self._report_losses(name, known[0].dropped, known[0].tried)
+                return self.given(known[0].value, known[1])
+        with _as_a_whole(name) as losses:
+            value = function(*inputs, **options)
+        made = _Kept(value, losses.dropped, len(losses.tried) if losses.dropped else 0)
+        self._report_losses(name, made.dropped, made.tried)
+        return self.given(value, write_product(path, made, key=key))
 
-    def _read(self, path: Path, key: str) -> tuple[Any, str] | None:
+    def _read(self, path: Path, key: str) -> tuple[_Kept, str] | None:
         """Read the product, if it was made under this key and is whole: a torn one is simply made anew."""
         try:
-            return read_product(path) if read_head(path)[0] == key else None
+            made, digest = read_product(path) if read_head(path)[0] == key else (None, "")
         except SchemaError:
             os.unlink(path)
             return None
+        return (made, digest) if isinstance(made, _Kept) else None
+
+
+@contextmanager
+def _as_a_whole(name: str) -> Iterator[Losses]:
+    """Listen to a stage; what fails in it, for no object in particular, ends the build in a sentence."""
+    try:
+        with listening() as losses:
+            yield losses
+    except OverlayError as error:
+        _log.info("stage %s failed", name, exc_info=True)
+        raise StageError(_failed(name, error)) from error
+    except (VicoError, OSError, MemoryError):
+        raise
+    except Exception as error:  # whatever: nobody who builds a city wants a traceback
+        _log.info("stage %s failed", name, exc_info=True)
+        raise StageError(_failed(name, error)) from error
+
+
+def _failed(name: str, error: Exception) -> str:
+    return (
+        f"world build: stage {name} failed ({sentence_of(error)} at {line_of(error)}), for no object in particular; "
+        "move the window or mend the map there, and report this with what vico --verbose shows"
+    )

@@ -5,36 +5,63 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from vico.world.check.buildings import outline_of
 from vico.world.check.finding import WorldFinding
 from vico.world.folder import World
+from vico.world.heights import HeightField
+from vico.world.model import Entrance, Place
+from vico.world.walkable import WalkableMap
 
 _APPROACH = 2.0  # metres between a door and the spot in front of it
+_FRONT = 0.2  # metres before a door that lie outside its building
+_ON_WALL = 0.05
 
 
 def check_entrances(world: World) -> Iterator[WorldFinding]:
     """Check that doors lie in the walls of their buildings, and can be walked up to."""
     outlines = {b.id: outline_of(b) for b in world.buildings}
     for door in world.entrances:
-        if door.building not in outlines:
-            yield WorldFinding("entrance lost", door.id, f"there is no building {door.building}")
-            continue
-        outline = outlines[door.building]
-        away = outline.exterior.distance(shapely.Point(door.position[:2]))
-        if away > 0.05:
-            yield WorldFinding("entrance off the wall", door.id, f"{away:.2f} m from the outline of {door.building}")
-        step = math.dist(door.position[:2], door.approach)
-        if step > _APPROACH:
-            yield WorldFinding("entrance far", door.id, f"its approach is {step:.2f} m away")
-        if not bool(world.walkable.is_connected(door.approach)):
-            yield WorldFinding("entrance blocked", door.id, "its approach can't be reached on foot from the map's edge")
-        if abs(float(world.height(door.position)) - door.position[2]) > 0.05:
-            yield WorldFinding("entrance not seated", door.id, "it is not at ground level")
-        front = (door.position[0] + 0.2 * math.cos(door.facing), door.position[1] + 0.2 * math.sin(door.facing))
-        if outline.contains(shapely.Point(front)):
-            yield WorldFinding("entrance turned", door.id, "it faces into the building")
+        yield from entrance_findings(door, outlines.get(door.building), world.walkable, world.height)
+
+
+def entrance_findings(
+    door: Entrance, outline: shapely.Polygon | None, walkable: WalkableMap, height: HeightField
+) -> Iterator[WorldFinding]:
+    """Check one door; `outline` is its building's, None if there is no such building."""
+    if outline is None:
+        yield WorldFinding("entrance lost", door.id, f"there is no building {door.building}")
+        return
+    away = outline.exterior.distance(shapely.Point(door.position[:2]))
+    if away > _ON_WALL:
+        yield WorldFinding("entrance off the wall", door.id, f"{away:.2f} m from the outline of {door.building}")
+    step = math.dist(door.position[:2], door.approach)
+    if step > _APPROACH:
+        yield WorldFinding("entrance far", door.id, f"its approach is {step:.2f} m away")
+    if not bool(walkable.is_connected(door.approach)):
+        yield WorldFinding("entrance blocked", door.id, "its approach can't be reached on foot from the map's edge")
+    if abs(float(height(door.position)) - door.position[2]) > 0.05:
+        yield WorldFinding("entrance not seated", door.id, "it is not at ground level")
+    out = np.array([[math.cos(door.facing), math.sin(door.facing)]])
+    if bool(faces_into(outline, np.array([door.position[:2]]), out)[0]):
+        yield WorldFinding("entrance turned", door.id, "it faces into the building")
+
+
+def faces_into(outline: shapely.Polygon, position: NDArray[np.float64], out: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which doors face into their building, shape ``(n,)``: what lies before them is inside its outline.
+
+    Parameters
+    ----------
+    outline
+        The building's.
+    position, out
+        Where the doors are, metres, and unit vectors of the way they face, shape ``(n, 2)``.
+    """
+    front = position + _FRONT * out
+    return np.asarray(shapely.contains_xy(outline, front[:, 0], front[:, 1]), bool)
 
 
 def check_places(world: World) -> Iterator[WorldFinding]:
@@ -58,7 +85,7 @@ def check_places(world: World) -> Iterator[WorldFinding]:
                 yield WorldFinding("place lost", place.id, f"there is no entrance {place.entrance}")
             elif door.building != place.building:
                 yield WorldFinding("place lost", place.id, f"its entrance belongs to {door.building}")
-        if not bool(world.walkable.is_connected(place.position[:2])):
+        if not is_reachable(place, world.walkable):
             yield WorldFinding("place unreachable", place.id, "its position can't be reached on foot")
         if place.building is not None and not place.rooms:
             yield WorldFinding("place empty", place.id, "it is in a building, but has no room")
@@ -66,3 +93,8 @@ def check_places(world: World) -> Iterator[WorldFinding]:
             room = world.room_by_id.get(name)
             if room is None or room.place != place.id:
                 yield WorldFinding("room lost", place.id, f"there is no room {name} of this place")
+
+
+def is_reachable(place: Place, walkable: WalkableMap) -> bool:
+    """Whether one can walk to a place from the map's edge."""
+    return bool(walkable.is_connected(place.position[:2]))

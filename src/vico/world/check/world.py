@@ -17,13 +17,15 @@ from vico.world.check.places import check_entrances, check_places
 from vico.world.check.rooms import check_containers, check_indoors, check_rooms
 from vico.world.check.streets import check_roads, check_transit
 from vico.world.folder import World, world_files
-from vico.world.model import FAILED, FAULT
+from vico.world.model import FAILED, FAULT, TRIED
 
 MOST_FAILED = 0.05
-"""Share of a stage's objects whose geometry may be at fault."""
+"""Share of the objects of any stage that may fail to be made."""
 
-_FEW_FAILED = 2  # that a small window may lack whatever their share
-_MADE = {"buildings": ("buildings",), "objects": ("amenity_objects", "natural_objects", "barrier_pieces")}
+FEW_FAILED = 2
+"""How many a stage may fail to make whatever their share: a small window has few objects."""
+
+_MADE = {"buildings": "buildings"}  # what counts the objects of a stage that does not say how many it tried
 
 
 def check_world(world: World) -> list[WorldFinding]:
@@ -114,13 +116,13 @@ def check_entities(world: World) -> Iterator[WorldFinding]:
 
 
 def check_dropped(world: World) -> Iterator[WorldFinding]:
-    """Check that no more than `MOST_FAILED` of what a stage had to make failed, and nothing for a fault of ours."""
+    """Check that no stage failed to make more than `MOST_FAILED` of its objects, nor any for a fault of ours."""
     for stage in world.manifest.stages:
         for dropped in stage.dropped:
             if dropped.reason.startswith(FAULT):
                 yield WorldFinding("program fault", dropped.id, f"{stage.name}: {dropped.reason}")
-        failed = sum(dropped.reason.startswith(FAILED) for dropped in stage.dropped)
-        made = max((stage.counts.get(name, 0) for name in _MADE.get(stage.name, ())), default=0)
-        if failed > max(_FEW_FAILED, MOST_FAILED * (failed + made)):
-            what = f"{failed} of {failed + made} can't be made; see the reasons in report.html"
+        failed = len({dropped.id for dropped in stage.dropped if dropped.reason.startswith(FAILED)})
+        tried = stage.counts.get(TRIED, failed + stage.counts.get(_MADE.get(stage.name, ""), 0))
+        if failed > max(FEW_FAILED, MOST_FAILED * tried):
+            what = f"{failed} of {tried} can't be made; see the reasons in report.html"
             yield WorldFinding("much left out", stage.name, what)

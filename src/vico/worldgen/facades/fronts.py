@@ -16,6 +16,7 @@ from vico.world.model import Building, Category, Entrance, Place
 from vico.worldgen.facades.pieces import Face, Pieces, Rgb, bare, cell_uv, is_bare
 from vico.worldgen.facades.signs import Board, Boards, colours_of, paint_boards
 from vico.worldgen.facades.walls import GroundFloors, Wall
+from vico.worldgen.facts.expendable import expendable
 
 _WHITE: Rgb = (255, 255, 255)
 _STONE: Rgb = (222, 218, 210)
@@ -106,17 +107,19 @@ def street_fronts(
             at_door.setdefault(place.entrance, []).append(place)
     spots = []
     for entrance in entrances:
-        building = known[entrance.building]
-        names = tuple(at_door.get(entrance.id, ()))
-        wall = ground.at(building.entity, entrance.position[0], entrance.position[1], entrance.facing)
-        spots.append(_Spot(entrance, building, wall, _kind(building, names), names))
+        with expendable(entrance.id):
+            building = known[entrance.building]
+            names = tuple(at_door.get(entrance.id, ()))
+            wall = ground.at(building.entity, entrance.position[0], entrance.position[1], entrance.facing)
+            spots.append(_Spot(entrance, building, wall, _kind(building, names), names))
     spots = _apportioned(spots)
     signed = [p for spot in spots for p in spot.names if _has_board(p)]
     boards = paint_boards(signed)
     pieces = Pieces({m.name: m for m in (*(s.material for s in walls), *boards.materials)})
     counts: Counter[str] = Counter(doors=0, shop_fronts=0, signs=0, awnings=0, projecting_signs=0)
     for spot in spots:
-        _Front(spot, pieces, boards, counts, rng(seed, "front", spot.entrance.id)).build()
+        with expendable(spot.entrance.id):
+            _Front(spot, pieces, boards, counts, rng(seed, "front", spot.entrance.id)).build()
     counts["signs_without_letters"] = len(boards.mute)
     counts["sign_pages"] = len(boards.materials)
     return Fronts(pieces.surfaces(), dict(sorted(counts.items())))

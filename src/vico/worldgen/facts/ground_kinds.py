@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -12,6 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import OsmData, polygons_of
+from vico.worldgen.facts.expendable import NamedShape, expendable, named_parts, united
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import PAVINGS, StreetPolygons
 from vico.worldgen.facts.tags import number, on_the_ground
@@ -64,48 +63,50 @@ def ground_partition(site: SiteFacts, streets: StreetPolygons, window: Polygon) 
     kerb = overlay.buffer(streets.carriageway, _CURB, quad_segs=2, join_style="mitre")
     kerb = overlay.difference(overlay.on_grid(kerb, grid=_GRID), streets.carriageway, grid=_GRID)
     kerb = overlay.intersection(overlay.areas_of(kerb), overlay.areas_of(paved), grid=_GRID)
-    ranked: list[tuple[str, BaseGeometry]] = [
-        ("carriageway", streets.carriageway),
-        ("kerb", kerb),
-        ("steps", streets.steps),
-        ("pedestrian", square),
-        ("cycleway", streets.cycleway),
-        ("sidewalk", streets.sidewalk),
-        ("path", streets.path),
-        ("parking", streets.parking),
-    ]
-    ranked += [(name, overlay.union_all(shapes, grid=_GRID)) for name, shapes in soft.items()]
+    ranked: dict[str, BaseGeometry] = {
+        "carriageway": streets.carriageway,
+        "kerb": kerb,
+        "steps": streets.steps,
+        "pedestrian": square,
+        "cycleway": streets.cycleway,
+        "sidewalk": streets.sidewalk,
+        "path": streets.path,
+        "parking": streets.parking,
+    }
+    ranked |= {name: united(shapes, grid=_GRID) for name, shapes in soft.items()}
     left: BaseGeometry = window
     result: dict[str, list[Polygon]] = {}
-    for name, shape in ranked:
+    for name, shape in ranked.items():
         shape = overlay.areas_of(overlay.on_grid(shape, grid=_GRID))
         mine = polygons_of(overlay.intersection(shape, left, grid=_GRID), 0.02)
         if mine:
             result |= _by_paving(name, mine, streets.paved) if name in _PAVED_KINDS else {name: mine}
             left = overlay.areas_of(overlay.difference(left, shape, grid=_GRID))
-    built = [area.polygon for area in site.osm.areas if area.tags.get("building", "no") != "no"]
-    near = overlay.buffer(overlay.union_all([*built, streets.carriageway], grid=_GRID), 30.0, quad_segs=2)
+    built = [NamedShape(area.id, area.polygon) for area in site.osm.areas if area.tags.get("building", "no") != "no"]
+    near = united([*built, NamedShape("carriageway", streets.carriageway)], grid=_GRID)
+    near = overlay.buffer(near, 30.0, quad_segs=2)
     near = overlay.on_grid(near, grid=_GRID)
     result["yard"] = polygons_of(overlay.intersection(left, near, grid=_GRID), 0.02)
     result["field"] = polygons_of(overlay.difference(left, near, grid=_GRID), 0.02)
     return {name: shapes for name, shapes in result.items() if shapes}
 
 
-def _square(streets: StreetPolygons, soft: dict[str, list[BaseGeometry]]) -> BaseGeometry:
+def _square(streets: StreetPolygons, soft: dict[str, list[NamedShape]]) -> BaseGeometry:
     """Squares without the lawns and ponds within them, which are beds; other greens end where the square begins."""
     square: BaseGeometry = streets.pedestrian
     shapely.prepare(square)
-    inner = [
-        bed
-        for name in ("water", "garden", "grass", "woods", "playground")
-        for bed in soft[name]
-        if bed.area < 0.6 * square.area
-        and square.intersects(bed)
-        and overlay.common_area(bed, square) > 0.9 * bed.area > 0.0
-    ]
+    inner: list[NamedShape] = []
+    for bed in (bed for name in ("water", "garden", "grass", "woods", "playground") for bed in soft[name]):
+        with expendable(bed.id):
+            if (
+                bed.shape.area < 0.6 * square.area
+                and square.intersects(bed.shape)
+                and overlay.common_area(bed.shape, square) > 0.9 * bed.shape.area > 0.0
+            ):
+                inner.append(bed)
     if not inner:
         return square
-    return overlay.difference(square, overlay.union_all(inner, grid=_GRID), grid=_GRID)
+    return overlay.difference(square, united(inner, grid=_GRID), grid=_GRID)
 
 
 def water_pieces(site: SiteFacts, streets: StreetPolygons, window: Polygon) -> list[Polygon]:
@@ -113,7 +114,7 @@ def water_pieces(site: SiteFacts, streets: StreetPolygons, window: Polygon) -> l
     soft = mapped_areas(site, window)
     if not soft["water"]:
         return []
-    water = overlay.areas_of(overlay.union_all(soft["water"], grid=_GRID))
+    water = overlay.areas_of(united(soft["water"], grid=_GRID))
     taken = [
         streets.carriageway,
         _square(streets, soft),
@@ -192,49 +193,54 @@ def _kind_of(tags: dict[str, str]) -> str | None:
     return "earth" if landuse in _WORKS else None
 
 
-def mapped_areas(site: SiteFacts, window: Polygon) -> dict[str, list[BaseGeometry]]:
-    """Return mapped areas by kind of ground, in order of precedence."""
+def mapped_areas(site: SiteFacts, window: Polygon) -> dict[str, list[NamedShape]]:
+    """Return mapped areas by kind of ground, in order of precedence, under the ids of what maps them."""
     osm, above = site.osm, site.levels.above
     order = ("water", "ballast", "playground", "court", "clay", "turf", "concrete", "sand", "gravel", "garden")
-    found: dict[str, list[BaseGeometry]] = {name: [] for name in (*order, "grass", "woods", "farmland", "earth")}
+    found: dict[str, list[NamedShape]] = {name: [] for name in (*order, "grass", "woods", "farmland", "earth")}
     for area in osm.areas:
         tags = area.tags
         if not on_the_ground(tags) or tags.get("building", "no") != "no":
             continue
         kind = _kind_of(tags)
         if kind:
-            found[kind] += polygons_of(overlay.intersection(area.polygon, window))
-    found["ballast"] += [
-        overlay.buffer(shapely.LineString(way.line), 1.8, cap_style="flat")
-        for way in osm.ways
-        if way.tags.get("railway") in _RAILS and on_the_ground(way.tags) and way.id not in above
-    ]
-    found["water"] += list(_streams(osm, window, found["water"]))
+            with expendable(area.id):
+                found[kind] += named_parts(area.id, polygons_of(overlay.intersection(area.polygon, window)))
+    for way in osm.ways:
+        if way.tags.get("railway") in _RAILS and on_the_ground(way.tags) and way.id not in above:
+            with expendable(f"w{way.id}"):
+                strip = overlay.buffer(shapely.LineString(way.line), 1.8, cap_style="flat")
+                found["ballast"].append(NamedShape(f"w{way.id}", strip))
+    found["water"] += _streams(osm, window, found["water"])
     # A pond within a park is water, a lawn within a wood is lawn: small before large comes with the kinds' order, but
     # the sea comes last of the waters and gives way to everything mapped on it (piers, moles).
-    sea = sea_polygons(osm, window)
+    sea: list[Polygon] = []
+    with expendable("sea"):
+        sea = sea_polygons(osm, window)
     if sea:
-        land = overlay.union_all(
-            [shape for name, shapes in found.items() if name != "water" for shape in shapes], grid=_GRID
-        )
-        found["water"].append(overlay.difference(overlay.union_all(sea), land, grid=_GRID))
+        land = united([shape for name, shapes in found.items() if name != "water" for shape in shapes], grid=_GRID)
+        with expendable("sea"):
+            found["water"].append(NamedShape("sea", overlay.difference(overlay.union_all(sea), land, grid=_GRID)))
     return found
 
 
-def _streams(osm: OsmData, window: Polygon, mapped: list[BaseGeometry]) -> Iterable[Polygon]:
+def _streams(osm: OsmData, window: Polygon, mapped: list[NamedShape]) -> list[NamedShape]:
     """Rivers, canals and streams that are drawn as lines only."""
     usual = {"river": 8.0, "canal": 8.0, "stream": 1.6, "drain": 1.0, "ditch": 0.8}
-    known = overlay.union_all([shape for shape in mapped if isinstance(shape, BaseGeometry)], grid=_GRID)
+    known = united(mapped, grid=_GRID)
+    found: list[NamedShape] = []
     for way in osm.ways:
         tags = way.tags
         if tags.get("waterway") not in usual or tags.get("tunnel", "no") != "no" or not on_the_ground(tags):
             continue
         line = shapely.LineString(way.line)
-        if known.intersects(line) and overlay.common_length(known, line) > 0.3 * line.length:
-            continue
-        width = min(max(number(tags.get("width")) or usual[tags["waterway"]], 0.6), 60.0)
-        strip = overlay.buffer(line, width / 2, cap_style="flat", quad_segs=2)
-        yield from polygons_of(overlay.intersection(strip, window))
+        with expendable(f"w{way.id}"):
+            if known.intersects(line) and overlay.common_length(known, line) > 0.3 * line.length:
+                continue
+            width = min(max(number(tags.get("width")) or usual[tags["waterway"]], 0.6), 60.0)
+            strip = overlay.buffer(line, width / 2, cap_style="flat", quad_segs=2)
+            found += named_parts(f"w{way.id}", polygons_of(overlay.intersection(strip, window)))
+    return found
 
 
 def sea_polygons(osm: OsmData, window: Polygon) -> list[Polygon]:

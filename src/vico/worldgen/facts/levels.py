@@ -14,6 +14,7 @@ import shapely
 
 from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.tags import is_bridge, level_of
 
 OVER_A_STREET = "a bridge over another street: the ground has one height, and the street below has it"
@@ -123,11 +124,11 @@ def overpasses(osm: OsmData) -> frozenset[int]:
     for ways in at.values():
         for other in ways[1:]:
             parent[max(root(ways[0]), root(other))] = min(root(ways[0]), root(other))
-    over = {
-        root(way.id)
-        for way in bridges
-        if any(level_of(other.tags) < level_of(way.tags) for other, _ in crossed(way, below, tree))
-    }
+    over: set[int] = set()
+    for way in bridges:
+        with expendable(f"w{way.id}"):
+            if any(level_of(other.tags) < level_of(way.tags) for other, _ in crossed(way, below, tree)):
+                over.add(root(way.id))
     decks = {way.id for way in bridges if root(way.id) in over}
     return frozenset(decks).union(_stairs_to(osm, decks))
 
@@ -158,7 +159,8 @@ def passages(osm: OsmData, above: frozenset[int]) -> list[Passage]:
         if way.id not in above or way.tags.get("highway") == "steps":
             continue
         slab = SLAB_ON_FOOT if way.tags.get("highway") in ON_FOOT else SLAB
-        for other, place in crossed(way, below, tree):
-            if level_of(other.tags) < level_of(way.tags):
-                found.append(Passage(way.id, (place.x, place.y), 9.0, CLEARANCE + slab))
+        with expendable(f"w{way.id}"):
+            for other, place in crossed(way, below, tree):
+                if level_of(other.tags) < level_of(way.tags):
+                    found.append(Passage(way.id, (place.x, place.y), 9.0, CLEARANCE + slab))
     return found

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vico.geo.osm import OsmData, Tags
 from vico.world.model import Category
+from vico.worldgen.facts.expendable import expendable
 
 _FOOD = "restaurant cafe fast_food pub bar biergarten ice_cream food_court canteen"
 _STORE = "pharmacy marketplace bureau_de_change car_rental money_transfer fuel bank post_office"
@@ -95,8 +96,9 @@ def named_places(osm: OsmData) -> list[NamedPlace]:
     found: list[NamedPlace] = []
     rows = [(f"n{n.id}", n.xy, n.tags, None) for n in osm.nodes]
     for area in osm.areas:
-        centre = np.array(area.polygon.representative_point().coords[0])
-        rows.append((area.id, centre, area.tags, area.polygon))
+        with expendable(area.id):
+            centre = np.array(area.polygon.representative_point().coords[0])
+            rows.append((area.id, centre, area.tags, area.polygon))
     for key, xy, tags, shape in rows:
         name = tags.get("name") or tags.get("brand") or (tags.get("operator") if "shop" in tags else None)
         if not name or np.abs(xy).max() > osm.half:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Set
+from dataclasses import dataclass, replace
 
 from vico.geo.osm import OsmData
 from vico.worldgen.facts.driving_side import keeps_left
@@ -30,6 +31,16 @@ class SiteFacts:
     levels: StreetLevels
     left_driving: bool
     named: list[NamedPlace]
+
+    def without(self, ids: Set[str]) -> SiteFacts:
+        """Return the site without objects of these ids: what one stage can't make, no later stage is to see."""
+        osm = replace(
+            self.osm,
+            nodes=[node for node in self.osm.nodes if f"n{node.id}" not in ids],
+            ways=[way for way in self.osm.ways if f"w{way.id}" not in ids],
+            areas=[area for area in self.osm.areas if area.id not in ids],
+        )
+        return replace(self, osm=osm, named=[named for named in self.named if named.id not in ids])
 
 
 def site_facts(osm: OsmData) -> SiteFacts:

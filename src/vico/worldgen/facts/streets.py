@@ -115,6 +115,8 @@ class Crossing:
 
     Attributes
     ----------
+    id
+        Of the way or point that maps it.
     start, end
         On the two kerbs, metres.
     width
@@ -133,6 +135,7 @@ class Crossing:
     painted: bool
     marking: str = "zebra"
     signals: bool = False
+    id: str = ""
 
     @property
     def polygon(self) -> Polygon:

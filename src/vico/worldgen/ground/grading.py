@@ -21,6 +21,7 @@ from shapely.geometry.base import BaseGeometry
 from vico.geo import overlay
 from vico.geo.osm import OsmData, polygons_of
 from vico.world.heights import HeightField
+from vico.worldgen.facts.expendable import NamedShape, changed, expendable, named_parts, united
 from vico.worldgen.facts.ground_kinds import water_pieces
 from vico.worldgen.facts.levels import ON_FOOT, Passage
 from vico.worldgen.facts.site import SiteFacts
@@ -234,39 +235,48 @@ def _samples(network: Network, found: Floats, wide: Floats, covers: NDArray[np.b
 def _pitches(height: HeightField, osm: OsmData) -> HeightField:
     """Sports pitches as planes that hardly tilt."""
     heights = height.heights.astype(np.float64)
-    n, cell = len(heights), height.cell
     for area in osm.areas:
-        if area.tags.get("leisure") != "pitch" or not 60.0 < area.polygon.area < 20_000.0:
-            continue
-        west, south, east, north = overlay.buffer(area.polygon, 10.0).bounds
-        i0, i1 = (min(max(round((v + height.half) / cell), 0), n - 1) for v in (west, east))
-        j0, j1 = (min(max(round((v + height.half) / cell), 0), n - 1) for v in (south, north))
-        if i1 - i0 < 2 or j1 - j0 < 2:
-            continue
-        x, y = np.meshgrid(np.arange(i0, i1 + 1) * cell - height.half, np.arange(j0, j1 + 1) * cell - height.half)
-        away = shapely.distance(area.polygon, shapely.points(x, y))
-        view = heights[j0 : j1 + 1, i0 : i1 + 1]
-        within = away <= cell
-        design = np.stack([x[within] - x.mean(), y[within] - y.mean(), np.ones(int(within.sum()))], axis=1)
-        if len(design) < 3:
-            continue
-        plane = np.linalg.lstsq(design, view[within], rcond=None)[0]
-        tilt = float(np.hypot(plane[0], plane[1]))
-        plane[:2] *= min(1.0, 0.015 / max(tilt, 1e-9))
-        part = np.clip((away - cell) / 6.0, 0.0, 1.0)
-        part = part * part * (3.0 - 2.0 * part)
-        target = plane[0] * (x - x.mean()) + plane[1] * (y - y.mean()) + plane[2]
-        # To a tenth of a millimetre: the last bits of a solver differ from processor to processor.
-        view[:] = np.round(view + (1.0 - part) * (target - view), 4)
+        if area.tags.get("leisure") == "pitch" and 60.0 < area.polygon.area < 20_000.0:
+            with expendable(area.id):
+                _lay_pitch(heights, height, area.polygon)
     return replace(height, heights=heights.astype(np.float32))
 
 
-def piped_waters(osm: OsmData) -> list[BaseGeometry]:
+def _lay_pitch(heights: Floats, height: HeightField, pitch: BaseGeometry) -> None:
+    """Level `heights`, which lie as those of `height` do, within a pitch and a few metres about it."""
+    n, cell = len(heights), height.cell
+    west, south, east, north = overlay.buffer(pitch, 10.0).bounds
+    i0, i1 = (min(max(round((v + height.half) / cell), 0), n - 1) for v in (west, east))
+    j0, j1 = (min(max(round((v + height.half) / cell), 0), n - 1) for v in (south, north))
+    if i1 - i0 < 2 or j1 - j0 < 2:
+        return
+    x, y = np.meshgrid(np.arange(i0, i1 + 1) * cell - height.half, np.arange(j0, j1 + 1) * cell - height.half)
+    away = shapely.distance(pitch, shapely.points(x, y))
+    view = heights[j0 : j1 + 1, i0 : i1 + 1]
+    within = away <= cell
+    design = np.stack([x[within] - x.mean(), y[within] - y.mean(), np.ones(int(within.sum()))], axis=1)
+    if len(design) < 3:
+        return
+    plane = np.linalg.lstsq(design, view[within], rcond=None)[0]
+    tilt = float(np.hypot(plane[0], plane[1]))
+    plane[:2] *= min(1.0, 0.015 / max(tilt, 1e-9))
+    part = np.clip((away - cell) / 6.0, 0.0, 1.0)
+    part = part * part * (3.0 - 2.0 * part)
+    target = plane[0] * (x - x.mean()) + plane[1] * (y - y.mean()) + plane[2]
+    # To a tenth of a millimetre: the last bits of a solver differ from processor to processor.
+    view[:] = np.round(view + (1.0 - part) * (target - view), 4)
+
+
+def piped_waters(osm: OsmData) -> list[NamedShape]:
     """Waters that the map has under the ground: under bridges too, where what flows on is the same water."""
-    return [area.polygon for area in osm.areas if area.tags.get("natural") == "water" and not on_the_ground(area.tags)]
+    return [
+        NamedShape(area.id, area.polygon)
+        for area in osm.areas
+        if area.tags.get("natural") == "water" and not on_the_ground(area.tags)
+    ]
 
 
-def open_water(height: HeightField, pieces: Sequence[Polygon], piped: Sequence[BaseGeometry] = ()) -> list[Water]:
+def open_water(height: HeightField, pieces: Sequence[Polygon], piped: Sequence[NamedShape] = ()) -> list[Water]:
     """Return the waters of a map with their surfaces: level, or as gently sloped as their banks.
 
     Parameters
@@ -276,11 +286,12 @@ def open_water(height: HeightField, pieces: Sequence[Polygon], piped: Sequence[B
     pieces
         `ground_partition`'s waters. Pieces that only a bridge parts belong together.
     piped
-        Waters under the ground that join pieces.
+        Waters under the ground that join pieces, under their ids.
     """
     if not pieces:
         return []
-    whole = overlay.buffer(overlay.union_all(overlay.buffer([*pieces, *piped], 12.0, quad_segs=2)), -11.5, quad_segs=2)
+    wide = changed([*named_parts("water", pieces), *piped], lambda shapes: overlay.buffer(shapes, 12.0, quad_segs=2))
+    whole = overlay.buffer(united(wide), -11.5, quad_segs=2)
     bodies = polygons_of(whole)
     tree = shapely.STRtree(bodies)
     shores: dict[int, tuple[Floats, Floats, float]] = {}

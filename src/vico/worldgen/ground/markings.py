@@ -13,6 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import polygons_of
+from vico.worldgen.facts.expendable import NamedShape, expendable, united
 from vico.worldgen.facts.streets import LANE_WIDTH, Crossing, Street, StreetPolygons
 
 _STRIPE, _STRIPE_PERIOD = 0.5, 1.0  # of a zebra, metres along the walk
@@ -71,28 +72,35 @@ def road_markings(
     stepped
         Stairs built of real steps, which need no painted ones.
     """
-    zebra = [quad for crossing in streets.crossings if crossing.painted for quad in _crossing(crossing)]
+    zebra: list[NDArray[np.float64]] = []
+    for crossing in streets.crossings:
+        if crossing.painted:
+            with expendable(crossing.id):
+                zebra += _crossing(crossing)
     zebra += _stop_lines(streets, left_driving)
     shapely.prepare(streets.carriageway)
     breaks = _junction_zones(streets)
     dashes: list[NDArray[np.float64]] = []
     middles: list[NDArray[np.float64]] = []
     for street in streets.streets:
-        for offset, between_directions in _lane_lines(street):
-            line = overlay.offset_curve(LineString(street.line), offset) if offset else LineString(street.line)
-            free = overlay.difference(line, breaks)
-            target = middles if between_directions and yellow else dashes
-            for piece in shapely.get_parts(free):
-                if isinstance(piece, LineString) and piece.length > _DASH:
-                    target += _dashes(piece, solid=between_directions and yellow, longest=longest)
+        with expendable(f"w{street.way}"):
+            for between_directions, quads in _painted_lines(street, breaks, yellow=yellow, longest=longest):
+                target = middles if between_directions and yellow else dashes
+                target += quads
     rails: list[NDArray[np.float64]] = []
     for line in (*streets.rails, *tracks):
         for side in (-0.5, 0.5):
             rails += _ribbon(_divided(line, longest), side * _GAUGE, 0.09)
     painted = streets.steps if stepped is None else overlay.difference(streets.steps, overlay.buffer(stepped, 0.1))
-    treads = [quad for shape in polygons_of(painted, 0.5) for quad in _treads(shape)]
-    lanes, edges, bays = _kerbside(streets, breaks, longest)
-    bays += [quad for shape in streets.parking.geoms for quad in _car_park(shape)]
+    treads: list[NDArray[np.float64]] = []
+    for shape in polygons_of(painted, 0.5):
+        with expendable(_placed("stairs", shape)):
+            treads += _treads(shape)
+    lanes, edges = _kerbside(streets, breaks, longest)
+    bays: list[NDArray[np.float64]] = []
+    for shape in streets.parking.geoms:
+        with expendable(_placed("car park", shape)):
+            bays += _car_park(shape)
     groups = [
         Quads(_within(lanes, window), _CYCLE, rank=0),
         Quads(_within(zebra + dashes + edges, window), _PAINT),
@@ -102,6 +110,26 @@ def road_markings(
         Quads(_within(bays, window), _FADED, low=False),
     ]
     return [group for group in groups if len(group.corners)]
+
+
+def _placed(what: str, shape: Polygon) -> str:
+    """Name a piece of ground that several objects of the map may share."""
+    x, y = shape.bounds[:2]
+    return f"{what} at {x:.1f}, {y:.1f}"
+
+
+def _painted_lines(
+    street: Street, breaks: BaseGeometry, *, yellow: bool, longest: float | None
+) -> list[tuple[bool, list[NDArray[np.float64]]]]:
+    """Return a street's lines: whether each parts opposite directions, and its quads."""
+    found: list[tuple[bool, list[NDArray[np.float64]]]] = []
+    for offset, between_directions in _lane_lines(street):
+        line = overlay.offset_curve(LineString(street.line), offset) if offset else LineString(street.line)
+        for piece in shapely.get_parts(overlay.difference(line, breaks)):
+            if isinstance(piece, LineString) and piece.length > _DASH:
+                quads = _dashes(piece, solid=between_directions and yellow, longest=longest)
+                found.append((between_directions, quads))
+    return found
 
 
 def _within(quads: list[NDArray[np.float64]], window: Polygon) -> NDArray[np.float64]:
@@ -167,52 +195,74 @@ def _stop_lines(streets: StreetPolygons, left_driving: bool) -> list[NDArray[np.
         walk = LineString([crossing.start, crossing.end])
         for k in np.sort(tree.query(walk, predicate="intersects")):
             street, line = streets.streets[int(k)], lines[int(k)]
-            if street.kind == "service" or not (crossing.signals or street.kind in _LINED):
-                continue
-            place = float(line.project(overlay.crossing(walk, line).centroid))
-            for ahead in (1.0,) if street.oneway else (1.0, -1.0):
-                at = place - ahead * (crossing.width / 2 + 1.1)
-                if not 0.5 < at < line.length - 0.5:
-                    continue
-                here, there = (np.asarray(line.interpolate(v).coords[0]) for v in (at, at + 0.2))
-                u = (there - here) / max(float(np.hypot(*(there - here))), 1e-9) * ahead
-                right = np.array([u[1], -u[0]]) * (-1.0 if left_driving else 1.0)
-                inner = -street.width / 2 + 0.3 if street.oneway else 0.1
-                ends = np.array([here + right * inner, here + right * (street.width / 2 - 0.3)])
-                found += _ribbon(ends, 0.0, _STOP)
+            if street.kind != "service" and (crossing.signals or street.kind in _LINED):
+                with expendable(crossing.id):
+                    found += _stop_lines_of(crossing, street, line, walk, left_driving)
+    return found
+
+
+def _stop_lines_of(
+    crossing: Crossing, street: Street, line: LineString, walk: LineString, left_driving: bool
+) -> list[NDArray[np.float64]]:
+    """Lines on both sides of a crossing (`walk`) of one street (`line`), or on the one that its traffic comes from."""
+    found: list[NDArray[np.float64]] = []
+    place = float(line.project(overlay.crossing(walk, line).centroid))
+    for ahead in (1.0,) if street.oneway else (1.0, -1.0):
+        at = place - ahead * (crossing.width / 2 + 1.1)
+        if not 0.5 < at < line.length - 0.5:
+            continue
+        here, there = (np.asarray(line.interpolate(v).coords[0]) for v in (at, at + 0.2))
+        u = (there - here) / max(float(np.hypot(*(there - here))), 1e-9) * ahead
+        right = np.array([u[1], -u[0]]) * (-1.0 if left_driving else 1.0)
+        inner = -street.width / 2 + 0.3 if street.oneway else 0.1
+        ends = np.array([here + right * inner, here + right * (street.width / 2 - 0.3)])
+        found += _ribbon(ends, 0.0, _STOP)
     return found
 
 
 def _kerbside(
     streets: StreetPolygons, breaks: BaseGeometry, longest: float | None
-) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]], list[NDArray[np.float64]]]:
-    """Cycle lanes as coloured strips, the lines that part them and parking lanes from the traffic, and bays."""
+) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+    """Cycle lanes as coloured strips, and the lines that part them and parking lanes from the traffic, with bays."""
     lanes: list[NDArray[np.float64]] = []
     edges: list[NDArray[np.float64]] = []
     for street in streets.streets:
-        for side, parking, cycle in (
-            (1.0, street.parking_left, street.cycle_left),
-            (-1.0, street.parking_right, street.cycle_right),
-        ):
-            if not parking and not cycle:
-                continue
-            outer = street.width / 2 - parking
-            for piece in _free_pieces(street, side * outer, breaks):
+        with expendable(f"w{street.way}"):
+            own_lanes, own_edges = _kerbside_of(street, breaks, longest)
+            lanes += own_lanes
+            edges += own_edges
+    return lanes, edges
+
+
+def _kerbside_of(
+    street: Street, breaks: BaseGeometry, longest: float | None
+) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+    """Lanes and edges along the kerbs of one street."""
+    lanes: list[NDArray[np.float64]] = []
+    edges: list[NDArray[np.float64]] = []
+    for side, parking, cycle in (
+        (1.0, street.parking_left, street.cycle_left),
+        (-1.0, street.parking_right, street.cycle_right),
+    ):
+        if not parking and not cycle:
+            continue
+        outer = street.width / 2 - parking
+        for piece in _free_pieces(street, side * outer, breaks):
+            path = _divided(np.asarray(piece.coords), longest)
+            if parking:
+                edges += _ribbon(path, 0.0, 0.1)
+                pitch = 2.6 if street.slanted else 5.8
+                for place in np.arange(1.0, piece.length - 1.0, pitch):
+                    a, b = (np.asarray(piece.interpolate(v).coords[0]) for v in (place, place + 0.1))
+                    u = (b - a) / max(float(np.hypot(*(b - a))), 1e-9)
+                    out = side * np.array([-u[1], u[0]])
+                    edges += _ribbon(np.array([a, a + out * (parking - 0.2)]), 0.0, 0.1)
+        if cycle:
+            for piece in _free_pieces(street, side * (outer - _CYCLE_WIDTH / 2 - 0.1), breaks):
                 path = _divided(np.asarray(piece.coords), longest)
-                if parking:
-                    edges += _ribbon(path, 0.0, 0.1)
-                    pitch = 2.6 if street.slanted else 5.8
-                    for place in np.arange(1.0, piece.length - 1.0, pitch):
-                        a, b = (np.asarray(piece.interpolate(v).coords[0]) for v in (place, place + 0.1))
-                        u = (b - a) / max(float(np.hypot(*(b - a))), 1e-9)
-                        out = side * np.array([-u[1], u[0]])
-                        edges += _ribbon(np.array([a, a + out * (parking - 0.2)]), 0.0, 0.1)
-            if cycle:
-                for piece in _free_pieces(street, side * (outer - _CYCLE_WIDTH / 2 - 0.1), breaks):
-                    path = _divided(np.asarray(piece.coords), longest)
-                    lanes += _ribbon(path, 0.0, _CYCLE_WIDTH)
-                    edges += _ribbon(path, -side * (_CYCLE_WIDTH / 2), _LINE)
-    return lanes, edges, []
+                lanes += _ribbon(path, 0.0, _CYCLE_WIDTH)
+                edges += _ribbon(path, -side * (_CYCLE_WIDTH / 2), _LINE)
+    return lanes, edges
 
 
 def _free_pieces(street: Street, offset: float, breaks: BaseGeometry) -> list[LineString]:
@@ -326,13 +376,16 @@ def _junction_zones(streets: StreetPolygons) -> BaseGeometry:
             key = (round(float(point[0]), 2), round(float(point[1]), 2))
             share = [street.width] if k in (0, len(street.line) - 1) else [street.width, street.width]
             ends.setdefault(key, []).extend(share)
-    zones = [
-        overlay.buffer(shapely.Point(point), max(widths) / 2 + 3.0, quad_segs=3)
-        for point, widths in ends.items()
-        if len(widths) >= 3
-    ]
-    zones += [overlay.buffer(crossing.polygon, 1.2, join_style="mitre") for crossing in streets.crossings]
-    return overlay.union_all(zones)
+    zones: list[NamedShape] = []
+    for point, widths in ends.items():
+        if len(widths) >= 3:
+            with expendable(name := f"junction at {point[0]:.1f}, {point[1]:.1f}"):
+                zone = overlay.buffer(shapely.Point(point), max(widths) / 2 + 3.0, quad_segs=3)
+                zones.append(NamedShape(name, zone))
+    for crossing in streets.crossings:
+        with expendable(crossing.id):
+            zones.append(NamedShape(crossing.id, overlay.buffer(crossing.polygon, 1.2, join_style="mitre")))
+    return united(zones)
 
 
 def _divided(line: NDArray[np.float64], longest: float | None) -> NDArray[np.float64]:

@@ -22,6 +22,7 @@ from vico.geo.osm import OsmData, polygons_of
 from vico.world.heights import HeightField
 from vico.world.mesh import Material, Surface, joined
 from vico.world.model import ENTITY_GROUND, ENTITY_ROAD
+from vico.worldgen.facts.expendable import NamedShape, changed, expendable, named_parts, united
 from vico.worldgen.facts.ground_kinds import ground_partition, mapped_areas
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import Crossing, StreetPolygons
@@ -242,16 +243,16 @@ def _hidden(osm: OsmData, standing: Sequence[BaseGeometry]) -> BaseGeometry:
     if not len(standing):
         return shapely.MultiPolygon()
     built = [
-        area.polygon
+        NamedShape(area.id, area.polygon)
         for area in osm.areas
         if area.tags.get("building", "no") not in ("no", "roof", "carport", "bridge", "ruins", "construction")
         and not any(key in area.tags for key in ("min_height", "building:min_level"))
         and on_the_ground(area.tags)
     ]
-    deep = overlay.buffer(np.array(built, object), -1.5, join_style="mitre")
-    mapped = overlay.union_all(deep[~shapely.is_empty(deep)], grid=0.01)
+    deep = changed(built, lambda shapes: overlay.buffer(shapes, -1.5, join_style="mitre"))
+    mapped = united([one for one in deep if not one.shape.is_empty], grid=0.01)
     # Not every building of the map is built whole, or at all: people walk on what is left of its ground.
-    whole = overlay.union_all(overlay.mended(np.array(list(standing), object)), grid=0.01)
+    whole = united(changed(named_parts("buildings", standing), overlay.mended), grid=0.01)
     both = overlay.intersection(mapped, overlay.buffer(whole, -1.5, join_style="mitre"), grid=0.01)
     return shapely.MultiPolygon(polygons_of(both))
 
@@ -260,7 +261,7 @@ def _tracks(site: SiteFacts) -> list[NDArray[np.float64]]:
     """Railways at ground level, cut where a street's bridge lies over them."""
     osm, above = site.osm, site.levels.above
     spans = spans_over_water(site)
-    found = []
+    found: list[NDArray[np.float64]] = []
     for way in osm.ways:
         tags = way.tags
         if tags.get("railway") not in ("rail", "light_rail", "narrow_gauge") or not on_the_ground(tags):
@@ -268,21 +269,21 @@ def _tracks(site: SiteFacts) -> list[NDArray[np.float64]]:
         if way.id in above:
             continue
         line: BaseGeometry = shapely.LineString(way.line)
-        if tags.get("bridge", "no") == "no":
-            line = overlay.difference(line, spans)
-        found += [np.asarray(part.coords) for part in shapely.get_parts(line) if part.geom_type == "LineString"]
+        with expendable(f"w{way.id}"):
+            if tags.get("bridge", "no") == "no":
+                line = overlay.difference(line, spans)
+            found += [np.asarray(part.coords) for part in shapely.get_parts(line) if part.geom_type == "LineString"]
     return [line for line in found if len(line) > 1]
 
 
 def _fields(osm: OsmData, window: Polygon) -> list[Quads]:
     """Lay out the lines of sports fields."""
-    lines = [
-        quad
-        for area in osm.areas
-        if area.tags.get("leisure") == "pitch" and on_the_ground(area.tags) and window.intersects(area.polygon)
-        for shape in polygons_of(area.polygon)
-        for quad in pitch_lines(shape, area.tags.get("sport", ""))
-    ]
+    lines: list[NDArray[np.float64]] = []
+    for area in osm.areas:
+        if area.tags.get("leisure") == "pitch" and on_the_ground(area.tags) and window.intersects(area.polygon):
+            with expendable(area.id):
+                sport = area.tags.get("sport", "")
+                lines += [quad for shape in polygons_of(area.polygon) for quad in pitch_lines(shape, sport)]
     return [Quads(np.stack(lines), (236, 236, 230), low=False)] if lines else []
 
 
@@ -415,7 +416,7 @@ def _under_bridges(site: SiteFacts, wet: BaseGeometry, window: Polygon) -> list[
     maps call what flows under a bridge a tunnel.
     """
     shapes = [*mapped_areas(site, window)["water"], *piped_waters(site.osm)]
-    below = overlay.union_all([overlay.on_grid(shape, grid=0.001) for shape in shapes])
+    below = united(changed(shapes, lambda each: overlay.on_grid(each, grid=0.001)))
     hidden = overlay.difference(overlay.intersection(below, window), overlay.buffer(wet, 0.001))
     spans = spans_over_water(site)
     beneath = overlay.intersection(hidden, overlay.buffer(spans, _OVERHANG, quad_segs=2))
@@ -487,7 +488,8 @@ def _tactile(streets: StreetPolygons, terrain: HeightField, window: Polygon) -> 
     quads: list[NDArray[np.float64]] = []
     for crossing in streets.crossings:
         if crossing.painted:
-            quads += _slabs_at(crossing, pavement)
+            with expendable(crossing.id):
+                quads += _slabs_at(crossing, pavement)
     if not quads:
         return []
     corners = np.stack(quads)

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
+from vico.geo.osm import OsmWay
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface, surface_of_quads
+from vico.worldgen.facts.expendable import NamedShape, expendable, united
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.tags import number, on_the_ground
 from vico.worldgen.ground.pavings import LOOKS, coloured, ground_material
@@ -84,30 +86,37 @@ def flights_of(site: SiteFacts, terrain: HeightField, where: BaseGeometry) -> Fl
     """
     above = site.levels.above
     shapely.prepare(where)
-    quads: list[Floats] = []
-    normals: list[Floats] = []
-    areas: list[BaseGeometry] = []
-    reach = terrain.half - 1.0
+    faces: list[tuple[Floats, Floats]] = []
+    areas: list[NamedShape] = []
     for way in site.osm.ways:
         tags = way.tags
         if tags.get("highway") != "steps" or not on_the_ground(tags) or way.id in above or way.closed:
             continue
-        line = shapely.LineString(way.line)
-        width = min(max(number(tags.get("width")) or _WIDTH, 1.2), 12.0)
-        for piece in shapely.get_parts(overlay.intersection(line, where)):
-            if piece.geom_type != "LineString" or piece.length < 0.8 or np.abs(piece.bounds).max() > reach:
-                continue
-            run = _rising(np.asarray(piece.coords), terrain)
-            faces = list(_flight(*run, width)) if run is not None else []
-            if faces and run is not None:
-                areas.append(overlay.buffer(shapely.LineString(run[0]), width / 2, cap_style="flat"))
-                quads += [quad for quad, _ in faces]
-                normals += [normal for _, normal in faces]
+        with expendable(f"w{way.id}"):
+            for area, own in _flights(way, terrain, where):
+                areas.append(NamedShape(f"w{way.id}", area))
+                faces += own
     return Flights(
-        overlay.union_all(areas) if areas else shapely.MultiPolygon(),
-        np.stack(quads) if quads else np.zeros((0, 4, 3)),
-        np.stack(normals) if normals else np.zeros((0, 3)),
+        united(areas) if areas else shapely.MultiPolygon(),
+        np.stack([quad for quad, _ in faces]) if faces else np.zeros((0, 4, 3)),
+        np.stack([normal for _, normal in faces]) if faces else np.zeros((0, 3)),
     )
+
+
+def _flights(
+    way: OsmWay, terrain: HeightField, where: BaseGeometry
+) -> list[tuple[BaseGeometry, list[tuple[Floats, Floats]]]]:
+    """Return the flights of a way: where each lies, and its faces with their normals."""
+    width = min(max(number(way.tags.get("width")) or _WIDTH, 1.2), 12.0)
+    found: list[tuple[BaseGeometry, list[tuple[Floats, Floats]]]] = []
+    for piece in shapely.get_parts(overlay.intersection(shapely.LineString(way.line), where)):
+        if piece.geom_type != "LineString" or piece.length < 0.8 or np.abs(piece.bounds).max() > terrain.half - 1.0:
+            continue
+        run = _rising(np.asarray(piece.coords), terrain)
+        faces = list(_flight(*run, width)) if run is not None else []
+        if faces and run is not None:
+            found.append((overlay.buffer(shapely.LineString(run[0]), width / 2, cap_style="flat"), faces))
+    return found
 
 
 def _rising(line: Floats, terrain: HeightField) -> tuple[Floats, Floats] | None:

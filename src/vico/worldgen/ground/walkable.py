@@ -9,7 +9,6 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from vico.geo import overlay
 from vico.geo.osm import polygons_of
 from vico.world.objects import Objects
 from vico.world.walkable import (
@@ -23,6 +22,7 @@ from vico.world.walkable import (
     fill_polygon,
     stroke,
 )
+from vico.worldgen.facts.expendable import NamedShape, united
 from vico.worldgen.facts.ground_kinds import mapped_areas
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import StreetPolygons
@@ -37,10 +37,17 @@ def walkable_from_site(
     return walkable_map(
         half=half,
         solids=solids,
-        roadway=overlay.union_all([streets.carriageway, streets.parking, *ground["ballast"]], grid=None),
+        roadway=united(
+            [
+                NamedShape("carriageways", streets.carriageway),
+                NamedShape("car parks", streets.parking),
+                *ground["ballast"],
+            ],
+            grid=None,
+        ),
         sidewalk=streets.footways(),
         crossing=streets.crossing,
-        water=overlay.union_all(ground["water"], grid=None),
+        water=united(ground["water"], grid=None),
         objects=objects,
     )
 

@@ -18,6 +18,7 @@ from vico.assets.shapes import pose_matrix
 from vico.world.mesh import Surface, joined
 from vico.world.model import FIRST_FURNITURE, FIRST_ROOM, Category, Container, Doorway, Place, Room
 from vico.world.objects import Objects
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.indoor.floorplans import OUTSIDE
 from vico.worldgen.indoor.layouts import ContainerPlan, FloorPlan, RoomPlan
 
@@ -86,18 +87,29 @@ def assembled(places: Sequence[Place], slots: dict[int, tuple[Slot, FloorPlan]])
         if k not in slots:
             furnished.append(place)
             continue
-        slot, plan = slots[k]
-        ids = [f"{place.id}.room{i}" for i in range(len(plan.rooms))]
-        entity = FIRST_ROOM + len(rooms)
-        matrix = pose_matrix(slot.x, slot.y, slot.z, slot.yaw)
-        for surface in plan.shell:
-            surfaces.append(replace(surface.moved(matrix), entity=surface.entity + np.int32(entity)))
-        for i, room in enumerate(plan.rooms):
-            first = FIRST_FURNITURE + len(rows)
-            rows += _objects(room, ids[i], slot, first)
-            rooms.append(_room(place, ids, i, room, slot, entity + i, first))
-        furnished.append(place.model_copy(update={"rooms": ids}))
+        with expendable(place.id):
+            own_rooms, own_rows, shell = _put(place, *slots[k], FIRST_ROOM + len(rooms), FIRST_FURNITURE + len(rows))
+            rooms += own_rooms
+            rows += own_rows
+            surfaces += shell
+            furnished.append(place.model_copy(update={"rooms": [room.id for room in own_rooms]}))
     return Indoors(furnished, rooms, Objects.from_rows(rows), joined(surfaces))
+
+
+def _put(
+    place: Place, slot: Slot, plan: FloorPlan, entity: int, furniture: int
+) -> tuple[list[Room], list[dict[str, Any]], list[Surface]]:
+    """Return rooms, rows of objects and surfaces of one place; `entity` and `furniture` are the first free numbers."""
+    rooms: list[Room] = []
+    rows: list[dict[str, Any]] = []
+    ids = [f"{place.id}.room{i}" for i in range(len(plan.rooms))]
+    matrix = pose_matrix(slot.x, slot.y, slot.z, slot.yaw)
+    shell = [replace(surface.moved(matrix), entity=surface.entity + np.int32(entity)) for surface in plan.shell]
+    for i, room in enumerate(plan.rooms):
+        first = furniture + len(rows)
+        rows += _objects(room, ids[i], slot, first)
+        rooms.append(_room(place, ids, i, room, slot, entity + i, first))
+    return rooms, rows, shell
 
 
 def rooms_of_plan(plan: FloorPlan, place: str = "plan") -> tuple[list[Room], Objects]:

@@ -16,6 +16,7 @@ from vico.geo import overlay
 from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.model import Building, Category, Entrance, Place
+from vico.worldgen.facts.expendable import expendable, leave_out
 from vico.worldgen.indoor.floorplans import FLATS, USES, area_of
 from vico.worldgen.indoor.layout_library import LayoutAuthor, Library, authored, read_library
 from vico.worldgen.indoor.layouts import VARIANTS, FloorPlan, plan_of
@@ -90,7 +91,8 @@ def furnish(
     places
         Places; those without a building keep none.
     buildings
-        The buildings they are in; their area and levels decide how large and how high a plan is.
+        The buildings they are in; their area and levels decide how large and how high a plan is. A place in a building
+        that has no room for it, or whose rooms can't be made, is left out (`expendable`).
     height
         Ground heights: all rooms lie at least 3 m below.
     seed
@@ -124,10 +126,19 @@ def furnish(
     for building in buildings:
         if building.id in wanted:
             count = len(wanted[building.id])
-            chosen = [(k, _plan(everyone[k], building, count, seed, shelf, author)) for k in wanted[building.id]]
-            for k, slot, plan in _stacked(by_id[building.id], chosen, height, ground):
-                slots[k] = (slot, plan)
-    return assembled(everyone, slots)
+            chosen: list[tuple[int, FloorPlan]] = []
+            for k in wanted[building.id]:
+                with expendable(everyone[k].id):
+                    chosen.append((k, _plan(everyone[k], building, count, seed, shelf, author)))
+            with expendable(building.id):
+                for k, slot, plan in _stacked(by_id[building.id], chosen, height, ground):
+                    slots[k] = (slot, plan)
+            for k, _ in chosen:
+                if k not in slots:
+                    leave_out(everyone[k].id, f"no room for it under building {building.id}")
+    # A place indoors is its rooms: without them there is nowhere to go in.
+    housed = [k for k, place in enumerate(everyone) if place.building is None or k in slots]
+    return assembled([everyone[k] for k in housed], {n: slots[k] for n, k in enumerate(housed) if k in slots})
 
 
 def _unnamed(places: Sequence[Place], buildings: Sequence[Building], entrances: Sequence[Entrance]) -> Iterator[Place]:
@@ -217,7 +228,7 @@ def _stacked(
             yield k, slot, plan
         down += max(layer, RISE) + _GAP
         if down > _DEEPEST:
-            raise RuntimeError(f"indoor: no room under building {building.id} within {_DEEPEST:g} m")
+            return
         waiting = rest
 
 

@@ -13,6 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from vico.assets.models.street import street_models
 from vico.geo import overlay
 from vico.geo.osm import OsmData, Tags
+from vico.worldgen.facts.expendable import NamedShape, expendable, united
 from vico.worldgen.objects import catalogue
 from vico.worldgen.objects.wishes import Wish, metres, number
 
@@ -43,13 +44,14 @@ def _model(tags: Tags) -> str | None:
 
 def barrier_wishes(osm: OsmData, carriageway: BaseGeometry, openings: BaseGeometry, half: float) -> list[Wish]:
     """Pieces of some two metres, open where ways and gates lead through; their length decides their scale."""
-    gates = [n.xy for n in osm.nodes if n.tags.get("barrier") in _GATES or "entrance" in n.tags]
+    gates = [(n.id, n.xy) for n in osm.nodes if n.tags.get("barrier") in _GATES or "entrance" in n.tags]
     lines = [(f"w{way.id}", way.line, way.tags) for way in osm.ways if "area" not in way.tags]
     hedges = [area for area in osm.areas if area.tags.get("barrier") == "hedge" and area.tags.get("area") == "yes"]
     drawn = {area.id for area in hedges}
-    gaps = [overlay.buffer(openings, 0.3), overlay.buffer(carriageway, 0.3)]
-    gaps += [overlay.buffer(shapely.Point(xy), 1.3) for xy in gates]
-    through = overlay.union_all(gaps, grid=None)
+    gaps = [NamedShape("footways", overlay.buffer(openings, 0.3))]
+    gaps.append(NamedShape("carriageways", overlay.buffer(carriageway, 0.3)))
+    gaps += [NamedShape(f"n{number}", overlay.buffer(shapely.Point(xy), 1.3)) for number, xy in gates]
+    through = united(gaps, grid=None)
     shapely.prepare(through)
     found: list[Wish] = []
     for key, line, tags in lines:
@@ -60,24 +62,31 @@ def barrier_wishes(osm: OsmData, carriageway: BaseGeometry, openings: BaseGeomet
             continue
         if kind in _IN_ROWS:
             mapped = [n.xy for n in osm.nodes if n.tags.get("barrier") == kind]
-            found += _row(key, line, *_IN_ROWS[kind], through if kind == "planter" else None, mapped)
+            with expendable(key):
+                found += _row(key, line, *_IN_ROWS[kind], through if kind == "planter" else None, mapped)
             continue
         name = _model(tags)
-        if name is None:
-            continue
-        tall = metres(tags.get("height"))
-        height = 1.0 if tall is None else float(np.clip(tall / street_models()[name].size[2], 0.55, 1.5))
-        pieces = shapely.get_parts(overlay.difference(shapely.LineString(line).simplify(0.15), through))
-        k = 0
-        for piece in pieces:
-            for a, b in zip(piece.coords[:-1], piece.coords[1:], strict=True):
-                for wish in _pieces(f"{key}.{k}", name, np.array(a), np.array(b), height):
-                    if np.abs(wish.xy).max() < half - _LONG:
-                        wish.id = f"{key}.{k}"
-                        found.append(wish)
-                        k += 1
+        if name is not None:
+            with expendable(key):
+                found += _line(key, line, name, metres(tags.get("height")), through, half)
     for area in hedges:
-        found += _blocks(area.id, area.polygon, metres(area.tags.get("height")))
+        with expendable(area.id):
+            found += _blocks(area.id, area.polygon, metres(area.tags.get("height")))
+    return found
+
+
+def _line(
+    key: str, line: NDArray[np.float64], name: str, tall: float | None, through: BaseGeometry, half: float
+) -> list[Wish]:
+    """Pieces of one barrier, as tall as it is said to be, open where something leads `through`."""
+    height = 1.0 if tall is None else float(np.clip(tall / street_models()[name].size[2], 0.55, 1.5))
+    found: list[Wish] = []
+    for piece in shapely.get_parts(overlay.difference(shapely.LineString(line).simplify(0.15), through)):
+        for a, b in zip(piece.coords[:-1], piece.coords[1:], strict=True):
+            for wish in _pieces(key, name, np.array(a), np.array(b), height):
+                if np.abs(wish.xy).max() < half - _LONG:
+                    wish.id = f"{key}.{len(found)}"
+                    found.append(wish)
     return found
 
 

@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from vico.geo import overlay
 from vico.geo.osm import OsmArea, OsmData
 from vico.seeds import rng
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.objects.kinds import on_the_ground, thing_of
 from vico.worldgen.objects.trees import spread
 from vico.worldgen.objects.wishes import Wish
@@ -31,27 +32,40 @@ def group_wishes(osm: OsmData, openings: BaseGeometry, half: float, seed: int, *
             continue
         if not area.polygon.intersects(shapely.box(-half, -half, half, half)):
             continue
-        random = rng(seed, "group", area.id)
-        if tags.get("amenity") in ("marketplace", "market"):
-            names = ("market_stall", "market_stall_green")
-            found += _grid(area, names, (3.2, 4.4), 30, random, keep=openings if _narrow(area) else None)
-        elif tags.get("leisure") == "outdoor_seating" or tags.get("amenity") == "biergarten":
-            names = ("cafe_parasol", "cafe_table") if tags.get("leisure") else ("picnic_table", "picnic_table")
-            found += _grid(area, names, (3.1, 3.1), 24, random)
-        elif tags.get("landuse") == "flowerbed" or tags.get("garden:type") == "flower_bed":
-            inner = overlay.buffer(area.polygon, -0.35)
-            name = _BEDS[int(random.integers(3))]
-            for k, xy in enumerate(spread(inner, 1.7, 60, random, least=0.98)):
-                found.append(Wish(f"{area.id}.{k}", name, xy, float(random.uniform(-np.pi, np.pi)), 0.8, reach=0.0))
-        elif tags.get("leisure") == "playground":
-            found += _playground(area, played, random)
-        elif tags.get("leisure") == "pitch":
-            found += _pitch(area)
-        elif tags.get("leisure") == "fitness_station":
-            found += [Wish(area.id, "fitness_station", _middle(area))]
-        else:
-            found += _single(area, seed, where)
+        with expendable(area.id):
+            found += _of_area(area, openings, played, seed, where)
     return found
+
+
+def _of_area(
+    area: OsmArea, openings: BaseGeometry, played: list[NDArray[np.float64]], seed: int, where: str
+) -> list[Wish]:
+    """Wish for what stands in one area; `played` is where play equipment is mapped piece by piece."""
+    tags, random = area.tags, rng(seed, "group", area.id)
+    if tags.get("amenity") in ("marketplace", "market"):
+        names = ("market_stall", "market_stall_green")
+        return _grid(area, names, (3.2, 4.4), 30, random, keep=openings if _narrow(area) else None)
+    if tags.get("leisure") == "outdoor_seating" or tags.get("amenity") == "biergarten":
+        names = ("cafe_parasol", "cafe_table") if tags.get("leisure") else ("picnic_table", "picnic_table")
+        return _grid(area, names, (3.1, 3.1), 24, random)
+    if tags.get("landuse") == "flowerbed" or tags.get("garden:type") == "flower_bed":
+        return _flower_bed(area, random)
+    if tags.get("leisure") == "playground":
+        return _playground(area, played, random)
+    if tags.get("leisure") == "pitch":
+        return _pitch(area)
+    if tags.get("leisure") == "fitness_station":
+        return [Wish(area.id, "fitness_station", _middle(area))]
+    return _single(area, seed, where)
+
+
+def _flower_bed(area: OsmArea, random: np.random.Generator) -> list[Wish]:
+    inner = overlay.buffer(area.polygon, -0.35)
+    name = _BEDS[int(random.integers(3))]
+    return [
+        Wish(f"{area.id}.{k}", name, xy, float(random.uniform(-np.pi, np.pi)), 0.8, reach=0.0)
+        for k, xy in enumerate(spread(inner, 1.7, 60, random, least=0.98))
+    ]
 
 
 def _middle(area: OsmArea) -> NDArray[np.float64]:

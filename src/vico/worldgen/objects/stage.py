@@ -19,7 +19,7 @@ from shapely.geometry.base import BaseGeometry
 from vico.assets.models.model import Model
 from vico.assets.models.street import street_models
 from vico.geo import overlay
-from vico.geo.osm import OsmData
+from vico.geo.osm import OsmData, OsmNode
 from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
@@ -93,7 +93,7 @@ def objects_from_osm(
     for wishes, listed in lots:
         for wish in wishes:
             if np.abs(wish.xy).max() < half:
-                with expendable(wish.id, dropped):
+                with expendable(wish.id):
                     reason = _settle(wish, models[wish.prototype], site, seed, rows)
                     if reason is not None and listed:
                         dropped.append(Dropped(id=wish.id, reason=reason))
@@ -111,9 +111,9 @@ def _swept(lanes: LaneGraph | None) -> list[BaseGeometry]:
     if lanes is None or not len(lanes):
         return []
     driven = np.flatnonzero(lanes.inside < 0)
-    lines = [shapely.LineString(lanes.line(int(k))[:, :2]) for k in driven]
+    lines = np.array([shapely.LineString(lanes.line(int(k))[:, :2]) for k in driven], object)
     widths = np.maximum(lanes.width[driven] / 2 - _SWEPT, 0.1)
-    return list(overlay.buffer(np.array(lines, object), widths, cap_style="flat")) if lines else []
+    return list(overlay.buffer(lines, widths, cap_style="flat")) if len(lines) else []
 
 
 def _settle(wish: Wish, model: Model, site: Site, seed: int, rows: list[dict[str, Any]]) -> str | None:
@@ -280,26 +280,32 @@ def _point_wishes(osm: OsmData, seed: int, zone: str, where: str) -> list[Wish]:
     found: list[Wish] = []
     gates = gate_yaws(osm)
     for node in osm.nodes:
-        key = f"n{node.id}"
-        if node.tags.get("natural") == "tree":
-            found.append(tree_wish(key, node.tags, node.xy, seed, zone))
-            continue
-        if node.tags.get("shelter") == "yes" and (
-            node.tags.get("highway") == "bus_stop" or node.tags.get("public_transport") == "platform"
-        ):
-            found.append(Wish(f"{key}.shelter", "shelter", node.xy, reach=4.5))
-            continue
-        random = rng(seed, "thing", key)
-        name = thing_of(node.tags, where=where, random=random)
-        if name is None:
-            continue
-        wish = Wish(key, name, node.xy, direction(node.tags))
-        if name.startswith(standing().of_any_size):
-            wish.scale = float(random.uniform(0.8, 1.25))
-        if node.id in gates and wish.yaw is None:
-            wish.yaw, wish.reach = gates[node.id], 0.0 if name == "gate" else 3.0
-        found.append(wish)
+        with expendable(f"n{node.id}"):
+            wish = _point_wish(node, seed, zone, where, gates.get(node.id))
+            if wish is not None:
+                found.append(wish)
     return found
+
+
+def _point_wish(node: OsmNode, seed: int, zone: str, where: str, gate: float | None) -> Wish | None:
+    """Wish for what a point maps; None for nothing. `gate` is the yaw of a gate there."""
+    key = f"n{node.id}"
+    if node.tags.get("natural") == "tree":
+        return tree_wish(key, node.tags, node.xy, seed, zone)
+    if node.tags.get("shelter") == "yes" and (
+        node.tags.get("highway") == "bus_stop" or node.tags.get("public_transport") == "platform"
+    ):
+        return Wish(f"{key}.shelter", "shelter", node.xy, reach=4.5)
+    random = rng(seed, "thing", key)
+    name = thing_of(node.tags, where=where, random=random)
+    if name is None:
+        return None
+    wish = Wish(key, name, node.xy, direction(node.tags))
+    if name.startswith(standing().of_any_size):
+        wish.scale = float(random.uniform(0.8, 1.25))
+    if gate is not None and wish.yaw is None:
+        wish.yaw, wish.reach = gate, 0.0 if name == "gate" else 3.0
+    return wish
 
 
 def _transit_wishes(transit: Transit | None, carriageway: BaseGeometry) -> list[Wish]:
@@ -309,20 +315,22 @@ def _transit_wishes(transit: Transit | None, carriageway: BaseGeometry) -> list[
         return found
     for stop in transit.stops:
         wait = np.array(stop.wait[:2])
-        kerb = _towards(wait, carriageway)
         spot, yaw = wait + np.array([1.0, 0.0]), 0.0
-        if kerb is not None:
-            out = kerb - wait
-            reach = float(np.hypot(*out))
-            out = out / max(reach, 1e-9)
-            along = np.array([-out[1], out[0]])
-            spot, yaw = wait + out * max(reach - 0.35, 0.0) + along * 0.9, math.atan2(out[1], out[0])
-        found.append(Wish(stop.id, "bus_stop", spot, yaw, 1.0, stop.entity))
+        with expendable(stop.id):
+            kerb = _towards(wait, carriageway)
+            if kerb is not None:
+                out = kerb - wait
+                reach = float(np.hypot(*out))
+                out = out / max(reach, 1e-9)
+                along = np.array([-out[1], out[0]])
+                spot, yaw = wait + out * max(reach - 0.35, 0.0) + along * 0.9, math.atan2(out[1], out[0])
+            found.append(Wish(stop.id, "bus_stop", spot, yaw, 1.0, stop.entity))
     for station in transit.bike_stations:
         at = np.array(station.position[:2])
-        kerb = _towards(at, carriageway)
-        yaw = math.atan2(*(kerb - at)[::-1]) if kerb is not None else 0.0
-        found.append(Wish(station.id, "bike_station", at, yaw, 1.0, station.entity))
+        with expendable(station.id):
+            kerb = _towards(at, carriageway)
+            yaw = math.atan2(*(kerb - at)[::-1]) if kerb is not None else 0.0
+            found.append(Wish(station.id, "bike_station", at, yaw, 1.0, station.entity))
     return found
 
 

@@ -15,6 +15,7 @@ from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, Tags
 from vico.seeds import rng
 from vico.world.heights import HeightField
+from vico.worldgen.facts.expendable import NamedShape, expendable, united
 from vico.worldgen.objects.catalogue import trees
 from vico.worldgen.objects.wishes import Wish, metres
 
@@ -122,16 +123,17 @@ def row_wishes(osm: OsmData, seed: int, zone: str) -> list[Wish]:
     for way in osm.ways:
         if way.tags.get("natural") != "tree_row":
             continue
-        line = shapely.LineString(way.line)
-        count = max(2, round(line.length / 8.0) + 1)
-        name = tree_wish(f"w{way.id}", way.tags, way.line[0], seed, zone).prototype
-        for k, d in enumerate(np.linspace(0, line.length, count)):
-            point = line.interpolate(d)
-            if near is not None and len(near.query(point, predicate="dwithin", distance=3.0)):
-                continue
-            wish = tree_wish(f"w{way.id}.{k}", way.tags, np.array(point.coords[0]), seed, zone)
-            wish.prototype = name
-            found.append(wish)
+        with expendable(f"w{way.id}"):
+            line = shapely.LineString(way.line)
+            count = max(2, round(line.length / 8.0) + 1)
+            name = tree_wish(f"w{way.id}", way.tags, way.line[0], seed, zone).prototype
+            for k, d in enumerate(np.linspace(0, line.length, count)):
+                point = line.interpolate(d)
+                if near is not None and len(near.query(point, predicate="dwithin", distance=3.0)):
+                    continue
+                wish = tree_wish(f"w{way.id}.{k}", way.tags, np.array(point.coords[0]), seed, zone)
+                wish.prototype = name
+                found.append(wish)
     return found
 
 
@@ -178,21 +180,7 @@ def planted_wishes(
 ) -> list[Wish]:
     """Trees of woods, parks, gardens and cemeteries, shrubs of scrub, where only the area is mapped, off the ways."""
     window = shapely.box(-half, -half, half, half)
-    room = trees().room
-    bare = [
-        area.polygon
-        for area in osm.areas
-        if any(area.tags.get(key) in values for key, values in _BARE.items()) and area.tags.get("layer", "0") == "0"
-    ]
-    solid = [area.polygon for area in osm.areas if "building" in area.tags or "building:part" in area.tags]
-    keep_off = overlay.union_all(
-        [
-            *(overlay.buffer(overlay.intersection(p, window), 1.0) for p in bare),
-            *(overlay.buffer(overlay.intersection(p, window), 2.2) for p in solid if p.intersects(window)),
-            overlay.buffer(openings, 0.8),
-            overlay.buffer(carriageway, 1.6),
-        ]
-    )
+    keep_off = _kept_free(osm, carriageway, openings, window)
     mapped = [node.xy for node in osm.nodes if node.tags.get("natural") == "tree"]
     trunks = shapely.points(np.array(mapped).reshape(-1, 2))
     done: BaseGeometry = shapely.Polygon()
@@ -202,34 +190,59 @@ def planted_wishes(
         use = _use(area)
         if use is None or area.polygon.area < 12.0:
             continue
-        ground = overlay.difference(overlay.difference(overlay.intersection(area.polygon, window), keep_off), done)
-        if ground.is_empty:
-            continue
-        done = overlay.union(done, ground)
-        random = rng(seed, "scatter", area.id)
-        if use == "scrub":
-            for k, xy in enumerate(spread(ground, _SHRUB_ROOM, 160, random, least=0.6)):
-                name = ("shrub", "shrub_tall", "shrub_tall")[int(random.integers(3))]
-                wish = Wish(f"{area.id}.{k}", name, xy, None, float(random.uniform(0.75, 1.3)), reach=0.0)
-                found.append((float(random.random()), wish))
-            continue
-        wild = use in ("wood", "forest", "nature_reserve")
-        there = int(shapely.contains(area.polygon, trunks).sum()) if len(trunks) else 0
-        if not wild and there > 0.3 * ground.area / room[use]:
-            continue  # somebody mapped them
-        for k, xy in enumerate(spread(ground, room[use], 260, random)):
-            wish = tree_wish(f"{area.id}.{k}", area.tags, xy, seed, zone, wild=wild)
-            if use == "orchard":
-                wish.prototype, wish.scale = "tree_fruit", 1.0
-            wish.reach = 0.0
-            found.append((float(random.random()), wish))
-        if use in ("park", "garden", "cemetery"):
-            for k, xy in enumerate(spread(ground, 2.2 * room[use] if use == "park" else 70.0, 40, random)):
-                name = ("shrub", "shrub_tall", "shrub_flowering")[int(random.integers(3))]
-                wish = Wish(f"{area.id}.s{k}", name, xy, None, float(random.uniform(0.8, 1.2)), reach=0.0)
-                found.append((float(random.random()), wish))
+        with expendable(area.id):
+            ground = overlay.difference(overlay.difference(overlay.intersection(area.polygon, window), keep_off), done)
+            if not ground.is_empty:
+                done = overlay.union(done, ground)
+                found += _planted(area, use, ground, trunks, seed, zone)
     if len(found) <= _MOST:
         return [wish for _, wish in found]
     # Every area is thinned alike.
     limit = sorted(rank for rank, _ in found)[_MOST]
     return [wish for rank, wish in found if rank < limit]
+
+
+def _kept_free(
+    osm: OsmData, carriageway: BaseGeometry, openings: BaseGeometry, window: shapely.Polygon
+) -> BaseGeometry:
+    """Return where nothing is planted: on and beside ways, houses, and areas that are bare."""
+    kept = [NamedShape("footways", overlay.buffer(openings, 0.8))]
+    kept.append(NamedShape("carriageways", overlay.buffer(carriageway, 1.6)))
+    for area in osm.areas:
+        bare = any(area.tags.get(key) in values for key, values in _BARE.items()) and area.tags.get("layer", "0") == "0"
+        built = ("building" in area.tags or "building:part" in area.tags) and area.polygon.intersects(window)
+        if bare or built:
+            with expendable(area.id):
+                within = overlay.intersection(area.polygon, window)
+                kept.append(NamedShape(area.id, overlay.buffer(within, 2.2 if built else 1.0)))
+    return united(kept)
+
+
+def _planted(
+    area: OsmArea, use: str, ground: BaseGeometry, trunks: NDArray[np.object_], seed: int, zone: str
+) -> list[tuple[float, Wish]]:
+    """Plant what is free of an area (`ground`): wishes, each with a rank by which areas are thinned."""
+    room, random = trees().room, rng(seed, "scatter", area.id)
+    found: list[tuple[float, Wish]] = []
+    if use == "scrub":
+        for k, xy in enumerate(spread(ground, _SHRUB_ROOM, 160, random, least=0.6)):
+            name = ("shrub", "shrub_tall", "shrub_tall")[int(random.integers(3))]
+            wish = Wish(f"{area.id}.{k}", name, xy, None, float(random.uniform(0.75, 1.3)), reach=0.0)
+            found.append((float(random.random()), wish))
+        return found
+    wild = use in ("wood", "forest", "nature_reserve")
+    there = int(shapely.contains(area.polygon, trunks).sum()) if len(trunks) else 0
+    if not wild and there > 0.3 * ground.area / room[use]:
+        return found  # somebody mapped them
+    for k, xy in enumerate(spread(ground, room[use], 260, random)):
+        wish = tree_wish(f"{area.id}.{k}", area.tags, xy, seed, zone, wild=wild)
+        if use == "orchard":
+            wish.prototype, wish.scale = "tree_fruit", 1.0
+        wish.reach = 0.0
+        found.append((float(random.random()), wish))
+    if use in ("park", "garden", "cemetery"):
+        for k, xy in enumerate(spread(ground, 2.2 * room[use] if use == "park" else 70.0, 40, random)):
+            name = ("shrub", "shrub_tall", "shrub_flowering")[int(random.integers(3))]
+            wish = Wish(f"{area.id}.s{k}", name, xy, None, float(random.uniform(0.8, 1.2)), reach=0.0)
+            found.append((float(random.random()), wish))
+    return found

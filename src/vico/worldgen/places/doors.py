@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 from vico.exact import dot
 from vico.geo import overlay
 from vico.geo.osm import OsmData, Tags
+from vico.world.check.places import faces_into
 from vico.world.heights import HeightField
 from vico.world.model import Building, Category, Entrance, Place
 from vico.world.routing import Router
 from vico.world.walkable import CROSSING, OPEN, ROADWAY, SIDEWALK, WalkableMap
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.named_places import NamedPlace
 
 _NO_DOOR = {"no", "service", "garage", "emergency", "exit", "fire_exit", "private"}
@@ -276,11 +278,12 @@ class Finder:
             kind = node.tags.get("entrance") or ("yes" if node.tags.get("building") == "entrance" else "no")
             if kind in _NO_DOOR or node.tags.get("access") in ("no", "private"):
                 continue
-            point = shapely.Point(node.xy)
-            near = self.tree.query(point, predicate="dwithin", distance=1.0)
-            near = [i for i in near.tolist() if shapely.distance(self.shapes[i].exterior, point) < 1.0]
-            if near:
-                found[min(near)].append((node.xy, kind))
+            with expendable(f"n{node.id}"):
+                point = shapely.Point(node.xy)
+                near = self.tree.query(point, predicate="dwithin", distance=1.0)
+                near = [i for i in near.tolist() if shapely.distance(self.shapes[i].exterior, point) < 1.0]
+                if near:
+                    found[min(near)].append((node.xy, kind))
         for doors in found.values():
             doors.sort(key=lambda door: ("main", "home", "staircase", "yes").index(door[1])
                        if door[1] in ("main", "home", "staircase", "yes") else 4)  # fmt: skip
@@ -316,7 +319,8 @@ class Finder:
         best = np.full(len(where), np.inf)
         approach = np.zeros_like(where)
         for distance in _APPROACHES:
-            spot = where + out * distance
+            # As it is written: a millimetre decides on which side of a cell's edge a spot lies.
+            spot = np.round(where + out * distance, 3)
             found = price[self.walkable.class_at(spot)] + distance
             found[~self.walkable.is_connected(spot)] = np.inf
             better = found < best
@@ -325,6 +329,7 @@ class Finder:
         for distance in (4.0, 8.0, 12.0):
             seen = self.walkable.class_at(where + out * distance)
             cost = cost + np.where(np.isin(seen, (SIDEWALK, CROSSING, ROADWAY)), 0.0, 1.0)
-        good = np.isfinite(best)
+        # A wall that comes back on itself within a hand's breadth has its other side before it.
+        good = np.isfinite(best) & ~faces_into(self.shapes[at], np.round(where, 3), out)
         self._doors[at] = _Doors(where[good], out[good], approach[good], (cost + best)[good])
         return self._doors[at]

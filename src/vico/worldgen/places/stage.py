@@ -7,13 +7,16 @@ from collections.abc import Sequence
 import shapely
 
 from vico.geo.places.model import FoundPlace
+from vico.world.check.places import entrance_findings, is_reachable
 from vico.world.heights import HeightField
 from vico.world.model import Building, Category, Dropped, Entrance, Place, Roads, Transit
 from vico.world.routing import Router
 from vico.world.walkable import WalkableMap
+from vico.worldgen.facts.expendable import expendable
+from vico.worldgen.facts.named_places import NamedPlace
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.places.doors import Finder
-from vico.worldgen.places.found import compared
+from vico.worldgen.places.found import Compared, compared
 from vico.worldgen.places.names import StreetAddresses, unused
 
 _LARGE_HOUSE = 4000.0  # square metres of floor above which a house has two stairways
@@ -63,28 +66,55 @@ def places_from_osm(
     places: list[Place] = []
     seen: set[tuple[str, str | None]] = set()
     for named in [*mapped, *told.added]:
-        reason = "closed, as another source says" if named.id in told.closed else finder.misfit(named)
-        if reason is None:
-            named = told.refined.get(named.id, named)
-            if not named.name:
-                named = streets.invented(named)
-            place = finder.outdoors(named) if finder.is_outdoors(named) else finder.indoors(named)
-            if isinstance(place, Place):
-                key = (place.name.casefold(), place.building or f"{place.category}")
-                if key in seen:
-                    reason = "mapped twice"
-                else:
+        with expendable(named.id):
+            named, made = _made(named, finder, streets, told)
+            if isinstance(made, Place):
+                key = (made.name.casefold(), made.building or f"{made.category}")
+                if key not in seen:
                     seen.add(key)
-                    places.append(place)
-            else:
-                reason = place
-        if reason is not None:
+                    places.append(made)
+                    continue
+                made = "mapped twice"
             label = f"{named.kind} {named.name!r}" if named.name else named.kind
-            dropped.append(Dropped(id=named.id, reason=f"{label}: {reason}"))
+            dropped.append(Dropped(id=named.id, reason=f"{label}: {made}"))
     places += _homes(finder, streets)
     if transit is not None:
         places += _transit_places(transit, walkable, height, dropped)
-    return places, finder.entrances, dropped
+    return (*_sound(places, finder, dropped), dropped)
+
+
+def _made(
+    named: NamedPlace, finder: Finder, streets: StreetAddresses, told: Compared
+) -> tuple[NamedPlace, Place | str]:
+    """Make a place of something named, as other sources refine it; or say why it is none."""
+    reason = "closed, as another source says" if named.id in told.closed else finder.misfit(named)
+    if reason is not None:
+        return named, reason
+    named = told.refined.get(named.id, named)
+    if not named.name:
+        named = streets.invented(named)
+    return named, finder.outdoors(named) if finder.is_outdoors(named) else finder.indoors(named)
+
+
+def _sound(places: list[Place], finder: Finder, dropped: list[Dropped]) -> tuple[list[Place], list[Entrance]]:
+    """Return places and entrances by the rules that `check_world` has for them, and list the others."""
+    walkable, height = finder.walkable, finder.height
+    doors: list[Entrance] = []
+    for door in finder.entrances:
+        outline = finder.shapes[finder.index[door.building]]
+        found = next(entrance_findings(door, outline, walkable, height), None)
+        if found is None:
+            doors.append(door)
+        else:
+            dropped.append(Dropped(id=door.id, reason=f"{found.id}: {found.what}"))
+    usable = {None, *(door.id for door in doors)}
+    kept: list[Place] = []
+    for place in places:
+        if place.entrance in usable and is_reachable(place, walkable):
+            kept.append(place)
+        else:
+            dropped.append(Dropped(id=place.id, reason=f"{place.kind} {place.name!r}: can't be reached on foot"))
+    return kept, doors
 
 
 def _homes(finder: Finder, streets: StreetAddresses) -> list[Place]:
@@ -131,12 +161,14 @@ def _homes(finder: Finder, streets: StreetAddresses) -> list[Place]:
     # In a quarter of small houses not every one needs rooms: an even share of them has.
     stride = max(1, -(-len(houses) // _MOST_HOMES))
     for building, shape in houses[::stride]:
-        add(building, shape)
+        with expendable(building.id):
+            add(building, shape)
     # Over shops and offices of old towns people live too.
     for building, shape in rest:
         if len(homes) >= _HOMES_WANTED:
             break
-        add(building, shape)
+        with expendable(building.id):
+            add(building, shape)
     return homes
 
 
@@ -148,21 +180,22 @@ def _transit_places(
     rows = [(s.id, s.name, "bus_stop", s.wait) for s in transit.stops]
     rows += [(b.id, b.name, "bicycle_rental", b.position) for b in transit.bike_stations]
     for key, name, kind, position in rows:
-        spot = router.nearest_walkable(position[:2], within=6.0)
-        if spot is None:
-            dropped.append(Dropped(id=key, reason=f"{kind} {name!r}: can't be reached on foot"))
-            continue
-        x, y = round(float(spot[0]), 3), round(float(spot[1]), 3)
-        z = round(float(height((x, y))), 3)
-        places.append(
-            Place(
-                id=key,
-                name=name,
-                category=Category.TRANSIT,
-                kind=kind,
-                building=None,
-                entrance=None,
-                position=(x, y, z),
+        with expendable(key):
+            spot = router.nearest_walkable(position[:2], within=6.0)
+            if spot is None:
+                dropped.append(Dropped(id=key, reason=f"{kind} {name!r}: can't be reached on foot"))
+                continue
+            x, y = round(float(spot[0]), 3), round(float(spot[1]), 3)
+            z = round(float(height((x, y))), 3)
+            places.append(
+                Place(
+                    id=key,
+                    name=name,
+                    category=Category.TRANSIT,
+                    kind=kind,
+                    building=None,
+                    entrance=None,
+                    position=(x, y, z),
+                )
             )
-        )
     return places

@@ -11,6 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.streets import Crossing, Street
 from vico.worldgen.facts.tags import number
 
@@ -28,10 +29,11 @@ def crossings_of(
         node_tags = next((kinds[n] for n in way.nodes if n in kinds), {})
         look = _marking({**node_tags, **way.tags}, "unmarked")
         width = min(max(number(way.tags.get("width")) or _CROSSING_WIDTH, 2.0), 8.0)
-        for piece in shapely.get_parts(overlay.intersection(LineString(way.line), carriageway)):
-            if isinstance(piece, LineString) and 2.0 < piece.length < 40.0:
-                (ax, ay), (bx, by) = piece.coords[0], piece.coords[-1]
-                found.append(Crossing((ax, ay), (bx, by), width, *look))
+        with expendable(f"w{way.id}"):
+            for piece in shapely.get_parts(overlay.intersection(LineString(way.line), carriageway)):
+                if isinstance(piece, LineString) and 2.0 < piece.length < 40.0:
+                    (ax, ay), (bx, by) = piece.coords[0], piece.coords[-1]
+                    found.append(Crossing((ax, ay), (bx, by), width, *look, id=f"w{way.id}"))
     middles = np.array([((c.start[0] + c.end[0]) / 2, (c.start[1] + c.end[1]) / 2) for c in found]).reshape(-1, 2)
     by_node: dict[int, Street] = {}
     lines = {street.way: street for street in streets}
@@ -51,7 +53,8 @@ def crossings_of(
         across = np.array([-along[1], along[0]]) * (street.width / 2)
         a, b = node.xy - across, node.xy + across
         look = _marking(kinds[node.id], "zebra")
-        found.append(Crossing((float(a[0]), float(a[1])), (float(b[0]), float(b[1])), _CROSSING_WIDTH, *look))
+        start, end = (float(a[0]), float(a[1])), (float(b[0]), float(b[1]))
+        found.append(Crossing(start, end, _CROSSING_WIDTH, *look, id=f"n{node.id}"))
     return found
 
 

@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import polygons_of
+from vico.worldgen.facts.expendable import NamedShape, changed, united
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.streets.crossings import crossings_of
@@ -23,7 +24,7 @@ _KERB_RADIUS = 2.0
 _GRID = 0.001  # metres: overlays on a grid are robust where free ones fail on nearly coincident outlines
 
 
-def road_polygons(site: SiteFacts, obstacles: Sequence[BaseGeometry] = ()) -> StreetPolygons:
+def road_polygons(site: SiteFacts, obstacles: Sequence[NamedShape] = ()) -> StreetPolygons:
     """Turn the streets of an OSM extract into polygons.
 
     Parameters
@@ -31,8 +32,8 @@ def road_polygons(site: SiteFacts, obstacles: Sequence[BaseGeometry] = ()) -> St
     site
         The extract, local metres, and which of its ways pass above others.
     obstacles
-        Footprints of buildings that stand on the ground: no sidewalk or square runs under them, and carriageways
-        only where a way leads through.
+        Footprints of buildings that stand on the ground, under their ids: no sidewalk or square runs under them, and
+        carriageways only where a way leads through.
 
     Returns
     -------
@@ -41,7 +42,7 @@ def road_polygons(site: SiteFacts, obstacles: Sequence[BaseGeometry] = ()) -> St
     """
     reach = site.osm.half + site.osm.margin
     window = shapely.box(-reach, -reach, reach, reach)
-    solid = overlay.union_all(overlay.mended(list(obstacles)), grid=_GRID) if len(obstacles) else MultiPolygon()
+    solid = united(changed(obstacles, overlay.mended), grid=_GRID) if len(obstacles) else MultiPolygon()
     strips = strips_of(site)
     carriageway = _carriageway(strips.drive, strips.through, solid, window)
     crossings = crossings_of(site.osm, carriageway, strips.streets, strips.crossings)
@@ -56,7 +57,7 @@ def road_polygons(site: SiteFacts, obstacles: Sequence[BaseGeometry] = ()) -> St
     return StreetPolygons(
         carriageway=_multi(carriageway),
         sidewalk=sidewalk,
-        crossing=_multi(overlay.intersection(overlay.union_all([c.polygon for c in crossings]), carriageway)),
+        crossing=_multi(overlay.intersection(united([NamedShape(c.id, c.polygon) for c in crossings]), carriageway)),
         pedestrian=pedestrian,
         path=path,
         cycleway=cycleway,
@@ -67,22 +68,22 @@ def road_polygons(site: SiteFacts, obstacles: Sequence[BaseGeometry] = ()) -> St
         rails=strips.rails,
         sunken=_sunken(strips.kerbed, carriageway),
         paved={
-            name: _multi(overlay.intersection(_multi(overlay.union_all(shapes, grid=_GRID)), window))
+            name: _multi(overlay.intersection(_multi(united(shapes, grid=_GRID)), window))
             for name, shapes in sorted(strips.paved.items())
         },
     )
 
 
 def _carriageway(
-    drive: list[BaseGeometry], through: list[BaseGeometry], solid: BaseGeometry, window: Polygon
+    drive: list[NamedShape], through: list[NamedShape], solid: BaseGeometry, window: Polygon
 ) -> MultiPolygon:
     """Carriageways in one, without what lies under buildings except where a way leads `through`."""
     # Closing the outline rounds the inner corners of junctions the way kerbs do.
-    carriageway = overlay.union_all(drive, grid=_GRID)
+    carriageway = united(drive, grid=_GRID)
     carriageway = overlay.buffer(overlay.buffer(carriageway, _KERB_RADIUS, quad_segs=4), -_KERB_RADIUS, quad_segs=4)
     carriageway = overlay.on_grid(overlay.simplify(carriageway, 0.08), grid=_GRID)
     if not solid.is_empty:
-        under = overlay.difference(solid, overlay.union_all(through, grid=_GRID), grid=_GRID)
+        under = overlay.difference(solid, united(through, grid=_GRID), grid=_GRID)
         carriageway = overlay.difference(carriageway, under, grid=_GRID)
     return _multi(overlay.intersection(_multi(carriageway), window, grid=_GRID))
 
@@ -93,20 +94,20 @@ class _Unclaimed:
     def __init__(self, taken: BaseGeometry, window: Polygon) -> None:
         self._taken, self._window = taken, window
 
-    def claim(self, shapes: list[BaseGeometry]) -> MultiPolygon:
+    def claim(self, shapes: list[NamedShape]) -> MultiPolygon:
         """Claim what is left of `shapes` beside what was claimed before."""
-        shape = overlay.simplify(overlay.union_all(shapes, grid=_GRID), 0.08)
+        shape = overlay.simplify(united(shapes, grid=_GRID), 0.08)
         shape = overlay.intersection(overlay.on_grid(shape, grid=_GRID), self._window, grid=_GRID)
         left = _multi(overlay.difference(_multi(shape), self._taken, grid=_GRID), 0.3)
         self._taken = overlay.union(self._taken, left, grid=_GRID)
         return left
 
 
-def _sunken(kerbed: list[BaseGeometry], carriageway: BaseGeometry) -> MultiPolygon:
+def _sunken(kerbed: list[NamedShape], carriageway: BaseGeometry) -> MultiPolygon:
     """Return the kerbed part of the carriageways, the rounded corners of their junctions with it."""
     if not kerbed:
         return MultiPolygon()
-    shape = overlay.union_all(kerbed, grid=_GRID)
+    shape = united(kerbed, grid=_GRID)
     shape = overlay.buffer(overlay.buffer(shape, 2 * _KERB_RADIUS, quad_segs=3), -2 * _KERB_RADIUS + 0.1, quad_segs=3)
     return _multi(overlay.intersection(_multi(overlay.on_grid(shape, grid=_GRID)), carriageway, grid=_GRID))
 

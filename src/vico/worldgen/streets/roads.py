@@ -17,6 +17,7 @@ from vico.exact import dot
 from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
 from vico.world.model import Dropped, Junction, Road, Roads
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.levels import OVER_A_STREET
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.tags import on_the_ground
@@ -245,15 +246,25 @@ def streets_from_osm(site: SiteFacts, solids: Sequence[BaseGeometry] = ()) -> li
         if "highway" not in way.tags:
             continue
         pieces, new_id = _cut(way, site.osm.half, new_id)
-        for part, (nodes, line) in enumerate(pieces):
-            street = _street(way, part, nodes, line)
-            if street is not None and np.linalg.norm(line[1:] - line[:-1], axis=1).sum() > 0.5:
-                if way.id in site.levels.above:
-                    street = replace(street, closed=OVER_A_STREET)
-                elif street.closed is None and _is_passage(way.tags) and _blocked(line, standing):
-                    street = replace(street, closed=THROUGH_A_BUILDING)
-                streets.append(street)
+        with expendable(f"w{way.id}"):
+            streets += _parts(way, pieces, site, standing)
     return _medians_cleared(streets, lefthand=site.left_driving)
+
+
+def _parts(
+    way: OsmWay, pieces: list[tuple[list[int], NDArray[np.float64]]], site: SiteFacts, standing: shapely.STRtree
+) -> list[NetworkStreet]:
+    """Return the streets that the pieces of a way are, those that nobody can use closed."""
+    found: list[NetworkStreet] = []
+    for part, (nodes, line) in enumerate(pieces):
+        street = _street(way, part, nodes, line)
+        if street is not None and np.linalg.norm(line[1:] - line[:-1], axis=1).sum() > 0.5:
+            if way.id in site.levels.above:
+                street = replace(street, closed=OVER_A_STREET)
+            elif street.closed is None and _is_passage(way.tags) and _blocked(line, standing):
+                street = replace(street, closed=THROUGH_A_BUILDING)
+            found.append(street)
+    return found
 
 
 def _is_passage(tags: Mapping[str, str]) -> bool:

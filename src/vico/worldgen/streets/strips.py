@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 import shapely
@@ -13,6 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import OsmArea, OsmWay, means_area
+from vico.worldgen.facts.expendable import NamedShape, expendable, named_parts
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import DRIVABLE, PAVINGS, Street, carriageway_width, is_oneway, lane_count
 from vico.worldgen.facts.tags import is_bridge, number, on_the_ground
@@ -39,7 +40,9 @@ _LEDGE = 0.5  # metres of a bridge's edge beside its carriageway
 
 @dataclass
 class Strips:
-    """Ground that a map gives to vehicles, walkers and others; strips of one kind overlap, and kinds each other.
+    """Ground that a map gives to vehicles, walkers and others, each strip under the id of its way or area.
+
+    Strips of one kind overlap, and kinds each other.
 
     Attributes
     ----------
@@ -59,19 +62,26 @@ class Strips:
         Ways that are crossings.
     """
 
-    drive: list[BaseGeometry] = field(default_factory=list)
-    kerbed: list[BaseGeometry] = field(default_factory=list)
-    through: list[BaseGeometry] = field(default_factory=list)
-    walk: list[BaseGeometry] = field(default_factory=list)
-    loose: list[BaseGeometry] = field(default_factory=list)
-    cycle: list[BaseGeometry] = field(default_factory=list)
-    stairs: list[BaseGeometry] = field(default_factory=list)
-    square: list[BaseGeometry] = field(default_factory=list)
-    car_park: list[BaseGeometry] = field(default_factory=list)
-    paved: dict[str, list[BaseGeometry]] = field(default_factory=dict)
+    drive: list[NamedShape] = field(default_factory=list)
+    kerbed: list[NamedShape] = field(default_factory=list)
+    through: list[NamedShape] = field(default_factory=list)
+    walk: list[NamedShape] = field(default_factory=list)
+    loose: list[NamedShape] = field(default_factory=list)
+    cycle: list[NamedShape] = field(default_factory=list)
+    stairs: list[NamedShape] = field(default_factory=list)
+    square: list[NamedShape] = field(default_factory=list)
+    car_park: list[NamedShape] = field(default_factory=list)
+    paved: dict[str, list[NamedShape]] = field(default_factory=dict)
     streets: list[Street] = field(default_factory=list)
     rails: list[NDArray[np.float64]] = field(default_factory=list)
     crossings: list[OsmWay] = field(default_factory=list)
+
+    def add(self, other: Strips) -> None:
+        """Add the strips of another."""
+        for name in (one.name for one in fields(self) if one.name != "paved"):
+            getattr(self, name).extend(getattr(other, name))
+        for paving, shapes in other.paved.items():
+            self.paved.setdefault(paving, []).extend(shapes)
 
 
 def strips_of(site: SiteFacts) -> Strips:
@@ -83,35 +93,41 @@ def strips_of(site: SiteFacts) -> Strips:
     tram_tree = shapely.STRtree(trams)
     for way in site.osm.ways:
         if on_the_ground(way.tags) and not (way.closed and means_area(way.tags)) and way.id not in site.levels.above:
-            _add_way(strips, way, tram_tree)
+            with expendable(f"w{way.id}"):
+                strips.add(_strips_of_way(way, tram_tree))
     for area in site.osm.areas:
         if on_the_ground(area.tags) and area.tags.get("building", "no") == "no":
-            _add_area(strips, area)
+            with expendable(area.id):
+                strips.add(_strips_of_area(area))
     return strips
 
 
-def _add_way(strips: Strips, way: OsmWay, trams: shapely.STRtree) -> None:
-    """Add a way at ground level."""
+def _strips_of_way(way: OsmWay, trams: shapely.STRtree) -> Strips:
+    """Return the strips of a way at ground level."""
+    strips = Strips()
     if way.tags.get("railway") == "tram":
         strips.rails.append(way.line)
     kind = way.tags.get("highway")
     if kind is None:
-        return
+        return strips
     line = LineString(way.line)
     if kind in DRIVABLE:
         _add_carriageway(strips, way, line, tracks=bool(len(trams.query(line, "dwithin", _TRAM_REACH))))
     elif kind in ("pedestrian", "platform"):
-        strips.square.append(overlay.buffer(line, max(number(way.tags.get("width")) or 5.0, 2.0) / 2, quad_segs=4))
-        _note_paving(strips.paved, way.tags, strips.square[-1])
+        wide = max(number(way.tags.get("width")) or 5.0, 2.0)
+        strip = NamedShape(f"w{way.id}", overlay.buffer(line, wide / 2, quad_segs=4))
+        strips.square.append(strip)
+        _note_paving(strips.paved, way.tags, strip)
     elif kind in _FOOT_WIDTH:
         _add_footway(strips, way, line)
+    return strips
 
 
 def _add_carriageway(strips: Strips, way: OsmWay, line: LineString, *, tracks: bool) -> None:
     """Add a drivable way with the sidewalks beside it."""
-    tags = way.tags
+    tags, name = way.tags, f"w{way.id}"
     width = carriageway_width(tags)
-    strip = overlay.buffer(line, width / 2, quad_segs=4)
+    strip = NamedShape(name, overlay.buffer(line, width / 2, quad_segs=4))
     strips.drive.append(strip)
     _note_paving(strips.paved, tags, strip)
     if tags.get("tunnel") == "building_passage" or tags.get("covered", "no") != "no":
@@ -120,9 +136,9 @@ def _add_carriageway(strips: Strips, way: OsmWay, line: LineString, *, tracks: b
     if _is_kerbed(tags, sidewalks=bool(sides)):
         strips.kerbed.append(strip)
     strips.streets.append(_street(way, width, tracks))
-    strips.walk += sides
+    strips.walk += named_parts(name, sides)
     if is_bridge(tags):
-        strips.walk.append(overlay.buffer(line, width / 2 + _LEDGE, cap_style="flat"))
+        strips.walk.append(NamedShape(name, overlay.buffer(line, width / 2 + _LEDGE, cap_style="flat")))
 
 
 def _is_kerbed(tags: Mapping[str, str], *, sidewalks: bool) -> bool:
@@ -139,28 +155,30 @@ def _add_footway(strips: Strips, way: OsmWay, line: LineString) -> None:
         strips.crossings.append(way)
         return
     width = number(tags.get("width")) or (2.6 if tags.get("footway") == "sidewalk" else _FOOT_WIDTH[kind])
-    strip = overlay.buffer(line, min(max(width, 1.4), 12.0) / 2, quad_segs=3)
+    strip = NamedShape(f"w{way.id}", overlay.buffer(line, min(max(width, 1.4), 12.0) / 2, quad_segs=3))
     unpaved = tags.get("surface") in _LOOSE or (kind in ("path", "track") and "surface" not in tags)
     _note_paving(strips.paved, tags, strip)
     others = {"steps": strips.stairs, "cycleway": strips.cycle}
     others.get(kind, strips.loose if unpaved else strips.walk).append(strip)
 
 
-def _add_area(strips: Strips, area: OsmArea) -> None:
-    """Add an area at ground level that is no building."""
+def _strips_of_area(area: OsmArea) -> Strips:
+    """Return the strips of an area at ground level that is no building."""
+    strips, shape = Strips(), NamedShape(area.id, area.polygon)
     tags = area.tags
     kind = tags.get("highway") or tags.get("area:highway")
     if kind in _SQUARES or (kind is None and _is_square(tags)):
-        strips.square.append(area.polygon)
+        strips.square.append(shape)
     elif kind in DRIVABLE:
-        strips.drive.append(area.polygon)
+        strips.drive.append(shape)
     elif kind == "steps":
-        strips.stairs.append(area.polygon)
+        strips.stairs.append(shape)
     elif tags.get("amenity") == "parking" and tags.get("parking", "surface") in ("surface", "lane", "street_side"):
-        strips.car_park.append(area.polygon)
+        strips.car_park.append(shape)
     else:
-        return
-    _note_paving(strips.paved, tags, area.polygon)
+        return strips
+    _note_paving(strips.paved, tags, shape)
+    return strips
 
 
 def _is_square(tags: Mapping[str, str]) -> bool:
@@ -168,7 +186,7 @@ def _is_square(tags: Mapping[str, str]) -> bool:
     return tags.get("place") == "square" or "platform" in (tags.get("railway"), tags.get("public_transport"))
 
 
-def _note_paving(paved: dict[str, list[BaseGeometry]], tags: Mapping[str, str], shape: BaseGeometry) -> None:
+def _note_paving(paved: dict[str, list[NamedShape]], tags: Mapping[str, str], shape: NamedShape) -> None:
     """Remember where the map says what the ground is paved with."""
     name = PAVINGS.get(tags.get("surface", "").split(";")[0])
     if name is not None:

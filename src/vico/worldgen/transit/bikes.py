@@ -15,6 +15,7 @@ from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.model import BikeStation
 from vico.world.walkways import SIDEWALK, Walkways
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.transit.plan import k_means, where_people_go
 
@@ -35,13 +36,18 @@ def bike_stations(
     osm = site.osm
     random = rng(seed, "transit", "bikes")
     found: list[tuple[NDArray[np.float64], str, int]] = []
-    places = [(n.xy, n.tags) for n in osm.nodes]
-    places += [(np.array(a.polygon.centroid.coords[0]), a.tags) for a in osm.areas if not a.polygon.is_empty]
-    for xy, tags in places:
-        if tags.get("amenity") == "bicycle_rental" and np.abs(xy).max() <= osm.half - 5.0:
-            size = re.match(r"\d{1,4}", tags.get("capacity", ""))
-            capacity = int(np.clip(int(size.group()) if size else _CAPACITY, 2, 60))
-            found.append((_off_the_lanes(lanes, xy), tags.get("name") or f"Bike station {len(found) + 1}", capacity))
+    places = [(f"n{n.id}", shapely.Point(n.xy), n.tags) for n in osm.nodes]
+    places += [(a.id, a.polygon, a.tags) for a in osm.areas if not a.polygon.is_empty]
+    for key, shape, tags in places:
+        if tags.get("amenity") != "bicycle_rental":
+            continue
+        with expendable(key):
+            xy = np.array(shape.centroid.coords[0])
+            if np.abs(xy).max() <= osm.half - 5.0:
+                size = re.match(r"\d{1,4}", tags.get("capacity", ""))
+                capacity = int(np.clip(int(size.group()) if size else _CAPACITY, 2, 60))
+                name = tags.get("name") or f"Bike station {len(found) + 1}"
+                found.append((_off_the_lanes(lanes, xy), name, capacity))
     origin = "osm"
     if not found:
         origin = "planned"
@@ -70,9 +76,10 @@ def _planned(site: SiteFacts, walks: Walkways, seed: int) -> list[NDArray[np.flo
         for way in osm.ways:
             if way.tags.get("highway") in _FOOTWAYS and len(way.line) > 1:
                 # Beside the way, not on it.
-                beside = overlay.offset_curve(shapely.LineString(way.line), -_ASIDE)
-                stretches += [part for part in shapely.get_parts(overlay.intersection(beside, window))
-                              if part.geom_type == "LineString" and part.length > 15.0]  # fmt: skip
+                with expendable(f"w{way.id}"):
+                    beside = overlay.offset_curve(shapely.LineString(way.line), -_ASIDE)
+                    stretches += [part for part in shapely.get_parts(overlay.intersection(beside, window))
+                                  if part.geom_type == "LineString" and part.length > 15.0]  # fmt: skip
     if not stretches:
         return []
     # Not at the very corners, where people cross.

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.seeds import rng
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.transit.drive import BUS_LENGTH, Berth, Drive, Kerbs
 
@@ -24,11 +25,10 @@ def where_people_go(site: SiteFacts) -> NDArray[np.float64]:
     """Places that people go to, metres, shape ``(n, 2)``: the named ones; every building where these are few."""
     points = [named.xy for named in site.named]
     if len(points) < _FEW:
-        points += [
-            np.array(area.polygon.representative_point().coords[0])
-            for area in site.osm.areas
-            if area.tags.get("building", "no") != "no" and not area.polygon.is_empty
-        ]
+        for area in site.osm.areas:
+            if area.tags.get("building", "no") != "no" and not area.polygon.is_empty:
+                with expendable(area.id):
+                    points.append(np.array(area.polygon.representative_point().coords[0]))
     xy = np.array(points).reshape(-1, 2)
     return xy[np.abs(xy).max(axis=1, initial=0.0) < site.osm.half]
 

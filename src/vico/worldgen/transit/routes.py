@@ -14,6 +14,7 @@ import shapely
 from vico.geo.gtfs import DAY, Feed, GtfsRoute, Pattern
 from vico.geo.osm import OsmData, OsmRelation, Tags
 from vico.world.model import Dropped
+from vico.worldgen.facts.expendable import expendable
 
 _SAME_STOP = 60.0  # metres within which a platform and a stop position of one name are one stop
 _BESIDE = 35.0  # and of any name, where one follows the other in the relation
@@ -75,8 +76,9 @@ def routes_from_osm(osm: OsmData, half: float) -> tuple[list[Route], list[Droppe
             continue
         if any(tags.get(key) == "yes" for key in _GONE) or tags.get("state") in ("proposed", "abandoned"):
             continue
-        for run in _runs(relation, spots, half):
-            grouped[name, tags.get("network", "") or tags.get("operator", "")].append((relation, run))
+        with expendable(f"r{relation.id}"):
+            for run in _runs(relation, spots, half):
+                grouped[name, tags.get("network", "") or tags.get("operator", "")].append((relation, run))
     routes: list[Route] = []
     dropped: list[Dropped] = []
     for (name, _), members in grouped.items():

@@ -14,8 +14,9 @@ from vico.geo.gtfs import Feed
 from vico.geo.osm import OsmData
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
-from vico.world.model import Dropped, Line, Stop, Transit
+from vico.world.model import FAILED, Dropped, Line, Stop, Transit
 from vico.world.walkways import SIDEWALK, Walkways
+from vico.worldgen.facts.expendable import expendable, leave_out
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.transit.bikes import FIRST_STATION, bike_stations
 from vico.worldgen.transit.drive import BUS_LENGTH, Berth, Drive, Kerbs, merged
@@ -151,18 +152,26 @@ def transit_from_osm(
     kept = list(dict.fromkeys([*mapped, *served]))
     walks = lanes.walks.clear_of(solids or [])
     waiting = _Waiting(lanes, walks, height)
-    stops = {
-        berth: Stop(
-            id=f"stop_{k}",
-            entity=FIRST_STOP + k,
-            name=berth.name,
-            wait=waiting.at(berth),
-            lane=lanes.ids[berth.lane],
-            offset=round(berth.offset, 2),
-        )
-        for k, berth in enumerate(kept)
-    }
-    lines = [_record(k, line, stops) for k, line in enumerate(_staggered(chosen))]
+    stops: dict[Berth, Stop] = {}
+    for k, berth in enumerate(kept):
+        with expendable(berth.key):
+            stops[berth] = Stop(
+                id=f"stop_{k}",
+                entity=FIRST_STOP + k,
+                name=berth.name,
+                wait=waiting.at(berth),
+                lane=lanes.ids[berth.lane],
+                offset=round(berth.offset, 2),
+            )
+    lines: list[Line] = []
+    for k, line in enumerate(_staggered(chosen)):
+        name = "/".join(line.names)
+        lost = [berth.name for berth in line.loop if berth not in stops]
+        if lost:
+            leave_out(line.ids[0] if line.ids else name, f"{FAILED}: its stop {lost[0]} can't")
+            continue
+        with expendable(line.ids[0] if line.ids else name):
+            lines.append(_record(k, line, stops))
     stations, racks = bike_stations(site, lanes, walks, height, seed)
     origins = dict.fromkeys("planned" if line.route is None else line.route.origin for line in chosen)
     return Transit(
@@ -218,11 +227,12 @@ def _mapped_berths(osm: OsmData, kerbs: Kerbs) -> list[Berth]:
         )
         if not stop or np.abs(xy).max() > osm.half:
             continue
-        near = kerbs.near(xy, _REACH)
-        if near:
-            berth = Berth(key, tags.get("name") or f"Stop {len(berths) + 1}", near[0][1], near[0][2])
-            if merged(berth, berths) == berth:
-                berths.append(berth)
+        with expendable(key):
+            near = kerbs.near(xy, _REACH)
+            if near:
+                berth = Berth(key, tags.get("name") or f"Stop {len(berths) + 1}", near[0][1], near[0][2])
+                if merged(berth, berths) == berth:
+                    berths.append(berth)
     return berths
 
 
@@ -230,11 +240,12 @@ def _driven(routes: Sequence[Route], kerbs: Kerbs, mapped: Sequence[Berth], left
     """Choose some routes that can be driven as closed rounds: timetables first, then the longest on the map."""
     fits: list[tuple[Route, tuple[Berth, ...], Drive, float]] = []
     for route in routes:
-        fit = _fit(route, kerbs, [*mapped, *(b for _, loop, _, _ in fits for b in loop)])
-        if isinstance(fit, str):
-            left_out.append(Dropped(id=route.id, reason=f"bus {route.name}: {fit}"))
-        else:
-            fits.append((route, *fit))
+        with expendable(route.id):
+            fit = _fit(route, kerbs, [*mapped, *(b for _, loop, _, _ in fits for b in loop)])
+            if isinstance(fit, str):
+                left_out.append(Dropped(id=route.id, reason=f"bus {route.name}: {fit}"))
+            else:
+                fits.append((route, *fit))
 
     ways = [drive.driven(loop) for _, loop, drive, _ in fits]
 

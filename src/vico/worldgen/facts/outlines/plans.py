@@ -10,6 +10,7 @@ from shapely import Polygon
 
 from vico.geo.osm import Tags
 from vico.world.model import Dropped
+from vico.worldgen.facts.expendable import NamedShape
 from vico.worldgen.facts.outlines.roof_shapes import Roof
 
 _TALL = 2.2  # metres: what begins higher up is walked under
@@ -99,6 +100,6 @@ class BuildingPlans:
     plans: list[BuildingPlan]
     dropped: list[Dropped]
 
-    def standing(self) -> list[Polygon]:
+    def standing(self) -> list[NamedShape]:
         """Return the footprints of what stands on the ground: parts that begin lower than a person is tall, metres."""
-        return [part.polygon for plan in self.plans for part in plan.parts if part.low < _TALL]
+        return [NamedShape(plan.id, part.polygon) for plan in self.plans for part in plan.parts if part.low < _TALL]

@@ -15,6 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
 from vico.world.heights import HeightField
+from vico.worldgen.facts.expendable import NamedShape, expendable, united
 from vico.worldgen.facts.levels import ON_FOOT, SLAB, SLAB_ON_FOOT
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import StreetPolygons, carriageway_width
@@ -65,13 +66,15 @@ def deck_walk(tags: Mapping[str, str]) -> float:
 def spans_over_water(site: SiteFacts) -> BaseGeometry:
     """Return where bridges are the ground: their decks, over whatever lies below."""
     osm, above = site.osm, site.levels.above
-    strips: list[BaseGeometry] = []
+    strips: list[NamedShape] = []
     for way in osm.ways:
         if is_bridge(way.tags) and way.id not in above and ("highway" in way.tags or "railway" in way.tags):
             width = deck_width(way) + (1.6 if way.tags.get("highway") not in ON_FOOT else 0.0)
-            strips.append(overlay.buffer(shapely.LineString(way.line), width / 2, cap_style="flat"))
-    strips += [area.polygon for area in osm.areas if area.tags.get("man_made") == "bridge"]
-    return overlay.union_all(strips, grid=0.001) if strips else shapely.MultiPolygon()
+            with expendable(f"w{way.id}"):
+                strip = overlay.buffer(shapely.LineString(way.line), width / 2, cap_style="flat")
+                strips.append(NamedShape(f"w{way.id}", strip))
+    strips += [NamedShape(area.id, area.polygon) for area in osm.areas if area.tags.get("man_made") == "bridge"]
+    return united(strips, grid=0.001) if strips else shapely.MultiPolygon()
 
 
 def decks_of(site: SiteFacts, terrain: HeightField) -> list[Deck]:
@@ -125,12 +128,12 @@ def decks_of(site: SiteFacts, terrain: HeightField) -> list[Deck]:
 
 def kept_clear(osm: OsmData, streets: StreetPolygons) -> BaseGeometry:
     """Return where no pier may stand: streets and railways at ground level, with a metre beside them."""
-    rails = [
-        overlay.buffer(shapely.LineString(way.line), 1.8)
-        for way in osm.ways
-        if way.tags.get("railway") in _RAILS and on_the_ground(way.tags) and not is_bridge(way.tags)
-    ]
-    return overlay.buffer(overlay.union_all([streets.carriageway, *rails]), 1.0, quad_segs=2)
+    kept = [NamedShape("carriageways", streets.carriageway)]
+    for way in osm.ways:
+        if way.tags.get("railway") in _RAILS and on_the_ground(way.tags) and not is_bridge(way.tags):
+            with expendable(f"w{way.id}"):
+                kept.append(NamedShape(f"w{way.id}", overlay.buffer(shapely.LineString(way.line), 1.8)))
+    return overlay.buffer(united(kept), 1.0, quad_segs=2)
 
 
 def left_normals(line: Floats) -> Floats:
@@ -145,11 +148,12 @@ def left_normals(line: Floats) -> Floats:
 
 def pier_feet(decks: Sequence[Deck], terrain: HeightField, keep_clear: BaseGeometry) -> list[Polygon]:
     """Return where the piers of decks stand, for those who must not walk through them, metres."""
-    return [
-        Polygon([corner[:2] for corner in foot])
-        for deck in decks
-        for foot, _, _ in pier_boxes(deck, left_normals(deck.line), terrain, keep_clear, terrain.half)
-    ]
+    feet: list[Polygon] = []
+    for deck in decks:
+        with expendable(f"w{deck.way.id}"):
+            boxes = pier_boxes(deck, left_normals(deck.line), terrain, keep_clear, terrain.half)
+            feet += [Polygon([corner[:2] for corner in foot]) for foot, _, _ in boxes]
+    return feet
 
 
 def pier_boxes(

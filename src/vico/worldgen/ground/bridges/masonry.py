@@ -30,6 +30,12 @@ class Masonry:
         self.quads.setdefault(key, []).append(np.asarray(quad, np.float64))
         self.tints[key] = (LOOKS[look], tint)
 
+    def take(self, other: Masonry) -> None:
+        """Add the quadrilaterals of another."""
+        for key, quads in other.quads.items():
+            self.quads.setdefault(key, []).extend(quads)
+            self.tints[key] = other.tints[key]
+
     def box(
         self, foot: Sequence[Floats], low: float, high: float, look: str, tint: tuple[int, int, int] | None = None
     ) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -18,6 +18,7 @@ from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmWay
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface, joined
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.levels import ON_FOOT
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.facts.tags import on_the_ground
@@ -35,7 +36,9 @@ _TRACK_WIDTH = 4.6  # metres
 
 @dataclass(frozen=True)
 class Portal:
-    """The mouth of a tunnel: its middle, the direction into it, its inner width and height, metres."""
+    """The mouth of a tunnel (its way's id): its middle, the direction into it, its inner width and height, metres."""
+
+    way: int
 
     place: tuple[float, float]
     inward: tuple[float, float]
@@ -55,43 +58,58 @@ def portals_of(osm: OsmData, streets: StreetPolygons) -> list[Portal]:
     )
     paved = overlay.union_all([streets.carriageway, streets.sidewalk, streets.pedestrian, streets.cycleway], grid=None)
     shapely.prepare(paved)
-    found = []
+    found: list[Portal] = []
     for way in osm.ways:
-        tags = way.tags
-        if tags.get("tunnel", "no") in ("no", "building_passage", "culvert") or tags.get("highway") == "steps":
+        if _is_tunnel(way):
+            with expendable(f"w{way.id}"):
+                found += _mouths(way, walked, built, paved)
+    return found
+
+
+def _is_tunnel(way: OsmWay) -> bool:
+    """Whether a way goes under ground and is long enough for two mouths."""
+    tags = way.tags
+    if tags.get("tunnel", "no") in ("no", "building_passage", "culvert") or tags.get("highway") == "steps":
+        return False
+    if not ("highway" in tags or tags.get("railway") in ("rail", "light_rail", "tram")) or tags.get("indoor"):
+        return False
+    return bool(shapely.LineString(way.line).length >= _LEAST_TUNNEL)
+
+
+def _mouths(
+    way: OsmWay, walked: Mapping[int, Sequence[OsmWay]], built: shapely.STRtree, paved: BaseGeometry
+) -> list[Portal]:
+    """Return the mouths of a tunnel that lie in the open: streets lead to their nodes (`walked`), nothing is built."""
+    foot = way.tags.get("highway") in ON_FOOT
+    width = deck_width(way) - (1.0 if foot else 2.0) if "highway" in way.tags else _TRACK_WIDTH
+    width = max(width, 2.2)
+    found: list[Portal] = []
+    for end, beyond, node in ((0, 1, way.nodes[0]), (-1, -2, way.nodes[-1])):
+        if node not in walked:
             continue
-        foot = tags.get("highway") in ON_FOOT
-        if not ("highway" in tags or tags.get("railway") in ("rail", "light_rail", "tram")) or tags.get("indoor"):
+        here, inside = way.line[end], way.line[beyond]
+        u = (inside - here) / max(float(np.hypot(*(inside - here))), 1e-9)
+        across = np.array([-u[1], u[0]]) * (width / 2 + 0.6)
+        face = shapely.LineString([here + u * 1.5 - across, here + u * 1.5 + across])
+        # A wall across another street or into a house is worse than none; the street that leads in ends there. A
+        # passage for walkers may lie on the ground whatever its tags say: no wall bars its way.
+        if len(built.query(overlay.buffer(face, 0.8), predicate="intersects")):
             continue
-        if shapely.LineString(way.line).length < _LEAST_TUNNEL:
+        leading = [] if foot else walked[node]
+        ends = overlay.union_all([_end_of(street, here, u) for street in leading])
+        across_it = overlay.difference(overlay.buffer(face, 0.5, cap_style="flat"), ends)
+        if overlay.common_area(across_it, paved) > 0.45 * (width + 1.2):
             continue
-        width = deck_width(way) - (1.0 if foot else 2.0) if "highway" in tags else _TRACK_WIDTH
-        width = max(width, 2.2)
-        for end, beyond, node in ((0, 1, way.nodes[0]), (-1, -2, way.nodes[-1])):
-            if node not in walked:
-                continue
-            here, inside = way.line[end], way.line[beyond]
-            u = (inside - here) / max(float(np.hypot(*(inside - here))), 1e-9)
-            across = np.array([-u[1], u[0]]) * (width / 2 + 0.6)
-            face = shapely.LineString([here + u * 1.5 - across, here + u * 1.5 + across])
-            # A wall across another street or into a house is worse than none; the street that leads in ends there. A
-            # passage for walkers may lie on the ground whatever its tags say: no wall bars its way.
-            if len(built.query(overlay.buffer(face, 0.8), predicate="intersects")):
-                continue
-            leading = [] if foot else walked[node]
-            ends = overlay.union_all([_end_of(street, here, u) for street in leading])
-            across_it = overlay.difference(overlay.buffer(face, 0.5, cap_style="flat"), ends)
-            if overlay.common_area(across_it, paved) > 0.45 * (width + 1.2):
-                continue
-            place = here + u
-            found.append(
-                Portal(
-                    (float(place[0]), float(place[1])),
-                    (float(u[0]), float(u[1])),
-                    width,
-                    _FOOT_HEADROOM if foot else _HEADROOM,
-                )
+        place = here + u
+        found.append(
+            Portal(
+                way.id,
+                (float(place[0]), float(place[1])),
+                (float(u[0]), float(u[1])),
+                width,
+                _FOOT_HEADROOM if foot else _HEADROOM,
             )
+        )
     return found
 
 
@@ -123,18 +141,26 @@ def portal_surfaces(portals: Sequence[Portal], terrain: HeightField, window: Pol
     """Draw the mouths of tunnels: a body of stone with a dark opening in its face."""
     stone = Masonry()
     for portal in portals:
-        foot, u, left = _mouth(portal)
-        if not window.contains(Polygon([p[:2] for p in foot])):
-            continue
-        ground = float(terrain(np.array(portal.place)))
-        low = float(min(ground, terrain(np.array(foot)).min())) - 0.3
-        if float(terrain(np.array(portal.place) + _BEHIND * u)) - ground < 0.4 * portal.height:
-            _well(stone, foot, u, left, ground)
-            continue
-        top = ground + portal.height + 0.9
-        stone.box(foot, low, top, "wall")
-        _opening(stone, portal, ground, u, left)
+        with expendable(f"w{portal.way}"):
+            stone.take(_drawn(portal, terrain, window))
     return joined(stone.surfaces())
+
+
+def _drawn(portal: Portal, terrain: HeightField, window: Polygon) -> Masonry:
+    """Draw one mouth, if it lies within the window."""
+    stone = Masonry()
+    foot, u, left = _mouth(portal)
+    if not window.contains(Polygon([p[:2] for p in foot])):
+        return stone
+    ground = float(terrain(np.array(portal.place)))
+    low = float(min(ground, terrain(np.array(foot)).min())) - 0.3
+    if float(terrain(np.array(portal.place) + _BEHIND * u)) - ground < 0.4 * portal.height:
+        _well(stone, foot, u, left, ground)
+        return stone
+    top = ground + portal.height + 0.9
+    stone.box(foot, low, top, "wall")
+    _opening(stone, portal, ground, u, left)
+    return stone
 
 
 def _well(stone: Masonry, foot: Sequence[Floats], u: Floats, left: Floats, ground: float) -> None:

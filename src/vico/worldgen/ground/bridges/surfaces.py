@@ -13,8 +13,10 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
+from vico.geo.osm import OsmWay
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface, joined
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.levels import ON_FOOT
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import StreetPolygons
@@ -40,7 +42,10 @@ def bridge_surfaces(
     shapely.prepare(keep_clear)
     beside = _Beside.of(decks)
     for own, deck in enumerate(decks):
-        _draw_deck(stone, deck, terrain, window, keep_clear, partial(beside.reaches, own))
+        with expendable(f"w{deck.way.id}"):
+            drawn = Masonry()
+            _draw_deck(drawn, deck, terrain, window, keep_clear, partial(beside.reaches, own))
+            stone.take(drawn)
     _draw_rails(stone, site, terrain, window)
     return joined(stone.surfaces())
 
@@ -218,29 +223,41 @@ def _piers(
 def _draw_rails(stone: Masonry, site: SiteFacts, terrain: HeightField, window: Polygon) -> None:
     """Railings along bridges that are the ground."""
     osm, above = site.osm, site.levels.above
-    others = [
-        overlay.buffer(shapely.LineString(way.line), deck_width(way) / 2 + 0.5, cap_style="flat")
-        for way in osm.ways
-        if "highway" in way.tags and way.id not in above and on_the_ground(way.tags)
-    ]
+    ids: list[int] = []
+    others: list[BaseGeometry] = []
+    for way in osm.ways:
+        if "highway" in way.tags and way.id not in above and on_the_ground(way.tags):
+            with expendable(f"w{way.id}"):
+                strip = overlay.buffer(shapely.LineString(way.line), deck_width(way) / 2 + 0.5, cap_style="flat")
+                others.append(strip)
+                ids.append(way.id)
     tree = shapely.STRtree(others)
-    ids = [way.id for way in osm.ways if "highway" in way.tags and way.id not in above and on_the_ground(way.tags)]
     for way in osm.ways:
         if not is_bridge(way.tags) or way.id in above or "highway" not in way.tags or not on_the_ground(way.tags):
             continue
-        line = np.asarray(shapely.segmentize(shapely.LineString(way.line), 4.0).coords)
-        left = left_normals(line)
-        width = deck_width(way) + (1.2 if way.tags["highway"] not in ON_FOOT else 0.0)
-        for side in (1.0, -1.0):
-            edge = line + side * left * (width / 2 - 0.1)
-            z = terrain.upper(edge)
-            for k in range(len(edge) - 1):
-                middle = shapely.Point((edge[k] + edge[k + 1]) / 2)
-                crowded = [j for j in tree.query(middle, predicate="intersects") if ids[int(j)] != way.id]
-                if crowded or not window.contains(middle):
-                    continue
-                p, q = np.r_[edge[k], z[k]], np.r_[edge[k + 1], z[k + 1]]
-                out = side * np.r_[left[k], 0.0]
-                if side > 0:
-                    p, q = q, p
-                _parapet(stone, p, q, out, solid=False)
+        with expendable(f"w{way.id}"):
+            drawn = Masonry()
+            _draw_rail(drawn, way, terrain, window, tree, ids)
+            stone.take(drawn)
+
+
+def _draw_rail(
+    stone: Masonry, way: OsmWay, terrain: HeightField, window: Polygon, others: shapely.STRtree, ids: list[int]
+) -> None:
+    """Railings along one bridge, but not where other ways (`others`, with these ids) go on beside it."""
+    line = np.asarray(shapely.segmentize(shapely.LineString(way.line), 4.0).coords)
+    left = left_normals(line)
+    width = deck_width(way) + (1.2 if way.tags["highway"] not in ON_FOOT else 0.0)
+    for side in (1.0, -1.0):
+        edge = line + side * left * (width / 2 - 0.1)
+        z = terrain.upper(edge)
+        for k in range(len(edge) - 1):
+            middle = shapely.Point((edge[k] + edge[k + 1]) / 2)
+            crowded = [j for j in others.query(middle, predicate="intersects") if ids[int(j)] != way.id]
+            if crowded or not window.contains(middle):
+                continue
+            p, q = np.r_[edge[k], z[k]], np.r_[edge[k + 1], z[k + 1]]
+            out = side * np.r_[left[k], 0.0]
+            if side > 0:
+                p, q = q, p
+            _parapet(stone, p, q, out, solid=False)

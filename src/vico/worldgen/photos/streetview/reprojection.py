@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from vico.geo.street_images.model import StreetImage
 from vico.world.model import Dropped
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.sight import Sight
 from vico.worldgen.photos.atlas import Atlas
 from vico.worldgen.photos.streetview.blending import Blending, Layer, paint_chart
@@ -131,15 +132,16 @@ def reproject(
     shots: list[tuple[int, Shot]] = []
     views: list[Seen] = []
     for image in images:
-        outcome, shot = prepared(image, photograph, config, ground or flat_ground)
-        if shot is not None:
-            seen = _sampled(samples, shot, atlas, sight, config)
-            if len(seen.index):
-                shots.append((len(outcomes), shot))
-                views.append(seen)
-            else:
-                outcome = replace(outcome, used=False, reason="sees no wall near enough")
-        outcomes.append(outcome)
+        with expendable(f"{image.source} {image.id}"):
+            outcome, shot = prepared(image, photograph, config, ground or flat_ground)
+            if shot is not None:
+                seen = _sampled(samples, shot, atlas, sight, config)
+                if len(seen.index):
+                    shots.append((len(outcomes), shot))
+                    views.append(seen)
+                else:
+                    outcome = replace(outcome, used=False, reason="sees no wall near enough")
+            outcomes.append(outcome)
     looks = [
         lab_of(shot.colours(seen.xy, seen.pixels * (PATCH / atlas.texel)))
         for (_, shot), seen in zip(shots, views, strict=True)
