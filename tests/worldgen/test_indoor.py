@@ -15,11 +15,12 @@ from vico.rules import REACH
 from vico.world.check.indoors import walkable_inside
 from vico.world.folder import World
 from vico.world.model import FIRST_FURNITURE, Category, Entrance
-from vico.worldgen.indoor.floorplans import FLATS, OUTSIDE, USES, sketch_of
+from vico.worldgen.indoor import catalogue
+from vico.worldgen.indoor.catalogue import use_of
+from vico.worldgen.indoor.floorplans import OUTSIDE, sketch_of
 from vico.worldgen.indoor.layouts import plan_of, uses
 from vico.worldgen.indoor.rooms import rooms_of_plan
 from vico.worldgen.indoor.stage import furnish
-from vico.worldgen.indoor.uses import use_of
 
 SMALL = set(read_models(PACKAGED / "models" / "indoor" / "small_things.toml"))
 
@@ -49,7 +50,7 @@ def test_in_all_of_helsinki_one_walks_to_every_room_and_container(helsinki: Worl
 @pytest.mark.parametrize("use", uses())
 def test_one_walks_from_the_entrance_to_every_container_on_every_floor(use: str) -> None:
     for size, variant in ((0, 0), (2, 1)):
-        rooms, objects = rooms_of_plan(plan_of(use, size, USES[use].storeys, variant))
+        rooms, objects = rooms_of_plan(plan_of(use, size, catalogue.uses().uses[use].storeys, variant))
         assert walkable_inside(rooms, objects) == []
         assert all(room.containers for room in rooms if room.kind not in ("stairs", "lift")), use
 
@@ -73,7 +74,7 @@ def test_a_room_without_a_door_is_found() -> None:
 @pytest.mark.parametrize("use", uses())
 def test_furniture_stands_within_its_room_and_apart(use: str) -> None:
     models = furniture_models()
-    for room in plan_of(use, 1, USES[use].storeys).rooms:
+    for room in plan_of(use, 1, catalogue.uses().uses[use].storeys).rooms:
         solid: list[tuple[float, float, float, float]] = []
         for item in room.items:
             wide, deep, _ = models[item.prototype].size
@@ -153,9 +154,9 @@ def test_containers_are_within_reach(helsinki: World) -> None:
             assert container.entity == room.entity or container.entity >= FIRST_FURNITURE
 
 
-@pytest.mark.parametrize("use", [*USES])
+@pytest.mark.parametrize("use", [*catalogue.uses().uses])
 def test_doors_are_wide_enough_and_lie_on_shared_walls(use: str) -> None:
-    sketch = sketch_of(use, 1, USES[use].storeys)
+    sketch = sketch_of(use, 1, catalogue.uses().uses[use].storeys)
     for door in sketch.doors:
         assert door.width >= 0.9
         for room in (sketch.rooms[k] for k in (door.a, door.b) if k != OUTSIDE and not door.lift):
@@ -222,5 +223,5 @@ def test_every_kind_of_place_has_a_use() -> None:
     assert use_of(Category.STORE, "something new") == "shop"
     assert {use_of(category, "?") for category in Category} <= set(uses())
     assert use_of(Category.ACCOMMODATION, "apartments") == "flat"
-    assert set(FLATS) <= set(uses())
+    assert set(catalogue.uses().homes) <= set(uses())
     assert len(uses()) >= 40

@@ -17,10 +17,10 @@ from vico.llm import Budget, Connection, Endpoint, LanguageModel, Sampling
 from vico.world.check.indoors import walkable_inside
 from vico.world.folder import World
 from vico.world.model import Place
+from vico.worldgen.indoor.catalogue import use_of
 from vico.worldgen.indoor.layout_library import Layout, findings_of
 from vico.worldgen.indoor.layout_llm import EXAMPLE, LlmLayoutAuthor, furnish_drawn
 from vico.worldgen.indoor.stage import Indoors, furnish
-from vico.worldgen.indoor.uses import use_of
 from vico.worldgen.stages import Stages
 
 

@@ -6,11 +6,13 @@ are rectangles that share walls; doors lie on shared walls. Furniture comes late
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from vico.assets.interior import RISE
+from vico.worldgen.indoor.catalogue import uses
 from vico.worldgen.indoor.furnishing import Furnishing
+from vico.worldgen.indoor.records import Cell, EntryPlan, FrontPlan, SpinePlan
 
 CEILING = 2.7
 OUTSIDE = -1
@@ -19,7 +21,6 @@ _CAR = 1.8
 _CORRIDOR = 1.8
 
 Box = tuple[float, float, float, float]
-Cell = tuple[str, float]  # kind of room and its share of the strip
 
 
 @dataclass(frozen=True)
@@ -135,73 +136,56 @@ class _Draft:
 Composer = Callable[["_Draft", float, float, int], None]
 
 
-def _front(main: str, backs: Sequence[Cell], deep: float, *, height: float = CEILING, lift: bool = False) -> Composer:
-    """Return a large room at the street, rooms for the staff behind it."""
-
-    def compose(d: _Draft, w: float, h: float, storeys: int) -> None:
-        back = max(deep, CORE[1]) if storeys > 1 else deep
-        hosts = [d.room(main, 0, 0, w, h - back, k, height) for k in range(storeys)]
-        d.door(hosts[0], OUTSIDE, round(w * 0.35, 1), 0, 0, 1.2)
-        x = d.cores(0.0, h - back, hosts, lift=lift) if storeys > 1 else 0.0
-        for k, host in enumerate(hosts):
-            if backs:
-                d.strip(x, w, h - back, back, backs if not k else backs[:2], host, k)
-
-    return compose
+def _front(d: _Draft, plan: FrontPlan, size: tuple[float, float], storeys: int) -> None:
+    """Draw a large room at the street, rooms for the staff behind it."""
+    w, h = size
+    back = max(plan.depth, CORE[1]) if storeys > 1 else plan.depth
+    hosts = [d.room(plan.front, 0, 0, w, h - back, k, plan.height) for k in range(storeys)]
+    d.door(hosts[0], OUTSIDE, round(w * 0.35, 1), 0, 0, 1.2)
+    x = d.cores(0.0, h - back, hosts, lift=plan.lift) if storeys > 1 else 0.0
+    for k, host in enumerate(hosts):
+        if plan.backs:
+            d.strip(x, w, h - back, back, plan.backs if not k else plan.backs[:2], host, k)
 
 
-def _entry(
-    hall: str, main: str, deep: float, *, height: float = CEILING, side: str | None = None, after: str | None = None
-) -> Composer:
-    """Return a hall at the street, the large room behind it; perhaps a side room, perhaps one more room beyond."""
-
-    def compose(d: _Draft, w: float, h: float, storeys: int) -> None:
-        beyond = 3.4 if after else 0.0
-        edge = w - 2.6 if side else w
-        first = d.room(hall, 0, 0, edge, deep)
-        large = d.room(main, 0, deep, w, h - beyond, 0, height)
-        d.door(first, OUTSIDE, round(edge / 2, 1), 0, 0, 1.2)
-        d.door(first, large, round(min(w / 2, edge - 0.9), 1), deep, 0, 1.4)
-        if side:
-            room = d.room(side, edge, 0, w, deep)
-            d.door(first, room, edge, deep / 2)
-        if after:
-            room = d.room(after, 0, h - beyond, min(w, 5.0), h)
-            d.door(large, room, 1.1, h - beyond)
-
-    return compose
+def _entry(d: _Draft, plan: EntryPlan, size: tuple[float, float]) -> None:
+    """Draw a hall at the street, the large room behind it; perhaps a side room, perhaps one more room beyond."""
+    w, h = size
+    beyond = 3.4 if plan.after else 0.0
+    edge = w - 2.6 if plan.side else w
+    first = d.room(plan.entry, 0, 0, edge, plan.depth)
+    large = d.room(plan.main, 0, plan.depth, w, h - beyond, 0, plan.height)
+    d.door(first, OUTSIDE, round(edge / 2, 1), 0, 0, 1.2)
+    d.door(first, large, round(min(w / 2, edge - 0.9), 1), plan.depth, 0, 1.4)
+    if plan.side:
+        room = d.room(plan.side, edge, 0, w, plan.depth)
+        d.door(first, room, edge, plan.depth / 2)
+    if plan.after:
+        room = d.room(plan.after, 0, h - beyond, min(w, 5.0), h)
+        d.door(large, room, 1.1, h - beyond)
 
 
-def _spine(
-    hall: str,
-    north: Sequence[Cell],
-    south: Sequence[Cell],
-    *,
-    upper: tuple[Sequence[Cell], Sequence[Cell]] | None = None,
-    hall_width: float = 5.0,
-    lift: bool = True,
-) -> Composer:
-    """Return a lobby, then a corridor with rooms on both sides; the same on every floor above."""
-
-    def compose(d: _Draft, w: float, h: float, storeys: int) -> None:
-        up = CORE[1] if storeys > 1 else round((h - _CORRIDOR) / 2, 1)
-        ys = round(h - up - _CORRIDOR, 2)
-        yn = round(ys + _CORRIDOR, 2)
-        hosts: list[int] = []
-        first = d.room(hall, 0, 0, hall_width, h)
-        d.door(first, OUTSIDE, 0, round(h / 2, 1), 0, 1.2)
-        hosts.append(d.room("corridor", hall_width, ys, w, yn))
-        d.door(first, hosts[0], hall_width, ys + _CORRIDOR / 2, 0, 1.3)
-        hosts += [d.room("corridor", 0, ys, w, yn, k) for k in range(1, storeys)]
-        x = d.cores(hall_width, yn, hosts, lift=lift) if storeys > 1 else hall_width
-        for k, host in enumerate(hosts):
-            rooms_north, rooms_south = (north, south) if k == 0 or upper is None else upper
-            d.strip(x, w, yn, h - yn, rooms_north, host, k)
-            d.strip(hall_width if k == 0 else 0.0, w, ys, -ys, rooms_south, host, k)
-            if k:
-                d.strip(0.0, hall_width, yn, h - yn, rooms_north[:1], host, k)
-
-    return compose
+def _spine(d: _Draft, plan: SpinePlan, size: tuple[float, float], storeys: int) -> None:
+    """Draw a lobby, then a corridor with rooms on both sides; the same on every floor above."""
+    w, h = size
+    up = CORE[1] if storeys > 1 else round((h - _CORRIDOR) / 2, 1)
+    ys = round(h - up - _CORRIDOR, 2)
+    yn = round(ys + _CORRIDOR, 2)
+    hosts: list[int] = []
+    first = d.room(plan.spine, 0, 0, plan.hall_width, h)
+    d.door(first, OUTSIDE, 0, round(h / 2, 1), 0, 1.2)
+    hosts.append(d.room("corridor", plan.hall_width, ys, w, yn))
+    d.door(first, hosts[0], plan.hall_width, ys + _CORRIDOR / 2, 0, 1.3)
+    hosts += [d.room("corridor", 0, ys, w, yn, k) for k in range(1, storeys)]
+    x = d.cores(plan.hall_width, yn, hosts, lift=plan.lift) if storeys > 1 else plan.hall_width
+    above = (plan.north if plan.upper_north is None else plan.upper_north,
+             plan.south if plan.upper_south is None else plan.upper_south)  # fmt: skip
+    for k, host in enumerate(hosts):
+        north, south = (plan.north, plan.south) if k == 0 else above
+        d.strip(x, w, yn, h - yn, north, host, k)
+        d.strip(plan.hall_width if k == 0 else 0.0, w, ys, -ys, south, host, k)
+        if k:
+            d.strip(0.0, plan.hall_width, yn, h - yn, north[:1], host, k)
 
 
 def _flat_small(d: _Draft, w: float, h: float, storeys: int) -> None:
@@ -257,177 +241,13 @@ def _galleries(d: _Draft, w: float, h: float, storeys: int) -> None:
     d.door(left, right, w / 2, (5.0 + h) / 2, 0, 1.4)
 
 
-@dataclass(frozen=True)
-class Use:
-    """A use: how it is composed, its small, medium and large extent, and on how many floors at most."""
-
-    compose: Composer
-    sizes: tuple[tuple[float, float], ...]
-    storeys: int = 1
-
-
-_STAFF: tuple[Cell, ...] = (("storage", 3.0), ("washroom", 2.4))
-_STOCK: tuple[Cell, ...] = (("storage", 1.0),)
-_SHOP_SIZES = ((7.0, 8.6), (9.2, 10.4), (12.0, 12.0))
-
-
-def _shop(main: str, sizes: tuple[tuple[float, float], ...] = _SHOP_SIZES, backs: Sequence[Cell] = _STAFF) -> Use:
-    return Use(_front(main, backs, 2.6), sizes)
-
-
-_FOOD_SIZES = ((8.4, 11.0), (11.0, 12.6), (14.0, 14.6))
-_KITCHEN: tuple[Cell, ...] = (("restaurant_kitchen", 5.2), ("washroom", 2.4))
-_GUEST = ("hotel_room", 3.6)
-_WORK_UP = ((("open_office", 7.0), ("office", 3.2)), (("meeting_room", 4.4), ("open_office", 7.0), ("break_room", 3.4)))
-
-USES: dict[str, Use] = {
-    "flat_small": Use(_flat_small, ((5.4, 7.4),)),
-    "flat_medium": Use(_flat_medium, ((8.6, 7.6),)),
-    "flat_large": Use(_flat_large, ((11.6, 9.6),)),
-    "maisonette": Use(_maisonette, ((8.8, 10.1),), 2),
-    "hotel": Use(
-        _spine("lobby", (_GUEST, _GUEST), (_GUEST, _GUEST, ("storage", 2.0)), hall_width=6.4),
-        ((15.0, 11.0), (19.4, 11.0), (19.4, 11.0)),
-        3,
-    ),
-    "hostel": Use(
-        _spine(
-            "lobby",
-            (("dormitory", 4.6), ("shower_room", 3.4)),
-            (("dormitory", 4.6), ("common_room", 4.6)),
-            lift=False,
-            hall_width=5.6,
-        ),
-        ((15.4, 11.0), (18.0, 11.0), (18.0, 11.0)),
-        2,
-    ),
-    "office": Use(
-        _spine(
-            "reception",
-            (("open_office", 7.0), ("meeting_room", 4.4)),
-            (("office", 3.4), ("office", 3.4), ("break_room", 3.6), ("washroom", 2.4)),
-            upper=_WORK_UP,
-        ),
-        ((15.0, 11.0), (19.0, 11.6), (22.0, 11.6)),
-        3,
-    ),
-    "studio": Use(
-        _front("open_office", (("meeting_room", 4.4), ("washroom", 2.4)), 4.2),
-        ((8.0, 11.0), (10.0, 12.0), (13.0, 13.0)),
-    ),
-    "restaurant": Use(_front("dining_room", _KITCHEN, 3.8), _FOOD_SIZES),
-    "cafe": Use(_front("cafe", (("storage", 3.0), ("washroom", 2.4)), 2.6), ((7.6, 9.4), (9.6, 11.0), (12.0, 12.4))),
-    "bar": Use(_front("bar", (("storage", 3.0), ("washroom", 2.8)), 2.6), ((8.4, 10.4), (10.6, 12.0), (13.0, 14.0))),
-    "fast_food": Use(_front("fast_food", _KITCHEN, 3.6), ((8.4, 11.0), (10.6, 12.4), (13.0, 13.6))),
-    "bakery": Use(_front("bakery", (("restaurant_kitchen", 1.0),), 3.4), ((7.0, 9.6), (8.6, 11.0), (10.0, 12.0))),
-    "club": Use(_front("club", _STAFF, 2.6), ((11.0, 12.0), (13.0, 14.0), (15.0, 16.0))),
-    "shop": _shop("shop"),
-    "supermarket": Use(
-        _front("supermarket", (("storage", 4.0), ("washroom", 2.4)), 3.4, height=3.4),
-        ((14.0, 15.4), (18.0, 18.0), (22.0, 20.0)),
-    ),
-    "clothes": _shop("clothes_shop"),
-    "pharmacy": _shop("pharmacy"),
-    "electronics": _shop("electronics_shop"),
-    "books": _shop("bookshop"),
-    "jewellery": _shop("jeweller", ((6.4, 8.0), (8.0, 9.4), (9.6, 10.4)), _STOCK),
-    "florist": _shop("florist", ((6.4, 8.0), (8.0, 9.4), (9.6, 10.4)), _STOCK),
-    "furniture_shop": _shop("furniture_shop", ((10.0, 11.4), (13.0, 13.6), (16.0, 16.0))),
-    "toys": _shop("toy_shop"),
-    "wine": _shop("wine_shop", ((6.4, 8.0), (8.0, 9.4), (9.6, 10.4)), _STOCK),
-    "kiosk": _shop("kiosk", ((5.0, 6.8), (6.0, 7.4), (7.0, 8.0)), _STOCK),
-    "salon": _shop("salon"),
-    "repair": _shop("repair_shop", ((6.4, 8.0), (8.0, 9.4), (9.6, 10.4)), _STOCK),
-    "laundry": _shop("laundry", ((7.0, 8.6), (9.0, 10.0), (11.0, 11.0)), _STOCK),
-    "department_store": Use(
-        _front("sales_floor", (("storage", 3.0), ("washroom", 2.6)), 4.6, lift=True),
-        ((17.0, 16.0), (20.0, 18.0), (24.0, 20.0)),
-        3,
-    ),
-    "bank": Use(
-        _front("bank_hall", (("office", 3.4), ("storage", 2.4)), 3.6), ((8.4, 10.4), (11.0, 12.4), (13.0, 14.0))
-    ),
-    "bureau": Use(
-        _spine(
-            "reception", (("council_room", 6.0), ("office", 3.6)), (("office", 3.6), ("office", 3.6), ("washroom", 2.4))
-        ),
-        ((15.0, 11.0), (18.0, 12.0), (20.0, 12.6)),
-        2,
-    ),
-    "police": Use(
-        _spine(
-            "waiting_room",
-            (("open_office", 6.0), ("cell", 2.6)),
-            (("office", 3.6), ("cell", 2.6), ("washroom", 2.4)),
-            lift=False,
-        ),
-        ((15.0, 11.0), (17.0, 12.0), (17.0, 12.0)),
-    ),
-    "clinic": Use(
-        _spine(
-            "waiting_room",
-            (("consulting_room", 3.6), ("consulting_room", 3.6)),
-            (("consulting_room", 3.6), ("storage", 2.4), ("washroom", 2.4)),
-        ),
-        ((13.0, 10.4), (14.6, 11.0), (16.0, 11.0)),
-    ),
-    "hospital": Use(
-        _spine(
-            "waiting_room",
-            (("ward", 6.4), ("ward", 6.4)),
-            (("consulting_room", 4.0), ("consulting_room", 4.0), ("storage", 2.4), ("washroom", 3.0)),
-            hall_width=7.0,
-        ),
-        ((21.0, 12.4), (23.0, 12.4), (25.0, 12.4)),
-        2,
-    ),
-    "school": Use(
-        _spine(
-            "foyer",
-            (("classroom", 7.4),),
-            (("classroom", 7.4), ("office", 3.4), ("washroom", 2.6)),
-            upper=((("classroom", 7.4),), (("laboratory", 7.4), ("classroom", 7.4))),
-            hall_width=6.0,
-        ),
-        ((20.0, 13.6), (21.0, 14.0), (22.0, 14.0)),
-        2,
-    ),
-    "kindergarten": Use(
-        _front("common_room", (("kids_room", 4.0), ("washroom", 2.6)), 4.0), ((8.6, 10.6), (11.0, 12.0), (12.0, 13.0))
-    ),
-    "library": Use(_front("library", _STAFF, 3.0), ((11.0, 12.4), (14.0, 15.0), (17.0, 17.0))),
-    "museum": Use(_galleries, ((12.0, 13.0), (15.0, 16.0), (18.0, 18.0))),
-    "cinema": Use(
-        _entry("foyer", "auditorium", 5.2, height=3.6, side="washroom"), ((10.6, 15.0), (13.0, 18.0), (15.4, 21.0))
-    ),
-    "theatre": Use(
-        _entry("foyer", "theatre", 5.2, height=3.8, side="washroom"), ((10.6, 16.0), (13.0, 19.0), (15.4, 22.0))
-    ),
-    "church": Use(
-        _entry("narthex", "nave", 3.2, height=6.2, after="sacristy"), ((9.0, 19.0), (12.0, 24.0), (14.6, 29.0))
-    ),
-    "hall": Use(_entry("foyer", "community_hall", 4.6, side="washroom"), ((9.4, 14.0), (12.0, 16.0), (14.0, 18.0))),
-    "gym": Use(
-        _front("gym", (("changing_room", 4.0), ("washroom", 2.6)), 4.0), ((9.6, 12.6), (12.6, 15.0), (16.0, 17.0))
-    ),
-    "sports": Use(
-        _front("sports_hall", (("changing_room", 4.0), ("changing_room", 4.0)), 4.0, height=4.4),
-        ((9.6, 13.0), (13.0, 17.0), (16.0, 20.0)),
-    ),
-    "games": Use(_front("games", _STAFF, 2.6), ((9.0, 10.6), (11.6, 13.0), (14.0, 15.0))),
-    "lounge": Use(_front("lounge", _STAFF, 2.6), ((8.4, 10.0), (11.0, 12.0), (13.0, 14.0))),
-    "station": Use(
-        _front("station_hall", (("office", 3.4), ("washroom", 3.0)), 3.4, height=4.2),
-        ((12.0, 12.0), (16.0, 15.0), (20.0, 17.0)),
-    ),
-    "workshop": Use(
-        _front("workshop", (("office", 3.4), ("storage", 3.0), ("washroom", 2.4)), 3.6, height=3.6),
-        ((10.6, 13.0), (14.0, 16.0), (18.0, 18.0)),
-    ),
-    "parking": Use(_front("parking", (), 0.0), ((17.0, 15.0), (22.0, 15.6), (28.0, 15.6))),
+_DRAWN: Mapping[str, Composer] = {
+    "flat_small": _flat_small,
+    "flat_medium": _flat_medium,
+    "flat_large": _flat_large,
+    "maisonette": _maisonette,
+    "galleries": _galleries,
 }
-
-FLATS = ("flat_small", "flat_medium", "flat_large", "maisonette")
 
 
 def area_of(use: str, size: int) -> float:
@@ -437,7 +257,7 @@ def area_of(use: str, size: int) -> float:
 
 
 def _extent(use: str, size: int) -> tuple[float, float]:
-    sizes = USES[use].sizes
+    sizes = uses().uses[use].sizes
     return sizes[min(size, len(sizes) - 1)]
 
 
@@ -453,10 +273,18 @@ def sketch_of(use: str, size: int = 0, storeys: int = 1, *, mirrored: bool = Fal
     mirrored
         East and west swapped.
     """
-    recipe = USES[use]
+    wanted = uses().uses[use]
     w, h = _extent(use, size)
     draft = _Draft()
-    recipe.compose(draft, w, h, max(1, min(storeys, recipe.storeys)) if use != "maisonette" else 2)
+    floors = max(wanted.least_storeys, min(storeys, wanted.storeys))
+    if isinstance(wanted.plan, FrontPlan):
+        _front(draft, wanted.plan, (w, h), floors)
+    elif isinstance(wanted.plan, EntryPlan):
+        _entry(draft, wanted.plan, (w, h))
+    elif isinstance(wanted.plan, SpinePlan):
+        _spine(draft, wanted.plan, (w, h), floors)
+    else:
+        _DRAWN[wanted.plan.drawn](draft, w, h, floors)
     sketch = draft.done(use, (w, h))
     return _mirrored(sketch) if mirrored else sketch
 

@@ -32,9 +32,10 @@ from vico.errors import InputError, MissingFileError, SchemaError
 from vico.seeds import rng
 from vico.world.check.indoors import walkable_inside
 from vico.world.model import Category, Place
+from vico.worldgen.indoor.catalogue import UNFURNISHED, room_kinds
 from vico.worldgen.indoor.floorplans import OUTSIDE, Sketch, SketchDoor, SketchRoom
 from vico.worldgen.indoor.furnishing import Furnishing
-from vico.worldgen.indoor.layouts import RECIPES, FloorPlan, furnished, uses
+from vico.worldgen.indoor.layouts import FloorPlan, furnished, uses
 from vico.worldgen.indoor.rooms import rooms_of_plan
 
 SCHEMA = "vico.layout"
@@ -44,7 +45,6 @@ _MOST_ROOMS, _MOST_PIECES = 60, 400
 _LEAST_ROOM = 1.4
 _EDGE = 0.06  # metres a point may lie off the wall it is meant to be on
 _CLEAR_WIDTH = 0.9
-_KINDS = tuple(sorted(kind for kind in RECIPES if kind not in ("stairs", "lift")))
 
 Metres = Annotated[float, Field(ge=-100.0, le=100.0, allow_inf_nan=False)]
 Colour = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")]
@@ -146,10 +146,15 @@ def _sketch_room(room: LayoutRoom) -> SketchRoom:
     return SketchRoom(room.kind, (x0, y0, x1, y1), 0, room.height, 0.0, 1, items, room.floor, room.walls, colour)
 
 
+def _room_kinds() -> list[str]:
+    """All kinds of rooms that can be furnished."""
+    return sorted(kind for kind in room_kinds().kinds if kind not in UNFURNISHED)
+
+
 def layout_schema() -> dict[str, Any]:
     """JSON Schema of a layout, with what can stand in it: what a language model is given to draw one."""
     schema = Layout.model_json_schema(by_alias=True)
-    schema["x-room-kinds"] = list(_KINDS)
+    schema["x-room-kinds"] = _room_kinds()
     schema["x-uses"] = ["flat", *uses()]
     schema["x-furniture"] = {
         name: {"size": list(model.size), "solid": model.solid}
@@ -239,8 +244,9 @@ def _id_findings(here: str, room: LayoutRoom, before: Sequence[LayoutRoom]) -> I
 
 
 def _kind_findings(here: str, room: LayoutRoom) -> Iterator[str]:
-    if room.kind not in _KINDS and room.furniture is None:
-        yield f"{here}.kind: nothing is known of {room.kind!r}; give its furniture, or one of {', '.join(_KINDS)}"
+    known = _room_kinds()
+    if room.kind not in known and room.furniture is None:
+        yield f"{here}.kind: nothing is known of {room.kind!r}; give its furniture, or one of {', '.join(known)}"
 
 
 def _size_findings(here: str, room: LayoutRoom) -> Iterator[str]:

@@ -10,27 +10,26 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from vico.assets.interior import DOOR_HEIGHT, HEAD, RISE, SHOP_SILL, SILL, THICK, Inside, WallOpening, shell
 from vico.assets.models.furniture import furniture_models
+from vico.io.data_files import cached_data
 from vico.rules import REACH
 from vico.seeds import rng
 from vico.world.mesh import Surface
 from vico.world.model import LANDING
-from vico.worldgen.indoor.floorplans import OUTSIDE, USES, Sketch, SketchRoom, sketch_of
+from vico.worldgen.indoor import catalogue
+from vico.worldgen.indoor.catalogue import UNFURNISHED, RoomKind, room_kinds
+from vico.worldgen.indoor.floorplans import OUTSIDE, Sketch, SketchRoom, sketch_of
 from vico.worldgen.indoor.furnishing import EAST, GRID, NORTH, SOUTH, STEP_IN, WEST, Furnishing, Opening, RoomDraft
-from vico.worldgen.indoor.furnishing_public import PUBLIC
-from vico.worldgen.indoor.furnishing_rooms import ROOMS
 from vico.worldgen.indoor.furnishing_small import Dressed, dressed
-from vico.worldgen.indoor.looks import LOOKS, PALETTES, PLAIN, RoomStyle
+from vico.worldgen.indoor.recipes import furnish_room
 
 _MOST_CHAIRS = 3  # containers of this kind a room
 _LARGEST_TOP = 24  # containers a room
-RECIPES = {**ROOMS, **PUBLIC}
 VARIANTS = 4
 
 
@@ -87,10 +86,10 @@ class FloorPlan:
 
 def uses() -> list[str]:
     """All uses there are plans for."""
-    return list(USES)
+    return list(catalogue.uses().uses)
 
 
-@cache
+@cached_data
 def plan_of(use: str, size: int = 0, storeys: int = 1, variant: int = 0) -> FloorPlan:
     """Return the furnished plan of a use; variants differ in handedness, colours and furniture."""
     sketch = sketch_of(use, size, storeys, mirrored=variant % 2 == 1)
@@ -110,8 +109,8 @@ def furnished(sketch: Sketch, chance: np.random.Generator, variant: int = 0) -> 
         cx, cy, z = round((x0 + x1) / 2 - w / 2, 3), round((y0 + y1) / 2 - h / 2, 3), round(room.storey * RISE, 3)
         size = (round(x1 - x0, 3), round(y1 - y0, 3))
         mine = sorted(openings[i], key=lambda way: -1 if way.to == OUTSIDE else order[way.to])
-        look = LOOKS.get(room.kind, PLAIN)
-        windows = _windows(sketch, room, size, mine, street=look.street) if look.daylight else []
+        kind = room_kinds().of(room.kind)
+        windows = _windows(sketch, room, size, mine, street=kind.entry.shop_window) if kind.entry.daylight else []
         draft = RoomDraft(size, [way.opening for way in mine if not way.lift], windows, chance)
         if room.items is not None:
             items = list(room.items)
@@ -120,10 +119,9 @@ def furnished(sketch: Sketch, chance: np.random.Generator, variant: int = 0) -> 
         elif room.kind == "lift":
             items = [Furnishing("lift_panel", *_lift_panel(draft))]
         else:
-            RECIPES[room.kind](draft)
-            items = draft.items
-        dress = dressed(room.kind, items, chance) if room.kind not in ("stairs", "lift") else Dressed((), {})
-        spots = _spots(room, draft, items, dress) if room.kind not in ("stairs", "lift") else ()
+            items = _furniture(draft, kind)
+        dress = dressed(room.kind, items, chance) if room.kind not in UNFURNISHED else Dressed((), {})
+        spots = _spots(room, draft, items, dress) if room.kind not in UNFURNISHED else ()
         rooms.append(
             RoomPlan(
                 kind=room.kind,
@@ -142,8 +140,17 @@ def furnished(sketch: Sketch, chance: np.random.Generator, variant: int = 0) -> 
                 spots=tuple(_shifted(spot, cx, cy, z) for spot in spots),
             )
         )
-        insides.append(_inside(i, room, look, (cx, cy, z), size, mine, windows, variant))
+        insides.append(_inside(i, room, kind, (cx, cy, z), size, mine, windows, variant))
     return FloorPlan(sketch.use, tuple(rooms), sketch.size, round(sketch.height, 3), tuple(shell(insides)))
+
+
+def _furniture(draft: RoomDraft, kind: RoomKind) -> list[Furnishing]:
+    """Furnish a room by its kind."""
+    if kind.composition is not None:
+        kind.composition(draft)
+    else:
+        furnish_room(draft, kind.entry.furniture, room_kinds().names)
+    return draft.items
 
 
 def _inner(room: SketchRoom) -> tuple[float, float, float, float]:
@@ -245,7 +252,7 @@ def _door_plan(way: _Doorway, draft: RoomDraft, centre: tuple[float, float, floa
 def _inside(
     index: int,
     room: SketchRoom,
-    look: RoomStyle,
+    kind: RoomKind,
     centre: tuple[float, float, float],
     size: tuple[float, float],
     ways: Sequence[_Doorway],
@@ -256,20 +263,19 @@ def _inside(
     for other, opening, low, lift in ways:
         if lift:
             continue
-        kind = "entrance" if other == OUTSIDE else "door"
-        parts.append(WallOpening(opening.side, opening.at, opening.width, low, low + DOOR_HEIGHT, kind, index < other))
+        what = "entrance" if other == OUTSIDE else "door"
+        parts.append(WallOpening(opening.side, opening.at, opening.width, low, low + DOOR_HEIGHT, what, index < other))
     head = min(HEAD, room.height - 0.3)
-    sill = SHOP_SILL if look.street else SILL
+    sill = SHOP_SILL if kind.entry.shop_window else SILL
     parts += [WallOpening(o.side, o.at, o.width, sill, head, "window") for o in windows]
-    palette = PALETTES[look.palette]
     return Inside(
         entity=index,
         centre=centre,
         size=(*size, room.height),
-        floor=room.floor or look.floor,
-        floor_colour=look.tone,
-        walls=room.walls or look.walls,
-        wall_colour=room.colour or palette[(variant // 2 + index) % len(palette)],
+        floor=room.floor or kind.entry.floor,
+        floor_colour=kind.tone,
+        walls=room.walls or kind.entry.walls,
+        wall_colour=room.colour or kind.palette[(variant // 2 + index) % len(kind.palette)],
         openings=tuple(parts),
         rise=room.rise,
         facing=room.facing if room.rise else 0,

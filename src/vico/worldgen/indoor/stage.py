@@ -17,11 +17,11 @@ from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.model import Building, Category, Entrance, Place
 from vico.worldgen.facts.expendable import expendable, leave_out
-from vico.worldgen.indoor.floorplans import FLATS, USES, area_of
+from vico.worldgen.indoor.catalogue import use_of, uses
+from vico.worldgen.indoor.floorplans import area_of
 from vico.worldgen.indoor.layout_library import LayoutAuthor, Library, authored, read_library
 from vico.worldgen.indoor.layouts import VARIANTS, FloorPlan, plan_of
 from vico.worldgen.indoor.rooms import Indoors, Slot, assembled
-from vico.worldgen.indoor.uses import use_of
 
 __all__ = ["Indoors", "furnish"]
 
@@ -175,23 +175,31 @@ def _plan(
             return drawn.plan(seed)
     variant = int(chance.integers(VARIANTS))
     if use == "flat":
-        options = [name for name in FLATS if area_of(name, 0) * USES[name].storeys <= max(share, area_of(FLATS[0], 0))]
-        if building.levels < 2 and "maisonette" in options:
-            options.remove("maisonette")
-        weights = np.array(
-            [{"flat_small": 0.6, "flat_medium": 1.0, "flat_large": 1.0, "maisonette": 0.5}[o] for o in options]
-        )
-        return plan_of(options[int(chance.choice(len(options), p=weights / weights.sum()))], 0, 1, variant)
+        return plan_of(_home(building.levels, share, chance), 0, 1, variant)
     storeys = _storeys(use, building.levels, share)
-    size = max((k for k in range(len(USES[use].sizes)) if area_of(use, k) * storeys <= share), default=0)
+    size = max((k for k in range(len(uses().uses[use].sizes)) if area_of(use, k) * storeys <= share), default=0)
     return plan_of(use, size, storeys, variant)
+
+
+def _home(levels: int, share: float, chance: np.random.Generator) -> str:
+    """Choose a home that fits the house and the place's part of it, by how common they are."""
+    known = uses()
+    smallest = area_of(known.homes[0], 0)
+    options = [
+        name
+        for name in known.homes
+        if area_of(name, 0) * known.uses[name].storeys <= max(share, smallest)
+        and known.uses[name].least_storeys <= max(levels, 1)
+    ]
+    weights = np.array([known.uses[name].home for name in options], float)
+    return options[int(chance.choice(len(options), p=weights / weights.sum()))]
 
 
 def _storeys(use: str, levels: int, share: float) -> int:
     """Floors a plan gets: as many as use, house and the place's part of it allow, three only in high houses."""
     most = 1 + sum(levels >= least for least in _LEVELS_FOR)
     fits = max(1, int(share / area_of(use, 0)))
-    return max(1, min(USES[use].storeys, most, fits))
+    return max(1, min(uses().uses[use].storeys, most, fits))
 
 
 def _stacked(
