@@ -1,4 +1,4 @@
-"""NamedPlace places of OpenStreetMap: which tags make a place people go to, and of which of our categories."""
+"""Named places of OpenStreetMap: which tags make a place people go to, and of which of our categories."""
 
 from __future__ import annotations
 
@@ -11,59 +11,8 @@ from numpy.typing import NDArray
 from vico.geo.osm import OsmData, Tags
 from vico.world.model import Category
 from vico.worldgen.facts.expendable import expendable
+from vico.worldgen.facts.place_words import categories
 
-_FOOD = "restaurant cafe fast_food pub bar biergarten ice_cream food_court canteen"
-_STORE = "pharmacy marketplace bureau_de_change car_rental money_transfer fuel bank post_office"
-_OFFICE = (
-    "embassy townhall courthouse police fire_station clinic doctors dentist hospital veterinary school university "
-    "college kindergarten childcare driving_school language_school music_school prep_school coworking_space "
-    "social_facility research_institute studio conference_centre public_building post_depot"
-)
-_FUN = (
-    "cinema theatre nightclub casino arts_centre community_centre events_venue library social_centre gambling "
-    "place_of_worship dojo planetarium public_bath spa internet_cafe"
-)
-
-
-def _all(text: str, category: Category) -> dict[str, Category]:
-    return dict.fromkeys(text.split(), category)
-
-
-_CATEGORIES: dict[str, dict[str, Category]] = {
-    "tourism": {
-        **_all("hotel hostel guest_house motel apartment chalet", Category.ACCOMMODATION),
-        **_all("museum gallery attraction zoo theme_park aquarium", Category.ENTERTAINMENT),
-        "viewpoint": Category.OPEN,
-        "picnic_site": Category.OPEN,
-    },
-    "amenity": {
-        **_all(_FOOD, Category.FOOD),
-        **_all(_STORE, Category.STORE),
-        **_all(_OFFICE, Category.OFFICE),
-        **_all(_FUN, Category.ENTERTAINMENT),
-        "fountain": Category.OPEN,
-        "bus_station": Category.TRANSIT,
-        "ferry_terminal": Category.TRANSIT,
-    },
-    "leisure": {
-        **_all(
-            "fitness_centre sports_centre dance bowling_alley amusement_arcade adult_gaming_centre escape_game sauna "
-            "sports_hall ice_rink hackerspace arena",
-            Category.ENTERTAINMENT,
-        ),
-        **_all("park garden playground pitch dog_park common nature_reserve miniature_golf bandstand", Category.OPEN),
-    },
-    "historic": _all("castle church monument", Category.ENTERTAINMENT),
-    "railway": _all("station halt subway_entrance tram_stop train_station_entrance", Category.TRANSIT),
-    "place": {"square": Category.OPEN},
-    "natural": {"beach": Category.OPEN},
-}
-_ANY = (
-    ("shop", Category.STORE),
-    ("office", Category.OFFICE),
-    ("craft", Category.STORE),
-    ("healthcare", Category.OFFICE),
-)
 _CLOSED_VALUES = {"no", "vacant", "disused", "closed", "abandoned"}
 
 
@@ -111,11 +60,11 @@ def named_places(osm: OsmData) -> list[NamedPlace]:
 
 def category_of(tags: Tags, is_area: bool) -> tuple[Category, str] | None:
     """Return the category that tags mean, and the value that says so; None if they mean no place."""
-    for key, values in _CATEGORIES.items():
+    for key, values in categories().tables:
         value = tags.get(key, "").split(";")[0]
         if value in values:
             return values[value], value
-    for key, category in _ANY:
+    for key, category in categories().any.items():
         value = tags.get(key, "no").split(";")[0]
         if value not in _CLOSED_VALUES:
             return category, value if value != "yes" else key

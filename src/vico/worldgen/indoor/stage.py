@@ -17,6 +17,7 @@ from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.model import Building, Category, Entrance, Place
 from vico.worldgen.facts.expendable import expendable, leave_out
+from vico.worldgen.facts.place_words import place_names
 from vico.worldgen.indoor.catalogue import use_of, uses
 from vico.worldgen.indoor.floorplans import area_of
 from vico.worldgen.indoor.layout_library import LayoutAuthor, Library, authored, read_library
@@ -151,7 +152,8 @@ def _unnamed(places: Sequence[Place], buildings: Sequence[Building], entrances: 
         entrance = doors.get(building.id)
         if entrance is not None and building.id not in known:
             kind, category = _BY_USE.get(building.use, ("events_venue", Category.ENTERTAINMENT))
-            name = building.name or f"{building.use.capitalize()} building {building.id}"
+            called = place_names()
+            name = building.name or called.building.format(what=called.of(building.use), id=building.id)
             x, y = entrance.approach
             yield Place(id=f"{building.id}.hall", name=name, category=category, kind=kind, building=building.id,
                         entrance=entrance.id, position=(x, y, entrance.position[2]))  # fmt: skip

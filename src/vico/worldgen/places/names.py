@@ -11,6 +11,7 @@ import shapely
 from vico.geo.osm import Tags
 from vico.world.model import Roads
 from vico.worldgen.facts.named_places import NamedPlace
+from vico.worldgen.facts.place_words import place_names
 from vico.worldgen.places.doors import MATCH, Finder
 
 
@@ -34,14 +35,13 @@ class StreetAddresses:
 
     def invented(self, named: NamedPlace) -> NamedPlace:
         """Give a place a name of our making: what it is, and the address of the building it is in."""
-        what = named.kind.replace("_", " ").capitalize()
         at = self._finder.building_at(named.xy, MATCH)
         if at is None:
             return named
         building = self._finder.buildings[at]
         address = self.addresses.get(building.id)
         street = None if address else self.nearest(shapely.Polygon(building.footprint[0]).centroid.coords[0])
-        name = f"{what}, {address}" if address else f"{what} on {street}" if street else what
+        name = place_names().called(place_names().of(named.kind), where=address, street=street)
         return replace(named, name=unused(name, self._used))
 
 

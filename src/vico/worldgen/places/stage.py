@@ -14,6 +14,7 @@ from vico.world.routing import Router
 from vico.world.walkable import WalkableMap
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.named_places import NamedPlace
+from vico.worldgen.facts.place_words import place_names
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.places.doors import Finder
 from vico.worldgen.places.found import Compared, compared
@@ -46,7 +47,7 @@ def places_from_osm(
     height
         Ground heights.
     roads
-        NamedPlace streets, for the addresses of homes.
+        Named streets, for the addresses of homes.
     transit
         Stops and stations, which become places of their own with the same ids.
     found
@@ -130,13 +131,9 @@ def _homes(finder: Finder, streets: StreetAddresses) -> list[Place]:
             door = finder.building_door(building, k)
             if door is None:
                 return
-            if address:
-                name = f"Apartments, {address}"
-            elif tags.get("name"):
-                name = f"Apartments, {tags['name']}"
-            else:
-                street = streets.nearest(door.position[:2])
-                name = f"Apartments on {street}" if street else "Apartments"
+            where = address or tags.get("name")
+            street = None if where else streets.nearest(door.position[:2])
+            name = place_names().called(place_names().home, where=where, street=street)
             homes.append(
                 Place(
                     id=f"{building.id}.home{k}",
