@@ -17,6 +17,7 @@ import numpy as np
 from vico.geo import overlay
 from vico.geo.overlay import OverlayError
 from vico.world.check.buildings import open_edges_of, overlapping_faces, unseated, volumes_of
+from vico.world.check.solids import open_edges
 from vico.world.heights import HeightField
 from vico.world.model import FAILED, Dropped
 from vico.worldgen.buildings.drafts import Draft, drafted, record_of, standing_parts
@@ -96,11 +97,10 @@ def _faults(standing: Mapping[str, Draft], blocks: set[str], mesh: SolidMesh, te
     corners, owner = mesh.points[mesh.faces], mesh.plan_of_part[mesh.part]
     first = np.searchsorted(mesh.plan_of_part, np.arange(len(drafts)))
     volume = volumes_of(corners, owner)
-    # As in the file, corners are one where they are equal in single precision.
-    single = corners.astype(np.float32)
-    for k in open_edges_of(single, owner):
+    for k in np.unique(owner[open_edges(mesh.faces)]).tolist():
         mine = owner == k
-        for solid, count in open_edges_of(single[mine], mesh.part[mine] - first[k]).items():
+        # As in the file, corners are one where they are equal in single precision.
+        for solid, count in open_edges_of(corners[mine].astype(np.float32), mesh.part[mine] - first[k]).items():
             yield _Fault(names[k], solid, "building leaks", f"{count} of its edges have no counterpart")
     for k, draft in enumerate(drafts):
         if not volume.get(k, 0.0) > 0.0:
