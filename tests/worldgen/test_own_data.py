@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
+from vico.errors import SchemaError
 from vico.world.check import check_world
 from vico.world.folder import World, read_world
 from vico.worldgen.pipeline import build_world
@@ -129,3 +131,31 @@ def test_homes_have_german_names(world: World) -> None:
 
 def test_the_world_is_sound_without_the_folder(world: World) -> None:
     assert check_world(world) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        (
+            "objects/kinds_x.toml",
+            '[tags.amenity]\npiano = "piano"',
+            "kinds_x.toml: tags.amenity.piano: no model 'piano'",
+        ),
+        ("indoor/rooms_x.toml", "[room.x]\nflor = 1", "rooms_x.toml: room.x.flor"),
+        (
+            "models/outdoor/x.toml",
+            'group = "amenity"\n[model.x]\nparts = [{ shape = "box", size = [1, 1, 1], colour = "oak" }]',
+            "x.toml: model.x: no colour is called 'oak'",
+        ),
+    ],
+)
+def test_a_wrong_entry_ends_the_build_before_anything_is_built(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, text: str, message: str
+) -> None:
+    path = tmp_path / "vico" / name
+    path.parent.mkdir(parents=True)
+    path.write_text(text)
+    monkeypatch.setenv("VICO_DATA", str(tmp_path / "vico"))
+    with pytest.raises(SchemaError, match=re.escape(message)):
+        build_world(write_map(tmp_path / "stadt.osm"), lat=LAT, lon=LON, half=60.0, out=tmp_path / "world")
+    assert not (tmp_path / "world").exists()

@@ -50,6 +50,7 @@ from vico.worldgen.stages import Stages
 from vico.worldgen.streets.netconvert import road_network
 from vico.worldgen.streets.polygons import road_polygons
 from vico.worldgen.streets.roads import roads_from_osm
+from vico.worldgen.tables import read_tables
 from vico.worldgen.transit.stage import transit_from_osm
 from vico.worldgen.transit.waiting import waiting_off_the_road
 from vico.worldgen.writing import Layers, WorldParts, WorldWriter, faces, manifest_of
@@ -60,6 +61,7 @@ _LEAST_COVERED = 0.3
 
 def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: Stages) -> World:
     """Run every stage between the sources and the pictures, and write the world's files into `folder`."""
+    read_tables()
     if request.sources.installed_things:
         read_things()  # refuses before anything is built if they are not installed
     seed, run, write = request.seed, stages.run, WorldWriter(folder, stages)

@@ -1,0 +1,41 @@
+"""All data that building a world needs, read at once: a wrong entry is told before anything is built."""
+
+from __future__ import annotations
+
+from vico.assets.models.files import read_all
+from vico.assets.models.furniture import ROOM as INDOOR
+from vico.assets.models.street import ROOM as OUTDOOR
+from vico.io.data_files import own_files
+from vico.worldgen.facades import catalogue as facades
+from vico.worldgen.facts import place_words
+from vico.worldgen.indoor import catalogue as rooms
+from vico.worldgen.objects import catalogue as objects
+
+
+def read_tables() -> None:
+    """Read every file of data, ours and the user's, and make the user's models.
+
+    Raises
+    ------
+    InputError
+        If `VICO_DATA` names no folder.
+    SchemaError
+        If a file can't be used; the message names file and entry.
+    """
+    for models in (read_all(own_files(OUTDOOR)), read_all(own_files(INDOOR))):
+        for model in models.values():
+            _ = model.surfaces
+    for read in (
+        facades.styles,
+        place_words.categories,
+        place_words.source_words,
+        place_words.place_names,
+        objects.kinds,
+        objects.signs,
+        objects.standing,
+        objects.trees,
+        objects.barriers,
+        rooms.room_kinds,
+        rooms.uses,
+    ):
+        read()
