@@ -306,6 +306,26 @@ def _junction_of(lane: _Lane, junctions: dict[str, int]) -> int:
     return junctions[lane.edge[1:].rsplit("_", 1)[0]]
 
 
+def _linked(driven: list[_Lane], links: list[dict[str, str]]) -> list[tuple[int, int]]:
+    """Return which lanes lead into which, by number."""
+    index = {lane.id: i for i, lane in enumerate(driven)}
+    ends = [
+        (
+            index.get(f"{link['from']}_{link['fromLane']}"),
+            index.get(link.get("via") or f"{link['to']}_{link['toLane']}"),
+        )
+        for link in links
+    ]
+    return [(start, end) for start, end in ends if start is not None and end is not None]
+
+
+def _beside(driven: list[_Lane], step: int) -> Ints:
+    """Return the lane beside each, -1 for none; lanes inside junctions have none."""
+    by_place = {(lane.edge, lane.index): i for i, lane in enumerate(driven)}
+    found = [-1 if lane.function == "internal" else by_place.get((lane.edge, lane.index + step), -1) for lane in driven]
+    return np.array(found, np.int32)
+
+
 def _assembled(
     driven: list[_Lane],
     lanes: list[_Lane],
@@ -315,16 +335,9 @@ def _assembled(
     lefthand: bool,
 ) -> LaneGraph:
     n = len(driven)
-    index = {lane.id: i for i, lane in enumerate(driven)}
     edges = list(dict.fromkeys(lane.edge for lane in driven))
     edge_number = {edge: i for i, edge in enumerate(edges)}
-    by_place = {(lane.edge, lane.index): i for i, lane in enumerate(driven)}
-    pairs: list[tuple[int, int]] = []
-    for link in links:
-        start = index.get(f"{link['from']}_{link['fromLane']}")
-        end = index.get(link.get("via") or f"{link['to']}_{link['toLane']}")
-        if start is not None and end is not None:
-            pairs.append((start, end))
+    pairs = _linked(driven, links)
     junction_number = {j["id"]: i for i, j in enumerate(junctions)}
     inside = np.array(
         [_junction_of(lane, junction_number) if lane.function == "internal" else -1 for lane in driven],
@@ -336,7 +349,6 @@ def _assembled(
     first[1:] = np.cumsum([len(lane.line) for lane in driven])
     steps = [np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(lane.line, axis=0), axis=1))]) for lane in driven]
     length = np.array([s[-1] for s in steps])
-    side = [0 if lane.function == "internal" else 1 for lane in driven]
     crossed = {_junction_of(lane, junction_number) for lane in lanes if lane.function == "crossing"}
     zone = _zones(driven, inside, length, pairs, len(junctions), crossed)
     return LaneGraph(
@@ -352,14 +364,8 @@ def _assembled(
         inside=inside,
         zone=zone,
         buses_only=np.array([not lane.cars for lane in driven], bool),
-        left=np.array(
-            [by_place.get((lane.edge, lane.index + 1), -1) if s else -1 for lane, s in zip(driven, side, strict=True)],
-            np.int32,
-        ),
-        right=np.array(
-            [by_place.get((lane.edge, lane.index - 1), -1) if s else -1 for lane, s in zip(driven, side, strict=True)],
-            np.int32,
-        ),
+        left=_beside(driven, 1),
+        right=_beside(driven, -1),
         next_first=next_first,
         next=following,
         previous_first=previous_first,

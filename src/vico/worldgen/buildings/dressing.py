@@ -20,7 +20,7 @@ from vico.worldgen.facades import sheets
 from vico.worldgen.facades.catalogue import styles
 from vico.worldgen.facades.cuts import cut_at_heights, without_needless
 from vico.worldgen.facades.looks import FacadeStyle
-from vico.worldgen.facades.records import LONGEST_NAME, Rgb
+from vico.worldgen.facades.records import LONGEST_NAME, Finish, Rgb
 from vico.worldgen.facades.textures.materials import material
 from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
 
@@ -47,9 +47,7 @@ class _Pile:
         uv = np.round(np.concatenate(self.uv).reshape(-1, 2), 5).astype(np.float32) + np.float32(0)
         colour = np.repeat(np.concatenate(self.colour), 3, axis=0)
         entity = np.repeat(np.concatenate(self.entity), 3)
-        packed = np.zeros((len(corners), 9), np.float32)
-        packed[:, :3], packed[:, 3:6], packed[:, 6:8] = corners, normals, uv
-        packed[:, 8] = entity
+        packed = np.column_stack([corners, normals, uv, entity.astype(np.float32)])
         rows = np.ascontiguousarray(packed).view(np.dtype((np.void, packed.dtype.itemsize * 9))).ravel()
         _, index, inverse = np.unique(rows, return_index=True, return_inverse=True)
         normals = normals[index]
@@ -240,6 +238,31 @@ def _zones(faces: _Faces, edges: WallLines, levels: _Levels) -> NDArray[np.int64
     return zone
 
 
+_Cloth = tuple[str, Rgb]  # a material's name and its tint
+
+
+def _of_look(look: FacadeStyle, shop: str) -> dict[Zone, _Cloth]:
+    """Return what each zone of a part wears that has no finish of its own."""
+    return {
+        Zone.ROOF: (look.roof, look.roof_tint),
+        Zone.BLANK: (look.blank, look.tint),
+        Zone.PLINTH: ("blank_stone", _PLINTH_STONE),
+        Zone.SHOPFRONT: (shop, _WHITE),
+        Zone.GROUND_FLOOR: (look.ground, look.ground_tint),
+        Zone.UPPER_FLOORS: (look.wall, look.tint),
+        Zone.BACK: (look.back, look.back_tint),
+        Zone.GABLE: (look.gable, look.gable_tint) if look.gable else (look.blank, look.tint),
+    }
+
+
+def _of_finish(finish: Finish) -> dict[Zone, _Cloth]:
+    """Return what a finish has zones wear instead."""
+    worn = {Zone.BLANK: (finish.side, finish.tint), Zone.GROUND_FLOOR: (finish.picture or finish.side, finish.tint)}
+    if finish.cover:
+        worn[Zone.ROOF] = (finish.cover, finish.cover_tint)
+    return worn
+
+
 @dataclass(frozen=True)
 class _Wardrobe:
     """Materials and colours of every part: by zone, and of undersides and flat roofs; shape ``(parts, ...)`` each."""
@@ -257,35 +280,21 @@ class _Wardrobe:
         """Open it: small solids wear their finish, all others their building's look."""
         finishes = styles().finishes
         worn = [finishes[part.finish] if part.finish else None for part in parts]
-        rows = list(zip(worn, looks, strict=True))
-        names = {
-            Zone.ROOF: [worn.cover if worn and worn.cover else look.roof for worn, look in rows],
-            Zone.BLANK: [worn.side if worn else look.blank for worn, look in rows],
-            Zone.PLINTH: ["blank_stone"] * len(parts),
-            Zone.SHOPFRONT: shops,
-            Zone.GROUND_FLOOR: [worn.picture or worn.side if worn else look.ground for worn, look in rows],
-            Zone.UPPER_FLOORS: [look.wall for look in looks],
-            Zone.BACK: [look.back for look in looks],
-            Zone.GABLE: [look.gable or look.blank for look in looks],
-        }
-        tints = {
-            Zone.ROOF: [worn.cover_tint if worn and worn.cover else look.roof_tint for worn, look in rows],
-            Zone.BLANK: [worn.tint if worn else look.tint for worn, look in rows],
-            Zone.PLINTH: [_PLINTH_STONE] * len(parts),
-            Zone.SHOPFRONT: [_WHITE] * len(parts),
-            Zone.GROUND_FLOOR: [worn.tint if worn else look.ground_tint for worn, look in rows],
-            Zone.UPPER_FLOORS: [look.tint for look in looks],
-            Zone.BACK: [look.back_tint for look in looks],
-            Zone.GABLE: [look.gable_tint if look.gable else look.tint for look in looks],
-        }
-        under_tints = [worn.under_tint if worn else tints[Zone.ROOF][k] for k, worn in enumerate(worn)]
+        clothes = [_of_look(look, shop) for look, shop in zip(looks, shops, strict=True)]
+        under: list[_Cloth] = []
+        for outfit, finish in zip(clothes, worn, strict=True):
+            if finish is not None:
+                outfit |= _of_finish(finish)
+            under.append(
+                ("blank_plaster", outfit[Zone.ROOF][1]) if finish is None else (finish.under, finish.under_tint)
+            )
         return cls(
-            {zone: np.array(labels, _LABEL) for zone, labels in names.items()},
-            {zone: np.array(colours, np.uint8) for zone, colours in tints.items()},
-            np.array([worn.bay if worn else look.bay for worn, look in rows]),
-            np.array([bool(worn and worn.cover) for worn in worn]),
-            np.array([worn.under if worn else "blank_plaster" for worn in worn], _LABEL),
-            np.array(under_tints, np.uint8),
+            {zone: np.array([outfit[zone][0] for outfit in clothes], _LABEL) for zone in Zone},
+            {zone: np.array([outfit[zone][1] for outfit in clothes], np.uint8) for zone in Zone},
+            np.array([look.bay if finish is None else finish.bay for finish, look in zip(worn, looks, strict=True)]),
+            np.array([finish is not None and bool(finish.cover) for finish in worn]),
+            np.array([name for name, _ in under], _LABEL),
+            np.array([tint for _, tint in under], np.uint8),
             np.array([look.flat_tint for look in looks], np.uint8),
         )
 

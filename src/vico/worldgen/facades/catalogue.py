@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeVar
@@ -30,6 +30,7 @@ from vico.worldgen.facades.records import (
     SignsFile,
     SignTrade,
     StreetMix,
+    TagValues,
     Uses,
     UsesFile,
 )
@@ -79,34 +80,26 @@ def styles() -> FacadeStyles:
         If a file can't be used; the message says which, where, and what is wrong.
     """
     families, regions, uses = _files("families", FamiliesFile), _files("regions", RegionsFile), _files("uses", UsesFile)
-    roofs, signs = [file for _, file in _files("roofs", RoofsFile)], [file for _, file in _files("signs", SignsFile)]
-    known = {family.name for _, file in families for family in file.family}
-    for path, file in families:
-        _check_families(path, file)
-    for path, place in regions:
-        for where, shares in _shares_of_regions(place):
-            _check_shares(path, where, shares, known)
-    for path, use in uses:
-        for where, shares in _shares_of_uses(use):
-            _check_shares(path, where, shares, known)
-    said = [use for _, use in uses]
+    roofs, signs = _files("roofs", RoofsFile), _files("signs", SignsFile)
+    _check_pictures(families)
+    _check_named_families(regions, uses, {family.name for family in _gathered(families, lambda file: file.family)})
     return FacadeStyles(
-        plaster=tuple(tint for _, file in families for tint in file.plaster),
-        stone=tuple(tint for _, file in families for tint in file.stone),
-        families=_by_name(family for _, file in families for family in file.family),
-        ground_floors=_by_name(floor for _, file in families for floor in file.ground_floor),
-        blank_walls=_by_name(wall for _, file in families for wall in file.blank_wall),
-        regions=_by_name(region for _, file in regions for region in file.region),
-        uses=[file.uses for file in said if file.uses is not None][-1],
-        materials={value: entry.families for file in said for entry in file.material for value in entry.values},
-        architectures={value: entry.families for file in said for entry in file.architecture for value in entry.values},
-        wood=tuple(tint for file in roofs for tint in file.wood),
-        felt=tuple(tint for file in roofs for tint in file.felt),
-        modern_roofs=tuple(tint for file in roofs for tint in file.modern),
-        roofs=_by_name(roof for file in roofs for roof in file.roof),
-        colours={name: rgb for _, file in _files("colours", ColoursFile) for name, rgb in file.named.items()},
-        finishes=_by_name(finish for _, file in _files("finishes", FinishesFile) for finish in file.finish),
-        trades=_by_name(trade for file in signs for trade in file.trade),
+        plaster=_gathered(families, lambda file: file.plaster),
+        stone=_gathered(families, lambda file: file.stone),
+        families=_by_name(_gathered(families, lambda file: file.family)),
+        ground_floors=_by_name(_gathered(families, lambda file: file.ground_floor)),
+        blank_walls=_by_name(_gathered(families, lambda file: file.blank_wall)),
+        regions=_by_name(_gathered(regions, lambda file: file.region)),
+        uses=[file.uses for _, file in uses if file.uses is not None][-1],
+        materials=_families_by_value(_gathered(uses, lambda file: file.material)),
+        architectures=_families_by_value(_gathered(uses, lambda file: file.architecture)),
+        wood=_gathered(roofs, lambda file: file.wood),
+        felt=_gathered(roofs, lambda file: file.felt),
+        modern_roofs=_gathered(roofs, lambda file: file.modern),
+        roofs=_by_name(_gathered(roofs, lambda file: file.roof)),
+        colours=dict(_gathered(_files("colours", ColoursFile), lambda file: file.named.items())),
+        finishes=_by_name(_gathered(_files("finishes", FinishesFile), lambda file: file.finish)),
+        trades=_by_name(_gathered(signs, lambda file: file.trade)),
     )
 
 
@@ -122,6 +115,7 @@ class _Named(Protocol):
 
 N = TypeVar("N", bound=_Named)
 R = TypeVar("R", bound=DataRecord)
+T = TypeVar("T")
 
 
 def _files(kind: str, record: type[R]) -> list[tuple[Path, R]]:
@@ -137,19 +131,37 @@ def _by_name(entries: Iterable[N]) -> dict[str, N]:
     return found
 
 
-def _check_families(path: Path, file: FamiliesFile) -> None:
-    for k, family in enumerate(file.family):
-        picture = family.picture or family.name
-        if picture not in WALLS:
-            raise SchemaError(
-                f"{path}: family.{k}.picture: nothing paints {picture!r}; there are {', '.join(sorted(WALLS))}"
-            )
-        for floor in family.ground_floors:
-            if floor not in GROUNDS:
-                raise SchemaError(
-                    f"{path}: family.{k}.ground_floors: nothing paints {floor!r}; there are "
-                    f"{', '.join(sorted(GROUNDS))}"
-                )
+def _gathered(files: Iterable[tuple[Path, R]], entries: Callable[[R], Iterable[T]]) -> tuple[T, ...]:
+    """Return the entries of all files, in their order."""
+    return tuple(entry for _, file in files for entry in entries(file))
+
+
+def _families_by_value(entries: Iterable[TagValues]) -> dict[str, Shares]:
+    return {value: entry.families for entry in entries for value in entry.values}
+
+
+def _check_pictures(files: Iterable[tuple[Path, FamiliesFile]]) -> None:
+    for path, file in files:
+        for k, family in enumerate(file.family):
+            _check_painted(f"{path}: family.{k}.picture", family.picture or family.name, WALLS)
+            for floor in family.ground_floors:
+                _check_painted(f"{path}: family.{k}.ground_floors", floor, GROUNDS)
+
+
+def _check_painted(where: str, name: str, painted: Iterable[str]) -> None:
+    if name not in painted:
+        raise SchemaError(f"{where}: nothing paints {name!r}; there are {', '.join(sorted(painted))}")
+
+
+def _check_named_families(
+    regions: Iterable[tuple[Path, RegionsFile]], uses: Iterable[tuple[Path, UsesFile]], known: set[str]
+) -> None:
+    for path, places in regions:
+        for where, shares in _shares_of_regions(places):
+            _check_shares(path, where, shares, known)
+    for path, use in uses:
+        for where, shares in _shares_of_uses(use):
+            _check_shares(path, where, shares, known)
 
 
 def _check_shares(path: Path, where: str, shares: Shares, known: set[str]) -> None:

@@ -131,60 +131,97 @@ def level_estimates(
     """
     if not outlines:
         return np.zeros(0, np.int64), []
-    areas = np.array([row[1].area for row in outlines])
-    centres = np.array([row[1].centroid.coords[0] for row in outlines])
-    said = np.array([said_levels(row[2]) or 0 for row in outlines])
-    example = np.maximum(said, tallest)
-    known = np.flatnonzero((example > 0) & (areas > 45.0))
-    large = np.flatnonzero((example > 0) & (areas > 120.0))
-    reach = shapely.box(*(f(centres[:, k]) for f in (np.min, np.max) for k in (0, 1)))
-    dense = areas.sum() / max(reach.area, 1.0) > 0.22
-    usual = (5 if lon > -30 else 4) if dense else 2
-    use_code = np.unique(np.array(uses), return_inverse=True)[1].ravel()
-    near_tree = cKDTree(centres[known]) if len(known) else None
-    far_tree = cKDTree(centres[large]) if len(large) else None
+    town = _Town(outlines, tallest, uses, lon)
     result = np.empty(len(outlines), np.int64)
     rules: list[str] = []
     for k, (_, _, tags) in enumerate(outlines):
-        kind = tags.get("building", "yes")
-        if said[k]:
-            result[k] = said[k]
-            rules.append("levels tag" if number(tags.get("building:levels")) else "height tag")
-            continue
-        if typical[k]:
-            result[k] = typical[k]
-            rules.append("parts")
-            continue
-        usual_kind = _KIND_LEVELS.get(kind)
-        if kind_eaves(tags, uses[k], float(areas[k])) is not None or (usual_kind and kind not in _YIELDING):
-            result[k] = usual_kind or 1
-            rules.append("kind")
-            continue
-        estimate, rule = 0, ""
-        if areas[k] < 45.0:
-            estimate, rule = usual_kind or 1, "kind"
-        if not rule and near_tree is not None:
-            index = np.array(sorted(near_tree.query_ball_point(centres[k], _NEAR)), np.int64)
-            index = index[use_code[known[index]] == use_code[k]] if len(index) else index
-            if len(index) >= 2:
-                others = known[index]
-                distance = np.hypot(*(centres[others] - centres[k]).T)
-                likeness = np.minimum(areas[others], areas[k]) / np.maximum(areas[others], areas[k])
-                estimate = weighted_median(example[others], np.sqrt(likeness) / (1.0 + distance / 25.0))
-                rule = "neighbours"
-        if not rule and usual_kind:
-            estimate, rule = usual_kind, "kind"
-        if not rule and far_tree is not None:
-            distances, nearest = far_tree.query(centres[k], k=min(7, len(large)))
-            pairs = zip(np.atleast_1d(distances).tolist(), np.atleast_1d(nearest).tolist(), strict=True)
-            near = [int(example[large[i]]) for d, i in pairs if d < _REACH]
-            if len(near) >= 2:
-                estimate, rule = round(float(np.median(near))), "area"
-        if not rule:
-            estimate, rule = usual, "town"
-        result[k] = max(min(estimate, 2 if areas[k] < 90.0 else 3 if areas[k] < 140.0 else 12), 1)
+        if town.said[k]:
+            result[k], rule = town.said[k], "levels tag" if number(tags.get("building:levels")) else "height tag"
+        elif typical[k]:
+            result[k], rule = typical[k], "parts"
+        elif (alike := town.by_kind(k)) is not None:
+            result[k], rule = alike, "kind"
+        else:
+            result[k], rule = town.by_what_is_near(k)
         rules.append(rule)
     return result, rules
+
+
+class _Town:
+    """What is known of all outlines, for those that don't say their storeys.
+
+    Attributes
+    ----------
+    said
+        Storeys that the tags of each state, 0 for none, shape ``(n,)``.
+    """
+
+    def __init__(
+        self, outlines: Sequence[tuple[str, Polygon, Tags]], tallest: NDArray[np.int64], uses: Sequence[str], lon: float
+    ) -> None:
+        self._tags, self._uses = [row[2] for row in outlines], uses
+        self._areas = np.array([row[1].area for row in outlines])
+        self._centres = np.array([row[1].centroid.coords[0] for row in outlines])
+        self.said = np.array([said_levels(tags) or 0 for tags in self._tags])
+        self._example = np.maximum(self.said, tallest)
+        self._known = np.flatnonzero((self._example > 0) & (self._areas > 45.0))
+        self._large = np.flatnonzero((self._example > 0) & (self._areas > 120.0))
+        self._near_tree = cKDTree(self._centres[self._known]) if len(self._known) else None
+        self._far_tree = cKDTree(self._centres[self._large]) if len(self._large) else None
+        self._use_code = np.unique(np.array(uses), return_inverse=True)[1].ravel()
+        reach = shapely.box(*(f(self._centres[:, k]) for f in (np.min, np.max) for k in (0, 1)))
+        dense = self._areas.sum() / max(reach.area, 1.0) > 0.22
+        self._usual = (5 if lon > -30 else 4) if dense else 2
+
+    def _kind(self, k: int) -> str:
+        return self._tags[k].get("building", "yes")
+
+    def by_kind(self, k: int) -> int | None:
+        """Storeys of what looks alike everywhere; None where what stands beside it counts."""
+        kind = self._kind(k)
+        usual = _KIND_LEVELS.get(kind)
+        if kind_eaves(self._tags[k], self._uses[k], float(self._areas[k])) is not None:
+            return usual or 1
+        return usual if kind not in _YIELDING else None
+
+    def by_what_is_near(self, k: int) -> tuple[int, str]:
+        """Storeys by neighbours of its use, by its kind, by the area around or by the town, and which of these."""
+        usual = _KIND_LEVELS.get(self._kind(k))
+        if self._areas[k] < 45.0:
+            estimate, rule = usual or 1, "kind"
+        elif (neighbours := self._of_neighbours(k)) is not None:
+            estimate, rule = neighbours, "neighbours"
+        elif usual:
+            estimate, rule = usual, "kind"
+        elif (around := self._of_area(k)) is not None:
+            estimate, rule = around, "area"
+        else:
+            estimate, rule = self._usual, "town"
+        most = 2 if self._areas[k] < 90.0 else 3 if self._areas[k] < 140.0 else 12
+        return max(min(estimate, most), 1), rule
+
+    def _of_neighbours(self, k: int) -> int | None:
+        """Storeys of those of the same use within 100 m, if there are two."""
+        if self._near_tree is None:
+            return None
+        index = np.array(sorted(self._near_tree.query_ball_point(self._centres[k], _NEAR)), np.int64)
+        others = self._known[index]
+        others = others[self._use_code[others] == self._use_code[k]]
+        if len(others) < 2:
+            return None
+        distance = np.hypot(*(self._centres[others] - self._centres[k]).T)
+        areas, area = self._areas[others], self._areas[k]
+        likeness = np.minimum(areas, area) / np.maximum(areas, area)
+        return weighted_median(self._example[others], np.sqrt(likeness) / (1.0 + distance / 25.0))
+
+    def _of_area(self, k: int) -> int | None:
+        """Storeys of the nearest large houses of any use, if there are two."""
+        if self._far_tree is None:
+            return None
+        distances, nearest = self._far_tree.query(self._centres[k], k=min(7, len(self._large)))
+        pairs = zip(np.atleast_1d(distances).tolist(), np.atleast_1d(nearest).tolist(), strict=True)
+        near = [int(self._example[self._large[i]]) for d, i in pairs if d < _REACH]
+        return round(float(np.median(near))) if len(near) >= 2 else None
 
 
 def weighted_median(values: NDArray[np.int64], weights: NDArray[np.float64]) -> int:

@@ -51,28 +51,19 @@ def part_of(
         The building's own stream.
     """
     draw = random.random(4)
-    merged = {**{k: v for k, v in outer.items() if k in _INHERITED}, **tags}
-    if outer and "roof:shape" not in tags and "height" in tags and outer.get("roof:shape") not in (None, "flat"):
-        # A part of a measured model that says nothing of a roof has none of its own.
-        merged.pop("roof:shape", None)
+    merged = _with_inherited(tags, outer)
     kind = tags.get("building", tags.get("building:part", "yes"))
     open_below = kind in OPEN_KINDS or tags.get("wall") == "no"
     said = said_levels(tags)
-    storeys = said or levels
     usual_eaves = kind_eaves(merged, use, polygon.area) if said is None and not outer else None
-    if said is None and kind in SMALL_KINDS:
-        storeys = 1
-    elif said is None and not outer and storeys >= 3 and usual_eaves is None:
-        storeys += -1 if draw[0] < 0.2 else 1 if draw[0] > 0.8 else 0
+    may_vary = said is None and not outer and usual_eaves is None
+    storeys = said or _unsaid_storeys(kind, levels, may_vary, float(draw[0]))
     roof = _roof(polygon, merged, use, storeys, flat, draw, open_below)
     allowance = 0.8 if use in ("retail", "commercial", "office", "civic", "hotel") else 0.4
     height = said_height(tags)
     low = _said_low(tags, allowance)
     if height is not None:
-        if number(tags.get("roof:height")) is None and low <= 0.0:
-            roof = replace(roof, height=min(roof.height, 0.4 * height))
-        room = height - max(low, 0.0) - (0.05 if low > 0.0 else 0.5)
-        roof = replace(roof, height=max(min(roof.height, room), 0.0))
+        roof = _roof_below(height, roof, tags, low)
         eaves = height - (roof.height if roof.shape != "flat" else 0.0)
     elif open_below:
         eaves = 4.4
@@ -84,13 +75,40 @@ def part_of(
     if open_below and low <= 0.0:
         low = max(eaves - 0.45, 0.5)
         storeys = 0
-    if low > 0.0 and height is None and low > eaves - 1.0:
+    if height is None and low > max(eaves - 1.0, 0.0):
         # Only its first level is said: it begins there and has its storeys above.
         eaves = low + max(storeys, 1) * STOREY
     low = min(low, eaves - 0.05) if low > 0 else 0.0
     if said is None and storeys and use != "religious":
         storeys = max(round((eaves - low - 0.6) / STOREY), 1)
     return PartPlan(polygon, low, eaves, storeys, roof, merged)
+
+
+def _with_inherited(tags: Tags, outer: Tags) -> dict[str, str]:
+    """Return the tags of a part, with those of its building that hold for it too."""
+    merged = {**{k: v for k, v in outer.items() if k in _INHERITED}, **tags}
+    measured = outer and "height" in tags and "roof:shape" not in tags
+    if measured and outer.get("roof:shape") not in (None, "flat"):
+        # A part of a measured model that says nothing of a roof has none of its own.
+        merged.pop("roof:shape", None)
+    return merged
+
+
+def _unsaid_storeys(kind: str, levels: int, may_vary: bool, draw: float) -> int:
+    """Storeys where nobody says them: one in what is small; in high houses sometimes one more or less than usual."""
+    if kind in SMALL_KINDS:
+        return 1
+    if may_vary and levels >= 3:
+        return levels + (-1 if draw < 0.2 else 1 if draw > 0.8 else 0)
+    return levels
+
+
+def _roof_below(height: float, roof: Roof, tags: Tags, low: float) -> Roof:
+    """Return a roof that ends at a stated height: lower where its walls would not be seen."""
+    if number(tags.get("roof:height")) is None and low <= 0.0:
+        roof = replace(roof, height=min(roof.height, 0.4 * height))
+    room = height - max(low, 0.0) - (0.05 if low > 0.0 else 0.5)
+    return replace(roof, height=max(min(roof.height, room), 0.0))
 
 
 def _said_low(tags: Tags, allowance: float) -> float:
