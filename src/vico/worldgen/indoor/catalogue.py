@@ -16,7 +16,7 @@ from vico.errors import SchemaError
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 from vico.world.model import Category
 from vico.worldgen.indoor.compositions import COMPOSITIONS, Composition
-from vico.worldgen.indoor.recipes import Names
+from vico.worldgen.indoor.recipes import NamedPieces
 from vico.worldgen.indoor.records import (
     DrawnPlan,
     EntryPlan,
@@ -25,6 +25,7 @@ from vico.worldgen.indoor.records import (
     HangStep,
     LayStep,
     LineStep,
+    PlaceUsesFile,
     PutStep,
     RoomEntry,
     RoomsFile,
@@ -33,7 +34,6 @@ from vico.worldgen.indoor.records import (
     StandStep,
     Step,
     Use,
-    UsesFile,
 )
 
 ROOM = "indoor"
@@ -67,7 +67,7 @@ class RoomKinds:
     """All kinds of rooms by name, what steps may name, and small things by the piece they lie on."""
 
     kinds: Mapping[str, RoomKind]
-    names: Names
+    names: NamedPieces
     on: Mapping[str, tuple[str, ...]]
     plain: RoomKind
 
@@ -77,7 +77,7 @@ class RoomKinds:
 
 
 @dataclass(frozen=True)
-class Uses:
+class PlaceUses:
     """Uses by name, the use of a kind of place and of a category, and the kinds that are homes."""
 
     uses: Mapping[str, Use]
@@ -103,7 +103,7 @@ def room_kinds() -> RoomKinds:
     files = _read("rooms", RoomsFile)
     colours = {name: colour for _, file in files for name, colour in file.colours.items()}
     palettes = {name: palette for _, file in files for name, palette in file.palettes.items()}
-    names = Names(
+    names = NamedPieces(
         sets={name: members for _, file in files for name, members in file.sets.items()},
         choices={name: pieces for _, file in files for name, pieces in file.choices.items()},
     )
@@ -121,7 +121,7 @@ def room_kinds() -> RoomKinds:
 
 
 @cached_data
-def uses() -> Uses:
+def uses() -> PlaceUses:
     """Return what floor plans are for.
 
     Raises
@@ -129,7 +129,7 @@ def uses() -> Uses:
     SchemaError
         If a file can't be used, or names a kind of room, a plan or a use that there is none of.
     """
-    files = _read("uses", UsesFile)
+    files = _read("uses", PlaceUsesFile)
     found = {name: use for _, file in files for name, use in file.use.items()}
     for path, file in files:
         for name, use in file.use.items():
@@ -138,7 +138,7 @@ def uses() -> Uses:
             if name not in found:
                 raise SchemaError(f"{path}: categories.{category.value}: no use {name!r}; there are {', '.join(found)}")
     by_kind = {kind: name for _, file in files for name, use in file.use.items() for kind in use.kinds}
-    return Uses(
+    return PlaceUses(
         found,
         by_kind,
         {category: name for _, file in files for category, name in file.categories.items()},
@@ -182,7 +182,7 @@ def _check_names(path: Path, file: RoomsFile) -> None:
         _check_pieces(f"{path}: on.{piece}", (piece, *small))
 
 
-def _check_steps(where: str, steps: Iterable[Step], names: Names) -> None:
+def _check_steps(where: str, steps: Iterable[Step], names: NamedPieces) -> None:
     for k, step in enumerate(steps):
         here = f"{where}.{k}"
         for piece in _named_pieces(step):

@@ -14,7 +14,7 @@ Spot = tuple[int, float]  # a wall, and where along it
 
 
 @dataclass(frozen=True)
-class Names:
+class NamedPieces:
     """What steps may name: sets of pieces that stand together, and pieces of which chance picks one."""
 
     sets: Mapping[str, tuple[Member, ...]]
@@ -37,7 +37,7 @@ class Names:
                 yield name
 
 
-def furnish_room(room: RoomDraft, steps: Sequence[records.Step], names: Names, spot: Spot | None = None) -> None:
+def furnish_room(room: RoomDraft, steps: Sequence[records.Step], names: NamedPieces, spot: Spot | None = None) -> None:
     """Furnish a room by steps.
 
     Parameters
@@ -84,7 +84,7 @@ def _walls(room: RoomDraft, names: Sequence[records.WallName], spot: Spot | None
     return found or None
 
 
-def _stand(room: RoomDraft, step: records.StandStep, names: Names, spot: Spot | None) -> None:
+def _stand(room: RoomDraft, step: records.StandStep, names: NamedPieces, spot: Spot | None) -> None:
     for piece in names.pieces(step.stand, step.times, room):
         along: str | float = step.along
         if step.along == "same":
@@ -101,7 +101,7 @@ def _stand(room: RoomDraft, step: records.StandStep, names: Names, spot: Spot | 
         furnish_room(room, step.then if found else step.else_, names, found or spot)
 
 
-def _put(room: RoomDraft, step: records.PutStep, names: Names) -> bool:
+def _put(room: RoomDraft, step: records.PutStep, names: NamedPieces) -> bool:
     """Put a set where the step says; whether it found room anywhere."""
     members = names.members(step.put)
     done = False

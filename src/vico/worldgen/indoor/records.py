@@ -366,7 +366,7 @@ class Use(DataRecord):
         return self
 
 
-class UsesFile(DataRecord):
+class PlaceUsesFile(DataRecord):
     """Uses by name.
 
     Attributes
