@@ -13,6 +13,8 @@ Action = dict[str, Any]
 Observation = dict[str, Any]
 Info = dict[str, Any]
 
+AHEAD = slice(3, 5)  # of an observation's pose: east and north of the direction it looks along
+
 
 class Agent(Protocol):
     """Turns observations into actions, once a step. Sees nothing else of the world but public maps."""
@@ -56,8 +58,8 @@ class RandomAgent:
 
 def heading(observation: Observation) -> float:
     """Yaw an agent looks along, radians."""
-    pose = observation["pose"]
-    return float(np.arctan2(pose[4], pose[3]))
+    east, north = observation["pose"][AHEAD]
+    return float(np.arctan2(north, east))
 
 
 def wrapped(angle: float) -> float:

@@ -22,6 +22,7 @@ THICK = 0.1  # metres between the faces of a wall
 SILL, SHOP_SILL, HEAD = 0.85, 0.4, 2.35
 _TILE = {"planks": 2.0, "tiles": 1.2, "carpet": 2.0, "stone": 1.6, "concrete": 4.0, "parquet": 1.2, "chequer": 1.2}
 _WALL_TILE = 2.4
+_SKIRTING = 5  # rows of a wall's picture
 _STEPS = 8  # risers a flight
 FLOORS = tuple(_TILE)
 WALLS = ("plaster", "wallpaper", "tiled", "brick", "panels")
@@ -147,8 +148,8 @@ def wall_material(kind: str) -> Material:
             picture[8:10, k + 3 : k + 29] = picture[44:46, k + 3 : k + 29] = np.array([128, 88, 58])
     else:
         picture += random.normal(0, 2.5, (side, side, 1))
-    picture[:5] = np.array([176, 170, 160]) if kind != "panels" else np.array([104, 70, 46])
-    picture[5] = 120
+    picture[:_SKIRTING] = np.array([176, 170, 160]) if kind != "panels" else np.array([104, 70, 46])
+    picture[_SKIRTING] = 120
     return Material(f"wall_{kind}", np.clip(picture, 40, 252).astype(np.uint8))
 
 
@@ -216,12 +217,12 @@ class _Quads:
         found = []
         for material, rows in self._rows.values():
             a = np.array(rows, np.float64)
-            origin, u, v = a[:, 0:3], a[:, 3:6], a[:, 6:9]
+            origin, u, v, box, colour, entity = np.split(a, np.cumsum([3, 3, 3, 4, 3]), axis=1)
             points = np.stack([origin, origin + u, origin + u + v, origin + v], axis=1)
             normal = np.cross(u, v)
             normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-            uv = np.stack([a[:, [9, 10]], a[:, [11, 10]], a[:, [11, 12]], a[:, [9, 12]]], axis=1)
-            found.append(surface_of_quads(points, normal, uv, colour=a[:, 13:16], entity=a[:, 16], material=material))
+            uv = np.stack([box[:, [0, 1]], box[:, [2, 1]], box[:, [2, 3]], box[:, [0, 3]]], axis=1)
+            found.append(surface_of_quads(points, normal, uv, colour=colour, entity=entity.ravel(), material=material))
         return found
 
 

@@ -52,8 +52,8 @@ def _spans_of(text: str) -> list[Span] | None:
         match = _TIMES.fullmatch(part.strip().rstrip("+"))
         if match is None:
             return None
-        start = int(match[1]) * 60 + int(match[2] or 0)
-        end = int(match[3]) * 60 + int(match[4] or 0)
+        first_hour, first_minute, last_hour, last_minute = (int(part or 0) for part in match.groups())
+        start, end = first_hour * 60 + first_minute, last_hour * 60 + last_minute
         if start > MINUTES or end > 30 * 60:
             return None
         spans.append((start, end if end > start else end + MINUTES))

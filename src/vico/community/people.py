@@ -191,9 +191,10 @@ def draw_character(rng: np.random.Generator, draft: ResidentDraft, uses: dict[st
         How often each hobby has been given so far; common ones become less likely. Updated.
     """
     five = np.clip(rng.normal(0.55, 0.19, 5), 0.05, 0.95)
-    five[1] = min(0.95, five[1] + (0.08 if draft.age > 45 else 0.0))
-    five[4] = max(0.05, five[4] - 0.1)
     names = ("openness", "conscientiousness", "extraversion", "agreeableness", "neuroticism")
+    diligent, nervous = names.index("conscientiousness"), names.index("neuroticism")
+    five[diligent] = min(0.95, five[diligent] + (0.08 if draft.age > 45 else 0.0))
+    five[nervous] = max(0.05, five[nervous] - 0.1)
     scores = {name: round(float(v), 2) for name, v in zip(names, five, strict=True)}
     # The words for the two or three traits that stand out most from the middle.
     order = sorted(names, key=lambda name: (-abs(scores[name] - 0.5), name))

@@ -12,6 +12,7 @@ import warnings
 import zipfile
 import zlib
 from dataclasses import dataclass
+from enum import IntEnum
 from pathlib import Path
 from typing import Protocol
 
@@ -103,8 +104,11 @@ class _Array:
 
 def _hgt(content: bytes, name: str, path: Path, size: int) -> Raster:
     match = _HGT_NAME.search(name)
-    south = int(match[2]) * (1 if match[1].upper() == "N" else -1) if match else 90
-    west = int(match[4]) * (1 if match[3].upper() == "E" else -1) if match else 180
+    south, west = 90, 180
+    if match:
+        hemisphere, lat, half, lon = match.groups()
+        south = int(lat) * (1 if hemisphere.upper() == "N" else -1)
+        west = int(lon) * (1 if half.upper() == "E" else -1)
     if not (-90 <= south < 90 and -180 <= west < 180):
         raise InputError(f"{path}: {name} does not say which tile it is; HGT files are named like N43E007.hgt")
     side = _HGT_SIDES.get(size)
@@ -212,12 +216,37 @@ class _Tiff:
         return heights * self.unit
 
 
+class _Tag(IntEnum):
+    """Fields of a TIFF's directory."""
+
+    WIDTH = 256
+    LENGTH = 257
+    BITS_PER_SAMPLE = 258
+    COMPRESSION = 259
+    BLACK_IS_ZERO = 262
+    FILL_ORDER = 266
+    STRIP_OFFSET = 273
+    SAMPLES_PER_PIXEL = 277
+    ROWS_PER_STRIP = 278
+    STRIP_BYTES = 279
+
+
 def _by_pillow(packed: bytes, rows: int, width: int, compression: int, reversed_bits: bool) -> bytes:
     """Unpack one block with Pillow's TIFF reader, as a picture of bytes: the base install has no other LZW."""
-    values = {256: width, 257: rows, 258: 8, 259: compression, 262: 1, 273: 0, 277: 1, 278: rows, 279: len(packed)}
+    values = {
+        _Tag.WIDTH: width,
+        _Tag.LENGTH: rows,
+        _Tag.BITS_PER_SAMPLE: 8,
+        _Tag.COMPRESSION: compression,
+        _Tag.BLACK_IS_ZERO: 1,
+        _Tag.STRIP_OFFSET: 0,
+        _Tag.SAMPLES_PER_PIXEL: 1,
+        _Tag.ROWS_PER_STRIP: rows,
+        _Tag.STRIP_BYTES: len(packed),
+    }
     if reversed_bits:
-        values[266] = 2
-    values[273] = 8 + 2 + 12 * len(values) + 4
+        values[_Tag.FILL_ORDER] = 2
+    values[_Tag.STRIP_OFFSET] = 8 + 2 + 12 * len(values) + 4
     entries = b"".join(struct.pack("<HHII", tag, 4, 1, values[tag]) for tag in sorted(values))
     content = b"II*\0" + struct.pack("<IH", 8, len(values)) + entries + bytes(4) + packed
     with warnings.catch_warnings():

@@ -118,8 +118,10 @@ class Indoor:
         """Free room around a point of a room, metres: to the nearest wall or piece of furniture; negative in one."""
         x, y = float(xy[0]), float(xy[1])
         best = float(room_gap(x, y, self.boxes[room]))
-        for b in self.furniture[self.furniture_start[room] : self.furniture_start[room + 1]]:
-            best = min(best, float(box_gap(x, y, b[0], b[1], b[2], b[3], b[4])))
+        for bx, by, yaw, half_length, half_width, *_ in self.furniture[
+            self.furniture_start[room] : self.furniture_start[room + 1]
+        ]:
+            best = min(best, float(box_gap(x, y, bx, by, yaw, half_length, half_width)))
         return best
 
     def free_spot(self, room: int, near: ArrayLike, taken: NDArray[np.float64]) -> NDArray[np.float64] | None:

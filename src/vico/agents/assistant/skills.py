@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vico.agents.base import AHEAD
 from vico.agents.perception import DepthGrid, Sighting, sightings
 from vico.agents.wayfinding import Walker
 from vico.world.public import PublicMap
@@ -205,7 +206,8 @@ class AssistantSkills:
 def turn_to(pose: NDArray[np.float64], target: ArrayLike) -> float:
     """Radians to turn, counter-clockwise positive, to face a point."""
     x, y = np.asarray(target, np.float64)[:2] - pose[:2]
-    return math.remainder(math.atan2(y, x) - math.atan2(pose[4], pose[3]), 2 * math.pi)
+    east, north = pose[AHEAD]
+    return math.remainder(math.atan2(y, x) - math.atan2(north, east), 2 * math.pi)
 
 
 def turn_action(radians: float) -> Action:

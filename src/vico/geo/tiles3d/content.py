@@ -171,20 +171,21 @@ def _b3dm(data: bytes, where: str) -> TileContent:
     ends = np.cumsum([at, feature_json, feature_binary, batch_json, batch_binary]).tolist()
     if ends[-1] > length:
         raise SchemaError(f"{where}: its tables leave the file (byte {ends[-1]:,} of {length:,}); download it again")
-    features, batch = data[ends[0] : ends[1]], data[ends[2] : ends[3]]
+    start, centre_at, batch_at, columns_at, model_at = ends
+    features, batch = data[start:centre_at], data[batch_at:columns_at]
     centre = np.zeros(3)
     if features.strip():
         table = json.loads(features)
         count = int(table.get("BATCH_LENGTH", count))
         said = table.get("RTC_CENTER")
         if isinstance(said, dict):
-            said = struct.unpack_from("<fff", data[ends[1] : ends[2]], said["byteOffset"])
+            said = struct.unpack_from("<fff", data[centre_at:batch_at], said["byteOffset"])
         if said is not None:
             centre = np.asarray(said, np.float64)
             if centre.shape != (3,) or not np.isfinite(centre).all():
                 raise SchemaError(f"{where}: RTC_CENTER is no point; export it anew")
-    columns = _columns(json.loads(batch), data[ends[3] : ends[4]], count, where) if batch.strip() else {}
-    return TileContent(data[ends[4] : length], centre, columns)
+    columns = _columns(json.loads(batch), data[columns_at:model_at], count, where) if batch.strip() else {}
+    return TileContent(data[model_at:length], centre, columns)
 
 
 def _columns(table: dict[str, Any], binary: bytes, count: int, where: str) -> dict[str, list[Any]]:

@@ -154,6 +154,6 @@ class PathFollower:
     def restore(self, path: NDArray[np.float64], numbers: NDArray[np.float64]) -> None:
         """Go back to what `path` and `numbers` held."""
         self.path = np.ascontiguousarray(path, np.float64)
-        self.along, self.waiting, self.stuck, self.backing, self.marked = (float(v) for v in numbers[:5])
-        self.detours, self.status = int(numbers[5]), RobotStatus(int(numbers[6]))
+        self.along, self.waiting, self.stuck, self.backing, self.marked, detours, status = numbers.tolist()
+        self.detours, self.status = int(detours), RobotStatus(int(status))
         self.wants_detour = False

@@ -18,6 +18,8 @@ from vico.exact import dot
 from vico.world.mesh import Surface
 from vico.worldgen.facades.textures.walls import BAYS
 
+_U, _V = 3, 4  # columns of a corner after its position: texture coordinates
+
 
 @dataclass(frozen=True)
 class Wall:
@@ -145,8 +147,8 @@ class GroundFloors:
         i, j = along.argmin(axis=1), along.argmax(axis=1)
         rows = np.arange(len(along))
         span = along[rows, j] - along[rows, i]
-        rate = (corner[rows, j, 3] - corner[rows, i, 3]) / np.maximum(span, 1e-9) * BAYS
-        phase = corner[rows, i, 3] * BAYS - rate * along[rows, i]
+        rate = (corner[rows, j, _U] - corner[rows, i, _U]) / np.maximum(span, 1e-9) * BAYS
+        phase = corner[rows, i, _U] * BAYS - rate * along[rows, i]
         reach = np.maximum(np.maximum(along.min(axis=1), -along.max(axis=1)), 0.0)
         seed = int(np.lexsort((-span, reach > 0.3))[0])
         if span[seed] < 0.3 or rate[seed] <= 1e-3:
@@ -162,7 +164,7 @@ class GroundFloors:
                 break
             chosen |= touching
             low, high = min(low, float(along[touching].min())), max(high, float(along[touching].max()))
-        z, v = corner[chosen][:, :, 2], corner[chosen][:, :, 4]
+        z, v = corner[chosen][:, :, 2], corner[chosen][:, :, _V]
         bottom, top = float(z.min()), float(z.max())
         if top - bottom < 1.8:
             return None

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,16 @@ class Opening:
         return (self.at, y if self.side == NORTH else -y)
 
 
+class _Hung(NamedTuple):
+    """Something on a wall: which, where along it, how wide, and from where to where above the floor."""
+
+    side: int
+    at: float
+    width: float
+    low: float
+    high: float
+
+
 class RoomDraft:
     """A room that is being furnished.
 
@@ -85,7 +96,7 @@ class RoomDraft:
         self.solid: list[Box] = []
         self.tall: list[Box] = []
         self._clear = [self._door_zone(door) for door in self.doors]
-        self._hung: list[tuple[int, float, float, float, float]] = []
+        self._hung: list[_Hung] = []
         self.taken = self._empty()
         self._spots = [self._cell(door.point(size, STEP_IN)) for door in self.doors]
 
@@ -396,7 +407,7 @@ class RoomDraft:
                     o.side == side and abs(o.at - s) < (o.width + wide) / 2 + 0.12 for o in [*self.doors, *self.windows]
                 )
                 blocked |= any(
-                    h[0] == side and abs(h[1] - s) < (h[2] + wide) / 2 + 0.1 and h[3] < high and low < h[4]
+                    h.side == side and abs(h.at - s) < (h.width + wide) / 2 + 0.1 and h.low < high and low < h.high
                     for h in self._hung
                 )
                 strip = self._strip(side, s, wide, 0.0, 0.25)
@@ -405,7 +416,7 @@ class RoomDraft:
                     x, y = _middle(self._strip(side, s, 0.0, 0.012, model.size[0]))
                     yaw = math.remainder((side + 2) * math.pi / 2, 2 * math.pi)
                     self.items.append(Furnishing(name, round(x, 3), round(y, 3), round(yaw, 5)))
-                    self._hung.append((side, s, wide, low, high))
+                    self._hung.append(_Hung(side, s, wide, low, high))
                     return True
         return False
 

@@ -268,5 +268,6 @@ def _hours(tags: Tags) -> tuple[int, int] | None:
     match = _HOURS.search(tags.get("opening_hours") or tags.get("service_times") or tags.get("hours") or "")
     if match is None:
         return None
-    first, last = int(match[1]) * 3600 + int(match[2]) * 60, int(match[3]) * 3600 + int(match[4]) * 60
+    first_hour, first_minute, last_hour, last_minute = (int(part) for part in match.groups())
+    first, last = first_hour * 3600 + first_minute * 60, last_hour * 3600 + last_minute * 60
     return (first, last) if 0 <= first < last <= DAY else None

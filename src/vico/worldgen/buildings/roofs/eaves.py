@@ -142,7 +142,7 @@ def slopes_of(mesh: Mesh, edges: Edges, eaves: float) -> list[Slope]:
             low, high = sorted((float(s[j]), float(t[j])))
             row = found.setdefault(key, [low, high, c, float(gx), float(gy)])
             row[0], row[1] = min(row[0], low), max(row[1], high)
-    made = [Slope(key[0], row[0], row[1], (row[2], row[3], row[4])) for key, row in found.items()]
+    made = [Slope(k, low, high, (c, gx, gy)) for (k, *_), (low, high, c, gx, gy) in found.items()]
     return sorted(made, key=lambda slope: (slope.edge, slope.start, slope.end))
 
 

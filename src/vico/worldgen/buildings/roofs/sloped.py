@@ -47,7 +47,8 @@ def sloped_solid(polygon: Polygon, rings: list[NDArray[np.float64]], low: float,
     probe = _cut(rings, low, roof.height, [(0.0, 0.0), (gentle, 1.0)], gables, "")
     if roof.shape == "gabled":
         return probe
-    deep = min(max(probe.bounding_box()[5] / roof.height * gentle, 0.1), gentle)
+    *_, top = probe.bounding_box()
+    deep = min(max(top / roof.height * gentle, 0.1), gentle)
     slope = slope_of(roof.shape, deep)
     if roof.shape == "round":
         slope = slope[::2]  # half the facets: every one is cut along every edge

@@ -76,7 +76,7 @@ def building_solid(polygon: Polygon, low: float, eaves: float, roof: Roof) -> Ma
 
 def _as_high_as(solid: Manifold, height: float) -> Manifold:
     """Stretch what lies above 0 so that its top is at `height`."""
-    top = solid.bounding_box()[5] if not solid.is_empty() else 0.0
+    *_, top = (0.0,) if solid.is_empty() else solid.bounding_box()
     if top < 0.01 or abs(top - height) < 0.002:
         return solid
     share = height / top

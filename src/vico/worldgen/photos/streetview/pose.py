@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from vico.worldgen.photos.streetview.matching import Matches, opencv
 
 _NORM_METRES = 20.0
+_ABOVE, _LEFT, _HERE, _RIGHT, _BELOW = 1, 3, 4, 5, 7  # of a pixel and its eight neighbours, row by row
 _ENOUGH = 12  # points that agree on a pose
 _PRIOR_METRES, _PRIOR_RADIANS = 3.0, 0.07  # what is expected of the metadata: a weak pull where points say little
 
@@ -163,11 +164,11 @@ def lifted(
     column = np.clip(np.floor(xy[:, 0]).astype(np.int64), 1, width - 2)
     row = np.clip(np.floor(xy[:, 1]).astype(np.int64), 1, height - 2)
     around = np.stack([depth[row + i, column + j] for i in (-1, 0, 1) for j in (-1, 0, 1)], axis=1)
-    here = around[:, 4].astype(np.float64)
+    here = around[:, _HERE].astype(np.float64)
     # On a plane the middle of opposite neighbours is the pixel itself, in inverse depth exactly.
     safe = np.where(around > 0, around, np.inf)
-    bend = np.abs((1 / safe[:, 3] + 1 / safe[:, 5]) * here / 2 - 1) + np.abs(
-        (1 / safe[:, 1] + 1 / safe[:, 7]) * here / 2 - 1
+    bend = np.abs((1 / safe[:, _LEFT] + 1 / safe[:, _RIGHT]) * here / 2 - 1) + np.abs(
+        (1 / safe[:, _ABOVE] + 1 / safe[:, _BELOW]) * here / 2 - 1
     )
     solid = (around > 0).all(axis=1) & (bend < 0.02)
     rays = np.column_stack([xy, np.ones(len(xy))]) @ np.linalg.inv(intrinsics).T
