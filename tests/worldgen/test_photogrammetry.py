@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,16 +15,18 @@ from photogrammetry.tile_view import tile_surfaces
 from photogrammetry.tileset import write_tileset
 from vico.errors import EmptyInputError, InputError
 from vico.geo.osm import OsmData, read_osm
+from vico.geo.overlay import OverlayError
 from vico.geo.tiles3d.mesh import TileMesh
 from vico.geo.tiles3d.reader import read_tileset
 from vico.seeds import rng
 from vico.world.folder import World, read_world
 from vico.world.heights import HeightField
+from vico.worldgen.buildings.fitting import moves, nudging
 from vico.worldgen.buildings.fitting.nudging import fit_to_tiles, plans_on_tiles, settled
 from vico.worldgen.buildings.solids import leaky, seat_of, solid_meshes
 from vico.worldgen.buildings.stage import buildings_from_plans
 from vico.worldgen.facts.outlines.buildings import building_plans
-from vico.worldgen.facts.outlines.plans import BuildingPlan
+from vico.worldgen.facts.outlines.plans import BuildingPlan, BuildingPlans
 from vico.worldgen.facts.sight import Sight
 from vico.worldgen.ground.terrain import terrain_from_tiles
 from vico.worldgen.ground.tile_ground import on_ground
@@ -224,6 +227,31 @@ def test_shifted_footprints_are_moved_back(helsinki_tiles: TileMesh, map_of_hels
     assert report.after < report.before
     mesh = solid_meshes(fitted, [seat_of(p, ground) for p in fitted])
     assert leaky(mesh) == set()
+
+
+def test_a_building_that_cant_be_fitted_stays_as_planned_and_is_told(
+    helsinki_tiles: TileMesh, map_of_helsinki: OsmData, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plans = building_plans(map_of_helsinki, seed=0).plans
+
+    def failing(plan: BuildingPlan, *given: Any) -> tuple[BuildingPlan, str]:
+        if plan.id == plans[1].id:
+            raise OverlayError("side location conflict")
+        return plan, "already fits"
+
+    def unmoved(*_: Any) -> None:
+        raise OverlayError("side location conflict")
+
+    monkeypatch.setattr(nudging, "raised_to_mesh", failing)
+    monkeypatch.setattr(moves, "_displaced", unmoved)
+    by = replace(helsinki_tiles, positions=helsinki_tiles.positions + np.array([1.1, -0.7, 0.0]))
+    decided, report = plans_on_tiles(BuildingPlans(plans, []), by, HeightField.flat(200.0))
+    assert decided.plans == plans
+    assert report.fits[1].reason == "can't be raised"
+    told = [entry.id for entry in decided.dropped]
+    assert told[0] == f"{plans[1].id} fit"
+    assert len(told) > 2
+    assert all(entry.reason == "can't be made: OverlayError: side location conflict" for entry in decided.dropped)
 
 
 def test_where_the_tiles_show_no_building_none_is_changed(map_of_helsinki: OsmData) -> None:

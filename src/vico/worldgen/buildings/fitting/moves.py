@@ -12,7 +12,9 @@ from scipy.sparse.csgraph import connected_components
 from shapely import Polygon
 
 from vico.geo import overlay
+from vico.world.model import Dropped
 from vico.worldgen.buildings.fitting.measure import GAIN, LEAST_POINTS, Measure, mean_of
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.outlines.plans import BuildingPlan
 
 MOST_SHIFT = 2.0
@@ -25,8 +27,13 @@ _MOST_SCALE = 0.04
 Move = tuple[tuple[float, float], float]
 
 
-def moved_to_mesh(plans: list[BuildingPlan], measure: Measure) -> tuple[list[BuildingPlan], list[Move]]:
-    """Plans with their footprints where the mesh has its walls; and each one's shift and scale."""
+def moved_to_mesh(
+    plans: list[BuildingPlan], measure: Measure, failed: list[Dropped]
+) -> tuple[list[BuildingPlan], list[Move]]:
+    """Plans with their footprints where the mesh has its walls; and each one's shift and scale.
+
+    Buildings that touch and can't be moved together stay, and are told in `failed`.
+    """
     still: Move = ((0.0, 0.0), 1.0)
     walls = measure.walls(plans)
     group = _touching(plans)
@@ -44,28 +51,29 @@ def moved_to_mesh(plans: list[BuildingPlan], measure: Measure) -> tuple[list[Bui
         if len(mine) < 2 * LEAST_POINTS:
             continue
         own = members[g]
-        # Where many touch, stretching one would tear it from its neighbours.
-        pivot = np.asarray(overlay.union_all([shapes[k] for k in own]).centroid.coords[0])
-        shift, scale = _best_move(walls.place[mine] - pivot, walls.normal[mine], walls.outward[mine], len(own) == 1)
-        near = shapely.STRtree([shapes[k] for k in range(len(plans)) if group[k] != g])
-        for _ in range(4):
-            new = [_displaced(plans[k], shift, scale, pivot) for k in own]
-            outlines = [overlay.union_all([plan.outline, *(part.polygon for part in plan.parts)]) for plan in new]
-            grown = sum(
-                float(overlay.common_area(shape, near.geometries[i]))
-                for shape in outlines
-                for i in near.query(shape, predicate="intersects").tolist()
-            )
-            if grown < 0.02:
-                break
-            shift, scale = 0.5 * shift, 1.0 + 0.5 * (scale - 1.0)
-        else:
-            continue
-        if float(np.hypot(*shift)) < 0.03 and abs(scale - 1.0) < 0.001:
-            continue
-        for k, plan, shape in zip(own, new, outlines, strict=True):
-            tried[k], shapes[k] = plan, shape
-            moves[k] = (round(float(shift[0]), 3), round(float(shift[1]), 3)), round(float(scale), 4)
+        with expendable(f"{plans[own[0]].id} fit", failed):
+            # Where many touch, stretching one would tear it from its neighbours.
+            pivot = np.asarray(overlay.union_all([shapes[k] for k in own]).centroid.coords[0])
+            shift, scale = _best_move(walls.place[mine] - pivot, walls.normal[mine], walls.outward[mine], len(own) == 1)
+            near = shapely.STRtree([shapes[k] for k in range(len(plans)) if group[k] != g])
+            for _ in range(4):
+                new = [_displaced(plans[k], shift, scale, pivot) for k in own]
+                outlines = [overlay.union_all([plan.outline, *(part.polygon for part in plan.parts)]) for plan in new]
+                grown = sum(
+                    float(overlay.common_area(shape, near.geometries[i]))
+                    for shape in outlines
+                    for i in near.query(shape, predicate="intersects").tolist()
+                )
+                if grown < 0.02:
+                    break
+                shift, scale = 0.5 * shift, 1.0 + 0.5 * (scale - 1.0)
+            else:
+                continue
+            if float(np.hypot(*shift)) < 0.03 and abs(scale - 1.0) < 0.001:
+                continue
+            for k, plan, shape in zip(own, new, outlines, strict=True):
+                tried[k], shapes[k] = plan, shape
+                moves[k] = (round(float(shift[0]), 3), round(float(shift[1]), 3)), round(float(scale), 4)
     after = measure.walls(tried)
     for g in range(many):
         if all(tried[k] is plans[k] for k in members[g]):

@@ -16,10 +16,12 @@ from vico.errors import EmptyInputError
 from vico.geo import overlay
 from vico.geo.tiles3d.mesh import TileMesh
 from vico.world.heights import HeightField
+from vico.world.model import Dropped
 from vico.worldgen.buildings.fitting.heights import raised_to_mesh
 from vico.worldgen.buildings.fitting.measure import GAIN, LEAST_POINTS, Measure, mean_of
 from vico.worldgen.buildings.fitting.moves import moved_to_mesh
 from vico.worldgen.buildings.solids import seat_of
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.outlines.plans import BuildingPlan, BuildingPlans
 from vico.worldgen.facts.sight import Sight
 
@@ -62,9 +64,12 @@ class FitReport:
     ----------
     fits
         One a building, in the order of the plans.
+    failed
+        Buildings whose outline can't be cut, with the reason; they stay as planned.
     """
 
     fits: tuple[Fit, ...]
+    failed: tuple[Dropped, ...] = ()
 
     @property
     def before(self) -> float:
@@ -90,7 +95,7 @@ class FitReport:
 def plans_on_tiles(decided: BuildingPlans, mesh: TileMesh, terrain: HeightField) -> tuple[BuildingPlans, FitReport]:
     """Nudge the buildings of a place to a photogrammetry mesh; `terrain` should come from it (`terrain_from_tiles`)."""
     plans, report = fit_to_tiles(decided.plans, mesh, terrain)
-    return replace(decided, plans=plans), report
+    return replace(decided, plans=plans, dropped=[*decided.dropped, *report.failed]), report
 
 
 def fit_to_tiles(
@@ -130,7 +135,11 @@ def fit_to_tiles(
     rays = sight or Sight(mesh.positions, mesh.triangles)
     measure = Measure(rays, mesh, height)
     roofs, walls = measure.roofs(plans), measure.walls(plans)
-    raised = [raised_to_mesh(plan, roofs, k, seat_of(plan, height).base) for k, plan in enumerate(plans)]
+    failed: list[Dropped] = []
+    raised: list[tuple[BuildingPlan, str]] = [(plan, "can't be raised") for plan in plans]
+    for k, plan in enumerate(plans):
+        with expendable(f"{plan.id} fit", failed):
+            raised[k] = raised_to_mesh(plan, roofs, k, seat_of(plan, height).base)
     higher = measure.roofs([plan for plan, _ in raised])
     kept: list[BuildingPlan] = []
     reasons: list[str] = []
@@ -138,7 +147,7 @@ def fit_to_tiles(
         better = new is not plan and mean_of(higher.off(k)) < mean_of(roofs.off(k)) - GAIN
         kept.append(new if better else plan)
         reasons.append("" if better else reason or "already fits")
-    moved, moves = moved_to_mesh(kept, measure)
+    moved, moves = moved_to_mesh(kept, measure, failed)
     final_roofs, final_walls = measure.roofs(moved), measure.walls(moved)
     fits = []
     for k, (plan, new) in enumerate(zip(plans, moved, strict=True)):
@@ -155,7 +164,7 @@ def fit_to_tiles(
                 "" if changed else reasons[k],
             )
         )
-    return moved, FitReport(tuple(fits))
+    return moved, FitReport(tuple(fits), tuple(failed))
 
 
 def settled(mesh: TileMesh, plans: list[BuildingPlan], height: HeightField) -> tuple[TileMesh, float]:
