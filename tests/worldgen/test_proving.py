@@ -11,8 +11,9 @@ import pytest
 import shapely
 from shapely import Polygon
 
+from stages_alone import buildings_of
 from vico.geo.frame import LocalFrame
-from vico.geo.osm import OsmData
+from vico.geo.osm import OsmArea, OsmData
 from vico.geo.overlay import OverlayError
 from vico.world.check.buildings import check_buildings_apart, check_buildings_closed, check_buildings_seated
 from vico.world.folder import World
@@ -83,6 +84,17 @@ def test_an_open_part_becomes_a_block_with_a_flat_roof() -> None:
     assert list(told) == ["w1 roof and details"]
     assert "edges have no counterpart" in told["w1 roof and details"]
     assert built.watertight == 2
+
+
+@pytest.mark.parametrize("kind", ["carport", "roof"])
+def test_a_low_carport_stays_open_below(kind: str) -> None:
+    areas = [OsmArea("w1", shapely.box(0, 0, 6, 5), {"building": kind, "height": "2"})]
+    osm = replace(NOWHERE, areas=areas)
+    built = buildings_of(osm, TERRAIN, seed=0)
+    assert findings(built) == []
+    assert built.dropped == []
+    lowest = sorted(float(body.positions[:, 2].min()) for body in built.collision)
+    assert lowest[-1] == pytest.approx(1.55)  # the roof itself; what stands below it are posts
 
 
 def test_a_part_that_hovers_is_brought_down() -> None:

@@ -56,6 +56,9 @@ class Source(Record):
     sha256: str | None = None
 
 
+OPEN_KINDS = frozenset({"roof", "carport", "canopy", "bridge"})
+"""Values of the tag `building` for what stands on posts and is open below, however low it is."""
+
 FAILED = "can't be made"
 """How the reason begins where an object's geometry is at fault."""
 FAULT = "can't be made, by a fault of the program"

@@ -14,7 +14,7 @@ from vico.world.check.solids import CoplanarPairs, coplanar_overlaps
 from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface, read_glb
-from vico.world.model import Building
+from vico.world.model import OPEN_KINDS, Building
 
 _SEATED = 0.5  # metres a ground floor may lie above the highest ground at its walls
 _FLICKER = 0.05  # square metres of two triangles in one plane that count
@@ -121,7 +121,7 @@ def unseated(building: Building, low: float, height: HeightField) -> Iterator[Wo
         The ground.
     """
     ground = height(np.array(building.footprint[0]))
-    canopy = building.tags.get("building") == "roof"  # open below, however low it is
+    canopy = building.tags.get("building") in OPEN_KINDS
     if ground.min() + 0.05 < low < ground.min() + 2.2 and not canopy:
         yield WorldFinding(
             "building floats", building.id, f"its walls begin at {low:.2f} m, the ground at {ground.min():.2f} m"

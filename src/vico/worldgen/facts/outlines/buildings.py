@@ -17,12 +17,12 @@ from shapely import MultiPolygon, Polygon
 from vico.geo import overlay
 from vico.geo.osm import OsmArea, OsmData, Tags, polygons_of
 from vico.seeds import rng
-from vico.world.model import Dropped
+from vico.world.model import OPEN_KINDS, Dropped
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.outlines.apart import apart, supported, without_slivers
 from vico.worldgen.facts.outlines.heights import STOREY, level_estimates, said_height, said_levels, weighted_median
 from vico.worldgen.facts.outlines.needles import without_needles
-from vico.worldgen.facts.outlines.parts import OPEN_KINDS, SMALL_KINDS, part_of
+from vico.worldgen.facts.outlines.parts import SMALL_KINDS, part_of
 from vico.worldgen.facts.outlines.plans import BuildingPlan, BuildingPlans, PartPlan
 from vico.worldgen.facts.outlines.roof_shapes import Roof, shape_named
 from vico.worldgen.facts.tags import number

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from vico.geo.osm import Tags
+from vico.world.model import OPEN_KINDS
 from vico.worldgen.facts.outlines.heights import STOREY, kind_eaves, said_height, said_levels
 from vico.worldgen.facts.outlines.plans import PartPlan
 from vico.worldgen.facts.outlines.roof_shapes import Roof, inradius, shape_named
 from vico.worldgen.facts.tags import number
 
-OPEN_KINDS = {"roof", "carport", "canopy", "bridge"}
 SMALL_KINDS = {"kiosk", "garage", "garages", "shed", "hut", "carport", "service", "toilets", "pavilion", "greenhouse"}
 
 _INHERITED = {
