@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from pathlib import Path
 
+import numpy as np
 import pytest
 import shapely
 
@@ -14,7 +15,7 @@ from vico.world.check import check_world
 from vico.world.folder import World, read_world
 from vico.world.model import Dropped
 from vico.worldgen.buildings import drafts
-from vico.worldgen.facts.expendable import expendable
+from vico.worldgen.facts.expendable import NamedShape, expendable, listening, united, widened
 from vico.worldgen.pipeline import build_world
 
 EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
@@ -70,3 +71,55 @@ def test_what_is_about_the_whole_build_ends_it() -> None:
     for error in (InputError("no such file"), OSError(28, "No space left on device"), MemoryError()):
         with pytest.raises(type(error)), expendable("w1"):
             raise error
+
+
+def refusing(operation: str, culprit: shapely.Geometry, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The geometry engine does not do this with a geometry, alone or among others."""
+    does, cleans = getattr(shapely, operation), shapely.set_precision
+
+    def given(shapes: object) -> bool:
+        return any(shape is culprit or shape.equals(culprit) for shape in np.atleast_1d(np.asarray(shapes, object)))
+
+    def failing(shapes: object, *rest: object, **options: object) -> object:
+        if given(shapes):
+            raise shapely.errors.GEOSException("TopologyException: side location conflict")
+        return does(shapes, *rest, **options)
+
+    def not_cleaned(shapes: object, *rest: object, **options: object) -> object:
+        return failing(shapes) if given(shapes) else cleans(shapes, *rest, **options)
+
+    failing.__name__ = operation
+    monkeypatch.setattr(shapely, operation, failing)
+    monkeypatch.setattr(shapely, "set_precision", not_cleaned)
+
+
+BOXES = [NamedShape(f"w{k}", shapely.box(3 * k, 0, 3 * k + 2, 2)) for k in range(5)]
+
+
+@pytest.mark.parametrize("culprit", [0, 2, 4])
+def test_the_one_that_the_engine_refuses_is_found_among_many(culprit: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    refusing("union_all", BOXES[culprit].shape, monkeypatch)
+    with listening() as losses:
+        whole = united(BOXES)
+    assert losses.ids == {f"w{culprit}"}
+    assert shapely.area(whole) == pytest.approx(16.0)
+
+
+def test_the_others_keep_their_own_amounts(monkeypatch: pytest.MonkeyPatch) -> None:
+    refusing("buffer", BOXES[1].shape, monkeypatch)
+    with listening() as losses:
+        wide = widened(BOXES, np.array([0.1, 0.2, 0.3, 0.4, 0.5]), join_style="mitre")
+    assert losses.ids == {"w1"}
+    assert {one.id: round(one.shape.bounds[3] - 2.0, 3) for one in wide} == {"w0": 0.1, "w2": 0.3, "w3": 0.4, "w4": 0.5}
+
+
+def test_what_is_lost_twice_is_told_once_and_only_to_who_listens() -> None:
+    with listening() as outer:
+        with listening() as inner:
+            for _ in range(2):
+                with expendable("w1"):
+                    raise OverlayError("side location conflict")
+        with expendable("w2"):
+            pass
+    assert [one.id for one in inner.dropped] == ["w1"]
+    assert (inner.tried, outer.tried, outer.dropped) == ({"w1"}, {"w2"}, [])

@@ -379,7 +379,11 @@ def _area_of_way(way: OsmWay, window: shapely.Polygon, missing: int, broken: lis
     broken
         Told what is wrong with it.
     """
-    polygon, fault = mended(Polygon(way.line))
+    try:
+        polygon, fault = mended(Polygon(way.line))
+    except OverlayError as error:
+        broken.append((f"w{way.id}", f"its ring can't be made into an area ({error})"))
+        return None
     if polygon.is_empty:
         broken.append((f"w{way.id}", fault or "area without extent"))
         return None
@@ -405,7 +409,11 @@ def _plain(area: OsmArea, broken: list[tuple[str, str]]) -> OsmArea:
     """Return the area; a building's outline without more corners than walls and roofs can be made for."""
     if "building" not in area.tags and "building:part" not in area.tags:
         return area
-    shape, what = simplified(area.polygon)
+    try:
+        shape, what = simplified(area.polygon)
+    except OverlayError as error:
+        broken.append((area.id, f"its outline stays as it is: it can't be simplified ({error})"))
+        return area
     if what is None:
         return area
     broken.append((area.id, what))

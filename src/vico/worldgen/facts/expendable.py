@@ -17,9 +17,10 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 from shapely.errors import ShapelyError
 from shapely.geometry.base import BaseGeometry
 
@@ -120,27 +121,48 @@ def named_parts(name: str, shapes: Iterable[BaseGeometry]) -> list[NamedShape]:
 
 def united(shapes: Iterable[NamedShape], *, grid: float | None = GRID) -> BaseGeometry:
     """Return what lies in any of the shapes, as `overlay.union_all`; those that the engine refuses are left out."""
-    return _without_refused(shapes, lambda kept: overlay.union_all(kept, grid=grid))[1]
+    return _without_refused(shapes, lambda kept, _: overlay.union_all(kept, grid=grid))[1]
 
 
 def changed(shapes: Iterable[NamedShape], operation: Callable[[Shapes], Shapes]) -> list[NamedShape]:
     """Apply an operation of `overlay` to all shapes at once; those that the engine refuses are left out."""
-    kept, made = _without_refused(shapes, operation)
+    kept, made = _without_refused(shapes, lambda each, _: operation(each))
     return [NamedShape(one.id, shape) for one, shape in zip(kept, made, strict=True)]
 
 
-def _without_refused(shapes: Iterable[NamedShape], operation: Callable[[Shapes], T]) -> tuple[list[NamedShape], T]:
+def widened(shapes: Iterable[NamedShape], distances: NDArray[np.float64], **style: Any) -> list[NamedShape]:
+    """Return everything within a distance of each shape, as `overlay.buffer`, without those that the engine refuses.
+
+    Parameters
+    ----------
+    shapes
+        Geometries, metres.
+    distances
+        One for each, metres.
+    style
+        As `shapely.buffer` takes it.
+    """
+    kept, made = _without_refused(shapes, lambda each, own: overlay.buffer(each, distances[own], **style))
+    return [NamedShape(one.id, shape) for one, shape in zip(kept, made, strict=True)]
+
+
+def _without_refused(
+    shapes: Iterable[NamedShape], operation: Callable[[Shapes, NDArray[np.int64]], T]
+) -> tuple[list[NamedShape], T]:
     """Do an overlay of many shapes without those that are at fault when it fails: the shapes left, and the result.
 
-    All are tried at once: nothing is looked at one by one unless something fails.
+    All are tried at once: nothing is looked at one by one unless something fails. The operation is told which of the
+    shapes it is given.
     """
-    kept = list(shapes)
+    given = list(shapes)
+    array = np.empty(len(given), object)
+    array[:] = [one.shape for one in given]
+    own = np.arange(len(given))
     while True:
-        array = np.empty(len(kept), object)
-        array[:] = [one.shape for one in kept]
         try:
-            return kept, operation(array)
+            return [given[k] for k in own.tolist()], operation(array[own], own)
         except OverlayError as error:
             if error.at is None:
                 raise
-            leave_out(kept.pop(error.at).id, f"{FAILED}: {sentence_of(error)}")
+            leave_out(given[int(own[error.at])].id, f"{FAILED}: {sentence_of(error)}")
+            own = np.delete(own, error.at)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -77,11 +79,14 @@ def ground_partition(site: SiteFacts, streets: StreetPolygons, window: Polygon) 
     left: BaseGeometry = window
     result: dict[str, list[Polygon]] = {}
     for name, shape in ranked.items():
-        shape = overlay.areas_of(overlay.on_grid(shape, grid=_GRID))
-        mine = polygons_of(overlay.intersection(shape, left, grid=_GRID), 0.02)
-        if mine:
-            result |= _by_paving(name, mine, streets.paved) if name in _PAVED_KINDS else {name: mine}
-            left = overlay.areas_of(overlay.difference(left, shape, grid=_GRID))
+        # A kind of ground that can't be laid stays a yard or a field; streets can't.
+        with expendable(name) if name in soft else nullcontext():
+            shape = overlay.areas_of(overlay.on_grid(shape, grid=_GRID))
+            mine = polygons_of(overlay.intersection(shape, left, grid=_GRID), 0.02)
+            if mine:
+                rest = overlay.areas_of(overlay.difference(left, shape, grid=_GRID))
+                result |= _by_paving(name, mine, streets.paved) if name in _PAVED_KINDS else {name: mine}
+                left = rest
     built = [NamedShape(area.id, area.polygon) for area in site.osm.areas if area.tags.get("building", "no") != "no"]
     near = united([*built, NamedShape("carriageway", streets.carriageway)], grid=_GRID)
     near = overlay.buffer(near, 30.0, quad_segs=2)

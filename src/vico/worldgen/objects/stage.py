@@ -18,14 +18,13 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.assets.models.model import Model
 from vico.assets.models.street import street_models
-from vico.geo import overlay
 from vico.geo.osm import OsmData, OsmNode
 from vico.seeds import rng
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.model import FIRST_OBJECT, Dropped, Transit
 from vico.world.objects import FEET, Objects
-from vico.worldgen.facts.expendable import expendable
+from vico.worldgen.facts.expendable import NamedShape, expendable, widened
 from vico.worldgen.objects.barriers import barrier_wishes, gate_yaws
 from vico.worldgen.objects.catalogue import standing
 from vico.worldgen.objects.groups import group_wishes
@@ -111,9 +110,9 @@ def _swept(lanes: LaneGraph | None) -> list[BaseGeometry]:
     if lanes is None or not len(lanes):
         return []
     driven = np.flatnonzero(lanes.inside < 0)
-    lines = np.array([shapely.LineString(lanes.line(int(k))[:, :2]) for k in driven], object)
+    lines = [NamedShape(lanes.ids[int(k)], shapely.LineString(lanes.line(int(k))[:, :2])) for k in driven]
     widths = np.maximum(lanes.width[driven] / 2 - _SWEPT, 0.1)
-    return list(overlay.buffer(lines, widths, cap_style="flat")) if len(lines) else []
+    return [strip.shape for strip in widened(lines, widths, cap_style="flat")]
 
 
 def _settle(wish: Wish, model: Model, site: Site, seed: int, rows: list[dict[str, Any]]) -> str | None:

@@ -239,15 +239,15 @@ def _mapped_berths(osm: OsmData, kerbs: Kerbs) -> list[Berth]:
 def _driven(routes: Sequence[Route], kerbs: Kerbs, mapped: Sequence[Berth], left_out: list[Dropped]) -> list[_Chosen]:
     """Choose some routes that can be driven as closed rounds: timetables first, then the longest on the map."""
     fits: list[tuple[Route, tuple[Berth, ...], Drive, float]] = []
+    ways: list[tuple[set[int], int]] = []
     for route in routes:
         with expendable(route.id):
             fit = _fit(route, kerbs, [*mapped, *(b for _, loop, _, _ in fits for b in loop)])
             if isinstance(fit, str):
                 left_out.append(Dropped(id=route.id, reason=f"bus {route.name}: {fit}"))
             else:
+                ways.append(fit[1].driven(fit[0]))
                 fits.append((route, *fit))
-
-    ways = [drive.driven(loop) for _, loop, drive, _ in fits]
 
     def rank(k: int) -> tuple[bool, bool, bool, float, int]:
         route, loop, _, cost = fits[k]
