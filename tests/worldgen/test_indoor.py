@@ -15,7 +15,8 @@ from vico.rules import REACH
 from vico.world.check.indoors import walkable_inside
 from vico.world.folder import World
 from vico.world.model import FIRST_FURNITURE, Category, Entrance
-from vico.worldgen.indoor import catalogue
+from vico.worldgen.facts.expendable import listening
+from vico.worldgen.indoor import catalogue, stage
 from vico.worldgen.indoor.catalogue import use_of
 from vico.worldgen.indoor.floorplans import OUTSIDE, sketch_of
 from vico.worldgen.indoor.layouts import plan_of, uses
@@ -196,9 +197,26 @@ def test_a_house_full_of_places_has_room_for_all(helsinki: World) -> None:
     template = next(p for p in helsinki.places if p.kind == "apartments")
     many = [template.model_copy(update={"id": f"p{k}", "building": building.id}) for k in range(60)]
     made = furnish(many, buildings=helsinki.buildings, height=helsinki.height)
+    assert len(made.places) == 60
     assert all(place.rooms for place in made.places)
     spots = {room.centre for room in made.rooms}
     assert len(spots) == len(made.rooms)
+
+
+def test_a_place_without_room_under_its_house_is_left_out_and_told(
+    helsinki: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stage, "_DEEPEST", 0.0)
+    building = helsinki.buildings[0]
+    template = next(p for p in helsinki.places if p.kind == "apartments")
+    many = [template.model_copy(update={"id": f"p{k}", "building": building.id}) for k in range(60)]
+    with listening() as losses:
+        made = furnish(many, buildings=helsinki.buildings, height=helsinki.height)
+    housed = {place.id for place in made.places}
+    assert 0 < len(housed) < 60
+    assert losses.ids == {place.id for place in many} - housed
+    assert {one.reason for one in losses.dropped} == {f"no room for it under building {building.id}"}
+    assert all(place.rooms for place in made.places)
 
 
 def test_the_same_seed_gives_the_same_rooms(helsinki: World) -> None:
