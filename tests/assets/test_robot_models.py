@@ -11,7 +11,8 @@ from vico.assets.packages import installed
 from vico.assets.robots import BUMPER, robot_model, robot_names
 from vico.assets.robots.onnx import dense_layers
 from vico.assets.robots.packs import GO2_PACKAGE, HUSKY_PACKAGE
-from vico.assets.robots.simplify import decimated, shaded
+from vico.assets.shading import shaded
+from vico.assets.simplify import thinned
 from vico.errors import InputError, SchemaError
 from vico.world.mesh import Surface
 
@@ -151,7 +152,7 @@ def test_the_installed_policy_has_the_layers_it_was_published_with() -> None:
 def test_a_decimated_sphere_stays_a_sphere() -> None:
     ball = trimesh.creation.icosphere(subdivisions=5)
     points, faces = np.asarray(ball.vertices), np.asarray(ball.faces)
-    light, triangles = decimated(points, faces, 800)
+    light, triangles, _ = thinned(points, faces, 800)
     assert 400 < len(triangles) <= 800
     assert np.abs(np.linalg.norm(light, axis=1) - 1).max() < 0.03
     surface = shaded(light, triangles, (9, 9, 9))

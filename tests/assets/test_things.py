@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from vico.assets.packages import FetchError, IntegrityError
+from vico.assets.simplify import thinned
 from vico.assets.things import pack as things
 from vico.assets.things.archive import COLLECTIONS, archives
 from vico.assets.things.fit import OURS, StandIn
@@ -28,8 +29,8 @@ from vico.assets.things.pack import (
     our_models,
     read_things,
 )
-from vico.assets.things.simplify import textured_again, thinned
 from vico.assets.things.stand_ins import STAND_INS
+from vico.assets.things.texturing import textured_again
 from vico.errors import MissingExtraError, MissingFileError, SchemaError
 
 BOX = """mtllib box.mtl
@@ -163,7 +164,7 @@ def test_thinning_keeps_a_ball_round_and_a_plank_that_touches_nothing() -> None:
     points = np.concatenate([ball.vertices, plank.vertices])
     faces = np.concatenate([ball.faces, plank.faces + len(ball.vertices)])
     paint = np.r_[np.zeros(len(ball.faces), int), np.ones(len(plank.faces), int)]
-    few, kept_faces, kept = thinned(points, faces, paint, 400)
+    few, kept_faces, kept = thinned(points, faces, 400, kinds=paint)
     assert 350 <= len(kept_faces) <= 400
     worn = paint[kept]
     board = few[np.unique(kept_faces[worn == 1])]
@@ -181,7 +182,7 @@ def test_a_picture_stays_in_its_place_on_a_thinned_surface() -> None:
     a = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
     faces = np.concatenate([np.stack([a, a + 1, a + n], 1), np.stack([a + 1, a + n + 1, a + n], 1)])
     paint = np.zeros(len(faces), int)
-    few, kept_faces, kept = thinned(points, faces, paint, 60)
+    few, kept_faces, kept = thinned(points, faces, 60, kinds=paint)
     uv = textured_again(few, kept_faces, paint[kept], points, faces, points[faces][..., :2], paint)
     assert len(kept_faces) <= 60
     assert np.allclose(uv, few[kept_faces][..., :2], atol=1e-9)

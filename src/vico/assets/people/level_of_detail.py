@@ -1,22 +1,19 @@
-"""Lighter bodies for simulation: what other layers hide is left out, the rest is thinned by edge collapses.
+"""Lighter bodies for simulation: what other layers hide is left out, the rest is thinned by `assets.simplify`.
 
-A body is several surfaces (skin, clothes, hair) with doubled vertices where a colour ends. Vertices at one place are
-collapsed together, so that no crack opens there; of each, the colours of both sides are kept (its *wedges*, as in
-Hoppe, *New Quadric Metric for Simplifying Meshes with Appearance Attributes*, Visualization 1999). The order of the
-collapses is that of Garland and Heckbert's quadric error (SIGGRAPH 1997) plus what would change in colour and in how
-the place is carried by the joints; remaining vertices stay where they were, with their normals.
+A body is several surfaces (skin, clothes, hair) with doubled vertices where a colour ends: these are the wedges of a
+place. Beside the shape it counts what would change in colour and in how the place is carried by the joints.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from heapq import heapify, heappop, heappush
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.people.model import JOINTS, J, SkinnedBody
+from vico.assets.simplify import Worth, collapsed, is_sound
 from vico.io.compiled import compiled
 
 # Triangles of a light body.
@@ -29,10 +26,8 @@ _COLOUR_METRES, _JOINT_METRES = 0.018, 0.010
 _LAYERS = 0.006
 # Factors on what is lost at a place: faces are looked at.
 _FACE, _HAIR = 30.0, 8.0
-# How far the surface (or, at its rate, its colour) may move, metres: between layers, in a face, in a hand. More counts
-# so many times.
+# How far the surface (or, at its rate, its colour) may move, metres: between layers, in a face, in a hand.
 _LAYERED_LIMIT, _FACE_LIMIT, _HAND_LIMIT = 0.0006, 0.0014, 0.0060
-_BEYOND = 300.0
 
 Array = NDArray[Any]
 
@@ -59,17 +54,14 @@ def lightened(body: SkinnedBody, triangles: int = LIGHT) -> SkinnedBody:
     faces = body.triangles.astype(np.int64)
     faces = faces[~_hidden(points, faces, shares)]
     _, first, place = np.unique(np.round(points, 5), axis=0, return_index=True, return_inverse=True)
-    place = place.ravel()
-    welded = place[faces]
-    sound = (welded[:, 0] != welded[:, 1]) & (welded[:, 1] != welded[:, 2]) & (welded[:, 2] != welded[:, 0])
-    faces, welded = faces[sound], welded[sound]
+    places = place.ravel()[faces]
+    sound = is_sound(places)
+    faces, places = faces[sound], places[sound]
     if len(faces) > triangles:
-        at = points[first]
         care, limit = _care(body, points, faces, shares)
-        quadrics, area = _quadrics(at, welded)
-        traits = np.hstack([body.colour / 255.0 * _COLOUR_METRES, shares * _JOINT_METRES])[first]
-        loss = _Loss(at, quadrics, area, traits, care[first], limit[first])
-        faces = faces[_collapse(loss, welded, faces, triangles)]
+        traits = np.hstack([body.colour / 255.0 * _COLOUR_METRES, shares * _JOINT_METRES])
+        worth = Worth(traits[first], care[first], limit[first])
+        _, faces = collapsed(points[first], places, faces, worth, triangles=triangles)
     used, faces = np.unique(faces, return_inverse=True)
     return replace(
         body,
@@ -259,279 +251,3 @@ def _leaves(start: Array, way: Array, corners: Array, normals: Array, among: Arr
         if 1e-4 < far < _COVER:
             return True
     return False
-
-
-def _quadrics(points: Array, faces: Array) -> tuple[Array, Array]:
-    """Squared distances to the planes around each vertex, weighted by area, as 4x4 forms; and the areas."""
-    quadrics, around = np.zeros((len(points), 4, 4)), np.zeros(len(points))
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    area = np.linalg.norm(normal, axis=1)
-    normal /= np.maximum(area, 1e-15)[:, None]
-    plane = np.column_stack([normal, -(normal * a).sum(1)])
-    outer = plane[:, :, None] * plane[:, None, :] * area[:, None, None]
-    for k in range(3):
-        np.add.at(quadrics, faces[:, k], outer)
-        np.add.at(around, faces[:, k], area / 3)
-    # Open edges are held by planes across the surface.
-    edges = np.concatenate([faces[:, [k, (k + 1) % 3]] for k in range(3)])
-    ordered = np.sort(edges, axis=1)
-    _, index, times = np.unique(ordered, axis=0, return_index=True, return_counts=True)
-    rim = np.sort(index[times == 1])
-    u, v = edges[rim, 0], edges[rim, 1]
-    along = points[v] - points[u]
-    across = np.cross(along, normal[rim % len(faces)])
-    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-15)
-    fence = np.column_stack([across, -(across * points[u]).sum(1)])
-    held = 2.0 * (along * along).sum(1)[:, None, None] * fence[:, :, None] * fence[:, None, :]
-    np.add.at(quadrics, u, held)
-    np.add.at(quadrics, v, held)
-    return quadrics, around
-
-
-class _Loss(NamedTuple):
-    """What is known of each vertex to tell what its collapse loses."""
-
-    points: Array  # metres, float64 (n, 3)
-    quadrics: Array  # squared distances to the planes around, times their area, float64 (n, 4, 4)
-    area: Array  # of the surface around, square metres, float64 (n,)
-    traits: Array  # colour, then shares of joints, both in metres of displacement, float64 (n, k)
-    care: Array  # factor on what is lost here, float64 (n,)
-    limit: Array  # how far the surface may move here, metres, float64 (n,)
-
-
-@compiled
-def _cost(loss: _Loss, u: int, v: int) -> float:
-    """Return what is lost if `u` moves to `v`."""
-    points, traits, area = loss.points, loss.traits, loss.area
-    x, y, z = points[v, 0], points[v, 1], points[v, 2]
-    total = 0.0
-    for which in (u, v):
-        q = loss.quadrics[which]
-        total += x * (q[0, 0] * x + 2 * (q[0, 1] * y + q[0, 2] * z + q[0, 3]))
-        total += y * (q[1, 1] * y + 2 * (q[1, 2] * z + q[1, 3])) + z * (q[2, 2] * z + 2 * q[2, 3]) + q[3, 3]
-    total = max(total, 0.0)
-    colour, change = 0.0, 0.0
-    for k in range(3):
-        colour += (traits[u, k] - traits[v, k]) ** 2
-    for k in range(3, traits.shape[1]):
-        change += (traits[u, k] - traits[v, k]) ** 2
-    length = 0.0
-    for k in range(3):
-        length += (points[u, k] - points[v, k]) ** 2
-    factor = max(loss.care[u], loss.care[v])
-    if total + area[u] * colour > (area[u] + area[v]) * min(loss.limit[u], loss.limit[v]) ** 2:
-        factor *= _BEYOND
-    # A little of the length breaks ties on flat ground towards even triangles.
-    return factor * (total + area[u] * (colour + change + 1e-3 * length))
-
-
-class _Corners(NamedTuple):
-    """Triangles, and the corners at each vertex in chains: corner ``3 f + k`` is triangle f's k-th; -1 ends a chain."""
-
-    faces: Array  # vertices of each triangle, int64 (m, 3)
-    wedges: Array  # its vertices before those at one place were joined, int64 (m, 3)
-    alive: Array  # which triangles are left, bool (m,)
-    head: Array  # first corner at each vertex, int64 (n,)
-    tail: Array  # last corner at each vertex, int64 (n,)
-    following: Array  # next corner at the same vertex, int64 (3 m,)
-
-
-class _Ring(NamedTuple):
-    """What is noted of the vertices around one that may go."""
-
-    mark: Array  # number of the attempt in which a vertex was last met, int64 (n,)
-    times: Array  # triangles of the ring that a marked vertex is in, int64 (n,)
-    pairs: Array  # wedges at the vertex that goes, and those that take their place, int64 (8, 2)
-
-
-@compiled(nogil=True)
-def _collapse(loss: _Loss, faces: Array, wedges: Array, target: int) -> Array:
-    """Collapse edges in place until `target` triangles are left; returns which are."""
-    count, left = len(loss.points), len(faces)
-    mesh = _chained(faces, wedges, count)
-    ring = _Ring(np.zeros(count, np.int64), np.zeros(count, np.int64), np.empty((8, 2), np.int64))
-    here = np.ones(count, np.bool_)
-    stamp = np.zeros(count, np.int64)
-    heap = _first_offers(loss, faces)
-    mark = 0
-    while left > target and len(heap):
-        _, u, v, a, b = heappop(heap)
-        if not (here[u] and here[v]) or stamp[u] != a or stamp[v] != b:
-            continue
-        mark += 2
-        shared, known = _look_around(mesh, ring, u, v, mark)
-        if shared == 0 or shared > 2 or (shared != 1 and _on_open_edge(mesh, ring, u)):
-            continue
-        # Link condition: the only common neighbours are those of the shared triangles.
-        if _common_neighbours(mesh, ring, u, v, mark) != shared:
-            continue
-        if not _star_fits(mesh, loss.points, ring.pairs[:known], u, v):
-            continue
-        left -= _merge(mesh, ring.pairs[:known], u, v)
-        here[u] = False
-        loss.quadrics[v] += loss.quadrics[u]
-        loss.area[v] += loss.area[u]
-        stamp[v] += 1
-        _offer_around(loss, mesh, heap, stamp, v)
-    return mesh.alive
-
-
-@compiled
-def _chained(faces: Array, wedges: Array, count: int) -> _Corners:
-    """Chain the corners at each of `count` vertices."""
-    corners = 3 * len(faces)
-    head, tail, following = np.full(count, -1), np.full(count, -1), np.full(corners, -1)
-    for corner in range(corners):
-        v = faces[corner // 3, corner % 3]
-        if head[v] < 0:
-            head[v] = corner
-        else:
-            following[tail[v]] = corner
-        tail[v] = corner
-    return _Corners(faces, wedges, np.ones(len(faces), np.bool_), head, tail, following)
-
-
-@compiled
-def _first_offers(loss: _Loss, faces: Array) -> list[tuple[float, int, int, int, int]]:
-    """Return a heap of all collapses: cost, who goes, who stays, and how often each had changed when it was offered."""
-    heap = [(0.0, 0, 0, 0, 0)]
-    for f in range(len(faces)):
-        for k in range(3):
-            for turn in range(1, 3):
-                u, v = faces[f, k], faces[f, (k + turn) % 3]
-                heap.append((_cost(loss, u, v), u, v, 0, 0))
-    heap = heap[1:]
-    heapify(heap)
-    return heap
-
-
-@compiled
-def _has(faces: Array, f: int, v: int) -> bool:
-    """Whether a triangle has a vertex."""
-    return bool(faces[f, 0] == v or faces[f, 1] == v or faces[f, 2] == v)
-
-
-@compiled
-def _look_around(mesh: _Corners, ring: _Ring, u: int, v: int, mark: int) -> tuple[int, int]:
-    """Mark the neighbours of `u`, and pair its wedges with those of `v` where they share a triangle.
-
-    Returns how many triangles they share, and how many pairs there are.
-    """
-    faces, wedges = mesh.faces, mesh.wedges
-    corner, shared, known = mesh.head[u], 0, 0
-    while corner >= 0:
-        f = corner // 3
-        if mesh.alive[f]:
-            mate = -1
-            for k in range(3):
-                w = faces[f, k]
-                if w == v:
-                    mate = k
-                if w != u:
-                    if ring.mark[w] != mark:
-                        ring.mark[w] = mark
-                        ring.times[w] = 0
-                    ring.times[w] += 1
-            if mate >= 0:
-                shared += 1
-                if known < len(ring.pairs):
-                    ring.pairs[known, 0], ring.pairs[known, 1] = wedges[f, corner % 3], wedges[f, mate]
-                    known += 1
-        corner = mesh.following[corner]
-    return shared, known
-
-
-@compiled
-def _on_open_edge(mesh: _Corners, ring: _Ring, u: int) -> bool:
-    """Whether a neighbour of `u` shares but one triangle with it."""
-    corner, found = mesh.head[u], False
-    while corner >= 0:
-        f = corner // 3
-        if mesh.alive[f]:
-            for k in range(3):
-                w = mesh.faces[f, k]
-                found |= w != u and ring.times[w] == 1
-        corner = mesh.following[corner]
-    return found
-
-
-@compiled
-def _common_neighbours(mesh: _Corners, ring: _Ring, u: int, v: int, mark: int) -> int:
-    """Return how many neighbours of `v` are marked as neighbours of `u`; each is marked as counted."""
-    corner, common = mesh.head[v], 0
-    while corner >= 0:
-        f = corner // 3
-        if mesh.alive[f]:
-            for k in range(3):
-                w = mesh.faces[f, k]
-                if w != v and w != u and ring.mark[w] == mark:
-                    ring.mark[w] = mark + 1
-                    common += 1
-        corner = mesh.following[corner]
-    return common
-
-
-@compiled
-def _star_fits(mesh: _Corners, points: Array, pairs: Array, u: int, v: int) -> bool:
-    """Whether every side of a seam at `u` has its like at `v`, and no triangle turns over."""
-    corner, fits = mesh.head[u], True
-    while corner >= 0 and fits:
-        f = corner // 3
-        if mesh.alive[f] and not _has(mesh.faces, f, v):
-            mapped = False
-            for k in range(len(pairs)):
-                mapped |= pairs[k, 0] == mesh.wedges[f, corner % 3]
-            fits = mapped and not _turns(points, mesh.faces, f, corner % 3, v)
-        corner = mesh.following[corner]
-    return fits
-
-
-@compiled
-def _merge(mesh: _Corners, pairs: Array, u: int, v: int) -> int:
-    """Move the corners at `u` to `v`; returns how many triangles vanish."""
-    corner, vanished = mesh.head[u], 0
-    while corner >= 0:
-        f, k = corner // 3, corner % 3
-        if mesh.alive[f]:
-            if _has(mesh.faces, f, v):
-                mesh.alive[f] = False
-                vanished += 1
-            else:
-                mesh.faces[f, k] = v
-                for pair in range(len(pairs)):
-                    if pairs[pair, 0] == mesh.wedges[f, k]:
-                        mesh.wedges[f, k] = pairs[pair, 1]
-                        break
-        corner = mesh.following[corner]
-    mesh.following[mesh.tail[v]] = mesh.head[u]
-    mesh.tail[v] = mesh.tail[u]
-    return vanished
-
-
-@compiled
-def _offer_around(
-    loss: _Loss, mesh: _Corners, heap: list[tuple[float, int, int, int, int]], stamp: Array, v: int
-) -> None:
-    """Offer the collapses of `v` into its neighbours, and of those into it."""
-    corner = mesh.head[v]
-    while corner >= 0:
-        f = corner // 3
-        if mesh.alive[f]:
-            for k in range(3):
-                w = mesh.faces[f, k]
-                if w != v:
-                    forth, back = _cost(loss, v, w), _cost(loss, w, v)
-                    heappush(heap, (forth, v, w, stamp[v], stamp[w]))
-                    heappush(heap, (back, w, v, stamp[w], stamp[v]))
-        corner = mesh.following[corner]
-
-
-@compiled
-def _turns(points: Array, faces: Array, f: int, moved: int, to: int) -> bool:
-    """Whether a triangle turns too far, or becomes a sliver, when one corner moves to another vertex."""
-    a, b, c = points[faces[f, moved]], points[faces[f, (moved + 1) % 3]], points[faces[f, (moved + 2) % 3]]
-    old, new = np.cross(b - a, c - a), np.cross(b - points[to], c - points[to])
-    before, after = np.sqrt((old * old).sum()), np.sqrt((new * new).sum())
-    longest = max(((b - points[to]) ** 2).sum(), ((c - points[to]) ** 2).sum(), ((b - c) ** 2).sum())
-    return (old * new).sum() < 0.25 * before * after or after < 0.02 * longest

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from vico.assets.people.model import JOINTS, Appearance, SkinnedBody
 from vico.io.cache import cache_folder
+from vico.io.compiled import source_digest
 from vico.io.files import sha256_of, write_bytes
 
 _ARRAYS = tuple(field.name for field in fields(SkinnedBody) if field.name != "height")
@@ -42,10 +43,7 @@ def stored_body(look: Appearance, source: str, data: Path | None) -> Path:
 @lru_cache(maxsize=1)
 def _makers() -> str:
     """Return a digest of the code that makes bodies: when it changes, kept bodies are of no use."""
-    digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
+    return source_digest(Path(__file__).with_name("choice.py"), "vico.assets.people.choice")
 
 
 @lru_cache(maxsize=2)

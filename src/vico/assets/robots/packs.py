@@ -17,7 +17,8 @@ from defusedxml.ElementTree import parse
 from vico.assets.packages import Package, Tags, installed
 from vico.assets.robots.model import FOOT_CONTACT, PolicyNetwork
 from vico.assets.robots.onnx import dense_layers
-from vico.assets.robots.simplify import decimated, shaded
+from vico.assets.shading import shaded
+from vico.assets.simplify import thinned
 from vico.errors import SchemaError
 from vico.io.cache import cache_folder
 from vico.world.mesh import Surface, joined, read_glb, write_glb
@@ -42,7 +43,7 @@ HUSKY_PACKAGE = Package(
     size_limit=10_000_000,
 )
 # Raise when what is baked changes, so that older caches are left alone.
-_BAKE = 3
+_BAKE = 4
 # The policy's legs, and the share of an output unit each joint moves, from the policy's deployment configuration.
 _POLICY_LEGS = ("FR", "FL", "RR", "RL")
 _POLICY_REST, _POLICY_SCALE = (0.0, 0.8, -1.5), (0.125, 0.25, 0.25)
@@ -75,7 +76,7 @@ def _light(path: Path, triangles: int, colour: tuple[int, int, int], scale: floa
     """Read an OBJ or STL file as a light surface."""
     mesh = trimesh.load(path, process=False, force="mesh", skip_materials=True)
     mesh.merge_vertices(merge_tex=True, merge_norm=True, digits_vertex=6)
-    points, faces = decimated(np.asarray(mesh.vertices) * scale, np.asarray(mesh.faces), triangles)
+    points, faces, _ = thinned(np.asarray(mesh.vertices) * scale, np.asarray(mesh.faces), triangles)
     return shaded(points, faces, colour)
 
 

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.models.model import Model
-from vico.assets.robots.simplify import shaded
+from vico.assets.shading import shaded
 from vico.assets.shapes import pose_matrix
+from vico.assets.simplify import thinned
 from vico.assets.things.archive import ArchiveEntry
 from vico.assets.things.obj import ObjMaterial, ObjMesh
-from vico.assets.things.simplify import textured_again, thinned
+from vico.assets.things.texturing import textured_again
 from vico.world.mesh import Material, Surface, joined
 
 #: In place of a collection: one of our own models, as it is.
@@ -95,12 +96,12 @@ def fitted(
 
 
 def _placed(piece: StandIn, ours: Model, entry: ArchiveEntry, solid: ObjMesh) -> list[Surface]:
-    points, faces, kept = thinned(_upright(solid.points, entry, piece.turn), solid.faces, solid.paint, piece.triangles)
+    upright = _upright(solid.points, entry, piece.turn)
+    points, faces, kept = thinned(upright, solid.faces, piece.triangles, kinds=solid.paint)
     paint = solid.paint[kept]
     if len(faces) == len(solid.faces):
         uv = solid.uv[kept]
     else:
-        upright = _upright(solid.points, entry, piece.turn)
         uv = textured_again(points, faces, paint, upright, solid.faces, solid.uv, solid.paint)
     points = _into_box(points, _box_of(piece, ours), whole=piece.whole)
     corners = shaded(points, faces, (255, 255, 255), crease=_CREASE)
