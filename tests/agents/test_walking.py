@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from vico.agents.assistant.skills import turn_to
+from vico.agents.indoor_walk import IndoorWalker
 from vico.agents.wayfinding import Walker
 from vico.seeds import rng
 from vico.world.heights import HeightField
@@ -70,7 +70,26 @@ def test_walker_gets_past_what_the_map_does_not_show(seed: int) -> None:
     assert math.hypot(body.pose[0] + 10.0, body.pose[1]) <= 0.5
 
 
-@pytest.mark.parametrize(("x", "y", "degrees"), [(0, 5, 90), (0, -5, -90), (5, 0, 0), (-5, 1e-9, 180)])
-def test_turn_is_counter_clockwise_positive(x: float, y: float, degrees: float) -> None:
-    pose = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
-    assert math.degrees(turn_to(pose, (x, y))) == pytest.approx(degrees)
+@pytest.mark.parametrize(
+    ("x", "y", "type_", "degrees"), [(0, 2, "turn_left", 90), (0, -2, "turn_right", 90), (-2, 1e-9, "turn_left", 180)]
+)
+def test_indoors_one_turns_the_shorter_way_to_face_the_route(x: float, y: float, type_: str, degrees: float) -> None:
+    observation = {"pose": np.array([0.0, 0, 0, 1, 0, 0]), "state": {"room": "hall", "action_status": "ok"}}
+    action = IndoorWalker().towards(observation, (x, y), near=0.3)
+    assert action is not None
+    assert action["type"] == type_
+    assert action["degrees"] == pytest.approx(degrees, abs=10.0)  # a route runs along the cells of a grid
+
+
+def test_indoors_one_walks_around_what_one_bumped_into() -> None:
+    walker, body, status = IndoorWalker(), Point(-1.5, 0.05), "ok"
+    body.discs = [(0.0, 0.0, 0.3)]
+    for _ in range(60):
+        observation = {"pose": body.pose, "state": {"room": "hall", "action_status": status}}
+        walker.notice(observation)
+        action = walker.towards(observation, (1.5, 0.0), near=0.3)
+        if action is None:
+            break
+        body.do(action)
+        status = "collision" if body.collided else "ok"
+    assert math.hypot(body.pose[0] - 1.5, body.pose[1]) <= 0.3

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from vico.agents.base import Action, Observation, heading, wrapped
 from vico.agents.perception import DepthGrid
 
-_STRIDE = 1.0
+_STRIDE = 1.0  # metres a step
 _ALIGNED = math.radians(8.0)
+_REACH_OF_BUMPS = 0.4  # metres ahead of one's middle is what stopped a step
 
 
 class IndoorWalker:
@@ -20,25 +21,40 @@ class IndoorWalker:
     def __init__(self) -> None:
         self._grids: dict[str, DepthGrid] = {}
 
+    def notice(self, observation: Observation, *, ignore: ArrayLike = ()) -> None:
+        """Take in what a new observation shows of the room one is in.
+
+        Parameters
+        ----------
+        ignore
+            Entities that are not in the way (what one carries or is going to pick up).
+        """
+        grid, pose = self._grid(observation), np.asarray(observation["pose"], np.float64)
+        if "depth" in observation:
+            grid.see(observation, floor=float(pose[2]), ignore=ignore)
+        if observation["state"]["action_status"] == "collision":
+            yaw = heading(observation)
+            grid.bump(pose[:2] + _REACH_OF_BUMPS * np.array([math.cos(yaw), math.sin(yaw)]))
+
     def towards(self, observation: Observation, target: ArrayLike, *, near: float) -> Action | None:
         """Return the next action on the way to a point of the room; None once within `near` metres of it."""
-        state, pose = observation["state"], np.asarray(observation["pose"], np.float64)
-        position = pose[:2]
+        position = np.asarray(observation["pose"], np.float64)[:2]
         goal = np.asarray(target, np.float64)[:2]
-        grid = self._grids.setdefault(state["room"], DepthGrid(position))
-        if "depth" in observation:
-            grid.see(observation, floor=float(pose[2]))
-        yaw = heading(observation)
-        if state["action_status"] == "collision":
-            grid.bump(position + 0.4 * np.array([math.cos(yaw), math.sin(yaw)]))
         if math.dist(position, goal) <= near:
             return None
-        route = grid.route(position, goal, near=near * 0.9)
+        route = self._grid(observation).route(position, goal, near=near * 0.9)
+        # Where no way is known, nothing known is in the way of trying.
         aim = _straight(position, route) if len(route) else goal
-        turn = wrapped(math.atan2(aim[1] - position[1], aim[0] - position[0]) - yaw)
+        turn = wrapped(math.atan2(aim[1] - position[1], aim[0] - position[0]) - heading(observation))
         if abs(turn) > _ALIGNED:
             return {"type": "turn_left" if turn > 0 else "turn_right", "degrees": abs(math.degrees(turn))}
         return {"type": "move_forward", "distance": max(0.1, min(_STRIDE, math.dist(position, aim)))}
+
+    def _grid(self, observation: Observation) -> DepthGrid:
+        room = observation["state"]["room"]
+        if room not in self._grids:
+            self._grids[room] = DepthGrid(np.asarray(observation["pose"], np.float64)[:2])
+        return self._grids[room]
 
 
 def _straight(position: NDArray[np.float64], route: NDArray[np.float64]) -> NDArray[np.float64]:

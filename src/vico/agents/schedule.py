@@ -253,6 +253,7 @@ class ScheduleFollower:
         if out is None:
             return {"type": "wait"}
         outside = out["to"] == "outside"
+        self._indoors.notice(observation)
         step = self._indoors.towards(observation, out["position"], near=1.9 if outside else 0.9)
         if step is not None:
             return step

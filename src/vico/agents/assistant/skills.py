@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.agents.base import AHEAD
-from vico.agents.perception import DepthGrid, Sighting, sightings
+from vico.agents.indoor_walk import IndoorWalker
+from vico.agents.perception import Sighting, sightings
 from vico.agents.wayfinding import Walker
 from vico.world.public import PublicMap
 
@@ -64,11 +64,6 @@ class ObservationView:
         return [int(entity or 0) for entity in self.state["held"]]
 
     @property
-    def collided(self) -> bool:
-        """Whether the last motion was stopped by something."""
-        return str(self.state["action_status"]) == "collision"
-
-    @property
     def refused(self) -> bool:
         """Whether the last action was refused."""
         return str(self.state["action_status"]) == "refused"
@@ -98,7 +93,7 @@ class AssistantSkills:
     def __init__(self, public_map: PublicMap, generator: np.random.Generator) -> None:
         self.map = public_map
         self._walker = Walker(public_map, generator)
-        self._grids: dict[str, DepthGrid] = {}
+        self._indoors = IndoorWalker()
         self._trail: list[str] = []
         self._tries = 0
 
@@ -112,18 +107,9 @@ class AssistantSkills:
             del self._trail[self._trail.index(room) + 1 :]
         else:
             self._trail.append(room)
-        grid = self._grid(view)
         carried = [entity for entity in view.held if entity]
         goods = [thing.entity for thing in view.things if thing.kind == "object"]
-        grid.see(view.observation, floor=float(view.pose[2]), ignore=carried + goods)
-        if view.collided:
-            grid.bump(view.pose[:2] + view.pose[3:5] * 0.45)
-
-    def _grid(self, view: ObservationView) -> DepthGrid:
-        room = str(view.room)
-        if room not in self._grids:
-            self._grids[room] = DepthGrid(view.pose[:2])
-        return self._grids[room]
+        self._indoors.notice(dict(view.observation), ignore=carried + goods)
 
     def go_to(self, view: ObservationView, region: Mapping[str, Any]) -> Action | None:
         """Go to a region of a task: into the place, or to the middle of the spot outdoors."""
@@ -170,21 +156,7 @@ class AssistantSkills:
 
     def walk_indoors(self, view: ObservationView, target: ArrayLike, *, near: float) -> Action | None:
         """Walk within a room around what depth images showed; None once within `near` metres of the target."""
-        if view.away(target) <= near:
-            return None
-        route = self._grid(view).route(view.pose[:2], target, near=near * 0.9)
-        if not len(route):  # nothing known to be in the way of trying
-            route = np.asarray(target, np.float64)[None, :2]
-        # As far along the route as one straight step of at most a metre follows it.
-        aim = route[0]
-        for point in route[1:]:
-            if view.away(point) > 1.0 or _bends(view.pose[:2], route, point):
-                break
-            aim = point
-        turn = turn_to(view.pose, aim)
-        if abs(turn) > math.radians(8.0):
-            return turn_action(turn)
-        return {"type": "move_forward", "distance": max(min(1.0, view.away(aim)), 0.1)}
+        return self._indoors.towards(dict(view.observation), target, near=near)
 
     def approach(self, view: ObservationView, position: ArrayLike, *, near: float) -> Action | None:
         """Walk up to a point, indoors or out; None once within `near` metres."""
@@ -201,31 +173,6 @@ class AssistantSkills:
             return None
         x, y = (float(value) for value in np.asarray(point, np.float64)[:2])
         return self._walker.towards((x, y), WALK, dict(view.observation), {"entities": view.entities})
-
-
-def turn_to(pose: NDArray[np.float64], target: ArrayLike) -> float:
-    """Radians to turn, counter-clockwise positive, to face a point."""
-    x, y = np.asarray(target, np.float64)[:2] - pose[:2]
-    east, north = pose[AHEAD]
-    return math.remainder(math.atan2(y, x) - math.atan2(north, east), 2 * math.pi)
-
-
-def turn_action(radians: float) -> Action:
-    """Return the action that turns by an angle, counter-clockwise positive."""
-    return {"type": "turn_left" if radians >= 0 else "turn_right", "degrees": abs(math.degrees(radians))}
-
-
-def _bends(start: NDArray[np.float64], route: NDArray[np.float64], end: NDArray[np.float64]) -> bool:
-    """Whether the points before `end` leave the straight line from start to it by more than a hand's breadth."""
-    way = end - start
-    length = math.hypot(*way)
-    for point in route:
-        if np.array_equal(point, end):
-            return False
-        across = abs(way[0] * (point[1] - start[1]) - way[1] * (point[0] - start[0])) / max(length, 1e-9)
-        if across > 0.12:
-            return True
-    return False
 
 
 class LookAround:
