@@ -1,19 +1,22 @@
 """Streets of real places for the tests of roads, lanes, transit and traffic: built once a session."""
 
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData, polygons_of, read_osm
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph, read_lanes
-from vico.world.model import Transit
+from vico.world.model import Roads, Transit
 from vico.worldgen.facts.site import site_facts
 from vico.worldgen.streets.netconvert import RoadNetwork, road_network
+from vico.worldgen.streets.roads import roads_from_osm, streets_from_osm
 from vico.worldgen.transit.stage import transit_from_osm
 
 EXTRACT = Path(__file__).parents[1] / "src" / "vico" / "data" / "helsinki.osm.pbf"
@@ -37,6 +40,18 @@ class RoadCity:
     solids: list[shapely.Polygon]
 
 
+def roads_of(osm: OsmData, solids: Sequence[BaseGeometry] = ()) -> Roads:
+    """The road database of a map."""
+    site = site_facts(osm)
+    return roads_from_osm(site, streets_from_osm(site, solids))
+
+
+def network_of(osm: OsmData) -> RoadNetwork:
+    """The lane-level network of a map."""
+    site = site_facts(osm)
+    return road_network(site, streets_from_osm(site))
+
+
 def lanes_of(network: RoadNetwork) -> LaneGraph:
     """Read a network's lanes back from its file."""
     with tempfile.TemporaryDirectory() as folder:
@@ -49,7 +64,7 @@ def lanes_of(network: RoadNetwork) -> LaneGraph:
 def road_city(path: Path = EXTRACT, lat: float = 60.1690, lon: float = 24.9435, half: float = HALF) -> RoadCity:
     """Roads, lanes and transit of 800 m x 800 m; central Helsinki where nothing else is asked for."""
     osm = read_osm(path, LocalFrame(lat, lon), half)
-    network = road_network(site_facts(osm))
+    network = network_of(osm)
     lanes = lanes_of(network)
     solids = [
         polygon

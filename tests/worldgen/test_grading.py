@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import shapely
 
+from road_city import roads_of
 from stages_alone import ground_of
 from vico.geo.elevation import read_elevation
 from vico.geo.frame import LocalFrame
@@ -25,7 +26,7 @@ from vico.worldgen.ground.grading import graded, open_water
 from vico.worldgen.ground.kerbs import KERB, lowered_kerbs
 from vico.worldgen.ground.terrain import flat_terrain, terrain_from_dem
 from vico.worldgen.streets.polygons import road_polygons
-from vico.worldgen.streets.roads import is_traffic_street, roads_from_osm, streets_from_osm
+from vico.worldgen.streets.roads import is_traffic_street, streets_from_osm
 
 PLACE = Path(str(resources.files("vico") / "data" / "helsinki.osm.pbf"))
 HALF = 120.0
@@ -147,7 +148,7 @@ def test_a_bridge_over_a_street_is_high_and_left_out_of_the_traffic(crossroads: 
     assert abs(deck.z[0] - float(field.smooth(deck.line[0]))) < 0.3
     used = [s.way for s in streets_from_osm(site_facts(crossroads)) if is_traffic_street(s)]
     assert used == [1, 2, 4]
-    closed = {road.osm_id: road.closed for road in roads_from_osm(site_facts(crossroads)).roads}
+    closed = {road.osm_id: road.closed for road in roads_of(crossroads).roads}
     assert closed[3] == OVER_A_STREET
     assert closed[1] is None
 

@@ -7,32 +7,31 @@ import numpy as np
 import pytest
 import shapely
 
-from road_city import HALF, PLACES, lanes_of, road_city
+from road_city import HALF, PLACES, lanes_of, network_of, road_city, roads_of
 from vico.errors import MissingExtraError
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, OsmWay
 from vico.worldgen.facts.driving_side import drives_left, keeps_left
 from vico.worldgen.facts.levels import OVER_A_STREET
 from vico.worldgen.facts.site import site_facts
-from vico.worldgen.streets.netconvert import netconvert_binary, road_network
+from vico.worldgen.streets.netconvert import netconvert_binary
 from vico.worldgen.streets.roads import (
     THROUGH_A_BUILDING,
     UNDERGROUND,
     closed_roads,
     is_traffic_street,
-    roads_from_osm,
     streets_from_osm,
 )
 
 
 def test_no_road_leaves_the_window() -> None:
-    roads = roads_from_osm(site_facts(road_city().osm))
+    roads = roads_of(road_city().osm)
     reach = max(abs(v) for road in roads.roads for point in road.line for v in point)
     assert reach <= HALF + 1e-3
 
 
 def test_every_junction_joins_three_drivable_roads_at_its_place() -> None:
-    roads = roads_from_osm(site_facts(road_city().osm))
+    roads = roads_of(road_city().osm)
     lines = {road.id: road.line for road in roads.roads}
     for junction in roads.junctions:
         assert len(junction.roads) >= 3
@@ -42,7 +41,7 @@ def test_every_junction_joins_three_drivable_roads_at_its_place() -> None:
 
 def test_central_helsinki_has_the_junctions_the_map_shows() -> None:
     # 157 junctions of drivable ways in the map (driveways and car parks among them), a third of them private.
-    assert 80 <= len(roads_from_osm(site_facts(road_city().osm)).junctions) <= 160
+    assert 80 <= len(roads_of(road_city().osm).junctions) <= 160
 
 
 def test_reversed_oneways_run_in_the_direction_of_travel() -> None:
@@ -55,7 +54,7 @@ def test_reversed_oneways_run_in_the_direction_of_travel() -> None:
 
 def test_equal_input_gives_equal_network_bytes() -> None:
     city = road_city()
-    assert road_network(site_facts(city.osm)) == city.network
+    assert network_of(city.osm) == city.network
 
 
 def test_network_files_hold_neither_time_nor_path() -> None:
@@ -66,7 +65,7 @@ def test_network_files_hold_neither_time_nor_path() -> None:
 
 
 def test_a_window_without_streets_has_a_network_without_lanes() -> None:
-    network = road_network(site_facts(replace(road_city().osm, ways=[])))
+    network = network_of(replace(road_city().osm, ways=[]))
     assert len(lanes_of(network)) == 0
     assert b"<OpenDRIVE>" in network.xodr
 
@@ -108,7 +107,7 @@ def test_ways_are_closed_for_a_reason_that_the_report_names() -> None:
     house = shapely.box(-60, 10, -40, 30)
     open_ = [street.way for street in streets_from_osm(site_facts(osm), [house]) if is_traffic_street(street)]
     assert open_ == [1, 4]
-    assert {d.id: d.reason for d in closed_roads(roads_from_osm(site_facts(osm), solids=[house]))} == {
+    assert {d.id: d.reason for d in closed_roads(roads_of(osm, [house]))} == {
         "w2": THROUGH_A_BUILDING,
         "w3": UNDERGROUND,
         "w5": OVER_A_STREET,
@@ -138,7 +137,7 @@ def test_the_country_of_addresses_goes_before_the_coarse_map() -> None:
 @pytest.mark.parametrize(("country", "side"), [("GB", -1.0), ("FI", 1.0)])
 def test_oncoming_lanes_lie_on_the_side_the_country_says(country: str, side: float) -> None:
     osm = _map(_street(1, [(-90, 0), (90, 0)], lanes="4"), _street(2, [(0, -90), (0, 90)]), country=country)
-    lanes = lanes_of(road_network(site_facts(osm)))
+    lanes = lanes_of(network_of(osm))
     assert lanes.lefthand is (country == "GB")
     east = [k for k in np.flatnonzero(lanes.inside < 0) if lanes.line(k)[-1, 0] - lanes.line(k)[0, 0] > 20]
     assert east
@@ -153,7 +152,7 @@ def test_a_bridge_over_water_is_open_to_traffic_walkers_and_buses(shared_data: P
     city = road_city(shared_data / "places" / "andorra" / "andorra.osm.pbf", 42.50745, 1.52536)
     lanes, walks = city.lanes, city.lanes.walks
     bridge = 225345368  # Pont Prat de la Creu over the Valira
-    assert bridge not in {road.osm_id for road in roads_from_osm(site_facts(city.osm)).roads if road.closed}
+    assert bridge not in {road.osm_id for road in roads_of(city.osm).roads if road.closed}
     deck = shapely.LineString(next(way.line for way in city.osm.ways if way.id == bridge)).buffer(6, cap_style="flat")
     over = {
         lanes.ids[k]

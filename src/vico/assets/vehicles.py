@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.shapes import Colour, box
-from vico.world.mesh import Surface, joined
+from vico.world.mesh import Surface, joined, quad_triangles
 
 _GLASS: Colour = (44, 54, 64)
 _TYRE: Colour = (26, 26, 28)
@@ -136,9 +136,7 @@ def _joined(parts: Sequence[Surface]) -> Surface:
 def _quads(corners: NDArray[np.float64] | Sequence[Sequence[Sequence[float]]], colour: Colour) -> Surface:
     """Flat quadrilaterals, shape (n, 4, 3), counter-clockwise from outside."""
     points = np.asarray(corners, np.float64).reshape(-1, 3)
-    start = np.arange(0, len(points), 4)[:, None]
-    faces = np.concatenate([start + np.array([0, 1, 2]), start + np.array([0, 2, 3])])
-    return Surface.from_triangles(points, faces, colour=colour)
+    return Surface.from_triangles(points, quad_triangles(np.arange(0, len(points), 4), by_halves=True), colour=colour)
 
 
 def _mirrored(surface: Surface) -> Surface:

@@ -21,6 +21,7 @@ from tyro.extras import SubcommandApp
 
 from vico.cli.options import AssistantOptions, CommaSeparated, RunOptions, WorldBuildOptions
 from vico.errors import VicoError, line_of, sentence_of
+from vico.io.files import reason_of
 from vico.version import __version__
 
 # The fields of a record are options of the verb itself, not of a part of it.
@@ -340,9 +341,7 @@ def _sentence(error: OSError) -> str:
     if error.filename is None and error.errno != errno.ENOSPC:
         return _fault(error)
     where = f"{error.filename}: " if error.filename is not None else ""
-    if error.errno == errno.ENOSPC:
-        return f"{where}no space left on the disk; free some, or choose another --out"
-    return f"{where}{(error.strerror or str(error)).lower()}; give a path that can be read and written"
+    return f"{where}{reason_of(error, writing=False)}"
 
 
 def _configure_logging(given: list[str]) -> list[str]:

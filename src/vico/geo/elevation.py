@@ -17,6 +17,7 @@ from scipy.spatial import QhullError, cKDTree
 from vico.errors import EmptyInputError, InputError, SchemaError
 from vico.geo.frame import LocalFrame
 from vico.geo.rasters import Raster, read_raster
+from vico.io.files import sha256_of
 
 _LOWEST, _HIGHEST = -1000.0, 9000.0  # SRTM's void is -32768, others use -9999; no dry land lies under -430 m
 _MOST_CUT = 100_000_000  # pixels
@@ -136,7 +137,7 @@ def read_elevation(
     if not cuts or covered < 1.0:
         _refuse(given, rasters, frame, half, covered)
     points, filled, counts = _together(cuts, frame, half)
-    digests = {path: _sha256(path) for path in given}
+    digests = {path: sha256_of(path) for path in given}
     files = tuple((cut.path.name, digests[cut.path], count) for cut, count in zip(cuts, counts, strict=True) if count)
     gave = {cut.path for cut, count in zip(cuts, counts, strict=True) if count}
     used = [path for path in given if path in gave]
@@ -321,11 +322,3 @@ def _filled(points: NDArray[np.float64], empty: NDArray[np.float64]) -> NDArray[
     except QhullError:
         return np.asarray(nearest, np.float64)
     return np.asarray(np.where(np.isfinite(linear), linear, nearest), np.float64)
-
-
-def _sha256(path: Path) -> str:
-    digest = sha256()
-    with path.open("rb") as file:
-        while block := file.read(1 << 20):
-            digest.update(block)
-    return digest.hexdigest()

@@ -15,7 +15,6 @@ from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import date, timedelta
-from hashlib import sha256
 from itertools import pairwise
 from pathlib import Path
 
@@ -23,6 +22,7 @@ import numpy as np
 
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
+from vico.io.files import sha256_of
 
 DAY = 86_400
 
@@ -245,7 +245,7 @@ class _Reader:
         names = {stop: parents.get(stop, "") for stop in used}
         return Feed(
             name=self.path.name,
-            sha256=sha256(self.path.read_bytes()).hexdigest(),
+            sha256=sha256_of(self.path),
             day="" if chosen is None else chosen.isoformat(),
             stops=tuple(GtfsStop(k, names[k] or k, stops[k]) for k in sorted(used)),
             routes=tuple(routes[k] for k in sorted(served)),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +19,7 @@ from vico.geo.frame import LocalFrame
 from vico.geo.outlines import check_size, is_scribble, mended, simplified
 from vico.geo.overlay import OverlayError
 from vico.geo.overlay import polygons_of as polygons_of
+from vico.io.files import sha256_of
 
 Tags = dict[str, str]
 
@@ -297,7 +297,7 @@ def read_osm(
     except (RuntimeError, ValueError, OSError, osmium.InvalidLocationError) as error:
         # libosmium reports everything from a cut block to a bad tag as one of these.
         raise SchemaError(f"{path}: truncated or broken ({error}); download it again, or clip it anew") from None
-    data = _assembled(reader, half, margin, sha256(path.read_bytes()).hexdigest())
+    data = _assembled(reader, half, margin, sha256_of(path))
     window = f"the {2 * half:.0f} m square around {frame.lat}, {frame.lon}"
     if not (data.ways or data.nodes or data.areas):
         if reader.drafts and not reader.way_rows:

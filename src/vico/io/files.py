@@ -38,8 +38,10 @@ def write_errors(path: Path) -> Iterator[None]:
         raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from None
 
 
-def reason_of(error: OSError) -> str:
-    """Return why writing failed, and how to mend it."""
+def reason_of(error: OSError, *, writing: bool = True) -> str:
+    """Return why a file could not be written (or, not `writing`, be used at all), and how to mend it."""
+    if error.errno == errno.ENOENT and not writing:
+        return "no such file or folder; give one that is there"
     return _REASONS.get(error.errno or 0) or error.strerror or str(error)
 
 

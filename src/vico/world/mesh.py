@@ -136,6 +136,25 @@ class Surface:
         return replace(self, colour=product.astype(np.uint8))
 
 
+def quad_triangles(first: NDArray[Any], *, by_halves: bool = False) -> NDArray[Any]:
+    """Return the triangles of quadrilaterals whose four corners follow one another.
+
+    Parameters
+    ----------
+    first
+        Number of each quad's first corner, integers, shape ``(n,)``.
+    by_halves
+        List the first triangles of all quads before the second ones, instead of quad by quad.
+
+    Returns
+    -------
+    NDArray
+        Of `first`'s type, shape ``(2 * n, 3)``.
+    """
+    halves = [first[:, None] + np.array(corners, first.dtype) for corners in ((0, 1, 2), (0, 2, 3))]
+    return np.concatenate(halves, axis=0 if by_halves else 1).reshape(-1, 3)
+
+
 def surface_of_quads(
     corners: NDArray[Any],
     normals: NDArray[Any],
@@ -164,9 +183,7 @@ def surface_of_quads(
         List the first triangles of all quads before the second ones, instead of quad by quad.
     """
     count = len(corners)
-    first = 4 * np.arange(count, dtype=np.int32)[:, None]
-    halves = [first + np.array([0, 1, 2], np.int32), first + np.array([0, 2, 3], np.int32)]
-    triangles = np.concatenate(halves, axis=0 if by_halves else 1).reshape(-1, 3)
+    triangles = quad_triangles(4 * np.arange(count, dtype=np.int32), by_halves=by_halves)
     colours = np.asarray(colour, np.uint8)
     if colours.shape == (count, 3):
         colours = np.repeat(colours, 4, axis=0)

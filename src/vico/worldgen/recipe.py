@@ -49,7 +49,7 @@ from vico.worldgen.request import WorldRequest
 from vico.worldgen.stages import Stages
 from vico.worldgen.streets.netconvert import road_network
 from vico.worldgen.streets.polygons import road_polygons
-from vico.worldgen.streets.roads import roads_from_osm
+from vico.worldgen.streets.roads import roads_from_osm, streets_from_osm
 from vico.worldgen.tables import read_tables
 from vico.worldgen.transit.stage import transit_from_osm
 from vico.worldgen.transit.waiting import waiting_off_the_road
@@ -84,8 +84,9 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     built = run("buildings", buildings_from_plans, plans, site.osm, height, seed=seed)
     solids = stages.digested([*built.standing(height), *bridges.feet])
 
-    roads = run("roads", roads_from_osm, site, solids=solids)
-    lanes = write.streets(roads, run("network", road_network, site, solids=solids))
+    ways = run("ways", streets_from_osm, site, solids)
+    roads = run("roads", roads_from_osm, site, ways)
+    lanes = write.streets(roads, run("network", road_network, site, ways))
     feeds = list(evidence.feeds)
     mapped = run("transit", transit_from_osm, site, lanes, height, solids=solids, seed=seed, feeds=feeds)
     with stages.timed("waiting"):

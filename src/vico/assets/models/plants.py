@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw
 from vico.assets.models.model import Model, model
 from vico.assets.shapes import Colour, ball, box
 from vico.seeds import rng
-from vico.world.mesh import Material, Surface
+from vico.world.mesh import Material, Surface, quad_triangles
 
 _SIDE = 128
 
@@ -94,11 +94,10 @@ def _cards(
     n = len(centres)
     corners = np.stack([centres - right - up, centres + right - up, centres + right + up, centres - right + up], axis=1)
     corners[..., 2] = np.maximum(corners[..., 2], 0.02)  # nothing grows downwards
-    faces = np.array([[0, 1, 2], [0, 2, 3]])[None] + (np.arange(n) * 4)[:, None, None]
     uv = np.tile(np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32), (n, 1))
     return Surface.from_triangles(
         corners.reshape(-1, 3),
-        faces.reshape(-1, 3),
+        quad_triangles(4 * np.arange(n)),
         colour=np.repeat(colours, 4, axis=0),
         uv=uv,
         normals=np.repeat(normals, 4, axis=0),

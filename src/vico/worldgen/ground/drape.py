@@ -16,6 +16,7 @@ from shapely.geometry.base import BaseGeometry
 from vico.geo import overlay
 from vico.geo.osm import polygons_of
 from vico.world.heights import HeightField
+from vico.world.mesh import quad_triangles
 from vico.worldgen.ground.halving import halved
 from vico.worldgen.ground.kerbs import filled
 
@@ -194,7 +195,7 @@ def triangulated(polygons: Sequence[Polygon]) -> tuple[Floats, NDArray[np.int64]
     turn = edge[..., 0] * after[..., 1] - edge[..., 1] * after[..., 0]
     convex = (turn > 1e-9).all(axis=1) | (turn < -1e-9).all(axis=1)
     start = start[convex]
-    triangles += [start[:, None] + np.array([0, 1, 2]), start[:, None] + np.array([0, 2, 3])]
+    triangles.append(quad_triangles(start, by_halves=True))
     rest = np.ones(len(every), bool)
     rest[simple & (corners == 3)] = False
     rest[fours[convex]] = False
@@ -251,7 +252,6 @@ def curtain(lines: Sequence[BaseGeometry], bottom: Heights, top: Heights, *, lea
     uv = np.stack(
         [np.stack([along, along + length, along + length, along], axis=1), positions[..., 2]], axis=-1
     ).reshape(-1, 2)
-    start = 4 * np.arange(n)[:, None]
     # Seen from the right of a line, its start lies at the right hand.
-    triangles = np.concatenate([start + np.array([0, 1, 2]), start + np.array([0, 2, 3])])
+    triangles = quad_triangles(4 * np.arange(n), by_halves=True)
     return Curtain(positions.reshape(-1, 3), np.repeat(right, 4, axis=0), uv, triangles)

@@ -20,7 +20,7 @@ from shapely.geometry.base import BaseGeometry
 from vico.geo import overlay
 from vico.geo.osm import OsmData, polygons_of
 from vico.world.heights import HeightField
-from vico.world.mesh import Material, Surface, joined
+from vico.world.mesh import Material, Surface, joined, quad_triangles
 from vico.world.model import ENTITY_GROUND, ENTITY_ROAD
 from vico.worldgen.facts.expendable import NamedShape, changed, expendable, named_parts, united
 from vico.worldgen.facts.ground_kinds import ground_partition, mapped_areas
@@ -524,11 +524,7 @@ def terrain_normals(terrain: HeightField, xy: NDArray[np.float64]) -> NDArray[np
 def _painted(quads: Quads, terrain: HeightField, *, lift: float, look: GroundStyle | None = None) -> Surface:
     """Paint and rails: quads a little above the ground."""
     corners = quads.corners.reshape(-1, 2)
-    n = len(quads.corners)
-    first = 4 * np.arange(n)[:, None]
-    triangles = (
-        np.concatenate([first + np.array([0, 1, 2]), first + np.array([0, 2, 3])]) if n else np.zeros((0, 3), np.int32)
-    )
+    triangles = quad_triangles(4 * np.arange(len(quads.corners)), by_halves=True)
     ground = terrain.lower(corners) if quads.low else terrain.upper(corners)
     return Surface.from_triangles(
         np.c_[corners, ground + lift],

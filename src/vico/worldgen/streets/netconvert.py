@@ -14,7 +14,6 @@ from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from shapely.geometry.base import BaseGeometry
 
 from vico.errors import MissingExtraError, VicoError
 from vico.geo.frame import LocalFrame
@@ -26,7 +25,6 @@ from vico.worldgen.streets.roads import (
     WALKING,
     NetworkStreet,
     is_traffic_street,
-    streets_from_osm,
 )
 
 _NO_RAIL = (
@@ -97,15 +95,15 @@ def netconvert_binary() -> Path:
     )
 
 
-def road_network(site: SiteFacts, *, solids: Sequence[BaseGeometry] = ()) -> RoadNetwork:
+def road_network(site: SiteFacts, streets: Sequence[NetworkStreet]) -> RoadNetwork:
     """Build the lane-level network of a window: lanes, junctions, sidewalks, crossings, signals.
 
     Parameters
     ----------
     site
         The map and its facts; every street ends at the edge of its window.
-    solids
-        What stands on the ground: passages that it closes are no streets.
+    streets
+        `streets_from_osm` of the same site.
 
     Returns
     -------
@@ -119,7 +117,6 @@ def road_network(site: SiteFacts, *, solids: Sequence[BaseGeometry] = ()) -> Roa
         If netconvert is not installed, or gives no network.
     """
     osm = site.osm
-    streets = streets_from_osm(site, solids)
     used = [street for street in streets if is_traffic_street(street)]
     used += [s for s in streets if s.kind == "pedestrian" and s.closed is None]
     if not used:

@@ -310,15 +310,15 @@ def is_traffic_street(street: NetworkStreet) -> bool:
     return True
 
 
-def roads_from_osm(site: SiteFacts, *, solids: Sequence[BaseGeometry] = ()) -> Roads:
+def roads_from_osm(site: SiteFacts, streets: Sequence[NetworkStreet]) -> Roads:
     """Build the road database: streets and walkways split at junctions, with widths, lanes and sidewalks.
 
     Parameters
     ----------
     site
         The map and its facts.
-    solids
-        What stands on the ground, metres: passages that it closes are `closed`.
+    streets
+        `streets_from_osm` of the same site.
 
     Returns
     -------
@@ -326,7 +326,7 @@ def roads_from_osm(site: SiteFacts, *, solids: Sequence[BaseGeometry] = ()) -> R
         Junctions are where three or more drivable roads meet; crossings are mapped crossing points on carriageways.
     """
     osm = site.osm
-    streets = [s for s in streets_from_osm(site, solids) if not (s.kind == "service" and s.access == "private")]
+    streets = [s for s in streets if not (s.kind == "service" and s.access == "private")]
     meeting: Counter[int] = Counter()
     for street in streets:
         meeting.update(street.nodes)
