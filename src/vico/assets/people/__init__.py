@@ -1,12 +1,12 @@
 """Bodies of people: how somebody looks, and the skinned mesh that comes of it."""
 
-from vico.assets.people.choice import (
+from vico.assets.people.choice import PASSERS_BY, body_of, passer_by, random_appearance
+from vico.assets.people.model import (
     BOTTOMS,
     FINGERS,
     HAIR,
     JOINTS,
     PARENTS,
-    PASSERS_BY,
     SHOES,
     TOPS,
     Appearance,
@@ -17,9 +17,6 @@ from vico.assets.people.choice import (
     Shoes,
     SkinnedBody,
     Top,
-    body_of,
-    passer_by,
-    random_appearance,
     t_pose,
 )
 

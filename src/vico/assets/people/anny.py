@@ -14,8 +14,8 @@ from vico.assets.people.bake import ANCESTRIES, GENDERS, LEVELS, TARGETS, VERSIO
 from vico.assets.people.clothes import darker, front_of, hemmed
 from vico.assets.people.cutting import open_loops
 from vico.assets.people.heads import hairline, worn_on_head
-from vico.assets.people.lofts import BodyPart, merged, strongest, with_normals
-from vico.assets.people.model import JOINTS, Appearance, Colour, J, SkinnedBody, t_pose
+from vico.assets.people.lofts import BodyPart, merged, skinned, with_normals
+from vico.assets.people.model import JOINTS, Appearance, Colour, J, SkinnedBody
 from vico.errors import MissingExtraError
 from vico.io.cache import cache_folder
 from vico.io.compiled import compiled
@@ -337,18 +337,5 @@ def body(look: Appearance) -> SkinnedBody:
         If the data are not installed.
     """
     fit = _Fitting(look, installed_file())
-    whole = merged([*_head(fit), fit.piece("hands", look.skin), *_lower(fit), *_upper(fit), *_feet(fit)])
-    weight_joints, weights = strongest(whole.weights)
-    frames, joints = t_pose(fit.joints)
-    return SkinnedBody(
-        whole.vertices.astype(np.float32),
-        whole.normals.astype(np.float32),
-        whole.triangles.astype(np.int32),
-        np.clip(np.rint(whole.colour), 0, 255).astype(np.uint8),
-        weight_joints,
-        weights,
-        fit.joints.astype(np.float32),
-        frames,
-        joints,
-        look.height,
-    )
+    parts = [*_head(fit), fit.piece("hands", look.skin), *_lower(fit), *_upper(fit), *_feet(fit)]
+    return skinned(parts, fit.joints, look.height)

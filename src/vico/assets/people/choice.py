@@ -13,24 +13,7 @@ import numpy as np
 from vico.assets.people.anny import available, installed_file
 from vico.assets.people.anny import body as anny_body
 from vico.assets.people.level_of_detail import lightened
-from vico.assets.people.model import (
-    BOTTOMS,
-    FINGERS,
-    HAIR,
-    JOINTS,
-    PARENTS,
-    SHOES,
-    TOPS,
-    Appearance,
-    Bottom,
-    Colour,
-    Hair,
-    J,
-    Shoes,
-    SkinnedBody,
-    Top,
-    t_pose,
-)
+from vico.assets.people.model import Appearance, Colour, SkinnedBody
 from vico.assets.people.procedural import body as procedural_body
 from vico.assets.people.store import keep_body, read_body, stored_body
 from vico.seeds import rng
@@ -170,27 +153,3 @@ def body_of(
         body = lightened(make(appearance))
         keep_body(path, body)
     return body
-
-
-__all__ = [
-    "BOTTOMS",
-    "FINGERS",
-    "HAIR",
-    "JOINTS",
-    "PARENTS",
-    "PASSERS_BY",
-    "SHOES",
-    "TOPS",
-    "Appearance",
-    "Bottom",
-    "Colour",
-    "Hair",
-    "J",
-    "Shoes",
-    "SkinnedBody",
-    "Top",
-    "body_of",
-    "passer_by",
-    "random_appearance",
-    "t_pose",
-]

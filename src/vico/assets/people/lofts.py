@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.people.model import JOINTS, Colour
+from vico.assets.people.model import JOINTS, Colour, SkinnedBody, t_pose
 
 Vector = tuple[float, float, float] | NDArray[np.float64]
 Weights = dict[int, float]
@@ -223,7 +223,36 @@ def merged(parts: Sequence[BodyPart]) -> BodyPart:
     )
 
 
-def strongest(weights: NDArray[Any]) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+def skinned(parts: Sequence[BodyPart], joints: NDArray[np.float64], height: float) -> SkinnedBody:
+    """Make a body of its parts.
+
+    Parameters
+    ----------
+    parts
+        All of them; they are put together without welding.
+    joints
+        Where the joints are at rest, metres, shape ``(len(JOINTS), 3)``.
+    height
+        Metres, of the person.
+    """
+    whole = merged(parts)
+    weight_joints, weights = _strongest(whole.weights)
+    frames, turned = t_pose(joints)
+    return SkinnedBody(
+        whole.vertices.astype(np.float32),
+        whole.normals.astype(np.float32),
+        whole.triangles.astype(np.int32),
+        np.clip(np.rint(whole.colour), 0, 255).astype(np.uint8),
+        weight_joints,
+        weights,
+        joints.astype(np.float32),
+        frames,
+        turned,
+        height,
+    )
+
+
+def _strongest(weights: NDArray[Any]) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Keep each vertex's four strongest joints, renormalised, descending."""
     order = np.argsort(-weights, axis=1, kind="stable")[:, :4]
     kept = np.take_along_axis(weights, order, axis=1)

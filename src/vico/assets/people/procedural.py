@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from vico.assets.people.clothes import darker, front_of
 from vico.assets.people.heads import head_parts
-from vico.assets.people.lofts import BodyPart, LoftRing, Weights, blend, dense, loft, merged, strongest
-from vico.assets.people.model import FINGERS, JOINTS, Appearance, Colour, J, SkinnedBody, t_pose
+from vico.assets.people.lofts import BodyPart, LoftRing, Weights, blend, dense, loft, merged, skinned
+from vico.assets.people.model import FINGERS, JOINTS, Appearance, Colour, J, SkinnedBody
 
 # Arms rest this far below the horizontal: halfway between walking and reaching, where shoulders deform best.
 _ARM_DROP = np.radians(58)
@@ -489,18 +489,4 @@ def body(look: Appearance) -> SkinnedBody:
         parts += _leg(tailor, side)
         parts += _arm(tailor, side)
     parts += head_parts(look, tailor.head, tailor.h)
-    whole = merged(parts)
-    weight_joints, weights = strongest(whole.weights)
-    frames, joints = t_pose(tailor.joints)
-    return SkinnedBody(
-        whole.vertices.astype(np.float32),
-        whole.normals.astype(np.float32),
-        whole.triangles.astype(np.int32),
-        np.clip(np.rint(whole.colour), 0, 255).astype(np.uint8),
-        weight_joints,
-        weights,
-        tailor.joints.astype(np.float32),
-        frames,
-        joints,
-        look.height,
-    )
+    return skinned(parts, tailor.joints, look.height)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from vico.assets.packages import Package
 from vico.assets.robots.go2 import go2
 from vico.assets.robots.husky import husky
-from vico.assets.robots.model import BUMP, BUMPER, FOOT_CONTACT, TOUCH, PolicyNetwork, RobotModel
+from vico.assets.robots.model import RobotModel
 from vico.assets.robots.packs import GO2_PACKAGE, HUSKY_PACKAGE
 from vico.errors import InputError
 
@@ -42,16 +42,3 @@ def robot_model(name: str, *, packs: bool = True) -> RobotModel:
 def robot_packages() -> tuple[Package, ...]:
     """Return the packages that richer robots are read from."""
     return GO2_PACKAGE, HUSKY_PACKAGE
-
-
-__all__ = [
-    "BUMP",
-    "BUMPER",
-    "FOOT_CONTACT",
-    "TOUCH",
-    "PolicyNetwork",
-    "RobotModel",
-    "robot_model",
-    "robot_names",
-    "robot_packages",
-]
