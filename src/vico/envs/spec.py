@@ -11,7 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from vico.clock import seconds_of_day
 from vico.errors import InputError, SchemaError
-from vico.sim.config import SimConfig
+from vico.sim.config import SimConfig, SimSettings
 
 SCHEMA = "vico.env"
 VERSION = 1
@@ -34,51 +34,26 @@ class EnvOptions(TypedDict, total=False):
     max_steps: int
 
 
-@dataclass(frozen=True)
-class EnvSpec:
-    """What an environment is made from.
+@dataclass(frozen=True, kw_only=True)
+class EnvSpec(SimSettings):
+    """What an environment is made from, beside the settings of its simulation.
 
     Attributes
     ----------
     world, community
         Folders, if the environment was made from folders; a community of None is nobody.
-    seed
-        Decides the first episode.
     start
         Time of day, ``HH:MM`` or ``HH:MM:SS``.
-    residents
-        How many of the community's residents take part; None for all.
-    assistants
-        Avatars under test, without home or schedule.
-    robots
-        Model names; robot ``i`` is the agent ``robot_i``.
-    errands
-        Robots that nobody controls go from place to place.
-    cars, pedestrians
-        Vehicles and people nobody plays.
-    transit
-        Whether buses and bicycles are there.
     observe
         Whose views are rendered: ``"all"``, ``"none"``, or names.
-    image
-        Side of the square images, pixels.
     max_steps
         Length of an episode, steps of one second.
     """
 
     world: str | None = None
     community: str | None = None
-    seed: int = 0
     start: str = "08:00"
-    residents: int | None = None
-    assistants: int = 0
-    robots: tuple[str, ...] = ()
-    errands: bool = False
-    cars: int = 0
-    pedestrians: int = 0
-    transit: bool = True
     observe: str | tuple[str, ...] = "all"
-    image: int = 256
     max_steps: int = 1500
 
     @classmethod
@@ -94,24 +69,14 @@ class EnvSpec:
         unknown = [name for name in options if name not in known]
         if unknown:
             raise InputError(f"env: there is no option {unknown[0]!r}; options are {', '.join(known)}")
-        return cls(_folder(world), _folder(community), **options)
+        return cls(world=_folder(world), community=_folder(community), **options)
 
     @property
     def config(self) -> SimConfig:
         """The simulation's configuration."""
-        return SimConfig(
-            seed=self.seed,
-            start=seconds_of_day(self.start),
-            residents=self.residents,
-            assistants=self.assistants,
-            robots=tuple(self.robots),
-            errands=self.errands,
-            cars=self.cars,
-            pedestrians=self.pedestrians,
-            transit=self.transit,
-            observe=self._observers(),
-            image=self.image,
-        )
+        shared = {field.name: getattr(self, field.name) for field in fields(SimSettings)}
+        shared["robots"] = tuple(self.robots)
+        return SimConfig(**shared, start=seconds_of_day(self.start), observe=self._observers())
 
     def _observers(self) -> tuple[str, ...] | None:
         if isinstance(self.observe, str):
@@ -120,7 +85,7 @@ class EnvSpec:
 
     def to_json(self) -> str:
         """Return the spec as JSON text."""
-        return json.dumps({"schema_name": SCHEMA, "version": VERSION} | asdict(self), indent=1)
+        return json.dumps({"schema_name": SCHEMA, "version": VERSION, "world": self.world} | asdict(self), indent=1)
 
     @classmethod
     def from_json(cls, text: str) -> EnvSpec:

@@ -12,16 +12,14 @@ SUBSTEPS = 10
 SUBSTEP = 0.1
 
 
-@dataclass(frozen=True)
-class SimConfig:
-    """Everything that decides a run beside the world and the community.
+@dataclass(frozen=True, kw_only=True)
+class SimSettings:
+    """What a simulation's configuration and an environment's spec have in common: who and what is there.
 
     Attributes
     ----------
     seed
-        Decides whatever is left to chance.
-    start
-        Second of the day at which the run starts.
+        Decides whatever is left to chance; in a spec, the first episode.
     residents
         How many of the community's residents take part, in the community's order; None for all.
     assistants
@@ -34,14 +32,11 @@ class SimConfig:
         Vehicles and people nobody plays.
     transit
         Whether buses and bicycles are there.
-    observe
-        Agents whose views are rendered; None for all, ``()`` for none. The rest of the observation is always given.
     image
         Side of the square images, pixels.
     """
 
     seed: int = 0
-    start: int = 8 * 3600
     residents: int | None = None
     assistants: int = 0
     robots: tuple[str, ...] = ()
@@ -49,8 +44,23 @@ class SimConfig:
     cars: int = 0
     pedestrians: int = 0
     transit: bool = True
-    observe: tuple[str, ...] | None = None
     image: int = 256
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimConfig(SimSettings):
+    """Everything that decides a run beside the world and the community.
+
+    Attributes
+    ----------
+    start
+        Second of the day at which the run starts.
+    observe
+        Agents whose views are rendered; None for all, ``()`` for none. The rest of the observation is always given.
+    """
+
+    start: int = 8 * 3600
+    observe: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
         for name in ("seed", "assistants", "cars", "pedestrians", "residents"):
