@@ -61,7 +61,7 @@ class BoxPart(_Turnable):
     """A box of extents `size` along x, y, z around `at`."""
 
     shape: Literal["box"]
-    size: Point
+    size: tuple[Length, Length, Length]
 
 
 class CylinderPart(_Turnable):
