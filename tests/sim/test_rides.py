@@ -86,8 +86,8 @@ def test_at_a_stop_one_gets_off_beside_the_bus(sim: Simulation) -> None:
 def test_a_bicycle_is_ridden_away_and_left_astray_costs_more(sim: Simulation) -> None:
     transit = sim.state.transit
     assert transit is not None
-    for bike in range(len(transit.bike_xy)):
-        sim.scenario.place_agent("assistant_0", transit.bike_xy[bike])
+    for bike in range(len(transit.bicycles.xy)):
+        sim.scenario.place_agent("assistant_0", transit.bicycles.xy[bike])
         state = act(sim, type="enter_bike")
         if state["action_status"] == "ok":
             break
@@ -101,8 +101,8 @@ def test_a_bicycle_is_ridden_away_and_left_astray_costs_more(sim: Simulation) ->
         if np.linalg.norm(sim.state.people.position[0, :2] - start) > 12.0:
             break
     assert np.linalg.norm(sim.state.people.position[0, :2] - start) > 5.0
-    bike = int(sim.state.people.vehicle_entity[0]) - transit.first_bike
-    assert transit.bike_xy[bike] == pytest.approx(sim.state.people.position[0, :2])
+    bike = int(sim.state.people.vehicle_entity[0]) - transit.bicycles.first_entity
+    assert transit.bicycles.xy[bike] == pytest.approx(sim.state.people.position[0, :2])
     state = act(sim, type="exit_bike")
     paid = 50.0 - state["cash"]
     minutes = round((paid % BIKE_ASTRAY) / BIKE_RATE)

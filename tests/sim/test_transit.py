@@ -132,23 +132,23 @@ def test_a_ride_costs_by_the_started_minute_and_more_when_left_astray() -> None:
 
 def test_a_bicycle_taken_and_brought_back_is_in_the_station_again() -> None:
     _, transit = _systems(0, 0)
-    before = transit.free_bikes()
-    bike = transit.bike_at(transit.transit.bike_stations[0].position)
+    before = transit.bicycles.free()
+    bike = transit.bicycles.at(transit.transit.bike_stations[0].position)
     assert bike is not None
-    transit.mount(bike, 0)
-    assert transit.free_bikes().sum() == before.sum() - 1
-    transit.carry(bike, *transit.transit.bike_stations[0].position[:2], 0.0)
-    assert transit.dismount(bike) < 1.0
-    assert np.array_equal(transit.free_bikes(), before)
+    transit.bicycles.mount(bike, 0, float(transit.clock[0]))
+    assert transit.bicycles.free().sum() == before.sum() - 1
+    transit.bicycles.carry(bike, *transit.transit.bike_stations[0].position[:2], 0.0)
+    assert transit.bicycles.dismount(bike, float(transit.clock[0])) < 1.0
+    assert np.array_equal(transit.bicycles.free(), before)
 
 
 def test_a_bicycle_left_astray_stays_there_as_a_body() -> None:
     _, transit = _systems(0, 0)
-    bike = transit.bike_at(transit.transit.bike_stations[0].position)
+    bike = transit.bicycles.at(transit.transit.bike_stations[0].position)
     assert bike is not None
-    transit.mount(bike, 0)
-    transit.carry(bike, 3.0, 4.0, 0.5)
-    assert transit.dismount(bike) > 20.0
+    transit.bicycles.mount(bike, 0, float(transit.clock[0]))
+    transit.bicycles.carry(bike, 3.0, 4.0, 0.5)
+    assert transit.bicycles.dismount(bike, float(transit.clock[0])) > 20.0
     assert transit.bodies().position[:, :2].tolist() == [[3.0, 4.0]]
 
 

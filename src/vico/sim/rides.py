@@ -59,24 +59,24 @@ def alight(i: int, state: SimulationState) -> None:
 def mount(i: int, state: SimulationState) -> None:
     """Take a bicycle: it is wheeled to where there is room to ride."""
     transit, p = _transit(state), state.people
-    bike = transit.bike_at(p.position[i])
+    bike = transit.bicycles.at(p.position[i])
     assert bike is not None
     start = room_to_ride(i, bike, state, transit)
     assert start is not None
-    transit.mount(bike, i)
-    p.vehicle[i], p.vehicle_entity[i] = Vehicle.BIKE, transit.first_bike + bike
+    transit.bicycles.mount(bike, i, float(transit.clock[0]))
+    p.vehicle[i], p.vehicle_entity[i] = Vehicle.BIKE, transit.bicycles.first_entity + bike
     p.posture[i] = Posture.STANDING
     p.position[i, :2], p.yaw[i] = start[:2], start[2]
     state.avatars.settle(np.array([i]))
-    transit.carry(bike, float(start[0]), float(start[1]), float(start[2]))
+    transit.bicycles.carry(bike, float(start[0]), float(start[1]), float(start[2]))
     state.events.add("mount", p.names[i], "gets on a bicycle", p.position[i], bike=int(p.vehicle_entity[i]))
 
 
 def dismount(i: int, state: SimulationState) -> None:
     """Leave the bicycle, pay for the ride, and step beside it."""
     transit, p = _transit(state), state.people
-    bike = int(p.vehicle_entity[i]) - transit.first_bike
-    price = transit.dismount(bike)
+    bike = int(p.vehicle_entity[i]) - transit.bicycles.first_entity
+    price = transit.bicycles.dismount(bike, float(transit.clock[0]))
     p.cash[i] -= price
     p.vehicle[i], p.vehicle_entity[i] = Vehicle.NONE, 0
     spot = free_ground(state.world.walkable, p.position[i], state.obstacles_to(i), within=6.0, connected=False)
@@ -95,8 +95,8 @@ def follow(state: SimulationState) -> None:
     for i in np.flatnonzero(p.vehicle == Vehicle.BUS):
         _seat(int(i), state, transit)
     for i in np.flatnonzero(p.vehicle == Vehicle.BIKE):
-        bike = int(p.vehicle_entity[i]) - transit.first_bike
-        transit.carry(bike, float(p.position[i, 0]), float(p.position[i, 1]), float(p.yaw[i]))
+        bike = int(p.vehicle_entity[i]) - transit.bicycles.first_entity
+        transit.bicycles.carry(bike, float(p.position[i, 0]), float(p.position[i, 1]), float(p.yaw[i]))
 
 
 def _seat(i: int, state: SimulationState, transit: TransitSystem) -> None:
@@ -136,7 +136,7 @@ def room_to_ride(i: int, bike: int, state: SimulationState, transit: TransitSyst
     """
     p = state.people
     others = state.obstacles_to(i)
-    others = others.where(others.entity != transit.first_bike + bike)
+    others = others.where(others.entity != transit.bicycles.first_entity + bike)
     best: tuple[float, NDArray[np.float64]] | None = None
     for spot in p.position[i, :2] + _STEPS:
         # One has to walk there.

@@ -53,7 +53,7 @@ def check_enter_bike(values: Values, i: int, state: SimulationState) -> Refusal 
     refusal = _refuse_unless_on_foot_outdoors("enter_bike", i, state)
     if refusal is not None:
         return refusal
-    bike = transit.bike_at(state.people.position[i])
+    bike = transit.bicycles.at(state.people.position[i])
     if bike is None:
         return Refusal(ReasonCode.NO_VEHICLE, f"enter_bike: no free bicycle within {BIKE_REACH:g} m")
     if rides.room_to_ride(i, bike, state, transit) is None:

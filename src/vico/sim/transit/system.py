@@ -1,8 +1,7 @@
-"""Buses on their timetable and bicycles to rent: who may board what, where, and what it costs.
+"""Buses on their timetable: when they leave, who may board where, and what it costs.
 
 Buses are vehicles of `Traffic` (they queue with the cars and take junctions like them); what is here sends them from
-stop to stop. Rules and prices: fare 2 on boarding a stopped bus within 3 m of a door; bicycles within 2 m, 0.2 per
-started minute, 20 more where one is left farther than 5 m from a station with a free place.
+stop to stop. The fare is 2, on boarding a stopped bus within 3 m of a door. Bicycles to rent are `Bicycles`.
 """
 
 from __future__ import annotations
@@ -12,13 +11,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from vico.assets.vehicles import BICYCLE_SIZE, BUS_SIZE, vehicle_prototypes
+from vico.assets.vehicles import BUS_SIZE, vehicle_prototypes
 from vico.errors import InputError
-from vico.sim.bodies import BICYCLE, Bodies, Drawn
+from vico.sim.bodies import Bodies, Drawn
 from vico.sim.traffic import Traffic
+from vico.sim.transit.bicycles import Bicycles
 from vico.sim.transit.bus_plan import BusPlan, departure, next_departure
 from vico.world.mesh import Surface
 from vico.world.model import Line, Transit
@@ -30,17 +29,12 @@ _START_STOP = 10.0
 FARE = 2.0
 DOOR_REACH = 3.0
 CAPACITY = 60
-BIKE_REACH = 2.0
-BIKE_RATE = 0.2
-BIKE_ASTRAY = 20.0
-STATION_REACH = 5.0
-_SLOT = 0.75  # metres between bicycles in a station
 # Doors on a bus's right side, metres ahead of its centre.
 DOORS = (4.65, -0.05, -3.55)
 
 
 class TransitSystem:
-    """Timetable, riders' rules, bicycles.
+    """Timetable and riders' rules, with the bicycles to rent.
 
     Attributes
     ----------
@@ -56,17 +50,12 @@ class TransitSystem:
         Riders in each bus.
     taken
         Departures each line has begun since the first one of the first day.
-    bike_xy, bike_yaw
-        Where each bicycle is.
-    bike_rider
-        Who rides it, -1 for nobody; the caller's numbers.
-    bike_since
-        Clock at which the ride began.
+    bicycles
+        The bicycles to rent, and who rides them.
     """
 
     def __init__(self, transit: Transit, traffic: Traffic, plan: BusPlan, *, second: float, first_bike: int) -> None:
         self.transit, self.traffic = transit, traffic
-        self.first_bike = first_bike
         self._plan = plan
         self._vehicle = np.arange(traffic.cars, traffic.cars + traffic.buses)
         buses = traffic.buses
@@ -76,20 +65,7 @@ class TransitSystem:
         self.begun = np.array(plan.begun)
         self.aboard = np.zeros(buses, np.int32)
         self.taken = np.array([next_departure(line, second) for line in transit.lines], np.int64)
-        stations = transit.bike_stations
-        self._station_xy = np.array([s.position[:2] for s in stations]).reshape(-1, 2)
-        self._station_capacity = np.array([s.capacity for s in stations], np.int32)
-        self._station_yaw = _rack_yaws(traffic, self._station_xy)
-        self.bike_station = np.repeat(np.arange(len(stations), dtype=np.int32), [s.bikes for s in stations])
-        n = len(self.bike_station)
-        self.bike_slot = (
-            np.concatenate([np.arange(s.bikes, dtype=np.int32) for s in stations]) if n else np.zeros(0, np.int32)
-        )
-        self.bike_xy, self.bike_yaw = np.zeros((n, 2)), np.zeros(n)
-        for bike in range(n):
-            self._dock(bike, int(self.bike_station[bike]), int(self.bike_slot[bike]))
-        self.bike_rider = np.full(n, -1, np.int32)
-        self.bike_since = np.zeros(n)
+        self.bicycles = Bicycles(transit.bike_stations, traffic, first_entity=first_bike)
         for bus in range(buses):
             self._send(bus, int(self.stop[bus]))
             traffic.fleet.at_stop[self._vehicle[bus]] = True
@@ -98,12 +74,13 @@ class TransitSystem:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Every number that decides the future; the buses' own motion is among the traffic's."""
-        return {name: getattr(self, name).copy() for name in _STATE}
+        return {name: getattr(self, name).copy() for name in _STATE} | self.bicycles.arrays()
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Go back to what `arrays` held."""
         for name in _STATE:
             getattr(self, name)[...] = arrays[name]
+        self.bicycles.restore(arrays)
 
     def advance(self, dt: float, obstacles: Bodies) -> None:
         """Advance the timetable by `dt` seconds; the buses themselves move with the traffic."""
@@ -142,34 +119,12 @@ class TransitSystem:
         self._send(bus, int(self.stop[bus]))
 
     def bodies(self) -> Bodies:
-        """Return the bicycles left astray.
-
-        Racks are street furniture, buses are among the traffic's bodies, and ridden bicycles among their riders'.
-        """
-        free = np.flatnonzero((self.bike_rider < 0) & (self.bike_station < 0))
-        n = len(free)
-        if not n:
-            return Bodies.none()
-        return Bodies(
-            entity=(self.first_bike + free).astype(np.int32),
-            kind=np.full(n, BICYCLE, np.int8),
-            position=np.column_stack([self.bike_xy[free], self.traffic.height(self.bike_xy[free])]),
-            yaw=self.bike_yaw[free],
-            half_length=np.full(n, BICYCLE_SIZE[0] / 2),
-            half_width=np.full(n, BICYCLE_SIZE[1] / 2),
-            height=np.full(n, BICYCLE_SIZE[2]),
-            velocity=np.zeros((n, 2)),
-        )
+        """Return the bicycles left astray; buses are among the traffic's bodies."""
+        return self.bicycles.bodies()
 
     def draw(self) -> Drawn:
-        """All bicycles, ridden ones too."""
-        n = len(self.bike_yaw)
-        c, s = np.cos(self.bike_yaw), np.sin(self.bike_yaw)
-        transforms = np.tile(np.eye(4, dtype=np.float32), (n, 1, 1))
-        transforms[:, 0, 0], transforms[:, 0, 1], transforms[:, 1, 0], transforms[:, 1, 1] = c, -s, s, c
-        transforms[:, :2, 3], transforms[:, 2, 3] = self.bike_xy, self.traffic.height(self.bike_xy)
-        entity = np.arange(self.first_bike, self.first_bike + n, dtype=np.int32)
-        return Drawn(["bicycle"], np.zeros(n, np.int32), transforms, entity)
+        """All bicycles, ridden ones too; buses are drawn with the traffic."""
+        return self.bicycles.draw()
 
     def prototypes(self) -> dict[str, list[Surface]]:
         """Return the shape of a bicycle."""
@@ -290,99 +245,11 @@ class TransitSystem:
                     rows += [(line.name, departure(line, first + i) - now) for i in range(3)]
         return sorted(rows, key=lambda row: row[1])
 
-    # -- bicycles ----------------------------------------------------------------------------------------------------
 
-    def bike_at(self, xy: ArrayLike, reach: float = BIKE_REACH) -> int | None:
-        """Return the nearest bicycle nobody rides within `reach` of a point, None if there is none."""
-        if not len(self.bike_rider):
-            return None
-        away = np.linalg.norm(self.bike_xy - np.asarray(xy, np.float64)[:2], axis=1)
-        away[self.bike_rider >= 0] = np.inf
-        best = int(np.argmin(away))
-        return best if away[best] <= reach else None
-
-    def free_bikes(self) -> NDArray[np.int32]:
-        """Bicycles that stand in each station."""
-        docked = self.bike_station[(self.bike_rider < 0) & (self.bike_station >= 0)]
-        return np.bincount(docked, minlength=len(self._station_capacity)).astype(np.int32)
-
-    def mount(self, bike: int, rider: int) -> None:
-        """Begin a ride.
-
-        Raises
-        ------
-        InputError
-            If somebody rides it.
-        """
-        if self.bike_rider[bike] >= 0:
-            raise InputError("enter_bike: somebody rides it")
-        self.bike_rider[bike], self.bike_since[bike] = rider, self.clock[0]
-        self.bike_station[bike] = self.bike_slot[bike] = -1
-
-    def carry(self, bike: int, x: float, y: float, yaw: float) -> None:
-        """Take a ridden bicycle along with its rider."""
-        self.bike_xy[bike], self.bike_yaw[bike] = (x, y), yaw
-
-    def dismount(self, bike: int) -> float:
-        """End a ride where the bicycle is; returns the price.
-
-        Within 5 m of a station with a free place the bicycle goes into it. Elsewhere it stays, and that costs more.
-        """
-        station = self._station_near(self.bike_xy[bike])
-        price = ride_price(self.clock[0] - self.bike_since[bike], returned=station >= 0)
-        self.bike_rider[bike] = -1
-        if station >= 0:
-            used = set(self.bike_slot[self.bike_station == station].tolist())
-            self._dock(bike, station, next(k for k in range(len(used) + 1) if k not in used))
-        return price
-
-    def _station_near(self, xy: NDArray[np.float64]) -> int:
-        """Return the nearest station within reach that has a free place, -1 for none."""
-        if not len(self._station_xy):
-            return -1
-        away = np.linalg.norm(self._station_xy - xy, axis=1)
-        away[self.free_bikes() >= self._station_capacity] = np.inf
-        best = int(np.argmin(away))
-        return best if away[best] <= STATION_REACH else -1
-
-    def _dock(self, bike: int, station: int, slot: int) -> None:
-        """Stand a bicycle in its place: side by side along the rack, from its middle outwards."""
-        yaw = self._station_yaw[station]
-        aside = _SLOT * ((slot + 1) // 2) * (1 if slot % 2 else -1)
-        self.bike_station[bike], self.bike_slot[bike] = station, slot
-        self.bike_xy[bike] = self._station_xy[station] + aside * np.array([np.cos(yaw), np.sin(yaw)])
-        self.bike_yaw[bike] = yaw + np.pi / 2
-
-
-_STATE = (
-    "clock", "dwell", "stop", "begun", "aboard", "taken", "bike_station", "bike_slot", "bike_xy", "bike_yaw",
-    "bike_rider", "bike_since",
-)  # fmt: skip
-
-
-def ride_price(seconds: float, *, returned: bool) -> float:
-    """Price of a bicycle ride: 0.2 per started minute, 20 more if it was not brought to a station."""
-    return BIKE_RATE * math.ceil(max(seconds, 1e-9) / 60.0) + (0.0 if returned else BIKE_ASTRAY)
+_STATE = ("clock", "dwell", "stop", "begun", "aboard", "taken")
 
 
 def _beside(pose: NDArray[np.float64], ahead: Sequence[float], right: float) -> NDArray[np.float64]:
     """Points `ahead` of a pose and `right` of it."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
     return np.array([[pose[0] + a * c + right * s, pose[1] + a * s - right * c] for a in ahead])
-
-
-def _rack_yaws(traffic: Traffic, spots: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Racks stand along the nearest sidewalk or street."""
-    lanes, walks = traffic.lanes, traffic.walks
-    lines = [shapely.LineString(walks.line(i)) for i in range(len(walks)) if walks.kind[i] == 0]
-    lines = lines or [shapely.LineString(lanes.line(i)) for i in range(len(lanes))]
-    if not lines:
-        return np.zeros(len(spots))
-    yaws = []
-    for spot in spots:
-        point = shapely.Point(spot)
-        line = lines[int(np.argmin(shapely.distance(lines, point)))]
-        at = line.project(point)
-        a, b = line.interpolate(max(at - 1.0, 0.0)), line.interpolate(min(at + 1.0, line.length))
-        yaws.append(math.atan2(b.y - a.y, b.x - a.x))
-    return np.array(yaws)
