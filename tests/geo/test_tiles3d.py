@@ -17,8 +17,9 @@ from vico.geo.frame import LocalFrame
 from vico.geo.gltf import read_gltf
 from vico.geo.tiles3d.content import read_tile_file
 from vico.geo.tiles3d.mesh import TileMesh
-from vico.geo.tiles3d.reader import TileLimits, TileReport, credits_of, read_tileset, welded
+from vico.geo.tiles3d.reader import TileLimits, TileReport, credits_of, read_tileset
 from vico.geo.tiles3d.volumes import ECEF, TileWindow, boxes_touch
+from vico.geo.tiles3d.welding import welded
 
 FRAME = LocalFrame(60.169, 24.9435)
 PLACE = at_place(60.169, 24.9435)

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from road_city import HALF, RoadCity, lanes_of, road_city
-from vico.geo.gtfs import DAY, Feed, GtfsRoute, GtfsStop, Pattern, read_gtfs
+from vico.geo.gtfs.feed import DAY, Feed, GtfsRoute, GtfsStop, Pattern
+from vico.geo.gtfs.reader import read_gtfs
 from vico.geo.osm import OsmNode, OsmRelation
 from vico.sim.transit import DWELL, departure, plan_buses
 from vico.world.heights import HeightField

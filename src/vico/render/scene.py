@@ -12,9 +12,7 @@ from vico.errors import InputError
 from vico.render.arrays import (
     ANYWHERE,
     INDOORS,
-    INSTANCE_GROUP,
     OUTDOORS,
-    InstanceGroups,
     Instances,
     PosedAvatars,
     Prototypes,
@@ -22,6 +20,14 @@ from vico.render.arrays import (
 )
 from vico.render.compiled import kernel
 from vico.render.geometry import Mesh, Soup, clustered, grouped, joined_meshes, mesh_of, simplified, soup_of, spans
+from vico.render.instances import (
+    NO_GROUPS,
+    entities_of,
+    joined_instances,
+    matrix_rows,
+    neighbours_together,
+    with_spare,
+)
 from vico.render.lighting import Lighting, cloud_map, linear_table, sky_table, tone_table, unit
 from vico.render.records import COUNTS, ROOM, SPAN, SPHERE
 from vico.render.shading.light import Light, ReliefMap, ShadowMap
@@ -111,7 +117,7 @@ class Scene:
             np.zeros(0, np.int32),
             np.zeros(0, np.uint8),
             np.zeros(0, SPHERE),
-            _NO_GROUPS,
+            NO_GROUPS,
         )
         self._placed = self._spacious = empty
         # The mesh and the arrays whose triangles and colours it holds.
@@ -154,12 +160,12 @@ class Scene:
         if unknown:
             raise InputError(f"scene: no prototype called {unknown[0]}; there are {len(self.names)} others")
         number = np.array([self.names[name] for name in prototype_names], np.int32)
-        rows = _rows(transforms, len(number))
+        rows = matrix_rows(transforms, len(number))
         inside = np.broadcast_to(np.asarray(indoor, bool), len(number))
         where = np.where(inside, INDOORS, OUTDOORS).astype(np.uint8)
-        added = _neighbours_together(self._instances(rows, number, _entities(entities, len(number)), where))
+        added = neighbours_together(self._instances(rows, number, entities_of(entities, len(number)), where))
         moving = self._moving()
-        self._placed = _joined(self._placed, added)
+        self._placed = joined_instances(self._placed, added)
         self._set_instances(moving)
         outdoors = ~inside
         if outdoors.any():
@@ -174,9 +180,9 @@ class Scene:
         number = np.atleast_1d(np.asarray(prototype_index, np.int32))
         if number.size and (number.min() < 0 or number.max() >= len(self.names)):
             raise InputError(f"scene: prototype index {int(number.max())} of {len(self.names)}")
-        rows = _rows(transforms, len(number))
+        rows = matrix_rows(transforms, len(number))
         where = np.full(len(number), ANYWHERE, np.uint8)
-        self._set_instances(self._instances(rows, number, _entities(entity, len(number)), where))
+        self._set_instances(self._instances(rows, number, entities_of(entity, len(number)), where))
 
     def set_skinned(
         self,
@@ -283,7 +289,7 @@ class Scene:
             all_of.entity[moving],
             all_of.where[moving],
             all_of.sphere[moving],
-            _NO_GROUPS,
+            NO_GROUPS,
         )
 
     def _instances(
@@ -301,13 +307,13 @@ class Scene:
         sphere["x"], sphere["y"], sphere["z"] = centre.T
         # A hair more than exact, for the rounding.
         sphere["radius"] = np.linalg.norm(high - low, axis=1) / 2 * scale * 1.001
-        return Instances(rows, number, entity, where, sphere, _NO_GROUPS)
+        return Instances(rows, number, entity, where, sphere, NO_GROUPS)
 
     def _set_instances(self, moving: Instances) -> None:
         """Put what moves behind what stays; copying all that stays is left for when there is no room."""
         fixed, count = len(self._placed.entity), len(moving.entity)
         if self._spacious is not self._placed or len(self.arrays.instances.entity) < fixed + count:
-            self._replace(instances=_with_spare(self._placed, count * 5 // 4 + 8))
+            self._replace(instances=with_spare(self._placed, count * 5 // 4 + 8))
             self._spacious = self._placed
         all_of, rows = self.arrays.instances, slice(fixed, fixed + count)
         all_of.matrix[rows], all_of.prototype[rows], all_of.entity[rows] = (
@@ -378,77 +384,6 @@ def _prototypes(soups: Sequence[Soup]) -> tuple[Prototypes, list[Mesh]]:
 
 def _no_avatars() -> PosedAvatars:
     return PosedAvatars(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), np.zeros(0, SPAN))
-
-
-def _joined(a: Instances, b: Instances) -> Instances:
-    where, sphere = np.concatenate([a.where, b.where]), np.concatenate([a.sphere, b.sphere])
-    return Instances(
-        np.concatenate([a.matrix, b.matrix]),
-        np.concatenate([a.prototype, b.prototype]),
-        np.concatenate([a.entity, b.entity]),
-        where,
-        sphere,
-        _groups_of(where, sphere),
-    )
-
-
-def _with_spare(a: Instances, spare: int) -> Instances:
-    def wide(values: NDArray[Any]) -> NDArray[Any]:
-        return np.concatenate([values, np.zeros((spare, *values.shape[1:]), values.dtype)])
-
-    return Instances(wide(a.matrix), wide(a.prototype), wide(a.entity), wide(a.where), wide(a.sphere), a.groups)
-
-
-_NO_GROUPS = InstanceGroups(
-    np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), np.zeros(0, np.uint8), np.zeros(0, np.float32)
-)
-
-
-def _groups_of(where: NDArray[np.uint8], sphere: NDArray[np.void]) -> InstanceGroups:
-    if not len(where):
-        return _NO_GROUPS
-    starts = np.arange(0, len(where), INSTANCE_GROUP)
-    centre, radius = _centres(sphere), sphere["radius"]
-    # A hair more than exact, for the rounding of sums in single precision.
-    low = np.minimum.reduceat(centre - radius[:, None], starts) - np.float32(0.001)
-    high = np.maximum.reduceat(centre + radius[:, None], starts) + np.float32(0.001)
-    least, most = np.minimum.reduceat(where, starts), np.maximum.reduceat(where, starts)
-    mixed = np.where(least == most, least, np.uint8(ANYWHERE)).astype(np.uint8)
-    return InstanceGroups(low, high, mixed, np.maximum.reduceat(radius, starts))
-
-
-def _centres(sphere: NDArray[np.void]) -> NDArray[np.float32]:
-    return np.stack([sphere["x"], sphere["y"], sphere["z"]], axis=1)
-
-
-def _neighbours_together(a: Instances) -> Instances:
-    """Return the same things in another order: outdoors, then indoors, each along a curve that fills space."""
-    if not len(a.entity):
-        return a
-    centre = _centres(a.sphere).astype(np.float64)
-    cell = np.floor((centre - centre.min(axis=0)) / max(float(np.ptp(centre, axis=0).max()), 1e-6) * 1023.0)
-    code = np.zeros(len(cell), np.int64)
-    for bit in range(10):
-        for axis in range(3):
-            code |= ((cell[:, axis].astype(np.int64) >> bit) & 1) << (3 * bit + axis)
-    order = np.lexsort((np.arange(len(code)), code, a.where))
-    return Instances(a.matrix[order], a.prototype[order], a.entity[order], a.where[order], a.sphere[order], a.groups)
-
-
-def _rows(transforms: ArrayLike, count: int) -> NDArray[np.float32]:
-    matrices = np.asarray(transforms, np.float32)
-    if matrices.shape != (count, 4, 4):
-        raise InputError(f"scene: transforms of shape {matrices.shape}; expected ({count}, 4, 4)")
-    if not np.isfinite(matrices).all():
-        raise InputError("scene: a transform is not finite")
-    return np.ascontiguousarray(matrices[:, :3])
-
-
-def _entities(values: ArrayLike, count: int) -> NDArray[np.int32]:
-    entities = np.atleast_1d(np.asarray(values, np.int32))
-    if entities.shape != (count,):
-        raise InputError(f"scene: entities of shape {entities.shape}; expected ({count},)")
-    return np.ascontiguousarray(entities)
 
 
 def _with_room(mesh: Mesh, used: tuple[int, int], vertices: int, triangles: int) -> Mesh:

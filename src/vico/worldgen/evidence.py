@@ -10,7 +10,8 @@ from pathlib import Path
 from vico.errors import InputError
 from vico.geo.elevation import HeightSamples, read_elevation
 from vico.geo.frame import LocalFrame
-from vico.geo.gtfs import Feed, read_gtfs
+from vico.geo.gtfs.feed import Feed
+from vico.geo.gtfs.reader import read_gtfs
 from vico.geo.osm import OsmData, read_osm
 from vico.geo.places.google import GooglePlaces, google_key
 from vico.geo.places.model import FoundPlace

@@ -14,94 +14,12 @@ from numpy.typing import NDArray
 from vico.assets.people.clothes import darker, front_of
 from vico.assets.people.heads import head_parts
 from vico.assets.people.lofts import BodyPart, LoftRing, Weights, blend, dense, loft, merged, skinned
+from vico.assets.people.measures import ARM, FINGER, FOREARM, LEG, LEG_EASE, TOP_EASE, TORSO, UPPER_ARM
 from vico.assets.people.model import FINGERS, JOINTS, Appearance, Colour, J, SkinnedBody
 
 # Arms rest this far below the horizontal: halfway between walking and reaching, where shoulders deform best.
 _ARM_DROP = np.radians(58)
 _TORSO_SIDES = 18
-
-# Height of the ring, then front, back and half-width for a male and for a female body of average build.
-_TORSO = np.array(
-    [
-        [0.478, 0.045, 0.050, 0.070, 0.045, 0.050, 0.072],
-        [0.492, 0.057, 0.068, 0.088, 0.058, 0.072, 0.093],
-        [0.510, 0.062, 0.075, 0.096, 0.062, 0.080, 0.102],
-        [0.530, 0.062, 0.075, 0.098, 0.062, 0.079, 0.105],
-        [0.560, 0.061, 0.066, 0.095, 0.060, 0.067, 0.101],
-        [0.590, 0.060, 0.056, 0.089, 0.058, 0.054, 0.089],
-        [0.620, 0.059, 0.050, 0.085, 0.055, 0.047, 0.079],
-        [0.650, 0.060, 0.050, 0.085, 0.055, 0.047, 0.077],
-        [0.680, 0.063, 0.054, 0.089, 0.060, 0.051, 0.081],
-        [0.710, 0.067, 0.059, 0.094, 0.072, 0.055, 0.086],
-        [0.735, 0.069, 0.062, 0.099, 0.076, 0.058, 0.090],
-        [0.760, 0.066, 0.064, 0.103, 0.068, 0.060, 0.093],
-        [0.785, 0.058, 0.062, 0.107, 0.056, 0.059, 0.097],
-        [0.805, 0.049, 0.057, 0.108, 0.047, 0.054, 0.098],
-        [0.820, 0.040, 0.048, 0.094, 0.039, 0.045, 0.084],
-        [0.832, 0.035, 0.041, 0.066, 0.034, 0.038, 0.059],
-        [0.842, 0.031, 0.037, 0.043, 0.029, 0.034, 0.038],
-        [0.855, 0.029, 0.034, 0.033, 0.026, 0.031, 0.029],
-        [0.885, 0.028, 0.033, 0.032, 0.025, 0.030, 0.028],
-    ]
-)
-# Height, front, back, half-width of a leg.
-_LEG = np.array(
-    [
-        [0.515, 0.040, 0.048, 0.036],
-        [0.495, 0.050, 0.058, 0.046],
-        [0.470, 0.053, 0.057, 0.049],
-        [0.440, 0.052, 0.051, 0.047],
-        [0.400, 0.049, 0.046, 0.044],
-        [0.350, 0.043, 0.041, 0.039],
-        [0.315, 0.037, 0.036, 0.034],
-        [0.285, 0.034, 0.031, 0.032],
-        [0.260, 0.031, 0.032, 0.031],
-        [0.225, 0.029, 0.038, 0.032],
-        [0.190, 0.027, 0.037, 0.030],
-        [0.140, 0.023, 0.030, 0.024],
-        [0.095, 0.020, 0.024, 0.019],
-        [0.060, 0.019, 0.022, 0.018],
-        [0.040, 0.019, 0.022, 0.018],
-    ]
-)
-# Distance along the arm from the shoulder joint, then half-thickness front-back and across.
-_ARM = np.array(
-    [
-        [-0.040, 0.020, 0.014],
-        [-0.018, 0.031, 0.021],
-        [0.004, 0.035, 0.027],
-        [0.035, 0.034, 0.029],
-        [0.070, 0.030, 0.028],
-        [0.110, 0.027, 0.026],
-        [0.150, 0.024, 0.024],
-        [0.172, 0.023, 0.023],
-        [0.192, 0.025, 0.023],
-        [0.220, 0.025, 0.022],
-        [0.260, 0.021, 0.019],
-        [0.300, 0.017, 0.015],
-        [0.318, 0.016, 0.0125],
-    ]
-)
-_UPPER_ARM, _FOREARM = 0.172, 0.148
-# Along the arm to the knuckle, sideways towards the thumb, length, of index, middle, pinky and ring finger.
-_FINGER = {
-    "index": (0.376, 0.0150, 0.043),
-    "middle": (0.380, 0.0050, 0.047),
-    "pinky": (0.367, -0.0145, 0.034),
-    "ring": (0.376, -0.0050, 0.043),
-}
-# What a garment adds to every radius.
-_TOP_EASE = {
-    "t-shirt": 0.004,
-    "shirt": 0.005,
-    "jumper": 0.008,
-    "hoodie": 0.010,
-    "jacket": 0.011,
-    "suit": 0.008,
-    "coat": 0.013,
-    "dress": 0.002,
-}
-_LEG_EASE = {"trousers": 0.007, "jeans": 0.0035, "shorts": 0.009, "skirt": 0.0, "leggings": 0.0008}
 
 
 class _Tailor:
@@ -119,11 +37,11 @@ class _Tailor:
         self.brawn = (look.muscle - 0.5) * 2 * (0.5 + 0.5 * male)
         self.shoulder_y = (0.098 + 0.012 * male + 0.004 * self.brawn - 0.004 * child) * self.h
         self.hip_y = (0.053 - 0.003 * male) * self.h
-        self.torso = _TORSO[:, 4:7] * (1 - male) + _TORSO[:, 1:4] * male
+        self.torso = TORSO[:, 4:7] * (1 - male) + TORSO[:, 1:4] * male
         if child > 0:
-            plain = _TORSO[:, 1:4] * np.array([0.92, 0.9, 0.92])
+            plain = TORSO[:, 1:4] * np.array([0.92, 0.9, 0.92])
             self.torso = self.torso * (1 - child) + plain * child
-        z = _TORSO[:, 0]
+        z = TORSO[:, 0]
         belly = np.exp(-(((z - 0.61) / 0.07) ** 2))
         chest = np.exp(-(((z - 0.75) / 0.05) ** 2))
         trunk = np.where(z < 0.84, 1.0, 0.35)
@@ -155,7 +73,7 @@ class _Tailor:
             joints[J[f"{side}_foot"]] = 0.070 * h, left * self.hip_y * 1.02, z(0.011)
             joints[J[f"{side}_collar"]] = -0.004 * h, left * 0.022 * h, z(0.798)
             joints[J[f"{side}_shoulder"]] = -0.006 * h, left * self.shoulder_y, z(0.803)
-            for name, along in (("elbow", _UPPER_ARM), ("wrist", _UPPER_ARM + _FOREARM)):
+            for name, along in (("elbow", UPPER_ARM), ("wrist", UPPER_ARM + FOREARM)):
                 joints[J[f"{side}_{name}"]] = self.on_arm(joints, side, along)
             for finger, points in self.fingers(joints, side).items():
                 for k in range(3):
@@ -187,7 +105,7 @@ class _Tailor:
             if finger == "thumb":
                 along, ahead, palm, length, way = 0.336, 0.012, 0.006, 0.058, np.array([0.72, 0.62, 0.3])
             else:
-                along, ahead, length = _FINGER[finger]
+                along, ahead, length = FINGER[finger]
                 palm, way = 0.0, np.array([1.0, 0.25 * ahead / 0.015 * 0.3, 0.12])
             way = way / np.linalg.norm(way)
             at, row = np.array([along, ahead, palm]), []
@@ -224,19 +142,19 @@ def _torso(tailor: _Tailor) -> list[BodyPart]:
     tucked = look.bottom == "skirt" or look.top == "shirt"
     hem = 0.585 if tucked and look.top in ("t-shirt", "shirt", "jumper") else 0.505
     neckline = {"t-shirt": 0.838, "dress": 0.815, "hoodie": 0.848, "shirt": 0.852, "coat": 0.850}.get(look.top, 0.843)
-    ease = _TOP_EASE[look.top]
+    ease = TOP_EASE[look.top]
     below = look.top_colour if look.top == "dress" else look.bottom_colour
-    heights = np.unique(np.concatenate([_TORSO[:, 0], [hem, neckline]]))
+    heights = np.unique(np.concatenate([TORSO[:, 0], [hem, neckline]]))
     rings = []
     for share in heights:
-        radii = np.array([np.interp(share, _TORSO[:, 0], tailor.torso[:, k]) for k in range(3)])
+        radii = np.array([np.interp(share, TORSO[:, 0], tailor.torso[:, k]) for k in range(3)])
         if share >= neckline:
             colour, room = look.skin, 0.0
         elif share >= hem:
             # Cloth hangs from the chest: the waist is hidden a little.
             colour, room = look.top_colour, ease * (1.0 if share < 0.80 else 0.6)
         else:
-            colour, room = below, 0.001 + _LEG_EASE[look.bottom] * 0.5
+            colour, room = below, 0.001 + LEG_EASE[look.bottom] * 0.5
         # Nothing hangs open between the trousers' seat and the thighs.
         front, back, side = (radii + room) * h
         lean = -0.006 - 0.010 * np.clip((share - 0.74) / 0.1, 0, 1)
@@ -256,7 +174,7 @@ def _torso(tailor: _Tailor) -> list[BodyPart]:
         parts.append(_skirt(tailor, *hems[look.top], ease=ease + 0.003, colour=look.top_colour))
     if look.bottom == "skirt" and look.top not in ("dress", "coat"):
         parts.append(_skirt(tailor, 0.60, 0.325, 1.15, ease=0.010, colour=look.bottom_colour))
-    rows = [tailor.z(float(share)) for share in _TORSO[:, 0]]
+    rows = [tailor.z(float(share)) for share in TORSO[:, 0]]
     return parts + front_of(look, merged(parts), tailor.z, neckline, rows)
 
 
@@ -278,10 +196,10 @@ def _skirt(tailor: _Tailor, top: float, hem: float, flare: float, *, ease: float
     h = tailor.h
     shares = np.append(np.linspace(top, hem, 7), hem - 0.004)
     rings = []
-    hips = np.array([np.interp(0.515, _TORSO[:, 0], tailor.torso[:, k]) for k in range(3)])
+    hips = np.array([np.interp(0.515, TORSO[:, 0], tailor.torso[:, k]) for k in range(3)])
     for share in shares:
         down = float(np.clip((0.515 - share) / (0.515 - hem), 0, 1)) if share < 0.515 else 0.0
-        radii = np.array([np.interp(max(share, 0.515), _TORSO[:, 0], tailor.torso[:, k]) for k in range(3)])
+        radii = np.array([np.interp(max(share, 0.515), TORSO[:, 0], tailor.torso[:, k]) for k in range(3)])
         radii = radii + (hips * flare - hips) * down + ease
         centre = (-0.006 * h, 0.0, tailor.z(float(share)))
         front, back, side = radii * h
@@ -311,16 +229,16 @@ def _leg(tailor: _Tailor, side: str) -> list[BodyPart]:
         covered = 1.0
     boots = 0.125 if look.shoes == "boots" else 0.0
     stops = [covered] if covered < 1 else []
-    heights = np.unique(np.concatenate([_LEG[:, 0], stops, [boots] if boots > 0.05 else []]))[::-1]
+    heights = np.unique(np.concatenate([LEG[:, 0], stops, [boots] if boots > 0.05 else []]))[::-1]
     straight = look.bottom in ("trousers", "jeans") and covered < 1
     rings = []
     for share in heights:
-        radii = np.array([np.interp(share, _LEG[::-1, 0], _LEG[::-1, k]) for k in (1, 2, 3)]) * tailor.limb
+        radii = np.array([np.interp(share, LEG[::-1, 0], LEG[::-1, k]) for k in (1, 2, 3)]) * tailor.limb
         colour, room = look.skin, 0.0
         if share < boots + 1e-9:
             colour, room = look.shoes_colour, 0.004
         elif share >= covered - 1e-9 and covered < 1:
-            colour, room = look.bottom_colour, _LEG_EASE[look.bottom]
+            colour, room = look.bottom_colour, LEG_EASE[look.bottom]
             if straight and share < 0.3:
                 # Trouser legs hang from the knee rather than follow the calf.
                 radii = np.maximum(
@@ -406,12 +324,12 @@ def _arm(tailor: _Tailor, side: str) -> list[BodyPart]:
     look = tailor.look
     scale = tailor.h * tailor.trunk
     sleeve = 0.095 if look.top in ("t-shirt", "dress") else 0.322
-    ease = _TOP_EASE[look.top] * 0.8
-    stations = np.unique(np.concatenate([_ARM[:, 0], [sleeve]]))
+    ease = TOP_EASE[look.top] * 0.8
+    stations = np.unique(np.concatenate([ARM[:, 0], [sleeve]]))
     rings = []
     for along in stations:
-        ahead = np.interp(along, _ARM[:, 0], _ARM[:, 1])
-        across = np.interp(along, _ARM[:, 0], _ARM[:, 2])
+        ahead = np.interp(along, ARM[:, 0], ARM[:, 1])
+        across = np.interp(along, ARM[:, 0], ARM[:, 2])
         grow = tailor.limb + 0.10 * tailor.brawn * float(np.exp(-(((along - 0.07) / 0.06) ** 2)))
         inside = along <= sleeve + 1e-9
         room = ease * float(np.clip((along + 0.04) / 0.05, 0, 1)) if inside else 0.0
@@ -425,8 +343,8 @@ def _arm(tailor: _Tailor, side: str) -> list[BodyPart]:
         rings.append(LoftRing(centre, radii[0], radii[0], radii[1], _arm_weights(side, float(along)), colour, 2.1))
         if abs(along - sleeve) < 1e-9:
             # The cuff turns in to the skin.
-            thin = max(np.interp(along, _ARM[:, 0], _ARM[:, 1]) * tailor.limb, 0.012) * scale * 0.95
-            thin2 = max(np.interp(along, _ARM[:, 0], _ARM[:, 2]) * tailor.limb, 0.010) * scale * 0.95
+            thin = max(np.interp(along, ARM[:, 0], ARM[:, 1]) * tailor.limb, 0.012) * scale * 0.95
+            thin2 = max(np.interp(along, ARM[:, 0], ARM[:, 2]) * tailor.limb, 0.010) * scale * 0.95
             rings[-1] = LoftRing(centre, radii[0], radii[0], radii[1], rings[-1].weights, look.top_colour, 2.1)
             back = tailor.on_arm(tailor.joints, side, float(along) - 0.0005)
             rings.append(LoftRing(back, thin, thin, thin2, rings[-1].weights, look.skin, 2.1))
@@ -439,7 +357,7 @@ def _arm_weights(side: str, along: float) -> Weights:
     if along < 0.06:
         return blend(collar, shoulder, float(np.clip((along + 0.045) / 0.06, 0.15, 1)))
     if along < 0.25:
-        return blend(shoulder, elbow, float(np.clip((along - (_UPPER_ARM - 0.022)) / 0.044, 0, 1)))
+        return blend(shoulder, elbow, float(np.clip((along - (UPPER_ARM - 0.022)) / 0.044, 0, 1)))
     return blend(elbow, wrist, float(np.clip((along - 0.310) / 0.02, 0, 1)))
 
 

@@ -6,9 +6,8 @@ up. Where two kinds meet at different heights an upright face closes the step: k
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -31,13 +30,14 @@ from vico.worldgen.ground.bridges.decks import spans_over_water
 from vico.worldgen.ground.bridges.stage import Bridges
 from vico.worldgen.ground.conform import PlanMesh, conforming
 from vico.worldgen.ground.contours import region_above
-from vico.worldgen.ground.drape import CLOSE, NEAR, ROUGH, Curtain, Grid, Heights, curtain, triangulated
+from vico.worldgen.ground.drape import CLOSE, NEAR, ROUGH, Grid, Heights, curtain, triangulated
 from vico.worldgen.ground.grading import is_level, open_water, piped_waters
 from vico.worldgen.ground.kerbs import RAMP, Water, lowered_kerbs
 from vico.worldgen.ground.markings import Quads, pitch_lines, road_markings
 from vico.worldgen.ground.pavings import LOOKS, GroundStyle, coloured, ground_material, look_of
 from vico.worldgen.ground.stairs import flights_of
 from vico.worldgen.ground.thinning import thinned
+from vico.worldgen.ground.upright import border_chains, faced_lines, hung, lowered, parted_by
 
 _UNDERLAY, _UNDERLAY_SLOPED = 0.5, 3.0  # metres below: shows through nothing but the hairlines between two surfaces
 _UNDER_STAIRS = 0.3
@@ -51,7 +51,6 @@ _AT_EDGE = 0.06  # metres within which two outlines are the same edge
 _OVERHANG = 6.0  # metres beside the ways of bridges where water that is hidden goes on
 _HELD = ("yard", "field", "grass", "garden", "woods", "sidewalk", "pedestrian", "path", "parking")
 _PAVED = ("kerb", "steps", "pedestrian", "cycleway", "sidewalk", "path", "parking")
-_LONG = 12.0
 
 
 def ground_from_osm(
@@ -340,73 +339,13 @@ def _used(flat: NDArray[np.float64], faces: NDArray[np.int64]) -> tuple[NDArray[
     return flat[kept], index.reshape(-1, 3)
 
 
-def _hung(found: Curtain, look: GroundStyle, tile: float | None = None) -> list[Surface]:
-    if not len(found.triangles):
-        return []
-    return [
-        Surface.from_triangles(
-            found.positions,
-            found.triangles,
-            colour=coloured(look, found.positions[:, :2]),
-            entity=look.entity,
-            uv=found.uv / (tile or look.tile),
-            normals=found.normals,
-            material=ground_material(look.material),
-        )
-    ]
-
-
-def _faced_lines(shapes: Iterable[BaseGeometry], low: Heights, high: Heights, spacing: float) -> list[BaseGeometry]:
-    """Outlines with the inside to their right, with as many points as their heights need."""
-    rings = [
-        ring
-        for shape in shapes
-        for polygon in polygons_of(shape, 0.05)
-        for ring in (polygon.normalize().exterior, *polygon.normalize().interiors)
-    ]
-    if not rings:
-        return []
-    dense = shapely.segmentize(np.array(rings, object), spacing)
-    points, owner = shapely.get_coordinates(dense, return_index=True)
-    corner = np.zeros(len(points), bool)
-    own = shapely.get_coordinates(rings)
-    # Points of the rings themselves stay; of those between only where heights bend, and every few metres.
-    keys = {(round(x, 6), round(y, 6)) for x, y in own.tolist()}
-    corner[:] = [(round(x, 6), round(y, 6)) in keys for x, y in points.tolist()]
-    bend = np.zeros(len(points))
-    for heights in (low, high):
-        z = heights(points)
-        bend[1:-1] = np.maximum(bend[1:-1], np.abs(z[:-2] - 2 * z[1:-1] + z[2:]))
-    kept = corner | (bend > 0.002)
-    kept[1:] |= bend[:-1] > 0.002
-    kept[:-1] |= bend[1:] > 0.002
-    kept |= np.arange(len(points)) % max(round(_LONG / spacing), 1) == 0
-    lines = []
-    borders = [0, *(np.flatnonzero(owner[1:] != owner[:-1]) + 1).tolist(), len(owner)]
-    for start, end in pairwise(borders):
-        chosen = points[start:end][kept[start:end]]
-        if len(chosen) > 1:
-            lines.append(shapely.LineString(chosen))
-    return lines
-
-
-def _chains(plan: PlanMesh, edges: NDArray[np.int64], reach: float) -> list[BaseGeometry]:
-    """Edges of the plan joined to lines; those on the rim of what is drawn are left out."""
-    pieces = plan.corners[edges]
-    rim = np.abs(pieces).max(axis=2).min(axis=1) > reach - 0.01
-    if rim.all():
-        return []
-    lines = shapely.multilinestrings([shapely.linestrings(pieces[~rim])])[0]
-    return list(shapely.get_parts(shapely.line_merge(lines, directed=True)))
-
-
 def _kerbs(
     plan: PlanMesh, laid: Sequence[_Piece], streets: StreetPolygons, terrain: HeightField, reach: float
 ) -> list[Surface]:
     """Make the faces of kerb stones: between the very corners of what lies on both sides."""
     numbers = np.array([k for k, piece in enumerate(laid) if piece.carriageway], np.int64)
-    lines = _chains(plan, plan.border(numbers, shapely.boundary(streets.carriageway))[:, ::-1], reach)
-    return _hung(curtain(lines, terrain.lower, terrain.upper, least=0.004), LOOKS["kerb"])
+    lines = border_chains(plan, plan.border(numbers, shapely.boundary(streets.carriageway))[:, ::-1], reach)
+    return hung(curtain(lines, terrain.lower, terrain.upper, least=0.004), LOOKS["kerb"])
 
 
 def _under_bridges(site: SiteFacts, wet: BaseGeometry, window: Polygon) -> list[Polygon]:
@@ -444,41 +383,22 @@ def _banks(
             continue
         water = waters[piece.water]
         rims = plan.border(np.array([number]), outline)
-        over, bank = _sorted_by(_chains(plan, rims[:, ::-1], window.bounds[2]), over_spans)
-        found += _hung(curtain(bank, _below(water.level, 0.3), terrain.upper), LOOKS["quay"])
-        found += _hung(curtain(over, lambda xy: terrain.upper(xy) - _SLAB, terrain.upper), LOOKS["kerb"])
+        over, bank = parted_by(border_chains(plan, rims[:, ::-1], window.bounds[2]), over_spans)
+        found += hung(curtain(bank, lowered(water.level, 0.3), terrain.upper), LOOKS["quay"])
+        found += hung(curtain(over, lambda xy: terrain.upper(xy) - _SLAB, terrain.upper), LOOKS["kerb"])
     for shape in under:
         water = waters[int(tree.nearest(shape))]
         flat, faces = triangulated([shape])
         up = np.broadcast_to((0.0, 0.0, 1.0), (len(flat), 3))
         found.append(_surface(flat, water.level(flat), np.asarray(up), faces, LOOKS["water"]))
         found.append(_surface(flat, terrain.smooth(flat) - _SLAB, -np.asarray(up), faces[:, ::-1], LOOKS["kerb"]))
-        edges = _faced_lines([shape], water.level, terrain.smooth, 3.0)
-        _, walls = _sorted_by(edges, overlay.buffer(dry, _AT_EDGE))
-        found += _hung(
-            curtain(walls, _below(water.level, 0.3), lambda xy: terrain.smooth(xy) - _SLAB + 0.02),
+        edges = faced_lines([shape], water.level, terrain.smooth, 3.0)
+        _, walls = parted_by(edges, overlay.buffer(dry, _AT_EDGE))
+        found += hung(
+            curtain(walls, lowered(water.level, 0.3), lambda xy: terrain.smooth(xy) - _SLAB + 0.02),
             LOOKS["quay"],
         )
     return found
-
-
-def _below(heights: Heights, depth: float) -> Heights:
-    return lambda xy: heights(xy) - depth
-
-
-def _sorted_by(lines: Sequence[BaseGeometry], area: BaseGeometry) -> tuple[list[BaseGeometry], list[BaseGeometry]]:
-    """Segments of lines that lie within an area, and the rest; directions kept."""
-    if not len(lines):
-        return [], []
-    points, line = shapely.get_coordinates(list(lines), return_index=True)
-    first = np.flatnonzero(line[:-1] == line[1:])
-    shapely.prepare(area)
-    inside = np.ones(len(first), bool)
-    for share in (0.0, 0.5, 1.0):
-        at = points[first] + share * (points[first + 1] - points[first])
-        inside &= shapely.contains_xy(area, at[:, 0], at[:, 1])
-    pieces = np.stack([points[first], points[first + 1]], axis=1)
-    return list(shapely.linestrings(pieces[inside])), list(shapely.linestrings(pieces[~inside]))
 
 
 def _tactile(streets: StreetPolygons, terrain: HeightField, window: Polygon) -> list[Surface]:

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from vico.errors import InputError
 from vico.io.compiled import compiled
 from vico.world.mesh import Material, Surface
+from vico.worldgen.photos.chart_planes import level_turns, plane_axes, projected
+from vico.worldgen.photos.packing import pack
 
 _GUTTER = 4  # pixels around a chart: two mip levels before neighbours mix
 _BEND = np.cos(np.radians(14.0))  # neighbouring faces that turn less than this share a chart ...
@@ -168,7 +169,7 @@ def unwrap(
     for layer in (False, True):
         mine = np.flatnonzero(roof[index] == layer)
         if len(mine):
-            places[mine] = _pack(cells[mine] + 2 * _GUTTER, page)
+            places[mine] = pack(cells[mine] + 2 * _GUTTER, page)
             places[mine, 0] += first
             first = int(places[mine, 0].max()) + 1
     charts = []
@@ -309,19 +310,19 @@ def _patches(surfaces: Sequence[Surface], layers: int) -> _Patches:
     # Degenerate slivers join no patch; `-1` indexes the spare last entry of tables by patch.
     n = len(seeds)
     plane = normal[seeds].reshape(-1, 3)
-    right, up = _axes(plane)
+    right, up = plane_axes(plane)
     member = np.flatnonzero(label >= 0)
     patch = label[member]
     by_patch = np.argsort(patch, kind="stable")
     patch, member = patch[by_patch], member[by_patch]
     base = points[seeds, 0].reshape(-1, 3)
-    flat_x, flat_y = _projected(points[member], patch, base, right, up)
-    turn = _turns(flat_x, flat_y, patch, plane)
+    flat_x, flat_y = projected(points[member], patch, base, right, up)
+    turn = level_turns(flat_x, flat_y, patch, plane)
     right, up = (
         np.cos(turn)[:, None] * right + np.sin(turn)[:, None] * up,
         -np.sin(turn)[:, None] * right + np.cos(turn)[:, None] * up,
     )
-    flat_x, flat_y = _projected(points[member], patch, base, right, up)
+    flat_x, flat_y = projected(points[member], patch, base, right, up)
     first = np.searchsorted(patch, np.arange(n))
     low = np.zeros((n, 2))
     high = np.zeros((n, 2))
@@ -384,88 +385,6 @@ def _grow(points, normal, order, start, neighbours, charted):  # type: ignore[no
                     top += 1
         count += 1
     return label, seeds
-
-
-def _axes(normal: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Right and up of planes as seen from outside: up is as near to the zenith as it gets."""
-    up = np.array([0.0, 0.0, 1.0]) - normal * normal[:, 2:]
-    level = np.linalg.norm(up, axis=1) < 1e-3
-    up[level] = np.array([0.0, 1.0, 0.0]) - normal[level] * normal[level, 1:2]
-    up /= np.linalg.norm(up, axis=1, keepdims=True)
-    return np.cross(up, normal), up
-
-
-def _projected(
-    points: NDArray[np.float64],
-    patch: NDArray[np.int64],
-    base: NDArray[np.float64],
-    right: NDArray[np.float64],
-    up: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    away = points - base[patch][:, None]
-    return np.einsum("nkc,nc->nk", away, right[patch]), np.einsum("nkc,nc->nk", away, up[patch])
-
-
-def _turns(
-    x: NDArray[np.float64], y: NDArray[np.float64], patch: NDArray[np.int64], plane: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Angles that lay the charts of flat roofs along their longer sides; walls and slopes stand as they are."""
-    turn = np.zeros(len(plane))
-    level = plane[:, 2] > 0.995
-    take = level[patch]
-    if not take.any():
-        return turn
-    which = np.flatnonzero(level)
-    compact = np.cumsum(level) - 1
-    points = np.column_stack([x[take].ravel(), y[take].ravel()])
-    hulls = shapely.oriented_envelope(shapely.multipoints(points, indices=np.repeat(compact[patch[take]], 3)))
-    for k, hull in zip(which, hulls, strict=True):
-        ring = shapely.get_coordinates(hull)
-        if len(ring) == 5:
-            sides = np.diff(ring, axis=0)[:2]
-            along = sides[int(np.linalg.norm(sides[1]) > np.linalg.norm(sides[0]) + 1e-6)]
-            angle = float(np.arctan2(along[1], along[0]))
-            turn[k] = (angle + np.pi / 2) % np.pi - np.pi / 2
-    return turn
-
-
-def _pack(cells: NDArray[np.int64], page: int) -> NDArray[np.int64]:
-    """Place rectangles (width, height) on pages: page, x, y of each; the highest first, each as low as it goes."""
-    order = np.lexsort((np.arange(len(cells)), -cells[:, 0], -cells[:, 1]))
-    return _skyline(cells, order, page) if len(cells) else np.zeros((0, 3), np.int64)
-
-
-@compiled(nogil=True)
-def _skyline(cells, order, page):  # type: ignore[no-untyped-def]
-    places = np.zeros((len(cells), 3), np.int64)
-    tops = np.zeros((len(cells), page), np.int32)
-    pages = 1
-    queue = np.zeros(page, np.int64)
-    for index in order:
-        w, h = cells[index]
-        k = 0
-        while True:
-            top = tops[k]
-            best, best_x = page + 1, -1
-            head, tail = 0, 0
-            for x in range(page):
-                while tail > head and top[queue[tail - 1]] <= top[x]:
-                    tail -= 1
-                queue[tail] = x
-                tail += 1
-                left = x - w + 1
-                if left >= 0:
-                    if queue[head] < left:
-                        head += 1
-                    if top[queue[head]] < best:
-                        best, best_x = top[queue[head]], left
-            if best + h <= page:
-                places[index] = k, best_x, best
-                top[best_x : best_x + w] = best + h
-                break
-            k += 1
-            pages = max(pages, k + 1)
-    return places
 
 
 def _page_sizes(charts: Sequence[Chart], page: int) -> list[tuple[int, int]]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 
-from vico.geo.gtfs import Feed
+from vico.geo.gtfs.feed import Feed
 from vico.geo.osm import OsmData
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
@@ -119,7 +119,7 @@ def transit_from_osm(
     seed
         Decides what the map leaves open: planned stops, bikes in a station.
     feeds
-        Timetables of the same window (`vico.geo.gtfs.read_gtfs`).
+        Timetables of the same window (`vico.geo.gtfs.reader.read_gtfs`).
 
     Returns
     -------

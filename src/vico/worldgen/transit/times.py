@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from vico.geo.gtfs import DAY
+from vico.geo.gtfs.feed import DAY
 from vico.world.model import Line, Stop
 from vico.worldgen.transit.drive import BUS_LENGTH, Berth, Drive
 

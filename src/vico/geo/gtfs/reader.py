@@ -6,13 +6,11 @@ space. Rows that can't be used are left out and named in `Feed.broken`.
 
 from __future__ import annotations
 
-import csv
-import io
 import re
 import zipfile
 import zlib
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from datetime import date, timedelta
 from itertools import pairwise
@@ -22,13 +20,10 @@ import numpy as np
 
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
+from vico.geo.gtfs.feed import Feed, GtfsRoute, GtfsStop, Pattern
+from vico.geo.gtfs.tables import FeedTables
 from vico.io.files import sha256_of
 
-DAY = 86_400
-
-_MOST_BYTES = 4 << 30  # unpacked, of one table
-_MOST_RATIO = 400  # unpacked to packed; timetables pack 10 to 40 to 1
-_MOST_LINE = 1 << 16
 _MOST_STOPS = 400  # calls of one trip
 _MOST_REPEATS = 2_000  # departures that one row of frequencies.txt may stand for
 _MOST_DAYS = 3_660
@@ -38,83 +33,6 @@ _TIME = re.compile(r"\s*(\d{1,3}):([0-5]\d):([0-5]\d)\s*")
 _DATE = re.compile(r"(\d{4})(\d\d)(\d\d)")
 _COLOUR = re.compile(r"[0-9a-fA-F]{6}")
 _TRAMS = {0, 5, 12, *range(900, 907)}
-
-
-@dataclass(frozen=True)
-class GtfsStop:
-    """A stop in the window; `xy` metres, ENU."""
-
-    id: str
-    name: str
-    xy: tuple[float, float]
-
-
-@dataclass(frozen=True)
-class GtfsRoute:
-    """A route that stops in the window; `kind` is bus or tram, `colour` ``#rrggbb`` or empty."""
-
-    id: str
-    name: str
-    title: str
-    kind: str
-    colour: str
-    agency: str
-
-
-@dataclass(frozen=True)
-class Pattern:
-    """Trips of a route that call at the same stops of the window in the same order.
-
-    Attributes
-    ----------
-    route
-        Id of the route.
-    direction
-        ``0`` or ``1`` as the feed says, else empty.
-    stops
-        Ids of the calls in the window: the longest run of a trip between two of its calls outside.
-    departures
-        Seconds of the service day at which a bus leaves the first of them, sorted; beyond 86,400 after midnight.
-    travel
-        Seconds from then to each of them, in the median of the trips; the first is 0.
-    line
-        The way driven in the window's surroundings, ENU metres, shape ``(n, 2)`` as tuples; empty where no shape says.
-    """
-
-    route: str
-    direction: str
-    stops: tuple[str, ...]
-    departures: tuple[int, ...]
-    travel: tuple[int, ...]
-    line: tuple[tuple[float, float], ...] = ()
-
-
-@dataclass(frozen=True)
-class Feed:
-    """What a GTFS feed says about a window on one day of service.
-
-    Attributes
-    ----------
-    name, sha256
-        Of the file.
-    day
-        The day whose timetable it is, ISO 8601; empty where nothing runs in the window.
-    stops, routes, patterns
-        Those of buses and trams that stop in the window, sorted by id; patterns of trams are not among them.
-    attribution
-        Who publishes it, as the feed says.
-    broken
-        Id and fault of rows that were left out (the first 200).
-    """
-
-    name: str
-    sha256: str
-    day: str
-    stops: tuple[GtfsStop, ...]
-    routes: tuple[GtfsRoute, ...]
-    patterns: tuple[Pattern, ...]
-    attribution: str
-    broken: tuple[tuple[str, str], ...] = ()
 
 
 def read_gtfs(path: Path, frame: LocalFrame, half: float, *, day: date | None = None) -> Feed:
@@ -183,24 +101,6 @@ def _date_of(text: str) -> date | None:
         return None
 
 
-class _Bounded(io.RawIOBase):
-    """A member of a zip, unpacked no further than its bound."""
-
-    def __init__(self, stream: io.BufferedIOBase, most: int, what: str) -> None:
-        self._stream, self._left, self._what = stream, most, what
-
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
-        data = self._stream.read(len(buffer))
-        self._left -= len(data)
-        if self._left < 0:
-            raise SchemaError(f"{self._what} unpacks to an absurd size; this is no timetable")
-        buffer[: len(data)] = data
-        return len(data)
-
-
 # stop_sequence, stop id, arrival, departure (None where not given)
 Call = tuple[int, str, int | None, int | None]
 
@@ -218,18 +118,14 @@ class _Trip:
 
 class _Reader:
     def __init__(self, path: Path, archive: zipfile.ZipFile, frame: LocalFrame, half: float) -> None:
-        self.path, self.archive, self.frame, self.half = path, archive, frame, half
+        self.path, self.frame, self.half = path, frame, half
+        self._tables = FeedTables(path, archive)
+        self._rows = self._tables.rows
         self.broken: list[tuple[str, str]] = []
-        self.members: dict[str, zipfile.ZipInfo] = {}
-        for info in archive.infolist():
-            parts = info.filename.replace("\\", "/").split("/")
-            # Some feeds lie in a folder of their zip.
-            if len(parts) <= 2 and parts[-1].endswith(".txt"):
-                self.members.setdefault(parts[-1], info)
 
     def read(self, day: date | None) -> Feed:
-        self._need("stops.txt", "routes.txt", "trips.txt", "stop_times.txt")
-        if "calendar.txt" not in self.members and "calendar_dates.txt" not in self.members:
+        self._tables.need("stops.txt", "routes.txt", "trips.txt", "stop_times.txt")
+        if "calendar.txt" not in self._tables.members and "calendar_dates.txt" not in self._tables.members:
             raise SchemaError(f"{self.path}: has neither calendar.txt nor calendar_dates.txt; a GTFS feed has one")
         agencies = self._agencies()
         stops, parents = self._stops()
@@ -254,52 +150,9 @@ class _Reader:
             broken=tuple(self.broken),
         )
 
-    # -- tables ------------------------------------------------------------------------------------------------------
-
-    def _need(self, *names: str) -> None:
-        for name in names:
-            if name not in self.members:
-                raise SchemaError(f"{self.path}: has no {name}, which every GTFS feed has; download it again")
-
     def _fault(self, what: str, why: str) -> None:
         if len(self.broken) < _MOST_BROKEN:
             self.broken.append((what, why))
-
-    def _lines(self, text: io.TextIOWrapper, name: str) -> Iterator[str]:
-        while line := text.readline(_MOST_LINE):
-            if len(line) >= _MOST_LINE:
-                raise SchemaError(f"{self.path}: {name} has a line of more than {_MOST_LINE:,} characters")
-            yield line.replace("\0", "")
-
-    def _rows(self, name: str, needed: Sequence[str], wanted: Sequence[str] = ()) -> Iterator[list[str]]:
-        """Return the named columns of a table, row by row; empty texts for optional columns that it lacks."""
-        if name not in self.members:
-            return
-        info = self.members[name]
-        most = min(_MOST_BYTES, max(info.compress_size, 1 << 14) * _MOST_RATIO)
-        if info.file_size > most:
-            raise SchemaError(f"{self.path}: {name} unpacks to an absurd size; this is no timetable")
-        with self.archive.open(info) as stream:
-            raw = io.BufferedReader(_Bounded(stream, most, f"{self.path}: {name}"), 1 << 16)  # type: ignore[arg-type]
-            text = io.TextIOWrapper(raw, encoding="utf-8-sig", newline="")
-            table = csv.reader(self._lines(text, name))
-            try:
-                header = [column.strip() for column in next(table, [])]
-                missing = [column for column in needed if column not in header]
-                if missing:
-                    raise SchemaError(f"{self.path}: {name} has no column {missing[0]}; the feed can't be used")
-                at = [header.index(column) if column in header else -1 for column in (*needed, *wanted)]
-                last = max(at)
-                for row in table:
-                    if len(row) > last:
-                        yield [row[k] if k >= 0 else "" for k in at]
-                    elif row:
-                        row = row + [""] * (last + 1 - len(row))
-                        yield [row[k] if k >= 0 else "" for k in at]
-            except UnicodeDecodeError as error:
-                raise SchemaError(f"{self.path}: {name} is not UTF-8 ({error.reason}); save it as UTF-8") from None
-            except csv.Error as error:
-                raise SchemaError(f"{self.path}: {name}, line {table.line_num}: {error}; mend the table") from None
 
     def _agencies(self) -> dict[str, str]:
         return {key.strip(): name.strip() for name, key in self._rows("agency.txt", ["agency_name"], ["agency_id"])}

@@ -1,0 +1,1 @@
+"""Timetables: zipped GTFS feeds, cut to a window."""
