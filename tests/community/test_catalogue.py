@@ -9,6 +9,7 @@ import pytest
 
 from vico.community import catalogue
 from vico.community.jobs import job_of
+from vico.community.usual_hours import usual_spans
 from vico.errors import InputError, SchemaError
 
 PAGE = Path(__file__).parents[2] / "docs" / "adding_people.md"
@@ -63,3 +64,15 @@ def test_values_that_hobbies_and_groups_name_exist() -> None:
     known = {value.name for value in catalogue.basic_values()}
     named = {v for entry in (*catalogue.hobbies(), *catalogue.circles()) for v in entry.values}
     assert named <= known
+
+
+def test_usual_hours_of_a_kind_of_ones_own(own_data: Path) -> None:
+    (own_data / "hours_mine.toml").write_text('[[usual]]\nhours = "05:00-14:00"\nkinds = ["fish_market"]\n')
+    assert usual_spans("fish_market", "store") == [(300, 840)]
+    assert usual_spans("cafe", "food") == [(450, 1140)]
+
+
+def test_usual_hours_that_nobody_can_read_are_told(own_data: Path) -> None:
+    (own_data / "hours_mine.toml").write_text('[[usual]]\nhours = "at dawn"\nkinds = ["fish_market"]\n')
+    with pytest.raises(SchemaError, match=r"hours_mine\.toml: usual\.0\.hours: 'at dawn' says no hours"):
+        usual_spans("fish_market", "store")

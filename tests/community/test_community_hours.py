@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from vico.community.hours import open_spans, usual_spans
+from vico.community.hours import open_spans
+from vico.community.usual_hours import usual_spans
 
 TUESDAY, SATURDAY, SUNDAY = 1, 5, 6
 

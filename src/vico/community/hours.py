@@ -1,4 +1,4 @@
-"""Opening hours: the common forms of OSM's `opening_hours`, and what is usual where a place says nothing."""
+"""Opening hours: the common forms of OSM's `opening_hours`."""
 
 from __future__ import annotations
 
@@ -15,24 +15,6 @@ _DAYS = re.compile(rf"{_DAY}(?:\s*-\s*{_DAY})?(?:\s*,\s*{_DAY}(?:\s*-\s*{_DAY})?
 _TIMES = re.compile(r"(\d{1,2})(?::(\d{2}))?\s*-\s*(\d{1,2})(?::(\d{2}))?")
 # A comma before a day name starts a new rule ("Mo-Fr 8:00-20:00, Sa 9:00-18:00"), unless it only lists days.
 _RULES = re.compile(rf";|,\s*(?={_DAYS.pattern}\s*(?:\d|off|closed))")
-
-_USUAL: dict[str, tuple[str, ...]] = {
-    "07:30-19:00": ("cafe", "coffee", "bakery", "pastry", "confectionery"),
-    "11:00-23:00": ("restaurant", "food_court", "fast_food", "ice_cream"),
-    "16:00-24:00": ("bar", "pub", "biergarten", "nightclub", "casino"),
-    "10:00-18:00": ("museum", "gallery", "arts_centre", "attraction", "zoo", "aquarium"),
-    "09:00-20:00": ("library", "community_centre", "social_centre"),
-    "12:00-23:30": ("cinema", "theatre", "bowling_alley", "miniature_golf", "amusement_arcade", "events_venue"),
-    "06:30-22:00": ("fitness_centre", "sports_centre", "swimming_pool", "sports_hall", "dance"),
-    "07:00-22:00": ("supermarket", "convenience", "kiosk", "grocery", "greengrocer", "department_store", "mall"),
-    "08:00-18:00": ("marketplace", "pharmacy", "clinic", "doctors", "dentist", "post_office", "place_of_worship"),
-    "08:00-17:00": ("school", "kindergarten", "university", "college", "music_school", "language_school"),
-    "10:00-19:00": ("store",),
-    "08:00-18:30": ("office",),
-    "24/7": ("open", "transit", "accommodation", "park", "garden", "square", "hotel", "hostel", "station", "police"),
-    "10:00-22:00": ("entertainment", "food"),
-}
-_USUAL_BY_KIND = {kind: text for text, kinds in _USUAL.items() for kind in kinds}
 
 
 def _days_of(text: str) -> set[int]:
@@ -106,11 +88,3 @@ def open_spans(text: str, weekday: int) -> list[Span] | None:
         return None
     spill = [(0, end - MINUTES) for _, end in week[(weekday - 1) % 7] if end > MINUTES]
     return sorted(spill + week[weekday])
-
-
-def usual_spans(kind: str, category: str) -> list[Span]:
-    """When a place of this kind is usually open on a working day."""
-    text = _USUAL_BY_KIND.get(kind) or _USUAL_BY_KIND.get(category, "08:00-20:00")
-    spans = open_spans(text, 1)
-    assert spans is not None
-    return spans

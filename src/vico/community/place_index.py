@@ -8,7 +8,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from vico.community.hours import Span, open_spans, usual_spans
+from vico.community.hours import Span, open_spans
+from vico.community.usual_hours import usual_spans
 from vico.errors import EmptyInputError
 from vico.world.folder import World
 from vico.world.model import Category, Place, Point2
