@@ -17,7 +17,7 @@ from vico.geo.osm import OsmArea, OsmData
 from vico.geo.overlay import OverlayError
 from vico.world.check.buildings import check_buildings_apart, check_buildings_closed, check_buildings_seated
 from vico.world.folder import World
-from vico.worldgen.buildings import details, drafts, stage
+from vico.worldgen.buildings import details, drafts, proving, stage
 from vico.worldgen.buildings.stage import BuildingsResult, buildings_from_plans
 from vico.worldgen.facts.outlines.plans import BuildingPlan, BuildingPlans, PartPlan
 from vico.worldgen.facts.outlines.roof_shapes import Roof
@@ -60,15 +60,25 @@ def test_a_sound_building_stays_as_it_was_planned() -> None:
     assert [record.roof_shape for record in built.records] == ["hipped", "hipped"]
 
 
-def test_of_two_buildings_on_one_spot_the_second_is_left_out() -> None:
+def test_of_two_buildings_on_one_spot_one_is_left_out() -> None:
     built, told = built_of(house("w1"), house("w2"))
-    assert [record.id for record in built.records] == ["w1"]
-    assert told["w2"].startswith("can't be made: even as a plain block")
-    assert "faces of w1" in told["w2"]
+    assert len(built.records) == 1
+    assert [reason for name, reason in told.items() if " " not in name] == [
+        "can't be made: OverlayError: nothing is left of it beside what stands there; see whether it is mapped twice"
+    ]
 
 
-def test_a_building_with_a_wall_in_its_neighbours_plane_becomes_a_block_beside_it() -> None:
+def test_a_building_with_a_wall_in_its_neighbours_plane_is_cut_there() -> None:
     flap = Polygon([(-8, 0), (9, 0), (9, 10), (0, 10), (0, 0.003), (-8, 0.003)])  # along its neighbour's wall
+    built, told = built_of(house("w1", shapely.box(-12, 0, 0, 10)), house("w2", flap))
+    assert [record.roof_shape for record in built.records] == ["hipped", "hipped"]
+    assert "in one plane with faces of w1" in told["w2 details"]
+    assert shapely.Polygon(built.records[1].footprint[0]).bounds == pytest.approx((0.05, 0, 9, 10), abs=0.002)
+
+
+def test_a_building_that_stays_in_anothers_plane_when_cut_becomes_a_block(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(proving, "_cut", lambda plan, _: plan.parts)
+    flap = Polygon([(-8, 0), (9, 0), (9, 10), (0, 10), (0, 0.003), (-8, 0.003)])
     built, told = built_of(house("w1", shapely.box(-12, 0, 0, 10)), house("w2", flap))
     assert [record.roof_shape for record in built.records] == ["hipped", "flat"]
     assert "in one plane with faces of w1" in told["w2 roof and details"]

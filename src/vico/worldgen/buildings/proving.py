@@ -1,8 +1,9 @@
 """Every building is held to the rules that a finished world is checked by, before anything is painted on it.
 
 Whatever a map draws, a building that would be a finding is made again, plainer: small solids that are at fault go, a
-part that would hover is brought down, and else the building becomes a block with a flat roof over its cleaned outline.
-One that fails even so is left out. What is left out or made plainer is told, with the reason.
+part that would hover is brought down, one that shares a plane with another is cut where that stands, and else the
+building becomes a block with a flat roof over its cleaned outline. One that fails even so is left out. What is left out
+or made plainer is told, with the reason.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
+from shapely import Polygon
 
 from vico.geo import overlay
 from vico.geo.overlay import OverlayError
@@ -29,25 +31,50 @@ from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
 from vico.worldgen.facts.outlines.roof_shapes import Roof
 
 _APART = 0.02  # metres that a block keeps from its neighbours' walls, so that no two lie in one plane
-_GAP = 0.05  # metres between parts over which a block goes on
+_GAP = 0.05  # metres between parts over which a block goes on, and that a part is cut off from another
 _LEAST_EAVES = 2.5  # metres above the ground floor
 _FLOATS = "building floats"
 
 
 class _Fault(NamedTuple):
-    """A rule that a building breaks: which and how, and which of its solids is at fault (None: all together)."""
+    """A rule that a building breaks.
+
+    Attributes
+    ----------
+    solid
+        Which of its solids is at fault; None: all together.
+    rule, what
+        Which rule, and how it is broken.
+    other
+        Outline of another solid that it is too near to; None: it is at fault by itself.
+    """
 
     building: str
     solid: int | None
     rule: str
     what: str
+    other: Polygon | None = None
 
 
 @dataclass
 class _Remedy:
-    """What is done about a building's faults: which small solids go, and why; else why it is lowered or a block."""
+    """What is done about a building's faults, by their reasons; the last that has one counts.
+
+    Attributes
+    ----------
+    without
+        Small solids that go, and why.
+    cut, others
+        Why parts are cut, and by which outlines each.
+    lowered
+        Why the lowest part is brought down.
+    block
+        Why it becomes a block.
+    """
 
     without: dict[int, str] = field(default_factory=dict)
+    cut: str = ""
+    others: dict[int, list[Polygon]] = field(default_factory=dict)
     lowered: str = ""
     block: str = ""
 
@@ -70,10 +97,11 @@ def proven(drafts: list[Draft], terrain: HeightField, dropped: list[Dropped]) ->
         The buildings, in their order, and all their solids.
     """
     standing = {draft.plan.id: draft for draft in drafts}
+    cut: set[str] = set()
     blocks: set[str] = set()
     while True:
         mesh = joined([draft.meshes for draft in standing.values()])
-        remedies = _remedies(_faults(standing, blocks, mesh, terrain), standing)
+        remedies = _remedies(_faults(standing, blocks, mesh, terrain), standing, cut)
         if not remedies:
             return list(standing.values()), mesh
         for name, remedy in remedies.items():
@@ -87,6 +115,8 @@ def proven(drafts: list[Draft], terrain: HeightField, dropped: list[Dropped]) ->
                 del standing[name]
                 continue
             standing[name] = made
+            if remedy.block or remedy.cut:
+                cut.add(name)
             if remedy.block:
                 blocks.add(name)
 
@@ -108,32 +138,33 @@ def _faults(standing: Mapping[str, Draft], blocks: set[str], mesh: SolidMesh, te
         low = min((float(body.positions[:, 2].min()) for body in draft.bodies), default=math.inf)
         for finding in unseated(record_of(draft, 1), low, terrain):
             yield _Fault(names[k], None, finding.id, finding.what)
-    for (one, other), pairs in overlapping_faces(corners, owner).items():
+    for pairs in overlapping_faces(corners, owner).values():
         area = float(pairs.area.sum())
         solids = np.stack([mesh.part[pairs.first], mesh.part[pairs.second]], axis=1)
         for pair in np.unique(solids, axis=0).tolist():
-            k, solid = _to_blame(
-                [(int(of), s - int(first[of])) for s in pair for of in [mesh.plan_of_part[s]]], drafts, blocks
+            whose = [int(mesh.plan_of_part[solid]) for solid in pair]
+            (k, solid), (n, other) = _giving_way(
+                [(k, solid - int(first[k])) for k, solid in zip(whose, pair, strict=True)], drafts, blocks
             )
-            whom = "itself" if one == other else names[other if k == one else one]
-            yield _Fault(
-                names[k], solid, "building faces overlap", f"{area:.2f} m2 lie in one plane with faces of {whom}"
-            )
+            whom = "itself" if k == n else names[n]
+            against = drafts[n].plan.solids[other].polygon if (k, solid) != (n, other) else None
+            what = f"{area:.2f} m2 lie in one plane with faces of {whom}"
+            yield _Fault(names[k], solid, "building faces overlap", what, against)
 
 
-def _to_blame(pair: list[tuple[int, int]], drafts: list[Draft], blocks: set[str]) -> tuple[int, int]:
-    """Choose which of two solids gives way: a small one before a part, then of the smaller building not yet a block."""
+def _giving_way(pair: list[tuple[int, int]], drafts: list[Draft], blocks: set[str]) -> list[tuple[int, int]]:
+    """Put the solid first that gives way: a small one before a part, then of the smaller building not yet a block."""
 
     def weight(solid: tuple[int, int]) -> tuple[bool, bool, float, int, int]:
         draft = drafts[solid[0]]
         part = solid[1] < len(draft.plan.parts)
         return part, draft.plan.id in blocks, draft.footprint.area if part else 0.0, -solid[0], -solid[1]
 
-    return min(pair, key=weight)
+    return sorted(pair, key=weight)
 
 
-def _remedies(faults: Iterator[_Fault], standing: Mapping[str, Draft]) -> dict[str, _Remedy]:
-    """Decide what is done about faults: the least that can help."""
+def _remedies(faults: Iterator[_Fault], standing: Mapping[str, Draft], cut: set[str]) -> dict[str, _Remedy]:
+    """Decide what is done about faults: the least that can help and was not done before."""
     made: dict[str, _Remedy] = {}
     for fault in faults:
         remedy = made.setdefault(fault.building, _Remedy())
@@ -142,6 +173,9 @@ def _remedies(faults: Iterator[_Fault], standing: Mapping[str, Draft]) -> dict[s
             remedy.without.setdefault(fault.solid, fault.what)
         elif fault.rule == _FLOATS and min(part.low for part in plan.parts) > 0.0:
             remedy.lowered = remedy.lowered or fault.what
+        elif fault.solid is not None and fault.other is not None and fault.building not in cut:
+            remedy.cut = remedy.cut or fault.what
+            remedy.others.setdefault(fault.solid, []).append(fault.other)
         else:
             remedy.block = remedy.block or fault.what
     return made
@@ -160,11 +194,30 @@ def _remedied(draft: Draft, remedy: _Remedy, terrain: HeightField, dropped: list
         made = drafted(replace(draft.plan, parts=parts, rooftop=[]), draft.look, terrain)
         dropped.append(Dropped(id=f"{name} details", reason=f"brought down to the ground: {remedy.lowered}"))
         return made
+    if remedy.cut:
+        made = drafted(replace(draft.plan, parts=_cut(draft.plan, remedy.others), rooftop=[]), draft.look, terrain)
+        dropped.append(Dropped(id=f"{name} details", reason=f"cut where others stand: {remedy.cut}"))
+        return made
     solids = draft.plan.solids
     dropped += [Dropped(id=f"{name} {solids[k].finish}", reason=why) for k, why in sorted(remedy.without.items())]
     kept = [k for k in range(len(solids)) if k not in remedy.without]
     plan = replace(draft.plan, rooftop=[solids[k] for k in kept if k >= len(draft.plan.parts)])
     return replace(draft, plan=plan, meshes=[draft.meshes[k] for k in kept])
+
+
+def _cut(plan: BuildingPlan, others: Mapping[int, list[Polygon]]) -> list[PartPlan]:
+    """Return the parts of a building, some of them cut by outlines of others."""
+    made: list[PartPlan] = []
+    for k, part in enumerate(plan.parts):
+        if k not in others:
+            made.append(part)
+            continue
+        taken = overlay.buffer(overlay.union_all(others[k]), _GAP, join_style="mitre")
+        rest = without_slivers(overlay.difference(part.polygon, taken), part.polygon)
+        made += [replace(part, polygon=piece) for piece in rest]
+    if not made:
+        raise OverlayError("nothing is left of it beside what stands there; see whether it is mapped twice")
+    return made
 
 
 def _block(plan: BuildingPlan) -> BuildingPlan:
