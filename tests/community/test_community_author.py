@@ -21,6 +21,8 @@ from vico.errors import EmptyInputError, InputError
 from vico.world.folder import World
 from vico.world.model import Category
 
+_ALWAYS = ("accommodation", "open", "transit")
+
 
 @pytest.mark.parametrize("seed", range(8))
 def test_the_validator_finds_nothing_in_any_draft(town: World, seed: int) -> None:
@@ -34,6 +36,21 @@ def test_helsinki_is_peopled_without_a_finding(helsinki: World) -> None:
 @pytest.mark.parametrize("count", [1, 2, 3, 7, 60])
 def test_any_number_of_residents_is_possible(town: World, count: int) -> None:
     assert len(build_community(town, residents=count, seed=1).residents) == count
+
+
+@pytest.mark.parametrize("hours", ["08:00-10:30, 11:00-16:00", "09:00-13:00, 16:00-20:00", "06:00-08:30, 17:00-02:00"])
+def test_shifts_heed_midday_closings(hours: str) -> None:
+    world = make_world(tuple((*p[:3], f"Mo-Su {hours}") if p[1] not in _ALWAYS else p for p in PLACES))
+    for seed in range(3):
+        assert check_community(procedural_author(world, residents=30, seed=seed), world) == []
+
+
+def test_hundreds_are_peopled_without_a_finding(helsinki: World) -> None:
+    community = build_community(helsinki, residents=300, seed=3)
+    assert len({r.name for r in community.residents}) == 300
+    sizes = [len(g.members) for g in community.groups]
+    assert min(sizes) >= 2
+    assert np.median(sizes) <= 8
 
 
 def test_names_are_unique(town: World) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from vico.community.hours import open_spans
+from vico.community.hours import open_spans, staffed
 from vico.community.usual_hours import usual_spans
 
 TUESDAY, SATURDAY, SUNDAY = 1, 5, 6
@@ -35,3 +35,8 @@ def test_opening_hours_are_read(text: str, weekday: int, expected: list[tuple[in
 def test_every_category_has_usual_hours() -> None:
     for category in ("accommodation", "food", "store", "office", "entertainment", "open", "transit"):
         assert usual_spans("something unheard of", category)
+
+
+def test_staff_stay_over_a_short_closing_and_go_home_over_a_long_one() -> None:
+    assert staffed([(480, 630), (660, 960)]) == [(420, 1020)]
+    assert staffed([(540, 780), (960, 1200)]) == [(480, 840), (900, 1260)]

@@ -2,6 +2,7 @@
 
 import math
 import time
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
 import numpy as np
@@ -110,3 +111,33 @@ def test_a_walk_across_the_map_is_found_quickly(router: Router, trips: list[tupl
         router.path(a, b)
         times.append(time.process_time() - start)
     assert float(np.median(times)) < 0.03
+
+
+def test_landmarks_change_no_way(helsinki: World, trips: list[tuple[np.ndarray, np.ndarray]]) -> None:
+    plain, learned = Router(helsinki.walkable), Router(helsinki.walkable)
+    for a, b in trips * 2:  # more searches than landmarks wait for
+        learned.path(a, b)
+    for a, b in trips[:12]:
+        one, two = plain.path(a, b), learned.path(a, b)
+        assert one is not None
+        assert two is not None
+        np.testing.assert_array_equal(one, two)
+
+
+def test_threads_may_share_a_router(helsinki: World, trips: list[tuple[np.ndarray, np.ndarray]]) -> None:
+    router = Router(helsinki.walkable)
+    alone = [router.path(a, b) for a, b in trips]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(lambda trip: router.path(*trip), trips * 3, timeout=100))
+    for k, route in enumerate(together):
+        expected = alone[k % len(trips)]
+        assert route is not None
+        assert expected is not None
+        np.testing.assert_array_equal(route, expected)
+
+
+def test_a_coarser_map_measures_walks_alike(helsinki: World, trips: list[tuple[np.ndarray, np.ndarray]]) -> None:
+    fine, coarse = Router(helsinki.walkable), Router(helsinki.walkable.coarser())
+    ratios = [coarse.length(a, b) / fine.length(a, b) for a, b in trips]
+    assert np.median(ratios) == pytest.approx(1.0, abs=0.02)
+    assert max(ratios) < 1.5

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from datetime import date, timedelta
 from typing import Protocol
@@ -202,7 +203,7 @@ def _cash(chance: np.random.Generator, draft: ResidentDraft) -> int:
 def _known(index: PlaceIndex, draft: ResidentDraft, frequented: Sequence[str], mine: Sequence[Meeting]) -> list[str]:
     """Where they go, where they meet, where their hobbies could take them, and what they pass on their own street."""
     known = [draft.home, *([draft.workplace] if draft.workplace else []), *frequented, *(m.place.id for m in mine)]
-    near = sorted(index.places(), key=lambda p: (round(index.metres(draft.home, p.id), 3), p.id))
+    near = index.by_nearness(draft.home)
     for hobby in draft.hobbies:
         known += [p.id for p in near if p.kind in hobby.kinds][:2]
     for category in (Category.FOOD, Category.STORE, Category.OPEN, Category.TRANSIT):
@@ -211,11 +212,10 @@ def _known(index: PlaceIndex, draft: ResidentDraft, frequented: Sequence[str], m
 
 
 def _groups(meetings: Sequence[Meeting]) -> list[Group]:
-    names = [m.circle.name for m in meetings]
     return [
         Group(
             id=f"group_{k}",
-            name=m.circle.name if names.count(m.circle.name) == 1 else f"{m.circle.name} at {m.place.name}",
+            name=name,
             description=m.circle.description,
             activity=m.circle.activity,
             place=m.place.id,
@@ -223,8 +223,23 @@ def _groups(meetings: Sequence[Meeting]) -> list[Group]:
             start=clock_of(m.start * 60),
             end=clock_of(m.end * 60),
         )
-        for k, m in enumerate(meetings)
+        for k, (m, name) in enumerate(zip(meetings, _group_names(meetings), strict=True))
     ]
+
+
+def _group_names(meetings: Sequence[Meeting]) -> list[str]:
+    """Name groups after their circle, with as much of place and time as tells them apart; chains share names."""
+    forms = [
+        [
+            m.circle.name,
+            f"{m.circle.name} at {m.place.name}",
+            f"{m.circle.name} at {m.place.name}, {clock_of(m.start * 60)[:5]}",
+            f"{m.circle.name} at {m.place.name}, {clock_of(m.start * 60)[:5]} ({m.place.id})",
+        ]
+        for m in meetings
+    ]
+    counts = [Counter(names) for names in zip(*forms, strict=True)]
+    return [next(name for name, count in zip(mine, counts, strict=True) if count[name] == 1) for mine in forms]
 
 
 __all__ = ["Author", "CommunityFinding", "ResidentDraft", "build_community", "procedural_author"]

@@ -6,8 +6,10 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from heapq import heapify, heappop, heapreplace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vico.community.catalogue import Circle, circles, neighbours_circle
 from vico.community.people import ResidentDraft
@@ -35,37 +37,103 @@ class Meeting:
         return self.circle.slot
 
 
-def is_free(index: PlaceIndex, draft: ResidentDraft, meeting: Meeting, others: Sequence[Meeting]) -> bool:
-    """Whether somebody can come to a meeting, beside work, sleep and the other groups they are in."""
-    start, end, place = meeting.start, meeting.end, meeting.place.id
-    early, late = 7 * 60 + 30, 22 * 60
-    if draft.shift is not None:
-        if draft.shift[1] >= 21 * 60 + 30:
-            early = 9 * 60 + 30
-        if draft.shift[0] <= 7 * 60:
-            late = 20 * 60 + 30
-        assert draft.workplace is not None
-        walk = index.estimate(draft.workplace, place)
-        inside = draft.shift[0] + 120 <= start and end <= draft.shift[1] - 90
-        if inside and meeting.slot == "lunch":
-            if walk > _MAX_LUNCH_WALK or draft.shift[1] - draft.shift[0] < 360:
-                return False
-        elif not (draft.shift[1] + walk <= start or end + walk <= draft.shift[0]):
-            return False
-    home = index.estimate(draft.home, place)
-    if start - home < early or end + home > late:
-        return False
-    for other in others:
-        walk = index.estimate(other.place.id, place)
-        if start < other.end + walk and other.start < end + walk:
-            return False
-        if meeting.slot == other.slot == "lunch" or meeting.circle.name == other.circle.name:
-            return False
-    return True
+class _Attendance:
+    """Who likes which of some meetings, and who is free for it, as arrays of all people.
+
+    Parameters
+    ----------
+    meetings
+        What may come about.
+    drafts
+        Everybody, in the order of their numbers.
+    """
+
+    def __init__(self, index: PlaceIndex, meetings: Sequence[Meeting], drafts: Sequence[ResidentDraft]) -> None:
+        self._index, self._meetings = index, list(meetings)
+        everybody = _Timetable.of(index, drafts)
+        likes: dict[str, NDArray[np.float64]] = {}
+        for meeting in self._meetings:
+            name = meeting.circle.name
+            if name not in likes:
+                likes[name] = np.array([_liking(s, meeting.circle) for s in drafts])
+        self._likes = likes
+        self._free = [everybody.free_for(index, meeting) for meeting in self._meetings]
+        self._walks: dict[str, NDArray[np.int64]] = {}
+        self._starts = np.array([m.start for m in self._meetings], np.int64)
+        self._ends = np.array([m.end for m in self._meetings], np.int64)
+        self._lunch = np.array([m.slot == "lunch" for m in self._meetings], bool)
+        self._names = np.array([m.circle.name for m in self._meetings])
+        self._places = np.array([index.spot[m.place.id] for m in self._meetings], np.int64)
+
+    def likes(self, k: int) -> NDArray[np.float64]:
+        """How much a meeting appeals to everybody, 0 to whom it does not or who is not free; shape ``(people,)``."""
+        return np.where(self._free[k], self._likes[self._names[k]], 0.0)
+
+    def join(self, person: int, group: Meeting) -> None:
+        """Note that somebody has joined a group: other meetings then may not be for them."""
+        place = group.place.id
+        if place not in self._walks:
+            self._walks[place] = self._index.estimates(place, self._places)
+        walk = self._walks[place]
+        off = (self._starts < group.end + walk) & (group.start < self._ends + walk)
+        off |= self._names == group.circle.name
+        if group.slot == "lunch":
+            off |= self._lunch
+        for k in np.flatnonzero(off).tolist():
+            self._free[k][person] = False
+
+
+@dataclass(frozen=True)
+class _Timetable:
+    """When people can be where, as arrays of all people.
+
+    Attributes
+    ----------
+    home, work
+        Spots (`PlaceIndex.spot`); -1 for no work.
+    start, end
+        Working hours, minutes of the day.
+    early, late
+        From when and until when they go out, minutes of the day.
+    """
+
+    home: NDArray[np.int64]
+    work: NDArray[np.int64]
+    start: NDArray[np.int64]
+    end: NDArray[np.int64]
+    early: NDArray[np.int64]
+    late: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, index: PlaceIndex, drafts: Sequence[ResidentDraft]) -> _Timetable:
+        shifts = [draft.shift or (-1, -1) for draft in drafts]
+        start, end = (np.array([shift[k] for shift in shifts], np.int64) for k in (0, 1))
+        works = [draft.workplace if draft.shift is not None else None for draft in drafts]
+        return cls(
+            home=np.array([index.spot[draft.home] for draft in drafts], np.int64),
+            work=np.array([-1 if work is None else index.spot[work] for work in works], np.int64),
+            start=start,
+            end=end,
+            early=np.where(end >= 21 * 60 + 30, 9 * 60 + 30, 7 * 60 + 30),
+            late=np.where((start >= 0) & (start <= 7 * 60), 20 * 60 + 30, 22 * 60),
+        )
+
+    def free_for(self, index: PlaceIndex, meeting: Meeting) -> NDArray[np.bool_]:
+        """Whether each can come to a meeting, beside work and sleep, by estimated walks; shape ``(people,)``."""
+        start, end, place = meeting.start, meeting.end, meeting.place.id
+        home = index.estimates(place, self.home)
+        free = (start - home >= self.early) & (end + home <= self.late)
+        walk = index.estimates(place, np.maximum(self.work, 0))
+        beside = (self.end + walk <= start) | (end + walk <= self.start)
+        if meeting.slot == "lunch":
+            inside = (self.start + 120 <= start) & (end <= self.end - 90)
+            short = (walk <= _MAX_LUNCH_WALK) & (self.end - self.start >= 360)
+            beside = np.where(inside, short, beside)
+        return free & (beside | (self.work < 0))
 
 
 def _exactly(index: PlaceIndex, draft: ResidentDraft, meeting: Meeting, others: Sequence[Meeting]) -> bool:
-    """Whether the walks really can be made in the time that `is_free` estimated."""
+    """Whether the walks really can be made in the time that was estimated."""
     place = meeting.place.id
     stays = [(o.start, o.end, o.place.id) for o in others]
     if draft.shift is not None and draft.workplace is not None:
@@ -96,7 +164,8 @@ def _number(draft: ResidentDraft) -> int:
     return int(draft.id.removeprefix("resident_"))
 
 
-def _options(rng: np.random.Generator, index: PlaceIndex, circles: Sequence[Circle]) -> list[Meeting]:
+def _options(rng: np.random.Generator, index: PlaceIndex, circles: Sequence[Circle], choice: int) -> list[Meeting]:
+    """Return what may come about: each circle at `choice` places of a kind at most, when they are open."""
     meetings: list[Meeting] = []
     public = index.places([c for c in Category if c not in (Category.TRANSIT, Category.ACCOMMODATION)])
     for circle in circles:
@@ -110,7 +179,7 @@ def _options(rng: np.random.Generator, index: PlaceIndex, circles: Sequence[Circ
         by_kind: Counter[str] = Counter()
         for k in order:
             place = places[int(k)]
-            if by_kind[kind_of(place)] >= 3:
+            if by_kind[kind_of(place)] >= choice:
                 continue
             by_kind[kind_of(place)] += 1
             spans = index.hours(place)
@@ -130,12 +199,13 @@ def form_groups(rng: np.random.Generator, index: PlaceIndex, drafts: Sequence[Re
         If somebody can't be brought together with anybody: the world has too few places.
     """
     wanted = max(1, round(len(drafts) * 4.4 / 15))
-    options = _options(rng, index, circles())
+    choice = max(3, math.ceil(len(drafts) / 40))
+    options = _options(rng, index, circles(), choice)
     noise = 1 + 0.25 * rng.random(len(options))
     forming = _Forming(index, drafts, size=math.ceil(len(drafts) / wanted) + 1)
     forming.form_most_liked(options, noise.tolist(), wanted)
     forming.admit_lonely()
-    spare = _options(rng, index, [neighbours_circle()])
+    spare = _options(rng, index, [neighbours_circle()], choice)
     forming.form_for_lonely([*options, *spare], [1.0] * len(options) + [0.05] * len(spare))
     return sorted(forming.groups, key=lambda g: (g.start, g.end, g.place.id, g.circle.name))
 
@@ -151,8 +221,10 @@ class _Forming:
 
     def __init__(self, index: PlaceIndex, drafts: Sequence[ResidentDraft], *, size: int) -> None:
         self.groups: list[Meeting] = []
-        self._index, self._sketches, self._size = index, drafts, size
-        self._joined: dict[str, list[Meeting]] = {s.id: [] for s in drafts}
+        self._index, self._size = index, size
+        self._drafts = sorted(drafts, key=_number)
+        self._joined: list[list[Meeting]] = [[] for _ in drafts]
+        self._counts = np.zeros(len(drafts), np.int64)
         self._names: Counter[str] = Counter()
         self._spots: Counter[str] = Counter()
         self._slots: Counter[str] = Counter()
@@ -161,19 +233,24 @@ class _Forming:
 
     def form_most_liked(self, options: Sequence[Meeting], weights: Sequence[float], wanted: int) -> None:
         """Form the groups that most people like most, until there are `wanted` or none is left."""
-        while len(self.groups) < wanted and (meeting := self._best(options, weights)) is not None:
-            self._found(meeting, self._size)
+        ranking = _Ranking(self, options, weights)
+        while len(self.groups) < wanted and (k := ranking.best()) is not None:
+            self._found(ranking, k, self._size)
 
     def admit_lonely(self) -> None:
         """Let those who are in no group join the one they like best among those they can come to."""
-        for s in self._sketches:
-            if self._joined[s.id]:
-                continue
-            reachable = [g for g in self.groups if self._may_join(s, g)]
-            if reachable:
-                group = max(reachable, key=lambda g: (_liking(s, g.circle), -len(g.members), -self.groups.index(g)))
-                group.members = sorted([*group.members, s], key=_number)
-                self._joined[s.id].append(group)
+        attendance = _Attendance(self._index, self.groups, self._drafts)
+        likes = np.array([attendance.likes(k) for k in range(len(self.groups))]).reshape(-1, len(self._drafts))
+        sizes = np.array([len(group.members) for group in self.groups])
+        for person in np.flatnonzero(self._counts == 0).tolist():
+            # The liked first, of these the small, of these the early formed.
+            for k in np.lexsort((sizes, -likes[:, person])).tolist():
+                if likes[k, person] <= 0:
+                    break
+                if _exactly(self._index, self._drafts[person], self.groups[k], []):
+                    self._join(person, self.groups[k])
+                    sizes[k] += 1
+                    break
 
     def form_for_lonely(self, options: Sequence[Meeting], weights: Sequence[float]) -> None:
         """Form further groups until nobody is alone.
@@ -183,80 +260,115 @@ class _Forming:
         EmptyInputError
             If nobody can be brought together with those who are.
         """
-        while lonely := [s for s in self._sketches if not self._joined[s.id]]:
-            meeting = self._best(options, weights)
-            if meeting is None:
+        if self._counts.all():
+            return
+        ranking = _Ranking(self, options, weights)
+        while not self._counts.all():
+            k = ranking.best()
+            if k is None:
+                lonely = [self._drafts[person] for person in np.flatnonzero(self._counts == 0)]
                 who = ", ".join(f"{s.first} {s.last} ({s.occupation})" for s in lonely)
                 raise EmptyInputError(
                     f"community: world {self._index.world.manifest.name!r} has no place where {who} could meet "
                     "others outside working hours; build a world with a larger --radius, or ask for other --residents"
                 )
-            self._found(meeting, max(self._size, 3))
+            self._found(ranking, k, max(self._size, 3))
 
-    def _may_join(self, draft: ResidentDraft, group: Meeting) -> bool:
-        return (
-            _liking(draft, group.circle) > 0
-            and is_free(self._index, draft, group, [])
-            and _exactly(self._index, draft, group, [])
-        )
+    def attendance(self, options: Sequence[Meeting]) -> _Attendance:
+        """Return who likes some meetings and is free for them beside the groups they are in."""
+        made = _Attendance(self._index, options, self._drafts)
+        for person, groups in enumerate(self._joined):
+            for group in groups:
+                made.join(person, group)
+        return made
 
-    def _fans(self, meeting: Meeting) -> list[tuple[float, ResidentDraft]]:
-        """Return who likes a meeting and is free for it, with how much they like it; the keenest first."""
-        found = []
-        for s in self._sketches:
-            like = _liking(s, meeting.circle)
-            mine = self._joined[s.id]
-            if like > 0 and len(mine) < _MAX_MEMBERSHIPS and is_free(self._index, s, meeting, mine):
-                found.append((like, s))
-        return sorted(found, key=lambda f: (-f[0], _number(f[1])))
+    def gain(self, meeting: Meeting, likes: NDArray[np.float64], weight: float) -> float:
+        """Return how much people like a meeting; what there is already (circle, place, part of the day) counts less.
 
-    def _best(self, candidates: Sequence[Meeting], weights: Sequence[float]) -> Meeting | None:
-        """Return the meeting with the largest gain; None if none brings anybody new together."""
-        top, chosen = 0.0, None
-        for meeting, weight in zip(candidates, weights, strict=True):
-            if (meeting.circle.name, meeting.place.id) in self._tried:
-                continue
-            gain = self._gain(meeting, weight)
-            if gain > top:
-                top, chosen = gain, meeting
-        return chosen
-
-    def _gain(self, meeting: Meeting, weight: float) -> float:
-        """Return how much people like a meeting; what there is already (circle, place, part of the day) counts less."""
-        liked = [(like * (0.2 if self._joined[s.id] else 1.0), s) for like, s in self._fans(meeting)]
-        fresh = sum(1 for _, s in liked if not self._joined[s.id])
-        if fresh == 0 or len(liked) < min(2, len(self._sketches)):
+        It never rises while groups form. 0 if the meeting would bring nobody new together, or was tried.
+        """
+        if (meeting.circle.name, meeting.place.id) in self._tried:
             return 0.0
-        gain = sum(sorted((like for like, _ in liked), reverse=True)[: self._size]) * weight
+        liked = np.where(self._counts < _MAX_MEMBERSHIPS, likes, 0.0)
+        fresh = self._counts == 0
+        if not (liked[fresh] > 0).any() or np.count_nonzero(liked) < min(2, len(self._drafts)):
+            return 0.0
+        gain = float(np.sort(np.where(fresh, liked, 0.2 * liked))[::-1][: self._size].sum()) * weight
         gain *= 0.25 ** self._names[meeting.circle.name] * 0.3 ** self._spots[meeting.place.id]
         gain *= 0.7 ** self._slots[meeting.slot]
         return gain
 
-    def _found(self, meeting: Meeting, limit: int) -> None:
+    def _found(self, ranking: _Ranking, k: int, limit: int) -> None:
         """Bring people together, unless in truth too few can come. Either way the place has had this circle."""
+        meeting = ranking.options[k]
         self._tried.add((meeting.circle.name, meeting.place.id))
-        members = self._members(meeting, limit)
-        if len(members) < min(2, len(self._sketches)):
+        members = self._members(meeting, ranking.attendance.likes(k), limit)
+        if len(members) < min(2, len(self._drafts)):
             return
-        meeting.members = sorted(members, key=_number)
-        for s in meeting.members:
-            self._joined[s.id].append(meeting)
+        self.groups.append(meeting)
+        for person in members:
+            self._join(person, meeting)
+            ranking.attendance.join(person, meeting)
         self._names[meeting.circle.name] += 1
         self._spots[meeting.place.id] += 1
         self._slots[meeting.slot] += 1
-        self.groups.append(meeting)
 
-    def _members(self, meeting: Meeting, limit: int) -> list[ResidentDraft]:
+    def _join(self, person: int, group: Meeting) -> None:
+        group.members = sorted([*group.members, self._drafts[person]], key=_number)
+        self._joined[person].append(group)
+        self._counts[person] += 1
+
+    def _members(self, meeting: Meeting, likes: NDArray[np.float64], limit: int) -> list[int]:
         """Return who comes: those who are in no group first; nobody if none of them can."""
-        liked = self._fans(meeting)
-        members: list[ResidentDraft] = []
-        for _, s in liked:
-            if not self._joined[s.id] and len(members) < limit and _exactly(self._index, s, meeting, []):
-                members.append(s)
+        order = np.argsort(-likes, kind="stable")
+        order = order[(likes[order] > 0) & (self._counts[order] < _MAX_MEMBERSHIPS)]
+        members: list[int] = []
+        for person in order[self._counts[order] == 0].tolist():
+            if len(members) == limit:
+                break
+            if _exactly(self._index, self._drafts[person], meeting, []):
+                members.append(person)
         if not members:
             return []
         # Those who are in a group already come along if this is just their thing, or to make it three.
-        for like, s in liked:
-            if self._joined[s.id] and len(members) < limit and (like > 1.5 or len(members) < 3):
-                members += [s] * _exactly(self._index, s, meeting, self._joined[s.id])
+        for person in order[self._counts[order] > 0].tolist():
+            if len(members) == limit or not (likes[person] > 1.5 or len(members) < 3):
+                break
+            if _exactly(self._index, self._drafts[person], meeting, self._joined[person]):
+                members.append(person)
         return members
+
+
+class _Ranking:
+    """Meetings by their gain, the largest first, each reckoned again only when it comes up: gains never rise.
+
+    Attributes
+    ----------
+    options
+        The meetings.
+    attendance
+        Who likes them and is free.
+    """
+
+    def __init__(self, forming: _Forming, options: Sequence[Meeting], weights: Sequence[float]) -> None:
+        self.options = options
+        self.attendance = forming.attendance(options)
+        self._forming, self._weights = forming, weights
+        self._heap = [(-self._gain(k), k) for k in range(len(options))]
+        heapify(self._heap)
+
+    def best(self) -> int | None:
+        """Return the meeting with the largest gain, of equal ones the first; None if none brings anybody together."""
+        while self._heap:
+            known, k = self._heap[0]
+            gain = self._gain(k)
+            if gain == -known and gain > 0:
+                return k
+            if gain > 0:
+                heapreplace(self._heap, (-gain, k))
+            else:
+                heappop(self._heap)
+        return None
+
+    def _gain(self, k: int) -> float:
+        return self._forming.gain(self.options[k], self.attendance.likes(k), self._weights[k])

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 DAYS = ("Mo", "Tu", "We", "Th", "Fr", "Sa", "Su")
 MINUTES = 24 * 60
 
 #: Open from, until, in minutes of the day; `until` may lie past midnight.
 Span = tuple[int, int]
+
+#: Staff are at their place so long before it opens and after it closes, at most, minutes.
+STAFF_MARGIN = 60
 
 _DAY = "(?:Mo|Tu|We|Th|Fr|Sa|Su|PH|SH)"
 _DAYS = re.compile(rf"{_DAY}(?:\s*-\s*{_DAY})?(?:\s*,\s*{_DAY}(?:\s*-\s*{_DAY})?)*")
@@ -88,3 +92,25 @@ def open_spans(text: str, weekday: int) -> list[Span] | None:
         return None
     spill = [(0, end - MINUTES) for _, end in week[(weekday - 1) % 7] if end > MINUTES]
     return sorted(spill + week[weekday])
+
+
+def staffed_stretches(spans: Sequence[Span]) -> list[list[Span]]:
+    """Group the opening hours of a day into stretches between which staff go home.
+
+    A place that closes at midday for less than twice `STAFF_MARGIN` stays staffed: one stretch of two spans.
+    """
+    stretches: list[list[Span]] = []
+    for span in sorted(spans):
+        if stretches and span[0] - max(end for _, end in stretches[-1]) <= 2 * STAFF_MARGIN:
+            stretches[-1].append(span)
+        else:
+            stretches.append([span])
+    return stretches
+
+
+def staffed(spans: Sequence[Span]) -> list[Span]:
+    """Return from when until when staff may be at a place with these opening hours, minutes of the day."""
+    return [
+        (min(start for start, _ in stretch) - STAFF_MARGIN, max(end for _, end in stretch) + STAFF_MARGIN)
+        for stretch in staffed_stretches(spans)
+    ]

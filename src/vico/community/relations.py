@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from vico.community.groups import Meeting
 from vico.community.model import Relation, RelationKind
@@ -103,8 +104,12 @@ def _tie_group(rng: np.random.Generator, network: _Network, group: Meeting) -> N
 
 
 def _tie_colleagues(rng: np.random.Generator, network: _Network, people: Sequence[ResidentDraft]) -> None:
-    for a, b in combinations([s for s in people if s.workplace is not None], 2):
-        if a.workplace == b.workplace:
+    staff: dict[str, list[ResidentDraft]] = {}
+    for s in people:
+        if s.workplace is not None:
+            staff.setdefault(s.workplace, []).append(s)
+    for colleagues in staff.values():
+        for a, b in combinations(colleagues, 2):
             note = "fellow students" if a.status == b.status == "student" else "work at the same place"
             network.tie(a, b, (RelationKind.COLLEAGUE, note), rng.uniform(0.3, 0.7), rng.exponential(3))
 
@@ -112,12 +117,19 @@ def _tie_colleagues(rng: np.random.Generator, network: _Network, people: Sequenc
 def _tie_neighbours(
     rng: np.random.Generator, network: _Network, index: PlaceIndex, people: Sequence[ResidentDraft]
 ) -> None:
-    for a, b in combinations(people, 2):
+    positions = np.array([index.place_by_id[s.home].position[:2] for s in people])
+    near = cKDTree(positions).query_pairs(_NEXT_DOOR, output_type="ndarray")
+    homes: dict[str, list[int]] = {}
+    for k, s in enumerate(people):
+        homes.setdefault(index.place_by_id[s.home].building or f"at {s.home}", []).append(k)
+    together = [pair for members in homes.values() for pair in combinations(members, 2)]
+    for i, j in sorted({*together, *map(tuple, np.sort(near, axis=1).tolist())}):
+        a, b = people[i], people[j]
         if a.household == b.household or "guest" in (a.status, b.status):
             continue
         if index.same_spot(a.home, b.home):
             network.tie(a, b, (RelationKind.NEIGHBOUR, "same house"), rng.uniform(0.2, 0.55), rng.exponential(5))
-        elif index.metres(a.home, b.home) < _NEXT_DOOR and rng.random() < 0.6:
+        elif rng.random() < 0.6:
             network.tie(a, b, (RelationKind.NEIGHBOUR, "next door"), rng.uniform(0.15, 0.45), rng.exponential(5))
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vico.clock import seconds_of_day
+from vico.community.hours import staffed
 from vico.community.jobs import job_of, jobs_at, works_at
 from vico.community.model import LAST, Community, ItemType, Resident, ScheduleItem
 from vico.community.place_index import SPAWN_GAP, PlaceIndex
@@ -21,9 +22,6 @@ from vico.world.folder import World
 from vico.world.model import Category, Place
 
 CASH = (100, 1000)
-
-#: Staff are at their place so long before it opens and after it closes, at most, minutes.
-_STAFF_MARGIN = 60
 
 # A walk may be planned with time to spare, but not with an hour of it.
 _SLACK = 2.0
@@ -251,9 +249,10 @@ class _Check:
         spans = self.index.given_hours(place)
         if spans is None or place.id == r.home:
             return
-        margin = _STAFF_MARGIN * 60 if place.id == r.workplace else 0
         start, end = seconds_of_day(item.start), seconds_of_day(item.end)
-        if not any(a * 60 - margin <= start and end <= b * 60 + margin for a, b in spans):
+        if not any(
+            a * 60 <= start and end <= b * 60 for a, b in (staffed(spans) if place.id == r.workplace else spans)
+        ):
             self.say(
                 where,
                 f"{place.name} is not open {item.start}-{item.end} on {self.community.weekday} ({place.opening_hours})",

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vico.community.catalogue import Job, trades, ways_of_life
-from vico.community.hours import Span
+from vico.community.hours import Span, staffed_stretches
 from vico.community.jobs import jobs_at
 from vico.community.people import Household, ResidentDraft
 from vico.community.place_index import PlaceIndex, kind_of
@@ -47,11 +47,16 @@ def assign_homes(rng: np.random.Generator, index: PlaceIndex, households: Sequen
 def employers(index: PlaceIndex) -> list[Place]:
     """Places where people work on the day: somebody's trade, and not closed."""
     return [
-        p
-        for p in index.places()
-        if p.category is not Category.TRANSIT
-        and jobs_at(p)
-        and any(min(end, 24 * 60) - max(start, 6 * 60) >= 4 * 60 for start, end in index.hours(p))
+        p for p in index.places() if p.category is not Category.TRANSIT and jobs_at(p) and _workdays(index.hours(p))
+    ]
+
+
+def _workdays(spans: Sequence[Span]) -> list[list[Span]]:
+    """Return the stretches of a place's hours that make a working day: four hours or more between six and midnight."""
+    return [
+        stretch
+        for stretch in staffed_stretches(spans)
+        if min(max(end for _, end in stretch), 24 * 60) - max(stretch[0][0], 6 * 60) >= 4 * 60
     ]
 
 
@@ -137,7 +142,8 @@ def _hire(
     held[job.title] += 1
     staff[place.id] += 1
     draft.job, draft.occupation, draft.workplace = job, job.title, place.id
-    start, end = _shift(rng, job.shift, index.hours(place))
+    workdays = _workdays(index.hours(place))
+    start, end = _shift(rng, job.shift, workdays[int(rng.integers(len(workdays))) if len(workdays) > 1 else 0])
     if end > 22 * 60:  # home before midnight, however far
         end = min(end, 23 * 60 + 40 - (index.minutes(place.id, draft.home) or 0)) // 5 * 5
     draft.shift = start, end
@@ -149,9 +155,7 @@ def _five(minutes: float) -> int:
 
 
 def _shift(rng: np.random.Generator, pattern: str, spans: Sequence[Span]) -> tuple[int, int]:
-    """Working hours that fit the pattern of the trade and the hours of the place, minutes."""
-    # What spills over from the night before is nobody's shift here.
-    spans = [span for span in spans if span[1] > 6 * 60] or list(spans)
+    """Working hours that fit the pattern of the trade and a stretch of the place's hours, minutes."""
     opens = max(min(start for start, _ in spans), 6 * 60)
     closes = min(max(end for _, end in spans), 24 * 60)
     low, high = max(5 * 60 + 30, opens - _BEFORE), min(_LATEST, closes + _AFTER)

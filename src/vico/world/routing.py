@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +21,10 @@ _SNAP = 6.0  # metres a start or goal may lie off what can be walked on
 _STRAIGHT, _DIAGONAL = 10, 14  # 10 : 14 for 1 : sqrt 2; a cost unit is a thousandth of a cell on sidewalk
 _RING = 32768  # circular buckets; more than the largest change of f along an edge (14 * 500 + 14 * 100)
 
+# Costs from landmarks are worth their making (a search of the whole map each) to who searches this often.
+_LANDMARKS = 6
+_WORTH_LANDMARKS = 40
+
 # Directions 0 to 3 lead east, west, north and south, 4 to 7 diagonally.
 _FIRST_DIAGONAL = 4
 
@@ -33,17 +38,17 @@ class _Work(NamedTuple):
         Least cost from the start found so far, int64; valid where `stamp` is of this search.
     stamp
         In which search the cell was last seen (an even number), plus 1 where `g` is final. int32.
+    rest
+        Least cost that may be left to the goal (the heuristic), int32; valid where `stamp` is of this search.
     after, before
         Neighbours in the list of the cell's bucket, -1 for none, int32.
-    parent
-        Direction of the step that led here, int8.
     """
 
     g: NDArray[np.int64]
     stamp: NDArray[np.int32]
+    rest: NDArray[np.int32]
     after: NDArray[np.int32]
     before: NDArray[np.int32]
-    parent: NDArray[np.int8]
 
 
 @compiled
@@ -87,79 +92,106 @@ def _may_step(cost, width, height, cell, direction):  # type: ignore[no-untyped-
 
 
 @compiled(inline="always")
-def _least_cost(x, y, goal_x, goal_y):  # type: ignore[no-untyped-def]
-    """Return the cost between two cells if all were sidewalk without walls: what A* goes by; 0 without a goal."""
-    if goal_x < 0:
+def _least_cost(node, goal, width, landmarks):  # type: ignore[no-untyped-def]
+    """Return a cost that no walk between two cells is below, what A* goes by; 0 without a goal.
+
+    The larger of two: the walk if all were sidewalk without walls; and, by the triangle inequality, what the two cells'
+    costs from a landmark differ by.
+    """
+    if goal < 0:
         return 0
-    dx, dy = abs(x - goal_x), abs(y - goal_y)
-    return 100 * (_STRAIGHT * max(dx, dy) + (_DIAGONAL - _STRAIGHT) * min(dx, dy))
+    dx, dy = abs(node % width - goal % width), abs(node // width - goal // width)
+    least = 100 * (_STRAIGHT * max(dx, dy) + (_DIAGONAL - _STRAIGHT) * min(dx, dy))
+    for k in range(landmarks.shape[1]):
+        least = max(least, abs(landmarks[node, k] - landmarks[goal, k]))
+    return least
+
+
+@compiled(inline="always")
+def _step_cost(flat, node, other, direction):  # type: ignore[no-untyped-def]
+    """Return the cost of a step between neighbours."""
+    length = _STRAIGHT if direction < _FIRST_DIAGONAL else _DIAGONAL
+    return length * (np.int64(flat[node]) + np.int64(flat[other])) // 2
 
 
 @compiled
-def _search(cost, work, start, goal, generation):  # type: ignore[no-untyped-def]
+def _search(cost, work, start, goal, generation, landmarks):  # type: ignore[no-untyped-def]
     """Run A* from `start`, or Dijkstra where `goal` is -1, with circular buckets; return whether the goal was met.
 
-    `work.stamp` becomes `generation` where a cell was seen, `generation` + 1 where its cost is final.
+    All cells of all cheapest walks are made final, not those of the first one found alone: so `_backtrack` chooses
+    among them the same way whatever the landmarks. `work.stamp` becomes `generation` where a cell was seen,
+    `generation` + 1 where its cost is final.
     """
-    g, stamp, parent, after, before = work.g, work.stamp, work.parent, work.after, work.before
+    g, stamp, rest, after, before = work.g, work.stamp, work.rest, work.after, work.before
     height, width = cost.shape
     flat = cost.ravel()
     head = np.full(_RING, -1, np.int32)
-    goal_x, goal_y = (goal % width, goal // width) if goal >= 0 else (-1, -1)
-    g[start] = 0
-    stamp[start] = generation
-    parent[start] = -1
-    level = _least_cost(start % width, start // width, goal_x, goal_y)
+    g[start], stamp[start] = 0, generation
+    rest[start] = _least_cost(start, goal, width, landmarks)
+    level = np.int64(rest[start])
     _link(start, level % _RING, head, after, before)
-    left = 1
+    left, met = 1, False
     while left > 0:
         while head[level % _RING] < 0:
             level += 1
+        if met and level > g[goal]:
+            return True
         node = head[level % _RING]
         _unlink(node, level % _RING, head, after, before)
         left -= 1
         stamp[node] = generation + 1
-        if node == goal:
-            return True
-        x, y = node % width, node // width
+        met = met or node == goal
         for direction in range(8):
             step_x, step_y = _step(direction)
             other = node + step_y * width + step_x
             if not _may_step(flat, width, height, node, direction) or stamp[other] == generation + 1:
                 continue
-            length = _STRAIGHT if direction < _FIRST_DIAGONAL else _DIAGONAL
-            value = g[node] + length * (np.int64(flat[node]) + np.int64(flat[other])) // 2
-            rest = _least_cost(x + step_x, y + step_y, goal_x, goal_y)
+            value = g[node] + _step_cost(flat, node, other, direction)
             if stamp[other] == generation:
                 if value >= g[other]:
                     continue
-                _unlink(other, (g[other] + rest) % _RING, head, after, before)
+                _unlink(other, (g[other] + rest[other]) % _RING, head, after, before)
             else:
                 stamp[other] = generation
+                rest[other] = _least_cost(other, goal, width, landmarks)
                 left += 1
             g[other] = value
-            parent[other] = direction
-            _link(other, (value + rest) % _RING, head, after, before)
-    return False
+            _link(other, (value + rest[other]) % _RING, head, after, before)
+    return met
 
 
 @compiled
-def _backtrack(parent, start, goal, width):  # type: ignore[no-untyped-def]
-    """Return the cells from `start` to `goal`, by the direction each was entered in."""
-    count = 1
-    node = goal
+def _entered(flat, work, node, generation, width, height, last):  # type: ignore[no-untyped-def]
+    """Return the direction in which a cheapest walk enters a cell: straight on if it can, else the first that does."""
+    for k in range(-1, 8):
+        direction = last if k < 0 else k
+        if direction < 0:
+            continue
+        step_x, step_y = _step(direction)
+        x, y = node % width - step_x, node // width - step_y
+        if x < 0 or y < 0 or x >= width or y >= height:
+            continue
+        source = y * width + x
+        if work.stamp[source] != generation + 1 or not _may_step(flat, width, height, source, direction):
+            continue
+        if work.g[source] + _step_cost(flat, source, node, direction) == work.g[node]:
+            return direction
+    return -1
+
+
+@compiled
+def _backtrack(cost, work, start, goal, generation):  # type: ignore[no-untyped-def]
+    """Return the cells of a cheapest walk from `start` to `goal`, the one with the fewest turns near its end."""
+    height, width = cost.shape
+    flat = cost.ravel()
+    cells = [goal]
+    node, direction = goal, -1
     while node != start:
-        step_x, step_y = _step(parent[node])
+        direction = _entered(flat, work, node, generation, width, height, direction)
+        step_x, step_y = _step(direction)
         node -= step_y * width + step_x
-        count += 1
-    cells = np.empty(count, np.int64)
-    node = goal
-    for k in range(count - 1, 0, -1):
-        cells[k] = node
-        step_x, step_y = _step(parent[node])
-        node -= step_y * width + step_x
-    cells[0] = start
-    return cells
+        cells.append(node)
+    return np.array(cells[::-1], np.int64)
 
 
 @compiled
@@ -250,7 +282,10 @@ def _nearest(free, x, y, reach):  # type: ignore[no-untyped-def]
 
 
 class Router:
-    """Finds walks on a map. Not to be shared between threads (it reuses its working memory).
+    """Finds walks on a map; threads that share it wait for each other.
+
+    After some searches it learns the costs from a few landmarks, by which later ones are several times as fast and find
+    the same walks.
 
     Parameters
     ----------
@@ -273,11 +308,14 @@ class Router:
         self._work = _Work(
             g=np.zeros(cells, np.int64),
             stamp=np.zeros(cells, np.int32),
+            rest=np.zeros(cells, np.int32),
             after=np.zeros(cells, np.int32),
             before=np.zeros(cells, np.int32),
-            parent=np.zeros(cells, np.int8),
         )
         self._generation = 0
+        self._searches = 0
+        self._landmarks = np.zeros((cells, 0), np.int32)
+        self._lock = Lock()
         self._nothing = np.zeros((0, 0), np.bool_)
 
     def nearest_walkable(self, xy: ArrayLike, *, within: float = 30.0) -> NDArray[np.float64] | None:
@@ -314,12 +352,13 @@ class Router:
         first, last = self._nearest_cell(a, free, _SNAP), self._nearest_cell(b, free, _SNAP)
         if first < 0 or last < 0:
             return None
-        if not self._run(cost, first, last):
-            return None
+        with self._lock:
+            if not self._run(cost, first, last):
+                return None
+            cells = _backtrack(cost, self._work, first, last, self._generation)
+            g = self._work.g[cells]
         n = self.walkable.n
-        cells = _backtrack(self._work.parent, first, last, n)
         points = np.column_stack([cells % n, cells // n]) + 0.5
-        g = self._work.g[cells]
         extra = self._nothing if blocked is None else np.ascontiguousarray(blocked)
         kept = _pull(self._cost, self._clearance, extra, blocked is not None, points, g)
         route = points[kept] * self.walkable.cell - self.walkable.half
@@ -347,14 +386,36 @@ class Router:
         shape = self._cost.shape
         if first < 0:
             return np.full(shape, np.inf, np.float32)
-        self._run(cost, first, -1)
         metre = self.walkable.cell / (100 * _STRAIGHT)
-        reached = self._work.stamp == self._generation + 1
-        return np.where(reached, self._work.g * metre, np.inf).astype(np.float32).reshape(shape)
+        with self._lock:
+            self._run(cost, first, -1)
+            reached = self._work.stamp == self._generation + 1
+            return np.where(reached, self._work.g * metre, np.inf).astype(np.float32).reshape(shape)
 
     def _run(self, cost: NDArray[np.int32], first: int, last: int) -> bool:
+        if last >= 0:
+            self._searches += 1
+            if self._searches == _WORTH_LANDMARKS:
+                self._landmarks = self._placed_landmarks()
         self._generation += 2
-        return bool(_search(cost, self._work, first, last, self._generation))
+        return bool(_search(cost, self._work, first, last, self._generation, self._landmarks))
+
+    def _placed_landmarks(self) -> NDArray[np.int32]:
+        """Return what it costs from each cell to cells at the edges of the map, each as far from the others as can be.
+
+        Shape ``(cells, landmarks)``; 0 where there is no way.
+        """
+        costs = np.zeros((self._cost.size, _LANDMARKS), np.int32)
+        nearest = np.where(self._free.ravel(), np.iinfo(np.int32).max, 0)
+        source = int(np.flatnonzero(nearest)[0])
+        for k in range(_LANDMARKS):
+            self._run(self._cost, source, -1)
+            final = self._work.stamp == self._generation + 1
+            costs[final, k] = self._work.g[final]
+            # Of the first search only the farthest cell is wanted, for it lies at an edge.
+            nearest = np.where(final, np.minimum(nearest, costs[:, k]) if k else costs[:, k], nearest)
+            source = int(nearest.argmax())
+        return costs
 
     def _flat(self, xy: NDArray[Any]) -> int:
         ix, iy = self.walkable.cell_of(xy)
