@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from typing import Any
 
 import toy_city
@@ -50,3 +51,17 @@ def test_a_late_agent_waits_until_it_is_done() -> None:
     assert first.agent_faults["assistant_0"][0] is second.agent_faults["assistant_0"][0] is ActionStatus.LATE
     result = sim.step(first.actions, first.agent_faults)
     assert result.observations["assistant_0"]["state"]["action_status"] == "late"
+
+
+def test_late_agents_are_waited_for_together() -> None:
+    sim = Simulation(toy_city.world(), None, SimConfig(assistants=10, observe=()))
+    dawdlers = {f"assistant_{i}": Dawdler() for i in range(10)}
+    gatherer = Gatherer(dawdlers, deadline=1.0)
+    begun = time.monotonic()
+    gathered = gatherer.gather(*sim.observe())
+    waited = time.monotonic() - begun
+    for dawdler in dawdlers.values():
+        dawdler.signal.set()
+    gatherer.close()
+    assert {status for status, _ in gathered.agent_faults.values()} == {ActionStatus.LATE}
+    assert waited < 5.0  # one after the other they would take ten

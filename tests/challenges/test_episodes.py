@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import math
+from pathlib import Path
+from typing import Any
+
 import pytest
 
+from vico.challenges.assistant import runner
 from vico.challenges.assistant.delivery import generate_delivery
 from vico.challenges.assistant.runner import community_for, run_episode
-from vico.challenges.results import EpisodeResult
+from vico.challenges.results import EpisodeResult, Fault
 from vico.community.model import Community
+from vico.io.files import read_json
 from vico.world.folder import World
 
 
@@ -45,3 +51,71 @@ def test_an_episode_repeats_itself(helsinki: World, few: Community, method: str,
 def test_another_seed_is_another_episode(helsinki: World, few: Community) -> None:
     hashes = {play(helsinki, few, method="random", steps=5, seed=seed).state_hash for seed in (0, 1)}
     assert len(hashes) == 2
+
+
+class _Saboteur:
+    """Crashes, lies or dawdles by turns."""
+
+    def __init__(self) -> None:
+        self._turn = 0
+
+    def act(self, observation: dict[str, Any], info: dict[str, Any]) -> Any:
+        self._turn += 1
+        lies: list[Any] = [
+            {"type": "move_forward", "distance": math.nan},
+            {"type": "turn_left", "degrees": "many"},
+            {"type": "task_complete", "index": 10**9},
+            {"type": "give", "agent": "nobody_7"},
+            "task_complete",
+            None,
+            42,
+        ]
+        if self._turn % 3 == 0:
+            raise ZeroDivisionError("no plan")
+        return lies[self._turn % len(lies)]
+
+
+def test_a_planner_that_crashes_and_lies_ends_no_evaluation(
+    helsinki: World, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(runner, "make_planner", lambda *_, **__: _Saboteur())
+    monkeypatch.setattr(runner, "community_for", lambda world: community_for(world, residents=2))
+    (episode,) = runner.evaluate([helsinki], method="heuristic", assistants=1, seeds=1, steps=21, folder=tmp_path)
+    assert not any(episode.success)
+    assert episode.fault_count == 7
+    assert episode.faults[0] == Fault(3, "assistant_0", "failed", "ZeroDivisionError: no plan")
+    told = (tmp_path / "results.md").read_text()
+    assert "assistant_0 failed at step 3 (ZeroDivisionError: no plan); 7 faults" in told
+
+
+def test_an_interrupted_evaluation_goes_on_and_comes_to_the_same(
+    helsinki: World, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(runner, "community_for", lambda world: community_for(world, residents=2))
+
+    def evaluation(folder: Path) -> list[str]:
+        episodes = runner.evaluate([helsinki], method="random", assistants=1, seeds=3, steps=5, folder=folder)
+        return [episode.state_hash for episode in episodes]
+
+    whole = evaluation(tmp_path / "whole")
+    played = runner.run_episode
+
+    def killed_at_the_second(*arguments: Any, **options: Any) -> EpisodeResult:
+        if "seed 1" in options["label"]:
+            raise KeyboardInterrupt
+        return played(*arguments, **options)
+
+    monkeypatch.setattr(runner, "run_episode", killed_at_the_second)
+    with pytest.raises(KeyboardInterrupt):
+        evaluation(tmp_path / "cut")
+    labels: list[str] = []
+
+    def noted(*arguments: Any, **options: Any) -> EpisodeResult:
+        labels.append(options["label"])
+        return played(*arguments, **options)
+
+    monkeypatch.setattr(runner, "run_episode", noted)
+    assert evaluation(tmp_path / "cut") == whole
+    assert [label[-6:] for label in labels] == ["seed 1", "seed 2"]
+    first, second = (read_json(tmp_path / name / "results.json")["summary"] for name in ("whole", "cut"))
+    assert first | {"wall_seconds": 0} == second | {"wall_seconds": 0}

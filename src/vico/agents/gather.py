@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
-from concurrent.futures import TimeoutError as FutureTimeout
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -31,9 +30,9 @@ class Gatherer:
     agents
         By name.
     deadline
-        Seconds each agent has; None asks them one after the other in this thread and waits as long as it takes,
-        which is what makes a run repeatable. With a deadline every agent has a thread of its own; one that is late
-        waits this step, and is not asked again before it is done.
+        Seconds all agents have together, for they are asked side by side, each in a thread of its own; one that is
+        late waits this step, and is not asked again before it is done. None asks them one after the other in this
+        thread and waits as long as it takes, which is what makes a run repeatable.
     """
 
     def __init__(self, agents: Mapping[str, Agent], *, deadline: float | None = None) -> None:
@@ -59,11 +58,14 @@ class Gatherer:
                 continue
             pool = self._pool.setdefault(name, ThreadPoolExecutor(1, thread_name_prefix=name))
             asked[name] = self._busy[name] = pool.submit(agent.act, observations[name], infos[name])
+        # One deadline for all: they think side by side.
+        wait(asked.values(), timeout=self.deadline)
         for name, future in asked.items():
-            try:
-                gathered.actions[name] = future.result(timeout=self.deadline)
-            except FutureTimeout:
+            if not future.done():
                 gathered.agent_faults[name] = (ActionStatus.LATE, f"no action within {self.deadline:g} s")
+                continue
+            try:
+                gathered.actions[name] = future.result()
             except Exception as error:
                 self._failed(name, error, gathered)
         return gathered

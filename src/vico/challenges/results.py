@@ -4,14 +4,40 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
 from scipy import stats
 
-from vico.io.files import write_bytes, write_json
+from vico.io.files import read_json, write_bytes, write_json
+
+SCHEMA = "vico.results"
+VERSION = 2
+
+
+# So many faults of an episode are told one by one; more are only counted.
+_FAULTS_TOLD = 20
+
+
+@dataclass(frozen=True)
+class Fault:
+    """An agent that failed or was late, and waited.
+
+    Attributes
+    ----------
+    step
+        In which step of the episode.
+    status
+        ``failed`` or ``late``.
+    """
+
+    step: int
+    agent: str
+    status: str
+    reason: str
 
 
 @dataclass(frozen=True)
@@ -26,6 +52,8 @@ class EpisodeResult:
         Steps until the last subtask was done; the limit if not all were.
     tokens, cost
         Of language model calls, in tokens and US dollars.
+    fault_count, faults
+        How often an agent failed or was late, and the first of these.
     """
 
     world: str
@@ -41,6 +69,44 @@ class EpisodeResult:
     state_hash: str
     tokens: int = 0
     cost: float = 0.0
+    fault_count: int = 0
+    faults: list[Fault] = field(default_factory=list)
+
+
+class FaultLog:
+    """Counts the faults of an episode and keeps the first."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.first: list[Fault] = []
+
+    def add(self, step: int, agent: str, status: str, reason: str) -> None:
+        """Note that an agent failed or was late."""
+        self.count += 1
+        if len(self.first) < _FAULTS_TOLD:
+            self.first.append(Fault(step, agent, status, reason))
+
+
+def write_episode(path: Path, key: str, result: EpisodeResult) -> None:
+    """Write what an episode came to, whole or not at all.
+
+    Parameters
+    ----------
+    key
+        Digest of all that decides the episode.
+    """
+    write_json(path, {"schema_name": SCHEMA, "version": VERSION, "key": key, "episode": asdict(result)})
+
+
+def read_episode(path: Path, key: str) -> EpisodeResult | None:
+    """Read what `write_episode` wrote; None if there is none, or it is of another episode."""
+    if not path.exists():
+        return None
+    content = read_json(path)
+    known = (SCHEMA, VERSION, key)
+    if not isinstance(content, dict) or tuple(content.get(name) for name in ("schema_name", "version", "key")) != known:
+        return None
+    return TypeAdapter(EpisodeResult).validate_python(content["episode"])
 
 
 def interval(values: Sequence[float]) -> tuple[float, float, float]:
@@ -85,7 +151,22 @@ def summary(episodes: Sequence[EpisodeResult]) -> dict[str, Any]:
         "wall_seconds": sum(e.wall_seconds for e in episodes),
         "tokens": sum(e.tokens for e in episodes),
         "cost": sum(e.cost for e in episodes),
+        "faults": sum(e.fault_count for e in episodes),
     }
+
+
+def fault_lines(episodes: Sequence[EpisodeResult]) -> list[str]:
+    """Say which agents failed or were late, how often, and why first: a line an episode and agent."""
+    lines = []
+    for episode in episodes:
+        agents = dict.fromkeys(fault.agent for fault in episode.faults)
+        for agent in agents:
+            first = next(fault for fault in episode.faults if fault.agent == agent)
+            lines.append(
+                f"- {episode.world}, seed {episode.seed}: {agent} {first.status} at step {first.step} "
+                f"({first.reason}); {episode.fault_count} faults in the episode"
+            )
+    return lines
 
 
 def markdown_table(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -98,14 +179,14 @@ def markdown_table(rows: Sequence[Mapping[str, Any]]) -> str:
 
     lines = [
         "| Category | Method | Assistants | Episodes | Subtasks "
-        "| SR % (95 % CI) | Ts (95 % CI) | Wall s | Tokens | Cost $ |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "| SR % (95 % CI) | Ts (95 % CI) | Wall s | Tokens | Cost $ | Faults |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for row in rows:
         lines.append(
             f"| {row['category']} | {row['method']} | {row['assistants']} | {row['episodes']} | {row['subtasks']} "
             f"| {span(row, 'SR', '.1f')} | {span(row, 'Ts', '.0f')} | {row['wall_seconds']:.1f} "
-            f"| {row['tokens']} | {row['cost']:.2f} |"
+            f"| {row['tokens']} | {row['cost']:.2f} | {row['faults']} |"
         )
     return "\n".join(lines) + "\n"
 
@@ -115,7 +196,9 @@ def write_results(folder: Path, episodes: Sequence[EpisodeResult]) -> dict[str, 
     condensed = summary(episodes)
     write_json(
         folder / "results.json",
-        {"schema_name": "vico.results", "version": 1, "summary": condensed, "episodes": [asdict(e) for e in episodes]},
+        {"schema_name": SCHEMA, "version": VERSION, "summary": condensed, "episodes": [asdict(e) for e in episodes]},
     )
-    write_bytes(folder / "results.md", markdown_table([condensed]).encode())
+    faults = fault_lines(episodes)
+    told = ["", "Agents that failed or were late waited:", "", *faults, ""] if faults else []
+    write_bytes(folder / "results.md", (markdown_table([condensed]) + "\n".join(told)).encode())
     return condensed

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+
 from rich.console import Console
 from rich.markdown import Markdown
 
 from vico.agents.assistant import METHODS
 from vico.challenges.assistant.runner import evaluate
-from vico.challenges.results import markdown_table, write_results
+from vico.challenges.results import fault_lines, markdown_table, write_results
 from vico.cli.options import AssistantOptions
 from vico.cli.output import check_output, print_json, progress_bars
 from vico.errors import InputError
@@ -16,7 +18,10 @@ from vico.world.folder import read_world
 
 
 def assistant(options: AssistantOptions) -> int:
-    """Run the episodes; leave the tasks, ``results.json`` and ``results.md`` in ``options.out``."""
+    """Run the episodes; leave the tasks, ``results.json`` and ``results.md`` in ``options.out``.
+
+    Until all are over they are in a neighbour, ``OUT.partial``; the same command goes on there after an interruption.
+    """
     worlds, out, method, assistants = options.worlds, options.out, options.method, options.assistants
     seeds, steps = options.seeds, options.steps
     if method not in METHODS:
@@ -27,12 +32,14 @@ def assistant(options: AssistantOptions) -> int:
         raise InputError("eval: needs at least one world, one seed and one step")
     check_output(out, *worlds, force=options.force)
     places = [read_world(path) for path in worlds]
-    with new_folder(out, force=options.force) as folder:
+    with new_folder(out, force=options.force, work=out.with_name(f"{out.name}.partial")) as folder:
         with progress_bars() as report:
             episodes = evaluate(
                 places, method=method, assistants=assistants, seeds=seeds, steps=steps, folder=folder, progress=report
             )
         condensed = write_results(folder, episodes)
+        for line in fault_lines(episodes):
+            print(line, file=sys.stderr)
     if options.json:
         print_json(condensed)
     else:

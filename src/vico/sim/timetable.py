@@ -77,6 +77,8 @@ class Punctuality(ArrayState):
         Stays of all residents end to end; those of resident ``i`` are ``start[i]`` up to ``start[i + 1]``.
     following
         Index of the stay each resident is due at next (its row in `place`).
+    day
+        Days since the first on which that stay is: schedules come again every day.
     told
         Whether it has been noted that the next stay began without the resident.
     arrivals, late
@@ -88,6 +90,7 @@ class Punctuality(ArrayState):
     until: NDArray[np.int64]
     start: NDArray[np.int64]
     following: NDArray[np.int64]
+    day: NDArray[np.int64]
     told: NDArray[np.bool_]
     arrivals: NDArray[np.int64]
     late: NDArray[np.int64]
@@ -102,46 +105,62 @@ class Punctuality(ArrayState):
             [start[i] + sum(stay.due <= second for stay in day) for i, day in enumerate(days)], np.int64
         )
         n = len(days)
-        return cls(
+        made = cls(
             np.array([stay.place for stay in rows], np.int32),
             due,
             np.array([stay.until for stay in rows], np.int64),
             start,
             following,
+            np.zeros(n, np.int64),
             np.zeros(n, bool),
             np.zeros(n, np.int64),
             np.zeros(n, np.int64),
         )
+        for i in range(n):
+            made._wrap(i)
+        return made
 
     def watch(self, state: SimulationState) -> None:
         """Note arrivals and failures to arrive, as events and in the counts."""
-        second = state.second % DAY
-        for i in range(len(self.following)):
-            k = int(self.following[i])
-            if k >= self.start[i + 1]:
-                continue
-            index = int(self.place[k])
-            place = state.world.places[index]
+        some = np.flatnonzero(self.start[1:] > self.start[:-1])
+        rows, shift = self.following[some], DAY * self.day[some]
+        places = self.place[rows]
+        late = (state.second > self.due[rows] + shift + GRACE) & ~self.told[some]
+        there = self._are_there(some, places, state)
+        for n in np.flatnonzero(late | there | (state.second > self.until[rows] + shift)).tolist():
+            i, k = int(some[n]), int(rows[n])
+            place = state.world.places[int(places[n])]
             name, position = state.people.names[i], state.people.position[i]
-            is_late = second > self.due[k] + GRACE
-            if is_late and not self.told[i]:
+            if late[n]:
                 self.told[i] = True
                 self.late[i] += 1
                 state.events.add("late", name, f"is late for {place.name}", position, place=place.id)
-            if self._is_there(i, index, state):
-                behind = float(second - self.due[k])
+            if there[n]:
+                behind = float(state.second - self.due[k] - shift[n])
                 self.arrivals[i] += 1
                 state.events.add(
                     "arrival", name, f"arrives at {place.name}", position, place=place.id, seconds_late=behind
                 )
-            elif second <= self.until[k]:
+            elif state.second <= self.until[k] + shift[n]:
                 continue
             self.following[i] += 1
             self.told[i] = False
+            self._wrap(i)
 
-    def _is_there(self, i: int, index: int, state: SimulationState) -> bool:
-        place = state.world.places[index]
-        if place.rooms:
-            return bool(state.people.place[i] == index)
-        away = np.hypot(*(state.people.position[i, :2] - np.array(place.position[:2])))
-        return bool(state.people.room[i] < 0 and away <= OPEN_REACH)
+    def _wrap(self, i: int) -> None:
+        """Go on with the next day's stays after the last of a day; who ends the day where it begins is there already."""
+        first, end = int(self.start[i]), int(self.start[i + 1])
+        if first < end == self.following[i]:
+            self.day[i] += 1
+            stays_on = end - first > 1 and self.place[first] == self.place[end - 1]
+            self.following[i] = first + stays_on
+
+    @staticmethod
+    def _are_there(who: NDArray[np.int64], places: NDArray[np.int32], state: SimulationState) -> NDArray[np.bool_]:
+        """Whether each is at a place: in one of its rooms, or near an open one; shape ``(who,)``."""
+        people = state.people
+        with_rooms = np.array([bool(state.world.places[k].rooms) for k in places.tolist()], bool)
+        spots = np.array([state.world.places[k].position[:2] for k in places.tolist()]).reshape(-1, 2)
+        away = np.hypot(*(people.position[who, :2] - spots).T)
+        near = (people.room[who] < 0) & (away <= OPEN_REACH)
+        return np.where(with_rooms, people.place[who] == places, near)

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable
+from hashlib import sha256
 from pathlib import Path
 
 from vico.agents.assistant import make_planner
 from vico.agents.base import Agent
+from vico.agents.gather import Gatherer
 from vico.agents.schedule import followers_of
 from vico.assets.models.movable import movable_kinds, movable_prototype, movable_surfaces
 from vico.challenges.assistant.delivery import delivered, generate_delivery
 from vico.challenges.assistant.model import StateView, Task, write_task
-from vico.challenges.results import EpisodeResult
+from vico.challenges.results import EpisodeResult, FaultLog, read_episode, write_episode, write_results
 from vico.community import build_community
 from vico.community.model import Community
 from vico.envs import CommunityEnv, Simulation, make
+from vico.version import __version__
 from vico.world.folder import World
 
 START = "08:00"
@@ -107,22 +111,27 @@ def run_episode(
         for i, name in enumerate(names)
     }
     followers = followers_of(community, env.public_map, seed=task.seed)
-    judge = Judge(task, world, env.sim.ground_truth)
+    agents = Gatherer(followers | planners)
+    judge, faults = Judge(task, world, env.sim.ground_truth), FaultLog()
     judge.watch(0)
     steps = 0
     while env.agents and not judge.over:
-        actions = {name: followers[name].act(observations[name], infos[name]) for name in followers}
-        actions |= {name: planners[name].act(observations[name], infos[name]) for name in names}
-        observations, _, _, _, infos = env.step(actions)
+        gathered = agents.gather(observations, infos)
+        observations, _, _, _, infos = env.step(gathered.actions, gathered.agent_faults)
         steps += 1
+        for name, (status, reason) in gathered.agent_faults.items():
+            faults.add(steps, name, status.name.lower(), reason)
         judge.watch(steps)
         for name in names:
             # Only what the simulation accepted counts as a report.
-            if actions[name]["type"] == "task_complete" and observations[name]["state"]["action_status"] == "ok":
-                judge.report(int(actions[name]["index"]))
+            action = gathered.actions.get(name)
+            if action is None or observations[name]["state"]["action_status"] != "ok":
+                continue
+            if action["type"] == "task_complete":
+                judge.report(int(action["index"]))
         if progress is not None:
             progress(label, steps, task.steps)
-    return _result(task, method, judge, env, steps, time.perf_counter() - began)
+    return _result(task, method, judge, env, faults, time.perf_counter() - began)
 
 
 def _for_size(number: int, world: World) -> int:
@@ -144,7 +153,9 @@ def _set_up(simulation: Simulation, task: Task) -> None:
         simulation.scenario.place_agent(f"assistant_{i}", (*start.position, 0.0), yaw=start.yaw)
 
 
-def _result(task: Task, method: str, judge: Judge, env: CommunityEnv, steps: int, seconds: float) -> EpisodeResult:
+def _result(
+    task: Task, method: str, judge: Judge, env: CommunityEnv, faults: FaultLog, seconds: float
+) -> EpisodeResult:
     success = judge.final()
     done_at = [since if ok else None for ok, since in zip(success, judge.since, strict=True)]
     finished = [step for step in done_at if step is not None]
@@ -160,6 +171,8 @@ def _result(task: Task, method: str, judge: Judge, env: CommunityEnv, steps: int
         limit=task.steps,
         wall_seconds=seconds,
         state_hash=env.state_hash(),
+        fault_count=faults.count,
+        faults=faults.first,
     )
 
 
@@ -173,13 +186,35 @@ def evaluate(
     folder: Path,
     progress: Progress | None = None,
 ) -> list[EpisodeResult]:
-    """Generate and play `seeds` delivery episodes a world; task files go to ``folder/tasks``."""
-    episodes = []
+    """Generate and play `seeds` delivery episodes a world.
+
+    Task files go to ``folder/tasks``, what each episode came to into ``folder/episodes`` as soon as it is over, and
+    the results so far into ``folder/results.json`` and ``results.md``. Episodes that are there are not played again.
+    """
+    episodes: list[EpisodeResult] = []
+    names: set[str] = set()
     for number, world in enumerate(worlds):
         community = community_for(world)
         for seed in range(seeds):
             task = generate_delivery(world, seed=seed, assistants=assistants, steps=steps)
-            write_task(folder / "tasks" / f"{number}_{world.manifest.name}_{seed}.json", task)
-            label = f"{world.manifest.name}, seed {seed}"
-            episodes.append(run_episode(world, community, task, method=method, progress=progress, label=label))
+            name = f"{number}_{world.manifest.name}_{seed}.json"
+            write_task(folder / "tasks" / name, task)
+            key = _key(world, task, method)
+            episode = read_episode(folder / "episodes" / name, key)
+            if episode is None:
+                label = f"{world.manifest.name}, seed {seed}"
+                episode = run_episode(world, community, task, method=method, progress=progress, label=label)
+                write_episode(folder / "episodes" / name, key, episode)
+            names.add(name)
+            episodes.append(episode)
+            write_results(folder, episodes)
+    for path in (*(folder / "tasks").iterdir(), *(folder / "episodes").iterdir()):
+        if path.name not in names:  # of an interrupted evaluation with other settings
+            path.unlink()
     return episodes
+
+
+def _key(world: World, task: Task, method: str) -> str:
+    """Digest of all that decides an episode."""
+    decides = {"version": __version__, "world": world.digest, "task": task.model_dump(mode="json"), "method": method}
+    return sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
