@@ -1,6 +1,7 @@
 """The walker reaches its goal by actions alone, and gets around what is in the way."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -86,10 +87,25 @@ def test_indoors_one_walks_around_what_one_bumped_into() -> None:
     body.discs = [(0.0, 0.0, 0.3)]
     for _ in range(60):
         observation = {"pose": body.pose, "state": {"room": "hall", "action_status": status}}
-        walker.notice(observation)
+        walker.notice(observation, {"entities": {}})
         action = walker.towards(observation, (1.5, 0.0), near=0.3)
         if action is None:
             break
         body.do(action)
         status = "collision" if body.collided else "ok"
+    assert math.hypot(body.pose[0] - 1.5, body.pose[1]) <= 0.3
+
+
+def test_indoors_one_walks_around_furniture_in_view_without_touching_it() -> None:
+    walker, body = IndoorWalker(), Point(-1.5, 0.05)
+    body.discs = [(0.0, 0.0, 0.3)]
+    view = SimpleNamespace(room=np.array([0.0, 0, 0, 3, 2]), furniture=np.array([[0.0, 0, 0, 0.3, 0.3]]))
+    for _ in range(60):
+        observation = {"pose": body.pose, "state": {"room": "hall", "action_status": "ok"}}
+        walker.notice(observation, {"in_view": view})
+        action = walker.towards(observation, (1.5, 0.0), near=0.3)
+        if action is None:
+            break
+        body.do(action)
+        assert not body.collided
     assert math.hypot(body.pose[0] - 1.5, body.pose[1]) <= 0.3

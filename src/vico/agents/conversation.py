@@ -9,7 +9,6 @@ from typing import Any, Protocol
 import numpy as np
 
 from vico.agents.base import Action, Info, Observation
-from vico.agents.wayfinding import distance_to
 from vico.clock import DAY
 
 # People greet within this distance, metres, and not twice within this time, seconds.
@@ -88,7 +87,7 @@ class Conversation:
             reply = self._reply(message, time, errand)
             if reply is not None:
                 return reply
-        return self._greet(observation, info, time, errand)
+        return self._greet(info, time, errand)
 
     def _reply(self, message: dict[str, Any], time: float, errand: str) -> Action | None:
         speaker, text = message["speaker"], message["text"]
@@ -106,12 +105,11 @@ class Conversation:
             return _say(f"Hello! I'm {mine}. Sorry, I'm {errand}.")
         return _say(self._choose(self._answers(person, errand, last="?" not in text)))
 
-    def _greet(self, observation: Observation, info: Info, time: float, errand: str) -> Action | None:
-        for entity, what in info["entities"].items():
-            person = self._known.get(what.get("agent", ""))
+    def _greet(self, info: Info, time: float, errand: str) -> Action | None:
+        # Residents are told who is in view; others who live by a schedule greet nobody, but answer.
+        for body in info["in_view"].within(GREETING_DISTANCE) if "in_view" in info else ():
+            person = self._known.get(body.agent)
             if person is None or time - self._greeted.get(person.agent, -1e9) <= GREETING_PAUSE:
-                continue
-            if distance_to(entity, observation) > GREETING_DISTANCE:
                 continue
             self._greeted[person.agent] = time
             self._said[person.agent] = 1

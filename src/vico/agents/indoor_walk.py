@@ -1,4 +1,4 @@
-"""Walking within a room: around what depth images showed and what one bumped into."""
+"""Walking within a room: around what is in view there and what one bumped into."""
 
 from __future__ import annotations
 
@@ -7,30 +7,38 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.agents.base import Action, Observation, heading, wrapped
+from vico.agents.base import Action, Info, Observation, heading, wrapped
 from vico.agents.perception import DepthGrid
 
 _STRIDE = 1.0  # metres a step
 _ALIGNED = math.radians(8.0)
+_REMEMBERED = 6  # rooms
 _REACH_OF_BUMPS = 0.4  # metres ahead of one's middle is what stopped a step
 
 
 class IndoorWalker:
-    """Remembers what stands in each room, from pictures where there are any and from bumps otherwise."""
+    """Remembers what stands in rooms, by what is in view where that is told, else from pictures, and from bumps."""
 
     def __init__(self) -> None:
+        # The last few rooms, the one that was entered last at the end.
         self._grids: dict[str, DepthGrid] = {}
 
-    def notice(self, observation: Observation, *, ignore: ArrayLike = ()) -> None:
+    def notice(self, observation: Observation, info: Info, *, ignore: ArrayLike = ()) -> None:
         """Take in what a new observation shows of the room one is in.
 
         Parameters
         ----------
+        info
+            Its ``in_view``, if it has one, knows the room: then pictures are not looked at.
         ignore
             Entities that are not in the way (what one carries or is going to pick up).
         """
+        new, in_view = observation["state"]["room"] not in self._grids, info.get("in_view")
         grid, pose = self._grid(observation), np.asarray(observation["pose"], np.float64)
-        if "depth" in observation:
+        if in_view is not None:
+            if new:
+                grid.mark(in_view.room, in_view.furniture)
+        elif "depth" in observation:
             grid.see(observation, floor=float(pose[2]), ignore=ignore)
         if observation["state"]["action_status"] == "collision":
             yaw = heading(observation)
@@ -52,8 +60,10 @@ class IndoorWalker:
 
     def _grid(self, observation: Observation) -> DepthGrid:
         room = observation["state"]["room"]
-        if room not in self._grids:
-            self._grids[room] = DepthGrid(np.asarray(observation["pose"], np.float64)[:2])
+        grid = self._grids.pop(room, None)
+        self._grids[room] = grid or DepthGrid(np.asarray(observation["pose"], np.float64)[:2])
+        if len(self._grids) > _REMEMBERED:
+            del self._grids[next(iter(self._grids))]
         return self._grids[room]
 
 

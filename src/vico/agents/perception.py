@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vico.io.compiled import compiled
+
 #: Fewer pixels than this are not taken for a sighting.
 SIGHT = 4
 
@@ -134,6 +136,22 @@ class DepthGrid:
         cells = cells[((cells >= 0) & (cells < self.n)).all(axis=1)]
         np.add.at(self._hits, (cells[:, 1], cells[:, 0]), 1)
 
+    def mark(self, room: NDArray[np.float64], furniture: NDArray[np.float64]) -> None:
+        """Add walls and furniture that are known without a picture.
+
+        Parameters
+        ----------
+        room
+            Floor as ``x, y, yaw, half length, half width``, metres and radians, shape ``(5,)``; beyond it are walls.
+        furniture
+            What stands in it, in the same form, shape ``(k, 5)``.
+        """
+        axis = (np.arange(self.n) + 0.5) * self.cell
+        x, y = np.meshgrid(self.corner[0] + axis, self.corner[1] + axis)
+        self._bumps |= ~_within(room, x, y)
+        for box in furniture:
+            self._bumps |= _within(box, x, y)
+
     def bump(self, xy: ArrayLike) -> None:
         """Remember that something stopped a step at a point."""
         ix, iy = ((np.asarray(xy, np.float64)[:2] - self.corner) / self.cell).astype(np.int64)
@@ -154,8 +172,7 @@ class DepthGrid:
         first = tuple(((a - self.corner) / self.cell).astype(int))
         aim = (b - self.corner) / self.cell
         reach = near / self.cell
-        best = _a_star(blocked, first, aim, reach)
-        return np.array([self.corner + (np.array(c) + 0.5) * self.cell for c in best]).reshape(-1, 2)
+        return self.corner + (_a_star(blocked, first, aim, reach) + 0.5) * self.cell
 
     def _grown(self, radius: float) -> NDArray[np.bool_]:
         solid = (self._hits >= 3) | self._bumps
@@ -168,38 +185,77 @@ class DepthGrid:
         return grown
 
 
+def _within(box: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which points lie in an oriented rectangle ``x, y, yaw, half length, half width``."""
+    dx, dy = x - box[0], y - box[1]
+    cosine, sine = math.cos(box[2]), math.sin(box[2])
+    return np.asarray(
+        (np.abs(dx * cosine + dy * sine) <= box[3]) & (np.abs(dy * cosine - dx * sine) <= box[4]), np.bool_
+    )
+
+
 def _a_star(
     blocked: NDArray[np.bool_], start: tuple[int, ...], aim: NDArray[np.float64], reach: float
-) -> list[tuple[int, int]]:
-    """Cells from start (left out) to the first one within reach of the aim; ties are broken by position."""
+) -> NDArray[np.int64]:
+    """Cells ``(x, y)`` from start (left out) to the first one within reach of the aim, shape ``(k, 2)``."""
     n = blocked.shape[0]
-    origin = (int(start[0]), int(start[1]))
-    if not (0 <= origin[0] < n and 0 <= origin[1] < n):
-        return []
-    cost = {origin: 0.0}
-    parent: dict[tuple[int, int], tuple[int, int]] = {}
-    queue = [(0.0, origin)]
-    closed: set[tuple[int, int]] = set()
-    while queue:
-        _, cell = heapq.heappop(queue)
-        if cell in closed:
+    x, y = int(start[0]), int(start[1])
+    if not (0 <= x < n and 0 <= y < n):
+        return np.zeros((0, 2), np.int64)
+    return np.asarray(_search(blocked, x, y, float(aim[0]), float(aim[1]), reach), np.int64).reshape(-1, 2)
+
+
+@compiled
+def _search(blocked, start_x, start_y, aim_x, aim_y, reach):  # type: ignore[no-untyped-def]
+    """Run A* on a grid; ties are broken by position."""
+    n = blocked.shape[0]
+    cost = np.full((n, n), np.inf)
+    parent = np.full((n, n), -1, np.int64)
+    closed = np.zeros((n, n), np.bool_)
+    cost[start_y, start_x] = 0.0
+    queue = [(0.0, start_x, start_y)]
+    while len(queue) > 0:
+        _, x, y = heapq.heappop(queue)
+        if closed[y, x]:
             continue
-        closed.add(cell)
-        if math.hypot(cell[0] + 0.5 - aim[0], cell[1] + 0.5 - aim[1]) <= max(reach, 0.7):
-            way = []
-            while cell != origin:
-                way.append(cell)
-                cell = parent[cell]
-            return way[::-1]
-        for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)):
-            x, y = cell[0] + dx, cell[1] + dy
-            # A start that touches what is around it may still be left.
-            if not (0 <= x < n and 0 <= y < n) or (blocked[y, x] and not blocked[cell[1], cell[0]]):
-                continue
-            new = cost[cell] + math.hypot(dx, dy) * (4.0 if blocked[y, x] else 1.0)
-            if new < cost.get((x, y), math.inf):
-                cost[(x, y)] = new
-                parent[(x, y)] = cell
-                guess = max(math.hypot(x + 0.5 - aim[0], y + 0.5 - aim[1]) - reach, 0.0)
-                heapq.heappush(queue, (new + guess, (x, y)))
-    return []
+        closed[y, x] = True
+        if _distance(x + 0.5 - aim_x, y + 0.5 - aim_y) <= max(reach, 0.7):
+            return _way_back(parent, x, y, start_x, start_y)
+        for dy in range(-1, 2):
+            for dx in range(-1, 2):
+                i, j = x + dx, y + dy
+                if not (0 <= i < n and 0 <= j < n) or closed[j, i]:
+                    continue
+                # A start that touches what is around it may still be left.
+                if blocked[j, i] and not blocked[y, x]:
+                    continue
+                new = cost[y, x] + _distance(dx, dy) * (4.0 if blocked[j, i] else 1.0)
+                if new < cost[j, i]:
+                    cost[j, i] = new
+                    parent[j, i] = y * n + x
+                    guess = max(_distance(i + 0.5 - aim_x, j + 0.5 - aim_y) - reach, 0.0)
+                    heapq.heappush(queue, (new + guess, i, j))
+    return np.zeros((0, 2), np.int64)
+
+
+@compiled(inline="always")
+def _distance(dx, dy):  # type: ignore[no-untyped-def]
+    return math.sqrt(dx * dx + dy * dy)
+
+
+@compiled
+def _way_back(parent, x, y, start_x, start_y):  # type: ignore[no-untyped-def]
+    """Return the cells from after the start to ``(x, y)``."""
+    n = parent.shape[0]
+    count, i, j = 0, x, y
+    while i != start_x or j != start_y:
+        count += 1
+        before = parent[j, i]
+        i, j = before % n, before // n
+    cells = np.empty((count, 2), np.int64)
+    i, j = x, y
+    for k in range(count - 1, -1, -1):
+        cells[k, 0], cells[k, 1] = i, j
+        before = parent[j, i]
+        i, j = before % n, before // n
+    return cells

@@ -168,7 +168,7 @@ class ScheduleFollower:
         up = self._get_up()
         if up is not None:
             return up
-        return self._leave(observation) if state["room"] else self._walk(observation, info, stay, place)
+        return self._leave(observation, info) if state["room"] else self._walk(observation, info, stay, place)
 
     def _stay_at(self, second: float) -> Stay | None:
         current = None
@@ -240,7 +240,7 @@ class ScheduleFollower:
     def _get_up(self) -> Action | None:
         return None if self._posture == "standing" else self._become("standing")
 
-    def _leave(self, observation: Observation) -> Action:
+    def _leave(self, observation: Observation, info: Info) -> Action:
         """Walk to the door that leads out, and through it."""
         self._walker.stop()
         state = observation["state"]
@@ -253,7 +253,7 @@ class ScheduleFollower:
         if out is None:
             return {"type": "wait"}
         outside = out["to"] == "outside"
-        self._indoors.notice(observation)
+        self._indoors.notice(observation, info)
         step = self._indoors.towards(observation, out["position"], near=1.9 if outside else 0.9)
         if step is not None:
             return step

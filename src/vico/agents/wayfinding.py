@@ -146,7 +146,7 @@ class Walker:
         road = (ROADWAY, CROSSING)
         if int(walkable.class_at(position)) in road or int(walkable.class_at(position + ahead)) not in road:
             return False
-        return self._waited < _PATIENCE and nearest_of(VEHICLES, observation, info) < _CAR_NEAR
+        return self._waited < _PATIENCE and _nearest_vehicle(observation, info) < _CAR_NEAR
 
     def _meet_obstacle(self, observation: Observation) -> None:
         """Wait a moment, then pass on one side; close the spot for planning if that doesn't help."""
@@ -176,16 +176,15 @@ class Walker:
         self._plan(position)
 
 
-def nearest_of(kinds: tuple[str, ...], observation: Observation, info: Info) -> float:
-    """Distance along the view to the nearest thing of some kinds, metres; infinite if none is seen."""
-    best = math.inf
-    for entity, what in info["entities"].items():
-        if what["kind"] in kinds:
-            best = min(best, distance_to(entity, observation))
-    return best
+def _nearest_vehicle(observation: Observation, info: Info) -> float:
+    """Metres to the nearest vehicle in view: as one is told, else as the pictures show; infinite if there is none."""
+    if "in_view" in info:
+        return float(info["in_view"].nearest(VEHICLES))
+    seen = (entity for entity, what in info["entities"].items() if what["kind"] in VEHICLES)
+    return min((_distance_to(entity, observation) for entity in seen), default=math.inf)
 
 
-def distance_to(entity: int, observation: Observation) -> float:
+def _distance_to(entity: int, observation: Observation) -> float:
     """Distance along the view to what is seen of an entity, metres; infinite if it is not seen."""
     depth: NDArray[Any] = observation["depth"][observation["segmentation"] == entity]
     return float(np.median(depth)) if len(depth) else math.inf

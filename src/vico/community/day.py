@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from vico.clock import clock_of
-from vico.community.hours import Span
+from vico.community.hours import Span, staffed
 from vico.community.model import ActivityTag, ItemType, ScheduleItem
 from vico.community.place_index import PlaceIndex
 
@@ -41,18 +41,26 @@ class Day:
     ----------
     index
         Gives the walks.
-    home
-        Place id.
+    home, workplace
+        Place ids; `workplace` is None for those who have none.
     """
 
-    def __init__(self, index: PlaceIndex, home: str) -> None:
+    def __init__(self, index: PlaceIndex, home: str, workplace: str | None = None) -> None:
         self.index = index
         self.home = home
+        self.workplace = workplace
         self.blocks: list[Block] = []
 
     def walk(self, a: str, b: str) -> int | None:
         """Return the minutes to allow for the walk between two places; None if there is no way."""
         return self.index.minutes(a, b)
+
+    def open_spans(self, place: str) -> list[Span]:
+        """Return from when until when one may be at a place, minutes: at home always, at work as staff may."""
+        if place == self.home:
+            return [(0, MIDNIGHT)]
+        hours = self.index.hours(self.index.place_by_id[place])
+        return staffed(hours) if place == self.workplace else hours
 
     def fits(self, start: int, end: int, place: str) -> bool:
         """Whether something from `start` to `end` at `place` fits between what is there."""

@@ -93,32 +93,35 @@ def fill_day(day: Day, life: Homelife) -> None:
 
 
 def _stay_longer(day: Day, before: Block, after: Block, minutes: int) -> None:
-    """Spend minutes that are too few to go home for where one is, or, if that closes, where one goes."""
-    index = day.index
-    closes = any(
-        a <= before.start and before.end + minutes <= b for a, b in index.hours(index.place_by_id[before.place])
+    """Spend minutes that are too few to go home for where one is, or where one goes, as long as these are open.
+
+    What is left is walked in: the way takes longer.
+    """
+    can_stay = max(
+        (end - before.end for start, end in day.open_spans(before.place) if start <= before.start), default=0
     )
-    opened = any(a <= after.start - minutes and after.end <= b for a, b in index.hours(index.place_by_id[after.place]))
-    if before.role == "work" or closes or not opened:
-        text = {"work": "Finish up and put things away", "group": "Stay on and chat"}.get(before.role)
-        if before.role == "group" or (text and minutes >= 10):
-            assert text is not None
-            tag = ActivityTag.GROUP if before.role == "group" else before.tag or ActivityTag.WORK
-            day.blocks.append(Block(before.end, before.end + minutes, ItemType.MAIN, text, before.place, "stay", tag))
-        else:
-            before.end += minutes
-    else:
-        day.blocks.append(
-            Block(
-                after.start - minutes,
-                after.start,
-                ItemType.MAIN,
-                "Arrive early and look around",
-                after.place,
-                "stay",
-                ActivityTag.VISIT,
-            )
-        )
+    can_come = max((after.start - start for start, end in day.open_spans(after.place) if after.end <= end), default=0)
+    stay = minutes if can_stay >= minutes else 0
+    come = minutes if not stay and can_come >= minutes else 0
+    if not stay and not come:
+        stay = max(0, can_stay)
+        come = min(max(0, can_come), minutes - stay)
+    if stay:
+        _stay_on(day, before, stay)
+    if come:
+        text = "Arrive early and look around"
+        start = after.start - come
+        day.blocks.append(Block(start, after.start, ItemType.MAIN, text, after.place, "stay", ActivityTag.VISIT))
+
+
+def _stay_on(day: Day, block: Block, minutes: int) -> None:
+    """Stay some minutes longer."""
+    text = {"work": "Finish up and put things away", "group": "Stay on and chat"}.get(block.role)
+    if text is None or (block.role == "work" and minutes < 10):
+        block.end += minutes
+        return
+    tag = ActivityTag.GROUP if block.role == "group" else block.tag or ActivityTag.WORK
+    day.blocks.append(Block(block.end, block.end + minutes, ItemType.MAIN, text, block.place, "stay", tag))
 
 
 def _at_home(day: Day, life: Homelife, start: int, end: int) -> None:

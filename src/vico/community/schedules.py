@@ -100,7 +100,7 @@ class DayWriter:
     # What is fixed: sleep, work with its break, groups.
 
     def _frame(self, draft: ResidentDraft, groups: Sequence[Meeting]) -> Day:
-        rng, day = self._rng, Day(self._index, draft.home)
+        rng, day = self._rng, Day(self._index, draft.home, draft.workplace)
         lunch_group = None
         for group in groups:
             kind = ItemType.MEAL if group.circle.meal else ItemType.MAIN

@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.rules import ActionStatus, code_name
+from vico.sim.bodies import RESIDENT, Bodies
 from vico.sim.moves import eye_height
+from vico.sim.perception import OUTDOORS, Eyes, InView, in_view, opaque_grid
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture, Vehicle
 
@@ -101,11 +103,13 @@ def observe(
     -------
     tuple
         Observation by name (``rgb``, ``depth``, ``segmentation``, ``extrinsics``, ``intrinsics`` only for those who
-        see; ``pose``, ``events``, ``state`` for everybody), and info by name (``entities``: kind and name of what is
-        in view, by entity).
+        see; ``pose``, ``events``, ``state`` for everybody), and info by name: ``entities``, kind and name of what
+        the pictures show, by entity; ``action_code``; for residents ``in_view``, what is in view by sight lines
+        (`vico.sim.perception.InView`), the same with and without pictures.
     """
     names = state.names
     stances = poses(state)
+    perceived = look_about(state, stances)
     found: dict[str, Observation] = {}
     infos: dict[str, dict[str, Any]] = {}
     for i, name in enumerate(names):
@@ -115,6 +119,8 @@ def observe(
             "state": state_of(i, state),
         }
         infos[name] = {"entities": {}, "action_code": found[name]["state"]["action_code"]}
+        if i in perceived:
+            infos[name]["in_view"] = perceived[i]
     if renderer is None or not len(seeing):
         return found, infos
     order = list(seeing)
@@ -138,6 +144,39 @@ def observe(
         seen = _distinct(views.segmentation[k])
         infos[names[i]]["entities"] = renderer.names(seen)
     return found, infos
+
+
+def look_about(state: SimulationState, stances: NDArray[np.float64]) -> dict[int, InView]:
+    """Return what residents have in view, by their index; `stances` as from `poses`."""
+    p, indoor = state.people, state.indoor
+    residents = np.flatnonzero(p.kind == RESIDENT)
+    feet, mine = stances[residents], _spaces(state)
+    eyes = Eyes(
+        feet[:, :3] + np.column_stack([np.zeros((len(residents), 2)), eye_height(state)[residents]]),
+        p.yaw[residents],
+        p.entity[residents],
+        mine[residents],
+    )
+    others = [owner.bodies() for owner in (state.traffic, state.transit, state.robots) if owner is not None]
+    bodies = Bodies.joined([p.bodies_of(np.arange(len(p))), *others])
+    spaces = np.concatenate([mine, np.full(len(bodies) - len(p), OUTDOORS)])
+    found = dict(
+        zip(residents.tolist(), in_view(eyes, bodies, spaces, opaque_grid(state.world), state.entities), strict=True)
+    )
+    for i, view in found.items():
+        if (room := int(p.room[i])) >= 0:
+            view.room = indoor.boxes[room]
+            view.furniture = indoor.furniture[indoor.furniture_start[room] : indoor.furniture_start[room + 1]]
+    return found
+
+
+def _spaces(state: SimulationState) -> NDArray[np.int64]:
+    """Return in which space each avatar is, as `Eyes.space`: outdoors, its room, or its bus."""
+    p = state.people
+    spaces = np.where(p.room >= 0, p.room, OUTDOORS).astype(np.int64)
+    in_bus = p.vehicle == Vehicle.BUS
+    spaces[in_bus] = len(state.indoor.rooms) + p.vehicle_entity[in_bus]
+    return spaces
 
 
 def _distinct(image: NDArray[np.int32]) -> list[int]:

@@ -148,7 +148,7 @@ class Punctuality(ArrayState):
             self._wrap(i)
 
     def _wrap(self, i: int) -> None:
-        """Go on with the next day's stays after the last of a day; who ends the day where it begins is there already."""
+        """Go on with the next day's stays after a day's last; who ends it where it began is there already."""
         first, end = int(self.start[i]), int(self.start[i + 1])
         if first < end == self.following[i]:
             self.day[i] += 1

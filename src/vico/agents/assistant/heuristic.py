@@ -73,7 +73,7 @@ class HeuristicDelivery:
 
     def act(self, observation: Mapping[str, Any], info: Mapping[str, Any]) -> Action:
         """Return one action for one observation."""
-        view = ObservationView(observation, info.get("entities", {}))
+        view = ObservationView(observation, info)
         self.skills.notice(view)
         for _ in range(12):  # a chain of states that are done at once, each at most once or twice
             before = self.state

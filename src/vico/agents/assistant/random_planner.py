@@ -33,7 +33,7 @@ class RandomPlanner:
 
     def act(self, observation: Mapping[str, Any], info: Mapping[str, Any]) -> Action:
         """Return one action for one observation."""
-        view = ObservationView(observation, info.get("entities", {}))
+        view = ObservationView(observation, info)
         self.skills.notice(view)
         self._age += 1
         for _ in range(8):

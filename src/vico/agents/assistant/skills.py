@@ -35,7 +35,7 @@ class ObservationView:
     """One observation with its info, under short names."""
 
     observation: Mapping[str, Any]
-    entities: Mapping[int, Mapping[str, str]]
+    info: Mapping[str, Any]
 
     @cached_property
     def pose(self) -> NDArray[np.float64]:
@@ -71,7 +71,7 @@ class ObservationView:
     @cached_property
     def things(self) -> list[Sighting]:
         """Named things in view, nearest first."""
-        return sightings(self.observation, self.entities)
+        return sightings(self.observation, self.info["entities"])
 
     def away(self, point: ArrayLike) -> float:
         """Metres to a point, over the ground."""
@@ -109,7 +109,7 @@ class AssistantSkills:
             self._trail.append(room)
         carried = [entity for entity in view.held if entity]
         goods = [thing.entity for thing in view.things if thing.kind == "object"]
-        self._indoors.notice(dict(view.observation), ignore=carried + goods)
+        self._indoors.notice(dict(view.observation), dict(view.info), ignore=carried + goods)
 
     def go_to(self, view: ObservationView, region: Mapping[str, Any]) -> Action | None:
         """Go to a region of a task: into the place, or to the middle of the spot outdoors."""
@@ -172,7 +172,7 @@ class AssistantSkills:
             self._walker.stop()
             return None
         x, y = (float(value) for value in np.asarray(point, np.float64)[:2])
-        return self._walker.towards((x, y), WALK, dict(view.observation), {"entities": view.entities})
+        return self._walker.towards((x, y), WALK, dict(view.observation), dict(view.info))
 
 
 class LookAround:
