@@ -1,5 +1,6 @@
 """The road database and the network netconvert makes, on real maps."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,12 +13,15 @@ from vico.errors import MissingExtraError
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmArea, OsmData, OsmWay
 from vico.worldgen.facts.driving_side import drives_left, keeps_left
+from vico.worldgen.facts.expendable import listening
 from vico.worldgen.facts.levels import OVER_A_STREET
-from vico.worldgen.facts.site import site_facts
-from vico.worldgen.streets.netconvert import netconvert_binary
+from vico.worldgen.facts.site import SiteFacts, site_facts
+from vico.worldgen.streets import netconvert
+from vico.worldgen.streets.netconvert import RoadNetwork, netconvert_binary
 from vico.worldgen.streets.roads import (
     THROUGH_A_BUILDING,
     UNDERGROUND,
+    NetworkStreet,
     closed_roads,
     is_traffic_street,
     streets_from_osm,
@@ -163,3 +167,23 @@ def test_a_bridge_over_water_is_open_to_traffic_walkers_and_buses(shared_data: P
     assert any(over.intersection(line.lanes) for line in city.transit.lines)
     walked = (shapely.intersection(shapely.LineString(walks.line(k)), deck).length for k in range(len(walks)))
     assert max(walked) > 8.0
+
+
+def test_a_street_that_netconvert_refuses_costs_itself_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    site = site_facts(road_city().osm)
+    streets = streets_from_osm(site)
+    used = [street for street in streets if is_traffic_street(street)]
+    bad, converted = used[len(used) // 2].way, netconvert._converted
+
+    def refusing(binary: Path, site: SiteFacts, some: Sequence[NetworkStreet]) -> RoadNetwork:
+        if any(street.way == bad for street in some):
+            raise netconvert.NetconvertError("road network: netconvert gave no network")
+        return converted(binary, site, some)
+
+    monkeypatch.setattr(netconvert, "_converted", refusing)
+    with listening() as losses:
+        network = netconvert.road_network(site, streets)
+    assert losses.ids == {f"w{bad}"}
+    monkeypatch.undo()
+    rest = [street for street in streets if street.way != bad]
+    assert network == netconvert.road_network(site, rest)

@@ -9,14 +9,16 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import shapely
 
 from vico.seeds import rng
+from vico.world.check.buildings import overlapping_faces
 from vico.world.mesh import Surface
-from vico.world.model import Building, Category, Entrance, Place
+from vico.world.model import FAILED, Building, Category, Entrance, Place
 from vico.worldgen.facades.pieces import Face, Pieces, Rgb, bare, cell_uv, is_bare
 from vico.worldgen.facades.signs import Board, Boards, colours_of, paint_boards
 from vico.worldgen.facades.walls import GroundFloors, Wall
-from vico.worldgen.facts.expendable import expendable
+from vico.worldgen.facts.expendable import expendable, leave_out
 
 _WHITE: Rgb = (255, 255, 255)
 _STONE: Rgb = (222, 218, 210)
@@ -45,6 +47,7 @@ _SHELVES = {
 }
 _DUMMIES = {"clothes", "shoes", "fashion", "boutique", "fabric", "bag", "second_hand", "charity", "department_store"}
 _MOST_SHIFT = 0.6  # metres a door may stand beside its entrance: the threshold is wider than that
+_TOUCH = 0.05  # metres within which the front of one house may come to lie in a face of another
 _SHARED_MATERIALS = ("ground_shops", "ground_cafes", "ground_loft", "ground_lobby")
 
 
@@ -115,14 +118,64 @@ def street_fronts(
     spots = _apportioned(spots)
     signed = [p for spot in spots for p in spot.names if _has_board(p)]
     boards = paint_boards(signed)
-    pieces = Pieces({m.name: m for m in (*(s.material for s in walls), *boards.materials)})
-    counts: Counter[str] = Counter(doors=0, shop_fronts=0, signs=0, awnings=0, projecting_signs=0)
+    materials = {m.name: m for m in (*(s.material for s in walls), *boards.materials)}
+    built: list[_Built] = []
     for spot in spots:
         with expendable(spot.entrance.id):
-            _Front(spot, pieces, boards, counts, rng(seed, "front", spot.entrance.id)).build()
+            one = _Built(spot, Pieces(materials), Counter())
+            _Front(spot, one.pieces, boards, one.counts, rng(seed, "front", spot.entrance.id)).build()
+            built.append(one)
+    pieces = Pieces(materials)
+    counts: Counter[str] = Counter(doors=0, shop_fronts=0, signs=0, awnings=0, projecting_signs=0)
+    for one in _apart(built, buildings, walls):
+        pieces.absorb(one.pieces)
+        counts.update(one.counts)
     counts["signs_without_letters"] = len(boards.mute)
     counts["sign_pages"] = len(boards.materials)
     return Fronts(pieces.surfaces(), dict(sorted(counts.items())))
+
+
+@dataclass(frozen=True)
+class _Built:
+    """A front by itself: its pieces, and how many there are of each kind."""
+
+    spot: _Spot
+    pieces: Pieces
+    counts: Counter[str]
+
+
+def _apart(built: Sequence[_Built], buildings: Sequence[Building], walls: Sequence[Surface]) -> list[_Built]:
+    """Leave out fronts with faces that lie in one plane with those of another house, or of a front of one."""
+    near, houses = _near_others(built, buildings)
+    if not near:
+        return list(built)
+    mine = [built[k].pieces.triangles() for k in near]
+    standing = [s.positions[s.triangles] for s in walls]
+    entities = np.concatenate([s.entity[s.triangles[:, 0]].astype(np.int64) for s in walls] or [np.zeros(0, np.int64)])
+    # Fronts by their number, walls by their house's after them.
+    owner = np.concatenate([np.repeat(near, [len(corners) for corners in mine]), len(built) + entities])
+    among = np.concatenate([np.ones(sum(map(len, mine)), bool), np.isin(entities, list(houses))])
+    lost: set[int] = set()
+    for pair in sorted(overlapping_faces(np.concatenate([*mine, *standing]), owner, among=among)):
+        whose = {built[k].spot.building.entity if k < len(built) else k - len(built) for k in pair}
+        fronts = [k for k in pair if k < len(built)]
+        if len(whose) == 2 and fronts and not lost & set(fronts):
+            lost.add(max(fronts))
+            leave_out(built[max(fronts)].spot.entrance.id, f"{FAILED}: its front lies in one plane with a neighbour's")
+    return [one for k, one in enumerate(built) if k not in lost]
+
+
+def _near_others(built: Sequence[_Built], buildings: Sequence[Building]) -> tuple[list[int], set[int]]:
+    """Return the fronts that reach another house, or the front of one, and the entities of all houses concerned."""
+    outlines = [shapely.Polygon(b.footprint[0], b.footprint[1:]) for b in buildings]
+    corners = [one.pieces.triangles().reshape(-1, 3)[:, :2] for one in built]
+    boxes = [shapely.box(*points.min(axis=0), *points.max(axis=0)) for points in corners]
+    shapes = np.array([*outlines, *boxes], object)
+    owner = np.array([*(b.entity for b in buildings), *(one.spot.building.entity for one in built)], np.int64)
+    front, other = shapely.STRtree(shapes).query(np.array(boxes, object), predicate="dwithin", distance=_TOUCH)
+    foreign = owner[len(buildings) + front] != owner[other]
+    near = sorted(set(front[foreign].tolist()))
+    return near, set(owner[other[foreign]].tolist())
 
 
 def _has_board(place: Place) -> bool:

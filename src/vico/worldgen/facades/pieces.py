@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vico.world.mesh import Material, Surface, surface_of_quads
 from vico.world.model import Entrance
@@ -59,6 +60,21 @@ class Pieces:
         self._uv.setdefault(name, []).append(uv)
         self._colours.setdefault(name, []).append(colour)
         self._entities.setdefault(name, []).append(entity)
+
+    def absorb(self, other: Pieces) -> None:
+        """Take over all pieces of another."""
+        for name in other._corners:
+            self._corners.setdefault(name, []).extend(other._corners[name])
+            self._normals.setdefault(name, []).extend(other._normals[name])
+            self._uv.setdefault(name, []).extend(other._uv[name])
+            self._colours.setdefault(name, []).extend(other._colours[name])
+            self._entities.setdefault(name, []).extend(other._entities[name])
+
+    def triangles(self) -> NDArray[np.float32]:
+        """Corners of all triangles, ENU metres, shape ``(n, 3, 3)``."""
+        quads = [corners for name in sorted(self._corners) for corners in self._corners[name]]
+        corners = np.asarray(quads, np.float32).reshape(-1, 4, 3)
+        return np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
 
     def surfaces(self) -> list[Surface]:
         """One surface a material, by name."""

@@ -18,6 +18,8 @@ import numpy as np
 from vico.errors import MissingExtraError, VicoError
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData
+from vico.world.model import FAILED
+from vico.worldgen.facts.expendable import leave_out
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.streets.roads import (
     DEFAULTS,
@@ -57,7 +59,9 @@ _OPTIONS = {
     "xml-validation.net": "never",
 }
 # netconvert needs under a second for 800 m of a dense city; this only ends a hang.
-_LIMIT_SECONDS = 300
+_LIMIT_SECONDS = 60
+# So many streets may be left out because netconvert refuses them.
+_MOST_REFUSED = 3
 
 
 class NetconvertError(VicoError, RuntimeError):
@@ -114,7 +118,8 @@ def road_network(site: SiteFacts, streets: Sequence[NetworkStreet]) -> RoadNetwo
     Raises
     ------
     MissingExtraError, NetconvertError
-        If netconvert is not installed, or gives no network.
+        If netconvert is not installed, or gives no network even without the streets that it seems to refuse; one or a
+        few of these are left out.
     """
     osm = site.osm
     used = [street for street in streets if is_traffic_street(street)]
@@ -122,9 +127,41 @@ def road_network(site: SiteFacts, streets: Sequence[NetworkStreet]) -> RoadNetwo
     if not used:
         return empty_network(osm.frame, osm.half)
     binary = netconvert_binary()
+    for _ in range(_MOST_REFUSED):
+        try:
+            return _converted(binary, site, used)
+        except NetconvertError as error:
+            culprit = _culprit(binary, site, used)
+            leave_out(f"w{culprit}", f"{FAILED}: {error}")
+            used = [street for street in used if street.way != culprit]
+    return _converted(binary, site, used) if used else empty_network(osm.frame, osm.half)
+
+
+def _culprit(binary: Path, site: SiteFacts, streets: Sequence[NetworkStreet]) -> int:
+    """Return the way with which streets that are converted together begin to fail, by halving: the list fails whole."""
+    good, bad = 0, len(streets)
+    while bad - good > 1:
+        middle = (good + bad) // 2
+        try:
+            _converted(binary, site, streets[:middle])
+            good = middle
+        except NetconvertError:
+            bad = middle
+    return streets[bad - 1].way
+
+
+def _converted(binary: Path, site: SiteFacts, streets: Sequence[NetworkStreet]) -> RoadNetwork:
+    """Run netconvert.
+
+    Raises
+    ------
+    NetconvertError
+        If it gives no network.
+    """
+    osm = site.osm
     with tempfile.TemporaryDirectory(prefix="vico-roads-") as folder:
         work = Path(folder)
-        (work / "streets.osm").write_text(_osm_xml(osm, used), encoding="utf-8")
+        (work / "streets.osm").write_text(_osm_xml(osm, streets), encoding="utf-8")
         (work / "types.xml").write_text(_types_xml(), encoding="utf-8")
         command = [
             str(binary), "--osm-files", "streets.osm", "--type-files", "types.xml", "--proj", osm.frame.proj4,
@@ -230,7 +267,7 @@ def _way_tags(street: NetworkStreet) -> dict[str, str]:
     return tags
 
 
-def _osm_xml(osm: OsmData, streets: list[NetworkStreet]) -> str:
+def _osm_xml(osm: OsmData, streets: Sequence[NetworkStreet]) -> str:
     """Write an OSM file of just these streets."""
 
     # Parts of a cut way and the edge's new nodes need ids of their own; OSM's end far below these.
