@@ -290,7 +290,7 @@ def test_a_shelter_opens_to_the_street_and_a_sign_looks_along_it() -> None:
 
 def test_what_vehicles_sweep_is_kept_free_beyond_the_carriageway() -> None:
     class Lanes:
-        inside, width = np.array([-1]), np.array([3.2])
+        ids, inside, width = ["lane"], np.array([-1]), np.array([3.2])
 
         def __len__(self) -> int:
             return 1

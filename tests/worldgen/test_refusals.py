@@ -217,7 +217,7 @@ def _holds_shapes(given: Any) -> bool:
         ("grading", "stream", ()),
         ("bridges", "rails", ()),
         ("buildings", "next house", ("next house",)),
-        ("roads", "passage", ("passage",)),
+        ("ways", "passage", ("passage",)),
         ("objects", "fence", ("fence",)),
         ("objects", "wood", ("wood",)),
         ("walkable", "pond", ()),
