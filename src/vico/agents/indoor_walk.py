@@ -9,8 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from vico.agents.base import Action, Info, Observation, heading, wrapped
 from vico.agents.perception import DepthGrid
+from vico.rules import ReasonCode, code_name
 
 _STRIDE = 1.0  # metres a step
+_HIT_SOLID = code_name(ReasonCode.HIT_SOLID)
 _ALIGNED = math.radians(8.0)
 _REMEMBERED = 6  # rooms
 _REACH_OF_BUMPS = 0.4  # metres ahead of one's middle is what stopped a step
@@ -40,7 +42,9 @@ class IndoorWalker:
                 grid.mark(in_view.room, in_view.furniture)
         elif "depth" in observation:
             grid.see(observation, floor=float(pose[2]), ignore=ignore)
-        if observation["state"]["action_status"] == "collision":
+        # Who is told what is in the room need not take people for furniture, who go away again.
+        state = observation["state"]
+        if state["action_status"] == "collision" and (in_view is None or state["action_code"] == _HIT_SOLID):
             yaw = heading(observation)
             grid.bump(pose[:2] + _REACH_OF_BUMPS * np.array([math.cos(yaw), math.sin(yaw)]))
 

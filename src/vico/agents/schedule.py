@@ -27,6 +27,8 @@ _STROLL = 30.0
 _STROLLING = ("leisure", "visit")
 _RUNNING = ("exercise",)
 _EATING = ("meal_home", "meal_out")
+# How often who is stopped indoors steps aside instead of trying again.
+_GIVE_WAY = 0.5
 _STROLL_SPEED, _RUN_SPEED = 0.9, 1.9
 
 
@@ -135,6 +137,7 @@ class ScheduleFollower:
         self._rng = generator
         self._walker = Walker(public_map, generator)
         self._indoors = IndoorWalker()
+        self._aside: list[Action] = []
         self._conversation = Conversation(resident, known, generator)
         self._posture = "standing"
         self._tick = 0
@@ -253,6 +256,13 @@ class ScheduleFollower:
         if out is None:
             return {"type": "wait"}
         outside = out["to"] == "outside"
+        if self._aside:
+            return self._aside.pop()
+        if state["action_status"] == "collision" and self._rng.random() < _GIVE_WAY:
+            # Two who want past each other would push for ever: a step aside, somewhere.
+            self._aside = [{"type": "move_forward", "distance": float(self._rng.uniform(0.3, 0.8))}]
+            side = "turn_left" if self._rng.random() < 0.5 else "turn_right"
+            return {"type": side, "degrees": float(self._rng.uniform(60.0, 170.0))}
         self._indoors.notice(observation, info)
         step = self._indoors.towards(observation, out["position"], near=1.9 if outside else 0.9)
         if step is not None:
