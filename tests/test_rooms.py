@@ -24,6 +24,7 @@ ALLOWED = {
     "envs": {"sim", "world", "community"},
     "agents": {
         "envs",
+        "llm",
         "io.compiled",
         "world.public",
         "world.routing",

@@ -6,6 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from vico.agents.state import AgentState, generator_state, restore_generator
 from vico.seeds import rng
 from vico.world.public import PublicMap
 
@@ -17,10 +18,23 @@ AHEAD = slice(3, 5)  # of an observation's pose: east and north of the direction
 
 
 class Agent(Protocol):
-    """Turns observations into actions, once a step. Sees nothing else of the world but public maps."""
+    """Whoever acts: residents, planners, learners, people at a keyboard, submissions.
+
+    Turns observations into actions, once a step, and sees nothing else of the world but public maps. One that spends
+    on language models has attributes ``tokens`` and ``cost`` (US dollars), what it spent so far.
+    """
 
     def act(self, observation: Observation, info: Info) -> Action:
-        """Return the action for the coming second."""
+        """Return the action for the coming second; what it is given is its own, to keep or to change."""
+
+    def state(self) -> AgentState:
+        """Return all it remembers, as nested dicts of JSON values and arrays.
+
+        A fresh agent that is made in the same way and given this to `restore` acts on as this one does.
+        """
+
+    def restore(self, state: AgentState) -> None:
+        """Remember what `state` returned, instead of what it remembers."""
 
 
 class RandomAgent:
@@ -55,6 +69,14 @@ class RandomAgent:
             return {"type": ("drink", "eat", "wait")[int(self._rng.integers(3))]}
         return {"type": "move_forward", "distance": float(self._rng.uniform(0.2, 1.2))}
 
+    def state(self) -> AgentState:
+        """Return where its stream of chance stands."""
+        return {"generator": generator_state(self._rng)}
+
+    def restore(self, state: AgentState) -> None:
+        """Go on where another one was."""
+        restore_generator(self._rng, state["generator"])
+
 
 def heading(observation: Observation) -> float:
     """Yaw an agent looks along, radians."""
@@ -67,4 +89,4 @@ def wrapped(angle: float) -> float:
     return float((angle + np.pi) % (2 * np.pi) - np.pi)
 
 
-__all__ = ["Action", "Agent", "Info", "Observation", "PublicMap", "RandomAgent", "heading", "wrapped"]
+__all__ = ["Action", "Agent", "AgentState", "Info", "Observation", "PublicMap", "RandomAgent", "heading", "wrapped"]

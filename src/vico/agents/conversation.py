@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from vico.agents.base import Action, Info, Observation
+from vico.agents.state import AgentState
 from vico.clock import DAY
 
 # People greet within this distance, metres, and not twice within this time, seconds.
@@ -73,6 +74,14 @@ class Conversation:
         self._rng = generator
         self._greeted: dict[str, float] = {}
         self._said: dict[str, int] = {}
+
+    def state(self) -> AgentState:
+        """Return whom it greeted when, and how much it said; the generator is its owner's to save."""
+        return {"greeted": dict(self._greeted), "said": dict(self._said)}
+
+    def restore(self, state: AgentState) -> None:
+        """Remember what `state` returned."""
+        self._greeted, self._said = dict(state["greeted"]), dict(state["said"])
 
     def line(self, observation: Observation, info: Info, errand: str) -> Action | None:
         """Return something to say now, or None.

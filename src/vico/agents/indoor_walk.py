@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vico.agents.base import Action, Info, Observation, heading, wrapped
 from vico.agents.perception import DepthGrid
+from vico.agents.state import AgentState
 from vico.rules import ReasonCode, code_name
 
 _STRIDE = 1.0  # metres a step
@@ -24,6 +25,18 @@ class IndoorWalker:
     def __init__(self) -> None:
         # The last few rooms, the one that was entered last at the end.
         self._grids: dict[str, DepthGrid] = {}
+
+    def state(self) -> AgentState:
+        """Return what it knows of which rooms, numbered from the one that was entered longest ago."""
+        return {str(k): {"room": room, "grid": grid.state()} for k, (room, grid) in enumerate(self._grids.items())}
+
+    def restore(self, state: AgentState) -> None:
+        """Know what `state` returned."""
+        self._grids = {}
+        for k in range(len(state)):
+            grid = DepthGrid((0.0, 0.0))
+            grid.restore(state[str(k)]["grid"])
+            self._grids[state[str(k)]["room"]] = grid
 
     def notice(self, observation: Observation, info: Info, *, ignore: ArrayLike = ()) -> None:
         """Take in what a new observation shows of the room one is in.

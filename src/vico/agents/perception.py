@@ -33,6 +33,16 @@ class Sighting:
     pixels: int
     position: NDArray[np.float64]
 
+    def state(self) -> dict[str, Any]:
+        """Return it as plain data; ``Sighting(**state)`` is the same again."""
+        return {
+            "entity": self.entity,
+            "kind": self.kind,
+            "name": self.name,
+            "pixels": self.pixels,
+            "position": self.position.copy(),
+        }
+
 
 def points_from_depth(
     depth: NDArray[np.float32], intrinsics: NDArray[np.float64], extrinsics: NDArray[np.float64], *, step: int = 1
@@ -116,6 +126,24 @@ class DepthGrid:
         self.corner = np.asarray(middle, np.float64)[:2] - side / 2
         self._hits = np.zeros((self.n, self.n), np.int32)
         self._bumps = np.zeros((self.n, self.n), np.bool_)
+
+    def state(self) -> dict[str, Any]:
+        """Return the cells that hold something, as arrays; few do, so they are listed."""
+        (hit,) = np.nonzero(self._hits.ravel())
+        return {
+            "corner": self.corner.copy(),
+            "hit": hit.astype(np.int32),
+            "hits": self._hits.ravel()[hit],
+            "bumps": np.packbits(self._bumps.ravel()),
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Hold what another grid of the same size held."""
+        self.corner = np.array(state["corner"], np.float64)
+        self._hits = np.zeros((self.n, self.n), np.int32)
+        self._hits.ravel()[state["hit"]] = state["hits"]
+        bumps = np.unpackbits(state["bumps"], count=self.n * self.n)
+        self._bumps = bumps.astype(np.bool_).reshape(self.n, self.n)
 
     def see(self, observation: Mapping[str, Any], *, floor: float, ignore: ArrayLike = ()) -> None:
         """Add what a depth image shows between ankle and head height.

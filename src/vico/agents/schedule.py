@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from vico.agents.base import Action, Info, Observation
 from vico.agents.conversation import Acquaintance, Conversation, Speaker
 from vico.agents.indoor_walk import IndoorWalker
+from vico.agents.state import AgentState, generator_state, restore_generator
 from vico.agents.wayfinding import Walker
 from vico.clock import DAY, seconds_of_day
 from vico.seeds import rng
@@ -153,6 +154,37 @@ class ScheduleFollower:
         action = self._decide(observation, info)
         self._asked = str(action["type"])
         return action
+
+    def state(self) -> AgentState:
+        """Return all that decides what is done next, beside the day and the map."""
+        arrived = self._arrived
+        return {
+            "generator": generator_state(self._rng),
+            "walker": self._walker.state(),
+            "indoors": self._indoors.state(),
+            "conversation": self._conversation.state(),
+            "aside": [dict(action) for action in self._aside],
+            "posture": self._posture,
+            "tick": self._tick,
+            "tried": sorted(self._tried),
+            "arrived": None if arrived is None else self._stays.index(arrived),
+            "stroll": None if self._stroll is None else list(self._stroll),
+            "pause": self._pause,
+            "asked": self._asked,
+        }
+
+    def restore(self, state: AgentState) -> None:
+        """Go on with the day where a follower of the same resident was."""
+        restore_generator(self._rng, state["generator"])
+        self._walker.restore(state["walker"])
+        self._indoors.restore(state["indoors"])
+        self._conversation.restore(state["conversation"])
+        arrived, stroll = state["arrived"], state["stroll"]
+        self._aside = [dict(action) for action in state["aside"]]
+        self._posture, self._tick, self._tried = state["posture"], state["tick"], set(state["tried"])
+        self._arrived = None if arrived is None else self._stays[arrived]
+        self._stroll = None if stroll is None else (float(stroll[0]), float(stroll[1]))
+        self._pause, self._asked = state["pause"], state["asked"]
 
     def _decide(self, observation: Observation, info: Info) -> Action:
         self._tick += 1

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.base import Action, Info, Observation, heading, wrapped
+from vico.agents.state import AgentState
 from vico.rules import ReasonCode, code_name
 from vico.world.public import PublicMap
 from vico.world.walkable import CROSSING, ROADWAY
@@ -47,6 +48,29 @@ class Walker:
         self._stepped = False
         self._aside: list[Action] = []
         self._closed: list[tuple[float, float, float]] = []
+
+    def state(self) -> AgentState:
+        """Return the way under way and what is known to be in it; the generator is its owner's to save."""
+        return {
+            "goal": None if self._goal is None else list(self._goal),
+            "path": self._path.copy(),
+            "next": self._next,
+            "blocked": self._blocked,
+            "waited": self._waited,
+            "stepped": self._stepped,
+            "aside": [dict(action) for action in self._aside],
+            "closed": np.array(self._closed, np.float64).reshape(-1, 3),
+        }
+
+    def restore(self, state: AgentState) -> None:
+        """Go on the way that `state` returned."""
+        goal = state["goal"]
+        self._goal = None if goal is None else (float(goal[0]), float(goal[1]))
+        self._path = np.array(state["path"], np.float64).reshape(-1, 2)
+        self._next, self._blocked, self._waited = state["next"], state["blocked"], state["waited"]
+        self._stepped = state["stepped"]
+        self._aside = [dict(action) for action in state["aside"]]
+        self._closed = [(float(x), float(y), float(radius)) for x, y, radius in state["closed"]]
 
     def stop(self) -> None:
         """Forget the way."""

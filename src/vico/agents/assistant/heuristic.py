@@ -20,13 +20,14 @@ from typing import Any, ClassVar
 
 from vico.agents.assistant.skills import GRASP, Action, AssistantSkills, LookAround, ObservationView
 from vico.agents.perception import Sighting
+from vico.agents.state import AgentState
 from vico.seeds import rng
 from vico.world.public import PublicMap
 
 SEARCH_ROUNDS = 3
 
 
-class State(IntEnum):
+class Phase(IntEnum):
     """States of the automaton, numbered as in the figure."""
 
     GOTO_SOURCE = 0
@@ -55,7 +56,7 @@ class HeuristicDelivery:
     ) -> None:
         self.errands = instructions[number::of]
         self.skills = AssistantSkills(public_map, rng(seed, "heuristic", number))
-        self.state = State.GOTO_SOURCE if self.errands else State.FINISHED
+        self.phase = Phase.GOTO_SOURCE if self.errands else Phase.FINISHED
         self._current = 0
         self._search: LookAround | None = None
         self._rounds = 0
@@ -65,6 +66,35 @@ class HeuristicDelivery:
         self._picking = ""
         self._reported = 0
         self._steps_here = 0
+
+    def state(self) -> AgentState:
+        """Return the errand in hand and how far it came, and what the skills remember."""
+        return {
+            "skills": self.skills.state(),
+            "phase": int(self.phase),
+            "current": self._current,
+            "search": None if self._search is None else self._search.state(),
+            "rounds": self._rounds,
+            "target": None if self._target is None else self._target.state(),
+            "picked": sorted(self._picked),
+            "near": self._near,
+            "picking": self._picking,
+            "reported": self._reported,
+            "steps_here": self._steps_here,
+        }
+
+    def restore(self, state: AgentState) -> None:
+        """Go on with the errands as `state` returned them."""
+        self.skills.restore(state["skills"])
+        self.phase, self._current = Phase(state["phase"]), state["current"]
+        self._search = None
+        if state["search"] is not None:
+            self._search = self._new_search()
+            self._search.restore(state["search"])
+        self._rounds, self._near = state["rounds"], state["near"]
+        self._target = None if state["target"] is None else Sighting(**state["target"])
+        self._picked, self._picking = set(state["picked"]), state["picking"]
+        self._reported, self._steps_here = state["reported"], state["steps_here"]
 
     @property
     def errand(self) -> dict[str, Any]:
@@ -76,9 +106,9 @@ class HeuristicDelivery:
         view = ObservationView(observation, info)
         self.skills.notice(view)
         for _ in range(12):  # a chain of states that are done at once, each at most once or twice
-            before = self.state
-            action = self._STEPS[self.state](self, view)
-            self._steps_here = self._steps_here + 1 if self.state == before else 0
+            before = self.phase
+            action = self._STEPS[self.phase](self, view)
+            self._steps_here = self._steps_here + 1 if self.phase == before else 0
             if action is not None:
                 return action
         return {"type": "wait"}
@@ -86,11 +116,14 @@ class HeuristicDelivery:
     def _wanted(self, thing: Sighting) -> bool:
         return thing.name in self.errand["objects"] and thing.name not in self._picked
 
+    def _new_search(self) -> LookAround:
+        return LookAround(self.skills, self._wanted, self.errand["source"])
+
     def _goto_source(self, view: ObservationView) -> Action | None:
         action = self.skills.go_to(view, self.errand["source"])
         if action is None:
-            self._search = LookAround(self.skills, self._wanted, self.errand["source"])
-            self.state = State.SEARCH
+            self._search = self._new_search()
+            self.phase = Phase.SEARCH
         return action
 
     def _look(self, view: ObservationView) -> Action | None:
@@ -100,15 +133,15 @@ class HeuristicDelivery:
             return action
         if self._search.found is not None:
             self._target, self._near = self._search.found, GRASP
-            self.state = State.NAVIGATE
+            self.phase = Phase.NAVIGATE
             return None
         self._rounds += 1
         if any(view.held):
-            self.state = State.GOTO_DESTINATION
+            self.phase = Phase.GOTO_DESTINATION
         elif self._rounds >= SEARCH_ROUNDS:
             self._next_errand()
         else:
-            self._search = LookAround(self.skills, self._wanted, self.errand["source"])
+            self._search = self._new_search()
             return {"type": "wait"}
         return None
 
@@ -119,7 +152,7 @@ class HeuristicDelivery:
         action = self.skills.approach(view, self._target.position, near=self._near)
         if action is not None and self._steps_here < 60:
             return action
-        self.state = State.PICK
+        self.phase = Phase.PICK
         return None
 
     def _pick(self, view: ObservationView) -> Action | None:
@@ -130,15 +163,15 @@ class HeuristicDelivery:
                 self._picked.add(name)
             elif self._near > 0.5:
                 self._near -= 0.3
-                self.state = State.NAVIGATE
+                self.phase = Phase.NAVIGATE
                 return None
             else:
-                self.state = State.SEARCH
-                self._search = LookAround(self.skills, self._wanted, self.errand["source"])
+                self.phase = Phase.SEARCH
+                self._search = self._new_search()
                 return {"type": "wait"}
         left = [name for name in self.errand["objects"] if name not in self._picked]
         if not left or all(view.held):
-            self.state = State.GOTO_DESTINATION
+            self.phase = Phase.GOTO_DESTINATION
             return None
         if self._target.name in left:
             self._picking = self._target.name
@@ -146,17 +179,17 @@ class HeuristicDelivery:
         seen = next((thing for thing in view.things if self._wanted(thing)), None)
         if seen is not None:
             self._target, self._near = seen, GRASP
-            self.state = State.NAVIGATE
+            self.phase = Phase.NAVIGATE
             return None
         # More is wanted from here: one look around before carrying off what is in hand.
-        self._search = LookAround(self.skills, self._wanted, self.errand["source"])
-        self.state = State.SEARCH
+        self._search = self._new_search()
+        self.phase = Phase.SEARCH
         return None
 
     def _goto_destination(self, view: ObservationView) -> Action | None:
         action = self.skills.go_to(view, self.errand["destination"])
         if action is None:
-            self.state = State.DROP
+            self.phase = Phase.DROP
         return action
 
     def _drop(self, view: ObservationView) -> Action | None:
@@ -164,13 +197,13 @@ class HeuristicDelivery:
         if full:
             if view.refused and self._steps_here > 0:
                 if self._steps_here > 12:
-                    self.state = State.GOTO_DESTINATION
+                    self.phase = Phase.GOTO_DESTINATION
                 if self._steps_here % 2:
                     return {"type": "turn_left", "degrees": 70.0}
             return {"type": "put", "hand": full[0]}
         left = [name for name in self.errand["objects"] if name not in self._picked]
         if left and self._rounds < SEARCH_ROUNDS:
-            self.state = State.GOTO_SOURCE
+            self.phase = Phase.GOTO_SOURCE
             return None
         self._next_errand()
         return None
@@ -180,26 +213,26 @@ class HeuristicDelivery:
         self._rounds = 0
         self._search = None
         self._target = None
-        self.state = State.GOTO_SOURCE if self._current < len(self.errands) else State.COMPLETE
+        self.phase = Phase.GOTO_SOURCE if self._current < len(self.errands) else Phase.COMPLETE
 
     def _complete(self, view: ObservationView) -> Action | None:
         if self._reported < len(self.errands):
             index = int(self.errands[self._reported]["index"])
             self._reported += 1
             return {"type": "task_complete", "index": index}
-        self.state = State.FINISHED
+        self.phase = Phase.FINISHED
         return None
 
     def _finished(self, view: ObservationView) -> Action | None:
         return {"type": "wait"}
 
-    _STEPS: ClassVar[dict[State, Callable[[HeuristicDelivery, ObservationView], Action | None]]] = {
-        State.GOTO_SOURCE: _goto_source,
-        State.SEARCH: _look,
-        State.NAVIGATE: _navigate,
-        State.PICK: _pick,
-        State.GOTO_DESTINATION: _goto_destination,
-        State.DROP: _drop,
-        State.COMPLETE: _complete,
-        State.FINISHED: _finished,
+    _STEPS: ClassVar[dict[Phase, Callable[[HeuristicDelivery, ObservationView], Action | None]]] = {
+        Phase.GOTO_SOURCE: _goto_source,
+        Phase.SEARCH: _look,
+        Phase.NAVIGATE: _navigate,
+        Phase.PICK: _pick,
+        Phase.GOTO_DESTINATION: _goto_destination,
+        Phase.DROP: _drop,
+        Phase.COMPLETE: _complete,
+        Phase.FINISHED: _finished,
     }

@@ -7,6 +7,7 @@ from typing import Any
 
 from vico.agents.assistant.skills import GRASP, Action, AssistantSkills, LookAround, ObservationView
 from vico.agents.perception import Sighting
+from vico.agents.state import AgentState, generator_state, restore_generator
 from vico.seeds import rng
 from vico.world.public import PublicMap
 
@@ -31,6 +32,35 @@ class RandomPlanner:
         self._index = 0
         self._done = False
 
+    def state(self) -> AgentState:
+        """Return the plan under way, and where chance stands."""
+        return {
+            "skills": self.skills.state(),
+            "generator": generator_state(self._random),
+            "plan": self._plan,
+            "region": dict(self._region),
+            "search": None if self._search is None else self._search.state(),
+            "target": None if self._target is None else self._target.state(),
+            "age": self._age,
+            "index": self._index,
+            "done": self._done,
+        }
+
+    def restore(self, state: AgentState) -> None:
+        """Go on with the plan that `state` returned."""
+        self.skills.restore(state["skills"])
+        restore_generator(self._random, state["generator"])
+        self._plan, self._region = state["plan"], dict(state["region"])
+        self._search = None
+        if state["search"] is not None:
+            self._search = self._any_object()
+            self._search.restore(state["search"])
+        self._target = None if state["target"] is None else Sighting(**state["target"])
+        self._age, self._index, self._done = state["age"], state["index"], state["done"]
+
+    def _any_object(self) -> LookAround:
+        return LookAround(self.skills, lambda thing: thing.kind == "object", None)
+
     def act(self, observation: Mapping[str, Any], info: Mapping[str, Any]) -> Action:
         """Return one action for one observation."""
         view = ObservationView(observation, info)
@@ -48,7 +78,7 @@ class RandomPlanner:
         self._plan = ("go", "search", "pick", "put", "complete")[int(self._random.integers(5))]
         self._age = 0
         self._region = errand["source" if self._random.random() < 0.5 else "destination"]
-        self._search = LookAround(self.skills, lambda thing: thing.kind == "object", None)
+        self._search = self._any_object()
         things = [thing for thing in view.things if thing.kind == "object" and thing.entity not in view.held]
         self._target = things[int(self._random.integers(len(things)))] if things else None
         self._index = int(errand["index"])

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vico.agents.indoor_walk import IndoorWalker
 from vico.agents.perception import Sighting, sightings
+from vico.agents.state import AgentState, generator_state, restore_generator
 from vico.agents.wayfinding import Walker
 from vico.world.public import PublicMap
 
@@ -92,10 +93,28 @@ class AssistantSkills:
 
     def __init__(self, public_map: PublicMap, generator: np.random.Generator) -> None:
         self.map = public_map
+        self._rng = generator
         self._walker = Walker(public_map, generator)
         self._indoors = IndoorWalker()
         self._trail: list[str] = []
         self._tries = 0
+
+    def state(self) -> AgentState:
+        """Return the way under way, rooms known, and where chance stands."""
+        return {
+            "generator": generator_state(self._rng),
+            "walker": self._walker.state(),
+            "indoors": self._indoors.state(),
+            "trail": list(self._trail),
+            "tries": self._tries,
+        }
+
+    def restore(self, state: AgentState) -> None:
+        """Go on with what `state` returned."""
+        restore_generator(self._rng, state["generator"])
+        self._walker.restore(state["walker"])
+        self._indoors.restore(state["indoors"])
+        self._trail, self._tries = list(state["trail"]), state["tries"]
 
     def notice(self, view: ObservationView) -> None:
         """Take in a new observation: the room's depth, and the way one came."""
@@ -202,6 +221,23 @@ class LookAround:
             reach = 0.6 * max(float(region["radius"]), 3.0)
             ring = [middle + reach * np.array([math.cos(a), math.sin(a)]) for a in (0.0, 1.57, 3.14, 4.71)]
             self._spots = [spot for spot in ring if skills.map.walkable.is_connected(spot)]
+
+    def state(self) -> AgentState:
+        """Return what was looked at so far, and what is still to be; the skills are their owner's to save."""
+        return {
+            "turns": self.turns,
+            "spots": np.array(self._spots, np.float64).reshape(-1, 2),
+            "rooms_done": sorted(self._rooms_done),
+            "ways": {room: list(beyond) for room, beyond in self._ways.items()},
+            "walked": self._walked,
+        }
+
+    def restore(self, state: AgentState) -> None:
+        """Go on with a search for the same thing in the same region."""
+        self.turns, self._walked = state["turns"], state["walked"]
+        self._spots = list(np.array(state["spots"], np.float64).reshape(-1, 2))
+        self._rooms_done = set(state["rooms_done"])
+        self._ways = {room: list(beyond) for room, beyond in state["ways"].items()}
 
     def act(self, view: ObservationView) -> Action | None:
         """Return the next action; None when something was found (see `found`) or everything was looked at."""

@@ -1,0 +1,87 @@
+"""Plain data goes to bytes and back; whatever else the bytes hold is refused."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vico.errors import InputError, SchemaError
+from vico.io.plain_data import decode, encode
+
+
+def test_nested_values_and_arrays_come_back_as_they_were() -> None:
+    given = {
+        "number": 1.5,
+        "big": 2**127 + 1,
+        "none": None,
+        "yes": True,
+        "text": "Käpylä",
+        "list": [1, [2.0, "x"], {}],
+        "grid": np.arange(6, dtype=np.int32).reshape(2, 3),
+        "deep": {"empty": np.zeros((0, 2)), "flags": np.array([True, False]), "words": np.array(["ab", "c"])},
+    }
+    found = decode(encode(given))
+    assert found["grid"].dtype == np.int32
+    assert found["grid"].flags.writeable
+    np.testing.assert_array_equal(found.pop("grid"), given.pop("grid"))
+    for name, array in found.pop("deep").items():
+        np.testing.assert_array_equal(array, given["deep"][name])
+    del given["deep"]
+    assert found == given
+
+
+def test_numbers_that_are_none_survive() -> None:
+    found = decode(encode([float("nan"), float("inf"), np.float32(0.5), np.int64(3)]))
+    assert np.isnan(found[0])
+    assert found[1:] == [np.inf, 0.5, 3]
+
+
+@pytest.mark.parametrize(
+    ("value", "where"),
+    [
+        ({"a": {"b": object()}}, "a.b"),
+        ({"a": [1, {2: 3}]}, r"a\[1\]"),
+        ({"a": np.array([object()])}, "a"),
+        ({"a": "\ud800"}, "Unicode"),
+    ],
+)
+def test_objects_are_refused_with_their_place(value: Any, where: str) -> None:
+    with pytest.raises(InputError, match=where):
+        encode(value)
+
+
+def test_what_holds_itself_is_refused() -> None:
+    loop: list[Any] = []
+    loop.append(loop)
+    with pytest.raises(InputError, match="nested"):
+        encode(loop)
+
+
+def message(header: Any, rest: bytes = b"") -> bytes:
+    head = header if isinstance(header, bytes) else json.dumps(header).encode()
+    return b"VICOPD1\n" + len(head).to_bytes(4, "little") + head + rest
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"\x80\x04N.",
+        b"VICOPD1\n\xff\xff\xff\xff",
+        message(b"[" * 100_000),
+        message([]),
+        message({"value": {"__array__": 0}, "arrays": []}),
+        message({"value": 1, "arrays": [["|O", [1]]]}, b"12345678"),
+        message({"value": 1, "arrays": [["<f8", [2**62]]]}),
+        message({"value": 1, "arrays": [["<f8", [-1]]]}),
+        message({"value": 1, "arrays": [[[["a", "<f8"]], [1]]]}, b"12345678"),
+        message({"value": 1, "arrays": []}, b"x"),
+        encode({"a": np.ones(4)})[:-1],
+    ],
+)
+def test_bytes_from_anywhere_are_refused(content: bytes) -> None:
+    with pytest.raises(SchemaError):
+        decode(content)
