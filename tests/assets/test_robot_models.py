@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from vico.assets.packages import installed
-from vico.assets.robots import BUMPER, robot_model, robot_names
+from vico.assets.robots import BUMPER, FourLegs, robot_model, robot_names
 from vico.assets.robots.onnx import dense_layers
 from vico.assets.robots.packs import GO2_PACKAGE, HUSKY_PACKAGE
 from vico.assets.shading import shaded
@@ -81,9 +81,9 @@ def test_a_robot_has_few_triangles(name: str) -> None:
 def test_servos_are_named_as_the_control_vector_and_the_bumper_is_there(name: str) -> None:
     model = robot_model(name)
     spec = mujoco.MjSpec.from_string(model.mjcf)
-    assert [servo.name for servo in spec.actuators] == list(model.joints)
+    assert [servo.name for servo in spec.actuators] == list(model.motors)
     assert BUMPER in [geom.name for geom in spec.geoms]
-    assert len(model.lower) == len(model.upper) == len(model.rest) == len(model.joints)
+    assert len(model.rest) == len(model.joints)
 
 
 def varint(value: int) -> bytes:
@@ -144,7 +144,9 @@ def test_another_or_a_broken_network_is_refused(tmp_path: Path, damage: str) -> 
 
 @needs_go2
 def test_the_installed_policy_has_the_layers_it_was_published_with() -> None:
-    policy = robot_model("go2").policy
+    settings = robot_model("go2").controller
+    assert isinstance(settings, FourLegs)
+    policy = settings.policy
     assert policy is not None
     assert [w.shape for w in policy.weights] == [(512, 45), (256, 512), (128, 256), (12, 128)]
 

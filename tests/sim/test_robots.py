@@ -13,7 +13,7 @@ from vico.assets.shapes import box
 from vico.errors import InputError
 from vico.sim.bodies import RESIDENT, Bodies
 from vico.sim.robots import RobotPopulation, RobotStatus
-from vico.sim.robots.gait import leg_angles
+from vico.sim.robots.gait import LegGeometry, leg_angles
 from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.model import Manifest, Origin
@@ -21,6 +21,8 @@ from vico.world.objects import Objects
 from vico.world.walkable import BLOCKED, SIDEWALK, WalkableMap
 
 HALF = 40.0
+#: Of Go2: lengths of thigh and shin 0.213 m, 0.0955 m from the hip to the leg (Unitree's description).
+LEGS = LegGeometry(0.1934, 0.0465, 0.0955, 0.213, 0.213)
 PACKS = [
     False,
     pytest.param(
@@ -320,7 +322,7 @@ def test_joint_targets_move_the_joints() -> None:
 @pytest.mark.parametrize("foot", [(0.0, 0.0, -0.27), (0.1, 0.05, -0.25), (-0.12, -0.06, -0.3)])
 def test_leg_angles_bring_the_foot_where_it_is_wanted(side: float, foot: tuple[float, float, float]) -> None:
     x, y, z = foot[0], foot[1] + side * 0.0955, foot[2]
-    hip, thigh, calf = leg_angles(x, y, z, side)
+    hip, thigh, calf = leg_angles(x, y, z, side, LEGS)
     down = -0.213 * np.cos(thigh) - 0.213 * np.cos(thigh + calf)
     found = (
         -0.213 * np.sin(thigh) - 0.213 * np.sin(thigh + calf),

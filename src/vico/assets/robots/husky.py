@@ -10,7 +10,17 @@ from functools import cache
 
 import numpy as np
 
-from vico.assets.robots.model import BUMP, BUMPER, TOUCH, RobotModel
+from vico.assets.robots.model import (
+    BUMP,
+    BUMPER,
+    TOUCH,
+    ActionSpace,
+    Deck,
+    RobotModel,
+    Sensors,
+    SkidSteering,
+    velocity_space,
+)
 from vico.assets.robots.packs import husky_shapes
 from vico.assets.shapes import box, cylinder, extrusion
 from vico.world.mesh import Surface, joined
@@ -18,6 +28,8 @@ from vico.world.mesh import Surface, joined
 RADIUS, WIDTH = 0.165, 0.1143
 AXLE, TRACK, HUB = 0.256, 0.2854, 0.0328
 MASS, WHEEL_MASS = 50.0, 2.637
+# How much faster than by rolling alone the wheels have to turn for the base to turn, on pavement.
+_SLIP = 2.2
 WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
 _YELLOW, _BLACK, _DARK, _GREY = (238, 186, 24), (34, 35, 38), (58, 60, 64), (150, 153, 158)
 _STAND = RADIUS - HUB
@@ -114,16 +126,24 @@ def husky(packs: bool = True) -> RobotModel:
         title="Clearpath Husky",
         source="pybullet 3.2.7 (meshes), own physics" if meshes else "own model",
         mjcf=_mjcf(),
+        motors=WHEELS,
+        servos=("velocity",) * 4,
         joints=WHEELS,
-        lower=np.full(4, -8.0),
-        upper=np.full(4, 8.0),
         rest=np.zeros(4),
+        controller=SkidSteering(RADIUS, TRACK, _SLIP),
+        action_spaces={
+            "wheels": ActionSpace("motors", WHEELS, ("rad/s",) * 4, np.full(4, -8.0), np.full(4, 8.0)),
+            "velocity": velocity_space(1.0, 0.0, 1.2),
+        },
+        control_period=0.02,
+        sensors=Sensors(camera=(0.29, 0.0, 0.335)),
+        # The rails' tops, behind the camera's mast.
+        deck=Deck((-0.095, 0.0, 0.252), 0.63, 0.62),
         stand=_STAND,
         half_length=0.495,
         half_width=0.3425,
         height=0.39,
-        speed=1.0,
-        turn=1.2,
-        eye=(0.29, 0.0, 0.335),
+        lookahead=0.9,
+        arrival=0.4,
         shapes=meshes or _own_shapes(),
     )

@@ -3,18 +3,22 @@
 Every robot has a model of our own, primitive shapes with published masses, lengths and limits. Where the packages
 that ship a robot's meshes (and, for Go2, its walking policy) are installed, those are used instead.
 
-The control vector of a robot has one entry a motor, in the order of `RobotModel.joints`. Motors are servos: wheels
-follow a speed (rad/s), legs an angle (rad), within the motor's torque.
+A model says everything about its robot itself: its motors and joints, the spaces it can be commanded in with their
+units and bounds, the controller that turns a velocity into motor commands, its sensors, its deck and the period of its
+control. Nothing is concluded from how many joints it has.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.errors import InputError
 from vico.world.mesh import Surface
 
 #: Collision bits: 1 is what robots stand on and touch each other with, 2 is what their bumper meets.
@@ -24,6 +28,11 @@ BUMPER = "bumper"
 #: Contact of feet (MuJoCo's `solref`, `solimp`): they sink 1 cm at most. Softer ones sink below the cells of uneven
 #: ground and meet those from the side.
 FOOT_CONTACT = ("0.01 1", "0.9 0.95 0.001")
+
+#: What a motor follows: an angle (rad), a speed (rad/s), or a force or torque (N, Nm).
+Servo = Literal["position", "velocity", "force"]
+#: Seconds that control periods are multiples of.
+TICK = 0.01
 
 
 @dataclass(frozen=True)
@@ -50,6 +59,139 @@ class PolicyNetwork:
 
 
 @dataclass(frozen=True)
+class ActionSpace:
+    """One form of vectors that a robot is commanded by.
+
+    Attributes
+    ----------
+    drives
+        What a vector is: targets of all motors in their order (``motors``), or a velocity vx, vy (m/s, in the base's
+        frame) and wz (rad/s, to the left) that the robot's controller follows (``velocity``).
+    entries, units
+        Name and unit of each number.
+    low, high
+        Bounds of each number, float64, shape ``(n,)``. A vector beyond them is clipped to them.
+    """
+
+    drives: Literal["motors", "velocity"]
+    entries: tuple[str, ...]
+    units: tuple[str, ...]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.entries)
+
+
+def velocity_space(forward: float, sideways: float, turn: float) -> ActionSpace:
+    """Return the space of velocities up to some metres a second ahead and aside, and radians a second of turning."""
+    high = np.array([forward, sideways, turn])
+    return ActionSpace("velocity", ("vx", "vy", "wz"), ("m/s", "m/s", "rad/s"), -high, high)
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """What a robot feels.
+
+    Attributes
+    ----------
+    joints
+        Whether it measures angles and speeds of its joints.
+    imu
+        Whether it measures how its base turns, speeds up and stands to gravity.
+    odometry
+        Whether it knows pose and velocity of its base.
+    contacts
+        Links that feel whether they touch anything.
+    camera
+        Camera in the frame of the base, metres; it looks along +x. None: it has none.
+    """
+
+    joints: bool = True
+    imu: bool = True
+    odometry: bool = True
+    contacts: tuple[str, ...] = ()
+    camera: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Deck:
+    """A level rectangle of a moving body on which things can be put; they move with it.
+
+    Attributes
+    ----------
+    centre
+        Middle of its surface in the frame of the body, metres.
+    length, width
+        Extents along the body's x and y, metres.
+    """
+
+    centre: tuple[float, float, float]
+    length: float
+    width: float
+
+
+class ControllerSettings(Protocol):
+    """Which controller drives a robot, and what that has to know of it."""
+
+    @property
+    def name(self) -> str:
+        """Name of the controller, as in `vico.sim.robots.controllers.CONTROLLERS`."""
+
+
+@dataclass(frozen=True)
+class SkidSteering:
+    """Wheels in pairs, left first; the robot turns by driving its sides at different speeds.
+
+    Attributes
+    ----------
+    wheel_radius, half_track
+        Metres; half of what is between the middles of left and right wheels.
+    slip
+        How much faster than by rolling alone the wheels have to turn for the base to turn.
+    """
+
+    wheel_radius: float
+    half_track: float
+    slip: float
+    name: str = "skid_steer"
+
+
+@dataclass(frozen=True)
+class FourLegs:
+    """Four legs of three joints (hip, thigh, calf; front left, front right, rear left, rear right).
+
+    Attributes
+    ----------
+    hip_x, hip_y
+        Hip in the base's frame, metres.
+    side, thigh, shin
+        From the hip sideways to the leg's plane, and the leg's two parts, metres.
+    gait_gains, policy_gains
+        Stiffness and damping (Nm/rad, Nms/rad) of the servos for our own gait, and for the policy.
+    policy
+        A trained gait; None: our own.
+    """
+
+    hip_x: float
+    hip_y: float
+    side: float
+    thigh: float
+    shin: float
+    gait_gains: tuple[float, float]
+    policy_gains: tuple[float, float]
+    policy: PolicyNetwork | None = field(default=None, repr=False)
+    name: str = "four_legs"
+
+
+@dataclass(frozen=True)
+class NoController:
+    """Nothing follows velocities: whoever drives the robot commands its motors."""
+
+    name: str = "motors"
+
+
+@dataclass(frozen=True)
 class RobotModel:
     """A kind of robot.
 
@@ -60,46 +202,125 @@ class RobotModel:
     source
         Where shape and policy come from.
     mjcf
-        One floating body with collision shapes, inertias and servos (named as `joints`), without meshes.
+        One floating body with collision shapes, inertias and actuators (named as `motors`), without meshes.
+    motors
+        Actuators, in the order of vectors that drive motors.
+    servos
+        What each motor follows, in that order.
     joints
-        Driven joints, in the order of the control vector.
-    lower, upper
-        Limits of the control vector, rad/s for wheels, rad for legs.
+        Measured joints: names of the actuators that drive them, or their own.
     rest
-        Joint angles at which it stands, rad.
+        Joint angles at which it stands, rad, in the order of `joints`.
+    controller
+        What turns velocities into commands of its motors.
+    action_spaces
+        What it can be commanded by, by name; the first is its own unless another is asked for.
+    control_period
+        Seconds between two commands of its motors; a multiple of 0.01.
+    sensors
+        What it feels.
+    deck
+        Where things can be put on it; None: nowhere.
     stand
         Height of the base's origin above level ground at `rest`, metres.
     half_length, half_width, height
         Upright box around the robot, metres, centred on the base.
-    speed
-        Fastest it is driven, metres a second; `turn` is radians a second.
-    eye
-        Camera in the frame of the base, metres; it looks along +x.
+    lookahead, arrival
+        How far ahead on its way it steers for, and how near the end it has arrived, metres.
+    fallen_below
+        Cosine of the tilt at which it counts as fallen; None: it can't fall.
     shapes
         Surfaces by link, in the link's frame; links are bodies of `mjcf`.
-    policy
-        None: it walks by our own gait (legged), or has wheels.
+
+    Raises
+    ------
+    InputError
+        If its parts do not fit each other.
     """
 
     name: str
     title: str
     source: str
     mjcf: str
+    motors: tuple[str, ...]
+    servos: tuple[Servo, ...]
     joints: tuple[str, ...]
-    lower: NDArray[np.float64]
-    upper: NDArray[np.float64]
     rest: NDArray[np.float64]
+    controller: ControllerSettings
+    action_spaces: Mapping[str, ActionSpace]
+    control_period: float
     stand: float
     half_length: float
     half_width: float
     height: float
-    speed: float
-    turn: float
-    eye: tuple[float, float, float]
     shapes: Mapping[str, list[Surface]] = field(repr=False)
-    policy: PolicyNetwork | None = None
+    sensors: Sensors = Sensors()
+    deck: Deck | None = None
+    lookahead: float = 0.7
+    arrival: float = 0.3
+    fallen_below: float | None = 0.7
+
+    def __post_init__(self) -> None:
+        def need(good: bool, what: str) -> None:
+            if not good:
+                raise InputError(f"robot model {self.name!r}: {what}")
+
+        need(len(self.servos) == len(self.motors), f"{len(self.servos)} servos for {len(self.motors)} motors")
+        need(len(self.rest) == len(self.joints), f"{len(self.rest)} angles at rest for {len(self.joints)} joints")
+        need(bool(self.action_spaces), "it has no action space; name at least one")
+        for name, space in self.action_spaces.items():
+            wanted = len(self.motors) if space.drives == "motors" else 3
+            sizes = {len(space.entries), len(space.units), len(space.low), len(space.high)}
+            need(sizes == {wanted}, f"action space {name!r} needs {wanted} entries, units and bounds")
+            need(bool(np.all(space.low <= space.high)), f"action space {name!r} has a lower bound above the upper one")
+        velocity = any(space.drives == "velocity" for space in self.action_spaces.values())
+        need(
+            velocity == (self.controller.name != NoController.name),
+            "an action space of velocities and a controller that follows them go together",
+        )
+        ticks = round(self.control_period / TICK)
+        need(
+            ticks >= 1 and abs(ticks * TICK - self.control_period) < 1e-9,
+            f"a control period of {self.control_period} s is no multiple of {TICK} s",
+        )
 
     @property
-    def legged(self) -> bool:
-        """True for robots that walk."""
-        return len(self.joints) > 4
+    def default_space(self) -> str:
+        """Name of the action space its vectors belong to unless they say otherwise."""
+        return next(iter(self.action_spaces))
+
+    @cached_property
+    def velocity_limit(self) -> NDArray[np.float64] | None:
+        """Fastest it is driven: vx, vy, m/s, and wz, rad/s, shape ``(3,)``; None if it follows no velocities."""
+        found = [space.high for space in self.action_spaces.values() if space.drives == "velocity"]
+        return found[0] if found else None
+
+    @cached_property
+    def motor_limits(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Least and largest target of each motor; without bounds where no action space drives motors."""
+        for space in self.action_spaces.values():
+            if space.drives == "motors":
+                return space.low, space.high
+        count = len(self.motors)
+        return np.full(count, -np.inf), np.full(count, np.inf)
+
+    @cached_property
+    def stance(self) -> NDArray[np.float64]:
+        """Motor targets at rest: the joints' angles for servos that follow angles, 0 for others."""
+        angle = dict(zip(self.joints, self.rest.tolist(), strict=True))
+        pairs = zip(self.motors, self.servos, strict=True)
+        return np.array([angle.get(motor, 0.0) if servo == "position" else 0.0 for motor, servo in pairs])
+
+    def with_space(self, space: str) -> RobotModel:
+        """Return the same robot with another action space as its own.
+
+        Raises
+        ------
+        InputError
+            If it has no such action space.
+        """
+        if space not in self.action_spaces:
+            known = ", ".join(self.action_spaces)
+            raise InputError(f"robot {self.name!r} has no action space {space!r}; choose among {known}")
+        rest = {name: one for name, one in self.action_spaces.items() if name != space}
+        return replace(self, action_spaces={space: self.action_spaces[space]} | rest)

@@ -113,7 +113,7 @@ class MujocoEngine:
         self._index()
         for index, model in enumerate(self._robots):
             self._data.qpos[self._angle[index]] = model.rest
-            self._data.ctrl[self._motor[index]] = 0.0 if not model.legged else model.rest
+            self._data.ctrl[self._motor[index]] = model.stance
         self._from = np.zeros((people + vehicles, 3))
         self._pace = np.zeros((people + vehicles, 3))
         self._left = 0.0
@@ -124,22 +124,24 @@ class MujocoEngine:
         m = self._model
         self._root, self._root_speed = [], []
         self._angle, self._rate, self._motor, self._links = [], [], [], []
+        # Motors that follow angles: those alone have a stiffness that can be set.
+        self._servo: list[NDArray[np.int64]] = []
         # What servos were last given; not part of the state, it only saves writing it again.
         self._gains_of: list[tuple[float, float] | None] = [None] * len(self._robots)
         self._forget()
         for index, model in enumerate(self._robots):
             prefix = f"r{index}/"
-            motors = [m.actuator(prefix + joint).id for joint in model.joints]
-            joints = [int(m.actuator_trnid[motor, 0]) for motor in motors]
-            self._motor.append(np.array(motors))
+            motors = np.array([m.actuator(prefix + motor).id for motor in model.motors], np.int64)
+            joints = [_joint_of(m, prefix + joint, driven=joint in model.motors) for joint in model.joints]
+            self._motor.append(motors)
+            self._servo.append(motors[[servo == "position" for servo in model.servos]])
             self._angle.append(_run_of(m.jnt_qposadr[joints]))
             self._rate.append(_run_of(m.jnt_dofadr[joints]))
             first = int(m.body(prefix + "base").jntadr[0])
             self._root.append(int(m.jnt_qposadr[first]))
             self._root_speed.append(int(m.jnt_dofadr[first]))
             self._links.append(np.array([m.body(prefix + link).id for link in model.shapes]))
-        legs = [motors for motors, model in zip(self._motor, self._robots, strict=True) if model.legged]
-        self._legs = np.concatenate([np.zeros(0, np.int64), *legs]).astype(np.int64)
+        self._servos = np.concatenate([np.zeros(0, np.int64), *self._servo])
         names = [f"person{i}" for i in range(self._people)] + [f"vehicle{i}" for i in range(self._vehicles)]
         bodies = [m.body(name).id for name in names]
         self._mocap = np.array([m.body_mocapid[body] for body in bodies], np.int64)
@@ -195,7 +197,7 @@ class MujocoEngine:
         motors = self._motor[robot]
         self._data.ctrl[motors] = targets
         if gains is not None and gains != self._gains_of[robot]:
-            self._set_gains(motors, *gains)
+            self._set_gains(self._servo[robot], *gains)
             self._gains_of[robot] = gains
 
     def _set_gains(self, motors: NDArray[Any], stiffness: Any, damping: Any) -> None:
@@ -284,11 +286,11 @@ class MujocoEngine:
         """Positions, velocities, servo targets, the solver's warm start and the stock of kinematic bodies."""
         state = np.empty(self._size)
         mujoco.mj_getState(self._model, self._data, state, _STATE)
-        legs = self._legs
+        servos = self._servos
         return {
             "state": state,
-            "stiffness": self._model.actuator_gainprm[legs, 0].copy(),
-            "damping": -self._model.actuator_biasprm[legs, 2],
+            "stiffness": self._model.actuator_gainprm[servos, 0].copy(),
+            "damping": -self._model.actuator_biasprm[servos, 2],
             "stock_size": self._model.geom_size[self._stock_geom].copy(),
             "stock_from": self._from.copy(),
             "stock_pace": self._pace.copy(),
@@ -311,7 +313,7 @@ class MujocoEngine:
         mujoco.mj_resetData(self._model, self._data)
         self._place_scene()
         mujoco.mj_setState(self._model, self._data, state, _STATE)
-        self._set_gains(self._legs, np.asarray(arrays["stiffness"]), np.asarray(arrays["damping"]))
+        self._set_gains(self._servos, np.asarray(arrays["stiffness"]), np.asarray(arrays["damping"]))
         sizes = np.asarray(arrays["stock_size"])
         half = sizes.copy()
         people = slice(0, self._people)
@@ -327,8 +329,15 @@ class MujocoEngine:
         self._gains_of = [None] * len(self._robots)
 
 
+def _joint_of(model: Any, name: str, *, driven: bool) -> int:
+    """Return a joint: the one an actuator drives, or the one that has the name itself."""
+    return int(model.actuator_trnid[model.actuator(name).id, 0]) if driven else int(model.joint(name).id)
+
+
 def _run_of(indices: NDArray[Any]) -> slice | NDArray[Any]:
     """Return a slice where indices follow each other: reading it is much faster."""
+    if not len(indices):
+        return slice(0, 0)
     first = int(indices[0])
     run = np.array_equal(indices, np.arange(first, first + len(indices)))
     return slice(first, first + len(indices)) if run else indices.copy()

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.robots import RobotModel
-from vico.assets.robots.go2 import GAIT_GAINS, POLICY_GAINS
-from vico.assets.robots.husky import RADIUS, TRACK
+from vico.assets.robots import FourLegs, RobotModel, SkidSteering
+from vico.errors import InputError
 from vico.io.compiled import compiled
 from vico.sim.physics.engine import Base
-from vico.sim.robots.gait import BODY, Trot, leg_angles
+from vico.sim.robots.gait import BODY, LegGeometry, Trot, leg_angles
 from vico.sim.robots.policy import WalkingPolicy
 
 #: Seconds between two evaluations of a controller.
 PERIOD = 0.02
-#: How much faster than by rolling alone the wheels have to turn for the base to turn, on pavement.
-SKID = 2.2
 Vector = NDArray[np.float64]
 
 
@@ -115,8 +113,16 @@ _COMMAND = slice(0, 3)
 _WHEELS_TRIM = slice(3, 3 + _TRIM_SIZE)
 
 
+class WheelGeometry(NamedTuple):
+    """Of wheels that skid, as in `vico.assets.robots.SkidSteering`."""
+
+    radius: float
+    half_track: float
+    slip: float
+
+
 @compiled
-def _skid(trim, slew, top, motion, command, memory):  # type: ignore[no-untyped-def]
+def _skid(trim, slew, top, wheels, motion, command, memory):  # type: ignore[no-untyped-def]
     """Return wheel speeds, rad/s."""
     wanted_now, trim_memory = memory[_COMMAND], memory[_WHEELS_TRIM]
     _approach(wanted_now, command, slew)
@@ -127,7 +133,7 @@ def _skid(trim, slew, top, motion, command, memory):  # type: ignore[no-untyped-
     wanted = _trimmed(trim, motion, wanted_now, trim_memory)
     for k in range(4):
         side = -1.0 if k % 2 == 0 else 1.0
-        speed = (wanted[0] + side * wanted[2] * TRACK * SKID) / RADIUS
+        speed = (wanted[0] + side * wanted[2] * wheels.half_track * wheels.slip) / wheels.radius
         out[k] = min(max(speed, -top[k]), top[k])
     return out
 
@@ -139,7 +145,10 @@ class SkidSteer:
     slew = np.array([0.02, 0.0, 0.05])
 
     def __init__(self, model: RobotModel) -> None:
-        self._limit = np.array(model.upper, np.float64)
+        assert isinstance(model.controller, SkidSteering)
+        c = model.controller
+        self._wheels = WheelGeometry(c.wheel_radius, c.half_track, c.slip)
+        self._limit = model.motor_limits[1]
         self._trim = _trim((2.0, 0.0, 2.0), (0.4, 0.0, 1.0), 0.1)
         self.memory = _WHEELS_TRIM.stop
 
@@ -149,7 +158,7 @@ class SkidSteer:
 
     def targets(self, base: Base, angles: Vector, speeds: Vector, command: Vector, memory: Vector) -> Vector:
         """Wheel speeds, rad/s."""
-        found: Vector = _skid(self._trim, self.slew, self._limit, _motion_of(base), command, memory)
+        found: Vector = _skid(self._trim, self.slew, self._limit, self._wheels, _motion_of(base), command, memory)
         return found
 
 
@@ -168,18 +177,22 @@ class Legs:
     patience, ease = 0.6, np.full(12, 0.03)
 
     def __init__(self, model: RobotModel) -> None:
-        self._learned = model.policy is not None
-        self._gait: WalkingPolicy | Trot = WalkingPolicy(model) if model.policy else Trot(model)
+        assert isinstance(model.controller, FourLegs)
+        self._settings = model.controller
+        self._learned = self._settings.policy is not None
+        self._gait: WalkingPolicy | Trot = WalkingPolicy(model) if self._learned else Trot(model)
         self._trim = _trim((1.0, 1.0, 1.5), (0.35, 0.25, 0.5), 0.3)
-        if model.policy:
+        if self._learned:
             self.rest = model.rest
         else:
-            self.rest = np.concatenate([leg_angles(0.0, s * 0.0955, -BODY, s) for s in (1.0, -1.0, 1.0, -1.0)])
+            legs = LegGeometry.of(self._settings)
+            self.rest = np.concatenate([leg_angles(0.0, s * legs.side, -BODY, s, legs) for s in (1.0, -1.0, 1.0, -1.0)])
         self.memory = _LEGS_GAIT + self._gait.memory
 
     def gains(self, memory: Vector) -> tuple[float, float] | None:
         """Soft where the policy expects it, stiff to stand and for our own gait."""
-        return POLICY_GAINS if self._learned and memory[_LEGS_IDLE] <= self.patience else GAIT_GAINS
+        c = self._settings
+        return c.policy_gains if self._learned and memory[_LEGS_IDLE] <= self.patience else c.gait_gains
 
     def targets(self, base: Base, angles: Vector, speeds: Vector, command: Vector, memory: Vector) -> Vector:
         """Joint angles, rad."""
@@ -234,6 +247,41 @@ def getting_up(lying: float, base: Base, rest: Vector) -> Vector | None:
     return out.ravel()
 
 
+class Motors:
+    """No controller: the motors keep to their targets at rest until somebody commands them."""
+
+    def __init__(self, model: RobotModel) -> None:
+        self._stance = model.stance
+        self.memory = 0
+
+    def gains(self, memory: Vector) -> tuple[float, float] | None:
+        """They stay as they are."""
+        return None
+
+    def targets(self, base: Base, angles: Vector, speeds: Vector, command: Vector, memory: Vector) -> Vector:
+        """Targets at rest."""
+        return self._stance
+
+
+#: Makers of controllers by name.
+CONTROLLERS: dict[str, Callable[[RobotModel], Controller]] = {
+    "skid_steer": SkidSteer,
+    "four_legs": Legs,
+    "motors": Motors,
+}
+
+
 def controller_for(model: RobotModel) -> Controller:
-    """Return what drives a kind of robot."""
-    return Legs(model) if model.legged else SkidSteer(model)
+    """Return what drives a kind of robot.
+
+    Raises
+    ------
+    InputError
+        If there is no controller of the name the model gives.
+    """
+    name = model.controller.name
+    if name not in CONTROLLERS:
+        raise InputError(
+            f"robot {model.name!r}: no controller is called {name!r}; choose among {', '.join(CONTROLLERS)}"
+        )
+    return CONTROLLERS[name](model)

@@ -8,13 +8,12 @@ should (Raibert, "Legged robots that balance", 1986). Leg lengths on the ground 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.robots import RobotModel
-from vico.assets.robots.go2 import HIP_X, HIP_Y, SHIN, SIDE, THIGH
+from vico.assets.robots import FourLegs, RobotModel
 from vico.exact import apply_matrix
 from vico.io.compiled import compiled
 from vico.sim.physics.engine import Base
@@ -26,21 +25,40 @@ CYCLE, STANCE = 0.36, 0.55
 BODY, LIFT = 0.27, 0.055
 
 
+class LegGeometry(NamedTuple):
+    """Lengths of a leg and where its hip is; metres, as in `vico.assets.robots.FourLegs`."""
+
+    hip_x: float
+    hip_y: float
+    side: float
+    thigh: float
+    shin: float
+
+    @classmethod
+    def of(cls, legs: FourLegs) -> LegGeometry:
+        """Return a robot's."""
+        return cls(legs.hip_x, legs.hip_y, legs.side, legs.thigh, legs.shin)
+
+
 @compiled
-def leg_angles(x, y, z, side):  # type: ignore[no-untyped-def]
+def leg_angles(x, y, z, side, legs):  # type: ignore[no-untyped-def]
     """Return the angles (hip, thigh, calf) that bring a foot to x, y, z in the frame of its hip.
 
-    `side` is 1 on the left, -1 on the right. Points out of reach are brought to the nearest length the leg has.
+    `side` is 1 on the left, -1 on the right; `legs` is a `LegGeometry`. Points out of reach are brought to
+    the nearest length the leg has.
     """
-    across = np.sqrt(max(y * y + z * z - SIDE * SIDE, 1e-6))
-    hip = np.arctan2(z, y) + np.arctan2(across, side * SIDE)
+    across = np.sqrt(max(y * y + z * z - legs.side * legs.side, 1e-6))
+    hip = np.arctan2(z, y) + np.arctan2(across, side * legs.side)
     while hip > np.pi:
         hip -= 2 * np.pi
     while hip < -np.pi:
         hip += 2 * np.pi
-    reach = min(max(np.sqrt(x * x + across * across), 0.12), THIGH + SHIN - 0.005)
-    calf = np.arccos(min(max((THIGH**2 + SHIN**2 - reach * reach) / (2 * THIGH * SHIN), -1.0), 1.0)) - np.pi
-    lean = np.arccos(min(max((THIGH**2 + reach * reach - SHIN**2) / (2 * THIGH * reach), -1.0), 1.0))
+    reach = min(max(np.sqrt(x * x + across * across), 0.12), legs.thigh + legs.shin - 0.005)
+    calf = (
+        np.arccos(min(max((legs.thigh**2 + legs.shin**2 - reach * reach) / (2 * legs.thigh * legs.shin), -1.0), 1.0))
+        - np.pi
+    )
+    lean = np.arccos(min(max((legs.thigh**2 + reach * reach - legs.shin**2) / (2 * legs.thigh * reach), -1.0), 1.0))
     return hip, np.arctan2(-x, across) + lean, calf
 
 
@@ -50,19 +68,20 @@ _FOOT_X, _FOOT_Y, _LIFTED_X, _LIFTED_Y = range(4)
 
 
 @compiled
-def trot(memory, command, moving, roll, pitch, roll_rate, pitch_rate, dt):  # type: ignore[no-untyped-def]
+def trot(memory, command, moving, tilt, legs, dt):  # type: ignore[no-untyped-def]
     """Advance the feet by `dt` and return the twelve joint angles.
 
     `memory` holds the phase, then for every leg the foot's x, y and where it left the ground (x, y). `command` and
-    `moving` are vx, vy, wz wanted and measured.
+    `moving` are vx, vy, wz wanted and measured; `tilt` is roll, pitch and their rates.
     """
+    roll, pitch, roll_rate, pitch_rate = tilt
     memory[_PHASE] = (memory[_PHASE] + dt / CYCLE) % 1.0
     out = np.empty(12)
     hold = STANCE * CYCLE
     for leg in range(4):
         front = 1.0 if leg < 2 else -1.0
         side = 1.0 if leg % 2 == 0 else -1.0
-        hx, hy = front * HIP_X, side * (HIP_Y + SIDE)
+        hx, hy = front * legs.hip_x, side * (legs.hip_y + legs.side)
         first = _FEET + _FOOT_SIZE * leg
         foot = memory[first : first + _FOOT_SIZE]
         phase = (memory[_PHASE] + (0.0 if leg == 0 or leg == 3 else 0.5)) % 1.0
@@ -85,7 +104,7 @@ def trot(memory, command, moving, roll, pitch, roll_rate, pitch_rate, dt):  # ty
             foot[_FOOT_X] = foot[_LIFTED_X] + (goal_x - foot[_LIFTED_X]) * blend
             foot[_FOOT_Y] = foot[_LIFTED_Y] + (goal_y - foot[_LIFTED_Y]) * blend
             z += LIFT * np.sin(np.pi * s)
-        hip, thigh, calf = leg_angles(foot[_FOOT_X], foot[_FOOT_Y] + side * SIDE, z, side)
+        hip, thigh, calf = leg_angles(foot[_FOOT_X], foot[_FOOT_Y] + side * legs.side, z, side, legs)
         out[3 * leg], out[3 * leg + 1], out[3 * leg + 2] = hip, thigh, calf
     return out
 
@@ -97,7 +116,9 @@ class Trot:
     memory = _MEMORY
 
     def __init__(self, model: RobotModel) -> None:
-        self._model = model
+        assert isinstance(model.controller, FourLegs)
+        self._low, self._high = model.motor_limits
+        self._legs = LegGeometry.of(model.controller)
 
     def targets(
         self,
@@ -117,10 +138,8 @@ class Trot:
             memory,
             command,
             moving,
-            roll,
-            pitch,
-            float(base.angular_velocity_body[0]),
-            float(base.angular_velocity_body[1]),
+            (roll, pitch, float(base.angular_velocity_body[0]), float(base.angular_velocity_body[1])),
+            self._legs,
             PERIOD,
         )
-        return np.clip(wanted, self._model.lower, self._model.upper)
+        return np.clip(wanted, self._low, self._high)

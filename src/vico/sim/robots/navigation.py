@@ -168,13 +168,15 @@ def towards(model: RobotModel, x: float, y: float, yaw: float, path: Array, alon
     that it could stop `GAP` short of whoever is ahead, and at the end.
     """
     left = path_length(path) - along
-    ahead = min(0.7 if model.legged else 0.9, max(left, 0.05))
+    assert model.velocity_limit is not None
+    fastest, _, turning = model.velocity_limit.tolist()
+    ahead = min(model.lookahead, max(left, 0.05))
     gx, gy = point_at(path, along + ahead)
     error = (math.atan2(gy - y, gx - x) - yaw + math.pi) % (2 * math.pi) - math.pi
-    turn = min(model.turn, max(-model.turn, 1.8 * error))
+    turn = min(turning, max(-turning, 1.8 * error))
     if abs(error) > 0.8:
         return np.array([0.0, 0.0, turn])
-    speed = model.speed * max(0.3, math.cos(error) ** 2)
+    speed = fastest * max(0.3, math.cos(error) ** 2)
     speed = min(speed, math.sqrt(2 * BRAKE * max(left, 0.02)))
     speed = min(speed, math.sqrt(2 * BRAKE * max(free - GAP, 0.0)))
     if speed < 0.05:

@@ -72,7 +72,7 @@ class PathFollower:
         self.wants_detour = False
         self.along = progress(self.path, self.along, x, y)
         end = self.path[-1]
-        if path_length(self.path) - self.along < 0.5 and np.hypot(end[0] - x, end[1] - y) < (0.3 if m.legged else 0.4):
+        if path_length(self.path) - self.along < 0.5 and np.hypot(end[0] - x, end[1] - y) < m.arrival:
             self.status = RobotStatus.ARRIVED
             return np.zeros(3)
         if self.along > self.marked + 5.0:

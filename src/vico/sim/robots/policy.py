@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.robots import RobotModel
+from vico.assets.robots import FourLegs, RobotModel
 from vico.io.compiled import compiled
 from vico.sim.physics.engine import Base
 
@@ -78,7 +78,8 @@ class WalkingPolicy:
     memory = 12
 
     def __init__(self, model: RobotModel) -> None:
-        policy = model.policy
+        assert isinstance(model.controller, FourLegs)
+        policy = model.controller.policy
         assert policy is not None
         self._policy = policy
         self._layers = tuple(

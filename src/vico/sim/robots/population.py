@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.assets.robots import robot_model
-from vico.assets.robots.go2 import GAIT_GAINS, POLICY_GAINS
+from vico.assets.robots import FourLegs, robot_model
 from vico.errors import InputError, SchemaError
 from vico.exact import apply_matrix
 from vico.seeds import rng
@@ -124,7 +123,7 @@ class RobotPopulation:
         self.reasons = [""] * n
         self.reason_codes = [0] * n
         self._memory = np.zeros((n, memory))
-        self._vector = np.zeros((n, 12))
+        self._vector = np.zeros((n, max((max(len(model.motors), 3) for model in self.models), default=0)))
         self._velocity = np.zeros((n, 3))
         self._lying = np.zeros(n)
         self._errand = np.zeros(n, np.int64)
@@ -153,16 +152,16 @@ class RobotPopulation:
 
     def control_size(self, robot: int) -> int:
         """How many motors a robot has: wheel speeds (rad/s) or joint angles (rad)."""
-        return len(self.models[robot].joints)
+        return len(self.models[robot].motors)
 
     def command(self, robot: int, vector: ArrayLike) -> None:
         """Have the motors follow `vector` until another command comes; it is clipped to their limits."""
         values = np.asarray(vector, np.float64)
         model = self.models[robot]
-        if values.shape != (len(model.joints),) or not np.isfinite(values).all():
-            raise InputError(f"control: {model.title} takes {len(model.joints)} finite numbers, not {values.tolist()}")
+        if values.shape != (len(model.motors),) or not np.isfinite(values).all():
+            raise InputError(f"control: {model.title} takes {len(model.motors)} finite numbers, not {values.tolist()}")
         self._vector[robot] = 0.0
-        self._vector[robot, : len(values)] = np.clip(values, model.lower, model.upper)
+        self._vector[robot, : len(values)] = np.clip(values, *model.motor_limits)
         self._set_mode(robot, Mode.MOTORS)
 
     def drive(self, robot: int, velocity: ArrayLike) -> None:
@@ -171,8 +170,9 @@ class RobotPopulation:
         model = self.models[robot]
         if values.shape != (3,) or not np.isfinite(values).all():
             raise InputError(f"drive: 3 finite numbers (vx, vy, wz) are needed, not {values.tolist()}")
-        side = 0.4 if model.legged else 0.0
-        limit = np.array([model.speed, side, model.turn])
+        limit = model.velocity_limit
+        if limit is None:
+            raise InputError(f"drive: {model.title} follows no velocities; command its motors")
         self._vector[robot, :3] = np.clip(values, -limit, limit)
         self._set_mode(robot, Mode.VELOCITY)
 
@@ -326,16 +326,17 @@ class RobotPopulation:
             return
         memory[:] = 0.0
         if not fallen:
-            gains = POLICY_GAINS if model.policy else None
-            self.engine.command(robot, self._vector[robot, : len(model.joints)], gains)
-        elif not model.legged:
+            settings = model.controller
+            gains = settings.policy_gains if isinstance(settings, FourLegs) and settings.policy else None
+            self.engine.command(robot, self._vector[robot, : len(model.motors)], gains)
+        elif not isinstance(model.controller, FourLegs):
             self._lying[robot] += PERIOD
-            self.engine.command(robot, np.zeros(len(model.joints)))
+            self.engine.command(robot, model.stance)
         else:
             legs = getting_up(float(self._lying[robot]), self.engine.base(robot), model.rest)
             self._lying[robot] += PERIOD
-            targets = model.rest if legs is None else np.clip(legs, model.lower, model.upper)
-            self.engine.command(robot, targets, GAIT_GAINS)
+            targets = model.rest if legs is None else np.clip(legs, *model.motor_limits)
+            self.engine.command(robot, targets, model.controller.gait_gains)
 
     def _watch_falls(self, robot: int, dt: float) -> None:
         upright = float(self.engine.base(robot).rotation[2, 2])
@@ -348,7 +349,7 @@ class RobotPopulation:
                 self._note(robot, "fallen")
             return
         model = self.models[robot]
-        if upright > 0.95 and (not model.legged or self._stands(robot)):
+        if upright > 0.95 and (not isinstance(model.controller, FourLegs) or self._stands(robot)):
             self.status[robot] = RobotStatus.MOVING if self.mode[robot] != Mode.IDLE else RobotStatus.IDLE
             self._lying[robot] = 0.0
             self._note(robot, "recovered")
@@ -420,7 +421,7 @@ class RobotPopulation:
     def camera(self, robot: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Position of a robot's camera, the direction it looks in, and its upward direction, shape ``(3,)`` each."""
         base = self.engine.base(robot)
-        eye = base.position + apply_matrix(self.models[robot].eye, base.rotation)
+        eye = base.position + apply_matrix(self.models[robot].sensors.camera or (0.0, 0.0, 0.0), base.rotation)
         return eye, base.rotation[:, 0].copy(), base.rotation[:, 2].copy()
 
     def camera_heights(self) -> NDArray[np.float64]:
@@ -431,9 +432,9 @@ class RobotPopulation:
     def deck(self, entity: int) -> NDArray[np.float64] | None:
         """Middle of the deck of the robot with this entity; None if it has none."""
         for i, model in enumerate(self.models):
-            if int(self.entities[i]) == entity and not model.legged:
+            if int(self.entities[i]) == entity and model.deck is not None:
                 base = self.engine.base(i)
-                return base.position + apply_matrix([0.0, 0.0, model.height - model.stand], base.rotation)
+                return base.position + apply_matrix(model.deck.centre, base.rotation)
         return None
 
     def observation(self, robot: int) -> dict[str, NDArray[np.float64]]:
