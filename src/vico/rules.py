@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from enum import IntEnum
 
 #: Metres a second.
@@ -16,6 +17,20 @@ REACH_UP = 2.2
 #: How near one has to be to go through an entrance, and through a door between rooms, metres.
 DOOR_REACH = 2.0
 INNER_DOOR_REACH = 1.0
+
+#: Buses: seconds one stands at a stop, what boarding costs, how near to one of its doors one boards, metres, and how
+#: many ride in it.
+BUS_DWELL = 30.0
+BUS_FARE = 2.0
+BUS_DOOR_REACH = 3.0
+BUS_CAPACITY = 60
+
+#: Bicycles: how near one gets on, metres; the price of a started minute, and of leaving it farther from a station with
+#: a free place than `STATION_REACH` metres.
+BIKE_REACH = 2.0
+BIKE_RATE = 0.2
+BIKE_ASTRAY = 20.0
+STATION_REACH = 5.0
 
 #: How far a voice carries, metres, and how long a message may be, characters.
 EARSHOT = 10.0
@@ -89,6 +104,11 @@ class ReasonCode(IntEnum):
     NO_VEHICLE = 74
     NO_TRANSIT = 75
     MOVING = 76
+
+
+def ride_price(seconds: float, *, returned: bool) -> float:
+    """Price of a bicycle ride: 0.2 per started minute, 20 more if it was not brought to a station."""
+    return BIKE_RATE * math.ceil(max(seconds, 1e-9) / 60.0) + (0.0 if returned else BIKE_ASTRAY)
 
 
 def code_name(code: int) -> str:

@@ -16,14 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from vico.assets.vehicles import BICYCLE_SIZE
 from vico.errors import InputError
+from vico.rules import BIKE_REACH, STATION_REACH, ride_price
 from vico.sim.bodies import BICYCLE, Bodies, Drawn
 from vico.sim.traffic import Traffic
 from vico.world.model import BikeStation
 
-BIKE_REACH = 2.0
-BIKE_RATE = 0.2
-BIKE_ASTRAY = 20.0
-STATION_REACH = 5.0
 _SLOT = 0.75  # metres between bicycles in a station
 
 
@@ -161,11 +158,6 @@ class Bicycles:
 
 
 _STATE = ("station", "slot", "xy", "yaw", "rider", "since")
-
-
-def ride_price(seconds: float, *, returned: bool) -> float:
-    """Price of a bicycle ride: 0.2 per started minute, 20 more if it was not brought to a station."""
-    return BIKE_RATE * math.ceil(max(seconds, 1e-9) / 60.0) + (0.0 if returned else BIKE_ASTRAY)
 
 
 def _rack_yaws(traffic: Traffic, spots: NDArray[np.float64]) -> NDArray[np.float64]:

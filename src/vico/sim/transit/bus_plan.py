@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -11,7 +11,8 @@ from vico.clock import DAY
 from vico.errors import InputError
 from vico.sim.traffic.state import BusRoutes
 from vico.world.lanes import LaneGraph
-from vico.world.model import Line, Transit
+from vico.world.model import Transit
+from vico.world.timetable import buses_needed, departure
 
 
 @dataclass(frozen=True)
@@ -103,27 +104,3 @@ def plan_buses(transit: Transit, lanes: LaneGraph, second: float) -> BusPlan:
 def _stands(lane: int, offset: float, standing: Sequence[tuple[int, float]]) -> bool:
     """Whether one of the buses that stand already is in the way of another; lines share stops."""
     return any(lane == other and abs(offset - where) < BUS_SIZE[0] + 2.0 for other, where in standing)
-
-
-def departure(line: Line, number: int) -> int:
-    """When a line's departure of this number is, seconds from the midnight before the first; each day is alike."""
-    days, of_the_day = divmod(number, len(line.departures))
-    return line.departures[of_the_day] + DAY * days
-
-
-def next_departure(line: Line, second: float) -> int:
-    """Return the number of the first departure at a time or after it."""
-    days, of_the_day = divmod(second, DAY)
-    return bisect_left(line.departures, of_the_day) + len(line.departures) * int(days)
-
-
-def buses_needed(line: Line) -> int:
-    """Buses under way when most are: departures within the time of one round, but no more than stops."""
-    n = len(line.departures)
-    ahead = 0
-    most = 1
-    for k in range(n):
-        while departure(line, ahead + 1) < line.departures[k] + line.travel[-1]:
-            ahead += 1
-        most = max(most, ahead - k + 1)
-    return min(most, len(line.stops))

@@ -15,20 +15,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from vico.assets.vehicles import BUS_SIZE, vehicle_prototypes
 from vico.errors import InputError
+from vico.rules import BUS_CAPACITY as CAPACITY
+from vico.rules import BUS_DOOR_REACH as DOOR_REACH
+from vico.rules import BUS_DWELL as DWELL
+from vico.rules import BUS_FARE as FARE
 from vico.sim.bodies import Bodies, Drawn
 from vico.sim.traffic import Traffic
 from vico.sim.transit.bicycles import Bicycles
-from vico.sim.transit.bus_plan import BusPlan, departure, next_departure
+from vico.sim.transit.bus_plan import BusPlan
 from vico.world.mesh import Surface
 from vico.world.model import Line, Transit
+from vico.world.timetable import departure, next_departure
 
-DWELL = 30.0
-# Buses drive so fast as the timetable asks for, within these, m/s; starting and braking cost the seconds beside.
-PACE = (5.0, 10.0)
+# Buses drive so fast as the timetable asks for, within these, m/s; starting and braking cost the seconds beside. One
+# that had to drive faster than its time asks for would leave the next stop before it is due, without who comes on time.
+PACE = (2.5, 10.0)
 _START_STOP = 10.0
-FARE = 2.0
-DOOR_REACH = 3.0
-CAPACITY = 60
 # Doors on a bus's right side, metres ahead of its centre.
 DOORS = (4.65, -0.05, -3.55)
 
