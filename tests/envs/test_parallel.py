@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pettingzoo.test import parallel_api_test
@@ -13,7 +14,7 @@ from pettingzoo.test import parallel_api_test
 import toy_city
 import vico
 from vico.agents.base import RandomAgent
-from vico.envs import CommunityEnv
+from vico.envs import CommunityEnv, EnvSpec, SingleAgentEnv
 from vico.envs.spaces import short_form
 from vico.errors import InputError, MissingFileError
 from vico.sim.actions import PEOPLE_ACTIONS, Command, parse
@@ -144,3 +145,45 @@ def test_setup_places_things_and_people_at_each_reset() -> None:
     for seed in (0, 1):
         observations, _ = environment.reset(seed=seed)
         assert observations["assistant_0"]["pose"][:2] == pytest.approx([10.0, -20.0], abs=0.3)
+
+
+def quick() -> CommunityEnv:
+    """The toy city with an assistant that acts twice a second."""
+    return vico.make(
+        toy_city.world(),
+        toy_city.community(),
+        assistants=1,
+        observe="none",
+        periods={"assistant_0": 0.5},
+        max_steps=5,
+    )
+
+
+def test_with_periods_of_their_own_only_who_is_due_observes_until_the_end() -> None:
+    environment = quick()
+    environment.reset()
+    steps = [environment.step({})[0] for _ in range(5)]
+    assert [len(observations) for observations in steps] == [1, 4, 1, 4, 4]
+    assert steps[-1]["resident_0"]["state"]["time"] == pytest.approx(8 * 3600 + 2.5)
+    assert environment.agents == []
+
+
+@pytest.mark.parametrize(("agent", "seconds"), [("resident_0", 1.0), ("assistant_0", 0.5)])
+def test_a_single_agent_acts_at_its_own_period(agent: str, seconds: float) -> None:
+    environment = SingleAgentEnv(quick(), agent, others=lambda env, seed: {n: Idle() for n in env.possible_agents})
+    before, _ = environment.reset()
+    after, *_ = environment.step({"type": "wait"})
+    assert after["state"]["time"] - before["state"]["time"] == pytest.approx(seconds)
+
+
+class Idle:
+    """Waits."""
+
+    def act(self, observation: dict[str, Any], info: dict[str, Any]) -> dict[str, Any]:
+        """Return the action to wait."""
+        return {"type": "wait"}
+
+
+def test_periods_go_through_the_spec() -> None:
+    spec = quick().spec
+    assert EnvSpec.from_json(spec.to_json()).config.periods == {"assistant_0": 0.5}

@@ -20,8 +20,8 @@ def test_who_is_not_back_by_the_next_morning_is_late_and_who_goes_there_has_arri
     assert (state.people.place[:2] == shop).all()
 
     def kinds(second: float) -> list[tuple[str, str]]:
-        state.second = second
-        state.events.begin(0, second)
+        state.tick = second * 100
+        state.events.begin(0, second, state.names)
         watched.watch(state)
         return [(event.agent, event.kind) for event in state.events.log]
 
@@ -42,7 +42,7 @@ def test_every_day_has_its_arrivals() -> None:
     cafe, shop = (state.place_index[place] for place in (toy_city.CAFE, toy_city.SHOP))
     for day in range(1, 6):
         for second, place in ((10, cafe), (8 * 3600 + 120, shop)):
-            state.second = float(day * DAY + second)
+            state.tick = 100 * (day * DAY + second)
             state.people.place[0] = place
             sim.punctuality.watch(state)
     assert (sim.punctuality.arrivals[0], sim.punctuality.late[0]) == (10, 0)

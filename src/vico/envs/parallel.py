@@ -1,4 +1,4 @@
-"""The simulation as a PettingZoo `ParallelEnv`: residents, assistants and robots act at once, a second at a time."""
+"""The simulation as a PettingZoo `ParallelEnv`: residents, assistants and robots act at once."""
 
 from __future__ import annotations
 
@@ -33,6 +33,10 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
     Agents are called ``resident_0``, ``assistant_0``, ``robot_0`` and so on. Observations and actions are described
     in `vico.envs.spaces`. There is no reward of its own (0 for everybody): tasks judge the state. An episode ends,
     truncated, after ``spec.max_steps`` steps.
+
+    A step is a second, unless ``spec.periods`` give some agents other control periods: then it lasts until the next
+    agent is due, and what `step` returns holds those alone who are due, while ``agents`` lists all as ever. Only when
+    the episode ends is everybody there.
 
     Parameters
     ----------
@@ -131,7 +135,7 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
     ) -> tuple[
         dict[str, dict[str, Any]], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
     ]:
-        """Let one second pass; who has no action waits, bad actions are refused with a reason.
+        """Let time pass until somebody is due; who has no action waits, bad actions are refused with a reason.
 
         `infos` hold ``entities`` (kind and name of what is in view) and ``hash`` (of the whole state).
         """
@@ -142,14 +146,17 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         }
         result = self.sim.step(short, agent_faults)
         over = self.sim.metrics.steps >= self.max_steps
-        names = self.agents
+        observations, found = result.observations, result.infos
         if over:
+            if len(observations) < len(self.agents):
+                observations, found = self.sim.observe()
             self.agents = []
+        names = list(observations)
         self.events = result.events
-        self._views = result.observations
-        infos = {name: {**result.infos[name], "hash": result.hash} for name in names}
+        self._views = observations
+        infos = {name: {**found[name], "hash": result.hash} for name in names}
         return (
-            {name: result.observations[name] for name in names},
+            observations,
             dict.fromkeys(names, 0.0),
             dict.fromkeys(names, False),
             dict.fromkeys(names, over),
@@ -201,7 +208,7 @@ def make(
         Called with the fresh `Simulation` at each reset.
     options
         `seed`, `start`, `residents`, `assistants`, `robots`, `errands`, `cars`, `pedestrians`, `transit`, `observe`,
-        `image` and `max_steps`, as `vico.envs.spec.EnvSpec` has them.
+        `image`, `periods` and `max_steps`, as `vico.envs.spec.EnvSpec` has them.
 
     Raises
     ------

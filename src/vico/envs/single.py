@@ -66,14 +66,19 @@ class SingleAgentEnv(gymnasium.Env[dict[str, Any], Any]):
         return observations[self.agent], infos[self.agent]
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """Advance by one second; the others act upon what they saw last."""
-        observations, infos = self._seen
-        actions = {name: policy.act(observations[name], infos[name]) for name, policy in self._others.items()}
-        actions[self.agent] = action
-        observations, rewards, ended, cut, infos = self.community.step(actions)
-        self._seen = observations, infos
+        """Advance until the agent is due again; the others act upon what they saw last."""
         me = self.agent
-        return observations[me], rewards[me], ended[me], cut[me], infos[me]
+        actions = {me: action}
+        while True:
+            observations, infos = self._seen
+            actions |= {
+                n: policy.act(observations[n], infos[n]) for n, policy in self._others.items() if n in observations
+            }
+            observations, rewards, ended, cut, infos = self.community.step(actions)
+            self._seen = observations, infos
+            if me in observations:
+                return observations[me], rewards[me], ended[me], cut[me], infos[me]
+            actions = {}
 
     def render(self) -> NDArray[np.uint8]:
         """Return what the agent sees, uint8, shape ``(image, image, 3)``."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, TypedDict
@@ -31,6 +32,7 @@ class EnvOptions(TypedDict, total=False):
     transit: bool
     observe: str | tuple[str, ...]
     image: int
+    periods: Mapping[str, float | str]
     max_steps: int
 
 
@@ -47,7 +49,7 @@ class EnvSpec(SimSettings):
     observe
         Whose views are rendered: ``"all"``, ``"none"``, or names.
     max_steps
-        Length of an episode, steps of one second.
+        Length of an episode, steps: seconds, unless `periods` ask for others.
     """
 
     world: str | None = None

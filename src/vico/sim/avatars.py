@@ -59,18 +59,18 @@ class Avatars:
         """Bodies outdoors."""
         return self.people.bodies()
 
-    def begin(self) -> None:
-        """Start a step: nobody wants anything yet, and nothing has gone wrong."""
+    def begin(self, who: NDArray[np.bool_]) -> None:
+        """Start the step of some avatars: they want nothing yet, and nothing has gone wrong."""
         p = self.people
-        p.move_left[:] = 0.0
-        p.turn_left[:] = 0.0
-        p.move_speed[:] = 0.0
-        p.velocity[:] = 0.0
-        p.status[:] = ActionStatus.OK
-        p.contact[:] = 0
-        p.reason[:] = ""
-        p.reason_code[:] = ReasonCode.NONE
-        p.action_clip[:] = -1
+        p.move_left[who] = 0.0
+        p.turn_left[who] = 0.0
+        p.move_speed[who] = 0.0
+        p.velocity[who] = 0.0
+        p.status[who] = ActionStatus.OK
+        p.contact[who] = 0
+        p.reason[who] = ""
+        p.reason_code[who] = ReasonCode.NONE
+        p.action_clip[who] = -1
 
     def space(self) -> NDArray[np.int32]:
         """Return the room each avatar is in, `OUTDOORS` or `IN_BUS`: only those of one space can touch."""
@@ -80,7 +80,7 @@ class Avatars:
         """How far an avatar's body stretches fore and aft of its centre: wheels, for riders."""
         return np.where(self.people.vehicle == Vehicle.BIKE, RIDER_REACH, 0.0)
 
-    def advance(self, dt: float, obstacles: Bodies, *, share: float) -> None:
+    def advance(self, dt: float, obstacles: Bodies, *, share: NDArray[np.float64]) -> None:
         """Turn and walk on by `dt` seconds.
 
         Parameters
@@ -88,7 +88,8 @@ class Avatars:
         obstacles
             Bodies outdoors that are no avatars.
         share
-            Which part of the remaining turn belongs to this sub-step: 1 in the last one.
+            Which part of each avatar's remaining turn belongs to this sub-step (1 in the last one of its action),
+            shape ``(n,)``.
         """
         p = self.people
         if not len(p):

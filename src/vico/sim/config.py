@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from vico.clock import DAY
 from vico.errors import InputError
-
-SUBSTEPS = 10
-SUBSTEP = 0.1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,6 +32,10 @@ class SimSettings:
         Whether buses and bicycles are there.
     image
         Side of the square images, pixels.
+    periods
+        How often agents act and observe, seconds by agent's name; 1 s where nothing else is said. For robots also
+        ``"model"``, which is the control period of the robot's model, and the name ``"robots"`` for all of them.
+        People's are multiples of 0.1 s, robots' of 0.01 s.
     """
 
     seed: int = 0
@@ -45,6 +47,7 @@ class SimSettings:
     pedestrians: int = 0
     transit: bool = True
     image: int = 256
+    periods: Mapping[str, float | str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -95,11 +96,11 @@ class Events:
         self.log: list[Event] = []
         self.heard: dict[str, list[Message]] = {name: [] for name in names}
 
-    def begin(self, step: int, time: float) -> None:
-        """Start a step: forget what the last one held."""
+    def begin(self, step: int, time: float, observed: Iterable[str]) -> None:
+        """Start a step: forget what the last one held, and what those have heard who have `observed` it."""
         self.step, self.time = step, time
         self.log = []
-        self.heard = {name: [] for name in self.names}
+        self.heard |= {name: [] for name in observed}
 
     def add(self, kind: str, agent: str, text: str, position: NDArray[Any], **data: Any) -> None:
         """Note that something happened."""

@@ -12,6 +12,7 @@ from vico.sim.bodies import ASSISTANT, KINDS, RESIDENT
 from vico.sim.config import SimConfig
 from vico.sim.events import Events
 from vico.sim.indoor import Indoor
+from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import FIRST_ASSISTANT, FIRST_RESIDENT, FIRST_ROBOT, MovableObjects, People
 from vico.sim.timetable import Appointment
@@ -42,14 +43,15 @@ def initial_state(
     indoor = Indoor.from_world(world.rooms, world.places, world.objects)
     avatars = Avatars(people, indoor, world.walkable, world.height)
     events = Events(people.names)
-    state = SimulationState(world, indoor, people, MovableObjects.none(), avatars, events, second=float(config.start))
+    tick = config.start * TICKS_PER_SECOND
+    state = SimulationState(world, indoor, people, MovableObjects.none(), avatars, events, tick=tick)
     # Nobody has a place yet: until then avatars are nowhere that could be in anybody's way.
     people.room[:] = _NOWHERE
     state.traffic, state.transit = systems.traffic_and_transit_of(world, config)
     state.robots = systems.robots_of(world, config, state.obstacles(), errands=config.errands)
     state.entities = _entities(state, residents, config)
     events.names = state.names
-    events.begin(0, state.second)
+    events.begin(0, state.second, events.names)
     spawn.place_residents(state, days, config.start)
     for i in range(len(residents), len(people)):
         spawn.place_anywhere(i, state, rng(config.seed, "spawn", people.names[i]))

@@ -95,9 +95,18 @@ def camera_heights(state: SimulationState) -> NDArray[np.float64]:
 
 
 def observe(
-    state: SimulationState, seeing: Sequence[int], renderer: ObservationRenderer | None
+    state: SimulationState,
+    seeing: Sequence[int],
+    renderer: ObservationRenderer | None,
+    *,
+    who: Sequence[int] | None = None,
 ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
     """Return observations and infos of all agents; those in `seeing` get pictures, rendered in one call.
+
+    Parameters
+    ----------
+    who
+        Indices of the agents that observe; None for all. Those in `seeing` are among them.
 
     Returns
     -------
@@ -109,10 +118,12 @@ def observe(
     """
     names = state.names
     stances = poses(state)
-    perceived = look_about(state, stances)
+    chosen = range(len(names)) if who is None else who
+    perceived = look_about(state, stances, chosen)
     found: dict[str, Observation] = {}
     infos: dict[str, dict[str, Any]] = {}
-    for i, name in enumerate(names):
+    for i in chosen:
+        name = names[i]
         found[name] = {
             "pose": stances[i].copy(),
             "events": [message.record() for message in state.events.heard[name]],
@@ -146,10 +157,12 @@ def observe(
     return found, infos
 
 
-def look_about(state: SimulationState, stances: NDArray[np.float64]) -> dict[int, InView]:
-    """Return what residents have in view, by their index; `stances` as from `poses`."""
+def look_about(state: SimulationState, stances: NDArray[np.float64], who: Sequence[int]) -> dict[int, InView]:
+    """Return what those residents have in view that are in `who`, by index; `stances` as from `poses`."""
     p, indoor = state.people, state.indoor
-    residents = np.flatnonzero(p.kind == RESIDENT)
+    residents = np.array([i for i in who if i < len(p) and p.kind[i] == RESIDENT], np.int64)
+    if not len(residents):
+        return {}
     feet, mine = stances[residents], _spaces(state)
     eyes = Eyes(
         feet[:, :3] + np.column_stack([np.zeros((len(residents), 2)), eye_height(state)[residents]]),

@@ -1,4 +1,4 @@
-"""The loop: one outer second after the other, ten sub-steps each, seeded and repeatable."""
+"""The loop: what agents ask for, time until the next agent is due, what agents see; seeded and repeatable."""
 
 from __future__ import annotations
 
@@ -17,9 +17,11 @@ from vico.sim.events import Event
 from vico.sim.initial_state import initial_state
 from vico.sim.metrics import Metrics, StopWatch
 from vico.sim.observations import Observation, ObservationRenderer, observe
+from vico.sim.periods import TICKS_PER_SECOND, ControlPeriods, ticks_of
 from vico.sim.scenario import GroundTruth, Scenario
+from vico.sim.simulation_state import SimulationState
 from vico.sim.snapshot import arrays_of, copied, identity, read_snapshot, state_hash, write_snapshot
-from vico.sim.substeps import advance_second, report_collisions, report_robots
+from vico.sim.substeps import advance_ticks
 from vico.sim.timetable import Punctuality, appointments
 from vico.world.folder import World
 from vico.world.mesh import Surface
@@ -35,7 +37,7 @@ class StepResult:
     Attributes
     ----------
     observations, infos
-        By agent; see `vico.sim.observations.observe`.
+        By agent, of those who act next; see `vico.sim.observations.observe`.
     events
         What happened in the step.
     hash
@@ -101,6 +103,7 @@ class Simulation:
         place_index = {place.id: i for i, place in enumerate(world.places)}
         days = [appointments(r.schedule, place_index) for r in self.residents]
         self.state = initial_state(world, self.residents, days, self.config)
+        self.periods = _periods(self.state, self.config)
         self.punctuality = Punctuality.of(days, self.config.start)
         self.scenario, self.ground_truth = Scenario(self.state), GroundTruth(self.state)
         self.seeing = _indices(self.config.observe, self.agents)
@@ -109,32 +112,67 @@ class Simulation:
     # The loop.
 
     def step(self, actions: Mapping[str, Any], agent_faults: Mapping[str, AgentFault] | None = None) -> StepResult:
-        """Advance by one second.
+        """Advance until the next agent is due: by one second, where all agents' periods are that.
 
         Parameters
         ----------
         actions
-            One dict by agent's name; who has none waits. Bad ones are refused with a reason; names nobody has are
-            ignored.
+            One dict by agent's name; who has none waits. Bad ones are refused with a reason; names nobody has, and
+            agents that are not due, are ignored.
         agent_faults
             Agents that were late or failed, and why: they wait, and it is noted.
         """
-        state, metrics = self.state, self.metrics
-        watch = StopWatch(metrics.seconds)
-        state.events.begin(metrics.steps, state.second)
-        state.avatars.begin()
-        metrics.refused += apply_actions(actions, agent_faults or {}, state)
-        watch.lap("actions")
-        advance_second(state, watch)
-        metrics.collisions += report_collisions(state)
-        report_robots(state)
-        self.punctuality.watch(state)
-        metrics.steps += 1
-        watch.lap("bookkeeping")
-        observations, infos = self.observe(watch)
+        self.act(actions, agent_faults)
+        self._advance(self.periods.next_due(self.state.tick) - self.state.tick)
+        self.metrics.steps += 1
+        observations, infos = self.observe(self.due)
+        watch = StopWatch(self.metrics.seconds)
         digest = self.state_hash()
         watch.lap("hash")
-        return StepResult(observations, infos, list(state.events.log), digest)
+        return StepResult(observations, infos, list(self.state.events.log), digest)
+
+    def act(self, actions: Mapping[str, Any], agent_faults: Mapping[str, AgentFault] | None = None) -> None:
+        """Let the agents that are due begin what they ask for, without any time passing; see `step`."""
+        state, metrics = self.state, self.metrics
+        watch = StopWatch(metrics.seconds)
+        due = self.periods.due(state.tick)
+        names = self.due
+        state.events.begin(metrics.steps, state.second, names)
+        state.avatars.begin(due[: len(state.people)])
+        faults = agent_faults or {}
+        if not due.all():
+            actions = {name: actions[name] for name in names if name in actions}
+            faults = {name: faults[name] for name in names if name in faults}
+        metrics.refused += apply_actions(actions, faults, state)
+        watch.lap("actions")
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass, with all agents going on with what they do.
+
+        However a time is cut into calls, the state after it is the same.
+
+        Parameters
+        ----------
+        seconds
+            A multiple of 0.01.
+
+        Raises
+        ------
+        InputError
+            If it is none.
+        """
+        self._advance(ticks_of(seconds, "advance: the time"))
+
+    def _advance(self, ticks: int) -> None:
+        """Let ticks pass; at every whole second it is noted who is where the schedule says."""
+        state, watch = self.state, StopWatch(self.metrics.seconds)
+        end = state.tick + ticks
+        while state.tick < end:
+            until = min(end, state.tick - state.tick % TICKS_PER_SECOND + TICKS_PER_SECOND)
+            self.metrics.collisions += advance_ticks(state, until - state.tick, self.periods, watch)
+            if state.tick % TICKS_PER_SECOND == 0:
+                self.punctuality.watch(state)
+            watch.lap("bookkeeping")
 
     # What agents see.
 
@@ -143,11 +181,19 @@ class Simulation:
         """Names of all agents: residents, assistants, robots."""
         return self.state.names
 
-    def observe(self, watch: StopWatch | None = None) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
-        """Return observations and infos of all agents as things stand."""
-        watch = watch or StopWatch(self.metrics.seconds)
-        renderer = self.renderer if self.seeing else None
-        result = observe(self.state, self.seeing, renderer)
+    @property
+    def due(self) -> list[str]:
+        """Names of the agents that observe and act now."""
+        due = self.periods.due(self.state.tick)
+        return [name for name, now in zip(self.agents, due.tolist(), strict=True) if now]
+
+    def observe(self, who: Sequence[str] | None = None) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
+        """Return observations and infos as things stand, of all agents or of some."""
+        watch = StopWatch(self.metrics.seconds)
+        names = self.agents
+        asked = None if who is None or len(who) == len(names) else _indices(tuple(who), names)
+        seeing = self.seeing if asked is None else [i for i in self.seeing if i in asked]
+        result = observe(self.state, seeing, self.renderer if seeing else None, who=asked)
         watch.lap("observations")
         return result
 
@@ -217,6 +263,13 @@ class Simulation:
         """Version, configuration, world, community and objects in one hash: equal ones run equally."""
         residents = [resident.id for resident in self.residents]
         return identity(self.config.record(), self.world.digest, residents, self.state.objects.names)
+
+
+def _periods(state: SimulationState, config: SimConfig) -> ControlPeriods:
+    """Return how often each agent acts."""
+    robots = state.robots
+    models = {} if robots is None else {name: robots.control_period(k) for k, name in enumerate(robots.names)}
+    return ControlPeriods.of(state.people.names, models, config.periods, start=state.tick)
 
 
 def _indices(observe: Sequence[str] | None, names: list[str]) -> list[int]:

@@ -14,6 +14,7 @@ from vico.sim.avatars import Avatars
 from vico.sim.bodies import Bodies, HasBodies, Subsystem
 from vico.sim.events import Events
 from vico.sim.indoor import Indoor, near_door
+from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.snapshot import arrays_of
 from vico.sim.state import REASON_LENGTH, MovableObjects, People, Vehicle
 from vico.sim.transit import TransitSystem
@@ -77,6 +78,22 @@ class RobotSystem(Subsystem, Protocol):
     reasons: list[str]
     reason_codes: list[int]
 
+    def advance(self, dt: float, obstacles: Bodies, *, since: float = 0.0, substep: float | None = None) -> None:
+        """Move on by `dt` seconds, a multiple of 0.01.
+
+        Parameters
+        ----------
+        obstacles
+            Everybody else's bodies, where they are at the end of the sub-step that this slice of time is part of.
+        since
+            Seconds of that sub-step that have passed already.
+        substep
+            Length of that sub-step, seconds; None if the slice is all of it.
+        """
+
+    def control_period(self, robot: int) -> float:
+        """How often the robot's model wants to be controlled, seconds."""
+
     def control_size(self, robot: int) -> int:
         """How many numbers the robot's control vector has."""
 
@@ -115,8 +132,8 @@ class SimulationState:
         Kind and name of every body of the run by entity number, and the agent's name of those that have one.
     shapes
         Shapes of movable objects, by prototype.
-    second
-        Seconds since midnight of the first day.
+    tick
+        Hundredths of a second since midnight of the first day.
     place_index
         Index of each place in ``world.places`` by id.
     entrances
@@ -134,7 +151,7 @@ class SimulationState:
     traffic: TrafficSystem | None = None
     transit: TransitSystem | None = None
     robots: RobotSystem | None = None
-    second: float = 0.0
+    tick: int = 0
     entities: dict[int, dict[str, str]] = field(default_factory=dict)
     shapes: dict[str, list[Surface]] = field(default_factory=dict)
     place_index: dict[str, int] = field(default_factory=dict)
@@ -147,6 +164,11 @@ class SimulationState:
         far = (1e9, 1e9)
         doors = [self.entrances[p.entrance].position[:2] if p.entrance else far for p in self.world.places]
         self.doors = np.array(doors, np.float64).reshape(-1, 2)
+
+    @property
+    def second(self) -> float:
+        """Seconds since midnight of the first day."""
+        return self.tick / TICKS_PER_SECOND
 
     @property
     def names(self) -> list[str]:
@@ -245,14 +267,14 @@ class SimulationState:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return every array that decides the future, under a name each, in a fixed order; not copied."""
-        found: dict[str, NDArray[Any]] = {"second": np.array([self.second])}
+        found: dict[str, NDArray[Any]] = {"tick": np.array([self.tick], np.int64)}
         for name, part in self._parts().items():
             found |= {f"{name}.{key}": value for key, value in part.arrays().items()}
         return found
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Go back to what `arrays` held."""
-        self.second = float(arrays["second"][0])
+        self.tick = int(arrays["tick"][0])
         for name, part in self._parts().items():
             part.restore(arrays_of(arrays, name))
 

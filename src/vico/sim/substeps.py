@@ -1,4 +1,4 @@
-"""One second of all that moves: traffic, transit, avatars and robots in sub-steps, against each other's bodies."""
+"""All that moves, against each other's bodies: traffic, transit and avatars in sub-steps, robots in slices of them."""
 
 from __future__ import annotations
 
@@ -7,38 +7,34 @@ import numpy as np
 from vico.rules import ActionStatus, ReasonCode
 from vico.sim import moves, rides
 from vico.sim.bodies import Bodies, HasBodies, Subsystem
-from vico.sim.config import SUBSTEP, SUBSTEPS
 from vico.sim.metrics import StopWatch
+from vico.sim.periods import ACTION_TICKS, SUBSTEP, SUBSTEP_TICKS, TICKS_PER_SECOND, ControlPeriods
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import REASON_LENGTH
 
 
-def advance_second(state: SimulationState, watch: StopWatch) -> None:
-    """Advance everything by one second."""
+def advance_ticks(state: SimulationState, ticks: int, periods: ControlPeriods, watch: StopWatch) -> int:
+    """Advance everything by some hundredths of a second; return how many motions were stopped by something.
+
+    However the time is cut into calls, the same happens: traffic, transit and avatars advance on ticks that are
+    multiples of `SUBSTEP_TICKS`, to where they are at the end of that sub-step, and robots slice by slice after them.
+    """
     bodies = _AllBodies(state)
-    for k in range(SUBSTEPS):
-        _advance_subsystem(state.traffic, "traffic", bodies, watch)
-        _advance_subsystem(state.transit, "transit", bodies, watch)
-        state.avatars.advance(SUBSTEP, bodies.but(state.avatars), share=1.0 / (SUBSTEPS - k))
-        rides.follow(state)
-        bodies.refresh(state.avatars)
-        watch.lap("avatars")
-        _advance_subsystem(state.robots, "robots", bodies, watch)
+    end, stopped = state.tick + ticks, 0
+    while state.tick < end:
+        gone = state.tick % SUBSTEP_TICKS
+        if gone == 0:
+            stopped += _advance_substep(state, periods, bodies, watch)
+        ticks_now = min(SUBSTEP_TICKS - gone, end - state.tick)
+        if state.robots is not None:
+            dt, since = ticks_now / TICKS_PER_SECOND, gone / TICKS_PER_SECOND
+            state.robots.advance(dt, bodies.but(state.robots), since=since, substep=SUBSTEP)
+            bodies.refresh(state.robots)
+            report_robots(state)
+            watch.lap("robots")
+        state.tick += ticks_now
     moves.follow_hands(state)
-    state.second += 1.0
-
-
-def report_collisions(state: SimulationState) -> int:
-    """Say what stopped whom, as reasons and events; return how many were stopped."""
-    p = state.people
-    stopped = np.flatnonzero(p.status == ActionStatus.COLLISION)
-    for i in stopped:
-        entity = int(p.contact[i])
-        what = "something solid" if entity < 0 else state.entity(entity)["kind"]
-        p.reason[i] = f"stopped by {what}"[:REASON_LENGTH]
-        p.reason_code[i] = ReasonCode.HIT_SOLID if entity < 0 else ReasonCode.HIT_BODY
-        state.events.add("collision", p.names[i], f"is stopped by {what}", p.position[i], entity=entity)
-    return len(stopped)
+    return stopped
 
 
 def report_robots(state: SimulationState) -> None:
@@ -49,6 +45,33 @@ def report_robots(state: SimulationState) -> None:
         state.events.add("robot", name, note.kind, note.position)
 
 
+def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _AllBodies, watch: StopWatch) -> int:
+    """Advance all but robots by a sub-step; return how many avatars were stopped."""
+    _advance_subsystem(state.traffic, "traffic", bodies, watch)
+    _advance_subsystem(state.transit, "transit", bodies, watch)
+    gone = periods.since_begun(state.tick)[: len(state.people)]
+    share = SUBSTEP_TICKS / np.maximum(ACTION_TICKS - gone, SUBSTEP_TICKS)
+    state.avatars.advance(SUBSTEP, bodies.but(state.avatars), share=share)
+    rides.follow(state)
+    bodies.refresh(state.avatars)
+    stopped = _report_collisions(state)
+    watch.lap("avatars")
+    return stopped
+
+
+def _report_collisions(state: SimulationState) -> int:
+    """Say what has just stopped whom, as reasons and events; return how many were stopped."""
+    p = state.people
+    stopped = np.flatnonzero((p.status == ActionStatus.COLLISION) & (p.reason_code == ReasonCode.NONE))
+    for i in stopped:
+        entity = int(p.contact[i])
+        what = "something solid" if entity < 0 else state.entity(entity)["kind"]
+        p.reason[i] = f"stopped by {what}"[:REASON_LENGTH]
+        p.reason_code[i] = ReasonCode.HIT_SOLID if entity < 0 else ReasonCode.HIT_BODY
+        state.events.add("collision", p.names[i], f"is stopped by {what}", p.position[i], entity=entity)
+    return len(stopped)
+
+
 def _advance_subsystem(system: Subsystem | None, phase: str, bodies: _AllBodies, watch: StopWatch) -> None:
     if system is not None:
         system.advance(SUBSTEP, bodies.but(system))
@@ -57,7 +80,7 @@ def _advance_subsystem(system: Subsystem | None, phase: str, bodies: _AllBodies,
 
 
 class _AllBodies:
-    """Everybody's bodies during a step; an owner's are asked for again only when they have moved."""
+    """Everybody's bodies; an owner's are asked for again only when they have moved."""
 
     def __init__(self, state: SimulationState) -> None:
         self._bodies = {id(owner): owner.bodies() for owner in state.owners()}

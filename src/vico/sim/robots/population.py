@@ -251,10 +251,15 @@ class RobotPopulation:
 
     # Time.
 
-    def advance(self, dt: float, obstacles: Bodies) -> None:
+    def control_period(self, robot: int) -> float:
+        """How often a robot's model wants to be controlled, seconds."""
+        return PERIOD
+
+    def advance(self, dt: float, obstacles: Bodies, *, since: float = 0.0, substep: float | None = None) -> None:
         """Let `dt` seconds (a multiple of 0.02) of physics pass.
 
-        `obstacles` are everybody else's bodies, where they are at the end of the interval.
+        `obstacles` are everybody else's bodies, where they are at the end of the sub-step of `substep` seconds (None:
+        `dt`), of which `since` have passed. Robots decide where to go at its beginning.
         """
         frames = round(dt / FRAME)
         ticks = round(PERIOD / FRAME)
@@ -262,12 +267,13 @@ class RobotPopulation:
             raise InputError(f"robots: {dt} s is no multiple of {PERIOD} s")
         if not len(self):
             return
-        self.engine.set_dynamic_obstacles(obstacles, dt)
-        everyone = Bodies.joined([obstacles, self.bodies()])
-        for robot in range(len(self)):
-            self._decide(
-                robot, dt, neighbours_of(everyone, int(self.entities[robot]), self._position(robot), SIGHT + 4)
-            )
+        whole = dt if substep is None else substep
+        if since == 0.0:
+            self.engine.set_dynamic_obstacles(obstacles, whole)
+            everyone = Bodies.joined([obstacles, self.bodies()])
+            for robot in range(len(self)):
+                near = neighbours_of(everyone, int(self.entities[robot]), self._position(robot), SIGHT + 4)
+                self._decide(robot, whole, near)
         # Limbs thrown about, by a controller of somebody's own or to get up, need smaller steps than wheels and gaits.
         extra_substeps = bool(np.any(self.status == _FALLEN_STATUS) or np.any(self.mode == _MOTORS))
         for _ in range(frames // ticks):
@@ -275,8 +281,9 @@ class RobotPopulation:
                 self._drive(robot)
             self.engine.step(ticks, extra_substeps=extra_substeps)
         self._bodies = None
-        for robot in range(len(self)):
-            self._watch_falls(robot, dt)
+        if since + dt > whole - 1e-9:
+            for robot in range(len(self)):
+                self._watch_falls(robot, whole)
 
     def _position(self, robot: int) -> NDArray[np.float64]:
         return self.engine.base(robot).position
