@@ -7,20 +7,15 @@ import sys
 import numpy as np
 import pytest
 
+from robot_field import HALF, field, people
 from vico.assets.packages import installed
 from vico.assets.robots.packs import GO2_PACKAGE
-from vico.assets.shapes import box
 from vico.errors import InputError
-from vico.sim.bodies import RESIDENT, Bodies
+from vico.sim.bodies import Bodies
 from vico.sim.robots import RobotPopulation, RobotStatus
 from vico.sim.robots.gait import LegGeometry, leg_angles
-from vico.world.folder import World
 from vico.world.heights import HeightField
-from vico.world.model import Manifest, Origin
-from vico.world.objects import Objects
-from vico.world.walkable import BLOCKED, SIDEWALK, WalkableMap
 
-HALF = 40.0
 #: Of Go2: lengths of thigh and shin 0.213 m, 0.0955 m from the hip to the leg (Unitree's description).
 LEGS = LegGeometry(0.1934, 0.0465, 0.0955, 0.213, 0.213)
 PACKS = [
@@ -32,51 +27,6 @@ PACKS = [
         ),
     ),
 ]
-
-
-def field(*walls: tuple[float, float, float, float], height: HeightField | None = None) -> World:
-    """An 80 m square of sidewalk with walls given by their middle and size."""
-    manifest = Manifest(
-        producer="test",
-        name="field",
-        origin=Origin(lat=60.0, lon=25.0),
-        half=HALF,
-        bbox=(24.0, 59.0, 26.0, 61.0),
-        seed=0,
-        sources=[],
-        stages=[],
-        counts={},
-        places_by_type={},
-        files={},
-    )
-    cls = np.full((160, 160), SIDEWALK, np.uint8)
-    centre = (np.arange(160) + 0.5) * 0.5 - HALF
-    x, y = np.meshgrid(centre, centre)
-    for cx, cy, sx, sy in walls:
-        cls[(np.abs(x - cx) < sx / 2 + 0.3) & (np.abs(y - cy) < sy / 2 + 0.3)] = BLOCKED
-    return World(
-        manifest,
-        height=height or HeightField.flat(HALF),
-        objects=Objects.none(),
-        walkable=WalkableMap(cls, HALF),
-        places=[],
-        layers={"collision": [box((sx, sy, 5.0), (cx, cy, 2.0)) for cx, cy, sx, sy in walls]},
-    )
-
-
-def people(*points: tuple[float, float], velocity: tuple[float, float] = (0.0, 0.0)) -> Bodies:
-    n = len(points)
-    quarter = np.full(n, 0.25)
-    return Bodies(
-        np.arange(500, 500 + n).astype(np.int32),
-        np.full(n, RESIDENT, np.int8),
-        np.column_stack([np.array(points), np.zeros(n)]),
-        np.zeros(n),
-        quarter,
-        quarter,
-        np.full(n, 1.75),
-        np.tile(np.array(velocity), (n, 1)),
-    )
 
 
 def run(robots: RobotPopulation, seconds: float, bodies: Bodies | None = None) -> None:
@@ -277,7 +227,10 @@ def test_a_population_restored_on_its_way_goes_on_bit_for_bit(packs: bool) -> No
 def test_a_fresh_process_computes_the_same_bits() -> None:
     robots = on_the_way(False)
     run(robots, 8.0, people((6.5, 0.2)))
-    code = "import test_robots as t; r = t.on_the_way(False); t.run(r, 8.0, t.people((6.5, 0.2))); print(t.digest(r))"
+    code = (
+        "import sys; sys.path.insert(0, '..'); import test_robots as t; r = t.on_the_way(False); "
+        "t.run(r, 8.0, t.people((6.5, 0.2))); print(t.digest(r))"
+    )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=__file__.rsplit("/", 1)[0]
     )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.sim.avatars import CLIP, free_ground
+from vico.sim.carrying import carry_along
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import LEVEL_GAZE, Posture
 
@@ -74,8 +75,9 @@ def gesture(clip: str, i: int, state: SimulationState) -> None:
 
 
 def follow_hands(state: SimulationState) -> None:
-    """Move what people carry along with them: beside the hip, left or right."""
+    """Move what is carried along: beside the hip, left or right, of people; in its place on whatever has a deck."""
     objects, p = state.objects, state.people
+    carry_along(objects, state.carriers())
     for k in np.flatnonzero(objects.hand >= 0):
         i = int(np.flatnonzero(p.entity == objects.holder[k])[0])
         side = 0.3 if objects.hand[k] == 0 else -0.3
@@ -86,5 +88,5 @@ def follow_hands(state: SimulationState) -> None:
             p.position[i, 1] + 0.12 * s + side * c,
             max(height, p.position[i, 2]),
         )
-        objects.yaw[k] = p.yaw[i]
+        objects.set_yaw(int(k), float(p.yaw[i]))
         objects.room[k] = p.room[i]

@@ -19,6 +19,7 @@ from vico.sim.animation import STYLE, clip_index, hand_frames, pose, stride_leng
 from vico.sim.bodies import Drawn
 from vico.sim.config import SimConfig
 from vico.sim.observations import Views
+from vico.sim.quaternions import matrix_of
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Vehicle
 from vico.threads import in_order
@@ -214,10 +215,8 @@ class SceneRenderer:
         objects, p = state.objects, state.people
         names = sorted(set(objects.prototypes))
         transforms = np.zeros((len(objects), 4, 4))
-        c, s = np.cos(objects.yaw), np.sin(objects.yaw)
-        transforms[:, 0, 0], transforms[:, 0, 1] = c, -s
-        transforms[:, 1, 0], transforms[:, 1, 1] = s, c
-        transforms[:, 2, 2] = transforms[:, 3, 3] = 1.0
+        transforms[:, :3, :3] = matrix_of(objects.orientation)
+        transforms[:, 3, 3] = 1.0
         transforms[:, :3, 3] = objects.position
         held = np.flatnonzero(objects.hand >= 0)
         if len(held):

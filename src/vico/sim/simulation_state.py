@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from vico.rules import DOOR_REACH, INNER_DOOR_REACH, ActionStatus, ReasonCode
 from vico.sim.avatars import Avatars
 from vico.sim.bodies import Bodies, HasBodies, Subsystem
+from vico.sim.carrying import DeckPose, HasDecks
 from vico.sim.events import Events
 from vico.sim.indoor import Indoor, near_door
 from vico.sim.periods import TICKS_PER_SECOND
@@ -106,8 +107,8 @@ class RobotSystem(Subsystem, Protocol):
     def events(self) -> Sequence[RobotNote]:
         """Return what happened to robots since this was last asked."""
 
-    def deck(self, entity: int) -> NDArray[np.float64] | None:
-        """Middle of the deck of the robot with this entity, ENU metres; None if it has none."""
+    def deck(self, entity: int) -> DeckPose | None:
+        """Return the deck of the robot with this entity; None if it has none."""
 
 
 @dataclass
@@ -187,6 +188,15 @@ class SimulationState:
     def owners(self) -> list[HasBodies]:
         """Who has bodies: traffic, transit, avatars, robots; those of them that there are."""
         return [o for o in (self.traffic, self.transit, self.avatars, self.robots) if o is not None]
+
+    def carriers(self) -> list[HasDecks]:
+        """Who may have decks that things lie on."""
+        return [owner for owner in (self.robots,) if owner is not None]
+
+    def deck(self, entity: int) -> DeckPose | None:
+        """Return the deck of a body that moves; None if it has none."""
+        decks = (carrier.deck(entity) for carrier in self.carriers())
+        return next((deck for deck in decks if deck is not None), None)
 
     def position_of(self, agent: int) -> NDArray[np.float64]:
         """Return where an agent is, ENU metres, shape ``(3,)``; `agent` is its index in `names`."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from vico.errors import SchemaError
 from vico.sim.bodies import Bodies
+from vico.sim.quaternions import matrix_of, quaternion_of, upright
 
 # Entity numbers of what lives in a run; a world's own numbers all lie below.
 FIRST_RESIDENT = 1_000_000
@@ -231,10 +232,12 @@ class MovableObjects(ArrayState):
         Entity numbers, int32, shape ``(m,)``.
     position
         Centre of the bottom, ENU metres, float64, shape ``(m, 3)``; follows the hand while held.
-    yaw
-        Counter-clockwise from east, radians, float64, shape ``(m,)``.
+    orientation
+        Turn from how it stands at rest, quaternion w, x, y, z, float64, shape ``(m, 4)``.
     holder
-        Entity of who or what carries it (an avatar or a robot's deck), 0 for nobody, int32, shape ``(m,)``.
+        Entity of who or what carries it (an avatar, or whatever has a deck), 0 for nobody, int32, shape ``(m,)``.
+    offset
+        Where it lies in the frame of what carries it on a deck, metres, float64, shape ``(m, 3)``.
     hand
         0 left, 1 right, -1 if not in a hand, int8, shape ``(m,)``.
     room
@@ -247,8 +250,9 @@ class MovableObjects(ArrayState):
     prototypes: list[str]
     entity: NDArray[np.int32]
     position: NDArray[np.float64]
-    yaw: NDArray[np.float64]
+    orientation: NDArray[np.float64]
     holder: NDArray[np.int32]
+    offset: NDArray[np.float64]
     hand: NDArray[np.int8]
     room: NDArray[np.int32]
     size: NDArray[np.float64]
@@ -261,8 +265,9 @@ class MovableObjects(ArrayState):
             [],
             np.zeros(0, np.int32),
             np.zeros((0, 3)),
-            np.zeros(0),
+            np.zeros((0, 4)),
             np.zeros(0, np.int32),
+            np.zeros((0, 3)),
             np.zeros(0, np.int8),
             np.zeros(0, np.int32),
             np.zeros((0, 3)),
@@ -270,6 +275,26 @@ class MovableObjects(ArrayState):
 
     def __len__(self) -> int:
         return len(self.names)
+
+    @property
+    def yaw(self) -> NDArray[np.float64]:
+        """Heading of each, counter-clockwise from east, radians, shape ``(m,)``; not to be written to."""
+        w, x, y, z = self.orientation.T
+        yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        yaw.flags.writeable = False
+        return yaw
+
+    def set_yaw(self, k: int, yaw: float) -> None:
+        """Stand an object upright, heading `yaw` radians counter-clockwise from east."""
+        self.orientation[k] = upright(yaw)
+
+    def rotation(self, k: int) -> NDArray[np.float64]:
+        """Object to world, shape ``(3, 3)``."""
+        return matrix_of(self.orientation[k])
+
+    def set_rotation(self, k: int, rotation: NDArray[np.float64]) -> None:
+        """Turn an object; `rotation` is object to world, shape ``(3, 3)``."""
+        self.orientation[k] = quaternion_of(rotation)
 
     def index(self, entity: int) -> int:
         """Index of an entity, -1 if it is none of the objects."""
@@ -285,8 +310,9 @@ class MovableObjects(ArrayState):
         self.prototypes.append(prototype)
         self.entity = np.append(self.entity, np.int32(entity))
         self.position = np.vstack([self.position, position])
-        self.yaw = np.append(self.yaw, yaw)
+        self.orientation = np.vstack([self.orientation, upright(yaw)])
         self.holder = np.append(self.holder, np.int32(0))
+        self.offset = np.vstack([self.offset, np.zeros(3)])
         self.hand = np.append(self.hand, np.int8(-1))
         self.room = np.append(self.room, np.int32(room))
         self.size = np.vstack([self.size, size])

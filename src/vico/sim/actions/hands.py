@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from vico.rules import REACH, REACH_UP, ReasonCode
 from vico.sim.actions.fields import Field, short
 from vico.sim.actions.model import ActionType, Refusal, Situation, Values
+from vico.sim.carrying import DeckPose, free_place, lay_down
 from vico.sim.collisions import box_gap
 from vico.sim.moves import follow_hands, gesture
 from vico.sim.simulation_state import SimulationState
@@ -32,10 +33,13 @@ class PlacementPoint:
         World frame, metres, float64, shape ``(3,)``.
     carrier
         The entity that carries the thing there; 0: the ground, a floor or furniture.
+    offset
+        Where it lies in the carrier's frame, metres, shape ``(3,)``; None without a carrier.
     """
 
     point: NDArray[np.float64]
     carrier: int = 0
+    offset: NDArray[np.float64] | None = None
 
 
 def check_pick(values: Values, i: int, state: SimulationState) -> Refusal | None:
@@ -90,9 +94,12 @@ def put(values: Values, i: int, state: SimulationState) -> None:
     k = objects.index(int(p.held[i, values["hand"]]))
     p.held[i, values["hand"]] = 0
     objects.hand[k] = -1
-    objects.holder[k] = spot.carrier
+    objects.holder[k] = 0
     objects.position[k] = spot.point
     objects.room[k] = p.room[i]
+    deck = state.deck(spot.carrier)
+    if deck is not None and spot.offset is not None:
+        lay_down(deck, spot.carrier, k, spot.offset, objects)
     gesture("put", i, state)
     state.events.add(
         "put", p.names[i], f"puts down {objects.names[k]}", objects.position[k], object=int(objects.entity[k])
@@ -171,10 +178,9 @@ def put_down(target: Any, i: int, hand: int, state: SimulationState) -> Placemen
         for container in state.indoor.rooms[room].containers:
             if container.entity == target:
                 return _on(container, i, k, state)
-    if state.robots is not None:
-        deck = state.robots.deck(target)
-        if deck is not None:
-            return _on_deck(target, deck, i, state)
+    deck = state.deck(target)
+    if deck is not None:
+        return _on_deck(target, deck, i, k, state)
     return Refusal(ReasonCode.UNKNOWN_TARGET, f"put: {target} is nothing here that a thing can be put on")
 
 
@@ -242,11 +248,14 @@ def _on(container: Container, i: int, k: int, state: SimulationState) -> Placeme
     return Refusal(ReasonCode.NO_FREE_SPOT, f"put: no free spot on the {container.kind} within reach")
 
 
-def _on_deck(entity: int, deck: NDArray[np.float64], i: int, state: SimulationState) -> PlacementPoint | Refusal:
-    away = math.hypot(deck[0] - state.people.position[i, 0], deck[1] - state.people.position[i, 1])
+def _on_deck(entity: int, deck: DeckPose, i: int, k: int, state: SimulationState) -> PlacementPoint | Refusal:
+    away = deck.gap(state.people.position[i])
     if state.people.room[i] >= 0 or away > REACH:
         return Refusal(ReasonCode.TOO_FAR, f"put: the deck is {away:.1f} m away; reach is {REACH} m")
-    return PlacementPoint(np.asarray(deck, np.float64)[:3].copy(), carrier=int(entity))
+    place = free_place(deck, entity, k, state.objects)
+    if isinstance(place, str):
+        return Refusal(ReasonCode.NO_FREE_SPOT, f"put: {place}")
+    return PlacementPoint(deck.world(place), carrier=entity, offset=place)
 
 
 _HAND = Field("hand", slot="hand")

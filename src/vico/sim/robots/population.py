@@ -16,6 +16,7 @@ from vico.errors import InputError, SchemaError
 from vico.exact import apply_matrix
 from vico.seeds import rng
 from vico.sim.bodies import ROBOT, Bodies, Drawn
+from vico.sim.carrying import DeckPose
 from vico.sim.physics import MujocoEngine, PhysicsEngine
 from vico.sim.physics.engine import FRAME, Base
 from vico.sim.physics.surroundings import static_scene_of
@@ -436,12 +437,12 @@ class RobotPopulation:
         eyes = np.array([self.camera(i)[0] for i in range(len(self))]).reshape(-1, 3)
         return np.asarray(eyes[:, 2] - self.world.height(eyes))
 
-    def deck(self, entity: int) -> NDArray[np.float64] | None:
-        """Middle of the deck of the robot with this entity; None if it has none."""
-        for i, model in enumerate(self.models):
-            if int(self.entities[i]) == entity and model.deck is not None:
-                base = self.engine.base(i)
-                return base.position + apply_matrix(model.deck.centre, base.rotation)
+    def deck(self, entity: int) -> DeckPose | None:
+        """Return the deck of the robot with this entity; None if it has none."""
+        for i in np.flatnonzero(self.entities == entity):
+            deck, base = self.models[i].deck, self.engine.base(int(i))
+            if deck is not None:
+                return DeckPose(base.position, base.rotation, np.array(deck.centre), deck.length, deck.width)
         return None
 
     def observation(self, robot: int) -> dict[str, NDArray[np.float64]]:

@@ -1,0 +1,62 @@
+"""A level or hilly square of sidewalk with walls, and people who stand on it: where robots are tried."""
+
+import numpy as np
+
+from vico.assets.shapes import box
+from vico.sim.bodies import RESIDENT, Bodies
+from vico.world.folder import World
+from vico.world.heights import HeightField
+from vico.world.model import Manifest, Origin, Transit
+from vico.world.objects import Objects
+from vico.world.walkable import BLOCKED, SIDEWALK, WalkableMap
+
+HALF = 40.0
+
+
+def field(*walls: tuple[float, float, float, float], height: HeightField | None = None) -> World:
+    """An 80 m square of sidewalk with walls given by their middle and size."""
+    manifest = Manifest(
+        producer="test",
+        name="field",
+        origin=Origin(lat=60.0, lon=25.0),
+        half=HALF,
+        bbox=(24.0, 59.0, 26.0, 61.0),
+        seed=0,
+        sources=[],
+        stages=[],
+        counts={},
+        places_by_type={},
+        files={},
+    )
+    cls = np.full((160, 160), SIDEWALK, np.uint8)
+    centre = (np.arange(160) + 0.5) * 0.5 - HALF
+    x, y = np.meshgrid(centre, centre)
+    for cx, cy, sx, sy in walls:
+        cls[(np.abs(x - cx) < sx / 2 + 0.3) & (np.abs(y - cy) < sy / 2 + 0.3)] = BLOCKED
+    return World(
+        manifest,
+        height=height or HeightField.flat(HALF),
+        objects=Objects.none(),
+        walkable=WalkableMap(cls, HALF),
+        buildings=[],
+        places=[],
+        entrances=[],
+        rooms=[],
+        transit=Transit(stops=[], lines=[], bike_stations=[], origin={}),
+        layers={"collision": [box((sx, sy, 5.0), (cx, cy, 2.0)) for cx, cy, sx, sy in walls]},
+    )
+
+
+def people(*points: tuple[float, float], velocity: tuple[float, float] = (0.0, 0.0)) -> Bodies:
+    n = len(points)
+    quarter = np.full(n, 0.25)
+    return Bodies(
+        np.arange(500, 500 + n).astype(np.int32),
+        np.full(n, RESIDENT, np.int8),
+        np.column_stack([np.array(points), np.zeros(n)]),
+        np.zeros(n),
+        quarter,
+        quarter,
+        np.full(n, 1.75),
+        np.tile(np.array(velocity), (n, 1)),
+    )
