@@ -1,7 +1,7 @@
 """Things that lie on a deck of something that moves: where there is room for one more, and going along with it.
 
-Whatever has a deck says so by an entity number (`HasDecks`); nothing here knows what it is. A thing on a deck lies along
-the deck's sides, and keeps its place in the carrier's frame until somebody takes it.
+Whatever has a deck says so by an entity number (`HasDecks`); nothing here knows what it is. A thing on a deck lies
+along the deck's sides, and keeps its place in the carrier's frame until somebody takes it.
 """
 
 from __future__ import annotations

@@ -209,7 +209,7 @@ def state_of(i: int, state: SimulationState) -> dict[str, Any]:
     p = state.people
     if i >= len(p):
         assert state.robots is not None
-        reason = state.robots.reasons[i - len(p)]
+        robots, k = state.robots, i - len(p)
         return {
             **common,
             "cash": 0.0,
@@ -221,9 +221,9 @@ def state_of(i: int, state: SimulationState) -> dict[str, Any]:
             "accessible_places": [],
             "doors": [],
             "posture": "standing",
-            "action_status": "refused" if reason else "ok",
-            "action_code": code_name(state.robots.reason_codes[i - len(p)]),
-            "action_reason": reason,
+            "action_status": ActionStatus(int(robots.action_status[k])).name.lower(),
+            "action_code": code_name(int(robots.reason_code[k])),
+            "action_reason": str(robots.reason[k]),
         }
     room = state.indoor.rooms[p.room[i]] if p.room[i] >= 0 else None
     place = state.world.places[p.place[i]] if p.place[i] >= 0 else None

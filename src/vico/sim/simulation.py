@@ -139,6 +139,8 @@ class Simulation:
         names = self.due
         state.events.begin(metrics.steps, state.second, names)
         state.avatars.begin(due[: len(state.people)])
+        if state.robots is not None:
+            state.robots.begin(due[len(state.people) :])
         faults = agent_faults or {}
         if not due.all():
             actions = {name: actions[name] for name in names if name in actions}

@@ -69,15 +69,19 @@ class RobotSystem(Subsystem, Protocol):
     ----------
     names
         Agents' names, ``robot_0`` and on.
-    reasons
-        Why each robot's last action was refused, in words; "" if it was not.
-    reason_codes
-        The same as `vico.rules.ReasonCode`.
+    action_status
+        How each robot's last action went, as `vico.rules.ActionStatus`, int8, shape ``(n,)``.
+    reason, reason_code
+        Why, in words ("" if it was done), shape ``(n,)``, and as `vico.rules.ReasonCode`, int16, shape ``(n,)``.
     """
 
     names: list[str]
-    reasons: list[str]
-    reason_codes: list[int]
+    action_status: NDArray[np.int8]
+    reason: NDArray[np.str_]
+    reason_code: NDArray[np.int16]
+
+    def begin(self, who: NDArray[np.bool_] | None = None) -> None:
+        """Forget how the last actions went of the robots that act now; None: all of them."""
 
     def advance(self, dt: float, obstacles: Bodies, *, since: float = 0.0, substep: float | None = None) -> None:
         """Move on by `dt` seconds, a multiple of 0.01.
@@ -213,8 +217,9 @@ class SimulationState:
             self.people.reason_code[agent] = code
         elif self.robots is not None:
             robot = agent - len(self.people)
-            self.robots.reasons[robot] = reason[:REASON_LENGTH]
-            self.robots.reason_codes[robot] = code
+            self.robots.action_status[robot] = status
+            self.robots.reason[robot] = reason[:REASON_LENGTH]
+            self.robots.reason_code[robot] = code
 
     def entity(self, entity: int) -> dict[str, str]:
         """Return kind and name of an entity of the world or of this run."""

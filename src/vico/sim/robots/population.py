@@ -23,12 +23,12 @@ from vico.sim.physics.surroundings import static_scene_of
 from vico.sim.robots.controllers import PERIOD, controller_for, getting_up
 from vico.sim.robots.navigation import GAP, SIGHT, neighbours_of
 from vico.sim.robots.path_follower import PathFollower, RobotStatus
+from vico.sim.state import REASON_LENGTH
 from vico.world.folder import World
 from vico.world.mesh import Surface
 from vico.world.model import FIRST_BODY
 from vico.world.routing import Router
 
-_REASON = 240
 #: Cosine of the tilt at which a robot counts as fallen, and seconds it has to last.
 _FALLEN, _FALL_TIME = 0.7, 0.3
 #: Seconds after which a robot that can't get up is left lying.
@@ -121,8 +121,9 @@ class RobotPopulation:
         n, memory = len(kinds), max((c.memory for c in self._controllers), default=0)
         self.mode = np.zeros(n, np.int8)
         self.status = np.zeros(n, np.int8)
-        self.reasons = [""] * n
-        self.reason_codes = [0] * n
+        self.action_status = np.zeros(n, np.int8)
+        self.reason = np.full(n, "", f"<U{REASON_LENGTH}")
+        self.reason_code = np.zeros(n, np.int16)
         self._memory = np.zeros((n, memory))
         self._vector = np.zeros((n, max((max(len(model.motors), 3) for model in self.models), default=0)))
         self._velocity = np.zeros((n, 3))
@@ -150,6 +151,13 @@ class RobotPopulation:
         return np.array(found).reshape(-1, 3)
 
     # Commands.
+
+    def begin(self, who: NDArray[np.bool_] | None = None) -> None:
+        """Forget how the last actions went of the robots that act now; None: all of them."""
+        chosen = slice(None) if who is None else who
+        self.action_status[chosen] = 0
+        self.reason[chosen] = ""
+        self.reason_code[chosen] = 0
 
     def control_size(self, robot: int) -> int:
         """How many motors a robot has: wheel speeds (rad/s) or joint angles (rad)."""
@@ -483,8 +491,9 @@ class RobotPopulation:
             "followers": np.array([follower.numbers() for follower in self._followers]).reshape(len(self), -1),
             "path_ends": np.cumsum([len(path) for path in paths], dtype=np.int64),
             "paths": np.concatenate([np.zeros((0, 2)), *paths]),
-            "reasons": np.array(self.reasons, f"<U{_REASON}"),
-            "reason_codes": np.array(self.reason_codes, np.int16),
+            "action_status": self.action_status.copy(),
+            "reason": self.reason.copy(),
+            "reason_code": self.reason_code.copy(),
         }
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
@@ -503,6 +512,7 @@ class RobotPopulation:
         starts = np.concatenate([[0], arrays["path_ends"]]).astype(int)
         for i, follower in enumerate(self._followers):
             follower.restore(arrays["paths"][starts[i] : starts[i + 1]], arrays["followers"][i])
-        self.reasons = [str(reason) for reason in arrays["reasons"]]
-        self.reason_codes = [int(code) for code in arrays["reason_codes"]]
+        self.action_status[:] = arrays["action_status"]
+        self.reason[:] = arrays["reason"]
+        self.reason_code[:] = arrays["reason_code"]
         self._bodies = None
