@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from road_city import HALF, road_city
 from vico.errors import InputError
 from vico.sim.bodies import RESIDENT, Bodies
-from vico.sim.traffic import Traffic
+from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.traffic.pedestrians import place_pedestrian
 from vico.world.heights import HeightField
 from vico.world.walkways import SIDEWALK
@@ -18,13 +18,12 @@ from vico.world.walkways import SIDEWALK
 def _traffic(cars: int = 30, pedestrians: int = 30, seed: int = 1) -> Traffic:
     city = road_city()
     return Traffic(
-        city.lanes,
+        TrafficNetwork.of(city.lanes, city.solids),
         HeightField.flat(HALF),
         cars=cars,
         pedestrians=pedestrians,
         seed=seed,
         first_entity=1_000_000,
-        solids=city.solids,
     )
 
 

@@ -9,7 +9,7 @@ from road_city import HALF, road_city
 from vico.assets.vehicles import vehicle_prototypes
 from vico.errors import InputError
 from vico.sim.bodies import Bodies
-from vico.sim.traffic import Traffic
+from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.transit import DWELL, FARE, TransitSystem, plan_buses, ride_price
 from vico.world.heights import HeightField
 
@@ -18,14 +18,13 @@ def _systems(cars: int = 20, pedestrians: int = 20) -> tuple[Traffic, TransitSys
     city, second = road_city(), 8 * 3600.0
     plan = plan_buses(city.transit, city.lanes, second)
     traffic = Traffic(
-        city.lanes,
+        TrafficNetwork.of(city.lanes, city.solids),
         HeightField.flat(HALF),
         cars=cars,
         pedestrians=pedestrians,
         seed=3,
         first_entity=1_000_000,
         buses=plan.bus_routes,
-        solids=city.solids,
     )
     return traffic, TransitSystem(city.transit, traffic, plan, second=second, first_bike=1_100_000)
 

@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING
 from vico.seeds import rng
 from vico.sim import spawn, systems
 from vico.sim.avatars import Avatars
+from vico.sim.base import SimulationBase
 from vico.sim.bodies import ASSISTANT, KINDS, RESIDENT
 from vico.sim.config import SimConfig
 from vico.sim.events import Events
-from vico.sim.indoor import Indoor
 from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import FIRST_ASSISTANT, FIRST_RESIDENT, FIRST_ROBOT, MovableObjects, People
 from vico.sim.timetable import Appointment
-from vico.world.folder import World
 
 if TYPE_CHECKING:
     from vico.community.model import Resident
@@ -25,7 +24,7 @@ _NOWHERE = 2**30
 
 
 def initial_state(
-    world: World, residents: Sequence[Resident], days: Sequence[Sequence[Appointment]], config: SimConfig
+    base: SimulationBase, residents: Sequence[Resident], days: Sequence[Sequence[Appointment]], config: SimConfig
 ) -> SimulationState:
     """Make the state before the first step.
 
@@ -40,15 +39,14 @@ def initial_state(
         If a robot's model is not known, or there is no free ground for everybody.
     """
     people = _people(residents, config)
-    indoor = Indoor.from_world(world.rooms, world.places, world.objects)
-    avatars = Avatars(people, indoor, world.walkable, world.height)
+    avatars = Avatars(people, base.indoor, base.world.walkable, base.world.height)
     events = Events(people.names)
     tick = config.start * TICKS_PER_SECOND
-    state = SimulationState(world, indoor, people, MovableObjects.none(), avatars, events, tick=tick)
+    state = SimulationState(base, people, MovableObjects.none(), avatars, events, tick=tick)
     # Nobody has a place yet: until then avatars are nowhere that could be in anybody's way.
     people.room[:] = _NOWHERE
-    state.traffic, state.transit = systems.traffic_and_transit_of(world, config)
-    state.robots = systems.robots_of(world, config, state.obstacles(), errands=config.errands)
+    state.traffic, state.transit = systems.traffic_and_transit_of(base, config)
+    state.robots = systems.robots_of(base, config, state.obstacles(), errands=config.errands)
     state.entities = _entities(state, residents, config)
     events.names = state.names
     events.begin(0, state.second, events.names)

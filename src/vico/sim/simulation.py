@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError
 from vico.sim.actions import AgentFault, apply_actions
+from vico.sim.base import SimulationBase
 from vico.sim.config import SimConfig
 from vico.sim.events import Event
 from vico.sim.initial_state import initial_state
@@ -61,6 +62,8 @@ class Simulation:
         Whose residents take part; None for nobody.
     config
         What the run is asked to be.
+    base
+        What never changes about the world; None takes the one that is kept with the world.
     renderer
         Renders what agents see; None makes the usual one the first time it is needed.
     defer_rgb
@@ -86,6 +89,7 @@ class Simulation:
         community: Community | None = None,
         config: SimConfig | None = None,
         *,
+        base: SimulationBase | None = None,
         renderer: ObservationRenderer | None = None,
         defer_rgb: bool = False,
     ) -> None:
@@ -94,15 +98,16 @@ class Simulation:
                 f"simulation: the community was made for world {community.world.name!r}, not for this one "
                 f"({world.manifest.name!r}); give that world, or build a community for this one"
             )
+        self.base = base or SimulationBase.of(world)
+        self.base.require(world)
         self.world = world
         self.defer_rgb = defer_rgb
         self.community = community
         self.config = config or SimConfig()
         self.metrics = Metrics()
         self.residents = list(community.residents)[: self.config.residents] if community is not None else []
-        place_index = {place.id: i for i, place in enumerate(world.places)}
-        days = [appointments(r.schedule, place_index) for r in self.residents]
-        self.state = initial_state(world, self.residents, days, self.config)
+        days = [appointments(r.schedule, self.base.place_index) for r in self.residents]
+        self.state = initial_state(self.base, self.residents, days, self.config)
         self.periods = _periods(self.state, self.config)
         self.punctuality = Punctuality.of(days, self.config.start)
         self.scenario, self.ground_truth = Scenario(self.state), GroundTruth(self.state)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from vico.rules import DOOR_REACH, INNER_DOOR_REACH, ActionStatus, ReasonCode
 from vico.sim.avatars import Avatars
+from vico.sim.base import SimulationBase
 from vico.sim.bodies import Bodies, HasBodies, Subsystem
 from vico.sim.carrying import DeckPose, HasDecks
 from vico.sim.events import Events
@@ -121,10 +122,8 @@ class SimulationState:
 
     Attributes
     ----------
-    world
-        Where it happens; never changes.
-    indoor
-        The world's rooms as arrays; never changes.
+    base
+        What never changes: the world, in the form it is looked up in.
     people, objects
         Avatars, and the movable objects they carry.
     avatars
@@ -139,16 +138,9 @@ class SimulationState:
         Shapes of movable objects, by prototype.
     tick
         Hundredths of a second since midnight of the first day.
-    place_index
-        Index of each place in ``world.places`` by id.
-    entrances
-        Entrances by id.
-    doors
-        Entrance of each place, ENU metres, float64, shape ``(places, 2)``; far away for places without one.
     """
 
-    world: World
-    indoor: Indoor
+    base: SimulationBase
     people: People
     objects: MovableObjects
     avatars: Avatars
@@ -159,16 +151,26 @@ class SimulationState:
     tick: int = 0
     entities: dict[int, dict[str, str]] = field(default_factory=dict)
     shapes: dict[str, list[Surface]] = field(default_factory=dict)
-    place_index: dict[str, int] = field(default_factory=dict)
-    entrances: dict[str, Entrance] = field(default_factory=dict)
-    doors: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
 
-    def __post_init__(self) -> None:
-        self.place_index = {place.id: i for i, place in enumerate(self.world.places)}
-        self.entrances = {entrance.id: entrance for entrance in self.world.entrances}
-        far = (1e9, 1e9)
-        doors = [self.entrances[p.entrance].position[:2] if p.entrance else far for p in self.world.places]
-        self.doors = np.array(doors, np.float64).reshape(-1, 2)
+    @property
+    def world(self) -> World:
+        """Where it happens."""
+        return self.base.world
+
+    @property
+    def indoor(self) -> Indoor:
+        """The world's rooms as arrays."""
+        return self.base.indoor
+
+    @property
+    def place_index(self) -> Mapping[str, int]:
+        """Index of each place in ``world.places`` by id."""
+        return self.base.place_index
+
+    @property
+    def entrances(self) -> Mapping[str, Entrance]:
+        """Entrances by id."""
+        return self.base.entrances
 
     @property
     def second(self) -> float:
@@ -254,7 +256,7 @@ class SimulationState:
             doors = self.indoor.doors[room]
             near = [d.to for d in doors if d.to >= 0 and near_door(p.position[i], d, INNER_DOOR_REACH)]
             return [self.indoor.rooms[to].id for to in near]
-        away = np.hypot(*(self.doors - p.position[i, :2]).T)
+        away = np.hypot(*(self.base.doors - p.position[i, :2]).T)
         return [self.world.places[k].id for k in np.flatnonzero(away <= DOOR_REACH) if self.world.places[k].rooms]
 
     def doors_of(self, i: int) -> list[dict[str, Any]]:

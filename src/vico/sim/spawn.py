@@ -13,7 +13,6 @@ from vico.sim.avatars import free_ground
 from vico.sim.moves import place_in_room, put_outdoors
 from vico.sim.simulation_state import SimulationState
 from vico.sim.timetable import Appointment, whereabouts
-from vico.world.routing import Router
 
 _PASSAGES = ("hall", "corridor", "stairs", "lift", "storage", "bathroom", "washroom", "shower_room")
 
@@ -26,7 +25,6 @@ def place_residents(state: SimulationState, days: Sequence[Sequence[Appointment]
     InputError
         If somebody has no schedule, or there is no room where they should be.
     """
-    router: Router | None = None
     for i, stays in enumerate(days):
         where = whereabouts(stays, second)
         name = state.people.names[i]
@@ -35,9 +33,7 @@ def place_residents(state: SimulationState, days: Sequence[Sequence[Appointment]
         if where.share >= 1.0 or where.origin == where.place:
             place_at(i, where.place, state)
             continue
-        places = state.world.places
-        router = router or Router(state.world.walkable)
-        path = router.path(places[where.origin].position[:2], places[where.place].position[:2])
+        path = state.base.way(where.origin, where.place)
         if path is None or len(path) < 2 or where.share <= 0.0:
             place_at(i, where.origin, state)
             continue

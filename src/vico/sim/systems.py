@@ -3,56 +3,46 @@
 from __future__ import annotations
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from vico.errors import InputError
 from vico.seeds import rng
 from vico.sim.avatars import clearances
+from vico.sim.base import SimulationBase
 from vico.sim.bodies import Bodies
 from vico.sim.config import SimConfig
 from vico.sim.robots import RobotPopulation
 from vico.sim.state import FIRST_BIKE, FIRST_ROBOT, FIRST_TRAFFIC
 from vico.sim.traffic import Traffic
-from vico.sim.transit import BusPlan, TransitSystem, plan_buses
-from vico.world.folder import World
+from vico.sim.transit import BusPlan, TransitSystem
 
 # Robots start where there is this much free ground, and this far from everybody, metres.
 _ROBOT_ROOM = 1.0
 _ROBOT_APART = 1.5
 
 
-def traffic_and_transit_of(world: World, config: SimConfig) -> tuple[Traffic | None, TransitSystem | None]:
+def traffic_and_transit_of(base: SimulationBase, config: SimConfig) -> tuple[Traffic | None, TransitSystem | None]:
     """Cars and pedestrians, buses and bicycles; None for what nobody asked for, or the world has not."""
-    second = float(config.start)
+    world = base.world
     has_transit = config.transit and bool(world.transit.lines or world.transit.bike_stations)
     if not has_transit and not config.cars and not config.pedestrians:
         return None, None
-    plan = plan_buses(world.transit, world.lanes, second) if has_transit else BusPlan()
+    plan = base.bus_plan(config.start) if has_transit else BusPlan()
     traffic = Traffic(
-        world.lanes,
+        base.streets,
         world.height,
         cars=config.cars,
         pedestrians=config.pedestrians,
         seed=config.seed,
         first_entity=FIRST_TRAFFIC,
         buses=plan.bus_routes,
-        solids=solids_of(world),
     )
     if not has_transit:
         return traffic, None
-    return traffic, TransitSystem(world.transit, traffic, plan, second=second, first_bike=FIRST_BIKE)
+    return traffic, TransitSystem(world.transit, traffic, plan, second=float(config.start), first_bike=FIRST_BIKE)
 
 
-def solids_of(world: World) -> list[shapely.Polygon]:
-    """Footprints nobody walks through: buildings and solid things outdoors."""
-    solids = [shapely.Polygon(b.footprint[0], b.footprint[1:]) for b in world.buildings]
-    things = world.objects.where(np.asarray(world.objects.solid & world.objects.outdoors, bool))
-    solids += [shapely.Polygon(corners) for corners in things.corners()]
-    return [solid for solid in solids if solid.is_valid and not solid.is_empty]
-
-
-def robots_of(world: World, config: SimConfig, others: Bodies, *, errands: bool) -> RobotPopulation | None:
+def robots_of(base: SimulationBase, config: SimConfig, others: Bodies, *, errands: bool) -> RobotPopulation | None:
     """Robots on free ground, clear of `others`; None where nobody asked for any.
 
     Raises
@@ -62,6 +52,7 @@ def robots_of(world: World, config: SimConfig, others: Bodies, *, errands: bool)
     """
     if not config.robots:
         return None
+    world = base.world
     spawns: list[NDArray[np.float64]] = []
     for i, kind in enumerate(config.robots):
         stream = rng(config.seed, "robot spawn", i)
@@ -74,5 +65,11 @@ def robots_of(world: World, config: SimConfig, others: Bodies, *, errands: bool)
             raise InputError(f"robots: no free ground for robot {i} ({kind}); take fewer robots")
         spawns.append(np.array([*xy, stream.uniform(-np.pi, np.pi)]))
     return RobotPopulation(
-        world, config.robots, np.array(spawns), seed=config.seed, first_entity=FIRST_ROBOT, errands=errands
+        world,
+        config.robots,
+        np.array(spawns),
+        seed=config.seed,
+        first_entity=FIRST_ROBOT,
+        errands=errands,
+        router=base.router,
     )

@@ -70,6 +70,8 @@ class World:
     ----------
     manifest, frame, half
         The manifest, the local frame, and half the side of the square, metres.
+    derived
+        What others have made of the world and share, each under a key of its own.
     """
 
     def __init__(self, manifest: Manifest, path: Path | None = None, **parts: Any) -> None:
@@ -77,6 +79,7 @@ class World:
         self.path = path
         self.half = manifest.half
         self.frame = LocalFrame(manifest.origin.lat, manifest.origin.lon)
+        self.derived: dict[object, object] = {}
         self._layers: dict[str, list[Surface]] = dict(parts.pop("layers", {}))
         known = {"height", "buildings", "places", "entrances", "rooms", "objects", "roads", "transit", "walkable"}
         if unknown := set(parts) - known - {"lanes", "models"}:

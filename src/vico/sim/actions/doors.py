@@ -53,7 +53,7 @@ def _refuse_entrance(name: str, i: int, state: SimulationState) -> Refusal | Non
         return Refusal(ReasonCode.UNKNOWN_PLACE, f"enter: no place has the id {short(name)}")
     if place.entrance is None or not place.rooms:
         return Refusal(ReasonCode.NO_DOOR, f"enter: {place.name} is in the open; there is nothing to enter")
-    away = float(np.hypot(*(state.doors[state.place_index[name]] - state.people.position[i, :2])))
+    away = float(np.hypot(*(state.base.doors[state.place_index[name]] - state.people.position[i, :2])))
     if away <= DOOR_REACH:
         return None
     sentence = f"enter: the entrance of {place.name} is {away:.1f} m away; {DOOR_REACH:g} m or less is needed"

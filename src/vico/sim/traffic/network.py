@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -18,23 +19,58 @@ _LEAST_WALK = 60.0  # m of connected sidewalk that are worth walking along
 _CAR_HALF_WIDTH, _CROSSING_MARGIN, _PAST_CROSSING = 0.9, 0.3, 0.5  # m
 
 
-def lane_network(lanes: LaneGraph, walks: Walkways, routes: Sequence[Sequence[int]]) -> LaneNetwork:
-    """Return the lanes as kernels take them.
+@dataclass(frozen=True)
+class TrafficNetwork:
+    """What all traffic of a world moves on; never changes.
 
-    Parameters
+    Attributes
     ----------
+    lanes
+        The world's lanes.
     walks
-        Whose crossings lanes run over.
-    routes
-        Lane numbers of each bus route's round.
+        Its walkways that can be walked along: clear of solids, without scraps.
+    driven, walked
+        Both as kernels take them; `driven` without routes of buses.
+    starts, entries
+        Lanes cars can stand on at the start, and those they come back in on.
     """
+
+    lanes: LaneGraph
+    walks: Walkways
+    driven: LaneNetwork
+    walked: WalkwayNetwork
+    starts: NDArray[np.int64]
+    entries: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, lanes: LaneGraph, solids: Sequence[shapely.Polygon] = ()) -> TrafficNetwork:
+        """Make the network of a world's lanes.
+
+        Parameters
+        ----------
+        solids
+            Footprints nobody walks through.
+        """
+        walks = connected_walkways(lanes.walks.clear_of(list(solids)))
+        driven = _lane_network(lanes, walks)
+        return cls(lanes, walks, driven, walkway_network(walks), *lanes_to_start_on(lanes, driven))
+
+    def with_routes(self, routes: Sequence[Sequence[int]]) -> LaneNetwork:
+        """Return the lanes as kernels take them, with the lane numbers of each bus route's round."""
+        first = np.zeros(len(routes) + 1, np.int32)
+        first[1:] = np.cumsum([len(route) for route in routes])
+        return self.driven._replace(
+            route_first=first, route=np.array([lane for route in routes for lane in route], np.int32)
+        )
+
+
+def _lane_network(lanes: LaneGraph, walks: Walkways) -> LaneNetwork:
+    """Return the lanes as kernels take them; `walks` have the crossings they run over."""
     crossings_first, crossings, cleared = _crossings_of_lanes(lanes, walks)
     leaves = (lanes.inside < 0) & _at_border(lanes, lanes.first[1:] - 1)
     n = np.arange(len(lanes))
     turn = lanes.at(n, lanes.length)[:, 2] - lanes.at(n, 0.0)[:, 2]
     u_turn = (lanes.inside >= 0) & (np.abs((turn + np.pi) % (2 * np.pi) - np.pi) > _U_TURN)
-    route_first = np.zeros(len(routes) + 1, np.int32)
-    route_first[1:] = np.cumsum([len(route) for route in routes])
     records = np.zeros(len(lanes), LANE)
     for name, values in {
         "first_point": lanes.first[:-1],
@@ -62,8 +98,8 @@ def lane_network(lanes: LaneGraph, walks: Walkways, routes: Sequence[Sequence[in
         next=lanes.next,
         crossings=crossings,
         crossings_cleared=cleared,
-        route_first=route_first,
-        route=np.array([lane for route in routes for lane in route], np.int32),
+        route_first=np.zeros(1, np.int32),
+        route=np.zeros(0, np.int32),
     )
 
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from vico.assets.vehicles import CAR_KINDS, mirrored, vehicle_prototypes, vehicle_size
@@ -14,7 +13,7 @@ from vico.errors import InputError
 from vico.seeds import rng
 from vico.sim.bodies import BUS, CAR, PEDESTRIAN, Bodies, Drawn
 from vico.sim.traffic.junctions import mark_busy_crossings
-from vico.sim.traffic.network import connected_walkways, lane_network, lanes_to_start_on, walkway_network
+from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.traffic.pedestrians import RADIUS, advance_pedestrians, place_pedestrian
 from vico.sim.traffic.route import count_per_street
 from vico.sim.traffic.shapes import Shapes, count_overlaps
@@ -29,7 +28,6 @@ from vico.sim.traffic.state import (
 )
 from vico.sim.traffic.vehicles import advance_vehicles, bring_back, place_vehicle
 from vico.world.heights import HeightField
-from vico.world.lanes import LaneGraph
 from vico.world.mesh import Surface
 from vico.world.walkways import SIDEWALK
 
@@ -50,7 +48,7 @@ class Traffic:
 
     Parameters
     ----------
-    lanes
+    network
         Where they drive and walk.
     height
         Ground heights.
@@ -62,8 +60,6 @@ class Traffic:
         Entities are numbered from here: cars, then buses, then pedestrians.
     buses
         Their routes and where they start.
-    solids
-        Footprints nobody walks through.
 
     Attributes
     ----------
@@ -78,7 +74,7 @@ class Traffic:
 
     def __init__(
         self,
-        lanes: LaneGraph,
+        network: TrafficNetwork,
         height: HeightField,
         *,
         cars: int,
@@ -86,16 +82,14 @@ class Traffic:
         seed: int,
         first_entity: int,
         buses: BusRoutes | None = None,
-        solids: Sequence[shapely.Polygon] = (),
     ) -> None:
         buses = buses or BusRoutes()
-        self.lanes, self.height = lanes, height
+        lanes = network.lanes
+        self.lanes, self.height, self.walks = lanes, height, network.walks
         self.cars, self.buses, self.pedestrians = cars, len(buses.buses), pedestrians
         self.vehicles = self.cars + self.buses
         self.first_entity = first_entity
-        self.walks = connected_walkways(lanes.walks.clear_of(list(solids)))
-        self._net = lane_network(lanes, self.walks, buses.routes)
-        self._paths = walkway_network(self.walks)
+        self._net, self._paths = network.with_routes(buses.routes), network.walked
         self._prototypes = [f"{kind}_{colour}" for kind, colours in CAR_KINDS.items() for colour in colours] + ["bus"]
         self._vehicles = new_fleet(self.vehicles, seed)
         self.fleet = self._vehicles.view(np.recarray)
@@ -106,9 +100,9 @@ class Traffic:
         self.junctions = new_junctions(lanes.zones, len(self.walks))
         self.shapes = self._new_shapes()
         self._street_load = np.zeros(len(lanes.edges), np.int32)
-        starts, self._entries = lanes_to_start_on(lanes, self._net)
+        self._entries = network.entries
         self._place_buses(buses.starts)
-        self._place_cars(seed, starts)
+        self._place_cars(seed, network.starts)
         self._place_pedestrians(seed)
 
     # -- start -------------------------------------------------------------------------------------------------------

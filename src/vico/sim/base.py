@@ -1,0 +1,117 @@
+"""What never changes about a world, in the form that simulations look it up in: built once, shared by all of them."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from vico.errors import InputError
+from vico.sim.indoor import Indoor
+from vico.sim.traffic.network import TrafficNetwork
+from vico.sim.transit import BusPlan, plan_buses
+from vico.world.folder import World
+from vico.world.model import Entrance
+from vico.world.routing import Router
+
+#: Whole ways that are remembered, and plans of buses: more than a community asks for at its start.
+_KEPT = 4096
+
+
+class SimulationBase:
+    """The fixed facts of a world; a simulation is arrays on top of it.
+
+    Its parts are made the first time somebody asks for them. Nobody may change them.
+
+    Parameters
+    ----------
+    world
+        The world.
+    """
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self._ways: dict[tuple[int, int], NDArray[np.float64] | None] = {}
+        self._bus_plans: dict[int, BusPlan] = {}
+
+    @classmethod
+    def of(cls, world: World) -> SimulationBase:
+        """Return the base of a world; it is kept with the world."""
+        known = world.derived.get(cls)
+        if not isinstance(known, cls):
+            world.derived[cls] = known = cls(world)
+        return known
+
+    def require(self, world: World) -> None:
+        """Refuse another world than the base's.
+
+        Raises
+        ------
+        InputError
+            If it is another one.
+        """
+        if world is not self.world:
+            raise InputError(
+                f"simulation: the base was made of another world ({self.world.manifest.name!r}), not of this one "
+                f"({world.manifest.name!r}); leave it out, or take SimulationBase.of(world)"
+            )
+
+    @cached_property
+    def indoor(self) -> Indoor:
+        """All rooms as arrays."""
+        return Indoor.from_world(self.world.rooms, self.world.places, self.world.objects)
+
+    @cached_property
+    def solids(self) -> list[shapely.Polygon]:
+        """Footprints nobody walks through: buildings and solid things outdoors."""
+        world = self.world
+        solids = [shapely.Polygon(b.footprint[0], b.footprint[1:]) for b in world.buildings]
+        things = world.objects.where(np.asarray(world.objects.solid & world.objects.outdoors, bool))
+        solids += [shapely.Polygon(corners) for corners in things.corners()]
+        return [solid for solid in solids if solid.is_valid and not solid.is_empty]
+
+    @cached_property
+    def streets(self) -> TrafficNetwork:
+        """What traffic moves on."""
+        return TrafficNetwork.of(self.world.lanes, self.solids)
+
+    @cached_property
+    def router(self) -> Router:
+        """Finds ways on the walkable map."""
+        return Router(self.world.walkable)
+
+    @cached_property
+    def place_index(self) -> dict[str, int]:
+        """Index of each place in ``world.places`` by id."""
+        return {place.id: i for i, place in enumerate(self.world.places)}
+
+    @cached_property
+    def entrances(self) -> dict[str, Entrance]:
+        """Entrances by id."""
+        return {entrance.id: entrance for entrance in self.world.entrances}
+
+    @cached_property
+    def doors(self) -> NDArray[np.float64]:
+        """Entrance of each place, ENU metres, float64, shape ``(places, 2)``; far away for places without one."""
+        far = (1e9, 1e9)
+        doors = [self.entrances[p.entrance].position[:2] if p.entrance else far for p in self.world.places]
+        return np.array(doors, np.float64).reshape(-1, 2)
+
+    def bus_plan(self, second: int) -> BusPlan:
+        """Return which buses drive at a second of the day, and where they are."""
+        if second not in self._bus_plans:
+            if len(self._bus_plans) >= _KEPT:
+                self._bus_plans.clear()
+            self._bus_plans[second] = plan_buses(self.world.transit, self.world.lanes, float(second))
+        return self._bus_plans[second]
+
+    def way(self, origin: int, goal: int) -> NDArray[np.float64] | None:
+        """Return the way on foot from one place to another, by their indices; None if there is none."""
+        if (origin, goal) not in self._ways:
+            if len(self._ways) >= _KEPT:
+                self._ways.clear()
+            places = self.world.places
+            self._ways[origin, goal] = self.router.path(places[origin].position[:2], places[goal].position[:2])
+        return self._ways[origin, goal]
