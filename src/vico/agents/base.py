@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -35,6 +36,31 @@ class Agent(Protocol):
 
     def restore(self, state: AgentState) -> None:
         """Remember what `state` returned, instead of what it remembers."""
+
+
+class GroupAgent(Protocol):
+    """Many agents that are quicker asked together; what each of them does is what it would do alone.
+
+    An agent that belongs to one has it as its attribute ``group``. Members keep their own `Agent.state`.
+    """
+
+    def act_for(
+        self, names: Sequence[str], observations: Mapping[str, Observation], infos: Mapping[str, Info]
+    ) -> dict[str, Action | Exception]:
+        """Return the members' actions for the coming second, by name; the error of one that failed in its place."""
+
+
+def by_group(agents: Mapping[str, Agent]) -> tuple[list[tuple[GroupAgent, list[str]]], list[str]]:
+    """Return the groups that agents belong to, each with its members' names, and the names of those without."""
+    groups: dict[int, tuple[GroupAgent, list[str]]] = {}
+    alone = []
+    for name, agent in agents.items():
+        group: GroupAgent | None = getattr(agent, "group", None)
+        if group is None:
+            alone.append(name)
+        else:
+            groups.setdefault(id(group), (group, []))[1].append(name)
+    return list(groups.values()), alone
 
 
 class RandomAgent:
@@ -89,4 +115,16 @@ def wrapped(angle: float) -> float:
     return float((angle + np.pi) % (2 * np.pi) - np.pi)
 
 
-__all__ = ["Action", "Agent", "AgentState", "Info", "Observation", "PublicMap", "RandomAgent", "heading", "wrapped"]
+__all__ = [
+    "Action",
+    "Agent",
+    "AgentState",
+    "GroupAgent",
+    "Info",
+    "Observation",
+    "PublicMap",
+    "RandomAgent",
+    "by_group",
+    "heading",
+    "wrapped",
+]
