@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from pettingzoo.test import parallel_api_test
 
@@ -102,7 +103,8 @@ def test_every_sampled_action_is_well_formed() -> None:
     environment = env()
     space = environment.action_space("assistant_0")
     space.seed(0)
-    places = [place.id for place in environment.public_map.places]
+    world = environment.world
+    places = [place.id for place in world.places] + [room.id for room in world.rooms]
     people = environment.sim.state.people.names
     bad = []
     for _ in range(300):
@@ -187,3 +189,30 @@ class Idle:
 def test_periods_go_through_the_spec() -> None:
     spec = quick().spec
     assert EnvSpec.from_json(spec.to_json()).config.periods == {"assistant_0": 0.5}
+
+
+def learners_action(kind: str, **slots: Any) -> dict[str, Any]:
+    """An action in the learners' form, with what it does not use left at its first value."""
+    space = env().action_space("assistant_0")
+    action = space.sample()
+    action |= {"type": PEOPLE_ACTIONS.index(kind), "hand": 0, "where": 0} | slots
+    assert space.contains(action)
+    return action
+
+
+def test_learners_may_enter_rooms_and_choose_where_to_put() -> None:
+    world = toy_city.world()
+    names = [place.id for place in world.places] + [room.id for room in world.rooms]
+    further = next(
+        room.id for room in world.rooms if all(room.id != place.rooms[0] for place in world.places if place.rooms)
+    )
+    entering = short_form(learners_action("enter", place=names.index(further)), names, ["assistant_0"])
+    assert entering == {"type": "enter", "place": further}
+    point = np.array([1.0, 2.0, 0.5], np.float32)
+    put = {
+        where: short_form(learners_action("put", where=where, entity=77, target=point), names, []) for where in range(3)
+    }
+    assert "target" not in put[0]
+    assert put[1]["target"] == 77
+    assert put[2]["target"] == [1.0, 2.0, 0.5]
+    assert all(isinstance(parse(action), Command) for action in put.values())

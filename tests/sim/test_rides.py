@@ -8,8 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vico.sim import rides
+from vico.sim.actions.check import check
+from vico.sim.actions.model import Refusal
+from vico.sim.avatars import clearances
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
+from vico.sim.state import RADIUS, Posture
 from vico.sim.transit import BIKE_ASTRAY, BIKE_RATE, FARE
 from vico.world.folder import World, read_world
 from vico.worldgen.pipeline import build_world
@@ -116,3 +121,130 @@ def test_indoors_or_far_from_a_stop_nobody_boards(sim: Simulation) -> None:
     if away > 10.0:
         assert "door" in act(sim, type="enter_bus")["action_reason"]
     assert "not in a bus" in act(sim, type="exit_bus")["action_reason"]
+
+
+def test_sixty_riders_have_sixty_places(city: World) -> None:
+    sim = Simulation(city, None, SimConfig(assistants=61, observe=()))
+    state, transit = sim.state, sim.state.transit
+    assert transit is not None
+    state.people.cash[:] = 10.0
+    bus = next(b for b in range(transit.traffic.buses) if transit.stopped_at(b) is not None)
+    for i in range(61):
+        sim.scenario.place_agent(f"assistant_{i}", transit.exit_spots(bus)[0])
+        refused = check({"type": "enter_bus"}, i, state)
+        if i < 60:
+            rides.board(i, state)
+    assert isinstance(refused, Refusal)
+    assert "full" in refused.reason
+    where = state.people.position[:60, :2]
+    apart = np.hypot(*(where[:, None] - where[None]).transpose(2, 0, 1))
+    assert apart[np.triu_indices(60, 1)].min() > 0.39
+    seated = state.people.posture[:60] == Posture.SITTING
+    assert 30 <= seated.sum() < 60
+    assert seated[: seated.sum()].all()
+
+
+def test_a_place_that_somebody_left_is_taken_by_the_next(city: World) -> None:
+    sim = Simulation(city, None, SimConfig(assistants=3, observe=()))
+    transit = sim.state.transit
+    assert transit is not None
+    sim.state.people.cash[:] = 10.0
+    bus = next(b for b in range(transit.traffic.buses) if transit.stopped_at(b) is not None)
+    for i in (0, 1):
+        sim.scenario.place_agent(f"assistant_{i}", transit.exit_spots(bus)[0])
+        rides.board(i, sim.state)
+    first = sim.state.people.position[0].copy()
+    rides.alight(0, sim.state)
+    assert sim.state.people.posture[0] == Posture.STANDING
+    sim.scenario.place_agent("assistant_2", transit.exit_spots(bus)[1])
+    rides.board(2, sim.state)
+    assert np.allclose(sim.state.people.position[2], first)
+
+
+def test_riders_are_seen_through_the_windows(city: World) -> None:
+    sim = Simulation(city, None, SimConfig(assistants=2, observe=("assistant_1",), image=256))
+    transit = sim.state.transit
+    assert transit is not None
+    sim.state.people.cash[:] = 10.0
+    bus = next(b for b in range(transit.traffic.buses) if transit.stopped_at(b) is not None)
+    sim.scenario.place_agent("assistant_0", transit.exit_spots(bus)[0])
+    rides.board(0, sim.state)
+    rider = sim.state.people.position[0]
+    beside = np.array([-np.sin(transit.bus_pose(bus)[2]), np.cos(transit.bus_pose(bus)[2])])
+    views = sim.renderer.render(
+        sim.state,
+        np.array([[*(rider[:2] + 4.0 * beside), rider[2] + 1.3, *-beside, 0.0]]),
+        np.array([0], np.int32),
+    )
+    assert int((views.segmentation == sim.state.people.entity[0]).sum()) > 100
+
+
+def on_a_bicycle(sim: Simulation) -> int:
+    """Put the assistant on some bicycle; return its number."""
+    transit = sim.state.transit
+    assert transit is not None
+    for bike in range(len(transit.bicycles.xy)):
+        sim.scenario.place_agent("assistant_0", transit.bicycles.xy[bike])
+        if act(sim, type="enter_bike")["action_status"] == "ok":
+            return int(sim.state.people.vehicle_entity[0]) - transit.bicycles.first_entity
+    raise AssertionError("no bicycle can be mounted")
+
+
+def test_cash_never_falls_below_zero_and_who_owes_rides_no_more(sim: Simulation) -> None:
+    transit = sim.state.transit
+    assert transit is not None
+    sim.state.people.cash[0] = 5.0
+    bike = on_a_bicycle(sim)
+    transit.bicycles.since[bike] -= 3600.0
+    price = BIKE_RATE * 61
+    state = act(sim, type="exit_bike")
+    assert (state["action_status"], state["cash"]) == ("ok", 0.0)
+    owed = float(sim.state.people.owed[0])
+    assert owed == pytest.approx(price - 5.0) or owed == pytest.approx(price + BIKE_ASTRAY - 5.0)
+    sim.state.people.cash[0] = 50.0
+    sim.scenario.place_agent("assistant_0", transit.bicycles.xy[bike])
+    assert "owe" in act(sim, type="enter_bike")["action_reason"]
+
+
+def test_without_money_nobody_gets_on_a_bicycle(sim: Simulation) -> None:
+    transit = sim.state.transit
+    assert transit is not None
+    on_a_bicycle(sim)
+    act(sim, type="exit_bike")
+    sim.state.people.cash[0] = 0.1
+    reasons = set()
+    for spot in transit.bicycles.xy:
+        sim.scenario.place_agent("assistant_0", spot)
+        reasons.add(act(sim, type="enter_bike")["action_reason"].split(",")[0])
+    assert "enter_bike: the first minute costs 0.2" in reasons
+
+
+def test_without_free_ground_nobody_gets_off_a_bicycle(sim: Simulation, monkeypatch: pytest.MonkeyPatch) -> None:
+    on_a_bicycle(sim)
+    monkeypatch.setattr(rides, "free_ground", lambda *args, **kwargs: None)
+    before = sim.state.people.cash[0]
+    state = act(sim, type="exit_bike")
+    assert (state["action_status"], state["vehicle"]) == ("refused", "bike")
+    assert "no free ground" in state["action_reason"]
+    assert sim.state.people.cash[0] == before
+
+
+def test_who_gets_off_stands_beside_the_bicycle(sim: Simulation) -> None:
+    transit = sim.state.transit
+    assert transit is not None
+    bike = on_a_bicycle(sim)
+    chance = np.random.default_rng(1)
+    for _ in range(100):
+        if act(sim, type="move_forward", distance=3.0)["action_status"] == "collision":
+            act(sim, type="turn_left", degrees=float(chance.uniform(20, 160)))
+    act(sim, type="exit_bike")
+    standing = transit.bicycles.standing_bodies(np.array([bike]))
+    assert clearances(sim.state.people.position[0, :2], standing).min() >= RADIUS
+    assert np.hypot(*(transit.bicycles.xy[bike] - sim.state.people.position[0, :2])) < 8.0
+
+
+def test_bicycles_are_named_wherever_they_stand(sim: Simulation) -> None:
+    transit = sim.state.transit
+    assert transit is not None
+    for entity in transit.draw().entity.tolist():
+        assert sim.entity(entity)["kind"] == "bicycle"

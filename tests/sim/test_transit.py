@@ -120,8 +120,8 @@ def test_a_stopped_bus_can_be_boarded_from_the_place_to_wait() -> None:
     stop = transit.stopped_at(0)
     assert stop is not None
     assert transit.bus_at(waits[stop]) == 0
-    assert transit.board(0) == FARE
-    assert transit.aboard[0] == 1
+    assert transit.board(0, 7) == FARE
+    assert transit.aboard(0) == 1
 
 
 def test_a_bus_out_of_reach_is_not_found() -> None:
@@ -134,9 +134,9 @@ def test_a_moving_bus_can_be_neither_boarded_nor_left() -> None:
     while transit.stopped_at(0):
         _advance(traffic, transit)
     with pytest.raises(InputError, match="not at a stop"):
-        transit.board(0)
+        transit.board(0, 7)
     with pytest.raises(InputError, match="moving"):
-        transit.alight(0)
+        transit.alight(0, 7)
 
 
 def test_a_ride_costs_by_the_started_minute_and_more_when_left_astray() -> None:

@@ -70,7 +70,8 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         self.events: list[Event] = []
         self._setup = setup
         self._episode = 0
-        self._places = [place.id for place in world.places]
+        # What one may enter: places from the street, rooms from within.
+        self._places = [place.id for place in world.places] + [room.id for room in world.rooms]
         # Made at once, so that the agents and their spaces are known before the first reset.
         self._simulation: Simulation | None = self._fresh(self.config.seed)
         self._views: dict[str, Any] = {}

@@ -160,13 +160,19 @@ def observation_space(image: int | None) -> spaces.Dict:
     return spaces.Dict(parts)
 
 
+#: Values of ``where`` in a learner's action: where a thing is put down.
+WHERE_AHEAD, WHERE_ENTITY, WHERE_POINT = range(3)
+
+
 def action_space(places: int, people: int, half: float) -> spaces.Dict:
     """Return the space of an avatar's actions: the number of the action, and every field an action may have.
+
+    ``where`` says where `put` puts a thing: on the ground ahead (0), on what ``entity`` names (1), at ``target`` (2).
 
     Parameters
     ----------
     places, people
-        How many there are: `place` and `agent` are indices.
+        How many there are: `place` (the world's places, then its rooms) and `agent` are indices.
     half
         Half the side of the world, metres: bounds `target`.
     """
@@ -181,6 +187,7 @@ def action_space(places: int, people: int, half: float) -> spaces.Dict:
             "place": spaces.Discrete(max(1, places)),
             "index": spaces.Discrete(64),
             "text": TextSpace(LONGEST_TEXT),
+            "where": spaces.Discrete(3),
         }
     )
 
@@ -205,7 +212,8 @@ def short_form(action: Any, places: Sequence[str], people: Sequence[str]) -> Any
     try:
         kind = PEOPLE_ACTIONS[int(action["type"])]
         fields = ACTIONS[kind].fields.items()
-        return {"type": kind} | {name: _read(field, action, places, people) for name, field in fields if field.slot}
+        values = {name: _read(field, action, places, people) for name, field in fields if field.slot}
+        return {"type": kind} | {name: value for name, value in values.items() if value is not None}
     except (KeyError, IndexError, TypeError, ValueError):
         # It is refused where all actions are judged, with the reason.
         return action
@@ -219,8 +227,17 @@ def _read(field: Field, action: Mapping[str, Any], places: Sequence[str], people
         value = float(np.asarray(raw, np.float64).reshape(-1)[0]) * field.scale
         return value if field.least is None else max(field.least, value)
     if field.slot == "target":
-        return [float(value) for value in np.asarray(raw, np.float64)]
+        return _point(raw)
+    if field.slot == "where":
+        where = int(raw)
+        if where == WHERE_POINT:
+            return _point(action["target"])
+        return int(action["entity"]) if where == WHERE_ENTITY else None
     if field.slot == "text":
         return raw
     number = int(raw)
     return {"place": places, "agent": people}[field.slot][number] if field.slot in ("place", "agent") else number
+
+
+def _point(raw: Any) -> list[float]:
+    return [float(value) for value in np.asarray(raw, np.float64)]

@@ -129,7 +129,7 @@ class Avatars:
         still[p.posture == Posture.SITTING] = CLIP["sit"]
         still[p.posture == Posture.LYING] = CLIP["sleep"]
         still[p.turn_left != 0.0] = CLIP["turn"]
-        still[p.vehicle == Vehicle.BUS] = CLIP["ride_bus"]
+        still[(p.vehicle == Vehicle.BUS) & (p.posture == Posture.SITTING)] = CLIP["ride_bus"]
         clip = np.where(p.action_clip >= 0, p.action_clip, still)
         walking = np.where(p.move_speed > 1.6, CLIP["run"], CLIP["walk"])
         walking = np.where((p.held > 0).any(axis=1) & (walking == CLIP["walk"]), CLIP["carry"], walking)

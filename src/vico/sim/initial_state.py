@@ -75,13 +75,16 @@ def _entities(state: SimulationState, residents: Sequence[Resident], config: Sim
         kind = "resident" if i < len(residents) else "assistant"
         shown = residents[i].name if i < len(residents) else name
         found[entity] = {"kind": kind, "name": shown, "agent": name}
-    for system, kind in ((state.robots, "robot"), (state.traffic, ""), (state.transit, "")):
+    for system, kind in ((state.robots, "robot"), (state.traffic, "")):
         if system is None:
             continue
         bodies = system.bodies()
         for k, entity in enumerate(bodies.entity.tolist()):
             named = kind or KINDS[int(bodies.kind[k])]
             found[entity] = {"kind": named, "name": f"{named} {k}"}
+    # Bicycles in their stations are nobody's obstacle, but are seen.
+    for k, entity in enumerate(state.transit.bicycles.entities().tolist() if state.transit is not None else []):
+        found[entity] = {"kind": "bicycle", "name": f"bicycle {k}"}
     for k, name in enumerate(state.robots.names if state.robots is not None else []):
         found[FIRST_ROBOT + k] |= {"name": f"{config.robots[k]} {k}", "agent": name}
     return found

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.assets.bus import BUS_FLOOR
 from vico.sim.avatars import clearances, free_ground
 from vico.sim.bodies import Bodies
 from vico.sim.moves import follow_hands, wrapped
@@ -14,8 +15,8 @@ from vico.sim.simulation_state import SimulationState
 from vico.sim.state import RADIUS, RIDER_REACH, Posture, Vehicle
 from vico.sim.transit import FARE, TransitSystem
 
-# A bus's floor above the ground, metres.
-_BUS_FLOOR = 0.35
+# Who gets off a bicycle steps beside it, no farther than this, metres.
+_BESIDE = 2.0
 # Directions tried for a bicycle that is mounted, relative to where the rider looks.
 _TURNS = tuple(math.radians(d) for d in (0, 30, -30, 60, -60, 90, -90, 135, -135, 180))
 # Spots tried for it, relative to the rider: here, and one or two steps to all sides; and the way ahead one wants.
@@ -31,9 +32,9 @@ def board(i: int, state: SimulationState) -> None:
     transit, p = _transit(state), state.people
     bus = transit.bus_at(p.position[i])
     assert bus is not None
-    p.cash[i] -= transit.board(bus)
+    p.cash[i] -= transit.board(bus, i)
     p.vehicle[i], p.vehicle_entity[i] = Vehicle.BUS, transit.entity_of(bus)
-    p.posture[i] = Posture.STANDING
+    p.posture[i] = Posture.SITTING if transit.is_seated(bus, i) else Posture.STANDING
     line = transit.line_of(bus)
     state.events.add("boarding", p.names[i], f"boards bus {line.name}", p.position[i], line=line.id, fare=FARE)
     p.vehicle_yaw[i] = p.yaw[i] = transit.bus_pose(bus)[2]
@@ -47,8 +48,9 @@ def alight(i: int, state: SimulationState) -> None:
     spot = spot_beside(bus, state, transit)
     assert spot is not None
     stop = transit.stopped_at(bus)
-    transit.alight(bus)
+    transit.alight(bus, i)
     p.vehicle[i], p.vehicle_entity[i] = Vehicle.NONE, 0
+    p.posture[i] = Posture.STANDING
     p.position[i, :2] = spot
     p.yaw[i] = wrapped(float(transit.bus_pose(bus)[2]) - math.pi / 2)
     state.avatars.settle(np.array([i]))
@@ -73,18 +75,24 @@ def mount(i: int, state: SimulationState) -> None:
 
 
 def dismount(i: int, state: SimulationState) -> None:
-    """Leave the bicycle, pay for the ride, and step beside it."""
+    """Leave the bicycle, pay for the ride, and step beside it.
+
+    What one cannot pay is owed: nobody who owes anything is let onto a bus or a bicycle.
+    """
     transit, p = _transit(state), state.people
     bike = int(p.vehicle_entity[i]) - transit.bicycles.first_entity
+    spot = spot_beside_bicycle(i, state, transit)
+    assert spot is not None
     price = transit.bicycles.dismount(bike, float(transit.clock[0]))
-    p.cash[i] -= price
+    paid = min(price, float(p.cash[i]))
+    p.cash[i] -= paid
+    p.owed[i] += price - paid
     p.vehicle[i], p.vehicle_entity[i] = Vehicle.NONE, 0
-    spot = free_ground(state.world.walkable, p.position[i], state.obstacles_to(i), within=6.0, connected=False)
-    if spot is not None:
-        p.position[i, :2] = spot
+    p.position[i, :2] = spot
     state.avatars.settle(np.array([i]))
     follow_hands(state)
-    state.events.add("dismount", p.names[i], "gets off the bicycle", p.position[i], price=round(price, 2))
+    costs = {"price": round(price, 2)} | ({"owed": round(price - paid, 2)} if paid < price else {})
+    state.events.add("dismount", p.names[i], "gets off the bicycle", p.position[i], **costs)
 
 
 def follow(state: SimulationState) -> None:
@@ -102,7 +110,7 @@ def follow(state: SimulationState) -> None:
 def _seat(i: int, state: SimulationState, transit: TransitSystem) -> None:
     p = state.people
     x, y, yaw = transit.seat(bus_of(i, state, transit), i)
-    p.position[i] = x, y, float(state.world.height((x, y))) + _BUS_FLOOR
+    p.position[i] = x, y, float(state.world.height((x, y))) + BUS_FLOOR
     # Whoever looks out of a window goes on doing so while the bus turns.
     p.yaw[i] = wrapped(float(p.yaw[i] + yaw - p.vehicle_yaw[i]))
     p.vehicle_yaw[i] = yaw
@@ -126,6 +134,19 @@ def spot_beside(bus: int, state: SimulationState, transit: TransitSystem) -> NDA
         if spot is not None:
             return spot
     return None
+
+
+def spot_beside_bicycle(i: int, state: SimulationState, transit: TransitSystem) -> NDArray[np.float64] | None:
+    """Return free ground beside the bicycle person `i` rides, clear of it where it will stand; None if there is none.
+
+    What is brought to a station goes into its place there, and is in nobody's way.
+    """
+    bike = int(state.people.vehicle_entity[i]) - transit.bicycles.first_entity
+    others = [state.obstacles_to(i)]
+    if not transit.bicycles.is_at_station(bike):
+        others.append(transit.bicycles.standing_bodies(np.array([bike])))
+    here = state.people.position[i]
+    return free_ground(state.world.walkable, here, Bodies.joined(others), within=_BESIDE, connected=False)
 
 
 def room_to_ride(i: int, bike: int, state: SimulationState, transit: TransitSystem) -> NDArray[np.float64] | None:

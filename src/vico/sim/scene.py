@@ -21,15 +21,13 @@ from vico.sim.config import SimConfig
 from vico.sim.observations import Views
 from vico.sim.quaternions import matrix_of
 from vico.sim.simulation_state import SimulationState
-from vico.sim.state import Vehicle
+from vico.sim.state import Posture, Vehicle
 from vico.threads import in_order
 from vico.world.folder import World
 from vico.world.mesh import Surface
 
 # The sun moves slowly: the light is set anew this often, seconds.
 _LIGHT_EVERY = 60.0
-# Who can't be seen (riders behind a bus's windows) waits far below the ground.
-_AWAY = np.array([0.0, 0.0, -1000.0])
 
 
 class _Motion(NamedTuple):
@@ -232,12 +230,12 @@ class SceneRenderer:
 
 
 def _motion_of_agents(state: SimulationState) -> _Motion:
-    """Return how residents and assistants move; who rides behind a bus's windows is put out of sight."""
+    """Return how residents and assistants move; who sits in a bus sits as the seat stands, wherever they look."""
     p = state.people
     speed = np.hypot(p.velocity[:, 0], p.velocity[:, 1])
-    position = p.position.copy()
-    position[p.vehicle == Vehicle.BUS] += _AWAY
-    return _Motion(p.clip.astype(np.int64), p.phase.copy(), speed, position, p.yaw.copy())
+    in_seat = (p.vehicle == Vehicle.BUS) & (p.posture == Posture.SITTING)
+    yaw = np.where(in_seat, p.vehicle_yaw, p.yaw)
+    return _Motion(p.clip.astype(np.int64), p.phase.copy(), speed, p.position.copy(), yaw)
 
 
 def _joined_motion(a: _Motion, b: _Motion) -> _Motion:

@@ -117,7 +117,9 @@ class People(ArrayState):
     held
         Entities in the left and right hand, 0 for none, int32, shape ``(n, 2)``.
     cash
-        Money left, float64, shape ``(n,)``.
+        Money left, float64, shape ``(n,)``; never negative.
+    owed
+        What rides cost beyond the money there was, float64, shape ``(n,)``.
     status
         A `vico.rules.ActionStatus`: how the last action went, int8, shape ``(n,)``.
     contact
@@ -150,6 +152,7 @@ class People(ArrayState):
     vehicle_yaw: NDArray[np.float64]
     held: NDArray[np.int32]
     cash: NDArray[np.float64]
+    owed: NDArray[np.float64]
     status: NDArray[np.int8]
     contact: NDArray[np.int32]
     reason: NDArray[np.str_]
@@ -182,6 +185,7 @@ class People(ArrayState):
             vehicle_yaw=np.zeros(n),
             held=np.zeros((n, 2), np.int32),
             cash=np.zeros(n),
+            owed=np.zeros(n),
             status=np.zeros(n, np.int8),
             contact=np.zeros(n, np.int32),
             reason=np.full(n, "", f"<U{REASON_LENGTH}"),

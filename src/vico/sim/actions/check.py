@@ -97,7 +97,13 @@ _ON_BIKE = _Bar(Situation.ON_BIKE, ReasonCode.ON_BIKE, "on a bicycle; exit_bike 
 
 def _refuse_situation(kind: ActionType, i: int, state: SimulationState) -> Refusal | None:
     """Refuse what can't be done asleep, seated, in a bus or on a bicycle."""
-    posture = {Posture.LYING: _ASLEEP, Posture.SITTING: _SEATED}.get(Posture(int(state.people.posture[i])))
+    # In a bus the place decides whether one sits.
+    riding = Vehicle(int(state.people.vehicle[i])) == Vehicle.BUS
+    posture = (
+        None
+        if riding
+        else {Posture.LYING: _ASLEEP, Posture.SITTING: _SEATED}.get(Posture(int(state.people.posture[i])))
+    )
     vehicle = {Vehicle.BUS: _IN_BUS, Vehicle.BIKE: _ON_BIKE}.get(Vehicle(int(state.people.vehicle[i])))
     for bar in (posture, vehicle):
         if bar is not None and bar.situation not in kind.when:

@@ -12,7 +12,7 @@ from vico.rules import LONGEST_TEXT
 
 Kind = Literal["number", "integer", "point", "vector", "text", "hand", "target", "name"]
 #: Parts of a learner's action that fields are read from; `vico.envs.spaces` gives each its space.
-Slot = Literal["amount", "target", "hand", "entity", "agent", "place", "index", "text"]
+Slot = Literal["amount", "target", "hand", "entity", "agent", "place", "index", "text", "where"]
 
 #: What a value of each kind has to be, in words.
 FORMS: dict[Kind, str] = {

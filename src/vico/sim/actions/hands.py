@@ -275,7 +275,7 @@ HANDS = (
         "Put down what a hand holds: on a container, on a robot's deck, at a point, or on the ground ahead.",
         put,
         check_put,
-        {"hand": _HAND, "target": Field("target", required=False)},
+        {"hand": _HAND, "target": Field("target", required=False, slot="where")},
         when=_WHEN,
     ),
     ActionType(

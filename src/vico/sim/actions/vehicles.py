@@ -7,7 +7,7 @@ from vico.sim import rides
 from vico.sim.actions.model import ActionType, Refusal, Situation, Values
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Vehicle
-from vico.sim.transit import BIKE_REACH, CAPACITY, DOOR_REACH, FARE
+from vico.sim.transit import BIKE_RATE, BIKE_REACH, CAPACITY, DOOR_REACH, FARE
 
 _NO_TRANSIT = "this run has no transit"
 
@@ -23,11 +23,9 @@ def check_enter_bus(values: Values, i: int, state: SimulationState) -> Refusal |
     bus = transit.bus_at(p.position[i])
     if bus is None:
         return Refusal(ReasonCode.NO_VEHICLE, f"enter_bus: no bus stands with a door within {DOOR_REACH:g} m")
-    if transit.aboard[bus] >= CAPACITY:
+    if transit.aboard(bus) >= CAPACITY:
         return Refusal(ReasonCode.FULL, "enter_bus: the bus is full")
-    if p.cash[i] < FARE:
-        return Refusal(ReasonCode.NO_MONEY, f"enter_bus: the fare is {FARE:g}, and you have {p.cash[i]:.2f}")
-    return None
+    return _refuse_unless_paid("enter_bus", "the fare is", FARE, i, state)
 
 
 def check_exit_bus(values: Values, i: int, state: SimulationState) -> Refusal | None:
@@ -58,7 +56,7 @@ def check_enter_bike(values: Values, i: int, state: SimulationState) -> Refusal 
         return Refusal(ReasonCode.NO_VEHICLE, f"enter_bike: no free bicycle within {BIKE_REACH:g} m")
     if rides.room_to_ride(i, bike, state, transit) is None:
         return Refusal(ReasonCode.NO_FREE_SPOT, "enter_bike: no room to get on here")
-    return None
+    return _refuse_unless_paid("enter_bike", "the first minute costs", BIKE_RATE, i, state)
 
 
 def check_exit_bike(values: Values, i: int, state: SimulationState) -> Refusal | None:
@@ -67,6 +65,17 @@ def check_exit_bike(values: Values, i: int, state: SimulationState) -> Refusal |
         return Refusal(ReasonCode.NO_TRANSIT, f"exit_bike: {_NO_TRANSIT}")
     if state.people.vehicle[i] != Vehicle.BIKE:
         return Refusal(ReasonCode.NOT_RIDING, "exit_bike: not on a bicycle")
+    if rides.spot_beside_bicycle(i, state, state.transit) is None:
+        return Refusal(ReasonCode.NO_FREE_SPOT, "exit_bike: no free ground beside the bicycle; ride on a little")
+    return None
+
+
+def _refuse_unless_paid(kind: str, what: str, price: float, i: int, state: SimulationState) -> Refusal | None:
+    cash, owed = float(state.people.cash[i]), float(state.people.owed[i])
+    if owed > 0.0:
+        return Refusal(ReasonCode.NO_MONEY, f"{kind}: you owe {owed:.2f} for an earlier ride")
+    if cash < price:
+        return Refusal(ReasonCode.NO_MONEY, f"{kind}: {what} {price:g}, and you have {cash:.2f}")
     return None
 
 

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.vehicles import CAR_KINDS, mirrored, vehicle_prototypes, vehicle_size
+from vico.assets.vehicle_parts import mirrored
+from vico.assets.vehicles import CAR_KINDS, vehicle_prototypes, vehicle_size
 from vico.errors import InputError
 from vico.seeds import rng
 from vico.sim.bodies import BUS, CAR, PEDESTRIAN, Bodies, Drawn

@@ -70,15 +70,16 @@ class Bicycles:
 
         Racks are street furniture, buses are among the traffic's bodies, and ridden bicycles among their riders'.
         """
-        free = np.flatnonzero((self.rider < 0) & (self.station < 0))
-        n = len(free)
-        if not n:
-            return Bodies.none()
+        return self.standing_bodies(np.flatnonzero((self.rider < 0) & (self.station < 0)))
+
+    def standing_bodies(self, bikes: NDArray[np.int64]) -> Bodies:
+        """Return the bodies some bicycles have, or would have, standing where they are."""
+        n = len(bikes)
         return Bodies(
-            entity=(self.first_entity + free).astype(np.int32),
+            entity=(self.first_entity + bikes).astype(np.int32),
             kind=np.full(n, BICYCLE, np.int8),
-            position=np.column_stack([self.xy[free], self._height(self.xy[free])]),
-            yaw=self.yaw[free],
+            position=np.column_stack([self.xy[bikes], self._height(self.xy[bikes])]),
+            yaw=self.yaw[bikes],
             half_length=np.full(n, BICYCLE_SIZE[0] / 2),
             half_width=np.full(n, BICYCLE_SIZE[1] / 2),
             height=np.full(n, BICYCLE_SIZE[2]),
@@ -138,6 +139,14 @@ class Bicycles:
             used = set(self.slot[self.station == station].tolist())
             self._dock(bike, station, next(k for k in range(len(used) + 1) if k not in used))
         return price
+
+    def is_at_station(self, bike: int) -> bool:
+        """Return whether a bicycle left where it is would go into a station."""
+        return self._station_near(self.xy[bike]) >= 0
+
+    def entities(self) -> NDArray[np.int32]:
+        """Return the entities of all bicycles, whether or not anybody could bump into them."""
+        return np.arange(self.first_entity, self.first_entity + len(self.rider)).astype(np.int32)
 
     def _station_near(self, xy: NDArray[np.float64]) -> int:
         """Return the nearest station within reach that has a free place, -1 for none."""

@@ -6,7 +6,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from vico.assets.vehicles import BUS_SIZE
+from vico.assets.bus import BUS_SIZE
 from vico.clock import DAY
 from vico.errors import InputError
 from vico.sim.traffic.state import BusRoutes

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.assets.vehicles import BUS_SIZE, vehicle_prototypes
+from vico.assets.bus import BUS_SIZE, bus_places
+from vico.assets.vehicles import vehicle_prototypes
 from vico.errors import InputError
 from vico.rules import BUS_CAPACITY as CAPACITY
 from vico.rules import BUS_DOOR_REACH as DOOR_REACH
@@ -48,8 +49,9 @@ class TransitSystem:
         Index in its line of the stop each bus stands at or drives to.
     begun
         Second of the day at which each bus's round began by the timetable.
-    aboard
-        Riders in each bus.
+    riders
+        Who is at each place of each bus, seats first (`vico.assets.bus.bus_places`), -1 for nobody, int32, shape
+        ``(buses, CAPACITY)``; the caller's numbers.
     taken
         Departures each line has begun since the first one of the first day.
     bicycles
@@ -65,7 +67,7 @@ class TransitSystem:
         self.dwell = np.full(buses, DWELL / 2)
         self.stop = np.array(plan.first_stops, np.int32)
         self.begun = np.array(plan.begun)
-        self.aboard = np.zeros(buses, np.int32)
+        self.riders = np.full((buses, CAPACITY), -1, np.int32)
         self.taken = np.array([next_departure(line, second) for line in transit.lines], np.int64)
         self.bicycles = Bicycles(transit.bike_stations, traffic, first_entity=first_bike)
         for bus in range(buses):
@@ -191,12 +193,23 @@ class TransitSystem:
         return _beside(self.bus_pose(bus), DOORS, (BUS_SIZE[1] / 2 + 0.5) * self._kerb)
 
     def seat(self, bus: int, rider: int) -> NDArray[np.float64]:
-        """x, y, yaw of a rider's seat; `rider` is the caller's number for them."""
+        """x, y, yaw of where a rider is; `rider` is the caller's number for them."""
         x, y, yaw = self.bus_pose(bus)
-        row, side = divmod(rider % 20, 2)
-        ahead, left = 3.2 - 0.85 * row, 0.75 if side == 0 else -0.75
+        ahead, left = bus_places()[0][self._place_of(bus, rider)]
+        left *= self._kerb
         c, s = math.cos(yaw), math.sin(yaw)
         return np.array([x + ahead * c - left * s, y + ahead * s + left * c, yaw])
+
+    def is_seated(self, bus: int, rider: int) -> bool:
+        """Return whether a rider has a seat; the others stand."""
+        return self._place_of(bus, rider) < bus_places()[1]
+
+    def aboard(self, bus: int) -> int:
+        """Return how many ride in a bus."""
+        return int((self.riders[bus] >= 0).sum())
+
+    def _place_of(self, bus: int, rider: int) -> int:
+        return int(np.flatnonzero(self.riders[bus] == rider)[0])
 
     def bus_at(self, xy: ArrayLike, reach: float = DOOR_REACH) -> int | None:
         """Return the bus that stands at a stop with the nearest door within `reach` of a point; None without one."""
@@ -209,8 +222,8 @@ class TransitSystem:
                     best = (away, bus)
         return None if best is None else best[1]
 
-    def board(self, bus: int) -> float:
-        """Take a rider in; returns the fare.
+    def board(self, bus: int, rider: int) -> float:
+        """Take a rider in, at the first free place; returns the fare.
 
         Raises
         ------
@@ -219,12 +232,13 @@ class TransitSystem:
         """
         if self.stopped_at(bus) is None:
             raise InputError("enter_bus: the bus is not at a stop")
-        if self.aboard[bus] >= CAPACITY:
+        free = np.flatnonzero(self.riders[bus] < 0)
+        if not len(free):
             raise InputError("enter_bus: the bus is full")
-        self.aboard[bus] += 1
+        self.riders[bus, free[0]] = rider
         return FARE
 
-    def alight(self, bus: int) -> None:
+    def alight(self, bus: int, rider: int) -> None:
         """Let a rider off.
 
         Raises
@@ -234,7 +248,7 @@ class TransitSystem:
         """
         if self.stopped_at(bus) is None:
             raise InputError("exit_bus: the bus is moving")
-        self.aboard[bus] -= 1
+        self.riders[bus, self._place_of(bus, rider)] = -1
 
     def arrivals(self, stop: str) -> list[tuple[str, float]]:
         """Scheduled buses at a stop from now on: line name and seconds from now, the next three of each line."""
@@ -248,7 +262,7 @@ class TransitSystem:
         return sorted(rows, key=lambda row: row[1])
 
 
-_STATE = ("clock", "dwell", "stop", "begun", "aboard", "taken")
+_STATE = ("clock", "dwell", "stop", "begun", "riders", "taken")
 
 
 def _beside(pose: NDArray[np.float64], ahead: Sequence[float], right: float) -> NDArray[np.float64]:
