@@ -39,6 +39,8 @@ from vico.world.heights import HeightField
 from vico.world.mesh import Surface, read_glb
 from vico.world.model import Building, Entrance, Manifest, Place, Record, Roads, Room, Transit
 from vico.world.objects import Objects, read_objects
+from vico.world.routing import Router
+from vico.world.trips import Trips
 from vico.world.walkable import WalkableMap, read_walkable
 
 if TYPE_CHECKING:
@@ -144,6 +146,16 @@ class World:
     def walkable(self) -> WalkableMap:
         """Where people can walk."""
         return read_walkable(self.file("walkable.npz"))
+
+    @cached_property
+    def router(self) -> Router:
+        """Finds ways on the walkable map."""
+        return Router(self.walkable)
+
+    @cached_property
+    def trips(self) -> Trips:
+        """Plans trips on foot, by bus and by bicycle."""
+        return Trips(self)
 
     @cached_property
     def lanes(self) -> LaneGraph:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from vico.world.folder import World
 from vico.world.heights import HeightField
-from vico.world.model import Category, Line, Point3, Ring, Stop
+from vico.world.model import BikeStation, Category, Line, Point3, Ring, Stop, Transit
 from vico.world.routing import Router
+from vico.world.trips import Trips
 from vico.world.walkable import WalkableMap
 
 
@@ -62,6 +63,7 @@ class PublicMap:
     buildings: list[PublicBuilding]
     stops: list[Stop]
     lines: list[Line]
+    bike_stations: list[BikeStation] = field(default_factory=list)
 
     @classmethod
     def from_world(cls, world: World) -> PublicMap:
@@ -75,12 +77,31 @@ class PublicMap:
         ]
         buildings = [PublicBuilding(b.id, b.name, b.footprint) for b in world.buildings]
         transit = world.transit
-        return cls(world.half, world.walkable, world.height, places, buildings, transit.stops, transit.lines)
+        return cls(
+            world.half,
+            world.walkable,
+            world.height,
+            places,
+            buildings,
+            transit.stops,
+            transit.lines,
+            transit.bike_stations,
+        )
 
     @cached_property
     def router(self) -> Router:
         """Finds walks on the map."""
         return Router(self.walkable)
+
+    @cached_property
+    def transit(self) -> Transit:
+        """Stops, lines with their timetables, and bicycle stations."""
+        return Transit(stops=self.stops, lines=self.lines, bike_stations=self.bike_stations, origin={})
+
+    @cached_property
+    def trips(self) -> Trips:
+        """Plans trips on foot, by bus and by bicycle."""
+        return Trips(self)
 
     @cached_property
     def place_by_id(self) -> dict[str, PublicPlace]:

@@ -1,0 +1,219 @@
+"""Planning trips: one router for everybody, on foot, by bus and by bicycle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vico.errors import InputError
+from vico.rules import WALK_SPEED
+from vico.world.model import Point2, Transit
+from vico.world.routing import Router
+from vico.world.trips.model import MODES, Closure, Leg, Trip
+from vico.world.trips.network import Network
+from vico.world.trips.search import Label, Question, best_trips
+from vico.world.trips.ways import Way, Ways
+
+
+class Place(Protocol):
+    """What trips are planned on: a `World`, or a `PublicMap`."""
+
+    @property
+    def router(self) -> Router:
+        """Finds ways on the ground."""
+
+    @property
+    def transit(self) -> Transit:
+        """Stops, lines and bicycle stations."""
+
+
+class Trips:
+    """Plans trips; threads may share it.
+
+    A trip is the one that arrives first; of those the cheapest, then the one with the least to walk. Buses keep the
+    timetable (`vico.world.timetable`), bicycles go from station to station. The same question has the same answer in
+    every process, whatever was asked before.
+
+    Parameters
+    ----------
+    place
+        Where.
+    walk_speed
+        Metres a second on foot.
+    """
+
+    def __init__(self, place: Place, *, walk_speed: float = WALK_SPEED) -> None:
+        self.router = place.router
+        self.transit = place.transit
+        self.walk_speed = walk_speed
+        self._kept: dict[tuple[str, str], Way] = {}
+        self._networks: dict[tuple[bool, bool], Network] = {}
+        self._known = {
+            r.id for part in (self.transit.stops, self.transit.lines, self.transit.bike_stations) for r in part
+        }
+
+    def plan(
+        self,
+        start: ArrayLike,
+        goal: ArrayLike,
+        depart: float,
+        *,
+        modes: Collection[str] = MODES,
+        cash: float | None = None,
+        arrive_by: float | None = None,
+        closed: Iterable[Closure] = (),
+    ) -> Trip | None:
+        """Plan the trip that arrives first.
+
+        Parameters
+        ----------
+        start, goal
+            ENU metres, up to 6 m off what can be walked on.
+        depart
+            Second of the day at which one sets out, or, with `arrive_by`, before which one does not.
+        modes
+            Of `MODES`. To and from stops and stations one walks in any case; without ``walk`` not all the way.
+        cash
+            What the rides may cost together; as much as they do if None.
+        arrive_by
+            Then it is the trip that sets out last, to the second, of those that arrive by this second of the day.
+        closed
+            What is out of use.
+
+        Returns
+        -------
+        Trip or None
+            None if there is no such trip.
+
+        Raises
+        ------
+        InputError
+            If a mode or an id of `closed` is not known.
+        """
+        question = self._question(start, goal, modes, cash, tuple(closed))
+        found = best_trips(question, depart)
+        if arrive_by is None or not found:
+            return self._trip(question, found[0], depart) if found else None
+        if found[0].arrive > arrive_by:
+            return None
+        # Who leaves later arrives no earlier: the last second to leave is found by halving.
+        low, high = 0, math.floor(arrive_by - depart)
+        best = found[0]
+        while low < high:
+            middle = (low + high + 1) // 2
+            found = best_trips(question, depart + middle)
+            if found and found[0].arrive <= arrive_by:
+                low, best = middle, found[0]
+            else:
+                high = middle - 1
+        return self._trip(question, best, depart + low)
+
+    def alternatives(
+        self,
+        start: ArrayLike,
+        goal: ArrayLike,
+        depart: float,
+        *,
+        modes: Collection[str] = MODES,
+        cash: float | None = None,
+        closed: Iterable[Closure] = (),
+    ) -> list[Trip]:
+        """Return all trips than which none is as good in arrival, price and metres on foot at once.
+
+        In the order of arrival; parameters are those of `plan`.
+        """
+        question = self._question(start, goal, modes, cash, tuple(closed), all_good=True)
+        return [self._trip(question, label, depart) for label in best_trips(question, depart)]
+
+    def seconds(self, start: ArrayLike, goal: ArrayLike, depart: float, *, modes: Collection[str] = MODES) -> float:
+        """Seconds from setting out to arriving; infinite if there is no trip. Parameters are those of `plan`."""
+        trip = self.plan(start, goal, depart, modes=modes)
+        return math.inf if trip is None else trip.seconds
+
+    def _question(
+        self,
+        start: ArrayLike,
+        goal: ArrayLike,
+        modes: Collection[str],
+        cash: float | None,
+        closed: Sequence[Closure],
+        *,
+        all_good: bool = False,
+    ) -> Question:
+        if unknown := set(modes) - set(MODES):
+            raise InputError(f"trips: mode {sorted(unknown)[0]!r} is not known; there are {', '.join(MODES)}")
+        ids = {closure for closure in closed if isinstance(closure, str)}
+        if unknown := ids - self._known:
+            raise InputError(
+                f"trips: nothing is called {sorted(unknown)[0]!r}; close a line, a stop or a station by its id"
+            )
+        network = self._network(ids, buses="bus" in modes, bikes="bike" in modes)
+        circles = [closure for closure in closed if not isinstance(closure, str)]
+        ways = Ways(
+            self.router,
+            [*network.points, _point(start), _point(goal)],
+            [*network.ids, None, None],
+            self._kept,
+            walk_speed=self.walk_speed,
+            blocked=self._blocked(circles) if circles else None,
+        )
+        return Question(network, ways, "walk" in modes, math.inf if cash is None else cash, all_good)
+
+    def _network(self, closed: set[str], *, buses: bool, bikes: bool) -> Network:
+        if closed:
+            return Network(self.transit, closed, buses=buses, bikes=bikes)
+        if (buses, bikes) not in self._networks:
+            self._networks[buses, bikes] = Network(self.transit, buses=buses, bikes=bikes)
+        return self._networks[buses, bikes]
+
+    def _blocked(self, circles: Sequence[tuple[float, float, float]]) -> NDArray[np.bool_]:
+        """Return the cells whose centres lie in one of some circles."""
+        walkable = self.router.walkable
+        axis = walkable.centre_of(np.arange(walkable.n))
+        blocked = np.zeros((walkable.n, walkable.n), bool)
+        for x, y, radius in circles:
+            blocked |= (axis[None, :] - x) ** 2 + (axis[:, None] - y) ** 2 <= radius * radius
+        return blocked
+
+    def _trip(self, question: Question, last: Label, depart: float) -> Trip:
+        legs = [
+            self._leg(question, label) for label in last.chain() if label.parent and label.parent.node != label.node
+        ]
+        return Trip(depart, tuple(legs))
+
+    def _leg(self, question: Question, label: Label) -> Leg:
+        network, ways, ride = question.network, question.ways, label.step
+        assert label.parent is not None
+        a, b = label.parent.node, label.node
+        start, end = ways.points[a], ways.points[b]
+        if ride.line == -2:
+            way = ways.way(a, b)
+            return Leg("walk", start, end, way.path, label.parent.arrive, label.arrive, way.metres)
+        if ride.line == -1:
+            way = ways.way(a, b)
+            path, metres, line = way.path, way.metres, None
+        else:
+            path = np.array(network.bus_stops_between(ride), np.float64)
+            metres, line = float(np.hypot(*np.diff(path, axis=0).T).sum()), network.lines[ride.line].line.id
+        return Leg(
+            "bike" if line is None else "bus",
+            start,
+            end,
+            path,
+            ride.depart,
+            ride.arrive,
+            metres,
+            price=ride.price,
+            line=line,
+            origin=network.ids[a],
+            destination=network.ids[b],
+        )
+
+
+def _point(xy: ArrayLike) -> Point2:
+    x, y = np.asarray(xy, np.float64)[:2].tolist()
+    return x, y

@@ -1,0 +1,190 @@
+"""The search: least arrival, then price, then metres on foot, over stops, stations and the clock.
+
+Labels are settled in the order of arrival, as in Dijkstra's algorithm; one is dropped where another is no worse in all
+three. Ways on the ground begin as lower bounds. A trip that is best and consists of known ways alone is the best one;
+as long as it does not, its ways are found and the search is done again, so few of the many ways are ever looked for.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from vico.world.trips.network import Network, Ride
+from vico.world.trips.ways import Ways
+
+_ON_FOOT = Ride(-1, 0.0, 0.0, 0.0, -2)
+_Step = tuple[int, int, int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Label:
+    """A way to be somewhere.
+
+    Attributes
+    ----------
+    arrive, price, metres
+        When, at what cost so far, and after how many metres on foot.
+    node
+        Where.
+    walked
+        Whether one came there on foot, to board or at the goal; else one has just got off (or not yet set out).
+    parent
+        Where one came from; None at the start.
+    step
+        How: a ride; `line` is -2 for a walk.
+    trace
+        All steps, to choose among equals: to, line, first, last.
+    """
+
+    arrive: float
+    price: float
+    metres: float
+    node: int
+    walked: bool
+    parent: Label | None
+    step: Ride
+    trace: tuple[_Step, ...]
+
+    @property
+    def key(self) -> tuple[float, float, float, int, tuple[_Step, ...]]:
+        """What labels are settled by: no two that differ are equal in it."""
+        return self.arrive, self.price, self.metres, len(self.trace), self.trace
+
+    def chain(self) -> list[Label]:
+        """Return the labels from the first step to this one."""
+        found: list[Label] = []
+        label: Label = self
+        while label.parent is not None:
+            found.append(label)
+            label = label.parent
+        return found[::-1]
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked: all that a search depends on.
+
+    Attributes
+    ----------
+    network, ways
+        Its points are the network's, then the start, then the goal.
+    direct
+        Whether one may walk all the way.
+    cash
+        What rides may cost together.
+    all_good
+        Whether all trips are wanted than which none is better in arrival, price and metres on foot; else the best one.
+    """
+
+    network: Network
+    ways: Ways
+    direct: bool = True
+    cash: float = math.inf
+    all_good: bool = False
+
+    @property
+    def start(self) -> int:
+        """Number of the start."""
+        return len(self.network)
+
+    @property
+    def goal(self) -> int:
+        """Number of the goal."""
+        return len(self.network) + 1
+
+
+def best_trips(question: Question, depart: float) -> list[Label]:
+    """Return the trips asked for, the best first; none if the goal can't be reached."""
+    ways = question.ways
+    while True:
+        found = _settle(question, depart)
+        unknown = [
+            (a, b)
+            for label in found
+            for step in label.chain()
+            for a, b in ([_ground(step)] if step.step.line < 0 else [])
+            if a != b and not ways.known(a, b)
+        ]
+        if not unknown:
+            return found
+        for a, b in dict.fromkeys(unknown):
+            ways.way(a, b)
+
+
+def _ground(label: Label) -> tuple[int, int]:
+    assert label.parent is not None
+    return label.parent.node, label.node
+
+
+def _settle(question: Question, depart: float) -> list[Label]:
+    """Search with what is known of the ways."""
+    goal = question.goal
+    settled: dict[tuple[int, bool], list[Label]] = {}
+    first = Label(depart, 0.0, 0.0, question.start, False, None, _ON_FOOT, ())
+    queue = [(first.key, first)]
+    at_goal = settled.setdefault((goal, True), [])
+    limit = math.inf
+    while queue:
+        _, label = heapq.heappop(queue)
+        others = settled.setdefault((label.node, label.walked), [])
+        if _is_no_better(label.arrive, label.price, label.metres, others):
+            continue
+        others.append(label)
+        if label.node == goal:
+            if not question.all_good:
+                return [label]
+            continue
+        for after, left in _steps(question, label):
+            if after.price > question.cash or after.arrive + left > limit:
+                continue
+            if question.all_good:
+                if _is_no_better(after.arrive + left, after.price, after.metres, at_goal):
+                    continue
+            elif after.node == goal:
+                limit = min(limit, after.arrive)
+            heapq.heappush(queue, (after.key, after))
+    return at_goal
+
+
+def _is_no_better(arrive: float, price: float, metres: float, others: list[Label]) -> bool:
+    """Return whether one of the labels is at least as good in everything."""
+    return any(o.arrive <= arrive and o.price <= price and o.metres <= metres for o in others)
+
+
+def _steps(question: Question, label: Label) -> Iterator[tuple[Label, float]]:
+    """Yield what may come after a label, each with the least that is left to the goal, seconds."""
+    network, ways, node = question.network, question.ways, label.node
+    top = max(network.top_speed, ways.walk_speed)
+    if label.walked:
+        for ride in _rides(question, label):
+            price = round(label.price + ride.price, 2)
+            trace = (*label.trace, (ride.to, ride.line, ride.first, ride.last))
+            after = Label(ride.arrive, price, label.metres, ride.to, False, label, ride, trace)
+            yield after, ways.bee_line[ride.to] / top
+        return
+    seconds, metres = ways.walk[node], ways.metres[node]
+    for to in network.boardable:
+        if to == node:
+            # Changing where one got off costs no way.
+            yield _on_foot(label, to, 0.0, 0.0), ways.bee_line[to] / top
+        elif seconds[to] < math.inf:
+            yield _on_foot(label, to, seconds[to], metres[to]), ways.bee_line[to] / top
+    if seconds[question.goal] < math.inf and (question.direct or label.parent is not None):
+        yield _on_foot(label, question.goal, seconds[question.goal], metres[question.goal]), 0.0
+
+
+def _rides(question: Question, label: Label) -> Iterator[Ride]:
+    network, ways, node = question.network, question.ways, label.node
+    yield from network.bus_rides(node, label.arrive)
+    if node in network.stations and network.stations[node].gives:
+        for to, station in network.stations.items():
+            if to != node and station.takes and ways.ride[node][to] < math.inf:
+                yield network.bike_ride(to, label.arrive, ways.ride[node][to])
+
+
+def _on_foot(label: Label, to: int, seconds: float, metres: float) -> Label:
+    arrive = label.arrive + seconds
+    return Label(arrive, label.price, label.metres + metres, to, True, label, _ON_FOOT, (*label.trace, (to, -2, 0, 0)))

@@ -1,0 +1,131 @@
+"""Ways on the ground between the ends of rides: bounds at first, found when it matters, then kept."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.rules import BIKE_SPEED
+from vico.world.model import Point2
+from vico.world.routing import Router
+
+#: Seconds that a corner costs: an agent that turns does not go on in the same second.
+TURN = 1.0
+# Metres that a way may be shorter than the bee line at an end from which the nearest walkable point is taken.
+_SNAP = 6.0
+
+
+class Way(NamedTuple):
+    """A way on the ground.
+
+    Attributes
+    ----------
+    path
+        Corner points, shape ``(k, 2)``.
+    metres
+        Its length; infinite if there is no way.
+    """
+
+    path: NDArray[np.float64]
+    metres: float
+
+    def seconds(self, speed: float) -> float:
+        """How long it takes at a speed, m/s, with a moment at every corner, in hundredths of a second."""
+        return round(self.metres / speed + TURN * max(0, len(self.path) - 2), 2)
+
+
+NO_WAY = Way(np.zeros((0, 2)), math.inf)
+
+
+def find_way(router: Router, start: Point2, goal: Point2, blocked: NDArray[np.bool_] | None = None) -> Way:
+    """Return the way between two points; `NO_WAY` if there is none."""
+    path = router.path(start, goal, blocked=blocked)
+    if path is None:
+        return NO_WAY
+    return Way(path, round(float(np.hypot(*np.diff(path, axis=0).T).sum()), 3))
+
+
+class Ways:
+    """Ways between numbered points.
+
+    Parameters
+    ----------
+    router
+        Finds them.
+    points
+        ENU metres; the last one is the goal.
+    names
+        A name for each point under which its ways are kept for later; None for points nobody will come back to.
+    kept
+        Ways by names of their ends, shared between searches.
+    walk_speed
+        Metres a second on foot.
+    blocked
+        Cells that are closed, as for `Router.path`; ways around them are not kept.
+
+    Attributes
+    ----------
+    metres, walk, ride
+        Of the way from each point to each: metres, seconds on foot and by bicycle; lower bounds until it is known.
+    bee_line
+        Metres that a way from each point to the goal has at least.
+    """
+
+    def __init__(
+        self,
+        router: Router,
+        points: Sequence[Point2],
+        names: Sequence[str | None],
+        kept: dict[tuple[str, str], Way],
+        *,
+        walk_speed: float,
+        blocked: NDArray[np.bool_] | None = None,
+    ) -> None:
+        self.points = list(points)
+        self.walk_speed = walk_speed
+        self._router, self._names, self._kept, self._blocked = router, list(names), kept, blocked
+        xy = np.array(self.points, np.float64).reshape(-1, 2)
+        sure = router.walkable.is_connected(xy) if blocked is None else np.zeros(len(xy), bool)
+        off = np.where(sure, 0.0, _SNAP)
+        away = np.hypot(xy[:, None, 0] - xy[None, :, 0], xy[:, None, 1] - xy[None, :, 1])
+        # A little below, so that rounding makes no bound too high.
+        self.metres: list[list[float]] = np.maximum(away - off[:, None] - off[None, :] - 0.02, 0.0).tolist()
+        self.bee_line = [row[-1] for row in self.metres]
+        n = len(self.points)
+        self.walk = [[m / walk_speed for m in row] for row in self.metres]
+        self.ride = [[m / BIKE_SPEED for m in row] for row in self.metres]
+        self._found: dict[tuple[int, int], Way] = {}
+        if blocked is None:
+            for a in range(n):
+                for b in range(n):
+                    way = self._remembered(a, b)
+                    if way is not None:
+                        self._note(a, b, way)
+
+    def known(self, a: int, b: int) -> bool:
+        """Whether the way is known, and not a bound."""
+        return (a, b) in self._found
+
+    def way(self, a: int, b: int) -> Way:
+        """Return the way from one point to another, finding it if need be."""
+        if (a, b) not in self._found:
+            way = find_way(self._router, self.points[a], self.points[b], self._blocked)
+            first, second = self._names[a], self._names[b]
+            if self._blocked is None and first is not None and second is not None:
+                way = self._kept.setdefault((first, second), way)
+            self._note(a, b, way)
+        return self._found[a, b]
+
+    def _remembered(self, a: int, b: int) -> Way | None:
+        first, second = self._names[a], self._names[b]
+        return None if first is None or second is None else self._kept.get((first, second))
+
+    def _note(self, a: int, b: int, way: Way) -> None:
+        self._found[a, b] = way
+        self.metres[a][b] = way.metres
+        self.walk[a][b] = way.seconds(self.walk_speed)
+        self.ride[a][b] = way.seconds(BIKE_SPEED)
