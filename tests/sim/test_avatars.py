@@ -7,8 +7,8 @@ import pytest
 
 import toy_city
 from vico.sim.avatars import CLIPS
-from vico.sim.collisions import overlaps
 from vico.sim.config import SimConfig
+from vico.sim.overlaps import overlaps_of
 from vico.sim.simulation import Simulation
 from vico.sim.state import RADIUS
 
@@ -61,7 +61,7 @@ def test_a_crowd_that_walks_about_at_random_never_overlaps(sim: Simulation) -> N
         turn = {"type": "turn_left", "degrees": float(chance.uniform(0, 360))}
         step = {"type": "move_forward", "distance": float(chance.uniform(0, 2.5))}
         sim.step({f"assistant_{i}": turn if chance.random() < 0.5 else step for i in range(4)})
-        assert overlaps(sim.state.people.position, RADIUS) == []
+        assert overlaps_of(sim.state) == []
         walls = sim.world.walkable.clearance_at(sim.state.people.position[:, :2])
         assert walls.min() >= RADIUS
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from road_city import HALF, road_city
 from vico.errors import InputError
 from vico.sim.bodies import RESIDENT, Bodies
+from vico.sim.overlaps import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.traffic.pedestrians import place_pedestrian
 from vico.world.heights import HeightField
@@ -40,7 +41,7 @@ def _run(traffic: Traffic, seconds: int, obstacles: Bodies | None = None) -> int
     overlaps = 0
     for _ in range(seconds * 10):
         traffic.advance(0.1, obstacles or Bodies.none())
-        overlaps += traffic.overlaps(obstacles)
+        overlaps += len(overlapping(Bodies.joined([traffic.bodies(), obstacles or Bodies.none()]), 0.0))
     return overlaps
 
 

@@ -9,6 +9,7 @@ from road_city import HALF, road_city
 from vico.assets.vehicles import vehicle_prototypes
 from vico.errors import InputError
 from vico.sim.bodies import Bodies
+from vico.sim.overlaps import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.transit import DWELL, FARE, TransitSystem, plan_buses, ride_price
 from vico.world.heights import HeightField
@@ -189,7 +190,7 @@ def test_buses_and_bicycles_overlap_nobody() -> None:
     overlaps = 0
     for _ in range(3000):
         _advance(traffic, transit)
-        overlaps += traffic.overlaps(Bodies.joined([transit.bodies()]))
+        overlaps += len(overlapping(Bodies.joined([traffic.bodies(), transit.bodies()]), 0.0))
     assert overlaps == 0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,7 +12,8 @@ from numpy.typing import NDArray
 from vico.rules import ActionStatus, ReasonCode
 from vico.sim.animation import CLIPS, stride_length
 from vico.sim.bodies import Bodies
-from vico.sim.collisions import IN_BUS, OBSTACLE, AvatarBodies, SolidMap, sweep
+from vico.sim.collisions import SolidMap, sweep
+from vico.sim.footprints import IN_BUS, Rectangle, gaps, records_of
 from vico.sim.indoor import Indoor
 from vico.sim.state import RADIUS, RIDER_REACH, People, Posture, Vehicle
 from vico.world.heights import HeightField
@@ -31,6 +33,11 @@ class Avatars:
         Their arrays; changed in place.
     indoor, walkable, height
         Where walls, furniture, free ground are, and how high the ground is.
+
+    Attributes
+    ----------
+    solids
+        What never moves, as the sweep takes it.
     """
 
     def __init__(self, people: People, indoor: Indoor, walkable: WalkableMap, height: HeightField) -> None:
@@ -39,7 +46,7 @@ class Avatars:
         self._walkable = walkable
         self._height = height
         # A room may be missing altogether, but numba wants arrays of the right shape.
-        self._solids = SolidMap(
+        self.solids = SolidMap(
             np.ascontiguousarray(walkable.clearance),
             walkable.half,
             indoor.boxes if len(indoor.boxes) else np.zeros((1, 5)),
@@ -76,17 +83,13 @@ class Avatars:
         """Return the room each avatar is in, `OUTDOORS` or `IN_BUS`: only those of one space can touch."""
         return np.where(self.people.vehicle == Vehicle.BUS, IN_BUS, self.people.room).astype(np.int32)
 
-    def reach(self) -> NDArray[np.float64]:
-        """How far an avatar's body stretches fore and aft of its centre: wheels, for riders."""
-        return np.where(self.people.vehicle == Vehicle.BIKE, RIDER_REACH, 0.0)
-
-    def advance(self, dt: float, obstacles: Bodies, *, share: NDArray[np.float64]) -> None:
+    def advance(self, dt: float, obstacles: NDArray[np.void], *, share: NDArray[np.float64]) -> None:
         """Turn and walk on by `dt` seconds.
 
         Parameters
         ----------
         obstacles
-            Bodies outdoors that are no avatars.
+            Bodies that are no avatars, in the street and in rooms, dtype `vico.sim.footprints.BODY`.
         share
             Which part of each avatar's remaining turn belongs to this sub-step (1 in the last one of its action),
             shape ``(n,)``.
@@ -101,8 +104,9 @@ class Avatars:
             turn = p.turn_left * share
             distance = np.minimum(p.move_left, p.move_speed * dt)
             before = p.position[:, :2].copy()
-            avatars = AvatarBodies(p.position, p.yaw, self.reach(), self.space(), p.entity)
-            moved, contact = sweep(distance, turn, avatars, self._solids, _obstacles(obstacles))
+            avatars = records_of(p.bodies_of(np.arange(len(p))), self.space())
+            moved, contact = sweep(distance, turn, p.yaw, avatars, self.solids, obstacles)
+            p.position[:, 0], p.position[:, 1] = avatars["x"], avatars["y"]
             hit = contact != 0
             p.turn_left -= turn
             p.move_left -= moved
@@ -144,15 +148,6 @@ class Avatars:
         p.phase %= 1.0
 
 
-def _obstacles(bodies: Bodies) -> NDArray[np.void]:
-    """Return bodies as the sweep takes them, dtype `OBSTACLE`."""
-    records = np.empty(len(bodies), OBSTACLE)
-    records["x"], records["y"], records["yaw"] = bodies.position[:, 0], bodies.position[:, 1], bodies.yaw
-    records["half_length"], records["half_width"] = bodies.half_length, bodies.half_width
-    records["entity"], records["disc"] = bodies.entity, bodies.disc
-    return records
-
-
 def free_ground(
     walkable: WalkableMap,
     near: NDArray[Any],
@@ -188,13 +183,23 @@ def free_ground(
     return None
 
 
+def cyclist_fits(walkable: WalkableMap, position: NDArray[Any], yaw: float, bodies: Bodies) -> bool:
+    """Return whether a cyclist at a position would be clear of the map's solids and of some bodies."""
+    x, y = float(position[0]), float(position[1])
+    core = Rectangle(x, y, math.cos(yaw), math.sin(yaw), RIDER_REACH, 0.0)
+    along = np.linspace(-RIDER_REACH, RIDER_REACH, 7)[:, None] * np.array([core.cos, core.sin])
+    spots = np.array([x, y]) + along
+    if float(walkable.clearance_at(spots).min()) < 0.28 or not bool(walkable.inside(spots).all()):
+        return False
+    return not len(bodies) or float(gaps(core, records_of(bodies)).min()) > RADIUS + 0.01
+
+
 def clearances(point: NDArray[Any], bodies: Bodies) -> NDArray[np.float64]:
     """Distance from a point to the outline of each body, metres; negative inside."""
+    rounding = bodies.rounding
     d = np.asarray(point, np.float64)[:2] - bodies.position[:, :2]
     c, s = np.cos(bodies.yaw), np.sin(bodies.yaw)
-    u = np.abs(c * d[:, 0] + s * d[:, 1]) - bodies.half_length
-    v = np.abs(-s * d[:, 0] + c * d[:, 1]) - bodies.half_width
+    u = np.abs(c * d[:, 0] + s * d[:, 1]) - (bodies.half_length - rounding)
+    v = np.abs(-s * d[:, 0] + c * d[:, 1]) - (bodies.half_width - rounding)
     outside = np.hypot(np.maximum(u, 0.0), np.maximum(v, 0.0))
-    box = np.where((u > 0.0) | (v > 0.0), outside, np.maximum(u, v))
-    disc = np.hypot(d[:, 0], d[:, 1]) - bodies.half_length
-    return np.where(bodies.disc, disc, box)
+    return np.where((u > 0.0) | (v > 0.0), outside, np.maximum(u, v)) - rounding

@@ -1,4 +1,8 @@
-"""Bodies as arrays: what every moving thing shows of itself for collisions, drawing and recording."""
+"""Bodies as arrays: what every moving thing shows of itself for collisions, drawing and recording.
+
+A body is an upright prism: a footprint over the ground, and an extent in height. Two bodies of one space are in each
+other's way where their footprints meet and so do their extents; `docs/bodies.md` says who has which body.
+"""
 
 from __future__ import annotations
 
@@ -9,17 +13,22 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 
 KINDS = ("resident", "assistant", "robot", "car", "bus", "bicycle", "pedestrian", "object")
 RESIDENT, ASSISTANT, ROBOT, CAR, BUS, BICYCLE, PEDESTRIAN, OBJECT = range(len(KINDS))
 #: By kind: whether it is a person.
 IS_PERSON = np.isin(np.arange(len(KINDS)), (RESIDENT, ASSISTANT, PEDESTRIAN))
+#: People step over what is no higher than this, metres: the lowest part of a person's extent is in nobody's way.
+STEP_HEIGHT = 0.1
+#: Nobody on the ground reaches as high as this, metres, on foot or in the saddle.
+TALLEST = 2.5
 
 
 @dataclass(frozen=True)
 class Bodies:
-    """Upright bodies on the ground; index = the owner's stable order.
+    """Upright bodies; index = the owner's stable order.
 
     Attributes
     ----------
@@ -28,12 +37,16 @@ class Bodies:
     kind
         Index into `KINDS`, int8, shape ``(n,)``.
     position
-        Centre of the footprint at ground level, metres, float64, shape ``(n, 3)``.
+        Centre of the underside, ENU metres, float64, shape ``(n, 3)``: on the ground, unless the body flies or stands
+        on something.
     yaw
         Radians, float64, shape ``(n,)``.
-    half_length, half_width, height
-        Metres, float64, shape ``(n,)``: an oriented rectangle, or a disc where `half_length == half_width` and the
-        kind is a person.
+    half_length, half_width
+        Half the footprint's extents along and across its heading, metres, float64, shape ``(n,)``. People have a round
+        footprint: all that is within `half_width` of a line as long as leaves `half_length` in all; a disc on foot, a
+        stadium on a bicycle. Everything else has a rectangle.
+    height
+        From the underside to the top, metres, float64, shape ``(n,)``.
     velocity
         Metres a second over the ground, float64, shape ``(n, 2)``.
     """
@@ -56,9 +69,31 @@ class Bodies:
         return IS_PERSON[self.kind]
 
     @property
-    def disc(self) -> NDArray[np.bool_]:
-        """Which bodies are discs of radius `half_length`: people on foot. The rest are rectangles."""
-        return np.asarray(self.person & (self.half_length == self.half_width), bool)
+    def rounding(self) -> NDArray[np.float64]:
+        """Radius of the footprints' round ends, metres: `half_width` for people, 0 for rectangles; shape ``(n,)``.
+
+        A footprint is all that is within `rounding` of its core, a rectangle of `half_length` and `half_width` less
+        `rounding`: a point for people on foot, a line for cyclists.
+        """
+        return np.where(self.person, self.half_width, 0.0)
+
+    @property
+    def bottom(self) -> NDArray[np.float64]:
+        """Where the extents that are in others' way begin, ENU metres, shape ``(n,)``: people lift their feet."""
+        return np.asarray(self.position[:, 2] + STEP_HEIGHT * self.person, np.float64)
+
+    @property
+    def top(self) -> NDArray[np.float64]:
+        """Where the extents end, ENU metres, shape ``(n,)``."""
+        return np.asarray(self.position[:, 2] + self.height, np.float64)
+
+    def levels(self, ground: HeightField) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return `bottom` and `top` above the ground beneath each body, metres.
+
+        For who looks far ahead: whoever stands further up the same street is on the same level.
+        """
+        below = ground(self.position[:, :2])
+        return self.bottom - below, self.top - below
 
     def where(self, chosen: NDArray[Any]) -> Bodies:
         """Return the bodies a mask or an index array picks."""

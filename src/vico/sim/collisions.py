@@ -1,7 +1,7 @@
-"""Continuous collision of upright avatars with the map, with rooms and furniture, and with each other's bodies.
+"""Continuous collision of avatars with the map, with rooms and furniture, and with every other body.
 
 A motion is walked in strides far shorter than a body is wide, each tested against the map's clearance and, exactly,
-against the boxes and discs near it; the last one is halved: so nothing is tunnelled through, and a blocked motion
+against the footprints near it; the last one is halved: so nothing is tunnelled through, and a blocked motion
 ends at the obstacle. Someone who already touches something may move if that makes the gap wider.
 """
 
@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
+from vico.sim.footprints import OUTDOORS, Rectangle, can_touch, core_of, point_gap, rectangle_gap
+from vico.sim.neighbours import neighbour_grid, search
 from vico.sim.state import RADIUS
 
 STRIDE = 0.05
@@ -21,12 +23,13 @@ WALL = -1
 # The map promises 0.3 m of free room at the centre of a free cell. Clearance interpolated to 0.27 m means at most
 # 0.05 m off such a centre towards something solid: the 0.25 m of a body.
 MAP_ROOM = 0.27
-#: Spaces that are no rooms: the street, and buses, whose riders take no room.
-OUTDOORS, IN_BUS = -1, -2
 #: Columns of boxes: centre (metres), heading (radians), half sides (metres).
 BOX_X, BOX_Y, BOX_YAW, BOX_HALF_LENGTH, BOX_HALF_WIDTH = range(5)
-_FAR = 1e9
 _HALVINGS = 6  # of the last stride
+# Along a cyclist's line the map is asked at points this far apart, metres: discs of MAP_ROOM around them cover all that
+# is within a person's radius of the line.
+_SPACING = 0.2
+_CELL = 4.0  # of the grid of neighbours, metres
 
 Array = NDArray[Any]
 
@@ -49,57 +52,6 @@ class SolidMap(NamedTuple):
     rooms: Array
     furniture: Array
     furniture_start: Array
-
-
-class AvatarBodies(NamedTuple):
-    """The avatars, arrays of shape ``(n,)``.
-
-    Attributes
-    ----------
-    position
-        Metres, shape ``(n, 3)``.
-    yaw
-        Heading, radians.
-    reach
-        How far the body reaches fore and aft of its centre disc, metres: wheels, for riders.
-    space
-        Room each is in, `OUTDOORS` or `IN_BUS`: only those of one space can touch.
-    entity
-        Their entities.
-    """
-
-    position: Array
-    yaw: Array
-    reach: Array
-    space: Array
-    entity: Array
-
-
-#: An avatar while it is moved: pose (metres, radians), see `AvatarBodies`, and its number.
-AVATAR = np.dtype(
-    [
-        ("x", np.float64),
-        ("y", np.float64),
-        ("yaw", np.float64),
-        ("reach", np.float64),
-        ("space", np.int64),
-        ("entity", np.int64),
-        ("index", np.int64),
-    ]
-)
-#: A body outdoors that is no avatar: pose, half sides (metres; the radius of a disc), whether it is a disc, entity.
-OBSTACLE = np.dtype(
-    [
-        ("x", np.float64),
-        ("y", np.float64),
-        ("yaw", np.float64),
-        ("half_length", np.float64),
-        ("half_width", np.float64),
-        ("entity", np.int64),
-        ("disc", np.bool_),
-    ],
-    align=True,
-)
 
 
 @compiled
@@ -125,12 +77,7 @@ def map_gap(x: float, y: float, clearance: Array, half: float) -> float:
 @compiled
 def box_gap(x: float, y: float, bx: float, by: float, yaw: float, half_length: float, half_width: float) -> float:
     """Signed distance from a point to an oriented rectangle, metres; negative inside."""
-    c, s = math.cos(yaw), math.sin(yaw)
-    u = abs(c * (x - bx) + s * (y - by)) - half_length
-    v = abs(-s * (x - bx) + c * (y - by)) - half_width
-    if u > 0.0 and v > 0.0:
-        return math.sqrt(u * u + v * v)
-    return max(u, v)
+    return point_gap(x, y, Rectangle(bx, by, math.cos(yaw), math.sin(yaw), half_length, half_width))
 
 
 @compiled
@@ -146,119 +93,86 @@ def room_gap(x: float, y: float, room: Array) -> float:
 
 
 @compiled
-def _gap_between(x: float, y: float, yaw: float, reach: float, other: Any) -> float:
-    """Smallest distance between the disc centres of two avatars (one disc, or three in a row for a rider)."""
-    best = _FAR
-    for a in range(-1, 2):
-        if a != 0 and reach == 0.0:
-            continue
-        ax, ay = x + a * reach * math.cos(yaw), y + a * reach * math.sin(yaw)
-        for b in range(-1, 2):
-            if b != 0 and other.reach == 0.0:
-                continue
-            bx, by = other.x + b * other.reach * math.cos(other.yaw), other.y + b * other.reach * math.sin(other.yaw)
-            best = min(best, math.hypot(ax - bx, ay - by))
-    return best
-
-
-@compiled
 def _is_too_close(gap: float, was: float) -> bool:
     """Return whether a gap to an obstacle is too small, and no wider than it was."""
     return gap < RADIUS and gap <= was
 
 
 @compiled
-def _obstacle_gap(x: float, y: float, other: Any) -> float:
-    """Return the distance from a point to a body outdoors, metres."""
-    if other.disc:
-        return math.hypot(other.x - x, other.y - y) - other.half_length
-    return box_gap(x, y, other.x, other.y, other.yaw, other.half_length, other.half_width)
-
-
-@compiled
-def _blocker_outdoors(x: float, y: float, from_x: float, from_y: float, solids: SolidMap, others: Array) -> int:
-    """Return the entity that keeps a disc from going from one point to another in the street; `WALL`, or 0 if free."""
-    gap = map_gap(x, y, solids.clearance, solids.half)
-    if gap < MAP_ROOM and gap <= map_gap(from_x, from_y, solids.clearance, solids.half):
-        return WALL
-    for other in others:
-        dx, dy = other.x - x, other.y - y
-        far = other.half_length + other.half_width + RADIUS
-        if dx * dx + dy * dy > far * far:
-            continue
-        if other.disc:
-            gap = math.sqrt(dx * dx + dy * dy) - other.half_length
-        else:
-            gap = _obstacle_gap(x, y, other)
-        if _is_too_close(gap, _obstacle_gap(from_x, from_y, other)):
-            return int(other.entity)
-    return 0
-
-
-@compiled
-def _blocker_in_room(x: float, y: float, from_x: float, from_y: float, room: int, solids: SolidMap) -> int:
-    """Return `WALL` if a wall or furniture keeps a disc from going from one point to another in a room, 0 if free."""
-    gap = room_gap(x, y, solids.rooms[room])
-    if _is_too_close(gap, room_gap(from_x, from_y, solids.rooms[room])):
-        return WALL
-    for f in range(solids.furniture_start[room], solids.furniture_start[room + 1]):
+def _blocked_at(x: float, y: float, from_x: float, from_y: float, space: int, solids: SolidMap) -> bool:
+    """Return whether something solid keeps a disc from going from one point to another, in the street or a room."""
+    if space == OUTDOORS:
+        gap = map_gap(x, y, solids.clearance, solids.half)
+        return gap < MAP_ROOM and gap <= map_gap(from_x, from_y, solids.clearance, solids.half)
+    gap = room_gap(x, y, solids.rooms[space])
+    if _is_too_close(gap, room_gap(from_x, from_y, solids.rooms[space])):
+        return True
+    for f in range(solids.furniture_start[space], solids.furniture_start[space + 1]):
         gap = gap_to(x, y, solids.furniture[f])
         if _is_too_close(gap, gap_to(from_x, from_y, solids.furniture[f])):
-            return WALL
-    return 0
+            return True
+    return False
 
 
 @compiled
-def _blocking_avatar(me: Any, x: float, y: float, yaw: float, avatars: Array) -> int:
-    """Return the entity of the avatar that keeps avatar `me` from standing at a pose, 0 if none does."""
-    for other in avatars:
-        if other.index == me.index or other.space != me.space or other.space == IN_BUS:
+def _is_blocked(core: Rectangle, was: Rectangle, space: int, solids: SolidMap) -> bool:
+    """Return whether something solid keeps a body from moving from one place of its core to another."""
+    reach = core.half_length
+    if reach == 0.0:
+        return _blocked_at(core.x, core.y, was.x, was.y, space, solids)
+    points = math.ceil(2.0 * reach / _SPACING) + 1
+    for k in range(points):
+        s = reach * (2.0 * k / (points - 1) - 1.0)
+        if _blocked_at(
+            core.x + s * core.cos, core.y + s * core.sin, was.x + s * was.cos, was.y + s * was.sin, space, solids
+        ):
+            return True
+    return False
+
+
+@compiled
+def _body_in_way(core: Rectangle, was: Rectangle, bodies: Array, near: Array) -> int:
+    """Return the entity of the first of the bodies `near` that a move would touch, 0 if none does."""
+    reach = core.half_length + RADIUS
+    for k in near:
+        other = bodies[k]
+        dx, dy = other.x - core.x, other.y - core.y
+        far = reach + other.radius
+        if dx * dx + dy * dy > far * far:
             continue
-        near = 2.0 * RADIUS + me.reach + other.reach
-        dx, dy = other.x - x, other.y - y
-        if dx * dx + dy * dy > near * near:
-            continue
-        gap = _gap_between(x, y, yaw, me.reach, other)
-        if gap < 2.0 * RADIUS and gap <= _gap_between(me.x, me.y, me.yaw, me.reach, other):
+        theirs = core_of(other)
+        gap = rectangle_gap(core, theirs) - other.rounding
+        if gap < RADIUS and gap <= rectangle_gap(was, theirs) - other.rounding:
             return int(other.entity)
     return 0
 
 
 @compiled
-def blocker(me: Any, x: float, y: float, yaw: float, avatars: Array, solids: SolidMap, others: Array) -> int:
-    """Entity that keeps avatar `me` from standing at a pose; `WALL` for walls, edges and furniture, 0 if free."""
-    hit = 0
-    for k in range(-1, 2):
-        if k != 0 and me.reach == 0.0:
-            continue
-        px, py = x + k * me.reach * math.cos(yaw), y + k * me.reach * math.sin(yaw)
-        qx, qy = me.x + k * me.reach * math.cos(me.yaw), me.y + k * me.reach * math.sin(me.yaw)
-        if me.space == OUTDOORS:
-            hit = _blocker_outdoors(px, py, qx, qy, solids, others)
-        elif me.space >= 0:
-            hit = _blocker_in_room(px, py, qx, qy, me.space, solids)
-        if hit != 0:
-            break
-    return hit if hit != 0 else _blocking_avatar(me, x, y, yaw, avatars)
+def _blocker(me: Any, core: Rectangle, around: Any) -> int:
+    """Entity that keeps avatar `me` from moving its core to a place; `WALL` for walls, edges, furniture, 0 if free."""
+    solids, avatars, near_avatars, others, near_others = around
+    was = core_of(me)
+    if _is_blocked(core, was, me.space, solids):
+        return WALL
+    hit = _body_in_way(core, was, others, near_others)
+    return hit if hit != 0 else _body_in_way(core, was, avatars, near_avatars)
 
 
 @compiled
-def _turn(me: Any, angle: float, avatars: Array, solids: SolidMap, others: Array) -> int:
+def _turn(me: Any, yaw: float, around: Any) -> int:
     """Turn an avatar if its body has room to; return the entity that is in the way, 0 for none."""
-    yaw = me.yaw + angle
-    yaw = yaw - 2.0 * math.pi * math.floor((yaw + math.pi) / (2.0 * math.pi))
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    reach = me.half_length - me.rounding
     hit = 0
-    if me.reach > 0.0:
-        hit = blocker(me, me.x, me.y, yaw, avatars, solids, others)
+    if reach > 0.0:
+        hit = _blocker(me, Rectangle(me.x, me.y, cos, sin, reach, 0.0), around)
     if hit == 0:
-        me.yaw = yaw
+        me.cos, me.sin = cos, sin
     return hit
 
 
 @compiled
-def _walk_ahead(
-    me: Any, distance: float, contact: int, avatars: Array, solids: SolidMap, others: Array
-) -> tuple[float, int]:
+def _walk_ahead(me: Any, distance: float, contact: int, around: Any) -> tuple[float, int]:
     """Move an avatar ahead as far as the way is free.
 
     Parameters
@@ -271,13 +185,13 @@ def _walk_ahead(
     tuple
         Metres, and the entity that was touched last, 0 for none.
     """
-    cx, cy = math.cos(me.yaw), math.sin(me.yaw)
     free, step = 0.0, min(distance, STRIDE)
     halvings = 0
+    reach = me.half_length - me.rounding
     # Whole strides while the way is free, then halves: `free` metres are known to be clear.
     while free < distance - 1e-12:
-        x, y = me.x + cx * step, me.y + cy * step
-        hit = blocker(me, x, y, me.yaw, avatars, solids, others)
+        x, y = me.x + me.cos * step, me.y + me.sin * step
+        hit = _blocker(me, Rectangle(x, y, me.cos, me.sin, reach, 0.0), around)
         if hit == 0:
             me.x, me.y = x, y
             free += step
@@ -293,49 +207,71 @@ def _walk_ahead(
 
 
 @compiled
-def _avatar_records(avatars: AvatarBodies) -> Array:
-    records = np.empty(len(avatars.yaw), AVATAR)
-    for i in range(len(records)):
-        one = records[i]
-        one.x, one.y, one.yaw = avatars.position[i, 0], avatars.position[i, 1], avatars.yaw[i]
-        one.reach, one.space = avatars.reach[i], avatars.space[i]
-        one.entity, one.index = avatars.entity[i], i
-    return records
+def _grid_of(bodies: Array, drift: float) -> Any:
+    """Return the grid of some bodies that move no farther than `drift` while it is used."""
+    x, y, spread = np.empty(len(bodies)), np.empty(len(bodies)), 0.0
+    for k in range(len(bodies)):
+        x[k], y[k] = bodies[k].x, bodies[k].y
+        spread = max(spread, bodies[k].radius)
+    return neighbour_grid(x, y, _CELL, spread + drift)
 
 
 @compiled
-def sweep(distance: Array, turn: Array, bodies: AvatarBodies, solids: SolidMap, others: Array) -> tuple[Array, Array]:
-    """Turn, then move every avatar ahead as far as the way is free, one after the other.
+def _who_can_touch(me: Any, bodies: Array, found: Array) -> Array:
+    """Leave those of the found bodies that avatar `me` can touch: others, in its space, on its level."""
+    n = 0
+    for k in found:
+        if bodies[k].entity != me.entity and can_touch(me, bodies[k]):
+            found[n] = k
+            n += 1
+    return found[:n]
+
+
+@compiled
+def sweep(distance: Array, turn: Array, yaw: Array, avatars: Array, solids: SolidMap, others: Array) -> Any:
+    """Turn and walk all avatars, in order; each sees where the ones before it have come to stand.
 
     Parameters
     ----------
     distance, turn
-        Metres and radians wanted, shape ``(n,)``.
-    bodies
-        The avatars; their positions and yaws are changed in place.
+        Metres ahead and radians counter-clockwise, float64, shape ``(n,)``.
+    yaw
+        Headings, radians, shape ``(n,)``; changed in place.
+    avatars
+        Everybody who may move, dtype `vico.sim.footprints.BODY`; changed in place.
     others
-        Bodies outdoors that are no avatars, dtype `OBSTACLE`.
+        Bodies that stand still meanwhile, dtype `vico.sim.footprints.BODY`.
 
     Returns
     -------
     tuple
-        Metres moved, float64, and the entity that stopped each (0: nobody, `WALL`), int64; shape ``(n,)``.
+        Metres walked by each, and what it touched: an entity, `WALL`, or 0; shape ``(n,)``.
     """
     moved = np.zeros(len(distance))
     contact = np.zeros(len(distance), np.int64)
-    avatars = _avatar_records(bodies)
+    drift = 0.0
+    for d in distance:
+        drift = max(drift, d)
+    avatar_grid, other_grid = _grid_of(avatars, drift), _grid_of(others, 0.0)
+    found, found_others = np.empty(len(avatars), np.int64), np.empty(len(others), np.int64)
     for i in range(len(distance)):
         me = avatars[i]
+        if turn[i] == 0.0 and (distance[i] <= 0.0 or me.space < OUTDOORS):
+            continue
+        reach = me.half_length + distance[i]
+        around = (
+            solids,
+            avatars,
+            _who_can_touch(me, avatars, search(avatar_grid, me.x, me.y, reach, found)),
+            others,
+            _who_can_touch(me, others, search(other_grid, me.x, me.y, reach, found_others)),
+        )
         if turn[i] != 0.0:
-            contact[i] = _turn(me, turn[i], avatars, solids, others)
-        if distance[i] > 0.0 and me.space != IN_BUS:
-            moved[i], contact[i] = _walk_ahead(me, distance[i], contact[i], avatars, solids, others)
-        bodies.position[i, 0], bodies.position[i, 1], bodies.yaw[i] = me.x, me.y, me.yaw
+            heading = yaw[i] + turn[i]
+            heading = heading - 2.0 * math.pi * math.floor((heading + math.pi) / (2.0 * math.pi))
+            contact[i] = _turn(me, heading, around)
+            if contact[i] == 0:
+                yaw[i] = heading
+        if distance[i] > 0.0 and me.space >= OUTDOORS:
+            moved[i], contact[i] = _walk_ahead(me, distance[i], contact[i], around)
     return moved, contact
-
-
-def overlaps(centres: Array, radius: float) -> list[tuple[int, int]]:
-    """Pairs of discs of one radius that overlap by more than a rounding error; for checks and tests."""
-    gaps = np.hypot(*(centres[:, None, :2] - centres[None, :, :2]).transpose(2, 0, 1))
-    first, second = np.nonzero(np.triu(gaps < 2 * radius - 1e-9, 1))
-    return list(zip(first.tolist(), second.tolist(), strict=True))

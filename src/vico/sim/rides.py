@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.bus import BUS_FLOOR
-from vico.sim.avatars import clearances, free_ground
+from vico.sim.avatars import clearances, cyclist_fits, free_ground
 from vico.sim.bodies import Bodies
 from vico.sim.moves import follow_hands, wrapped
 from vico.sim.simulation_state import SimulationState
-from vico.sim.state import RADIUS, RIDER_REACH, Posture, Vehicle
+from vico.sim.state import RADIUS, Posture, Vehicle
 from vico.sim.transit import FARE, TransitSystem
 
 # Who gets off a bicycle steps beside it, no farther than this, metres.
@@ -167,7 +167,7 @@ def room_to_ride(i: int, bike: int, state: SimulationState, transit: TransitSyst
             yaw = wrapped(float(p.yaw[i]) + turn)
             ahead = np.array([math.cos(yaw), math.sin(yaw)])
             way = -1.0
-            while way < _RUN_UP and _fits(spot + (way + 1.0) * ahead, yaw, others, state):
+            while way < _RUN_UP and cyclist_fits(state.world.walkable, spot + (way + 1.0) * ahead, yaw, others):
                 way += 1.0
             if way >= 0.0 and (best is None or way > best[0]):
                 best = way, np.array([*spot, yaw])
@@ -177,14 +177,8 @@ def room_to_ride(i: int, bike: int, state: SimulationState, transit: TransitSyst
 
 
 def _clear(point: NDArray[np.float64], others: Bodies, state: SimulationState) -> bool:
-    """Whether one disc of a body is clear of the map's solids and of all bodies."""
+    """Whether somebody on foot is clear of the map's solids and of all bodies."""
     walkable = state.world.walkable
     if float(walkable.clearance_at(point)) < 0.28 or not bool(walkable.inside(point)):
         return False
     return not len(others) or float(clearances(point, others).min()) > RADIUS + 0.01
-
-
-def _fits(position: NDArray[np.float64], yaw: float, others: Bodies, state: SimulationState) -> bool:
-    """Whether the three discs of a rider are clear of the map's solids and of all bodies."""
-    ahead = np.array([math.cos(yaw), math.sin(yaw)])
-    return all(_clear(position[:2] + k * RIDER_REACH * ahead, others, state) for k in (-1, 0, 1))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vico.rules import DOOR_REACH, INNER_DOOR_REACH, ActionStatus, ReasonCode
 from vico.sim.avatars import Avatars
 from vico.sim.base import SimulationBase
-from vico.sim.bodies import Bodies, HasBodies, Subsystem
+from vico.sim.bodies import TALLEST, Bodies, HasBodies, Subsystem
 from vico.sim.carrying import DeckPose, HasDecks
 from vico.sim.events import Events
 from vico.sim.indoor import Indoor, near_door
@@ -138,6 +138,8 @@ class SimulationState:
         Shapes of movable objects, by prototype.
     tick
         Hundredths of a second since midnight of the first day.
+    on_substep
+        Called after every sub-step, for checks; it has to leave the state as it is. Not part of the state.
     """
 
     base: SimulationBase
@@ -151,6 +153,7 @@ class SimulationState:
     tick: int = 0
     entities: dict[int, dict[str, str]] = field(default_factory=dict)
     shapes: dict[str, list[Surface]] = field(default_factory=dict)
+    on_substep: Callable[[], None] | None = None
 
     @property
     def world(self) -> World:
@@ -188,12 +191,15 @@ class SimulationState:
         return None if index is None else self.world.places[index]
 
     def obstacles(self) -> Bodies:
-        """Every body outdoors."""
-        return Bodies.joined([owner.bodies() for owner in self.owners()])
+        """Every body outdoors that somebody on the ground could touch."""
+        everything = Bodies.joined([owner.bodies() for owner in self.owners()])
+        bottom, _ = everything.levels(self.world.height)
+        return everything.where(bottom < TALLEST)
 
     def owners(self) -> list[HasBodies]:
-        """Who has bodies: traffic, transit, avatars, robots; those of them that there are."""
-        return [o for o in (self.traffic, self.transit, self.avatars, self.robots) if o is not None]
+        """Who has bodies: traffic, transit, movable objects, avatars, robots; those of them that there are."""
+        owners = (self.traffic, self.transit, self.objects, self.avatars, self.robots)
+        return [owner for owner in owners if owner is not None]
 
     def carriers(self) -> list[HasDecks]:
         """Who may have decks that things lie on."""

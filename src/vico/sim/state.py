@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import SchemaError
-from vico.sim.bodies import Bodies
+from vico.sim.bodies import OBJECT, Bodies
 from vico.sim.quaternions import matrix_of, quaternion_of, upright
 
 # Entity numbers of what lives in a run; a world's own numbers all lie below.
@@ -204,7 +204,7 @@ class People(ArrayState):
         return self.bodies_of(np.flatnonzero(self.outdoors()))
 
     def bodies_of(self, who: NDArray[np.int64]) -> Bodies:
-        """Bodies of the avatars with the given indices; a cyclist's is as long as the bicycle."""
+        """Bodies of the avatars with the given indices; a cyclist's is as long as the bicycle, see `Bodies`."""
         riding = self.vehicle[who] == Vehicle.BIKE
         return Bodies(
             self.entity[who],
@@ -218,7 +218,7 @@ class People(ArrayState):
         )
 
 
-# A rider's body is three discs in a row: saddle, front and rear wheel this far from it.
+#: Half the line that a cyclist's body is drawn around, metres: from the saddle to either end of the bicycle's core.
 RIDER_REACH = 0.6
 
 
@@ -299,6 +299,33 @@ class MovableObjects(ArrayState):
     def set_rotation(self, k: int, rotation: NDArray[np.float64]) -> None:
         """Turn an object; `rotation` is object to world, shape ``(3, 3)``."""
         self.orientation[k] = quaternion_of(rotation)
+
+    def bodies(self) -> Bodies:
+        """Those that lie outdoors: what people carry, or what lies on a robot, is part of whoever carries it."""
+        return self.bodies_of(np.flatnonzero((self.holder == 0) & (self.room < 0)))
+
+    def bodies_of(self, which: NDArray[np.int64]) -> Bodies:
+        """Bodies of the objects with the given indices: their boxes, or what is around them where they lie tilted."""
+        n, half = len(which), self.size[which] / 2
+        turn, yaw = matrix_of(self.orientation[which]), self.yaw[which]
+        middle = self.position[which] + turn[:, :, 2] * half[:, 2:]
+        c, s = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
+        along, across = c * turn[:, 0] + s * turn[:, 1], c * turn[:, 1] - s * turn[:, 0]
+        length, width, height = ((np.abs(axis) * half).sum(axis=1) for axis in (along, across, turn[:, 2]))
+        return Bodies(
+            self.entity[which],
+            np.full(n, OBJECT, np.int8),
+            middle - np.column_stack([np.zeros((n, 2)), height]),
+            yaw,
+            length,
+            width,
+            2 * height,
+            np.zeros((n, 2)),
+        )
+
+    def in_rooms(self) -> NDArray[np.int64]:
+        """Return the indices of those that lie in rooms, on the floor or on furniture."""
+        return np.flatnonzero((self.holder == 0) & (self.room >= 0))
 
     def index(self, entity: int) -> int:
         """Index of an entity, -1 if it is none of the objects."""

@@ -7,6 +7,7 @@ import numpy as np
 from vico.rules import ActionStatus, ReasonCode
 from vico.sim import moves, rides
 from vico.sim.bodies import Bodies, HasBodies, Subsystem
+from vico.sim.footprints import records_of
 from vico.sim.metrics import StopWatch
 from vico.sim.periods import ACTION_TICKS, SUBSTEP, SUBSTEP_TICKS, TICKS_PER_SECOND, ControlPeriods
 from vico.sim.simulation_state import SimulationState
@@ -33,6 +34,8 @@ def advance_ticks(state: SimulationState, ticks: int, periods: ControlPeriods, w
             report_robots(state)
             watch.lap("robots")
         state.tick += ticks_now
+        if state.on_substep is not None and state.tick % SUBSTEP_TICKS == 0:
+            state.on_substep()
     moves.follow_hands(state)
     return stopped
 
@@ -51,7 +54,10 @@ def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _A
     _advance_subsystem(state.transit, "transit", bodies, watch)
     gone = periods.since_begun(state.tick)[: len(state.people)]
     share = SUBSTEP_TICKS / np.maximum(ACTION_TICKS - gone, SUBSTEP_TICKS)
-    state.avatars.advance(SUBSTEP, bodies.but(state.avatars), share=share)
+    lying = state.objects.in_rooms()
+    in_rooms = records_of(state.objects.bodies_of(lying), state.objects.room[lying])
+    obstacles = np.concatenate([records_of(bodies.but(state.avatars)), in_rooms])
+    state.avatars.advance(SUBSTEP, obstacles, share=share)
     rides.follow(state)
     bodies.refresh(state.avatars)
     stopped = _report_collisions(state)

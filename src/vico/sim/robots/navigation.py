@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from vico.assets.robots import RobotModel
 from vico.io.compiled import compiled
 from vico.sim.bodies import Bodies
+from vico.sim.footprints import Rectangle, point_gap
 
 Array = NDArray[Any]
 
-#: Somebody near a robot: pose, half sides (the radius of a disc), velocity (ENU), whether it is a disc; metres, m/s.
+#: Somebody near a robot: pose, half sides of its footprint's core, velocity (ENU), rounding; metres, m/s.
 NEIGHBOUR = np.dtype(
     [
         ("x", np.float64),
@@ -24,7 +25,7 @@ NEIGHBOUR = np.dtype(
         ("half_width", np.float64),
         ("vx", np.float64),
         ("vy", np.float64),
-        ("disc", np.bool_),
+        ("rounding", np.float64),
     ],
     align=True,
 )
@@ -42,9 +43,9 @@ def neighbours_of(bodies: Bodies, own: int, position: Array, reach: float) -> ND
     near = bodies.where(np.flatnonzero((away - bodies.half_length < reach) & (bodies.entity != own)))
     found = np.empty(len(near), NEIGHBOUR)
     found["x"], found["y"], found["yaw"] = near.position[:, 0], near.position[:, 1], near.yaw
-    found["half_length"], found["half_width"] = near.half_length, near.half_width
+    found["rounding"] = near.rounding
+    found["half_length"], found["half_width"] = near.half_length - near.rounding, near.half_width - near.rounding
     found["vx"], found["vy"] = near.velocity[:, 0], near.velocity[:, 1]
-    found["disc"] = near.person
     return found
 
 
@@ -95,14 +96,8 @@ def path_length(path):  # type: ignore[no-untyped-def]
 @compiled
 def _gap(x, y, ox, oy, other):  # type: ignore[no-untyped-def]
     """Return the distance from a point to a neighbour that is at (ox, oy); negative inside a rectangle."""
-    if other.disc:
-        return math.hypot(x - ox, y - oy) - other.half_width
-    c, s = math.cos(other.yaw), math.sin(other.yaw)
-    u = abs(c * (x - ox) + s * (y - oy)) - other.half_length
-    v = abs(-s * (x - ox) + c * (y - oy)) - other.half_width
-    if u > 0.0 and v > 0.0:
-        return math.hypot(u, v)
-    return max(u, v)
+    core = Rectangle(ox, oy, math.cos(other.yaw), math.sin(other.yaw), other.half_length, other.half_width)
+    return point_gap(x, y, core) - other.rounding
 
 
 @compiled

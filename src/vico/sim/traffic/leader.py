@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
+from vico.sim.footprints import Rectangle, point_gap, separation
 from vico.sim.traffic.path import Outline, footprint
-from vico.sim.traffic.shapes import Rectangle, point_to_rectangle, rectangles_overlap
+from vico.sim.traffic.shapes import share_level, within
 from vico.sim.traffic.state import NONE
 
-#: A body near a vehicle: centre, heading cosine and sine, half sides (metres), index into `Shapes`, radius of the
-#: circle around it, and whether it is a disc.
+#: A body near a vehicle: centre, heading cosine and sine, half sides of its footprint's core, rounding of that, radius
+#: of the circle around it (metres), and index into `Shapes`. Whoever is round is a person.
 NEARBY_BODY = np.dtype(
     [
         ("x", np.float64),
@@ -22,9 +23,9 @@ NEARBY_BODY = np.dtype(
         ("sin", np.float64),
         ("half_length", np.float64),
         ("half_width", np.float64),
+        ("rounding", np.float64),
         ("radius", np.float64),
         ("body", np.int64),
-        ("disc", np.bool_),
     ],
     align=True,
 )
@@ -54,7 +55,7 @@ class VehicleView(NamedTuple):
 
 @compiled
 def nearby_bodies(shapes, v, reach, buffer):  # type: ignore[no-untyped-def]
-    """Write the bodies within `reach` metres of body v into `buffer` and return the part of it that is used."""
+    """Write the bodies within `reach` metres of body v, on its level, into `buffer`; return the part that is used."""
     sx, sy, half = shapes.x, shapes.y, shapes.half_length
     x, y = sx[v], sy[v]
     n = 0
@@ -64,13 +65,14 @@ def nearby_bodies(shapes, v, reach, buffer):  # type: ignore[no-untyped-def]
         if dx > r or dx < -r or j == v:
             continue
         dy = sy[j] - y
-        if dx * dx + dy * dy < r * r:
-            one = buffer[n]
+        if dx * dx + dy * dy < r * r and share_level(shapes, v, j):
+            one, rounding = buffer[n], shapes.rounding[j]
             one.x, one.y = sx[j], sy[j]
             one.cos, one.sin = np.cos(shapes.yaw[j]), np.sin(shapes.yaw[j])
-            one.half_length, one.half_width = half[j], shapes.half_width[j]
-            one.radius = half[j] if shapes.disc[j] else np.sqrt(half[j] ** 2 + shapes.half_width[j] ** 2)
-            one.body, one.disc = j, shapes.disc[j]
+            one.half_length, one.half_width = half[j] - rounding, shapes.half_width[j] - rounding
+            one.rounding = rounding
+            one.radius = np.sqrt(one.half_length**2 + one.half_width**2) + rounding
+            one.body = j
             n += 1
     return buffer[:n]
 
@@ -78,10 +80,12 @@ def nearby_bodies(shapes, v, reach, buffer):  # type: ignore[no-untyped-def]
 @compiled
 def touches(rectangle, one):  # type: ignore[no-untyped-def]
     """Return whether a rectangle touches a nearby body."""
-    if one.disc:
-        return point_to_rectangle(one.x, one.y, rectangle) <= one.half_length
+    if one.half_length == 0.0 and one.half_width == 0.0:
+        return point_gap(one.x, one.y, rectangle) <= one.rounding
     other = Rectangle(one.x, one.y, one.cos, one.sin, one.half_length, one.half_width)
-    return rectangles_overlap(rectangle, other)
+    if one.rounding == 0.0:
+        return separation(rectangle, other) <= 0.0
+    return within(rectangle, other, one.rounding)
 
 
 @compiled
@@ -101,7 +105,7 @@ def touched_at(path, outline, front, bodies, vehicle_gap, person_gap, below=ANY_
         r = reach + one.radius
         if dx * dx + dy * dy > r * r:
             continue
-        side = person_gap if one.disc else vehicle_gap
+        side = person_gap if one.rounding > 0.0 else vehicle_gap
         if touches(Rectangle(cx, cy, c, s, length + _NOSE, width + side), one):
             return k
     return NONE
@@ -133,7 +137,7 @@ def _sort_by_contact(path, outline, front, bodies):  # type: ignore[no-untyped-d
     cx, cy, c, s = footprint(path, outline, front)
     apart = 0
     for k in range(len(bodies)):
-        side = outline.person_gap if bodies[k].disc else _VEHICLE_GAP
+        side = outline.person_gap if bodies[k].rounding > 0.0 else _VEHICLE_GAP
         grown = Rectangle(cx, cy, c, s, outline.length / 2 + _NOSE, outline.half_width + side)
         if not touches(grown, bodies[k]):
             if k != apart:

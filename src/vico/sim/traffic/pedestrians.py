@@ -13,7 +13,7 @@ import numpy as np
 from vico.io.compiled import compiled
 from vico.sim.traffic.path import project_on_polyline
 from vico.sim.traffic.random_stream import next_random
-from vico.sim.traffic.shapes import disc_touches, point_to_rectangle, rectangle_of
+from vico.sim.traffic.shapes import disc_touches, distance_to, is_disc, share_level
 from vico.sim.traffic.state import NONE
 from vico.world.lanes import lane_pose
 from vico.world.walkways import CORNER as _CORNER_KIND
@@ -184,7 +184,7 @@ def _nearby(shapes, b, buffer):  # type: ignore[no-untyped-def]
     for j in range(len(shapes.x)):
         dx, dy = shapes.x[j] - x, shapes.y[j] - y
         r = _SIGHT + 1.0 + shapes.half_length[j] + shapes.half_width[j]
-        if j != b and dx * dx + dy * dy < r * r:
+        if j != b and dx * dx + dy * dy < r * r and share_level(shapes, b, j):
             buffer[n] = j
             n += 1
     return buffer[:n]
@@ -196,7 +196,7 @@ def _free_distance(x, y, c, s, shapes, near, gap):  # type: ignore[no-untyped-de
     free = _SIGHT
     for j in near:
         dx, dy = shapes.x[j] - x, shapes.y[j] - y
-        if shapes.disc[j]:
+        if is_disc(shapes, j):
             reach = RADIUS + shapes.half_length[j] + gap
             ahead = dx * c + dy * s
             if ahead <= 0.0:
@@ -211,14 +211,6 @@ def _free_distance(x, y, c, s, shapes, near, gap):  # type: ignore[no-untyped-de
                     free = min(free, d - 0.25)
                 d += 0.25
     return free
-
-
-@compiled
-def _distance(x, y, shapes, j):  # type: ignore[no-untyped-def]
-    """Return the metres from a point to body j: to a disc's middle, to a rectangle's edge."""
-    if shapes.disc[j]:
-        return np.hypot(x - shapes.x[j], y - shapes.y[j])
-    return point_to_rectangle(x, y, rectangle_of(shapes, j))
 
 
 @compiled
@@ -252,7 +244,7 @@ def may_step_to(tx, ty, x, y, shapes, near):  # type: ignore[no-untyped-def]
     """Return whether a walker at (x, y) may stand at (tx, ty); who is too near already may go away from the other."""
     for j in near:
         if disc_touches(tx, ty, RADIUS + _TOUCH, shapes, j):
-            is_leaving = _distance(tx, ty, shapes, j) > _distance(x, y, shapes, j)
+            is_leaving = distance_to(tx, ty, shapes, j) > distance_to(x, y, shapes, j)
             if not is_leaving or disc_touches(tx, ty, RADIUS + _LEAST_GAP, shapes, j):
                 return False
     return True
@@ -340,7 +332,7 @@ def place_pedestrian(paths, pedestrians, i, walkway, offset, direction, shapes, 
     walker.walkway, walker.offset, walker.direction = walkway, offset, direction
     point = follow_point(paths, walker)
     for j in range(len(shapes.x)):
-        if j != b and disc_touches(point.x, point.y, RADIUS + 0.5, shapes, j):
+        if j != b and share_level(shapes, b, j) and disc_touches(point.x, point.y, RADIUS + 0.5, shapes, j):
             return False
     shapes.x[b], shapes.y[b] = point.x, point.y
     along = np.arctan2(point.left_y, point.left_x)

@@ -12,12 +12,12 @@ from vico.assets.vehicle_parts import mirrored
 from vico.assets.vehicles import CAR_KINDS, vehicle_prototypes, vehicle_size
 from vico.errors import InputError
 from vico.seeds import rng
-from vico.sim.bodies import BUS, CAR, PEDESTRIAN, Bodies, Drawn
+from vico.sim.bodies import BUS, CAR, PEDESTRIAN, STEP_HEIGHT, Bodies, Drawn
 from vico.sim.traffic.junctions import mark_busy_crossings
 from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.traffic.pedestrians import RADIUS, advance_pedestrians, place_pedestrian
 from vico.sim.traffic.route import count_per_street
-from vico.sim.traffic.shapes import Shapes, count_overlaps
+from vico.sim.traffic.shapes import Shapes
 from vico.sim.traffic.state import (
     NONE,
     PEDESTRIAN_RECORD,
@@ -127,13 +127,17 @@ class Traffic:
 
     def _new_shapes(self) -> Shapes:
         n = self.vehicles + self.pedestrians
+        heights = np.concatenate([self._vehicle_height, np.full(self.pedestrians, PERSON_HEIGHT)])
+        walks = np.arange(n) >= self.vehicles
         return Shapes(
             x=np.full(n, _FAR) + np.arange(n) * 100.0,
             y=np.full(n, _FAR),
             yaw=np.zeros(n),
             half_length=np.concatenate([self.fleet.length / 2, np.full(self.pedestrians, RADIUS)]),
             half_width=np.concatenate([self.fleet.half_width, np.full(self.pedestrians, RADIUS)]),
-            disc=np.arange(n) >= self.vehicles,
+            rounding=np.where(walks, RADIUS, 0.0),
+            bottom=np.where(walks, STEP_HEIGHT, 0.0),
+            top=heights,
             vx=np.zeros(n),
             vy=np.zeros(n),
         )
@@ -224,7 +228,7 @@ class Traffic:
 
     def advance(self, dt: float, obstacles: Bodies) -> None:
         """Advance everybody by `dt` seconds; nobody touches anybody, `obstacles` (all other bodies) among them."""
-        mine, others = self.shapes, shapes_of(obstacles)
+        mine, others = self.shapes, shapes_of(obstacles, self.height)
         everybody = Shapes(*(np.concatenate([getattr(mine, f), getattr(others, f)]) for f in Shapes._fields))
         net, fleet, junctions = self._net, self._vehicles, self.junctions
         mark_busy_crossings(net, fleet, junctions)
@@ -276,20 +280,19 @@ class Traffic:
         """Speed (m/s) and distance walked so far (m) of each pedestrian: what sets a walking clip's rate and phase."""
         return self.pedestrian_state.speed.copy(), self.pedestrian_state.distance_walked.copy()
 
-    def overlaps(self, others: Bodies | None = None) -> int:
-        """Return the number of pairs of touching bodies among traffic (and `others`): 0 at all times."""
-        return int(count_overlaps(shapes_of(Bodies.joined([self.bodies(), others or Bodies.none()])), 0.0))
 
-
-def shapes_of(bodies: Bodies) -> Shapes:
-    """Return bodies as the kernels take them."""
+def shapes_of(bodies: Bodies, ground: HeightField) -> Shapes:
+    """Return bodies as the kernels take them, their extents in height above the ground."""
+    bottom, top = bodies.levels(ground)
     return Shapes(
         x=np.ascontiguousarray(bodies.position[:, 0]),
         y=np.ascontiguousarray(bodies.position[:, 1]),
         yaw=bodies.yaw,
         half_length=bodies.half_length,
         half_width=bodies.half_width,
-        disc=bodies.person,
+        rounding=bodies.rounding,
+        bottom=bottom,
+        top=top,
         vx=np.ascontiguousarray(bodies.velocity[:, 0]),
         vy=np.ascontiguousarray(bodies.velocity[:, 1]),
     )

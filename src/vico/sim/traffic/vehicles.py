@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from vico.io.compiled import compiled
+from vico.sim.footprints import Rectangle
 from vico.sim.traffic.backing_up import vehicles_backing_up
 from vico.sim.traffic.car_following import (
     braking_distance,
@@ -47,7 +48,6 @@ from vico.sim.traffic.path import (
 )
 from vico.sim.traffic.random_stream import next_random
 from vico.sim.traffic.route import advance_lane, plan_lanes
-from vico.sim.traffic.shapes import Rectangle
 from vico.sim.traffic.state import NONE
 
 STANDING = 0.1  # slower is standing, m/s

@@ -1,0 +1,157 @@
+"""Exact distances between the footprints of bodies: oriented rectangles, discs and stadiums alike.
+
+A footprint is all that is within a rounding of its core. The core is a rectangle, with sides that may be 0: a point
+makes a disc, a line a stadium. So two footprints are as far apart as their cores, less their roundings; a negative
+distance is how deep they are in each other.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.io.compiled import compiled
+from vico.sim.bodies import Bodies
+
+#: Spaces that are no rooms: the street, and buses, whose riders take no room.
+OUTDOORS, IN_BUS = -1, -2
+#: A body for kernels: centre, heading cosine and sine, half sides and rounding of its footprint, radius of the circle
+#: around that, extent in height (metres), velocity (m/s), its entity, the space it is in (only those of one space can
+#: touch: a room, `OUTDOORS`, `IN_BUS`), and its index among those given.
+BODY = np.dtype(
+    [
+        ("x", np.float64),
+        ("y", np.float64),
+        ("cos", np.float64),
+        ("sin", np.float64),
+        ("half_length", np.float64),
+        ("half_width", np.float64),
+        ("rounding", np.float64),
+        ("radius", np.float64),
+        ("bottom", np.float64),
+        ("top", np.float64),
+        ("vx", np.float64),
+        ("vy", np.float64),
+        ("entity", np.int64),
+        ("space", np.int64),
+        ("index", np.int64),
+    ],
+    align=True,
+)
+
+
+class Rectangle(NamedTuple):
+    """An oriented rectangle: centre, cosine and sine of its heading, half its sides; metres."""
+
+    x: float
+    y: float
+    cos: float
+    sin: float
+    half_length: float
+    half_width: float
+
+
+def records_of(bodies: Bodies, space: NDArray[Any] | int = OUTDOORS) -> NDArray[np.void]:
+    """Return bodies as kernels take them, dtype `BODY`; extents in ENU metres, `space` one for all or one each."""
+    found = np.empty(len(bodies), BODY)
+    found["x"], found["y"] = bodies.position[:, 0], bodies.position[:, 1]
+    found["half_length"], found["half_width"] = bodies.half_length, bodies.half_width
+    found["rounding"] = bodies.rounding
+    found["bottom"], found["top"] = bodies.bottom, bodies.top
+    found["vx"], found["vy"] = bodies.velocity[:, 0], bodies.velocity[:, 1]
+    found["entity"], found["space"], found["index"] = bodies.entity, space, np.arange(len(bodies))
+    _set_derived(found, bodies.yaw)
+    return found
+
+
+@compiled
+def _set_derived(found, yaw):  # type: ignore[no-untyped-def]
+    # Compiled, for NumPy's own cosine differs between processors in its last digit.
+    for k in range(len(found)):
+        one = found[k]
+        one.cos, one.sin = math.cos(yaw[k]), math.sin(yaw[k])
+        u, v = one.half_length - one.rounding, one.half_width - one.rounding
+        one.radius = math.sqrt(u * u + v * v) + one.rounding
+
+
+@compiled
+def core_of(body):  # type: ignore[no-untyped-def]
+    """Return the core of a body's footprint."""
+    r = body.rounding
+    return Rectangle(body.x, body.y, body.cos, body.sin, body.half_length - r, body.half_width - r)
+
+
+@compiled
+def point_gap(px, py, r):  # type: ignore[no-untyped-def]
+    """Return the signed distance from a point to a rectangle, metres; negative inside."""
+    dx, dy = px - r.x, py - r.y
+    u = abs(dx * r.cos + dy * r.sin) - r.half_length
+    v = abs(-dx * r.sin + dy * r.cos) - r.half_width
+    if u > 0.0 and v > 0.0:
+        return math.sqrt(u * u + v * v)
+    return max(u, v)
+
+
+@compiled
+def separation(a, b):  # type: ignore[no-untyped-def]
+    """Return the widest gap between two rectangles along any of their sides (separating axis theorem), metres.
+
+    Negative where they overlap: then it is how deep they do. Otherwise they are at least so far apart.
+    """
+    dx, dy = b.x - a.x, b.y - a.y
+    cos = abs(a.cos * b.cos + a.sin * b.sin)
+    sin = abs(a.cos * b.sin - a.sin * b.cos)
+    along_a = abs(dx * a.cos + dy * a.sin) - (a.half_length + b.half_length * cos + b.half_width * sin)
+    across_a = abs(-dx * a.sin + dy * a.cos) - (a.half_width + b.half_length * sin + b.half_width * cos)
+    along_b = abs(dx * b.cos + dy * b.sin) - (b.half_length + a.half_length * cos + a.half_width * sin)
+    across_b = abs(-dx * b.sin + dy * b.cos) - (b.half_width + a.half_length * sin + a.half_width * cos)
+    return max(max(along_a, across_a), max(along_b, across_b))
+
+
+@compiled
+def _corner_gap(a, b):  # type: ignore[no-untyped-def]
+    """Return the distance from the nearest corner of rectangle `a` to rectangle `b`."""
+    best = 1e18
+    for i in (-1.0, 1.0):
+        for j in (-1.0, 1.0):
+            u, v = i * a.half_length, j * a.half_width
+            best = min(best, point_gap(a.x + u * a.cos - v * a.sin, a.y + u * a.sin + v * a.cos, b))
+    return best
+
+
+@compiled
+def rectangle_gap(a, b):  # type: ignore[no-untyped-def]
+    """Return the signed distance between two rectangles, metres: negative is how deep they overlap."""
+    if a.half_length == 0.0 and a.half_width == 0.0:
+        return point_gap(a.x, a.y, b)
+    if b.half_length == 0.0 and b.half_width == 0.0:
+        return point_gap(b.x, b.y, a)
+    apart = separation(a, b)
+    if apart <= 0.0:
+        return apart
+    # Rectangles that are apart are nearest to each other at a corner of one of them.
+    return min(_corner_gap(a, b), _corner_gap(b, a))
+
+
+@compiled
+def body_gap(a, b):  # type: ignore[no-untyped-def]
+    """Return the signed distance between the footprints of two bodies, dtype `BODY`, metres."""
+    return rectangle_gap(core_of(a), core_of(b)) - a.rounding - b.rounding
+
+
+@compiled
+def gaps(core, bodies):  # type: ignore[no-untyped-def]
+    """Return the distance from a core to the footprint of each body, dtype `BODY`, metres; shape ``(n,)``."""
+    found = np.empty(len(bodies))
+    for k in range(len(bodies)):
+        found[k] = rectangle_gap(core, core_of(bodies[k])) - bodies[k].rounding
+    return found
+
+
+@compiled
+def can_touch(a, b):  # type: ignore[no-untyped-def]
+    """Return whether two bodies, dtype `BODY`, can touch: in one space, not in a bus, and on one level."""
+    return a.space == b.space and a.space != IN_BUS and a.bottom < b.top and b.bottom < a.top
