@@ -67,7 +67,7 @@ def run(options: RunOptions) -> int:
                 gathered = agents.gather(observations, infos)
                 result = sim.step(gathered.actions, gathered.agent_faults)
                 observations, infos = result.observations, result.infos
-                recorder.write(result)
+                recorder.write(result, actions=gathered.actions)
                 report("simulating", step + 1, steps)
             metrics = recorder.close()
     if options.json:
@@ -87,7 +87,7 @@ def _cut_short(out: Path) -> dict[str, Any] | None:
         content = read_json(out / "run.json")
         unfinished = isinstance(content, dict) and content.get("status") in ("running", "stopped")
         return content if unfinished else None
-    begun = "events.jsonl" in names and all(name == "events.jsonl" or name.startswith(".run.json.") for name in names)
+    begun = bool(names) and all(name.startswith(".run.json.") for name in names)
     return {} if begun else None
 
 
