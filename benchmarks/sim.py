@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 from reporting import machine
 
-from vico.agents.gather import Gatherer
 from vico.agents.schedule import followers_of
 from vico.community import read_community
 from vico.community.model import Community
+from vico.runner.gather import Gatherer
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
 from vico.world.folder import World, read_world
@@ -32,7 +32,8 @@ _WARM = 5
 def measure(world: World, community: Community, config: SimConfig, steps: int) -> dict[str, float | str]:
     """Median milliseconds a step, and the share of each phase."""
     sim = Simulation(world, community, config)
-    agents = Gatherer(followers_of(community, PublicMap.from_world(world), seed=config.seed))
+    followers = followers_of(community, PublicMap.from_world(world), seed=config.seed)
+    agents = Gatherer(followers, trusted=followers.keys())
     observations, infos = sim.observe()
     cpu, wall = [], []
     for step in range(steps + _WARM):

@@ -32,7 +32,8 @@ ALLOWED = {
         "world.model",
         "world.heights",
     },
-    "challenges": {"envs", "agents", "community", "world", "assets", "io"},
+    "runner": {"agents", "envs", "sim", "world", "io"},
+    "challenges": {"runner", "envs", "agents", "community", "world", "assets", "io"},
 }
 OPEN = {"viewer", "cli"}  # and the front door, api.py
 

@@ -35,6 +35,20 @@ def workers() -> int:
     return min(os.cpu_count() or 1, _MOST)
 
 
+def use_workers(number: int) -> None:
+    """Use so many threads in this process from now on; 0 changes nothing.
+
+    Raises
+    ------
+    InputError
+        If it is no number in 0..256.
+    """
+    if not 0 <= number <= _MOST:
+        raise InputError(f"--workers {number}; give a number of threads in 1..{_MOST}, or 0 for one a processor")
+    if number:
+        os.environ[WORKERS] = str(number)
+
+
 def in_order(task: Callable[[T], R], items: Iterable[T], *, most: int = _MOST) -> Iterator[R]:
     """Do a task for each item in threads, and yield what they return in the order of the items.
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import toy_city
-from vico.agents.gather import Gatherer
 from vico.agents.schedule import followers_of, stays_of
+from vico.runner.gather import Gatherer
 from vico.sim.config import SimConfig
 from vico.sim.events import Event
 from vico.sim.simulation import Simulation

@@ -11,9 +11,10 @@ import pytest
 from vico.challenges.assistant import runner
 from vico.challenges.assistant.delivery import generate_delivery
 from vico.challenges.assistant.runner import community_for, run_episode
-from vico.challenges.results import EpisodeResult, Fault
+from vico.challenges.results import EpisodeResult
 from vico.community.model import Community
 from vico.io.files import read_json
+from vico.runner.faults import Fault
 from vico.world.folder import World
 
 
@@ -82,10 +83,11 @@ def test_a_planner_that_crashes_and_lies_ends_no_evaluation(
     monkeypatch.setattr(runner, "community_for", lambda world: community_for(world, residents=2))
     (episode,) = runner.evaluate([helsinki], method="heuristic", assistants=1, seeds=1, steps=21, folder=tmp_path)
     assert not any(episode.success)
-    assert episode.fault_count == 7
-    assert episode.faults[0] == Fault(3, "assistant_0", "failed", "ZeroDivisionError: no plan")
+    assert episode.fault_counts == {"crashed": 7, "malformed": 12}
+    assert Fault(3, "assistant_0", "crashed", "ZeroDivisionError: no plan") in episode.faults
     told = (tmp_path / "results.md").read_text()
-    assert "assistant_0 failed at step 3 (ZeroDivisionError: no plan); 7 faults" in told
+    assert "| 7 crashed, 12 malformed |" in told
+    assert "assistant_0 crashed at step 3 (ZeroDivisionError: no plan); 7 times in the episode" in told
 
 
 def test_an_interrupted_evaluation_goes_on_and_comes_to_the_same(

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import toy_city
-from vico.agents.gather import Gatherer
 from vico.agents.schedule import followers_of
+from vico.runner.gather import Gatherer
 from vico.sim.bodies import Bodies
 from vico.sim.config import SimConfig
 from vico.sim.perception import OUTDOORS, SIGHT, Eyes, InView, OpaqueGrid, in_view, opaque_grid

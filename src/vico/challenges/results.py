@@ -13,31 +13,10 @@ from pydantic import TypeAdapter
 from scipy import stats
 
 from vico.io.files import read_json, write_bytes, write_json
+from vico.runner.faults import FAULT_KINDS, Fault
 
 SCHEMA = "vico.results"
-VERSION = 2
-
-
-# So many faults of an episode are told one by one; more are only counted.
-_FAULTS_TOLD = 20
-
-
-@dataclass(frozen=True)
-class Fault:
-    """An agent that failed or was late, and waited.
-
-    Attributes
-    ----------
-    step
-        In which step of the episode.
-    status
-        ``failed`` or ``late``.
-    """
-
-    step: int
-    agent: str
-    status: str
-    reason: str
+VERSION = 3
 
 
 @dataclass(frozen=True)
@@ -52,8 +31,8 @@ class EpisodeResult:
         Steps until the last subtask was done; the limit if not all were.
     tokens, cost
         Of language model calls, in tokens and US dollars.
-    fault_count, faults
-        How often an agent failed or was late, and the first of these.
+    fault_counts, faults
+        How often agents did something wrong, by kind (see `vico.runner.faults`), and the first of it.
     """
 
     world: str
@@ -69,22 +48,8 @@ class EpisodeResult:
     state_hash: str
     tokens: int = 0
     cost: float = 0.0
-    fault_count: int = 0
+    fault_counts: dict[str, int] = field(default_factory=dict)
     faults: list[Fault] = field(default_factory=list)
-
-
-class FaultLog:
-    """Counts the faults of an episode and keeps the first."""
-
-    def __init__(self) -> None:
-        self.count = 0
-        self.first: list[Fault] = []
-
-    def add(self, step: int, agent: str, status: str, reason: str) -> None:
-        """Note that an agent failed or was late."""
-        self.count += 1
-        if len(self.first) < _FAULTS_TOLD:
-            self.first.append(Fault(step, agent, status, reason))
 
 
 def write_episode(path: Path, key: str, result: EpisodeResult) -> None:
@@ -151,20 +116,20 @@ def summary(episodes: Sequence[EpisodeResult]) -> dict[str, Any]:
         "wall_seconds": sum(e.wall_seconds for e in episodes),
         "tokens": sum(e.tokens for e in episodes),
         "cost": sum(e.cost for e in episodes),
-        "faults": sum(e.fault_count for e in episodes),
+        "faults": {kind: n for kind in FAULT_KINDS if (n := sum(e.fault_counts.get(kind, 0) for e in episodes))},
     }
 
 
 def fault_lines(episodes: Sequence[EpisodeResult]) -> list[str]:
-    """Say which agents failed or were late, how often, and why first: a line an episode and agent."""
+    """Say which agents did something wrong, of which kinds, and why first: a line an episode, agent and kind."""
     lines = []
     for episode in episodes:
-        agents = dict.fromkeys(fault.agent for fault in episode.faults)
-        for agent in agents:
-            first = next(fault for fault in episode.faults if fault.agent == agent)
+        for agent, kind in dict.fromkeys((fault.agent, fault.kind) for fault in episode.faults):
+            first = next(fault for fault in episode.faults if (fault.agent, fault.kind) == (agent, kind))
+            reason = " ".join(first.reason.split())  # of an agent's making: it must not end the line
             lines.append(
-                f"- {episode.world}, seed {episode.seed}: {agent} {first.status} at step {first.step} "
-                f"({first.reason}); {episode.fault_count} faults in the episode"
+                f"- {episode.world}, seed {episode.seed}: {agent} {kind} at step {first.step} ({reason}); "
+                f"{episode.fault_counts[kind]} times in the episode"
             )
     return lines
 
@@ -177,6 +142,9 @@ def markdown_table(rows: Sequence[Mapping[str, Any]]) -> str:
         bounds = "one episode" if low is None else f"{low:{form}} to {high:{form}}"
         return f"{row[name]:{form}} ({bounds})"
 
+    def counts(faults: Mapping[str, int]) -> str:
+        return ", ".join(f"{number} {kind}" for kind, number in faults.items()) or "0"
+
     lines = [
         "| Category | Method | Assistants | Episodes | Subtasks "
         "| SR % (95 % CI) | Ts (95 % CI) | Wall s | Tokens | Cost $ | Faults |",
@@ -186,7 +154,7 @@ def markdown_table(rows: Sequence[Mapping[str, Any]]) -> str:
         lines.append(
             f"| {row['category']} | {row['method']} | {row['assistants']} | {row['episodes']} | {row['subtasks']} "
             f"| {span(row, 'SR', '.1f')} | {span(row, 'Ts', '.0f')} | {row['wall_seconds']:.1f} "
-            f"| {row['tokens']} | {row['cost']:.2f} | {row['faults']} |"
+            f"| {row['tokens']} | {row['cost']:.2f} | {counts(row['faults'])} |"
         )
     return "\n".join(lines) + "\n"
 
@@ -199,6 +167,6 @@ def write_results(folder: Path, episodes: Sequence[EpisodeResult]) -> dict[str, 
         {"schema_name": SCHEMA, "version": VERSION, "summary": condensed, "episodes": [asdict(e) for e in episodes]},
     )
     faults = fault_lines(episodes)
-    told = ["", "Agents that failed or were late waited:", "", *faults, ""] if faults else []
+    told = ["", "What agents did wrong, waiting instead:", "", *faults, ""] if faults else []
     write_bytes(folder / "results.md", (markdown_table([condensed]) + "\n".join(told)).encode())
     return condensed

@@ -14,6 +14,9 @@ from vico.cli.options import AssistantOptions
 from vico.cli.output import check_output, print_json, progress_bars
 from vico.errors import InputError
 from vico.io.folders import new_folder
+from vico.runner.foreign import Terms
+from vico.runner.loading import load
+from vico.threads import use_workers, workers
 from vico.world.folder import read_world
 
 
@@ -24,8 +27,16 @@ def assistant(options: AssistantOptions) -> int:
     """
     worlds, out, method, assistants = options.worlds, options.out, options.method, options.assistants
     seeds, steps = options.seeds, options.steps
+    if method not in METHODS and ":" not in method:
+        raise InputError(
+            f"eval: no method called {method!r}; there are {', '.join(sorted(METHODS))}, or my_module:MyPlanner"
+        )
+    use_workers(options.workers)
+    terms = Terms()
     if method not in METHODS:
-        raise InputError(f"eval: no method called {method!r}; there are {', '.join(sorted(METHODS))}")
+        terms = Terms(deadline=options.deadline or None, isolate=options.isolate, workers=workers())
+        if not options.isolate:
+            load(method)  # whatever is wrong with its name or its module is said before anything is written
     if not 1 <= assistants <= 2:
         raise InputError(f"eval: {assistants} assistants; the tasks are for 1 or 2")
     if seeds < 1 or steps < 1 or not worlds:
@@ -35,7 +46,14 @@ def assistant(options: AssistantOptions) -> int:
     with new_folder(out, force=options.force, work=out.with_name(f"{out.name}.partial")) as folder:
         with progress_bars() as report:
             episodes = evaluate(
-                places, method=method, assistants=assistants, seeds=seeds, steps=steps, folder=folder, progress=report
+                places,
+                method=method,
+                assistants=assistants,
+                seeds=seeds,
+                steps=steps,
+                folder=folder,
+                terms=terms,
+                progress=report,
             )
         condensed = write_results(folder, episodes)
         for line in fault_lines(episodes):

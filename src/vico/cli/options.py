@@ -161,6 +161,18 @@ class RunOptions:
         How many people nobody plays walk around.
     observe
         Whose views are rendered: all, none, or names separated by commas.
+    assistants
+        How many avatars take part that are nobody's resident: assistant_0, ...
+    agent
+        Who plays them: my_module:MyAgent, or path/to/file.py:MyAgent. Without it they wait.
+    deadline
+        Seconds that agents given with --agent have for an action; who is late waits a step. 0 waits for them as long
+        as it takes.
+    isolate
+        Ask each of them in a process of its own.
+    workers
+        Threads that render, and agents that are asked at a time where there is no deadline; 0 is one a processor.
+        Decides nothing but how long it takes.
     seed
         Decides everything that is left to chance.
     force
@@ -178,6 +190,11 @@ class RunOptions:
     cars: int = 30
     pedestrians: int = 30
     observe: CommaSeparated = "all"
+    assistants: int = 0
+    agent: Annotated[str, tyro.conf.arg(metavar="MODULE:NAME")] = ""
+    deadline: float = 60.0
+    isolate: bool = False
+    workers: int = 0
     seed: int = 0
     force: bool = False
     json: bool = False
@@ -196,7 +213,13 @@ class AssistantOptions:
     category
         What is asked for.
     method
-        Planner: random or heuristic.
+        Planner: random, heuristic, or my_module:MyPlanner (path/to/file.py:MyPlanner).
+    deadline
+        Seconds a planner of yours has for an action; who is late waits a step. 0 waits for it as long as it takes.
+    isolate
+        Ask each planner of yours in a process of its own.
+    workers
+        Threads that render, and planners of yours asked at a time where there is no deadline; 0 is one a processor.
     assistants
         How many assistants work together.
     seeds
@@ -213,6 +236,9 @@ class AssistantOptions:
     out: Path
     category: Literal["delivery"] = "delivery"
     method: str = "heuristic"
+    deadline: float = 60.0
+    isolate: bool = False
+    workers: int = 0
     assistants: int = 1
     seeds: int = 3
     steps: int = 1500

@@ -4,21 +4,27 @@ from __future__ import annotations
 
 import json as jsonlib
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from vico.agents.gather import Gatherer
 from vico.agents.schedule import followers_of
 from vico.cli.options import RunOptions
-from vico.cli.output import check_output, print_json, print_table, progress_bars
+from vico.cli.output import Report, check_output, print_json, print_table, progress_bars
 from vico.clock import seconds_of_day
-from vico.community import read_community
+from vico.community import Community, read_community
 from vico.errors import InputError, OutputExistsError
 from vico.io.files import read_json
 from vico.io.folders import remove
+from vico.runner.foreign import Terms, foreign_agents
+from vico.runner.gather import Gatherer
+from vico.runner.loading import Seat
+from vico.runner.loop import Hook, Runner, Step
+from vico.runner.recording import Recording
 from vico.sim.config import SimConfig
 from vico.sim.recorder import Recorder
 from vico.sim.simulation import Simulation
+from vico.threads import use_workers, workers
 from vico.world.folder import World, read_world
 from vico.world.public import PublicMap
 
@@ -36,10 +42,14 @@ def run(options: RunOptions) -> int:
     steps, out = options.steps, options.out
     if steps < 1:
         raise InputError(f"run: --steps {steps}; it has to be 1 or more")
+    if options.agent and not options.assistants:
+        raise InputError("run: --agent plays assistants; say how many, for example --assistants 1")
+    use_workers(options.workers)
     cut_short = None if options.force else _cut_short(out)
     check_output(out, options.world, options.community, force=options.force or cut_short is not None)
     config = SimConfig(
         seed=options.seed,
+        assistants=options.assistants,
         start=seconds_of_day(options.start),
         robots=_names(options.robots),
         errands=True,
@@ -53,29 +63,43 @@ def run(options: RunOptions) -> int:
         _restart(out, cut_short, config, place)
     with progress_bars() as report:
         report("setting the scene", 0, 1)
-        # Residents act on depth, segmentation and what they hear; only the recorder looks at colours.
+        # Residents act on what they have in view and hear; mostly, the recorder alone looks at colours.
         sim = Simulation(place, people, config, defer_rgb=True)
-        agents = Gatherer(followers_of(people, PublicMap.from_world(place), seed=options.seed))
-        observations, infos = sim.observe()
-        report("setting the scene", 1, 1)
-        # Only now: whatever is wrong with the input has been said, and nothing was replaced for nothing.
-        remove(out)
-        sources = {"world": str(options.world.resolve()), "community": str(options.community.resolve())}
-        with Recorder(out, sim, sources=sources, wanted=steps) as recorder:
-            recorder.begin(observations)
-            for step in range(steps):
-                gathered = agents.gather(observations, infos)
-                result = sim.step(gathered.actions, gathered.agent_faults)
-                observations, infos = result.observations, result.infos
-                recorder.write(result, actions=gathered.actions)
-                report("simulating", step + 1, steps)
-            metrics = recorder.close()
+        with closing(_agents(options, place, people)) as agents:
+            report("setting the scene", 1, 1)
+            # Only now: whatever is wrong with the input has been said, and nothing was replaced for nothing.
+            remove(out)
+            sources = {"world": str(options.world.resolve()), "community": str(options.community.resolve())}
+            with Recorder(out, sim, sources=sources, wanted=steps) as recorder:
+                runner = Runner(sim, agents, hooks=[_Progress(report, steps), Recording(recorder)])
+                runner.run(steps)
+                metrics = recorder.close()
     if options.json:
         print_json(metrics)
     else:
         shown = {name: value for name, value in metrics.items() if not isinstance(value, dict)}
         print_table(str(out), shown)
     return 0
+
+
+class _Progress(Hook):
+    """Shows how far a run is."""
+
+    def __init__(self, report: Report, steps: int) -> None:
+        self._report, self._steps = report, steps
+
+    def stepped(self, step: Step) -> None:
+        """Show it."""
+        self._report("simulating", step.number, self._steps)
+
+
+def _agents(options: RunOptions, place: World, people: Community) -> Gatherer:
+    """Return who acts: residents who follow their schedules, and whoever plays the assistants."""
+    followers = followers_of(people, PublicMap.from_world(place), seed=options.seed)
+    terms = Terms(deadline=options.deadline or None, isolate=options.isolate, workers=workers())
+    seats = [Seat(f"assistant_{i}", options.seed, [], i, options.assistants) for i in range(options.assistants)]
+    players = foreign_agents(options.agent, seats, place, terms) if options.agent else {}
+    return Gatherer(followers | players, trusted=followers, deadline=terms.deadline, workers=terms.workers)
 
 
 def _cut_short(out: Path) -> dict[str, Any] | None:
@@ -87,7 +111,7 @@ def _cut_short(out: Path) -> dict[str, Any] | None:
         content = read_json(out / "run.json")
         unfinished = isinstance(content, dict) and content.get("status") in ("running", "stopped")
         return content if unfinished else None
-    begun = bool(names) and all(name.startswith(".run.json.") for name in names)
+    begun = "events.jsonl" in names and all(name == "events.jsonl" or name.startswith(".run.json.") for name in names)
     return {} if begun else None
 
 

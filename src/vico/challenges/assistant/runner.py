@@ -7,20 +7,28 @@ import time
 from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
-from vico.agents.assistant import make_planner
+from vico.agents.assistant import METHODS, make_planner
 from vico.agents.base import Agent
-from vico.agents.gather import Gatherer
 from vico.agents.schedule import followers_of
+from vico.agents.wrappers import usage_of
 from vico.assets.models.movable import movable_kinds, movable_prototype, movable_surfaces
 from vico.challenges.assistant.delivery import delivered, generate_delivery
 from vico.challenges.assistant.model import StateView, Task, write_task
-from vico.challenges.results import EpisodeResult, FaultLog, read_episode, write_episode, write_results
+from vico.challenges.results import EpisodeResult, read_episode, write_episode, write_results
 from vico.community import build_community
 from vico.community.model import Community
-from vico.envs import CommunityEnv, Simulation, make
+from vico.envs import Simulation, make
+from vico.errors import InputError
+from vico.runner.faults import FaultLog
+from vico.runner.foreign import AbsentAgent, Terms, foreign_agents
+from vico.runner.gather import Gatherer
+from vico.runner.loading import Seat, source_digest
+from vico.runner.loop import Hook, Runner, Step
 from vico.version import __version__
 from vico.world.folder import World
+from vico.world.public import PublicMap
 
 START = "08:00"
 RESIDENTS = 15
@@ -30,7 +38,7 @@ CARS, PEDESTRIANS = 30, 30
 Progress = Callable[[str, int, int], None]
 
 
-class Judge:
+class Judge(Hook):
     """Keeps the verdicts of one episode.
 
     A subtask is judged once and for all when an assistant reports it (`task_complete`), or else at the episode's end.
@@ -44,6 +52,17 @@ class Judge:
         self._subtasks = [s.model_copy(update={"objects": [names[i] for i in s.objects]}) for s in task.subtasks]
         self.verdicts: list[bool | None] = [None] * len(task.subtasks)
         self.since: list[int | None] = [None] * len(task.subtasks)
+
+    def stepped(self, step: Step) -> None:
+        """Look at the state after a step, and take the reports that were made in it."""
+        self.watch(step.number)
+        for name, action in step.actions.items():
+            # Only what the simulation accepted counts as a report.
+            if action.get("type") != "task_complete" or not name.startswith("assistant_"):
+                continue
+            seen = step.result.observations.get(name)
+            if seen is not None and seen["state"]["action_status"] == "ok":
+                self.report(int(action["index"]))
 
     def watch(self, step: int) -> None:
         """Look at the state after a step."""
@@ -78,6 +97,7 @@ def run_episode(
     task: Task,
     *,
     method: str,
+    terms: Terms | None = None,
     progress: Progress | None = None,
     label: str = "episode",
 ) -> EpisodeResult:
@@ -86,7 +106,9 @@ def run_episode(
     Parameters
     ----------
     method
-        Name of the planner; see `vico.agents.assistant.METHODS`.
+        Name of the planner (see `vico.agents.assistant.METHODS`), or ``my_module:MyPlanner``.
+    terms
+        On which terms planners from elsewhere take part.
     progress
         Called with `label`, the step and the limit.
     """
@@ -105,33 +127,52 @@ def run_episode(
         max_steps=task.steps,
         setup=lambda simulation: _set_up(simulation, task),
     )
-    observations, infos = env.reset(seed=task.seed)
-    planners: dict[str, Agent] = {
-        name: make_planner(method, task.instructions(), env.public_map, seed=task.seed, number=i, of=count)
-        for i, name in enumerate(names)
-    }
+    sim = env.sim
+    terms = terms or Terms()
+    planners = _planners(method, names, task, world, terms)
     followers = followers_of(community, env.public_map, seed=task.seed)
-    agents = Gatherer(followers | planners)
-    judge, faults = Judge(task, world, env.sim.ground_truth), FaultLog()
+    judge = Judge(task, world, sim.ground_truth)
     judge.watch(0)
-    steps = 0
-    while env.agents and not judge.over:
-        gathered = agents.gather(observations, infos)
-        observations, _, _, _, infos = env.step(gathered.actions, gathered.agent_faults)
-        steps += 1
-        for name, (status, reason) in gathered.agent_faults.items():
-            faults.add(steps, name, status.name.lower(), reason)
-        judge.watch(steps)
-        for name in names:
-            # Only what the simulation accepted counts as a report.
-            action = gathered.actions.get(name)
-            if action is None or observations[name]["state"]["action_status"] != "ok":
-                continue
-            if action["type"] == "task_complete":
-                judge.report(int(action["index"]))
-        if progress is not None:
-            progress(label, steps, task.steps)
-    return _result(task, method, judge, env, faults, time.perf_counter() - began)
+    hooks: list[Hook] = [judge]
+    if progress is not None:
+        hooks.append(_Reported(progress, label, task.steps))
+    agents = Gatherer(followers | planners, trusted=followers, deadline=terms.deadline, workers=terms.workers)
+    runner = Runner(sim, agents, hooks=hooks)
+    try:
+        runner.run(task.steps, until=lambda: judge.over)
+    finally:
+        agents.close()
+    return _result(task, method, judge, sim, runner.faults, list(planners.values()), time.perf_counter() - began)
+
+
+class _Reported(Hook):
+    """Tells how far an episode is."""
+
+    def __init__(self, progress: Progress, label: str, steps: int) -> None:
+        self._progress, self._label, self._steps = progress, label, steps
+
+    def stepped(self, step: Step) -> None:
+        """Tell it."""
+        self._progress(self._label, step.number, self._steps)
+
+
+def _planners(method: str, names: list[str], task: Task, world: World, terms: Terms) -> dict[str, Agent]:
+    """Make the planners of an episode; those that can't be made fail at each of its steps."""
+    told, of = task.instructions(), len(names)
+    if method in METHODS:
+        public_map = PublicMap.from_world(world)
+        return {
+            name: make_planner(method, told, public_map, seed=task.seed, number=i, of=of)
+            for i, name in enumerate(names)
+        }
+    made: dict[str, Agent] = {}
+    for i, name in enumerate(names):
+        seat = Seat(name, task.seed, told, i, of)
+        try:
+            made |= foreign_agents(method, [seat], world, terms)
+        except InputError as error:
+            made[name] = AbsentAgent(str(error))
+    return made
 
 
 def _for_size(number: int, world: World) -> int:
@@ -154,7 +195,7 @@ def _set_up(simulation: Simulation, task: Task) -> None:
 
 
 def _result(
-    task: Task, method: str, judge: Judge, env: CommunityEnv, faults: FaultLog, seconds: float
+    task: Task, method: str, judge: Judge, sim: Simulation, faults: FaultLog, planners: list[Agent], seconds: float
 ) -> EpisodeResult:
     success = judge.final()
     done_at = [since if ok else None for ok, since in zip(success, judge.since, strict=True)]
@@ -170,8 +211,10 @@ def _result(
         steps=max(finished) if all(success) else task.steps,
         limit=task.steps,
         wall_seconds=seconds,
-        state_hash=env.state_hash(),
-        fault_count=faults.count,
+        state_hash=sim.state_hash(),
+        tokens=sum(usage_of(planner).tokens for planner in planners),
+        cost=sum(usage_of(planner).cost for planner in planners),
+        fault_counts=faults.by_kind(),
         faults=faults.first,
     )
 
@@ -184,6 +227,7 @@ def evaluate(
     seeds: int,
     steps: int,
     folder: Path,
+    terms: Terms | None = None,
     progress: Progress | None = None,
 ) -> list[EpisodeResult]:
     """Generate and play `seeds` delivery episodes a world.
@@ -191,6 +235,7 @@ def evaluate(
     Task files go to ``folder/tasks``, what each episode came to into ``folder/episodes`` as soon as it is over, and
     the results so far into ``folder/results.json`` and ``results.md``. Episodes that are there are not played again.
     """
+    terms = terms or Terms()
     episodes: list[EpisodeResult] = []
     names: set[str] = set()
     for number, world in enumerate(worlds):
@@ -199,11 +244,13 @@ def evaluate(
             task = generate_delivery(world, seed=seed, assistants=assistants, steps=steps)
             name = f"{number}_{world.manifest.name}_{seed}.json"
             write_task(folder / "tasks" / name, task)
-            key = _key(world, task, method)
+            key = _key(world, task, method, terms)
             episode = read_episode(folder / "episodes" / name, key)
             if episode is None:
                 label = f"{world.manifest.name}, seed {seed}"
-                episode = run_episode(world, community, task, method=method, progress=progress, label=label)
+                episode = run_episode(
+                    world, community, task, method=method, terms=terms, progress=progress, label=label
+                )
                 write_episode(folder / "episodes" / name, key, episode)
             names.add(name)
             episodes.append(episode)
@@ -214,7 +261,14 @@ def evaluate(
     return episodes
 
 
-def _key(world: World, task: Task, method: str) -> str:
+def _key(world: World, task: Task, method: str, terms: Terms) -> str:
     """Digest of all that decides an episode."""
-    decides = {"version": __version__, "world": world.digest, "task": task.model_dump(mode="json"), "method": method}
+    decides: dict[str, Any] = {
+        "version": __version__,
+        "world": world.digest,
+        "task": task.model_dump(mode="json"),
+        "method": method,
+    }
+    if method not in METHODS:
+        decides |= {"source": source_digest(method), "terms": [terms.deadline, terms.isolate, terms.memory]}
     return sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()

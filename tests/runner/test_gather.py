@@ -7,8 +7,8 @@ import time
 from typing import Any
 
 import toy_city
-from vico.agents.gather import Gatherer
 from vico.rules import ActionStatus
+from vico.runner.gather import Gatherer
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
 

@@ -1,0 +1,169 @@
+"""An agent in a process of its own: it is sent what it observes, and its answers are taken as data, never as code."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from vico.agents.base import Action, AgentState, Info, Observation
+from vico.errors import InputError, SchemaError
+from vico.runner.answers import MalformedError
+from vico.runner.given import sent_info
+from vico.runner.loading import Seat
+from vico.runner.wire import ClosedError, packed, receive, send
+
+#: Memory an agent's process may have, MiB.
+MEMORY = 4096
+
+_LONGEST_ANSWER = 2**20
+_LONGEST_STATE = 2**28
+_START = 300.0  # seconds a process may take until its agent is made: libraries are imported, weights are read
+_STATE = 60.0
+
+
+class EndedError(RuntimeError):
+    """An agent's process is gone."""
+
+
+class AgentProcessError(RuntimeError):
+    """An agent failed in its process; the message is what it said."""
+
+
+class IsolatedAgent:
+    """An agent that is made and asked in a process of its own.
+
+    The process never holds the simulation: it is sent observations and infos as plain data, and sends back actions
+    and states as plain data. It is ended with the run, also if the run is killed.
+
+    Parameters
+    ----------
+    spec
+        ``my_module:MyAgent``, loaded in that process alone.
+    seat
+        What its constructor may ask for.
+    world
+        Folder of the world whose public map it is given, if its constructor asks for it.
+    memory
+        MiB the process may have.
+
+    Raises
+    ------
+    InputError
+        If it can't be loaded or made; the message says why.
+    """
+
+    def __init__(self, spec: str, seat: Seat, *, world: Path, memory: int = MEMORY) -> None:
+        self.tokens = 0
+        self.cost = 0.0
+        self._spec = spec
+        self._channel, theirs = socket.socketpair()
+        # Held open by this process as long as it lives; when it is gone, the agent's process ends itself.
+        lifeline, self._lifeline = os.pipe()
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "vico.runner.child", str(theirs.fileno()), str(lifeline)],
+                pass_fds=(theirs.fileno(), lifeline),
+                stdin=subprocess.DEVNULL,
+                stdout=sys.stderr.fileno() if _has_descriptor(sys.stderr) else subprocess.DEVNULL,
+                start_new_session=True,
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
+            )
+        finally:
+            theirs.close()
+            os.close(lifeline)
+        told = {"spec": spec, "seat": asdict(seat), "world": str(world.resolve()), "memory": memory}
+        try:
+            self._channel.settimeout(_START)
+            self._ask({"do": "make", **told}, _LONGEST_ANSWER)
+        except (EndedError, AgentProcessError, SchemaError) as error:
+            self.close()
+            raise InputError(f"{seat.name}: {error}") from None
+        self._channel.settimeout(None)
+
+    def act(self, observation: Observation, info: Info) -> Action:
+        """Send what it observes, and wait for its action."""
+        sent = {"do": "act", "observation": dict(observation), "info": sent_info(info)}
+        try:
+            action: Action = self._ask(sent, _LONGEST_ANSWER)
+        except SchemaError as error:
+            raise MalformedError(str(error)) from None
+        return action
+
+    def state(self) -> AgentState:
+        """Ask it what it remembers."""
+        self._channel.settimeout(_STATE)
+        state: AgentState = self._ask({"do": "state"}, _LONGEST_STATE)
+        self._channel.settimeout(None)
+        if not isinstance(state, dict):
+            raise SchemaError(f"state() has to be a dict, not {type(state).__name__}")
+        return state
+
+    def restore(self, state: AgentState) -> None:
+        """Let it remember what `state` returned."""
+        self._ask({"do": "restore", "state": state}, _LONGEST_ANSWER)
+
+    def close(self) -> None:
+        """End the process at once."""
+        with suppress(OSError):
+            self._channel.shutdown(socket.SHUT_RDWR)  # whoever waits for its answer waits no longer
+        self._end_it()
+        if self._lifeline >= 0:
+            os.close(self._lifeline)
+            self._lifeline = -1
+        self._channel.close()
+
+    def _ask(self, message: Mapping[str, Any], limit: int) -> Any:
+        if self._process.poll() is not None:
+            raise EndedError(self._end())
+        try:
+            send(self._channel, packed(message))
+            reply = receive(self._channel, limit=limit)
+        except ClosedError as error:
+            # A process that closed its end, or did not answer in time, can't be spoken with any more.
+            self._end_it()
+            raise EndedError(self._end(str(error))) from None
+        except SchemaError:
+            self._end_it()  # what follows in the channel is anyone's guess
+            raise
+        if not isinstance(reply, dict) or reply.keys() not in ({"error", "malformed"}, {"answer", "tokens", "cost"}):
+            raise SchemaError("an answer of another form than vico.runner.child gives")
+        if "error" in reply:
+            raise (MalformedError if reply["malformed"] is True else AgentProcessError)(str(reply["error"])[:1000])
+        self._spent(reply["tokens"], reply["cost"])
+        return reply["answer"]
+
+    def _spent(self, tokens: Any, cost: Any) -> None:
+        if type(tokens) is int and 0 <= tokens < 2**53:
+            self.tokens = tokens
+        if type(cost) in (int, float) and 0 <= cost < 1e12:
+            self.cost = float(cost)
+
+    def _end_it(self) -> None:
+        if self._process.poll() is None:
+            with suppress(ProcessLookupError):
+                os.killpg(self._process.pid, signal.SIGKILL)  # with all that it started
+        self._process.wait()
+
+    def _end(self, why: str = "") -> str:
+        code = self._process.returncode
+        if code is not None and code < 0 and why != "timed out":
+            return f"its process was ended by {signal.Signals(-code).name}"
+        if why == "timed out":
+            return "its process did not answer in time and was ended"
+        return f"its process ended with exit status {code}"
+
+
+def _has_descriptor(stream: Any) -> bool:
+    try:
+        stream.fileno()
+    except (AttributeError, OSError, ValueError):
+        return False
+    return True

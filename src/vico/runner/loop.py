@@ -1,0 +1,151 @@
+"""The runner: asks agents, steps the simulation, tells whoever follows it, and saves now and then."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from vico.agents.base import Action, AgentState
+from vico.envs.spaces import short_form
+from vico.errors import InputError
+from vico.runner.faults import Failure, FaultLog, is_malformed
+from vico.runner.gather import Gatherer
+from vico.sim.simulation import Simulation, StepResult
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Step:
+    """What a step was.
+
+    Attributes
+    ----------
+    number
+        From 1.
+    actions
+        By agent, as plain data.
+    failures
+        Why others have none.
+    result
+        What it brought.
+    """
+
+    number: int
+    actions: Mapping[str, Action]
+    failures: Mapping[str, Failure]
+    result: StepResult
+
+
+class Hook:
+    """Follows a run: a recorder, a judge, a viewer, a progress bar. Each method does nothing unless overridden."""
+
+    def begin(self, observations: Mapping[str, dict[str, Any]]) -> None:
+        """Take in how things stand before the first step of this run (or after the one it is resumed from)."""
+
+    def stepped(self, step: Step) -> None:
+        """Take in a step."""
+
+    def checkpoint(self, states: Mapping[str, AgentState], faults: FaultLog) -> None:
+        """Save what every agent remembers, together with the simulation as it stands now."""
+
+
+class Runner:
+    """Runs a simulation with agents.
+
+    Parameters
+    ----------
+    sim
+        Before the first step, or where a run is resumed.
+    agents
+        Who acts; everybody else waits.
+    hooks
+        Who follows the run, told in this order.
+    states_every
+        After every so many steps all agents' states are taken and handed to the hooks; 0 never.
+    faults
+        What agents did wrong before, where a run is resumed.
+    """
+
+    def __init__(
+        self,
+        sim: Simulation,
+        agents: Gatherer,
+        *,
+        hooks: Sequence[Hook] = (),
+        states_every: int = 0,
+        faults: FaultLog | None = None,
+    ) -> None:
+        self.sim = sim
+        self.agents = agents
+        self.hooks = list(hooks)
+        self.states_every = states_every
+        self.faults = faults or FaultLog()
+        self._looked_at = bool(set(agents.others) & {sim.agents[i] for i in sim.seeing})
+
+    def run(self, steps: int, *, until: Callable[[], bool] = lambda: False) -> None:
+        """Go on until the simulation has made `steps` steps in all, or `until` says so.
+
+        Raises
+        ------
+        InputError
+            If states are to be saved, and an agent has none to give.
+        """
+        sim = self.sim
+        places, people = [place.id for place in sim.world.places], sim.state.people.names
+        names = set(sim.agents)
+        if self.states_every:
+            self._check_states()
+        observations, infos = sim.observe(sim.due)
+        for hook in self.hooks:
+            hook.begin(observations)
+        while sim.metrics.steps < steps and not until():
+            if sim.defer_rgb and self._looked_at:
+                sim.rgb_waiter()()
+            gathered = self.agents.gather(observations, infos)
+            actions: dict[str, Action] = {}
+            for name, action in gathered.actions.items():
+                short = short_form(action, places, people)
+                if isinstance(other := short.get("agent"), str) and other not in names:
+                    gathered.failures[name] = Failure("malformed", f"there is no agent {other[:40]!r}")
+                else:
+                    actions[name] = short
+            result = sim.step(actions, gathered.agent_faults)
+            observations, infos = result.observations, result.infos
+            self._note(Step(sim.metrics.steps, actions, gathered.failures, result))
+
+    def _note(self, step: Step) -> None:
+        """Count what agents did wrong, tell the hooks, and save if it is time."""
+        for name, failure in step.failures.items():
+            self._fault(step.number, name, failure)
+        for name in self.agents.others:
+            observation = step.result.observations.get(name)
+            if observation is None or name in step.failures:
+                continue
+            if is_malformed(observation["state"]["action_code"]):
+                self._fault(step.number, name, Failure("malformed", observation["state"]["action_reason"]))
+        for hook in self.hooks:
+            hook.stepped(step)
+        if self.states_every and step.number % self.states_every == 0:
+            self._save(step.number)
+
+    def _save(self, number: int) -> None:
+        states, failures = self.agents.states()
+        for name, failure in failures.items():
+            # Without everybody's state the run could not go on from here; it can from the checkpoint before.
+            self._fault(number, name, Failure("state", f"no checkpoint: {failure.reason}"))
+        if not failures:
+            for hook in self.hooks:
+                hook.checkpoint(states, self.faults)
+
+    def _fault(self, number: int, name: str, failure: Failure) -> None:
+        if not self.faults.counts[name, failure.kind]:
+            log.warning("%s: %s at step %d, and waits: %s", name, failure.kind, number, failure.reason)
+        self.faults.add(number, name, failure.kind, failure.reason)
+
+    def _check_states(self) -> None:
+        _, failures = self.agents.states()
+        for name, failure in failures.items():
+            raise InputError(f"{name}: {failure.reason}")
