@@ -62,7 +62,7 @@ def killed(
         "run", helsinki_path, helsinki_people, "--steps", 90, "--robots", "none", "--cars", 2, "--pedestrians", 2,
         "--observe", "resident_0", "--out",
     ]  # fmt: skip
-    kill_once([*words, out], (out / "steps" / "part-00000.parquet").exists)
+    kill_once([*words, out], (out / "segments" / "00000000-00000060").exists)
     return out, words
 
 
@@ -117,7 +117,6 @@ def test_a_run_killed_before_its_manifest_begins_again(
 ) -> None:
     out = tmp_path / "run"
     out.mkdir()
-    (out / "events.jsonl").touch()
     (out / ".run.json.x1").write_text("{")
     quiet = ("--robots", "none", "--cars", 0, "--pedestrians", 0, "--observe", "none")
     assert vico("run", helsinki_path, helsinki_people, "--steps", 2, *quiet, "--out", out) == 0

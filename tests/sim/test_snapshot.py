@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import toy_city
@@ -15,6 +17,7 @@ from vico.agents.schedule import followers_of
 from vico.errors import MissingFileError, SchemaError
 from vico.runner.gather import Gatherer
 from vico.sim.config import SimConfig
+from vico.sim.physics.mujoco_engine import PhysicsError
 from vico.sim.simulation import Simulation
 from vico.world.public import PublicMap
 
@@ -109,3 +112,49 @@ def test_two_fresh_processes_agree_on_every_hash() -> None:
         for k in (1, 2)
     ]
     assert runs[0] == runs[1] != ""
+
+
+def test_what_a_planner_tries_is_undone() -> None:
+    sim = fresh()
+    actions = followed(fresh(), 30)
+    hashes(sim, actions[:10])
+    digest, log = sim.state_hash(), list(sim.state.events.log)
+    with sim.branch():
+        tried = hashes(sim, actions[10:20])
+    assert (sim.state_hash(), sim.state.events.log) == (digest, log)
+    assert hashes(sim, actions[10:20]) == tried
+
+
+def hurl(sim: Simulation) -> None:
+    """Spoil the speed of a robot."""
+    robots: Any = sim.state.robots
+    robots.engine._data.qvel[0] = np.nan
+
+
+def test_physics_that_diverges_leaves_a_snapshot_that_shows_it_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("VICO_CACHE", str(tmp_path))
+    config = replace(MORNING, robots=("husky",))
+    sim = fresh(config)
+    sim.step({})
+    hurl(sim)
+    before = sim.state_hash()
+    with pytest.raises(PhysicsError, match=r"diverged at .*; the state before it is in .*npz: report it with"):
+        sim.step({})
+    (path,) = tmp_path.glob("diverged/*.npz")
+    again = fresh(config)
+    again.load(path)
+    with pytest.raises(PhysicsError, match="diverged"):
+        again.advance(1.0)
+    # Both stand where they stood before the second that failed.
+    assert again.state_hash() == sim.state_hash() == before
+
+
+def test_a_snapshot_that_cannot_be_kept_is_told_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("VICO_CACHE", str(tmp_path / "file"))
+    sim = fresh(replace(MORNING, robots=("husky",)))
+    hurl(sim)
+    with pytest.raises(PhysicsError, match="could not be kept"):
+        sim.step({})

@@ -141,3 +141,32 @@ def test_a_coarser_map_measures_walks_alike(helsinki: World, trips: list[tuple[n
     ratios = [coarse.length(a, b) / fine.length(a, b) for a, b in trips]
     assert np.median(ratios) == pytest.approx(1.0, abs=0.02)
     assert max(ratios) < 1.5
+
+
+def test_closing_squares_is_blocking_their_cells(helsinki: World, trips: list[tuple[np.ndarray, np.ndarray]]) -> None:
+    router = Router(helsinki.walkable)
+    before = [router.path(a, b) for a, b in trips]
+    for (a, b), route in list(zip(trips, before, strict=True))[:8]:
+        assert route is not None
+        middle = route[len(route) // 2]
+        closed = [(float(middle[0]), float(middle[1]), reach) for reach in (0.5, 1.3)]
+        mask = np.zeros(helsinki.walkable.cls.shape, bool)
+        for x, y, reach in closed:
+            ix, iy = helsinki.walkable.cell_of((x, y))
+            k = math.ceil(reach / helsinki.walkable.cell)
+            mask[max(0, iy - k) : iy + k + 1, max(0, ix - k) : ix + k + 1] = True
+        around, masked = router.path(a, b, closed=closed), router.path(a, b, blocked=mask)
+        assert (around is None) == (masked is None)
+        if around is not None and masked is not None:
+            np.testing.assert_array_equal(around, masked)
+    # They are open again afterwards.
+    for (a, b), route in list(zip(trips, before, strict=True))[:8]:
+        np.testing.assert_array_equal(router.path(a, b), route)
+
+
+def test_landmarks_are_learnt_of_the_open_map(helsinki: World, trips: list[tuple[np.ndarray, np.ndarray]]) -> None:
+    plain, learned = Router(helsinki.walkable), Router(helsinki.walkable)
+    for a, b in trips * 2:  # more searches than landmarks wait for, each with something closed
+        learned.path(a, b, closed=[(float(a[0]) + 3.0, float(a[1]), 2.0)])
+    for a, b in trips[:12]:
+        np.testing.assert_array_equal(learned.path(a, b), plain.path(a, b))

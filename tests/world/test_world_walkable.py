@@ -94,3 +94,21 @@ def test_roadways_are_wide_enough_to_drive(helsinki: World) -> None:
         shapely.LineString(r.line).length * r.width for r in helsinki.roads.roads if r.lanes and r.layer >= 0
     )
     assert roadway > 0.5 * drivable
+
+
+def test_one_point_is_told_what_many_are(helsinki: World) -> None:
+    walkable = helsinki.walkable
+    points = np.random.default_rng(5).uniform(-1.05 * walkable.half, 1.05 * walkable.half, (400, 2))
+    assert [walkable.class_of(x, y) for x, y in points.tolist()] == walkable.class_at(points).tolist()
+    rooms = [walkable.clearance_of(x, y) for x, y in points.tolist()]
+    np.testing.assert_allclose(rooms, walkable.clearance_at(points), atol=1e-6)
+
+
+def test_random_points_near_a_place_are_near_it(helsinki: World) -> None:
+    walkable, rng = helsinki.walkable, np.random.default_rng(6)
+    # At the edge of the map, too.
+    for corner in (np.array([0.0, 0.0]), np.array([-walkable.half, walkable.half])):
+        points = np.array([walkable.random_point(rng, near=corner, radius=60.0) for _ in range(40)])
+        assert (np.hypot(*(points - corner).T) <= 60.0).all()
+        assert walkable.is_connected(points).all()
+        assert len(np.unique(points, axis=0)) > 20

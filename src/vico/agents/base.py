@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
-
-import numpy as np
 
 from vico.agents.state import AgentState, generator_state, restore_generator
 from vico.seeds import rng
@@ -107,12 +106,12 @@ class RandomAgent:
 def heading(observation: Observation) -> float:
     """Yaw an agent looks along, radians."""
     east, north = observation["pose"][AHEAD]
-    return float(np.arctan2(north, east))
+    return math.atan2(north, east)
 
 
 def wrapped(angle: float) -> float:
     """Return the same direction within -pi..pi."""
-    return float((angle + np.pi) % (2 * np.pi) - np.pi)
+    return float((angle + math.pi) % (2 * math.pi) - math.pi)
 
 
 __all__ = [

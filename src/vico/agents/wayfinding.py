@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -23,7 +25,11 @@ _DRIFT = 0.12
 _CAR_NEAR, _PATIENCE = 9.0, 8
 # Radius of what is taken to be closed where one keeps being stopped, and its growth each time, metres.
 _BLOCK, _GROW = 0.5, 0.4
+# Who stepped aside joins its way again this far on, metres, unless that is longer than straight on by so much.
+_REJOIN, _DETOUR = 8.0, 6.0
 _HIT_SOLID = code_name(ReasonCode.HIT_SOLID)
+
+Point = tuple[float, float]
 
 
 class Walker:
@@ -41,7 +47,9 @@ class Walker:
         self._map = public_map
         self._rng = generator
         self._goal: tuple[float, float] | None = None
-        self._path: NDArray[np.float64] = np.zeros((0, 2))
+        self._path: list[tuple[float, float]] = []
+        # Metres from each point of the path to its end.
+        self._left: list[float] = []
         self._next = 0
         self._blocked = 0
         self._waited = 0
@@ -53,7 +61,7 @@ class Walker:
         """Return the way under way and what is known to be in it; the generator is its owner's to save."""
         return {
             "goal": None if self._goal is None else list(self._goal),
-            "path": self._path.copy(),
+            "path": np.array(self._path, np.float64).reshape(-1, 2),
             "next": self._next,
             "blocked": self._blocked,
             "waited": self._waited,
@@ -66,7 +74,7 @@ class Walker:
         """Go on the way that `state` returned."""
         goal = state["goal"]
         self._goal = None if goal is None else (float(goal[0]), float(goal[1]))
-        self._path = np.array(state["path"], np.float64).reshape(-1, 2)
+        self._take(np.asarray(state["path"], np.float64).reshape(-1, 2).tolist())
         self._next, self._blocked, self._waited = state["next"], state["blocked"], state["waited"]
         self._stepped = state["stepped"]
         self._aside = [dict(action) for action in state["aside"]]
@@ -77,12 +85,11 @@ class Walker:
         self._goal = None
         self._aside = []
 
-    def remaining(self, position: NDArray[np.float64]) -> float:
+    def remaining(self, position: Sequence[float]) -> float:
         """Metres still to walk."""
         if self._goal is None or self._next >= len(self._path):
             return 0.0
-        points = np.vstack([position[None, :2], self._path[self._next :]])
-        return float(np.hypot(*np.diff(points, axis=0).T).sum())
+        return math.dist(position[:2], self._path[self._next]) + self._left[self._next]
 
     def towards(self, goal: tuple[float, float], speed: float, observation: Observation, info: Info) -> Action | None:
         """Return the next action on the way to a point; None if there is no way or it is reached.
@@ -94,87 +101,102 @@ class Walker:
         speed
             Metres a second to walk at, up to 2.5.
         """
-        position = observation["pose"][:2]
+        x, y = observation["pose"][:2].tolist()
+        position = (x, y)
         if goal != self._goal:
             self._goal, self._closed, self._blocked = goal, [], 0
             self._aside = []
             self._plan(position)
         if observation["state"]["action_status"] == "collision":
-            self._meet_obstacle(observation)
+            self._meet_obstacle(position, observation)
         elif self._stepped and not self._aside:
             self._blocked = max(0, self._blocked - 1)
         self._stepped = False
         if self._aside:
             action = self._aside.pop(0)
             if not self._aside:
-                self._plan(position)
+                self._rejoin(position)
             return action
         self._pass_corners(position)
         if self._next >= len(self._path):
             return None
-        return self._step(speed, observation, info)
+        return self._step(position, speed, observation, info)
 
-    def _plan(self, position: NDArray[np.float64]) -> None:
+    def _plan(self, position: Point) -> None:
         assert self._goal is not None
-        path = self._map.router.path(position, self._goal, blocked=self._mask())
+        path = self._map.router.path(position, self._goal, closed=self._closed)
         if path is None and self._closed:
             # What stood in the way may have moved on by now.
             self._closed = []
             path = self._map.router.path(position, self._goal)
-        self._path = np.zeros((0, 2)) if path is None else path
+        self._take([] if path is None else path.tolist())
         self._next = 1 if len(self._path) > 1 else 0
 
-    def _mask(self) -> NDArray[np.bool_] | None:
-        if not self._closed:
-            return None
-        walkable = self._map.walkable
-        mask = np.zeros(walkable.cls.shape, bool)
-        for x, y, radius in self._closed:
-            ix, iy = walkable.cell_of((x, y))
-            reach = math.ceil(radius / walkable.cell)
-            mask[max(0, iy - reach) : iy + reach + 1, max(0, ix - reach) : ix + reach + 1] = True
-        return mask
+    def _rejoin(self, position: Point) -> None:
+        """Go back to the way a little further on, which is found sooner than all of it anew; else find a new one."""
+        ahead = next((k for k in range(self._next, len(self._path)) if self._along(k) >= _REJOIN), None)
+        if ahead is not None:
+            path = self._map.router.path(position, self._path[ahead], closed=self._closed)
+            points = [] if path is None else path.tolist()
+            detour = sum(math.dist(p, q) for p, q in pairwise(points)) - math.dist(position, self._path[ahead])
+            if points and detour <= _DETOUR:
+                self._take([*points, *self._path[ahead + 1 :]])
+                self._next = 1 if len(points) > 1 else 0
+                return
+        self._plan(position)
 
-    def _pass_corners(self, position: NDArray[np.float64]) -> None:
+    def _along(self, k: int) -> float:
+        """Metres along the way from the next corner to another."""
+        return self._left[self._next] - self._left[k]
+
+    def _take(self, path: Sequence[Sequence[float]]) -> None:
+        """Take a path for one's way."""
+        self._path = [(float(x), float(y)) for x, y in path]
+        self._left = [0.0] * len(self._path)
+        for k in range(len(self._path) - 2, -1, -1):
+            self._left[k] = self._left[k + 1] + math.dist(self._path[k], self._path[k + 1])
+
+    def _pass_corners(self, position: Point) -> None:
         while self._next < len(self._path):
             near = _END if self._next == len(self._path) - 1 else min(_CORNER, self._room(position) * 0.5)
-            if np.hypot(*(self._path[self._next] - position)) > near:
+            if math.dist(self._path[self._next], position) > near:
                 return
             self._next += 1
 
-    def _room(self, position: NDArray[np.float64]) -> float:
-        return float(self._map.walkable.clearance_at(position))
+    def _room(self, position: Point) -> float:
+        return self._map.walkable.clearance_of(*position)
 
-    def _step(self, speed: float, observation: Observation, info: Info) -> Action:
-        position = observation["pose"][:2]
-        gap = self._path[self._next] - position
-        away = float(np.hypot(*gap))
-        error = wrapped(math.atan2(gap[1], gap[0]) - heading(observation))
+    def _step(self, position: Point, speed: float, observation: Observation, info: Info) -> Action:
+        corner = self._path[self._next]
+        east, north = corner[0] - position[0], corner[1] - position[1]
+        away = math.hypot(east, north)
+        error = wrapped(math.atan2(north, east) - heading(observation))
         stride = min(away, speed)
         # Where it is narrow there is no room for drifting.
         drift = _DRIFT if self._room(position) > 0.6 else 0.03
         if abs(error) > 1e-3 and (abs(stride * math.sin(error)) > drift or math.cos(error) <= 0.0):
             return {"type": "turn_left" if error > 0 else "turn_right", "degrees": abs(math.degrees(error))}
-        if self._should_let_pass(position, gap / max(away, 1e-9), observation, info):
+        scale = 1.0 / max(away, 1e-9)
+        if self._should_let_pass(
+            position, (position[0] + east * scale, position[1] + north * scale), observation, info
+        ):
             self._waited += 1
             return {"type": "wait"}
         self._waited = 0
         self._stepped = True  # only a step that was made tells that the way is free again; a wait doesn't
         return {"type": "move_forward", "distance": stride}
 
-    def _should_let_pass(
-        self, position: NDArray[np.float64], ahead: NDArray[np.float64], observation: Observation, info: Info
-    ) -> bool:
-        """Whether one stands at the kerb and a vehicle is near."""
-        walkable = self._map.walkable
+    def _should_let_pass(self, position: Point, ahead: Point, observation: Observation, info: Info) -> bool:
+        """Whether one stands at the kerb, with the point a metre ahead on the road, and a vehicle is near."""
+        surface = self._map.walkable.class_of
         road = (ROADWAY, CROSSING)
-        if int(walkable.class_at(position)) in road or int(walkable.class_at(position + ahead)) not in road:
+        if surface(*position) in road or surface(*ahead) not in road:
             return False
         return self._waited < _PATIENCE and _nearest_vehicle(observation, info) < _CAR_NEAR
 
-    def _meet_obstacle(self, observation: Observation) -> None:
+    def _meet_obstacle(self, position: Point, observation: Observation) -> None:
         """Wait a moment, then pass on one side; close the spot for planning if that doesn't help."""
-        position, yaw = observation["pose"][:2], heading(observation)
+        yaw = heading(observation)
         self._blocked += 1
         self._aside = []
         solid = observation["state"]["action_code"] == _HIT_SOLID
@@ -182,22 +204,27 @@ class Walker:
             self._aside = [{"type": "wait"}] * int(self._rng.integers(1, 3))
             return
         if self._blocked % 4 == 0:
-            spot = position + 0.9 * np.array([math.cos(yaw), math.sin(yaw)])
+            x, y = _ahead(position, yaw, 0.9)
             # Stopped near a closed spot again: what stands there is wider than was thought.
-            again = sum(math.hypot(x - spot[0], y - spot[1]) < 2.5 for x, y, _ in self._closed)
-            self._closed = [*self._closed[-5:], (float(spot[0]), float(spot[1]), _BLOCK + _GROW * again)]
+            again = sum(math.dist((x, y), spot[:2]) < 2.5 for spot in self._closed)
+            self._closed = [*self._closed[-5:], (x, y, _BLOCK + _GROW * again)]
         # Everybody passes on the right, mostly: so two who meet don't mirror each other.
         first = -1.0 if self._rng.random() < 0.8 else 1.0
         for side in (first, -first):
             for degrees in (50.0, 90.0, 130.0):
                 angle = yaw + side * math.radians(degrees)
                 reach = 0.8 + 0.2 * min(self._blocked, 4)
-                spot = position + reach * np.array([math.cos(angle), math.sin(angle)])
-                if self._room(spot) >= 0.3 and self._room((position + spot) / 2) >= 0.28:
+                if self._room(_ahead(position, angle, reach)) >= 0.3 and (
+                    self._room(_ahead(position, angle, reach / 2)) >= 0.28
+                ):
                     turn = "turn_left" if side > 0 else "turn_right"
                     self._aside = [{"type": turn, "degrees": degrees}, {"type": "move_forward", "distance": reach}]
                     return
         self._plan(position)
+
+
+def _ahead(position: Point, yaw: float, reach: float) -> Point:
+    return position[0] + reach * math.cos(yaw), position[1] + reach * math.sin(yaw)
 
 
 def _nearest_vehicle(observation: Observation, info: Info) -> float:

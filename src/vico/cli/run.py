@@ -111,7 +111,7 @@ def _cut_short(out: Path) -> dict[str, Any] | None:
         content = read_json(out / "run.json")
         unfinished = isinstance(content, dict) and content.get("status") in ("running", "stopped")
         return content if unfinished else None
-    begun = "events.jsonl" in names and all(name == "events.jsonl" or name.startswith(".run.json.") for name in names)
+    begun = bool(names) and all(name.startswith(".run.json.") for name in names)
     return {} if begun else None
 
 

@@ -120,12 +120,3 @@ def read_film(path: Path, *, wanted: Collection[int] | None = None) -> Iterator[
         for number, frame in enumerate(container.decode(video=0)):
             if wanted is None or number in wanted:
                 yield frame.to_ndarray(format="rgb24")
-
-
-def read_key_frames(path: Path) -> Iterator[tuple[int, NDArray[np.uint8]]]:
-    """Yield number and picture of the frames that are stored whole; what lies between isn't even decoded."""
-    with av.open(str(path)) as container:
-        stream = container.streams.video[0]
-        stream.codec_context.skip_frame = "NONKEY"
-        for frame in container.decode(stream):
-            yield round(frame.time * stream.average_rate), frame.to_ndarray(format="rgb24")

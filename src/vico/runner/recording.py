@@ -27,4 +27,4 @@ class Recording(Hook):
 
     def stepped(self, step: Step) -> None:
         """Record a step."""
-        self._recorder.write(step.result)
+        self._recorder.write(step.result, actions=step.actions)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ from vico.errors import InputError
 from vico.sim.actions import AgentFault, apply_actions
 from vico.sim.base import SimulationBase
 from vico.sim.config import SimConfig
+from vico.sim.divergence import kept_if_diverged
 from vico.sim.events import Event
 from vico.sim.initial_state import initial_state
 from vico.sim.metrics import Metrics, StopWatch
@@ -176,10 +178,16 @@ class Simulation:
         end = state.tick + ticks
         while state.tick < end:
             until = min(end, state.tick - state.tick % TICKS_PER_SECOND + TICKS_PER_SECOND)
-            self.metrics.collisions += advance_ticks(state, until - state.tick, self.periods, watch)
+            ticks_now = until - state.tick
+            with self._guarded(ticks_now):
+                self.metrics.collisions += advance_ticks(state, ticks_now, self.periods, watch)
             if state.tick % TICKS_PER_SECOND == 0:
                 self.punctuality.watch(state)
             watch.lap("bookkeeping")
+
+    def _guarded(self, ticks: int) -> AbstractContextManager[None]:
+        """Return a context in which physics may diverge: the state before it is kept then."""
+        return nullcontext() if self.state.robots is None else kept_if_diverged(self, ticks / TICKS_PER_SECOND)
 
     # What agents see.
 
@@ -256,6 +264,19 @@ class Simulation:
         self.metrics.steps, self.metrics.collisions, self.metrics.refused = steps, collisions, refused
         self.state.restore(arrays)
         self.punctuality.restore(arrays_of(arrays, "punctuality"))
+
+    @contextmanager
+    def branch(self) -> Iterator[Simulation]:
+        """Let a planner try what would happen: whatever is done in the block is undone after it.
+
+        Only the state goes back; views rendered in the block, and wall-clock seconds, do not.
+        """
+        before, log = self.snapshot(), list(self.state.events.log)
+        try:
+            yield self
+        finally:
+            self.restore(before)
+            self.state.events.log = log
 
     def save(self, path: Path) -> None:
         """Write a snapshot file (``.npz``, no pickle)."""

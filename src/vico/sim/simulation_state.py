@@ -109,6 +109,9 @@ class RobotSystem(Subsystem, Protocol):
     def camera_heights(self) -> NDArray[np.float64]:
         """Height of each robot's camera above the ground it stands on, metres."""
 
+    def observation(self, robot: int) -> Mapping[str, NDArray[np.float64]]:
+        """Return what a robot feels of itself: ``base_pose`` and ``joint_position`` are recorded."""
+
     def events(self) -> Sequence[RobotNote]:
         """Return what happened to robots since this was last asked."""
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from vico.clock import seconds_of_day
-from vico.render.film import read_film, write_film
+from vico.render.film import write_film
 from vico.threads import in_order
 from vico.viewer.map_picture import MapPicture
 from vico.viewer.recording import Recording
@@ -49,14 +49,13 @@ def _frames(recording: Recording, world: World) -> Iterator[NDArray[np.uint8]]:
     times = np.linspace(0, recording.steps, count)
     chosen = _most_alive(recording, 4)
     steps = [int(time) for time in times]
-    films = {name: read_film(recording.views[name], wanted=set(steps)) for name in chosen}
+    films = {name: recording.pictures(name, sorted(set(steps))) for name in chosen}
 
     def moments() -> Iterator[tuple[float, list[NDArray[np.uint8] | None]]]:
         views: list[NDArray[np.uint8] | None] = [None] * len(chosen)
         for k, (time, step) in enumerate(zip(times, steps, strict=True)):
             if k == 0 or step != steps[k - 1]:
-                # A film that was cut short keeps its last picture.
-                views = [next(films[name], view) for name, view in zip(chosen, views, strict=True)]
+                views = [next(films[name]) for name in chosen]
             yield float(time), views
 
     def draw(moment: tuple[float, list[NDArray[np.uint8] | None]]) -> NDArray[np.uint8]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vico.sim.recording import Run
 from vico.viewer.recording import RecordedBody, RecordedEvent, Recording
@@ -14,29 +15,35 @@ _SILENT = {"refused", "collision"}
 
 
 def recording_of(run: Run) -> Recording:
-    """Read what the page and the film show out of a run."""
-    by_entity = {agent["entity"]: agent["name"] for agent in run.manifest["agents"]}
-    bodies = [
-        RecordedBody(b["entity"], b["kind"], b["name"], b["size"][0], b["size"][1], by_entity.get(b["entity"]))
-        for b in run.manifest["bodies"]
-    ]
-    shown = {body.entity: body.name for body in bodies}
+    """Read what the page and the film show out of a run: its state at every whole second."""
+    chosen = _whole_seconds(run)
+    tracks = run.tracks()
+    cast = {int(entity): run.cast[int(entity)] for entity in tracks.entity}
+    bodies = [RecordedBody(e, b.kind, b.name, b.size[0], b.size[1], b.agent) for e, b in cast.items()]
     events = [
-        RecordedEvent(e["step"], e["kind"], e["agent"], e["text"], (e["x"], e["y"]))
+        RecordedEvent(int(np.searchsorted(chosen, e["step"])), e["kind"], e["agent"], e["text"], (e["x"], e["y"]))
         for e in run.events
         if e["kind"] not in _SILENT
     ]
     return Recording(
         path=run.path,
         start=int(run.manifest["start"]),
-        tracks=np.concatenate([run.position[..., :2], run.yaw[..., None]], axis=-1),
+        tracks=np.concatenate([tracks.position[chosen, :, :2], tracks.yaw[chosen, :, None]], axis=-1, dtype=np.float32),
         bodies=bodies,
         events=events,
-        people={agent["name"]: _about(agent, shown[agent["entity"]]) for agent in run.manifest["agents"]},
+        people={agent["name"]: _about(agent, cast[agent["entity"]].name) for agent in run.agents},
         views=run.views,
+        view_steps=chosen,
         metrics=run.metrics,
         state_hash=run.hashes[-1],
     )
+
+
+def _whole_seconds(run: Run) -> NDArray[np.int64]:
+    """Return the recorded steps that end whole seconds; all of them where every agent acts once a second."""
+    times = run.times
+    seconds = np.rint(times - times[0])
+    return np.flatnonzero((np.abs(times - times[0] - seconds) < 1e-6) & (np.diff(seconds, prepend=-1.0) > 0))
 
 
 def _about(agent: dict[str, Any], shown: str) -> dict[str, Any]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from vico.sim.recording import View
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,9 @@ class Recording:
     people
         Name, role, a few lines, and the schedule of each agent, by agent name.
     views
-        First-person films, by agent name; one frame a step, the first one for step 0.
+        First-person films, by agent name.
+    view_steps
+        The step of the run that each second of `tracks` shows, int64, shape ``(steps + 1,)``.
     """
 
     path: Path
@@ -55,7 +60,8 @@ class Recording:
     bodies: list[RecordedBody]
     events: list[RecordedEvent]
     people: dict[str, dict[str, Any]]
-    views: dict[str, Path]
+    views: dict[str, View]
+    view_steps: NDArray[np.int64]
     metrics: dict[str, Any]
     state_hash: str
 
@@ -67,6 +73,22 @@ class Recording:
     def body_of(self, agent: str) -> int:
         """Index of an agent's body."""
         return next(i for i, body in enumerate(self.bodies) if body.agent == agent)
+
+    def pictures(self, agent: str, seconds: Sequence[int]) -> Iterator[NDArray[np.uint8] | None]:
+        """Yield what an agent saw at each of some ascending seconds, or last before; None before its first picture."""
+        steps = self.view_steps[list(seconds)].tolist()
+        frames = self.views[agent].frames(set(steps))
+        picture: NDArray[np.uint8] | None = None
+        coming = next(frames, None)
+        for step in steps:
+            if coming is not None and coming[0] <= step:
+                picture, coming = coming[1], next(frames, None)
+            yield picture
+
+    def key_pictures(self, agent: str) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+        """Yield second and picture of what an agent saw, wherever a whole frame is stored."""
+        for step, picture in self.views[agent].key_frames():
+            yield int(np.searchsorted(self.view_steps, step)), picture
 
     def travelled(self) -> NDArray[np.float64]:
         """Metres each body covered, leaving out jumps through doors; shape ``(n,)``."""

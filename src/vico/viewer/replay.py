@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from vico.io.files import write_bytes
-from vico.render.film import read_key_frames
 from vico.threads import in_order
 from vico.viewer.recording import Recording
 from vico.world.folder import World
@@ -46,6 +45,13 @@ def page_data(recording: Recording, world: World, *, picture: NDArray[np.uint8] 
     reach = np.abs(recording.tracks[..., :2])
     unit = max(UNIT, float(np.max(reach, initial=0.0, where=np.isfinite(reach))) / 32_000)
     credit = "; ".join(dict.fromkeys(source.attribution for source in manifest.sources if source.attribution))
+
+    def pictures(name: str) -> list[tuple[int, str]]:
+        """Return what an agent saw every 20 s or so: views are filmed with a whole frame that often."""
+        if name not in recording.views:
+            return []
+        return [(second, _uri(frame, 60)) for second, frame in recording.key_pictures(name)]
+
     bodies = []
     for body in recording.bodies:
         entry = {"kind": body.kind, "name": body.agent or body.name, "length": body.length, "width": body.width}
@@ -74,8 +80,8 @@ def page_data(recording: Recording, world: World, *, picture: NDArray[np.uint8] 
             for e in recording.events
         ],
         "agents": [
-            recording.people[name] | {"id": name, "pictures": pictures}
-            for name, pictures in zip(names, in_order(_pictures, map(recording.views.get, names)), strict=True)
+            recording.people[name] | {"id": name, "pictures": seen}
+            for name, seen in zip(names, in_order(pictures, names), strict=True)
         ],
         "metrics": {k: v for k, v in recording.metrics.items() if isinstance(v, (int, float, str))},
         "picture": _uri(picture, 80) if picture is not None else None,
@@ -91,11 +97,6 @@ def _tracks(tracks: NDArray[np.float32], unit: float) -> str:
     whole = np.clip(np.nan_to_num(np.rint(scaled)), -32767, 32767).astype("<i2")
     whole[gone] = _HIDDEN
     return base64.b64encode(whole.tobytes()).decode()
-
-
-def _pictures(film: Path | None) -> list[tuple[int, str]]:
-    """Return a picture every 20 s: views are filmed with a whole frame that often (`vico.sim.recorder`)."""
-    return [] if film is None else [(step, _uri(frame, 60)) for step, frame in read_key_frames(film)]
 
 
 def _uri(image: NDArray[np.uint8], quality: int) -> str:

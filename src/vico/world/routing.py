@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from threading import Lock
 from typing import Any, NamedTuple
 
@@ -317,6 +319,7 @@ class Router:
         self._landmarks = np.zeros((cells, 0), np.int32)
         self._lock = Lock()
         self._nothing = np.zeros((0, 0), np.bool_)
+        self._shut = np.zeros(cost.shape, np.bool_)
 
     def nearest_walkable(self, xy: ArrayLike, *, within: float = 30.0) -> NDArray[np.float64] | None:
         """Centre of the nearest connected cell, ENU metres; None if there is none within `within` metres.
@@ -330,7 +333,12 @@ class Router:
         return None if index < 0 else self._centre(index)
 
     def path(
-        self, start: ArrayLike, goal: ArrayLike, *, blocked: NDArray[np.bool_] | None = None
+        self,
+        start: ArrayLike,
+        goal: ArrayLike,
+        *,
+        blocked: NDArray[np.bool_] | None = None,
+        closed: Sequence[tuple[float, float, float]] = (),
     ) -> NDArray[np.float64] | None:
         """Find a walk that prefers sidewalks and crossings and keeps 0.3 m from walls.
 
@@ -340,6 +348,9 @@ class Router:
             ENU metres. A point that can't be walked on is led to the nearest one that can, up to 6 m off.
         blocked
             Cells that are closed besides, bool, shape ``(n, n)``.
+        closed
+            Squares that are closed besides, as x, y and half their side, metres: quicker than `blocked` where they are
+            few and small.
 
         Returns
         -------
@@ -347,20 +358,28 @@ class Router:
             Corner points from start to goal, shape ``(k, 2)``, ``k >= 1``; None if there is no way.
         """
         a, b = np.asarray(start, np.float64)[:2], np.asarray(goal, np.float64)[:2]
-        cost = self._cost if blocked is None else np.where(blocked, np.int32(0), self._cost)
-        free = self._free if blocked is None else cost > 0
-        first, last = self._nearest_cell(a, free, _SNAP), self._nearest_cell(b, free, _SNAP)
-        if first < 0 or last < 0:
-            return None
         with self._lock:
-            if not self._run(cost, first, last):
-                return None
-            cells = _backtrack(cost, self._work, first, last, self._generation)
-            g = self._work.g[cells]
+            self._count_search()
+            with self._closed(closed):
+                if blocked is None:
+                    return self._path(a, b, self._cost, self._shut if closed else None)
+                shut = blocked | self._shut
+                return self._path(a, b, np.where(shut, np.int32(0), self._cost), shut)
+
+    def _path(
+        self, a: NDArray[np.float64], b: NDArray[np.float64], cost: NDArray[np.int32], shut: NDArray[np.bool_] | None
+    ) -> NDArray[np.float64] | None:
+        """Find a walk where `cost` is above 0; `shut` are the cells in which it is 0 for this walk only."""
+        free = self._free if cost is self._cost else cost > 0
+        first, last = self._nearest_cell(a, free, _SNAP), self._nearest_cell(b, free, _SNAP)
+        if first < 0 or last < 0 or not self._run(cost, first, last):
+            return None
+        cells = _backtrack(cost, self._work, first, last, self._generation)
+        g = self._work.g[cells]
         n = self.walkable.n
         points = np.column_stack([cells % n, cells // n]) + 0.5
-        extra = self._nothing if blocked is None else np.ascontiguousarray(blocked)
-        kept = _pull(self._cost, self._clearance, extra, blocked is not None, points, g)
+        checks = shut is not None
+        kept = _pull(self._cost, self._clearance, self._nothing if shut is None else shut, checks, points, g)
         route = points[kept] * self.walkable.cell - self.walkable.half
         # The exact ends, where they lie in the cells the search began and ended in.
         if self._flat(a) == first:
@@ -368,6 +387,27 @@ class Router:
         if self._flat(b) == last:
             route = np.vstack([route[:-1], b]) if len(route) > 1 else b[None]
         return route
+
+    @contextmanager
+    def _closed(self, squares: Sequence[tuple[float, float, float]]) -> Iterator[None]:
+        """Close squares for a while; writing all cells anew would take as long as a search."""
+        kept = []
+        for x, y, reach in squares:
+            part = self._square(x, y, reach)
+            kept.append((part, self._cost[part].copy()))
+            self._cost[part], self._free[part], self._shut[part] = 0, False, True
+        try:
+            yield
+        finally:
+            # Backwards, for squares may overlap.
+            for part, cost in reversed(kept):
+                self._cost[part], self._free[part], self._shut[part] = cost, cost > 0, False
+
+    def _square(self, x: float, y: float, reach: float) -> tuple[slice, slice]:
+        """Return rows and columns of the cells of a square, given by its middle and half its side, metres."""
+        column, row = (int(k) for k in self.walkable.cell_of((x, y)))
+        cells = math.ceil(reach / self.walkable.cell)
+        return slice(max(0, row - cells), row + cells + 1), slice(max(0, column - cells), column + cells + 1)
 
     def length(self, start: ArrayLike, goal: ArrayLike) -> float:
         """Metres of the walk; infinite if there is none."""
@@ -393,12 +433,14 @@ class Router:
             return np.where(reached, self._work.g * metre, np.inf).astype(np.float32).reshape(shape)
 
     def _run(self, cost: NDArray[np.int32], first: int, last: int) -> bool:
-        if last >= 0:
-            self._searches += 1
-            if self._searches == _WORTH_LANDMARKS:
-                self._landmarks = self._placed_landmarks()
         self._generation += 2
         return bool(_search(cost, self._work, first, last, self._generation, self._landmarks))
+
+    def _count_search(self) -> None:
+        """Learn the costs from landmarks when that is worth it; nothing may be closed meanwhile."""
+        self._searches += 1
+        if self._searches == _WORTH_LANDMARKS:
+            self._landmarks = self._placed_landmarks()
 
     def _placed_landmarks(self) -> NDArray[np.int32]:
         """Return what it costs from each cell to cells at the edges of the map, each as far from the others as can be.

@@ -7,6 +7,7 @@ centre touches nothing solid, so a person may stand at the centre of any free ce
 from __future__ import annotations
 
 import io
+import math
 import zipfile
 from dataclasses import dataclass
 from functools import cached_property
@@ -99,6 +100,24 @@ class WalkableMap:
         north = c[j + 1, i] * (1 - fu) + c[j + 1, i + 1] * fu
         return np.asarray(south * (1 - fv) + north * fv, np.float64)
 
+    def class_of(self, x: float, y: float) -> int:
+        """Class under one point; `class_at` in plain numbers, which is quicker for who asks for few."""
+        if not (abs(x) < self.half and abs(y) < self.half):
+            return BLOCKED
+        last = self.n - 1
+        return int(self.cls[min(int((y + self.half) / self.cell), last), min(int((x + self.half) / self.cell), last)])
+
+    def clearance_of(self, x: float, y: float) -> float:
+        """Clearance at one point, metres; `clearance_at` in plain numbers."""
+        last = self.n - 1.0
+        u = min(max((x + self.half) / self.cell - 0.5, 0.0), last)
+        v = min(max((y + self.half) / self.cell - 0.5, 0.0), last)
+        i, j = min(int(u), self.n - 2), min(int(v), self.n - 2)
+        fu, fv = u - i, v - j
+        (a, b), (c, d) = self.clearance[j : j + 2, i : i + 2].tolist()
+        south, north = a * (1 - fu) + b * fu, c * (1 - fu) + d * fu
+        return float(south * (1 - fv) + north * fv)
+
     @cached_property
     def connected(self) -> NDArray[np.bool_]:
         """Cells that can be reached on foot from the map's edge, roads crossed; bool, shape ``(n, n)``.
@@ -157,20 +176,29 @@ class WalkableMap:
         InputError
             If there is no such point.
         """
-        mask = self.connected & np.isin(self.cls, classes)
+        rows = columns = slice(0, self.n)
+        if near is not None and radius is not None:
+            x, y = (float(value) for value in np.asarray(near, np.float64)[:2])
+            rows, columns = self._cells_within(y, radius), self._cells_within(x, radius)
+        mask = self.connected[rows, columns] & np.isin(self.cls[rows, columns], classes)
         if clearance > BODY:
-            mask &= self.clearance >= clearance
+            mask &= self.clearance[rows, columns] >= clearance
         if near is not None and radius is not None:
             axis = self.centre_of(np.arange(self.n))
-            x, y = np.asarray(near, np.float64)[:2]
-            mask = mask & ((axis[None, :] - x) ** 2 + (axis[:, None] - y) ** 2 <= radius * radius)
-        free = np.flatnonzero(mask)
+            mask &= (axis[None, columns] - x) ** 2 + (axis[rows, None] - y) ** 2 <= radius * radius
+        free = np.argwhere(mask)
         if not len(free):
             names = ", ".join(CLASS_NAMES[c] for c in classes)
             place = "" if near is None else f" within {radius} m of {np.asarray(near)[:2].tolist()}"
             raise InputError(f"walkable map: no reachable {names} cell{place}; widen the search")
-        chosen = int(free[rng.integers(len(free))])
-        return self.centre_of([chosen % self.n, chosen // self.n])
+        row, column = free[rng.integers(len(free))]
+        return self.centre_of([column + columns.start, row + rows.start])
+
+    def _cells_within(self, middle: float, radius: float) -> slice:
+        """Return the columns (or rows) whose centres may lie within `radius` metres of a coordinate."""
+        first = math.floor((middle - radius + self.half) / self.cell)
+        end = math.ceil((middle + radius + self.half) / self.cell) + 1
+        return slice(min(max(first, 0), self.n), min(max(end, 0), self.n))
 
 
 def write_walkable(path: Path, walkable: WalkableMap) -> None:

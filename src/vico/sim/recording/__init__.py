@@ -1,0 +1,21 @@
+"""The run folder: what a simulation's recording holds, how it is written, and how it is read at any time.
+
+::
+
+    run.json                       what was run, and how far it came
+    agents.json                    who takes part
+    cast.jsonl                     which bodies come, change and go, and when
+    segments/FIRST-LAST/*.parquet  some steps in a row: a file a table (`schema.TABLES`)
+    checkpoints/STEP/              the exact state of the simulation and its agents
+    views/AGENT/FIRST.mp4          what an agent saw, a frame a step
+    metrics.json                   counts and seconds; written at the end
+
+`vico.sim.recorder.Recorder` writes it, `read_run` reads it. `docs/formats.md` describes it for other programs.
+"""
+
+from vico.sim.recording.cast import CastMember
+from vico.sim.recording.checkpoints import Checkpoint
+from vico.sim.recording.films import View
+from vico.sim.recording.run import AgentRecord, Moment, Run, Tracks, read_run
+
+__all__ = ["AgentRecord", "CastMember", "Checkpoint", "Moment", "Run", "Tracks", "View", "read_run"]

@@ -1,0 +1,116 @@
+"""What a run folder tells of the run as a whole: ``run.json`` and ``agents.json``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vico.errors import MissingFileError, SchemaError
+from vico.io.files import read_json
+from vico.sim.recording.schema import MANIFEST, SCHEMA, SEGMENT_STEPS, VERSION
+from vico.version import __version__
+
+if TYPE_CHECKING:
+    from vico.sim.simulation import Simulation
+
+
+def run_record(sim: Simulation, status: str, digest: str, sources: Mapping[str, str], wanted: int) -> dict[str, Any]:
+    """Return what ``run.json`` says of a simulation whose state has the hash `digest`."""
+    community = sim.community
+    return {
+        "schema_name": SCHEMA,
+        "version": VERSION,
+        "producer": f"vico {__version__}",
+        "status": status,
+        "identity": sim.identity,
+        "seed": sim.config.seed,
+        "config": sim.config.record(),
+        "world": {"path": sources.get("world", ""), "digest": sim.world.digest},
+        "community": None
+        if community is None
+        else {"path": sources.get("community", ""), "residents": len(sim.residents)},
+        "start": sim.config.start,
+        "steps": sim.metrics.steps,
+        "wanted_steps": wanted,
+        "segment_steps": SEGMENT_STEPS,
+        "state_hash": digest,
+    }
+
+
+def agents_record(sim: Simulation) -> list[dict[str, Any]]:
+    """Return what ``agents.json`` says of each agent."""
+    people, robots = sim.state.people, sim.state.robots
+    found: list[dict[str, Any]] = []
+    for i, name in enumerate(people.names):
+        person = sim.residents[i] if i < len(sim.residents) else None
+        found.append(
+            {
+                "name": name,
+                "kind": "assistant" if person is None else "resident",
+                "entity": int(people.entity[i]),
+                "resident": None if person is None else person.id,
+                "person": None if person is None else _person(person, sim),
+            }
+        )
+    if robots is not None:
+        entities = robots.bodies().entity.tolist()
+        found += [
+            {"name": name, "kind": "robot", "entity": entity, "resident": None, "person": None}
+            for name, entity in zip(robots.names, entities, strict=True)
+        ]
+    return found
+
+
+def read_manifest(path: Path) -> dict[str, Any]:
+    """Return ``run.json``.
+
+    Raises
+    ------
+    MissingFileError, SchemaError
+        If there is none, or it is of another version.
+    """
+    if not (path / MANIFEST).exists():
+        raise MissingFileError(f"{path}: holds no {MANIFEST}; make a run with vico run")
+    manifest = read_json(path / MANIFEST)
+    if not isinstance(manifest, dict) or manifest.get("schema_name") != SCHEMA:
+        raise SchemaError(f"{path / MANIFEST}: not a {SCHEMA} file; give a run folder")
+    if manifest.get("version") != VERSION:
+        raise SchemaError(
+            f"{path}: a run of version {manifest.get('version')!r} ({manifest.get('producer')}), which vico "
+            f"{__version__} does not read (it reads version {VERSION}); run it anew: {_command(path, manifest)}"
+        )
+    return manifest
+
+
+def _command(path: Path, manifest: Mapping[str, Any]) -> str:
+    """Return what to type to make a run again, as far as its manifest tells."""
+    sources = [manifest.get(name) for name in ("world", "community")]
+    folders = [source.get("path", "") if isinstance(source, dict) else "" for source in sources]
+    world, community = (folder or word for folder, word in zip(folders, ("WORLD", "COMMUNITY"), strict=True))
+    return (
+        f"vico run {world} {community} --steps {manifest.get('wanted_steps', 'N')} --seed {manifest.get('seed', 0)} "
+        f"--out {path} --force"
+    )
+
+
+def _person(resident: Any, sim: Simulation) -> dict[str, Any]:
+    places = {place.id: place.name for place in sim.world.places}
+    return {
+        "name": resident.name,
+        "age": resident.age,
+        "gender": resident.gender,
+        "occupation": resident.occupation,
+        "biography": resident.biography,
+        "appearance": dict(resident.appearance),
+        "schedule": [
+            {
+                "type": str(item.type),
+                "start": item.start,
+                "end": item.end,
+                "activity": item.activity,
+                "place": places.get(item.place or "", ""),
+            }
+            for item in resident.schedule
+        ],
+    }

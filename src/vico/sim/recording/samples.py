@@ -1,0 +1,205 @@
+"""What a recording takes from a simulation at a step, as rows of the tables."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow as pa
+
+from vico.sim.bodies import OBJECT, Bodies
+from vico.sim.events import Event
+from vico.sim.recording.action_text import action_text
+from vico.sim.recording.schema import TABLES, stored, table_of
+from vico.sim.state import MovableObjects
+
+if TYPE_CHECKING:
+    from vico.sim.simulation import Simulation, StepResult
+
+Rows = Mapping[str, Any]
+
+
+class Samples:
+    """Rows of the tables that wait to be written."""
+
+    def __init__(self) -> None:
+        self._rows: dict[str, list[Rows]] = {name: [] for name in TABLES}
+        self.steps: list[int] = []
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+    def take(
+        self, sim: Simulation, bodies: Bodies, digest: str, result: StepResult | None, actions: Mapping[str, Any]
+    ) -> None:
+        """Take what is to be told of a step.
+
+        Parameters
+        ----------
+        bodies
+            Of `everybody`.
+        digest
+            Hash of the state.
+        result
+            Of the step that led here; None before the first.
+        actions
+            What agents asked for in it, by name.
+        """
+        step = sim.metrics.steps
+        self.steps.append(step)
+        self._add("steps", {"step": [step], "hash": [digest], **_counts(sim)})
+        self._add("bodies", _bodies(step, bodies))
+        self._add("people", _people(step, sim))
+        self._add("agents", _agents(step, sim, actions))
+        if sim.state.robots is not None:
+            robots, joints = _robots(step, sim)
+            self._add("robots", robots)
+            self._add("joints", joints)
+        if result is not None and result.events:
+            self._add("events", _events(step, result.events))
+
+    def tables(self) -> dict[str, pa.Table]:
+        """Return all rows as tables, and wait for others."""
+        tables = {name: _joined(name, rows) for name, rows in self._rows.items()}
+        self.__init__()  # type: ignore[misc]
+        return tables
+
+    def _add(self, name: str, rows: Rows) -> None:
+        form = TABLES[name]
+        # Text stays as it is; numbers are brought to what is stored at once, for the state's arrays go on changing.
+        self._rows[name].append(
+            {
+                key: rows[key] if column.kind == pa.string() else stored(rows[key], column)
+                for key, column in form.items()
+            }
+        )
+
+
+def everybody(sim: Simulation) -> Bodies:
+    """Return all bodies of a run, indoors and outdoors, movable objects among them."""
+    state = sim.state
+    people = state.people.bodies_of(np.arange(len(state.people)))
+    owners = [s.bodies() for s in (state.robots, state.traffic, state.transit) if s is not None]
+    return Bodies.joined([people, *owners, _objects_as_bodies(state.objects)])
+
+
+def _objects_as_bodies(objects: MovableObjects) -> Bodies:
+    n = len(objects)
+    return Bodies(
+        objects.entity,
+        np.full(n, OBJECT, np.int8),
+        objects.position,
+        objects.yaw,
+        objects.size[:, 0] / 2,
+        objects.size[:, 1] / 2,
+        objects.size[:, 2],
+        np.zeros((n, 2)),
+    )
+
+
+def _counts(sim: Simulation) -> Rows:
+    return {
+        "time": [sim.state.second],
+        "collisions": [sim.metrics.collisions],
+        "refused": [sim.metrics.refused],
+        "arrivals": [int(sim.punctuality.arrivals.sum())],
+        "late": [int(sim.punctuality.late.sum())],
+    }
+
+
+def _bodies(step: int, bodies: Bodies) -> Rows:
+    return {
+        "entity": bodies.entity,
+        "step": np.full(len(bodies), step),
+        "x": bodies.position[:, 0],
+        "y": bodies.position[:, 1],
+        "z": bodies.position[:, 2],
+        "yaw": (bodies.yaw + np.pi) % (2 * np.pi) - np.pi,
+        "speed": np.hypot(bodies.velocity[:, 0], bodies.velocity[:, 1]),
+    }
+
+
+def _people(step: int, sim: Simulation) -> Rows:
+    p = sim.state.people
+    return {"entity": p.entity, "step": np.full(len(p), step), "clip": p.clip, "phase": p.phase}
+
+
+def _agents(step: int, sim: Simulation, actions: Mapping[str, Any]) -> Rows:
+    state, p, robots = sim.state, sim.state.people, sim.state.robots
+    names = state.names
+    rows: dict[str, Any] = {
+        "entity": p.entity,
+        "step": np.full(len(p), step),
+        "status": p.status,
+        "code": p.reason_code,
+        "reason": p.reason,
+        "pitch": p.pitch,
+        "posture": p.posture,
+        "room": p.room,
+        "place": p.place,
+        "vehicle": p.vehicle_entity,
+        "held_left": p.held[:, 0],
+        "held_right": p.held[:, 1],
+        "cash": p.cash,
+    }
+    if robots is not None:
+        own = {
+            "entity": robots.bodies().entity,
+            "status": robots.action_status,
+            "code": robots.reason_code,
+            "reason": robots.reason,
+        }
+        n = len(robots.names)
+        # A robot has no posture, pocket or hand, and is never indoors.
+        rest = {key: np.zeros(n) for key in rows} | {"step": np.full(n, step)}
+        rest |= {key: np.full(n, -1) for key in ("room", "place")}
+        rows = {key: np.concatenate([values, own.get(key, rest[key])]) for key, values in rows.items()}
+    rows["reason"] = rows["reason"].tolist()
+    return rows | {"action": [action_text(actions[name]) if name in actions else None for name in names]}
+
+
+def _robots(step: int, sim: Simulation) -> tuple[Rows, Rows]:
+    robots = sim.state.robots
+    assert robots is not None
+    entity = robots.bodies().entity
+    felt = [robots.observation(k) for k in range(len(entity))]
+    pose = np.array([f["base_pose"] for f in felt])
+    angles = [f["joint_position"] for f in felt]
+    counts = [len(a) for a in angles]
+    keys = ("x", "y", "z", "qw", "qx", "qy", "qz")
+    bases = {"entity": entity, "step": np.full(len(entity), step)} | {key: pose[:, k] for k, key in enumerate(keys)}
+    joints = {
+        "entity": np.repeat(entity, counts),
+        "joint": np.concatenate([np.arange(n) for n in counts]),
+        "step": np.full(sum(counts), step),
+        "angle": np.concatenate(angles),
+    }
+    return bases, joints
+
+
+def _events(step: int, events: Sequence[Event]) -> Rows:
+    position = np.array([event.position for event in events], np.float64)
+    return {
+        "step": np.full(len(events), step),
+        "time": [event.time for event in events],
+        "kind": [event.kind for event in events],
+        "agent": [event.agent for event in events],
+        "text": [event.text.encode("utf-8", "replace").decode() for event in events],
+        "x": position[:, 0],
+        "y": position[:, 1],
+        "z": position[:, 2],
+        "data": [json.dumps(event.data, sort_keys=True) for event in events],
+    }
+
+
+def _joined(name: str, parts: Sequence[Rows]) -> pa.Table:
+    columns: dict[str, Any] = {}
+    for key, column in TABLES[name].items():
+        pieces: Iterable[Any] = [part[key] for part in parts]
+        if column.kind == pa.string():
+            columns[key] = [value for piece in pieces for value in piece]
+        else:
+            columns[key] = np.concatenate([np.zeros(0, column.kind.to_pandas_dtype()), *pieces])
+    return table_of(name, columns)
