@@ -1,7 +1,10 @@
 """A level or hilly square of sidewalk with walls, and people who stand on it: where robots are tried."""
 
 import numpy as np
+import pytest
 
+from vico.assets.packages import installed
+from vico.assets.robots.packs import GO2_PACKAGE
 from vico.assets.shapes import box
 from vico.sim.bodies import RESIDENT, Bodies
 from vico.world.folder import World
@@ -11,6 +14,16 @@ from vico.world.objects import Objects
 from vico.world.walkable import BLOCKED, SIDEWALK, WalkableMap
 
 HALF = 40.0
+#: With our own models, and with installed packages where there are.
+PACKS = [
+    False,
+    pytest.param(
+        True,
+        marks=pytest.mark.skipif(
+            installed(GO2_PACKAGE) is None, reason="the Go2 package is not installed (vico assets install robots)"
+        ),
+    ),
+]
 
 
 def field(*walls: tuple[float, float, float, float], height: HeightField | None = None) -> World:

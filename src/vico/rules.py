@@ -70,6 +70,7 @@ class ReasonCode(IntEnum):
     WRONG_SIZE = 26
     FOR_ROBOTS_ONLY = 27
     FOR_PEOPLE_ONLY = 28
+    NOT_ABLE = 29
 
     # Refused: the state of one's own body.
     ASLEEP = 40

@@ -7,9 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from robot_field import HALF, field, people
-from vico.assets.packages import installed
-from vico.assets.robots.packs import GO2_PACKAGE
+from robot_field import HALF, PACKS, field, people
 from vico.errors import InputError
 from vico.sim.bodies import Bodies
 from vico.sim.robots import RobotPopulation, RobotStatus
@@ -18,15 +16,6 @@ from vico.world.heights import HeightField
 
 #: Of Go2: lengths of thigh and shin 0.213 m, 0.0955 m from the hip to the leg (Unitree's description).
 LEGS = LegGeometry(0.1934, 0.0465, 0.0955, 0.213, 0.213)
-PACKS = [
-    False,
-    pytest.param(
-        True,
-        marks=pytest.mark.skipif(
-            installed(GO2_PACKAGE) is None, reason="the Go2 package is not installed (vico assets install robots)"
-        ),
-    ),
-]
 
 
 def run(robots: RobotPopulation, seconds: float, bodies: Bodies | None = None) -> None:
@@ -177,7 +166,7 @@ def test_husky_goes_round_a_house() -> None:
 def test_a_goal_nobody_can_reach_is_refused() -> None:
     walls = [(20, 10, 20, 1), (20, -10, 20, 1), (10, 0, 1, 20), (30, 0, 1, 20)]
     robots = RobotPopulation(field(*walls), ["husky"], [[0, 0, 0]], packs=False)
-    assert not robots.go_to(0, (20, 0)) or np.abs(robots._followers[0].path[-1] - [20, 0]).max() > 5
+    assert not robots.go_to(0, (20, 0)) or np.abs(robots.run.followers[0].path[-1] - [20, 0]).max() > 5
 
 
 @pytest.mark.parametrize("packs", PACKS)

@@ -78,16 +78,22 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         self.possible_agents: list[str] = list(self.sim.agents)
         self.agents: list[str] = []
         seeing = {self.possible_agents[i] for i in self.sim.seeing}
-        self._observation_spaces = {
-            name: observation_space(self.config.image if name in seeing else None) for name in self.possible_agents
-        }
         people = self.sim.state.people.names
         robots = self.sim.state.robots
+        numbers = {} if robots is None else {name: k for k, name in enumerate(robots.names)}
+        self._observation_spaces = {
+            name: observation_space(
+                self.config.image if name in seeing else None,
+                robots.readings(numbers[name]) if robots is not None and name in numbers else None,
+            )
+            for name in self.possible_agents
+        }
         self._action_spaces: dict[str, spaces.Dict] = {
             name: action_space(len(self._places), len(people), world.half) for name in people
         }
         if robots is not None:
-            self._action_spaces |= {name: robot_space(robots.control_size(k)) for k, name in enumerate(robots.names)}
+            own = {name: next(iter(robots.action_spaces(k).values())) for name, k in numbers.items()}
+            self._action_spaces |= {name: robot_space(space) for name, space in own.items()}
 
     @property
     def sim(self) -> Simulation:

@@ -17,6 +17,7 @@ from gymnasium import spaces
 from vico.rules import LONGEST_TEXT
 from vico.sim.actions import ACTIONS, PEOPLE_ACTIONS
 from vico.sim.actions.fields import Field
+from vico.sim.robots import ActionSpace, Reading
 
 _PHRASES = ("Hello!", "Good morning.", "Excuse me.", "Thank you.", "See you later.", "Do you need help?")
 
@@ -115,8 +116,16 @@ def _number(low: float, high: float, *shape: int, dtype: Any = np.float64) -> sp
     return spaces.Box(low, high, shape, dtype)
 
 
-def observation_space(image: int | None) -> spaces.Dict:
-    """Return the space of an agent's observations; without pictures where `image` (their side, pixels) is None."""
+def observation_space(image: int | None, readings: Mapping[str, Reading] | None = None) -> spaces.Dict:
+    """Return the space of an agent's observations.
+
+    Parameters
+    ----------
+    image
+        Side of its pictures, pixels; None: it is given none.
+    readings
+        What a robot's sensors give; None for people.
+    """
     far, entity = 1e7, 2**31 - 1
     point = ListSpace(NumberSpace(-far, far))
     message = spaces.Dict(
@@ -149,6 +158,8 @@ def observation_space(image: int | None) -> spaces.Dict:
         "events": ListSpace(message),
         "state": state,
     }
+    if readings is not None:
+        parts["sensors"] = sensor_space(readings)
     if image is not None:
         parts |= {
             "rgb": spaces.Box(0, 255, (image, image, 3), np.uint8),
@@ -192,9 +203,14 @@ def action_space(places: int, people: int, half: float) -> spaces.Dict:
     )
 
 
-def robot_space(size: int) -> spaces.Dict:
-    """Return the space of a robot's actions: its control vector, each number -1..1."""
-    return spaces.Dict({"vector": _number(-1.0, 1.0, size, dtype=np.float32)})
+def robot_space(space: ActionSpace) -> spaces.Dict:
+    """Return the space of a robot's actions: vectors of one of its action spaces, in that one's units and bounds."""
+    return spaces.Dict({"vector": spaces.Box(space.low.astype(np.float32), space.high.astype(np.float32))})
+
+
+def sensor_space(readings: Mapping[str, Reading]) -> spaces.Dict:
+    """Return the space of what a robot feels of itself."""
+    return spaces.Dict({name: spaces.Box(r.low, r.high, r.shape, r.dtype) for name, r in readings.items()})
 
 
 def short_form(action: Any, places: Sequence[str], people: Sequence[str]) -> Any:

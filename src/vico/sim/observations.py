@@ -112,9 +112,9 @@ def observe(
     -------
     tuple
         Observation by name (``rgb``, ``depth``, ``segmentation``, ``extrinsics``, ``intrinsics`` only for those who
-        see; ``pose``, ``events``, ``state`` for everybody), and info by name: ``entities``, kind and name of what
-        the pictures show, by entity; ``action_code``; for residents ``in_view``, what is in view by sight lines
-        (`vico.sim.perception.InView`), the same with and without pictures.
+        see; ``sensors`` for robots; ``pose``, ``events``, ``state`` for everybody), and info by name: ``entities``,
+        kind and name of what the pictures show, by entity; ``action_code``; for residents ``in_view``, what is in
+        view by sight lines (`vico.sim.perception.InView`), the same with and without pictures.
     """
     names = state.names
     stances = poses(state)
@@ -129,6 +129,8 @@ def observe(
             "events": [message.record() for message in state.events.heard[name]],
             "state": state_of(i, state),
         }
+        if i >= len(state.people) and state.robots is not None:
+            found[name]["sensors"] = state.robots.observation(i - len(state.people))
         infos[name] = {"entities": {}, "action_code": found[name]["state"]["action_code"]}
         if i in perceived:
             infos[name]["in_view"] = perceived[i]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.assets.robots import ActionSpace
 from vico.rules import DOOR_REACH, INNER_DOOR_REACH, ActionStatus, ReasonCode
 from vico.sim.avatars import Avatars
 from vico.sim.base import SimulationBase
@@ -23,6 +24,9 @@ from vico.sim.transit import TransitSystem
 from vico.world.folder import World
 from vico.world.mesh import Surface
 from vico.world.model import Entrance, Place
+
+if TYPE_CHECKING:
+    from vico.sim.robots.sensing import Reading
 
 
 class HasArrays(Protocol):
@@ -77,9 +81,18 @@ class RobotSystem(Subsystem, Protocol):
     """
 
     names: list[str]
-    action_status: NDArray[np.int8]
-    reason: NDArray[np.str_]
-    reason_code: NDArray[np.int16]
+
+    @property
+    def action_status(self) -> NDArray[np.int8]:
+        """How each robot's last action went."""
+
+    @property
+    def reason(self) -> NDArray[np.str_]:
+        """Why, in words."""
+
+    @property
+    def reason_code(self) -> NDArray[np.int16]:
+        """Why, as a code."""
 
     def begin(self, who: NDArray[np.bool_] | None = None) -> None:
         """Forget how the last actions went of the robots that act now; None: all of them."""
@@ -100,11 +113,29 @@ class RobotSystem(Subsystem, Protocol):
     def control_period(self, robot: int) -> float:
         """How often the robot's model wants to be controlled, seconds."""
 
-    def control_size(self, robot: int) -> int:
-        """How many numbers the robot's control vector has."""
+    def action_spaces(self, robot: int) -> Mapping[str, ActionSpace]:
+        """Return what the robot can be commanded by, by name; the first is its own."""
 
-    def command(self, robot: int, vector: NDArray[np.float64]) -> None:
-        """Drive the robot by a control vector until the next one comes."""
+    def command(self, robot: int, vector: NDArray[np.float64], space: str = "") -> None:
+        """Have the robot follow a vector of an action space ("": its own) until another command comes."""
+
+    def has_way(self, robot: int, xy: NDArray[np.float64]) -> bool:
+        """Return whether there is a way to a point that is wide enough for the robot."""
+
+    def go_to(self, robot: int, xy: NDArray[np.float64]) -> bool:
+        """Have the robot go to a point; False if there is no way."""
+
+    def follow_body(self, robot: int, entity: int) -> None:
+        """Have the robot keep near a body, wherever that goes outdoors."""
+
+    def stop(self, robot: int) -> None:
+        """Have the robot stand still."""
+
+    def readings(self, robot: int) -> Mapping[str, Reading]:
+        """Return shape and bounds of what the robot's sensors give, by name."""
+
+    def observation(self, robot: int) -> dict[str, NDArray[Any]]:
+        """Return what the robot's sensors give, by name."""
 
     def camera_heights(self) -> NDArray[np.float64]:
         """Height of each robot's camera above the ground it stands on, metres."""

@@ -4,23 +4,79 @@ from __future__ import annotations
 
 import numpy as np
 
+from vico.assets.robots import ActionSpace
 from vico.rules import ReasonCode
-from vico.sim.actions.fields import Field
+from vico.sim.actions.fields import Field, short
 from vico.sim.actions.model import ActionType, Actors, Refusal, Situation, Values
 from vico.sim.simulation_state import RobotSystem, SimulationState
 
 
 def check_control(values: Values, robot: int, state: SimulationState) -> Refusal | None:
-    """Judge a motor command: one number a motor."""
-    width, given = _robots(state).control_size(robot), len(values["vector"])
+    """Judge a vector: it has to be one of the robot's action space."""
+    spaces = _robots(state).action_spaces(robot)
+    name = values.get("space") or next(iter(spaces))
+    if name not in spaces:
+        known = ", ".join(spaces)
+        return Refusal(ReasonCode.BAD_VALUE, f"control: no action space {short(name)}; this robot has {known}")
+    width, given = len(spaces[name]), len(values["vector"])
     if given == width:
         return None
-    return Refusal(ReasonCode.WRONG_SIZE, f"control: {given} numbers; this robot takes {width}")
+    sentence = f"control: {given} numbers; this robot takes {width} for {name!r}: {_described(spaces[name])}"
+    return Refusal(ReasonCode.WRONG_SIZE, sentence)
 
 
 def control(values: Values, robot: int, state: SimulationState) -> None:
-    """Have the motors follow a vector until the next one comes."""
-    _robots(state).command(robot, np.array(values["vector"], np.float64))
+    """Have a robot follow a vector until the next one comes."""
+    _robots(state).command(robot, np.array(values["vector"], np.float64), values.get("space") or "")
+
+
+def check_go_to(values: Values, robot: int, state: SimulationState) -> Refusal | None:
+    """Judge going to a point: the robot drives or walks, and there is a way."""
+    refusal = _refuse_without_velocities("go_to", robot, state)
+    if refusal is None and not _robots(state).has_way(robot, np.array(values["target"][:2])):
+        return Refusal(ReasonCode.BLOCKED, "go_to: no way there that is wide enough for this robot")
+    return refusal
+
+
+def go_to(values: Values, robot: int, state: SimulationState) -> None:
+    """Send a robot to a point."""
+    _robots(state).go_to(robot, np.array(values["target"][:2]))
+
+
+def check_follow(values: Values, robot: int, state: SimulationState) -> Refusal | None:
+    """Judge following somebody."""
+    if values["agent"] not in state.names:
+        return Refusal(ReasonCode.UNKNOWN_AGENT, f"follow: nobody is called {short(values['agent'])}")
+    if values["agent"] == _robots(state).names[robot]:
+        return Refusal(ReasonCode.SELF, "follow: that is yourself")
+    return _refuse_without_velocities("follow", robot, state)
+
+
+def follow(values: Values, robot: int, state: SimulationState) -> None:
+    """Have a robot keep near somebody."""
+    robots, agent = _robots(state), state.names.index(values["agent"])
+    people = len(state.people)
+    entity = state.people.entity[agent] if agent < people else robots.bodies().entity[agent - people]
+    robots.follow_body(robot, int(entity))
+
+
+def stop(values: Values, robot: int, state: SimulationState) -> None:
+    """Have a robot stand still."""
+    _robots(state).stop(robot)
+
+
+def _refuse_without_velocities(action: str, robot: int, state: SimulationState) -> Refusal | None:
+    spaces = _robots(state).action_spaces(robot)
+    if any(space.drives == "velocity" for space in spaces.values()):
+        return None
+    sentence = f"{action}: this robot follows no velocities; it takes control ({', '.join(spaces)})"
+    return Refusal(ReasonCode.NOT_ABLE, sentence)
+
+
+def _described(space: ActionSpace) -> str:
+    units = dict.fromkeys(space.units)
+    entries = ", ".join(space.entries[:4]) + (", ..." if len(space) > 4 else "")
+    return f"{entries} ({', '.join(units)})"
 
 
 def _robots(state: SimulationState) -> RobotSystem:
@@ -31,10 +87,35 @@ def _robots(state: SimulationState) -> RobotSystem:
 ROBOTS = (
     ActionType(
         "control",
-        "Drive a robot's motors by a vector of wheel speeds (rad/s) or joint angles (rad).",
+        "Have a robot follow a vector of one of its action spaces (its own, if none is named) until the next one.",
         control,
         check_control,
-        {"vector": Field("vector")},
+        {"vector": Field("vector"), "space": Field("name", required=False)},
+        when=Situation(0),
+        actors=Actors.ROBOTS,
+    ),
+    ActionType(
+        "go_to",
+        "Send a robot to a point outdoors, round whoever stands in the way.",
+        go_to,
+        check_go_to,
+        {"target": Field("point")},
+        when=Situation(0),
+        actors=Actors.ROBOTS,
+    ),
+    ActionType(
+        "follow",
+        "Have a robot keep near an agent, wherever that goes outdoors.",
+        follow,
+        check_follow,
+        {"agent": Field("name")},
+        when=Situation(0),
+        actors=Actors.ROBOTS,
+    ),
+    ActionType(
+        "stop",
+        "Have a robot stand still.",
+        stop,
         when=Situation(0),
         actors=Actors.ROBOTS,
     ),

@@ -1,6 +1,10 @@
 """Robots: physics bodies with controllers that drive, walk, follow ways and stop for people."""
 
+from vico.assets.robots import ActionSpace
 from vico.sim.robots.path_follower import RobotStatus
-from vico.sim.robots.population import Mode, RobotEvent, RobotPopulation
+from vico.sim.robots.population import RobotPopulation
+from vico.sim.robots.scene import RobotScene
+from vico.sim.robots.sensing import Reading
+from vico.sim.robots.state import Mode, RobotEvent
 
-__all__ = ["Mode", "RobotEvent", "RobotPopulation", "RobotStatus"]
+__all__ = ["ActionSpace", "Mode", "Reading", "RobotEvent", "RobotPopulation", "RobotScene", "RobotStatus"]

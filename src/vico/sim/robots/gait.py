@@ -8,17 +8,16 @@ should (Raibert, "Legged robots that balance", 1986). Leg lengths on the ground 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import FourLegs, RobotModel
-from vico.exact import apply_matrix
 from vico.io.compiled import compiled
-from vico.sim.physics.engine import Base
+from vico.sim.robots.motion import Motion
+from vico.sim.robots.tracking import planar_motion
 
-PERIOD = 0.02
 #: Seconds a cycle lasts and the share of it a foot is on the ground.
 CYCLE, STANCE = 0.36, 0.55
 #: Height of the hips, and how high a foot swings, metres.
@@ -109,6 +108,26 @@ def trot(memory, command, moving, tilt, legs, dt):  # type: ignore[no-untyped-de
     return out
 
 
+@compiled
+def _trot_all(geometry, limits, motion, command, memory, dt):  # type: ignore[no-untyped-def]
+    """Advance the feet of all robots and return their joint angles, shape ``(k, 12)``."""
+    rotation, velocity, angular_velocity_body = motion
+    low, high = limits
+    out = np.empty((len(command), 12))
+    for k in range(len(command)):
+        r, w = rotation[k], angular_velocity_body[k]
+        smoothed = memory[k, _MOTION:_MEMORY]
+        moving = planar_motion(r, velocity[k], w)
+        for n in range(3):
+            smoothed[n] += (moving[n] - smoothed[n]) * (dt / 0.1)
+        roll = math.atan2(r[2, 1], r[2, 2])
+        pitch = -math.asin(min(max(r[2, 0], -1.0), 1.0))
+        wanted = trot(memory[k], command[k], smoothed, (roll, pitch, w[0], w[1]), geometry, dt)
+        for n in range(12):
+            out[k, n] = min(max(wanted[n], low[n]), high[n])
+    return out
+
+
 class Trot:
     """Our own gait for a model without a policy."""
 
@@ -117,29 +136,12 @@ class Trot:
 
     def __init__(self, model: RobotModel) -> None:
         assert isinstance(model.controller, FourLegs)
-        self._low, self._high = model.motor_limits
+        self._limits = model.motor_limits
         self._legs = LegGeometry.of(model.controller)
+        self._period = model.control_period
 
-    def targets(
-        self,
-        base: Base,
-        angles: NDArray[np.float64],
-        speeds: NDArray[np.float64],
-        command: NDArray[np.float64],
-        memory: NDArray[np.float64],
-    ) -> NDArray[Any]:
-        """Joint angles to hold for the next `PERIOD` seconds; parameters as of the policy's."""
-        local = apply_matrix(base.velocity, base.rotation.T)
-        moving = memory[_MOTION:_MEMORY]
-        moving += (np.array([local[0], local[1], base.angular_velocity_body[2]]) - moving) * (PERIOD / 0.1)
-        roll = math.atan2(base.rotation[2, 1], base.rotation[2, 2])
-        pitch = -math.asin(min(max(base.rotation[2, 0], -1.0), 1.0))
-        wanted = trot(
-            memory,
-            command,
-            moving,
-            (roll, pitch, float(base.angular_velocity_body[0]), float(base.angular_velocity_body[1])),
-            self._legs,
-            PERIOD,
-        )
-        return np.clip(wanted, self._low, self._high)
+    def targets(self, motion: Motion, command: NDArray[np.float64], memory: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Joint angles to hold until the next call, shape ``(k, 12)``; parameters as of a controller's."""
+        moving = (motion.rotation, motion.velocity, motion.angular_velocity_body)
+        found: NDArray[np.float64] = _trot_all(self._legs, self._limits, moving, command, memory, self._period)
+        return found

@@ -38,8 +38,6 @@ class PathFollower:
 
     def __init__(self, model: RobotModel) -> None:
         self._model = model
-        #: Clearance a cell has to have for this robot, metres.
-        self.room = model.half_width + 0.12
         self.path = _NO_PATH
         self.status = RobotStatus.IDLE
         self.wants_detour = False

@@ -2,33 +2,36 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import FourLegs, RobotModel
 from vico.io.compiled import compiled
-from vico.sim.physics.engine import Base
+from vico.sim.robots.motion import Motion
 
 # Scales of the observation and its limit, from the policy's deployment configuration.
 _SPIN, _JOINT_SPEED, _LIMIT = 0.25, 0.05, 100.0
-#: Seconds between two evaluations.
-PERIOD = 0.02
 
 
 @compiled
 def _dense(inputs, weights, bias, last):  # type: ignore[no-untyped-def]
-    """One layer, summed input by input: vectorised over outputs, and in one order whatever the machine's BLAS."""
-    out = bias.copy()
-    for j in range(len(inputs)):
-        x = inputs[j]
-        for i in range(len(out)):
-            out[i] += weights[j, i] * x
+    """One layer of all robots, shape ``(k, outputs)``.
+
+    Summed input by input: vectorised over outputs, in one order whatever the machine's BLAS and however many robots.
+    """
+    out = np.empty((len(inputs), len(bias)), np.float32)
+    for k in range(len(inputs)):
+        out[k] = bias
+    for j in range(inputs.shape[1]):
+        for k in range(len(inputs)):
+            x = inputs[k, j]
+            for i in range(len(bias)):
+                out[k, i] += weights[j, i] * x
     if not last:
-        for i in range(len(out)):
-            if out[i] < 0.0:
-                out[i] = np.float32(np.expm1(out[i]))
+        for k in range(len(inputs)):
+            for i in range(len(bias)):
+                if out[k, i] < 0.0:
+                    out[k, i] = np.float32(np.expm1(out[k, i]))
     return out
 
 
@@ -38,8 +41,9 @@ _ANGULAR_VELOCITY, _GRAVITY, _COMMAND, _ANGLES, _SPEEDS, _ACTION, _OBSERVED = 0,
 
 
 @compiled
-def _observation(angular_velocity_body, rotation, command, angles, speeds, action, order, rest):  # type: ignore[no-untyped-def]
+def _observation(angular_velocity_body, rotation, command, joints, action, order, rest):  # type: ignore[no-untyped-def]
     """Return what the policy sees, scaled, shape ``(45,)``."""
+    angles, speeds = joints
     seen = np.empty(_OBSERVED)
     for k in range(3):
         seen[_ANGULAR_VELOCITY + k] = angular_velocity_body[k] * _SPIN
@@ -53,16 +57,32 @@ def _observation(angular_velocity_body, rotation, command, angles, speeds, actio
 
 
 @compiled
-def _evaluate(layers, seen, order, rest, scale, memory):  # type: ignore[no-untyped-def]
-    """Return joint targets in the model's order; `memory` becomes the action."""
+def _evaluate(layers, seen, pose, memory):  # type: ignore[no-untyped-def]
+    """Return joint targets in the model's order, shape ``(k, 12)``; `memory` becomes the actions."""
+    order, rest, scale = pose
     x = np.minimum(np.maximum(seen, -_LIMIT), _LIMIT).astype(np.float32)
     for index in range(len(layers)):
         x = _dense(x, layers[index][0], layers[index][1], index == len(layers) - 1)
-    out = np.empty(12)
-    for k in range(12):
-        memory[k] = min(max(np.float64(x[k]), -_LIMIT), _LIMIT)
-        out[order[k]] = rest[k] + memory[k] * scale[k]
+    out = np.empty((len(seen), 12))
+    for robot in range(len(seen)):
+        for k in range(12):
+            memory[robot, k] = min(max(np.float64(x[robot, k]), -_LIMIT), _LIMIT)
+            out[robot, order[k]] = rest[k] + memory[robot, k] * scale[k]
     return out
+
+
+@compiled
+def _observe_all(motion, command, joints, memory, pose):  # type: ignore[no-untyped-def]
+    """Return what the policy sees of all robots, shape ``(k, 45)``."""
+    rotation, angular_velocity_body = motion
+    angles, speeds = joints
+    order, rest, _ = pose
+    seen = np.empty((len(command), _OBSERVED))
+    for k in range(len(command)):
+        seen[k] = _observation(
+            angular_velocity_body[k], rotation[k], command[k], (angles[k], speeds[k]), memory[k], order, rest
+        )
+    return seen
 
 
 class WalkingPolicy:
@@ -81,32 +101,25 @@ class WalkingPolicy:
         assert isinstance(model.controller, FourLegs)
         policy = model.controller.policy
         assert policy is not None
-        self._policy = policy
+        self._pose = (policy.order, policy.rest, policy.scale)
         self._layers = tuple(
             (np.array(w.T, np.float32, order="C"), np.array(b, np.float32))
             for w, b in zip(policy.weights, policy.biases, strict=True)
         )
 
-    def targets(
-        self,
-        base: Base,
-        angles: NDArray[np.float64],
-        speeds: NDArray[np.float64],
-        command: NDArray[np.float64],
-        memory: NDArray[np.float64],
-    ) -> NDArray[Any]:
-        """Joint angles to hold for the next `PERIOD` seconds.
+    def targets(self, motion: Motion, command: NDArray[np.float64], memory: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Joint angles to hold until the next call, shape ``(k, 12)``; all robots in one batch.
 
         Parameters
         ----------
-        base, angles, speeds
-            The robot's motion, joints in the model's order.
+        motion
+            Of the robots, row = robot.
         command
-            vx, vy, metres a second in the base's frame, and radians a second to the left, shape ``(3,)``.
+            vx, vy, metres a second in the base's frame, and radians a second to the left, shape ``(k, 3)``.
         memory
-            The last action, shape ``(12,)``; updated in place.
+            The last actions, shape ``(k, 12)``; updated in place.
         """
-        p = self._policy
-        seen = _observation(base.angular_velocity_body, base.rotation, command, angles, speeds, memory, p.order, p.rest)
-        found: NDArray[Any] = _evaluate(self._layers, seen, p.order, p.rest, p.scale, memory)
+        bases, joints = (motion.rotation, motion.angular_velocity_body), (motion.angles, motion.speeds)
+        seen = _observe_all(bases, command, joints, memory, self._pose)
+        found: NDArray[np.float64] = _evaluate(self._layers, seen, self._pose, memory)
         return found

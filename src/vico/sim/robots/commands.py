@@ -1,0 +1,103 @@
+"""What robots can be told: a vector in one of their action spaces, a place to go to, whom to follow, to stop."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vico.errors import InputError
+from vico.sim.robots.state import Mode, RobotRun
+from vico.sim.robots.ways import way_to
+
+
+def command(run: RobotRun, robot: int, vector: ArrayLike, space: str = "") -> None:
+    """Follow a vector until another command comes.
+
+    Parameters
+    ----------
+    vector
+        One number an entry of the space, in its units; clipped to its bounds.
+    space
+        Name of one of the model's action spaces; "" for its own.
+
+    Raises
+    ------
+    InputError
+        If there is no such space, or the vector is of another size or not finite.
+    """
+    model, values = run.scene.models[robot], np.asarray(vector, np.float64)
+    name = space or model.default_space
+    if name not in model.action_spaces:
+        known = ", ".join(model.action_spaces)
+        raise InputError(f"control: {model.title} has no action space {name!r}; choose among {known}")
+    chosen = model.action_spaces[name]
+    if values.shape != (len(chosen),) or not np.isfinite(values).all():
+        raise InputError(f"control: {model.title} takes {len(chosen)} finite numbers, not {values.tolist()}")
+    run.arrays.command[robot] = 0.0
+    run.arrays.command[robot, : len(values)] = np.clip(values, chosen.low, chosen.high)
+    run.set_mode(robot, Mode.MOTORS if chosen.drives == "motors" else Mode.VELOCITY)
+
+
+def drive(run: RobotRun, robot: int, velocity: ArrayLike) -> None:
+    """Follow a velocity (vx, vy, wz): metres a second in the base's frame, radians a second to the left.
+
+    Raises
+    ------
+    InputError
+        If the robot follows no velocities, or these are not three finite numbers.
+    """
+    model = run.scene.models[robot]
+    spaces = [name for name, space in model.action_spaces.items() if space.drives == "velocity"]
+    if not spaces:
+        raise InputError(f"drive: {model.title} follows no velocities; command its motors")
+    command(run, robot, velocity, spaces[0])
+
+
+def stop(run: RobotRun, robot: int) -> None:
+    """Stand still."""
+    run.set_mode(robot, Mode.IDLE)
+
+
+def go_to(run: RobotRun, robot: int, goal: NDArray[np.float64]) -> bool:
+    """Take a way to a point, ENU metres; return False, and change nothing, if there is none."""
+    path = way_to(run, robot, goal)
+    if path is None:
+        return False
+    take(run, robot, path)
+    return True
+
+
+def take(run: RobotRun, robot: int, path: ArrayLike) -> None:
+    """Follow a polyline, ENU metres, shape ``(k, 2)``, ``k >= 2``.
+
+    Raises
+    ------
+    InputError
+        If it is none, or the robot follows no velocities.
+    """
+    points = np.ascontiguousarray(path, np.float64)
+    if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not np.isfinite(points).all():
+        raise InputError(f"follow: a path is two or more finite points x, y, not {points.shape}")
+    _need_velocities(run, robot, "follow")
+    run.followers[robot].begin(points)
+    run.set_mode(robot, Mode.ROUTE)
+
+
+def follow_body(run: RobotRun, robot: int, entity: int) -> None:
+    """Keep near a body, wherever it goes outdoors.
+
+    Raises
+    ------
+    InputError
+        If the robot follows no velocities.
+    """
+    _need_velocities(run, robot, "follow")
+    run.followers[robot].end()
+    run.set_mode(robot, Mode.FOLLOW)
+    run.arrays.leader[robot] = entity
+
+
+def _need_velocities(run: RobotRun, robot: int, what: str) -> None:
+    model = run.scene.models[robot]
+    if model.velocity_limit is None:
+        raise InputError(f"{what}: {model.title} follows no velocities; command its motors")

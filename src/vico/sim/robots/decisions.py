@@ -1,0 +1,118 @@
+"""What each robot does for the next sub-step: the velocity that its controller is to follow."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.sim.bodies import Bodies
+from vico.sim.robots import commands
+from vico.sim.robots.navigation import GAP, SIGHT, neighbours_of
+from vico.sim.robots.path_follower import RobotStatus
+from vico.sim.robots.state import Mode, RobotRun
+from vico.sim.robots.ways import next_errand, way_to
+
+# What the states' arrays hold: members of an enumeration are slow to look up in the control loop.
+_IDLE, _VELOCITY, _MOTORS, _ROUTE, _FOLLOW = (int(mode) for mode in Mode)
+_FALLEN = int(RobotStatus.FALLEN)
+#: Seconds a robot on errands rests between two.
+_REST = 5.0
+#: Metres a robot keeps from whom it follows, and how far that one has to go for another way to be found.
+_FOLLOW_GAP, _FOLLOW_DRIFT = 1.2, 1.0
+
+
+def decide(run: RobotRun, dt: float, everyone: Bodies, *, errands: bool) -> None:
+    """Set what every robot follows for the next `dt` seconds.
+
+    Parameters
+    ----------
+    everyone
+        All bodies outdoors, the robots' among them.
+    errands
+        Robots that nobody commands go from place to place.
+    """
+    arrays = run.arrays
+    arrays.velocity[:] = 0.0
+    for robot, mode in enumerate(arrays.mode.tolist()):
+        if arrays.status[robot] == _FALLEN or mode == _MOTORS:
+            continue
+        if mode == _IDLE:
+            if errands:
+                _rest(run, robot, dt)
+            continue
+        others = neighbours_of(everyone, int(run.entities[robot]), run.position(robot), SIGHT + 4)
+        if mode == _VELOCITY:
+            _hold_velocity(run, robot, others)
+        elif mode == _ROUTE:
+            _keep_to_way(run, robot, others, dt)
+        elif mode == _FOLLOW:
+            _keep_near(run, robot, others, dt, everyone)
+
+
+def _rest(run: RobotRun, robot: int, dt: float) -> None:
+    """Let time pass until the next errand."""
+    arrays = run.arrays
+    if run.scene.models[robot].velocity_limit is None:
+        return
+    arrays.rest[robot] += dt
+    if arrays.rest[robot] > _REST or arrays.errand[robot] == 0:
+        arrays.rest[robot] = 0.0
+        path = next_errand(run, robot)
+        if path is not None:
+            commands.take(run, robot, path)
+
+
+def _hold_velocity(run: RobotRun, robot: int, others: NDArray[np.void]) -> None:
+    """Follow the velocity asked for, but drive into nobody ahead."""
+    velocity, base = run.arrays.velocity[robot], run.engine.base(robot)
+    velocity[:] = run.arrays.command[robot, :3]
+    run.arrays.status[robot] = RobotStatus.MOVING
+    if velocity[0] > 0.0 and run.followers[robot].free(base, others, float(velocity[0]))[0] < GAP:
+        velocity[0] = 0.0
+        run.arrays.status[robot] = RobotStatus.WAITING
+
+
+def _keep_to_way(run: RobotRun, robot: int, others: NDArray[np.void], dt: float) -> None:
+    """Follow the way, and say when it ends or can't be gone."""
+    status = _steer(run, robot, others, dt)
+    run.arrays.status[robot] = status
+    if status in (RobotStatus.ARRIVED, RobotStatus.BLOCKED):
+        run.note(robot, "arrived" if status == RobotStatus.ARRIVED else "blocked")
+        run.arrays.mode[robot] = Mode.IDLE
+        run.followers[robot].end()
+        run.arrays.rest[robot] = 0.0
+
+
+def _steer(run: RobotRun, robot: int, others: NDArray[np.void], dt: float) -> RobotStatus:
+    """Steer along the way, and round who stands in it; return how that goes."""
+    follower, base = run.followers[robot], run.engine.base(robot)
+    run.arrays.velocity[robot] = follower.steer(base, others, dt)
+    if follower.wants_detour:
+        follower.detoured(way_to(run, robot, follower.path[-1], follower.closed(base, others)))
+    return follower.status
+
+
+def _keep_near(run: RobotRun, robot: int, others: NDArray[np.void], dt: float, everyone: Bodies) -> None:
+    """Go where the leader is; wait near it, and where it can't be found."""
+    follower, arrays = run.followers[robot], run.arrays
+    found = np.flatnonzero(everyone.entity == arrays.leader[robot])
+    arrays.status[robot] = RobotStatus.WAITING
+    if not len(found):
+        follower.end()
+        return
+    leader = everyone.position[found[0], :2]
+    near = run.scene.models[robot].half_length + _FOLLOW_GAP
+    if np.hypot(*(leader - run.position(robot)[:2])) < near:
+        follower.end()
+        return
+    if not len(follower.path) or np.hypot(*(follower.path[-1] - leader)) > _FOLLOW_DRIFT:
+        path = way_to(run, robot, leader)
+        if path is None:
+            follower.end()
+            return
+        follower.begin(path)
+    status = _steer(run, robot, others, dt)
+    arrays.status[robot] = status
+    if status in (RobotStatus.ARRIVED, RobotStatus.BLOCKED):
+        follower.end()
+        arrays.status[robot] = RobotStatus.WAITING

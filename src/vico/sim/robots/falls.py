@@ -1,0 +1,46 @@
+"""When a robot counts as fallen, as up again, and as lost."""
+
+from __future__ import annotations
+
+from vico.sim.robots.controller import MotorController
+from vico.sim.robots.path_follower import RobotStatus
+from vico.sim.robots.state import Mode, RobotRun
+
+#: Seconds a robot has to be tilted to count as fallen; cosine of the tilt at which it may be up again.
+_FALL_TIME, _UPRIGHT = 0.3, 0.95
+#: Seconds after which a robot that can't get up is left lying.
+_GIVE_UP = 30.0
+
+
+def watch_falls(run: RobotRun, dt: float) -> None:
+    """Note who fell, who is up again and who is lost, `dt` seconds after this was last asked."""
+    for group in run.scene.groups:
+        for robot in group.robots.tolist():
+            limit = group.model.fallen_below
+            if run.arrays.status[robot] == RobotStatus.FALLEN:
+                _watch_lying(run, robot, group.controller, dt)
+            elif limit is not None:
+                tilted = float(run.engine.base(robot).rotation[2, 2]) < limit
+                _watch_standing(run, robot, dt if tilted else 0.0)
+
+
+def _watch_standing(run: RobotRun, robot: int, tilted: float) -> None:
+    arrays = run.arrays
+    arrays.lying[robot] = arrays.lying[robot] + tilted if tilted else 0.0
+    if arrays.lying[robot] > _FALL_TIME:
+        arrays.status[robot] = RobotStatus.FALLEN
+        arrays.lying[robot] = 0.0
+        run.note(robot, "fallen")
+
+
+def _watch_lying(run: RobotRun, robot: int, controller: MotorController, dt: float) -> None:
+    arrays, base = run.arrays, run.engine.base(robot)
+    lying = float(arrays.lying[robot])
+    above = float(base.position[2]) - float(run.scene.world.height(base.position))
+    upright = float(base.rotation[2, 2]) > _UPRIGHT
+    if upright and controller.stands(lying, base, run.engine.joints(robot)[0], above):
+        arrays.status[robot] = RobotStatus.MOVING if arrays.mode[robot] != Mode.IDLE else RobotStatus.IDLE
+        arrays.lying[robot] = 0.0
+        run.note(robot, "recovered")
+    elif lying - dt <= _GIVE_UP < lying:
+        run.note(robot, "lost")

@@ -1,0 +1,121 @@
+"""What is fixed about the robots of a run: built once a world and kinds of robots, shared by all its simulations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.assets.robots import TICK, RobotModel, robot_model
+from vico.sim.physics import MujocoEngine, PhysicsEngine
+from vico.sim.physics.engine import StaticScene
+from vico.sim.physics.surroundings import static_scene_of
+from vico.sim.robots.controller import MotorController
+from vico.sim.robots.controllers import controller_for
+from vico.world.folder import World
+from vico.world.routing import Router
+
+#: Metres a robot leaves to walls on its way.
+_WALL_GAP = 0.12
+
+
+@dataclass(frozen=True)
+class Group:
+    """Robots of one kind: their controller is asked about all of them at once.
+
+    Attributes
+    ----------
+    model
+        Of the first; they differ in their own action space at most.
+    controller
+        What turns velocities into motor targets.
+    robots
+        Their indices, int64, shape ``(k,)``.
+    period
+        Ticks of 0.01 s between two commands of their motors.
+    """
+
+    model: RobotModel
+    controller: MotorController
+    robots: NDArray[np.int64]
+    period: int
+
+
+class RobotScene:
+    """World, models and controllers of a run's robots. Nothing in it changes.
+
+    Parameters
+    ----------
+    world
+        Where they are.
+    kinds
+        Names of their models, in order, as `vico.assets.robots.robot_model` takes them.
+    packs
+        Use installed packages' models; False: our own alone.
+    router
+        Finds ways; made from the world's walkable map when it is first needed if it is not given.
+
+    Attributes
+    ----------
+    models
+        One a robot.
+    groups
+        The robots by kind.
+
+    Raises
+    ------
+    InputError
+        If a model is not known.
+    """
+
+    def __init__(self, world: World, kinds: Sequence[str], *, packs: bool = True, router: Router | None = None) -> None:
+        self.world = world
+        self.kinds = tuple(kinds)
+        self.models = tuple(robot_model(kind, packs=packs) for kind in kinds)
+        self.groups = _groups(self.models)
+        self._router = router
+        self._narrow: dict[float, NDArray[np.bool_]] = {}
+
+    def __len__(self) -> int:
+        return len(self.models)
+
+    def engine(self, places: NDArray[np.float64]) -> PhysicsEngine:
+        """Return physics in which the robots stand at `places`: x, y, yaw, shape ``(n, 3)``."""
+        return MujocoEngine(self._static, self.models, places)
+
+    @cached_property
+    def _static(self) -> StaticScene:
+        return static_scene_of(self.world)
+
+    @property
+    def router(self) -> Router:
+        """Finds ways on the world's walkable map."""
+        if self._router is None:
+            self._router = Router(self.world.walkable)
+        return self._router
+
+    @cached_property
+    def goals(self) -> NDArray[np.float64]:
+        """Where the world's places are, ENU metres, shape ``(places, 2)``."""
+        return np.array([place.position[:2] for place in self.world.places]).reshape(-1, 2)
+
+    def narrow(self, robot: int) -> NDArray[np.bool_]:
+        """Return the cells of the walkable map that are too narrow for a robot; not to be written to."""
+        room = self.models[robot].half_width + _WALL_GAP
+        if room not in self._narrow:
+            self._narrow[room] = self.world.walkable.clearance < room
+        return self._narrow[room]
+
+
+def _groups(models: Sequence[RobotModel]) -> tuple[Group, ...]:
+    members: dict[str, list[int]] = {}
+    for robot, model in enumerate(models):
+        members.setdefault(model.name, []).append(robot)
+    return tuple(
+        Group(model, controller_for(model), np.array(robots, np.int64), round(model.control_period / TICK))
+        for robots in members.values()
+        for model in (models[robots[0]],)
+    )

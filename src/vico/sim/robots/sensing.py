@@ -1,0 +1,62 @@
+"""What robots feel of themselves: the sensors that their models name, and the shapes of what those give."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.assets.robots import RobotModel
+from vico.sim.robots.path_follower import RobotStatus
+from vico.sim.robots.state import RobotRun
+
+
+class Reading(NamedTuple):
+    """What one reading of a sensor looks like: an array of a shape, with bounds."""
+
+    shape: tuple[int, ...]
+    low: float
+    high: float
+    dtype: Any = np.float64
+
+
+def readings_of(model: RobotModel) -> dict[str, Reading]:
+    """Return what a kind of robot feels, by name; see `observation`."""
+    s, endless = model.sensors, float("inf")
+    found = {"fallen": Reading((1,), 0, 1, np.int8)}
+    if s.joints:
+        found["joint_position"] = found["joint_velocity"] = Reading((len(model.joints),), -endless, endless)
+    if s.imu:
+        found["angular_velocity"] = Reading((3,), -endless, endless)
+        found["gravity"] = Reading((3,), -1.001, 1.001)
+    if s.odometry:
+        found["base_pose"] = Reading((7,), -endless, endless)
+        found["base_velocity"] = Reading((3,), -endless, endless)
+    return found
+
+
+def observation(run: RobotRun, robot: int) -> dict[str, NDArray[Any]]:
+    """Return what a robot feels of itself, as `readings_of` its model says.
+
+    Returns
+    -------
+    dict
+        ``fallen`` (0 or 1); of joints ``joint_position`` and ``joint_velocity`` (rad, rad/s, order of the model's
+        joints); of the IMU ``angular_velocity`` (rad/s) and ``gravity`` (its direction), in the base's frame; of
+        odometry ``base_pose`` (x, y, z, quaternion w, x, y, z) and ``base_velocity`` (ENU, m/s).
+    """
+    s, base = run.scene.models[robot].sensors, run.engine.base(robot)
+    found: dict[str, NDArray[Any]] = {
+        "fallen": np.array([run.arrays.status[robot] == RobotStatus.FALLEN], np.int8),
+    }
+    if s.joints:
+        angles, speeds = run.engine.joints(robot)
+        found["joint_position"], found["joint_velocity"] = np.array(angles), np.array(speeds)
+    if s.imu:
+        found["angular_velocity"] = base.angular_velocity_body.copy()
+        found["gravity"] = -base.rotation[2]
+    if s.odometry:
+        found["base_pose"] = np.concatenate([base.position, base.quaternion])
+        found["base_velocity"] = base.velocity.copy()
+    return found

@@ -1,0 +1,207 @@
+"""Everything about the robots of a run that changes, beside the physics: arrays, and the ways they follow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.errors import SchemaError
+from vico.seeds import rng
+from vico.sim.bodies import Bodies
+from vico.sim.physics import PhysicsEngine
+from vico.sim.robots.path_follower import PathFollower, RobotStatus
+from vico.sim.robots.scene import RobotScene
+from vico.sim.state import REASON_LENGTH
+
+
+class Mode(IntEnum):
+    """Who decides what a robot does."""
+
+    IDLE, VELOCITY, MOTORS, ROUTE, FOLLOW = range(5)
+
+
+#: What can happen to a robot.
+NOTES = ("arrived", "blocked", "fallen", "recovered", "lost")
+
+
+@dataclass(frozen=True)
+class RobotEvent:
+    """Something that happened to a robot: `kind` is one of `NOTES`.
+
+    Attributes
+    ----------
+    position
+        Of the robot's base when it is asked, world frame, metres, float64, shape ``(3,)``.
+    """
+
+    robot: int
+    kind: str
+    position: NDArray[np.float64]
+
+
+@dataclass
+class RobotArrays:
+    """What is known of each robot; row = robot.
+
+    Attributes
+    ----------
+    mode
+        A `Mode`, int8, shape ``(n,)``.
+    status
+        A `RobotStatus`, int8, shape ``(n,)``.
+    action_status, reason, reason_code
+        How its last action went and why, as `vico.rules.ActionStatus`, in words, and as `vico.rules.ReasonCode`;
+        int8, text and int16, shape ``(n,)``.
+    command
+        The vector it was commanded by: motor targets or a velocity, by its mode; float64, shape ``(n, widest)``.
+    velocity
+        What its controller follows until the next decision, vx, vy, wz, float64, shape ``(n, 3)``.
+    leader
+        Entity it follows, 0 for nobody, int32, shape ``(n,)``.
+    lying
+        Seconds it has been tilted, or has lain fallen, float64, shape ``(n,)``.
+    errand
+        How many errands it was sent on, int64, shape ``(n,)``.
+    rest
+        Seconds it has had nothing to do, float64, shape ``(n,)``.
+    tick
+        Hundredths of a second since the start, int64, shape ``(1,)``.
+    """
+
+    mode: NDArray[np.int8]
+    status: NDArray[np.int8]
+    action_status: NDArray[np.int8]
+    reason: NDArray[np.str_]
+    reason_code: NDArray[np.int16]
+    command: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    leader: NDArray[np.int32]
+    lying: NDArray[np.float64]
+    errand: NDArray[np.int64]
+    rest: NDArray[np.float64]
+    tick: NDArray[np.int64]
+
+    @classmethod
+    def idle(cls, scene: RobotScene) -> RobotArrays:
+        """Robots that nobody has commanded yet."""
+        n = len(scene)
+        sizes = [len(space) for model in scene.models for space in model.action_spaces.values()]
+        return cls(
+            mode=np.zeros(n, np.int8),
+            status=np.zeros(n, np.int8),
+            action_status=np.zeros(n, np.int8),
+            reason=np.full(n, "", f"<U{REASON_LENGTH}"),
+            reason_code=np.zeros(n, np.int16),
+            command=np.zeros((n, max(sizes, default=0))),
+            velocity=np.zeros((n, 3)),
+            leader=np.zeros(n, np.int32),
+            lying=np.zeros(n),
+            errand=np.zeros(n, np.int64),
+            rest=np.zeros(n),
+            tick=np.zeros(1, np.int64),
+        )
+
+
+@dataclass
+class RobotRun:
+    """The robots of one run: what is fixed, their physics, and all that changes.
+
+    Attributes
+    ----------
+    scene
+        World, models and controllers; shared, never changes.
+    engine
+        Their physics.
+    entities
+        Entity of each, int32, shape ``(n,)``.
+    seed
+        Decides errands.
+    arrays
+        What is known of each robot.
+    memory
+        What each group's controller remembers, float64, shape ``(k, controller.memory)``.
+    followers
+        Take each robot along its way.
+    pending
+        Robot, and index into `NOTES`, of what happened since it was last asked.
+    """
+
+    scene: RobotScene
+    engine: PhysicsEngine
+    entities: NDArray[np.int32]
+    seed: int
+    arrays: RobotArrays
+    memory: list[NDArray[np.float64]] = field(init=False)
+    followers: list[PathFollower] = field(init=False)
+    pending: list[tuple[int, int]] = field(default_factory=list)
+    known_bodies: Bodies | None = None
+
+    def __post_init__(self) -> None:
+        self.memory = [np.zeros((len(group.robots), group.controller.memory)) for group in self.scene.groups]
+        self.followers = [PathFollower(model) for model in self.scene.models]
+
+    def position(self, robot: int) -> NDArray[np.float64]:
+        """Origin of a robot's base, ENU metres, shape ``(3,)``."""
+        return self.engine.base(robot).position
+
+    def note(self, robot: int, kind: str) -> None:
+        """Keep that something happened to a robot."""
+        self.pending.append((robot, NOTES.index(kind)))
+
+    def set_mode(self, robot: int, mode: Mode) -> None:
+        """Have somebody else decide what a robot does; a fallen one stays fallen."""
+        a = self.arrays
+        a.mode[robot] = mode
+        if a.status[robot] != RobotStatus.FALLEN:
+            a.status[robot] = RobotStatus.IDLE if mode == Mode.IDLE else RobotStatus.MOVING
+        if mode != Mode.FOLLOW:
+            a.leader[robot] = 0
+        if mode not in (Mode.ROUTE, Mode.FOLLOW):
+            self.followers[robot].end()
+
+    def errand_stream(self, robot: int) -> np.random.Generator:
+        """Random stream of a robot's errand under way."""
+        return rng(self.seed, "errand", robot, int(self.arrays.errand[robot]))
+
+    # Saved and restored.
+
+    def saved(self) -> dict[str, NDArray[Any]]:
+        """Every number that decides the future, copied."""
+        paths = [follower.path for follower in self.followers]
+        found = {f"engine_{key}": value for key, value in self.engine.arrays().items()}
+        found |= {name: value.copy() for name, value in vars(self.arrays).items()}
+        found |= {f"memory_{k}": memory.copy() for k, memory in enumerate(self.memory)}
+        numbers = [follower.numbers() for follower in self.followers]
+        return found | {
+            "pending": np.array(self.pending, np.int64).reshape(-1, 2),
+            "followers": np.array(numbers).reshape(len(self.followers), -1),
+            "path_ends": np.cumsum([len(path) for path in paths], dtype=np.int64),
+            "paths": np.concatenate([np.zeros((0, 2)), *paths]),
+        }
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go back to what `saved` returned.
+
+        Raises
+        ------
+        SchemaError
+            If it belongs to other robots.
+        """
+        mine: dict[str, NDArray[Any]] = dict(vars(self.arrays))
+        mine |= {f"memory_{k}": memory for k, memory in enumerate(self.memory)}
+        for name, value in mine.items():
+            if name not in arrays or arrays[name].shape != value.shape:
+                raise SchemaError("robots: the saved state belongs to other robots; start with the same ones")
+        self.engine.restore({key[7:]: value for key, value in arrays.items() if key.startswith("engine_")})
+        for name, value in mine.items():
+            value[...] = arrays[name]
+        self.pending = [(int(a), int(b)) for a, b in arrays["pending"]]
+        starts = np.concatenate([[0], arrays["path_ends"]]).astype(int)
+        for i, follower in enumerate(self.followers):
+            follower.restore(arrays["paths"][starts[i] : starts[i + 1]], arrays["followers"][i])
+        self.known_bodies = None
