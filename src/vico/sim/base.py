@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError
 from vico.sim.indoor import Indoor
+from vico.sim.robots.scene import RobotScene
 from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.transit import BusPlan, plan_buses
 from vico.world.folder import World
@@ -18,6 +20,8 @@ from vico.world.routing import Router
 
 #: Whole ways that are remembered, and plans of buses: more than a community asks for at its start.
 _KEPT = 4096
+#: Robots' scenes that are kept: each holds a compiled model.
+_SCENES = 4
 
 
 class SimulationBase:
@@ -35,6 +39,7 @@ class SimulationBase:
         self.world = world
         self._ways: dict[tuple[int, int], NDArray[np.float64] | None] = {}
         self._bus_plans: dict[int, BusPlan] = {}
+        self._robot_scenes: dict[tuple[str, ...], RobotScene] = {}
 
     @classmethod
     def of(cls, world: World) -> SimulationBase:
@@ -106,6 +111,14 @@ class SimulationBase:
                 self._bus_plans.clear()
             self._bus_plans[second] = plan_buses(self.world.transit, self.world.lanes, float(second))
         return self._bus_plans[second]
+
+    def robot_scene(self, kinds: Sequence[str]) -> RobotScene:
+        """Return what is fixed about robots of some kinds, in their order."""
+        if tuple(kinds) not in self._robot_scenes:
+            if len(self._robot_scenes) >= _SCENES:
+                self._robot_scenes.clear()
+            self._robot_scenes[tuple(kinds)] = RobotScene(self.world, kinds, router=self.router)
+        return self._robot_scenes[tuple(kinds)]
 
     def way(self, origin: int, goal: int) -> NDArray[np.float64] | None:
         """Return the way on foot from one place to another, by their indices; None if there is none."""

@@ -140,8 +140,11 @@ class RobotSystem(Subsystem, Protocol):
     def camera_heights(self) -> NDArray[np.float64]:
         """Height of each robot's camera above the ground it stands on, metres."""
 
-    def observation(self, robot: int) -> Mapping[str, NDArray[np.float64]]:
-        """Return what a robot feels of itself: ``base_pose`` and ``joint_position`` are recorded."""
+    def base_poses(self) -> NDArray[np.float64]:
+        """Return where the robots' bases are: x, y, z, quaternion w, x, y, z, float64, shape ``(n, 7)``."""
+
+    def joint_positions(self) -> list[NDArray[np.float64]]:
+        """Return the angles of each robot's joints, rad; as many as it has."""
 
     def events(self) -> Sequence[RobotNote]:
         """Return what happened to robots since this was last asked."""

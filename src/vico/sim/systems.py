@@ -71,5 +71,5 @@ def robots_of(base: SimulationBase, config: SimConfig, others: Bodies, *, errand
         seed=config.seed,
         first_entity=FIRST_ROBOT,
         errands=errands,
-        router=base.router,
+        scene=base.robot_scene(config.robots),
     )

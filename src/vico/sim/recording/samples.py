@@ -164,9 +164,7 @@ def _robots(step: int, sim: Simulation) -> tuple[Rows, Rows]:
     robots = sim.state.robots
     assert robots is not None
     entity = robots.bodies().entity
-    felt = [robots.observation(k) for k in range(len(entity))]
-    pose = np.array([f["base_pose"] for f in felt])
-    angles = [f["joint_position"] for f in felt]
+    pose, angles = robots.base_poses(), robots.joint_positions()
     counts = [len(a) for a in angles]
     keys = ("x", "y", "z", "qw", "qx", "qy", "qz")
     bases = {"entity": entity, "step": np.full(len(entity), step)} | {key: pose[:, k] for k, key in enumerate(keys)}

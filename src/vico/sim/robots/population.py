@@ -236,6 +236,11 @@ class RobotPopulation:
         """Return what a robot feels of itself; see `vico.sim.robots.sensing.observation`."""
         return sensing.observation(self.run, robot)
 
+    def base_poses(self) -> NDArray[np.float64]:
+        """Return where the bases are: x, y, z, quaternion w, x, y, z, float64, shape ``(n, 7)``."""
+        bases = [self.engine.base(i) for i in range(len(self))]
+        return np.array([np.concatenate([base.position, base.quaternion]) for base in bases]).reshape(-1, 7)
+
     def joint_names(self, robot: int) -> tuple[str, ...]:
         """Return the names of a robot's joints, in the order of `joint_positions`."""
         return self.models[robot].joints
