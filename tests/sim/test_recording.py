@@ -17,9 +17,10 @@ import pytest
 import toy_city
 from vico.agents.schedule import followers_of
 from vico.errors import EmptyInputError, InputError, MissingFileError, SchemaError
+from vico.sim.animation import pose
 from vico.sim.config import SimConfig
 from vico.sim.recorder import Recorder
-from vico.sim.recording import read_run
+from vico.sim.recording import PosedPeople, read_run
 from vico.sim.recording.action_text import LONGEST_ACTION, action_text
 from vico.sim.recording.schema import SEGMENT_STEPS
 from vico.sim.simulation import Simulation
@@ -325,3 +326,58 @@ def test_an_action_without_end_is_told_in_short() -> None:
     endless: dict[str, Any] = {"type": "wait"}
     endless["again"] = endless
     assert len(action_text(endless)) < LONGEST_ACTION
+
+
+# Joint poses.
+
+
+def test_joint_poses_are_those_that_were_drawn(path: Path) -> None:
+    run, sim = read_run(path), residents()
+    renderer = sim.renderer
+    people = PosedPeople(run)
+    for step in run.checkpoints:
+        sim.restore(run.checkpoint(step).arrays)
+        p, posed = sim.state.people, people.at(step)
+        assert posed.entity.tolist() == p.entity.tolist()
+        speed = np.hypot(p.velocity[:, 0], p.velocity[:, 1])
+        rotations, offsets = pose(p.clip, p.phase, speed, renderer._style)  # type: ignore[attr-defined]
+        assert posed.rotations.shape == (len(p), 55, 3)
+        assert np.abs(posed.rotations - rotations).max() < 0.01
+        assert np.abs(posed.offsets - offsets).max() < 0.002
+
+
+def test_nobody_is_posed_who_was_not_there(path: Path) -> None:
+    with pytest.raises(InputError, match="no person with the number 5"):
+        PosedPeople(read_run(path)).at(3, [5])
+
+
+# Runs of another version.
+
+
+def test_a_run_of_version_1_is_refused_with_what_to_type(tmp_path: Path) -> None:
+    manifest = {
+        "schema_name": "vico.run", "version": 1, "producer": "vico 0.3", "status": "complete", "seed": 4,
+        "wanted_steps": 1800, "world": {"path": "demo/world"}, "community": {"path": "demo/community"},
+    }  # fmt: skip
+    (tmp_path / "run.json").write_text(json.dumps(manifest))
+    with pytest.raises(SchemaError) as refused:
+        read_run(tmp_path)
+    said = str(refused.value)
+    assert "a run of version 1 (vico 0.3)" in said
+    assert f"vico run demo/world demo/community --steps 1800 --seed 4 --out {tmp_path} --force" in said
+    assert "\n" not in said
+
+
+# Size.
+
+
+def test_a_minute_of_a_standing_crowd_takes_little(tmp_path: Path) -> None:
+    sim = Simulation(toy_city.world(), None, SimConfig(assistants=30, observe=()))
+    recorder = Recorder(tmp_path / "run", sim, sources={}, wanted=SEGMENT_STEPS)
+    recorder.begin({})
+    for _ in range(SEGMENT_STEPS):
+        recorder.write(sim.step({}))
+    recorder.close()
+    segment = tmp_path / "run" / "segments" / "00000000-00000060"
+    # Nothing moves but the chests of 30 people who breathe: what is left is mostly the files' own heads.
+    assert sum(file.stat().st_size for file in segment.iterdir()) < 20_000

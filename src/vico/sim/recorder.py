@@ -24,7 +24,7 @@ from vico.sim.recording.checkpoints import (
     write_checkpoint,
 )
 from vico.sim.recording.films import ViewFilms, drop_views_after
-from vico.sim.recording.manifest import agents_record, read_manifest, run_record
+from vico.sim.recording.manifest import agents_record, describer, read_manifest, run_record
 from vico.sim.recording.samples import Samples, everybody
 from vico.sim.recording.schema import AGENTS, MANIFEST, METRICS, SEGMENT_STEPS
 from vico.sim.recording.segments import drop_after, segments_of, write_segment
@@ -77,13 +77,12 @@ class Recorder:
         self.out, self.sim, self.wanted, self.states_every = out, sim, wanted, states_every
         self._sources = dict(sources)
         self._closed = False
-        self._samples = Samples()
+        self._samples = Samples(sim)
         self._films = ViewFilms(out)
         self._hash = sim.state_hash()
         self._began = time.perf_counter()
         self._earlier = 0.0
-        entities = agents_record(sim)
-        self._cast = CastLog(sim.entity, {agent["entity"]: agent["name"] for agent in entities})
+        self._cast = CastLog(describer(sim))
 
     @classmethod
     def resume(
@@ -246,7 +245,7 @@ class Recorder:
         sim, step = self.sim, self.sim.metrics.steps
         bodies: Bodies = everybody(sim)
         self._cast.watch(step, bodies)
-        self._samples.take(sim, bodies, self._hash, result, actions)
+        self._samples.take(bodies, self._hash, result, actions)
         watch = time.perf_counter()
         pictures = {name: seen["rgb"] for name, seen in observations.items() if "rgb" in seen}
         self._films.add(step, pictures, sim.rgb_waiter())

@@ -8,17 +8,18 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.people import PASSERS_BY, Appearance, body_of, passer_by
+from vico.assets.people import Appearance, body_of
 from vico.clock import DAY
 from vico.community.model import Resident
 from vico.render import Cameras, Frames, Lighting, ViewCache, render
 from vico.render.skinning import BodyBatch, batch_bodies, skin
 from vico.render.world_scene import scene_of
 from vico.seeds import rng
-from vico.sim.animation import STYLE, clip_index, hand_frames, pose, stride_length, style_of
+from vico.sim.animation import STYLE, hand_frames, pose, style_of
 from vico.sim.bodies import Drawn
 from vico.sim.config import SimConfig
 from vico.sim.observations import Views
+from vico.sim.passers_by import looks_of_strangers, manner_of_pedestrian, pedestrian_motion
 from vico.sim.quaternions import matrix_of
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture, Vehicle
@@ -122,13 +123,11 @@ class SceneRenderer:
         strangers = state.people.names[len(looks) :]
         entities = state.people.entity.tolist()
         walkers = state.traffic.walkers.entity.tolist() if state.traffic is not None else []
-        # Which of the shared looks come, and in which order, is the run's; no two alike before all have come.
-        order = rng(sim.config.seed, "looks").permutation(PASSERS_BY)
-        looks += [passer_by(int(order[k % PASSERS_BY])) for k in range(len(strangers) + len(walkers))]
+        looks += looks_of_strangers(sim.config.seed, len(strangers) + len(walkers))
         made = dict(zip(dict.fromkeys(looks), in_order(body_of, dict.fromkeys(looks)), strict=True))
         bodies = [made[look] for look in looks]
         self._bodies: BodyBatch = batch_bodies(bodies, [*entities, *walkers])
-        names = [*state.people.names, *(f"pedestrian_{k}" for k in range(len(walkers)))]
+        names = [*state.people.names, *(manner_of_pedestrian(k) for k in range(len(walkers)))]
         style = [
             style_of(body, rng(sim.config.seed, "manner", name), age=look.age)
             for body, name, look in zip(bodies, names, looks, strict=True)
@@ -195,17 +194,11 @@ class SceneRenderer:
         )
 
     def _motion_of_pedestrians(self, state: SimulationState) -> _Motion:
-        """Return how the pedestrians of the traffic move: they walk, or stand and breathe."""
+        """Return how the pedestrians of the traffic move."""
         assert state.traffic is not None
         walkers = state.traffic.walkers
         speed, walked = state.traffic.gait
-        height = self._height[len(state.people) :]
-        moving = speed > 0.05
-        clip = np.where(moving, clip_index("walk"), clip_index("idle"))
-        stride = np.where(moving, stride_length(clip, speed, height), 2.0)
-        # People at rest breathe by the clock, each at their own time.
-        at_rest = state.second * 0.5 + np.arange(len(speed)) * 0.37
-        phase = np.where(moving, walked / stride, at_rest) % 1.0
+        clip, phase = pedestrian_motion(speed, walked, self._height[len(state.people) :], state.second)
         return _Motion(clip, phase, speed, walkers.position, walkers.yaw)
 
     def _objects(self, state: SimulationState, rotations: NDArray[np.float32], offsets: NDArray[np.float32]) -> Drawn:

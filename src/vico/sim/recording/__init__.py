@@ -16,6 +16,18 @@
 from vico.sim.recording.cast import CastMember
 from vico.sim.recording.checkpoints import Checkpoint
 from vico.sim.recording.films import View
+from vico.sim.recording.joint_poses import JointPoses, PosedPeople
 from vico.sim.recording.run import AgentRecord, Moment, Run, Tracks, read_run
 
-__all__ = ["AgentRecord", "CastMember", "Checkpoint", "Moment", "Run", "Tracks", "View", "read_run"]
+__all__ = [
+    "AgentRecord",
+    "CastMember",
+    "Checkpoint",
+    "JointPoses",
+    "Moment",
+    "PosedPeople",
+    "Run",
+    "Tracks",
+    "View",
+    "read_run",
+]

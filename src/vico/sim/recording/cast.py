@@ -35,6 +35,8 @@ class CastMember:
         Length, width, height as last recorded, metres.
     agent
         Name of the agent whose body it is, None for what nobody plays.
+    pedestrian
+        Index among the pedestrians nobody plays, None for everybody else; looks and manner follow from it.
     intervals
         First step at which it was there, and the first at which it no longer was (None: to the end), once for each
         time that it came.
@@ -45,6 +47,7 @@ class CastMember:
     name: str
     size: tuple[float, float, float]
     agent: str | None
+    pedestrian: int | None
     intervals: tuple[tuple[int, int | None], ...]
 
     def present(self, step: int) -> bool:
@@ -57,14 +60,12 @@ class CastLog:
 
     Parameters
     ----------
-    name_of
-        Kind and name of an entity.
-    agents
-        Names of agents by entity.
+    describe
+        Returns ``name``, ``agent`` and ``pedestrian`` of an entity.
     """
 
-    def __init__(self, name_of: Callable[[int], Mapping[str, str]], agents: Mapping[int, str]) -> None:
-        self._name_of, self._agents = name_of, agents
+    def __init__(self, describe: Callable[[int], Mapping[str, Any]]) -> None:
+        self._describe = describe
         self._entity = np.zeros(0, np.int32)
         self._shape = np.zeros((0, 4))
         self.lines: list[dict[str, Any]] = []
@@ -88,9 +89,8 @@ class CastLog:
             "step": step,
             "entity": entity,
             "kind": KINDS[int(row[0])],
-            "name": self._name_of(entity)["name"],
             "size": [round(float(value), 3) for value in row[1:]],
-            "agent": self._agents.get(entity),
+            **self._describe(entity),
         }
 
 
@@ -124,7 +124,8 @@ def read_cast(run: Path, last: int) -> dict[int, CastMember]:
             intervals = (*intervals, (step, None))
         length, width, height = line["size"]
         size = (float(length), float(width), float(height))
-        found[entity] = CastMember(entity, line["kind"], line["name"], size, line["agent"], intervals)
+        agent, pedestrian = line["agent"], line["pedestrian"]
+        found[entity] = CastMember(entity, line["kind"], line["name"], size, agent, pedestrian, intervals)
     return found
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -60,6 +60,19 @@ def agents_record(sim: Simulation) -> list[dict[str, Any]]:
             for name, entity in zip(robots.names, entities, strict=True)
         ]
     return found
+
+
+def describer(sim: Simulation) -> Callable[[int], dict[str, Any]]:
+    """Return what tells how an entity is called, whose body it is, and which pedestrian, as the cast says it."""
+    agents = {agent["entity"]: agent["name"] for agent in agents_record(sim)}
+    walkers = sim.state.traffic.walkers.entity.tolist() if sim.state.traffic is not None else []
+    pedestrians = {entity: k for k, entity in enumerate(walkers)}
+
+    def describe(entity: int) -> dict[str, Any]:
+        name = sim.entity(entity)["name"]
+        return {"name": name, "agent": agents.get(entity), "pedestrian": pedestrians.get(entity)}
+
+    return describe
 
 
 def read_manifest(path: Path) -> dict[str, Any]:

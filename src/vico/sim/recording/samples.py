@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from vico.sim.bodies import OBJECT, Bodies
 from vico.sim.events import Event
+from vico.sim.passers_by import looks_of_strangers, pedestrian_motion
 from vico.sim.recording.action_text import action_text
 from vico.sim.recording.schema import TABLES, stored, table_of
 from vico.sim.state import MovableObjects
@@ -22,18 +24,31 @@ Rows = Mapping[str, Any]
 
 
 class Samples:
-    """Rows of the tables that wait to be written."""
+    """Rows of the tables that wait to be written.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    sim
+        The simulation they are taken from.
+    """
+
+    def __init__(self, sim: Simulation) -> None:
+        self._sim = sim
+        state = sim.state
+        strangers = len(state.people) - len(sim.residents)
+        pedestrians = len(state.traffic.walkers) if state.traffic is not None else 0
+        looks = looks_of_strangers(sim.config.seed, strangers + pedestrians)[strangers:]
+        self._stature = np.array([look.height for look in looks], np.float64)
+        self._begin()
+
+    def _begin(self) -> None:
         self._rows: dict[str, list[Rows]] = {name: [] for name in TABLES}
         self.steps: list[int] = []
 
     def __len__(self) -> int:
         return len(self.steps)
 
-    def take(
-        self, sim: Simulation, bodies: Bodies, digest: str, result: StepResult | None, actions: Mapping[str, Any]
-    ) -> None:
+    def take(self, bodies: Bodies, digest: str, result: StepResult | None, actions: Mapping[str, Any]) -> None:
         """Take what is to be told of a step.
 
         Parameters
@@ -47,11 +62,11 @@ class Samples:
         actions
             What agents asked for in it, by name.
         """
-        step = sim.metrics.steps
+        sim, step = self._sim, self._sim.metrics.steps
         self.steps.append(step)
         self._add("steps", {"step": [step], "hash": [digest], **_counts(sim)})
         self._add("bodies", _bodies(step, bodies))
-        self._add("people", _people(step, sim))
+        self._add("people", self._people(step))
         self._add("agents", _agents(step, sim, actions))
         if sim.state.robots is not None:
             robots, joints = _robots(step, sim)
@@ -63,8 +78,19 @@ class Samples:
     def tables(self) -> dict[str, pa.Table]:
         """Return all rows as tables, and wait for others."""
         tables = {name: _joined(name, rows) for name, rows in self._rows.items()}
-        self.__init__()  # type: ignore[misc]
+        self._begin()
         return tables
+
+    def _people(self, step: int) -> Rows:
+        """Return the motion of everybody who has legs."""
+        state, p = self._sim.state, self._sim.state.people
+        parts: list[tuple[NDArray[Any], ...]] = [(p.entity, p.clip, p.phase)]
+        if state.traffic is not None:
+            speed, walked = state.traffic.gait
+            motion = pedestrian_motion(speed, walked, self._stature, state.second)
+            parts.append((state.traffic.walkers.entity, *motion))
+        entity, clip, phase = (np.concatenate(column) for column in zip(*parts, strict=True))
+        return {"entity": entity, "step": np.full(len(entity), step), "clip": clip, "phase": phase}
 
     def _add(self, name: str, rows: Rows) -> None:
         form = TABLES[name]
@@ -119,11 +145,6 @@ def _bodies(step: int, bodies: Bodies) -> Rows:
         "yaw": (bodies.yaw + np.pi) % (2 * np.pi) - np.pi,
         "speed": np.hypot(bodies.velocity[:, 0], bodies.velocity[:, 1]),
     }
-
-
-def _people(step: int, sim: Simulation) -> Rows:
-    p = sim.state.people
-    return {"entity": p.entity, "step": np.full(len(p), step), "clip": p.clip, "phase": p.phase}
 
 
 def _agents(step: int, sim: Simulation, actions: Mapping[str, Any]) -> Rows:

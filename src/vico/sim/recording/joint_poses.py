@@ -1,0 +1,97 @@
+"""Joint poses of recorded people: computed from motion and phase, as they were drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.assets.people import Appearance, body_of
+from vico.errors import InputError
+from vico.seeds import rng
+from vico.sim.animation import STYLE, pose, style_of
+from vico.sim.passers_by import looks_of_strangers, manner_of_pedestrian
+from vico.sim.recording.run import Run
+
+
+@dataclass(frozen=True)
+class JointPoses:
+    """How people hold themselves at a step.
+
+    Attributes
+    ----------
+    entity
+        Who, int32, shape ``(n,)``.
+    rotations
+        Axis-angle of each of the 55 joints (`vico.assets.people.JOINTS`) relative to its parent, radians, float32,
+        shape ``(n, 55, 3)``; all 0 is the T-pose.
+    offsets
+        Shift of the pelvis from its place in the T-pose, body frame, metres, float32, shape ``(n, 3)``.
+    joints
+        Joints in the T-pose, body frame (x forward, y left, z up), metres, float32, shape ``(n, 55, 3)``.
+    """
+
+    entity: NDArray[np.int32]
+    rotations: NDArray[np.float32]
+    offsets: NDArray[np.float32]
+    joints: NDArray[np.float32]
+
+
+class PosedPeople:
+    """Gives the joint poses of everybody on legs at any step of a run: residents, assistants and pedestrians.
+
+    Parameters
+    ----------
+    run
+        The run; bodies of those asked for are made when they are first needed.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._styles: dict[int, Any] = {}
+        self._looks, self._manners = _people_of(run)
+
+    def at(self, step: int, entities: Sequence[int] | None = None) -> JointPoses:
+        """Return the joint poses at a step, of all people or of some.
+
+        Raises
+        ------
+        InputError
+            If the step was not recorded, or one of `entities` was not there as a person.
+        """
+        people = self._run.columns("people", step, step)
+        bodies = self._run.columns("bodies", step, step)
+        speeds = dict(zip(bodies["entity"].tolist(), bodies["speed"].tolist(), strict=True))
+        there = {entity: row for row, entity in enumerate(people["entity"].tolist())}
+        wanted = list(there) if entities is None else list(entities)
+        absent = [entity for entity in wanted if entity not in there]
+        if absent:
+            raise InputError(f"{self._run.path}: at step {step} there is no person with the number {absent[0]}")
+        rows = [there[entity] for entity in wanted]
+        style = np.array([self._style(entity) for entity in wanted], STYLE)
+        speed = np.array([speeds[entity] for entity in wanted])
+        rotations, offsets = pose(people["clip"][rows], people["phase"][rows], speed, style)
+        return JointPoses(np.array(wanted, np.int32), rotations, offsets, style["joints"])
+
+    def _style(self, entity: int) -> Any:
+        if entity not in self._styles:
+            look, seed = self._looks[entity], self._run.manifest["seed"]
+            stream = rng(seed, "manner", self._manners[entity])
+            self._styles[entity] = style_of(body_of(look), stream, age=look.age)
+        return self._styles[entity]
+
+
+def _people_of(run: Run) -> tuple[dict[int, Appearance], dict[int, str]]:
+    """Return looks, and names of the streams that decide the manner, by entity."""
+    people = [agent for agent in run.agents if agent["kind"] != "robot"]
+    assistants = [agent for agent in people if agent["person"] is None]
+    pedestrians = {m.entity: m.pedestrian for m in run.cast.values() if m.pedestrian is not None}
+    strangers = looks_of_strangers(run.manifest["seed"], len(assistants) + max(pedestrians.values(), default=-1) + 1)
+    looks = {a["entity"]: Appearance.from_dict(a["person"]["appearance"]) for a in people if a["person"] is not None}
+    looks |= {a["entity"]: strangers[k] for k, a in enumerate(assistants)}
+    looks |= {entity: strangers[len(assistants) + k] for entity, k in pedestrians.items()}
+    manners = {a["entity"]: a["name"] for a in people}
+    return looks, manners | {entity: manner_of_pedestrian(k) for entity, k in pedestrians.items()}
