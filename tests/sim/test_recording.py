@@ -183,11 +183,11 @@ def residents() -> Simulation:
     return Simulation(toy_city.world(), toy_city.community(), config)
 
 
-def go_on(recorder: Recorder, agents: dict[str, Any], until: int) -> None:
+def go_on(recorder: Recorder, agents: dict[str, Any], until: int, *, begin: bool = True) -> None:
     """Simulate and record up to a step, with checkpoints."""
     sim = recorder.sim
     observations, infos = sim.observe()
-    if sim.metrics.steps == 0:
+    if begin:
         recorder.begin(observations)
     while sim.metrics.steps < until:
         actions = {name: agent.act(observations[name], infos[name]) for name, agent in agents.items()}
@@ -195,7 +195,8 @@ def go_on(recorder: Recorder, agents: dict[str, Any], until: int) -> None:
         observations, infos = result.observations, result.infos
         recorder.write(result, actions=actions)
         if recorder.checkpoint_due:
-            recorder.checkpoint({name: agent.state() for name, agent in agents.items()})
+            states = {name: agent.state() for name, agent in agents.items()}
+            recorder.checkpoint(states, {"faults": [sim.metrics.steps]})
 
 
 def fresh(out: Path) -> tuple[Recorder, dict[str, Any]]:
@@ -251,6 +252,7 @@ def test_a_killed_run_goes_on_to_the_same_folder(path: Path, tmp_path: Path, kil
     agents: dict[str, Any] = dict(followers_of(toy_city.community(), PublicMap.from_world(sim.world)))
     recorder, checkpoint = Recorder.resume(out, sim, sources={"world": "toy"}, wanted=STEPS, states_every=EVERY)
     assert checkpoint.step == sim.metrics.steps == EVERY * (killed_after // EVERY)
+    assert checkpoint.notes == {"faults": [checkpoint.step]}
     for name, agent in agents.items():
         agent.restore(checkpoint.agents[name])
     go_on(recorder, agents, STEPS)
@@ -295,7 +297,7 @@ def test_a_run_is_read_while_another_process_writes_it(path: Path, tmp_path: Pat
         assert other.stdout is not None
         hashes = read_run(path).hashes
         assert other.stdout.readline().split() == ["60", "False", hashes[60]]
-        go_on(recorder, agents, 80)
+        go_on(recorder, agents, 80, begin=False)
         other.stdin.write("\n")
         other.stdin.flush()
         assert other.stdout.readline().split() == ["True", "80", hashes[80]]

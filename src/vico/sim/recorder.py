@@ -81,7 +81,7 @@ class Recorder:
         self._films = ViewFilms(out)
         self._hash = sim.state_hash()
         self._began = time.perf_counter()
-        self._earlier = 0.0
+        self._earlier, self._resumed = 0.0, False
         self._cast = CastLog(describer(sim))
 
     @classmethod
@@ -108,7 +108,7 @@ class Recorder:
         Returns
         -------
         recorder, checkpoint
-            The recorder goes on with the step after the checkpoint: `begin` is not called again.
+            The recorder goes on with the step after the checkpoint.
 
         Raises
         ------
@@ -138,13 +138,18 @@ class Recorder:
             cut_cast(out, checkpoint.step)
             self._cast.watch(checkpoint.step, everybody(sim))
             self._cast.lines.clear()
-            self._earlier = float(checkpoint.clock["wall_seconds"])
+            self._earlier, self._resumed = float(checkpoint.clock["wall_seconds"]), True
             sim.metrics.seconds.update(checkpoint.clock["seconds_by_phase"])
             self._write_manifest("running")
         return self, checkpoint
 
     def begin(self, observations: Mapping[str, Mapping[str, Any]]) -> None:
-        """Record the state before the first step, and what is seen then."""
+        """Record the state before the first step, and what is seen then.
+
+        Where the recording goes on from a checkpoint nothing is recorded: that state was.
+        """
+        if self._resumed:
+            return
         with self._errors():
             self._take(None, {}, observations)
 
@@ -162,13 +167,15 @@ class Recorder:
         """Whether a `checkpoint` belongs after the step that was written last."""
         return self.states_every is not None and self.sim.metrics.steps % self.states_every == 0
 
-    def checkpoint(self, agents: Mapping[str, Any]) -> None:
+    def checkpoint(self, agents: Mapping[str, Any], notes: Mapping[str, Any] | None = None) -> None:
         """Keep the exact state after the step that was written last, so that the run can go on from it.
 
         Parameters
         ----------
         agents
             State of each agent by name: nested mappings of JSON values and arrays.
+        notes
+            What else whoever runs the simulation wants back as `Checkpoint.notes`; of the same kind.
 
         Raises
         ------
@@ -180,7 +187,7 @@ class Recorder:
             # The films that are on the disk end here: going on begins new files.
             self._films.end_part()
             clock = {"wall_seconds": self._wall(), "seconds_by_phase": dict(self.sim.metrics.seconds)}
-            checkpoint = Checkpoint(self.sim.metrics.steps, self.sim.arrays(), dict(agents), clock)
+            checkpoint = Checkpoint(self.sim.metrics.steps, self.sim.arrays(), dict(agents), dict(notes or {}), clock)
             write_checkpoint(self.out, checkpoint, owner=self.sim.identity)
             self._write_manifest("running")
 

@@ -11,6 +11,7 @@ import numpy as np
 #: An action whose JSON is longer is cut to its type, and says how long it was.
 LONGEST_ACTION = 8192
 _DEEPEST = 6
+_STRICT = json.JSONEncoder(ensure_ascii=False, allow_nan=False)
 _LONGEST_TEXT, _LONGEST_LIST = 2048, 512
 
 
@@ -18,7 +19,7 @@ def action_text(action: object) -> str:
     """Return an action as JSON: what JSON does not know is told in words, what is too large is cut."""
     try:
         # Most actions are small mappings of plain values: one call writes them.
-        text = json.dumps(action, ensure_ascii=False, allow_nan=False)
+        text = _STRICT.encode(action)
     except (TypeError, ValueError, RecursionError):
         text = json.dumps(_plain(action, 0), ensure_ascii=False)
     if len(text) <= LONGEST_ACTION:

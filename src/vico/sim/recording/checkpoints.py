@@ -33,6 +33,8 @@ class Checkpoint:
         The whole state of the simulation; `Simulation.restore` goes back to it.
     agents
         State of each agent, by name.
+    notes
+        What else whoever ran the simulation kept.
     clock
         Wall-clock seconds spent so far: ``wall_seconds`` in all, and ``seconds_by_phase``.
     """
@@ -40,6 +42,7 @@ class Checkpoint:
     step: int
     arrays: dict[str, NDArray[Any]]
     agents: dict[str, Any]
+    notes: dict[str, Any]
     clock: dict[str, Any]
 
 
@@ -47,7 +50,7 @@ def write_checkpoint(run: Path, checkpoint: Checkpoint, *, owner: str) -> None:
     """Write a checkpoint, whole or not at all; `owner` is the identity of its simulation."""
     with written_folder(run / CHECKPOINTS / f"{checkpoint.step:08d}") as folder:
         write_snapshot(folder / _SIMULATION, checkpoint.arrays, owner=owner)
-        write_nested(folder / _AGENTS, checkpoint.agents)
+        write_nested(folder / _AGENTS, {"agents": checkpoint.agents, "notes": checkpoint.notes})
         write_json(folder / _CLOCK, checkpoint.clock)
 
 
@@ -74,7 +77,8 @@ def read_checkpoint(run: Path, step: int, *, owner: str) -> Checkpoint:
         steps = ", ".join(map(str, checkpoint_steps(run))) or "none"
         raise MissingFileError(f"{run}: no checkpoint of step {step}; there are: {steps}")
     arrays = read_snapshot(folder / _SIMULATION, owner=owner)
-    return Checkpoint(step, arrays, read_nested(folder / _AGENTS), read_json(folder / _CLOCK))
+    kept = read_nested(folder / _AGENTS)
+    return Checkpoint(step, arrays, kept["agents"], kept["notes"], read_json(folder / _CLOCK))
 
 
 def drop_checkpoints_after(run: Path, step: int) -> None:

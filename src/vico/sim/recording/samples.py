@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from vico.sim.simulation import Simulation, StepResult
 
 Rows = Mapping[str, Any]
+_SORTED = json.JSONEncoder(sort_keys=True)
 
 
 class Samples:
@@ -93,14 +94,9 @@ class Samples:
         return {"entity": entity, "step": np.full(len(entity), step), "clip": clip, "phase": phase}
 
     def _add(self, name: str, rows: Rows) -> None:
-        form = TABLES[name]
-        # Text stays as it is; numbers are brought to what is stored at once, for the state's arrays go on changing.
-        self._rows[name].append(
-            {
-                key: rows[key] if column.kind == pa.string() else stored(rows[key], column)
-                for key, column in form.items()
-            }
-        )
+        # Copies, for the state's arrays go on changing; they are scaled all at once when they are written.
+        kept = {key: np.array(values) if isinstance(values, np.ndarray) else values for key, values in rows.items()}
+        self._rows[name].append(kept)
 
 
 def everybody(sim: Simulation) -> Bodies:
@@ -209,7 +205,7 @@ def _events(step: int, events: Sequence[Event]) -> Rows:
         "x": position[:, 0],
         "y": position[:, 1],
         "z": position[:, 2],
-        "data": [json.dumps(event.data, sort_keys=True) for event in events],
+        "data": [_SORTED.encode(event.data) for event in events],
     }
 
 
@@ -220,5 +216,5 @@ def _joined(name: str, parts: Sequence[Rows]) -> pa.Table:
         if column.kind == pa.string():
             columns[key] = [value for piece in pieces for value in piece]
         else:
-            columns[key] = np.concatenate([np.zeros(0, column.kind.to_pandas_dtype()), *pieces])
+            columns[key] = stored(np.concatenate([np.zeros(0), *pieces]), column)
     return table_of(name, columns)
