@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
 from vico.sim.footprints import Rectangle, point_gap, separation
-from vico.sim.traffic.path import Outline, footprint
+from vico.sim.traffic.path import Outline, footprint, point_on_path
 from vico.sim.traffic.shapes import share_level, within
 from vico.sim.traffic.state import NONE
 
@@ -54,12 +54,15 @@ class VehicleView(NamedTuple):
 
 
 @compiled
-def nearby_bodies(shapes, v, reach, buffer):  # type: ignore[no-untyped-def]
-    """Write the bodies within `reach` metres of body v, on its level, into `buffer`; return the part that is used."""
+def nearby_bodies(shapes, v, reach, candidates, buffer):  # type: ignore[no-untyped-def]
+    """Write those of the candidates within `reach` metres of body v, on its level, into `buffer`; return what is used.
+
+    `candidates` are indices of bodies, in ascending order, as from `vico.sim.neighbours.search`.
+    """
     sx, sy, half = shapes.x, shapes.y, shapes.half_length
     x, y = sx[v], sy[v]
     n = 0
-    for j in range(len(sx)):
+    for j in candidates:
         dx = sx[j] - x
         r = reach + half[j]
         if dx > r or dx < -r or j == v:
@@ -109,6 +112,23 @@ def touched_at(path, outline, front, bodies, vehicle_gap, person_gap, below=ANY_
         if touches(Rectangle(cx, cy, c, s, length + _NOSE, width + side), one):
             return k
     return NONE
+
+
+@compiled
+def _path_box(path, front, reach):  # type: ignore[no-untyped-def]
+    """Return the least and greatest x and y of the path from the front to a little beyond `reach` metres ahead."""
+    left, low, right, high = 1e18, 1e18, -1e18, -1e18
+    for p in range(len(path)):
+        point = path[p]
+        is_passed = p + 1 < len(path) and path[p + 1].s < front - 2.0
+        if is_passed or (p > 0 and path[p - 1].s > front + reach + 2.0):
+            continue
+        left, right = min(left, point.x), max(right, point.x)
+        low, high = min(low, point.y), max(high, point.y)
+    if path[len(path) - 1].s < front + reach + 2.0:
+        x, y, _, _ = point_on_path(path, front + reach + 2.0)  # beyond its end it goes straight on
+        left, right, low, high = min(left, x), max(right, x), min(low, y), max(high, y)
+    return left, low, right, high
 
 
 @compiled
@@ -166,7 +186,11 @@ def find_leader(view, front, reach, buffer):  # type: ignore[no-untyped-def]
     path, outline, nearby = view
     m = 0
     start = 1e18
+    left, low, right, high = _path_box(path, front, reach)
     for k in range(len(nearby)):
+        x, y, close = nearby[k].x, nearby[k].y, outline.half_width + nearby[k].radius + _NEAR_PATH
+        if x < left - close or x > right + close or y < low - close or y > high + close:
+            continue
         near, first_contact = _near_path(path, outline, front, reach, nearby[k])
         if near:
             buffer[m] = nearby[k]

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vico.io.compiled import compiled
+from vico.sim.neighbours import search
 from vico.sim.traffic.path import project_on_polyline
 from vico.sim.traffic.random_stream import next_random
 from vico.sim.traffic.shapes import disc_touches, distance_to, is_disc, share_level
@@ -177,11 +178,11 @@ def advance_follow_point(paths, walker, junctions, is_asked, x, y, dt):  # type:
 
 
 @compiled
-def _nearby(shapes, b, buffer):  # type: ignore[no-untyped-def]
+def _nearby(shapes, grid, b, buffer):  # type: ignore[no-untyped-def]
     """Return the indices of the bodies that body b, a walker, may meet."""
     x, y = shapes.x[b], shapes.y[b]
     n = 0
-    for j in range(len(shapes.x)):
+    for j in search(grid, x, y, _SIGHT + 1.0, buffer):
         dx, dy = shapes.x[j] - x, shapes.y[j] - y
         r = _SIGHT + 1.0 + shapes.half_length[j] + shapes.half_width[j]
         if j != b and dx * dx + dy * dy < r * r and share_level(shapes, b, j):
@@ -299,8 +300,8 @@ def asked_to_go(fleet, first, n):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, dt):  # type: ignore[no-untyped-def]
-    """Advance all pedestrians by `dt` seconds; their bodies follow those of the vehicles in `shapes`."""
+def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, dt):  # type: ignore[no-untyped-def]
+    """Advance all pedestrians by `dt` seconds; their bodies follow those of the vehicles in `shapes`, and in `grid`."""
     first = len(fleet)
     asked = asked_to_go(fleet, first, len(pedestrians))
     buffer = np.empty(len(shapes.x), np.int64)
@@ -309,7 +310,7 @@ def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, dt):  # ty
         walker = pedestrians[i]
         b = first + i
         x, y = shapes.x[b], shapes.y[b]
-        near = _nearby(shapes, b, buffer)
+        near = _nearby(shapes, grid, b, buffer)
         is_waiting = advance_follow_point(paths, walker, junctions, asked[i], x, y, dt)
         left = walker.leaving_crossing
         if left >= 0 and walker.distance_walked - walker.leaving_since > _OFF_CROSSING:

@@ -13,6 +13,7 @@ from vico.assets.vehicles import CAR_KINDS, vehicle_prototypes, vehicle_size
 from vico.errors import InputError
 from vico.seeds import rng
 from vico.sim.bodies import BUS, CAR, PEDESTRIAN, STEP_HEIGHT, Bodies, Drawn
+from vico.sim.neighbours import neighbour_grid
 from vico.sim.traffic.junctions import mark_busy_crossings
 from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.traffic.pedestrians import RADIUS, advance_pedestrians, place_pedestrian
@@ -21,6 +22,7 @@ from vico.sim.traffic.shapes import Shapes
 from vico.sim.traffic.state import (
     NONE,
     PEDESTRIAN_RECORD,
+    TOP_SPEED,
     VEHICLE_STATE,
     BusRoutes,
     new_fleet,
@@ -37,6 +39,8 @@ PERSON_HEIGHT = 1.72
 PATIENCE = 150.0
 _ENTRY_SPEED = 6.0  # m/s
 _FAR = 1e7  # where bodies are before they have a place, m
+_CELL = 25.0  # of the grid of neighbours, m
+_DRIFT = 2.0 * TOP_SPEED  # nobody moves faster, m/s
 _TRIES = 400  # places tried for a car or pedestrian
 #: Share of each kind of car.
 _SHARE = {"hatchback": 0.3, "sedan": 0.27, "suv": 0.23, "van": 0.12, "taxi": 0.08}
@@ -232,10 +236,12 @@ class Traffic:
         everybody = Shapes(*(np.concatenate([getattr(mine, f), getattr(others, f)]) for f in Shapes._fields))
         net, fleet, junctions = self._net, self._vehicles, self.junctions
         mark_busy_crossings(net, fleet, junctions)
-        advance_pedestrians(self._paths, self._walkers, junctions, fleet, everybody, dt)
+        widest = float(np.max(everybody.half_length + everybody.half_width, initial=0.0))
+        grid = neighbour_grid(everybody.x, everybody.y, _CELL, widest + _DRIFT * dt)
+        advance_pedestrians(self._paths, self._walkers, junctions, fleet, everybody, grid, dt)
         junctions.vehicle_wait[:] = 0.0
         count_per_street(net, fleet, self._street_load)
-        advance_vehicles(net, fleet, junctions, everybody, self._street_load, dt)
+        advance_vehicles(net, fleet, junctions, everybody, grid, self._street_load, dt)
         bring_back(net, fleet, junctions, everybody, self._entries, _ENTRY_SPEED, PATIENCE)
         for field in ("x", "y", "yaw", "vx", "vy"):
             getattr(mine, field)[:] = getattr(everybody, field)[: len(mine.x)]

@@ -10,6 +10,7 @@ import numpy as np
 
 from vico.io.compiled import compiled
 from vico.sim.footprints import Rectangle
+from vico.sim.neighbours import search
 from vico.sim.traffic.backing_up import vehicles_backing_up
 from vico.sim.traffic.car_following import (
     braking_distance,
@@ -60,20 +61,22 @@ _BEYOND_JUNCTION, _FAR_REACH = 60.0, 150.0  # m seen beyond a junction that is a
 
 
 @compiled
-def advance_vehicles(net, fleet, junctions, shapes, street_load, dt):  # type: ignore[no-untyped-def]
+def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # type: ignore[no-untyped-def]
     """Advance all vehicles by `dt` seconds, one after the other, each seeing where the ones before it went.
 
     Parameters
     ----------
     net, fleet, junctions, shapes
         See `vico.sim.traffic.state`; vehicle v is body v of `shapes`.
+    grid
+        Of the bodies, where they were at the start of the step.
     street_load
         Vehicles on each street, shape ``(streets,)``.
     """
     note_longest_waits(fleet, junctions)
     backs_up = vehicles_backing_up(net, fleet, shapes)
     buffers = np.empty(len(shapes.x), NEARBY_BODY), np.empty(len(shapes.x), NEARBY_BODY)
-    path_buffer = np.empty(PATH_POINTS, PATH_POINT)
+    candidates, path_buffer = np.empty(len(shapes.x), np.int64), np.empty(PATH_POINTS, PATH_POINT)
     for v in range(len(fleet)):
         vehicle = fleet[v]
         lane, speed, is_bus = vehicle.lane, vehicle.speed, vehicle.route >= 0
@@ -85,7 +88,7 @@ def advance_vehicles(net, fleet, junctions, shapes, street_load, dt):  # type: i
 
         stop_distance = distance_to_stop(vehicle)
         request = next_junction_request(net, vehicle, stop_distance, braking_distance(speed), path_ends)
-        view = _look_around(net, vehicle, shapes, request, path_buffer, buffers[0])
+        view = _look_around(net, vehicle, shapes, request, (grid, candidates, path_buffer, buffers[0]))
         gap, leader = find_leader(view, vehicle.offset, look, buffers[1])
         # Who is behind another vehicle does not ask: it would hold the junction that the other one needs.
         is_behind = 0 <= leader < len(fleet) and gap < request.distance
@@ -133,8 +136,9 @@ def advance_vehicles(net, fleet, junctions, shapes, street_load, dt):  # type: i
 
 
 @compiled
-def _look_around(net, vehicle, shapes, request, path_buffer, body_buffer):  # type: ignore[no-untyped-def]
+def _look_around(net, vehicle, shapes, request, scratch):  # type: ignore[no-untyped-def]
     """Return what a vehicle sees: its path and the bodies near it, farther where it has to see beyond a junction."""
+    grid, candidates, path_buffer, body_buffer = scratch
     look, length = look_ahead(vehicle.speed), vehicle.length
     far, reach = look, look + length + 6.0
     if request.planned_index >= 0:
@@ -148,7 +152,9 @@ def _look_around(net, vehicle, shapes, request, path_buffer, body_buffer):  # ty
         far = max(far, look)
         reach = max(reach, min(far, look + length + _FAR_REACH))
     path = path_polyline(net, vehicle, length + 3.0, vehicle.offset + far + 4.0, path_buffer)
-    return VehicleView(path, vehicle_outline(vehicle), nearby_bodies(shapes, vehicle.index, reach, body_buffer))
+    v = vehicle.index
+    near = search(grid, shapes.x[v], shapes.y[v], reach, candidates)
+    return VehicleView(path, vehicle_outline(vehicle), nearby_bodies(shapes, v, reach, near, body_buffer))
 
 
 @compiled
@@ -214,7 +220,8 @@ def place_vehicle(net, fleet, v, lane, offset, shapes, air):  # type: ignore[no-
     shapes.x[v], shapes.y[v] = cx, cy
     length = vehicle.length
     grown = Rectangle(cx, cy, c, s, length / 2 + air, vehicle.half_width + 0.3)
-    for one in nearby_bodies(shapes, v, length + air + 1.0, np.empty(len(shapes.x), NEARBY_BODY)):
+    everybody = np.arange(len(shapes.x))
+    for one in nearby_bodies(shapes, v, length + air + 1.0, everybody, np.empty(len(shapes.x), NEARBY_BODY)):
         if touches(grown, one):
             shapes.x[v], shapes.y[v] = before
             return False
