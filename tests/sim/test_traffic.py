@@ -1,6 +1,6 @@
 """Traffic on the streets of central Helsinki: nothing ever touches, nothing ever gridlocks, all repeats exactly."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from road_city import HALF, road_city
 from vico.errors import InputError
-from vico.sim.bodies import RESIDENT, Bodies
+from vico.sim.bodies import OBJECT, RESIDENT, Bodies
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.traffic.pedestrians import place_pedestrian
@@ -212,3 +212,69 @@ def test_what_is_drawn_are_known_prototypes_at_the_bodies() -> None:
     drawn = traffic.draw()
     assert set(drawn.prototypes) <= set(traffic.prototypes())
     assert np.allclose(drawn.transforms[:, :3, 3], traffic.bodies().position[: len(drawn.index)], atol=1e-3)
+
+
+def _blocked_street() -> tuple[Traffic, Bodies]:
+    """One car on the longest street, and somebody who stands in its lane for good."""
+    traffic = _traffic(1, 0)
+    lane = int(np.argmax(np.where((traffic.lanes.inside < 0) & ~traffic.lanes.buses_only, traffic.lanes.length, 0)))
+    traffic.fleet.lane[0], traffic.fleet.offset[0], traffic.fleet.speed[0] = lane, 12.0, 8.0
+    traffic.fleet.planned_count[0] = 0
+    x, y, _ = traffic.lanes.at(lane, 12.0)
+    traffic.shapes.x[0], traffic.shapes.y[0] = x, y
+    return traffic, _person(*traffic.lanes.at(lane, 60.0)[:2])
+
+
+def test_who_is_taken_out_of_a_jam_is_told_with_place_and_reason() -> None:
+    traffic, person = _blocked_street()
+    _run(traffic, 100, person)
+    stuck = traffic.stuck()
+    assert [(jam.entity, jam.before) for jam in stuck] == [(1_000_000, 7)]
+    assert traffic.jams.count == 0
+    where = traffic.shapes.x[0], traffic.shapes.y[0]
+    _run(traffic, 80, person)
+    rescued = traffic.jams.rescued()
+    assert traffic.jams.count == traffic.fleet.teleports.sum() == 1
+    assert [(jam.entity, jam.before, jam.position) for jam in rescued] == [(1_000_000, 7, where)]
+    assert rescued[0].stood >= 150.0
+    assert rescued[0].at > rescued[0].stood
+
+
+def test_rescues_are_remembered_in_a_saved_state() -> None:
+    traffic, person = _blocked_street()
+    _run(traffic, 180, person)
+    other = _traffic(1, 0)
+    other.restore(traffic.arrays())
+    assert other.jams.rescued() == traffic.jams.rescued() != []
+
+
+@pytest.mark.parametrize(("z", "stops"), [(0.0, True), (30.0, False)])
+def test_whoever_flies_above_the_street_or_stands_on_a_deck_over_it_stops_no_car(z: float, stops: bool) -> None:
+    traffic, person = _blocked_street()
+    above = replace(person, position=person.position + np.array([0.0, 0.0, z]))
+    far = 0.0
+    for _ in range(200):
+        traffic.advance(0.1, above)
+        far = max(far, float(traffic.fleet.offset[0]))
+    assert (far < 60.0) is stops
+
+
+@pytest.mark.parametrize("height", [0.05, 0.5])
+def test_a_car_stops_for_a_thing_that_lies_in_its_lane(height: float) -> None:
+    traffic, person = _blocked_street()
+    thing = replace(person, kind=np.array([OBJECT], np.int8), height=np.array([height]))
+    assert _run(traffic, 30, thing) == 0
+    assert traffic.fleet.speed[0] < 0.1
+
+
+def test_pedestrians_go_round_a_cyclist_as_long_as_the_bicycle() -> None:
+    traffic = _traffic(0, 60)
+    cyclists = replace(
+        Bodies.joined([_person(*traffic.lanes.walks.line(i)[1][:2]) for i in range(12)]),
+        entity=np.arange(7, 19, dtype=np.int32),
+        half_length=np.full(12, 0.85),
+        yaw=np.linspace(0, 3, 12),
+    )
+    start = len(overlapping(Bodies.joined([traffic.bodies(), cyclists]), 0.0))
+    assert start == 0
+    assert _run(traffic, 120, cyclists) == 0

@@ -175,6 +175,8 @@ class RunOptions:
         Decides nothing but how long it takes.
     seed
         Decides everything that is left to chance.
+    check
+        Look for overlaps of bodies after every sub-step; with any, the exit code is 1.
     force
         Replace what is in the output folder.
     json
@@ -196,6 +198,7 @@ class RunOptions:
     isolate: bool = False
     workers: int = 0
     seed: int = 0
+    check: Literal["none", "overlaps"] = "none"
     force: bool = False
     json: bool = False
 

@@ -65,6 +65,8 @@ def run(options: RunOptions) -> int:
         report("setting the scene", 0, 1)
         # Residents act on what they have in view and hear; mostly, the recorder alone looks at colours.
         sim = Simulation(place, people, config, defer_rgb=True)
+        if options.check == "overlaps":
+            sim.check_overlaps()
         with closing(_agents(options, place, people)) as agents:
             report("setting the scene", 1, 1)
             # Only now: whatever is wrong with the input has been said, and nothing was replaced for nothing.
@@ -77,9 +79,24 @@ def run(options: RunOptions) -> int:
     if options.json:
         print_json(metrics)
     else:
-        shown = {name: value for name, value in metrics.items() if not isinstance(value, dict)}
+        counted = {name: value.get("count", value) for name, value in metrics.items() if isinstance(value, dict)}
+        shown = {name: value for name, value in (metrics | counted).items() if not isinstance(value, dict)}
         print_table(str(out), shown)
-    return 0
+    return _judged(metrics)
+
+
+def _judged(metrics: dict[str, Any]) -> int:
+    """Return the exit code: 1 with overlaps, which are told in a sentence."""
+    overlaps = metrics.get("overlaps", {"count": 0})
+    if not overlaps["count"]:
+        return 0
+    first = overlaps["first"][0]
+    print(
+        f"{overlaps['pairs']} pairs overlapped in {overlaps['count']} of {overlaps['sub_steps']} sub-steps, the first: "
+        f"{first['who']} with {first['with']} at {first['where']}, {1000 * first['depth']:.0f} mm; see metrics.json",
+        file=sys.stderr,
+    )
+    return 1
 
 
 class _Progress(Hook):

@@ -234,7 +234,7 @@ class Recorder:
             "late": int(sim.punctuality.late.sum()),
             "observations": counts.steps * len(sim.seeing),
             "seconds_by_phase": {name: round(value, 3) for name, value in counts.seconds.items()},
-        }
+        } | sim.reports()
 
     def _wall(self) -> float:
         return self._earlier + time.perf_counter() - self._began

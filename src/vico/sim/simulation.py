@@ -20,7 +20,9 @@ from vico.sim.events import Event
 from vico.sim.initial_state import initial_state
 from vico.sim.metrics import Metrics, StopWatch
 from vico.sim.observations import Observation, ObservationRenderer, observe
+from vico.sim.overlaps import OverlapCheck
 from vico.sim.periods import TICKS_PER_SECOND, ControlPeriods, ticks_of
+from vico.sim.reports import reports
 from vico.sim.scenario import GroundTruth, Scenario
 from vico.sim.simulation_state import SimulationState
 from vico.sim.snapshot import arrays_of, copied, identity, read_snapshot, state_hash, write_snapshot
@@ -115,6 +117,7 @@ class Simulation:
         self.scenario, self.ground_truth = Scenario(self.state), GroundTruth(self.state)
         self.seeing = _indices(self.config.observe, self.agents)
         self._renderer, self._attached = renderer, False
+        self._overlap_check: OverlapCheck | None = None
 
     # The loop.
 
@@ -241,6 +244,17 @@ class Simulation:
     def entity(self, entity: int) -> dict[str, str]:
         """Return kind and name of an entity of the world or of this run."""
         return self.state.entity(entity)
+
+    # What a run tells of itself.
+
+    def check_overlaps(self) -> None:
+        """Look for overlaps after every sub-step from now on; `reports` tells what was found."""
+        self._overlap_check = OverlapCheck(self.state)
+        self.state.on_substep = self._overlap_check.look
+
+    def reports(self) -> dict[str, Any]:
+        """Return who was rescued from jams, who is stuck, and what overlapped; see `vico.sim.reports`."""
+        return reports(self.state, self._overlap_check)
 
     # State as a whole.
 

@@ -20,6 +20,7 @@ from vico.sim.indoor import Indoor, near_door
 from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.snapshot import arrays_of
 from vico.sim.state import REASON_LENGTH, MovableObjects, People, Vehicle
+from vico.sim.traffic.jams import Jam, JamLog
 from vico.sim.transit import TransitSystem
 from vico.world.folder import World
 from vico.world.mesh import Surface
@@ -49,6 +50,17 @@ class TrafficSystem(Subsystem, Protocol):
     @property
     def gait(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Speed (m/s) and distance walked so far (m) of each pedestrian."""
+
+    @property
+    def jams(self) -> JamLog:
+        """Who was taken out of a jam."""
+
+    @property
+    def reentered(self) -> int:
+        """How often cars that had left the map came back in."""
+
+    def stuck(self) -> list[Jam]:
+        """Who gets nowhere now."""
 
 
 class RobotNote(Protocol):

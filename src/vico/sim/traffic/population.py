@@ -14,6 +14,7 @@ from vico.errors import InputError
 from vico.seeds import rng
 from vico.sim.bodies import BUS, CAR, PEDESTRIAN, STEP_HEIGHT, Bodies, Drawn
 from vico.sim.neighbours import neighbour_grid
+from vico.sim.traffic.jams import STUCK_AFTER, Jam, JamLog, entity_before
 from vico.sim.traffic.junctions import mark_busy_crossings
 from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.traffic.pedestrians import RADIUS, advance_pedestrians, place_pedestrian
@@ -70,6 +71,8 @@ class Traffic:
     ----------
     fleet, pedestrian_state, junctions, shapes
         The state; see `vico.sim.traffic.state`.
+    jams
+        Remembers who was taken out of a jam.
 
     Raises
     ------
@@ -103,6 +106,8 @@ class Traffic:
         self._walkers = new_pedestrians(pedestrians, seed)
         self.pedestrian_state = self._walkers.view(np.recarray)
         self.junctions = new_junctions(lanes.zones, len(self.walks))
+        self.jams = JamLog(first_entity)
+        self._entities = np.zeros(0, np.int32)  # of all bodies of the last step, in the order of its shapes
         self.shapes = self._new_shapes()
         self._street_load = np.zeros(len(lanes.edges), np.int32)
         self._entries = network.entries
@@ -208,7 +213,7 @@ class Traffic:
         found |= {f"pedestrians.{field}": self._walkers[field] for field in PEDESTRIAN_RECORD.fields or ()}
         for name, part in (("junctions", self.junctions), ("shapes", self.shapes)):
             found |= {f"{name}.{field}": array for field, array in zip(part._fields, part, strict=True)}
-        return found
+        return found | {f"jams.{name}": array for name, array in self.jams.arrays().items()}
 
     def bodies(self) -> Bodies:
         """Vehicles, then pedestrians."""
@@ -216,11 +221,13 @@ class Traffic:
             self._bodies = self._bodies_now()
         return self._bodies
 
+    def _own_entities(self) -> NDArray[np.int32]:
+        return np.arange(self.first_entity, self.first_entity + len(self.shapes.x), dtype=np.int32)
+
     def _bodies_now(self) -> Bodies:
-        n = len(self.shapes.x)
         xy = np.column_stack([self.shapes.x, self.shapes.y])
         return Bodies(
-            entity=np.arange(self.first_entity, self.first_entity + n, dtype=np.int32),
+            entity=self._own_entities(),
             kind=np.repeat(np.array([CAR, BUS, PEDESTRIAN], np.int8), [self.cars, self.buses, self.pedestrians]),
             position=np.column_stack([xy, self.height(xy)]),
             yaw=self.shapes.yaw.copy(),
@@ -242,10 +249,47 @@ class Traffic:
         junctions.vehicle_wait[:] = 0.0
         count_per_street(net, fleet, self._street_load)
         advance_vehicles(net, fleet, junctions, everybody, grid, self._street_load, dt)
-        bring_back(net, fleet, junctions, everybody, self._entries, _ENTRY_SPEED, PATIENCE)
+        self._entities = np.concatenate([self._own_entities(), obstacles.entity])
+        self.jams.elapsed += dt
+        self._bring_back(everybody)
         for field in ("x", "y", "yaw", "vx", "vy"):
             getattr(mine, field)[:] = getattr(everybody, field)[: len(mine.x)]
         self._bodies = None
+
+    def _bring_back(self, everybody: Shapes) -> None:
+        """Bring cars back in that left the map or were stuck for too long; the latter are noted."""
+        stuck = [
+            (v, (float(everybody.x[v]), float(everybody.y[v])), float(self.fleet.stopped_time[v]), self._before(v))
+            for v in np.flatnonzero(self.fleet.stopped_time >= PATIENCE).tolist()
+        ]
+        teleports = self.fleet.teleports.copy() if stuck else self.fleet.teleports
+        bring_back(self._net, self._vehicles, self.junctions, everybody, self._entries, _ENTRY_SPEED, PATIENCE)
+        for v, xy, stood, before in stuck:
+            if self.fleet.teleports[v] > teleports[v]:
+                self.jams.note_rescue(v, xy, stood, before)
+
+    def _before(self, v: int) -> int:
+        return entity_before(int(self.fleet.blocker[v]), self._entities)
+
+    @property
+    def reentered(self) -> int:
+        """How often cars that had left the map came back in at its edge."""
+        return int(self.fleet.laps.sum())
+
+    def stuck(self) -> list[Jam]:
+        """Return who has got nowhere for `STUCK_AFTER` seconds or longer: vehicles, then pedestrians."""
+        now = float(self.jams.elapsed[0])
+        since = np.concatenate([self.fleet.stopped_time, self.pedestrian_state.jammed_time])
+        return [
+            Jam(
+                self.first_entity + k,
+                (float(self.shapes.x[k]), float(self.shapes.y[k])),
+                now,
+                float(since[k]),
+                self._before(k) if k < self.vehicles else 0,
+            )
+            for k in np.flatnonzero(since >= STUCK_AFTER).tolist()
+        ]
 
     def draw(self) -> Drawn:
         """Cars and buses; pedestrians are drawn by whoever skins people."""
