@@ -34,6 +34,12 @@ def test_delivery_gives_a_verdict_for_each_errand(helsinki_path: Path) -> None:
     assert printed.count("done") == 6
 
 
+def test_a_parcel_goes_with_the_robot(helsinki_path: Path) -> None:
+    printed = run("04_robots.py", "--world", str(helsinki_path), "--steps", "25")
+    metres = float(printed.split("the parcel went ")[1].split(" m")[0])
+    assert metres >= 5
+
+
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.name)
 def test_each_example_says_how_it_is_run(path: Path) -> None:
     assert f"python examples/{path.name} " in path.read_text()
