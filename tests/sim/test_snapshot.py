@@ -17,7 +17,7 @@ from vico.agents.schedule import followers_of
 from vico.errors import MissingFileError, SchemaError
 from vico.runner.gather import Gatherer
 from vico.sim.config import SimConfig
-from vico.sim.physics.mujoco_engine import PhysicsError
+from vico.sim.physics.records import PhysicsError
 from vico.sim.simulation import Simulation
 from vico.world.public import PublicMap
 

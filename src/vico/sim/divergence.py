@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vico.errors import OutputError
 from vico.io.cache import cache_folder
-from vico.sim.physics.mujoco_engine import PhysicsError
+from vico.sim.physics.records import PhysicsError
 from vico.sim.snapshot import state_hash, write_snapshot
 
 

@@ -14,6 +14,7 @@ from vico.assets.robots.model import (
     BUMP,
     BUMPER,
     FOOT_CONTACT,
+    LIMB,
     TOUCH,
     ActionSpace,
     FourLegs,
@@ -84,7 +85,7 @@ def _leg(leg: str) -> str:
       <body name="{leg}_hip" pos="{x} {sign * HIP_Y} 0">
         <joint name="{leg}_hip_joint" axis="1 0 0" range="{ranges["hip"]}" {common}/>
         <geom type="cylinder" size="0.046 0.02" pos="0 {sign * 0.04} 0" zaxis="0 1 0" mass="0.678"
-          contype="0" conaffinity="0"/>
+          contype="{LIMB}" conaffinity="0"/>
         <body name="{leg}_thigh" pos="0 {sign * SIDE} 0">
           <joint name="{leg}_thigh_joint" axis="0 1 0" range="{ranges["thigh"]}" {common}/>
           <geom type="box" size="0.03 0.02 0.1065" pos="0 {-sign * 0.015} -0.06" mass="1.152" {touch}/>

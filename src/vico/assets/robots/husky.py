@@ -51,6 +51,25 @@ def _mjcf() -> str:
         for name, (x, y, z) in ((name, _place(name)) for name in WHEELS)
     )
     servos = "".join(f'<velocity name="{name}" joint="{name}" kv="25" forcerange="-45 45"/>' for name in WHEELS)
+    touch = f'type="box" mass="0" contype="{TOUCH}" conaffinity="{TOUCH}"'
+    # Bumper bars, plates over the wheels, rails around the deck and the camera: what links are met with, massless.
+    parts = "".join(
+        f"""
+      <geom {touch} size="{size}" pos="{x} {y} {z}"/>"""
+        for size, x, y, z in (
+            ("0.01 0.267 0.014", 0.485, 0, 0.091),
+            ("0.01 0.267 0.014", -0.485, 0, 0.091),
+            ("0.045 0.21 0.0125", 0.44, 0, 0.091),
+            ("0.045 0.21 0.0125", -0.44, 0, 0.091),
+            ("0.405 0.05 0.006", 0, 0.25, 0.2),
+            ("0.405 0.05 0.006", 0, -0.25, 0.2),
+            ("0.2725 0.014 0.014", 0, 0.196, 0.237),
+            ("0.2725 0.014 0.014", 0, -0.196, 0.237),
+            ("0.014 0.21 0.014", 0.26, 0, 0.237),
+            ("0.014 0.21 0.014", -0.26, 0, 0.237),
+            ("0.025 0.06 0.055", 0.262, 0, 0.305),
+        )
+    )
     return f"""<mujoco model="husky">
   <compiler angle="radian" autolimits="true"/>
   <worldbody>
@@ -61,7 +80,7 @@ def _mjcf() -> str:
       <geom type="box" size="0.404 0.207 0.055" pos="0 0 0.175" mass="{chassis * 0.15}"
         contype="{TOUCH}" conaffinity="{TOUCH}"/>
       <geom name="{BUMPER}" type="box" size="0.495 0.3425 0.11" pos="0 0 0.14" mass="0" condim="1"
-        contype="{BUMP}" conaffinity="{BUMP}"/>{wheels}
+        contype="{BUMP}" conaffinity="{BUMP}"/>{parts}{wheels}
     </body>
   </worldbody>
   <actuator>{servos}</actuator>

@@ -21,9 +21,12 @@ from numpy.typing import NDArray
 from vico.errors import InputError
 from vico.world.mesh import Surface
 
-#: Collision bits: 1 is what robots stand on and touch each other with, 2 is what their bumper meets.
-TOUCH, BUMP = 1, 2
-#: A box of the robot's whole outline. It meets walls, people and vehicles, never the ground.
+#: Collision bits: 1 is what touches everything that is solid (links, ground, walls, objects, people, vehicles), 2 is
+#: what keeps out of the outline that traffic and people see of a robot (all but ground and objects), 4 touches all but
+#: other links: a contype of parts that lie within the motion of their neighbours.
+TOUCH, BUMP, LIMB = 1, 2, 4
+#: A box of the robot's whole outline, which is what `Bodies` show of it: it keeps out of walls, people, vehicles and
+#: other robots' outlines. Ground and objects meet links alone, and links meet all.
 BUMPER = "bumper"
 #: Contact of feet (MuJoCo's `solref`, `solimp`): they sink 1 cm at most. Softer ones sink below the cells of uneven
 #: ground and meet those from the side.

@@ -1,6 +1,17 @@
-"""Physics of robots: one small protocol, and MuJoCo behind it."""
+"""Physics of robots: two small protocols, and the engines behind them."""
 
-from vico.sim.physics.engine import PhysicsEngine, StaticScene
-from vico.sim.physics.mujoco_engine import MujocoEngine
+from vico.sim.physics.engine import PhysicsBatch, PhysicsEngine, PhysicsScene
+from vico.sim.physics.factory import DEFAULT_ENGINE, engine_names, make_engine, make_scene
+from vico.sim.physics.records import Capacity, StaticScene
 
-__all__ = ["MujocoEngine", "PhysicsEngine", "StaticScene"]
+__all__ = [
+    "DEFAULT_ENGINE",
+    "Capacity",
+    "PhysicsBatch",
+    "PhysicsEngine",
+    "PhysicsScene",
+    "StaticScene",
+    "engine_names",
+    "make_engine",
+    "make_scene",
+]

@@ -1,100 +1,225 @@
-"""What a physics engine has to do for the robots, and what it is told about their surroundings."""
+"""What a physics engine has to do for the robots: two protocols that a further engine is written against.
+
+A `PhysicsScene` is everything that is fixed once it is built: ground, solids, robots, and a preallocated number of
+kinematic bodies and free rigid objects. It is built once a world and its robots, never changes, and any number of
+engines share it. A `PhysicsEngine` is the state of one run in it.
+
+Engines that cannot add entities to what they have built park the unused ones out of reach, as MuJoCo's does. Nothing
+here says how contacts are solved: results of two engines agree loosely, those of one are the same bit for bit.
+"""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.assets.robots import RobotModel
 from vico.sim.bodies import Bodies
-from vico.world.heights import HeightField
-
-#: Seconds a frame of physics lasts: fifty a second, five in a sub-step of the simulation.
-FRAME = 0.02
-
-
-@dataclass(frozen=True)
-class StaticScene:
-    """Everything that never moves.
-
-    Attributes
-    ----------
-    height
-        The ground.
-    hulls
-        Corner points of convex solids, metres, each of shape ``(n, 3)``.
-    boxes
-        Upright boxes: x, y, z of the centre, yaw, half extents; float64, shape ``(n, 7)``.
-    pillars
-        Upright cylinders: x, y, z of the centre, radius, half height; float64, shape ``(n, 5)``.
-    """
-
-    height: HeightField
-    hulls: tuple[NDArray[np.float64], ...] = ()
-    boxes: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 7)))
-    pillars: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 5)))
-
-
-@dataclass(frozen=True)
-class Base:
-    """Motion of a robot's base.
-
-    Attributes
-    ----------
-    position
-        Of its origin, ENU metres, shape ``(3,)``.
-    rotation
-        Base to world, shape ``(3, 3)``.
-    velocity
-        Metres a second in the world's frame, shape ``(3,)``.
-    angular_velocity_body
-        Radians a second in the base's own frame, shape ``(3,)``.
-    quaternion
-        The rotation as w, x, y, z.
-    """
-
-    position: NDArray[np.float64]
-    rotation: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    angular_velocity_body: NDArray[np.float64]
-    quaternion: NDArray[np.float64]
-
-    @property
-    def yaw(self) -> float:
-        """Heading, radians."""
-        return math.atan2(self.rotation[1, 0], self.rotation[0, 0])
+from vico.sim.physics.frames import COARSE
+from vico.sim.physics.records import (
+    Base,
+    Capacity,
+    Contacts,
+    Imu,
+    ObjectMotion,
+    Party,
+    RigidObject,
+    StaticScene,
+)
 
 
 class PhysicsEngine(Protocol):
-    """Robots among fixed scene and kinematic bodies. Robots are addressed by their index.
+    """Robots, people, vehicles and loose things in a `PhysicsScene`. Robots are addressed by their index.
 
-    What is there is fixed when the engine is built; `arrays` and `restore` give exact snapshots.
+    Calls between two steps take effect at the next one. `arrays` and `restore` give exact snapshots: an engine of the
+    same scene that is restored goes on bit for bit as the saved one, and answers every query of this protocol alike.
     """
+
+    # Robots.
+
+    def link_names(self, robot: int) -> tuple[str, ...]:
+        """Names of a robot's links, base first, in the order that contacts count them."""
 
     def base(self, robot: int) -> Base:
         """Where a robot's base is and how it moves. Its arrays are shared until the next step: do not change them."""
 
     def joints(self, robot: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Angles and speeds of the driven joints, rad and rad/s, in the order of the model's `joints`."""
+        """Positions and speeds of the joints, rad and rad/s (m, m/s), in the order of the model's `joints`."""
 
-    def command(self, robot: int, targets: NDArray[np.float64], gains: tuple[float, float] | None = None) -> None:
-        """Set what the servos follow from now on; legs' servos also take a stiffness and a damping with it."""
+    def motor_forces(self, robot: int) -> NDArray[np.float64]:
+        """Torques (Nm; N for sliding joints) of the motors in the last step, in the order of the control vector."""
 
-    def set_dynamic_obstacles(self, obstacles: Bodies, dt: float) -> None:
-        """Say which bodies are near: they arrive at their positions `dt` seconds from now, at their velocities."""
-
-    def step(self, frames: int = 1, *, extra_substeps: bool = False) -> None:
-        """Move on by some frames with the servos as they are; with smaller steps where bodies lie and throw limbs."""
+    def imu(self, robot: int) -> Imu:
+        """Return what an inertial measurement unit in the base measures."""
 
     def links(self, robot: int) -> NDArray[np.float64]:
         """Poses of the links, in the order of the model's `shapes`, shape ``(n, 4, 4)``."""
 
+    def command(self, robot: int, targets: NDArray[np.float64], gains: tuple[float, float] | None = None) -> None:
+        """Set what the servos follow from now on; those that follow angles also take a stiffness and a damping."""
+
+    def thrust(
+        self, robot: int, sites: Sequence[str], forces: NDArray[np.float64], torques: NDArray[np.float64] | None = None
+    ) -> None:
+        """Push a robot at named sites from now on, as rotors do: force and torque turn with the site.
+
+        Parameters
+        ----------
+        sites
+            Names out of `PhysicsScene.site_names`; the robot's other sites keep what they had.
+        forces, torques
+            In the frame of each site, N and Nm, shape ``(len(sites), 3)``; no torques: zeros.
+
+        Raises
+        ------
+        InputError
+            If the robot has no such site, or a number is not finite.
+        """
+
+    # Everybody else.
+
+    def set_dynamic_obstacles(self, obstacles: Bodies, dt: float) -> None:
+        """Say who is near: each arrives at its pose `dt` seconds from now.
+
+        Until then it is moved at every frame, from where it was told to be last, or, if it is new here or has jumped,
+        from where its velocity says that it comes from. Nearest ones count if there are more than `Capacity` allows.
+        Bodies of kind ``object`` are left out: those are free rigid objects.
+        """
+
+    @property
+    def left_out(self) -> int:
+        """How many bodies near robots found no place in the last call of `set_dynamic_obstacles`."""
+
+    # Free rigid objects.
+
+    def place_object(self, slot: int, thing: RigidObject) -> None:
+        """Put an object into a slot (0 up to `Capacity.objects`), awake; what was there is gone."""
+
+    def remove_object(self, slot: int) -> None:
+        """Take the object of a slot out of the scene; nothing happens if there is none."""
+
+    def objects(self) -> ObjectMotion:
+        """Where all objects are."""
+
+    def clearance_below(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Metres from each point straight down to ground, solids, robots or objects; inf if there is nothing.
+
+        Parameters
+        ----------
+        points
+            ENU metres, shape ``(n, 3)``.
+
+        Returns
+        -------
+        ndarray
+            float64, shape ``(n,)``.
+        """
+
+    # Time.
+
+    def contacts(self) -> Contacts:
+        """Who touched whom, where and how hard, in the last step of the solver."""
+
+    def step(self, frames: int = 1, *, frame: float = COARSE) -> None:
+        """Move on by some frames of `FINE` or `COARSE` seconds (see `vico.sim.physics.frames`).
+
+        Raises
+        ------
+        PhysicsError
+            If the motion diverges.
+        """
+
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Everything that decides the future."""
+        """Everything that decides the future, and what queries of the last step answer from."""
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Go back to what `arrays` held, bit for bit."""
+        """Go back to what `arrays` held, bit for bit.
+
+        Raises
+        ------
+        SchemaError
+            If it belongs to another scene.
+        """
+
+
+class PhysicsBatch(Protocol):
+    """Many copies of one scene that are stepped together, for training and planning; row = copy.
+
+    Copies never meet. Each goes on bit for bit as an engine of its own would that is stepped alone.
+    """
+
+    def __len__(self) -> int:
+        """How many copies there are."""
+
+    def restore(self, copies: NDArray[np.int64], arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Put some copies into a state saved by an engine of the same scene."""
+
+    def arrays(self, copy: int) -> dict[str, NDArray[Any]]:
+        """State of one copy, as an engine's `arrays`: an engine that restores it goes on alike."""
+
+    def command(self, robot: int, targets: NDArray[np.float64]) -> None:
+        """Set what the servos of a robot follow in each copy, shape ``(copies, motors)``."""
+
+    def bases(self, robot: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Poses (x, y, z, quaternion) and motions (velocity, angular velocity in the base's frame) of a robot's base.
+
+        Returns
+        -------
+        tuple of ndarray
+            float64, shapes ``(copies, 7)`` and ``(copies, 6)``.
+        """
+
+    def joints(self, robot: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Positions and speeds of the joints, shape ``(copies, joints)`` each."""
+
+    def objects(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Poses and motions of the free rigid objects, shapes ``(copies, slots, 7)`` and ``(copies, slots, 6)``."""
+
+    def step(self, frames: int = 1, *, frame: float = COARSE) -> None:
+        """Move all copies on by some frames."""
+
+
+class PhysicsScene(Protocol):
+    """What is fixed: ground, solids, robots' bodies, and room for people, vehicles and loose things."""
+
+    @property
+    def name(self) -> str:
+        """Name of the engine, as `make_scene` takes it."""
+
+    @property
+    def models(self) -> tuple[RobotModel, ...]:
+        """The robots."""
+
+    @property
+    def capacity(self) -> Capacity:
+        """How many people, vehicles and objects there is room for."""
+
+    def link_names(self, robot: int) -> tuple[str, ...]:
+        """Names of a robot's links, base first, in the order that contacts count them."""
+
+    def site_names(self, robot: int) -> tuple[str, ...]:
+        """Names of the sites a robot can be pushed at."""
+
+    def engine(self, places: NDArray[np.float64]) -> PhysicsEngine:
+        """Return a new state: robots stand at `places` (x, y, yaw, shape ``(n, 3)``), nobody else is there."""
+
+    def batch(self, copies: int, places: NDArray[np.float64], *, threads: int = 0) -> PhysicsBatch:
+        """Return many copies of a new state, stepped on some threads (0: one a core)."""
+
+
+__all__ = [
+    "Base",
+    "Capacity",
+    "Contacts",
+    "Imu",
+    "ObjectMotion",
+    "Party",
+    "PhysicsBatch",
+    "PhysicsEngine",
+    "PhysicsScene",
+    "RigidObject",
+    "StaticScene",
+]

@@ -1,8 +1,7 @@
 """The physics engine of the default install: MuJoCo.
 
-People, cars and buses near a robot are kinematic ("mocap") shapes out of a fixed stock; the rest of the stock is
-parked far below the ground. They meet only the robots' bumpers, a box of each robot's whole outline, so that what
-other movers keep clear of and what physics keeps clear of are the same.
+People, cars and buses near a robot are kinematic ("mocap") shapes, movable things near it free boxes, both out of a
+fixed number that is parked far below the ground. Free boxes that lie still sleep and cost next to nothing.
 """
 
 from __future__ import annotations
@@ -16,31 +15,20 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.robots import RobotModel
-from vico.errors import SchemaError, VicoError
-from vico.io.compiled import compiled
+from vico.errors import InputError, SchemaError
 from vico.sim.bodies import Bodies
-from vico.sim.physics.engine import FRAME, Base, StaticScene
-from vico.sim.physics.mujoco_model import (
-    EXTRA_SUBSTEPS,
-    PARKED,
-    SLEEP,
-    SUBSTEPS,
-    add_scene,
-    add_stock,
-    set_options,
-    standing_pose,
-)
+from vico.sim.physics.frames import COARSE, SOLVER_STEPS
+from vico.sim.physics.movers import YAW, Movers
+from vico.sim.physics.mujoco_model import PARKED, PARKED_APART, parked_object, standing_pose
+from vico.sim.physics.mujoco_parameters import Parameters
+from vico.sim.physics.mujoco_scene import CompiledScene, SharedModel
+from vico.sim.physics.records import Base, Contacts, Imu, ObjectMotion, Party, PhysicsError, RigidObject
 
-#: Bodies within this distance of a robot can be met, metres.
-NEAR = 10.0
-#: Kinematic bodies are this much larger than what they stand for: soft contact never lets the real ones overlap.
-_SKIN = 0.03
-_STATE = mujoco.mjtState.mjSTATE_INTEGRATION
-
-
-class PhysicsError(VicoError, ArithmeticError):
-    """The equations of motion have no finite solution any more."""
+STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+_DOWN = np.array([0.0, 0.0, -1.0])
+_GRAVITY = np.array([0.0, 0.0, 9.81])
+#: Slower than this, m/s and rad/s, for so many seconds an object rests.
+_SLOW, _CALM_TIME = 0.03, 0.2
 
 
 class PhysicsWarning(RuntimeWarning):
@@ -56,97 +44,58 @@ def _take_note(message: str) -> None:
         _SAID.append(message)
 
 
-@compiled
-def _gaps(position, half_length, half_width, centres):  # type: ignore[no-untyped-def]
-    """Distance of every body's outline (at least) from the nearest of `centres`, metres."""
-    out = np.empty(len(position))
-    for k in range(len(position)):
-        least = np.inf
-        for c in range(len(centres)):
-            least = min(least, math.hypot(position[k, 0] - centres[c, 0], position[k, 1] - centres[c, 1]))
-        out[k] = least - max(half_length[k], half_width[k])
-    return out
-
-
 class MujocoEngine:
-    """Robots in MuJoCo.
+    """One run in a compiled scene; see `vico.sim.physics.engine.PhysicsEngine`.
 
     Parameters
     ----------
     scene
-        What never moves.
-    models, places
-        The robots, and where each stands at first: x, y, yaw, shape ``(n, 3)``.
-    people, vehicles
-        How many of each can be near robots at once; of more, the nearest count.
+        What is fixed.
+    places
+        Where each robot stands at first: x, y, yaw, shape ``(n, 3)``.
     """
 
-    def __init__(
-        self,
-        scene: StaticScene,
-        models: Sequence[RobotModel],
-        places: NDArray[np.float64],
-        *,
-        people: int = 32,
-        vehicles: int = 16,
-    ) -> None:
+    def __init__(self, scene: CompiledScene, places: NDArray[np.float64]) -> None:
         # By default MuJoCo appends its warnings to a file in the folder people happen to be in.
         if mujoco.get_mju_user_warning() is None:
             mujoco.set_mju_user_warning(_take_note)
-        self._robots = tuple(models)
-        self._people, self._vehicles = people, vehicles
-        spec = mujoco.MjSpec()
-        set_options(spec)
-        add_scene(spec, scene)
-        add_stock(spec, people, vehicles)
-        for index, (model, place) in enumerate(zip(models, places, strict=True)):
-            robot = mujoco.MjSpec.from_string(model.mjcf)
-            set_options(robot)
-            root = robot.body("base")
-            root.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER
-            root.pos, root.quat = standing_pose(scene.height, model, place)
-            spec.attach(robot, prefix=f"r{index}/", frame=spec.worldbody.add_frame())
-        self._model = spec.compile()
-        self._data = mujoco.MjData(self._model)
+        places = np.asarray(places, np.float64)
+        if places.shape != (len(scene.models), 3):
+            raise InputError(f"physics: {len(scene.models)} robots need as many places x, y, yaw, not {places.shape}")
+        self.compiled = scene
+        self._model = scene.model
+        self._data = mujoco.MjData(scene.model)
         self._qpos, self._qvel = self._data.qpos, self._data.qvel
-        self._place_scene()
-        self._index()
-        for index, model in enumerate(self._robots):
-            self._data.qpos[self._angle[index]] = model.rest
-            self._data.ctrl[self._motor[index]] = model.stance
-        self._from = np.zeros((people + vehicles, 3))
-        self._pace = np.zeros((people + vehicles, 3))
-        self._left = 0.0
-        self._size = mujoco.mj_stateSize(self._model, _STATE)
-        self._park_all()
-
-    def _index(self) -> None:
-        m = self._model
-        self._root, self._root_speed = [], []
-        self._angle, self._rate, self._motor, self._links = [], [], [], []
-        # Motors that follow angles: those alone have a stiffness that can be set.
-        self._servo: list[NDArray[np.int64]] = []
-        # What servos were last given; not part of the state, it only saves writing it again.
-        self._gains_of: list[tuple[float, float] | None] = [None] * len(self._robots)
+        self._size = mujoco.mj_stateSize(self._model, STATE)
+        self._parameters = Parameters(scene)
+        self._movers = Movers(scene.capacity)
+        count = scene.capacity.objects
+        self._present = np.zeros(count, np.bool_)
+        # Seconds for which each object has been slow.
+        self._calm = np.zeros(count)
+        # What the last frame leaves for sensors: velocities of bases before it and its length, torques, contacts.
+        self._velocity_before = np.zeros((len(scene.models), 3))
+        self._frame = np.zeros(1)
+        self._contacts: NDArray[np.float64] | None = np.zeros((0, 9))
+        self._gains_of: list[tuple[float, float] | None] = [None] * len(scene.models)
+        scene.reset(self._data)
+        for robot, (model, place) in enumerate(zip(scene.models, places, strict=True)):
+            index = scene.robots[robot]
+            position, quaternion = standing_pose(scene.height, model, place)
+            self._qpos[index.root : index.root + 7] = [*position, *quaternion]
+            self._qpos[index.angle] = model.rest
+            self._data.ctrl[index.motor] = model.stance
         self._forget()
-        for index, model in enumerate(self._robots):
-            prefix = f"r{index}/"
-            motors = np.array([m.actuator(prefix + motor).id for motor in model.motors], np.int64)
-            joints = [_joint_of(m, prefix + joint, driven=joint in model.motors) for joint in model.joints]
-            self._motor.append(motors)
-            self._servo.append(motors[[servo == "position" for servo in model.servos]])
-            self._angle.append(_run_of(m.jnt_qposadr[joints]))
-            self._rate.append(_run_of(m.jnt_dofadr[joints]))
-            first = int(m.body(prefix + "base").jntadr[0])
-            self._root.append(int(m.jnt_qposadr[first]))
-            self._root_speed.append(int(m.jnt_dofadr[first]))
-            self._links.append(np.array([m.body(prefix + link).id for link in model.shapes]))
-        self._servos = np.concatenate([np.zeros(0, np.int64), *self._servo])
-        names = [f"person{i}" for i in range(self._people)] + [f"vehicle{i}" for i in range(self._vehicles)]
-        bodies = [m.body(name).id for name in names]
-        self._mocap = np.array([m.body_mocapid[body] for body in bodies], np.int64)
-        self._stock_geom = np.array([m.body_geomadr[body] for body in bodies], np.int64)
-        self._stock_bvh = np.array([m.body_bvhadr[body] for body in bodies], np.int64)
+        self._move_movers()
+
+    def link_names(self, robot: int) -> tuple[str, ...]:
+        """Names of a robot's links, base first."""
+        return self.compiled.link_names(robot)
+
+    @property
+    def coordinates(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """All positions and all velocities, as MuJoCo orders them; views."""
+        return self._qpos, self._qvel
 
     @property
     def geoms(self) -> int:
@@ -155,32 +104,18 @@ class MujocoEngine:
 
     def _forget(self) -> None:
         """Drop what was computed from a state that is no more."""
-        self._bases: list[Base | None] = [None] * len(self._robots)
+        self._bases: list[Base | None] = [None] * len(self.compiled.models)
         self._kinematics_of = -1.0
 
-    def _place_scene(self) -> None:
-        """Compute the poses of all that never moves, which steps leave out."""
-        flags = self._model.opt.enableflags
-        self._model.opt.enableflags = flags & ~SLEEP
-        mujoco.mj_kinematics(self._model, self._data)
-        self._model.opt.enableflags = flags
-
-    def _park_all(self) -> None:
-        count = self._people + self._vehicles
-        self._from[:] = 0.0
-        self._from[:, 0] = 20.0 * np.arange(count)
-        self._from[:, 2] = PARKED
-        self._pace[:] = 0.0
-        self._left = 0.0
-        self._data.mocap_pos[self._mocap] = self._from
-        self._data.mocap_quat[self._mocap] = (1.0, 0.0, 0.0, 0.0)
+    # Robots.
 
     def base(self, robot: int) -> Base:
         """Where a robot's base is and how it moves."""
         known = self._bases[robot]
         if known is not None:
             return known
-        q, v = self._root[robot], self._root_speed[robot]
+        index = self.compiled.robots[robot]
+        q, v = index.root, index.root_speed
         pose, motion = self._qpos[q : q + 7].copy(), self._qvel[v : v + 6].copy()
         rotation = np.empty(9)
         mujoco.mju_quat2Mat(rotation, pose[3:])
@@ -189,78 +124,176 @@ class MujocoEngine:
         return base
 
     def joints(self, robot: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Angles and speeds of the driven joints."""
-        return self._qpos[self._angle[robot]].copy(), self._qvel[self._rate[robot]].copy()
+        """Positions and speeds of the joints."""
+        index = self.compiled.robots[robot]
+        return self._qpos[index.angle].copy(), self._qvel[index.rate].copy()
+
+    def motor_forces(self, robot: int) -> NDArray[np.float64]:
+        """Torques of the motors in the last step."""
+        return np.array(self._data.actuator_force[self.compiled.robots[robot].motor])
+
+    def imu(self, robot: int) -> Imu:
+        """Angular velocity, and acceleration without gravity's, in the base's frame."""
+        base, frame = self.base(robot), float(self._frame[0])
+        gained = base.velocity - self._velocity_before[robot]
+        acceleration = gained / frame if frame > 0.0 else np.zeros(3)
+        force = np.zeros(3)
+        mujoco.mju_mulMatTVec(force, base.rotation, acceleration + _GRAVITY)
+        return Imu(base.angular_velocity_body.copy(), force)
+
+    def links(self, robot: int) -> NDArray[np.float64]:
+        """Poses of the links, shape ``(n, 4, 4)``."""
+        self._refresh()
+        bodies = self.compiled.robots[robot].shown
+        poses = np.zeros((len(bodies), 4, 4))
+        poses[:, :3, :3] = self._data.xmat[bodies].reshape(-1, 3, 3)
+        poses[:, :3, 3] = self._data.xpos[bodies]
+        poses[:, 3, 3] = 1.0
+        return poses
+
+    def _refresh(self) -> None:
+        """Compute poses of links and objects from the state as it is."""
+        if self._kinematics_of != self._data.time:
+            mujoco.mj_kinematics(self._model, self._data)
+            self._kinematics_of = self._data.time
 
     def command(self, robot: int, targets: NDArray[np.float64], gains: tuple[float, float] | None = None) -> None:
         """Set what the servos follow, and how stiffly: Nm/rad and Nms/rad."""
-        motors = self._motor[robot]
-        self._data.ctrl[motors] = targets
+        index = self.compiled.robots[robot]
+        self._data.ctrl[index.motor] = targets
         if gains is not None and gains != self._gains_of[robot]:
-            self._set_gains(self._servo[robot], *gains)
+            mine = np.isin(self.compiled.servos, index.servo)
+            self._parameters.stiffness[mine], self._parameters.damping[mine] = gains
             self._gains_of[robot] = gains
 
-    def _set_gains(self, motors: NDArray[Any], stiffness: Any, damping: Any) -> None:
-        self._model.actuator_gainprm[motors, 0] = stiffness
-        self._model.actuator_biasprm[motors, 1] = -stiffness
-        self._model.actuator_biasprm[motors, 2] = -damping
+    def thrust(
+        self, robot: int, sites: Sequence[str], forces: NDArray[np.float64], torques: NDArray[np.float64] | None = None
+    ) -> None:
+        """Push a robot at named sites from now on; in the frames of the sites."""
+        known = self.compiled.robots[robot].thrusters
+        wrench = np.zeros((len(sites), 6))
+        wrench[:, :3] = forces
+        if torques is not None:
+            wrench[:, 3:] = torques
+        if not np.isfinite(wrench).all():
+            raise InputError(f"physics: forces on robot {robot} have to be finite, not {wrench.tolist()}")
+        for site, values in zip(sites, wrench, strict=True):
+            if site not in known:
+                raise InputError(
+                    f"physics: robot {robot} ({self.compiled.models[robot].name}) has no site {site!r}; "
+                    f"it has {', '.join(known) or 'none'}"
+                )
+            self._data.ctrl[known[site]] = values
+
+    # Everybody else.
 
     def set_dynamic_obstacles(self, obstacles: Bodies, dt: float) -> None:
-        """Take bodies near robots out of the stock, the nearest first; followers alone mind the rest."""
-        self._park_all()
-        if not len(obstacles):
-            return
-        centres = np.array([self._qpos[q : q + 2] for q in self._root]).reshape(-1, 2)
-        gap = _gaps(obstacles.position, obstacles.half_length, obstacles.half_width, centres)
-        if gap.min() >= NEAR:
-            return
-        person = obstacles.person
-        for first, count, chosen in ((0, self._people, person), (self._people, self._vehicles, ~person)):
-            near = np.flatnonzero(chosen & (gap < NEAR))
-            near = near[np.lexsort((obstacles.entity[near], gap[near]))][:count]
-            # In the order of their numbers, so that who comes and goes far away changes nothing.
-            near = near[np.argsort(obstacles.entity[near], kind="stable")]
-            self._fill(np.arange(first, first + len(near)), obstacles, near, dt, upright=chosen is person)
+        """Take people and vehicles near robots; they arrive `dt` seconds from now."""
+        centres = np.array([self._qpos[robot.root : robot.root + 2] for robot in self.compiled.robots]).reshape(-1, 2)
+        self._movers.set(obstacles, dt, centres)
+        self._parameters.mover_half[:] = self._movers.half
+        self._move_movers()
 
-    def _fill(self, slots: NDArray[Any], bodies: Bodies, rows: NDArray[Any], dt: float, *, upright: bool) -> None:
-        if not len(rows):
-            return
-        m, geoms = self._model, self._stock_geom[slots]
-        half = np.empty((len(rows), 3))
-        half[:, 0] = bodies.half_length[rows] + _SKIN
-        half[:, 1] = bodies.half_width[rows] + _SKIN
-        half[:, 2] = bodies.height[rows] / 2
-        if upright:
-            m.geom_size[geoms, 0] = half[:, 1]
-            m.geom_size[geoms, 1] = half[:, 2]
-            half[:, 0] = half[:, 1]
-        else:
-            m.geom_size[geoms] = half
-        # What the broad and middle phases go by has to follow the size.
-        m.geom_rbound[geoms] = np.sqrt((half * half).sum(axis=1))
-        m.geom_aabb[geoms, 3:] = half
-        m.bvh_aabb[self._stock_bvh[slots], 3:] = half
-        self._pace[slots, :2] = bodies.velocity[rows]
-        self._from[slots] = bodies.position[rows]
-        self._from[slots, 2] += bodies.height[rows] / 2
-        self._from[slots] -= self._pace[slots] * dt
-        yaw = bodies.yaw[rows] / 2
-        turn = np.zeros((len(rows), 4))
-        turn[:, 0], turn[:, 3] = np.cos(yaw), np.sin(yaw)
-        self._data.mocap_quat[self._mocap[slots]] = turn
-        self._left = dt
-        self._data.mocap_pos[self._mocap] = self._from
+    @property
+    def left_out(self) -> int:
+        """How many bodies near robots found no place."""
+        return int(self._movers.left_out[0])
 
-    def step(self, frames: int = 1, *, extra_substeps: bool = False) -> None:
-        """Move on by some frames; surrounding bodies move first."""
-        steps = EXTRA_SUBSTEPS if extra_substeps else SUBSTEPS
-        self._model.opt.timestep = FRAME / steps
-        if self._left > 0.0:
-            self._from += self._pace * (FRAME * frames)
-            self._left -= FRAME * frames
-            self._data.mocap_pos[self._mocap] = self._from
+    def _move_movers(self) -> None:
+        """Put kinematic bodies where they are now, and who is nobody out of the way."""
+        poses, gone = self._movers.poses(), self._movers.entity == 0
+        where = self.compiled.mover_mocap
+        poses[gone] = 0.0
+        poses[gone, 0] = PARKED_APART * np.flatnonzero(gone)
+        poses[gone, 2] = PARKED
+        turn = np.zeros((len(poses), 4))
+        turn[:, 0], turn[:, 3] = np.cos(poses[:, YAW] / 2), np.sin(poses[:, YAW] / 2)
+        self._data.mocap_pos[where] = poses[:, :3]
+        self._data.mocap_quat[where] = turn
+
+    # Free rigid objects.
+
+    def place_object(self, slot: int, thing: RigidObject) -> None:
+        """Put an object into a slot, awake."""
+        self._check_slot(slot)
+        size = np.asarray(thing.size, np.float64)
+        if size.shape != (3,) or not (np.isfinite(size).all() and size.min() > 0.0 and thing.mass > 0.0):
+            raise InputError(
+                f"physics: an object needs three positive extents and a mass, not {size.tolist()}, {thing.mass} kg"
+            )
+        self._parameters.object_half[slot], self._parameters.object_mass[slot] = size / 2, thing.mass
+        q, v = self.compiled.object_at(slot)
+        # Written to another pose than the parked one, it is awake from the next step on.
+        self._qpos[q : q + 7] = np.concatenate([thing.position, thing.quaternion])
+        self._qvel[v : v + 6] = np.concatenate([thing.velocity, thing.angular_velocity_body])
+        self._data.qacc_warmstart[v : v + 6] = 0.0
+        self._present[slot], self._calm[slot] = True, 0.0
+        self._kinematics_of = -1.0
+
+    def remove_object(self, slot: int) -> None:
+        """Take an object out of the scene."""
+        self._check_slot(slot)
+        if not self._present[slot]:
+            return
+        q, v = self.compiled.object_at(slot)
+        self._qpos[q : q + 7] = [*parked_object(slot), 1.0, 0.0, 0.0, 0.0]
+        self._qvel[v : v + 6] = 0.0
+        self._data.qacc_warmstart[v : v + 6] = 0.0
+        self._present[slot] = False
+        # Nobody but a reset puts anybody to sleep.
+        forces, contacts = np.array(self._data.actuator_force), self._last_contacts()
+        self._set_state(self._state(), forces, contacts)
+
+    def _check_slot(self, slot: int) -> None:
+        if not 0 <= slot < len(self._present):
+            raise InputError(f"physics: there is no slot {slot} for objects; there are {len(self._present)}")
+
+    def objects(self) -> ObjectMotion:
+        """Where all objects are."""
+        pose = np.array(self._qpos[self.compiled.object_pose]).reshape(-1, 7)
+        motion = np.array(self._qvel[self.compiled.object_motion]).reshape(-1, 6)
+        resting = self._calm >= _CALM_TIME - 1e-9
+        return ObjectMotion(self._present.copy(), pose[:, :3], pose[:, 3:], motion[:, :3], motion[:, 3:], resting)
+
+    def clearance_below(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Metres from each point straight down to what is there; inf for nothing."""
+        found, hit = np.full(len(points), np.inf), np.zeros(1, np.int32)
+        with self.compiled.shared.lock:
+            self._parameters.hold(self.compiled.shared)
+            self._refresh()
+            for k, point in enumerate(np.asarray(points, np.float64)):
+                away = mujoco.mj_ray(self._model, self._data, point, _DOWN, None, 1, -1, hit)
+                found[k] = away if away >= 0.0 else np.inf
+        return found
+
+    # Time.
+
+    def step(self, frames: int = 1, *, frame: float = COARSE) -> None:
+        """Move on by some frames; people and vehicles move first, at every one."""
+        self.step_in(self.compiled.shared, frames, frame)
+        self.judge()
+
+    def step_in(self, shared: SharedModel, frames: int, frame: float) -> None:
+        """Step, with the equations of a model of the same scene: its own for each thread of a batch."""
+        steps = SOLVER_STEPS[frame]
         self._forget()
-        mujoco.mj_step(self._model, self._data, steps * frames)
+        with shared.lock:
+            self._parameters.hold(shared)
+            shared.model.opt.timestep = frame / steps
+            for _ in range(frames):
+                if self._movers.moving:
+                    self._movers.advance(frame)
+                    self._move_movers()
+                self._velocity_before[:] = self._qvel[self.compiled.base_velocity]
+                mujoco.mj_step(shared.model, self._data, steps)
+                if self._present.any():
+                    motion = self._qvel[self.compiled.object_motion].reshape(-1, 6)
+                    self._calm = np.where(np.abs(motion).max(axis=1) < _SLOW, self._calm + frame, 0.0)
+        self._frame[0] = frame
+        self._contacts = None
+
+    def judge(self) -> None:
+        """Raise or warn if MuJoCo said something."""
         said, _SAID[:] = _SAID[:], ()
         if not math.isfinite(float(np.add.reduce(self._qvel))):
             why = f" ({said[0]})" if said else ""
@@ -268,34 +301,59 @@ class MujocoEngine:
                 f"physics: the robots' motion diverged at {self._data.time:.2f} s{why}; report it with the snapshot"
             )
         for message in said:
-            warnings.warn(f"physics: MuJoCo says: {message}", PhysicsWarning, stacklevel=2)
+            warnings.warn(f"physics: MuJoCo says: {message}", PhysicsWarning, stacklevel=3)
 
-    def links(self, robot: int) -> NDArray[np.float64]:
-        """Poses of the links, shape ``(n, 4, 4)``."""
-        if self._kinematics_of != self._data.time:
-            mujoco.mj_kinematics(self._model, self._data)
-            self._kinematics_of = self._data.time
-        bodies = self._links[robot]
-        poses = np.zeros((len(bodies), 4, 4))
-        poses[:, :3, :3] = self._data.xmat[bodies].reshape(-1, 3, 3)
-        poses[:, :3, 3] = self._data.xpos[bodies]
-        poses[:, 3, 3] = 1.0
-        return poses
+    def _last_contacts(self) -> NDArray[np.float64]:
+        """Shapes, position, normal and force of the last step's contacts: the state after it does not tell them."""
+        if self._contacts is None:
+            contact, solved = self._data.contact, np.asarray(self._data.contact.efc_address) >= 0
+            kept = np.empty((int(solved.sum()), 9))
+            kept[:, :2] = np.asarray(contact.geom)[solved]
+            kept[:, 2:5] = np.asarray(contact.pos)[solved]
+            kept[:, 5:8] = np.asarray(contact.frame)[solved, :3]
+            # The first row of an elliptic or frictionless contact is its normal force.
+            kept[:, 8] = self._data.efc_force[np.asarray(contact.efc_address)[solved]]
+            self._contacts = kept
+        return self._contacts
+
+    def contacts(self) -> Contacts:
+        """Who touched whom in the last step."""
+        s, kept = self.compiled, self._last_contacts()
+        geoms = kept[:, :2].astype(np.int64)
+        party, owner = s.geom_party[geoms], s.geom_owner[geoms]
+        movers = party == Party.BODY
+        owner = np.where(movers, self._movers.entity[np.where(movers, owner, 0)], owner).astype(np.int32)
+        return Contacts(party, owner, s.geom_link[geoms], *(kept[:, a].copy() for a in (slice(2, 5), slice(5, 8), 8)))
+
+    # State.
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Positions, velocities, servo targets, the solver's warm start and the stock of kinematic bodies."""
-        state = np.empty(self._size)
-        mujoco.mj_getState(self._model, self._data, state, _STATE)
-        servos = self._servos
+        """Positions, velocities, servo targets, the solver's warm start, pools, and what sensors answer from."""
         return {
-            "state": state,
-            "stiffness": self._model.actuator_gainprm[servos, 0].copy(),
-            "damping": -self._model.actuator_biasprm[servos, 2],
-            "stock_size": self._model.geom_size[self._stock_geom].copy(),
-            "stock_from": self._from.copy(),
-            "stock_pace": self._pace.copy(),
-            "stock_left": np.array([self._left]),
+            "state": self._state(),
+            "present": self._present.copy(),
+            "calm": self._calm.copy(),
+            "velocity_before": self._velocity_before.copy(),
+            "frame": self._frame.copy(),
+            "forces": np.array(self._data.actuator_force),
+            "contacts": self._last_contacts().copy(),
+            "parameters": self._parameters.numbers.copy(),
+            **self._movers.arrays(),
         }
+
+    def _state(self) -> NDArray[np.float64]:
+        state = np.empty(self._size)
+        mujoco.mj_getState(self._model, self._data, state, STATE)
+        return state
+
+    def _set_state(
+        self, state: NDArray[np.float64], forces: NDArray[np.float64], contacts: NDArray[np.float64]
+    ) -> None:
+        self.compiled.reset(self._data)
+        mujoco.mj_setState(self._model, self._data, state, STATE)
+        self._data.actuator_force[:] = forces
+        self._contacts = np.array(contacts)
+        self._forget()
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Go back to what `arrays` held.
@@ -306,38 +364,15 @@ class MujocoEngine:
             If it belongs to other robots or surroundings.
         """
         state = np.ascontiguousarray(arrays["state"], np.float64)
-        if state.shape != (self._size,) or arrays["stock_from"].shape != self._from.shape:
+        if state.shape != (self._size,) or arrays["forces"].shape != self._data.actuator_force.shape:
             raise SchemaError(
                 "physics: the saved state belongs to other robots or surroundings; start with the same ones"
             )
-        mujoco.mj_resetData(self._model, self._data)
-        self._place_scene()
-        mujoco.mj_setState(self._model, self._data, state, _STATE)
-        self._set_gains(self._servos, np.asarray(arrays["stiffness"]), np.asarray(arrays["damping"]))
-        sizes = np.asarray(arrays["stock_size"])
-        half = sizes.copy()
-        people = slice(0, self._people)
-        half[people] = sizes[people][:, [0, 0, 1]]
-        self._model.geom_size[self._stock_geom] = sizes
-        self._model.geom_rbound[self._stock_geom] = np.sqrt((half * half).sum(axis=1))
-        self._model.geom_aabb[self._stock_geom, 3:] = half
-        self._model.bvh_aabb[self._stock_bvh, 3:] = half
-        self._from[:] = arrays["stock_from"]
-        self._pace[:] = arrays["stock_pace"]
-        self._left = float(arrays["stock_left"][0])
-        self._forget()
-        self._gains_of = [None] * len(self._robots)
-
-
-def _joint_of(model: Any, name: str, *, driven: bool) -> int:
-    """Return a joint: the one an actuator drives, or the one that has the name itself."""
-    return int(model.actuator_trnid[model.actuator(name).id, 0]) if driven else int(model.joint(name).id)
-
-
-def _run_of(indices: NDArray[Any]) -> slice | NDArray[Any]:
-    """Return a slice where indices follow each other: reading it is much faster."""
-    if not len(indices):
-        return slice(0, 0)
-    first = int(indices[0])
-    run = np.array_equal(indices, np.arange(first, first + len(indices)))
-    return slice(first, first + len(indices)) if run else indices.copy()
+        self._movers.restore(arrays)
+        self._parameters.restore(arrays["parameters"])
+        self._set_state(state, arrays["forces"], arrays["contacts"])
+        self._present[:] = arrays["present"]
+        self._calm[:] = arrays["calm"]
+        self._velocity_before[:] = arrays["velocity_before"]
+        self._frame[:] = arrays["frame"]
+        self._gains_of = [None] * len(self.compiled.models)

@@ -1,4 +1,4 @@
-"""What MuJoCo's model of a run is made of: options, ground and solids, a stock of kinematic bodies, standing robots."""
+"""What MuJoCo's model of a scene is made of: options, ground and solids, pools of movers and objects, robots."""
 
 from __future__ import annotations
 
@@ -8,22 +8,26 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.robots import BUMP, TOUCH, RobotModel
+from vico.assets.robots import BUMP, LIMB, TOUCH, RobotModel
 from vico.errors import InputError
-from vico.sim.physics.engine import FRAME, StaticScene
+from vico.sim.physics.frames import COARSE, SOLVER_STEPS
+from vico.sim.physics.records import Capacity, StaticScene
 from vico.world.heights import HeightField
 
-#: MuJoCo's steps in a frame (1/150 s each), and in one for which extra sub-steps are asked (1/200 s).
-SUBSTEPS, EXTRA_SUBSTEPS = 3, 4
 SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
-#: Height at which the stock waits, metres.
+#: Height at which unused movers and objects wait, metres.
 PARKED = -500.0
+#: Metres between parked bodies.
+PARKED_APART = 20.0
 #: Finest grid of the ground, metres: finer ones cost time and give robots nothing.
 _CELL = 2.0
 #: ... and where it has kerbs, which are ramps half a metre wide then.
 _KERB_CELL = 0.5
-#: Solids whose tops are lower than this above the ground are met by feet and wheels as well as bumpers, metres.
-_LOW = 0.5
+#: What ground and objects say of what they touch; solids also keep outlines of robots out.
+_SOLID = {"contype": TOUCH, "conaffinity": TOUCH | LIMB}
+#: Extents and kilograms that objects are compiled with; every engine writes its own.
+OBJECT_HALF, OBJECT_MASS = 0.15, 1.0
+_FRICTION = [0.6, 0.005, 0.0001]
 
 
 def standing_pose(
@@ -46,37 +50,67 @@ def standing_pose(
     return [x, y, ground + model.stand / float(up[2]) + 0.01], quaternion.tolist()
 
 
-def set_options(spec: Any) -> None:
-    """Set how a model is solved."""
-    spec.option.timestep = FRAME / SUBSTEPS
+def compiled_model(scene: StaticScene, models: tuple[RobotModel, ...], capacity: Capacity) -> Any:
+    """Compile a scene."""
+    spec = mujoco.MjSpec()
+    _set_options(spec)
+    _add_scene(spec, scene)
+    for index, model in enumerate(models):
+        _add_robot(spec, index, model)
+    _add_movers(spec, capacity)
+    _add_objects(spec, capacity)
+    return spec.compile()
+
+
+def _set_options(spec: Any) -> None:
+    spec.option.timestep = COARSE / SOLVER_STEPS[COARSE]
     # Servo damping is integrated implicitly: stable for light legs.
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    # Robots never sleep; what never moves does, and its poses are not computed again at every step.
+    # Parked objects sleep, and what never moves is not computed again at every step. Nobody who moves at all falls
+    # asleep later: how near one is to it is no part of MuJoCo's state, and a restored run has to go on bit for bit.
     spec.option.enableflags |= SLEEP
+    spec.option.sleep_tolerance = 0.0
     # Bad numbers are an error here; MuJoCo would put everybody back to the start.
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    # Whether to start from the last solution is decided for everybody at once: what one robot meets would change the
+    # last bits of another's motion a street away. Islands are solved each for itself, and converge as soon from zero.
+    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_WARMSTART)
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    spec.option.impratio = 3.0
+    # Held things creep out of a grasp where friction is soft: 4-7 mm a minute at 10, ten times that at 1.
+    spec.option.impratio = 10.0
 
 
-def add_scene(spec: Any, scene: StaticScene) -> None:
-    """Ground and low solids as one body, tall solids as the world's own.
+def _add_robot(spec: Any, index: int, model: RobotModel) -> None:
+    robot = mujoco.MjSpec.from_string(model.mjcf)
+    _set_options(robot)
+    root = robot.body("base")
+    if not any(joint.type == mujoco.mjtJoint.mjJNT_FREE for joint in root.joints):
+        raise InputError(f"physics: the body 'base' of robot {model.name!r} has no free joint; give it one")
+    root.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER
+    root.pos = [10.0 * index, 0.0, model.stand]
+    for site in robot.sites:
+        for axis in range(6):
+            gear = [0.0] * 6
+            gear[axis] = 1.0
+            robot.add_actuator(
+                name=thruster(site.name, axis), target=site.name, trntype=mujoco.mjtTrn.mjTRN_SITE, gear=gear
+            )
+    spec.attach(robot, prefix=f"r{index}/", frame=spec.worldbody.add_frame())
 
-    Bodies whose bits do not match are passed over as a whole: feet and wheels are never compared with walls, which
-    the bumper around them keeps away.
-    """
-    ground = spec.worldbody.add_body(name="ground")
-    touch, bump = {"contype": TOUCH, "conaffinity": TOUCH}, {"contype": BUMP, "conaffinity": BUMP}
-    both = {"contype": TOUCH | BUMP, "conaffinity": TOUCH | BUMP}
 
-    def owner(top: float, foot: NDArray[np.float64]) -> tuple[Any, dict[str, int]]:
-        low = top - float(scene.height(foot).max()) < _LOW
-        return (ground, both) if low else (spec.worldbody, bump)
+def thruster(site: str, axis: int) -> str:
+    """Name of what pushes a site along one of its axes (0-2), or turns it about it (3-5)."""
+    return f"thrust/{site}/{axis}"
 
+
+def _add_scene(spec: Any, scene: StaticScene) -> None:
+    """Ground as one body, solids as the world's own."""
+    ground, world = spec.worldbody.add_body(name="ground"), spec.worldbody
+    bits = {"contype": TOUCH | BUMP, "conaffinity": TOUCH | BUMP | LIMB}
     heights, half = _grid(scene)
     low, high = float(heights.min()), float(heights.max())
     if high - low < 1e-4:
-        ground.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[half, half, 1.0], pos=[0, 0, low], **touch)
+        ground.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[half, half, 1.0], pos=[0, 0, low], **_SOLID)
     else:
         rows, columns = heights.shape
         spec.add_hfield(
@@ -86,7 +120,7 @@ def add_scene(spec: Any, scene: StaticScene) -> None:
             ncol=columns,
             userdata=((heights - low) / (high - low)).astype(np.float32).ravel().tolist(),
         )
-        ground.add_geom(type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="ground", pos=[0, 0, low], **touch)
+        ground.add_geom(type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="ground", pos=[0, 0, low], **_SOLID)
     for index, points in enumerate(scene.hulls):
         middle = (points.min(axis=0) + points.max(axis=0)) / 2
         spec.add_mesh(
@@ -94,15 +128,12 @@ def add_scene(spec: Any, scene: StaticScene) -> None:
             uservert=(points - middle).astype(np.float32).ravel().tolist(),
             inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX,
         )
-        body, bits = owner(float(points[:, 2].max()), points[:, :2])
-        body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"hull{index}", pos=middle.tolist(), **bits)
+        world.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"hull{index}", pos=middle.tolist(), **bits)
     for x, y, z, yaw, a, b, c in scene.boxes.tolist():
-        body, bits = owner(z + c, np.array([x, y]))
         turn = [np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]
-        body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[a, b, c], pos=[x, y, z], quat=turn, **bits)
+        world.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[a, b, c], pos=[x, y, z], quat=turn, **bits)
     for x, y, z, radius, length in scene.pillars.tolist():
-        body, bits = owner(z + length, np.array([x, y]))
-        body.add_geom(type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[radius, length, 0], pos=[x, y, z], **bits)
+        world.add_geom(type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[radius, length, 0], pos=[x, y, z], **bits)
 
 
 def _grid(scene: StaticScene) -> tuple[NDArray[np.float64], float]:
@@ -119,12 +150,38 @@ def _grid(scene: StaticScene) -> tuple[NDArray[np.float64], float]:
     return field(np.stack([xx, yy], axis=-1)), field.half
 
 
-def add_stock(spec: Any, people: int, vehicles: int) -> None:
-    """Add the kinematic bodies that people and vehicles near robots are taken from, parked."""
-    shape = {"contype": BUMP, "conaffinity": BUMP, "condim": 1, "priority": 2, "solref": [0.01, 1.0]}
-    for index in range(people):
+def _add_movers(spec: Any, capacity: Capacity) -> None:
+    """Add the kinematic bodies that people and vehicles near robots are taken from, parked.
+
+    They meet links and objects, and the outline of robots that everybody else keeps clear of.
+    """
+    bits = {"contype": TOUCH | BUMP, "conaffinity": TOUCH | BUMP | LIMB}
+    shape = {**bits, "condim": 1, "priority": 2, "solref": [0.01, 1.0]}
+    for index in range(capacity.people):
         body = spec.worldbody.add_body(name=f"person{index}", mocap=True, pos=[0, 0, PARKED])
         body.add_geom(type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[0.28, 0.85, 0], **shape)
-    for index in range(vehicles):
+    for index in range(capacity.vehicles):
         body = spec.worldbody.add_body(name=f"vehicle{index}", mocap=True, pos=[0, 0, PARKED])
         body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[2.3, 0.95, 0.75], **shape)
+
+
+def _add_objects(spec: Any, capacity: Capacity) -> None:
+    """Add free boxes that movable objects near robots are taken from, asleep and parked."""
+    for index in range(capacity.objects):
+        body = spec.worldbody.add_body(name=f"object{index}", pos=parked_object(index))
+        body.sleep = mujoco.mjtSleepPolicy.mjSLEEP_INIT
+        body.add_freejoint()
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=[OBJECT_HALF] * 3,
+            mass=OBJECT_MASS,
+            condim=4,
+            friction=_FRICTION,
+            solref=[0.01, 1.0],
+            **_SOLID,
+        )
+
+
+def parked_object(slot: int) -> list[float]:
+    """Where the object of a slot waits."""
+    return [PARKED_APART * slot, PARKED_APART, PARKED]

@@ -10,7 +10,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from vico.exact import apply_matrix
-from vico.sim.physics.engine import StaticScene
+from vico.sim.physics.records import StaticScene
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.world.objects import Objects

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
-from vico.sim.physics.engine import Base
+from vico.sim.physics.records import Base
 from vico.sim.robots.motion import Motion
 
 Array = NDArray[np.float64]

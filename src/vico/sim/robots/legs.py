@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import FourLegs, RobotModel
 from vico.io.compiled import compiled
-from vico.sim.physics.engine import Base
+from vico.sim.physics.records import Base
 from vico.sim.robots.controller import Array, Gains, MotorController
 from vico.sim.robots.gait import BODY, LegGeometry, Trot, leg_angles
 from vico.sim.robots.motion import Motion

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
-from vico.sim.physics.engine import Base
+from vico.sim.physics.records import Base
 from vico.sim.robots.navigation import (
     GAP,
     free_ahead,

@@ -12,7 +12,7 @@ from vico.assets.robots import TICK, ActionSpace
 from vico.errors import InputError
 from vico.sim.bodies import Bodies, Drawn
 from vico.sim.carrying import DeckPose
-from vico.sim.physics.engine import FRAME
+from vico.sim.physics.frames import FrameCount, FrameNeeds, frame_length
 from vico.sim.robots import commands, drawing, sensing
 from vico.sim.robots.decisions import decide
 from vico.sim.robots.falls import watch_falls
@@ -25,6 +25,9 @@ from vico.sim.robots.ways import way_to
 from vico.world.folder import World
 from vico.world.mesh import Surface
 from vico.world.model import FIRST_BODY
+
+# What the arrays hold: members of an enumeration are slow to look up at every frame.
+_MOTORS, _FALLEN = int(Mode.MOTORS), int(RobotStatus.FALLEN)
 
 
 class RobotPopulation:
@@ -160,10 +163,11 @@ class RobotPopulation:
         return self.models[robot].control_period
 
     def advance(self, dt: float, obstacles: Bodies, *, since: float = 0.0, substep: float | None = None) -> None:
-        """Let `dt` seconds (a multiple of 0.02) of physics pass.
+        """Let `dt` seconds (a multiple of 0.01) of physics pass.
 
         `obstacles` are everybody else's bodies, where they are at the end of the sub-step of `substep` seconds (None:
-        `dt`), of which `since` have passed. Robots decide where to go at its beginning.
+        `dt`), of which `since` have passed. Robots decide where to go at its beginning. However a sub-step is cut into
+        calls, the same frames are made, each when all of its time has passed.
         """
         ticks = round(dt / TICK)
         if ticks < 1 or abs(ticks * TICK - dt) > 1e-9:
@@ -174,28 +178,47 @@ class RobotPopulation:
         if since == 0.0:
             self.engine.set_dynamic_obstacles(obstacles, whole)
             decide(self.run, whole, Bodies.joined([obstacles, self.bodies()]), errands=self.errands)
-        self._step(ticks)
+        self._step(ticks, round((whole - since) / TICK))
         self.run.known_bodies = None
         if since + dt > whole - 1e-9:
             watch_falls(self.run, whole)
 
-    def _step(self, ticks: int) -> None:
-        """Let physics pass, with each kind of robots told what to do as often as its model asks."""
+    def _step(self, ticks: int, left: int) -> None:
+        """Let physics pass, with each kind of robots told what to do as often as its model asks.
+
+        `left` ticks of the sub-step were left before these.
+        """
         arrays = self.run.arrays
-        # Limbs thrown about, by a controller of somebody's own or to get up, need smaller steps than wheels and gaits.
-        extra_substeps = bool(np.any(arrays.status == RobotStatus.FALLEN) or np.any(arrays.mode == Mode.MOTORS))
-        while ticks > 0:
+        left += int(arrays.owed[0])
+        arrays.owed += ticks
+        while arrays.owed[0]:
             now = int(arrays.tick[0])
+            until_told = min(group.period - now % group.period for group in self.scene.groups)
+            frame = frame_length(self._needs(), min(left, until_told) * TICK)
+            taken = round(frame / TICK)
+            if taken > arrays.owed[0]:
+                return
             for group, memory in zip(self.scene.groups, self.run.memory, strict=True):
                 if now % group.period == 0:
                     command_motors(self.run, group, memory)
-            count = min(ticks, *(group.period - now % group.period for group in self.scene.groups))
-            frames = round(count * TICK / FRAME)
-            if abs(frames * FRAME - count * TICK) > 1e-9:
-                raise InputError(f"robots: physics has no frames of {count * TICK} s; advance by multiples of {FRAME}")
-            self.engine.step(frames, extra_substeps=extra_substeps)
-            arrays.tick += count
-            ticks -= count
+            self.engine.step(frame=frame)
+            arrays.frames[0 if taken == 1 else 1] += 1
+            arrays.tick += taken
+            arrays.owed -= taken
+            left -= taken
+
+    def _needs(self) -> FrameNeeds:
+        """Return what decides how long a frame is."""
+        arrays = self.run.arrays
+        return FrameNeeds(
+            motor_commands=bool(np.any(arrays.mode == _MOTORS)), fallen=bool(np.any(arrays.status == _FALLEN))
+        )
+
+    @property
+    def frames(self) -> FrameCount:
+        """How many frames of physics there have been, by their length."""
+        fine, coarse = self.run.arrays.frames.tolist()
+        return FrameCount(fine, coarse)
 
     def events(self) -> list[RobotEvent]:
         """Return what happened since this was last asked."""

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import TICK, RobotModel, robot_model
-from vico.sim.physics import MujocoEngine, PhysicsEngine
-from vico.sim.physics.engine import StaticScene
+from vico.sim.physics import DEFAULT_ENGINE, PhysicsEngine, PhysicsScene, make_scene
 from vico.sim.physics.surroundings import static_scene_of
 from vico.sim.robots.controller import MotorController
 from vico.sim.robots.controllers import controller_for
@@ -84,11 +83,12 @@ class RobotScene:
 
     def engine(self, places: NDArray[np.float64]) -> PhysicsEngine:
         """Return physics in which the robots stand at `places`: x, y, yaw, shape ``(n, 3)``."""
-        return MujocoEngine(self._static, self.models, places)
+        return self.physics.engine(places)
 
     @cached_property
-    def _static(self) -> StaticScene:
-        return static_scene_of(self.world)
+    def physics(self) -> PhysicsScene:
+        """Ground, solids and robots as physics has them, compiled when they are first needed."""
+        return make_scene(DEFAULT_ENGINE, static_scene_of(self.world), self.models)
 
     @property
     def router(self) -> Router:

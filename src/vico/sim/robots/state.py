@@ -70,7 +70,11 @@ class RobotArrays:
     rest
         Seconds it has had nothing to do, float64, shape ``(n,)``.
     tick
-        Hundredths of a second since the start, int64, shape ``(1,)``.
+        Hundredths of a second of physics since the start, int64, shape ``(1,)``.
+    owed
+        Hundredths of a second that have passed and are no whole frame yet, int64, shape ``(1,)``.
+    frames
+        How many frames of physics there have been, fine and coarse ones, int64, shape ``(2,)``.
     """
 
     mode: NDArray[np.int8]
@@ -85,6 +89,8 @@ class RobotArrays:
     errand: NDArray[np.int64]
     rest: NDArray[np.float64]
     tick: NDArray[np.int64]
+    owed: NDArray[np.int64]
+    frames: NDArray[np.int64]
 
     @classmethod
     def idle(cls, scene: RobotScene) -> RobotArrays:
@@ -104,6 +110,8 @@ class RobotArrays:
             errand=np.zeros(n, np.int64),
             rest=np.zeros(n),
             tick=np.zeros(1, np.int64),
+            owed=np.zeros(1, np.int64),
+            frames=np.zeros(2, np.int64),
         )
 
 

@@ -1,0 +1,24 @@
+"""MuJoCo behind the protocols: a scene that makes engines and batches."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.sim.physics.mujoco_batch import MujocoBatch
+from vico.sim.physics.mujoco_engine import MujocoEngine
+from vico.sim.physics.mujoco_scene import CompiledScene
+
+
+class MujocoScene(CompiledScene):
+    """See `vico.sim.physics.engine.PhysicsScene`."""
+
+    name = "mujoco"
+
+    def engine(self, places: NDArray[np.float64]) -> MujocoEngine:
+        """Return a new state with robots standing at `places`."""
+        return MujocoEngine(self, places)
+
+    def batch(self, copies: int, places: NDArray[np.float64], *, threads: int = 0) -> MujocoBatch:
+        """Return many copies of a new state."""
+        return MujocoBatch(self, copies, places, threads=threads)

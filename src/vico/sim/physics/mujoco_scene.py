@@ -1,0 +1,176 @@
+"""A compiled scene in MuJoCo, shared by all engines of a world and its robots."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.assets.robots import RobotModel
+from vico.sim.physics.mujoco_model import SLEEP, compiled_model, thruster
+from vico.sim.physics.records import Capacity, Party, StaticScene
+from vico.world.heights import HeightField
+
+
+class RobotIndex:
+    """Where a robot's numbers are in MuJoCo's arrays.
+
+    Attributes
+    ----------
+    root, root_speed
+        First of its base's position and speed.
+    angle, rate
+        Positions and speeds of its joints, in the order of the model's `joints`.
+    motor, servo
+        Its actuators in the order of the control vector, and those of them that follow angles.
+    shown
+        Bodies in the order of the model's `shapes`.
+    links
+        Names of all its bodies, base first.
+    thrusters
+        Actuators of each site, force x, y, z and torque x, y, z; by name of the site.
+    """
+
+    def __init__(self, model: Any, index: int, robot: RobotModel) -> None:
+        prefix = f"r{index}/"
+        motors = np.array([model.actuator(prefix + motor).id for motor in robot.motors], np.int64)
+        joints = [_joint_of(model, prefix + joint, driven=joint in robot.motors) for joint in robot.joints]
+        base = model.body(prefix + "base")
+        self.motor = motors
+        self.servo = motors[[servo == "position" for servo in robot.servos]]
+        self.angle, self.rate = _run_of(model.jnt_qposadr[joints]), _run_of(model.jnt_dofadr[joints])
+        self.root = int(model.jnt_qposadr[int(base.jntadr[0])])
+        self.root_speed = int(model.jnt_dofadr[int(base.jntadr[0])])
+        self.shown = np.array([model.body(prefix + link).id for link in robot.shapes], np.int64)
+        mine = [k for k in range(model.nbody) if model.body(k).name.startswith(prefix)]
+        self.links = tuple(model.body(k).name.removeprefix(prefix) for k in mine)
+        self.link_bodies = np.array(mine, np.int64)
+        sites = [model.site(k).name for k in range(model.nsite)]
+        self.thrusters = {
+            site.removeprefix(prefix): np.array(
+                [model.actuator(prefix + thruster(site.removeprefix(prefix), axis)).id for axis in range(6)]
+            )
+            for site in sites
+            if site.startswith(prefix)
+        }
+
+
+_POSES = ("xpos", "xquat", "xmat", "xipos", "ximat", "geom_xpos", "geom_xmat", "site_xpos", "site_xmat")
+
+
+class SharedModel:
+    """A model of MuJoCo that several engines take turns to use.
+
+    Attributes
+    ----------
+    model
+        The model.
+    written
+        Whose parameters it has now, as `Parameters.numbers`; None before the first.
+    lock
+        Held by whoever uses it.
+    """
+
+    def __init__(self, model: Any) -> None:
+        self.model = model
+        self.written: NDArray[np.float64] | None = None
+        self.lock = threading.RLock()
+
+
+class CompiledScene:
+    """Ground, solids, robots and parked bodies, compiled.
+
+    The model itself is shared. The little of it that differs from run to run (servos' gains, sizes and masses of
+    pooled bodies, the length of a step) belongs to engines, which write theirs into it before they use it (see
+    `vico.sim.physics.mujoco_parameters`), so that making another engine copies no terrain.
+
+    Parameters
+    ----------
+    static
+        What never moves.
+    models
+        The robots.
+    capacity
+        How many people, vehicles and objects there can be near robots.
+    """
+
+    def __init__(self, static: StaticScene, models: tuple[RobotModel, ...], capacity: Capacity) -> None:
+        self.models, self.capacity = models, capacity
+        self.height: HeightField = static.height
+        self.shared = SharedModel(compiled_model(static, models, capacity))
+        m = self.model = self.shared.model
+        self.robots = [RobotIndex(m, index, model) for index, model in enumerate(models)]
+        self.base_velocity = np.array([np.arange(3) + robot.root_speed for robot in self.robots], np.int64).reshape(
+            -1, 3
+        )
+        self.servos = np.concatenate([np.zeros(0, np.int64), *(robot.servo for robot in self.robots)])
+        movers = [m.body(f"person{i}").id for i in range(capacity.people)]
+        movers += [m.body(f"vehicle{i}").id for i in range(capacity.vehicles)]
+        self.mover_body = np.array(movers, np.int64)
+        self.mover_mocap = np.asarray(m.body_mocapid[self.mover_body], np.int64)
+        self.mover_geom = np.asarray(m.body_geomadr[self.mover_body], np.int64)
+        self.object_body = np.array([m.body(f"object{i}").id for i in range(capacity.objects)], np.int64)
+        self.object_geom = np.asarray(m.body_geomadr[self.object_body], np.int64)
+        joint = m.body_jntadr[self.object_body]
+        self.object_pose = _run_of(np.add.outer(m.jnt_qposadr[joint], np.arange(7)).ravel())
+        self.object_motion = _run_of(np.add.outer(m.jnt_dofadr[joint], np.arange(6)).ravel())
+        self._index_contacts()
+        pristine = mujoco.MjData(m)
+        m.opt.enableflags &= ~SLEEP
+        mujoco.mj_kinematics(m, pristine)
+        m.opt.enableflags |= SLEEP
+        self._poses = {name: np.array(getattr(pristine, name)) for name in _POSES}
+        self.stiffness = np.array(m.actuator_gainprm[self.servos, 0])
+        self.damping = -np.asarray(m.actuator_biasprm[self.servos, 2])
+
+    def _index_contacts(self) -> None:
+        """Note what each collision shape belongs to: party, owner (robot, mover or slot), link."""
+        m = self.model
+        party, owner = np.zeros(m.nbody, np.int8), np.full(m.nbody, -1, np.int32)
+        link = np.full(m.nbody, -1, np.int16)
+        for index, robot in enumerate(self.robots):
+            party[robot.link_bodies], owner[robot.link_bodies] = Party.ROBOT, index
+            link[robot.link_bodies] = np.arange(len(robot.link_bodies))
+        party[self.mover_body], owner[self.mover_body] = Party.BODY, np.arange(len(self.mover_body))
+        party[self.object_body], owner[self.object_body] = Party.OBJECT, np.arange(len(self.object_body))
+        body = m.geom_bodyid
+        self.geom_party, self.geom_owner, self.geom_link = party[body], owner[body], link[body]
+
+    def reset(self, data: Any) -> None:
+        """Put everybody to the start: objects asleep where they are parked, and what never moves where it stands.
+
+        Steps leave out what never moves and what sleeps; poses of those are computed once.
+        """
+        mujoco.mj_resetData(self.model, data)
+        for name, poses in self._poses.items():
+            getattr(data, name)[:] = poses
+
+    def object_at(self, slot: int) -> tuple[int, int]:
+        """First of an object's position and of its speed."""
+        body = int(self.object_body[slot])
+        return int(self.model.jnt_qposadr[self.model.body_jntadr[body]]), int(self.model.body_dofadr[body])
+
+    def link_names(self, robot: int) -> tuple[str, ...]:
+        """Names of a robot's links, base first."""
+        return self.robots[robot].links
+
+    def site_names(self, robot: int) -> tuple[str, ...]:
+        """Names of the sites a robot can be pushed at."""
+        return tuple(self.robots[robot].thrusters)
+
+
+def _joint_of(model: Any, name: str, *, driven: bool) -> int:
+    """Return a joint: the one an actuator drives, or the one that has the name itself."""
+    return int(model.actuator_trnid[model.actuator(name).id, 0]) if driven else int(model.joint(name).id)
+
+
+def _run_of(indices: NDArray[Any]) -> slice | NDArray[Any]:
+    """Return a slice where indices follow each other: reading it is much faster."""
+    if not len(indices):
+        return slice(0, 0)
+    first = int(indices[0])
+    run = np.array_equal(indices, np.arange(first, first + len(indices)))
+    return slice(first, first + len(indices)) if run else indices.copy()

@@ -1,0 +1,206 @@
+"""What an engine is given and what it answers: plain records of arrays, the same for every engine."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.errors import VicoError
+from vico.world.heights import HeightField
+
+
+class PhysicsError(VicoError, ArithmeticError):
+    """The equations of motion have no finite solution any more."""
+
+
+@dataclass(frozen=True)
+class StaticScene:
+    """Everything that never moves.
+
+    Attributes
+    ----------
+    height
+        The ground.
+    hulls
+        Corner points of convex solids, metres, each of shape ``(n, 3)``.
+    boxes
+        Upright boxes: x, y, z of the centre, yaw, half extents; float64, shape ``(n, 7)``.
+    pillars
+        Upright cylinders: x, y, z of the centre, radius, half height; float64, shape ``(n, 5)``.
+    """
+
+    height: HeightField
+    hulls: tuple[NDArray[np.float64], ...] = ()
+    boxes: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 7)))
+    pillars: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 5)))
+
+
+@dataclass(frozen=True)
+class Capacity:
+    """How many moving things there can be near robots at once; of more, the nearest count.
+
+    Attributes
+    ----------
+    people, vehicles
+        Kinematic cylinders (people on foot) and boxes (vehicles, cyclists).
+    objects
+        Free rigid objects.
+    """
+
+    people: int = 32
+    vehicles: int = 16
+    objects: int = 24
+
+
+@dataclass(frozen=True)
+class Base:
+    """Motion of a robot's base.
+
+    Attributes
+    ----------
+    position
+        Of its origin, ENU metres, shape ``(3,)``.
+    rotation
+        Base to world, shape ``(3, 3)``.
+    velocity
+        Metres a second in the world's frame, shape ``(3,)``.
+    angular_velocity_body
+        Radians a second in the base's own frame, shape ``(3,)``.
+    quaternion
+        The rotation as w, x, y, z.
+    """
+
+    position: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    angular_velocity_body: NDArray[np.float64]
+    quaternion: NDArray[np.float64]
+
+    @property
+    def yaw(self) -> float:
+        """Heading, radians."""
+        return math.atan2(self.rotation[1, 0], self.rotation[0, 0])
+
+
+@dataclass(frozen=True)
+class Imu:
+    """What an inertial measurement unit at the origin of a robot's base measures, in the base's frame.
+
+    Attributes
+    ----------
+    angular_velocity
+        Radians a second, shape ``(3,)``.
+    specific_force
+        Acceleration without gravity's, mean of the last frame, m/s2, shape ``(3,)``: 9.81 upwards at rest.
+    """
+
+    angular_velocity: NDArray[np.float64]
+    specific_force: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RigidObject:
+    """A free rigid box.
+
+    Attributes
+    ----------
+    size
+        Extents, metres, shape ``(3,)``.
+    mass
+        Kilograms, spread evenly.
+    position
+        Middle, ENU metres, shape ``(3,)``.
+    quaternion
+        Orientation w, x, y, z.
+    velocity, angular_velocity_body
+        m/s in the world's frame and rad/s in its own, shape ``(3,)``.
+    """
+
+    size: NDArray[np.float64]
+    mass: float
+    position: NDArray[np.float64]
+    quaternion: NDArray[np.float64]
+    velocity: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+    angular_velocity_body: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+
+
+@dataclass(frozen=True)
+class ObjectMotion:
+    """Where the free rigid objects are; row = slot.
+
+    Attributes
+    ----------
+    present
+        Which slots are taken, bool, shape ``(n,)``; the rest of a free slot's row means nothing.
+    position, quaternion
+        Middle, ENU metres, shape ``(n, 3)``; w, x, y, z, shape ``(n, 4)``.
+    velocity, angular_velocity_body
+        m/s in the world's frame and rad/s in the object's, shape ``(n, 3)``.
+    resting
+        Which have come to rest, bool, shape ``(n,)``.
+    """
+
+    present: NDArray[np.bool_]
+    position: NDArray[np.float64]
+    quaternion: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    angular_velocity_body: NDArray[np.float64]
+    resting: NDArray[np.bool_]
+
+
+class Party(IntEnum):
+    """What kind of thing takes part in a contact."""
+
+    SCENE, ROBOT, BODY, OBJECT = range(4)
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Who touches whom, as the engine solved it last; row = contact point.
+
+    Attributes
+    ----------
+    party
+        A `Party` for each of the two, int8, shape ``(n, 2)``.
+    owner
+        Index of the robot, entity of the person or vehicle, slot of the object; -1 for the scene; int32, shape
+        ``(n, 2)``.
+    link
+        Index into `PhysicsScene.link_names` of that robot, -1 for others, int16, shape ``(n, 2)``.
+    position
+        ENU metres, shape ``(n, 3)``.
+    normal
+        Unit vector from the first to the second, shape ``(n, 3)``.
+    force
+        Along the normal, newtons, 0 or more, shape ``(n,)``.
+    """
+
+    party: NDArray[np.int8]
+    owner: NDArray[np.int32]
+    link: NDArray[np.int16]
+    position: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    force: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.force)
+
+    def link_forces(self, robot: int, links: int) -> NDArray[np.float64]:
+        """Sum of the normal forces on each link of a robot, newtons, float64, shape ``(links,)``."""
+        found = np.zeros(links)
+        for side in (0, 1):
+            mine = (self.party[:, side] == Party.ROBOT) & (self.owner[:, side] == robot)
+            np.add.at(found, self.link[mine, side], self.force[mine])
+        return found
+
+    def touching(self, robot: int, link: int, slot: int) -> bool:
+        """Whether a link of a robot touches the object in a slot."""
+        for a, b in ((0, 1), (1, 0)):
+            mine = (self.party[:, a] == Party.ROBOT) & (self.owner[:, a] == robot) & (self.link[:, a] == link)
+            if np.any(mine & (self.party[:, b] == Party.OBJECT) & (self.owner[:, b] == slot)):
+                return True
+        return False
