@@ -38,7 +38,7 @@ def person(x: float, y: float, z: float = 0.0) -> Bodies:
 def seen(bodies: Bodies, *, yaw: float = 0.0, space: int = OUTDOORS, theirs: int = OUTDOORS) -> InView:
     """What somebody at the origin sees."""
     eyes = Eyes(np.array([[0.0, 0.0, 1.6]]), np.array([yaw]), np.array([1], np.int32), np.array([space]))
-    return in_view(eyes, bodies, np.full(len(bodies), theirs), wall(), {7: {"kind": "pedestrian", "name": "Ann"}})[0]
+    return in_view(eyes, bodies, np.full(len(bodies), theirs), wall(), {7: {"kind": "pedestrian", "name": "Ann"}}).of(0)
 
 
 @pytest.mark.parametrize(

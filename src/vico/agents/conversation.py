@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -83,13 +83,23 @@ class Conversation:
         """Remember what `state` returned."""
         self._greeted, self._said = dict(state["greeted"]), dict(state["said"])
 
-    def line(self, observation: Observation, info: Info, errand: str) -> Action | None:
+    @property
+    def known(self) -> Collection[str]:
+        """Agents whom the speaker knows."""
+        return self._known.keys()
+
+    @property
+    def greeted(self) -> Mapping[str, float]:
+        """When the speaker last spoke with agents, seconds."""
+        return self._greeted
+
+    def line(self, observation: Observation, info: Info, errand: Callable[[], str]) -> Action | None:
         """Return something to say now, or None.
 
         Parameters
         ----------
         errand
-            What one is about, to follow "I'm ", such as "on my way to work".
+            Says what one is about, to follow "I'm ", such as "on my way to work".
         """
         time = observation["state"]["time"]
         for message in observation["events"]:
@@ -98,7 +108,7 @@ class Conversation:
                 return reply
         return self._greet(info, time, errand)
 
-    def _reply(self, message: dict[str, Any], time: float, errand: str) -> Action | None:
+    def _reply(self, message: dict[str, Any], time: float, errand: Callable[[], str]) -> Action | None:
         speaker, text = message["speaker"], message["text"]
         person = self._known.get(speaker)
         mine = self._me.name.split()[0]
@@ -111,10 +121,10 @@ class Conversation:
             return None
         self._said[speaker] = self._said.get(speaker, 0) + 1
         if person is None:
-            return _say(f"Hello! I'm {mine}. Sorry, I'm {errand}.")
-        return _say(self._choose(self._answers(person, errand, last="?" not in text)))
+            return _say(f"Hello! I'm {mine}. Sorry, I'm {errand()}.")
+        return _say(self._choose(self._answers(person, errand(), last="?" not in text)))
 
-    def _greet(self, info: Info, time: float, errand: str) -> Action | None:
+    def _greet(self, info: Info, time: float, errand: Callable[[], str]) -> Action | None:
         # Residents are told who is in view; others who live by a schedule greet nobody, but answer.
         for body in info["in_view"].within(GREETING_DISTANCE) if "in_view" in info else ():
             person = self._known.get(body.agent)
@@ -122,7 +132,7 @@ class Conversation:
                 continue
             self._greeted[person.agent] = time
             self._said[person.agent] = 1
-            return _say(self._choose(self._greetings(person, time, errand)))
+            return _say(self._choose(self._greetings(person, time, errand())))
         return None
 
     def _greetings(self, person: Acquaintance, time: float, errand: str) -> list[str]:

@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from bisect import bisect_right
+from collections.abc import Collection, Mapping, Sequence
+from functools import partial
 from typing import Any, Protocol
 
 from vico.agents.base import Action, Info, Observation
 from vico.agents.conversation import Acquaintance, Conversation, Speaker
 from vico.agents.indoor_walk import IndoorWalker
+from vico.agents.residents import Residents
 from vico.agents.state import AgentState, generator_state, restore_generator
+from vico.agents.stays import SLACK, SLACK_SHARE, WALK, Item, Stay, stays_of, with_ways
 from vico.agents.wayfinding import Walker
-from vico.clock import DAY, seconds_of_day
+from vico.clock import DAY
 from vico.seeds import rng
 from vico.world.public import PublicMap, PublicPlace
 
-WALK, BRISK, RUN = 1.0, 1.5, 2.4
-# Time kept in hand for corners, crossings and doors: a share of the way, and seconds.
-_SLACK_SHARE, _SLACK = 0.15, 20.0
+BRISK, RUN = 1.5, 2.4
 # Open places are reached this close to their position, metres.
 _OPEN_REACH = 3.0
-_EAT_EVERY = 6
+# How often people at rest do something, seconds, and when it all comes round again.
+_EAT_EVERY, _MOVE_EVERY, _DRINK_EVERY = 6, 40, 90
+_ROUND = math.lcm(_EAT_EVERY, _MOVE_EVERY, _DRINK_EVERY)
 # Those who came out for a walk or a run stay within this distance of the place, metres.
 _STROLL = 30.0
 _STROLLING = ("leisure", "visit")
@@ -33,82 +35,12 @@ _GIVE_WAY = 0.5
 _STROLL_SPEED, _RUN_SPEED = 0.9, 1.9
 
 
-class Item(Protocol):
-    """A stretch of the day, as the community's schedules have it."""
-
-    @property
-    def type(self) -> str:
-        """sleep, meal, main or commute."""
-
-    @property
-    def tag(self) -> str | None:
-        """What it is about, as `vico.community.model.ActivityTag` has it; None if nobody said."""
-
-    @property
-    def start(self) -> str:
-        """``HH:MM:SS``."""
-
-    @property
-    def end(self) -> str:
-        """``HH:MM:SS``."""
-
-    @property
-    def activity(self) -> str:
-        """What for, in words."""
-
-    @property
-    def place(self) -> str | None:
-        """Id of the place; None on the way."""
-
-
 class Scheduled(Speaker, Protocol):
     """A resident, as the community has them."""
 
     @property
     def schedule(self) -> Sequence[Item]:
         """The day without gaps."""
-
-
-@dataclass(frozen=True)
-class Stay:
-    """To be at a place by `due`, and to set out at `leave`, seconds of the day; `tag` says what for."""
-
-    leave: float
-    due: float
-    type: str
-    tag: str
-    activity: str
-    place: str
-
-
-def stays_of(schedule: Iterable[Item], known: Mapping[str, object]) -> list[Stay]:
-    """Return the stays of a day, each with the time to set out; items without a place on the map are left out."""
-    stays: list[Stay] = []
-    leave: float | None = None
-    for item in schedule:
-        if str(item.type) == "commute":
-            leave = seconds_of_day(item.start) if leave is None else leave
-            continue
-        if item.place is None or item.place not in known:
-            continue
-        due = seconds_of_day(item.start)
-        when = due if leave is None else leave
-        stays.append(Stay(when, due, str(item.type), str(item.tag or ""), item.activity, item.place))
-        leave = None
-    return stays
-
-
-def with_ways(stays: Sequence[Stay], public_map: PublicMap) -> list[Stay]:
-    """Give those stays time for the way whose schedule has none: two doors of one building may lie streets apart."""
-    found = list(stays[:1])
-    for before, stay in pairwise(stays):
-        if stay.leave == stay.due and before.place != stay.place:
-            places = public_map.place_by_id
-            way = public_map.router.seconds(places[before.place].position, places[stay.place].position, WALK)
-            if math.isfinite(way):
-                stay = replace(stay, leave=max(before.due, stay.due - way * (1.0 + _SLACK_SHARE) - _SLACK))
-        found.append(stay)
-    return found
 
 
 class ScheduleFollower:
@@ -133,6 +65,10 @@ class ScheduleFollower:
         self, resident: Scheduled, public_map: PublicMap, *, known: Sequence[Acquaintance] = (), seed: int = 0
     ) -> None:
         generator = rng(seed, "schedule follower", resident.id)
+        self.group: Residents | None = None
+        #: Time before which it only waits, unless spoken to, met or moved.
+        self.rests_until = -math.inf
+        self._name = resident.id
         self._map = public_map
         self._stays = with_ways(stays_of(resident.schedule, public_map.place_by_id), public_map)
         self._rng = generator
@@ -141,19 +77,35 @@ class ScheduleFollower:
         self._aside: list[Action] = []
         self._conversation = Conversation(resident, known, generator)
         self._posture = "standing"
-        self._tick = 0
+        self._changes = sorted(stay.leave for stay in self._stays)
+        # So that not everybody takes a sip at once.
+        self._offset = int(generator.integers(_ROUND))
         self._tried: set[str] = set()
         self._arrived: Stay | None = None
         self._stroll: tuple[float, float] | None = None
-        self._pause = 0
+        # When a stroll goes on, seconds.
+        self._paused_until = -math.inf
         # The type of the last action that was asked for.
         self._asked = ""
 
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the action for the coming second."""
+        if self.group is not None:
+            self.group.forget(self._name)
+        self.rests_until = -math.inf
         action = self._decide(observation, info)
         self._asked = str(action["type"])
         return action
+
+    @property
+    def known(self) -> Collection[str]:
+        """Agents whom the resident knows."""
+        return self._conversation.known
+
+    @property
+    def greeted(self) -> Mapping[str, float]:
+        """When the resident last spoke with agents, seconds."""
+        return self._conversation.greeted
 
     def state(self) -> AgentState:
         """Return all that decides what is done next, beside the day and the map."""
@@ -165,29 +117,30 @@ class ScheduleFollower:
             "conversation": self._conversation.state(),
             "aside": [dict(action) for action in self._aside],
             "posture": self._posture,
-            "tick": self._tick,
             "tried": sorted(self._tried),
             "arrived": None if arrived is None else self._stays.index(arrived),
             "stroll": None if self._stroll is None else list(self._stroll),
-            "pause": self._pause,
+            "paused_until": None if math.isinf(self._paused_until) else self._paused_until,
             "asked": self._asked,
         }
 
     def restore(self, state: AgentState) -> None:
         """Go on with the day where a follower of the same resident was."""
+        if self.group is not None:
+            self.group.forget(self._name)
         restore_generator(self._rng, state["generator"])
         self._walker.restore(state["walker"])
         self._indoors.restore(state["indoors"])
         self._conversation.restore(state["conversation"])
         arrived, stroll = state["arrived"], state["stroll"]
         self._aside = [dict(action) for action in state["aside"]]
-        self._posture, self._tick, self._tried = state["posture"], state["tick"], set(state["tried"])
+        self._posture, self._tried = state["posture"], set(state["tried"])
         self._arrived = None if arrived is None else self._stays[arrived]
         self._stroll = None if stroll is None else (float(stroll[0]), float(stroll[1]))
-        self._pause, self._asked = state["pause"], state["asked"]
+        paused = state["paused_until"]
+        self._paused_until, self._asked = -math.inf if paused is None else paused, state["asked"]
 
     def _decide(self, observation: Observation, info: Info) -> Action:
-        self._tick += 1
         state = observation["state"]
         self._posture = state["posture"]
         stay = self._stay_at(state["time"] % DAY)
@@ -195,7 +148,8 @@ class ScheduleFollower:
             return {"type": "wait"}
         place = self._map.place_by_id[stay.place]
         if self._posture != "lying":
-            line = self._conversation.line(observation, info, _errand(stay, place, self._is_there(observation, place)))
+            errand = partial(self._errand, observation, stay, place)
+            line = self._conversation.line(observation, info, errand)
             if line is not None:
                 return line
         if self._is_there(observation, place):
@@ -225,42 +179,53 @@ class ScheduleFollower:
     def _stay(self, observation: Observation, info: Info, stay: Stay, place: PublicPlace) -> Action:
         """Live at the place; out in the open, those who came to move about do."""
         if self._arrived != stay:
-            self._arrived, self._stroll, self._pause = stay, None, 0
+            self._arrived, self._stroll, self._paused_until = stay, None, -math.inf
             self._walker.stop()
+        time = observation["state"]["time"]
         if place.building is not None or stay.tag not in (*_STROLLING, *_RUNNING):
-            return self._live(stay)
+            return self._live(stay, time)
         up = self._get_up()
         if up is not None:
             return up
-        if self._pause > 0:
-            self._pause -= 1
-            return {"type": "wait"}
+        if time < self._paused_until:
+            return self._rest(time, self._paused_until)
         if self._stroll is None:
             spot = self._map.walkable.random_point(self._rng, near=place.position[:2], radius=_STROLL)
             self._stroll = (float(spot[0]), float(spot[1]))
         pace = _RUN_SPEED if stay.tag in _RUNNING else _STROLL_SPEED
         action = self._walker.towards(self._stroll, pace, observation, info)
         if action is None:
-            self._stroll, self._pause = None, int(self._rng.integers(3, 15))
+            self._stroll, self._paused_until = None, time + int(self._rng.integers(4, 16))
             return {"type": "wait"}
         return action
 
-    def _live(self, stay: Stay) -> Action:
+    def _live(self, stay: Stay, time: float) -> Action:
         """Do what one came for."""
+        second = math.floor(time)
+        tick = second + self._offset
         if stay.type == "sleep":
-            return self._become("lying")
+            return self._rest(time, math.inf) if self._posture == "lying" else self._become("lying")
         if stay.type == "meal" or stay.tag in _EATING:
             if self._posture != "sitting":
                 return self._become("sitting")
-            if self._tick % _EAT_EVERY == 0:
+            if tick % _EAT_EVERY == 0:
                 return {"type": "drink" if self._rng.random() < 0.3 else "eat"}
-            return {"type": "wait"}
+            return self._rest(time, second + _EAT_EVERY - tick % _EAT_EVERY)
         if self._posture == "lying":
             return self._become("standing")
-        if self._tick % 40 == 0 and self._rng.random() < 0.5:
+        if tick % _MOVE_EVERY == 0 and self._rng.random() < 0.5:
             return self._become("sitting" if self._posture == "standing" else "standing")
-        if self._tick % 90 == 45:
+        if tick % _DRINK_EVERY == 0:
             return {"type": "drink"}
+        return self._rest(time, second + min(_MOVE_EVERY - tick % _MOVE_EVERY, _DRINK_EVERY - tick % _DRINK_EVERY))
+
+    def _rest(self, time: float, until: float) -> Action:
+        """Wait, and say until when nothing else will come of being asked: no longer than to the next stay."""
+        of_day = time % DAY
+        later = bisect_right(self._changes, of_day)
+        change = self._changes[later] if later < len(self._changes) else DAY
+        # A little early, for the rounding: being asked for nothing costs little.
+        self.rests_until = min(until, time - of_day + change - 1e-3)
         return {"type": "wait"}
 
     def _become(self, posture: str) -> Action:
@@ -320,14 +285,23 @@ class ScheduleFollower:
 
     def _speed(self, metres: float, seconds: float) -> float:
         """Walk at ease while there is time, briskly when it gets short, and run when late."""
-        needed = metres * (1.0 + _SLACK_SHARE) / max(1.0, seconds - _SLACK)
+        needed = metres * (1.0 + SLACK_SHARE) / max(1.0, seconds - SLACK)
         if needed <= WALK:
             return WALK
         return needed if needed <= BRISK else min(RUN, max(BRISK, needed))
 
+    def _errand(self, observation: Observation, stay: Stay, place: PublicPlace) -> str:
+        """Return what one is about, to follow "I'm "."""
+        doing = stay.activity.split(": ")[-1]
+        doing = doing[:1].lower() + doing[1:]
+        home = place.kind == "apartments"
+        if self._is_there(observation, place):
+            return f"at home, about to {doing}" if home else f"here to {doing}"
+        return "on my way home" if home else f"on my way to {place.name}, to {doing}"
+
 
 def followers_of(community: Any, public_map: PublicMap, *, seed: int = 0) -> dict[str, ScheduleFollower]:
-    """Make a follower for every resident of a community, by agent's name.
+    """Make a follower for every resident of a community, by agent's name; they may be asked as a group.
 
     Parameters
     ----------
@@ -341,20 +315,14 @@ def followers_of(community: Any, public_map: PublicMap, *, seed: int = 0) -> dic
         for me, other in ((first, second), (second, first)):
             if me in residents and other in residents:
                 known[me].append(Acquaintance(other, residents[other].name, str(relation.kind), relation.note))
-    return {
+    followers = {
         name: ScheduleFollower(resident, public_map, known=known[name], seed=seed)
         for name, resident in residents.items()
     }
-
-
-def _errand(stay: Stay, place: PublicPlace, there: bool) -> str:
-    """Return what one is about, to follow "I'm "."""
-    doing = stay.activity.split(": ")[-1]
-    doing = doing[:1].lower() + doing[1:]
-    home = place.kind == "apartments"
-    if there:
-        return f"at home, about to {doing}" if home else f"here to {doing}"
-    return "on my way home" if home else f"on my way to {place.name}, to {doing}"
+    group = Residents(followers)
+    for follower in followers.values():
+        follower.group = group
+    return followers
 
 
 __all__ = ["ScheduleFollower", "Stay", "followers_of", "stays_of"]

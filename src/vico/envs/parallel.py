@@ -133,9 +133,9 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
             self._simulation = self._fresh(drawn)
         self.agents = list(self.possible_agents)
         self.events = []
-        observations, infos = self.sim.observe()
-        self._views = observations
-        return observations, infos
+        told, infos = self.sim.observe()
+        self._views = observations = dict(told)
+        return observations, dict(infos)
 
     def step(
         self, actions: Mapping[str, Any], agent_faults: Mapping[str, AgentFault] | None = None
@@ -160,10 +160,10 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
             self.agents = []
         names = list(observations)
         self.events = result.events
-        self._views = observations
+        self._views = dict(observations)
         infos = {name: {**found[name], "hash": result.hash} for name in names}
         return (
-            observations,
+            self._views,
             dict.fromkeys(names, 0.0),
             dict.fromkeys(names, False),
             dict.fromkeys(names, over),

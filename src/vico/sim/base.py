@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from vico.errors import InputError
+from vico.rules import DOOR_REACH
 from vico.sim.indoor import Indoor
 from vico.sim.robots.scene import RobotScene
 from vico.sim.traffic.network import TrafficNetwork
@@ -103,6 +106,23 @@ class SimulationBase:
         far = (1e9, 1e9)
         doors = [self.entrances[p.entrance].position[:2] if p.entrance else far for p in self.world.places]
         return np.array(doors, np.float64).reshape(-1, 2)
+
+    @cached_property
+    def _places_by_cell(self) -> dict[tuple[int, int], list[int]]:
+        """Places with rooms whose entrance may be in reach from a cell as wide as the reach, in their order."""
+        found: dict[tuple[int, int], list[int]] = {}
+        for k, place in enumerate(self.world.places):
+            if place.entrance and place.rooms:
+                column, row = (int(c) for c in np.floor(self.doors[k] / DOOR_REACH))
+                for cell in product(range(column - 1, column + 2), range(row - 1, row + 2)):
+                    found.setdefault(cell, []).append(k)
+        return found
+
+    def entrances_near(self, x: float, y: float) -> list[int]:
+        """Return the places with rooms that one could enter from a point outdoors, by their indices."""
+        cell = math.floor(x / DOOR_REACH), math.floor(y / DOOR_REACH)
+        near = self._places_by_cell.get(cell, ())
+        return [k for k in near if math.hypot(self.doors[k, 0] - x, self.doors[k, 1] - y) <= DOOR_REACH]
 
     def bus_plan(self, second: int) -> BusPlan:
         """Return which buses drive at a second of the day, and where they are."""

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.rules import ActionStatus, code_name
-from vico.sim.bodies import RESIDENT, Bodies
+from vico.sim.lazy import LazyByName, Observations
 from vico.sim.moves import eye_height
-from vico.sim.perception import OUTDOORS, Eyes, InView, in_view, opaque_grid
 from vico.sim.simulation_state import SimulationState
-from vico.sim.state import Posture, Vehicle
+from vico.sim.told import Told
 
 Observation = dict[str, Any]
-
-VEHICLE_NAMES = {Vehicle.NONE: "", Vehicle.BUS: "bus", Vehicle.BIKE: "bike"}
 
 
 @dataclass(frozen=True)
@@ -100,7 +97,7 @@ def observe(
     renderer: ObservationRenderer | None,
     *,
     who: Sequence[int] | None = None,
-) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
+) -> tuple[Observations, Mapping[str, dict[str, Any]]]:
     """Return observations and infos of all agents; those in `seeing` get pictures, rendered in one call.
 
     Parameters
@@ -114,84 +111,50 @@ def observe(
         Observation by name (``rgb``, ``depth``, ``segmentation``, ``extrinsics``, ``intrinsics`` only for those who
         see; ``sensors`` for robots; ``pose``, ``events``, ``state`` for everybody), and info by name: ``entities``,
         kind and name of what the pictures show, by entity; ``action_code``; for residents ``in_view``, what is in
-        view by sight lines (`vico.sim.perception.InView`), the same with and without pictures.
+        view by sight lines (`vico.sim.perception.InView`), the same with and without pictures. Each is made when it is
+        first asked for, of the state as it is now.
     """
     names = state.names
-    stances = poses(state)
     chosen = range(len(names)) if who is None else who
-    perceived = look_about(state, stances, chosen)
-    found: dict[str, Observation] = {}
-    infos: dict[str, dict[str, Any]] = {}
-    for i in chosen:
-        name = names[i]
-        found[name] = {
-            "pose": stances[i].copy(),
-            "events": [message.record() for message in state.events.heard[name]],
-            "state": state_of(i, state),
-        }
-        if i >= len(state.people) and state.robots is not None:
-            found[name]["sensors"] = state.robots.observation(i - len(state.people))
-        infos[name] = {"entities": {}, "action_code": found[name]["state"]["action_code"]}
-        if i in perceived:
-            infos[name]["in_view"] = perceived[i]
-    if renderer is None or not len(seeing):
-        return found, infos
+    told = Told(_kept(state), poses(state), chosen)
+    pictures, seen = {}, {}
+    if renderer is not None and len(seeing):
+        for i, (picture, entities) in zip(seeing, _pictures(state, seeing, told.poses, renderer), strict=True):
+            pictures[names[i]], seen[names[i]] = picture, entities
+    asked = [names[i] for i in chosen]
+    observations = Observations(asked, lambda name: told.observation(name) | pictures.get(name, {}), told.crowd())
+    return observations, LazyByName(asked, lambda name: {"entities": seen.get(name, {})} | told.info(name))
+
+
+def _pictures(
+    state: SimulationState, seeing: Sequence[int], stances: NDArray[np.float64], renderer: ObservationRenderer
+) -> Iterator[tuple[Observation, dict[int, dict[str, str]]]]:
+    """Yield the pictures of some agents, and kind and name of what they show."""
     order = list(seeing)
     cameras = stances[order].copy()
     cameras[:, 2] += camera_heights(state)[order]
-    own = [int(state.people.entity[i]) for i in order if i < len(state.people)]
+    own = state.people.entity
     if state.robots is not None:
-        robots = state.robots.bodies().entity
-        own = [
-            int(state.people.entity[i]) if i < len(state.people) else int(robots[i - len(state.people)]) for i in order
-        ]
-    views = renderer.render(state, cameras, np.array(own, np.int32))
-    for k, i in enumerate(order):
-        found[names[i]] |= {
+        own = np.concatenate([own, state.robots.bodies().entity])
+    views = renderer.render(state, cameras, np.asarray(own[order], np.int32))
+    for k in range(len(order)):
+        picture = {
             "rgb": views.rgb[k],
             "depth": views.depth[k],
             "segmentation": views.segmentation[k],
             "extrinsics": views.extrinsics[k],
             "intrinsics": views.intrinsics,
         }
-        seen = _distinct(views.segmentation[k])
-        infos[names[i]]["entities"] = renderer.names(seen)
-    return found, infos
+        yield picture, renderer.names(_distinct(views.segmentation[k]))
 
 
-def look_about(state: SimulationState, stances: NDArray[np.float64], who: Sequence[int]) -> dict[int, InView]:
-    """Return what those residents have in view that are in `who`, by index; `stances` as from `poses`."""
-    p, indoor = state.people, state.indoor
-    residents = np.array([i for i in who if i < len(p) and p.kind[i] == RESIDENT], np.int64)
-    if not len(residents):
-        return {}
-    feet, mine = stances[residents], _spaces(state)
-    eyes = Eyes(
-        feet[:, :3] + np.column_stack([np.zeros((len(residents), 2)), eye_height(state)[residents]]),
-        p.yaw[residents],
-        p.entity[residents],
-        mine[residents],
-    )
-    others = [owner.bodies() for owner in (state.traffic, state.transit, state.robots) if owner is not None]
-    bodies = Bodies.joined([p.bodies_of(np.arange(len(p))), *others])
-    spaces = np.concatenate([mine, np.full(len(bodies) - len(p), OUTDOORS)])
-    found = dict(
-        zip(residents.tolist(), in_view(eyes, bodies, spaces, opaque_grid(state.world), state.entities), strict=True)
-    )
-    for i, view in found.items():
-        if (room := int(p.room[i])) >= 0:
-            view.room = indoor.boxes[room]
-            view.furniture = indoor.furniture[indoor.furniture_start[room] : indoor.furniture_start[room + 1]]
-    return found
-
-
-def _spaces(state: SimulationState) -> NDArray[np.int64]:
-    """Return in which space each avatar is, as `Eyes.space`: outdoors, its room, or its bus."""
-    p = state.people
-    spaces = np.where(p.room >= 0, p.room, OUTDOORS).astype(np.int64)
-    in_bus = p.vehicle == Vehicle.BUS
-    spaces[in_bus] = len(state.indoor.rooms) + p.vehicle_entity[in_bus]
-    return spaces
+def _kept(state: SimulationState) -> SimulationState:
+    """Return a state whose people, robots' outcomes and time stay what they are now."""
+    kept = copy(state)
+    kept.people = copy(state.people)
+    for name, array in state.people.arrays().items():
+        setattr(kept.people, name, array.copy())
+    return kept
 
 
 def _distinct(image: NDArray[np.int32]) -> list[int]:
@@ -200,50 +163,6 @@ def _distinct(image: NDArray[np.int32]) -> list[int]:
     change = np.flatnonzero(flat[1:] != flat[:-1])
     values = np.unique(np.append(flat[change], flat[-1]))
     return [int(v) for v in values if v > 0]
-
-
-def state_of(i: int, state: SimulationState) -> dict[str, Any]:
-    """Return the state part of an agent's observation; empty strings and 0 stand for "none".
-
-    ``doors`` lists the ways out of the room one is in (empty outdoors); ``posture`` is standing, sitting or lying.
-    """
-    common: Mapping[str, Any] = {"time": float(state.second)}
-    p = state.people
-    if i >= len(p):
-        assert state.robots is not None
-        robots, k = state.robots, i - len(p)
-        return {
-            **common,
-            "cash": 0.0,
-            "held": [0, 0],
-            "vehicle": "",
-            "building": "",
-            "room": "",
-            "place": "",
-            "accessible_places": [],
-            "doors": [],
-            "posture": "standing",
-            "action_status": ActionStatus(int(robots.action_status[k])).name.lower(),
-            "action_code": code_name(int(robots.reason_code[k])),
-            "action_reason": str(robots.reason[k]),
-        }
-    room = state.indoor.rooms[p.room[i]] if p.room[i] >= 0 else None
-    place = state.world.places[p.place[i]] if p.place[i] >= 0 else None
-    return {
-        **common,
-        "cash": round(float(p.cash[i]), 2),
-        "held": [int(p.held[i, 0]), int(p.held[i, 1])],
-        "vehicle": VEHICLE_NAMES[Vehicle(int(p.vehicle[i]))],
-        "building": room.building if room else "",
-        "room": room.id if room else "",
-        "place": place.id if place else "",
-        "accessible_places": state.accessible_places(i),
-        "doors": state.doors_of(i),
-        "posture": Posture(int(p.posture[i])).name.lower(),
-        "action_status": ActionStatus(int(p.status[i])).name.lower(),
-        "action_code": code_name(int(p.reason_code[i])),
-        "action_reason": str(p.reason[i]),
-    }
 
 
 def facing_of(yaw: float, pitch: float) -> tuple[float, float, float]:

@@ -18,8 +18,9 @@ from vico.sim.config import SimConfig
 from vico.sim.divergence import kept_if_diverged
 from vico.sim.events import Event
 from vico.sim.initial_state import initial_state
+from vico.sim.lazy import Observations
 from vico.sim.metrics import Metrics, StopWatch
-from vico.sim.observations import Observation, ObservationRenderer, observe
+from vico.sim.observations import ObservationRenderer, observe
 from vico.sim.overlaps import OverlapCheck
 from vico.sim.periods import TICKS_PER_SECOND, ControlPeriods, ticks_of
 from vico.sim.reports import reports
@@ -49,8 +50,8 @@ class StepResult:
         Of the state after it.
     """
 
-    observations: dict[str, Observation]
-    infos: dict[str, dict[str, Any]]
+    observations: Observations
+    infos: Mapping[str, dict[str, Any]]
     events: list[Event]
     hash: str
 
@@ -205,7 +206,7 @@ class Simulation:
         due = self.periods.due(self.state.tick)
         return [name for name, now in zip(self.agents, due.tolist(), strict=True) if now]
 
-    def observe(self, who: Sequence[str] | None = None) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
+    def observe(self, who: Sequence[str] | None = None) -> tuple[Observations, Mapping[str, dict[str, Any]]]:
         """Return observations and infos as things stand, of all agents or of some."""
         watch = StopWatch(self.metrics.seconds)
         names = self.agents

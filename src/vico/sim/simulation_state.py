@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import ActionSpace
-from vico.rules import DOOR_REACH, INNER_DOOR_REACH, ActionStatus, ReasonCode
+from vico.rules import INNER_DOOR_REACH, ActionStatus, ReasonCode
 from vico.sim.avatars import Avatars
 from vico.sim.base import SimulationBase
 from vico.sim.bodies import TALLEST, Bodies, HasBodies, Subsystem
@@ -311,8 +311,8 @@ class SimulationState:
             doors = self.indoor.doors[room]
             near = [d.to for d in doors if d.to >= 0 and near_door(p.position[i], d, INNER_DOOR_REACH)]
             return [self.indoor.rooms[to].id for to in near]
-        away = np.hypot(*(self.base.doors - p.position[i, :2]).T)
-        return [self.world.places[k].id for k in np.flatnonzero(away <= DOOR_REACH) if self.world.places[k].rooms]
+        x, y = p.position[i, :2].tolist()
+        return [self.world.places[k].id for k in self.base.entrances_near(x, y)]
 
     def doors_of(self, i: int) -> list[dict[str, Any]]:
         """Ways out of the room that person `i` is in: where each leads, and where it is."""

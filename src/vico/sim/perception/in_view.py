@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,8 @@ SIGHT = 40.0
 _HALF_ANGLE = math.pi / 4
 # What is looked at is near the top of a body: heads, roofs of cars.
 _LOOKED_AT = 0.9
+# Cells are numbered from here down, 2 ** 20 along a side.
+_HALF_KEYS = 2**19
 # A sight line is not stopped this near its ends, metres: who leans on a wall still sees along it.
 _FREE_END = 0.6
 
@@ -87,15 +90,15 @@ class InView:
 
     def within(self, reach: float) -> Iterator[Seen]:
         """Yield what is no farther away than `reach` metres, nearest first."""
-        for k, far in zip(self._chosen.tolist(), self.distance.tolist(), strict=True):
-            if far > reach:
-                return
+        near = int(np.searchsorted(self.distance, reach, side="right"))
+        for k, far in zip(self._chosen[:near].tolist(), self.distance[:near].tolist(), strict=True):
             yield self._seen(k, far)
 
     def nearest(self, kinds: tuple[str, ...]) -> float:
         """Return how far the nearest body of some kinds is, metres; infinite if none is in view."""
-        wanted = np.isin(self._bodies.kind[self._chosen], [KINDS.index(kind) for kind in kinds])
-        return float(self.distance[wanted][0]) if wanted.any() else math.inf
+        wanted = _is_of(kinds)[self._bodies.kind[self._chosen]]
+        first = int(wanted.argmax()) if len(wanted) else 0
+        return float(self.distance[first]) if len(wanted) and wanted[first] else math.inf
 
     def _seen(self, k: int, distance: float) -> Seen:
         entity = int(self._bodies.entity[k])
@@ -103,6 +106,39 @@ class InView:
         x, y, z = self._bodies.position[k].tolist()
         kind = KINDS[int(self._bodies.kind[k])]
         return Seen(entity, kind, about.get("name", ""), about.get("agent", ""), (x, y, z), distance)
+
+
+@cache
+def _is_of(kinds: tuple[str, ...]) -> NDArray[np.bool_]:
+    """Return, by kind of body, whether it is one of these."""
+    return np.isin(KINDS, kinds)
+
+
+@dataclass(frozen=True)
+class AllInView:
+    """What several agents have in view, in the order of their `Eyes`.
+
+    Attributes
+    ----------
+    bodies
+        Everybody and everything that might have been seen.
+    entities
+        Name and agent of each body by entity.
+    viewer, body, distance
+        Who has what in view, and how far away it is, metres: rows of the eyes, ascending, and of `bodies`, nearest
+        first for each; shape ``(pairs,)``.
+    """
+
+    bodies: Bodies
+    entities: Mapping[int, Mapping[str, str]]
+    viewer: NDArray[np.int64]
+    body: NDArray[np.int64]
+    distance: NDArray[np.float64]
+
+    def of(self, k: int) -> InView:
+        """Return what the agent with the `k`-th eyes has in view."""
+        a, b = np.searchsorted(self.viewer, (k, k + 1))
+        return InView(self.bodies, self.body[a:b], self.distance[a:b], self.entities)
 
 
 @dataclass(frozen=True)
@@ -134,7 +170,7 @@ def in_view(
     spaces: NDArray[np.int64],
     opaque: OpaqueGrid,
     entities: Mapping[int, Mapping[str, str]],
-) -> list[InView]:
+) -> AllInView:
     """Return what each agent has in view.
 
     Parameters
@@ -147,6 +183,8 @@ def in_view(
         Name and agent of each body by entity.
     """
     looked_at = bodies.position + np.column_stack([np.zeros((len(bodies), 2)), _LOOKED_AT * bodies.height])
+    keys = _keys(looked_at, spaces)
+    by_key = np.argsort(keys, kind="stable")
     who, what, far = _pairs(
         np.column_stack([eyes.position, np.cos(eyes.yaw), np.sin(eyes.yaw)]),
         np.column_stack([eyes.entity, eyes.space]).astype(np.int64),
@@ -154,36 +192,64 @@ def in_view(
         np.column_stack([bodies.entity, spaces]).astype(np.int64),
         np.array([SIGHT, math.cos(_HALF_ANGLE), _FREE_END, opaque.half, opaque.cell]),
         opaque.top,
+        keys[by_key],
+        by_key,
     )
     order = np.lexsort((bodies.entity[what], far, who))
-    bounds = np.searchsorted(who[order], np.arange(len(eyes.yaw) + 1))
-    return [
-        InView(bodies, what[order[a:b]], far[order[a:b]], entities)
-        for a, b in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True)
-    ]
+    return AllInView(bodies, entities, who[order], what[order], far[order])
+
+
+def _keys(points: NDArray[np.float64], spaces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return a number for the space each point is in, outdoors for the cell: only those of near ones see each other."""
+    cells = np.floor(points[:, :2] / SIGHT).astype(np.int64)
+    return np.where(spaces == OUTDOORS, _cell_key(cells[:, 0], cells[:, 1]), spaces)
 
 
 @compiled
-def _pairs(eyes, mine, targets, theirs, limits, top):  # type: ignore[no-untyped-def]
+def _cell_key(column, row):  # type: ignore[no-untyped-def]
+    """Return the key of a cell as wide as one sees; below those of all spaces indoors."""
+    return -1 - (((column + _HALF_KEYS) << 20) | (row + _HALF_KEYS))
+
+
+@compiled
+def _pairs(eyes, mine, targets, theirs, limits, top, keys, order):  # type: ignore[no-untyped-def]
     """Return who has what in view, and how far away it is; indices of agents and bodies, metres.
 
-    `eyes` holds position and gaze (a unit vector over the ground), `mine` and `theirs` entity and space.
+    `eyes` holds position and gaze (a unit vector over the ground), `mine` and `theirs` entity and space; `keys` are the
+    targets' (`_keys`) in ascending order, `order` whose each is.
     """
-    sight, cosine, free_end, half, cell = limits
+    sight = limits[0]
     who, what, far = [0 for _ in range(0)], [0 for _ in range(0)], [0.0 for _ in range(0)]
     for i in range(len(eyes)):
-        for j in range(len(targets)):
-            if theirs[j, 1] != mine[i, 1] or theirs[j, 0] == mine[i, 0]:
-                continue
-            dx, dy = targets[j, 0] - eyes[i, 0], targets[j, 1] - eyes[i, 1]
-            away = math.sqrt(dx * dx + dy * dy)
-            if away > sight or dx * eyes[i, 3] + dy * eyes[i, 4] < cosine * away:
-                continue
-            if mine[i, 1] >= 0 or _is_clear(eyes[i], targets[j], away, free_end, half, cell, top):
-                who.append(i)
-                what.append(j)
-                far.append(away)
+        outdoors = mine[i, 1] < 0
+        reach = 1 if outdoors else 0
+        column, row = math.floor(eyes[i, 0] / sight), math.floor(eyes[i, 1] / sight)
+        for dx in range(-reach, reach + 1):
+            for dy in range(-reach, reach + 1):
+                key = _cell_key(column + dx, row + dy) if outdoors else mine[i, 1]
+                for at in range(np.searchsorted(keys, key), np.searchsorted(keys, key, side="right")):
+                    j = order[at]
+                    if theirs[j, 0] == mine[i, 0]:
+                        continue
+                    away = _distance_in_view(eyes[i], targets[j], outdoors, limits, top)
+                    if away >= 0.0:
+                        who.append(i)
+                        what.append(j)
+                        far.append(away)
     return np.array(who, np.int64), np.array(what, np.int64), np.array(far, np.float64)
+
+
+@compiled
+def _distance_in_view(eye, target, outdoors, limits, top):  # type: ignore[no-untyped-def]
+    """Return how far away a point in the same space is, metres; -1 if it is out of view."""
+    sight, cosine, free_end, half, cell = limits
+    dx, dy = target[0] - eye[0], target[1] - eye[1]
+    away = math.sqrt(dx * dx + dy * dy)
+    if away > sight or dx * eye[3] + dy * eye[4] < cosine * away:
+        return -1.0
+    if outdoors and not _is_clear(eye, target, away, free_end, half, cell, top):
+        return -1.0
+    return away
 
 
 @compiled

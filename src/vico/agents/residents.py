@@ -1,0 +1,150 @@
+"""Residents asked together: who would only wait is not asked at all."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.agents.base import Action, Info, Observation
+from vico.agents.conversation import GREETING_DISTANCE, GREETING_PAUSE
+from vico.crowd import Crowd
+
+_LYING = 2
+_NEVER = -1e9
+
+
+class Resting(Protocol):
+    """A resident that may have nothing to decide for a while."""
+
+    @property
+    def rests_until(self) -> float:
+        """Time before which it only waits, and remembers nothing new, unless spoken to, met or moved."""
+
+    @property
+    def known(self) -> Collection[str]:
+        """Agents it would greet."""
+
+    @property
+    def greeted(self) -> Mapping[str, float]:
+        """When it last spoke with agents, seconds."""
+
+    def act(self, observation: Observation, info: Info) -> Action:
+        """Return the action for the coming second."""
+
+
+class Residents:
+    """Residents that are asked together: each does what it would do alone.
+
+    Those who rest where they were when they last decided to, heard nothing and see nobody they would greet are found in
+    arrays, and wait. Only the others are asked.
+
+    Parameters
+    ----------
+    members
+        By name; one has to say when it acted or was changed otherwise (`forget`).
+    """
+
+    def __init__(self, members: Mapping[str, Resting]) -> None:
+        self._members = list(members.values())
+        self._number = {name: k for k, name in enumerate(members)}
+        n = len(members)
+        # Each rests from the first to the second time.
+        self._since, self._until = np.full(n, np.inf), np.full(n, -np.inf)
+        self._pose = np.zeros((n, 2))
+        self._where = np.zeros((n, 3), np.int64)
+        # Who would greet whom, as one number a pair, ascending; and when they last spoke.
+        pairs = sorted(
+            (k * n + self._number[other], other)
+            for k, member in enumerate(self._members)
+            for other in member.known
+            if other in self._number
+        )
+        self._pairs = np.array([pair for pair, _ in pairs], np.int64)
+        self._greeted = np.full(len(pairs), _NEVER)
+        self._acquaintances = [other for _, other in pairs]
+        self._first_pair = np.searchsorted(self._pairs, np.arange(n + 1) * n).tolist()
+        self._changed = set(range(n))
+        self._rows: tuple[Mapping[str, int], NDArray[np.int64]] | None = None
+
+    def forget(self, name: str) -> None:
+        """Take nothing for granted of a member any more: it acted, or was restored."""
+        k = self._number[name]
+        self._until[k] = -np.inf
+        self._changed.add(k)
+
+    def act_for(
+        self, names: Sequence[str], observations: Mapping[str, Observation], infos: Mapping[str, Info]
+    ) -> dict[str, Action | Exception]:
+        """Return the members' actions for the coming second; see `vico.agents.base.GroupAgent`."""
+        crowd: Crowd | None = getattr(observations, "crowd", None)
+        numbers = np.array([self._number[name] for name in names], np.int64)
+        resting = np.zeros(len(names), bool) if crowd is None else self._resting(crowd, numbers)
+        found: dict[str, Action | Exception] = {}
+        for name, k, rests in zip(names, numbers.tolist(), resting.tolist(), strict=True):
+            if rests:
+                found[name] = {"type": "wait"}
+                continue
+            try:
+                found[name] = self._members[k].act(observations[name], infos[name])
+            except Exception as error:
+                found[name] = error
+                continue
+            if crowd is not None:
+                self._note(k, crowd, crowd.index[name])
+        return found
+
+    def _note(self, k: int, crowd: Crowd, row: int) -> None:
+        """Remember until when and where a member rests."""
+        until = self._members[k].rests_until
+        if until > crowd.time:
+            self._since[k], self._until[k] = crowd.time, until
+            self._pose[k] = crowd.pose[row, :2]
+            self._where[k] = crowd.place[row], crowd.room[row], crowd.posture[row]
+
+    def _resting(self, crowd: Crowd, numbers: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which of some members have nothing to decide."""
+        rows = self._rows_in(crowd)[numbers]
+        where = np.column_stack([crowd.place[rows], crowd.room[rows], crowd.posture[rows]])
+        still = (self._pose[numbers] == crowd.pose[rows, :2]).all(axis=1) & (self._where[numbers] == where).all(axis=1)
+        meets = self._meeting(crowd)[numbers] & (crowd.posture[rows] != _LYING)
+        now = (self._since[numbers] <= crowd.time) & (crowd.time < self._until[numbers])
+        return np.asarray(now & still & ~crowd.heard[rows] & ~meets, np.bool_)
+
+    def _meeting(self, crowd: Crowd) -> NDArray[np.bool_]:
+        """Return which members see somebody near whom they would greet."""
+        self._learn_greetings()
+        n = len(self._members)
+        meeting = np.zeros(n, bool)
+        number = np.full(len(crowd.pose), -1, np.int64)
+        rows = self._rows_in(crowd)
+        number[rows[rows >= 0]] = np.flatnonzero(rows >= 0)
+        near = crowd.distance <= GREETING_DISTANCE
+        me, other = number[crowd.viewer[near]], number[crowd.seen[near]]
+        both = (me >= 0) & (other >= 0)
+        me, pair = me[both], me[both] * n + other[both]
+        if not len(self._pairs) or not len(pair):
+            return meeting
+        at = np.minimum(np.searchsorted(self._pairs, pair), len(self._pairs) - 1)
+        due = (self._pairs[at] == pair) & (crowd.time - self._greeted[at] > GREETING_PAUSE)
+        meeting[me[due]] = True
+        return meeting
+
+    def _learn_greetings(self) -> None:
+        for k in self._changed:
+            greeted = self._members[k].greeted
+            for pair in range(self._first_pair[k], self._first_pair[k + 1]):
+                self._greeted[pair] = greeted.get(self._acquaintances[pair], _NEVER)
+        self._changed.clear()
+
+    def _rows_in(self, crowd: Crowd) -> NDArray[np.int64]:
+        """Return the members' rows; -1 for those who take no part in a run."""
+        if self._rows is None or self._rows[0] != crowd.index:
+            rows = np.array([crowd.index.get(name, -1) for name in self._number], np.int64)
+            self._rows = crowd.index, rows
+        return self._rows[1]
+
+
+__all__ = ["Residents", "Resting"]

@@ -1,0 +1,175 @@
+"""What agents are told of a moment beside pictures: their own state, what they heard, and who is in view."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.crowd import Crowd
+from vico.rules import ActionStatus, code_name
+from vico.sim.bodies import RESIDENT, Bodies
+from vico.sim.moves import eye_height
+from vico.sim.perception import OUTDOORS, AllInView, Eyes, in_view, opaque_grid
+from vico.sim.simulation_state import SimulationState
+from vico.sim.state import Posture, Vehicle
+
+# By number. Looking an enumeration's members up costs more than all the rest.
+_VEHICLES = {int(Vehicle.NONE): "", int(Vehicle.BUS): "bus", int(Vehicle.BIKE): "bike"}
+_POSTURES = {int(posture): posture.name.lower() for posture in Posture}
+_STATUSES = {int(status): status.name.lower() for status in ActionStatus}
+
+
+class Told:
+    """What agents are told of a moment, but for pictures.
+
+    Parameters
+    ----------
+    state
+        Of that moment; must stay as it is.
+    stances
+        As from `vico.sim.observations.poses`.
+    who
+        Indices of the agents that are told.
+    """
+
+    def __init__(self, state: SimulationState, stances: NDArray[np.float64], who: Sequence[int]) -> None:
+        self.poses = stances
+        self._state = state
+        self._index = {name: i for i, name in enumerate(state.names)}
+        self._heard = {name: tuple(said) for name, said in state.events.heard.items() if said}
+        people = len(state.people)
+        # Robots are few, and what they are told lies elsewhere.
+        self._robots = {i: state_of(i, state) for i in who if i >= people}
+        self._sensors = (
+            {i: state.robots.observation(i - people) for i in self._robots} if state.robots is not None else {}
+        )
+        chosen = np.asarray(who, np.int64)
+        chosen = chosen[chosen < people]
+        self._residents = chosen[state.people.kind[chosen] == RESIDENT]
+        self._eyes_of = {i: k for k, i in enumerate(self._residents.tolist())}
+        self._in_view = look_about(state, stances, self._residents)
+
+    def observation(self, name: str) -> dict[str, Any]:
+        """Return one agent's observation."""
+        i = self._index[name]
+        sensors = {"sensors": self._sensors[i]} if i in self._sensors else {}
+        return sensors | {
+            "pose": self.poses[i].copy(),
+            "events": [message.record() for message in self._heard.get(name, ())],
+            "state": self._state_of(i),
+        }
+
+    def info(self, name: str) -> dict[str, Any]:
+        """Return one agent's info."""
+        i = self._index[name]
+        p = self._state.people
+        code = code_name(int(p.reason_code[i])) if i < len(p) else self._robots[i]["action_code"]
+        if i not in self._eyes_of:
+            return {"action_code": code}
+        view = self._in_view.of(self._eyes_of[i])
+        if (room := int(p.room[i])) >= 0:
+            indoor = self._state.indoor
+            view.room = indoor.boxes[room]
+            view.furniture = indoor.furniture[indoor.furniture_start[room] : indoor.furniture_start[room + 1]]
+        return {"action_code": code, "in_view": view}
+
+    def crowd(self) -> Crowd:
+        """Return all agents' observations as arrays."""
+        p, n = self._state.people, len(self.poses)
+        heard = np.zeros(n, bool)
+        heard[[self._index[name] for name in self._heard]] = True
+        view = self._in_view
+        # The first bodies are the people's, in their order; who else is in view is no agent one would speak to.
+        people = view.body < len(p)
+        return Crowd(
+            index=self._index,
+            time=self._state.second,
+            pose=self.poses,
+            posture=_padded(p.posture, n, Posture.STANDING),
+            place=_padded(p.place, n, -1),
+            room=_padded(p.room, n, -1),
+            heard=heard,
+            viewer=self._residents[view.viewer[people]],
+            seen=view.body[people],
+            distance=view.distance[people],
+        )
+
+    def _state_of(self, i: int) -> dict[str, Any]:
+        return self._robots[i] if i in self._robots else state_of(i, self._state)
+
+
+def _padded(values: NDArray[Any], length: int, value: int) -> NDArray[Any]:
+    """Return values of people with one for each robot behind them."""
+    return np.concatenate([values, np.full(length - len(values), value, values.dtype)])
+
+
+def look_about(state: SimulationState, stances: NDArray[np.float64], residents: NDArray[np.int64]) -> AllInView:
+    """Return what residents, given by their indices, have in view; `stances` as from `poses`."""
+    p = state.people
+    feet, mine = stances[residents], _spaces(state)
+    eyes = Eyes(
+        feet[:, :3] + np.column_stack([np.zeros((len(residents), 2)), eye_height(state)[residents]]),
+        p.yaw[residents],
+        p.entity[residents],
+        mine[residents],
+    )
+    others = [owner.bodies() for owner in (state.traffic, state.transit, state.robots) if owner is not None]
+    bodies = Bodies.joined([p.bodies_of(np.arange(len(p))), *others])
+    spaces = np.concatenate([mine, np.full(len(bodies) - len(p), OUTDOORS)])
+    return in_view(eyes, bodies, spaces, opaque_grid(state.world), state.entities)
+
+
+def _spaces(state: SimulationState) -> NDArray[np.int64]:
+    """Return in which space each avatar is, as `Eyes.space`: outdoors, its room, or its bus."""
+    p = state.people
+    spaces = np.where(p.room >= 0, p.room, OUTDOORS).astype(np.int64)
+    in_bus = p.vehicle == Vehicle.BUS
+    spaces[in_bus] = len(state.indoor.rooms) + p.vehicle_entity[in_bus]
+    return spaces
+
+
+def state_of(i: int, state: SimulationState) -> dict[str, Any]:
+    """Return the state part of an agent's observation; empty strings and 0 stand for "none".
+
+    ``doors`` lists the ways out of the room one is in (empty outdoors); ``posture`` is standing, sitting or lying.
+    """
+    common: Mapping[str, Any] = {"time": float(state.second)}
+    p = state.people
+    if i >= len(p):
+        assert state.robots is not None
+        robots, k = state.robots, i - len(p)
+        return {
+            **common,
+            "cash": 0.0,
+            "held": [0, 0],
+            "vehicle": "",
+            "building": "",
+            "room": "",
+            "place": "",
+            "accessible_places": [],
+            "doors": [],
+            "posture": "standing",
+            "action_status": _STATUSES[int(robots.action_status[k])],
+            "action_code": code_name(int(robots.reason_code[k])),
+            "action_reason": str(robots.reason[k]),
+        }
+    room = state.indoor.rooms[p.room[i]] if p.room[i] >= 0 else None
+    place = state.world.places[p.place[i]] if p.place[i] >= 0 else None
+    return {
+        **common,
+        "cash": round(float(p.cash[i]), 2),
+        "held": [int(p.held[i, 0]), int(p.held[i, 1])],
+        "vehicle": _VEHICLES[int(p.vehicle[i])],
+        "building": room.building if room else "",
+        "room": room.id if room else "",
+        "place": place.id if place else "",
+        "accessible_places": state.accessible_places(i),
+        "doors": state.doors_of(i),
+        "posture": _POSTURES[int(p.posture[i])],
+        "action_status": _STATUSES[int(p.status[i])],
+        "action_code": code_name(int(p.reason_code[i])),
+        "action_reason": str(p.reason[i]),
+    }
