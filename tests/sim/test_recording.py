@@ -383,3 +383,22 @@ def test_a_minute_of_a_standing_crowd_takes_little(tmp_path: Path) -> None:
     segment = tmp_path / "run" / "segments" / "00000000-00000060"
     # Nothing moves but the chests of 30 people who breathe: what is left is mostly the files' own heads.
     assert sum(file.stat().st_size for file in segment.iterdir()) < 20_000
+
+
+# A city's recording.
+
+
+def test_pedestrians_are_posed_and_robots_have_joints(helsinki_run: tuple[Path, dict[str, Any]]) -> None:
+    run = read_run(helsinki_run[0])
+    walkers = [member.entity for member in run.cast.values() if member.kind == "pedestrian"]
+    assert len(walkers) == 3
+    before, after = (PosedPeople(run).at(step, walkers).rotations for step in (run.last - 1, run.last))
+    assert np.isfinite(after).all()
+    # Whoever walks or breathes holds no pose for a second.
+    assert (np.abs(after - before).max(axis=(1, 2)) > 1e-4).all()
+    robot = run.at(run.last).agents["robot_0"]
+    assert len(robot.joints) > 0
+    assert robot.clip == ""
+    bases = run.columns("robots")
+    length = np.sqrt(sum(bases[key] ** 2 for key in ("qw", "qx", "qy", "qz")))
+    assert length == pytest.approx(np.ones(len(length)), abs=2e-4)
