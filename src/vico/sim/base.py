@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from functools import cached_property
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -15,11 +16,15 @@ from vico.errors import InputError
 from vico.rules import DOOR_REACH
 from vico.sim.indoor import Indoor
 from vico.sim.robots.scene import RobotScene
+from vico.sim.appointments import Appointment, appointments
 from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.transit import BusPlan, plan_buses
 from vico.world.folder import World
 from vico.world.model import Entrance
 from vico.world.routing import Router
+
+if TYPE_CHECKING:
+    from vico.community.model import Community
 
 #: Whole ways that are remembered, and plans of buses: more than a community asks for at its start.
 _KEPT = 4096
@@ -43,6 +48,7 @@ class SimulationBase:
         self._ways: dict[tuple[int, int], NDArray[np.float64] | None] = {}
         self._bus_plans: dict[int, BusPlan] = {}
         self._robot_scenes: dict[tuple[str, ...], RobotScene] = {}
+        self._days: tuple[Community, list[list[Appointment]]] | None = None
 
     @classmethod
     def of(cls, world: World) -> SimulationBase:
@@ -123,6 +129,12 @@ class SimulationBase:
         cell = math.floor(x / DOOR_REACH), math.floor(y / DOOR_REACH)
         near = self._places_by_cell.get(cell, ())
         return [k for k in near if math.hypot(self.doors[k, 0] - x, self.doors[k, 1] - y) <= DOOR_REACH]
+
+    def days(self, community: Community) -> list[list[Appointment]]:
+        """Return the appointments of a community's residents; those of the last community asked for are kept."""
+        if self._days is None or self._days[0] is not community:
+            self._days = community, [appointments(r.schedule, self.place_index) for r in community.residents]
+        return self._days[1]
 
     def bus_plan(self, second: int) -> BusPlan:
         """Return which buses drive at a second of the day, and where they are."""

@@ -10,11 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.sim.collisions import box_gap, room_gap
+from vico.io.compiled import compiled
+from vico.sim.collisions import box_gap, gap_to, room_gap
 from vico.sim.state import RADIUS
 from vico.world.model import Entrance, Place, Room
 from vico.world.objects import Objects
 
+#: Lists of free spots that are remembered, one a room and door.
+_SPOTS_KEPT = 4096
 _LEVEL = 0.5  # metres a door may lie above or below who goes through it
 
 
@@ -116,13 +119,8 @@ class Indoor:
 
     def gap(self, room: int, xy: NDArray[np.float64] | tuple[float, float]) -> float:
         """Free room around a point of a room, metres: to the nearest wall or piece of furniture; negative in one."""
-        x, y = float(xy[0]), float(xy[1])
-        best = float(room_gap(x, y, self.boxes[room]))
-        for bx, by, yaw, half_length, half_width, *_ in self.furniture[
-            self.furniture_start[room] : self.furniture_start[room + 1]
-        ]:
-            best = min(best, float(box_gap(x, y, bx, by, yaw, half_length, half_width)))
-        return best
+        furniture = self.furniture[self.furniture_start[room] : self.furniture_start[room + 1]]
+        return float(_free_room(np.array([[float(xy[0]), float(xy[1])]]), self.boxes[room], furniture)[0])
 
     def free_spot(self, room: int, near: ArrayLike, taken: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Spot of a room nearest to `near` where someone can stand; None if the room is full.
@@ -137,26 +135,46 @@ class Indoor:
         ndarray or None
             On the floor, ENU metres, shape ``(3,)``.
         """
+        spots = self._spots(room, np.asarray(near, np.float64).reshape(-1)[:2])
+        if not len(taken) or not len(spots):
+            return spots[0].copy() if len(spots) else None
+        # A little more than touching, so that nobody starts in a contact.
+        away = np.hypot(*(spots[:, None, :2] - taken[None, :, :2]).transpose(2, 0, 1)).min(axis=1)
+        free = np.flatnonzero(away >= 2 * RADIUS + 0.05)
+        return spots[free[0]].copy() if len(free) else None
+
+    def _spots(self, room: int, near: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where someone can stand in an empty room, ENU metres, shape ``(k, 3)``, the nearest to a point first."""
+        key = (room, float(near[0]), float(near[1]))
+        if key not in self._known_spots:
+            if len(self._known_spots) >= _SPOTS_KEPT:
+                self._known_spots.clear()
+            self._known_spots[key] = self._find_spots(room, near)
+        return self._known_spots[key]
+
+    @cached_property
+    def _known_spots(self) -> dict[tuple[int, float, float], NDArray[np.float64]]:
+        """People come in by doors: the same few points are asked for again and again."""
+        return {}
+
+    def _find_spots(self, room: int, near: NDArray[np.float64]) -> NDArray[np.float64]:
         x, y, yaw, half_length, half_width = self.boxes[room]
         u = np.arange(-half_length + RADIUS + 0.02, half_length - RADIUS, 0.2)
         v = np.arange(-half_width + RADIUS + 0.02, half_width - RADIUS, 0.2)
         grid = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
         c, s = np.cos(yaw), np.sin(yaw)
         spots = np.column_stack([x + c * grid[:, 0] - s * grid[:, 1], y + s * grid[:, 0] + c * grid[:, 1]])
-        spots = np.vstack([np.asarray(near, np.float64).reshape(1, -1)[:, :2], spots])
-        order = np.argsort(np.hypot(*(spots - spots[0]).T), kind="stable")
-        level = self.floor_at(room, spots[0])
-        for k in order:
-            spot = spots[k]
-            # On stairs the other flight may be near, and yet a floor away.
-            if room in self.stairs and abs(self.floor_at(room, spot) - level) > 0.6:
-                continue
-            # A little more than touching, so that nobody starts in a contact.
-            if len(taken) and np.hypot(*(taken[:, :2] - spot).T).min() < 2 * RADIUS + 0.05:
-                continue
-            if self.gap(room, spot) >= RADIUS + (0.0 if k == 0 else 0.02):
-                return np.array([spot[0], spot[1], self.floor_at(room, spot)])
-        return None
+        spots = np.vstack([near[None], spots])
+        furniture = self.furniture[self.furniture_start[room] : self.furniture_start[room + 1]]
+        gap = _free_room(spots, self.boxes[room], furniture)
+        gap[0] += 0.02  # the point itself may be as narrow as can be
+        spots = spots[gap >= RADIUS + 0.02]
+        spots = spots[np.argsort(np.hypot(*(spots - near).T), kind="stable")]
+        if room not in self.stairs:
+            return np.column_stack([spots, np.full(len(spots), self.floor[room])])
+        # On stairs the other flight may be near, and yet a floor away.
+        level = np.array([self.floor_at(room, spot) for spot in spots]).reshape(-1)
+        return np.column_stack([spots, level])[np.abs(level - self.floor_at(room, near)) <= 0.6]
 
     def holds(self, room: int, point: Sequence[float]) -> bool:
         """Whether a point lies in the room's box."""
@@ -208,6 +226,19 @@ def _doors(rooms: Sequence[Room], places: Sequence[Place], index: dict[str, int]
             if j not in listed and not any(d.to == i for d in doors[j]):
                 doors[j].append(Door(i, rooms[inner].door))
     return doors
+
+
+@compiled
+def _free_room(points, box, furniture):  # type: ignore[no-untyped-def]
+    """Distance from points of a room to the nearest wall or piece of furniture, metres; negative in one."""
+    out = np.empty(len(points))
+    for k in range(len(points)):
+        x, y = points[k, 0], points[k, 1]
+        gap = room_gap(x, y, box)
+        for f in range(len(furniture)):
+            gap = min(gap, gap_to(x, y, furniture[f]))
+        out[k] = gap
+    return out
 
 
 def entrance_of(place: Place, entrances: dict[str, Entrance]) -> Entrance | None:

@@ -15,7 +15,7 @@ from vico.sim.events import Events
 from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import FIRST_ASSISTANT, FIRST_RESIDENT, FIRST_ROBOT, MovableObjects, People
-from vico.sim.timetable import Appointment
+from vico.sim.appointments import Appointment
 
 if TYPE_CHECKING:
     from vico.community.model import Resident

@@ -28,7 +28,7 @@ from vico.sim.scenario import GroundTruth, Scenario
 from vico.sim.simulation_state import SimulationState
 from vico.sim.snapshot import arrays_of, copied, identity, read_snapshot, state_hash, write_snapshot
 from vico.sim.substeps import advance_ticks
-from vico.sim.timetable import Punctuality, appointments
+from vico.sim.timetable import Punctuality
 from vico.world.folder import World
 from vico.world.mesh import Surface
 
@@ -111,7 +111,7 @@ class Simulation:
         self.config = config or SimConfig()
         self.metrics = Metrics()
         self.residents = list(community.residents)[: self.config.residents] if community is not None else []
-        days = [appointments(r.schedule, self.base.place_index) for r in self.residents]
+        days = self.base.days(community)[: len(self.residents)] if community is not None else []
         self.state = initial_state(self.base, self.residents, days, self.config)
         self.periods = _periods(self.state, self.config)
         self.punctuality = Punctuality.of(days, self.config.start)

@@ -12,7 +12,7 @@ from vico.errors import InputError
 from vico.sim.avatars import free_ground
 from vico.sim.moves import place_in_room, put_outdoors
 from vico.sim.simulation_state import SimulationState
-from vico.sim.timetable import Appointment, whereabouts
+from vico.sim.appointments import Appointment, whereabouts
 
 _PASSAGES = ("hall", "corridor", "stairs", "lift", "storage", "bathroom", "washroom", "shower_room")
 

@@ -149,6 +149,20 @@ class WalkableMap:
             cls[(four == surface).any(axis=(1, 3))] = surface
         return WalkableMap(np.where(free, cls, np.uint8(BLOCKED)), self.half, 2 * self.cell)
 
+    def _free_cells(self, classes: tuple[int, ...], clearance: float) -> NDArray[np.int64]:
+        """Numbers of the reachable cells of some classes with so much room, row by row."""
+        known = self._known_cells.get((classes, clearance))
+        if known is None:
+            mask = self.connected & np.isin(self.cls, classes)
+            if clearance > BODY:
+                mask &= self.clearance >= clearance
+            known = self._known_cells[classes, clearance] = np.flatnonzero(mask)
+        return known
+
+    @cached_property
+    def _known_cells(self) -> dict[tuple[tuple[int, ...], float], NDArray[np.int64]]:
+        return {}
+
     def random_point(
         self,
         rng: np.random.Generator,
@@ -176,23 +190,30 @@ class WalkableMap:
         InputError
             If there is no such point.
         """
-        rows = columns = slice(0, self.n)
-        if near is not None and radius is not None:
-            x, y = (float(value) for value in np.asarray(near, np.float64)[:2])
-            rows, columns = self._cells_within(y, radius), self._cells_within(x, radius)
-        mask = self.connected[rows, columns] & np.isin(self.cls[rows, columns], classes)
-        if clearance > BODY:
-            mask &= self.clearance[rows, columns] >= clearance
-        if near is not None and radius is not None:
-            axis = self.centre_of(np.arange(self.n))
-            mask &= (axis[None, columns] - x) ** 2 + (axis[rows, None] - y) ** 2 <= radius * radius
-        free = np.argwhere(mask)
-        if not len(free):
+        if near is None or radius is None:
+            cells = self._free_cells(classes, max(clearance, BODY))
+        else:
+            cells = self._free_cells_near(classes, clearance, np.asarray(near, np.float64)[:2], radius)
+        if not len(cells):
             names = ", ".join(CLASS_NAMES[c] for c in classes)
             place = "" if near is None else f" within {radius} m of {np.asarray(near)[:2].tolist()}"
             raise InputError(f"walkable map: no reachable {names} cell{place}; widen the search")
-        row, column = free[rng.integers(len(free))]
-        return self.centre_of([column + columns.start, row + rows.start])
+        chosen = int(cells[rng.integers(len(cells))])
+        return self.centre_of([chosen % self.n, chosen // self.n])
+
+    def _free_cells_near(
+        self, classes: tuple[int, ...], clearance: float, point: NDArray[np.float64], radius: float
+    ) -> NDArray[np.int64]:
+        """Numbers of those free cells whose centres lie within `radius` metres of a point, row by row."""
+        x, y = (float(value) for value in point)
+        rows, columns = self._cells_within(y, radius), self._cells_within(x, radius)
+        mask = self.connected[rows, columns] & np.isin(self.cls[rows, columns], classes)
+        if clearance > BODY:
+            mask &= self.clearance[rows, columns] >= clearance
+        axis = self.centre_of(np.arange(self.n))
+        mask &= (axis[None, columns] - x) ** 2 + (axis[rows, None] - y) ** 2 <= radius * radius
+        iy, ix = np.nonzero(mask)
+        return np.asarray((iy + rows.start) * self.n + ix + columns.start, np.int64)
 
     def _cells_within(self, middle: float, radius: float) -> slice:
         """Return the columns (or rows) whose centres may lie within `radius` metres of a coordinate."""
