@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 from vico.version import __version__
 
 if TYPE_CHECKING:
+    from vico.agents.single import make_vec
     from vico.api import build_community, build_world, check_community, check_world, read_world, view_world
     from vico.community import read_community
-    from vico.envs import EnvSpec, check_env, make
+    from vico.envs import EnvSpec, check_env, make, make_parallel_vec
 
 __all__ = [
     "EnvSpec",
@@ -25,6 +26,8 @@ __all__ = [
     "check_env",
     "check_world",
     "make",
+    "make_parallel_vec",
+    "make_vec",
     "read_community",
     "read_world",
     "view_world",
@@ -38,6 +41,8 @@ _WHERE = {
     "check_env": "vico.envs",
     "check_world": "vico.api",
     "make": "vico.envs",
+    "make_parallel_vec": "vico.envs",
+    "make_vec": "vico.agents.single",
     "read_community": "vico.community",
     "read_world": "vico.api",
     "view_world": "vico.api",

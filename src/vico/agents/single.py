@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Unpack
 
 from vico.agents.base import Agent
 from vico.agents.schedule import followers_of
-from vico.envs.parallel import CommunityEnv, make
+from vico.envs.parallel import CommunityEnv, CommunitySource, WorldSource, make
 from vico.envs.single import SingleAgentEnv
 from vico.envs.spec import EnvOptions
+from vico.envs.vector import VectorAgentEnv, makers
 
 
 def residents_of(env: CommunityEnv, seed: int) -> Mapping[str, Agent]:
@@ -22,8 +22,8 @@ def residents_of(env: CommunityEnv, seed: int) -> Mapping[str, Agent]:
 
 
 def make_single(
-    world: Path | str,
-    community: Path | str | None = None,
+    world: WorldSource,
+    community: CommunitySource = None,
     *,
     agent: str = "assistant_0",
     **options: Unpack[EnvOptions],
@@ -45,3 +45,33 @@ def make_single(
     """
     given: EnvOptions = {"assistants": 1, "observe": (agent,), **options}
     return SingleAgentEnv(make(world, community, **given), agent, others=residents_of)
+
+
+def make_vec(
+    world: WorldSource,
+    community: CommunitySource = None,
+    *,
+    num_envs: int,
+    agent: str = "assistant_0",
+    **options: Unpack[EnvOptions],
+) -> VectorAgentEnv:
+    """Make several environments for one agent each, among residents who follow their day, each in a process.
+
+    Parameters
+    ----------
+    world, community
+        Folders, or what was read from them: every process reads the world itself.
+    num_envs
+        How many; they begin with the seeds ``seed``, ``seed + 1`` and on.
+    agent, options
+        See `make_single`.
+
+    Raises
+    ------
+    InputError
+        If the world has no folder.
+    WorkerError
+        If an environment cannot be made: no such agent, a community of another world.
+    """
+    given = {"agent": agent, **options}
+    return VectorAgentEnv(makers(make_single, world, community, num_envs=num_envs, options=given))

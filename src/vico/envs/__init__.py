@@ -5,6 +5,8 @@ from vico.envs.parallel import CommunityEnv, make
 from vico.envs.registry import register_ids
 from vico.envs.single import SingleAgentEnv
 from vico.envs.spec import EnvSpec
+from vico.envs.vector import ParallelVectorEnv, VectorAgentEnv, make_parallel_vec
+from vico.envs.workers import WorkerError
 from vico.sim.simulation import Simulation
 
 register_ids()
@@ -13,9 +15,13 @@ __all__ = [
     "CommunityEnv",
     "EnvFinding",
     "EnvSpec",
+    "ParallelVectorEnv",
     "Simulation",
     "SingleAgentEnv",
+    "VectorAgentEnv",
+    "WorkerError",
     "check_env",
     "make",
+    "make_parallel_vec",
     "register_ids",
 ]

@@ -25,6 +25,9 @@ from vico.world.folder import World, read_world
 from vico.world.public import PublicMap
 
 Setup = Callable[[Simulation], None]
+#: Folders, or what was read from them.
+WorldSource = World | Path | str
+CommunitySource = Community | Path | str | None
 
 
 class CommunityEnv(ParallelEnv):  # type: ignore[misc]
@@ -201,8 +204,8 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
 
 
 def make(
-    world: World | Path | str,
-    community: Community | Path | str | None = None,
+    world: WorldSource,
+    community: CommunitySource = None,
     *,
     setup: Setup | None = None,
     **options: Unpack[EnvOptions],
@@ -239,9 +242,9 @@ def make_from_spec(spec: EnvSpec, *, setup: Setup | None = None) -> CommunityEnv
     return CommunityEnv(_world(spec.world), _community(spec.community), spec=spec, setup=setup)
 
 
-def _world(source: World | Path | str) -> World:
+def _world(source: WorldSource) -> World:
     return source if isinstance(source, World) else read_world(Path(source))
 
 
-def _community(source: Community | Path | str | None) -> Community | None:
+def _community(source: CommunitySource) -> Community | None:
     return source if source is None or isinstance(source, Community) else read_community(Path(source))

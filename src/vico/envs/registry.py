@@ -17,7 +17,12 @@ def register_ids() -> None:
     """
     if ID not in gymnasium.registry:
         # The checks of Gymnasium's own wrapper would refuse the short form of actions.
-        gymnasium.register(ID, entry_point="vico.agents.single:make_single", disable_env_checker=True)
+        gymnasium.register(
+            ID,
+            entry_point="vico.agents.single:make_single",
+            vector_entry_point="vico.agents.single:make_vec",
+            disable_env_checker=True,
+        )
     registry = getattr(pettingzoo, "parallel_registry", None)
     if registry is not None and ID not in registry:
         pettingzoo.register("parallel", ID, entry_point="vico.envs.parallel:make")
