@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError
 from vico.rules import DOOR_REACH
+from vico.sim.appointments import Appointment, appointments
 from vico.sim.indoor import Indoor
 from vico.sim.robots.scene import RobotScene
-from vico.sim.appointments import Appointment, appointments
 from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.transit import BusPlan, plan_buses
 from vico.world.folder import World

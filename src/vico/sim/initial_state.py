@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from vico.seeds import rng
 from vico.sim import spawn, systems
+from vico.sim.appointments import Appointment
 from vico.sim.avatars import Avatars
 from vico.sim.base import SimulationBase
 from vico.sim.bodies import ASSISTANT, KINDS, RESIDENT
@@ -15,7 +16,6 @@ from vico.sim.events import Events
 from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import FIRST_ASSISTANT, FIRST_RESIDENT, FIRST_ROBOT, MovableObjects, People
-from vico.sim.appointments import Appointment
 
 if TYPE_CHECKING:
     from vico.community.model import Resident

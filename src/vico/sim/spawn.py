@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import InputError
+from vico.sim.appointments import Appointment, whereabouts
 from vico.sim.avatars import free_ground
 from vico.sim.moves import place_in_room, put_outdoors
 from vico.sim.simulation_state import SimulationState
-from vico.sim.appointments import Appointment, whereabouts
 
 _PASSAGES = ("hall", "corridor", "stairs", "lift", "storage", "bathroom", "washroom", "shower_room")
 
