@@ -3,13 +3,15 @@
 import hashlib
 import subprocess
 import sys
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from robot_field import HALF, PACKS, field, people
 from vico.errors import InputError
-from vico.sim.bodies import Bodies
+from vico.sim.bodies import OBJECT, Bodies
 from vico.sim.robots import RobotPopulation, RobotStatus
 from vico.sim.robots.gait import LegGeometry, leg_angles
 from vico.world.heights import HeightField
@@ -280,3 +282,41 @@ def test_spawns_are_reachable_and_apart() -> None:
     assert robots.world.walkable.is_connected(positions).all()
     away = np.linalg.norm(positions[:, None] - positions[None], axis=2)
     assert away[np.triu_indices(3, 1)].min() > 2.9
+
+
+def test_a_robot_stops_for_a_thing_on_the_ground() -> None:
+    robots = RobotPopulation(field(), ["husky"], [[0, 0, 0]], packs=False)
+    crate = replace(people((5, 0)), kind=np.full(1, OBJECT, np.int8), height=np.array([0.4]))
+    robots.drive(0, (0.8, 0, 0))
+    run(robots, 10.0, crate)
+    nose = robots.bodies().position[0, 0] + robots.models[0].half_length
+    assert robots.status[0] == RobotStatus.WAITING
+    assert 0.2 < 4.75 - nose < 1.0
+
+
+def test_what_flies_high_above_stops_nobody() -> None:
+    robots = RobotPopulation(field(), ["husky"], [[0, 0, 0]], packs=False)
+    above = people((5, 0))
+    above.position[0, 2] = 30.0
+    robots.drive(0, (0.8, 0, 0))
+    run(robots, 10.0, above)
+    assert robots.bodies().position[0, 0] > 6.0
+
+
+def test_a_robot_keeps_near_whom_it_follows() -> None:
+    robots = RobotPopulation(field((6, 0, 2, 10)), ["go2"], [[0, 0, 0]], packs=False)
+    start = np.array([2.5, 0.0])
+    leader = people(tuple(start))
+    robots.follow_body(0, int(leader.entity[0]))
+    corners = [(2.5, 0), (3, 7.5), (9.5, 7.5), (10, 0)]
+    for a, b in pairwise(corners):
+        away = np.subtract(b, a)
+        steps = int(np.hypot(*away) / 0.05)
+        for k in range(steps):
+            robots.advance(0.1, people(tuple(np.add(a, away * k / steps)), velocity=tuple(away / np.hypot(*away) / 2)))
+    run(robots, 8.0, people(corners[-1]))
+    left = np.hypot(*(robots.bodies().position[0, :2] - corners[-1]))
+    assert 0.6 < left < 2.2
+    assert robots.status[0] == RobotStatus.WAITING
+    run(robots, 0.1)  # the leader has gone indoors
+    assert robots.status[0] == RobotStatus.WAITING

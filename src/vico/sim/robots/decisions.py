@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from vico.sim.bodies import Bodies
 from vico.sim.robots import commands
-from vico.sim.robots.navigation import GAP, SIGHT, neighbours_of
+from vico.sim.robots.navigation import GAP, SIGHT, Surroundings
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.state import Mode, RobotRun
 from vico.sim.robots.ways import next_errand, way_to
@@ -21,18 +21,19 @@ _REST = 5.0
 _FOLLOW_GAP, _FOLLOW_DRIFT = 1.2, 1.0
 
 
-def decide(run: RobotRun, dt: float, everyone: Bodies, *, errands: bool) -> None:
+def decide(run: RobotRun, dt: float, obstacles: Bodies, mine: Bodies, *, errands: bool) -> None:
     """Set what every robot follows for the next `dt` seconds.
 
     Parameters
     ----------
-    everyone
-        All bodies outdoors, the robots' among them.
+    obstacles, mine
+        Bodies of everybody else outdoors, and of the robots.
     errands
         Robots that nobody commands go from place to place.
     """
     arrays = run.arrays
     arrays.velocity[:] = 0.0
+    around: Surroundings | None = None
     for robot, mode in enumerate(arrays.mode.tolist()):
         if arrays.status[robot] == _FALLEN or mode == _MOTORS:
             continue
@@ -40,13 +41,14 @@ def decide(run: RobotRun, dt: float, everyone: Bodies, *, errands: bool) -> None
             if errands:
                 _rest(run, robot, dt)
             continue
-        others = neighbours_of(everyone, int(run.entities[robot]), run.position(robot), SIGHT + 4)
+        around = around or Surroundings(Bodies.joined([obstacles, mine]))
+        others = around.near(len(obstacles) + robot, SIGHT + 4)
         if mode == _VELOCITY:
             _hold_velocity(run, robot, others)
         elif mode == _ROUTE:
             _keep_to_way(run, robot, others, dt)
         elif mode == _FOLLOW:
-            _keep_near(run, robot, others, dt, everyone)
+            _keep_near(run, robot, others, dt, around.bodies)
 
 
 def _rest(run: RobotRun, robot: int, dt: float) -> None:

@@ -31,22 +31,44 @@ NEIGHBOUR = np.dtype(
 )
 #: Metres a robot leaves to whoever is ahead, and to the side.
 GAP, SIDE_GAP = 0.6, 0.15
+#: Metres above and below a robot that count as its height: the ground under two bodies differs.
+_HEIGHT_GAP = 0.5
 #: Metres a second squared it brakes with; metres it looks ahead at most; seconds others' motion is foreseen.
 BRAKE, SIGHT, FORESIGHT = 0.8, 5.0, 3.0
 #: Seconds the rest of a robot takes to follow its nose.
 FOLLOW = 1.5
 
 
-def neighbours_of(bodies: Bodies, own: int, position: Array, reach: float) -> NDArray[np.void]:
-    """Return those within `reach` metres of a position, without the entity `own`, dtype `NEIGHBOUR`."""
-    away = np.hypot(*(bodies.position[:, :2] - position[:2]).T)
-    near = bodies.where(np.flatnonzero((away - bodies.half_length < reach) & (bodies.entity != own)))
-    found = np.empty(len(near), NEIGHBOUR)
-    found["x"], found["y"], found["yaw"] = near.position[:, 0], near.position[:, 1], near.yaw
-    found["rounding"] = near.rounding
-    found["half_length"], found["half_width"] = near.half_length - near.rounding, near.half_width - near.rounding
-    found["vx"], found["vy"] = near.velocity[:, 0], near.velocity[:, 1]
-    return found
+class Surroundings:
+    """Everybody outdoors in one sub-step, to be asked who is near a robot.
+
+    Parameters
+    ----------
+    bodies
+        All bodies outdoors, the robots' among them.
+    """
+
+    def __init__(self, bodies: Bodies) -> None:
+        self.bodies = bodies
+        found = np.empty(len(bodies), NEIGHBOUR)
+        found["x"], found["y"], found["yaw"] = bodies.position[:, 0], bodies.position[:, 1], bodies.yaw
+        found["rounding"] = bodies.rounding
+        found["half_length"] = bodies.half_length - bodies.rounding
+        found["half_width"] = bodies.half_width - bodies.rounding
+        found["vx"], found["vy"] = bodies.velocity[:, 0], bodies.velocity[:, 1]
+        self._everyone = found
+        self._bottom, self._top = bodies.position[:, 2], bodies.position[:, 2] + bodies.height
+
+    def near(self, own: int, reach: float) -> NDArray[np.void]:
+        """Return who is within `reach` metres of the body with index `own`, and as high or low, dtype `NEIGHBOUR`."""
+        bodies = self.bodies
+        x, y, _ = bodies.position[own]
+        away = np.hypot(bodies.position[:, 0] - x, bodies.position[:, 1] - y)
+        chosen = away - bodies.half_length < reach
+        chosen &= (self._bottom < self._top[own] + _HEIGHT_GAP) & (self._top > self._bottom[own] - _HEIGHT_GAP)
+        chosen[own] = False
+        found: NDArray[np.void] = self._everyone[chosen]
+        return found
 
 
 @compiled

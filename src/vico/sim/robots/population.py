@@ -177,7 +177,7 @@ class RobotPopulation:
         whole = dt if substep is None else substep
         if since == 0.0:
             self.engine.set_dynamic_obstacles(obstacles, whole)
-            decide(self.run, whole, Bodies.joined([obstacles, self.bodies()]), errands=self.errands)
+            decide(self.run, whole, obstacles, self.bodies(), errands=self.errands)
         self._step(ticks, round((whole - since) / TICK))
         self.run.known_bodies = None
         if since + dt > whole - 1e-9:
