@@ -31,7 +31,7 @@ def place_in_room(i: int, room: int, state: SimulationState, *, near: NDArray[An
     p, indoor = state.people, state.indoor
     record = indoor.rooms[room]
     anchor = np.asarray(record.inside if near is None else near, np.float64)
-    spot = indoor.free_spot(room, anchor, state.people_in(room, without=i))
+    spot = indoor.free_spot(room, anchor, state.taken_in(room, without=i))
     assert spot is not None
     p.position[i] = spot
     p.room[i] = room

@@ -10,8 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from vico.errors import InputError
 from vico.sim import moves
 from vico.sim.avatars import free_ground
+from vico.sim.placing import Thing, free_spot_near, in_the_way
 from vico.sim.simulation_state import SimulationState
 from vico.world.mesh import Surface
+
+# An object that cannot lie where it is asked for lies no farther away than this, metres.
+_NEARBY = 2.0
 
 
 class Scenario:
@@ -37,7 +41,7 @@ class Scenario:
         size: ArrayLike = (0.3, 0.3, 0.3),
         yaw: float = 0.0,
     ) -> int:
-        """Add a movable object.
+        """Add a movable object: where it is asked for, or, if something or somebody is there, beside that.
 
         Parameters
         ----------
@@ -46,7 +50,7 @@ class Scenario:
         shape
             The shape, origin at the middle of its underside, z up.
         position
-            Where that origin comes to lie, ENU metres.
+            Where that origin is to lie, ENU metres; `GroundTruth.object_position` tells where it does.
         room
             Id of the room it lies in; "" outdoors.
         size
@@ -62,14 +66,18 @@ class Scenario:
         Raises
         ------
         InputError
-            If there is no such room.
+            If there is no such room, or no free spot within 2 m on the same surface.
         """
         state = self._state
         if room and room not in state.indoor.index:
             raise InputError(f"add_object: {name}: no room has the id {room!r}")
         index = state.indoor.index[room] if room else -1
-        spot = np.asarray(position, np.float64)
-        entity = state.objects.add(name, prototype, spot, index, np.asarray(size, np.float64), yaw)
+        point, extents = np.asarray(position, np.float64), np.asarray(size, np.float64)
+        spot = free_spot_near(Thing(extents, yaw), point, index, state, within=_NEARBY)
+        if spot is None:
+            other = state.entity(in_the_way(Thing(extents, yaw), point, index, state))["name"]
+            raise InputError(f"add_object: {name}: {other} is there, and no spot within {_NEARBY:g} m is free")
+        entity = state.objects.add(name, prototype, spot, index, extents, yaw)
         state.shapes[prototype] = list(shape)
         state.entities[entity] = {"kind": "object", "name": name}
         return entity

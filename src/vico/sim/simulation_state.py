@@ -13,13 +13,13 @@ from vico.assets.robots import ActionSpace
 from vico.rules import INNER_DOOR_REACH, ActionStatus, ReasonCode
 from vico.sim.avatars import Avatars
 from vico.sim.base import SimulationBase
-from vico.sim.bodies import TALLEST, Bodies, HasBodies, Subsystem
+from vico.sim.bodies import STEP_HEIGHT, TALLEST, Bodies, HasBodies, Subsystem
 from vico.sim.carrying import DeckPose, HasDecks
 from vico.sim.events import Events
 from vico.sim.indoor import Indoor, near_door
 from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.snapshot import arrays_of
-from vico.sim.state import REASON_LENGTH, MovableObjects, People, Vehicle
+from vico.sim.state import RADIUS, REASON_LENGTH, MovableObjects, People, Vehicle
 from vico.sim.traffic.jams import Jam, JamLog
 from vico.sim.transit import TransitSystem
 from vico.world.folder import World
@@ -325,12 +325,22 @@ class SimulationState:
             for d in self.indoor.doors[room]
         ]
 
-    def people_in(self, room: int, *, without: int = -1) -> NDArray[np.float64]:
-        """Where people stand in a room, shape ``(k, 3)``."""
+    def taken_in(self, room: int, *, without: int = -1) -> NDArray[np.float64]:
+        """Where nobody can stand in a room: who stands there already, and points of what lies in the way.
+
+        Returns
+        -------
+        ndarray
+            ENU metres, shape ``(k, 3)``: whoever keeps two radii of a person from each is clear of all.
+        """
         inside = self.people.room == room
         if without >= 0:
             inside[without] = False
-        return self.people.position[inside]
+        objects = self.objects
+        lying = objects.in_rooms()
+        things = objects.bodies_of(lying[objects.room[lying] == room])
+        things = things.where(things.height > STEP_HEIGHT)
+        return np.vstack([self.people.position[inside], *(_points_of(things, k) for k in range(len(things)))])
 
     def obstacles_to(self, i: int) -> Bodies:
         """Every body outdoors but person `i`'s."""
@@ -360,3 +370,13 @@ class SimulationState:
             "robots": self.robots,
         }
         return {name: part for name, part in parts.items() if part is not None}
+
+
+def _points_of(bodies: Bodies, k: int) -> NDArray[np.float64]:
+    """Return points of a rectangle that leave no gap as wide as a person between them, its corners among them."""
+    a, b, yaw = float(bodies.half_length[k]), float(bodies.half_width[k]), float(bodies.yaw[k])
+    u, v = (np.linspace(-half, half, 2 + int(2 * half / RADIUS)) for half in (a, b))
+    grid = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
+    c, s = np.cos(yaw), np.sin(yaw)
+    turned = np.column_stack([c * grid[:, 0] - s * grid[:, 1], s * grid[:, 0] + c * grid[:, 1], np.zeros(len(grid))])
+    return np.asarray(bodies.position[k] + turned, np.float64)

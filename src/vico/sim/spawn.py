@@ -52,7 +52,7 @@ def place_at(i: int, index: int, state: SimulationState) -> None:
     for room_id in order:
         room = state.indoor.index[room_id]
         inside = state.indoor.rooms[room].inside
-        if state.indoor.free_spot(room, inside, state.people_in(room, without=i)) is not None:
+        if state.indoor.free_spot(room, inside, state.taken_in(room, without=i)) is not None:
             place_in_room(i, room, state)
             return
     spot = free_ground(state.world.walkable, np.asarray(place.position), state.obstacles(), within=12.0)

@@ -23,7 +23,7 @@ def check_enter(values: Values, i: int, state: SimulationState) -> Refusal | Non
         return refusal
     room = _room_behind(name, i, state)
     anchor = state.indoor.arrival(room, int(p.room[i]) if p.room[i] >= 0 else -1)
-    if state.indoor.free_spot(room, anchor, state.people_in(room)) is None:
+    if state.indoor.free_spot(room, anchor, state.taken_in(room)) is None:
         return Refusal(ReasonCode.FULL, "enter: it is full")
     return None
 

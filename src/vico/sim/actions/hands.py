@@ -15,10 +15,13 @@ from vico.sim.actions.model import ActionType, Refusal, Situation, Values
 from vico.sim.carrying import DeckPose, free_place, lay_down
 from vico.sim.collisions import box_gap
 from vico.sim.moves import follow_hands, gesture
+from vico.sim.placing import Thing, free_spot_near, in_the_way
 from vico.sim.simulation_state import SimulationState
 from vico.world.model import Container
 
 _AHEAD = (0.55, 0.45, 0.7, 0.9)
+# Who lies where a thing is to go is given this much room beside it, metres.
+_BESIDE = 0.8
 # Containers are searched for a free spot at this pitch, metres.
 _PITCH = 0.1
 
@@ -35,11 +38,14 @@ class PlacementPoint:
         The entity that carries the thing there; 0: the ground, a floor or furniture.
     offset
         Where it lies in the carrier's frame, metres, shape ``(3,)``; None without a carrier.
+    beside
+        Entity of whoever or whatever is at the point that was asked for, so that the thing lies beside it; 0: nobody.
     """
 
     point: NDArray[np.float64]
     carrier: int = 0
     offset: NDArray[np.float64] | None = None
+    beside: int = 0
 
 
 def check_pick(values: Values, i: int, state: SimulationState) -> Refusal | None:
@@ -101,9 +107,9 @@ def put(values: Values, i: int, state: SimulationState) -> None:
     if deck is not None and spot.offset is not None:
         lay_down(deck, spot.carrier, k, spot.offset, objects)
     gesture("put", i, state)
-    state.events.add(
-        "put", p.names[i], f"puts down {objects.names[k]}", objects.position[k], object=int(objects.entity[k])
-    )
+    beside = f" beside {state.entity(spot.beside)['name']}" if spot.beside else ""
+    said, entity = f"puts down {objects.names[k]}{beside}", int(objects.entity[k])
+    state.events.add("put", p.names[i], said, objects.position[k], object=entity)
 
 
 def check_hand_over(values: Values, i: int, state: SimulationState) -> Refusal | None:
@@ -169,10 +175,11 @@ def put_down(target: Any, i: int, hand: int, state: SimulationState) -> Placemen
     p = state.people
     k = state.objects.index(int(p.held[i, hand]))
     size = state.objects.size[k]
+    thing = Thing(size, float(state.objects.yaw[k]), int(state.objects.entity[k]))
     if target is None:
-        return _ahead(i, size, state)
+        return _ahead(i, thing, state)
     if isinstance(target, tuple):
-        return _at_point(target, i, state)
+        return _at_point(target, i, thing, state)
     room = int(p.room[i])
     if room >= 0:
         for container in state.indoor.rooms[room].containers:
@@ -184,20 +191,25 @@ def put_down(target: Any, i: int, hand: int, state: SimulationState) -> Placemen
     return Refusal(ReasonCode.UNKNOWN_TARGET, f"put: {target} is nothing here that a thing can be put on")
 
 
-def _ahead(i: int, size: NDArray[np.float64], state: SimulationState) -> PlacementPoint | Refusal:
+def _ahead(i: int, thing: Thing, state: SimulationState) -> PlacementPoint | Refusal:
     p = state.people
+    room = int(p.room[i])
     c, s = math.cos(p.yaw[i]), math.sin(p.yaw[i])
     for ahead in _AHEAD:
         x, y = p.position[i, 0] + ahead * c, p.position[i, 1] + ahead * s
-        if p.room[i] < 0:
-            if state.world.walkable.class_at((x, y)) > 0:
-                return PlacementPoint(np.array([x, y, float(state.world.height((x, y)))]))
-        elif state.indoor.gap(int(p.room[i]), (x, y)) >= min(size[0], size[1]) / 2:
-            return PlacementPoint(np.array([x, y, state.indoor.floor_at(int(p.room[i]), (x, y))]))
+        if room < 0:
+            is_free = state.world.walkable.class_at((x, y)) > 0
+            ground = float(state.world.height((x, y)))
+        else:
+            is_free = state.indoor.gap(room, (x, y)) >= min(thing.size[0], thing.size[1]) / 2
+            ground = state.indoor.floor_at(room, (x, y))
+        spot = np.array([x, y, ground])
+        if is_free and in_the_way(thing, spot, room, state) == 0:
+            return PlacementPoint(spot)
     return Refusal(ReasonCode.NO_FREE_SPOT, "put: no free ground ahead; turn, or name a target")
 
 
-def _at_point(point: tuple[float, ...], i: int, state: SimulationState) -> PlacementPoint | Refusal:
+def _at_point(point: tuple[float, ...], i: int, thing: Thing, state: SimulationState) -> PlacementPoint | Refusal:
     p = state.people
     x, y, z = point
     away = math.hypot(x - p.position[i, 0], y - p.position[i, 1])
@@ -214,7 +226,15 @@ def _at_point(point: tuple[float, ...], i: int, state: SimulationState) -> Place
         height = float(state.world.height((x, y)))
     if not height - 0.5 <= z <= height + REACH_UP:
         return Refusal(ReasonCode.TOO_HIGH_OR_LOW, f"put: the point is not above the surface there ({height:.2f} m)")
-    return PlacementPoint(np.array([x, y, height]))
+    spot = np.array([x, y, height])
+    other = in_the_way(thing, spot, room, state)
+    if other == 0:
+        return PlacementPoint(spot)
+    beside = free_spot_near(thing, spot, room, state, within=_BESIDE)
+    if beside is None or math.hypot(beside[0] - p.position[i, 0], beside[1] - p.position[i, 1]) > REACH:
+        name = state.entity(other)["name"]
+        return Refusal(ReasonCode.NO_FREE_SPOT, f"put: {name} is at that point, and there is no room beside it")
+    return PlacementPoint(beside, beside=other)
 
 
 def _on(container: Container, i: int, k: int, state: SimulationState) -> PlacementPoint | Refusal:
