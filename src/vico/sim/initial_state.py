@@ -46,7 +46,10 @@ def initial_state(
     # Nobody has a place yet: until then avatars are nowhere that could be in anybody's way.
     people.room[:] = _NOWHERE
     state.traffic, state.transit = systems.traffic_and_transit_of(base, config)
-    state.robots = systems.robots_of(base, config, state.obstacles(), errands=config.errands)
+    robots = systems.robots_of(base, config, state.obstacles(), errands=config.errands)
+    if robots is not None:
+        robots.attach_objects(state.objects)
+    state.robots = robots
     state.entities = _entities(state, residents, config)
     events.names = state.names
     events.begin(0, state.second, events.names)

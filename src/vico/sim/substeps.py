@@ -31,6 +31,7 @@ def advance_ticks(state: SimulationState, ticks: int, periods: ControlPeriods, w
             dt, since = ticks_now / TICKS_PER_SECOND, gone / TICKS_PER_SECOND
             state.robots.advance(dt, bodies.but(state.robots), since=since, substep=SUBSTEP)
             bodies.refresh(state.robots)
+            bodies.refresh(state.objects)
             report_robots(state)
             watch.lap("robots")
         state.tick += ticks_now

@@ -105,7 +105,7 @@ class PhysicsEngine(Protocol):
         """Where all objects are."""
 
     def clearance_below(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Metres from each point straight down to ground, solids, robots or objects; inf if there is nothing.
+        """Metres from each point straight down to ground, solids, people, links of robots or objects.
 
         Parameters
         ----------
@@ -115,7 +115,7 @@ class PhysicsEngine(Protocol):
         Returns
         -------
         ndarray
-            float64, shape ``(n,)``.
+            float64, shape ``(n,)``: inf if there is nothing, -inf if the point lies inside of something.
         """
 
     # Time.

@@ -19,7 +19,7 @@ from vico.errors import InputError, SchemaError
 from vico.sim.bodies import Bodies
 from vico.sim.physics.frames import COARSE, SOLVER_STEPS
 from vico.sim.physics.movers import YAW, Movers
-from vico.sim.physics.mujoco_model import PARKED, PARKED_APART, parked_object, standing_pose
+from vico.sim.physics.mujoco_model import PARKED, PARKED_APART, SOLID_GROUPS, parked_object, standing_pose
 from vico.sim.physics.mujoco_parameters import Parameters
 from vico.sim.physics.mujoco_scene import CompiledScene, SharedModel
 from vico.sim.physics.records import Base, Contacts, Imu, ObjectMotion, Party, PhysicsError, RigidObject
@@ -256,14 +256,15 @@ class MujocoEngine:
         return ObjectMotion(self._present.copy(), pose[:, :3], pose[:, 3:], motion[:, :3], motion[:, 3:], resting)
 
     def clearance_below(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Metres from each point straight down to what is there; inf for nothing."""
-        found, hit = np.full(len(points), np.inf), np.zeros(1, np.int32)
+        """Metres from each point straight down to what is there; inf for nothing, -inf inside of something."""
+        found, hit, normal = np.full(len(points), np.inf), np.zeros(1, np.int32), np.zeros(3)
         with self.compiled.shared.lock:
             self._parameters.hold(self.compiled.shared)
             self._refresh()
             for k, point in enumerate(np.asarray(points, np.float64)):
-                away = mujoco.mj_ray(self._model, self._data, point, _DOWN, None, 1, -1, hit)
-                found[k] = away if away >= 0.0 else np.inf
+                away = mujoco.mj_ray(self._model, self._data, point, _DOWN, SOLID_GROUPS, 1, -1, hit, normal)
+                if away >= 0.0:
+                    found[k] = -np.inf if normal[2] < 0.0 else away
         return found
 
     # Time.

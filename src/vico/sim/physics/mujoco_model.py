@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.robots import BUMP, LIMB, TOUCH, RobotModel
+from vico.assets.robots import BUMP, BUMPER, LIMB, TOUCH, RobotModel
 from vico.errors import InputError
 from vico.sim.physics.frames import COARSE, SOLVER_STEPS
 from vico.sim.physics.records import Capacity, StaticScene
@@ -25,6 +25,9 @@ _CELL = 2.0
 _KERB_CELL = 0.5
 #: What ground and objects say of what they touch; solids also keep outlines of robots out.
 _SOLID = {"contype": TOUCH, "conaffinity": TOUCH | LIMB}
+#: Groups of shapes: rays meet all but the outlines of robots.
+SOLID_GROUPS = np.array([1, 1, 1, 1, 0, 0], np.uint8)
+_OUTLINES = 4
 #: Extents and kilograms that objects are compiled with; every engine writes its own.
 OBJECT_HALF, OBJECT_MASS = 0.15, 1.0
 _FRICTION = [0.6, 0.005, 0.0001]
@@ -88,6 +91,9 @@ def _add_robot(spec: Any, index: int, model: RobotModel) -> None:
         raise InputError(f"physics: the body 'base' of robot {model.name!r} has no free joint; give it one")
     root.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER
     root.pos = [10.0 * index, 0.0, model.stand]
+    for geom in robot.geoms:
+        if geom.name == BUMPER:
+            geom.group = _OUTLINES
     for site in robot.sites:
         for axis in range(6):
             gear = [0.0] * 6

@@ -13,6 +13,7 @@ from vico.errors import InputError
 from vico.sim.bodies import Bodies, Drawn
 from vico.sim.carrying import DeckPose
 from vico.sim.physics.frames import FrameCount, FrameNeeds, frame_length
+from vico.sim.physics.loose import LooseObjects
 from vico.sim.robots import commands, drawing, sensing
 from vico.sim.robots.decisions import decide
 from vico.sim.robots.falls import watch_falls
@@ -22,6 +23,7 @@ from vico.sim.robots.scene import RobotScene
 from vico.sim.robots.spawns import spawns
 from vico.sim.robots.state import NOTES, Mode, RobotArrays, RobotEvent, RobotRun
 from vico.sim.robots.ways import way_to
+from vico.sim.state import MovableObjects
 from vico.world.folder import World
 from vico.world.mesh import Surface
 from vico.world.model import FIRST_BODY
@@ -83,6 +85,7 @@ class RobotPopulation:
             raise InputError(f"robots: {len(kinds)} robots need as many places of x, y, yaw, not {where.shape}")
         self.engine = self.scene.engine(where)
         self.run = RobotRun(self.scene, self.engine, self.entities, seed, RobotArrays.idle(self.scene))
+        self._loose = LooseObjects(self.engine, MovableObjects.none())
 
     def __len__(self) -> int:
         return len(self.models)
@@ -178,7 +181,11 @@ class RobotPopulation:
         if since == 0.0:
             self.engine.set_dynamic_obstacles(obstacles, whole)
             decide(self.run, whole, obstacles, self.bodies(), errands=self.errands)
+            self._loose.update(np.array([self.run.position(i) for i in range(len(self))]))
+            arrays = self.run.arrays
+            arrays.left_out[:] = np.maximum(arrays.left_out, (self.engine.left_out, self._loose.left_out))
         self._step(ticks, round((whole - since) / TICK))
+        self._loose.write_back()
         self.run.known_bodies = None
         if since + dt > whole - 1e-9:
             watch_falls(self.run, whole)
@@ -211,8 +218,23 @@ class RobotPopulation:
         """Return what decides how long a frame is."""
         arrays = self.run.arrays
         return FrameNeeds(
-            motor_commands=bool(np.any(arrays.mode == _MOTORS)), fallen=bool(np.any(arrays.status == _FALLEN))
+            motor_commands=bool(np.any(arrays.mode == _MOTORS)),
+            fallen=bool(np.any(arrays.status == _FALLEN)),
+            loose_objects=self._loose.moving,
         )
+
+    def attach_objects(self, objects: MovableObjects) -> None:
+        """Have physics move things that lie near robots, or fall; before the first step."""
+        self._loose = LooseObjects(self.engine, objects)
+
+    def physics_record(self) -> dict[str, Any]:
+        """Return what a run reports of its physics: frames, and how many were near robots and found no room in it."""
+        people, things = self.run.arrays.left_out.tolist()
+        return {
+            "engine": self.scene.physics.name,
+            "frames": self.frames.record(),
+            "left_out_at_most": {"people_and_vehicles": people, "objects": things},
+        }
 
     @property
     def frames(self) -> FrameCount:
@@ -276,8 +298,9 @@ class RobotPopulation:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Every number that decides the future."""
-        return self.run.saved()
+        return self.run.saved() | self._loose.arrays()
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Go back to what `arrays` held."""
         self.run.restore(arrays)
+        self._loose.restore(arrays)

@@ -75,6 +75,9 @@ class RobotArrays:
         Hundredths of a second that have passed and are no whole frame yet, int64, shape ``(1,)``.
     frames
         How many frames of physics there have been, fine and coarse ones, int64, shape ``(2,)``.
+    left_out
+        How many people and vehicles, and how many things, found no room in physics at once at most, int64, shape
+        ``(2,)``.
     """
 
     mode: NDArray[np.int8]
@@ -91,6 +94,7 @@ class RobotArrays:
     tick: NDArray[np.int64]
     owed: NDArray[np.int64]
     frames: NDArray[np.int64]
+    left_out: NDArray[np.int64]
 
     @classmethod
     def idle(cls, scene: RobotScene) -> RobotArrays:
@@ -112,6 +116,7 @@ class RobotArrays:
             tick=np.zeros(1, np.int64),
             owed=np.zeros(1, np.int64),
             frames=np.zeros(2, np.int64),
+            left_out=np.zeros(2, np.int64),
         )
 
 
