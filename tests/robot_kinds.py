@@ -89,7 +89,7 @@ def rotors(packs: bool) -> RobotModel:
         rest=np.zeros(0),
         controller=NoController(),
         action_spaces={"thrust": ActionSpace("motors", ROTORS, ("N",) * 4, np.zeros(4), np.full(4, 8.0))},
-        control_period=0.02,
+        control_period=0.01,
         sensors=Sensors(joints=False, camera=(0.2, 0.0, 0.0)),
         stand=0.04,
         half_length=0.2,

@@ -119,6 +119,24 @@ def test_a_simulation_takes_their_vectors_and_refuses_others() -> None:
     assert result.observations["robot_0"]["state"]["action_code"] == "not_able"
 
 
+def test_an_agent_acts_as_often_as_its_robots_model_asks_and_is_obeyed_at_once() -> None:
+    config = SimConfig(robots=("chain", "rotors"), observe=(), periods={"robots": "model"})
+    sim = Simulation(field(), None, config)
+    assert sim.due == ["robot_0", "robot_1"]
+    heights = []
+    for k in range(40):
+        push = 4.0 if k < 20 else 0.0
+        actions = {name: {"type": "control", "vector": [push] * 4} for name in sim.due if name == "robot_1"}
+        result = sim.step(actions)
+        heights.append(float(sim.state.robots.base_poses()[1, 2]))
+    assert sim.state.tick - sim.periods.start == 40  # hundredths of a second
+    assert set(result.observations) == {"robot_0", "robot_1"}
+    rising = np.diff(heights)
+    # 16 N against 9.8 N lift it faster and faster; without them it slows down from the first frame on.
+    assert np.all(np.diff(rising[10:19]) > 0.0)
+    assert np.all(np.diff(rising[19:39]) < 0.0)
+
+
 def test_a_model_whose_parts_do_not_fit_is_refused() -> None:
     model = robot_kinds.chain(False)
     with pytest.raises(InputError, match="12 servos for 13 motors"):

@@ -320,3 +320,16 @@ def test_a_robot_keeps_near_whom_it_follows() -> None:
     assert robots.status[0] == RobotStatus.WAITING
     run(robots, 0.1)  # the leader has gone indoors
     assert robots.status[0] == RobotStatus.WAITING
+
+
+@pytest.mark.parametrize("packs", PACKS)
+def test_a_standing_go2_feels_its_weight(packs: bool) -> None:
+    robots = RobotPopulation(field(), ["go2"], [[0, 0, 0]], packs=packs)
+    run(robots, 3.0)
+    felt = robots.observation(0)
+    assert felt["contacts"].shape == (4,)
+    assert felt["contacts"].sum() == pytest.approx(15.0 * 9.81, rel=0.06)  # 15 kg, as Unitree publishes
+    assert felt["contacts"].min() > 10.0
+    assert felt["specific_force"] == pytest.approx([0, 0, 9.81], abs=0.4)
+    assert felt["gravity"] == pytest.approx([0, 0, -1], abs=0.06)
+    assert felt["fallen"] == [0]

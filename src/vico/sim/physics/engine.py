@@ -24,6 +24,7 @@ from vico.sim.physics.records import (
     Capacity,
     Contacts,
     Imu,
+    Motion,
     ObjectMotion,
     Party,
     RigidObject,
@@ -49,6 +50,9 @@ class PhysicsEngine(Protocol):
     def joints(self, robot: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Positions and speeds of the joints, rad and rad/s (m, m/s), in the order of the model's `joints`."""
 
+    def motion(self, robots: NDArray[np.int64]) -> Motion:
+        """Motion of several robots of one kind, by their indices: what `base` and `joints` say of each."""
+
     def motor_forces(self, robot: int) -> NDArray[np.float64]:
         """Torques (Nm; N for sliding joints) of the motors in the last step, in the order of the control vector."""
 
@@ -60,6 +64,11 @@ class PhysicsEngine(Protocol):
 
     def command(self, robot: int, targets: NDArray[np.float64], gains: tuple[float, float] | None = None) -> None:
         """Set what the servos follow from now on; those that follow angles also take a stiffness and a damping."""
+
+    def command_all(
+        self, robots: NDArray[np.int64], targets: NDArray[np.float64], gains: Sequence[tuple[float, float] | None]
+    ) -> None:
+        """Set what the servos of several robots of one kind follow, shape ``(k, motors)``; see `command`."""
 
     def thrust(
         self, robot: int, sites: Sequence[str], forces: NDArray[np.float64], torques: NDArray[np.float64] | None = None
@@ -215,6 +224,7 @@ __all__ = [
     "Capacity",
     "Contacts",
     "Imu",
+    "Motion",
     "ObjectMotion",
     "Party",
     "PhysicsBatch",

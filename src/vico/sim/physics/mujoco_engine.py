@@ -22,7 +22,7 @@ from vico.sim.physics.movers import YAW, Movers
 from vico.sim.physics.mujoco_model import PARKED, PARKED_APART, SOLID_GROUPS, parked_object, standing_pose
 from vico.sim.physics.mujoco_parameters import Parameters
 from vico.sim.physics.mujoco_scene import CompiledScene, SharedModel
-from vico.sim.physics.records import Base, Contacts, Imu, ObjectMotion, Party, PhysicsError, RigidObject
+from vico.sim.physics.records import Base, Contacts, Imu, Motion, ObjectMotion, Party, PhysicsError, RigidObject
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 _DOWN = np.array([0.0, 0.0, -1.0])
@@ -128,6 +128,23 @@ class MujocoEngine:
         index = self.compiled.robots[robot]
         return self._qpos[index.angle].copy(), self._qvel[index.rate].copy()
 
+    def motion(self, robots: NDArray[np.int64]) -> Motion:
+        """Motion of several robots of one kind."""
+        index = self.compiled.kind(robots)
+        pose, rates = self._qpos[index.pose], self._qvel[index.rates]
+        rotation = np.empty((len(robots), 9))
+        for row, quaternion in zip(rotation, pose[:, 3:], strict=True):
+            mujoco.mju_quat2Mat(row, quaternion)
+        # Kernels are compiled for whole arrays alone.
+        return Motion(
+            pose[:, :3].copy(),
+            rates[:, :3].copy(),
+            rotation.reshape(-1, 3, 3),
+            rates[:, 3:].copy(),
+            self._qpos[index.angle],
+            self._qvel[index.rate],
+        )
+
     def motor_forces(self, robot: int) -> NDArray[np.float64]:
         """Torques of the motors in the last step."""
         return np.array(self._data.actuator_force[self.compiled.robots[robot].motor])
@@ -161,8 +178,19 @@ class MujocoEngine:
         """Set what the servos follow, and how stiffly: Nm/rad and Nms/rad."""
         index = self.compiled.robots[robot]
         self._data.ctrl[index.motor] = targets
+        self._set_gains(robot, gains)
+
+    def command_all(
+        self, robots: NDArray[np.int64], targets: NDArray[np.float64], gains: Sequence[tuple[float, float] | None]
+    ) -> None:
+        """Set what the servos of several robots of one kind follow."""
+        self._data.ctrl[self.compiled.kind(robots).motor] = targets
+        for robot, wanted in zip(robots.tolist(), gains, strict=True):
+            self._set_gains(robot, wanted)
+
+    def _set_gains(self, robot: int, gains: tuple[float, float] | None) -> None:
         if gains is not None and gains != self._gains_of[robot]:
-            mine = np.isin(self.compiled.servos, index.servo)
+            mine = np.isin(self.compiled.servos, self.compiled.robots[robot].servo)
             self._parameters.stiffness[mine], self._parameters.damping[mine] = gains
             self._gains_of[robot] = gains
 

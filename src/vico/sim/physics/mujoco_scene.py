@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -58,7 +59,31 @@ class RobotIndex:
         }
 
 
+# Sets of robots that were asked about together and are kept.
+_KINDS = 64
 _POSES = ("xpos", "xquat", "xmat", "xipos", "ximat", "geom_xpos", "geom_xmat", "site_xpos", "site_xmat")
+
+
+class KindIndex:
+    """Where the numbers of several robots of one kind are in MuJoCo's arrays; a row a robot.
+
+    Attributes
+    ----------
+    pose, rates
+        Positions (x, y, z, quaternion) and speeds of their bases, int64, shapes ``(k, 7)`` and ``(k, 6)``.
+    angle, rate
+        Positions and speeds of their joints, shape ``(k, joints)``.
+    motor
+        Their actuators, shape ``(k, motors)``.
+    """
+
+    def __init__(self, robots: Sequence[RobotIndex], coordinates: int) -> None:
+        everything = np.arange(coordinates)
+        self.pose = np.array([np.arange(7) + robot.root for robot in robots])
+        self.rates = np.array([np.arange(6) + robot.root_speed for robot in robots])
+        self.angle = np.array([everything[robot.angle] for robot in robots])
+        self.rate = np.array([everything[robot.rate] for robot in robots])
+        self.motor = np.array([robot.motor for robot in robots])
 
 
 class SharedModel:
@@ -117,6 +142,7 @@ class CompiledScene:
         joint = m.body_jntadr[self.object_body]
         self.object_pose = _run_of(np.add.outer(m.jnt_qposadr[joint], np.arange(7)).ravel())
         self.object_motion = _run_of(np.add.outer(m.jnt_dofadr[joint], np.arange(6)).ravel())
+        self._kinds: dict[bytes, KindIndex] = {}
         self._index_contacts()
         pristine = mujoco.MjData(m)
         m.opt.enableflags &= ~SLEEP
@@ -152,6 +178,15 @@ class CompiledScene:
         """First of an object's position and of its speed."""
         body = int(self.object_body[slot])
         return int(self.model.jnt_qposadr[self.model.body_jntadr[body]]), int(self.model.body_dofadr[body])
+
+    def kind(self, robots: NDArray[np.int64]) -> KindIndex:
+        """Return where the numbers of robots of one kind are."""
+        key = robots.tobytes()
+        if key not in self._kinds:
+            if len(self._kinds) >= _KINDS:
+                self._kinds.clear()
+            self._kinds[key] = KindIndex([self.robots[robot] for robot in robots.tolist()], self.model.nq)
+        return self._kinds[key]
 
     def link_names(self, robot: int) -> tuple[str, ...]:
         """Names of a robot's links, base first."""

@@ -87,6 +87,37 @@ class Base:
 
 
 @dataclass(frozen=True)
+class Motion:
+    """Motion of several robots of one kind; row = robot.
+
+    Attributes
+    ----------
+    position, velocity
+        Of the bases, ENU metres and metres a second, float64, shape ``(k, 3)``.
+    rotation
+        Base to world, shape ``(k, 3, 3)``.
+    angular_velocity_body
+        Radians a second in the base's frame, shape ``(k, 3)``.
+    angles, speeds
+        Of the model's joints in their order, rad and rad/s, shape ``(k, joints)``.
+    """
+
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    angular_velocity_body: NDArray[np.float64]
+    angles: NDArray[np.float64]
+    speeds: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    def where(self, rows: NDArray[np.int64]) -> Motion:
+        """Return some of the rows."""
+        return Motion(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+
+
+@dataclass(frozen=True)
 class Imu:
     """What an inertial measurement unit at the origin of a robot's base measures, in the base's frame.
 

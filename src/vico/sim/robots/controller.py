@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
-from vico.sim.physics.records import Base
-from vico.sim.robots.motion import Motion
+from vico.sim.physics.records import Base, Motion
 
 Array = NDArray[np.float64]
 #: Stiffness and damping of servos that follow angles, Nm/rad and Nms/rad.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import FourLegs, RobotModel
 from vico.io.compiled import compiled
-from vico.sim.robots.motion import Motion
+from vico.sim.physics.records import Motion
 from vico.sim.robots.tracking import planar_motion
 
 #: Seconds a cycle lasts and the share of it a foot is on the ground.

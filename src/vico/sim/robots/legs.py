@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import FourLegs, RobotModel
 from vico.io.compiled import compiled
-from vico.sim.physics.records import Base
+from vico.sim.physics.records import Base, Motion
 from vico.sim.robots.controller import Array, Gains, MotorController
 from vico.sim.robots.gait import BODY, LegGeometry, Trot, leg_angles
-from vico.sim.robots.motion import Motion
 from vico.sim.robots.policy import WalkingPolicy
 from vico.sim.robots.tracking import TRIM_SIZE, TrimSettings, approach, planar_motion, trimmed
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from vico.sim.robots.motion import Motion
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.scene import Group
 from vico.sim.robots.state import Mode, RobotRun
@@ -47,9 +46,7 @@ def _follow_velocities(run: RobotRun, group: Group, memory: np.ndarray, rows: np
     everyone = len(rows) == len(group.robots)
     robots = group.robots if everyone else group.robots[rows]
     mine = memory if everyone else memory[rows]
-    targets = group.controller.targets(Motion.of(run.engine, robots), run.arrays.velocity[robots], mine)
-    gains = group.controller.gains(mine)
+    targets = group.controller.targets(run.engine.motion(robots), run.arrays.velocity[robots], mine)
+    run.engine.command_all(robots, targets, group.controller.gains(mine))
     if not everyone:
         memory[rows] = mine
-    for k, robot in enumerate(robots.tolist()):
-        run.engine.command(robot, targets[k], gains[k])

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import FourLegs, RobotModel
 from vico.io.compiled import compiled
-from vico.sim.robots.motion import Motion
+from vico.sim.physics.records import Motion
 
 # Scales of the observation and its limit, from the policy's deployment configuration.
 _SPIN, _JOINT_SPEED, _LIMIT = 0.25, 0.05, 100.0

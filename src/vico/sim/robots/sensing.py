@@ -29,10 +29,13 @@ def readings_of(model: RobotModel) -> dict[str, Reading]:
         found["joint_position"] = found["joint_velocity"] = Reading((len(model.joints),), -endless, endless)
     if s.imu:
         found["angular_velocity"] = Reading((3,), -endless, endless)
+        found["specific_force"] = Reading((3,), -endless, endless)
         found["gravity"] = Reading((3,), -1.001, 1.001)
     if s.odometry:
         found["base_pose"] = Reading((7,), -endless, endless)
         found["base_velocity"] = Reading((3,), -endless, endless)
+    if s.contacts:
+        found["contacts"] = Reading((len(s.contacts),), 0.0, endless)
     return found
 
 
@@ -43,8 +46,10 @@ def observation(run: RobotRun, robot: int) -> dict[str, NDArray[Any]]:
     -------
     dict
         ``fallen`` (0 or 1); of joints ``joint_position`` and ``joint_velocity`` (rad, rad/s, order of the model's
-        joints); of the IMU ``angular_velocity`` (rad/s) and ``gravity`` (its direction), in the base's frame; of
-        odometry ``base_pose`` (x, y, z, quaternion w, x, y, z) and ``base_velocity`` (ENU, m/s).
+        joints); of the IMU, in the base's frame, ``angular_velocity`` (rad/s), ``specific_force`` (acceleration
+        without gravity's, m/s2: 9.81 upwards at rest) and ``gravity`` (its direction); of odometry ``base_pose``
+        (x, y, z, quaternion w, x, y, z) and ``base_velocity`` (ENU, m/s); ``contacts``, newtons on each link that
+        feels.
     """
     s, base = run.scene.models[robot].sensors, run.engine.base(robot)
     found: dict[str, NDArray[Any]] = {
@@ -54,9 +59,14 @@ def observation(run: RobotRun, robot: int) -> dict[str, NDArray[Any]]:
         angles, speeds = run.engine.joints(robot)
         found["joint_position"], found["joint_velocity"] = np.array(angles), np.array(speeds)
     if s.imu:
-        found["angular_velocity"] = base.angular_velocity_body.copy()
+        imu = run.engine.imu(robot)
+        found["angular_velocity"], found["specific_force"] = imu.angular_velocity, imu.specific_force
         found["gravity"] = -base.rotation[2]
     if s.odometry:
         found["base_pose"] = np.concatenate([base.position, base.quaternion])
         found["base_velocity"] = base.velocity.copy()
+    if s.contacts:
+        links = run.engine.link_names(robot)
+        forces = run.engine.contacts().link_forces(robot, len(links))
+        found["contacts"] = forces[[links.index(link) for link in s.contacts]]
     return found

@@ -8,8 +8,8 @@ import numpy as np
 
 from vico.assets.robots import RobotModel, SkidSteering
 from vico.io.compiled import compiled
+from vico.sim.physics.records import Motion
 from vico.sim.robots.controller import Array, MotorController
-from vico.sim.robots.motion import Motion
 from vico.sim.robots.tracking import TRIM_SIZE, TrimSettings, approach, planar_motion, trimmed
 
 
