@@ -83,7 +83,7 @@ def hundred(helsinki: World) -> Community:
 
 def test_a_member_that_fails_is_told_in_its_place() -> None:
     class Failing:
-        rests_until, known, greeted = -np.inf, (), {}  # type: ignore[var-annotated]
+        rests_until, known, greeted, encounters = -np.inf, (), {}, 0  # type: ignore[var-annotated]
 
         def act(self, observation: Any, info: Any) -> dict[str, Any]:
             raise ValueError("no idea")

@@ -73,6 +73,8 @@ class Conversation:
         self._known = {person.agent: person for person in known}
         self._rng = generator
         self._greeted: dict[str, float] = {}
+        #: Changes whenever somebody is spoken with.
+        self.encounters = 0
         self._said: dict[str, int] = {}
 
     def state(self) -> AgentState:
@@ -81,6 +83,7 @@ class Conversation:
 
     def restore(self, state: AgentState) -> None:
         """Remember what `state` returned."""
+        self.encounters += 1
         self._greeted, self._said = dict(state["greeted"]), dict(state["said"])
 
     @property
@@ -117,6 +120,7 @@ class Conversation:
         if time - self._greeted.get(speaker, -1e9) > GREETING_PAUSE:
             self._said[speaker] = 0
         self._greeted[speaker] = time
+        self.encounters += 1
         if self._said.get(speaker, 0) >= _LINES:
             return None
         self._said[speaker] = self._said.get(speaker, 0) + 1
@@ -131,6 +135,7 @@ class Conversation:
             if person is None or time - self._greeted.get(person.agent, -1e9) <= GREETING_PAUSE:
                 continue
             self._greeted[person.agent] = time
+            self.encounters += 1
             self._said[person.agent] = 1
             return _say(self._choose(self._greetings(person, time, errand())))
         return None

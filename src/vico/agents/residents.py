@@ -31,6 +31,10 @@ class Resting(Protocol):
     def greeted(self) -> Mapping[str, float]:
         """When it last spoke with agents, seconds."""
 
+    @property
+    def encounters(self) -> int:
+        """Changes whenever `greeted` does."""
+
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the action for the coming second."""
 
@@ -66,6 +70,7 @@ class Residents:
         self._greeted = np.full(len(pairs), _NEVER)
         self._acquaintances = [other for _, other in pairs]
         self._first_pair = np.searchsorted(self._pairs, np.arange(n + 1) * n).tolist()
+        self._encounters = [-1] * n
         self._changed = set(range(n))
         self._rows: tuple[Mapping[str, int], NDArray[np.int64]] | None = None
 
@@ -134,7 +139,10 @@ class Residents:
 
     def _learn_greetings(self) -> None:
         for k in self._changed:
-            greeted = self._members[k].greeted
+            member = self._members[k]
+            if member.encounters == self._encounters[k]:
+                continue
+            self._encounters[k], greeted = member.encounters, member.greeted
             for pair in range(self._first_pair[k], self._first_pair[k + 1]):
                 self._greeted[pair] = greeted.get(self._acquaintances[pair], _NEVER)
         self._changed.clear()

@@ -20,6 +20,8 @@ from vico.seeds import rng
 from vico.world.public import PublicMap, PublicPlace
 
 BRISK, RUN = 1.5, 2.4
+# So many residents are sure to ask for many ways.
+_MANY = 40
 # Open places are reached this close to their position, metres.
 _OPEN_REACH = 3.0
 # How often people at rest do something, seconds, and when it all comes round again.
@@ -101,6 +103,11 @@ class ScheduleFollower:
     def known(self) -> Collection[str]:
         """Agents whom the resident knows."""
         return self._conversation.known
+
+    @property
+    def encounters(self) -> int:
+        """Changes whenever `greeted` does."""
+        return self._conversation.encounters
 
     @property
     def greeted(self) -> Mapping[str, float]:
@@ -309,6 +316,8 @@ def followers_of(community: Any, public_map: PublicMap, *, seed: int = 0) -> dic
         Anything with ``residents`` and ``relations`` as `vico.community.model.Community` has them.
     """
     residents = {resident.id: resident for resident in community.residents}
+    if len(residents) >= _MANY:
+        public_map.router.learn_landmarks()
     known: dict[str, list[Acquaintance]] = {name: [] for name in residents}
     for relation in community.relations:
         first, second = relation.between

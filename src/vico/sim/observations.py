@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.io.compiled import compiled
 from vico.sim.lazy import LazyByName, Observations
 from vico.sim.moves import eye_height
 from vico.sim.simulation_state import SimulationState
@@ -158,11 +159,19 @@ def _kept(state: SimulationState) -> SimulationState:
 
 
 def _distinct(image: NDArray[np.int32]) -> list[int]:
-    flat = image.ravel()
-    # Neighbouring pixels mostly show the same thing: look at the changes only.
-    change = np.flatnonzero(flat[1:] != flat[:-1])
-    values = np.unique(np.append(flat[change], flat[-1]))
-    return [int(v) for v in values if v > 0]
+    """Return the entities that a picture shows, ascending."""
+    return [int(value) for value in np.unique(_changes(image)) if value > 0]
+
+
+@compiled(nogil=True)
+def _changes(image):  # type: ignore[no-untyped-def]
+    """Return the values of a picture, row by row, without repeats of the one before: neighbours mostly are alike."""
+    found = [image[0, 0]]
+    for row in range(image.shape[0]):
+        for column in range(image.shape[1]):
+            if image[row, column] != found[-1]:
+                found.append(image[row, column])
+    return np.array(found)
 
 
 def facing_of(yaw: float, pitch: float) -> tuple[float, float, float]:

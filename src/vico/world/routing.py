@@ -321,6 +321,13 @@ class Router:
         self._nothing = np.zeros((0, 0), np.bool_)
         self._shut = np.zeros(cost.shape, np.bool_)
 
+    def learn_landmarks(self) -> None:
+        """Learn the costs from landmarks now, where many searches are to come, and not at one of the first of them."""
+        with self._lock:
+            if self._searches < _WORTH_LANDMARKS:
+                self._searches = _WORTH_LANDMARKS
+                self._landmarks = self._placed_landmarks()
+
     def nearest_walkable(self, xy: ArrayLike, *, within: float = 30.0) -> NDArray[np.float64] | None:
         """Centre of the nearest connected cell, ENU metres; None if there is none within `within` metres.
 

@@ -95,16 +95,18 @@ _IN_BUS = _Bar(Situation.IN_BUS, ReasonCode.IN_BUS, "in a bus; exit_bus first")
 _ON_BIKE = _Bar(Situation.ON_BIKE, ReasonCode.ON_BIKE, "on a bicycle; exit_bike first")
 
 
+# By number: every action of everybody is looked up here.
+_BUS = int(Vehicle.BUS)
+_POSTURE_BARS = {int(Posture.LYING): _ASLEEP, int(Posture.SITTING): _SEATED}
+_VEHICLE_BARS = {int(Vehicle.BUS): _IN_BUS, int(Vehicle.BIKE): _ON_BIKE}
+
+
 def _refuse_situation(kind: ActionType, i: int, state: SimulationState) -> Refusal | None:
     """Refuse what can't be done asleep, seated, in a bus or on a bicycle."""
+    riding, held = int(state.people.vehicle[i]), int(state.people.posture[i])
     # In a bus the place decides whether one sits.
-    riding = Vehicle(int(state.people.vehicle[i])) == Vehicle.BUS
-    posture = (
-        None
-        if riding
-        else {Posture.LYING: _ASLEEP, Posture.SITTING: _SEATED}.get(Posture(int(state.people.posture[i])))
-    )
-    vehicle = {Vehicle.BUS: _IN_BUS, Vehicle.BIKE: _ON_BIKE}.get(Vehicle(int(state.people.vehicle[i])))
+    posture = None if riding == _BUS else _POSTURE_BARS.get(held)
+    vehicle = _VEHICLE_BARS.get(riding)
     for bar in (posture, vehicle):
         if bar is not None and bar.situation not in kind.when:
             return Refusal(bar.code, f"{kind.name}: {bar.sentence}")
