@@ -1,6 +1,12 @@
-"""The command line in this process."""
+"""The command line in this process, and in one that is killed."""
 
 from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
 
 import pytest
 
@@ -14,3 +20,21 @@ def vico(*arguments: object) -> int:
     code = exit_.value.code
     assert code is None or isinstance(code, int)
     return code or 0
+
+
+def kill_once(arguments: list[object], ready: Callable[[], bool]) -> None:
+    """Start a command and kill it, without warning, as soon as `ready`."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "vico.cli.main", *map(str, arguments)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    deadline = time.monotonic() + 240
+    while not ready():
+        assert process.poll() is None, f"finished before it was killed: {process.communicate()[1]}"
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    process.kill()
+    process.communicate()
+    assert process.returncode == -signal.SIGKILL

@@ -40,6 +40,12 @@ def test_a_parcel_goes_with_the_robot(helsinki_path: Path) -> None:
     assert metres >= 5
 
 
+def test_an_agent_keeps_the_contract_alone_in_its_process(helsinki_path: Path) -> None:
+    printed = run("05_agent_contract.py", "--world", str(helsinki_path), "--steps", "20")
+    assert "findings: []" in printed
+    assert "went on from the middle to the same end: True; faults: {}" in printed
+
+
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.name)
 def test_each_example_says_how_it_is_run(path: Path) -> None:
     assert f"python examples/{path.name} " in path.read_text()

@@ -4,38 +4,15 @@ from __future__ import annotations
 
 import json
 import shutil
-import signal
-import subprocess
-import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from command_line import vico
+from command_line import kill_once, vico
 from vico.render.film import read_film
 from vico.sim.recording import read_run
 from vico.world.folder import read_world
-
-
-def kill_once(arguments: list[object], ready: Callable[[], bool]) -> None:
-    """Start a command and kill it, without warning, as soon as `ready`."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "vico.cli.main", *map(str, arguments)],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    deadline = time.monotonic() + 240
-    while not ready():
-        assert process.poll() is None, f"finished before it was killed: {process.communicate()[1]}"
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    process.kill()
-    process.communicate()
-    assert process.returncode == -signal.SIGKILL
 
 
 def test_a_killed_build_leaves_no_world_and_begins_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -25,7 +25,7 @@ class Agent(Protocol):
     """
 
     def act(self, observation: Observation, info: Info) -> Action:
-        """Return the action for the coming second; what it is given is its own, to keep or to change."""
+        """Return the action for the coming second; what it is given may be kept, and is left as it is."""
 
     def state(self) -> AgentState:
         """Return all it remembers, as nested dicts of JSON values and arrays.

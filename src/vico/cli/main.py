@@ -194,6 +194,37 @@ def check_community(path: Positional[Path], world: Path | None = None, json: boo
     return verb.check(path, world=world, json=json)
 
 
+@app.command(name="check-agent")
+def check_agent(
+    agent: Positional[Annotated[str, tyro.conf.arg(metavar="MODULE:NAME")]],
+    world: Path,
+    steps: int = 40,
+    seed: int = 0,
+    deadline: float = 1.0,
+    isolate: bool = False,
+    json: bool = False,
+) -> int:
+    """Check that an agent of yours keeps the contract, a line a finding. Exit 1 if anything is wrong.
+
+    It is made, it answers with actions and in time, it repeats itself, one restored from its state goes on as it does,
+    and it leaves what it is given as it is.
+
+    Example: vico check-agent my_agents:Walker --world helsinki
+
+    Args:
+        agent: my_module:MyAgent, or path/to/file.py:MyAgent.
+        world: World folder it plays an assistant in.
+        steps: How long, seconds.
+        seed: Of the simulation and the agent.
+        deadline: Seconds an action may take.
+        isolate: Ask it in a process of its own.
+        json: Print JSON.
+    """
+    from vico.cli import check_agent as verb
+
+    return verb.check(agent, world=world, steps=steps, seed=seed, deadline=deadline, isolate=isolate, json=json)
+
+
 @app.command(name="run")
 def run(options: Annotated[RunOptions, FLAT]) -> int:
     """Simulate a community: residents follow their schedules among robots, traffic and transit.

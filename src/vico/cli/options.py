@@ -148,7 +148,9 @@ class RunOptions:
     community
         Community folder, made for that world.
     out
-        Folder to record into; refused if it exists, unless --force.
+        Folder to record into; refused if it exists, unless --force. A run that was cut short there goes on.
+    resume
+        Folder of a run that was cut short, instead of all others but --agent: it goes on from its last checkpoint.
     start
         Time of day, HH:MM or HH:MM:SS.
     steps
@@ -170,6 +172,9 @@ class RunOptions:
         as it takes.
     isolate
         Ask each of them in a process of its own.
+    states_every
+        Checkpoint after so many steps, from which the run can go on if it is cut short; 0 for none. Without it every
+        300 steps, if all agents have a state.
     workers
         Threads that render, and agents that are asked at a time where there is no deadline; 0 is one a processor.
         Decides nothing but how long it takes.
@@ -183,9 +188,10 @@ class RunOptions:
         Print the metrics as JSON.
     """
 
-    world: Positional[Path]
-    community: Positional[Path]
-    out: Path
+    world: Positional[Annotated[Path | None, tyro.conf.arg(metavar="WORLD")]] = None
+    community: Positional[Annotated[Path | None, tyro.conf.arg(metavar="COMMUNITY")]] = None
+    out: Path | None = None
+    resume: Path | None = None
     start: str = "08:00"
     steps: int = 1800
     robots: CommaSeparated = "husky,go2"
@@ -196,6 +202,7 @@ class RunOptions:
     agent: Annotated[str, tyro.conf.arg(metavar="MODULE:NAME")] = ""
     deadline: float = 60.0
     isolate: bool = False
+    states_every: int | None = None
     workers: int = 0
     seed: int = 0
     check: Literal["none", "overlaps"] = "none"

@@ -1,32 +1,43 @@
-"""`vico run`: a community's morning, recorded."""
+"""`vico run`: a community's morning, recorded; cut short, it goes on where it was."""
 
 from __future__ import annotations
 
-import json as jsonlib
 import sys
 from contextlib import closing
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
 
 from vico.agents.schedule import followers_of
 from vico.cli.options import RunOptions
 from vico.cli.output import Report, check_output, print_json, print_table, progress_bars
 from vico.clock import seconds_of_day
 from vico.community import Community, read_community
-from vico.errors import InputError, OutputExistsError
+from vico.errors import InputError, OutputExistsError, SchemaError
 from vico.io.files import read_json
 from vico.io.folders import remove
+from vico.runner.faults import FaultLog
 from vico.runner.foreign import Terms, foreign_agents
 from vico.runner.gather import Gatherer
 from vico.runner.loading import Seat
 from vico.runner.loop import Hook, Runner, Step
-from vico.runner.recording import Recording
+from vico.runner.recording import Recording, go_on_from
 from vico.sim.config import SimConfig
 from vico.sim.recorder import Recorder
+from vico.sim.recording.checkpoints import checkpoint_steps
+from vico.sim.recording.manifest import read_manifest
 from vico.sim.simulation import Simulation
 from vico.threads import use_workers, workers
 from vico.world.folder import World, read_world
 from vico.world.public import PublicMap
+
+#: Steps between checkpoints unless a run says otherwise.
+STATES_EVERY = 300
+
+# Options that decide nothing of what is in the run folder; the others are kept in its run.json.
+_NOT_KEPT = ("out", "resume", "workers", "force", "json")
 
 
 def run(options: RunOptions) -> int:
@@ -39,49 +50,22 @@ def run(options: RunOptions) -> int:
     OutputExistsError
         If the output folder holds something and ``options.force`` is not given.
     """
-    steps, out = options.steps, options.out
-    if steps < 1:
-        raise InputError(f"run: --steps {steps}; it has to be 1 or more")
+    if options.resume is not None:
+        options = _resumed(options, options.resume)
+    if options.world is None or options.community is None or options.out is None:
+        raise InputError("run: give WORLD, COMMUNITY and --out OUT, or --resume OUT for a run that was cut short")
+    if options.steps < 1:
+        raise InputError(f"run: --steps {options.steps}; it has to be 1 or more")
     if options.agent and not options.assistants:
         raise InputError("run: --agent plays assistants; say how many, for example --assistants 1")
     use_workers(options.workers)
-    cut_short = None if options.force else _cut_short(out)
-    check_output(out, options.world, options.community, force=options.force or cut_short is not None)
-    config = SimConfig(
-        seed=options.seed,
-        assistants=options.assistants,
-        start=seconds_of_day(options.start),
-        robots=_names(options.robots),
-        errands=True,
-        cars=options.cars,
-        pedestrians=options.pedestrians,
-        observe=None if options.observe == "all" else _names(options.observe),
-    )
-    place = read_world(options.world)
-    people = read_community(options.community, place)
-    if cut_short is not None:
-        _restart(out, cut_short, config, place)
-    with progress_bars() as report:
-        report("setting the scene", 0, 1)
-        # Residents act on what they have in view and hear; mostly, the recorder alone looks at colours.
-        sim = Simulation(place, people, config, defer_rgb=True)
-        if options.check == "overlaps":
-            sim.check_overlaps()
-        with closing(_agents(options, place, people)) as agents:
-            report("setting the scene", 1, 1)
-            # Only now: whatever is wrong with the input has been said, and nothing was replaced for nothing.
-            remove(out)
-            sources = {"world": str(options.world.resolve()), "community": str(options.community.resolve())}
-            with Recorder(out, sim, sources=sources, wanted=steps) as recorder:
-                runner = Runner(sim, agents, hooks=[_Progress(report, steps), Recording(recorder)])
-                runner.run(steps)
-                metrics = recorder.close()
+    metrics = _Job.of(options, options.world, options.community, options.out).done()
     if options.json:
         print_json(metrics)
     else:
         counted = {name: value.get("count", value) for name, value in metrics.items() if isinstance(value, dict)}
         shown = {name: value for name, value in (metrics | counted).items() if not isinstance(value, dict)}
-        print_table(str(out), shown)
+        print_table(str(options.out), shown)
     return _judged(metrics)
 
 
@@ -99,6 +83,115 @@ def _judged(metrics: dict[str, Any]) -> int:
     return 1
 
 
+@dataclass(frozen=True)
+class _Job:
+    """A run that is about to begin or to go on.
+
+    Attributes
+    ----------
+    found
+        Manifest of the unfinished run that is in `out`; empty if it had none yet, None if nothing is there.
+    """
+
+    options: RunOptions
+    out: Path
+    world: World
+    community: Community
+    config: SimConfig
+    sources: dict[str, str]
+    found: dict[str, Any] | None
+
+    @classmethod
+    def of(cls, options: RunOptions, world: Path, community: Path, out: Path) -> _Job:
+        """Read what is needed, and look at what is in the output folder."""
+        found = None if options.force else _cut_short(out)
+        check_output(out, world, community, force=options.force or found is not None)
+        config = SimConfig(
+            seed=options.seed,
+            assistants=options.assistants,
+            start=seconds_of_day(options.start),
+            robots=_names(options.robots),
+            errands=True,
+            cars=options.cars,
+            pedestrians=options.pedestrians,
+            observe=None if options.observe == "all" else _names(options.observe),
+        )
+        place = read_world(world)
+        people = read_community(community, place)
+        sources = {"world": str(world.resolve()), "community": str(community.resolve())}
+        return cls(options, out, place, people, config, sources, found)
+
+    def done(self) -> dict[str, Any]:
+        """Do it; return its metrics."""
+        options, steps = self.options, self.options.steps
+        goes_on = self._goes_on()
+        with progress_bars() as report:
+            report("setting the scene", 0, 1)
+            # Residents act on what they have in view and hear; mostly, the recorder alone looks at colours.
+            sim = Simulation(self.world, self.community, self.config, defer_rgb=True)
+            if options.check == "overlaps":
+                sim.check_overlaps()
+            with closing(self._agents()) as agents:
+                every = _states_every(options, agents)
+                report("setting the scene", 1, 1)
+                faults = FaultLog()
+                how: Any = {"sources": self.sources, "wanted": steps, "states_every": every or None}
+                how["notes"] = {"command": self._command(), "faults": faults.record()}
+                if goes_on:
+                    recorder, checkpoint = Recorder.resume(self.out, sim, **how)
+                    faults = go_on_from(checkpoint, agents)
+                    recorder.notes["faults"] = faults.record()
+                else:
+                    # Only now: whatever is wrong with the input has been said, nothing was replaced for nothing.
+                    remove(self.out)
+                    recorder = Recorder(self.out, sim, **how)
+                with recorder:
+                    hooks = [_Progress(report, steps), Recording(recorder, faults)]
+                    Runner(sim, agents, hooks=hooks, states_every=every, faults=faults).run(steps)
+                    return recorder.close()
+
+    def _agents(self) -> Gatherer:
+        """Return who acts: residents who follow their schedules, and whoever plays the assistants."""
+        options = self.options
+        followers = followers_of(self.community, PublicMap.from_world(self.world), seed=options.seed)
+        terms = Terms(deadline=options.deadline or None, isolate=options.isolate, workers=workers())
+        seats = [Seat(f"assistant_{i}", options.seed, [], i, options.assistants) for i in range(options.assistants)]
+        players = foreign_agents(options.agent, seats, self.world, terms) if options.agent else {}
+        return Gatherer(followers | players, trusted=followers, deadline=terms.deadline, workers=terms.workers)
+
+    def _command(self) -> dict[str, Any]:
+        """Return the options that decide the run, as JSON has them."""
+        kept = asdict(self.options) | self.sources
+        return {name: value for name, value in kept.items() if name not in _NOT_KEPT}
+
+    def _goes_on(self) -> bool:
+        """Whether an unfinished run is gone on with; say what becomes of it.
+
+        Raises
+        ------
+        OutputExistsError
+            If it is one with other settings.
+        """
+        if self.found is None:
+            return False
+        if not self.found:
+            print(f"{self.out}: an unfinished run (nothing recorded) is started anew", file=sys.stderr)
+            return False
+        wanted = self._command()
+        same = self.found.get("world", {}).get("digest") == self.world.digest
+        # World and community may have been moved since.
+        if not same or _without_sources(self.found.get("command")) != _without_sources(wanted):
+            raise OutputExistsError(
+                f"{self.out}: holds an unfinished run with other settings; pass --force to replace it, or --out "
+                "another folder"
+            )
+        checkpoints = checkpoint_steps(self.out)
+        what = f"goes on after step {checkpoints[-1]}" if checkpoints else "has no checkpoint yet and is started anew"
+        steps = f"{self.found['steps']} of {self.found['wanted_steps']} steps"
+        print(f"{self.out}: an unfinished run ({steps}) {what}", file=sys.stderr)
+        return bool(checkpoints)
+
+
 class _Progress(Hook):
     """Shows how far a run is."""
 
@@ -110,13 +203,53 @@ class _Progress(Hook):
         self._report("simulating", step.number, self._steps)
 
 
-def _agents(options: RunOptions, place: World, people: Community) -> Gatherer:
-    """Return who acts: residents who follow their schedules, and whoever plays the assistants."""
-    followers = followers_of(people, PublicMap.from_world(place), seed=options.seed)
-    terms = Terms(deadline=options.deadline or None, isolate=options.isolate, workers=workers())
-    seats = [Seat(f"assistant_{i}", options.seed, [], i, options.assistants) for i in range(options.assistants)]
-    players = foreign_agents(options.agent, seats, place, terms) if options.agent else {}
-    return Gatherer(followers | players, trusted=followers, deadline=terms.deadline, workers=terms.workers)
+def _states_every(options: RunOptions, agents: Gatherer) -> int:
+    """Return after how many steps there is a checkpoint; 0 for never.
+
+    Raises
+    ------
+    InputError
+        If checkpoints are asked for, and an agent has no state.
+    """
+    asked = options.states_every
+    if asked is not None and asked < 0:
+        raise InputError(f"run: --states-every {asked}; it has to be 0 or more")
+    failures = agents.states()[1] if asked != 0 else {}
+    for name, failure in failures.items():
+        if asked:
+            raise InputError(f"{name}: {failure.reason}")
+        print(f"vico: this run cannot go on if it is cut short: {name}: {failure.reason}", file=sys.stderr)
+        return 0
+    return STATES_EVERY if asked is None else asked
+
+
+def _resumed(options: RunOptions, out: Path) -> RunOptions:
+    """Return the options a run was begun with.
+
+    Raises
+    ------
+    InputError
+        If it is complete, or options are given that it has of its own.
+    SchemaError
+        If it does not say how it was begun.
+    """
+    given = replace(options, resume=None, agent="", workers=0, json=False)
+    if given != RunOptions():
+        raise InputError("run: --resume takes everything but --agent, --workers and --json from the run itself")
+    manifest = read_manifest(out)
+    if manifest["status"] == "complete":
+        raise InputError(f"{out}: the run is complete; there is nothing to go on with")
+    try:
+        begun = TypeAdapter(RunOptions).validate_python(manifest.get("command"))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "command"
+        raise SchemaError(f"{out}/run.json: {where}: {first['msg']}; give the command that began the run") from None
+    if begun.agent != options.agent:
+        # Code is named by who gives the command, never by a file that may come from anywhere.
+        named = f"--agent {begun.agent}" if begun.agent else "no --agent"
+        raise InputError(f"{out}: was begun with {named}; give the same with --resume")
+    return replace(begun, out=out, workers=options.workers, json=options.json)
 
 
 def _cut_short(out: Path) -> dict[str, Any] | None:
@@ -132,15 +265,8 @@ def _cut_short(out: Path) -> dict[str, Any] | None:
     return {} if begun else None
 
 
-def _restart(out: Path, found: dict[str, Any], config: SimConfig, world: World) -> None:
-    """Allow an unfinished run to be replaced by the same one."""
-    wanted = jsonlib.loads(jsonlib.dumps(config.record()))
-    if found and (found.get("config") != wanted or found.get("world", {}).get("digest") != world.digest):
-        raise OutputExistsError(
-            f"{out}: holds an unfinished run with other settings; pass --force to replace it, or --out another folder"
-        )
-    steps = f"{found['steps']} of {found['wanted_steps']} steps" if found else "nothing recorded"
-    print(f"{out}: an unfinished run ({steps}) is started anew", file=sys.stderr)
+def _without_sources(command: Any) -> Any:
+    return {n: v for n, v in command.items() if n not in ("world", "community")} if isinstance(command, dict) else None
 
 
 def _names(text: str) -> tuple[str, ...]:

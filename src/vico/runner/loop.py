@@ -48,7 +48,7 @@ class Hook:
     def stepped(self, step: Step) -> None:
         """Take in a step."""
 
-    def checkpoint(self, states: Mapping[str, AgentState], faults: FaultLog) -> None:
+    def checkpoint(self, states: Mapping[str, AgentState]) -> None:
         """Save what every agent remembers, together with the simulation as it stands now."""
 
 
@@ -66,7 +66,7 @@ class Runner:
     states_every
         After every so many steps all agents' states are taken and handed to the hooks; 0 never.
     faults
-        What agents did wrong before, where a run is resumed.
+        Where to note what agents do wrong; where a run is resumed, with what they did before.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class Runner:
         self.agents = agents
         self.hooks = list(hooks)
         self.states_every = states_every
-        self.faults = faults or FaultLog()
+        self.faults = FaultLog() if faults is None else faults
         self._looked_at = bool(set(agents.others) & {sim.agents[i] for i in sim.seeing})
 
     def run(self, steps: int, *, until: Callable[[], bool] = lambda: False) -> None:
@@ -138,7 +138,7 @@ class Runner:
             self._fault(number, name, Failure("state", f"no checkpoint: {failure.reason}"))
         if not failures:
             for hook in self.hooks:
-                hook.checkpoint(states, self.faults)
+                hook.checkpoint(states)
 
     def _fault(self, number: int, name: str, failure: Failure) -> None:
         if not self.faults.counts[name, failure.kind]:

@@ -5,26 +5,56 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from vico.agents.base import AgentState
+from vico.errors import SchemaError
+from vico.runner.faults import FaultLog
+from vico.runner.gather import Gatherer
 from vico.runner.loop import Hook, Step
-from vico.sim.recorder import Recorder
+from vico.sim.recorder import Checkpoint, Recorder
+
+
+def go_on_from(checkpoint: Checkpoint, agents: Gatherer) -> FaultLog:
+    """Let agents remember what they did at a checkpoint; return what they had done wrong by then.
+
+    Raises
+    ------
+    SchemaError
+        If it is a checkpoint of other agents.
+    """
+    states = checkpoint.agents
+    if states.keys() != agents.agents.keys():
+        odd = sorted(states.keys() ^ agents.agents.keys())
+        raise SchemaError(f"checkpoint of step {checkpoint.step}: of other agents than these ({odd[0]}); run it anew")
+    agents.restore(states)
+    return FaultLog.of(checkpoint.notes["faults"])
 
 
 class Recording(Hook):
-    """Hands every step to a recorder.
+    """Hands every step to a recorder, and what agents did wrong; saves the run where it can be gone on with.
 
     Parameters
     ----------
     recorder
         Of the same simulation.
+    faults
+        Of the same runner.
     """
 
-    def __init__(self, recorder: Recorder) -> None:
-        self._recorder = recorder
+    def __init__(self, recorder: Recorder, faults: FaultLog) -> None:
+        self._recorder, self._faults = recorder, faults
+        self._told = -1
 
     def begin(self, observations: Mapping[str, dict[str, Any]]) -> None:
-        """Record how things stand before the first step."""
+        """Record how things stand before the first step; a run that goes on has that already."""
         self._recorder.begin(observations)
+
+    def checkpoint(self, states: Mapping[str, AgentState]) -> None:
+        """Save the simulation, what every agent remembers, and what they did wrong."""
+        self._recorder.checkpoint(states, notes={"faults": self._faults.record()})
 
     def stepped(self, step: Step) -> None:
         """Record a step."""
+        if self._faults.count != self._told:
+            self._told = self._faults.count
+            self._recorder.notes["faults"] = self._faults.record()
         self._recorder.write(step.result, actions=step.actions)

@@ -46,6 +46,13 @@ class Recorder:
         Steps the run is meant to have.
     states_every
         After how many steps a `checkpoint` is due; None for never.
+    notes
+        What else ``run.json`` is to hold, JSON values by name.
+
+    Attributes
+    ----------
+    notes
+        The same, to be changed while the run goes on.
 
     Raises
     ------
@@ -56,8 +63,16 @@ class Recorder:
     """
 
     def __init__(
-        self, out: Path, sim: Simulation, *, sources: Mapping[str, str], wanted: int, states_every: int | None = None
+        self,
+        out: Path,
+        sim: Simulation,
+        *,
+        sources: Mapping[str, str],
+        wanted: int,
+        states_every: int | None = None,
+        notes: Mapping[str, Any] | None = None,
     ) -> None:
+        self.notes = dict(notes or {})
         if out.exists() and any(out.iterdir()):
             raise OutputExistsError(f"{out}: the folder is not empty; give another, or --force")
         with write_errors(out):
@@ -93,6 +108,7 @@ class Recorder:
         sources: Mapping[str, str],
         wanted: int,
         states_every: int | None = None,
+        notes: Mapping[str, Any] | None = None,
     ) -> tuple[Self, Checkpoint]:
         """Go on with an interrupted run from its last checkpoint; what was recorded after it is dropped.
 
@@ -102,7 +118,7 @@ class Recorder:
             Folder of the run.
         sim
             Made in the same way as the recorded one; it is set to the checkpoint's state.
-        sources, wanted, states_every
+        sources, wanted, states_every, notes
             As for a new recorder.
 
         Returns
@@ -130,6 +146,7 @@ class Recorder:
         checkpoint = read_checkpoint(out, steps[-1], owner=sim.identity)
         sim.restore(checkpoint.arrays)
         self = cls.__new__(cls)
+        self.notes = dict(notes or {})
         self._open(out, sim, sources=sources, wanted=wanted, states_every=states_every)
         with self._errors():
             drop_after(out, checkpoint.step)
@@ -270,7 +287,7 @@ class Recorder:
 
     def _write_manifest(self, status: str) -> None:
         record = run_record(self.sim, status, self._hash, self._sources, self.wanted)
-        write_json(self.out / MANIFEST, record | {"states_every": self.states_every})
+        write_json(self.out / MANIFEST, self.notes | record | {"states_every": self.states_every})
 
 
 __all__ = ["Checkpoint", "Recorder"]
