@@ -359,14 +359,16 @@ def test_nobody_is_posed_who_was_not_there(path: Path) -> None:
 def test_a_run_of_version_1_is_refused_with_what_to_type(tmp_path: Path) -> None:
     manifest = {
         "schema_name": "vico.run", "version": 1, "producer": "vico 0.3", "status": "complete", "seed": 4,
-        "wanted_steps": 1800, "world": {"path": "demo/world"}, "community": {"path": "demo/community"},
+        "wanted_steps": 1800, "world": {"path": "my demo/world"}, "community": {"path": "my demo/people"},
+        "config": {"cars": 30, "robots": ["husky", "go2"], "observe": []},
     }  # fmt: skip
     (tmp_path / "run.json").write_text(json.dumps(manifest))
     with pytest.raises(SchemaError) as refused:
         read_run(tmp_path)
     said = str(refused.value)
-    assert "a run of version 1 (vico 0.3)" in said
-    assert f"vico run demo/world demo/community --steps 1800 --seed 4 --out {tmp_path} --force" in said
+    assert "a run of version 1 of the format, written by vico 0.3" in said
+    command = f"vico run 'my demo/world' 'my demo/people' --seed 4 --steps 1800 --out {tmp_path} --cars 30"
+    assert f"{command} --robots husky,go2 --observe none --force" in said
     assert "\n" not in said
 
 

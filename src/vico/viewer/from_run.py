@@ -21,7 +21,13 @@ def recording_of(run: Run) -> Recording:
     cast = {int(entity): run.cast[int(entity)] for entity in tracks.entity}
     bodies = [RecordedBody(e, b.kind, b.name, b.size[0], b.size[1], b.agent) for e, b in cast.items()]
     events = [
-        RecordedEvent(int(np.searchsorted(chosen, e["step"])), e["kind"], e["agent"], e["text"], (e["x"], e["y"]))
+        RecordedEvent(
+            min(int(np.searchsorted(chosen, e["step"])), len(chosen) - 1),
+            e["kind"],
+            e["agent"],
+            e["text"],
+            (e["x"], e["y"]),
+        )
         for e in run.events
         if e["kind"] not in _SILENT
     ]
@@ -40,10 +46,10 @@ def recording_of(run: Run) -> Recording:
 
 
 def _whole_seconds(run: Run) -> NDArray[np.int64]:
-    """Return the recorded steps that end whole seconds; all of them where every agent acts once a second."""
-    times = run.times
-    seconds = np.rint(times - times[0])
-    return np.flatnonzero((np.abs(times - times[0] - seconds) < 1e-6) & (np.diff(seconds, prepend=-1.0) > 0))
+    """Return the last recorded step of each second since the start: every step, where all agents act once a second."""
+    times = run.times - run.times[0]
+    seconds = np.arange(int(times[-1] + 1e-6) + 1)
+    return np.searchsorted(times, seconds + 1e-6) - 1
 
 
 def _about(agent: dict[str, Any], shown: str) -> dict[str, Any]:

@@ -88,7 +88,7 @@ class Recording:
     def key_pictures(self, agent: str) -> Iterator[tuple[int, NDArray[np.uint8]]]:
         """Yield second and picture of what an agent saw, wherever a whole frame is stored."""
         for step, picture in self.views[agent].key_frames():
-            yield int(np.searchsorted(self.view_steps, step)), picture
+            yield min(int(np.searchsorted(self.view_steps, step)), self.steps), picture
 
     def travelled(self) -> NDArray[np.float64]:
         """Metres each body covered, leaving out jumps through doors; shape ``(n,)``."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -90,21 +91,29 @@ def read_manifest(path: Path) -> dict[str, Any]:
         raise SchemaError(f"{path / MANIFEST}: not a {SCHEMA} file; give a run folder")
     if manifest.get("version") != VERSION:
         raise SchemaError(
-            f"{path}: a run of version {manifest.get('version')!r} ({manifest.get('producer')}), which vico "
-            f"{__version__} does not read (it reads version {VERSION}); run it anew: {_command(path, manifest)}"
+            f"{path}: a run of version {manifest.get('version')!r} of the format, written by "
+            f"{manifest.get('producer')}; this vico reads version {VERSION}; run it anew: {_command(path, manifest)}"
         )
     return manifest
 
 
 def _command(path: Path, manifest: Mapping[str, Any]) -> str:
     """Return what to type to make a run again, as far as its manifest tells."""
-    sources = [manifest.get(name) for name in ("world", "community")]
-    folders = [source.get("path", "") if isinstance(source, dict) else "" for source in sources]
-    world, community = (folder or word for folder, word in zip(folders, ("WORLD", "COMMUNITY"), strict=True))
-    return (
-        f"vico run {world} {community} --steps {manifest.get('wanted_steps', 'N')} --seed {manifest.get('seed', 0)} "
-        f"--out {path} --force"
-    )
+    world, community, config = (_mapping(manifest.get(name)) for name in ("world", "community", "config"))
+    words = ["vico", "run", world.get("path") or "WORLD", community.get("path") or "COMMUNITY"]
+    options = {"seed": manifest.get("seed"), "steps": manifest.get("wanted_steps"), "out": path}
+    options |= {name: config.get(name) for name in ("cars", "pedestrians")}
+    options |= {name: ",".join(config[name]) or "none" for name in ("robots", "observe") if _is_names(config.get(name))}
+    words += [word for name, value in options.items() if value is not None for word in (f"--{name}", value)]
+    return shlex.join(map(str, [*words, "--force"]))
+
+
+def _mapping(value: object) -> Mapping[str, Any]:
+    return value if isinstance(value, dict) else {}
+
+
+def _is_names(value: object) -> bool:
+    return isinstance(value, list) and all(isinstance(name, str) for name in value)
 
 
 def _person(resident: Any, sim: Simulation) -> dict[str, Any]:
