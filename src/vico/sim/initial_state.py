@@ -89,5 +89,5 @@ def _entities(state: SimulationState, residents: Sequence[Resident], config: Sim
     for k, entity in enumerate(state.transit.bicycles.entities().tolist() if state.transit is not None else []):
         found[entity] = {"kind": "bicycle", "name": f"bicycle {k}"}
     for k, name in enumerate(state.robots.names if state.robots is not None else []):
-        found[FIRST_ROBOT + k] |= {"name": f"{config.robots[k]} {k}", "agent": name}
+        found[FIRST_ROBOT + k] |= {"name": f"{config.robots[k].partition(':')[0]} {k}", "agent": name}
     return found

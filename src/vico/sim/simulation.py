@@ -116,7 +116,7 @@ class Simulation:
         self.periods = _periods(self.state, self.config)
         self.punctuality = Punctuality.of(days, self.config.start)
         self.scenario, self.ground_truth = Scenario(self.state), GroundTruth(self.state)
-        self.seeing = _indices(self.config.observe, self.agents)
+        self.seeing = _seeing(self.state, self.config.observe)
         self._renderer, self._attached = renderer, False
         self._overlap_check: OverlapCheck | None = None
 
@@ -315,10 +315,22 @@ def _periods(state: SimulationState, config: SimConfig) -> ControlPeriods:
     return ControlPeriods.of(state.people.names, models, config.periods, start=state.tick)
 
 
-def _indices(observe: Sequence[str] | None, names: list[str]) -> list[int]:
-    """Return the indices of the agents whose views are rendered."""
+def _seeing(state: SimulationState, observe: Sequence[str] | None) -> list[int]:
+    """Return the indices of the agents whose views are rendered: of all that have eyes or a camera, unless told."""
+    names = state.names
+    blind = (
+        [] if state.robots is None else [name for k, name in enumerate(state.robots.names) if not state.robots.sees(k)]
+    )
     if observe is None:
-        return list(range(len(names)))
+        return [i for i, name in enumerate(names) if name not in blind]
+    asked = [name for name in observe if name in blind]
+    if asked:
+        raise InputError(f"observe: {asked[0]} has no camera; leave it out")
+    return _indices(observe, names)
+
+
+def _indices(observe: Sequence[str], names: list[str]) -> list[int]:
+    """Return the indices of agents by their names."""
     unknown = [name for name in observe if name not in names]
     if unknown:
         raise InputError(f"observe: nobody is called {unknown[0]!r}; there are {', '.join(names)}")

@@ -143,6 +143,9 @@ class RobotSystem(Subsystem, Protocol):
     def stop(self, robot: int) -> None:
         """Have the robot stand still."""
 
+    def sees(self, robot: int) -> bool:
+        """Return whether the robot has a camera."""
+
     def readings(self, robot: int) -> Mapping[str, Reading]:
         """Return shape and bounds of what the robot's sensors give, by name."""
 

@@ -122,8 +122,13 @@ class Legs(MotorController):
         """Joint angles, rad."""
         wanted = np.zeros((len(motion), 3))
         moving = (motion.rotation, motion.velocity, motion.angular_velocity_body)
-        walks = np.flatnonzero(_stand_or_walk(self._settings, moving, motion.angles, command, memory, wanted))
-        if len(walks):
+        walking = _stand_or_walk(self._settings, moving, motion.angles, command, memory, wanted)
+        if walking.all():
+            gait = memory[:, _GAIT:].copy()
+            memory[:, _HELD] = self._gait.targets(motion, wanted, gait)
+            memory[:, _GAIT:] = gait
+        elif walking.any():
+            walks = walking.nonzero()[0]
             gait = memory[walks, _GAIT:]
             memory[walks, _HELD] = self._gait.targets(motion.where(walks), wanted[walks], gait)
             memory[walks, _GAIT:] = gait

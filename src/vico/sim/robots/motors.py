@@ -14,6 +14,8 @@ _MOTORS, _FALLEN = int(Mode.MOTORS), int(RobotStatus.FALLEN)
 def command_motors(run: RobotRun, group: Group, memory: np.ndarray) -> None:
     """Tell the motors of a kind of robots what to follow for its period.
 
+    The usual case, that all of them follow velocities, takes one call without copies.
+
     Parameters
     ----------
     memory
@@ -21,11 +23,14 @@ def command_motors(run: RobotRun, group: Group, memory: np.ndarray) -> None:
     """
     arrays, robots = run.arrays, group.robots
     fallen = arrays.status[robots] == _FALLEN
-    commanded = ~fallen & (arrays.mode[robots] == _MOTORS)
-    led = np.flatnonzero(~fallen & ~commanded)
-    if len(led):
-        _follow_velocities(run, group, memory, led)
-    for row in np.flatnonzero(fallen | commanded).tolist():
+    led = ~fallen & (arrays.mode[robots] != _MOTORS)
+    if led.all():
+        targets = group.controller.targets(run.engine.motion(robots), arrays.velocity[robots], memory)
+        run.engine.command_all(robots, targets, group.controller.gains(memory))
+        return
+    if led.any():
+        _follow_velocities(run, group, memory, led.nonzero()[0])
+    for row in (~led).nonzero()[0].tolist():
         memory[row] = 0.0
         robot = int(robots[row])
         lying = None
@@ -42,11 +47,8 @@ def command_motors(run: RobotRun, group: Group, memory: np.ndarray) -> None:
 
 
 def _follow_velocities(run: RobotRun, group: Group, memory: np.ndarray, rows: np.ndarray) -> None:
-    """Have robots follow their velocities, all in one call."""
-    everyone = len(rows) == len(group.robots)
-    robots = group.robots if everyone else group.robots[rows]
-    mine = memory if everyone else memory[rows]
+    """Have some of a kind's robots follow their velocities, all in one call."""
+    robots, mine = group.robots[rows], memory[rows]
     targets = group.controller.targets(run.engine.motion(robots), run.arrays.velocity[robots], mine)
     run.engine.command_all(robots, targets, group.controller.gains(mine))
-    if not everyone:
-        memory[rows] = mine
+    memory[rows] = mine

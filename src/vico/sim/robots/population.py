@@ -273,6 +273,10 @@ class RobotPopulation:
         """Return the deck of the robot with this entity; None if it has none."""
         return drawing.deck_of(self.run, entity)
 
+    def sees(self, robot: int) -> bool:
+        """Return whether a robot has a camera."""
+        return self.models[robot].sensors.camera is not None
+
     def readings(self, robot: int) -> Mapping[str, sensing.Reading]:
         """Return shape and bounds of what a robot feels of itself, by name."""
         return sensing.readings_of(self.models[robot])
