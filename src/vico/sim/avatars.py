@@ -104,9 +104,9 @@ class Avatars:
             turn = p.turn_left * share
             distance = np.minimum(p.move_left, p.move_speed * dt)
             before = p.position[:, :2].copy()
-            avatars = records_of(p.bodies_of(np.arange(len(p))), self.space())
-            moved, contact = sweep(distance, turn, p.yaw, avatars, self.solids, obstacles)
-            p.position[:, 0], p.position[:, 1] = avatars["x"], avatars["y"]
+            bodies = np.concatenate([records_of(p.bodies_of(slice(None)), self.space()), obstacles])
+            moved, contact = sweep(distance, turn, p.yaw, bodies, self.solids)
+            p.position[:, 0], p.position[:, 1] = bodies["x"][: len(p)], bodies["y"][: len(p)]
             hit = contact != 0
             p.turn_left -= turn
             p.move_left -= moved

@@ -150,12 +150,11 @@ def _body_in_way(core: Rectangle, was: Rectangle, bodies: Array, near: Array) ->
 @compiled
 def _blocker(me: Any, core: Rectangle, around: Any) -> int:
     """Entity that keeps avatar `me` from moving its core to a place; `WALL` for walls, edges, furniture, 0 if free."""
-    solids, avatars, near_avatars, others, near_others = around
+    solids, bodies, near = around
     was = core_of(me)
     if _is_blocked(core, was, me.space, solids):
         return WALL
-    hit = _body_in_way(core, was, others, near_others)
-    return hit if hit != 0 else _body_in_way(core, was, avatars, near_avatars)
+    return _body_in_way(core, was, bodies, near)
 
 
 @compiled
@@ -228,7 +227,7 @@ def _who_can_touch(me: Any, bodies: Array, found: Array) -> Array:
 
 
 @compiled
-def sweep(distance: Array, turn: Array, yaw: Array, avatars: Array, solids: SolidMap, others: Array) -> Any:
+def sweep(distance: Array, turn: Array, yaw: Array, bodies: Array, solids: SolidMap) -> Any:
     """Turn and walk all avatars, in order; each sees where the ones before it have come to stand.
 
     Parameters
@@ -237,10 +236,9 @@ def sweep(distance: Array, turn: Array, yaw: Array, avatars: Array, solids: Soli
         Metres ahead and radians counter-clockwise, float64, shape ``(n,)``.
     yaw
         Headings, radians, shape ``(n,)``; changed in place.
-    avatars
-        Everybody who may move, dtype `vico.sim.footprints.BODY`; changed in place.
-    others
-        Bodies that stand still meanwhile, dtype `vico.sim.footprints.BODY`.
+    bodies
+        The avatars, changed in place, and after them the bodies that stand still meanwhile; dtype
+        `vico.sim.footprints.BODY`.
 
     Returns
     -------
@@ -252,20 +250,13 @@ def sweep(distance: Array, turn: Array, yaw: Array, avatars: Array, solids: Soli
     drift = 0.0
     for d in distance:
         drift = max(drift, d)
-    avatar_grid, other_grid = _grid_of(avatars, drift), _grid_of(others, 0.0)
-    found, found_others = np.empty(len(avatars), np.int64), np.empty(len(others), np.int64)
+    grid, found = _grid_of(bodies, drift), np.empty(len(bodies), np.int64)
     for i in range(len(distance)):
-        me = avatars[i]
+        me = bodies[i]
         if turn[i] == 0.0 and (distance[i] <= 0.0 or me.space < OUTDOORS):
             continue
-        reach = me.half_length + distance[i]
-        around = (
-            solids,
-            avatars,
-            _who_can_touch(me, avatars, search(avatar_grid, me.x, me.y, reach, found)),
-            others,
-            _who_can_touch(me, others, search(other_grid, me.x, me.y, reach, found_others)),
-        )
+        near = search(grid, me.x, me.y, me.half_length + distance[i], found)
+        around = solids, bodies, _who_can_touch(me, bodies, near)
         if turn[i] != 0.0:
             heading = yaw[i] + turn[i]
             heading = heading - 2.0 * math.pi * math.floor((heading + math.pi) / (2.0 * math.pi))

@@ -203,7 +203,7 @@ class People(ArrayState):
         """Those outdoors: what traffic, transit and robots have to keep clear of."""
         return self.bodies_of(np.flatnonzero(self.outdoors()))
 
-    def bodies_of(self, who: NDArray[np.int64]) -> Bodies:
+    def bodies_of(self, who: NDArray[np.int64] | slice) -> Bodies:
         """Bodies of the avatars with the given indices; a cyclist's is as long as the bicycle, see `Bodies`."""
         riding = self.vehicle[who] == Vehicle.BIKE
         return Bodies(
@@ -212,7 +212,7 @@ class People(ArrayState):
             self.position[who],
             self.yaw[who],
             np.where(riding, RIDER_REACH + RADIUS, RADIUS),
-            np.full(len(who), RADIUS),
+            np.full(len(riding), RADIUS),
             self.height[who],
             self.velocity[who],
         )

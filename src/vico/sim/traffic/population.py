@@ -258,15 +258,14 @@ class Traffic:
 
     def _bring_back(self, everybody: Shapes) -> None:
         """Bring cars back in that left the map or were stuck for too long; the latter are noted."""
-        stuck = [
-            (v, (float(everybody.x[v]), float(everybody.y[v])), float(self.fleet.stopped_time[v]), self._before(v))
-            for v in np.flatnonzero(self.fleet.stopped_time >= PATIENCE).tolist()
-        ]
-        teleports = self.fleet.teleports.copy() if stuck else self.fleet.teleports
+        stopped, teleports = self._vehicles["stopped_time"], self._vehicles["teleports"]
+        due = np.flatnonzero(stopped >= PATIENCE)
+        where = [(float(everybody.x[v]), float(everybody.y[v])) for v in due.tolist()]
+        stood, before = stopped[due], teleports[due]
+        blockers = [self._before(v) for v in due.tolist()]
         bring_back(self._net, self._vehicles, self.junctions, everybody, self._entries, _ENTRY_SPEED, PATIENCE)
-        for v, xy, stood, before in stuck:
-            if self.fleet.teleports[v] > teleports[v]:
-                self.jams.note_rescue(v, xy, stood, before)
+        for k in np.flatnonzero(teleports[due] > before).tolist():
+            self.jams.note_rescue(int(due[k]), where[k], float(stood[k]), blockers[k])
 
     def _before(self, v: int) -> int:
         return entity_before(int(self.fleet.blocker[v]), self._entities)
