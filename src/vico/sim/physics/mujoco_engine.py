@@ -270,7 +270,7 @@ class MujocoEngine:
         self._present[slot] = False
         # Nobody but a reset puts anybody to sleep.
         forces, contacts = np.array(self._data.actuator_force), self._last_contacts()
-        self._set_state(self._state(), forces, contacts)
+        self._set_state(self._state(), forces, contacts, anew=True)
 
     def _check_slot(self, slot: int) -> None:
         if not 0 <= slot < len(self._present):
@@ -376,9 +376,11 @@ class MujocoEngine:
         return state
 
     def _set_state(
-        self, state: NDArray[np.float64], forces: NDArray[np.float64], contacts: NDArray[np.float64]
+        self, state: NDArray[np.float64], forces: NDArray[np.float64], contacts: NDArray[np.float64], *, anew: bool
     ) -> None:
-        self.compiled.reset(self._data)
+        """Go to a state; `anew` where somebody has to fall asleep for it."""
+        if anew:
+            self.compiled.reset(self._data)
         mujoco.mj_setState(self._model, self._data, state, STATE)
         self._data.actuator_force[:] = forces
         self._contacts = np.array(contacts)
@@ -399,7 +401,8 @@ class MujocoEngine:
             )
         self._movers.restore(arrays)
         self._parameters.restore(arrays["parameters"])
-        self._set_state(state, arrays["forces"], arrays["contacts"])
+        anew = not np.array_equal(self._present, arrays["present"])
+        self._set_state(state, arrays["forces"], arrays["contacts"], anew=anew)
         self._present[:] = arrays["present"]
         self._calm[:] = arrays["calm"]
         self._velocity_before[:] = arrays["velocity_before"]
