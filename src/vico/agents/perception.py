@@ -124,24 +124,36 @@ class DepthGrid:
         self.n = round(side / cell)
         self.cell = cell
         self.corner = np.asarray(middle, np.float64)[:2] - side / 2
-        self._hits = np.zeros((self.n, self.n), np.int32)
+        # How often pictures showed something; made with the first, for whoever is told of rooms looks at none.
+        self._hits: NDArray[np.int32] | None = None
         self._bumps = np.zeros((self.n, self.n), np.bool_)
+        # What a body of some radius keeps from, by radius, until something new is known.
+        self._blocked: dict[float, NDArray[np.bool_]] = {}
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of what is kept."""
+        hits = 0 if self._hits is None else self._hits.nbytes
+        return hits + self._bumps.nbytes + sum(blocked.nbytes for blocked in self._blocked.values())
 
     def state(self) -> dict[str, Any]:
         """Return the cells that hold something, as arrays; few do, so they are listed."""
-        (hit,) = np.nonzero(self._hits.ravel())
+        hits = np.zeros(0, np.int32) if self._hits is None else self._hits.ravel()
+        (hit,) = np.nonzero(hits)
         return {
             "corner": self.corner.copy(),
             "hit": hit.astype(np.int32),
-            "hits": self._hits.ravel()[hit],
+            "hits": hits[hit],
             "bumps": np.packbits(self._bumps.ravel()),
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Hold what another grid of the same size held."""
         self.corner = np.array(state["corner"], np.float64)
-        self._hits = np.zeros((self.n, self.n), np.int32)
-        self._hits.ravel()[state["hit"]] = state["hits"]
+        self._hits, self._blocked = None, {}
+        if len(state["hit"]):
+            self._hits = np.zeros((self.n, self.n), np.int32)
+            self._hits.ravel()[state["hit"]] = state["hits"]
         bumps = np.unpackbits(state["bumps"], count=self.n * self.n)
         self._bumps = bumps.astype(np.bool_).reshape(self.n, self.n)
 
@@ -162,7 +174,10 @@ class DepthGrid:
         keep = (points[:, 2] > floor + 0.15) & (points[:, 2] < floor + 1.8) & ~skip
         cells = ((points[keep, :2] - self.corner) / self.cell).astype(np.int64)
         cells = cells[((cells >= 0) & (cells < self.n)).all(axis=1)]
+        if self._hits is None:
+            self._hits = np.zeros((self.n, self.n), np.int32)
         np.add.at(self._hits, (cells[:, 1], cells[:, 0]), 1)
+        self._blocked.clear()
 
     def mark(self, room: NDArray[np.float64], furniture: NDArray[np.float64]) -> None:
         """Add walls and furniture that are known without a picture.
@@ -179,12 +194,14 @@ class DepthGrid:
         self._bumps |= ~_within(room, x, y)
         for box in furniture:
             self._bumps |= _within(box, x, y)
+        self._blocked.clear()
 
     def bump(self, xy: ArrayLike) -> None:
         """Remember that something stopped a step at a point."""
         ix, iy = ((np.asarray(xy, np.float64)[:2] - self.corner) / self.cell).astype(np.int64)
         if 0 <= ix < self.n and 0 <= iy < self.n:
             self._bumps[iy, ix] = True
+            self._blocked.clear()
 
     def route(self, start: ArrayLike, goal: ArrayLike, *, near: float, radius: float = 0.3) -> NDArray[np.float64]:
         """Find a way that keeps `radius` metres from what was seen, to within `near` metres of the goal.
@@ -196,14 +213,16 @@ class DepthGrid:
         """
         a = np.asarray(start, np.float64)[:2]
         b = np.asarray(goal, np.float64)[:2]
-        blocked = self._grown(radius)
+        if radius not in self._blocked:
+            self._blocked[radius] = self._grown(radius)
+        blocked = self._blocked[radius]
         first = tuple(((a - self.corner) / self.cell).astype(int))
         aim = (b - self.corner) / self.cell
         reach = near / self.cell
         return self.corner + (_a_star(blocked, first, aim, reach) + 0.5) * self.cell
 
     def _grown(self, radius: float) -> NDArray[np.bool_]:
-        solid = (self._hits >= 3) | self._bumps
+        solid = self._bumps if self._hits is None else (self._hits >= 3) | self._bumps
         grown = solid.copy()
         reach = math.ceil(radius / self.cell)
         for dy in range(-reach, reach + 1):
