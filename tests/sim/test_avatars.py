@@ -10,7 +10,7 @@ from vico.sim.avatars import CLIPS
 from vico.sim.config import SimConfig
 from vico.sim.overlaps import overlaps_of
 from vico.sim.simulation import Simulation
-from vico.sim.state import RADIUS
+from vico.sim.state import RADIUS, Vehicle
 
 
 @pytest.fixture
@@ -97,3 +97,17 @@ def test_running_shows_as_running_and_standing_as_idle(sim: Simulation) -> None:
     running = CLIPS[sim.state.people.clip[0]]
     sim.step({})
     assert (running, CLIPS[sim.state.people.clip[0]]) == ("run", "idle")
+
+
+@pytest.mark.parametrize("ahead", [0.0, 0.3, 0.6, 0.85])
+def test_a_cyclist_never_turns_or_rides_into_somebody_beside_the_bicycle(sim: Simulation, ahead: float) -> None:
+    sim.scenario.place_agent("assistant_0", (0.0, -15.0))
+    sim.scenario.place_agent("assistant_1", (ahead, -14.45))
+    for i in (2, 3):
+        sim.scenario.place_agent(f"assistant_{i}", (-20.0 + 3 * i, -15.0))
+    sim.state.people.vehicle[0] = Vehicle.BIKE
+    for turn in ("turn_left", "turn_right", "turn_left"):
+        sim.step({"assistant_0": {"type": turn, "degrees": 80.0}})
+        assert overlaps_of(sim.state) == []
+        sim.step({"assistant_0": {"type": "move_forward", "distance": 0.4}})
+        assert overlaps_of(sim.state) == []
