@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+import planted_agents
 from vico.challenges.assistant import runner
 from vico.challenges.assistant.delivery import generate_delivery
 from vico.challenges.assistant.runner import community_for, run_episode
@@ -15,6 +16,7 @@ from vico.challenges.results import EpisodeResult
 from vico.community.model import Community
 from vico.io.files import read_json
 from vico.runner.faults import Fault
+from vico.runner.foreign import Terms
 from vico.world.folder import World
 
 
@@ -88,6 +90,28 @@ def test_a_planner_that_crashes_and_lies_ends_no_evaluation(
     told = (tmp_path / "results.md").read_text()
     assert "| 7 crashed, 12 malformed |" in told
     assert "assistant_0 crashed at step 3 (ZeroDivisionError: no plan); 7 times in the episode" in told
+
+
+def test_a_planner_from_elsewhere_is_judged_alone_in_its_process(
+    helsinki: World, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(runner, "community_for", lambda world: community_for(world, residents=2))
+
+    def evaluation(name: str) -> EpisodeResult:
+        method, folder = f"{planted_agents.__file__}:{name}", tmp_path / name
+        terms = Terms(deadline=60.0, isolate=True)
+        (episode,) = runner.evaluate(
+            [helsinki], method=method, assistants=2, seeds=1, steps=4, folder=folder, terms=terms
+        )
+        return episode
+
+    # It ends its process in the third step; one that can't be made fails in each.
+    assert evaluation("Quitter").fault_counts == {"ended": 4}
+    broken = evaluation("Broken")
+    assert broken.fault_counts == {"crashed": 8}
+    assert "LookupError: no weights" in broken.faults[0].reason
+    honest = evaluation("Honest")
+    assert (honest.fault_counts, honest.tokens, honest.cost) == ({}, 80, 4.0)
 
 
 def test_an_interrupted_evaluation_goes_on_and_comes_to_the_same(

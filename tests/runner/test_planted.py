@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -157,3 +161,37 @@ def test_a_process_ends_with_its_agent(tmp_path: Path) -> None:
     agent.close()
     assert agent._process.returncode is not None
     agent.close()  # once more does no harm
+
+
+HOLDER = """
+import sys, time
+from pathlib import Path
+from vico.runner.isolated import IsolatedAgent
+from vico.runner.loading import Seat
+agent = IsolatedAgent(sys.argv[1], Seat("assistant_0"), world=Path("."))
+print(agent._process.pid, flush=True)
+agent.act({}, {})
+"""
+
+
+def test_a_process_ends_with_a_run_that_is_killed(tmp_path: Path) -> None:
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-c", HOLDER, f"{planted_agents.__file__}:Sleeper"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as run:
+        assert run.stdout is not None
+        agent = int(run.stdout.readline())
+        os.kill(agent, 0)  # it is there
+        run.kill()
+    deadline = time.monotonic() + 60
+    while _is_alive(agent):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def _is_alive(process: int) -> bool:
+    """Whether a process runs; one that has ended and was not waited for doesn't."""
+    try:
+        status = Path(f"/proc/{process}/stat").read_text(encoding="utf-8")
+    except OSError:
+        return False
+    return status.rpartition(")")[2].split()[0] != "Z"
