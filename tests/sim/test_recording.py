@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -370,6 +371,44 @@ def test_a_run_of_version_1_is_refused_with_what_to_type(tmp_path: Path) -> None
     command = f"vico run 'my demo/world' 'my demo/people' --seed 4 --steps 1800 --out {tmp_path} --cars 30"
     assert f"{command} --robots husky,go2 --observe none --force" in said
     assert "\n" not in said
+
+
+# Damage.
+
+
+def read_all(out: Path) -> tuple[Any, ...]:
+    """Read what other tests damage."""
+    run = read_run(out)
+    return run.table("bodies"), run.checkpoint(40), run.cast
+
+
+def test_a_damaged_file_is_named_in_one_sentence(path: Path, tmp_path: Path) -> None:
+    for name in (
+        "segments/00000000-00000040/bodies.parquet",
+        "checkpoints/00000040/simulation.npz",
+        "checkpoints/00000040/agents.npz",
+        "cast.jsonl",
+    ):
+        out = tmp_path / name.replace("/", "_")
+        shutil.copytree(path, out)
+        content = (out / name).read_bytes()
+        middle = len(content) // 2
+        (out / name).write_bytes(content[: middle - 40] + bytes(80) + content[middle + 40 :])
+        with pytest.raises(SchemaError, match=name) as damaged:
+            read_all(out)
+        assert "\n" not in str(damaged.value)
+
+
+def test_what_a_writer_left_unfinished_is_not_read(path: Path, tmp_path: Path) -> None:
+    shutil.copytree(path, tmp_path / "run")
+    last = tmp_path / "run" / "segments" / "00000081-00000100"
+    last.rename(last.with_name(f".{last.name}.partial"))
+    with (tmp_path / "run" / "cast.jsonl").open("ab") as cast:
+        cast.write(b'{"step": 95, "ent')
+    run = read_run(tmp_path / "run")
+    assert run.last == 80
+    assert len(run.cast) == 3
+    assert run.checkpoints == [40, 80]
 
 
 # Size.

@@ -5,6 +5,8 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -94,7 +96,7 @@ def read_snapshot(path: Path, *, owner: str) -> dict[str, NDArray[Any]]:
             arrays = {name: data[name] for name in data.files}
     except FileNotFoundError:
         raise MissingFileError(f"{path}: no such snapshot") from None
-    except (ValueError, OSError, EOFError, KeyError) as error:
+    except (ValueError, OSError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
         raise SchemaError(f"{path}: not a readable snapshot ({error})") from None
     schema = str(arrays.pop("__schema__", ""))
     version = int(arrays.pop("__version__", -1))
