@@ -1,9 +1,9 @@
-"""Whether an environment keeps its promises: the parallel contract, its spaces, repeatability, refusals, endings."""
+"""Whether an environment keeps its promises: contract, spaces, resets, repeatability, snapshots, refusals, endings."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,8 @@ import numpy as np
 from pettingzoo import ParallelEnv
 
 _BAD_ACTION = {"type": "no such action"}
+#: Steps of a short episode.
+_SOME = 5
 
 
 @dataclass(frozen=True)
@@ -20,7 +22,7 @@ class EnvFinding:
     Attributes
     ----------
     promise
-        ``contract``, ``space``, ``repeatable``, ``refusal`` or ``ending``.
+        ``contract``, ``space``, ``repeatable``, ``reset``, ``snapshot``, ``refusal`` or ``ending``.
     where
         Agent and step.
     what
@@ -33,12 +35,16 @@ class EnvFinding:
 
 
 def check_env(env: ParallelEnv[str, Any, Any], *, seed: int = 0, max_steps: int = 2000) -> list[EnvFinding]:
-    """Play two episodes of one seed with sampled actions, and look whether the environment keeps its promises.
+    """Play episodes with sampled actions, and look whether the environment keeps its promises.
+
+    Two episodes of one seed, one of the next seed, and the beginning of one of the first again: nothing may stay from
+    an episode. Where the environment has `snapshot` and `restore`, what follows a snapshot has to come again after it
+    is restored.
 
     Parameters
     ----------
     env
-        Ours, or one around it. It is reset, and left where the second episode ended.
+        Ours, or one around it. It is reset, and left within an episode.
     seed
         Of the episodes and of the actions.
     max_steps
@@ -63,7 +69,48 @@ def check_env(env: ParallelEnv[str, Any, Any], *, seed: int = 0, max_steps: int 
         )
         what = f"two episodes of seed {seed} differ from step {at} on; draw chance from the seed alone"
         found["repeatable", ""] = EnvFinding("repeatable", f"step {at}", what)
+    for finding in (*_check_reset(env, seed, first[: _SOME + 1]), *_check_snapshot(env, seed)):
+        found.setdefault((finding.promise, finding.where), finding)
     return list(found.values())
+
+
+def _check_reset(env: ParallelEnv[str, Any, Any], seed: int, expected: list[str]) -> Iterator[EnvFinding]:
+    """Cut an episode of another seed short: an episode of the first seed has to begin as ever after it."""
+    again: list[str] = []
+    for steps, one in (([], seed + 1), (again, seed)):
+        for _ in _episode(env, one, _SOME, steps):
+            pass  # what is wrong in every episode has been found before
+    if again != expected:
+        at = next((k for k, (a, b) in enumerate(zip(again, expected, strict=False)) if a != b), len(expected))
+        what = f"after an episode of seed {seed + 1}, seed {seed} gives another one; let nothing stay from an episode"
+        yield EnvFinding("reset", f"step {at}", what)
+
+
+def _check_snapshot(env: ParallelEnv[str, Any, Any], seed: int) -> Iterator[EnvFinding]:
+    """Go on from a snapshot twice."""
+    whole: Any = env.unwrapped
+    if not (hasattr(whole, "snapshot") and hasattr(whole, "restore")):
+        return
+    env.reset(seed=seed)
+
+    def play(steps: Sequence[Mapping[str, Any]]) -> list[str]:
+        found = []
+        for actions in steps:
+            if env.agents:
+                observations, _, _, _, infos = env.step(dict(actions))
+                found.append(_digest(observations, infos))
+        return found
+
+    steps = [{name: env.action_space(name).sample() for name in env.agents} for _ in range(2 * _SOME)]
+    play(steps[:_SOME])
+    kept = whole.snapshot()
+    first = play(steps[_SOME:])
+    whole.restore(kept)
+    second = play(steps[_SOME:])
+    if first != second:
+        at = next((k for k, (a, b) in enumerate(zip(first, second, strict=False)) if a != b), len(second))
+        what = "a restored snapshot goes on otherwise than the first time; save everything that decides the future"
+        yield EnvFinding("snapshot", f"step {_SOME + at + 1}", what)
 
 
 def _episode(env: ParallelEnv[str, Any, Any], seed: int, max_steps: int, digests: list[str]) -> Iterator[EnvFinding]:

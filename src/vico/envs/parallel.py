@@ -184,6 +184,16 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         """Hash of the whole state."""
         return self.sim.state_hash()
 
+    def snapshot(self) -> dict[str, NDArray[Any]]:
+        """Return a copy of the whole state; see `Simulation.snapshot`."""
+        return self.sim.snapshot()
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go back to a snapshot of this episode, or of one of an environment made in the same way."""
+        self.sim.restore(arrays)
+        self.agents = list(self.possible_agents) if self.sim.metrics.steps < self.max_steps else []
+        self.events = []
+
     def close(self) -> None:
         """Let go of the simulation."""
         self._simulation = None
