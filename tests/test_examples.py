@@ -46,6 +46,13 @@ def test_an_agent_keeps_the_contract_alone_in_its_process(helsinki_path: Path) -
     assert "went on from the middle to the same end: True; faults: {}" in printed
 
 
+def test_environments_side_by_side_branches_and_periods(helsinki_path: Path, helsinki_people: Path) -> None:
+    printed = run("06_many_environments.py", "--world", str(helsinki_path), "--community", str(helsinki_people))
+    assert "2 environments: poses of shape (2, 6)" in printed
+    assert "time is still 28800 s" in printed
+    assert "50 observations of the robot and 1 of the assistant" in printed
+
+
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.name)
 def test_each_example_says_how_it_is_run(path: Path) -> None:
     assert f"python examples/{path.name} " in path.read_text()
