@@ -147,3 +147,11 @@ def test_a_snapshot_may_be_taken_within_a_sub_step() -> None:
     sim.restore(kept)
     sim.advance(0.74)
     assert sim.state_hash() == after
+
+
+def test_a_robot_may_be_controlled_a_hundred_times_a_second() -> None:
+    sim = toy(replace(ROBOTS, periods={"robot_0": 0.01}))
+    start = sim.state.tick
+    due = [list(sim.step({"robot_0": {"type": "control", "vector": [3.0] * 4}}).observations) for _ in range(12)]
+    assert sim.state.tick - start == 12
+    assert due == [["robot_0"]] * 12
