@@ -48,6 +48,14 @@ def helsinki(helsinki_path: Path) -> World:
 
 
 @pytest.fixture(scope="session")
+def helsinki_city(tmp_path_factory: pytest.TempPathFactory) -> World:
+    """800 m x 800 m of central Helsinki: large enough for bus lines and bicycle stations."""
+    out = tmp_path_factory.mktemp("worlds") / "city"
+    build_world(EXTRACT, lat=60.1690, lon=24.9435, half=400.0, seed=0, out=out, options=BuildOptions(previews=False))
+    return read_world(out)
+
+
+@pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Real data beside the checkout; tests that need it are skipped where it is absent."""
     if not SHARED.is_dir():

@@ -53,6 +53,12 @@ def test_environments_side_by_side_branches_and_periods(helsinki_path: Path, hel
     assert "50 observations of the robot and 1 of the assistant" in printed
 
 
+def test_getting_around_prints_trips_and_arrives(helsinki_path: Path) -> None:
+    printed = run("07_getting_around.py", "--world", str(helsinki_path), "--steps", "600")
+    assert "on foot: walk" in printed
+    assert " after " in printed
+
+
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.name)
 def test_each_example_says_how_it_is_run(path: Path) -> None:
     assert f"python examples/{path.name} " in path.read_text()

@@ -28,6 +28,7 @@ ALLOWED = {
         "io.compiled",
         "world.public",
         "world.routing",
+        "world.trips",
         "world.walkable",
         "world.model",
         "world.heights",

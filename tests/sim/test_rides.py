@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,25 +15,13 @@ from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
 from vico.sim.state import RADIUS, Posture
 from vico.sim.transit import BIKE_ASTRAY, BIKE_RATE, FARE
-from vico.world.folder import World, read_world
-from vico.worldgen.pipeline import build_world
-from vico.worldgen.request import BuildOptions
-
-EXTRACT = Path(__file__).parents[2] / "src" / "vico" / "data" / "helsinki.osm.pbf"
-
-
-@pytest.fixture(scope="module")
-def city(tmp_path_factory: pytest.TempPathFactory) -> World:
-    """800 m x 800 m of central Helsinki: large enough for a bus line and bicycle stations."""
-    out = tmp_path_factory.mktemp("worlds") / "city"
-    build_world(EXTRACT, lat=60.1690, lon=24.9435, half=400.0, seed=0, out=out, options=BuildOptions(previews=False))
-    return read_world(out)
+from vico.world.folder import World
 
 
 @pytest.fixture
-def sim(city: World) -> Simulation:
+def sim(helsinki_city: World) -> Simulation:
     """Central Helsinki with its buses and bicycles, and one assistant with money."""
-    simulation = Simulation(city, None, SimConfig(assistants=1, observe=()))
+    simulation = Simulation(helsinki_city, None, SimConfig(assistants=1, observe=()))
     simulation.state.people.cash[0] = 50.0
     return simulation
 
@@ -123,8 +110,8 @@ def test_indoors_or_far_from_a_stop_nobody_boards(sim: Simulation) -> None:
     assert "not in a bus" in act(sim, type="exit_bus")["action_reason"]
 
 
-def test_sixty_riders_have_sixty_places(city: World) -> None:
-    sim = Simulation(city, None, SimConfig(assistants=61, observe=()))
+def test_sixty_riders_have_sixty_places(helsinki_city: World) -> None:
+    sim = Simulation(helsinki_city, None, SimConfig(assistants=61, observe=()))
     state, transit = sim.state, sim.state.transit
     assert transit is not None
     state.people.cash[:] = 10.0
@@ -144,8 +131,8 @@ def test_sixty_riders_have_sixty_places(city: World) -> None:
     assert seated[: seated.sum()].all()
 
 
-def test_a_place_that_somebody_left_is_taken_by_the_next(city: World) -> None:
-    sim = Simulation(city, None, SimConfig(assistants=3, observe=()))
+def test_a_place_that_somebody_left_is_taken_by_the_next(helsinki_city: World) -> None:
+    sim = Simulation(helsinki_city, None, SimConfig(assistants=3, observe=()))
     transit = sim.state.transit
     assert transit is not None
     sim.state.people.cash[:] = 10.0
@@ -161,8 +148,8 @@ def test_a_place_that_somebody_left_is_taken_by_the_next(city: World) -> None:
     assert np.allclose(sim.state.people.position[2], first)
 
 
-def test_riders_are_seen_through_the_windows(city: World) -> None:
-    sim = Simulation(city, None, SimConfig(assistants=2, observe=("assistant_1",), image=256))
+def test_riders_are_seen_through_the_windows(helsinki_city: World) -> None:
+    sim = Simulation(helsinki_city, None, SimConfig(assistants=2, observe=("assistant_1",), image=256))
     transit = sim.state.transit
     assert transit is not None
     sim.state.people.cash[:] = 10.0

@@ -15,8 +15,8 @@ from vico.sim.transit import DWELL, FARE, TransitSystem, plan_buses, ride_price
 from vico.world.heights import HeightField
 
 
-def _systems(cars: int = 20, pedestrians: int = 20) -> tuple[Traffic, TransitSystem]:
-    city, second = road_city(), 8 * 3600.0
+def _systems(cars: int = 20, pedestrians: int = 20, *, second: float = 8 * 3600.0) -> tuple[Traffic, TransitSystem]:
+    city = road_city()
     plan = plan_buses(city.transit, city.lanes, second)
     traffic = Traffic(
         TrafficNetwork.of(city.lanes, city.solids),
@@ -78,6 +78,18 @@ def test_buses_on_empty_streets_leave_no_stop_before_its_time() -> None:
                 early.append(due - transit.clock[0] if at else 0.0)
     # Seconds that a bus brakes less than the timetable reckons with; more was 45 before buses drove so slowly.
     assert max(early) < 10.0
+
+
+def test_a_bus_that_has_just_left_when_a_run_begins_drives_its_round() -> None:
+    travel = plan_buses(road_city().transit, road_city().lanes, 8 * 3600.0)
+    assert travel.first_stops[0] == 0
+    second = travel.begun[0] + 10.0
+    traffic, transit = _systems(0, 0, second=second)
+    assert transit.stop[0] == 0
+    for _ in range(300):
+        _advance(traffic, transit)
+    assert transit.stopped_at(0) is None
+    assert transit.begun[0] == travel.begun[0]
 
 
 def test_a_stop_behind_the_bus_is_a_whole_round_away() -> None:

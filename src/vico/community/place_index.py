@@ -13,6 +13,7 @@ from vico.community.hours import Span, open_spans
 from vico.community.usual_hours import usual_spans
 from vico.errors import EmptyInputError
 from vico.world.folder import World
+from vico.world.indoor_ways import IndoorWays
 from vico.world.model import Category, Place, Point2
 from vico.world.routing import Router
 from vico.world.walkable import CROSSING, ROADWAY
@@ -53,10 +54,9 @@ class PlaceIndex:
         self.spot = {p.id: k for k, p in enumerate(world.places)}
         self._positions = np.array([p.position[:2] for p in world.places], float).reshape(-1, 2)
         self._names = np.array([p.id for p in world.places])
-        numbers: dict[str, int] = {}
-        self._houses = np.array(
-            [numbers.setdefault(p.building or f"at {p.id}", len(numbers)) for p in world.places], np.int64
-        )
+        ways = IndoorWays(world.rooms if any(p.rooms for p in world.places) else ())
+        # From the street to the farthest room: whoever has come that far is there, whatever the room.
+        self._inside = np.array([ways.seconds(p.rooms) for p in world.places], np.float64)
         self._estimates: dict[str, NDArray[np.int64]] = {}
         self._seconds = _ROUTES.setdefault(world, {})
         self._reachable: dict[str, bool] = {}
@@ -92,17 +92,23 @@ class PlaceIndex:
             [p for p in found if kind_of(p) in GUEST_KINDS],
         )
 
-    def same_spot(self, a: str, b: str) -> bool:
-        """Whether two places need no way between them: the same place, or places of one building."""
-        if a == b:
-            return True
+    def same_building(self, a: str, b: str) -> bool:
+        """Whether two places are under one roof, or the same."""
         building = self.place_by_id[a].building
-        return building is not None and building == self.place_by_id[b].building
+        return a == b or (building is not None and building == self.place_by_id[b].building)
 
     def seconds(self, a: str, b: str) -> float:
-        """Seconds on foot between two places, at 1 m/s; infinite if there is no way; 0 within a building."""
-        if self.same_spot(a, b):
+        """Seconds on foot between two places, at 1 m/s; infinite if there is no way.
+
+        From the farthest room of the one over stairs and corridors to the street, and on to the farthest room of the
+        other: no door leads from place to place, not even in one building.
+        """
+        if a == b:
             return 0.0
+        return self.outdoors(a, b) + float(self._inside[self.spot[a]] + self._inside[self.spot[b]])
+
+    def outdoors(self, a: str, b: str) -> float:
+        """Seconds on foot between the doors of two places, at 1 m/s; infinite if there is no way."""
         # There as back, and for all places behind one door.
         start, goal = sorted((self.place_by_id[a].position[:2], self.place_by_id[b].position[:2]))
         if (start, goal) not in self._seconds:
@@ -122,15 +128,20 @@ class PlaceIndex:
 
     def estimate(self, a: str, b: str) -> int:
         """Minutes that a walk may take, before a route is asked for: streets are half as long again as the bee line."""
-        return 0 if self.same_spot(a, b) else math.ceil((self.metres(a, b) * 1.5 + 45) / 60)
+        if a == b:
+            return 0
+        inside = float(self._inside[self.spot[a]] + self._inside[self.spot[b]])
+        return math.ceil((self.metres(a, b) * 1.5 + inside * 1.05 + 45) / 60)
 
     def estimates(self, a: str, spots: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return `estimate` from a place to several, given as numbers of places (`spot`); the shape is theirs."""
         if a not in self._estimates:
             k = self.spot[a]
             far = np.hypot(*(self._positions - self._positions[k]).T)
-            minutes = np.ceil((far * 1.5 + 45) / 60).astype(np.int64)
-            self._estimates[a] = np.where(self._houses == self._houses[k], 0, minutes)
+            inside = self._inside + self._inside[k]
+            minutes = np.ceil((far * 1.5 + inside * 1.05 + 45) / 60).astype(np.int64)
+            minutes[k] = 0
+            self._estimates[a] = minutes
         return self._estimates[a][spots]
 
     def metres(self, a: str, b: str) -> float:

@@ -127,7 +127,7 @@ def _tie_neighbours(
         a, b = people[i], people[j]
         if a.household == b.household or "guest" in (a.status, b.status):
             continue
-        if index.same_spot(a.home, b.home):
+        if index.same_building(a.home, b.home):
             network.tie(a, b, (RelationKind.NEIGHBOUR, "same house"), rng.uniform(0.2, 0.55), rng.exponential(5))
         elif rng.random() < 0.6:
             network.tie(a, b, (RelationKind.NEIGHBOUR, "next door"), rng.uniform(0.15, 0.45), rng.exponential(5))

@@ -228,7 +228,7 @@ class _Check:
     def joined(self, before: ScheduleItem, item: ScheduleItem, where: str) -> None:
         places = self.index.place_by_id
         a, b = before.place, item.place
-        if a in places and b in places and a is not None and b is not None and not self.index.same_spot(a, b):
+        if a in places and b in places and a is not None and b is not None and a != b:
             self.say(
                 where,
                 f"nobody gets from {places[a].name} to {places[b].name} in no time",

@@ -71,6 +71,10 @@ class TransitSystem:
         self.taken = np.array([next_departure(line, second) for line in transit.lines], np.int64)
         self.bicycles = Bicycles(transit.bike_stations, traffic, first_entity=first_bike)
         for bus in range(buses):
+            gone, line = second - self.begun[bus], plan.line_of_bus[bus]
+            if self.stop[bus] == 0 and 0.0 < gone < transit.lines[line].travel[1]:
+                # It should be on its way to the second stop by now: the departure that is past is its own.
+                self.taken[line] -= 1
             self._send(bus, int(self.stop[bus]))
             traffic.fleet.at_stop[self._vehicle[bus]] = True
 

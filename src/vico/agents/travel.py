@@ -1,0 +1,347 @@
+"""Travelling: follows a planned trip leg by leg, on foot, by bus and by bicycle, and plans anew when it fails."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from typing import Any
+
+import numpy as np
+
+from vico.agents.base import Action, Info, Observation
+from vico.agents.state import AgentState
+from vico.agents.wayfinding import Walker
+from vico.rules import BIKE_SPEED, BUS_DWELL, STATION_REACH, WALK_SPEED, ReasonCode, code_name
+from vico.world.public import PublicMap
+from vico.world.trips import MODES, Leg, Trip
+from vico.world.walkable import ROADWAY
+
+# This near to where one waits for a bus, or to a rack, is there, metres. At a stop others may stand in the spot: then a
+# little beside it will do, but not on the road, where one would keep the bus from coming up.
+_AT_STOP, _BY_STOP, _AT_RACK = 0.3, 1.5, 1.0
+# A bicycle is left this near to the middle of its rack, metres.
+_TO_RACK = STATION_REACH - 1.0
+# Riders sit this near to the place to wait when their bus stands at a stop, metres.
+_BUS_AT_STOP = 12.0
+# A bus that is this late is not waited for, and one that is this late aboard is left; seconds.
+_LATE, _LOST = 240.0, 300.0
+# After so many seconds of trying when the bus should be there one steps back from the road for as long, so many metres.
+_IN_THE_WAY, _BACK = 15, 2.5
+# So long before a bus is to leave one tries to board: it stands for half a minute, and may be early.
+_EARLY = 2 * BUS_DWELL
+# Stands who has moved less than this in a second, metres; a bus stands that has for so many seconds.
+_STILL, _STANDS = 0.05, 3
+# How often one looks for another spot to get on a bicycle before going elsewhere.
+_TRIES = 4
+# How often one tries to turn a bicycle where it is narrow before leaving it there.
+_PUSHES = 40
+
+_NO_VEHICLE, _NO_FREE_SPOT, _NO_MONEY = (
+    code_name(code) for code in (ReasonCode.NO_VEHICLE, ReasonCode.NO_FREE_SPOT, ReasonCode.NO_MONEY)
+)
+
+
+class Traveller:
+    """Goes from door to door by the trip that arrives first, from observations and the public map alone.
+
+    It walks to the stop, waits, boards, gets off where it planned to, takes a bicycle and brings it back to a station.
+    When a bus is gone or late, a rack empty or the money short, it plans anew from where it is.
+
+    Parameters
+    ----------
+    public_map
+        Streets, timetables and stations.
+    generator
+        Decides how to get around others.
+    modes
+        Ways to get about that it may choose, of `vico.world.trips.MODES`.
+
+    Attributes
+    ----------
+    trip
+        The trip under way, None without one.
+    plans
+        How many trips were planned so far.
+    """
+
+    def __init__(
+        self, public_map: PublicMap, generator: np.random.Generator, *, modes: Collection[str] = MODES
+    ) -> None:
+        self._map = public_map
+        self._rng = generator
+        self._modes = tuple(modes)
+        self._walker = Walker(public_map, generator)
+        self._goal: tuple[float, float] | None = None
+        self.trip: Trip | None = None
+        self.plans = 0
+        self._leg = 0
+        # Stations that had no bicycle, or none one could get on; lines one has no money for need no note: it is seen.
+        self._closed: list[str] = []
+        self._asked = ""
+        self._tries = 0
+        self._last: tuple[float, float] | None = None
+        self._still = 0
+
+    def state(self) -> AgentState:
+        """Return the trip under way; the generator is its owner's to save."""
+        trip = self.trip
+        return {
+            "walker": self._walker.state(),
+            "goal": None if self._goal is None else list(self._goal),
+            "depart": None if trip is None else trip.depart,
+            "legs": {} if trip is None else {str(k): _leg_state(leg) for k, leg in enumerate(trip.legs)},
+            "plans": self.plans,
+            "leg": self._leg,
+            "closed": list(self._closed),
+            "asked": self._asked,
+            "tries": self._tries,
+            "last": None if self._last is None else list(self._last),
+            "still": self._still,
+        }
+
+    def restore(self, state: AgentState) -> None:
+        """Go on with the trip that `state` returned."""
+        self._walker.restore(state["walker"])
+        self._goal = None if state["goal"] is None else (float(state["goal"][0]), float(state["goal"][1]))
+        legs = tuple(_restored_leg(state["legs"][str(k)]) for k in range(len(state["legs"])))
+        self.trip = None if state["depart"] is None else Trip(float(state["depart"]), legs)
+        self.plans, self._leg = int(state["plans"]), int(state["leg"])
+        self._closed, self._asked = [str(name) for name in state["closed"]], str(state["asked"])
+        self._tries, self._still = int(state["tries"]), int(state["still"])
+        self._last = None if state["last"] is None else (float(state["last"][0]), float(state["last"][1]))
+
+    def stop(self) -> None:
+        """Forget the trip; who is in a bus gets off at its next stop, who rides a bicycle takes it to a station."""
+        self._goal, self.trip, self._closed = None, None, []
+        self._walker.stop()
+
+    def towards(
+        self, goal: tuple[float, float], observation: Observation, info: Info, *, speed: float = WALK_SPEED
+    ) -> Action | None:
+        """Return the next action on the way to a point; None once there, or if there is no way.
+
+        Parameters
+        ----------
+        goal
+            ENU metres; a point outdoors. Who is in a building goes out first.
+        speed
+            Metres a second on foot, up to 2.5.
+        """
+        if goal != self._goal:
+            self.stop()
+            self._goal = goal
+        self._notice(observation)
+        action = self._act(goal, observation, info, speed)
+        self._asked = "" if action is None else str(action["type"])
+        return action
+
+    def _notice(self, observation: Observation) -> None:
+        x, y = (float(v) for v in observation["pose"][:2])
+        moved = math.inf if self._last is None else math.hypot(x - self._last[0], y - self._last[1])
+        self._still = self._still + 1 if moved < _STILL else 0
+        self._last = x, y
+
+    def _act(self, goal: tuple[float, float], observation: Observation, info: Info, speed: float) -> Action | None:
+        vehicle = observation["state"]["vehicle"]
+        if vehicle == "bus":
+            return self._ride_bus(observation)
+        if vehicle == "bike":
+            return self._ride_bike(observation, info)
+        leg = self._leg_on_foot(goal, observation)
+        if leg is None:
+            return None
+        if leg.mode == "bus":
+            return self._board(leg, observation, info)
+        if leg.mode == "bike":
+            return self._mount(leg, observation, info)
+        last = self.trip is not None and self._leg == len(self.trip.legs) - 1
+        action = self._walker.towards(goal if last else leg.end, speed, observation, info)
+        if action is not None or last:
+            return action
+        # There is no way to where the ride begins.
+        self._close(leg)
+        return {"type": "wait"}
+
+    def _leg_on_foot(self, goal: tuple[float, float], observation: Observation) -> Leg | None:
+        """Return the leg that is due for who is in no vehicle, planning if need be; None without a trip."""
+        trip = self.trip
+        if trip is not None and self._asked in ("exit_bus", "exit_bike"):
+            # Got off: where it was planned, or somewhere else.
+            leg = trip.legs[self._leg]
+            if _away(observation, leg.end) > _BUS_AT_STOP:
+                trip = None
+            self._leg, self._tries = self._leg + 1, 0
+        if trip is None:
+            state = observation["state"]
+            cash, closed = float(state["cash"]), self._closed
+            trip = self._map.trips.plan(
+                observation["pose"][:2], goal, float(state["time"]), modes=self._modes, cash=cash, closed=closed
+            )
+            self.trip, self._leg, self._tries = trip, 0, 0
+            self.plans += 1
+        if trip is None:
+            return None
+        leg = trip.legs[self._leg]
+        rides_next = leg.mode == "walk" and self._leg < len(trip.legs) - 1
+        if rides_next and self._is_at_the_ride(trip.legs[self._leg + 1], observation):
+            self._leg += 1
+            self._walker.stop()
+            leg = trip.legs[self._leg]
+        return leg
+
+    def _is_at_the_ride(self, ride: Leg, observation: Observation) -> bool:
+        """Return whether one stands where a ride begins."""
+        away = _away(observation, ride.start)
+        if ride.mode == "bike":
+            return away <= _AT_RACK
+        stopped = observation["state"]["action_status"] == "collision"
+        beside = stopped and int(self._map.walkable.class_at(observation["pose"][:2])) != ROADWAY
+        return away <= (_BY_STOP if beside else _AT_STOP)
+
+    # -- buses -------------------------------------------------------------------------------------------------------
+
+    def _board(self, leg: Leg, observation: Observation, info: Info) -> Action:
+        """Wait for the bus, and get in; once it is too late for it, plan anew."""
+        state = observation["state"]
+        now = float(state["time"])
+        if self._asked == "enter_bus" and state["action_code"] == _NO_MONEY:
+            return self._plan_anew()
+        if now > leg.depart + _LATE:
+            return self._plan_anew()
+        # Which line a bus is of can't be seen: where several stop the time tells.
+        others = [line for line in self._map.lines if leg.origin in line.stops and line.id != leg.line]
+        if others and now < leg.depart - _EARLY:
+            return {"type": "wait"}
+        if self._asked == "enter_bus" and state["action_code"] == _NO_VEHICLE and now > leg.depart - BUS_DWELL:
+            self._tries += 1
+        # A bus that leaves or comes round a bend may stop short of who waits at the kerb: now and then room is made.
+        back = self._tries // _IN_THE_WAY % 2 == 1
+        spot = self._back_from_road(leg.start) if back else leg.start
+        if self._tries >= _IN_THE_WAY:
+            step = self._walker.towards(spot, WALK_SPEED, observation, info)
+            if step is not None:
+                self._tries += 1
+                return step
+        return {"type": "enter_bus"}
+
+    def _back_from_road(self, spot: tuple[float, float]) -> tuple[float, float]:
+        """Return a point a step farther from the road than a spot beside it; the spot if there is no room."""
+        walkable, here = self._map.walkable, np.asarray(spot, np.float64)
+        ix, iy = walkable.cell_of(here)
+        k = math.ceil(4.0 / walkable.cell)
+        low_x, low_y = max(0, int(ix) - k), max(0, int(iy) - k)
+        rows, columns = np.nonzero(walkable.cls[low_y : int(iy) + k + 1, low_x : int(ix) + k + 1] == ROADWAY)
+        road = walkable.centre_of(np.column_stack([columns + low_x, rows + low_y]))
+        around = np.arange(0.0, 2 * math.pi, math.pi / 8)
+        ring = here + _BACK * np.column_stack([np.cos(around), np.sin(around)])
+        ring = ring[walkable.is_connected(ring) & (walkable.clearance_at(ring) >= 0.3)]
+        if not len(road) or not len(ring):
+            return spot
+        away = np.hypot(ring[:, None, 0] - road[None, :, 0], ring[:, None, 1] - road[None, :, 1]).min(axis=1)
+        best = ring[int(np.argmax(np.round(away, 3)))]
+        return float(best[0]), float(best[1])
+
+    def _ride_bus(self, observation: Observation) -> Action:
+        """Stay in until the bus stands where one wants to get off."""
+        trip = self.trip
+        leg = trip.legs[self._leg] if trip is not None and self._leg < len(trip.legs) else None
+        if leg is None or leg.mode != "bus":
+            return {"type": "exit_bus"}
+        if _away(observation, leg.end) <= _BUS_AT_STOP:
+            return {"type": "exit_bus"}
+        late = float(observation["state"]["time"]) > leg.arrive + _LOST
+        if self._still >= _STANDS and (late or self._is_off_the_line(leg, observation)):
+            return {"type": "exit_bus"}
+        return {"type": "wait"}
+
+    def _is_off_the_line(self, leg: Leg, observation: Observation) -> bool:
+        """Return whether the bus stands at a stop of other lines only: it is not the one that was meant."""
+        near = [stop.id for stop in self._map.stops if _away(observation, stop.wait) <= _BUS_AT_STOP]
+        mine = next(line.stops for line in self._map.lines if line.id == leg.line)
+        return bool(near) and not any(stop in mine for stop in near)
+
+    # -- bicycles ----------------------------------------------------------------------------------------------------
+
+    def _mount(self, leg: Leg, observation: Observation, info: Info) -> Action:
+        """Get on a bicycle at the rack; if there is none, plan anew without it."""
+        code = observation["state"]["action_code"] if self._asked == "enter_bike" else ""
+        if code == _NO_MONEY:
+            return self._plan_anew()
+        if code == _NO_VEHICLE or self._tries > _TRIES:
+            return self._close(leg)
+        if code == _NO_FREE_SPOT:
+            self._tries += 1
+        if self._tries and self._asked == "enter_bike":
+            # No room to get on just here: from a step aside there may be.
+            aside = float(self._rng.uniform(40.0, 140.0))
+            return {"type": "turn_left" if self._tries % 2 else "turn_right", "degrees": aside}
+        if self._tries and self._asked in ("turn_left", "turn_right"):
+            return {"type": "move_forward", "distance": 0.8}
+        return {"type": "enter_bike"}
+
+    def _ride_bike(self, observation: Observation, info: Info) -> Action:
+        """Ride to the station, and leave the bicycle there."""
+        trip = self.trip
+        leg = trip.legs[self._leg] if trip is not None and self._leg < len(trip.legs) else None
+        end = leg.end if leg is not None and leg.mode == "bike" else self._nearest_station(observation)
+        if end is None or _away(observation, end) <= _TO_RACK:
+            refused = self._asked == "exit_bike" and observation["state"]["action_code"] == _NO_FREE_SPOT
+            if end is None or not refused:
+                return {"type": "exit_bike"}
+        freed = self._freed(observation)
+        if freed is not None:
+            return freed
+        action = self._walker.towards(end, BIKE_SPEED, observation, info)
+        return {"type": "exit_bike"} if action is None else action
+
+    def _freed(self, observation: Observation) -> Action | None:
+        """Return what gets a bicycle out of a place where it can't be turned; None where it can."""
+        if observation["state"]["action_status"] != "collision" or self._asked not in ("turn_left", "turn_right"):
+            return None
+        self._tries += 1
+        if self._tries > _PUSHES:
+            return {"type": "exit_bike"}
+        # Ahead a little, or round the other way.
+        if self._tries % 2:
+            return {"type": "move_forward", "distance": float(self._rng.uniform(0.3, 1.2))}
+        other = "turn_right" if self._asked == "turn_left" else "turn_left"
+        return {"type": other, "degrees": float(self._rng.uniform(20.0, 120.0))}
+
+    def _nearest_station(self, observation: Observation) -> tuple[float, float] | None:
+        spots = [(s.position[0], s.position[1]) for s in self._map.bike_stations]
+        return min(spots, key=lambda spot: _away(observation, spot), default=None)
+
+    def _close(self, leg: Leg) -> Action:
+        """Do without the place where a ride should have begun."""
+        trip = self.trip
+        ride = leg if leg.origin is not None or trip is None else trip.legs[self._leg + 1]
+        if ride.origin is not None:
+            self._closed.append(ride.origin)
+        return self._plan_anew()
+
+    def _plan_anew(self) -> Action:
+        self.trip = None
+        self._walker.stop()
+        return {"type": "wait"}
+
+
+def _away(observation: Observation, point: tuple[float, ...]) -> float:
+    x, y = observation["pose"][:2]
+    return math.hypot(float(x) - point[0], float(y) - point[1])
+
+
+_FIELDS = ("mode", "depart", "arrive", "metres", "price", "line", "origin", "destination")
+
+
+def _leg_state(leg: Leg) -> dict[str, Any]:
+    fields = {name: getattr(leg, name) for name in _FIELDS}
+    return fields | {"start": list(leg.start), "end": list(leg.end), "polyline": leg.polyline.copy()}
+
+
+def _restored_leg(state: dict[str, Any]) -> Leg:
+    start, end = ((float(x), float(y)) for x, y in (state["start"], state["end"]))
+    polyline = np.array(state["polyline"], np.float64).reshape(-1, 2)
+    return Leg(start=start, end=end, polyline=polyline, **{name: state[name] for name in _FIELDS})
+
+
+__all__ = ["Traveller"]

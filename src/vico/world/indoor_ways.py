@@ -1,0 +1,96 @@
+"""Ways inside buildings: from the street through corridors and over stairs to the rooms of a place."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Iterable
+
+from vico.rules import WALK_SPEED
+from vico.world.model import LANDING, Doorway, Point3, Room
+
+#: Seconds that going through a door takes, or from floor to floor in a lift: an agent acts once a second.
+DOOR = 1.0
+
+
+class IndoorWays:
+    """How long the ways are from the street to the rooms behind a door.
+
+    Parameters
+    ----------
+    rooms
+        Of a world; those of a place are joined by their doors.
+    """
+
+    def __init__(self, rooms: Iterable[Room]) -> None:
+        self._rooms = {room.id: room for room in rooms}
+        self._from_street: dict[str, dict[str, float]] = {}
+
+    def from_street(self, first: str) -> dict[str, float]:
+        """Return the seconds from before the door to a spot a step inside each room that can be reached, on foot.
+
+        Parameters
+        ----------
+        first
+            Id of the room behind the door to the street.
+        """
+        if first not in self._from_street:
+            self._from_street[first] = self._search(first)
+        return self._from_street[first]
+
+    def seconds(self, rooms: Iterable[str]) -> float:
+        """Return the seconds from the street to the farthest room of a place, by its rooms' ids, entrance room first.
+
+        0 for a place in the open.
+        """
+        ids = list(rooms)
+        if not ids or ids[0] not in self._rooms:
+            return 0.0
+        found = self.from_street(ids[0])
+        return max(found.get(room, 0.0) for room in ids)
+
+    def _search(self, first: str) -> dict[str, float]:
+        best: dict[str, float] = {}
+        start = self._rooms[first]
+        way_in = next((door.inside for door in self._doors(start) if not door.to), start.inside)
+        queue: list[tuple[float, str, Point3]] = [(DOOR, first, way_in)]
+        seen: set[tuple[str, Point3]] = set()
+        while queue:
+            at, name, here = heapq.heappop(queue)
+            if (name, here) in seen:
+                continue
+            seen.add((name, here))
+            best.setdefault(name, at)
+            room = self._rooms[name]
+            for door in self._doors(room):
+                if door.to in self._rooms:
+                    after = at + walk_within(room, here, door.inside) / WALK_SPEED + DOOR
+                    heapq.heappush(queue, (round(after, 3), door.to, self._arrival(door.to, name)))
+        return best
+
+    def _arrival(self, room: str, origin: str) -> Point3:
+        record = self._rooms[room]
+        return next((door.inside for door in self._doors(record) if door.to == origin), record.inside)
+
+    def _doors(self, room: Room) -> list[Doorway]:
+        """Return a room's ways out; where it lists none, its own door leads to the street or a room it links."""
+        if room.doors:
+            return room.doors
+        return [Doorway(to=link, position=self._rooms[link].door, inside=room.inside) for link in room.links]
+
+
+def walk_within(room: Room, start: Point3, goal: Point3) -> float:
+    """Return the metres between two points of a room; on stairs around the wall between the flights."""
+    if not room.rise:
+        return math.dist(start[:2], goal[:2])
+    c, s = math.cos(room.yaw), math.sin(room.yaw)
+    (along, across), (along_goal, across_goal) = (
+        (c * (x - room.centre[0]) + s * (y - room.centre[1]), c * (y - room.centre[1]) - s * (x - room.centre[0]))
+        for x, y, _ in (start, goal)
+    )
+    if (across < 0) == (across_goal < 0):
+        return math.dist(start[:2], goal[:2])
+    # The flights meet at the landing halfway up, at the far end along own x.
+    turn = room.size[0] / 2 - LANDING / 2
+    up = math.hypot(turn - along, across)
+    return up + math.hypot(turn - along_goal, across_goal)
