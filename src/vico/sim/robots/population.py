@@ -195,24 +195,24 @@ class RobotPopulation:
 
         `left` ticks of the sub-step were left before these.
         """
-        arrays = self.run.arrays
-        left += int(arrays.owed[0])
-        arrays.owed += ticks
-        while arrays.owed[0]:
-            now = int(arrays.tick[0])
-            until_told = min(group.period - now % group.period for group in self.scene.groups)
-            frame = frame_length(self._needs(), min(left, until_told) * TICK)
+        arrays, groups = self.run.arrays, self.scene.groups
+        now, owed = int(arrays.tick[0]), int(arrays.owed[0]) + ticks
+        left += owed - ticks
+        needs = self._needs()  # decided between sub-steps, not within
+        arrays.owed[0] = owed
+        while owed:
+            until_told = min([group.period - now % group.period for group in groups])
+            frame = frame_length(needs, min(left, until_told) * TICK)
             taken = round(frame / TICK)
-            if taken > arrays.owed[0]:
+            if taken > owed:
                 return
-            for group, memory in zip(self.scene.groups, self.run.memory, strict=True):
+            for group, memory in zip(groups, self.run.memory, strict=True):
                 if now % group.period == 0:
                     command_motors(self.run, group, memory)
             self.engine.step(frame=frame)
+            now, owed, left = now + taken, owed - taken, left - taken
             arrays.frames[0 if taken == 1 else 1] += 1
-            arrays.tick += taken
-            arrays.owed -= taken
-            left -= taken
+            arrays.tick[0], arrays.owed[0] = now, owed
 
     def _needs(self) -> FrameNeeds:
         """Return what decides how long a frame is."""
