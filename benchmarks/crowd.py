@@ -17,6 +17,7 @@ import resource
 import subprocess
 import sys
 import time
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
@@ -55,15 +56,20 @@ def steps(world_folder: Path, community_folder: Path, options: dict[str, Any], c
     followers = followers_of(community, PublicMap.from_world(world), seed=config.seed)
     observations, infos = sim.observe()
     cpu, wall = [], []
-    for step in range(count + _WARM):
-        if step == _WARM:
-            sim.metrics.seconds.clear()
-        began, spent = time.perf_counter(), time.process_time()
-        result = sim.step(ask(followers, observations, infos))
-        observations, infos = result.observations, result.infos
-        if step >= _WARM:
-            cpu.append(1000 * (time.process_time() - spent))
-            wall.append(1000 * (time.perf_counter() - began))
+    # As the runner of these sources does.
+    settled: Any = nullcontext
+    with suppress(ImportError):
+        from vico.runner.garbage import settled
+    with settled():
+        for step in range(count + _WARM):
+            if step == _WARM:
+                sim.metrics.seconds.clear()
+            began, spent = time.perf_counter(), time.process_time()
+            result = sim.step(ask(followers, observations, infos))
+            observations, infos = result.observations, result.infos
+            if step >= _WARM:
+                cpu.append(1000 * (time.process_time() - spent))
+                wall.append(1000 * (time.perf_counter() - began))
     phases = {name: 1000 * seconds / count for name, seconds in sim.metrics.seconds.items()}
     phases["agents and the rest"] = float(np.mean(wall)) - sum(phases.values())
     return {"cpu": cpu, "wall": wall, "phases": phases}

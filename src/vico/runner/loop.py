@@ -11,6 +11,7 @@ from vico.agents.base import Action, AgentState
 from vico.envs.spaces import short_form
 from vico.errors import InputError
 from vico.runner.faults import Failure, FaultLog, is_malformed
+from vico.runner.garbage import settled
 from vico.runner.gather import Gatherer
 from vico.sim.simulation import Simulation, StepResult
 
@@ -93,6 +94,10 @@ class Runner:
         InputError
             If states are to be saved, and an agent has none to give.
         """
+        with settled():
+            self._run(steps, until)
+
+    def _run(self, steps: int, until: Callable[[], bool]) -> None:
         sim = self.sim
         places, people = [place.id for place in sim.world.places], sim.state.people.names
         names = set(sim.agents)
