@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import toy_city
-from vico.sim.avatars import CLIPS
+from vico.sim.avatars import CLIPS, clearances
 from vico.sim.config import SimConfig
 from vico.sim.overlaps import overlaps_of
 from vico.sim.simulation import Simulation
@@ -111,3 +111,15 @@ def test_a_cyclist_never_turns_or_rides_into_somebody_beside_the_bicycle(sim: Si
         assert overlaps_of(sim.state) == []
         sim.step({"assistant_0": {"type": "move_forward", "distance": 0.4}})
         assert overlaps_of(sim.state) == []
+
+
+def test_people_stop_a_little_before_a_robot_that_physics_may_move() -> None:
+    sim = Simulation(toy_city.world(), None, SimConfig(assistants=1, robots=("husky",), observe=()))
+    assert sim.state.robots is not None
+    x, y, _ = sim.state.robots.bodies().position[0]
+    sim.scenario.place_agent("assistant_0", (x + 1.6, y), yaw=np.pi)
+    for _ in range(3):
+        result = sim.step({"assistant_0": {"type": "move_forward", "distance": 1.0}})
+    assert "stopped by robot" in result.observations["assistant_0"]["state"]["action_reason"]
+    gap = clearances(sim.state.people.position[0], sim.state.robots.bodies())[0] - RADIUS
+    assert 0.025 < gap < 0.05

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vico.rules import ActionStatus, ReasonCode
 from vico.sim import moves, rides
-from vico.sim.bodies import Bodies, HasBodies, Subsystem
+from vico.sim.bodies import ROBOT, Bodies, HasBodies, Subsystem
 from vico.sim.footprints import records_of
 from vico.sim.metrics import StopWatch
 from vico.sim.periods import ACTION_TICKS, SUBSTEP, SUBSTEP_TICKS, TICKS_PER_SECOND, ControlPeriods
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import REASON_LENGTH
+
+#: Metres that people keep from robots: these move after them in the same sub-step, and in physics bodies give a little.
+ROBOT_MARGIN = 0.03
 
 
 def advance_ticks(state: SimulationState, ticks: int, periods: ControlPeriods, watch: StopWatch) -> int:
@@ -57,13 +61,23 @@ def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _A
     share = SUBSTEP_TICKS / np.maximum(ACTION_TICKS - gone, SUBSTEP_TICKS)
     lying = state.objects.in_rooms()
     in_rooms = records_of(state.objects.bodies_of(lying), state.objects.room[lying])
-    obstacles = np.concatenate([records_of(bodies.but(state.avatars)), in_rooms])
+    obstacles = np.concatenate([_held_off(bodies.but(state.avatars)), in_rooms])
     state.avatars.advance(SUBSTEP, obstacles, share=share)
     rides.follow(state)
     bodies.refresh(state.avatars)
     stopped = _report_collisions(state)
     watch.lap("avatars")
     return stopped
+
+
+def _held_off(others: Bodies) -> NDArray[np.void]:
+    """Return bodies as avatars are kept off them, dtype `vico.sim.footprints.BODY`: robots with some room to yield."""
+    records = records_of(others)
+    margin = np.where(others.kind == ROBOT, ROBOT_MARGIN, 0.0)
+    for name in ("half_length", "half_width"):
+        records[name] += margin
+    records["radius"] += 2 * margin
+    return records
 
 
 def _report_collisions(state: SimulationState) -> int:
