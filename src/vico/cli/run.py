@@ -53,7 +53,10 @@ def run(options: RunOptions) -> int:
     if options.resume is not None:
         options = _resumed(options, options.resume)
     if options.world is None or options.community is None or options.out is None:
-        raise InputError("run: give WORLD, COMMUNITY and --out OUT, or --resume OUT for a run that was cut short")
+        raise InputError(
+            "run: give WORLD, COMMUNITY and --out OUT, or --resume OUT for a run that was cut short; "
+            "see vico run --help"
+        )
     if options.steps < 1:
         raise InputError(f"run: --steps {options.steps}; it has to be 1 or more")
     if options.agent and not options.assistants:

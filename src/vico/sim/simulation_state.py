@@ -161,6 +161,9 @@ class RobotSystem(Subsystem, Protocol):
     def joint_positions(self) -> list[NDArray[np.float64]]:
         """Return the angles of each robot's joints, rad; as many as it has."""
 
+    def physics_record(self) -> dict[str, Any]:
+        """Return the engine, how many frames of either length there were and why, and what found no room in it."""
+
     def events(self) -> Sequence[RobotNote]:
         """Return what happened to robots since this was last asked."""
 
