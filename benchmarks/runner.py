@@ -18,7 +18,7 @@ from reporting import machine
 
 from vico.runner.foreign import Terms, foreign_agents
 from vico.runner.gather import Gatherer
-from vico.runner.loading import Seat
+from vico.runner.loading import AgentSeat
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
 from vico.world.folder import World, read_world
@@ -57,7 +57,7 @@ def measure(world: World, *, steps: int, pictures: bool, how: str) -> tuple[floa
     costs = []
     for count in (0, steps):  # what starting and ending a process costs is taken off
         before = spent_by_children()
-        seats = [Seat(name, number=i, of=AGENTS) for i, name in enumerate(names)]
+        seats = [AgentSeat(name, number=i, of=AGENTS) for i, name in enumerate(names)]
         players = foreign_agents(f"{__file__}:Waiter", seats, world, Terms(isolate=how == "isolated"))
         agents = Gatherer(players, trusted=names if how == "trusted" else (), deadline=60.0)
         agents.gather(observations, infos)

@@ -13,7 +13,7 @@ from vico.community import build_community
 from vico.runner.check import check_agent
 from vico.runner.foreign import Terms, foreign_agents
 from vico.runner.gather import Gatherer
-from vico.runner.loading import Seat
+from vico.runner.loading import AgentSeat
 from vico.runner.loop import Runner
 from vico.seeds import rng
 from vico.sim.config import SimConfig
@@ -69,7 +69,7 @@ def main() -> None:
 
     people = build_community(world, residents=3, seed=0)
     sim = Simulation(world, people, SimConfig(assistants=2, cars=5, pedestrians=5, observe=()))
-    seats = [Seat(f"assistant_{i}", seed=0, number=i, of=2) for i in range(2)]
+    seats = [AgentSeat(f"assistant_{i}", seed=0, number=i, of=2) for i in range(2)]
     agents = Gatherer(foreign_agents(spec, seats, world, Terms(isolate=True)), deadline=60.0)
     try:
         Runner(sim, agents).run(arguments.steps // 2)

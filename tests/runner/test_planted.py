@@ -17,7 +17,7 @@ from vico.runner.faults import Fault
 from vico.runner.foreign import Terms, foreign_agents
 from vico.runner.gather import Gatherer
 from vico.runner.isolated import IsolatedAgent
-from vico.runner.loading import Seat
+from vico.runner.loading import AgentSeat
 from vico.runner.loop import Hook, Runner, Step
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
@@ -49,7 +49,7 @@ def play(
     world.path = folder  # isolated agents could read their map there; none of the planted ones does
     terms = Terms(deadline=deadline, isolate=isolate)
     spec = f"{planted_agents.__file__}:{name}"
-    players = foreign_agents(spec, [Seat("assistant_0")], world, terms)
+    players = foreign_agents(spec, [AgentSeat("assistant_0")], world, terms)
     followers = followers_of(toy_city.community(), PublicMap.from_world(world))
     agents = Gatherer(followers | players, trusted=followers, deadline=terms.deadline)
     listener = Messages()
@@ -117,7 +117,7 @@ def test_the_world_goes_on_as_if_they_had_waited(tmp_path: Path, name: str) -> N
     def outcome(name: str) -> list[object]:
         world = toy_city.world()
         sim = Simulation(world, toy_city.community(), SimConfig(assistants=1, observe=("assistant_0",), image=32))
-        players = foreign_agents(f"{planted_agents.__file__}:{name}", [Seat("assistant_0")], world, Terms())
+        players = foreign_agents(f"{planted_agents.__file__}:{name}", [AgentSeat("assistant_0")], world, Terms())
         followers = followers_of(toy_city.community(), PublicMap.from_world(world))
         agents = Gatherer(followers | players, trusted=followers, deadline=2.0)
         Runner(sim, agents).run(3)
@@ -157,7 +157,7 @@ def test_a_function_is_an_agent(tmp_path: Path, isolate: bool) -> None:
 
 
 def test_a_process_ends_with_its_agent(tmp_path: Path) -> None:
-    agent = IsolatedAgent(f"{planted_agents.__file__}:Sleeper", Seat("assistant_0"), world=tmp_path)
+    agent = IsolatedAgent(f"{planted_agents.__file__}:Sleeper", AgentSeat("assistant_0"), world=tmp_path)
     agent.close()
     assert agent._process.returncode is not None
     agent.close()  # once more does no harm
@@ -167,8 +167,8 @@ HOLDER = """
 import sys, time
 from pathlib import Path
 from vico.runner.isolated import IsolatedAgent
-from vico.runner.loading import Seat
-agent = IsolatedAgent(sys.argv[1], Seat("assistant_0"), world=Path("."))
+from vico.runner.loading import AgentSeat
+agent = IsolatedAgent(sys.argv[1], AgentSeat("assistant_0"), world=Path("."))
 print(agent._process.pid, flush=True)
 agent.act({}, {})
 """

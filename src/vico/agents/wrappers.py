@@ -15,19 +15,19 @@ class NoStateError(InputError):
     """An agent was asked for its state and has none to give."""
 
 
-class Usage(NamedTuple):
+class AgentUsage(NamedTuple):
     """What an agent spent on language models so far: tokens, and US dollars."""
 
     tokens: int = 0
     cost: float = 0.0
 
 
-def usage_of(agent: object) -> Usage:
+def usage_of(agent: object) -> AgentUsage:
     """Return what an agent says it spent: its attributes ``tokens`` and ``cost``, 0 where it has none."""
     tokens, cost = getattr(agent, "tokens", 0), getattr(agent, "cost", 0.0)
     whole = tokens if isinstance(tokens, int) and tokens >= 0 else 0
     dollars = float(cost) if isinstance(cost, (int, float)) and np.isfinite(cost) and cost >= 0 else 0.0
-    return Usage(whole, dollars)
+    return AgentUsage(whole, dollars)
 
 
 def as_agent(thing: Any, *, name: str = "agent") -> Agent:

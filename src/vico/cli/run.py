@@ -21,9 +21,9 @@ from vico.io.folders import remove
 from vico.runner.faults import FaultLog
 from vico.runner.foreign import Terms, foreign_agents
 from vico.runner.gather import Gatherer
-from vico.runner.loading import Seat
+from vico.runner.loading import AgentSeat
 from vico.runner.loop import Hook, Runner, Step
-from vico.runner.recording import Recording, go_on_from
+from vico.runner.recording import RecordedRun, go_on_from
 from vico.sim.config import SimConfig
 from vico.sim.recorder import Recorder
 from vico.sim.recording.checkpoints import checkpoint_steps
@@ -149,7 +149,7 @@ class _Job:
                     remove(self.out)
                     recorder = Recorder(self.out, sim, **how)
                 with recorder:
-                    hooks = [_Progress(report, steps), Recording(recorder, faults)]
+                    hooks = [_Progress(report, steps), RecordedRun(recorder, faults)]
                     Runner(sim, agents, hooks=hooks, states_every=every, faults=faults).run(steps)
                     return recorder.close()
 
@@ -158,7 +158,9 @@ class _Job:
         options = self.options
         followers = followers_of(self.community, PublicMap.from_world(self.world), seed=options.seed)
         terms = Terms(deadline=options.deadline or None, isolate=options.isolate, workers=workers())
-        seats = [Seat(f"assistant_{i}", options.seed, [], i, options.assistants) for i in range(options.assistants)]
+        seats = [
+            AgentSeat(f"assistant_{i}", options.seed, [], i, options.assistants) for i in range(options.assistants)
+        ]
         players = foreign_agents(options.agent, seats, self.world, terms) if options.agent else {}
         return Gatherer(followers | players, trusted=followers, deadline=terms.deadline, workers=terms.workers)
 

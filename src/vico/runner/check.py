@@ -19,7 +19,7 @@ from vico.runner.foreign import Terms, foreign_agents
 from vico.runner.gather import failure_of
 from vico.runner.given import own_info, own_observation, sent_info
 from vico.runner.isolated import IsolatedAgent
-from vico.runner.loading import Seat
+from vico.runner.loading import AgentSeat
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
 from vico.world.folder import World
@@ -114,7 +114,7 @@ def check_agent(
     """
     check = AgentCheck()
     terms = Terms(isolate=isolate)
-    seat = Seat(NAME, seed, instructions or [])
+    seat = AgentSeat(NAME, seed, instructions or [])
     with ExitStack() as made:
 
         def another() -> Agent:

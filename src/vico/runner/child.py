@@ -15,7 +15,7 @@ from vico.agents.wrappers import usage_of
 from vico.errors import VicoError, sentence_of
 from vico.runner.answers import MalformedError, plain_action
 from vico.runner.given import received_info
-from vico.runner.loading import Seat, load, make_agent
+from vico.runner.loading import AgentSeat, load, make_agent
 from vico.runner.wire import ClosedError, packed, receive, send
 from vico.world.folder import read_world
 from vico.world.public import PublicMap
@@ -57,7 +57,7 @@ def _do(agent: Agent, message: dict[str, Any]) -> Any:
 
 def _make(message: dict[str, Any]) -> Agent:
     _limit_memory(int(message["memory"]))
-    seat = Seat(**message["seat"])
+    seat = AgentSeat(**message["seat"])
     return make_agent(load(message["spec"]), seat, lambda: PublicMap.from_world(read_world(Path(message["world"]))))
 
 

@@ -9,7 +9,7 @@ from vico.agents.base import Action, Agent, AgentState, Info, Observation
 from vico.errors import InputError
 from vico.runner.given import own_map
 from vico.runner.isolated import MEMORY, IsolatedAgent
-from vico.runner.loading import Seat, load, make_agent
+from vico.runner.loading import AgentSeat, load, make_agent
 from vico.world.folder import World
 from vico.world.public import PublicMap
 
@@ -71,7 +71,7 @@ class AbsentAgent:
         """Remember nothing."""
 
 
-def foreign_agents(spec: str, seats: Sequence[Seat], world: World, terms: Terms) -> dict[str, Agent]:
+def foreign_agents(spec: str, seats: Sequence[AgentSeat], world: World, terms: Terms) -> dict[str, Agent]:
     """Make an agent for every seat.
 
     Parameters

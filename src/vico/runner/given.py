@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vico.agents.base import Info, Observation
-from vico.sim.perception import Seen
+from vico.sim.perception import SeenBody
 from vico.world.public import PublicMap
 
 
@@ -27,7 +27,7 @@ class ListedInView:
         As in `InView`.
     """
 
-    def __init__(self, bodies: Sequence[Seen], room: ArrayLike, furniture: ArrayLike) -> None:
+    def __init__(self, bodies: Sequence[SeenBody], room: ArrayLike, furniture: ArrayLike) -> None:
         self._bodies = list(bodies)
         self.distance: NDArray[np.float64] = np.array([body.distance for body in self._bodies], np.float64)
         self.room: NDArray[np.float64] = np.array(room, np.float64)
@@ -36,10 +36,10 @@ class ListedInView:
     def __len__(self) -> int:
         return len(self._bodies)
 
-    def __iter__(self) -> Iterator[Seen]:
+    def __iter__(self) -> Iterator[SeenBody]:
         return iter(self._bodies)
 
-    def within(self, reach: float) -> Iterator[Seen]:
+    def within(self, reach: float) -> Iterator[SeenBody]:
         """Yield what is no farther away than `reach` metres, nearest first."""
         return (body for body in self._bodies if body.distance <= reach)
 
@@ -55,7 +55,7 @@ class ListedInView:
     @classmethod
     def of(cls, record: Mapping[str, Any]) -> ListedInView:
         """Make one of what `record` returned."""
-        bodies = [Seen(**{**body, "position": tuple(body["position"])}) for body in record["bodies"]]
+        bodies = [SeenBody(**{**body, "position": tuple(body["position"])}) for body in record["bodies"]]
         return cls(bodies, record["room"], record["furniture"])
 
 

@@ -17,7 +17,7 @@ from vico.agents.base import Action, AgentState, Info, Observation
 from vico.errors import InputError, SchemaError
 from vico.runner.answers import MalformedError
 from vico.runner.given import sent_info
-from vico.runner.loading import Seat
+from vico.runner.loading import AgentSeat
 from vico.runner.wire import ClosedError, packed, receive, send
 
 #: Memory an agent's process may have, MiB.
@@ -60,7 +60,7 @@ class IsolatedAgent:
         If it can't be loaded or made; the message says why.
     """
 
-    def __init__(self, spec: str, seat: Seat, *, world: Path, memory: int = MEMORY) -> None:
+    def __init__(self, spec: str, seat: AgentSeat, *, world: Path, memory: int = MEMORY) -> None:
         self.tokens = 0
         self.cost = 0.0
         self._spec = spec

@@ -19,7 +19,7 @@ from vico.world.public import PublicMap
 
 
 @dataclass(frozen=True)
-class Seat:
+class AgentSeat:
     """What an agent may be told when it is made: its constructor names what it wants of it as arguments.
 
     Attributes
@@ -85,7 +85,7 @@ def source_digest(spec: str) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
 
 
-def make_agent(thing: Any, seat: Seat, public_map: Callable[[], PublicMap]) -> Agent:
+def make_agent(thing: Any, seat: AgentSeat, public_map: Callable[[], PublicMap]) -> Agent:
     """Make an agent of what `load` found.
 
     Parameters

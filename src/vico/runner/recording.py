@@ -29,7 +29,7 @@ def go_on_from(checkpoint: Checkpoint, agents: Gatherer) -> FaultLog:
     return FaultLog.of(checkpoint.notes["faults"])
 
 
-class Recording(Hook):
+class RecordedRun(Hook):
     """Hands every step to a recorder, and what agents did wrong; saves the run where it can be gone on with.
 
     Parameters

@@ -25,7 +25,7 @@ from vico.sim.recording.checkpoints import (
 )
 from vico.sim.recording.films import ViewFilms, drop_views_after
 from vico.sim.recording.manifest import agents_record, describer, read_manifest, run_record
-from vico.sim.recording.samples import Samples, everybody
+from vico.sim.recording.samples import StepSamples, everybody
 from vico.sim.recording.schema import AGENTS, MANIFEST, METRICS, SEGMENT_STEPS
 from vico.sim.recording.segments import drop_after, segments_of, write_segment
 from vico.sim.simulation import Simulation, StepResult
@@ -92,7 +92,7 @@ class Recorder:
         self.out, self.sim, self.wanted, self.states_every = out, sim, wanted, states_every
         self._sources = dict(sources)
         self._closed = False
-        self._samples = Samples(sim)
+        self._samples = StepSamples(sim)
         self._films = ViewFilms(out)
         self._hash = sim.state_hash()
         self._began = time.perf_counter()

@@ -15,7 +15,7 @@ from vico.assets.robots.model import (
     BUMPER,
     TOUCH,
     ActionSpace,
-    Deck,
+    DeckModel,
     RobotModel,
     Sensors,
     SkidSteering,
@@ -157,7 +157,7 @@ def husky(packs: bool = True) -> RobotModel:
         control_period=0.02,
         sensors=Sensors(camera=(0.29, 0.0, 0.335)),
         # The rails' tops, behind the camera's mast.
-        deck=Deck((-0.095, 0.0, 0.252), 0.63, 0.62),
+        deck=DeckModel((-0.095, 0.0, 0.252), 0.63, 0.62),
         stand=_STAND,
         half_length=0.495,
         half_width=0.3425,

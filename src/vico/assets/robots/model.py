@@ -118,7 +118,7 @@ class Sensors:
 
 
 @dataclass(frozen=True)
-class Deck:
+class DeckModel:
     """A level rectangle of a moving body on which things can be put; they move with it.
 
     Attributes
@@ -258,7 +258,7 @@ class RobotModel:
     height: float
     shapes: Mapping[str, list[Surface]] = field(repr=False)
     sensors: Sensors = Sensors()
-    deck: Deck | None = None
+    deck: DeckModel | None = None
     lookahead: float = 0.7
     arrival: float = 0.3
     fallen_below: float | None = 0.7

@@ -24,7 +24,7 @@ from vico.errors import InputError
 from vico.runner.faults import FaultLog
 from vico.runner.foreign import AbsentAgent, Terms, foreign_agents
 from vico.runner.gather import Gatherer
-from vico.runner.loading import Seat, source_digest
+from vico.runner.loading import AgentSeat, source_digest
 from vico.runner.loop import Hook, Runner, Step
 from vico.version import __version__
 from vico.world.folder import World
@@ -167,7 +167,7 @@ def _planners(method: str, names: list[str], task: Task, world: World, terms: Te
         }
     made: dict[str, Agent] = {}
     for i, name in enumerate(names):
-        seat = Seat(name, task.seed, told, i, of)
+        seat = AgentSeat(name, task.seed, told, i, of)
         try:
             made |= foreign_agents(method, [seat], world, terms)
         except InputError as error:

@@ -31,7 +31,7 @@ _FREE_END = 0.6
 
 
 @dataclass(frozen=True)
-class Seen:
+class SeenBody:
     """A body in view.
 
     Attributes
@@ -85,10 +85,10 @@ class InView:
     def __len__(self) -> int:
         return len(self._chosen)
 
-    def __iter__(self) -> Iterator[Seen]:
+    def __iter__(self) -> Iterator[SeenBody]:
         return self.within(math.inf)
 
-    def within(self, reach: float) -> Iterator[Seen]:
+    def within(self, reach: float) -> Iterator[SeenBody]:
         """Yield what is no farther away than `reach` metres, nearest first."""
         near = int(np.searchsorted(self.distance, reach, side="right"))
         for k, far in zip(self._chosen[:near].tolist(), self.distance[:near].tolist(), strict=True):
@@ -100,12 +100,12 @@ class InView:
         first = int(wanted.argmax()) if len(wanted) else 0
         return float(self.distance[first]) if len(wanted) and wanted[first] else math.inf
 
-    def _seen(self, k: int, distance: float) -> Seen:
+    def _seen(self, k: int, distance: float) -> SeenBody:
         entity = int(self._bodies.entity[k])
         about = self._entities.get(entity, {})
         x, y, z = self._bodies.position[k].tolist()
         kind = KINDS[int(self._bodies.kind[k])]
-        return Seen(entity, kind, about.get("name", ""), about.get("agent", ""), (x, y, z), distance)
+        return SeenBody(entity, kind, about.get("name", ""), about.get("agent", ""), (x, y, z), distance)
 
 
 @cache

@@ -40,7 +40,7 @@ def _gaps(position, half_length, half_width, centres):  # type: ignore[no-untype
     return out
 
 
-class Movers:
+class KinematicBodies:
     """A fixed number of slots: people on foot first, then everything else that is driven or ridden.
 
     Attributes

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from vico.errors import InputError, SchemaError
 from vico.sim.bodies import Bodies
 from vico.sim.physics.frames import COARSE, SOLVER_STEPS
-from vico.sim.physics.movers import YAW, Movers
+from vico.sim.physics.movers import YAW, KinematicBodies
 from vico.sim.physics.mujoco_model import PARKED, PARKED_APART, SOLID_GROUPS, parked_object, standing_pose
 from vico.sim.physics.mujoco_parameters import Parameters
 from vico.sim.physics.mujoco_scene import CompiledScene, SharedModel
@@ -68,7 +68,7 @@ class MujocoEngine:
         self._qpos, self._qvel = self._data.qpos, self._data.qvel
         self._size = mujoco.mj_stateSize(self._model, STATE)
         self._parameters = Parameters(scene)
-        self._movers = Movers(scene.capacity)
+        self._movers = KinematicBodies(scene.capacity)
         count = scene.capacity.objects
         self._present = np.zeros(count, np.bool_)
         # Seconds for which each object has been slow.

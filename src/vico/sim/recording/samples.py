@@ -24,7 +24,7 @@ Rows = Mapping[str, Any]
 _SORTED = json.JSONEncoder(sort_keys=True)
 
 
-class Samples:
+class StepSamples:
     """Rows of the tables that wait to be written.
 
     Parameters

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from vico.sim.bodies import Bodies
 from vico.sim.robots import commands
-from vico.sim.robots.navigation import GAP, SIGHT, Surroundings
+from vico.sim.robots.navigation import GAP, SIGHT, NearbyBodies
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.state import Mode, RobotRun
 from vico.sim.robots.ways import next_errand, way_to
@@ -33,7 +33,7 @@ def decide(run: RobotRun, dt: float, obstacles: Bodies, mine: Bodies, *, errands
     """
     arrays = run.arrays
     arrays.velocity[:] = 0.0
-    around: Surroundings | None = None
+    around: NearbyBodies | None = None
     for robot, mode in enumerate(arrays.mode.tolist()):
         if arrays.status[robot] == _FALLEN or mode == _MOTORS:
             continue
@@ -41,7 +41,7 @@ def decide(run: RobotRun, dt: float, obstacles: Bodies, mine: Bodies, *, errands
             if errands:
                 _rest(run, robot, dt)
             continue
-        around = around or Surroundings(Bodies.joined([obstacles, mine]))
+        around = around or NearbyBodies(Bodies.joined([obstacles, mine]))
         others = around.near(len(obstacles) + robot, SIGHT + 4)
         if mode == _VELOCITY:
             _hold_velocity(run, robot, others)

@@ -24,7 +24,7 @@ _TRIM = slice(16, 16 + TRIM_SIZE)
 _GAIT = _TRIM.stop
 
 
-class Gait(Protocol):
+class LegGait(Protocol):
     """Joint targets of robots that walk."""
 
     memory: int
@@ -99,7 +99,7 @@ class Legs(MotorController):
         super().__init__(model)
         assert isinstance(model.controller, FourLegs)
         c, period = model.controller, model.control_period
-        self._gait: Gait = WalkingPolicy(model) if c.policy is not None else Trot(model)
+        self._gait: LegGait = WalkingPolicy(model) if c.policy is not None else Trot(model)
         if c.policy is not None:
             rest = np.asarray(model.rest, np.float64)
         else:

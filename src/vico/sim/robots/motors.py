@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from vico.sim.robots.path_follower import RobotStatus
-from vico.sim.robots.scene import Group
+from vico.sim.robots.scene import RobotGroup
 from vico.sim.robots.state import Mode, RobotRun
 
 _MOTORS, _FALLEN = int(Mode.MOTORS), int(RobotStatus.FALLEN)
 
 
-def command_motors(run: RobotRun, group: Group, memory: np.ndarray) -> None:
+def command_motors(run: RobotRun, group: RobotGroup, memory: np.ndarray) -> None:
     """Tell the motors of a kind of robots what to follow for its period.
 
     The usual case, that all of them follow velocities, takes one call without copies.
@@ -46,7 +46,7 @@ def command_motors(run: RobotRun, group: Group, memory: np.ndarray) -> None:
             run.engine.command(robot, group.model.stance)
 
 
-def _follow_velocities(run: RobotRun, group: Group, memory: np.ndarray, rows: np.ndarray) -> None:
+def _follow_velocities(run: RobotRun, group: RobotGroup, memory: np.ndarray, rows: np.ndarray) -> None:
     """Have some of a kind's robots follow their velocities, all in one call."""
     robots, mine = group.robots[rows], memory[rows]
     targets = group.controller.targets(run.engine.motion(robots), run.arrays.velocity[robots], mine)

@@ -39,7 +39,7 @@ BRAKE, SIGHT, FORESIGHT = 0.8, 5.0, 3.0
 FOLLOW = 1.5
 
 
-class Surroundings:
+class NearbyBodies:
     """Everybody outdoors in one sub-step, to be asked who is near a robot.
 
     Parameters

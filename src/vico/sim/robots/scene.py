@@ -22,7 +22,7 @@ _WALL_GAP = 0.12
 
 
 @dataclass(frozen=True)
-class Group:
+class RobotGroup:
     """Robots of one kind: their controller is asked about all of them at once.
 
     Attributes
@@ -110,12 +110,12 @@ class RobotScene:
         return self._narrow[room]
 
 
-def _groups(models: Sequence[RobotModel]) -> tuple[Group, ...]:
+def _groups(models: Sequence[RobotModel]) -> tuple[RobotGroup, ...]:
     members: dict[str, list[int]] = {}
     for robot, model in enumerate(models):
         members.setdefault(model.name, []).append(robot)
     return tuple(
-        Group(model, controller_for(model), np.array(robots, np.int64), round(model.control_period / TICK))
+        RobotGroup(model, controller_for(model), np.array(robots, np.int64), round(model.control_period / TICK))
         for robots in members.values()
         for model in (models[robots[0]],)
     )

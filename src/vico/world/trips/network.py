@@ -52,7 +52,7 @@ class Station:
     takes: bool
 
 
-class Network:
+class TripNetwork:
     """The stops that lines serve, then the bicycle stations, as nodes; numbers of nodes are their order.
 
     Parameters

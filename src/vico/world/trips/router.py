@@ -14,12 +14,12 @@ from vico.rules import WALK_SPEED
 from vico.world.model import Point2, Transit
 from vico.world.routing import Router
 from vico.world.trips.model import MODES, Closure, Leg, Trip
-from vico.world.trips.network import Network
+from vico.world.trips.network import TripNetwork
 from vico.world.trips.search import Label, Question, best_trips
 from vico.world.trips.ways import Way, Ways
 
 
-class Place(Protocol):
+class TripEnd(Protocol):
     """What trips are planned on: a `World`, or a `PublicMap`."""
 
     @property
@@ -46,12 +46,12 @@ class Trips:
         Metres a second on foot.
     """
 
-    def __init__(self, place: Place, *, walk_speed: float = WALK_SPEED) -> None:
+    def __init__(self, place: TripEnd, *, walk_speed: float = WALK_SPEED) -> None:
         self.router = place.router
         self.transit = place.transit
         self.walk_speed = walk_speed
         self._kept: dict[tuple[str, str], Way] = {}
-        self._networks: dict[tuple[bool, bool], Network] = {}
+        self._networks: dict[tuple[bool, bool], TripNetwork] = {}
         self._known = {
             r.id for part in (self.transit.stops, self.transit.lines, self.transit.bike_stations) for r in part
         }
@@ -163,11 +163,11 @@ class Trips:
         )
         return Question(network, ways, "walk" in modes, math.inf if cash is None else cash, all_good)
 
-    def _network(self, closed: set[str], *, buses: bool, bikes: bool) -> Network:
+    def _network(self, closed: set[str], *, buses: bool, bikes: bool) -> TripNetwork:
         if closed:
-            return Network(self.transit, closed, buses=buses, bikes=bikes)
+            return TripNetwork(self.transit, closed, buses=buses, bikes=bikes)
         if (buses, bikes) not in self._networks:
-            self._networks[buses, bikes] = Network(self.transit, buses=buses, bikes=bikes)
+            self._networks[buses, bikes] = TripNetwork(self.transit, buses=buses, bikes=bikes)
         return self._networks[buses, bikes]
 
     def _blocked(self, circles: Sequence[tuple[float, float, float]]) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from vico.world.trips.network import Network, Ride
+from vico.world.trips.network import Ride, TripNetwork
 from vico.world.trips.ways import Ways
 
 _ON_FOOT = Ride(-1, 0.0, 0.0, 0.0, -2)
@@ -79,7 +79,7 @@ class Question:
         Whether all trips are wanted than which none is better in arrival, price and metres on foot; else the best one.
     """
 
-    network: Network
+    network: TripNetwork
     ways: Ways
     direct: bool = True
     cash: float = math.inf
