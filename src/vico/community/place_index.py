@@ -46,7 +46,7 @@ class PlaceIndex:
     def __init__(self, world: World, weekday: int) -> None:
         self.world = world
         self.weekday = weekday
-        self.router = Router(world.walkable)
+        self.router = world.router
         # Thousands of walks are measured on cells of a metre: a quarter of the cost, most within 2 % of the walk.
         self._measure = Router(world.walkable.coarser())
         self.place_by_id = {p.id: p for p in world.places}

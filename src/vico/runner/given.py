@@ -71,8 +71,9 @@ def own_info(info: Mapping[str, Any]) -> Info:
 
 def own_map(public_map: PublicMap) -> PublicMap:
     """Return a copy of a public map: whoever changes it changes nobody else's."""
-    parts = ("walkable", "height", "places", "buildings", "stops", "lines")
-    return replace(public_map, **{name: copy.deepcopy(getattr(public_map, name)) for name in parts})
+    parts = ("walkable", "height", "places", "buildings", "stops", "lines", "bike_stations")
+    mine = {name: copy.deepcopy(getattr(public_map, name)) for name in parts}
+    return replace(public_map, **mine, shared_router=None)
 
 
 def sent_info(info: Mapping[str, Any]) -> dict[str, Any]:

@@ -94,7 +94,7 @@ class SimulationBase:
     @cached_property
     def router(self) -> Router:
         """Finds ways on the walkable map."""
-        return Router(self.world.walkable)
+        return self.world.router
 
     @cached_property
     def place_index(self) -> dict[str, int]:

@@ -54,6 +54,8 @@ class PublicMap:
     ----------
     half
         Half the side of the square world, metres.
+    shared_router
+        The world's router: what it learns about ways serves all who ask. None: the map has one of its own.
     """
 
     half: float
@@ -64,6 +66,7 @@ class PublicMap:
     stops: list[Stop]
     lines: list[Line]
     bike_stations: list[BikeStation] = field(default_factory=list)
+    shared_router: Router | None = field(default=None, repr=False, compare=False)
 
     @classmethod
     def from_world(cls, world: World) -> PublicMap:
@@ -86,12 +89,13 @@ class PublicMap:
             transit.stops,
             transit.lines,
             transit.bike_stations,
+            world.router,
         )
 
     @cached_property
     def router(self) -> Router:
         """Finds walks on the map."""
-        return Router(self.walkable)
+        return self.shared_router or Router(self.walkable)
 
     @cached_property
     def transit(self) -> Transit:

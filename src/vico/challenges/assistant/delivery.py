@@ -49,7 +49,7 @@ def generate_delivery(
     """
     chance = rng(seed, "delivery", world.digest)
     choose = chooser or seeded_chooser(chance)
-    router = Router(world.walkable)
+    router = world.router
     start, surroundings = _start(world, router, chance)
     objects: list[TaskObject] = []
     subtasks: list[Subtask] = []
