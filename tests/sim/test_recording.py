@@ -242,7 +242,7 @@ os.kill(os.getpid(), 9)
 
 @pytest.mark.parametrize("killed_after", [EVERY, 73, 95])
 def test_a_killed_run_goes_on_to_the_same_folder(path: Path, tmp_path: Path, killed_after: int) -> None:
-    out, code = tmp_path / "run", KILLED.format(tests=str(Path(__file__).parent))
+    out, code = tmp_path / "run", KILLED.format(tests=str(Path(__file__).parents[1]))
     process = subprocess.run([sys.executable, "-c", code, str(out), str(killed_after)], check=False)
     assert process.returncode == -signal.SIGKILL
     killed = read_run(out)
