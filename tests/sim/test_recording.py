@@ -232,7 +232,7 @@ def contents(folder: Path) -> dict[str, Any]:
 KILLED = """
 import os, sys
 from pathlib import Path
-sys.path.insert(0, {tests!r})
+sys.path[:0] = {folders!r}
 from test_recording import fresh, go_on
 recorder, agents = fresh(Path(sys.argv[1]))
 go_on(recorder, agents, int(sys.argv[2]))
@@ -242,7 +242,8 @@ os.kill(os.getpid(), 9)
 
 @pytest.mark.parametrize("killed_after", [EVERY, 73, 95])
 def test_a_killed_run_goes_on_to_the_same_folder(path: Path, tmp_path: Path, killed_after: int) -> None:
-    out, code = tmp_path / "run", KILLED.format(tests=str(Path(__file__).parents[1]))
+    here = Path(__file__).parent
+    out, code = tmp_path / "run", KILLED.format(folders=[str(here), str(here.parent)])
     process = subprocess.run([sys.executable, "-c", code, str(out), str(killed_after)], check=False)
     assert process.returncode == -signal.SIGKILL
     killed = read_run(out)
