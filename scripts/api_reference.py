@@ -14,6 +14,8 @@ import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
+# First: pdoc keeps modules that it imports from starting processes, and the library of MuJoCo's window starts one.
+import mujoco  # noqa: F401
 import pdoc
 import pdoc.render
 
