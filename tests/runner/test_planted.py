@@ -174,6 +174,9 @@ agent.act({}, {})
 """
 
 
+@pytest.mark.skipif(
+    not Path("/proc/self/stat").exists(), reason="no /proc here to tell a running process from an ended one"
+)
 def test_a_process_ends_with_a_run_that_is_killed(tmp_path: Path) -> None:
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     command = [sys.executable, "-c", HOLDER, f"{planted_agents.__file__}:Sleeper"]
