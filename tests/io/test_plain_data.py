@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import json
+import zlib
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from vico.errors import InputError, SchemaError
-from vico.io.plain_data import decode, encode
+from vico.errors import InputError, MissingFileError, SchemaError
+from vico.io.plain_data import decode, encode, read_plain, write_plain
+
+SCALARS = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text()
 
 
 def test_nested_values_and_arrays_come_back_as_they_were() -> None:
@@ -85,3 +91,29 @@ def message(header: Any, rest: bytes = b"") -> bytes:
 def test_bytes_from_anywhere_are_refused(content: bytes) -> None:
     with pytest.raises(SchemaError):
         decode(content)
+
+
+@given(
+    st.recursive(SCALARS, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner), max_leaves=8)
+)
+def test_json_values_come_back_exactly(value: Any) -> None:
+    assert decode(encode(value)) == value
+
+
+def test_files_hold_what_was_written(tmp_path: Path) -> None:
+    file = tmp_path / "kept.bin"
+    write_plain(file, {"way": np.arange(6.0).reshape(3, 2), "n": [1, None]})
+    found = read_plain(file)
+    np.testing.assert_array_equal(found["way"], np.arange(6.0).reshape(3, 2))
+    assert found["n"] == [1, None]
+    with pytest.raises(MissingFileError):
+        read_plain(tmp_path / "none.bin")
+
+
+def test_damaged_and_foreign_files_are_refused(tmp_path: Path) -> None:
+    whole = zlib.compress(encode({"a": np.arange(100)}))
+    file = tmp_path / "kept.bin"
+    for content in (whole[:-5], b"", b"PK", whole + b"x", whole[:20] + b"x" * 9 + whole[29:], zlib.compress(b"{}")):
+        file.write_bytes(content)
+        with pytest.raises(SchemaError, match=r"kept\.bin.*make it anew"):
+            read_plain(file)

@@ -387,7 +387,7 @@ def test_a_damaged_file_is_named_in_one_sentence(path: Path, tmp_path: Path) -> 
     for name in (
         "segments/00000000-00000040/bodies.parquet",
         "checkpoints/00000040/simulation.npz",
-        "checkpoints/00000040/agents.npz",
+        "checkpoints/00000040/agents.bin",
         "cast.jsonl",
     ):
         out = tmp_path / name.replace("/", "_")

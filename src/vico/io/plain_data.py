@@ -8,24 +8,29 @@
     rest      the arrays' bytes, one after the other
 
 What comes from outside may be anything: `decode` builds nothing but what is named above, and no more than was sent.
+A file holds the same, compressed by zlib.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import zlib
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.errors import InputError, SchemaError
+from vico.errors import InputError, MissingFileError, SchemaError
+from vico.io.files import write_bytes
 
 _MAGIC = b"VICOPD1\n"
 _ARRAY = "__array__"
 _KINDS = "biufSU"  # truth values, numbers and text of fixed width
 _DEEPEST = 32
+_LARGEST = 1 << 30  # bytes of a file when it is unpacked
 
 
 def encode(value: Any) -> bytes:
@@ -73,6 +78,38 @@ def decode(content: bytes) -> Any:
         if isinstance(error, SchemaError):
             raise
         raise SchemaError(f"plain data: damaged ({type(error).__name__}: {str(error)[:100]})") from None
+
+
+def write_plain(path: Path, value: Any) -> None:
+    """Write plain data to a file, whole or not at all; see `encode`."""
+    write_bytes(path, zlib.compress(encode(value)))
+
+
+def read_plain(path: Path) -> Any:
+    """Read what `write_plain` wrote.
+
+    Raises
+    ------
+    MissingFileError
+        If there is no such file.
+    SchemaError
+        If it is damaged, or of more than 1 GiB.
+    """
+    try:
+        packed = path.read_bytes()
+    except FileNotFoundError:
+        raise MissingFileError(f"{path}: no such file") from None
+    unpacking = zlib.decompressobj()
+    try:
+        content = unpacking.decompress(packed, _LARGEST)
+    except zlib.error as error:
+        raise SchemaError(f"{path}: damaged ({error}); make it anew") from None
+    if not unpacking.eof or unpacking.unused_data:
+        raise SchemaError(f"{path}: damaged, or of more than {_LARGEST >> 20} MiB; make it anew")
+    try:
+        return decode(content)
+    except SchemaError as error:
+        raise SchemaError(f"{path}: {error}; make it anew") from None
 
 
 def _shown(value: Any, where: str, depth: int, arrays: list[NDArray[Any]]) -> Any:
