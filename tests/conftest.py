@@ -1,10 +1,11 @@
-"""Worlds that many tests look at, built once a session from real data."""
+"""Worlds that many tests look at, built once a run from real data, whichever process needs them first."""
 
 from __future__ import annotations
 
 import io
 import json
 import os
+from collections.abc import Iterator
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import pytest
 from hypothesis import settings
 
 from command_line import vico
+from shared_folders import Shared, SharedFolders
 from vico.community import build_community, write_community
 from vico.io.compiled import compiled_folder
 from vico.world.folder import World, read_world
@@ -34,11 +36,21 @@ SHARED = Path(__file__).parents[2] / "shared" / "data"
 
 
 @pytest.fixture(scope="session")
-def helsinki_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shared]:
+    """Make a folder once for all processes of this run: ``shared(name, make)``. No test may change what lies there."""
+    made = SharedFolders(tmp_path_factory.getbasetemp())
+    yield made.folder
+    made.confirm()
+
+
+def _world(out: Path, half: float) -> None:
+    build_world(EXTRACT, lat=60.1690, lon=24.9435, half=half, seed=0, out=out, options=BuildOptions(previews=False))
+
+
+@pytest.fixture(scope="session")
+def helsinki_path(shared: Shared) -> Path:
     """A folder with 300 m x 300 m of central Helsinki, built from the packaged extract."""
-    out = tmp_path_factory.mktemp("worlds") / "helsinki"
-    build_world(EXTRACT, lat=60.1690, lon=24.9435, half=150.0, seed=0, out=out, options=BuildOptions(previews=False))
-    return out
+    return shared("helsinki", lambda out: _world(out, 150.0))
 
 
 @pytest.fixture(scope="session")
@@ -48,11 +60,15 @@ def helsinki(helsinki_path: Path) -> World:
 
 
 @pytest.fixture(scope="session")
-def helsinki_city(tmp_path_factory: pytest.TempPathFactory) -> World:
+def corner_path(shared: Shared) -> Path:
+    """A folder with 120 m x 120 m of central Helsinki: as small as a world can be and have everything."""
+    return shared("corner", lambda out: _world(out, 60.0))
+
+
+@pytest.fixture(scope="session")
+def helsinki_city(shared: Shared) -> World:
     """800 m x 800 m of central Helsinki: large enough for bus lines and bicycle stations."""
-    out = tmp_path_factory.mktemp("worlds") / "city"
-    build_world(EXTRACT, lat=60.1690, lon=24.9435, half=400.0, seed=0, out=out, options=BuildOptions(previews=False))
-    return read_world(out)
+    return read_world(shared("city", lambda out: _world(out, 400.0)))
 
 
 @pytest.fixture(scope="session")
@@ -64,24 +80,26 @@ def shared_data() -> Path:
 
 
 @pytest.fixture(scope="session")
-def helsinki_people(helsinki: World, helsinki_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def helsinki_people(helsinki: World, helsinki_path: Path, shared: Shared) -> Path:
     """A community folder with four residents of `helsinki_path`."""
-    out = tmp_path_factory.mktemp("communities") / "people"
-    write_community(build_community(helsinki, residents=4), out, world=helsinki_path)
-    return out
+    return shared(
+        "people", lambda out: write_community(build_community(helsinki, residents=4), out, world=helsinki_path)
+    )
 
 
 @pytest.fixture(scope="session")
-def helsinki_run(
-    helsinki_path: Path, helsinki_people: Path, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[Path, dict[str, Any]]:
+def helsinki_run(helsinki_path: Path, helsinki_people: Path, shared: Shared) -> tuple[Path, dict[str, Any]]:
     """A run folder of eight steps with one observer and the Husky, and what ``vico run --json`` printed."""
-    out = tmp_path_factory.mktemp("runs") / "run"
-    printed = io.StringIO()
-    with redirect_stdout(printed):
-        code = vico(
-            "run", helsinki_path, helsinki_people, "--steps", 8, "--robots", "husky", "--cars", 3,
-            "--pedestrians", 3, "--observe", "resident_0", "--out", out, "--json",
-        )  # fmt: skip
-    assert code == 0
-    return out, json.loads(printed.getvalue())
+
+    def make(out: Path) -> None:
+        printed = io.StringIO()
+        with redirect_stdout(printed):
+            code = vico(
+                "run", helsinki_path, helsinki_people, "--steps", 8, "--robots", "husky", "--cars", 3,
+                "--pedestrians", 3, "--observe", "resident_0", "--out", out / "run", "--json",
+            )  # fmt: skip
+        assert code == 0
+        (out / "printed.json").write_text(printed.getvalue())
+
+    out = shared("run", make)
+    return out / "run", json.loads((out / "printed.json").read_text())
