@@ -107,6 +107,9 @@ class ReasonCode(IntEnum):
     MOVING = 76
 
 
+_CODE_NAMES = {int(code): code.name.lower() if code else "" for code in ReasonCode}
+
+
 def ride_price(seconds: float, *, returned: bool) -> float:
     """Price of a bicycle ride: 0.2 per started minute, 20 more if it was not brought to a station."""
     return BIKE_RATE * math.ceil(max(seconds, 1e-9) / 60.0) + (0.0 if returned else BIKE_ASTRAY)
@@ -114,4 +117,4 @@ def ride_price(seconds: float, *, returned: bool) -> float:
 
 def code_name(code: int) -> str:
     """Return the name of a reason code as observations give it; "" for none."""
-    return ReasonCode(code).name.lower() if code else ""
+    return _CODE_NAMES[code]

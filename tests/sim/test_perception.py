@@ -38,7 +38,9 @@ def person(x: float, y: float, z: float = 0.0) -> Bodies:
 def seen(bodies: Bodies, *, yaw: float = 0.0, space: int = OUTDOORS, theirs: int = OUTDOORS) -> InView:
     """What somebody at the origin sees."""
     eyes = Eyes(np.array([[0.0, 0.0, 1.6]]), np.array([yaw]), np.array([1], np.int32), np.array([space]))
-    return in_view(eyes, bodies, np.full(len(bodies), theirs), wall(), {7: {"kind": "pedestrian", "name": "Ann"}}).of(0)
+    return in_view(
+        eyes, bodies, np.full(len(bodies), theirs), wall(), {7: {"kind": "pedestrian", "name": "Ann", "agent": "ann"}}
+    ).of(0)
 
 
 @pytest.mark.parametrize(
@@ -69,6 +71,8 @@ def test_what_is_seen_tells_who_and_how_far() -> None:
     view = seen(Bodies.joined([person(4.0, 0.0), replace(person(3.0, 0.0), entity=np.array([8], np.int32))]))
     assert [(body.entity, body.name, body.distance) for body in view] == [(8, "", 3.0), (7, "Ann", 4.0)]
     assert [body.entity for body in view.within(3.5)] == [8]
+    assert list(view.agents_within(10.0)) == ["ann"]
+    assert list(view.agents_within(3.5)) == []
     assert view.nearest(("pedestrian",)) == 3.0
     assert view.nearest(("car",)) == math.inf
 

@@ -19,6 +19,7 @@ from vico.runner.gather import Gatherer
 from vico.sim.config import SimConfig
 from vico.sim.physics.records import PhysicsError
 from vico.sim.simulation import Simulation
+from vico.sim.snapshot import state_hash
 from vico.world.public import PublicMap
 
 MORNING = SimConfig(start=8 * 3600 - 20, assistants=1, observe=())
@@ -55,6 +56,11 @@ def test_equal_actions_give_equal_hashes_at_every_step() -> None:
 def test_another_seed_gives_another_hash() -> None:
     other = SimConfig(seed=1, start=MORNING.start, assistants=1, observe=())
     assert fresh().state_hash() != fresh(other).state_hash()
+
+
+def test_every_letter_of_every_text_counts_in_the_hash() -> None:
+    texts = [["", "", ""], ["a", "", ""], ["", "a", ""], ["", "ab", ""], ["", "\0b", ""], ["a", "a", ""]]
+    assert len({state_hash({"texts": np.array(some, "<U8")}) for some in texts}) == len(texts)
 
 
 def test_saved_loaded_and_continued_equals_uninterrupted(tmp_path: Path) -> None:

@@ -130,8 +130,8 @@ class Conversation:
 
     def _greet(self, info: Info, time: float, errand: Callable[[], str]) -> Action | None:
         # Residents are told who is in view; others who live by a schedule greet nobody, but answer.
-        for body in info["in_view"].within(GREETING_DISTANCE) if "in_view" in info else ():
-            person = self._known.get(body.agent)
+        for agent in info["in_view"].agents_within(GREETING_DISTANCE) if "in_view" in info else ():
+            person = self._known.get(agent)
             if person is None or time - self._greeted.get(person.agent, -1e9) <= GREETING_PAUSE:
                 continue
             self._greeted[person.agent] = time

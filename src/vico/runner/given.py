@@ -43,6 +43,10 @@ class ListedInView:
         """Yield what is no farther away than `reach` metres, nearest first."""
         return (body for body in self._bodies if body.distance <= reach)
 
+    def agents_within(self, reach: float) -> Iterator[str]:
+        """Yield the names of the agents that are no farther away than `reach` metres, nearest first."""
+        return (body.agent for body in self._bodies if body.agent and body.distance <= reach)
+
     def nearest(self, kinds: tuple[str, ...]) -> float:
         """Return how far the nearest body of some kinds is, metres; infinite if none is in view."""
         return next((body.distance for body in self._bodies if body.kind in kinds), math.inf)

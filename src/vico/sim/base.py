@@ -114,21 +114,31 @@ class SimulationBase:
         return np.array(doors, np.float64).reshape(-1, 2)
 
     @cached_property
-    def _places_by_cell(self) -> dict[tuple[int, int], list[int]]:
-        """Places with rooms whose entrance may be in reach from a cell as wide as the reach, in their order."""
-        found: dict[tuple[int, int], list[int]] = {}
+    def place_spots(self) -> NDArray[np.float64]:
+        """Position of each place, ENU metres, float64, shape ``(places, 2)``."""
+        return np.array([place.position[:2] for place in self.world.places], np.float64).reshape(-1, 2)
+
+    @cached_property
+    def has_rooms(self) -> NDArray[np.bool_]:
+        """Whether each place has rooms, shape ``(places,)``."""
+        return np.array([bool(place.rooms) for place in self.world.places], bool)
+
+    @cached_property
+    def _places_by_cell(self) -> dict[tuple[int, int], list[tuple[int, float, float]]]:
+        """Places with rooms whose entrance may be in reach from a cell as wide as the reach, and that, in order."""
+        found: dict[tuple[int, int], list[tuple[int, float, float]]] = {}
         for k, place in enumerate(self.world.places):
             if place.entrance and place.rooms:
                 column, row = (int(c) for c in np.floor(self.doors[k] / DOOR_REACH))
                 for cell in product(range(column - 1, column + 2), range(row - 1, row + 2)):
-                    found.setdefault(cell, []).append(k)
+                    found.setdefault(cell, []).append((k, *self.doors[k].tolist()))
         return found
 
     def entrances_near(self, x: float, y: float) -> list[int]:
         """Return the places with rooms that one could enter from a point outdoors, by their indices."""
         cell = math.floor(x / DOOR_REACH), math.floor(y / DOOR_REACH)
         near = self._places_by_cell.get(cell, ())
-        return [k for k in near if math.hypot(self.doors[k, 0] - x, self.doors[k, 1] - y) <= DOOR_REACH]
+        return [k for k, door_x, door_y in near if math.hypot(door_x - x, door_y - y) <= DOOR_REACH]
 
     def days(self, community: Community) -> list[list[Appointment]]:
         """Return the appointments of a community's residents; those of the last community asked for are kept."""

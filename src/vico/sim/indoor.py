@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -248,6 +249,7 @@ def entrance_of(place: Place, entrances: dict[str, Entrance]) -> Entrance | None
 
 def near_door(position: NDArray[Any], door: Door, reach: float) -> bool:
     """Whether someone stands within `reach` metres of a door, measured on the floor, and on the door's level."""
-    if abs(float(position[2]) - door.position[2]) > _LEVEL:
+    x, y, z = position.tolist()
+    if abs(z - door.position[2]) > _LEVEL:
         return False
-    return float(np.hypot(position[0] - door.position[0], position[1] - door.position[1])) <= reach
+    return math.hypot(x - door.position[0], y - door.position[1]) <= reach

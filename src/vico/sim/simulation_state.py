@@ -30,6 +30,10 @@ if TYPE_CHECKING:
     from vico.sim.robots.sensing import Reading
 
 
+# By number: looking an enumeration's member up costs more than all the rest.
+_ON_FOOT = int(Vehicle.NONE)
+
+
 class HasArrays(Protocol):
     """A part of the state: hashed, saved and restored as named arrays."""
 
@@ -310,10 +314,9 @@ class SimulationState:
     def accessible_places(self, i: int) -> list[str]:
         """Return what person `i` could enter from where it is: places outdoors, rooms from a room."""
         p = self.people
-        if p.vehicle[i] != Vehicle.NONE:
+        if p.vehicle.item(i) != _ON_FOOT:
             return []
-        if p.room[i] >= 0:
-            room = int(p.room[i])
+        if (room := p.room.item(i)) >= 0:
             doors = self.indoor.doors[room]
             near = [d.to for d in doors if d.to >= 0 and near_door(p.position[i], d, INNER_DOOR_REACH)]
             return [self.indoor.rooms[to].id for to in near]
@@ -322,7 +325,7 @@ class SimulationState:
 
     def doors_of(self, i: int) -> list[dict[str, Any]]:
         """Ways out of the room that person `i` is in: where each leads, and where it is."""
-        room = int(self.people.room[i])
+        room = self.people.room.item(i)
         if room < 0:
             return []
         rooms = self.indoor.rooms

@@ -111,8 +111,6 @@ class Punctuality(ArrayState):
     def _are_there(who: NDArray[np.int64], places: NDArray[np.int32], state: SimulationState) -> NDArray[np.bool_]:
         """Whether each is at a place: in one of its rooms, or near an open one; shape ``(who,)``."""
         people = state.people
-        with_rooms = np.array([bool(state.world.places[k].rooms) for k in places.tolist()], bool)
-        spots = np.array([state.world.places[k].position[:2] for k in places.tolist()]).reshape(-1, 2)
-        away = np.hypot(*(people.position[who, :2] - spots).T)
+        away = np.hypot(*(people.position[who, :2] - state.base.place_spots[places]).T)
         near = (people.room[who] < 0) & (away <= OPEN_REACH)
-        return np.where(with_rooms, people.place[who] == places, near)
+        return np.where(state.base.has_rooms[places], people.place[who] == places, near)

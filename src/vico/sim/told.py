@@ -66,11 +66,11 @@ class Told:
         """Return one agent's info."""
         i = self._index[name]
         p = self._state.people
-        code = code_name(int(p.reason_code[i])) if i < len(p) else self._robots[i]["action_code"]
+        code = code_name(p.reason_code.item(i)) if i < len(p) else self._robots[i]["action_code"]
         if i not in self._eyes_of:
             return {"action_code": code}
         view = self._in_view.of(self._eyes_of[i])
-        if (room := int(p.room[i])) >= 0:
+        if (room := p.room.item(i)) >= 0:
             indoor = self._state.indoor
             view.room = indoor.boxes[room]
             view.furniture = indoor.furniture[indoor.furniture_start[room] : indoor.furniture_start[room + 1]]
@@ -156,20 +156,21 @@ def state_of(i: int, state: SimulationState) -> dict[str, Any]:
             "action_code": code_name(int(robots.reason_code[k])),
             "action_reason": str(robots.reason[k]),
         }
-    room = state.indoor.rooms[p.room[i]] if p.room[i] >= 0 else None
-    place = state.world.places[p.place[i]] if p.place[i] >= 0 else None
+    inside, at, held = p.room.item(i), p.place.item(i), p.held[i].tolist()
+    room = state.indoor.rooms[inside] if inside >= 0 else None
+    place = state.world.places[at] if at >= 0 else None
     return {
         **common,
-        "cash": round(float(p.cash[i]), 2),
-        "held": [int(p.held[i, 0]), int(p.held[i, 1])],
-        "vehicle": _VEHICLES[int(p.vehicle[i])],
+        "cash": round(p.cash.item(i), 2),
+        "held": held,
+        "vehicle": _VEHICLES[p.vehicle.item(i)],
         "building": room.building if room else "",
         "room": room.id if room else "",
         "place": place.id if place else "",
         "accessible_places": state.accessible_places(i),
         "doors": state.doors_of(i),
-        "posture": _POSTURES[int(p.posture[i])],
-        "action_status": _STATUSES[int(p.status[i])],
-        "action_code": code_name(int(p.reason_code[i])),
+        "posture": _POSTURES[p.posture.item(i)],
+        "action_status": _STATUSES[p.status.item(i)],
+        "action_code": code_name(p.reason_code.item(i)),
         "action_reason": str(p.reason[i]),
     }

@@ -30,8 +30,8 @@ def apply_actions(actions: Mapping[str, Any], faults: Mapping[str, AgentFault], 
     for agent, name in enumerate(state.names):
         if name in faults:
             _note_fault(faults[name], agent, state)
-        elif actions.get(name) is not None:
-            verdict = check(actions[name], agent, state)
+        elif (action := actions.get(name)) is not None and not _is_wait(action):
+            verdict = check(action, agent, state)
             if isinstance(verdict, Command):
                 perform(verdict, agent, state)
                 continue
@@ -40,6 +40,14 @@ def apply_actions(actions: Mapping[str, Any], faults: Mapping[str, AgentFault], 
             where, code = state.position_of(agent), code_name(verdict.code)
             state.events.add("refused", name, verdict.reason, where, code=code)
     return refused
+
+
+def _is_wait(action: object) -> bool:
+    """Return whether an action is a plain wait, which anybody may do at any time, and which does nothing."""
+    if type(action) is not dict or len(action) != 1:
+        return False
+    kind = action.get("type")
+    return isinstance(kind, str) and kind == "wait"
 
 
 def perform(command: Command, agent: int, state: SimulationState) -> None:

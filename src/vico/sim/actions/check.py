@@ -7,10 +7,12 @@ from typing import Any, NamedTuple
 
 from vico.rules import ReasonCode
 from vico.sim.actions.fields import FORMS, short
-from vico.sim.actions.model import ActionType, Actors, Command, Refusal, Situation
-from vico.sim.actions.table import ACTIONS, ROBOT_ACTIONS
+from vico.sim.actions.model import ActionType, Command, Refusal, Situation
+from vico.sim.actions.table import ACTIONS, PEOPLE_ACTIONS, ROBOT_ACTIONS
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture, Vehicle
+
+_OF_PEOPLE, _OF_ROBOTS = frozenset(PEOPLE_ACTIONS), frozenset(ROBOT_ACTIONS)
 
 
 def check(action: object, agent: int, state: SimulationState) -> Command | Refusal:
@@ -72,10 +74,10 @@ def parse(action: object) -> Command | Refusal:
 
 def _refuse_actor(kind: ActionType, *, is_robot: bool) -> Refusal | None:
     """Refuse what robots alone, or people alone, can do."""
-    if is_robot and Actors.ROBOTS not in kind.actors:
+    if is_robot and kind.name not in _OF_ROBOTS:
         sentence = f"{kind.name}: robots take {' and '.join(sorted(ROBOT_ACTIONS))}"
         return Refusal(ReasonCode.FOR_PEOPLE_ONLY, sentence)
-    if not is_robot and Actors.PEOPLE not in kind.actors:
+    if not is_robot and kind.name not in _OF_PEOPLE:
         sentence = f"{kind.name} is for robots; avatars move with move_forward, turn_left and turn_right"
         return Refusal(ReasonCode.FOR_ROBOTS_ONLY, sentence)
     return None
@@ -103,7 +105,7 @@ _VEHICLE_BARS = {int(Vehicle.BUS): _IN_BUS, int(Vehicle.BIKE): _ON_BIKE}
 
 def _refuse_situation(kind: ActionType, i: int, state: SimulationState) -> Refusal | None:
     """Refuse what can't be done asleep, seated, in a bus or on a bicycle."""
-    riding, held = int(state.people.vehicle[i]), int(state.people.posture[i])
+    riding, held = state.people.vehicle.item(i), state.people.posture.item(i)
     # In a bus the place decides whether one sits.
     posture = None if riding == _BUS else _POSTURE_BARS.get(held)
     vehicle = _VEHICLE_BARS.get(riding)

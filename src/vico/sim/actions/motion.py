@@ -20,7 +20,7 @@ _HALF_TURN = 180.0
 def check_move_forward(values: Values, i: int, state: SimulationState) -> Refusal | None:
     """Judge a walk: on foot one is slower than on a bicycle."""
     distance = values["distance"]
-    if state.people.vehicle[i] == Vehicle.BIKE or distance <= RUN_SPEED:
+    if distance <= RUN_SPEED or state.people.vehicle[i] == Vehicle.BIKE:
         return None
     return Refusal(
         ReasonCode.OUT_OF_RANGE, f"move_forward: {distance:g} m is out of range; 0 to {RUN_SPEED:g} m a step on foot"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,9 +90,19 @@ class InView:
 
     def within(self, reach: float) -> Iterator[SeenBody]:
         """Yield what is no farther away than `reach` metres, nearest first."""
-        near = int(np.searchsorted(self.distance, reach, side="right"))
-        for k, far in zip(self._chosen[:near].tolist(), self.distance[:near].tolist(), strict=True):
+        for k, far in zip(self._chosen.tolist(), self.distance.tolist(), strict=True):
+            if far > reach:
+                return
             yield self._seen(k, far)
+
+    def agents_within(self, reach: float) -> Iterator[str]:
+        """Yield the names of the agents that are no farther away than `reach` metres, nearest first."""
+        for k, far in zip(self._chosen.tolist(), self.distance.tolist(), strict=True):
+            if far > reach:
+                return
+            agent = self._entities.get(self._bodies.entity.item(k), {}).get("agent", "")
+            if agent:
+                yield agent
 
     def nearest(self, kinds: tuple[str, ...]) -> float:
         """Return how far the nearest body of some kinds is, metres; infinite if none is in view."""
@@ -120,6 +130,8 @@ class AllInView:
 
     Attributes
     ----------
+    agents
+        How many look.
     bodies
         Everybody and everything that might have been seen.
     entities
@@ -129,15 +141,22 @@ class AllInView:
         first for each; shape ``(pairs,)``.
     """
 
+    agents: int
     bodies: Bodies
     entities: Mapping[int, Mapping[str, str]]
     viewer: NDArray[np.int64]
     body: NDArray[np.int64]
     distance: NDArray[np.float64]
 
+    @cached_property
+    def _first(self) -> list[int]:
+        """Where each agent's pairs begin, and the last one's end."""
+        first: list[int] = np.searchsorted(self.viewer, np.arange(self.agents + 1)).tolist()
+        return first
+
     def of(self, k: int) -> InView:
         """Return what the agent with the `k`-th eyes has in view."""
-        a, b = np.searchsorted(self.viewer, (k, k + 1))
+        a, b = self._first[k], self._first[k + 1]
         return InView(self.bodies, self.body[a:b], self.distance[a:b], self.entities)
 
 
@@ -196,7 +215,7 @@ def in_view(
         by_key,
     )
     order = np.lexsort((bodies.entity[what], far, who))
-    return AllInView(bodies, entities, who[order], what[order], far[order])
+    return AllInView(len(eyes.entity), bodies, entities, who[order], what[order], far[order])
 
 
 def _keys(points: NDArray[np.float64], spaces: NDArray[np.int64]) -> NDArray[np.int64]:
