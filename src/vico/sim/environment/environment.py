@@ -1,0 +1,168 @@
+"""What is the same for everybody outdoors: the weather, what lies on the ground, sun and lamps, and what they do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.errors import InputError
+from vico.sim.environment.effects import Conditions, conditions
+from vico.sim.environment.forecast import Forecast, Site, forecast_of
+from vico.sim.environment.ground import aged, cover, settled, wetness
+from vico.sim.environment.sky import Sky
+from vico.sim.environment.weather import NAMES, Weather, blended, kind_of_weather
+
+# What lies on the ground is reckoned anew this often, and the sun looked at, seconds.
+_AGES_EVERY = 60
+
+
+class Environment:
+    """Weather, ground and light of a run; part of its state.
+
+    Parameters
+    ----------
+    sky
+        Over the world.
+    wanted
+        The weather that is asked for; see `forecast_of`.
+    seed
+        Decides weather that changes by itself.
+    second
+        Seconds since midnight of the first day; the ground is as it would be after hours of the weather then.
+    """
+
+    def __init__(self, sky: Sky, wanted: str | Mapping[str, Any], *, seed: int, second: float) -> None:
+        self.sky = sky
+        self._forecast: Forecast = forecast_of(wanted, Site(sky.lat, sky.lon, sky.day_of_year), seed)
+        # When a change that was called for begins and ends, and the weather before and after it; none: NaN.
+        self._change = np.full(2, np.nan)
+        self._before_after = np.zeros((2, len(NAMES)))
+        self._ground = settled(Weather.of(self._forecast.at(second)))
+        self._lamps = np.ones(1)
+        self._second = np.array([second])
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Every number that decides the future."""
+        return {
+            "second": self._second,
+            "change": self._change,
+            "before_after": self._before_after,
+            "ground": self._ground,
+            "lamps": self._lamps,
+        }
+
+    def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
+        """Go back to what `arrays` held."""
+        for name, array in self.arrays().items():
+            array[:] = arrays[name]
+        self._forget()
+
+    def advance(self, seconds: float) -> None:
+        """Go on by some seconds; the ground gets wet or dry every minute."""
+        before = int(self._second[0])
+        self._second += seconds
+        for _ in range(int(self._second[0]) // _AGES_EVERY - before // _AGES_EVERY):
+            water, snow = self._ground.tolist()
+            self._ground[:] = aged(water, snow, self.weather, _AGES_EVERY)
+        self._forget()
+
+    # What it is like.
+
+    @cached_property
+    def weather(self) -> Weather:
+        """The weather now."""
+        now = float(self._second[0])
+        begin, end = self._change.tolist()
+        if not now >= begin:
+            return Weather.of(self._forecast.at(now))
+        share = 1.0 if now >= end else (now - begin) / (end - begin)
+        return Weather.of(blended(self._before_after[0], self._before_after[1], share))
+
+    @property
+    def wet(self) -> float:
+        """How wet open ground is, 0..1."""
+        return wetness(float(self._ground[0]))
+
+    @property
+    def snow_cover(self) -> float:
+        """Share of open ground under snow, 0..1."""
+        return cover(float(self._ground[1]))
+
+    @property
+    def lamps(self) -> float:
+        """Share of the lamps that are lit when it is dark, 0..1."""
+        return float(self._lamps[0])
+
+    @cached_property
+    def dark(self) -> float:
+        """How dark it is outdoors: 0 by day, 1 at night."""
+        return self.sky.dark(float(self._second[0]) // _AGES_EVERY * _AGES_EVERY)
+
+    @cached_property
+    def conditions(self) -> Conditions:
+        """What it is like for whoever moves or looks outdoors."""
+        weather = self.weather
+        return conditions(
+            rain=weather.rain,
+            snowfall=weather.snow,
+            visibility=weather.visibility,
+            wet=self.wet,
+            cover=self.snow_cover,
+            dark=self.dark,
+            lamps=self.lamps,
+        )
+
+    def record(self) -> dict[str, Any]:
+        """Return what anybody outdoors notices: the weather, the ground, and how dark it is."""
+        return {
+            **self.weather.record(),
+            "wet": round(self.wet, 3),
+            "snow_cover": round(self.snow_cover, 3),
+            "dark": round(self.dark, 3),
+        }
+
+    # What can be called for while a run goes on.
+
+    def change_weather(self, wanted: str | Weather, *, over: float = 300.0) -> None:
+        """Let the weather become another, and stay so, instead of what the forecast says.
+
+        Parameters
+        ----------
+        wanted
+            A kind of weather, or the weather itself.
+        over
+            How long that takes, seconds.
+
+        Raises
+        ------
+        InputError
+            If no kind is called so, or the time is negative.
+        """
+        if not over >= 0:
+            raise InputError(f"weather: a change over {over} s; it has to be 0 or more")
+        now = self.weather
+        after = kind_of_weather(wanted).weather(now.temperature, now.wind_from) if isinstance(wanted, str) else wanted
+        self._before_after[:] = now.array(), after.array()
+        self._change[:] = float(self._second[0]), float(self._second[0]) + over
+        self._forget()
+
+    def set_lamps(self, share: float) -> None:
+        """Let a share of the lamps be lit when it is dark, as in a power cut; 0..1.
+
+        Raises
+        ------
+        InputError
+            If the share is out of range.
+        """
+        if not 0 <= share <= 1:
+            raise InputError(f"lamps: a share of {share} is lit; it has to be 0..1")
+        self._lamps[0] = share
+        self._forget()
+
+    def _forget(self) -> None:
+        for name in ("weather", "dark", "conditions"):
+            self.__dict__.pop(name, None)
