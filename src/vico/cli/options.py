@@ -153,6 +153,12 @@ class RunOptions:
         Folder of a run that was cut short, instead of all others but --agent: it goes on from its last checkpoint.
     start
         Time of day, HH:MM or HH:MM:SS.
+    date
+        Of the first day, YYYY-MM-DD.
+    utc_offset
+        Hours that clocks are ahead of UTC there; without it, as the time zone of 15 degrees the world lies in.
+    weather
+        A kind of weather, "changing", or a weather file (.json).
     steps
         Seconds to simulate.
     robots
@@ -193,6 +199,9 @@ class RunOptions:
     out: Path | None = None
     resume: Path | None = None
     start: str = "08:00"
+    date: str = "2026-06-21"
+    utc_offset: float | None = None
+    weather: str = "fair"
     steps: int = 1800
     robots: CommaSeparated = "husky,go2"
     cars: int = 30

@@ -72,6 +72,11 @@ def run(options: RunOptions) -> int:
     return _judged(metrics)
 
 
+def weather_of(text: str) -> str | dict[str, Any]:
+    """Return the weather that an option names: itself, or the content of a weather file."""
+    return read_json(Path(text)) if text.endswith(".json") else text
+
+
 def _judged(metrics: dict[str, Any]) -> int:
     """Return the exit code: 1 with overlaps, which are told in a sentence."""
     overlaps = metrics.get("overlaps", {"count": 0})
@@ -113,6 +118,9 @@ class _Job:
             seed=options.seed,
             assistants=options.assistants,
             start=seconds_of_day(options.start),
+            date=options.date,
+            utc_offset=options.utc_offset,
+            weather=weather_of(options.weather),
             robots=_names(options.robots),
             errands=True,
             cars=options.cars,

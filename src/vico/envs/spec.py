@@ -32,6 +32,9 @@ class EnvOptions(TypedDict, total=False):
     transit: bool
     observe: str | tuple[str, ...]
     image: int
+    date: str
+    utc_offset: float | None
+    weather: str | Mapping[str, Any]
     periods: Mapping[str, float | str]
     max_steps: int
 

@@ -14,7 +14,10 @@ Colour = tuple[float, float, float]
 SKY_STEPS = 512
 TONE_STEPS = 4096
 TONE_RANGE = 4.0
-_SHADOW_STEP = 300.0
+#: Seconds for which the direction that shadows are cast from is held.
+SHADOW_STEP = 300.0
+# Haze of clear air, metres to 63 %: farther than a world is wide, it gives depth.
+_CLEAREST = 1600.0
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,13 @@ class Lighting:
 
     @classmethod
     def at(
-        cls, seconds_of_day: float, lat: float = 50.0, *, day: int = 172, clouds: float = 0.45, fog: float = 1600.0
+        cls,
+        seconds_of_day: float,
+        lat: float = 50.0,
+        *,
+        day: int = 172,
+        clouds: float = 0.45,
+        visibility: float = 20_000.0,
     ) -> Lighting:
         """Return the light at a (solar) time of day.
 
@@ -70,21 +79,68 @@ class Lighting:
             Day of the year, 1..365; 172 is the June solstice.
         """
         sun = sun_direction(seconds_of_day, lat, day)
-        held = sun_direction(np.floor(seconds_of_day / _SHADOW_STEP) * _SHADOW_STEP, lat, day)
+        held = sun_direction(np.floor(seconds_of_day / SHADOW_STEP) * SHADOW_STEP, lat, day)
+        return cls.under(sun, held_sun=held, clouds=clouds, visibility=visibility)
+
+    @classmethod
+    def under(
+        cls,
+        sun: Colour,
+        *,
+        held_sun: Colour | None = None,
+        moon: Colour = (0.35, -0.30, 0.88),
+        moon_lit: float = 0.5,
+        clouds: float = 0.45,
+        falling: float = 0.0,
+        visibility: float = 20_000.0,
+        lamps: float = 1.0,
+    ) -> Lighting:
+        """Return the light under a sky.
+
+        Parameters
+        ----------
+        sun, moon
+            Unit vectors to them, ENU; below the horizon they do not shine.
+        held_sun
+            The sun's direction that shadows are cast from; None: the sun's.
+        moon_lit
+            Share of the moon's disc, 0..1.
+        clouds
+            Share of the sky, 0..1; from about 0.6 on they hide the sun.
+        falling
+            How thick rain or snow falls, mm/h of rain.
+        visibility
+            Meteorological visibility, metres; the contrast left there is 5 %, that is exp(-3).
+        lamps
+            Share of lamps and windows that are lit when it is dark, 0..1.
+        """
+        held = sun if held_sun is None else held_sun
         up = sun[2]
         high = _ramp(up, 0.02, 0.55)
         day_share = _ramp(up, -0.14, 0.16)
-        glow = _ramp(up, -0.16, 0.02) * (1 - _ramp(up, 0.05, 0.38))
-        shine = _ramp(up, -0.02, 0.10) * (1 - 0.55 * clouds * clouds)
+        # Fog is a cloud on the ground: nothing but itself is seen of the sky.
+        fogged = 1 - _ramp(visibility, 150.0, 3000.0)
+        hidden = max(_ramp(clouds, 0.6, 1.0), fogged)
+        gloom = 1 - 0.35 * hidden * min(falling / 10.0, 1.0)
+        glow = _ramp(up, -0.16, 0.02) * (1 - _ramp(up, 0.05, 0.38)) * (1 - hidden)
+        shine = _ramp(up, -0.02, 0.10) * (1 - 0.55 * clouds * clouds) * (1 - 0.92 * hidden)
         warm = _mix((1.0, 0.52, 0.24), (1.0, 0.92, 0.80), high)
         night = up < -0.03
-        sun_colour = _scaled((0.10, 0.13, 0.20) if night else warm, 0.25 if night else (1.15 + 0.95 * high) * shine)
-        zenith = _mix((0.006, 0.010, 0.026), _mix((0.15, 0.27, 0.54), (0.17, 0.37, 0.78), high), day_share)
-        horizon = _mix((0.018, 0.024, 0.046), _mix((0.72, 0.74, 0.80), (0.80, 0.90, 1.00), high), day_share)
+        moonlight = 0.10 + 0.30 * moon_lit * _ramp(moon[2], 0.0, 0.3) * (1 - 0.9 * hidden)
+        sun_colour = _scaled(
+            (0.10, 0.13, 0.20) if night else warm, moonlight if night else (1.15 + 0.95 * high) * shine
+        )
+        zenith = _mix((0.15, 0.27, 0.54), (0.17, 0.37, 0.78), high)
+        zenith = _mix((0.006, 0.010, 0.026), _mix(zenith, _scaled((0.60, 0.63, 0.68), gloom), hidden), day_share)
+        horizon = _mix((0.72, 0.74, 0.80), (0.80, 0.90, 1.00), high)
+        horizon = _mix((0.018, 0.024, 0.046), _mix(horizon, _scaled((0.74, 0.77, 0.80), gloom), hidden), day_share)
         horizon = _mix(horizon, (0.92, 0.52, 0.30), 0.6 * glow)
-        ambient = _mix((0.040, 0.050, 0.085), _mix((0.52, 0.55, 0.64), (0.66, 0.74, 0.90), high), day_share)
-        bounce = _mix((0.022, 0.022, 0.026), _mix((0.28, 0.24, 0.21), (0.44, 0.40, 0.34), high), day_share)
-        light = (0.35, -0.30, 0.88) if night else sun
+        zenith = _mix(zenith, horizon, 0.9 * fogged)
+        ambient = _mix((0.52, 0.55, 0.64), (0.66, 0.74, 0.90), high)
+        ambient = _mix((0.040, 0.050, 0.085), _mix(ambient, _scaled((0.74, 0.77, 0.82), gloom), hidden), day_share)
+        bounce = _mix((0.28, 0.24, 0.21), (0.44, 0.40, 0.34), high)
+        bounce = _mix((0.022, 0.022, 0.026), _mix(bounce, _scaled((0.34, 0.33, 0.32), gloom), hidden), day_share)
+        light = (moon if moon[2] > 0.15 else (0.35, -0.30, 0.88)) if night else sun
         return cls(
             sun_direction=light,
             shadow_direction=light if night else (held if held[2] > 0.02 else sun),
@@ -93,9 +149,9 @@ class Lighting:
             bounce=bounce,
             zenith=zenith,
             horizon=horizon,
-            fog=fog,
-            clouds=clouds,
-            lamps=1.0 - _ramp(up, -0.10, 0.10),
+            fog=min(_CLEAREST, visibility / 3.0),
+            clouds=clouds * (1 - fogged),
+            lamps=lamps * (1.0 - _ramp(up, -0.10, 0.10)),
             exposure=0.78 + 0.75 * (1 - day_share) + 0.18 * (1 - high) * day_share,
         )
 

@@ -32,6 +32,12 @@ class SimSettings:
         Whether buses and bicycles are there.
     image
         Side of the square images, pixels.
+    date
+        On which the first day is, YYYY-MM-DD.
+    utc_offset
+        Hours that clocks are ahead of UTC there; None: as the time zone of 15 degrees the world lies in.
+    weather
+        A kind of weather (`vico.sim.environment.weather_kinds`), ``"changing"``, or the content of a weather file.
     periods
         How often agents act and observe, seconds by agent's name; 1 s where nothing else is said. For robots also
         ``"model"``, which is the control period of the robot's model, and the name ``"robots"`` for all of them.
@@ -47,6 +53,9 @@ class SimSettings:
     pedestrians: int = 0
     transit: bool = True
     image: int = 256
+    date: str = "2026-06-21"
+    utc_offset: float | None = None
+    weather: str | Mapping[str, Any] = "fair"
     periods: Mapping[str, float | str] = field(default_factory=dict)
 
 

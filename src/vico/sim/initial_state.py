@@ -12,6 +12,7 @@ from vico.sim.avatars import Avatars
 from vico.sim.base import SimulationBase
 from vico.sim.bodies import ASSISTANT, KINDS, RESIDENT
 from vico.sim.config import SimConfig
+from vico.sim.environment import Environment, Sky
 from vico.sim.events import Events
 from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.simulation_state import SimulationState
@@ -42,7 +43,8 @@ def initial_state(
     avatars = Avatars(people, base.indoor, base.world.walkable, base.world.height)
     events = Events(people.names)
     tick = config.start * TICKS_PER_SECOND
-    state = SimulationState(base, people, MovableObjects.none(), avatars, events, tick=tick)
+    environment = _environment(base, config)
+    state = SimulationState(base, people, MovableObjects.none(), avatars, events, environment, tick=tick)
     # Nobody has a place yet: until then avatars are nowhere that could be in anybody's way.
     people.room[:] = _NOWHERE
     state.traffic, state.transit = systems.traffic_and_transit_of(base, config)
@@ -57,6 +59,12 @@ def initial_state(
     for i in range(len(residents), len(people)):
         spawn.place_anywhere(i, state, rng(config.seed, "spawn", people.names[i]))
     return state
+
+
+def _environment(base: SimulationBase, config: SimConfig) -> Environment:
+    origin = base.world.manifest.origin
+    sky = Sky.over(origin.lat, origin.lon, config.date, config.utc_offset)
+    return Environment(sky, config.weather, seed=config.seed, second=float(config.start))
 
 
 def _people(residents: Sequence[Resident], config: SimConfig) -> People:

@@ -9,15 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.people import Appearance, body_of
-from vico.clock import DAY
 from vico.community.model import Resident
 from vico.render import Cameras, Frames, Lighting, ViewCache, render
+from vico.render.lighting import SHADOW_STEP
 from vico.render.skinning import BodyBatch, batch_bodies, skin
 from vico.render.world_scene import scene_of
 from vico.seeds import rng
 from vico.sim.animation import STYLE, hand_frames, pose, style_of
 from vico.sim.bodies import Drawn
 from vico.sim.config import SimConfig
+from vico.sim.environment import Environment
 from vico.sim.observations import Views
 from vico.sim.passers_by import looks_of_strangers, manner_of_pedestrian, pedestrian_motion
 from vico.sim.quaternions import matrix_of
@@ -171,8 +172,7 @@ class SceneRenderer:
         moment = state.second // _LIGHT_EVERY
         if moment != self._lit:
             self._lit = moment
-            origin = self._sim.world.manifest.origin
-            self._scene.lighting = Lighting.at(moment * _LIGHT_EVERY % DAY, origin.lat)
+            self._scene.lighting = _lighting(state.environment, moment * _LIGHT_EVERY)
 
     def _set_moving(self, state: SimulationState) -> None:
         """Put everything that moves where it is now."""
@@ -220,6 +220,22 @@ class SceneRenderer:
                 transforms[k, :3, 3] = p.position[i] + np.array([cy * x - sy * y, sy * x + cy * y, hanging])
         index = np.array([names.index(name) for name in objects.prototypes], np.int32)
         return Drawn(names, index, transforms.astype(np.float32), objects.entity)
+
+
+def _lighting(environment: Environment, second: float) -> Lighting:
+    """Return the light that a moment's sun, moon and weather make."""
+    sky, weather = environment.sky, environment.weather
+    held = np.floor(second / SHADOW_STEP) * SHADOW_STEP
+    return Lighting.under(
+        tuple(sky.sun(second).tolist()),
+        held_sun=tuple(sky.sun(held).tolist()),
+        moon=tuple(sky.moon(held).tolist()),
+        moon_lit=sky.moon_lit(second),
+        clouds=weather.clouds,
+        falling=weather.rain + 2.0 * weather.snow,
+        visibility=weather.visibility,
+        lamps=environment.lamps,
+    )
 
 
 def _motion_of_agents(state: SimulationState) -> _Motion:

@@ -187,6 +187,7 @@ class Simulation:
             with self._guarded(ticks_now):
                 self.metrics.collisions += advance_ticks(state, ticks_now, self.periods, watch)
             if state.tick % TICKS_PER_SECOND == 0:
+                state.environment.advance(1.0)
                 self.punctuality.watch(state)
             watch.lap("bookkeeping")
 

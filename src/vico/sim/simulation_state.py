@@ -15,6 +15,7 @@ from vico.sim.avatars import Avatars
 from vico.sim.base import SimulationBase
 from vico.sim.bodies import STEP_HEIGHT, TALLEST, Bodies, HasBodies, Subsystem
 from vico.sim.carrying import DeckPose, HasDecks
+from vico.sim.environment import Environment
 from vico.sim.events import Events
 from vico.sim.indoor import Indoor, near_door
 from vico.sim.periods import TICKS_PER_SECOND
@@ -189,6 +190,8 @@ class SimulationState:
         Moves `people`.
     events
         What happened in the step, and what agents heard.
+    environment
+        Weather, ground and light outdoors.
     traffic, transit, robots
         Subsystems with a state of their own; None where a run has none.
     entities
@@ -206,6 +209,7 @@ class SimulationState:
     objects: MovableObjects
     avatars: Avatars
     events: Events
+    environment: Environment
     traffic: TrafficSystem | None = None
     transit: TransitSystem | None = None
     robots: RobotSystem | None = None
@@ -374,6 +378,7 @@ class SimulationState:
             "people": self.people,
             "objects": self.objects,
             "events": self.events,
+            "environment": self.environment,
             "traffic": self.traffic,
             "transit": self.transit,
             "robots": self.robots,

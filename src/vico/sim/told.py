@@ -51,6 +51,7 @@ class Told:
         self._residents = chosen[state.people.kind[chosen] == RESIDENT]
         self._eyes_of = {i: k for k, i in enumerate(self._residents.tolist())}
         self._in_view = look_about(state, stances, self._residents)
+        self._weather = state.environment.record()
 
     def observation(self, name: str) -> dict[str, Any]:
         """Return one agent's observation."""
@@ -67,14 +68,15 @@ class Told:
         i = self._index[name]
         p = self._state.people
         code = code_name(p.reason_code.item(i)) if i < len(p) else self._robots[i]["action_code"]
+        found = {"action_code": code, "weather": self._weather}
         if i not in self._eyes_of:
-            return {"action_code": code}
+            return found
         view = self._in_view.of(self._eyes_of[i])
         if (room := p.room.item(i)) >= 0:
             indoor = self._state.indoor
             view.room = indoor.boxes[room]
             view.furniture = indoor.furniture[indoor.furniture_start[room] : indoor.furniture_start[room + 1]]
-        return {"action_code": code, "in_view": view}
+        return found | {"in_view": view}
 
     def crowd(self) -> Crowd:
         """Return all agents' observations as arrays."""
@@ -119,7 +121,8 @@ def look_about(state: SimulationState, stances: NDArray[np.float64], residents: 
     others = [owner.bodies() for owner in (state.traffic, state.transit, state.robots) if owner is not None]
     bodies = Bodies.joined([p.bodies_of(np.arange(len(p))), *others])
     spaces = np.concatenate([mine, np.full(len(bodies) - len(p), OUTDOORS)])
-    return in_view(eyes, bodies, spaces, opaque_grid(state.world), state.entities)
+    sight = state.environment.conditions.sight
+    return in_view(eyes, bodies, spaces, opaque_grid(state.world), state.entities, sight=sight)
 
 
 def _spaces(state: SimulationState) -> NDArray[np.int64]:

@@ -28,10 +28,11 @@ def check_move_forward(values: Values, i: int, state: SimulationState) -> Refusa
 
 
 def move_forward(values: Values, i: int, state: SimulationState) -> None:
-    """Walk or ride straight ahead over the coming second."""
+    """Walk or ride straight ahead over the coming second; on snow one gets less far."""
     p = state.people
-    p.move_left[i] = values["distance"]
-    p.move_speed[i] = values["distance"]
+    gets_on = state.environment.conditions.walking if p.room[i] < 0 else 1.0
+    p.move_left[i] = values["distance"] * gets_on
+    p.move_speed[i] = values["distance"] * gets_on
     p.pitch[i] = LEVEL_GAZE
 
 

@@ -84,6 +84,7 @@ def conditions(
     seen = visibility * (1.0 if dark < 0.5 else 0.8)
     safe = hard * (math.sqrt(_REACTION**2 + 2 * seen / hard) - _REACTION)
     slower = 0.12 * min(rain / 8.0, 1.0) + 0.12 * min(snowfall / 2.0, 1.0) + 0.20 * cover
+    slower += 0.11 * min(max((400.0 - visibility) / 200.0, 0.0), 1.0)
     return Conditions(
         sight=sight,
         friction=friction,

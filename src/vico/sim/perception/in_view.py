@@ -17,7 +17,7 @@ from vico.sim.perception.opaque import OpaqueGrid
 #: The space of all that is in no room and no bus.
 OUTDOORS = -1
 
-#: Bodies farther away than this are not noticed, metres.
+#: Bodies farther away than this are never noticed, metres.
 SIGHT = 40.0
 
 # Half the angle of view, as the pictures have it: a quarter turn in all.
@@ -189,6 +189,8 @@ def in_view(
     spaces: NDArray[np.int64],
     opaque: OpaqueGrid,
     entities: Mapping[int, Mapping[str, str]],
+    *,
+    sight: float = SIGHT,
 ) -> AllInView:
     """Return what each agent has in view.
 
@@ -200,6 +202,8 @@ def in_view(
         What hides things outdoors.
     entities
         Name and agent of each body by entity.
+    sight
+        How far bodies are noticed outdoors, metres; at most `SIGHT`.
     """
     looked_at = bodies.position + np.column_stack([np.zeros((len(bodies), 2)), _LOOKED_AT * bodies.height])
     keys = _keys(looked_at, spaces)
@@ -209,7 +213,7 @@ def in_view(
         np.column_stack([eyes.entity, eyes.space]).astype(np.int64),
         looked_at,
         np.column_stack([bodies.entity, spaces]).astype(np.int64),
-        np.array([SIGHT, math.cos(_HALF_ANGLE), _FREE_END, opaque.half, opaque.cell]),
+        np.array([SIGHT, math.cos(_HALF_ANGLE), _FREE_END, opaque.half, opaque.cell, sight]),
         opaque.top,
         keys[by_key],
         by_key,
@@ -261,10 +265,10 @@ def _pairs(eyes, mine, targets, theirs, limits, top, keys, order):  # type: igno
 @compiled
 def _distance_in_view(eye, target, outdoors, limits, top):  # type: ignore[no-untyped-def]
     """Return how far away a point in the same space is, metres; -1 if it is out of view."""
-    sight, cosine, free_end, half, cell = limits
+    farthest, cosine, free_end, half, cell, sight = limits
     dx, dy = target[0] - eye[0], target[1] - eye[1]
     away = math.sqrt(dx * dx + dy * dy)
-    if away > sight or dx * eye[3] + dy * eye[4] < cosine * away:
+    if away > (sight if outdoors else farthest) or dx * eye[3] + dy * eye[4] < cosine * away:
         return -1.0
     if outdoors and not _is_clear(eye, target, away, free_end, half, cell, top):
         return -1.0
