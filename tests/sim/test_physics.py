@@ -11,7 +11,9 @@ from vico.errors import InputError
 from vico.sim.physics import StaticScene, factory, make_engine, make_scene
 from vico.sim.physics.frames import COARSE, FINE, FrameCount, FrameNeeds, frame_length
 from vico.sim.physics.mujoco_engine import MujocoEngine
+from vico.sim.physics.mujoco_physics import MujocoScene
 from vico.sim.physics.records import PhysicsError
+from vico.sim.physics.solids import SolidCells
 from vico.sim.physics.surroundings import convex_parts
 from vico.world.heights import HeightField
 from vico.world.mesh import joined
@@ -36,6 +38,52 @@ def test_pieces_of_a_collision_surface_are_told_apart() -> None:
     # The first two touch but belong to different entities.
     assert sorted(float(part[:, 0].mean()) for part in parts) == [0.0, 1.0, 5.0]
     assert all(len(part) == 8 for part in parts)
+
+
+def test_cells_near_a_solid_of_any_kind_are_marked_and_far_ones_are_not() -> None:
+    hull = np.array([[10.0, 10.0], [14.0, 11.0], [11.0, 15.0]])
+    corners = np.vstack([np.column_stack([hull, np.full(3, z)]) for z in (0.0, 3.0)])
+    boxes = np.array([[-12.0, 3.0, 1.0, 0.5, 3.0, 0.2, 1.0]])
+    pillars = np.array([[5.0, -15.0, 1.0, 0.25, 1.0]])
+    grid = SolidCells(StaticScene(HeightField.flat(40.0), (corners,), boxes, pillars), 0.8)
+    rng = np.random.default_rng(3)
+    along = np.sort(rng.random((200, 2)), axis=1)
+    inside = np.vstack(
+        [
+            hull[0] * along[:, :1] + hull[1] * np.diff(along, axis=1) + hull[2] * (1.0 - along[:, 1:]),
+            np.array([-12.0, 3.0]) + rng.uniform(-3.0, 3.0, (200, 1)) * [np.cos(0.5), np.sin(0.5)],
+            np.tile([[5.0, -15.0]], (200, 1)),
+        ]
+    )
+    angle = rng.uniform(0.0, 2 * np.pi, len(inside))
+    near = inside + 0.8 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    column, row = ((near + grid.half) * len(grid.cells) / (2 * grid.half)).astype(int).T
+    assert grid.cells[row, column].all()
+    column, row = ((rng.uniform(-40.0, 40.0, (4000, 2)) + 40.0) * len(grid.cells) / 80.0).astype(int).T
+    middle = (np.stack([column, row], axis=1) + 0.5) * 80.0 / len(grid.cells) - 40.0
+    away = np.linalg.norm(middle[:, None] - inside[None], axis=2).min(axis=1)
+    assert not grid.cells[row, column][away > 3.5].any()
+
+
+def test_looking_for_solids_only_where_they_are_near_changes_nothing() -> None:
+    walls = np.array([[4.0, 0.0, 1.0, 0.2, 0.2, 5.0, 1.0], [-3.0, 4.0, 1.0, 0.0, 0.2, 0.2, 1.0]])
+    models = (robot_model("husky", packs=False), robot_model("go2", packs=False))
+    scene = make_scene("mujoco", StaticScene(HeightField.flat(50.0), boxes=walls), models)
+    assert isinstance(scene, MujocoScene)
+    places = np.array([[-3.0, 0.0, 0.1], [0.0, 20.0, 0.0]])
+    motions = []
+    for everywhere in (False, True):
+        if everywhere:
+            scene.solids.cells[:] = True
+        engine = scene.engine(places)
+        engine.command(0, np.full(4, 6.0))
+        path = []
+        for _ in range(400):
+            engine.step(1)
+            path.append(np.concatenate([engine.base(0).position, engine.base(1).position]))
+        motions.append(np.array(path))
+    assert 3.0 < motions[0][-1, 0] < 3.6  # it stands before the wall
+    assert np.array_equal(*motions)
 
 
 def test_an_engine_nobody_knows_and_one_that_is_not_installed_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -40,6 +40,18 @@ def _gaps(position, half_length, half_width, centres):  # type: ignore[no-untype
     return out
 
 
+@compiled
+def _poses(start, end, share):  # type: ignore[no-untyped-def]
+    """Return middle and yaw of everybody after a share of the way, the shorter way round."""
+    out = np.empty(start.shape)
+    for k in range(len(start)):
+        for i in range(YAW):
+            out[k, i] = start[k, i] + (end[k, i] - start[k, i]) * share
+        turn = (end[k, YAW] - start[k, YAW] + math.pi) % (2 * math.pi) - math.pi
+        out[k, YAW] = start[k, YAW] + turn * share
+    return out
+
+
 class KinematicBodies:
     """A fixed number of slots: people on foot first, then everything else that is driven or ridden.
 
@@ -120,9 +132,8 @@ class KinematicBodies:
         """Middle and yaw of everybody now, shape ``(n, 4)``."""
         gone, whole = self.time.tolist()
         share = 1.0 if whole <= 0.0 else min(1.0, gone / whole)
-        way = self.end - self.start
-        way[:, YAW] = (way[:, YAW] + math.pi) % (2 * math.pi) - math.pi
-        return np.asarray(self.start + way * share)
+        found: NDArray[np.float64] = _poses(self.start, self.end, share)
+        return found
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Everything that decides where they will be."""

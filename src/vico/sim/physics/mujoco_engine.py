@@ -18,11 +18,18 @@ from numpy.typing import NDArray
 from vico.errors import InputError, SchemaError
 from vico.sim.bodies import Bodies
 from vico.sim.physics.frames import COARSE, SOLVER_STEPS
-from vico.sim.physics.movers import YAW, KinematicBodies
-from vico.sim.physics.mujoco_model import PARKED, PARKED_APART, SOLID_GROUPS, parked_object, standing_pose
+from vico.sim.physics.movers import KinematicBodies
+from vico.sim.physics.mujoco_model import (
+    FRICTION,
+    SOLID_GROUPS,
+    parked_object,
+    standing_pose,
+)
 from vico.sim.physics.mujoco_parameters import Parameters
 from vico.sim.physics.mujoco_scene import CompiledScene, SharedModel
+from vico.sim.physics.mujoco_views import base_motion, joint_motion, place_bodies
 from vico.sim.physics.records import Base, Contacts, Imu, Motion, ObjectMotion, Party, PhysicsError, RigidObject
+from vico.sim.physics.solids import find_near
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 _DOWN = np.array([0.0, 0.0, -1.0])
@@ -66,6 +73,7 @@ class MujocoEngine:
         self._model = scene.model
         self._data = mujoco.MjData(scene.model)
         self._qpos, self._qvel = self._data.qpos, self._data.qvel
+        self._mocap_pos, self._mocap_quat = self._data.mocap_pos, self._data.mocap_quat
         self._size = mujoco.mj_stateSize(self._model, STATE)
         self._parameters = Parameters(scene)
         self._movers = KinematicBodies(scene.capacity)
@@ -78,6 +86,7 @@ class MujocoEngine:
         self._frame = np.zeros(1)
         self._contacts: NDArray[np.float64] | None = np.zeros((0, 9))
         self._gains_of: list[tuple[float, float] | None] = [None] * len(scene.models)
+        self._near_solids = np.ones(len(scene.models), np.bool_)
         scene.reset(self._data)
         for robot, (model, place) in enumerate(zip(scene.models, places, strict=True)):
             index = scene.robots[robot]
@@ -104,24 +113,19 @@ class MujocoEngine:
 
     def _forget(self) -> None:
         """Drop what was computed from a state that is no more."""
-        self._bases: list[Base | None] = [None] * len(self.compiled.models)
+        self._bases: list[Base] = []
         self._kinematics_of = -1.0
 
     # Robots.
 
     def base(self, robot: int) -> Base:
         """Where a robot's base is and how it moves."""
-        known = self._bases[robot]
-        if known is not None:
-            return known
-        index = self.compiled.robots[robot]
-        q, v = index.root, index.root_speed
-        pose, motion = self._qpos[q : q + 7].copy(), self._qvel[v : v + 6].copy()
-        rotation = np.empty(9)
-        mujoco.mju_quat2Mat(rotation, pose[3:])
-        base = Base(pose[:3], rotation.reshape(3, 3), motion[:3], motion[3:], pose[3:])
-        self._bases[robot] = base
-        return base
+        if self._bases:
+            return self._bases[robot]
+        self._bases = [
+            Base(*rows) for rows in zip(*base_motion(self._qpos, self._qvel, self.compiled.first), strict=True)
+        ]
+        return self._bases[robot]
 
     def joints(self, robot: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Positions and speeds of the joints."""
@@ -131,19 +135,9 @@ class MujocoEngine:
     def motion(self, robots: NDArray[np.int64]) -> Motion:
         """Motion of several robots of one kind."""
         index = self.compiled.kind(robots)
-        pose, rates = self._qpos[index.pose], self._qvel[index.rates]
-        rotation = np.empty((len(robots), 9))
-        for row, quaternion in zip(rotation, pose[:, 3:], strict=True):
-            mujoco.mju_quat2Mat(row, quaternion)
-        # Kernels are compiled for whole arrays alone.
-        return Motion(
-            pose[:, :3].copy(),
-            rates[:, :3].copy(),
-            rotation.reshape(-1, 3, 3),
-            rates[:, 3:].copy(),
-            self._qpos[index.angle],
-            self._qvel[index.rate],
-        )
+        position, rotation, velocity, angular_velocity, _ = base_motion(self._qpos, self._qvel, index.first)
+        angles, speeds = joint_motion(self._qpos, self._qvel, index.angle, index.rate)
+        return Motion(position, velocity, rotation, angular_velocity, angles, speeds)
 
     def motor_forces(self, robot: int) -> NDArray[np.float64]:
         """Torques of the motors in the last step."""
@@ -192,6 +186,7 @@ class MujocoEngine:
         if gains is not None and gains != self._gains_of[robot]:
             mine = np.isin(self.compiled.servos, self.compiled.robots[robot].servo)
             self._parameters.stiffness[mine], self._parameters.damping[mine] = gains
+            self._parameters.changed()
             self._gains_of[robot] = gains
 
     def thrust(
@@ -217,9 +212,10 @@ class MujocoEngine:
 
     def set_dynamic_obstacles(self, obstacles: Bodies, dt: float) -> None:
         """Take people and vehicles near robots; they arrive `dt` seconds from now."""
-        centres = np.array([self._qpos[robot.root : robot.root + 2] for robot in self.compiled.robots]).reshape(-1, 2)
-        self._movers.set(obstacles, dt, centres)
-        self._parameters.mover_half[:] = self._movers.half
+        self._movers.set(obstacles, dt, self._qpos[self.compiled.base_position])
+        if not np.array_equal(self._parameters.mover_half, self._movers.half):
+            self._parameters.mover_half[:] = self._movers.half
+            self._parameters.changed()
         self._move_movers()
 
     @property
@@ -229,15 +225,8 @@ class MujocoEngine:
 
     def _move_movers(self) -> None:
         """Put kinematic bodies where they are now, and who is nobody out of the way."""
-        poses, gone = self._movers.poses(), self._movers.entity == 0
-        where = self.compiled.mover_mocap
-        poses[gone] = 0.0
-        poses[gone, 0] = PARKED_APART * np.flatnonzero(gone)
-        poses[gone, 2] = PARKED
-        turn = np.zeros((len(poses), 4))
-        turn[:, 0], turn[:, 3] = np.cos(poses[:, YAW] / 2), np.sin(poses[:, YAW] / 2)
-        self._data.mocap_pos[where] = poses[:, :3]
-        self._data.mocap_quat[where] = turn
+        movers = self._movers
+        place_bodies(movers.poses(), movers.entity, self.compiled.mover_mocap, self._mocap_pos, self._mocap_quat)
 
     # Free rigid objects.
 
@@ -250,6 +239,7 @@ class MujocoEngine:
                 f"physics: an object needs three positive extents and a mass, not {size.tolist()}, {thing.mass} kg"
             )
         self._parameters.object_half[slot], self._parameters.object_mass[slot] = size / 2, thing.mass
+        self._parameters.changed()
         q, v = self.compiled.object_at(slot)
         # Written to another pose than the parked one, it is awake from the next step on.
         self._qpos[q : q + 7] = np.concatenate([thing.position, thing.quaternion])
@@ -304,19 +294,22 @@ class MujocoEngine:
 
     def step_in(self, shared: SharedModel, frames: int, frame: float) -> None:
         """Step, with the equations of a model of the same scene: its own for each thread of a batch."""
-        steps = SOLVER_STEPS[frame]
+        s, steps = self.compiled, SOLVER_STEPS[frame]
+        coordinates = (self._qpos, self._qvel, s.first)
         self._forget()
         with shared.lock:
             self._parameters.hold(shared)
-            shared.model.opt.timestep = frame / steps
+            shared.set_frame(frame / steps, FRICTION[frame])
             for _ in range(frames):
+                find_near(s.solids.cells, s.solids.half, s.solids.SLACK, frame, coordinates, self._near_solids)
+                s.meet_solids(shared, self._near_solids)
                 if self._movers.moving:
                     self._movers.advance(frame)
                     self._move_movers()
-                self._velocity_before[:] = self._qvel[self.compiled.base_velocity]
+                self._velocity_before[:] = self._qvel[s.base_velocity]
                 mujoco.mj_step(shared.model, self._data, steps)
                 if self._present.any():
-                    motion = self._qvel[self.compiled.object_motion].reshape(-1, 6)
+                    motion = self._qvel[s.object_motion].reshape(-1, 6)
                     self._calm = np.where(np.abs(motion).max(axis=1) < _SLOW, self._calm + frame, 0.0)
         self._frame[0] = frame
         self._contacts = None

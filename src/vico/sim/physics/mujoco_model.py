@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import BUMP, BUMPER, LIMB, TOUCH, RobotModel
 from vico.errors import InputError
-from vico.sim.physics.frames import COARSE, SOLVER_STEPS
+from vico.sim.physics.frames import COARSE, FINE, SOLVER_STEPS
 from vico.sim.physics.records import Capacity, StaticScene
 from vico.world.heights import HeightField
 
@@ -23,14 +23,18 @@ PARKED_APART = 20.0
 _CELL = 2.0
 #: ... and where it has kerbs, which are ramps half a metre wide then.
 _KERB_CELL = 0.5
-#: What ground and objects say of what they touch; solids also keep outlines of robots out.
+#: What ground and objects say of what they touch; solids meet whatever has their bit, outlines of robots too.
 _SOLID = {"contype": TOUCH, "conaffinity": TOUCH | LIMB}
+SOLID = 8
 #: Groups of shapes: rays meet all but the outlines of robots.
 SOLID_GROUPS = np.array([1, 1, 1, 1, 0, 0], np.uint8)
 _OUTLINES = 4
 #: Extents and kilograms that objects are compiled with; every engine writes its own.
 OBJECT_HALF, OBJECT_MASS = 0.15, 1.0
 _FRICTION = [0.6, 0.005, 0.0001]
+#: How much harder friction is than contact, by the length of a frame. Held things creep out of a grasp where friction
+#: is soft, 4-7 mm a minute at 10, ten times that at 1; wheels and feet follow commands alike, at 60% of the cost.
+FRICTION = {FINE: 10.0, COARSE: 1.0}
 
 
 def standing_pose(
@@ -79,8 +83,7 @@ def _set_options(spec: Any) -> None:
     # last bits of another's motion a street away. Islands are solved each for itself, and converge as soon from zero.
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_WARMSTART)
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    # Held things creep out of a grasp where friction is soft: 4-7 mm a minute at 10, ten times that at 1.
-    spec.option.impratio = 10.0
+    spec.option.impratio = FRICTION[COARSE]
 
 
 def _add_robot(spec: Any, index: int, model: RobotModel) -> None:
@@ -94,6 +97,8 @@ def _add_robot(spec: Any, index: int, model: RobotModel) -> None:
     for geom in robot.geoms:
         if geom.name == BUMPER:
             geom.group = _OUTLINES
+        if geom.contype or geom.conaffinity & (TOUCH | BUMP):
+            geom.contype |= SOLID
     for site in robot.sites:
         for axis in range(6):
             gear = [0.0] * 6
@@ -112,7 +117,7 @@ def thruster(site: str, axis: int) -> str:
 def _add_scene(spec: Any, scene: StaticScene) -> None:
     """Ground as one body, solids as the world's own."""
     ground, world = spec.worldbody.add_body(name="ground"), spec.worldbody
-    bits = {"contype": TOUCH | BUMP, "conaffinity": TOUCH | BUMP | LIMB}
+    bits = {"contype": 0, "conaffinity": SOLID}
     heights, half = _grid(scene)
     low, high = float(heights.min()), float(heights.max())
     if high - low < 1e-4:
@@ -184,7 +189,8 @@ def _add_objects(spec: Any, capacity: Capacity) -> None:
             condim=4,
             friction=_FRICTION,
             solref=[0.01, 1.0],
-            **_SOLID,
+            contype=TOUCH | SOLID,
+            conaffinity=TOUCH | LIMB,
         )
 
 

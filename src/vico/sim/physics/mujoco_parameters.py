@@ -24,7 +24,9 @@ class Parameters:
     object_half, object_mass
         Half extents, metres, shape ``(objects, 3)``, and kilograms, shape ``(objects,)``.
     numbers
-        All of these in one array, of which they are views.
+        All of these in one array, of which they are views; whoever writes to any of them says so by `changed`.
+    token
+        Stands for what the numbers are now.
     """
 
     def __init__(self, scene: CompiledScene) -> None:
@@ -38,12 +40,20 @@ class Parameters:
         self.stiffness, self.damping, self.mover_half, self.object_half, self.object_mass = parts
         self.stiffness[:], self.damping[:] = scene.stiffness, scene.damping
         self.mover_half[:], self.object_half[:], self.object_mass[:] = 0.25, OBJECT_HALF, OBJECT_MASS
+        self.token = object()
+
+    def changed(self) -> None:
+        """Note that some of the numbers were written."""
+        self.token = object()
 
     def hold(self, model: SharedModel) -> None:
         """Have a model say what these say."""
+        if model.holder is self.token:
+            return
         if model.written is None or not np.array_equal(model.written, self.numbers):
             self.write(model.model)
             model.written = self.numbers.copy()
+        model.holder = self.token
 
     def write(self, model: Any) -> None:
         """Write them, and what the broad phase and the solver derive from them, into a model of the scene."""
@@ -84,3 +94,4 @@ class Parameters:
         if numbers.shape != self.numbers.shape:
             raise SchemaError("physics: the saved state belongs to other robots or surroundings")
         self.numbers[:] = numbers
+        self.changed()

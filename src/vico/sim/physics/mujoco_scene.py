@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
-from vico.sim.physics.mujoco_model import SLEEP, compiled_model, thruster
+from vico.sim.physics.mujoco_model import SLEEP, SOLID, compiled_model, thruster
 from vico.sim.physics.records import Capacity, Party, StaticScene
+from vico.sim.physics.solids import SolidCells
 from vico.world.heights import HeightField
 
 
@@ -31,6 +32,10 @@ class RobotIndex:
         Bodies in the order of the model's `shapes`.
     links
         Names of all its bodies, base first.
+    link_bodies
+        Those bodies, int64, shape ``(links,)``.
+    reach
+        Metres from its base within which all of it is, however its joints turn.
     thrusters
         Actuators of each site, force x, y, z and torque x, y, z; by name of the site.
     """
@@ -50,6 +55,7 @@ class RobotIndex:
         self.links = tuple(model.body(k).name.removeprefix(prefix) for k in mine)
         self.link_bodies = np.array(mine, np.int64)
         sites = [model.site(k).name for k in range(model.nsite)]
+        self.reach = _reach(model, self.link_bodies)
         self.thrusters = {
             site.removeprefix(prefix): np.array(
                 [model.actuator(prefix + thruster(site.removeprefix(prefix), axis)).id for axis in range(6)]
@@ -69,8 +75,8 @@ class KindIndex:
 
     Attributes
     ----------
-    pose, rates
-        Positions (x, y, z, quaternion) and speeds of their bases, int64, shapes ``(k, 7)`` and ``(k, 6)``.
+    first
+        Where positions and speeds of their bases begin, int64, shape ``(k, 2)``.
     angle, rate
         Positions and speeds of their joints, shape ``(k, joints)``.
     motor
@@ -79,8 +85,7 @@ class KindIndex:
 
     def __init__(self, robots: Sequence[RobotIndex], coordinates: int) -> None:
         everything = np.arange(coordinates)
-        self.pose = np.array([np.arange(7) + robot.root for robot in robots])
-        self.rates = np.array([np.arange(6) + robot.root_speed for robot in robots])
+        self.first = np.array([(robot.root, robot.root_speed) for robot in robots])
         self.angle = np.array([everything[robot.angle] for robot in robots])
         self.rate = np.array([everything[robot.rate] for robot in robots])
         self.motor = np.array([robot.motor for robot in robots])
@@ -95,6 +100,10 @@ class SharedModel:
         The model.
     written
         Whose parameters it has now, as `Parameters.numbers`; None before the first.
+    holder
+        Stands for the parameters it has, as `Parameters.token`.
+    near
+        Of which robots links meet solids now, as bytes of an array of bool.
     lock
         Held by whoever uses it.
     """
@@ -102,7 +111,16 @@ class SharedModel:
     def __init__(self, model: Any) -> None:
         self.model = model
         self.written: NDArray[np.float64] | None = None
+        self.holder: object = None
+        self.near = b""
         self.lock = threading.RLock()
+        self._frame = (0.0, 0.0)
+
+    def set_frame(self, timestep: float, friction: float) -> None:
+        """Have steps take so many seconds, and friction be so much harder than contact."""
+        if self._frame != (timestep, friction):
+            self.model.opt.timestep, self.model.opt.impratio = timestep, friction
+            self._frame = (timestep, friction)
 
 
 class CompiledScene:
@@ -131,6 +149,8 @@ class CompiledScene:
         self.base_velocity = np.array([np.arange(3) + robot.root_speed for robot in self.robots], np.int64).reshape(
             -1, 3
         )
+        self.base_position = np.array([np.arange(2) + robot.root for robot in self.robots], np.int64).reshape(-1, 2)
+        self.first = np.array([(robot.root, robot.root_speed) for robot in self.robots], np.int64).reshape(-1, 2)
         self.servos = np.concatenate([np.zeros(0, np.int64), *(robot.servo for robot in self.robots)])
         movers = [m.body(f"person{i}").id for i in range(capacity.people)]
         movers += [m.body(f"vehicle{i}").id for i in range(capacity.vehicles)]
@@ -144,11 +164,18 @@ class CompiledScene:
         self.object_motion = _run_of(np.add.outer(m.jnt_dofadr[joint], np.arange(6)).ravel())
         self._kinds: dict[bytes, KindIndex] = {}
         self._index_contacts()
+        self.solids = SolidCells(static, max((robot.reach for robot in self.robots), default=0.0))
+        self._links = np.concatenate([np.zeros(0, np.int64), *(robot.link_bodies for robot in self.robots)])
+        self._link_owner = np.repeat(np.arange(len(models)), [len(robot.link_bodies) for robot in self.robots])
+        self._link_bits = np.array(m.body_contype[self._links])
         pristine = mujoco.MjData(m)
         m.opt.enableflags &= ~SLEEP
         mujoco.mj_kinematics(m, pristine)
         m.opt.enableflags |= SLEEP
         self._poses = {name: np.array(getattr(pristine, name)) for name in _POSES}
+        # For every body that might meet the world's shapes MuJoCo joins the bits of all of them, at every step. They
+        # are alike: two say what thousands do. Which of them are met is found from their tree of bounding boxes.
+        m.body_geomnum[0] = min(int(m.body_geomnum[0]), 2)
         self.stiffness = np.array(m.actuator_gainprm[self.servos, 0])
         self.damping = -np.asarray(m.actuator_biasprm[self.servos, 2])
 
@@ -174,6 +201,20 @@ class CompiledScene:
         for name, poses in self._poses.items():
             getattr(data, name)[:] = poses
 
+    def meet_solids(self, shared: SharedModel, near: NDArray[np.bool_]) -> None:
+        """Have the links of some robots meet solids; what is far from all of them need not be looked for.
+
+        Parameters
+        ----------
+        near
+            Of which robots, shape ``(robots,)``.
+        """
+        key = near.tobytes()
+        if key != shared.near:
+            bits = np.where(near[self._link_owner], self._link_bits, self._link_bits & ~SOLID)
+            shared.model.body_contype[self._links] = bits
+            shared.near = key
+
     def object_at(self, slot: int) -> tuple[int, int]:
         """First of an object's position and of its speed."""
         body = int(self.object_body[slot])
@@ -195,6 +236,31 @@ class CompiledScene:
     def site_names(self, robot: int) -> tuple[str, ...]:
         """Names of the sites a robot can be pushed at."""
         return tuple(self.robots[robot].thrusters)
+
+
+def _reach(model: Any, bodies: NDArray[np.int64]) -> float:
+    """Metres from the first of a robot's bodies within which all of their shapes are, however its joints turn."""
+    away = {int(bodies[0]): 0.0}
+    whole = 0.0
+    for body in bodies.tolist():
+        if body not in away:
+            away[body] = away[int(model.body_parentid[body])] + float(np.linalg.norm(model.body_pos[body]))
+        first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
+        for joint in range(first, first + count):
+            away[body] += _slide(model, joint)
+        for geom in np.flatnonzero(model.geom_bodyid == body).tolist():
+            size = float(np.linalg.norm(model.geom_pos[geom])) + float(model.geom_rbound[geom])
+            whole = max(whole, away[body] + size)
+    return whole
+
+
+def _slide(model: Any, joint: int) -> float:
+    """Metres a joint moves its body at most, away from where that turns."""
+    kind = model.jnt_type[joint]
+    if kind == mujoco.mjtJoint.mjJNT_SLIDE:
+        return float(np.abs(model.jnt_range[joint]).max()) if model.jnt_limited[joint] else np.inf
+    # A hinge or ball away from its body's origin swings that around itself.
+    return 0.0 if kind == mujoco.mjtJoint.mjJNT_FREE else 2.0 * float(np.linalg.norm(model.jnt_pos[joint]))
 
 
 def _joint_of(model: Any, name: str, *, driven: bool) -> int:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.exact import apply_matrix
-from vico.sim.bodies import ROBOT, Bodies, Drawn
+from vico.sim.bodies import Bodies, Drawn
 from vico.sim.carrying import DeckPose
 from vico.sim.robots.state import RobotRun
 from vico.world.mesh import Surface
@@ -20,21 +20,21 @@ _AIRBORNE = 0.5
 
 def bodies_of(run: RobotRun) -> Bodies:
     """Return upright boxes around the robots: on the ground, or where they fly."""
-    models = run.scene.models
-    bases = [run.engine.base(i) for i in range(len(models))]
+    outlines = run.scene.outlines
+    bases = [run.engine.base(i) for i in range(len(run.entities))]
     position = np.array([base.position for base in bases]).reshape(-1, 3)
     ground = run.scene.world.height(position)
-    bottom = position[:, 2] - np.array([model.stand for model in models])
+    bottom = position[:, 2] - outlines.stand
     position[:, 2] = np.where(bottom > ground + _AIRBORNE, bottom, ground)
     return Bodies(
         run.entities,
-        np.full(len(models), ROBOT, np.int8),
+        outlines.kind,
         position,
         np.array([base.yaw for base in bases]),
-        np.array([model.half_length for model in models]),
-        np.array([model.half_width for model in models]),
-        np.array([model.height for model in models]),
-        np.array([base.velocity[:2] for base in bases]).reshape(-1, 2),
+        outlines.half_length,
+        outlines.half_width,
+        outlines.height,
+        np.array([base.velocity for base in bases]).reshape(-1, 3)[:, :2].copy(),
     )
 
 

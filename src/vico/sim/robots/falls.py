@@ -10,14 +10,17 @@ from vico.sim.robots.state import Mode, RobotRun
 _FALL_TIME, _UPRIGHT = 0.3, 0.95
 #: Seconds after which a robot that can't get up is left lying.
 _GIVE_UP = 30.0
+# What the arrays hold: members of an enumeration are slow to look up.
+_FALLEN = int(RobotStatus.FALLEN)
 
 
 def watch_falls(run: RobotRun, dt: float) -> None:
     """Note who fell, who is up again and who is lost, `dt` seconds after this was last asked."""
+    status = run.arrays.status.tolist()
     for group in run.scene.groups:
+        limit = group.model.fallen_below
         for robot in group.robots.tolist():
-            limit = group.model.fallen_below
-            if run.arrays.status[robot] == RobotStatus.FALLEN:
+            if status[robot] == _FALLEN:
                 _watch_lying(run, robot, group.controller, dt)
             elif limit is not None:
                 tilted = float(run.engine.base(robot).rotation[2, 2]) < limit
@@ -26,8 +29,9 @@ def watch_falls(run: RobotRun, dt: float) -> None:
 
 def _watch_standing(run: RobotRun, robot: int, tilted: float) -> None:
     arrays = run.arrays
-    arrays.lying[robot] = arrays.lying[robot] + tilted if tilted else 0.0
-    if arrays.lying[robot] > _FALL_TIME:
+    lying = float(arrays.lying[robot]) + tilted if tilted else 0.0
+    arrays.lying[robot] = lying
+    if lying > _FALL_TIME:
         arrays.status[robot] = RobotStatus.FALLEN
         arrays.lying[robot] = 0.0
         run.note(robot, "fallen")

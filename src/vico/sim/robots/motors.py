@@ -11,7 +11,18 @@ from vico.sim.robots.state import Mode, RobotRun
 _MOTORS, _FALLEN = int(Mode.MOTORS), int(RobotStatus.FALLEN)
 
 
-def command_motors(run: RobotRun, group: RobotGroup, memory: np.ndarray) -> None:
+def velocities(run: RobotRun, group: RobotGroup) -> np.ndarray | None:
+    """Return what a kind of robots follow, shape ``(k, 3)``; None unless all of them follow velocities.
+
+    It stays the same until the robots decide again, or somebody commands one.
+    """
+    arrays, robots = run.arrays, group.robots
+    if np.any((arrays.status[robots] == _FALLEN) | (arrays.mode[robots] == _MOTORS)):
+        return None
+    return arrays.velocity[robots]
+
+
+def command_motors(run: RobotRun, group: RobotGroup, memory: np.ndarray, velocity: np.ndarray | None) -> None:
     """Tell the motors of a kind of robots what to follow for its period.
 
     The usual case, that all of them follow velocities, takes one call without copies.
@@ -20,14 +31,16 @@ def command_motors(run: RobotRun, group: RobotGroup, memory: np.ndarray) -> None
     ----------
     memory
         What the group's controller remembers, shape ``(k, controller.memory)``; updated in place.
+    velocity
+        As `velocities` has it.
     """
     arrays, robots = run.arrays, group.robots
-    fallen = arrays.status[robots] == _FALLEN
-    led = ~fallen & (arrays.mode[robots] != _MOTORS)
-    if led.all():
-        targets = group.controller.targets(run.engine.motion(robots), arrays.velocity[robots], memory)
+    if velocity is not None:
+        targets = group.controller.targets(run.engine.motion(robots), velocity, memory)
         run.engine.command_all(robots, targets, group.controller.gains(memory))
         return
+    fallen = arrays.status[robots] == _FALLEN
+    led = ~fallen & (arrays.mode[robots] != _MOTORS)
     if led.any():
         _follow_velocities(run, group, memory, led.nonzero()[0])
     for row in (~led).nonzero()[0].tolist():

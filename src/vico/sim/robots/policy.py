@@ -14,6 +14,26 @@ _SPIN, _JOINT_SPEED, _LIMIT = 0.25, 0.05, 100.0
 
 
 @compiled
+def _elu(values):  # type: ignore[no-untyped-def]
+    """Replace what is negative by exp(x) - 1, to 3e-7 of it.
+
+    A polynomial for x / 64, doubled six times: without a branch or a call, so that all of it is vectorised.
+    """
+    one, two = np.float32(1.0), np.float32(2.0)
+    for i in range(len(values)):
+        x = max(min(values[i], np.float32(0.0)), np.float32(-20.0)) * np.float32(1.0 / 64.0)
+        e = one + x * (np.float32(1 / 2) + x * (np.float32(1 / 6) + x * (np.float32(1 / 24) + x * np.float32(1 / 120))))
+        e = x * e
+        e = e * (e + two)
+        e = e * (e + two)
+        e = e * (e + two)
+        e = e * (e + two)
+        e = e * (e + two)
+        e = e * (e + two)
+        values[i] = max(values[i], np.float32(0.0)) + e
+
+
+@compiled
 def _dense(inputs, weights, bias, last):  # type: ignore[no-untyped-def]
     """One layer of all robots, shape ``(k, outputs)``.
 
@@ -29,9 +49,7 @@ def _dense(inputs, weights, bias, last):  # type: ignore[no-untyped-def]
                 out[k, i] += weights[j, i] * x
     if not last:
         for k in range(len(inputs)):
-            for i in range(len(bias)):
-                if out[k, i] < 0.0:
-                    out[k, i] = np.float32(np.expm1(out[k, i]))
+            _elu(out[k])
     return out
 
 
@@ -57,9 +75,23 @@ def _observation(angular_velocity_body, rotation, command, joints, action, order
 
 
 @compiled
-def _evaluate(layers, seen, pose, memory):  # type: ignore[no-untyped-def]
+def _observe_all(motion, command, memory, pose):  # type: ignore[no-untyped-def]
+    """Return what the policy sees of all robots, shape ``(k, 45)``."""
+    rotation, angular_velocity_body, angles, speeds = motion
+    order, rest, _ = pose
+    seen = np.empty((len(command), _OBSERVED))
+    for k in range(len(command)):
+        seen[k] = _observation(
+            angular_velocity_body[k], rotation[k], command[k], (angles[k], speeds[k]), memory[k], order, rest
+        )
+    return seen
+
+
+@compiled
+def _evaluate(layers, motion, command, memory, pose):  # type: ignore[no-untyped-def]
     """Return joint targets in the model's order, shape ``(k, 12)``; `memory` becomes the actions."""
     order, rest, scale = pose
+    seen = _observe_all(motion, command, memory, pose)
     x = np.minimum(np.maximum(seen, -_LIMIT), _LIMIT).astype(np.float32)
     for index in range(len(layers)):
         x = _dense(x, layers[index][0], layers[index][1], index == len(layers) - 1)
@@ -69,20 +101,6 @@ def _evaluate(layers, seen, pose, memory):  # type: ignore[no-untyped-def]
             memory[robot, k] = min(max(np.float64(x[robot, k]), -_LIMIT), _LIMIT)
             out[robot, order[k]] = rest[k] + memory[robot, k] * scale[k]
     return out
-
-
-@compiled
-def _observe_all(motion, command, joints, memory, pose):  # type: ignore[no-untyped-def]
-    """Return what the policy sees of all robots, shape ``(k, 45)``."""
-    rotation, angular_velocity_body = motion
-    angles, speeds = joints
-    order, rest, _ = pose
-    seen = np.empty((len(command), _OBSERVED))
-    for k in range(len(command)):
-        seen[k] = _observation(
-            angular_velocity_body[k], rotation[k], command[k], (angles[k], speeds[k]), memory[k], order, rest
-        )
-    return seen
 
 
 class WalkingPolicy:
@@ -119,7 +137,6 @@ class WalkingPolicy:
         memory
             The last actions, shape ``(k, 12)``; updated in place.
         """
-        bases, joints = (motion.rotation, motion.angular_velocity_body), (motion.angles, motion.speeds)
-        seen = _observe_all(bases, command, joints, memory, self._pose)
-        found: NDArray[np.float64] = _evaluate(self._layers, seen, self._pose, memory)
+        moving = (motion.rotation, motion.angular_velocity_body, motion.angles, motion.speeds)
+        found: NDArray[np.float64] = _evaluate(self._layers, moving, command, memory, self._pose)
         return found

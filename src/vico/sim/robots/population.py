@@ -17,7 +17,7 @@ from vico.sim.physics.loose import LooseObjects
 from vico.sim.robots import commands, drawing, sensing
 from vico.sim.robots.decisions import decide
 from vico.sim.robots.falls import watch_falls
-from vico.sim.robots.motors import command_motors
+from vico.sim.robots.motors import command_motors, velocities
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.scene import RobotScene
 from vico.sim.robots.spawns import spawns
@@ -199,6 +199,7 @@ class RobotPopulation:
         now, owed = int(arrays.tick[0]), int(arrays.owed[0]) + ticks
         left += owed - ticks
         needs = self._needs()  # decided between sub-steps, not within
+        orders = [(g, memory, velocities(self.run, g)) for g, memory in zip(groups, self.run.memory, strict=True)]
         arrays.owed[0] = owed
         while owed:
             until_told = min([group.period - now % group.period for group in groups])
@@ -206,9 +207,9 @@ class RobotPopulation:
             taken = round(frame / TICK)
             if taken > owed:
                 return
-            for group, memory in zip(groups, self.run.memory, strict=True):
+            for group, memory, velocity in orders:
                 if now % group.period == 0:
-                    command_motors(self.run, group, memory)
+                    command_motors(self.run, group, memory, velocity)
             self.engine.step(frame=frame)
             now, owed, left = now + taken, owed - taken, left - taken
             arrays.frames[0 if taken == 1 else 1] += 1
@@ -218,8 +219,8 @@ class RobotPopulation:
         """Return what decides how long a frame is."""
         arrays = self.run.arrays
         return FrameNeeds(
-            motor_commands=bool(np.any(arrays.mode == _MOTORS)),
-            fallen=bool(np.any(arrays.status == _FALLEN)),
+            motor_commands=_MOTORS in arrays.mode.tolist(),
+            fallen=_FALLEN in arrays.status.tolist(),
             loose_objects=self._loose.moving,
         )
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import TICK, RobotModel, robot_model
+from vico.sim.bodies import ROBOT
 from vico.sim.physics import DEFAULT_ENGINE, PhysicsEngine, PhysicsScene, make_scene
 from vico.sim.physics.surroundings import static_scene_of
 from vico.sim.robots.controller import MotorController
@@ -41,6 +42,27 @@ class RobotGroup:
     controller: MotorController
     robots: NDArray[np.int64]
     period: int
+
+
+@dataclass(frozen=True)
+class Outlines:
+    """Upright boxes around robots; row = robot.
+
+    Attributes
+    ----------
+    kind
+        What kind of bodies they are, int8.
+    half_length, half_width, height
+        Of the boxes, metres.
+    stand
+        Height of a standing robot's base above the ground, metres.
+    """
+
+    kind: NDArray[np.int8]
+    half_length: NDArray[np.float64]
+    half_width: NDArray[np.float64]
+    height: NDArray[np.float64]
+    stand: NDArray[np.float64]
 
 
 class RobotScene:
@@ -84,6 +106,12 @@ class RobotScene:
     def engine(self, places: NDArray[np.float64]) -> PhysicsEngine:
         """Return physics in which the robots stand at `places`: x, y, yaw, shape ``(n, 3)``."""
         return self.physics.engine(places)
+
+    @cached_property
+    def outlines(self) -> Outlines:
+        """The robots' outlines; not to be written to."""
+        sizes = [(m.half_length, m.half_width, m.height, m.stand) for m in self.models]
+        return Outlines(np.full(len(self), ROBOT, np.int8), *np.array(sizes, np.float64).reshape(-1, 4).T.copy())
 
     @cached_property
     def physics(self) -> PhysicsScene:
