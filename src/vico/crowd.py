@@ -26,8 +26,8 @@ class Crowd:
     place, room
         Place one is in, by its index in ``PublicMap.places``, and a number of the room; -1 where there is none, int32,
         shape ``(n,)``.
-    heard
-        Whether there are messages, bool, shape ``(n,)``.
+    heard, stopped
+        Whether there are messages, and whether something stopped the last motion, bool, shape ``(n,)``.
     viewer, seen, distance
         Who has which other agent in view, by rows, int64, and how far away it is, metres; shape ``(pairs,)``. Only
         residents are told.
@@ -40,6 +40,7 @@ class Crowd:
     place: NDArray[np.int32]
     room: NDArray[np.int32]
     heard: NDArray[np.bool_]
+    stopped: NDArray[np.bool_]
     viewer: NDArray[np.int64]
     seen: NDArray[np.int64]
     distance: NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Residents asked together: who would only wait is not asked at all."""
+"""Residents asked together: who would only wait, or walk straight on, is not asked at all."""
 
 from __future__ import annotations
 
@@ -10,18 +10,29 @@ from numpy.typing import NDArray
 
 from vico.agents.base import Action, Info, Observation
 from vico.agents.conversation import GREETING_DISTANCE, GREETING_PAUSE
+from vico.agents.strides import Stride, stride_lengths
+from vico.clock import DAY
 from vico.crowd import Crowd
+from vico.world.walkable import WalkableMap
 
 _LYING = 2
 _NEVER = -1e9
 
 
 class Resting(Protocol):
-    """A resident that may have nothing to decide for a while."""
+    """A resident that may have nothing to decide for a while, and remembers nothing new meanwhile."""
 
     @property
     def rests_until(self) -> float:
-        """Time before which it only waits, and remembers nothing new, unless spoken to, met or moved."""
+        """Time before which it only waits, unless spoken to, met or moved."""
+
+    @property
+    def stride(self) -> Stride | None:
+        """What it goes on with, outdoors, unless spoken to, met or stopped; None for what has to be decided."""
+
+    @property
+    def walks_until(self) -> float:
+        """Time before which it goes on with `stride`."""
 
     @property
     def known(self) -> Collection[str]:
@@ -42,21 +53,25 @@ class Resting(Protocol):
 class Residents:
     """Residents that are asked together: each does what it would do alone.
 
-    Those who rest where they were when they last decided to, heard nothing and see nobody they would greet are found in
-    arrays, and wait. Only the others are asked.
+    Those who rest where they were when they last decided to, or are on a straight way, heard nothing and see nobody
+    they would greet are found in arrays; they wait, or walk on. Only the others are asked.
 
     Parameters
     ----------
     members
         By name; one has to say when it acted or was changed otherwise (`forget`).
+    walkable
+        Where they walk.
     """
 
-    def __init__(self, members: Mapping[str, Resting]) -> None:
+    def __init__(self, members: Mapping[str, Resting], walkable: WalkableMap) -> None:
+        self._walkable = walkable
         self._members = list(members.values())
         self._number = {name: k for k, name in enumerate(members)}
         n = len(members)
-        # Each rests from the first to the second time.
+        # Each rests from the first to the second time, or walks on.
         self._since, self._until = np.full(n, np.inf), np.full(n, -np.inf)
+        self._walks, self._strides = np.zeros(n, bool), np.zeros((n, len(Stride._fields)))
         self._pose = np.zeros((n, 2))
         self._where = np.zeros((n, 3), np.int64)
         # Who would greet whom, as one number a pair, ascending; and when they last spoke.
@@ -86,11 +101,11 @@ class Residents:
         """Return the members' actions for the coming second; see `vico.agents.base.GroupAgent`."""
         crowd: Crowd | None = getattr(observations, "crowd", None)
         numbers = np.array([self._number[name] for name in names], np.int64)
-        resting = np.zeros(len(names), bool) if crowd is None else self._resting(crowd, numbers)
+        going_on = np.full(len(names), np.nan) if crowd is None else self._going_on(crowd, numbers)
         found: dict[str, Action | Exception] = {}
-        for name, k, rests in zip(names, numbers.tolist(), resting.tolist(), strict=True):
-            if rests:
-                found[name] = {"type": "wait"}
+        for name, k, distance in zip(names, numbers.tolist(), going_on.tolist(), strict=True):
+            if distance >= 0.0:
+                found[name] = {"type": "move_forward", "distance": distance} if distance else {"type": "wait"}
                 continue
             try:
                 found[name] = self._members[k].act(observations[name], infos[name])
@@ -102,21 +117,31 @@ class Residents:
         return found
 
     def _note(self, k: int, crowd: Crowd, row: int) -> None:
-        """Remember until when and where a member rests."""
-        until = self._members[k].rests_until
+        """Remember until when and where a member rests or walks on."""
+        member = self._members[k]
+        stride = member.stride
+        until = member.rests_until if stride is None else member.walks_until
         if until > crowd.time:
             self._since[k], self._until[k] = crowd.time, until
             self._pose[k] = crowd.pose[row, :2]
             self._where[k] = crowd.place[row], crowd.room[row], crowd.posture[row]
+            self._walks[k] = stride is not None
+            if stride is not None:
+                self._strides[k] = stride
 
-    def _resting(self, crowd: Crowd, numbers: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return which of some members have nothing to decide."""
+    def _going_on(self, crowd: Crowd, numbers: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return how far ahead some members walk that have nothing to decide, metres: 0 for who rests; NaN else."""
         rows = self._rows_in(crowd)[numbers]
         where = np.column_stack([crowd.place[rows], crowd.room[rows], crowd.posture[rows]])
-        still = (self._pose[numbers] == crowd.pose[rows, :2]).all(axis=1) & (self._where[numbers] == where).all(axis=1)
         meets = self._meeting(crowd)[numbers] & (crowd.posture[rows] != _LYING)
         now = (self._since[numbers] <= crowd.time) & (crowd.time < self._until[numbers])
-        return np.asarray(now & still & ~crowd.heard[rows] & ~meets, np.bool_)
+        undisturbed = now & (self._where[numbers] == where).all(axis=1) & ~crowd.heard[rows] & ~meets
+        still = (self._pose[numbers] == crowd.pose[rows, :2]).all(axis=1)
+        found = np.where(undisturbed & still & ~self._walks[numbers], 0.0, np.nan)
+        walks = np.flatnonzero(undisturbed & self._walks[numbers] & ~crowd.stopped[rows])
+        strides, pose = self._strides[numbers[walks]], crowd.pose[rows[walks]]
+        found[walks] = stride_lengths(strides, pose, crowd.time % DAY, self._walkable)
+        return found
 
     def _meeting(self, crowd: Crowd) -> NDArray[np.bool_]:
         """Return which members see somebody near whom they would greet."""

@@ -13,13 +13,15 @@ from vico.agents.conversation import Acquaintance, Conversation, Speaker
 from vico.agents.indoor_walk import IndoorWalker
 from vico.agents.residents import Residents
 from vico.agents.state import AgentState, generator_state, restore_generator
-from vico.agents.stays import SLACK, SLACK_SHARE, WALK, Item, Stay, stays_of, with_ways
+from vico.agents.stays import Item, Stay, stays_of, with_ways
+from vico.agents.strides import Stride, pace_in_time
 from vico.agents.wayfinding import Walker
 from vico.clock import DAY
+from vico.rules import DOOR_REACH
 from vico.seeds import rng
+from vico.world.model import Point3
 from vico.world.public import PublicMap, PublicPlace
 
-BRISK, RUN = 1.5, 2.4
 # So many residents are sure to ask for many ways.
 _MANY = 40
 # Open places are reached this close to their position, metres.
@@ -70,6 +72,9 @@ class ScheduleFollower:
         self.group: Residents | None = None
         #: Time before which it only waits, unless spoken to, met or moved.
         self.rests_until = -math.inf
+        #: What it goes on with until `walks_until` unless it is spoken to, met, moved or stopped.
+        self.stride: Stride | None = None
+        self.walks_until = -math.inf
         self._name = resident.id
         self._map = public_map
         self._stays = with_ways(stays_of(resident.schedule, public_map.place_by_id), public_map)
@@ -87,16 +92,16 @@ class ScheduleFollower:
         self._stroll: tuple[float, float] | None = None
         # When a stroll goes on, seconds.
         self._paused_until = -math.inf
-        # The type of the last action that was asked for.
-        self._asked = ""
+        # Whether the last action was to go in somewhere.
+        self._went_in = False
 
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the action for the coming second."""
         if self.group is not None:
             self.group.forget(self._name)
-        self.rests_until = -math.inf
+        self.rests_until, self.stride = -math.inf, None
         action = self._decide(observation, info)
-        self._asked = str(action["type"])
+        self._went_in = action["type"] == "enter"
         return action
 
     @property
@@ -128,7 +133,7 @@ class ScheduleFollower:
             "arrived": None if arrived is None else self._stays.index(arrived),
             "stroll": None if self._stroll is None else list(self._stroll),
             "paused_until": None if math.isinf(self._paused_until) else self._paused_until,
-            "asked": self._asked,
+            "went_in": self._went_in,
         }
 
     def restore(self, state: AgentState) -> None:
@@ -145,7 +150,7 @@ class ScheduleFollower:
         self._arrived = None if arrived is None else self._stays[arrived]
         self._stroll = None if stroll is None else (float(stroll[0]), float(stroll[1]))
         paused = state["paused_until"]
-        self._paused_until, self._asked = -math.inf if paused is None else paused, state["asked"]
+        self._paused_until, self._went_in = -math.inf if paused is None else paused, state["went_in"]
 
     def _decide(self, observation: Observation, info: Info) -> Action:
         state = observation["state"]
@@ -204,6 +209,7 @@ class ScheduleFollower:
         if action is None:
             self._stroll, self._paused_until = None, time + int(self._rng.integers(4, 16))
             return {"type": "wait"}
+        self._go_on(time, pace, stay, (place.position, 0.0, 2 * _STROLL))
         return action
 
     def _live(self, stay: Stay, time: float) -> Action:
@@ -215,25 +221,33 @@ class ScheduleFollower:
         if stay.type == "meal" or stay.tag in _EATING:
             if self._posture != "sitting":
                 return self._become("sitting")
-            if tick % _EAT_EVERY == 0:
-                return {"type": "drink" if self._rng.random() < 0.3 else "eat"}
-            return self._rest(time, second + _EAT_EVERY - tick % _EAT_EVERY)
+            bite = "" if tick % _EAT_EVERY else "drink" if self._rng.random() < 0.3 else "eat"
+            return self._rest(time, second + _EAT_EVERY - tick % _EAT_EVERY, bite or "wait")
         if self._posture == "lying":
             return self._become("standing")
         if tick % _MOVE_EVERY == 0 and self._rng.random() < 0.5:
             return self._become("sitting" if self._posture == "standing" else "standing")
-        if tick % _DRINK_EVERY == 0:
-            return {"type": "drink"}
-        return self._rest(time, second + min(_MOVE_EVERY - tick % _MOVE_EVERY, _DRINK_EVERY - tick % _DRINK_EVERY))
+        rest = second + min(_MOVE_EVERY - tick % _MOVE_EVERY, _DRINK_EVERY - tick % _DRINK_EVERY)
+        return self._rest(time, rest, "wait" if tick % _DRINK_EVERY else "drink")
 
-    def _rest(self, time: float, until: float) -> Action:
-        """Wait, and say until when nothing else will come of being asked: no longer than to the next stay."""
+    def _rest(self, time: float, until: float, now: str = "wait") -> Action:
+        """Wait, maybe after a sip or a bite, and say until when nothing else will come of being asked."""
+        self.rests_until = min(until, self._next_stay(time))
+        return {"type": now}
+
+    def _go_on(self, time: float, pace: float, stay: Stay, around: tuple[Point3, float, float]) -> None:
+        """Say what comes of being asked while it walks straight on; `around`: as `Stride.place_x` and on."""
+        ahead, ((x, y, _), least, most) = self._walker.straight_on, around
+        if ahead is not None:
+            self.stride, self.walks_until = Stride(*ahead, pace, stay.due, x, y, least, most), self._next_stay(time)
+
+    def _next_stay(self, time: float) -> float:
+        """Return when the next stay begins, or the next day."""
         of_day = time % DAY
         later = bisect_right(self._changes, of_day)
         change = self._changes[later] if later < len(self._changes) else DAY
         # A little early, for the rounding: being asked for nothing costs little.
-        self.rests_until = min(until, time - of_day + change - 1e-3)
-        return {"type": "wait"}
+        return time - of_day + change - 1e-3
 
     def _become(self, posture: str) -> Action:
         if posture == self._posture:
@@ -279,23 +293,19 @@ class ScheduleFollower:
     def _walk(self, observation: Observation, info: Info, stay: Stay, place: PublicPlace) -> Action:
         self._arrived = None
         state = observation["state"]
-        turned_away = self._asked == "enter" and state["action_status"] == "refused"
+        turned_away = self._went_in and state["action_status"] == "refused"
         if place.id in state["accessible_places"] and not turned_away:
             return {"type": "enter", "place": place.id}
         goal = (float(place.position[0]), float(place.position[1]))
         left = self._walker.remaining(observation["pose"])
         time_left = stay.due - state["time"] % DAY
-        action = self._walker.towards(goal, self._speed(left, time_left), observation, info)
+        action = self._walker.towards(goal, pace_in_time(left, time_left), observation, info)
         if action is not None:
+            door = place.position if place.building is None else place.entrance or place.position
+            near = _OPEN_REACH if place.building is None else DOOR_REACH
+            self._go_on(state["time"], math.nan, stay, (door, near, math.inf))
             return action
         return {"type": "enter", "place": place.id} if place.id in state["accessible_places"] else {"type": "wait"}
-
-    def _speed(self, metres: float, seconds: float) -> float:
-        """Walk at ease while there is time, briskly when it gets short, and run when late."""
-        needed = metres * (1.0 + SLACK_SHARE) / max(1.0, seconds - SLACK)
-        if needed <= WALK:
-            return WALK
-        return needed if needed <= BRISK else min(RUN, max(BRISK, needed))
 
     def _errand(self, observation: Observation, stay: Stay, place: PublicPlace) -> str:
         """Return what one is about, to follow "I'm "."""
@@ -328,7 +338,7 @@ def followers_of(community: Any, public_map: PublicMap, *, seed: int = 0) -> dic
         name: ScheduleFollower(resident, public_map, known=known[name], seed=seed)
         for name, resident in residents.items()
     }
-    group = Residents(followers)
+    group = Residents(followers, public_map.walkable)
     for follower in followers.values():
         follower.group = group
     return followers

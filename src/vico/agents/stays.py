@@ -11,8 +11,8 @@ from typing import Protocol
 from vico.clock import seconds_of_day
 from vico.world.public import PublicMap
 
-#: Metres a second of who has time.
-WALK = 1.0
+#: Metres a second of who has time, and at most of who is late.
+WALK, RUN = 1.0, 2.4
 #: Time kept in hand for corners, crossings and doors: a share of the way, and seconds.
 SLACK_SHARE, SLACK = 0.15, 20.0
 

@@ -12,15 +12,13 @@ from numpy.typing import NDArray
 
 from vico.agents.base import Action, Info, Observation, heading, wrapped
 from vico.agents.state import AgentState
+from vico.agents.strides import CORNER, DRIFT, NARROW, NARROW_DRIFT, ROAD
 from vico.rules import ReasonCode, code_name
 from vico.world.public import PublicMap
-from vico.world.walkable import CROSSING, ROADWAY
 
 VEHICLES = ("car", "bus", "bicycle")
-# Corners count as passed this close, metres; the last point of a path is walked to more closely.
-_CORNER, _END = 0.35, 0.2
-# Off the line by more than this after a step means turning first, metres.
-_DRIFT = 0.12
+# The last point of a path is walked to more closely than other corners, metres.
+_END = 0.2
 # At a kerb, people let vehicles pass that are nearer than this, metres, but not for ever, seconds.
 _CAR_NEAR, _PATIENCE = 9.0, 8
 # Radius of what is taken to be closed where one keeps being stopped, and its growth each time, metres.
@@ -89,7 +87,20 @@ class Walker:
         """Metres still to walk."""
         if self._goal is None or self._next >= len(self._path):
             return 0.0
-        return math.dist(position[:2], self._path[self._next]) + self._left[self._next]
+        corner = self._path[self._next]
+        east, north = corner[0] - float(position[0]), corner[1] - float(position[1])
+        # As `vico.agents.strides` reckons for many, to the last bit.
+        return math.sqrt(east * east + north * north) + self._left[self._next]
+
+    @property
+    def straight_on(self) -> tuple[float, float, float] | None:
+        """The corner that the last step led towards, ENU metres, and how far it is from there to the end of the way.
+
+        None where the next step towards the same goal may change what the walker remembers, even if nothing is met.
+        """
+        if not self._stepped or self._blocked:
+            return None
+        return (*self._path[self._next], self._left[self._next])
 
     def towards(self, goal: tuple[float, float], speed: float, observation: Observation, info: Info) -> Action | None:
         """Return the next action on the way to a point; None if there is no way or it is reached.
@@ -158,7 +169,7 @@ class Walker:
 
     def _pass_corners(self, position: Point) -> None:
         while self._next < len(self._path):
-            near = _END if self._next == len(self._path) - 1 else min(_CORNER, self._room(position) * 0.5)
+            near = _END if self._next == len(self._path) - 1 else min(CORNER, self._room(position) * 0.5)
             if math.dist(self._path[self._next], position) > near:
                 return
             self._next += 1
@@ -169,11 +180,11 @@ class Walker:
     def _step(self, position: Point, speed: float, observation: Observation, info: Info) -> Action:
         corner = self._path[self._next]
         east, north = corner[0] - position[0], corner[1] - position[1]
-        away = math.hypot(east, north)
+        away = math.sqrt(east * east + north * north)
         error = wrapped(math.atan2(north, east) - heading(observation))
         stride = min(away, speed)
         # Where it is narrow there is no room for drifting.
-        drift = _DRIFT if self._room(position) > 0.6 else 0.03
+        drift = DRIFT if self._room(position) > NARROW else NARROW_DRIFT
         if abs(error) > 1e-3 and (abs(stride * math.sin(error)) > drift or math.cos(error) <= 0.0):
             return {"type": "turn_left" if error > 0 else "turn_right", "degrees": abs(math.degrees(error))}
         scale = 1.0 / max(away, 1e-9)
@@ -189,8 +200,7 @@ class Walker:
     def _should_let_pass(self, position: Point, ahead: Point, observation: Observation, info: Info) -> bool:
         """Whether one stands at the kerb, with the point a metre ahead on the road, and a vehicle is near."""
         surface = self._map.walkable.class_of
-        road = (ROADWAY, CROSSING)
-        if surface(*position) in road or surface(*ahead) not in road:
+        if surface(*position) in ROAD or surface(*ahead) not in ROAD:
             return False
         return self._waited < _PATIENCE and _nearest_vehicle(observation, info) < _CAR_NEAR
 

@@ -94,6 +94,7 @@ class Told:
             place=_padded(p.place, n, -1),
             room=_padded(p.room, n, -1),
             heard=heard,
+            stopped=_padded(p.status == ActionStatus.COLLISION, n, False),
             viewer=self._residents[view.viewer[people]],
             seen=view.body[people],
             distance=view.distance[people],
@@ -103,7 +104,7 @@ class Told:
         return self._robots[i] if i in self._robots else state_of(i, self._state)
 
 
-def _padded(values: NDArray[Any], length: int, value: int) -> NDArray[Any]:
+def _padded(values: NDArray[Any], length: int, value: int | bool) -> NDArray[Any]:
     """Return values of people with one for each robot behind them."""
     return np.concatenate([values, np.full(length - len(values), value, values.dtype)])
 
