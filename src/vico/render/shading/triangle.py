@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from vico.render.compiled import inlined, kernel
+from vico.render.compiled import inlined
 from vico.render.records import DOUBLE_SIDED, FLAT_NORMAL, PLAIN_COLOUR, TWO_SIDED
 from vico.render.visibility.culling import set_instance_view, set_world_view
 from vico.render.visibility.draw import item_of
 
 
-@kernel
+@inlined
 def set_up_triangle(scene: Any, camera: Any, buffers: Any, drawn: int, number: int, setup: Any) -> None:
     """Write the `TRIANGLE_SETUP` of a triangle number."""
     item = item_of(buffers.base, drawn, number)

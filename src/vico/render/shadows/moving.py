@@ -160,7 +160,7 @@ def _set_screen_bounds(caster: Any, camera: Any) -> bool:
     return caster.first_column < caster.end_column and caster.first_row < caster.end_row
 
 
-@kernel
+@inlined
 def set_caster(scene: Any, k: int, camera: Any, light: Any, reach: float, caster: Any) -> bool:
     """Write the `CASTER` of a moving thing (instances, then avatars); return whether it may darken what is seen."""
     avatar = k - scene.counts.instances

@@ -36,12 +36,14 @@ def renew_tiles(buffers: Any, camera: Any) -> None:
     blocks[:] = np.uint32(0xFFFFFFFF)
     for tile_row in range(tiles_along(height)):
         top = tile_row * TILE
+        # Slices: of a sum of two numbers the compiler can't tell that it is no index from the end, and gathers.
+        line = keys[top * width : (top + 1) * width]
         for i in range(width):
-            strip[i] = keys[top * width + i]
+            strip[i] = line[i]
         for row in range(top + 1, min(top + TILE, height)):
-            offset = row * width
+            line = keys[row * width : (row + 1) * width]
             for i in range(width):
-                strip[i] = min(strip[i], keys[offset + i])
+                strip[i] = min(strip[i], line[i])
         for tile in range(across):
             least = strip[tile * TILE]
             for i in range(tile * TILE + 1, min(tile * TILE + TILE, width)):
