@@ -15,6 +15,7 @@ from vico.world.heights import HeightField
 
 FLAT = HeightField.flat(50.0)
 SMALL = Capacity(people=8, vehicles=4, objects=6)
+HILL = HeightField(np.add.outer(np.sin(np.arange(101.0)), np.cos(np.arange(101.0) / 2)).astype(np.float32) * 0.2, 50.0)
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 pytestmark = pytest.mark.parametrize("name", engine_names())
 
@@ -416,6 +417,25 @@ def test_what_happens_far_away_changes_nothing_here(name: str) -> None:
     assert np.array_equal(quiet.base(0).position, lively.base(0).position)
     assert np.array_equal(quiet.objects().position[0], lively.objects().position[0])
     assert not np.array_equal(quiet.base(1).position, lively.base(1).position)
+
+
+def test_a_thing_that_comes_and_goes_out_of_reach_changes_nothing_here(name: str) -> None:
+    scene = make_scene(name, StaticScene(HILL), (HUSKY, GO2), SMALL)
+    places = np.array([[0.0, 0.0, 0.3], [0.0, 20.0, 0.0]])
+    alone, visited = scene.engine(places), scene.engine(places)
+    for k in range(60):
+        if k == 20:
+            visited.place_object(2, cube(20.0, -20.0, 5.0))
+        elif k == 40:
+            visited.remove_object(2)
+        for engine in (alone, visited):
+            engine.command(0, np.array([4.0, 2.0, 4.0, 2.0]))
+            engine.set_dynamic_obstacles(body(RESIDENT, 3.0, 1.0, velocity=(0.0, 0.1)), 0.1)
+            engine.step(5)
+    for robot in (0, 1):
+        assert np.array_equal(alone.base(robot).position, visited.base(robot).position)
+        assert np.array_equal(alone.joints(robot)[1], visited.joints(robot)[1])
+    assert not visited.objects().present.any()
 
 
 def test_a_batch_computes_what_single_engines_compute(name: str) -> None:

@@ -41,7 +41,8 @@ class MujocoBatch:
         self.compiled = scene
         self.engines = [MujocoEngine(scene, places) for _ in range(copies)]
         count = min(threads or os.cpu_count() or 1, copies)
-        self._models = [SharedModel(copying.copy(scene.model)) for _ in range(count - 1)] + [scene.shared]
+        # The last thread is the caller's.
+        self._models: list[dict[CompiledScene, SharedModel]] = [{} for _ in range(count)]
         self._pool = ThreadPoolExecutor(count - 1) if count > 1 else None
 
     def __len__(self) -> int:
@@ -73,8 +74,10 @@ class MujocoBatch:
 
     def objects(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Poses and motions of the objects, shapes ``(copies, slots, 7)`` and ``(copies, slots, 6)``."""
-        pose, motion = self._gather(self.compiled.object_pose, self.compiled.object_motion)
-        return pose.reshape(len(self), -1, 7), motion.reshape(len(self), -1, 6)
+        found = [engine.objects() for engine in self.engines]
+        poses = [np.concatenate([one.position, one.quaternion], axis=1) for one in found]
+        motions = [np.concatenate([one.velocity, one.angular_velocity_body], axis=1) for one in found]
+        return np.stack(poses), np.stack(motions)
 
     def _gather(self, pose: Any, motion: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         states = [engine.coordinates for engine in self.engines]
@@ -84,9 +87,13 @@ class MujocoBatch:
         """Move all copies on by some frames."""
         parts = [self.engines[k :: len(self._models)] for k in range(len(self._models))]
 
-        def run(model: SharedModel, engines: list[MujocoEngine]) -> None:
+        def run(models: dict[CompiledScene, SharedModel], engines: list[MujocoEngine]) -> None:
             for engine in engines:
-                engine.step_in(model, frames, frame)
+                scene = engine.compiled
+                if scene not in models:
+                    own = models is self._models[-1]
+                    models[scene] = scene.shared if own else SharedModel(copying.copy(scene.model))
+                engine.step_in(models[scene], frames, frame)
 
         others = (
             [self._pool.submit(run, *pair) for pair in zip(self._models[:-1], parts[:-1], strict=True)]

@@ -69,13 +69,9 @@ class MujocoEngine:
         places = np.asarray(places, np.float64)
         if places.shape != (len(scene.models), 3):
             raise InputError(f"physics: {len(scene.models)} robots need as many places x, y, yaw, not {places.shape}")
-        self.compiled = scene
-        self._model = scene.model
-        self._data = mujoco.MjData(scene.model)
-        self._qpos, self._qvel = self._data.qpos, self._data.qvel
-        self._mocap_pos, self._mocap_quat = self._data.mocap_pos, self._data.mocap_quat
-        self._size = mujoco.mj_stateSize(self._model, STATE)
-        self._parameters = Parameters(scene)
+        # Making one takes milliseconds: things come and go.
+        self._kept: dict[CompiledScene, Any] = {}
+        self._use(scene.bare)
         self._movers = KinematicBodies(scene.capacity)
         count = scene.capacity.objects
         self._present = np.zeros(count, np.bool_)
@@ -87,7 +83,6 @@ class MujocoEngine:
         self._contacts: NDArray[np.float64] | None = np.zeros((0, 9))
         self._gains_of: list[tuple[float, float] | None] = [None] * len(scene.models)
         self._near_solids = np.ones(len(scene.models), np.bool_)
-        scene.reset(self._data)
         for robot, (model, place) in enumerate(zip(scene.models, places, strict=True)):
             index = scene.robots[robot]
             position, quaternion = standing_pose(scene.height, model, place)
@@ -100,6 +95,34 @@ class MujocoEngine:
     def link_names(self, robot: int) -> tuple[str, ...]:
         """Names of a robot's links, base first."""
         return self.compiled.link_names(robot)
+
+    def _use(self, scene: CompiledScene) -> None:
+        """Go to the beginning of a scene, the one without objects or the one with."""
+        self.compiled = scene
+        self._model = scene.model
+        if scene not in self._kept:
+            self._kept[scene] = mujoco.MjData(scene.model)
+        self._data = self._kept[scene]
+        self._qpos, self._qvel = self._data.qpos, self._data.qvel
+        self._mocap_pos, self._mocap_quat = self._data.mocap_pos, self._data.mocap_quat
+        self._size = mujoco.mj_stateSize(self._model, STATE)
+        self._parameters = Parameters(scene)
+        scene.reset(self._data)
+
+    def _move_to(self, scene: CompiledScene) -> None:
+        """Go on in the scene with objects, or without them: robots, people and vehicles as they are."""
+        if scene is self.compiled:
+            return
+        contacts, data, parameters = self._last_contacts(), self._data, self._parameters
+        self._use(scene)
+        count = min(len(self._qpos), len(data.qpos)), min(len(self._qvel), len(data.qvel))
+        self._qpos[: count[0]], self._qvel[: count[1]] = data.qpos[: count[0]], data.qvel[: count[1]]
+        self._mocap_pos[:], self._mocap_quat[:] = data.mocap_pos, data.mocap_quat
+        self._data.ctrl[:], self._data.actuator_force[:] = data.ctrl, data.actuator_force
+        self._data.time = data.time
+        self._parameters.copy_from(parameters)
+        self._contacts = contacts
+        self._kinematics_of = -1.0
 
     @property
     def coordinates(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -238,6 +261,7 @@ class MujocoEngine:
             raise InputError(
                 f"physics: an object needs three positive extents and a mass, not {size.tolist()}, {thing.mass} kg"
             )
+        self._move_to(self.compiled.full)
         self._parameters.object_half[slot], self._parameters.object_mass[slot] = size / 2, thing.mass
         self._parameters.changed()
         q, v = self.compiled.object_at(slot)
@@ -253,11 +277,15 @@ class MujocoEngine:
         self._check_slot(slot)
         if not self._present[slot]:
             return
+        self._present[slot] = False
+        if not self._present.any():
+            self._calm[:] = 0.0
+            self._move_to(self.compiled.bare)
+            return
         q, v = self.compiled.object_at(slot)
         self._qpos[q : q + 7] = [*parked_object(slot), 1.0, 0.0, 0.0, 0.0]
         self._qvel[v : v + 6] = 0.0
         self._data.qacc_warmstart[v : v + 6] = 0.0
-        self._present[slot] = False
         # Nobody but a reset puts anybody to sleep.
         forces, contacts = np.array(self._data.actuator_force), self._last_contacts()
         self._set_state(self._state(), forces, contacts, anew=True)
@@ -268,8 +296,10 @@ class MujocoEngine:
 
     def objects(self) -> ObjectMotion:
         """Where all objects are."""
-        pose = np.array(self._qpos[self.compiled.object_pose]).reshape(-1, 7)
-        motion = np.array(self._qvel[self.compiled.object_motion]).reshape(-1, 6)
+        pose, motion = np.zeros((len(self._present), 7)), np.zeros((len(self._present), 6))
+        if self.compiled.slots:
+            pose[:] = self._qpos[self.compiled.object_pose].reshape(-1, 7)
+            motion[:] = self._qvel[self.compiled.object_motion].reshape(-1, 6)
         resting = self._calm >= _CALM_TIME - 1e-9
         return ObjectMotion(self._present.copy(), pose[:, :3], pose[:, 3:], motion[:, :3], motion[:, 3:], resting)
 
@@ -387,16 +417,21 @@ class MujocoEngine:
         SchemaError
             If it belongs to other robots or surroundings.
         """
-        state = np.ascontiguousarray(arrays["state"], np.float64)
-        if state.shape != (self._size,) or arrays["forces"].shape != self._data.actuator_force.shape:
+        state, present = np.ascontiguousarray(arrays["state"], np.float64), arrays["present"]
+        scene = self.compiled.full if present.any() else self.compiled.bare
+        other = scene is not self.compiled
+        size = mujoco.mj_stateSize(scene.model, STATE) if other else self._size
+        if state.shape != (size,) or present.shape != self._present.shape:
             raise SchemaError(
                 "physics: the saved state belongs to other robots or surroundings; start with the same ones"
             )
         self._movers.restore(arrays)
+        if other:
+            self._use(scene)
         self._parameters.restore(arrays["parameters"])
-        anew = not np.array_equal(self._present, arrays["present"])
+        anew = not other and not np.array_equal(self._present, present)
         self._set_state(state, arrays["forces"], arrays["contacts"], anew=anew)
-        self._present[:] = arrays["present"]
+        self._present[:] = present
         self._calm[:] = arrays["calm"]
         self._velocity_before[:] = arrays["velocity_before"]
         self._frame[:] = arrays["frame"]

@@ -82,6 +82,7 @@ def _set_options(spec: Any) -> None:
     # Whether to start from the last solution is decided for everybody at once: what one robot meets would change the
     # last bits of another's motion a street away. Islands are solved each for itself, and converge as soon from zero.
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_WARMSTART)
+    spec.option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = FRICTION[COARSE]
 

@@ -89,6 +89,12 @@ class Parameters:
         model.dof_M0[dofs] = np.concatenate([np.repeat(mass[:, None], 3, axis=1), inertia], axis=1)
         model.dof_invweight0[dofs] = np.repeat(slow, 3, axis=1)
 
+    def copy_from(self, other: Parameters) -> None:
+        """Take over what another engine of the same scene, with objects or without, says of all but objects."""
+        self.stiffness[:], self.damping[:] = other.stiffness, other.damping
+        self.mover_half[:] = other.mover_half
+        self.changed()
+
     def restore(self, numbers: NDArray[np.float64]) -> None:
         """Go back to what `numbers` was."""
         if numbers.shape != self.numbers.shape:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import mujoco
@@ -130,6 +131,9 @@ class CompiledScene:
     pooled bodies, the length of a step) belongs to engines, which write theirs into it before they use it (see
     `vico.sim.physics.mujoco_parameters`), so that making another engine copies no terrain.
 
+    Objects that sleep far away still cost a fifth of every step, so there are two models: one without any, and one with
+    room for them, which is compiled when the first is placed. A robot moves alike in both, bit for bit.
+
     Parameters
     ----------
     static
@@ -138,13 +142,34 @@ class CompiledScene:
         The robots.
     capacity
         How many people, vehicles and objects there can be near robots.
+    bare
+        The same scene without objects; None: this is it.
+
+    Attributes
+    ----------
+    bare
+        Itself, or the scene without objects.
+    slots
+        How many objects there is room for: none, or all.
     """
 
-    def __init__(self, static: StaticScene, models: tuple[RobotModel, ...], capacity: Capacity) -> None:
-        self.models, self.capacity = models, capacity
+    def __init__(
+        self,
+        static: StaticScene,
+        models: tuple[RobotModel, ...],
+        capacity: Capacity,
+        bare: CompiledScene | None = None,
+    ) -> None:
+        self._static, self.models, self.capacity = static, models, capacity
+        self.bare = self if bare is None else bare
+        self.slots = 0 if bare is None else capacity.objects
         self.height: HeightField = static.height
-        self.shared = SharedModel(compiled_model(static, models, capacity))
+        self.shared = SharedModel(compiled_model(static, models, replace(capacity, objects=self.slots)))
         m = self.model = self.shared.model
+        if bare is not None:
+            # What the solver takes for near enough depends on all there is.
+            b = bare.model
+            m.stat.meaninertia = b.stat.meaninertia * max(b.nv, 1) / m.nv
         self.robots = [RobotIndex(m, index, model) for index, model in enumerate(models)]
         self.base_velocity = np.array([np.arange(3) + robot.root_speed for robot in self.robots], np.int64).reshape(
             -1, 3
@@ -157,14 +182,16 @@ class CompiledScene:
         self.mover_body = np.array(movers, np.int64)
         self.mover_mocap = np.asarray(m.body_mocapid[self.mover_body], np.int64)
         self.mover_geom = np.asarray(m.body_geomadr[self.mover_body], np.int64)
-        self.object_body = np.array([m.body(f"object{i}").id for i in range(capacity.objects)], np.int64)
+        self.object_body = np.array([m.body(f"object{i}").id for i in range(self.slots)], np.int64)
         self.object_geom = np.asarray(m.body_geomadr[self.object_body], np.int64)
         joint = m.body_jntadr[self.object_body]
         self.object_pose = _run_of(np.add.outer(m.jnt_qposadr[joint], np.arange(7)).ravel())
         self.object_motion = _run_of(np.add.outer(m.jnt_dofadr[joint], np.arange(6)).ravel())
         self._kinds: dict[bytes, KindIndex] = {}
+        self._full: CompiledScene | None = None
         self._index_contacts()
-        self.solids = SolidCells(static, max((robot.reach for robot in self.robots), default=0.0))
+        reach = max((robot.reach for robot in self.robots), default=0.0)
+        self.solids: SolidCells = SolidCells(static, reach) if bare is None else bare.solids
         self._links = np.concatenate([np.zeros(0, np.int64), *(robot.link_bodies for robot in self.robots)])
         self._link_owner = np.repeat(np.arange(len(models)), [len(robot.link_bodies) for robot in self.robots])
         self._link_bits = np.array(m.body_contype[self._links])
@@ -178,6 +205,15 @@ class CompiledScene:
         m.body_geomnum[0] = min(int(m.body_geomnum[0]), 2)
         self.stiffness = np.array(m.actuator_gainprm[self.servos, 0])
         self.damping = -np.asarray(m.actuator_biasprm[self.servos, 2])
+
+    @property
+    def full(self) -> CompiledScene:
+        """The same scene with room for objects."""
+        bare = self.bare
+        with bare.shared.lock:
+            if bare._full is None:
+                bare._full = CompiledScene(bare._static, bare.models, bare.capacity, bare)
+            return bare._full
 
     def _index_contacts(self) -> None:
         """Note what each collision shape belongs to: party, owner (robot, mover or slot), link."""
