@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 import planted_agents
 from vico.challenges.assistant import runner
 from vico.challenges.assistant.delivery import generate_delivery
+from vico.challenges.assistant.model import Task
 from vico.challenges.assistant.runner import community_for, run_episode
 from vico.challenges.results import EpisodeResult
 from vico.community.model import Community
@@ -30,16 +32,21 @@ def play(world: World, people: Community, *, method: str, steps: int, seed: int,
     return run_episode(world, people, task, method=method)
 
 
-def test_the_heuristic_delivers_something_within_five_minutes(helsinki: World, few: Community) -> None:
-    # How far the first errand of an episode is, is luck; about every other one is near enough.
-    results: list[EpisodeResult] = []
-    while len(results) < 8 and not any(any(result.success) for result in results):
-        results.append(play(helsinki, few, method="heuristic", steps=300, seed=len(results)))
-    assert sum(sum(result.success) for result in results) >= 1
-    for result in results:
-        assert [step is not None for step in result.done_at] == result.success
-        assert all(20 < step <= 300 for step in result.done_at if step is not None)
-        assert result.steps == 300  # not everything was done
+def metres_of_the_first_errand(task: Task) -> float:
+    """From the start to where the things lie, and from there to where they belong; as the crow flies."""
+    stops = (task.assistants[0].position, task.subtasks[0].source.centre, task.subtasks[0].destination.centre)
+    return sum(math.dist(here[:2], there[:2]) for here, there in pairwise(stops))
+
+
+def test_the_heuristic_delivers_what_is_near_enough(helsinki: World, few: Community) -> None:
+    # How far the first errand of an episode is, is luck: half of them take longer than this.
+    steps = 240
+    tasks = [generate_delivery(helsinki, seed=seed, steps=steps) for seed in range(8)]
+    result = run_episode(helsinki, few, min(tasks, key=metres_of_the_first_errand), method="heuristic")
+    assert result.success[0]
+    assert [step is not None for step in result.done_at] == result.success
+    assert all(20 < step <= steps for step in result.done_at if step is not None)
+    assert result.steps == steps  # not everything was done
 
 
 @pytest.mark.parametrize(("method", "assistants"), [("random", 1), ("heuristic", 2)])
