@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -62,6 +63,32 @@ def run(town: Path, cache: Path | None = None) -> tuple[float, int, str]:
     assert done.returncode == 0, done.stderr
     speed, hits = done.stdout.split()
     return float(speed), int(hits), done.stderr
+
+
+def test_processes_that_start_at_once_compile_each_function_once(town: Path) -> None:
+    paths = os.pathsep.join([str(town.parent), *(path for path in sys.path if path)])
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    environment |= {"PYTHONPATH": paths, "VICO_CACHE": str(town.parent / "cache")}
+    program = _RUN.replace("print(", "print('ready', flush=True)\ninput()\nprint(")
+    with ExitStack() as ended:
+        both = [
+            ended.enter_context(
+                subprocess.Popen(
+                    [sys.executable, "-B", "-c", program],
+                    env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+                )
+            )
+            for _ in range(2)
+        ]  # fmt: skip
+        for process in both:
+            assert process.stdout is not None
+            assert process.stdout.readline() == "ready\n"
+        for process in both:
+            assert process.stdin is not None
+            process.stdin.write("\n")
+            process.stdin.flush()
+        printed = sorted(process.stdout.readline() for process in both if process.stdout)
+    assert printed == ["7.0 0\n", "7.0 1\n"]
 
 
 def change(file: Path, old: str, new: str) -> None:

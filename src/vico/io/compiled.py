@@ -5,10 +5,12 @@ into the machine code: functions called from other files are compiled into it, a
 records. After an update of a checkout such code would be old, or could not even be read: its index names classes that
 are called otherwise by now. Here a module's compiled functions have a folder named after what the module and all that
 it imports of its package say, so a changed source has a folder of its own, and one that is back has its old one.
+Processes that start at once compile each function once: whoever comes second waits for what the first one keeps.
 """
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import importlib.metadata
 import logging
@@ -17,12 +19,15 @@ import pickle
 import re
 import shutil
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
 import numba
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.compiler_lock import global_compiler_lock
 
 from vico.io.cache import cache_folder
 
@@ -52,6 +57,7 @@ def compiled(function: Any = None, /, **options: Any) -> Any:
         return lambda given: compiled(given, **options)
     dispatcher = numba.njit(**options)(function)
     dispatcher._cache = _KeptCode(function)  # what `cache=True` would set to numba's own
+    dispatcher.compile = _in_turn(dispatcher.compile, dispatcher._cache)
     return dispatcher
 
 
@@ -210,6 +216,33 @@ class _KeptCode(FunctionCache):  # type: ignore[misc]
         except OSError as error:
             self.disable()
             _tell(Path(self.cache_path).parent, error.strerror or str(error))
+
+    @contextmanager
+    def turn(self) -> Iterator[None]:
+        """Hold the right to compile this function among all processes; another that wants to compile it waits."""
+        try:
+            self._impl.locator.ensure_cache_path()
+            handle = os.open(Path(self.cache_path) / f"{self._impl.filename_base}.lock", os.O_CREAT | os.O_RDWR)
+        except OSError:
+            yield  # the folder cannot be written: said when the code is to be kept
+            return
+        try:
+            with suppress(OSError):  # a file system without locks: then each compiles for itself
+                fcntl.flock(handle, fcntl.LOCK_EX)
+            yield
+        finally:
+            os.close(handle)  # which lets go of the lock, as the end of the process would
+
+
+def _in_turn(compile_here: Callable[[Any], Any], cache: _KeptCode) -> Callable[[Any], Any]:
+    """Let one process compile a function while others wait, who then load what it kept."""
+
+    def compile_or_load(signature: Any) -> Any:
+        # numba's own lock first: threads of this process must not wait for each other in two orders.
+        with global_compiler_lock, cache.turn():
+            return compile_here(signature)
+
+    return compile_or_load
 
 
 @lru_cache
