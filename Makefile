@@ -28,7 +28,7 @@ demo: .venv/assets
 	$(BIN)/vico demo --out $(DEMO) --seed $(SEED) --force
 
 test: .venv/dev
-	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
+	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal
 
 # The Khronos glTF validator, for a test; without npm that test is skipped.
 .venv/gltf:

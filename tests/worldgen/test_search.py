@@ -21,7 +21,7 @@ from vico.seeds import rng
 _SEARCH = os.environ.get("HYPOTHESIS_PROFILE") == "search"
 # Shrinking would build hundreds of worlds; the window that failed is printed instead.
 _windows = settings(
-    max_examples=300 if _SEARCH else 5,
+    max_examples=300 if _SEARCH else 3,
     phases=[Phase.explicit, Phase.reuse, Phase.generate],
     suppress_health_check=list(HealthCheck),
 )
