@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vico.io.compiled import compiled
-from vico.sim.traffic.leader import touched_at
+from vico.sim.traffic.leader import bodies_around, touched_at
+from vico.sim.traffic.path import point_on_path
 from vico.sim.traffic.route import NEVER, STANDING_ROOM, is_lane_of_stop
 from vico.sim.traffic.state import HELD_JUNCTIONS, NONE, PREVIOUS_LANES
 
@@ -21,6 +22,7 @@ _QUEUE_LEAD, _QUEUE_LEAST = 5.0, 10.0  # s that somebody has to have waited long
 _HESITATION = 3.0  # s that a vehicle let in may stand before the junction goes back
 _BUSY_WHILE = 5.0  # s that a vehicle which stands before its junction still counts on crossings
 _GAP = 0.05  # m kept from others where a vehicle will stand
+_AROUND = 5.0  # more than a vehicle's corners leave its path, and another's its half length, m
 
 
 class JunctionRequest(NamedTuple):
@@ -143,9 +145,11 @@ def _exit_is_free(vehicle, leave, view, vehicles):  # type: ignore[no-untyped-de
     if leave.start < 0.0:
         return True
     room = min(vehicle.length + STANDING_ROOM, max(leave.clear, 0.0))
+    x, y, _, _ = point_on_path(view.path, leave.start + (room - vehicle.length) / 2)
+    nearby = bodies_around(vehicle.index, x, y, (room + vehicle.length) / 2 + _AROUND, view.beyond)
     for i in range(1, 6):
         there = leave.start + room * i / 5
-        if touched_at(view.path, view.outline, there, view.nearby, _GAP, _GAP, vehicles) >= 0:
+        if touched_at(view.path, view.outline, there, nearby, _GAP, _GAP, vehicles) >= 0:
             return False
     return True
 
@@ -154,8 +158,10 @@ def _exit_is_free(vehicle, leave, view, vehicles):  # type: ignore[no-untyped-de
 def _way_is_free(vehicle, leave, view, vehicles):  # type: ignore[no-untyped-def]
     """Return whether no vehicle is on the whole way through the junctions."""
     there = vehicle.offset + 0.5
+    x, y, _, _ = point_on_path(view.path, there)
+    nearby = bodies_around(vehicle.index, x, y, leave.far - there + vehicle.length + _AROUND, view.beyond)
     while there < leave.far:
-        if touched_at(view.path, view.outline, there, view.nearby, _GAP, _GAP, vehicles) >= 0:
+        if touched_at(view.path, view.outline, there, nearby, _GAP, _GAP, vehicles) >= 0:
             return False
         there += 1.0
     return True

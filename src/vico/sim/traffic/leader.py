@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
 from vico.sim.footprints import Rectangle, point_gap, separation
+from vico.sim.neighbours import NeighbourGrid, search
 from vico.sim.traffic.path import Outline, footprint, point_on_path
-from vico.sim.traffic.shapes import share_level, within
+from vico.sim.traffic.shapes import Shapes, share_level, within
 from vico.sim.traffic.state import NONE
 
 #: A body near a vehicle: centre, heading cosine and sine, half sides of its footprint's core, rounding of that, radius
@@ -39,6 +40,21 @@ _NEAR_PATH = 1.5  # more than a bus's corners leave its path in a bend, m
 _FINE_STEP, _COARSE_STEP, _COARSE_FROM = 1.0, 2.0, 8.0  # steps of the sweep, and from where on it takes the larger, m
 
 
+class Surroundings(NamedTuple):
+    """All bodies, the grid to find them by, and memory to write finds into.
+
+    Attributes
+    ----------
+    candidates, found
+        As long as there are bodies, int64 and dtype `NEARBY_BODY`: what `bodies_around` found last.
+    """
+
+    shapes: Shapes
+    grid: NeighbourGrid
+    candidates: NDArray[np.int64]
+    found: NDArray[np.void]
+
+
 class VehicleView(NamedTuple):
     """What a vehicle sees in a step: its path, its outline on it, and the bodies near it.
 
@@ -46,21 +62,33 @@ class VehicleView(NamedTuple):
     ----------
     nearby
         Structured array of `NEARBY_BODY`; positions in the world frame, metres.
+    beyond
+        For who has to know what is farther away.
     """
 
     path: NDArray[np.void]
     outline: Outline
     nearby: NDArray[np.void]
+    beyond: Surroundings
 
 
 @compiled
-def nearby_bodies(shapes, v, reach, candidates, buffer):  # type: ignore[no-untyped-def]
-    """Write those of the candidates within `reach` metres of body v, on its level, into `buffer`; return what is used.
+def bodies_around(v, x, y, reach, surroundings):  # type: ignore[no-untyped-def]
+    """Return the bodies within `reach` metres of a point on body v's level, but v, dtype `NEARBY_BODY`.
 
-    `candidates` are indices of bodies, in ascending order, as from `vico.sim.neighbours.search`.
+    They are valid until this is called again with the same surroundings.
+    """
+    shapes, grid, candidates, found = surroundings
+    return nearby_bodies(shapes, v, x, y, reach, search(grid, x, y, reach, candidates), found)
+
+
+@compiled
+def nearby_bodies(shapes, v, x, y, reach, candidates, buffer):  # type: ignore[no-untyped-def]
+    """Write those of the candidates within `reach` metres of a point, on body v's level, into `buffer`; return them.
+
+    `candidates` are indices of bodies, in ascending order, as from `vico.sim.neighbours.search`; v is left out.
     """
     sx, sy, half = shapes.x, shapes.y, shapes.half_length
-    x, y = sx[v], sy[v]
     n = 0
     for j in candidates:
         dx = sx[j] - x
@@ -183,7 +211,7 @@ def _gap_to(path, outline, front, low, high, one, person_gap, vehicle_gap):  # t
 @compiled
 def find_leader(view, front, reach, buffer):  # type: ignore[no-untyped-def]
     """Return the gap to the first body on the path and its index; `NO_GAP` and `NONE` without one within `reach`."""
-    path, outline, nearby = view
+    path, outline, nearby = view.path, view.outline, view.nearby
     m = 0
     start = 1e18
     left, low, right, high = _path_box(path, front, reach)

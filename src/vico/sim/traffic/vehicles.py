@@ -36,7 +36,16 @@ from vico.sim.traffic.lane_change import (
     change_to_emptier_lane,
     wants_lane_change,
 )
-from vico.sim.traffic.leader import NEARBY_BODY, TOUCH, VehicleView, find_leader, nearby_bodies, touched_at, touches
+from vico.sim.traffic.leader import (
+    NEARBY_BODY,
+    TOUCH,
+    Surroundings,
+    VehicleView,
+    find_leader,
+    nearby_bodies,
+    touched_at,
+    touches,
+)
 from vico.sim.traffic.path import (
     LANE_CHANGE,
     PATH_POINT,
@@ -57,7 +66,7 @@ _REVERSE = 0.6  # m/s
 _BLOCKER_GAP = 3.0  # m within which a leader is what a standing vehicle stands before
 _CREEP = 1.0  # a vehicle that is refused a junction waits for it below this speed, m/s
 _OTHER_WAY_AFTER = 15.0  # s of waiting for a junction after which a car looks for another way, every 50 steps
-_BEYOND_JUNCTION, _FAR_REACH = 60.0, 150.0  # m seen beyond a junction that is asked for, and around at most
+_BEYOND_JUNCTION = 60.0  # m seen beyond a junction that is asked for
 
 
 @compiled
@@ -76,7 +85,8 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
     note_longest_waits(fleet, junctions)
     backs_up = vehicles_backing_up(net, fleet, shapes)
     buffers = np.empty(len(shapes.x), NEARBY_BODY), np.empty(len(shapes.x), NEARBY_BODY)
-    candidates, path_buffer = np.empty(len(shapes.x), np.int64), np.empty(PATH_POINTS, PATH_POINT)
+    beyond = Surroundings(shapes, grid, np.empty(len(shapes.x), np.int64), np.empty(len(shapes.x), NEARBY_BODY))
+    path_buffer = np.empty(PATH_POINTS, PATH_POINT)
     for v in range(len(fleet)):
         vehicle = fleet[v]
         lane, speed, is_bus = vehicle.lane, vehicle.speed, vehicle.route >= 0
@@ -88,7 +98,7 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
 
         stop_distance = distance_to_stop(vehicle)
         request = next_junction_request(net, vehicle, stop_distance, braking_distance(speed), path_ends)
-        view = _look_around(net, vehicle, shapes, request, (grid, candidates, path_buffer, buffers[0]))
+        view = _look_around(net, vehicle, request, (path_buffer, buffers[0]), beyond)
         gap, leader = find_leader(view, vehicle.offset, look, buffers[1])
         # Who is behind another vehicle does not ask: it would hold the junction that the other one needs.
         is_behind = 0 <= leader < len(fleet) and gap < request.distance
@@ -136,9 +146,9 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
 
 
 @compiled
-def _look_around(net, vehicle, shapes, request, scratch):  # type: ignore[no-untyped-def]
-    """Return what a vehicle sees: its path and the bodies near it, farther where it has to see beyond a junction."""
-    grid, candidates, path_buffer, body_buffer = scratch
+def _look_around(net, vehicle, request, scratch, beyond):  # type: ignore[no-untyped-def]
+    """Return what a vehicle sees: bodies near it, and its path, farther where it may have to see beyond a junction."""
+    path_buffer, body_buffer = scratch
     look, length = look_ahead(vehicle.speed), vehicle.length
     far, reach = look, look + length + 6.0
     if request.planned_index >= 0:
@@ -150,11 +160,11 @@ def _look_around(net, vehicle, shapes, request, scratch):  # type: ignore[no-unt
             if k > request.planned_index and is_street and far > look + _BEYOND_JUNCTION:
                 break
         far = max(far, look)
-        reach = max(reach, min(far, look + length + _FAR_REACH))
     path = path_polyline(net, vehicle, length + 3.0, vehicle.offset + far + 4.0, path_buffer)
-    v = vehicle.index
-    near = search(grid, shapes.x[v], shapes.y[v], reach, candidates)
-    return VehicleView(path, vehicle_outline(vehicle), nearby_bodies(shapes, v, reach, near, body_buffer))
+    v, shapes = vehicle.index, beyond.shapes
+    near = search(beyond.grid, shapes.x[v], shapes.y[v], reach, beyond.candidates)
+    nearby = nearby_bodies(shapes, v, shapes.x[v], shapes.y[v], reach, near, body_buffer)
+    return VehicleView(path, vehicle_outline(vehicle), nearby, beyond)
 
 
 @compiled
@@ -221,7 +231,7 @@ def place_vehicle(net, fleet, v, lane, offset, shapes, air):  # type: ignore[no-
     length = vehicle.length
     grown = Rectangle(cx, cy, c, s, length / 2 + air, vehicle.half_width + 0.3)
     everybody = np.arange(len(shapes.x))
-    for one in nearby_bodies(shapes, v, length + air + 1.0, everybody, np.empty(len(shapes.x), NEARBY_BODY)):
+    for one in nearby_bodies(shapes, v, cx, cy, length + air + 1.0, everybody, np.empty(len(shapes.x), NEARBY_BODY)):
         if touches(grown, one):
             shapes.x[v], shapes.y[v] = before
             return False
