@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.io.compiled import compiled
 from vico.rules import ActionStatus, ReasonCode
-from vico.sim.animation import CLIPS, stride_length
+from vico.sim.animation import CLIPS
+from vico.sim.animation.stride import stride_of
 from vico.sim.bodies import Bodies
 from vico.sim.collisions import SolidMap, sweep
 from vico.sim.footprints import IN_BUS, Rectangle, gaps, records_of
@@ -22,6 +24,26 @@ from vico.world.walkable import WalkableMap
 CLIP = {name: i for i, name in enumerate(CLIPS)}
 
 _CYCLES_PER_SECOND = 0.5
+_STANDING, _FASTEST_WALK = 0.01, 1.6  # m/s
+# As plain numbers, for kernels.
+_IDLE, _SIT, _SLEEP, _TURN, _WALK, _RUN, _CARRY, _RIDE_BIKE, _RIDE_BUS = (
+    CLIP[name] for name in ("idle", "sit", "sleep", "turn", "walk", "run", "carry", "ride_bike", "ride_bus")
+)
+_STANDING_UP, _SITTING = int(Posture.STANDING), int(Posture.SITTING)
+_IN_BUS, _ON_BIKE = int(Vehicle.BUS), int(Vehicle.BIKE)
+
+
+class _Motion(NamedTuple):
+    """What decides which clip shows somebody; columns of `People`."""
+
+    velocity: NDArray[np.float64]
+    move_speed: NDArray[np.float64]
+    turn_left: NDArray[np.float64]
+    posture: NDArray[np.int8]
+    vehicle: NDArray[np.int8]
+    held: NDArray[np.int32]
+    action_clip: NDArray[np.int16]
+    height: NDArray[np.float64]
 
 
 class Avatars:
@@ -128,24 +150,43 @@ class Avatars:
 
     def _animate(self, dt: float) -> None:
         p = self.people
-        speed = np.hypot(p.velocity[:, 0], p.velocity[:, 1])
-        still = np.full(len(p), CLIP["idle"], np.int16)
-        still[p.posture == Posture.SITTING] = CLIP["sit"]
-        still[p.posture == Posture.LYING] = CLIP["sleep"]
-        still[p.turn_left != 0.0] = CLIP["turn"]
-        still[(p.vehicle == Vehicle.BUS) & (p.posture == Posture.SITTING)] = CLIP["ride_bus"]
-        clip = np.where(p.action_clip >= 0, p.action_clip, still)
-        walking = np.where(p.move_speed > 1.6, CLIP["run"], CLIP["walk"])
-        walking = np.where((p.held > 0).any(axis=1) & (walking == CLIP["walk"]), CLIP["carry"], walking)
-        clip = np.where(speed > 0.01, walking, clip)
-        clip = np.where(p.vehicle == Vehicle.BIKE, CLIP["ride_bike"], clip).astype(np.int16)
-        p.phase[clip != p.clip] = 0.0
-        p.clip[:] = clip
-        stride = stride_length(clip, speed, p.height)
-        gait = np.isfinite(stride)
-        p.phase[gait] += speed[gait] * dt / stride[gait]
-        p.phase[~gait] += dt * _CYCLES_PER_SECOND
-        p.phase %= 1.0
+        _advance_clips(
+            _Motion(p.velocity, p.move_speed, p.turn_left, p.posture, p.vehicle, p.held, p.action_clip, p.height),
+            p.clip, p.phase, dt,
+        )  # fmt: skip
+
+
+@compiled
+def _clip_of(motion, k, speed):  # type: ignore[no-untyped-def]
+    """Return the clip that shows what somebody does, at a speed over the ground in m/s."""
+    if motion.vehicle[k] == _ON_BIKE:
+        return _RIDE_BIKE
+    if speed > _STANDING:
+        if motion.move_speed[k] > _FASTEST_WALK:
+            return _RUN
+        return _CARRY if motion.held[k, 0] > 0 or motion.held[k, 1] > 0 else _WALK
+    if motion.action_clip[k] >= 0:
+        return np.int64(motion.action_clip[k])
+    if motion.posture[k] == _SITTING and motion.vehicle[k] == _IN_BUS:
+        return _RIDE_BUS
+    if motion.turn_left[k] != 0.0:
+        return _TURN
+    if motion.posture[k] == _STANDING_UP:
+        return _IDLE
+    return _SIT if motion.posture[k] == _SITTING else _SLEEP
+
+
+@compiled
+def _advance_clips(motion, clip, phase, dt):  # type: ignore[no-untyped-def]
+    """Choose everybody's clip and go on in it by `dt` seconds; `clip` and `phase` are changed in place."""
+    for k in range(len(clip)):
+        vx, vy = motion.velocity[k, 0], motion.velocity[k, 1]
+        speed = math.sqrt(vx * vx + vy * vy)
+        now = _clip_of(motion, k, speed)
+        if now != clip[k]:
+            clip[k], phase[k] = now, 0.0
+        stride = stride_of(now, speed, motion.height[k])
+        phase[k] = (phase[k] + (dt * _CYCLES_PER_SECOND if stride == np.inf else speed * dt / stride)) % 1.0
 
 
 def free_ground(

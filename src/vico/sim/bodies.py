@@ -110,8 +110,9 @@ class Bodies:
     @classmethod
     def joined(cls, parts: Sequence[Bodies]) -> Bodies:
         """All bodies of several owners, in order."""
-        if not parts:
-            return cls.none()
+        parts = [part for part in parts if len(part)]
+        if len(parts) < 2:
+            return parts[0] if parts else cls.none()
         return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in cls.__dataclass_fields__))
 
 

@@ -306,6 +306,8 @@ class MovableObjects(ArrayState):
 
     def bodies_of(self, which: NDArray[np.int64]) -> Bodies:
         """Bodies of the objects with the given indices: their boxes, or what is around them where they lie tilted."""
+        if not len(which):
+            return Bodies.none()
         n, half = len(which), self.size[which] / 2
         turn, yaw = matrix_of(self.orientation[which]), self.yaw[which]
         middle = self.position[which] + turn[:, :, 2] * half[:, 2:]

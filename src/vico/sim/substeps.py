@@ -59,9 +59,11 @@ def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _A
     _advance_subsystem(state.transit, "transit", bodies, watch)
     gone = periods.since_begun(state.tick)[: len(state.people)]
     share = SUBSTEP_TICKS / np.maximum(ACTION_TICKS - gone, SUBSTEP_TICKS)
+    obstacles = _held_off(bodies.but(state.avatars))
     lying = state.objects.in_rooms()
-    in_rooms = records_of(state.objects.bodies_of(lying), state.objects.room[lying])
-    obstacles = np.concatenate([_held_off(bodies.but(state.avatars)), in_rooms])
+    if len(lying):
+        in_rooms = records_of(state.objects.bodies_of(lying), state.objects.room[lying])
+        obstacles = np.concatenate([obstacles, in_rooms])
     state.avatars.advance(SUBSTEP, obstacles, share=share)
     rides.follow(state)
     bodies.refresh(state.avatars)
@@ -72,11 +74,11 @@ def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _A
 
 def _held_off(others: Bodies) -> NDArray[np.void]:
     """Return bodies as avatars are kept off them, dtype `vico.sim.footprints.BODY`: robots with some room to yield."""
-    records = records_of(others)
-    margin = np.where(others.kind == ROBOT, ROBOT_MARGIN, 0.0)
-    for name in ("half_length", "half_width"):
-        records[name] += margin
-    records["radius"] += 2 * margin
+    records, robots = records_of(others), np.flatnonzero(others.kind == ROBOT)
+    if len(robots):
+        for name in ("half_length", "half_width"):
+            records[name][robots] += ROBOT_MARGIN
+        records["radius"][robots] += 2 * ROBOT_MARGIN
     return records
 
 

@@ -7,7 +7,8 @@ distance / `stride_length`, so feet never slide.
 """
 
 from vico.sim.animation.names import CLIPS, clip_index
-from vico.sim.animation.posing import hand_frames, hand_position, pose, stride_length
+from vico.sim.animation.posing import hand_frames, hand_position, pose
+from vico.sim.animation.stride import stride_length
 from vico.sim.animation.style import STYLE, style_of
 
 __all__ = ["CLIPS", "STYLE", "clip_index", "hand_frames", "hand_position", "pose", "stride_length", "style_of"]

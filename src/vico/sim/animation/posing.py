@@ -12,45 +12,10 @@ from vico.io.compiled import compiled
 from vico.render.skinning import forward_kinematics
 from vico.sim.animation.clips import animate
 from vico.sim.animation.limbs import WRIST
-from vico.sim.animation.names import CARRY, RIDE_BIKE, RUN, WALK
+from vico.sim.animation.stride import stride_length
 from vico.sim.animation.style import KERNEL_STYLE
 
 _KNUCKLE = (J["left_middle1"], J["right_middle1"])
-
-
-def stride_length(
-    clip: NDArray[Any] | int, speed: NDArray[Any] | float, height: NDArray[Any] | float
-) -> NDArray[np.float64]:
-    """Return the metres one cycle (two steps, or a turn of the cranks) covers.
-
-    Parameters
-    ----------
-    clip
-        Motion numbers, shape ``(n,)``.
-    speed
-        Metres a second over the ground, shape ``(n,)``.
-    height
-        Stature, metres, shape ``(n,)``.
-
-    Returns
-    -------
-    ndarray
-        float64; infinite for motions that do not cover ground (their phase runs with time).
-
-    Notes
-    -----
-    Fitted to Grieve and Gear's relation of stride and speed.
-    """
-    number, v, tall = np.broadcast_arrays(
-        np.asarray(clip), np.asarray(speed, np.float64), np.asarray(height, np.float64)
-    )
-    stride = np.full(number.shape, np.inf)
-    walking = (number == WALK) | (number == CARRY)
-    stride[walking] = (0.727 * tall * np.maximum(v, 0.15) ** 0.45)[walking]
-    running = number == RUN
-    stride[running] = (tall * (0.62 + 0.20 * v))[running]
-    stride[number == RIDE_BIKE] = 4.0
-    return stride
 
 
 def pose(

@@ -226,7 +226,10 @@ def best_heading(x, y, point, walkway, shapes, near, is_jammed):  # type: ignore
     left = walkway.reach_left if is_jammed else walkway.room_left
     right = walkway.reach_right if is_jammed else walkway.room_right
     best, best_score, best_free = 0.0, -1.0, 0.0
+    ease = 1.2 if is_jammed else 0.35
     for k in range(len(_ANGLES) if is_jammed else _FORWARD):
+        if _SIGHT * (ease + np.cos(_ANGLES[k])) - 0.01 * k <= best_score:
+            continue  # not even if all of it were free
         angle = straight + _ANGLES[k]
         c, s = np.cos(angle), np.sin(angle)
         there = aside + _STRIDE_AHEAD * (c * point.left_x + s * point.left_y)
@@ -234,7 +237,7 @@ def best_heading(x, y, point, walkway, shapes, near, is_jammed):  # type: ignore
         if k > 0 and abs(there) > most + 0.1 and abs(there) >= abs(aside):
             continue
         free = _free_distance(x, y, c, s, shapes, near, gap)
-        score = free * ((1.2 if is_jammed else 0.35) + np.cos(_ANGLES[k])) - 0.01 * k
+        score = free * (ease + np.cos(_ANGLES[k])) - 0.01 * k
         if score > best_score:
             best, best_score, best_free = angle, score, free
     return best, best_free

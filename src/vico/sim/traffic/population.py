@@ -136,7 +136,11 @@ class Traffic:
 
     def _new_shapes(self) -> Shapes:
         n = self.vehicles + self.pedestrians
-        heights = np.concatenate([self._vehicle_height, np.full(self.pedestrians, PERSON_HEIGHT)])
+        # What never changes of the bodies.
+        self._own_entities = np.arange(self.first_entity, self.first_entity + n, dtype=np.int32)
+        kinds = np.array([CAR, BUS, PEDESTRIAN], np.int8)
+        self._kinds = np.repeat(kinds, [self.cars, self.buses, self.pedestrians])
+        self._heights = np.concatenate([self._vehicle_height, np.full(self.pedestrians, PERSON_HEIGHT)])
         walks = np.arange(n) >= self.vehicles
         return Shapes(
             x=np.full(n, _FAR) + np.arange(n) * 100.0,
@@ -146,7 +150,7 @@ class Traffic:
             half_width=np.concatenate([self.fleet.half_width, np.full(self.pedestrians, RADIUS)]),
             rounding=np.where(walks, RADIUS, 0.0),
             bottom=np.where(walks, STEP_HEIGHT, 0.0),
-            top=heights,
+            top=self._heights.copy(),
             vx=np.zeros(n),
             vy=np.zeros(n),
         )
@@ -221,19 +225,16 @@ class Traffic:
             self._bodies = self._bodies_now()
         return self._bodies
 
-    def _own_entities(self) -> NDArray[np.int32]:
-        return np.arange(self.first_entity, self.first_entity + len(self.shapes.x), dtype=np.int32)
-
     def _bodies_now(self) -> Bodies:
         xy = np.column_stack([self.shapes.x, self.shapes.y])
         return Bodies(
-            entity=self._own_entities(),
-            kind=np.repeat(np.array([CAR, BUS, PEDESTRIAN], np.int8), [self.cars, self.buses, self.pedestrians]),
+            entity=self._own_entities,
+            kind=self._kinds,
             position=np.column_stack([xy, self.height(xy)]),
             yaw=self.shapes.yaw.copy(),
-            half_length=self.shapes.half_length.copy(),
-            half_width=self.shapes.half_width.copy(),
-            height=np.concatenate([self._vehicle_height, np.full(self.pedestrians, PERSON_HEIGHT)]),
+            half_length=self.shapes.half_length,
+            half_width=self.shapes.half_width,
+            height=self._heights,
             velocity=np.column_stack([self.shapes.vx, self.shapes.vy]),
         )
 
@@ -249,7 +250,7 @@ class Traffic:
         junctions.vehicle_wait[:] = 0.0
         count_per_street(net, fleet, self._street_load)
         advance_vehicles(net, fleet, junctions, everybody, grid, self._street_load, dt)
-        self._entities = np.concatenate([self._own_entities(), obstacles.entity])
+        self._entities = np.concatenate([self._own_entities, obstacles.entity])
         self.jams.elapsed += dt
         self._bring_back(everybody)
         for field in ("x", "y", "yaw", "vx", "vy"):

@@ -75,6 +75,8 @@ class Bicycles:
     def standing_bodies(self, bikes: NDArray[np.int64]) -> Bodies:
         """Return the bodies some bicycles have, or would have, standing where they are."""
         n = len(bikes)
+        if not n:
+            return Bodies.none()
         return Bodies(
             entity=(self.first_entity + bikes).astype(np.int32),
             kind=np.full(n, BICYCLE, np.int8),

@@ -1,0 +1,61 @@
+"""How far a cycle of each motion carries: what phases advance by, so that feet never slide."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.io.compiled import compiled
+from vico.sim.animation.names import CARRY, RIDE_BIKE, RUN, WALK
+
+_TURN_OF_CRANKS = 4.0  # metres
+_SLOWEST = 0.15  # shorter strides than at this speed nobody takes, m/s
+
+
+@compiled
+def stride_of(clip, speed, height):  # type: ignore[no-untyped-def]
+    """Return the metres one cycle of one motion covers; see `stride_length`."""
+    if clip in (WALK, CARRY):
+        return 0.727 * height * max(speed, _SLOWEST) ** 0.45
+    if clip == RUN:
+        return height * (0.62 + 0.20 * speed)
+    return _TURN_OF_CRANKS if clip == RIDE_BIKE else np.inf
+
+
+def stride_length(
+    clip: NDArray[Any] | int, speed: NDArray[Any] | float, height: NDArray[Any] | float
+) -> NDArray[np.float64]:
+    """Return the metres one cycle (two steps, or a turn of the cranks) covers.
+
+    Parameters
+    ----------
+    clip
+        Motion numbers, shape ``(n,)``.
+    speed
+        Metres a second over the ground, shape ``(n,)``.
+    height
+        Stature, metres, shape ``(n,)``.
+
+    Returns
+    -------
+    ndarray
+        float64; infinite for motions that do not cover ground (their phase runs with time).
+
+    Notes
+    -----
+    Fitted to Grieve and Gear's relation of stride and speed.
+    """
+    number, v, tall = np.broadcast_arrays(
+        np.asarray(clip, np.int64), np.asarray(speed, np.float64), np.asarray(height, np.float64)
+    )
+    found = np.empty(number.shape)
+    _strides(number.ravel(), v.ravel(), tall.ravel(), found.reshape(-1))
+    return found
+
+
+@compiled
+def _strides(clip, speed, height, found):  # type: ignore[no-untyped-def]
+    for k in range(len(found)):
+        found[k] = stride_of(clip[k], speed[k], height[k])
