@@ -6,12 +6,8 @@ that 3D Tiles add. What would be read wrongly (another compression, KTX2 texture
 
 from __future__ import annotations
 
-import base64
-import binascii
 import io
-import json
 import math
-import struct
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,18 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from vico.errors import MissingExtraError, SchemaError
+from vico.errors import MissingExtraError
+from vico.io.gltf_file import COMPONENTS, GltfFault, GltfFile, faults_told, node_matrix
 
-_MAGIC, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
-_COMPONENTS: dict[int, np.dtype[Any]] = {
-    5120: np.dtype("<i1"),
-    5121: np.dtype("<u1"),
-    5122: np.dtype("<i2"),
-    5123: np.dtype("<u2"),
-    5125: np.dtype("<u4"),
-    5126: np.dtype("<f4"),
-}
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _KNOWN = {
     "KHR_draco_mesh_compression",
     "KHR_mesh_quantization",
@@ -99,10 +86,6 @@ class GltfScene:
     centre: NDArray[np.float64]
 
 
-class GltfFault(ValueError):
-    """Something a glTF file must not have; becomes one sentence with the file's name."""
-
-
 def read_gltf(data: bytes, where: str, *, resource: Callable[[str], bytes] | None = None) -> GltfScene:
     """Read a binary or textual glTF 2.0 file.
 
@@ -122,59 +105,16 @@ def read_gltf(data: bytes, where: str, *, resource: Callable[[str], bytes] | Non
     MissingExtraError
         If it is Draco-compressed and DracoPy is not installed.
     """
-    try:
-        document, binary = _document(data)
-        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is sorted out point by point
-            return _Reader(document, binary, resource).scene()
-    except GltfFault as fault:
-        raise SchemaError(f"{where}: {fault}") from None
-    except (ValueError, KeyError, IndexError, TypeError, AttributeError, OverflowError, struct.error) as error:
-        told = f"{type(error).__name__}: {' '.join(str(error).split())[:120]}"
-        raise SchemaError(f"{where}: not a readable glTF file ({told}); export it anew") from None
-    except (RecursionError, MemoryError) as error:
-        raise SchemaError(f"{where}: not a readable glTF file ({type(error).__name__}); export it anew") from None
-
-
-def _document(data: bytes) -> tuple[dict[str, Any], bytes | None]:
-    """Return the JSON and the binary chunk."""
-    if data[:4] != b"glTF":
-        document = json.loads(data)
-        if not isinstance(document, dict):
-            raise GltfFault("is no glTF document; export it anew")
-        return document, None
-    if len(data) < 20:
-        raise GltfFault(f"truncated after {len(data)} bytes; download it again")
-    _, version, length = struct.unpack_from("<III", data)
-    if version != 2:
-        raise GltfFault(f"is binary glTF {version}; only glTF 2.0 is read: convert it first")
-    if length > len(data) or length < 20:
-        raise GltfFault(f"truncated at byte {len(data):,} of {length:,}; download it again")
-    size, kind = struct.unpack_from("<II", data, 12)
-    if kind != _JSON or 20 + size > length:
-        raise GltfFault("its first chunk is no JSON, or leaves the file; download it again")
-    document = json.loads(data[20 : 20 + size])
-    if not isinstance(document, dict):
-        raise GltfFault("is no glTF document; export it anew")
-    at = 20 + size
-    at += -at % 4
-    while at + 8 <= length:
-        size, kind = struct.unpack_from("<II", data, at)
-        if at + 8 + size > length:
-            raise GltfFault(f"its chunk at byte {at:,} leaves the file; download it again")
-        if kind == _BIN:
-            return document, data[at + 8 : at + 8 + size]
-        at += 8 + size + (-size % 4)
-    return document, None
+    with faults_told(where), np.errstate(over="ignore", invalid="ignore"):  # what is not finite is sorted out later
+        return _Reader(GltfFile.of(data, resource)).scene()
 
 
 class _Reader:
     """One glTF document while it is read."""
 
-    def __init__(self, document: dict[str, Any], binary: bytes | None, resource: Callable[[str], bytes] | None) -> None:
-        self.document = document
-        self.binary = binary
-        self.resource = resource
-        self.buffers: dict[int, bytes] = {}
+    def __init__(self, file: GltfFile) -> None:
+        self.file = file
+        self.document = file.document
         self.textures: list[NDArray[np.uint8]] = []
         self.texture_index: dict[int, int] = {}
         self.vertices = 0
@@ -204,13 +144,13 @@ class _Reader:
                 raise GltfFault(f"node {index} is its own ancestor or has two parents; export it anew")
             seen.add(index)
             node = nodes[index]
-            matrix = above @ _matrix(node)
+            matrix = above @ node_matrix(node)
             if not np.isfinite(matrix).all():
                 raise GltfFault(f"node {index} has no finite transform; export it anew")
             if "EXT_mesh_gpu_instancing" in node.get("extensions", {}):
                 raise GltfFault("requires the extension EXT_mesh_gpu_instancing, which is not read")
             if "mesh" in node:
-                for primitive in self._entry("meshes", node["mesh"])["primitives"]:
+                for primitive in self.file.entry("meshes", node["mesh"])["primitives"]:
                     part = self._part(primitive, matrix)
                     if part is not None:
                         parts.append(part)
@@ -222,15 +162,6 @@ class _Reader:
         credit = asset.get("copyright", "")
         return GltfScene(tuple(parts), tuple(self.textures), credit if isinstance(credit, str) else "", middle)
 
-    def _entry(self, name: str, index: int) -> dict[str, Any]:
-        """Return an entry of one of the document's lists; negative numbers name nothing."""
-        if not isinstance(index, int) or index < 0:
-            raise GltfFault(f"names {name}[{index}], which is not there; export it anew")
-        entry = self.document[name][index]
-        if not isinstance(entry, dict):
-            raise GltfFault(f"{name}[{index}] is no object; export it anew")
-        return entry
-
     def _part(self, primitive: dict[str, Any], matrix: NDArray[np.float64]) -> GltfPart | None:
         mode = primitive.get("mode", 4)
         if mode not in (4, 5, 6):
@@ -240,10 +171,10 @@ class _Reader:
         if draco is not None:
             arrays, faces = self._draco(draco, attributes)
         else:
-            arrays = {name: self._accessor(attributes[name]) for name in attributes if name in _WANTED}
+            arrays = {name: self.file.accessor(attributes[name]) for name in attributes if name in _WANTED}
             faces = None
             if "indices" in primitive:
-                faces = self._accessor(primitive["indices"]).ravel().astype(np.int64)
+                faces = self.file.accessor(primitive["indices"]).ravel().astype(np.int64)
         points = arrays["POSITION"].astype(np.float64)
         if points.ndim != 2 or points.shape[1] != 3:
             raise GltfFault("positions are no triples; export it anew")
@@ -283,7 +214,7 @@ class _Reader:
         self, index: int | None, arrays: dict[str, NDArray[Any]], count: int
     ) -> tuple[int, NDArray[np.float32], NDArray[np.uint8]]:
         """Texture, texture coordinates and colours of a primitive."""
-        material: dict[str, Any] = {} if index is None else self._entry("materials", index)
+        material: dict[str, Any] = {} if index is None else self.file.entry("materials", index)
         pbr = material.get("pbrMetallicRoughness", {})
         said = pbr.get("baseColorTexture")
         factor = pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))
@@ -314,93 +245,23 @@ class _Reader:
         return self._texture(said["index"]), np.ascontiguousarray(coordinates, np.float32), colour
 
     def _texture(self, index: int) -> int:
-        entry = self._entry("textures", index)
+        entry = self.file.entry("textures", index)
         source = entry.get("extensions", {}).get("EXT_texture_webp", {}).get("source", entry.get("source"))
         if source is None:
             if "KHR_texture_basisu" in entry.get("extensions", {}):
                 raise GltfFault("has KTX2 textures (KHR_texture_basisu), which are not read; export JPEG, PNG or WebP")
             return -1
         if source not in self.texture_index:
-            image = self._entry("images", source)
+            image = self.file.entry("images", source)
             if "bufferView" in image:
-                data = bytes(self._view(image["bufferView"])[0])
+                data = bytes(self.file.view(image["bufferView"])[0])
             else:
-                data = self._bytes_at(image["uri"])
+                data = self.file.bytes_at(image["uri"])
             if data[:12] == b"\xabKTX 20\xbb\r\n\x1a\n":
                 raise GltfFault("has KTX2 textures, which are not read; export JPEG, PNG or WebP")
             self.texture_index[source] = len(self.textures)
             self.textures.append(_picture(data))
         return self.texture_index[source]
-
-    def _bytes_at(self, uri: str) -> bytes:
-        if uri.startswith("data:"):
-            head, _, body = uri.partition(",")
-            if not head.endswith(";base64"):
-                raise GltfFault("holds a data address that is not base64; export it anew")
-            try:
-                return base64.b64decode(body, validate=True)
-            except binascii.Error:
-                raise GltfFault("holds a broken data address; export it anew") from None
-        if self.resource is None:
-            raise GltfFault(f"refers to {uri[:80]!r} outside itself; export it as one .glb file")
-        return self.resource(uri)
-
-    def _buffer(self, index: int) -> bytes:
-        if index not in self.buffers:
-            uri = self._entry("buffers", index).get("uri")
-            if uri is not None:
-                self.buffers[index] = self._bytes_at(uri)
-            elif index == 0 and self.binary is not None:
-                self.buffers[index] = self.binary
-            else:
-                raise GltfFault(f"its buffer {index} is not there; download it again")
-        return self.buffers[index]
-
-    def _view(self, index: int) -> tuple[memoryview, int]:
-        """Return the bytes of a buffer view, and its stride (0: packed)."""
-        view = self._entry("bufferViews", index)
-        for name in view.get("extensions", {}):
-            if "meshopt" in name:
-                raise GltfFault(f"is compressed with {name}, which is not read; export it plain or with Draco")
-        buffer = self._buffer(view["buffer"])
-        start, size = view.get("byteOffset", 0), view["byteLength"]
-        if start < 0 or size < 0 or start + size > len(buffer):
-            raise GltfFault(f"buffer view {index} leaves the file; download it again")
-        return memoryview(buffer)[start : start + size], int(view.get("byteStride", 0))
-
-    def _accessor(self, index: int) -> NDArray[Any]:
-        """Return an accessor's values, normalised ones as float."""
-        accessor = self._entry("accessors", index)
-        kind = _COMPONENTS[accessor["componentType"]]
-        width = _WIDTHS[accessor["type"]]
-        count = accessor["count"]
-        if not isinstance(count, int) or not 0 <= count <= _MOST_VERTICES * 3:
-            raise GltfFault(f"accessor {index} claims {count} values; export it anew")
-        if "bufferView" in accessor:
-            values = self._strided(accessor["bufferView"], accessor.get("byteOffset", 0), kind, width, count, index)
-        else:
-            values = np.zeros((count, width), kind)
-        sparse = accessor.get("sparse")
-        if sparse:
-            values = values.copy()
-            many = sparse["count"]
-            at, new = sparse["indices"], sparse["values"]
-            which = self._strided(
-                at["bufferView"], at.get("byteOffset", 0), _COMPONENTS[at["componentType"]], 1, many, index
-            )
-            values[which[:, 0]] = self._strided(new["bufferView"], new.get("byteOffset", 0), kind, width, many, index)
-        if accessor.get("normalized") and kind.kind in "iu":
-            values = np.maximum(values / float(np.iinfo(kind).max), -1.0)
-        return values[:, 0] if width == 1 else values
-
-    def _strided(self, view: int, offset: int, kind: np.dtype[Any], width: int, count: int, index: int) -> NDArray[Any]:
-        data, stride = self._view(view)
-        packed = kind.itemsize * width
-        stride = stride or packed
-        if count and (offset < 0 or stride < packed or offset + stride * (count - 1) + packed > len(data)):
-            raise GltfFault(f"accessor {index} reaches past its buffer view; download it again")
-        values: NDArray[Any] = np.ndarray((count, width), kind, data, offset, (stride, kind.itemsize))
-        return values
 
     def _draco(
         self, entry: dict[str, Any], attributes: dict[str, Any]
@@ -411,7 +272,7 @@ class _Reader:
             raise MissingExtraError(
                 "Draco-compressed tiles need DracoPy: pip install 'virtual-community[photos]'"
             ) from None
-        data = bytes(self._view(entry["bufferView"])[0])
+        data = bytes(self.file.view(entry["bufferView"])[0])
         try:
             mesh = DracoPy.decode(data)
             faces = np.asarray(mesh.faces, np.int64).ravel()
@@ -423,9 +284,9 @@ class _Reader:
             if name not in _WANTED:
                 continue
             values = found[number]
-            accessor = self._entry("accessors", attributes[name]) if name in attributes else {}
+            accessor = self.file.entry("accessors", attributes[name]) if name in attributes else {}
             # Draco hands out integers in wider types than they have: what they mean the accessor says.
-            kind = _COMPONENTS[accessor.get("componentType", 5126)]
+            kind = COMPONENTS[accessor.get("componentType", 5126)]
             if accessor.get("normalized") and kind.kind in "iu" and values.dtype.kind in "iu":
                 values = np.maximum(values / float(np.iinfo(kind).max), -1.0)
             arrays[name] = values[:, 0] if values.ndim == 2 and values.shape[1] == 1 else values
@@ -434,25 +295,6 @@ class _Reader:
 
 _FEATURES = ("_BATCHID", "_FEATURE_ID_0", "BATCHID")
 _WANTED = {"POSITION", "COLOR_0", "TEXCOORD_0", "TEXCOORD_1", "TEXCOORD_2", "TEXCOORD_3", *_FEATURES}
-
-
-def _matrix(node: dict[str, Any]) -> NDArray[np.float64]:
-    """Return a node's own transform."""
-    if "matrix" in node:
-        return np.asarray(node["matrix"], np.float64).reshape(4, 4).T
-    matrix = np.eye(4)
-    x, y, z, w = np.asarray(node.get("rotation", (0.0, 0.0, 0.0, 1.0)), np.float64)
-    size = math.sqrt(x * x + y * y + z * z + w * w)
-    if size > 0:
-        x, y, z, w = x / size, y / size, z / size, w / size
-        matrix[:3, :3] = [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    matrix[:3, :3] *= np.asarray(node.get("scale", (1.0, 1.0, 1.0)), np.float64)[None, :]
-    matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
-    return matrix
 
 
 def _triangles(faces: NDArray[np.int64], mode: int) -> NDArray[np.int64]:

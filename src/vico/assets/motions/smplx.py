@@ -1,0 +1,126 @@
+"""SMPL-X parameters in and out: AMASS files (``.npz``), and arrays.
+
+SMPL-X looks along z with y up, and so do the axes its joints turn about; ours look along x with z up. Its world, in
+AMASS, has z up as ours has. Shapes (betas) and expressions are not motion, and are left.
+"""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.assets.motions.clip import HIP_HEIGHT, MotionClip
+from vico.assets.motions.rotations import matrices_of, vectors_of
+from vico.assets.people import JOINTS, J
+from vico.errors import InputError, MissingFileError, SchemaError
+
+#: Pelvis height of the mean SMPL-X body in the T-pose, metres; its translations are for a body of that size.
+_SMPLX_HIP_HEIGHT = 0.95
+_MOST_BYTES = 1 << 30
+
+# Rows: our axes (forward, left, up) in those of an SMPL-X body (left, up, forward).
+_AXES = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+_BODY, _HANDS = 21, 30
+# Full poses: with jaw and eyes (SMPL-X), without (SMPL-H), and bodies without hands (SMPL: its two hand joints rest).
+_WHOLE, _WITHOUT_FACE, _WITHOUT_HANDS = 55, 52, 24
+
+
+def motion_from_smplx(
+    poses: NDArray[Any], translation: NDArray[Any], rate: float, *, name: str = "motion"
+) -> MotionClip:
+    """Return a motion from SMPL-X, SMPL-H or SMPL parameters.
+
+    Parameters
+    ----------
+    poses
+        Axis-angle of all joints, the pelvis first, radians, shape ``(t, 165)`` (SMPL-X), ``(t, 156)`` (SMPL-H) or
+        ``(t, 72)`` (SMPL).
+    translation
+        Metres, z up, shape ``(t, 3)``.
+    rate
+        Frames a second.
+
+    Raises
+    ------
+    InputError
+        If the shapes are others.
+    """
+    poses = np.asarray(poses, np.float64)
+    if poses.ndim != 2 or poses.shape[1] not in (3 * _WHOLE, 3 * _WITHOUT_FACE, 3 * _WITHOUT_HANDS):
+        raise InputError(
+            f"motion {name!r}: poses have shape {poses.shape}; they have to be (t, 165) of SMPL-X, (t, 156) of SMPL-H "
+            "or (t, 72) of SMPL"
+        )
+    given = poses.reshape(len(poses), -1, 3)
+    if not np.isfinite(given).all():
+        raise InputError(f"motion {name!r}: poses hold numbers that are not finite; repair the file")
+    joints = np.zeros((len(poses), len(JOINTS), 3))
+    joints[:, : 1 + _BODY] = given[:, : 1 + _BODY]
+    if given.shape[1] == _WHOLE:
+        joints[:, 1 + _BODY :] = given[:, 1 + _BODY :]
+    elif given.shape[1] == _WITHOUT_FACE:
+        joints[:, -_HANDS:] = given[:, -_HANDS:]
+    return MotionClip(
+        name,
+        float(rate),
+        np.asarray(translation, np.float32) * np.float32(HIP_HEIGHT / _SMPLX_HIP_HEIGHT),
+        vectors_of(matrices_of(joints[:, 0]) @ _AXES.T),
+        np.asarray(joints[:, 1:] @ _AXES.T, np.float32),
+    )
+
+
+def smplx_of(clip: MotionClip) -> dict[str, NDArray[np.float32]]:
+    """Return a motion as SMPL-X parameters, under the names of AMASS.
+
+    Returns
+    -------
+    dict
+        ``poses``, radians, shape ``(t, 165)``; of them ``root_orient`` ``(t, 3)``, ``pose_body`` ``(t, 63)``,
+        ``pose_jaw`` ``(t, 3)``, ``pose_eye`` ``(t, 6)``, ``pose_hand`` ``(t, 90)``; ``trans``, metres, ``(t, 3)``;
+        and ``mocap_frame_rate``.
+    """
+    root = vectors_of(matrices_of(clip.orientation) @ _AXES)
+    rest = np.asarray(clip.pose.astype(np.float64) @ _AXES, np.float32)
+    poses = np.concatenate([root[:, None], rest], axis=1).reshape(len(clip), -1)
+    parts = {"root_orient": (0, 1), "pose_body": (1, 22), "pose_jaw": (22, 23), "pose_eye": (23, 25)}
+    found = {part: poses[:, 3 * first : 3 * end] for part, (first, end) in parts.items()}
+    return found | {
+        "pose_hand": poses[:, 3 * J["left_index1"] :],
+        "poses": poses,
+        "trans": clip.position * np.float32(_SMPLX_HIP_HEIGHT / HIP_HEIGHT),
+        "mocap_frame_rate": np.array(clip.rate, np.float32),
+    }
+
+
+def read_amass(path: Path) -> MotionClip:
+    """Read a motion of AMASS: an ``.npz`` with ``poses``, ``trans`` and a frame rate.
+
+    Raises
+    ------
+    MissingFileError
+        If there is no such file.
+    SchemaError
+        If it is no such archive.
+    InputError
+        If its arrays have other shapes.
+    """
+    try:
+        if path.stat().st_size > _MOST_BYTES:
+            raise SchemaError(f"{path}: larger than {_MOST_BYTES >> 20} MiB; cut it into pieces")
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
+            rate = next((float(data[key]) for key in ("mocap_frame_rate", "mocap_framerate") if key in data), None)
+            if rate is None or "poses" not in data or "trans" not in data:
+                held = ", ".join(data.files[:12]) or "nothing"
+                raise SchemaError(f"{path}: no motion of AMASS (poses, trans, mocap_frame_rate); it holds {held}")
+            return motion_from_smplx(data["poses"], data["trans"], rate, name=path.stem)
+    except FileNotFoundError:
+        raise MissingFileError(f"{path}: no such file") from None
+    except (ValueError, OSError, EOFError, TypeError, zipfile.BadZipFile, zlib.error) as error:
+        if isinstance(error, (SchemaError, InputError)):
+            raise
+        raise SchemaError(f"{path}: no readable .npz of plain arrays ({error})") from None

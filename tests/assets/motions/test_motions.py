@@ -1,0 +1,231 @@
+"""Motions of other programs move our bodies as they moved theirs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from assets.motions import rigs
+from vico.assets.motions import (
+    MotionClip,
+    import_motion,
+    motion_from_smplx,
+    read_amass,
+    read_bvh,
+    read_gltf_motion,
+    smplx_of,
+)
+from vico.assets.motions.grounding import places_of
+from vico.assets.people import Appearance, J, body_of
+from vico.errors import InputError, MissingFileError, SchemaError
+
+FRAMES = 5
+TURNS = rigs.random_turns(rigs.MIXAMO, FRAMES, seed=1)
+ROOT = np.array([0.0, 0.95, 0.0]) + np.linspace(0.0, 1.0, FRAMES)[:, None] * np.array([0.3, 0.0, 1.0])
+# Our forward, left and up in the rigs' axes.
+AXES = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+BONES = {
+    f"{side}_{ours}": (f"{side.title()}{theirs}", f"{side.title()}{end}", f"{side}_{our_end}")
+    for side in ("left", "right")
+    for ours, theirs, end, our_end in (
+        ("hip", "UpLeg", "Leg", "knee"),
+        ("knee", "Leg", "Foot", "ankle"),
+        ("shoulder", "Arm", "ForeArm", "elbow"),
+        ("elbow", "ForeArm", "Hand", "wrist"),
+    )
+}
+
+
+def joints() -> Any:
+    return body_of(Appearance(), source="procedural").joints.astype(np.float64)
+
+
+def directions(places: Any, start: int, end: int) -> Any:
+    way = places[:, end] - places[:, start]
+    return way / np.linalg.norm(way, axis=1, keepdims=True)
+
+
+def bones_agree(clip: MotionClip, rig: rigs.Rig) -> None:
+    """Every limb of ours points where the rig's does, in every frame."""
+    index = {name: k for k, (name, _, _) in enumerate(rig)}
+    theirs, ours = rigs.places(rig, TURNS, ROOT) @ AXES.T, places_of(clip, t_pose())
+    for name, (start, end, our_end) in BONES.items():
+        np.testing.assert_allclose(
+            directions(ours, J[name], J[our_end]), directions(theirs, index[start], index[end]), atol=1e-4
+        )
+
+
+def t_pose() -> Any:
+    """Joints with limbs straight along the axes, as the T-pose has them; real bodies' bend a little."""
+    straight = joints()
+    for side, way in (("left", 1.0), ("right", -1.0)):
+        for a, b, axis in (("hip", "knee", -2), ("knee", "ankle", -2), ("shoulder", "elbow", 1), ("elbow", "wrist", 1)):
+            start, end = J[f"{side}_{a}"], J[f"{side}_{b}"]
+            length = np.linalg.norm(joints()[end] - joints()[start])
+            straight[end] = straight[start]
+            straight[end, abs(axis)] += length * (way if axis == 1 else -1.0)
+    return straight
+
+
+@pytest.mark.parametrize("rig", [rigs.MIXAMO, rigs.arms_down(rigs.MIXAMO)], ids=["t_pose", "arms_down"])
+@pytest.mark.parametrize("unit", [1.0, 100.0])
+def test_limbs_point_where_those_of_a_bvh_do(tmp_path: Path, rig: rigs.Rig, unit: float) -> None:
+    path = tmp_path / "dance.bvh"
+    path.write_text(rigs.bvh(rig, TURNS, ROOT, unit=unit))
+    clip = read_bvh(path)
+    assert (clip.name, len(clip), clip.rate) == ("dance", FRAMES, pytest.approx(30.0))
+    bones_agree(clip, rig)
+    moved = clip.position[-1] - clip.position[0]
+    assert moved[0] / moved[1] == pytest.approx(1 / 0.3, rel=1e-3)
+    assert moved[2] == pytest.approx(0.0, abs=1e-4)
+    assert moved[0] == pytest.approx(1.0, rel=0.1)
+
+
+def test_a_gltf_of_the_same_rig_gives_the_same_motion(tmp_path: Path) -> None:
+    (tmp_path / "a.bvh").write_text(rigs.bvh(rigs.MIXAMO, TURNS, ROOT))
+    (tmp_path / "a.glb").write_bytes(rigs.glb(rigs.MIXAMO, TURNS, ROOT))
+    one, other = import_motion(tmp_path / "a.bvh"), import_motion(tmp_path / "a.glb")
+    assert other.name == "dance"
+    bones_agree(other, rigs.MIXAMO)
+    np.testing.assert_allclose(other.position, one.position, atol=1e-3)
+    np.testing.assert_allclose(places_of(other, joints()), places_of(one, joints()), atol=2e-3)
+
+
+def test_feet_stand_on_the_ground_where_they_are_lowest(tmp_path: Path) -> None:
+    still = np.zeros_like(TURNS)
+    high = ROOT + np.array([0.0, 3.0, 0.0])
+    (tmp_path / "a.bvh").write_text(rigs.bvh(rigs.MIXAMO, still, high))
+    body = joints()
+    feet = [J["left_ankle"], J["right_ankle"]]
+    placed = places_of(read_bvh(tmp_path / "a.bvh"), body)
+    np.testing.assert_allclose(placed[:, feet, 2], np.tile(body[feet, 2], (FRAMES, 1)), atol=0.01)
+
+
+def test_smplx_comes_back_as_it_went() -> None:
+    rng = np.random.default_rng(2)
+    poses, trans = rng.normal(0.0, 0.5, (7, 165)), rng.normal(0.0, 1.0, (7, 3))
+    found = smplx_of(motion_from_smplx(poses, trans, 60.0))
+    np.testing.assert_allclose(found["poses"], poses, atol=1e-5)
+    np.testing.assert_allclose(found["trans"], trans, atol=1e-5)
+    np.testing.assert_allclose(found["pose_hand"], poses[:, 75:], atol=1e-5)
+    assert found["mocap_frame_rate"] == 60.0
+
+
+def test_smplx_s_axes_are_renamed() -> None:
+    # In AMASS somebody who stands and looks along -y is turned a quarter about x: y up becomes z up.
+    poses = np.zeros((1, 165))
+    poses[0, 0] = np.pi / 2
+    # About the forward axis (z of SMPL-X) the left arm (along x) goes up.
+    poses[0, 3 * J["left_shoulder"] + 2] = np.pi / 2
+    body = t_pose()
+    placed = places_of(motion_from_smplx(poses, np.array([[0.0, 0.0, 0.95]]), 30.0), body)[0]
+    up = placed[J["head"]] - placed[0]
+    assert up[2] > 0.9 * np.linalg.norm(up)
+    toes = placed[J["left_foot"]] - placed[J["left_ankle"]]
+    assert toes[1] < -0.5 * np.linalg.norm(toes)
+    assert placed[J["left_elbow"]][2] - placed[J["left_shoulder"]][2] > 0.2
+    assert placed[J["left_hip"]][0] > placed[J["right_hip"]][0]
+    assert placed[0, 2] == pytest.approx(body[0, 2], rel=1e-5)
+
+
+@pytest.mark.parametrize("width", [165, 156, 72])
+def test_amass_files_of_every_model_are_read(tmp_path: Path, width: int) -> None:
+    poses = np.zeros((3, width))
+    poses[:, 3 * J["left_knee"]] = 0.7
+    np.savez(tmp_path / "walk.npz", poses=poses, trans=np.ones((3, 3)), mocap_frame_rate=120.0, betas=np.zeros(10))
+    clip = read_amass(tmp_path / "walk.npz")
+    assert clip.rate == 120.0
+    assert clip.pose[1, J["left_knee"] - 1].tolist() == pytest.approx([0.0, 0.7, 0.0])
+
+
+def test_a_motion_comes_back_from_its_file(tmp_path: Path) -> None:
+    clip = motion_from_smplx(np.zeros((4, 165)), np.zeros((4, 3)), 30.0, name="stand")
+    clip.write(tmp_path / "stand.motion")
+    again = import_motion(tmp_path / "stand.motion")
+    assert (again.name, again.rate, again.seconds) == ("stand", 30.0, pytest.approx(4 / 30))
+    np.testing.assert_array_equal(again.pose, clip.pose)
+
+
+def _bvh_of(change: Any) -> str:
+    return change(rigs.bvh(rigs.MIXAMO, TURNS, ROOT))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda text: "", "no whole BVH hierarchy"),
+        (lambda text: text[: text.index("\n}") - 1], "no whole BVH hierarchy"),
+        (lambda text: text.rsplit("\n", 3)[0], "3 of 5 frames"),
+        (lambda text: text.replace("OFFSET", "OFFSETS", 1), "line 4"),
+        (lambda text: text.replace("Zrotation", "Wrotation", 1), "line 5"),
+        (lambda text: text.replace("\n0.0 ", "\nnan ", 1), "no frame of 75 numbers"),
+        (lambda text: text.replace("UpLeg", "Tentacle"), "no joint stands for left_hip"),
+        (lambda text: text.replace("Frame Time: 0.0", "Frame Time: -0.0"), "frames of"),
+    ],
+)
+def test_broken_bvh_is_refused_in_a_sentence(tmp_path: Path, change: Any, words: str) -> None:
+    path = tmp_path / "a.bvh"
+    path.write_text(_bvh_of(change))
+    with pytest.raises((SchemaError, InputError), match=words):
+        read_bvh(path)
+
+
+def _round(document: dict[str, Any]) -> None:
+    document["nodes"][5]["children"] = [0]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (_round, "ancestors|two parents"),
+        (lambda d: d.pop("animations"), "no animation"),
+        (lambda d: d["buffers"][0].update(uri="../../etc/passwd"), "outside its folder"),
+        (lambda d: d["buffers"][0].update(uri="http://example.org/a.bin"), "outside its folder"),
+        (lambda d: d["accessors"][0].update(count=10**12), "claims"),
+        (lambda d: d["accessors"][0].update(count=2), "no ascending times"),
+        (lambda d: d["animations"][0]["channels"].clear(), "moves no joint"),
+        (lambda d: [node.update(name="bone") for node in d["nodes"]], "no joint stands for"),
+    ],
+)
+def test_broken_gltf_is_refused_in_a_sentence(tmp_path: Path, change: Any, words: str) -> None:
+    path = tmp_path / "a.glb"
+    path.write_bytes(rigs.glb(rigs.MIXAMO, TURNS, ROOT, change=change))
+    with pytest.raises((SchemaError, InputError), match=words):
+        read_gltf_motion(path)
+
+
+def test_other_animations_are_chosen_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "a.glb"
+    path.write_bytes(rigs.glb(rigs.MIXAMO, TURNS, ROOT))
+    assert len(read_gltf_motion(path, animation="dance")) == FRAMES
+    with pytest.raises(SchemaError, match="it has dance"):
+        read_gltf_motion(path, animation="walk")
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [("a.npz", b"PK\x03\x04"), ("a.npz", b""), ("a.glb", b"glTF"), ("a.motion", b"x"), ("a.bvh", b"\xff\xfe\x00")],
+)
+def test_files_that_are_no_motion_are_refused(tmp_path: Path, name: str, content: bytes) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(SchemaError, match=name):
+        import_motion(tmp_path / name)
+    with pytest.raises(MissingFileError):
+        import_motion(tmp_path / f"none{Path(name).suffix}")
+
+
+def test_shapes_that_are_no_smplx_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"\(t, 165\)"):
+        motion_from_smplx(np.zeros((3, 100)), np.zeros((3, 3)), 30.0)
+    with pytest.raises(InputError, match="not finite"):
+        motion_from_smplx(np.full((3, 165), np.nan), np.zeros((3, 3)), 30.0)
+    with pytest.raises(InputError, match="position has shape"):
+        motion_from_smplx(np.zeros((3, 165)), np.zeros((3, 2)), 30.0)
+    with pytest.raises(InputError, match="convert FBX"):
+        import_motion(tmp_path / "a.fbx")
+    np.savez(tmp_path / "a.npz", poses=np.array([object()], dtype=object), trans=np.zeros(3), mocap_frame_rate=1.0)
+    with pytest.raises(SchemaError, match=r"a\.npz"):
+        read_amass(tmp_path / "a.npz")
