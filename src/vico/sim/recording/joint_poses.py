@@ -1,4 +1,4 @@
-"""Joint poses of recorded people: computed from motion and phase, as they were drawn."""
+"""Joint poses of recorded people: computed from motion and phase, as they were drawn; one person's as a motion."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.assets.motions import HIP_HEIGHT, MotionClip
+from vico.assets.motions.rotations import matrices_of, vectors_of
 from vico.assets.people import Appearance, body_of
 from vico.errors import InputError
 from vico.seeds import rng
@@ -82,6 +84,38 @@ class PosedPeople:
             stream = rng(seed, "manner", self._manners[entity])
             self._styles[entity] = style_of(body_of(look), stream, age=look.age)
         return self._styles[entity]
+
+
+def motion_of(run: Run, agent: str) -> MotionClip:
+    """Return how one person moved in a run, a frame a step.
+
+    Raises
+    ------
+    InputError
+        If no person of that name takes part in it, or was not recorded.
+    """
+    people = {a["name"]: a["entity"] for a in run.agents if a["kind"] != "robot"}
+    if agent not in people:
+        raise InputError(f"{run.path}: no person is called {agent!r}; there are {', '.join(people) or 'none'}")
+    entity, posed = people[agent], PosedPeople(run)
+    rows = run.columns("bodies")
+    mine = np.flatnonzero(rows["entity"] == entity)
+    steps, yaw = rows["step"][mine], rows["yaw"][mine]
+    poses = [posed.at(int(step), [entity]) for step in steps]
+    if not poses:
+        raise InputError(f"{run.path}: nothing was recorded of {agent}")
+    turned = np.zeros((len(poses), 3, 3))
+    turned[:, 0, 0] = turned[:, 1, 1] = np.cos(yaw)
+    turned[:, 1, 0], turned[:, 0, 1], turned[:, 2, 2] = np.sin(yaw), -np.sin(yaw), 1.0
+    rotations = np.concatenate([found.rotations for found in poses])
+    pelvis = np.concatenate([found.joints[:, 0] + found.offsets for found in poses]).astype(np.float64)
+    place = np.column_stack([rows[axis][mine] for axis in ("x", "y", "z")])
+    standing = float(poses[0].joints[0, 0, 2])
+    position = (place + (turned @ pelvis[:, :, None])[:, :, 0]) * (HIP_HEIGHT / standing)
+    times = run.columns("steps")["time"]
+    rate = (len(times) - 1) / float(times[-1] - times[0]) if len(times) > 1 else 1.0
+    orientation = vectors_of(turned @ matrices_of(rotations[:, 0]))
+    return MotionClip(agent, rate, np.asarray(position, np.float32), orientation, rotations[:, 1:])
 
 
 def _people_of(run: Run) -> tuple[dict[int, Appearance], dict[int, str]]:
