@@ -98,20 +98,24 @@ def test_what_a_run_says_of_itself_is_not_trusted(
 
 
 def test_a_run_has_one_hash_whoever_looks_and_however_many_work(
-    helsinki_path: Path, helsinki_people: Path, tmp_path: Path
+    helsinki_path: Path, helsinki_people: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     common = [
         "run", helsinki_path, helsinki_people, "--steps", 20, "--seed", 1, "--robots", "husky,go2", "--cars", 4,
         "--pedestrians", 4, "--assistants", 2, "--agent", "vico.agents.base:RandomAgent", "--deadline", 0, "--json",
     ]  # fmt: skip
     hashes = set()
-    for observe, workers in (("none", 1), ("none", 4), ("all", 1), ("all", 4)):
-        command = [*common, "--observe", observe, "--workers", workers, "--out", tmp_path / f"{observe}{workers}"]
-        done = subprocess.run(
-            [sys.executable, "-m", "vico.cli.main", *map(str, command)], capture_output=True, text=True, check=False
-        )
-        assert done.returncode == 0, done.stderr
-        hashes.add(json.loads(done.stdout)["state_hash"])
+    for observe, workers in (("none", 4), ("all", 1), ("all", 4)):
+        capsys.readouterr()
+        assert vico(*common, "--observe", observe, "--workers", workers, "--out", tmp_path / f"{observe}{workers}") == 0
+        hashes.add(json.loads(capsys.readouterr().out)["state_hash"])
+    # And one in a process that has done nothing else.
+    fresh = [*common, "--observe", "none", "--workers", 1, "--out", tmp_path / "fresh"]
+    done = subprocess.run(
+        [sys.executable, "-m", "vico.cli.main", *map(str, fresh)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    hashes.add(json.loads(done.stdout)["state_hash"])
     assert len(hashes) == 1
 
 
