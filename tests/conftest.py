@@ -66,6 +66,12 @@ def corner_path(shared: Shared) -> Path:
 
 
 @pytest.fixture(scope="session")
+def corner(corner_path: Path) -> World:
+    """The world in `corner_path`."""
+    return read_world(corner_path)
+
+
+@pytest.fixture(scope="session")
 def helsinki_city(shared: Shared) -> World:
     """800 m x 800 m of central Helsinki: large enough for bus lines and bicycle stations."""
     return read_world(shared("city", lambda out: _world(out, 400.0)))

@@ -13,8 +13,8 @@ from vico.world.objects import write_objects
 
 
 @pytest.fixture
-def copy(helsinki_path: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(helsinki_path, tmp_path / "world"))
+def copy(corner_path: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(corner_path, tmp_path / "world"))
 
 
 def rules(path: Path) -> set[str]:
@@ -35,30 +35,30 @@ def test_a_missing_file_is_found(copy: Path) -> None:
     assert "file missing" in rules(copy)
 
 
-def test_an_entrance_off_its_wall_is_found(copy: Path, helsinki: World) -> None:
-    first, *rest = helsinki.entrances
+def test_an_entrance_off_its_wall_is_found(copy: Path, corner: World) -> None:
+    first, *rest = corner.entrances
     x, y, z = first.position
     write_records(copy / "entrances.json", [first.model_copy(update={"position": (x + 1.5, y + 1.5, z)}), *rest])
     assert {"entrance off the wall"} <= rules(copy)
 
 
-def test_a_place_in_a_building_that_is_not_there_is_found(copy: Path, helsinki: World) -> None:
-    inside = [p for p in helsinki.places if p.building]
+def test_a_place_in_a_building_that_is_not_there_is_found(copy: Path, corner: World) -> None:
+    inside = [p for p in corner.places if p.building]
     broken = inside[0].model_copy(update={"building": "w0"})
-    write_records(copy / "places.json", [broken, *(p for p in helsinki.places if p.id != broken.id)])
+    write_records(copy / "places.json", [broken, *(p for p in corner.places if p.id != broken.id)])
     assert "place lost" in rules(copy)
 
 
-def test_rooms_that_overlap_are_found(copy: Path, helsinki: World) -> None:
-    first, second, *rest = helsinki.rooms
+def test_rooms_that_overlap_are_found(copy: Path, corner: World) -> None:
+    first, second, *rest = corner.rooms
     write_records(copy / "rooms.json", [first, second.model_copy(update={"centre": first.centre}), *rest])
     assert "rooms overlap" in rules(copy)
 
 
-def test_a_thing_within_a_wall_is_found(copy: Path, helsinki: World) -> None:
-    objects = helsinki.objects
+def test_a_thing_within_a_wall_is_found(copy: Path, corner: World) -> None:
+    objects = corner.objects
     outdoors = int(np.flatnonzero(objects.outdoors)[0])
-    body = max(helsinki.surfaces("collision"), key=lambda s: float(np.ptp(s.positions[:, 0])))
+    body = max(corner.surfaces("collision"), key=lambda s: float(np.ptp(s.positions[:, 0])))
     x, y = objects.x.copy(), objects.y.copy()
     x[outdoors], y[outdoors] = body.positions[:, :2].mean(axis=0)
     write_objects(copy / "objects.parquet", replace(objects, x=x, y=y))
