@@ -6,7 +6,7 @@ import numpy as np
 
 from vico.world.folder import World
 from vico.world.heights import HeightField
-from vico.world.model import Building, Category, Manifest, Origin, Place
+from vico.world.model import Building, Category, Manifest, Origin, Place, Transit
 from vico.world.walkable import BLOCKED, OPEN, ROADWAY, SIDEWALK, WalkableMap
 
 HALF = 120.0
@@ -82,4 +82,7 @@ def make_world(places: tuple[tuple[str, str, str, str | None], ...] = PLACES, na
         producer="test", name=name, origin=Origin(lat=60.0, lon=25.0), half=HALF, bbox=(24.9, 59.9, 25.1, 60.1), seed=0,
         sources=[], stages=[], counts={}, places_by_type={}, files={},
     )  # fmt: skip
-    return World(manifest, height=HeightField.flat(HALF), buildings=buildings, places=records, walkable=walkable)
+    transit = Transit(stops=[], lines=[], bike_stations=[], origin={})
+    return World(
+        manifest, height=HeightField.flat(HALF), buildings=buildings, places=records, walkable=walkable, transit=transit
+    )

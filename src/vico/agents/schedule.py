@@ -15,6 +15,7 @@ from vico.agents.residents import Residents
 from vico.agents.state import AgentState, generator_state, restore_generator
 from vico.agents.stays import Item, Stay, stays_of, with_ways
 from vico.agents.strides import Stride, pace_in_time
+from vico.agents.travel import Traveller
 from vico.agents.wayfinding import Walker
 from vico.clock import DAY
 from vico.rules import DOOR_REACH
@@ -80,6 +81,7 @@ class ScheduleFollower:
         self._stays = with_ways(stays_of(resident.schedule, public_map.place_by_id), public_map)
         self._rng = generator
         self._walker = Walker(public_map, generator)
+        self._traveller = Traveller(public_map, generator)
         self._indoors = IndoorWalker()
         self._aside: list[Action] = []
         self._conversation = Conversation(resident, known, generator)
@@ -125,6 +127,7 @@ class ScheduleFollower:
         return {
             "generator": generator_state(self._rng),
             "walker": self._walker.state(),
+            "traveller": self._traveller.state() if self._traveller.plans else None,
             "indoors": self._indoors.state(),
             "conversation": self._conversation.state(),
             "aside": [dict(action) for action in self._aside],
@@ -142,6 +145,9 @@ class ScheduleFollower:
             self.group.forget(self._name)
         restore_generator(self._rng, state["generator"])
         self._walker.restore(state["walker"])
+        self._traveller = Traveller(self._map, self._rng)
+        if state["traveller"] is not None:
+            self._traveller.restore(state["traveller"])
         self._indoors.restore(state["indoors"])
         self._conversation.restore(state["conversation"])
         arrived, stroll = state["arrived"], state["stroll"]
@@ -159,6 +165,8 @@ class ScheduleFollower:
         if stay is None:
             return {"type": "wait"}
         place = self._map.place_by_id[stay.place]
+        if state["vehicle"]:
+            return self._travel(observation, info, stay, place)
         if self._posture != "lying":
             errand = partial(self._errand, observation, stay, place)
             line = self._conversation.line(observation, info, errand)
@@ -193,6 +201,7 @@ class ScheduleFollower:
         if self._arrived != stay:
             self._arrived, self._stroll, self._paused_until = stay, None, -math.inf
             self._walker.stop()
+            self._traveller.stop()
         time = observation["state"]["time"]
         if place.building is not None or stay.tag not in (*_STROLLING, *_RUNNING):
             return self._live(stay, time)
@@ -264,6 +273,7 @@ class ScheduleFollower:
     def _leave(self, observation: Observation, info: Info) -> Action:
         """Walk to the door that leads out, and through it."""
         self._walker.stop()
+        self._traveller.stop()
         state = observation["state"]
         doors = state["doors"]
         out = next((door for door in doors if door["to"] == "outside"), None)
@@ -296,6 +306,8 @@ class ScheduleFollower:
         turned_away = self._went_in and state["action_status"] == "refused"
         if place.id in state["accessible_places"] and not turned_away:
             return {"type": "enter", "place": place.id}
+        if stay.mode != "walk":
+            return self._travel(observation, info, stay, place)
         goal = (float(place.position[0]), float(place.position[1]))
         left = self._walker.remaining(observation["pose"])
         time_left = stay.due - state["time"] % DAY
@@ -304,6 +316,18 @@ class ScheduleFollower:
             door = place.position if place.building is None else place.entrance or place.position
             near = _OPEN_REACH if place.building is None else DOOR_REACH
             self._go_on(state["time"], math.nan, stay, (door, near, math.inf))
+            return action
+        return {"type": "enter", "place": place.id} if place.id in state["accessible_places"] else {"type": "wait"}
+
+    def _travel(self, observation: Observation, info: Info, stay: Stay, place: PublicPlace) -> Action:
+        """Go by bus or bicycle, as the schedule says; where that fails, as one gets there first."""
+        state = observation["state"]
+        goal = (float(place.position[0]), float(place.position[1]))
+        left, time_left = self._traveller.remaining(observation["pose"]), stay.due - state["time"] % DAY
+        ride = None if stay.mode == "walk" else (stay.mode, float(state["time"]) + time_left)
+        pace = pace_in_time(left, time_left)
+        action = self._traveller.towards(goal, observation, info, speed=pace, ride=ride)
+        if action is not None:
             return action
         return {"type": "enter", "place": place.id} if place.id in state["accessible_places"] else {"type": "wait"}
 

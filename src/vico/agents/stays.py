@@ -44,10 +44,17 @@ class Item(Protocol):
     def place(self) -> str | None:
         """Id of the place; None on the way."""
 
+    @property
+    def mode(self) -> str | None:
+        """On the way: walk, bus or bike; None is walk."""
+
 
 @dataclass(frozen=True)
 class Stay:
-    """To be at a place by `due`, and to set out at `leave`, seconds of the day; `tag` says what for."""
+    """To be at a place by `due`, and to set out at `leave`, seconds of the day; `tag` says what for.
+
+    `mode` is how one means to get there: walk, bus or bike.
+    """
 
     leave: float
     due: float
@@ -55,22 +62,25 @@ class Stay:
     tag: str
     activity: str
     place: str
+    mode: str = "walk"
 
 
 def stays_of(schedule: Iterable[Item], known: Mapping[str, object]) -> list[Stay]:
     """Return the stays of a day, each with the time to set out; items without a place on the map are left out."""
     stays: list[Stay] = []
     leave: float | None = None
+    mode = "walk"
     for item in schedule:
         if str(item.type) == "commute":
             leave = seconds_of_day(item.start) if leave is None else leave
+            mode = str(item.mode or "walk")
             continue
         if item.place is None or item.place not in known:
             continue
         due = seconds_of_day(item.start)
         when = due if leave is None else leave
-        stays.append(Stay(when, due, str(item.type), str(item.tag or ""), item.activity, item.place))
-        leave = None
+        stays.append(Stay(when, due, str(item.type), str(item.tag or ""), item.activity, item.place, mode))
+        leave, mode = None, "walk"
     return stays
 
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
 
 from vico.agents.base import Action, Info, Observation
 from vico.agents.state import AgentState
+from vico.agents.stays import RUN
 from vico.agents.wayfinding import Walker
 from vico.rules import BIKE_SPEED, BUS_DWELL, STATION_REACH, WALK_SPEED, ReasonCode, code_name
 from vico.world.public import PublicMap
-from vico.world.trips import MODES, Leg, Trip
+from vico.world.trips import AHEAD, MODES, Leg, Trip
 from vico.world.walkable import ROADWAY
 
 # This near to where one waits for a bus, or to a rack, is there, metres. At a stop others may stand in the spot: then a
@@ -77,6 +78,9 @@ class Traveller:
         self._leg = 0
         # Stations that had no bicycle, or none one could get on; lines one has no money for need no note: it is seen.
         self._closed: list[str] = []
+        # Whether no trip to the goal was begun yet; and how one means to make it.
+        self._fresh = True
+        self._ride: tuple[str, float] | None = None
         self._asked = ""
         self._tries = 0
         self._last: tuple[float, float] | None = None
@@ -93,6 +97,7 @@ class Traveller:
             "plans": self.plans,
             "leg": self._leg,
             "closed": list(self._closed),
+            "fresh": self._fresh,
             "asked": self._asked,
             "tries": self._tries,
             "last": None if self._last is None else list(self._last),
@@ -107,16 +112,32 @@ class Traveller:
         self.trip = None if state["depart"] is None else Trip(float(state["depart"]), legs)
         self.plans, self._leg = int(state["plans"]), int(state["leg"])
         self._closed, self._asked = [str(name) for name in state["closed"]], str(state["asked"])
+        self._fresh = bool(state["fresh"])
         self._tries, self._still = int(state["tries"]), int(state["still"])
         self._last = None if state["last"] is None else (float(state["last"][0]), float(state["last"][1]))
 
     def stop(self) -> None:
         """Forget the trip; who is in a bus gets off at its next stop, who rides a bicycle takes it to a station."""
-        self._goal, self.trip, self._closed = None, None, []
+        self._goal, self.trip, self._closed, self._fresh = None, None, [], True
         self._walker.stop()
 
+    @property
+    def waits_for_bus(self) -> bool:
+        """Whether it stands at a stop until its bus comes."""
+        return self.trip is not None and self._leg < len(self.trip.legs) and self.trip.legs[self._leg].mode == "bus"
+
+    def remaining(self, position: Sequence[float]) -> float:
+        """Metres still to walk on the present leg."""
+        return self._walker.remaining(position)
+
     def towards(
-        self, goal: tuple[float, float], observation: Observation, info: Info, *, speed: float = WALK_SPEED
+        self,
+        goal: tuple[float, float],
+        observation: Observation,
+        info: Info,
+        *,
+        speed: float = WALK_SPEED,
+        ride: tuple[str, float] | None = None,
     ) -> Action | None:
         """Return the next action on the way to a point; None once there, or if there is no way.
 
@@ -125,12 +146,16 @@ class Traveller:
         goal
             ENU metres; a point outdoors. Who is in a building goes out first.
         speed
-            Metres a second on foot, up to 2.5.
+            Metres a second on foot, up to 2.5; to a bus that would be missed it goes faster.
+        ride
+            Mode that is meant, and the second of the day by which one wants to be there: if a trip by it is there in
+            time, that is made. Where it fails (a bus gone or full, a rack empty) the trip that arrives first is.
         """
         if goal != self._goal:
             self.stop()
             self._goal = goal
         self._notice(observation)
+        self._ride = ride
         action = self._act(goal, observation, info, speed)
         self._asked = "" if action is None else str(action["type"])
         return action
@@ -155,7 +180,8 @@ class Traveller:
         if leg.mode == "bike":
             return self._mount(leg, observation, info)
         last = self.trip is not None and self._leg == len(self.trip.legs) - 1
-        action = self._walker.towards(goal if last else leg.end, speed, observation, info)
+        pace = self._pace(observation, speed)
+        action = self._walker.towards(goal if last else leg.end, pace, observation, info)
         if action is not None or last:
             return action
         # There is no way to where the ride begins.
@@ -172,11 +198,7 @@ class Traveller:
                 trip = None
             self._leg, self._tries = self._leg + 1, 0
         if trip is None:
-            state = observation["state"]
-            cash, closed = float(state["cash"]), self._closed
-            trip = self._map.trips.plan(
-                observation["pose"][:2], goal, float(state["time"]), modes=self._modes, cash=cash, closed=closed
-            )
+            trip = self._planned(goal, observation)
             self.trip, self._leg, self._tries = trip, 0, 0
             self.plans += 1
         if trip is None:
@@ -188,6 +210,27 @@ class Traveller:
             self._walker.stop()
             leg = trip.legs[self._leg]
         return leg
+
+    def _planned(self, goal: tuple[float, float], observation: Observation) -> Trip | None:
+        """Return the trip that is meant, if there is one in time; else the one that arrives first."""
+        state = observation["state"]
+        here, now, cash = observation["pose"][:2], float(state["time"]), float(state["cash"])
+        meant, self._fresh = self._ride if self._fresh else None, False
+        if meant is not None:
+            mode, due = meant
+            trip = self._map.trips.plan(here, goal, now, modes=(mode,), cash=cash)
+            if trip is not None and trip.arrive <= due:
+                return trip
+        return self._map.trips.plan(here, goal, now, modes=self._modes, cash=cash, closed=self._closed)
+
+    def _pace(self, observation: Observation, speed: float) -> float:
+        """Return the speed on foot at which the bus that comes next is not missed, if that can be done."""
+        trip = self.trip
+        ride = trip.legs[self._leg + 1] if trip is not None and self._leg + 1 < len(trip.legs) else None
+        if ride is None or ride.mode != "bus":
+            return speed
+        left = ride.depart - AHEAD - float(observation["state"]["time"])
+        return max(speed, min(RUN, self.remaining(observation["pose"]) / max(left, 1.0)))
 
     def _is_at_the_ride(self, ride: Leg, observation: Observation) -> bool:
         """Return whether one stands where a ride begins."""

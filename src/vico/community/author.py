@@ -16,6 +16,7 @@ from vico.community.model import Community, Group, Resident, ResidentAppearance,
 from vico.community.people import Household, ResidentDraft, Wardrobe, draw_character, draw_households
 from vico.community.place_index import PlaceIndex
 from vico.community.relations import draw_relations
+from vico.community.rides import with_rides
 from vico.community.schedules import DayWriter
 from vico.community.tags import with_tags
 from vico.community.validator import CommunityFinding, check_community
@@ -166,6 +167,8 @@ def _draft(index: PlaceIndex, count: int, seed: int, attempt: int, day: date) ->
                 schedule=schedules[draft.id],
             )
         )
+    groups = _groups(meetings)
+    people = with_rides(people, groups, index, lambda name: rng(seed, "community", "rides", attempt, name))
     return Community(
         producer=f"vico {__version__}",
         author=_PROCEDURAL,
@@ -173,7 +176,7 @@ def _draft(index: PlaceIndex, count: int, seed: int, attempt: int, day: date) ->
         date=day,
         world=WorldIdentity(name=world.manifest.name, digest=world.digest),
         residents=people,
-        groups=_groups(meetings),
+        groups=groups,
         relations=relations,
     )
 

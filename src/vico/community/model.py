@@ -59,6 +59,14 @@ class ActivityTag(StrEnum):
     COMMUTE = "commute"
 
 
+class Mode(StrEnum):
+    """How a resident means to get from one place to another."""
+
+    WALK = "walk"
+    BUS = "bus"
+    BIKE = "bike"
+
+
 class ScheduleItem(Record):
     """A stretch of a resident's day.
 
@@ -68,6 +76,8 @@ class ScheduleItem(Record):
         What it is about. None where the author did not say; `vico.community.tags.with_tags` fills it in.
     start, end
         ``HH:MM:SS``; the next item starts when this one ends; the last one ends 23:59:59.
+    mode
+        On the way: by what. None, and everywhere else: on foot.
     place, building
         Ids of where it happens; `building` is None at open places; both None on the way (``commute``).
     """
@@ -79,6 +89,7 @@ class ScheduleItem(Record):
     activity: Annotated[str, Field(min_length=1)]
     place: str | None
     building: str | None
+    mode: Mode | None = None
 
 
 @with_config(ConfigDict(extra="forbid"))

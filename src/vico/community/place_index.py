@@ -107,6 +107,10 @@ class PlaceIndex:
             return 0.0
         return self.outdoors(a, b) + float(self._inside[self.spot[a]] + self._inside[self.spot[b]])
 
+    def indoors(self, a: str) -> float:
+        """Seconds on foot from the door of a place to its farthest room; 0 in the open."""
+        return float(self._inside[self.spot[a]])
+
     def outdoors(self, a: str, b: str) -> float:
         """Seconds on foot between the doors of two places, at 1 m/s; infinite if there is no way."""
         # There as back, and for all places behind one door.

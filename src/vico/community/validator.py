@@ -14,8 +14,9 @@ import numpy as np
 from vico.clock import seconds_of_day
 from vico.community.hours import staffed
 from vico.community.jobs import job_of, jobs_at, works_at
-from vico.community.model import LAST, Community, ItemType, Resident, ScheduleItem
+from vico.community.model import LAST, Community, ItemType, Mode, Resident, ScheduleItem
 from vico.community.place_index import SPAWN_GAP, PlaceIndex
+from vico.community.rides import first_ride
 from vico.community.tags import TAGS_OF_TYPE
 from vico.community.work import STUDY_KINDS
 from vico.world.folder import World
@@ -209,21 +210,24 @@ class _Check:
         a, b = items[k - 1].place, items[k + 1].place
         if a not in self.index.place_by_id or b not in self.index.place_by_id or a is None or b is None:
             return  # said already
-        needed = self.index.seconds(a, b)
-        given = _length(item)
         names = f"from {self.index.place_by_id[a].name} to {self.index.place_by_id[b].name}"
-        if math.isinf(needed):
-            self.say(where, f"there is no way {names}", "choose a place that can be reached")
-        elif given < needed:
-            self.say(
-                where,
-                f"{given} s for the walk {names}, which takes {needed:.0f} s",
-                f"allow {math.ceil(needed)} s or more",
-            )
+        if item.mode is None or item.mode is Mode.WALK:
+            what, needed = "walk", self.index.seconds(a, b)
+            if math.isinf(needed):
+                self.say(where, f"there is no way {names}", "choose a place that can be reached")
+                return
+        else:
+            what, start = f"way by {item.mode}", seconds_of_day(item.start)
+            needed = first_ride(self.index, (a, b), item.mode, start, r.cash) - start
+            if math.isinf(needed):
+                self.say(where, f"no {item.mode} goes {names}", "walk, or choose a place that can be reached so")
+                return
+        given = _length(item)
+        taking = f"{given} s for the {what} {names}, which takes {needed:.0f} s"
+        if given < needed:
+            self.say(where, taking, f"allow {math.ceil(needed)} s or more")
         elif given > _SLACK * needed + _SPARE:
-            self.say(
-                where, f"{given} s for the walk {names}, which takes {needed:.0f} s", "leave later or arrive earlier"
-            )
+            self.say(where, taking, "leave later or arrive earlier")
 
     def joined(self, before: ScheduleItem, item: ScheduleItem, where: str) -> None:
         places = self.index.place_by_id
@@ -236,6 +240,8 @@ class _Check:
             )
 
     def stay(self, r: Resident, item: ScheduleItem, where: str) -> None:
+        if item.mode is not None:
+            self.say(where, f"{item.activity!r} has a mode, {item.mode}", "only ways have a mode: leave it out")
         if item.place is None:
             self.say(where, f"{item.activity!r} has no place", "say where it happens")
             return

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from vico.clock import seconds_of_day
-from vico.community.model import ItemType, ScheduleItem
+from vico.community.model import ItemType, Mode, ScheduleItem
 
 
 @dataclass(frozen=True)
 class Appointment:
-    """Being at a place from `due` until `until`, seconds of the day."""
+    """Being at a place from `due` until `until`, seconds of the day, and by what one means to get there."""
 
     place: int
     due: int
     until: int
+    mode: Mode = Mode.WALK
 
 
 @dataclass(frozen=True)
@@ -30,15 +31,20 @@ class Whereabouts:
 def appointments(schedule: Sequence[ScheduleItem], places: dict[str, int]) -> list[Appointment]:
     """Return the stays of a day, neighbours at one place joined, travel left out."""
     stays: list[Appointment] = []
+    mode = Mode.WALK
     for item in schedule:
-        if item.type is ItemType.COMMUTE or item.place is None or item.place not in places:
+        if item.type is ItemType.COMMUTE:
+            mode = item.mode or Mode.WALK
+            continue
+        if item.place is None or item.place not in places:
             continue
         place, due = places[item.place], seconds_of_day(item.start)
         until = seconds_of_day(item.end)
         if stays and stays[-1].place == place:
-            stays[-1] = Appointment(place, stays[-1].due, until)
+            stays[-1] = replace(stays[-1], until=until)
         else:
-            stays.append(Appointment(place, due, until))
+            stays.append(Appointment(place, due, until, mode))
+        mode = Mode.WALK
     return stays
 
 

@@ -249,6 +249,7 @@ class Recorder:
             "refused": counts.refused,
             "arrivals": int(sim.punctuality.arrivals.sum()),
             "late": int(sim.punctuality.late.sum()),
+            "trips": sim.punctuality.by_mode(),
             "observations": counts.steps * len(sim.seeing),
             "seconds_by_phase": {name: round(value, 3) for name, value in counts.seconds.items()},
         } | sim.reports()

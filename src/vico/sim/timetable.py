@@ -9,14 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.clock import DAY
+from vico.community.model import Mode
 from vico.sim.appointments import Appointment
 from vico.sim.simulation_state import SimulationState
-from vico.sim.state import ArrayState
+from vico.sim.state import ArrayState, Vehicle
 
 # Somebody who comes up to a minute after the hour is not called late.
 GRACE = 60
 # An open place is reached when its position is this near, metres.
 OPEN_REACH = 5.0
+#: Ways to get about, by number. Who was in a bus at all came by bus.
+MODES = tuple(Mode)
+_MADE = (MODES.index(Mode.WALK), MODES.index(Mode.BUS), MODES.index(Mode.BIKE), MODES.index(Mode.BUS))
+#: Seconds late that are told apart begin here (who is earlier counts as this early), and end there.
+EARLIEST, _LATEST = -300, 1800
 
 
 @dataclass
@@ -33,6 +39,15 @@ class Punctuality(ArrayState):
         Days since the first on which that stay is: schedules come again every day.
     told
         Whether it has been noted that the next stay began without the resident.
+    rode
+        In what each resident was since the last stay was reached: 1 a bus, 2 a bicycle, 3 both.
+    meant
+        By what the way to each stay is to be made, a number of `MODES`.
+    trips
+        Stays reached, by how the way was meant and how it was made, shape ``(MODES, MODES)``.
+    lateness
+        Of ways by how they were made: how many took each number of seconds more than the schedule gives, from
+        `EARLIEST`; shape ``(MODES, seconds)``.
     arrivals, late
         Stays reached so far, and stays that began without the resident by more than `GRACE` seconds.
     """
@@ -44,6 +59,10 @@ class Punctuality(ArrayState):
     following: NDArray[np.int64]
     day: NDArray[np.int64]
     told: NDArray[np.bool_]
+    rode: NDArray[np.int8]
+    meant: NDArray[np.int8]
+    trips: NDArray[np.int64]
+    lateness: NDArray[np.int32]
     arrivals: NDArray[np.int64]
     late: NDArray[np.int64]
 
@@ -65,6 +84,10 @@ class Punctuality(ArrayState):
             following,
             np.zeros(n, np.int64),
             np.zeros(n, bool),
+            np.zeros(n, np.int8),
+            np.array([MODES.index(stay.mode) for stay in rows], np.int8),
+            np.zeros((len(MODES), len(MODES)), np.int64),
+            np.zeros((len(MODES), _LATEST - EARLIEST + 1), np.int32),
             np.zeros(n, np.int64),
             np.zeros(n, np.int64),
         )
@@ -74,6 +97,8 @@ class Punctuality(ArrayState):
 
     def watch(self, state: SimulationState) -> None:
         """Note arrivals and failures to arrive, as events and in the counts."""
+        vehicles = state.people.vehicle[: len(self.rode)]
+        self.rode |= (vehicles == Vehicle.BUS).astype(np.int8) | 2 * (vehicles == Vehicle.BIKE).astype(np.int8)
         some = np.flatnonzero(self.start[1:] > self.start[:-1])
         rows, shift = self.following[some], DAY * self.day[some]
         places = self.place[rows]
@@ -90,14 +115,36 @@ class Punctuality(ArrayState):
             if there[n]:
                 behind = float(state.second - self.due[k] - shift[n])
                 self.arrivals[i] += 1
-                state.events.add(
-                    "arrival", name, f"arrives at {place.name}", position, place=place.id, seconds_late=behind
-                )
+                made = _MADE[self.rode[i]]
+                self.trips[self.meant[k], made] += 1
+                self.lateness[made, min(max(round(behind), EARLIEST), _LATEST) - EARLIEST] += 1
+                self.rode[i] = 0
+                how = {"seconds_late": behind, "mode": MODES[made]}
+                state.events.add("arrival", name, f"arrives at {place.name}", position, place=place.id, **how)
             elif state.second <= self.until[k] + shift[n]:
                 continue
             self.following[i] += 1
             self.told[i] = False
             self._wrap(i)
+
+    def by_mode(self) -> dict[str, dict[str, int]]:
+        """Return what became of ways, by how they were made.
+
+        Returns
+        -------
+        dict
+            Of each mode: ``made``; ``meant``, ways that were to be made so and were made, however; ``on_time``, made
+            no more than `GRACE` seconds late; ``late_median`` and ``late_p90``, seconds, where any was made.
+        """
+        found: dict[str, dict[str, int]] = {}
+        for mode, name in enumerate(MODES):
+            counts = np.cumsum(self.lateness[mode])
+            made = int(counts[-1])
+            found[name] = {"made": made, "meant": int(self.trips[mode].sum()), "on_time": int(counts[GRACE - EARLIEST])}
+            if made:
+                for what, share in (("late_median", 0.5), ("late_p90", 0.9)):
+                    found[name][what] = EARLIEST + int(np.searchsorted(counts, share * made))
+        return found
 
     def _wrap(self, i: int) -> None:
         """Go on with the next day's stays after a day's last; who ends it where it began is there already."""

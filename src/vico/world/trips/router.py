@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -52,9 +53,22 @@ class Trips:
         self.walk_speed = walk_speed
         self._kept: dict[tuple[str, str], Way] = {}
         self._networks: dict[tuple[bool, bool], TripNetwork] = {}
+        self._remembered: dict[Point2, str] = {}
         self._known = {
             r.id for part in (self.transit.stops, self.transit.lines, self.transit.bike_stations) for r in part
         }
+
+    def remember(self, points: Iterable[ArrayLike]) -> None:
+        """Keep the ways between some points, stops and stations once they are found: they will be asked about again.
+
+        Parameters
+        ----------
+        points
+            ENU metres. Answers stay the same; only trips that begin or end exactly there are planned sooner.
+        """
+        for point in points:
+            x, y = _point(point)
+            self._remembered[x, y] = f"{x!r} {y!r}"
 
     def plan(
         self,
@@ -95,18 +109,23 @@ class Trips:
             If a mode or an id of `closed` is not known.
         """
         question = self._question(start, goal, modes, cash, tuple(closed))
+        if arrive_by is not None:
+            question = replace(question, latest=arrive_by)
         found = best_trips(question, depart)
         if arrive_by is None or not found:
             return self._trip(question, found[0], depart) if found else None
-        if found[0].arrive > arrive_by:
-            return None
         # Who leaves later arrives no earlier: the last second to leave is found by halving.
         low, high = 0, math.floor(arrive_by - depart)
         best = found[0]
+        if not question.network.lines:
+            # Without buses all trips take as long whenever one leaves.
+            low = max(0, math.floor(arrive_by - best.arrive) - 1)
+            high = min(high, low + 2)
+            best = best_trips(question, depart + low)[0]
         while low < high:
             middle = (low + high + 1) // 2
             found = best_trips(question, depart + middle)
-            if found and found[0].arrive <= arrive_by:
+            if found:
                 low, best = middle, found[0]
             else:
                 high = middle - 1
@@ -153,15 +172,16 @@ class Trips:
             )
         network = self._network(ids, buses="bus" in modes, bikes="bike" in modes)
         circles = [closure for closure in closed if not isinstance(closure, str)]
+        ends = [_point(start), _point(goal)]
         ways = Ways(
             self.router,
-            [*network.points, _point(start), _point(goal)],
-            [*network.ids, None, None],
+            [*network.points, *ends],
+            [*network.ids, *(self._remembered.get(end) for end in ends)],
             self._kept,
             walk_speed=self.walk_speed,
             blocked=self._blocked(circles) if circles else None,
         )
-        return Question(network, ways, "walk" in modes, math.inf if cash is None else cash, all_good)
+        return Question(network, ways, "walk" in modes, math.inf if cash is None else cash, all_good=all_good)
 
     def _network(self, closed: set[str], *, buses: bool, bikes: bool) -> TripNetwork:
         if closed:

@@ -75,6 +75,8 @@ class Question:
         Whether one may walk all the way.
     cash
         What rides may cost together.
+    latest
+        Second by which one has to be there; trips that arrive later are not looked for.
     all_good
         Whether all trips are wanted than which none is better in arrival, price and metres on foot; else the best one.
     """
@@ -83,6 +85,7 @@ class Question:
     ways: Ways
     direct: bool = True
     cash: float = math.inf
+    latest: float = math.inf
     all_good: bool = False
 
     @property
@@ -126,7 +129,7 @@ def _settle(question: Question, depart: float) -> list[Label]:
     first = Label(depart, 0.0, 0.0, question.start, False, None, _ON_FOOT, ())
     queue = [(first.key, first)]
     at_goal = settled.setdefault((goal, True), [])
-    limit = math.inf
+    limit = question.latest
     while queue:
         _, label = heapq.heappop(queue)
         others = settled.setdefault((label.node, label.walked), [])

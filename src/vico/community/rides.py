@@ -1,0 +1,264 @@
+"""Who takes the bus or a bicycle where: the way that costs somebody the least time, money and bother.
+
+Days are planned on foot. Where a ride is worth it, one sets out later instead and stays longer where one is; so
+nobody's day hangs on it, and who misses the bus is late by some minutes at most.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vico.clock import DAY, clock_of, seconds_of_day
+from vico.community.hours import staffed
+from vico.community.model import ActivityTag, Group, ItemType, Mode, Resident, ScheduleItem
+from vico.community.place_index import PlaceIndex
+from vico.community.ride_estimates import RideEstimates
+from vico.rules import BIKE_RATE, BUS_FARE, WALK_SPEED
+from vico.world.model import Place
+from vico.world.trips import Leg, Trip
+
+#: Seconds kept for doors and for others on the pavement when setting out, as for walks.
+SETTING_OUT = 20.0
+#: Seconds kept in hand at the end: buses are up to two minutes late, bicycles are ridden around others.
+RESERVE = {Mode.BUS: 120.0, Mode.BIKE: 60.0}
+# Shorter ways are walked, seconds.
+_SHORT = 6 * 60
+_LEAST_PRICE = {Mode.BUS: BUS_FARE, Mode.BIKE: BIKE_RATE}
+# Who carries a hundred would spend two minutes to save one; who carries more, less.
+_SECONDS_OF_MONEY = 12_000.0
+# At these ages people cycle.
+_CYCLISTS = (12, 74)
+# Each year beyond so many makes a walk so much longer.
+_TIRED_FROM, _TIRED = 60, 0.015
+_BOTHER = {Mode.BUS: 0.0, Mode.BIKE: 270.0}
+# A second on foot counts like so many spent sitting, as people choose.
+_ON_FOOT = 1.5
+
+
+@dataclass(frozen=True)
+class Habits:
+    """What getting about costs somebody, in seconds of their time spent sitting.
+
+    Attributes
+    ----------
+    walking
+        Of a second on foot.
+    money
+        Of a unit of money.
+    bother
+        Of a ride as such, by mode; modes they don't use are missing.
+    """
+
+    walking: float
+    money: float
+    bother: dict[Mode, float]
+
+    @classmethod
+    def of(cls, resident: Resident, chance: np.random.Generator) -> Habits:
+        """Draw somebody's habits from their age, money and character."""
+        character = resident.personality
+        off_bus, off_bike = chance.normal(0.0, 60.0), chance.normal(0.0, 120.0)
+        bother = {Mode.BUS: _BOTHER[Mode.BUS] + float(off_bus)}
+        if _CYCLISTS[0] <= resident.age <= _CYCLISTS[1]:
+            # Among cars the anxious would rather walk; the open-minded cycle.
+            mind = 150.0 * (character.neuroticism - character.openness)
+            bother[Mode.BIKE] = _BOTHER[Mode.BIKE] + mind + float(off_bike)
+        walking = _ON_FOOT + _TIRED * max(0, resident.age - _TIRED_FROM)
+        return cls(walking, _SECONDS_OF_MONEY / max(resident.cash, 1), bother)
+
+    def of_walk(self, seconds: float) -> float:
+        """Return what a walk costs."""
+        return seconds * self.walking
+
+    def of_ride(self, mode: Mode, seconds: float, price: float) -> float:
+        """Return what a ride costs of so many seconds from door to door, those on foot counted as `walking` has it."""
+        return seconds + price * self.money + self.bother[mode]
+
+
+def first_ride(index: PlaceIndex, ends: tuple[str, str], mode: Mode, set_out: float, cash: float) -> float:
+    """Return the second of the day at which somebody is at a place who sets out by bus or bicycle at one.
+
+    From the farthest room of the one place to the farthest room of the other; infinite if there is no such ride.
+    """
+    a, b = (index.place_by_id[end] for end in ends)
+    depart = set_out + index.indoors(a.id)
+    trip = index.world.trips.plan(a.position[:2], b.position[:2], depart, modes=(mode.value,), cash=cash)
+    return math.inf if trip is None else trip.arrive + index.indoors(b.id)
+
+
+class _Racks:
+    """Bicycles and free places at each station, minute by minute: what the community has planned so far is taken."""
+
+    def __init__(self, index: PlaceIndex) -> None:
+        stations = index.world.transit.bike_stations
+        self._number = {station.id: k for k, station in enumerate(stations)}
+        self._bikes = np.array([[station.bikes] * (DAY // 60 + 1) for station in stations], np.int64)
+        self._most = np.array([station.capacity for station in stations], np.int64)
+
+    def serve(self, ride: Leg) -> bool:
+        """Take the bicycle and the place for a ride; False, and nothing taken, where there is none to the day's end."""
+        assert ride.origin is not None
+        assert ride.destination is not None
+        a, b = self._number[ride.origin], self._number[ride.destination]
+        gone, back = (min(int(second) // 60, DAY // 60) for second in (ride.depart, ride.arrive))
+        if self._bikes[a, gone:].min() < 1 or self._bikes[b, back:].max() >= self._most[b]:
+            return False
+        self._bikes[a, gone:] -= 1
+        self._bikes[b, back:] += 1
+        return True
+
+
+def with_rides(
+    residents: Sequence[Resident],
+    groups: Sequence[Group],
+    index: PlaceIndex,
+    stream: Callable[[str], np.random.Generator],
+) -> list[Resident]:
+    """Let residents take the bus or a bicycle on the ways of their day where that costs them less than to walk.
+
+    Parameters
+    ----------
+    residents
+        With their days on foot.
+    groups
+        When they meet; those times stay.
+    index
+        Places, ways and hours.
+    stream
+        Gives each resident's random stream, by id.
+    """
+    world = index.world
+    if not world.transit.lines and len(world.transit.bike_stations) < 2:
+        return list(residents)
+    world.trips.remember(index.place_by_id[item.place].position for r in residents for item in r.schedule if item.place)
+    means = _Means(
+        index, RideEstimates(world), _Racks(index), {(group.place, group.start, group.end) for group in groups}
+    )
+    return [
+        resident.model_copy(update={"schedule": means.day(resident, Habits.of(resident, stream(resident.id)))})
+        for resident in residents
+    ]
+
+
+@dataclass(frozen=True)
+class _Ride:
+    """A ride somebody may take: what it costs them, and when they set out, second of the day."""
+
+    mode: Mode
+    trip: Trip
+    cost: float
+    set_out: int
+
+
+@dataclass(frozen=True)
+class _Means:
+    """What there is to ride in a world.
+
+    Attributes
+    ----------
+    meetings
+        Place, start and end of all meetings.
+    """
+
+    index: PlaceIndex
+    estimates: RideEstimates
+    racks: _Racks
+    meetings: set[tuple[str | None, str, str]]
+
+    def day(self, resident: Resident, habits: Habits) -> list[ScheduleItem]:
+        """Return a resident's day, with rides where they are worth it."""
+        old = resident.schedule
+        items: list[ScheduleItem] = []
+        for k, item in enumerate(old):
+            if item.type is not ItemType.COMMUTE or not 0 < k < len(old) - 1:
+                items.append(item)
+                continue
+            ends = self.index.place_by_id[items[-1].place or ""], self.index.place_by_id[old[k + 1].place or ""]
+            ride = self._best(resident, habits, ends, item)
+            if ride is None or not self._is_to_be_had(ride):
+                items.append(item)
+                continue
+            stay = items.pop()
+            set_out = clock_of(ride.set_out) if self._may_stay(resident, stay, ride.set_out) else item.start
+            items += self._longer(stay, set_out)
+            words = _words(ride.mode, ends[1], home=ends[1].id == resident.home)
+            items.append(item.model_copy(update={"start": set_out, "mode": ride.mode, "activity": words}))
+        return items
+
+    def _best(self, resident: Resident, habits: Habits, ends: tuple[Place, Place], way: ScheduleItem) -> _Ride | None:
+        """Return the ride that costs somebody least on a way; None where to walk costs no more."""
+        walk = 60 * (self.index.minutes(ends[0].id, ends[1].id) or 0)
+        if walk < _SHORT:
+            return None
+        found: list[_Ride] = []
+        most = habits.of_walk(walk)
+        indoors = self.index.indoors(ends[0].id) + self.index.indoors(ends[1].id)
+        for mode in habits.bother:
+            least = self.estimates.seconds(*ends, mode, on_foot=habits.walking) + habits.walking * indoors
+            if habits.of_ride(mode, least + RESERVE[mode], _LEAST_PRICE[mode]) >= most:
+                continue
+            # Who has to set out earlier than this loses more than is won.
+            spare = most - habits.of_ride(mode, (habits.walking - 1.0) * indoors, _LEAST_PRICE[mode])
+            trip = self._trip(ends, mode, (seconds_of_day(way.end) - spare, way), float(resident.cash))
+            if trip is None:
+                continue
+            set_out = trip.depart - self.index.indoors(ends[0].id) - SETTING_OUT
+            on_foot = trip.walked / WALK_SPEED + indoors
+            seconds = seconds_of_day(way.end) - set_out + (habits.walking - 1.0) * on_foot
+            cost = habits.of_ride(mode, seconds, trip.price)
+            if cost < most:
+                # Schedules have whole minutes.
+                found.append(_Ride(mode, trip, cost, max(seconds_of_day(way.start), math.floor(set_out / 60) * 60)))
+        return min(found, key=lambda ride: ride.cost, default=None)
+
+    def _trip(
+        self, ends: tuple[Place, Place], mode: Mode, when: tuple[float, ScheduleItem], cash: float
+    ) -> Trip | None:
+        """Return the ride that sets out last of those that are there in time; None if there is none.
+
+        Parameters
+        ----------
+        when
+            Second of the day before which one does not set out, and the way as it is planned.
+        """
+        (a, b), (not_before, way) = ends, when
+        trip = self.index.world.trips.plan(
+            a.position[:2],
+            b.position[:2],
+            max(not_before, seconds_of_day(way.start)) + self.index.indoors(a.id) + SETTING_OUT,
+            modes=(mode.value,),
+            cash=cash,
+            arrive_by=seconds_of_day(way.end) - self.index.indoors(b.id) - RESERVE[mode],
+        )
+        # One ride is enough: who changes is stranded too easily.
+        return trip if trip is not None and trip.modes.count(mode.value) == 1 else None
+
+    def _is_to_be_had(self, ride: _Ride) -> bool:
+        """Take the bicycle for a ride; False where others have planned with it."""
+        return all(self.racks.serve(leg) for leg in ride.trip.legs if leg.mode == Mode.BIKE)
+
+    def _may_stay(self, resident: Resident, item: ScheduleItem, until: int) -> bool:
+        """Return whether somebody may be where they are until a second of the day."""
+        if item.place is None or item.place == resident.home:
+            return True
+        hours = self.index.hours(self.index.place_by_id[item.place])
+        spans = staffed(hours) if item.place == resident.workplace else hours
+        return any(60 * a <= seconds_of_day(item.start) and until <= 60 * b for a, b in spans)
+
+    def _longer(self, item: ScheduleItem, until: str) -> list[ScheduleItem]:
+        """Stay until a time; meetings end when they end."""
+        if item.end == until:
+            return [item]
+        if (item.place, item.start, item.end) not in self.meetings:
+            return [item.model_copy(update={"end": until})]
+        chat = {"type": ItemType.MAIN, "start": item.end, "end": until, "activity": "Stay on and chat"}
+        return [item, item.model_copy(update=chat | {"tag": ActivityTag.GROUP})]
+
+
+def _words(mode: Mode, goal: Place, *, home: bool) -> str:
+    how = "Take the bus" if mode is Mode.BUS else "Cycle"
+    return f"{how} home" if home else f"{how} to {goal.name}"
