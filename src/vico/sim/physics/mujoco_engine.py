@@ -27,7 +27,7 @@ from vico.sim.physics.mujoco_model import (
 )
 from vico.sim.physics.mujoco_parameters import Parameters
 from vico.sim.physics.mujoco_scene import CompiledScene, SharedModel
-from vico.sim.physics.mujoco_views import base_motion, joint_motion, place_bodies
+from vico.sim.physics.mujoco_views import base_motion, motion_of, place_bodies
 from vico.sim.physics.records import Base, Contacts, Imu, Motion, ObjectMotion, Party, PhysicsError, RigidObject
 from vico.sim.physics.solids import find_near
 
@@ -105,6 +105,7 @@ class MujocoEngine:
         self._data = self._kept[scene]
         self._qpos, self._qvel = self._data.qpos, self._data.qvel
         self._mocap_pos, self._mocap_quat = self._data.mocap_pos, self._data.mocap_quat
+        self._ctrl = self._data.ctrl
         self._size = mujoco.mj_stateSize(self._model, STATE)
         self._parameters = Parameters(scene)
         scene.reset(self._data)
@@ -158,9 +159,7 @@ class MujocoEngine:
     def motion(self, robots: NDArray[np.int64]) -> Motion:
         """Motion of several robots of one kind."""
         index = self.compiled.kind(robots)
-        position, rotation, velocity, angular_velocity, _ = base_motion(self._qpos, self._qvel, index.first)
-        angles, speeds = joint_motion(self._qpos, self._qvel, index.angle, index.rate)
-        return Motion(position, velocity, rotation, angular_velocity, angles, speeds)
+        return Motion(*motion_of(self._qpos, self._qvel, index.first, index.angle, index.rate))
 
     def motor_forces(self, robot: int) -> NDArray[np.float64]:
         """Torques of the motors in the last step."""
@@ -194,16 +193,17 @@ class MujocoEngine:
     def command(self, robot: int, targets: NDArray[np.float64], gains: tuple[float, float] | None = None) -> None:
         """Set what the servos follow, and how stiffly: Nm/rad and Nms/rad."""
         index = self.compiled.robots[robot]
-        self._data.ctrl[index.motor] = targets
+        self._ctrl[index.motor] = targets
         self._set_gains(robot, gains)
 
     def command_all(
         self, robots: NDArray[np.int64], targets: NDArray[np.float64], gains: Sequence[tuple[float, float] | None]
     ) -> None:
         """Set what the servos of several robots of one kind follow."""
-        self._data.ctrl[self.compiled.kind(robots).motor] = targets
+        self._ctrl[self.compiled.kind(robots).motor] = targets
         for robot, wanted in zip(robots.tolist(), gains, strict=True):
-            self._set_gains(robot, wanted)
+            if wanted is not None:
+                self._set_gains(robot, wanted)
 
     def _set_gains(self, robot: int, gains: tuple[float, float] | None) -> None:
         if gains is not None and gains != self._gains_of[robot]:
@@ -338,7 +338,7 @@ class MujocoEngine:
                     self._move_movers()
                 self._velocity_before[:] = self._qvel[s.base_velocity]
                 mujoco.mj_step(shared.model, self._data, steps)
-                if self._present.any():
+                if s.slots:
                     motion = self._qvel[s.object_motion].reshape(-1, 6)
                     self._calm = np.where(np.abs(motion).max(axis=1) < _SLOW, self._calm + frame, 0.0)
         self._frame[0] = frame

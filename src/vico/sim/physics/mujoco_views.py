@@ -44,13 +44,20 @@ def base_motion(positions, speeds, first):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def joint_motion(positions, speeds, angle, rate):  # type: ignore[no-untyped-def]
-    """Return positions and speeds of joints, given where each is, shape ``(k, joints)``."""
+def motion_of(positions, speeds, first, angle, rate):  # type: ignore[no-untyped-def]
+    """Return what `Motion` holds of robots of one kind, in its order.
+
+    Parameters
+    ----------
+    angle, rate
+        Where positions and speeds of the joints are, shape ``(k, joints)``; the rest is as for `base_motion`.
+    """
+    position, rotation, velocity, angular_velocity_body, _ = base_motion(positions, speeds, first)
     angles, rates = np.empty(angle.shape), np.empty(rate.shape)
     for k in range(angle.shape[0]):
         for j in range(angle.shape[1]):
             angles[k, j], rates[k, j] = positions[angle[k, j]], speeds[rate[k, j]]
-    return angles, rates
+    return position, velocity, rotation, angular_velocity_body, angles, rates
 
 
 @compiled

@@ -85,7 +85,7 @@ class SolidCells:
     """
 
     #: Metres a robot may move before it is asked again.
-    SLACK = 0.3
+    SLACK = 0.1
 
     def __init__(self, scene: StaticScene, reach: float) -> None:
         self.half = float(scene.height.half)

@@ -41,8 +41,8 @@ def decide(run: RobotRun, dt: float, obstacles: Bodies, mine: Bodies, *, errands
             if errands:
                 _rest(run, robot, dt)
             continue
-        around = around or NearbyBodies(Bodies.joined([obstacles, mine]))
-        others = around.near(len(obstacles) + robot, SIGHT + 4)
+        around = around or NearbyBodies(obstacles, mine)
+        others = around.near(robot, SIGHT + 4)
         if mode == _VELOCITY:
             _hold_velocity(run, robot, others)
         elif mode == _ROUTE:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.io.compiled import compiled
-from vico.sim.bodies import Bodies
+from vico.sim.bodies import IS_PERSON, Bodies
 from vico.sim.footprints import Rectangle, point_gap
 
 Array = NDArray[Any]
@@ -39,36 +39,60 @@ BRAKE, SIGHT, FORESIGHT = 0.8, 5.0, 3.0
 FOLLOW = 1.5
 
 
+@compiled
+def _neighbours(found, count, parts, own, reach):  # type: ignore[no-untyped-def]
+    """Write those near a body into `found`, after the first `count`, and return how many there are then.
+
+    Parameters
+    ----------
+    parts
+        Entity, kind, position, yaw, half length, half width, height and velocity of bodies.
+    own
+        Of the body itself: entity, x, y, bottom and top.
+    """
+    entity, kind, position, yaw, half_length, half_width, height, velocity = parts
+    for k in range(len(entity)):
+        x, y, z = position[k]
+        if math.hypot(x - own[1], y - own[2]) - half_length[k] >= reach or entity[k] == own[0]:
+            continue
+        if z >= own[4] + _HEIGHT_GAP or z + height[k] <= own[3] - _HEIGHT_GAP:
+            continue
+        one = found[count]
+        one.x, one.y, one.yaw, one.vx, one.vy = x, y, yaw[k], velocity[k, 0], velocity[k, 1]
+        one.rounding = half_width[k] if IS_PERSON[kind[k]] else 0.0
+        one.half_length, one.half_width = half_length[k] - one.rounding, half_width[k] - one.rounding
+        count += 1
+    return count
+
+
 class NearbyBodies:
     """Everybody outdoors in one sub-step, to be asked who is near a robot.
 
     Parameters
     ----------
-    bodies
-        All bodies outdoors, the robots' among them.
+    others, robots
+        All bodies outdoors but the robots', and the robots'.
     """
 
-    def __init__(self, bodies: Bodies) -> None:
-        self.bodies = bodies
-        found = np.empty(len(bodies), NEIGHBOUR)
-        found["x"], found["y"], found["yaw"] = bodies.position[:, 0], bodies.position[:, 1], bodies.yaw
-        found["rounding"] = bodies.rounding
-        found["half_length"] = bodies.half_length - bodies.rounding
-        found["half_width"] = bodies.half_width - bodies.rounding
-        found["vx"], found["vy"] = bodies.velocity[:, 0], bodies.velocity[:, 1]
-        self._everyone = found
-        self._bottom, self._top = bodies.position[:, 2], bodies.position[:, 2] + bodies.height
+    def __init__(self, others: Bodies, robots: Bodies) -> None:
+        self._others, self._robots = others, robots
 
-    def near(self, own: int, reach: float) -> NDArray[np.void]:
-        """Return who is within `reach` metres of the body with index `own`, and as high or low, dtype `NEIGHBOUR`."""
-        bodies = self.bodies
-        x, y, _ = bodies.position[own]
-        away = np.hypot(bodies.position[:, 0] - x, bodies.position[:, 1] - y)
-        chosen = away - bodies.half_length < reach
-        chosen &= (self._bottom < self._top[own] + _HEIGHT_GAP) & (self._top > self._bottom[own] - _HEIGHT_GAP)
-        chosen[own] = False
-        found: NDArray[np.void] = self._everyone[chosen]
-        return found
+    @property
+    def bodies(self) -> Bodies:
+        """All of them."""
+        return Bodies.joined([self._others, self._robots])
+
+    def near(self, robot: int, reach: float) -> NDArray[np.void]:
+        """Return who is within `reach` metres of a robot, and as high or low, dtype `NEIGHBOUR`."""
+        mine = self._robots
+        x, y, bottom = mine.position[robot].tolist()
+        own = (int(mine.entity[robot]), x, y, bottom, bottom + float(mine.height[robot]))
+        found = np.empty(len(self._others) + len(mine), NEIGHBOUR)
+        count = 0
+        for b in (self._others, mine):
+            parts = (b.entity, b.kind, b.position, b.yaw, b.half_length, b.half_width, b.height, b.velocity)
+            count = _neighbours(found, count, parts, own, reach)
+        return found[:count]
 
 
 @compiled

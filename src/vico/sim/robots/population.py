@@ -200,10 +200,13 @@ class RobotPopulation:
         left += owed - ticks
         needs = self._needs()  # decided between sub-steps, not within
         orders = [(g, memory, velocities(self.run, g)) for g, memory in zip(groups, self.run.memory, strict=True)]
+        lengths: dict[int, float] = {}  # of frames, by the ticks there are for one
         arrays.owed[0] = owed
         while owed:
-            until_told = min([group.period - now % group.period for group in groups])
-            frame = frame_length(needs, min(left, until_told) * TICK)
+            room = min(left, *[group.period - now % group.period for group in groups])
+            if room not in lengths:
+                lengths[room] = frame_length(needs, room * TICK)
+            frame = lengths[room]
             taken = round(frame / TICK)
             if taken > owed:
                 return
