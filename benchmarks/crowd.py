@@ -27,14 +27,20 @@ _WARM = 5
 _PEOPLE = 15
 
 
-def ask(followers: dict[str, Any], observations: Any, infos: Any) -> dict[str, Any]:
-    """Return everybody's actions: as a group where these sources have groups."""
+def asked_together(followers: dict[str, Any]) -> tuple[list[Any], list[str]]:
+    """Return groups with their members' names, and who is asked alone: everybody where these sources have no groups."""
     try:
         from vico.agents.base import by_group
     except ImportError:
-        return {name: agent.act(observations[name], infos[name]) for name, agent in followers.items()}
+        return [], list(followers)
+    return by_group(followers)
+
+
+def ask(followers: dict[str, Any], together: tuple[list[Any], list[str]], told: tuple[Any, Any]) -> dict[str, Any]:
+    """Return everybody's actions; `together` as from `asked_together`, `told` observations and infos."""
+    observations, infos = told
+    groups, alone = together
     actions: dict[str, Any] = {}
-    groups, alone = by_group(followers)
     for group, names in groups:
         actions |= group.act_for(names, observations, infos)
     return actions | {name: followers[name].act(observations[name], infos[name]) for name in alone}
@@ -55,6 +61,7 @@ def steps(world_folder: Path, community_folder: Path, options: dict[str, Any], c
     sim = Simulation(world, community, config)
     followers = followers_of(community, PublicMap.from_world(world), seed=config.seed)
     observations, infos = sim.observe()
+    together = asked_together(followers)
     cpu, wall = [], []
     # As the runner of these sources does.
     settled: Any = nullcontext
@@ -65,7 +72,7 @@ def steps(world_folder: Path, community_folder: Path, options: dict[str, Any], c
             if step == _WARM:
                 sim.metrics.seconds.clear()
             began, spent = time.perf_counter(), time.process_time()
-            result = sim.step(ask(followers, observations, infos))
+            result = sim.step(ask(followers, together, (observations, infos)))
             observations, infos = result.observations, result.infos
             if step >= _WARM:
                 cpu.append(1000 * (time.process_time() - spent))
