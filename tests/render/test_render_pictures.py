@@ -137,6 +137,24 @@ def test_a_car_darkens_the_ground_beside_it(square: Scene) -> None:
     square.lighting = Lighting()
 
 
+def test_the_shadow_of_a_car_behind_a_house_is_seen_beside_it(square: Scene) -> None:
+    square.lighting = Lighting(sun_direction=(-1.0, 0.0, 0.3))
+    eye = Cameras(np.array([[0.0, 5, 35.0]]), np.array([[0.0, 1, -0.55]]), width=512, height=512)
+
+    def darkened(x: float) -> int:
+        """How many pixels a car at (x, 58.5) darkens; the house before it reaches to x = 6."""
+        square.set_rigid([], np.zeros((0, 4, 4)), [])
+        empty = render(square, eye)
+        square.set_rigid([square.names["car"]], pose_matrix(x, 58.5)[None], [1_000_000])
+        full = render(square, eye)
+        assert not (full.segmentation == 1_000_000).any()
+        return int((full.rgb.astype(int).sum(axis=3) < empty.rgb.astype(int).sum(axis=3) - 60).sum())
+
+    assert darkened(5.0) > 15  # the shadow reaches 5 m to the east
+    assert darkened(-2.0) == 0
+    square.lighting = Lighting()
+
+
 def test_night_is_darker_than_noon_and_lit_windows_shine() -> None:
     wall = quad(Material("window", emission=1.0), colour=(255, 230, 180))
     dark = quad(Material("wall"), colour=(255, 230, 180))
