@@ -33,6 +33,7 @@ def words(helsinki_path: Path, helsinki_people: Path) -> list[object]:
     return [
         "run", helsinki_path, helsinki_people, "--steps", STEPS, "--robots", "husky", "--cars", 2, "--pedestrians", 2,
         "--observe", "resident_0", "--assistants", 2, "--agent", "vico.agents.base:RandomAgent", "--states-every", 15,
+        "--check", "overlaps",
     ]  # fmt: skip
 
 
@@ -59,7 +60,9 @@ def test_a_killed_run_goes_on_to_the_same_end(
     assert vico("run", "--resume", out, "--agent", "vico.agents.base:RandomAgent", "--json") == 0
     said = capsys.readouterr()
     assert "goes on after step" in said.err
-    assert json.loads(said.out)["state_hash"] == read_json(whole / "run.json")["state_hash"]
+    told = json.loads(said.out)
+    assert told["state_hash"] == read_json(whole / "run.json")["state_hash"]
+    assert (told["overlaps"]["count"], told["overlaps"]["sub_steps"]) == (0, 10 * STEPS)
     assert contents(read_run(out)) == contents(read_run(whole))
     assert checkpoint_steps(out) == checkpoint_steps(whole)
     # Now that it is whole, there is nothing to go on with.

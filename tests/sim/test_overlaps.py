@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -100,6 +102,19 @@ def test_the_check_counts_sub_steps_and_tells_who(sim: Simulation) -> None:
     assert record["first"][0]["who"] == "assistant_0"
     assert record["first"][0]["with"] == "assistant_1"
     assert record["first"][0]["depth"] == pytest.approx(0.3)
+
+
+def test_a_check_that_goes_on_from_another_ones_counts_tells_the_same(sim: Simulation) -> None:
+    stand(sim, APART[0], APART[0], APART[1])
+    unbroken, first, second = (OverlapCheck(sim.state) for _ in range(3))
+    unbroken.look()
+    first.look()
+    second.restore(json.loads(json.dumps(first.state())))
+    stand(sim, APART[0], APART[0], APART[0])
+    unbroken.look()
+    second.look()
+    assert second.record() == unbroken.record()
+    assert (second.looks, second.count) == (2, 4)
 
 
 def test_a_simulation_looks_after_every_sub_step_and_is_not_changed_by_it(sim: Simulation) -> None:

@@ -150,7 +150,7 @@ class _Job:
                 how["notes"] = {"command": self._command(), "faults": faults.record()}
                 if goes_on:
                     recorder, checkpoint = Recorder.resume(self.out, sim, **how)
-                    faults = go_on_from(checkpoint, agents)
+                    faults = go_on_from(checkpoint, agents, sim)
                     recorder.notes["faults"] = faults.record()
                 else:
                     # Only now: whatever is wrong with the input has been said, nothing was replaced for nothing.

@@ -11,10 +11,13 @@ from vico.runner.faults import FaultLog
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Hook, Step
 from vico.sim.recorder import Checkpoint, Recorder
+from vico.sim.simulation import Simulation
 
 
-def go_on_from(checkpoint: Checkpoint, agents: Gatherer) -> FaultLog:
+def go_on_from(checkpoint: Checkpoint, agents: Gatherer, sim: Simulation) -> FaultLog:
     """Let agents remember what they did at a checkpoint; return what they had done wrong by then.
+
+    Where overlaps are looked for, those that had been found by then count, too.
 
     Raises
     ------
@@ -26,6 +29,9 @@ def go_on_from(checkpoint: Checkpoint, agents: Gatherer) -> FaultLog:
         odd = sorted(states.keys() ^ agents.agents.keys())
         raise SchemaError(f"checkpoint of step {checkpoint.step}: of other agents than these ({odd[0]}); run it anew")
     agents.restore(states)
+    counted = checkpoint.notes["overlaps"]
+    if sim.overlap_check is not None and counted is not None:
+        sim.overlap_check.restore(counted)
     return FaultLog.of(checkpoint.notes["faults"])
 
 
@@ -49,8 +55,10 @@ class RecordedRun(Hook):
         self._recorder.begin(observations)
 
     def checkpoint(self, states: Mapping[str, AgentState]) -> None:
-        """Save the simulation, what every agent remembers, and what they did wrong."""
-        self._recorder.checkpoint(states, notes={"faults": self._faults.record()})
+        """Save the simulation, what every agent remembers, what they did wrong, and overlaps where they are counted."""
+        check = self._recorder.sim.overlap_check
+        overlaps = None if check is None else check.state()
+        self._recorder.checkpoint(states, notes={"faults": self._faults.record(), "overlaps": overlaps})
 
     def stepped(self, step: Step) -> None:
         """Record a step."""

@@ -6,6 +6,7 @@ inside a wall, furniture or another solid; two passengers in one seat.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -104,6 +105,19 @@ class OverlapCheck:
             "pairs": len(self._pairs),
             "deepest": round(self._worst, 4),
             "first": told,
+        }
+
+    def state(self) -> dict[str, Any]:
+        """Return all that was counted, as plain data; `restore` goes on from there."""
+        pairs = [{"pair": list(pair), **record} for pair, record in self._pairs.items()]
+        return {"looks": self.looks, "count": self.count, "worst": self._worst, "pairs": pairs}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go on counting where `state` was asked for."""
+        self.looks, self.count, self._worst = state["looks"], state["count"], state["worst"]
+        self._pairs = {
+            (record["pair"][0], record["pair"][1]): {name: value for name, value in record.items() if name != "pair"}
+            for record in state["pairs"]
         }
 
     def _record(self, one: Overlap) -> dict[str, Any]:

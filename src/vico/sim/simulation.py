@@ -118,7 +118,8 @@ class Simulation:
         self.scenario, self.ground_truth = Scenario(self.state), GroundTruth(self.state)
         self.seeing = _seeing(self.state, self.config.observe)
         self._renderer, self._attached = renderer, False
-        self._overlap_check: OverlapCheck | None = None
+        #: Counts overlaps since `check_overlaps`; None where they are not looked for.
+        self.overlap_check: OverlapCheck | None = None
 
     # The loop.
 
@@ -252,12 +253,12 @@ class Simulation:
 
     def check_overlaps(self) -> None:
         """Look for overlaps after every sub-step from now on; `reports` tells what was found."""
-        self._overlap_check = OverlapCheck(self.state)
-        self.state.on_substep = self._overlap_check.look
+        self.overlap_check = OverlapCheck(self.state)
+        self.state.on_substep = self.overlap_check.look
 
     def reports(self) -> dict[str, Any]:
         """Return who was rescued from jams, who is stuck, and what overlapped; see `vico.sim.reports`."""
-        return reports(self.state, self._overlap_check)
+        return reports(self.state, self.overlap_check)
 
     # State as a whole.
 
