@@ -23,6 +23,8 @@ INNER_DOOR_REACH = 1.0
 BUS_DWELL = 30.0
 BUS_FARE = 2.0
 BUS_DOOR_REACH = 3.0
+#: How wide a bus is, and how far behind its front the middle of its front door, metres.
+BUS_WIDTH, BUS_DOOR_BEHIND_FRONT = 2.55, 1.35
 BUS_CAPACITY = 60
 
 #: Bicycles: how near one gets on, metres; the price of a started minute, and of leaving it farther from a station with

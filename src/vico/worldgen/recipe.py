@@ -52,7 +52,7 @@ from vico.worldgen.streets.polygons import road_polygons
 from vico.worldgen.streets.roads import roads_from_osm, streets_from_osm
 from vico.worldgen.tables import read_tables
 from vico.worldgen.transit.stage import transit_from_osm
-from vico.worldgen.transit.waiting import waiting_off_the_road
+from vico.worldgen.transit.waiting import waiting_places
 from vico.worldgen.writing import Layers, WorldParts, WorldWriter, faces, manifest_of
 
 # Faces that photos cover less than this share of keep their facade.
@@ -90,7 +90,7 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     feeds = list(evidence.feeds)
     mapped = run("transit", transit_from_osm, site, lanes, height, solids=solids, seed=seed, feeds=feeds)
     with stages.timed("waiting"):
-        transit = waiting_off_the_road(mapped, streets, height)
+        transit = waiting_places(mapped, streets, lanes, height, solids)
     write.transit(transit)
 
     outdoors, dropped = run(

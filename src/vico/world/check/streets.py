@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
 
+from vico.rules import BUS_DOOR_BEHIND_FRONT, BUS_DOOR_REACH, BUS_WIDTH
 from vico.world.check.finding import WorldFinding
 from vico.world.folder import World
+from vico.world.model import Stop
 
 
 def check_roads(world: World) -> Iterator[WorldFinding]:
@@ -28,6 +31,18 @@ def check_roads(world: World) -> Iterator[WorldFinding]:
                 yield WorldFinding("junction road", junction.id, f"there is no road {name}")
 
 
+def _check_waiting(world: World, stop: Stop) -> Iterator[WorldFinding]:
+    """Check that one can stand where one waits at a stop, and board the bus from there."""
+    lanes = world.lanes
+    x, y, yaw = lanes.at(lanes.index[stop.lane], stop.offset - BUS_DOOR_BEHIND_FRONT)
+    aside = BUS_WIDTH / 2 * (-1.0 if lanes.lefthand else 1.0)
+    away = math.hypot(x + math.sin(yaw) * aside - stop.wait[0], y - math.cos(yaw) * aside - stop.wait[1])
+    if away > BUS_DOOR_REACH:
+        yield WorldFinding("stop out of reach", stop.id, f"its bus's front door is {away:.1f} m from where one waits")
+    if not world.walkable.is_connected(stop.wait[:2]):
+        yield WorldFinding("stop blocked", stop.id, "nobody can stand where one waits")
+
+
 def check_transit(world: World) -> Iterator[WorldFinding]:
     """Check that lines drive over lanes that follow one another, past their stops, where people can wait."""
     lanes, transit = world.lanes, world.transit
@@ -37,6 +52,8 @@ def check_transit(world: World) -> Iterator[WorldFinding]:
             yield WorldFinding("stop lane", stop.id, f"there is no lane {stop.lane}")
         elif not 0.0 <= stop.offset <= float(lanes.length[lanes.index[stop.lane]]) + 0.01:
             yield WorldFinding("stop lane", stop.id, f"{stop.offset} m is beyond the end of {stop.lane}")
+        elif any(stop.id in line.stops for line in transit.lines):
+            yield from _check_waiting(world, stop)
     for line in transit.lines:
         missing = [name for name in line.lanes if name not in lanes.index]
         if missing or any(name not in stops for name in line.stops):

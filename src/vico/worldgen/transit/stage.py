@@ -12,6 +12,7 @@ import shapely
 
 from vico.geo.gtfs.feed import Feed
 from vico.geo.osm import OsmData
+from vico.rules import BUS_DOOR_BEHIND_FRONT
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.model import FAILED, Dropped, Line, Stop, Transit
@@ -47,7 +48,6 @@ __all__ = (
 
 # Entities of stops, at the upper end of the numbers for objects; those of stations follow.
 FIRST_STOP = 90_000
-DOOR_BEHIND_FRONT = 1.3  # metres from a bus's front to the middle of its front door
 
 _REACH = 18.0  # a mapped pole stands this near to the lane it serves, metres
 _FEED_REACH = 30.0  # and one of a timetable, whose places are rougher
@@ -404,7 +404,7 @@ class _Waiting:
         self._sidewalks = [shapely.LineString(walks.line(int(i))) for i in np.flatnonzero(walks.kind == SIDEWALK)]
 
     def at(self, berth: Berth) -> tuple[float, float, float]:
-        x, y, yaw = self._lanes.at(berth.lane, berth.offset - DOOR_BEHIND_FRONT)
+        x, y, yaw = self._lanes.at(berth.lane, berth.offset - BUS_DOOR_BEHIND_FRONT)
         kerb = (self._lanes.width[berth.lane] / 2 + 1.0) * (-1.0 if self._lanes.lefthand else 1.0)
         xy = np.array([x + math.sin(yaw) * kerb, y - math.cos(yaw) * kerb])
         if self._sidewalks:

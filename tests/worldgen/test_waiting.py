@@ -1,0 +1,102 @@
+"""One waits for a bus where one can board it, whatever the street looks like."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import shapely
+
+from road_city import road_city
+from vico.rules import BUS_DOOR_REACH, BUS_WIDTH
+from vico.world.check.streets import check_transit
+from vico.world.folder import World
+from vico.world.heights import HeightField
+from vico.world.lanes import LaneGraph
+from vico.world.model import Stop, Transit
+from vico.worldgen.facts.streets import StreetPolygons
+from vico.worldgen.transit.waiting import front_door, waiting_places
+
+
+@pytest.fixture(scope="module")
+def stop() -> tuple[Stop, LaneGraph]:
+    """A stop of a bus line in central Helsinki, and its lanes."""
+    city = road_city()
+    return next(stop for stop in city.transit.stops if stop.id == city.transit.lines[0].stops[0]), city.lanes
+
+
+def street(stop: Stop, lanes: LaneGraph, kerb: float) -> StreetPolygons:
+    """A straight street along the stop's lane whose pavement begins so many metres from the lane's middle."""
+    x, y, yaw = lanes.at(lanes.index[stop.lane], stop.offset)
+    side = 1.0 if lanes.lefthand else -1.0
+
+    def strip(near: float, far: float) -> shapely.Polygon:
+        corners = [(-40.0, near), (40.0, near), (40.0, far), (-40.0, far)]
+        c, s = math.cos(yaw), math.sin(yaw)
+        return shapely.Polygon([(x + a * c - side * b * s, y + a * s + side * b * c) for a, b in corners])
+
+    nothing = shapely.MultiPolygon()
+    return StreetPolygons(
+        carriageway=shapely.MultiPolygon([strip(-12.0, kerb)]),
+        sidewalk=shapely.MultiPolygon([strip(kerb, kerb + 3.0)]),
+        crossing=nothing, pedestrian=nothing, path=nothing, cycleway=nothing, steps=nothing, parking=nothing,
+        streets=[], crossings=[], rails=[],
+    )  # fmt: skip
+
+
+def wait(stop: Stop, lanes: LaneGraph, kerb: float, solids: list[shapely.Polygon] | None = None) -> shapely.Point:
+    transit = Transit(stops=[stop], lines=[], bike_stations=[], origin={})
+    made = waiting_places(transit, street(stop, lanes, kerb), lanes, HeightField.flat(600.0), solids or [])
+    return shapely.Point(made.stops[0].wait[:2])
+
+
+@pytest.mark.parametrize("kerb", [1.5, 2.0, 3.0, 4.0, 5.0, 7.0])
+def test_the_bus_can_be_boarded_from_where_one_waits(stop: tuple[Stop, LaneGraph], kerb: float) -> None:
+    here, lanes = stop
+    found = wait(here, lanes, kerb)
+    door = shapely.Point(front_door(lanes, here.lane, here.offset))
+    assert found.distance(door) < BUS_DOOR_REACH
+    # And nobody stands where the bus does.
+    middle = shapely.LineString(lanes.line(lanes.index[here.lane]))
+    assert found.distance(middle) > BUS_WIDTH / 2 + 0.5
+    pavement = street(here, lanes, kerb).sidewalk
+    assert pavement.contains(found) == (kerb < BUS_WIDTH / 2 + 2.2)
+    # Where it is too far off one goes as near to it as one can.
+    assert found.distance(pavement) < max(kerb - BUS_WIDTH / 2 - 2.2, 0.01)
+
+
+def test_nobody_waits_in_a_wall(stop: tuple[Stop, LaneGraph]) -> None:
+    here, lanes = stop
+    free = wait(here, lanes, 2.0)
+    wall = free.buffer(0.6)
+    found = wait(here, lanes, 2.0, [wall])
+    assert found.distance(wall) > 0.3
+    assert found.distance(shapely.Point(front_door(lanes, here.lane, here.offset))) < BUS_DOOR_REACH
+
+
+def test_a_good_waiting_place_stays(stop: tuple[Stop, LaneGraph]) -> None:
+    here, lanes = stop
+    found = wait(here, lanes, 2.0)
+    again = here.model_copy(update={"wait": (found.x, found.y, 0.0)})
+    assert wait(again, lanes, 2.0).equals(found)
+
+
+def test_a_stop_that_cannot_be_boarded_at_is_a_finding(helsinki_city: World) -> None:
+    assert list(check_transit(helsinki_city)) == []
+    transit = helsinki_city.transit
+    served = transit.lines[0].stops[0]
+
+    def moved(by: float) -> list[str]:
+        stops = [s.model_copy(update={"wait": (s.wait[0] + by, *s.wait[1:])}) if s.id == served else s
+                 for s in transit.stops]  # fmt: skip
+        world: Any = SimpleNamespace(
+            lanes=helsinki_city.lanes,
+            walkable=helsinki_city.walkable,
+            transit=transit.model_copy(update={"stops": stops}),
+        )
+        return [finding.id for finding in check_transit(world) if finding.where == served]
+
+    assert "stop out of reach" in moved(8.0)
+    assert "stop blocked" in moved(10_000.0)
