@@ -8,7 +8,7 @@ import pytest
 from road_city import HALF, road_city
 from vico.assets.vehicles import vehicle_prototypes
 from vico.errors import InputError
-from vico.sim.bodies import Bodies
+from vico.sim.bodies import RESIDENT, Bodies
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.transit import DWELL, FARE, TransitSystem, plan_buses, ride_price
@@ -195,6 +195,39 @@ def test_transit_goes_on_from_a_saved_state_as_if_never_stopped() -> None:
     for a, b in ((traffic, other_traffic), (transit, other)):
         here, there = a.arrays(), b.arrays()
         assert all(np.array_equal(here[k], there[k]) for k in here)
+
+
+def test_a_bus_that_somebody_stops_for_good_goes_on_from_its_next_stop_and_is_counted() -> None:
+    traffic, transit = _systems(0, 0)
+    while transit.stopped_at(0):
+        _advance(traffic, transit)
+    goal = transit.line_of(0).stops[int(transit.stop[0])]
+    transit.riders[0, 0] = 7
+    x, y, yaw = transit.bus_pose(0)
+    somebody = Bodies(
+        entity=np.array([7], np.int32),
+        kind=np.array([RESIDENT], np.int8),
+        position=np.array([[x + 14.0 * np.cos(yaw), y + 14.0 * np.sin(yaw), 0.0]]),
+        yaw=np.zeros(1),
+        half_length=np.full(1, 0.25),
+        half_width=np.full(1, 0.25),
+        height=np.full(1, 1.8),
+        velocity=np.zeros((1, 2)),
+    )
+    others = Bodies.joined([transit.bodies(), somebody])
+    reached = 0.0
+    while transit.stopped_at(0) is None and reached < 400.0:
+        traffic.advance(0.1, others)
+        transit.advance(0.1, traffic.bodies())
+        reached += 0.1
+        assert len(overlapping(Bodies.joined([traffic.bodies(), others]), 0.0)) == 0
+    assert transit.stopped_at(0) == goal
+    assert 150.0 < reached < 200.0
+    assert traffic.jams.count == 1
+    told = traffic.jams.rescued()[0]
+    assert (told.entity, told.before) == (transit.entity_of(0), 7)
+    assert np.hypot(told.position[0] - x, told.position[1] - y) < 14.0
+    assert transit.aboard(0) == 1
 
 
 def test_buses_and_bicycles_overlap_nobody() -> None:

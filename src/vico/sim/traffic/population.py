@@ -258,7 +258,7 @@ class Traffic:
         self._bodies = None
 
     def _bring_back(self, everybody: Shapes) -> None:
-        """Bring cars back in that left the map or were stuck for too long; the latter are noted."""
+        """Bring cars back in that left the map, and vehicles that were stuck for too long; the latter are noted."""
         stopped, teleports = self._vehicles["stopped_time"], self._vehicles["teleports"]
         due = np.flatnonzero(stopped >= PATIENCE)
         where = [(float(everybody.x[v]), float(everybody.y[v])) for v in due.tolist()]

@@ -251,8 +251,23 @@ def has_left_map(net, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _bring_to_stop(net, fleet, v, junctions, shapes):  # type: ignore[no-untyped-def]
+    """Put a bus at the stop it drives to, if that is free; its riders come along."""
+    vehicle = fleet[v]
+    if vehicle.stop_route_index < 0:
+        return
+    lane = net.route[net.route_first[vehicle.route] + vehicle.stop_route_index]
+    if place_vehicle(net, fleet, v, lane, vehicle.stop_offset, shapes, 1.0):
+        vehicle.route_index = vehicle.stop_route_index
+        release_all_junctions(junctions, vehicle)
+        vehicle.teleports += 1
+
+
+@compiled
 def bring_back(net, fleet, junctions, shapes, entries, entry_speed, patience):  # type: ignore[no-untyped-def]
     """Bring cars that left the map, or stood still for longer than `patience`, back in where the map begins.
+
+    Buses that stood still for so long, not at a stop, go on from the stop they drove to.
 
     Parameters
     ----------
@@ -265,7 +280,11 @@ def bring_back(net, fleet, junctions, shapes, entries, entry_speed, patience):  
     """
     for v in range(len(fleet)):
         vehicle = fleet[v]
-        if vehicle.route >= 0 or len(entries) == 0:
+        if vehicle.route >= 0:
+            if vehicle.stopped_time >= patience:
+                _bring_to_stop(net, fleet, v, junctions, shapes)
+            continue
+        if len(entries) == 0:
             continue
         left = has_left_map(net, vehicle)
         if not left and vehicle.stopped_time < patience:
