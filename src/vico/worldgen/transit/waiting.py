@@ -84,14 +84,14 @@ class _Finder:
         outward = ((door[0] - middle[0]) / (BUS_WIDTH / 2), (door[1] - middle[1]) / (BUS_WIDTH / 2))
         # Within reach of the door, and beyond the side of the bus.
         along = shapely.Point(door[0] + outward[0] * _FROM_BUS, door[1] + outward[1] * _FROM_BUS)
-        reach = shapely.Point(door).buffer(_REACH)
-        beside = reach.intersection(_half_plane(along, outward))
-        room = beside.difference(self._near_walls(beside))
+        reach = overlay.buffer(shapely.Point(door), _REACH)
+        beside = overlay.intersection(reach, _half_plane(along, outward), grid=None)
+        room = overlay.difference(beside, self._near_walls(beside), grid=None)
         here = shapely.Point(stop.wait[:2])
         if not self._carriageway.contains(here) and room.covers(here):
             return stop.wait[0], stop.wait[1]
         for pavement in self._pavements:
-            found = room.intersection(pavement)
+            found = overlay.intersection(room, pavement, grid=None)
             if not found.is_empty:
                 return _nearest(found, here)
         if room.is_empty:
@@ -101,8 +101,8 @@ class _Finder:
         return _nearest(room, here if widest.is_empty else widest)
 
     def _near_walls(self, area: shapely.Geometry) -> shapely.Geometry:
-        near = self._walls.query(area.buffer(_FROM_WALL)).tolist()
-        return shapely.union_all([self._walls.geometries[k].buffer(_FROM_WALL) for k in near])
+        near = self._walls.query(overlay.buffer(area, _FROM_WALL)).tolist()
+        return overlay.union_all([overlay.buffer(self._walls.geometries[k], _FROM_WALL) for k in near], grid=None)
 
 
 def _half_plane(start: shapely.Point, outward: Point2) -> shapely.Polygon:
