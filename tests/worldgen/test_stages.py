@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import json
+import shutil
 import weakref
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 
 from command_line import vico
 from vico.errors import InputError, MissingFileError
-from vico.world.folder import read_world
+from vico.world.folder import World, read_world
 from vico.worldgen import recipe
 from vico.worldgen.ground.terrain import flat_terrain
 from vico.worldgen.many import read_place_table
@@ -70,10 +71,9 @@ def test_a_torn_product_is_made_anew(tmp_path: Path) -> None:
     assert stages.kept == []
 
 
-def test_a_stopped_build_goes_on_and_gives_the_same_world(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = build_world(
-        EXTRACT, **CENTRE, half=60, out=tmp_path / "whole", options=BuildOptions(keep_stages=False, previews=False)
-    )
+def test_a_stopped_build_goes_on_and_gives_the_same_world(
+    corner: World, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     ran: list[str] = []
 
     def stop(*_: object, **__: object) -> None:
@@ -92,12 +92,14 @@ def test_a_stopped_build_goes_on_and_gives_the_same_world(tmp_path: Path, monkey
             build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w", options=BuildOptions(previews=False))
     resumed = build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w", options=BuildOptions(previews=False))
     assert ran == ["buildings"]
-    assert resumed.files == whole.files
-    assert resumed == whole
+    assert resumed.files == corner.manifest.files
+    assert resumed == corner.manifest
 
 
-def test_one_stage_runs_alone_and_changes_nothing_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    built = build_world(EXTRACT, **CENTRE, half=60, out=tmp_path / "w", options=BuildOptions(previews=False))
+def test_one_stage_runs_alone_and_changes_nothing_else(
+    corner: World, corner_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(corner_path, tmp_path / "w", symlinks=True)
     ran: list[str] = []
     for name in ("buildings_from_plans", "objects_from_osm", "ground_from_osm", "furnish"):
         real = getattr(recipe, name)
@@ -109,7 +111,7 @@ def test_one_stage_runs_alone_and_changes_nothing_else(tmp_path: Path, monkeypat
         monkeypatch.setattr(recipe, name, counted)
     again = rebuild_world(tmp_path / "w", ["objects"])
     assert ran == ["objects_from_osm"]
-    assert again.files == built.files
+    assert again.files == corner.manifest.files
     with pytest.raises(InputError, match=r"'objectz'.*buildings.*objects"):
         rebuild_world(tmp_path / "w", ["objectz"])
 
