@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -107,9 +107,22 @@ class Events:
         x, y, z = (float(value) for value in position[:3])
         self.log.append(Event(self.step, self.time, kind, agent, text, (x, y, z), data))
 
-    def say(self, speaker: str, text: str, position: NDArray[Any], listeners: list[str]) -> None:
-        """Deliver a message: those who hear it find it in their next observation."""
-        self.add("message", speaker, text, position, hearers=listeners)
+    def say(
+        self,
+        speaker: str,
+        text: str,
+        position: NDArray[Any],
+        listeners: list[str],
+        missed: Mapping[str, str] | None = None,
+    ) -> None:
+        """Deliver a message: those who hear it find it in their next observation.
+
+        Parameters
+        ----------
+        missed
+            Who was near and did not hear it, and why.
+        """
+        self.add("message", speaker, text, position, hearers=listeners, missed=dict(missed or {}))
         said = Message(self.time, speaker, text, self.log[-1].position)
         for name in listeners:
             self.heard[name].append(said)

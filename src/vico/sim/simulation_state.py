@@ -304,17 +304,6 @@ class SimulationState:
             return bool(p.vehicle[i] == p.vehicle[j] and p.vehicle_entity[i] == p.vehicle_entity[j])
         return bool(p.room[i] == p.room[j])
 
-    def listeners(self, i: int, reach: float) -> list[str]:
-        """Agents within `reach` metres of person `i` in the same space, in the order of names."""
-        p = self.people
-        away = np.linalg.norm(p.position - p.position[i], axis=1)
-        heard = [p.names[j] for j in np.flatnonzero(away <= reach) if j != i and self.same_space(i, int(j))]
-        if self.robots is not None and p.room[i] < 0 and p.vehicle[i] != Vehicle.BUS:
-            positions = self.robots.bodies().position
-            near = np.linalg.norm(positions - p.position[i], axis=1) <= reach
-            heard += [name for name, close in zip(self.robots.names, near, strict=True) if close]
-        return heard
-
     def accessible_places(self, i: int) -> list[str]:
         """Return what person `i` could enter from where it is: places outdoors, rooms from a room."""
         p = self.people

@@ -5,15 +5,16 @@ from __future__ import annotations
 from vico.rules import EARSHOT
 from vico.sim.actions.fields import Field
 from vico.sim.actions.model import ActionType, Situation, Values
+from vico.sim.hearing import hearers_of
 from vico.sim.moves import gesture
 from vico.sim.simulation_state import SimulationState
 
 
 def communicate(values: Values, i: int, state: SimulationState) -> None:
-    """Say something to everybody near in the same space."""
+    """Say something to everybody near in the same space; noise and corners keep some from hearing it."""
     p = state.people
-    listeners = state.listeners(i, values.get("range", EARSHOT))
-    state.events.say(p.names[i], values["text"], p.position[i], listeners)
+    heard = hearers_of(state, i, values.get("range", EARSHOT))
+    state.events.say(p.names[i], values["text"], p.position[i], heard.hearers, heard.missed)
     gesture("talk", i, state)
 
 
@@ -30,7 +31,7 @@ _RANGE = Field(
 SPEECH = (
     ActionType(
         "communicate",
-        "Say something to everybody within a range in the same space.",
+        "Say something to everybody within a range in the same space who can hear it above the noise.",
         communicate,
         fields={"text": Field("text", slot="text"), "range": _RANGE},
         when=Situation.AWAKE,

@@ -38,8 +38,8 @@ class Environment:
     def __init__(self, sky: Sky, wanted: str | Mapping[str, Any], *, seed: int, second: float) -> None:
         self.sky = sky
         self._forecast: Forecast = forecast_of(wanted, Site(sky.lat, sky.lon, sky.day_of_year), seed)
-        # When a change that was called for begins and ends, and the weather before and after it; none: NaN.
-        self._change = np.full(2, np.nan)
+        # When a change that was called for begins and ends, and the weather before and after it; none: never.
+        self._change = np.full(2, np.inf)
         self._before_after = np.zeros((2, len(NAMES)))
         self._ground = settled(Weather.of(self._forecast.at(second)))
         self._lamps = np.ones(1)
@@ -77,7 +77,7 @@ class Environment:
         """The weather now."""
         now = float(self._second[0])
         begin, end = self._change.tolist()
-        if not now >= begin:
+        if now < begin:
             return Weather.of(self._forecast.at(now))
         share = 1.0 if now >= end else (now - begin) / (end - begin)
         return Weather.of(blended(self._before_after[0], self._before_after[1], share))

@@ -222,6 +222,12 @@ def in_view(
     return AllInView(len(eyes.entity), bodies, entities, who[order], what[order], far[order])
 
 
+def is_clear(one: NDArray[np.float64], other: NDArray[np.float64], opaque: OpaqueGrid) -> bool:
+    """Return whether no building stands between two points outdoors, ENU metres, shape ``(3,)`` each."""
+    away = math.hypot(other[0] - one[0], other[1] - one[1])
+    return bool(_is_clear(one, other, away, _FREE_END, opaque.half, opaque.cell, opaque.top))
+
+
 def _keys(points: NDArray[np.float64], spaces: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return a number for the space each point is in, outdoors for the cell: only those of near ones see each other."""
     cells = np.floor(points[:, :2] / SIGHT).astype(np.int64)
