@@ -45,9 +45,15 @@ def renew_tiles(buffers: Any, camera: Any) -> None:
             for i in range(width):
                 strip[i] = min(strip[i], line[i])
         for tile in range(across):
-            least = strip[tile * TILE]
-            for i in range(tile * TILE + 1, min(tile * TILE + TILE, width)):
-                least = min(least, strip[i])
+            first = tile * TILE
+            least = strip[first]
+            if first + TILE <= width:
+                # Of a fixed length: vector code.
+                for i in range(TILE):
+                    least = min(least, strip[first + i])
+            else:
+                for i in range(first, width):
+                    least = min(least, strip[i])
             bits = np.uint32(least >> np.uint64(32))
             tiles[tile_row * across + tile] = bits
             block = tile_row // BLOCK * blocks_across + tile // BLOCK
