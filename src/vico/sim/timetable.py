@@ -119,7 +119,7 @@ class Punctuality(ArrayState):
                 self.trips[self.meant[k], made] += 1
                 self.lateness[made, min(max(round(behind), EARLIEST), _LATEST) - EARLIEST] += 1
                 self.rode[i] = 0
-                how = {"seconds_late": behind, "mode": MODES[made]}
+                how = {"seconds_late": behind, "mode": MODES[made].value}
                 state.events.add("arrival", name, f"arrives at {place.name}", position, place=place.id, **how)
             elif state.second <= self.until[k] + shift[n]:
                 continue
@@ -140,10 +140,14 @@ class Punctuality(ArrayState):
         for mode, name in enumerate(MODES):
             counts = np.cumsum(self.lateness[mode])
             made = int(counts[-1])
-            found[name] = {"made": made, "meant": int(self.trips[mode].sum()), "on_time": int(counts[GRACE - EARLIEST])}
+            found[name.value] = {
+                "made": made,
+                "meant": int(self.trips[mode].sum()),
+                "on_time": int(counts[GRACE - EARLIEST]),
+            }
             if made:
                 for what, share in (("late_median", 0.5), ("late_p90", 0.9)):
-                    found[name][what] = EARLIEST + int(np.searchsorted(counts, share * made))
+                    found[name.value][what] = EARLIEST + int(np.searchsorted(counts, share * made))
         return found
 
     def _wrap(self, i: int) -> None:

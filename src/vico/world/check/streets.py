@@ -12,6 +12,9 @@ from vico.world.check.finding import WorldFinding
 from vico.world.folder import World
 from vico.world.model import Stop
 
+# Metres beside the place to wait where one may stand instead.
+_BESIDE = 1.0
+
 
 def check_roads(world: World) -> Iterator[WorldFinding]:
     """Check that lanes follow one another end to end, and most of the network can be driven round."""
@@ -39,7 +42,11 @@ def _check_waiting(world: World, stop: Stop) -> Iterator[WorldFinding]:
     away = math.hypot(x + math.sin(yaw) * aside - stop.wait[0], y - math.cos(yaw) * aside - stop.wait[1])
     if away > BUS_DOOR_REACH:
         yield WorldFinding("stop out of reach", stop.id, f"its bus's front door is {away:.1f} m from where one waits")
-    if not world.walkable.is_connected(stop.wait[:2]):
+    walkable, here = world.walkable, np.array(stop.wait[:2])
+    low, high = walkable.cell_of([here - _BESIDE, here + _BESIDE])
+    # A shelter may stand where one waits: a step beside it will do.
+    room = walkable.connected[low[1] : high[1] + 1, low[0] : high[0] + 1]
+    if not (bool(walkable.inside(here)) and room.any()):
         yield WorldFinding("stop blocked", stop.id, "nobody can stand where one waits")
 
 
