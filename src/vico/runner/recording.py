@@ -29,7 +29,7 @@ def go_on_from(checkpoint: Checkpoint, agents: Gatherer, sim: Simulation) -> Fau
         odd = sorted(states.keys() ^ agents.agents.keys())
         raise SchemaError(f"checkpoint of step {checkpoint.step}: of other agents than these ({odd[0]}); run it anew")
     agents.restore(states)
-    counted = checkpoint.notes["overlaps"]
+    counted = checkpoint.notes.get("overlaps")  # runs that were begun before these were kept have none
     if sim.overlap_check is not None and counted is not None:
         sim.overlap_check.restore(counted)
     return FaultLog.of(checkpoint.notes["faults"])
