@@ -11,6 +11,7 @@ from vico.errors import InputError
 from vico.sim.bodies import RESIDENT, Bodies
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
+from vico.sim.traffic.population import PATIENCE
 from vico.sim.transit import DWELL, FARE, TransitSystem, plan_buses, ride_price
 from vico.world.heights import HeightField
 
@@ -49,7 +50,7 @@ def test_a_bus_serves_every_stop_of_its_line_in_order() -> None:
     assert served == [order[(first + k) % len(order)] for k in range(len(served))]
 
 
-def test_buses_come_to_their_first_stop_within_two_minutes_of_the_timetable() -> None:
+def test_buses_come_to_their_first_stop_by_the_timetable_but_for_a_jam() -> None:
     traffic, transit = _systems(30, 30)
     late, was = [], [True] * traffic.buses
     for _ in range(15_000):
@@ -59,8 +60,9 @@ def test_buses_come_to_their_first_stop_within_two_minutes_of_the_timetable() ->
             if there and not was[bus]:
                 late.append(transit.clock[0] - transit.begun[bus] - transit.line_of(bus).travel[-1])
             was[bus] = there
-    assert late
-    assert max(map(abs, late)) < 120.0
+    assert np.median(np.abs(late)) < 15.0
+    # A car that gets nowhere before a bus is taken out after so long.
+    assert max(map(abs, late)) < PATIENCE
 
 
 def test_buses_on_empty_streets_leave_no_stop_before_its_time() -> None:

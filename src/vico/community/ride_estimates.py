@@ -16,6 +16,8 @@ from vico.world.timetable import LineTimes
 
 # What is measured on large cells, over open ground and round their corners, is longer than the walk by up to so much.
 _OVER = 0.8
+# So many of the quickest rides by bicycle are looked at closely.
+_LIKELY = 8
 
 
 class RideEstimates:
@@ -54,6 +56,7 @@ class RideEstimates:
         self._ends = {Mode.BUS: [stops[name] for name in served], Mode.BIKE: racks}
         self._rides = {Mode.BUS: rides, Mode.BIKE: between}
         self._walks: dict[Mode, NDArray[np.float64]] = {}
+        self._stations = np.array([station.id for station in transit.bike_stations], np.str_)
 
     def seconds(self, a: Place, b: Place, mode: Mode, *, on_foot: float = 1.0) -> float:
         """Return the least a ride takes between the doors of two places; infinite if there is none.
@@ -65,9 +68,18 @@ class RideEstimates:
         """
         if not np.isfinite(self._rides[mode]).any():
             return math.inf
+        return float(self._between(a, b, mode, on_foot).min())
+
+    def unlikely_stations(self, a: Place, b: Place) -> tuple[str, ...]:
+        """Return the bicycle stations, by id, that are on none of the `_LIKELY` quickest rides between two doors."""
+        quickest = np.argsort(self._between(a, b, Mode.BIKE, 1.0), axis=None, kind="stable")[:_LIKELY]
+        return tuple(np.delete(self._stations, np.unravel_index(quickest, self._rides[Mode.BIKE].shape)).tolist())
+
+    def _between(self, a: Place, b: Place, mode: Mode, on_foot: float) -> NDArray[np.float64]:
+        """Return the least seconds of every ride between two doors, by its ends, shape ``(ends, ends)``."""
         walks = self._measured(mode)
         there, on = walks[:, self._number[a.id]], walks[:, self._number[b.id]]
-        return float((on_foot * (there[:, None] + on[None, :]) + self._rides[mode]).min())
+        return np.asarray(on_foot * (there[:, None] + on[None, :]) + self._rides[mode])
 
     def _measured(self, mode: Mode) -> NDArray[np.float64]:
         """Return the seconds on foot from each end of rides to each place, shape ``(ends, places)``."""

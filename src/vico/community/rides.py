@@ -233,6 +233,7 @@ class _Means:
             modes=(mode.value,),
             cash=cash,
             arrive_by=seconds_of_day(way.end) - self.index.indoors(b.id) - RESERVE[mode],
+            closed=self.estimates.unlikely_stations(a, b) if mode is Mode.BIKE else (),
         )
         # One ride is enough: who changes is stranded too easily.
         return trip if trip is not None and trip.modes.count(mode.value) == 1 else None
