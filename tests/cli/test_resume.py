@@ -16,7 +16,7 @@ from vico.io.files import read_json
 from vico.sim.recording import Run, read_run
 from vico.sim.recording.checkpoints import checkpoint_steps
 
-STEPS = 70
+STEPS = 45
 
 
 def contents(run: Run) -> dict[str, Any]:
@@ -32,7 +32,7 @@ def words(helsinki_path: Path, helsinki_people: Path) -> list[object]:
     """A run with two assistants, one observer, a robot and traffic, without its end: ``--out FOLDER``."""
     return [
         "run", helsinki_path, helsinki_people, "--steps", STEPS, "--robots", "husky", "--cars", 2, "--pedestrians", 2,
-        "--observe", "resident_0", "--assistants", 2, "--agent", "vico.agents.base:RandomAgent", "--states-every", 15,
+        "--observe", "resident_0", "--assistants", 2, "--agent", "vico.agents.base:RandomAgent", "--states-every", 10,
         "--check", "overlaps",
     ]  # fmt: skip
 
@@ -53,7 +53,7 @@ def test_a_killed_run_goes_on_to_the_same_end(
     words: list[object], whole: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run"
-    kill_once([*words, "--out", out], at_step(out, 30))
+    kill_once([*words, "--out", out], at_step(out, 20))
     # Code is only run if the command line names it.
     assert vico("run", "--resume", out) == 2
     assert "--agent vico.agents.base:RandomAgent" in capsys.readouterr().err
@@ -74,7 +74,7 @@ def test_so_it_does_with_the_same_command_and_isolated_agents(
     words: list[object], whole: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run"
-    kill_once([*words, "--isolate", "--out", out], at_step(out, 45))
+    kill_once([*words, "--isolate", "--out", out], at_step(out, 30))
     assert vico(*words, "--isolate", "--out", out) == 0
     assert "goes on after step" in capsys.readouterr().err
     assert contents(read_run(out)) == contents(read_run(whole))

@@ -181,7 +181,7 @@ def every_trip(possible: Possible, depart: float, cash: float) -> tuple[float, f
     return best
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(towns, spots, spots, st.integers(0, 500), st.sampled_from([math.inf, 4.5, 2.2, 0.3]))
 def test_no_trip_is_better_than_the_planned_one(
     place: Town, start: Point2, goal: Point2, late: int, cash: float
