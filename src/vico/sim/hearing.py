@@ -58,16 +58,17 @@ class Heard(NamedTuple):
 def hearers_of(state: SimulationState, i: int, reach: float) -> Heard:
     """Return who hears what person `i` says to everybody within `reach` metres in the same space."""
     p = state.people
+    eyes = eye_height(state).tolist()
     voice = _NORMAL if reach <= _NORMAL_RANGE else _RAISED
     outdoors = p.room[i] < 0 and p.vehicle[i] != Vehicle.BUS
     away = np.linalg.norm(p.position - p.position[i], axis=1)
     near = [(p.names[j], j) for j in np.flatnonzero(away <= reach).tolist() if j != i and state.same_space(i, j)]
-    places = [(name, p.position[j], float(eye_height(state)[j])) for name, j in near]
+    places = [(name, p.position[j], eyes[j]) for name, j in near]
     if state.robots is not None and outdoors:
         positions, heights = state.robots.bodies().position, state.robots.camera_heights()
         close = np.linalg.norm(positions - p.position[i], axis=1) <= reach
         places += [(state.robots.names[k], positions[k], float(heights[k])) for k in np.flatnonzero(close).tolist()]
-    mouth = p.position[i] + _up(float(eye_height(state)[i]))
+    mouth = p.position[i] + _up(eyes[i])
     found = Heard([], {})
     for name, feet, height in places:
         ear = feet + _up(height)

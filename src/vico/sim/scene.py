@@ -112,7 +112,7 @@ class SceneRenderer:
 
     def _attach(self, sim: RenderedSimulation) -> None:
         self._sim = sim
-        self._lit = -1.0
+        self._lit: tuple[float, ...] = ()
         self.wait()
         self._cache = ViewCache(defer_rgb=sim.defer_rgb)
         self._load_bodies(sim)
@@ -170,8 +170,11 @@ class SceneRenderer:
 
     def _set_light(self, state: SimulationState) -> None:
         moment = state.second // _LIGHT_EVERY
-        if moment != self._lit:
-            self._lit = moment
+        weather = state.environment.weather
+        # All that decides the light: a restore or a change of weather may come within the same minute.
+        lit = (moment, weather.clouds, weather.rain, weather.snow, weather.visibility, state.environment.lamps)
+        if lit != self._lit:
+            self._lit = lit
             self._scene.lighting = _lighting(state.environment, moment * _LIGHT_EVERY)
 
     def _set_moving(self, state: SimulationState) -> None:

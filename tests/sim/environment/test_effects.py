@@ -97,6 +97,19 @@ def test_fog_hides_what_is_far_in_pictures_and_night_is_darker_than_day() -> Non
     assert brightness["night"] < 0.5 * brightness["day"]
 
 
+def test_pictures_follow_the_state_and_not_what_was_seen_before() -> None:
+    sim = Simulation(toy_city.world(), None, SimConfig(assistants=1, image=64, weather="clear", seed=1))
+
+    def seen() -> Any:
+        return sim.observe()[0]["assistant_0"]["rgb"].copy()
+
+    before = seen()
+    with sim.branch():
+        sim.state.environment.change_weather("fog", over=0.0)
+        assert not np.array_equal(seen(), before)
+    np.testing.assert_array_equal(seen(), before)
+
+
 def test_environments_have_a_date_and_weather_too() -> None:
     spec = EnvSpec(weather=FOG, date="2026-12-21", utc_offset=1.0)
     again = EnvSpec.from_json(spec.to_json())
