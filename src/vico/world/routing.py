@@ -21,7 +21,9 @@ WEIGHTS = {SIDEWALK: 100, CROSSING: 110, OPEN: 120, ROADWAY: 400}
 _BERTH = 0.6
 _SNAP = 6.0  # metres a start or goal may lie off what can be walked on
 _STRAIGHT, _DIAGONAL = 10, 14  # 10 : 14 for 1 : sqrt 2; a cost unit is a thousandth of a cell on sidewalk
-_RING = 32768  # circular buckets; more than the largest change of f along an edge (14 * 500 + 14 * 100)
+# Circular buckets, a power of 2; more than the largest change of f along an edge (14 * 500 + 14 * 100).
+_RING = 32768
+_IN_RING = _RING - 1
 
 # Costs from landmarks are worth their making (a search of the whole map each) to who searches this often.
 _LANDMARKS = 6
@@ -31,46 +33,52 @@ _WORTH_LANDMARKS = 40
 _FIRST_DIAGONAL = 4
 
 
+# What a search knows of a cell; all in one place, for it is read together.
+_CELL = np.dtype(
+    [
+        ("g", np.int64),  # least cost from the start found so far; valid where `stamp` is of this search
+        ("rest", np.int32),  # least cost that may be left to the goal (the heuristic); valid as `g` is
+        ("stamp", np.int32),  # in which search it was last seen (an even number), plus 1 where `g` is final
+        ("after", np.int32),  # neighbours in the list of its bucket, -1 for none
+        ("before", np.int32),
+    ],
+    align=True,
+)
+
+
 class _Work(NamedTuple):
-    """Working memory of a search, a value for each cell, shape ``(cells,)``.
+    """Working memory of a search.
 
     Attributes
     ----------
-    g
-        Least cost from the start found so far, int64; valid where `stamp` is of this search.
-    stamp
-        In which search the cell was last seen (an even number), plus 1 where `g` is final. int32.
-    rest
-        Least cost that may be left to the goal (the heuristic), int32; valid where `stamp` is of this search.
-    after, before
-        Neighbours in the list of the cell's bucket, -1 for none, int32.
+    cells
+        Records of `_CELL`, shape ``(cells,)``.
+    head
+        First cell in the list of each bucket, -1 for none, int32, shape ``(_RING,)``.
     """
 
-    g: NDArray[np.int64]
-    stamp: NDArray[np.int32]
-    rest: NDArray[np.int32]
-    after: NDArray[np.int32]
-    before: NDArray[np.int32]
+    cells: NDArray[np.void]
+    head: NDArray[np.int32]
 
 
-@compiled
-def _unlink(node, key, head, after, before):  # type: ignore[no-untyped-def]
-    n, p = after[node], before[node]
+@compiled(inline="always")
+def _unlink(cell, key, work):  # type: ignore[no-untyped-def]
+    n, p = cell.after, cell.before
     if p >= 0:
-        after[p] = n
+        work.cells[p].after = n
     else:
-        head[key] = n
+        work.head[key] = n
     if n >= 0:
-        before[n] = p
+        work.cells[n].before = p
 
 
-@compiled
-def _link(node, key, head, after, before):  # type: ignore[no-untyped-def]
-    first = head[key]
-    after[node], before[node] = first, -1
+@compiled(inline="always")
+def _link(node, cell, key, work):  # type: ignore[no-untyped-def]
+    first = work.head[key]
+    cell.after, cell.before = first, -1
     if first >= 0:
-        before[first] = node
-    head[key] = node
+        work.cells[first].before = node
+    work.head[key] = node
 
 
 @compiled(inline="always")
@@ -94,18 +102,18 @@ def _may_step(cost, width, height, cell, direction):  # type: ignore[no-untyped-
 
 
 @compiled(inline="always")
-def _least_cost(node, goal, width, landmarks):  # type: ignore[no-untyped-def]
+def _least_cost(node, goal, width, landmarks, from_goal):  # type: ignore[no-untyped-def]
     """Return a cost that no walk between two cells is below, what A* goes by; 0 without a goal.
 
     The larger of two: the walk if all were sidewalk without walls; and, by the triangle inequality, what the two cells'
-    costs from a landmark differ by.
+    costs from a landmark differ by (`from_goal` are the goal's).
     """
     if goal < 0:
         return 0
     dx, dy = abs(node % width - goal % width), abs(node // width - goal // width)
     least = 100 * (_STRAIGHT * max(dx, dy) + (_DIAGONAL - _STRAIGHT) * min(dx, dy))
     for k in range(landmarks.shape[1]):
-        least = max(least, abs(landmarks[node, k] - landmarks[goal, k]))
+        least = max(least, abs(landmarks[node, k] - from_goal[k]))
     return least
 
 
@@ -116,49 +124,74 @@ def _step_cost(flat, node, other, direction):  # type: ignore[no-untyped-def]
     return length * (np.int64(flat[node]) + np.int64(flat[other])) // 2
 
 
+@compiled(inline="always")
+def _open_sides(flat, node, width, height):  # type: ignore[no-untyped-def]
+    """Return whether the cells east, west, north and south of a cell are open."""
+    y = node // width
+    x = node - y * width
+    return (
+        x < width - 1 and flat[node + 1] != 0,
+        x > 0 and flat[node - 1] != 0,
+        y < height - 1 and flat[node + width] != 0,
+        y > 0 and flat[node - width] != 0,
+    )
+
+
 @compiled
 def _search(cost, work, start, goal, generation, landmarks):  # type: ignore[no-untyped-def]
     """Run A* from `start`, or Dijkstra where `goal` is -1, with circular buckets; return whether the goal was met.
 
     All cells of all cheapest walks are made final, not those of the first one found alone: so `_backtrack` chooses
-    among them the same way whatever the landmarks. `work.stamp` becomes `generation` where a cell was seen,
+    among them the same way whatever the landmarks. The stamp of a cell becomes `generation` where it was seen,
     `generation` + 1 where its cost is final.
     """
-    g, stamp, rest, after, before = work.g, work.stamp, work.rest, work.after, work.before
+    cells, head = work.cells, work.head
     height, width = cost.shape
     flat = cost.ravel()
-    head = np.full(_RING, -1, np.int32)
-    g[start], stamp[start] = 0, generation
-    rest[start] = _least_cost(start, goal, width, landmarks)
-    level = np.int64(rest[start])
-    _link(start, level % _RING, head, after, before)
-    left, met = 1, False
+    from_goal = landmarks[max(goal, 0)].copy()
+    head[:] = -1
+    first = cells[start]
+    first.g, first.stamp = 0, generation
+    first.rest = _least_cost(start, goal, width, landmarks, from_goal)
+    level = np.int64(first.rest)
+    _link(start, first, level & _IN_RING, work)
+    left, met, goal_cost = 1, False, np.int64(0)
     while left > 0:
-        while head[level % _RING] < 0:
+        while head[level & _IN_RING] < 0:
             level += 1
-        if met and level > g[goal]:
+        if met and level > goal_cost:
             return True
-        node = head[level % _RING]
-        _unlink(node, level % _RING, head, after, before)
+        node = np.int64(head[level & _IN_RING])
+        cell = cells[node]
+        _unlink(cell, level & _IN_RING, work)
         left -= 1
-        stamp[node] = generation + 1
-        met = met or node == goal
+        cell.stamp = generation + 1
+        if node == goal:
+            met, goal_cost = True, cell.g
+        east, west, north, south = _open_sides(flat, node, width, height)
         for direction in range(8):
             step_x, step_y = _step(direction)
-            other = node + step_y * width + step_x
-            if not _may_step(flat, width, height, node, direction) or stamp[other] == generation + 1:
+            if not (
+                (step_x == 0 or (east if step_x > 0 else west)) and (step_y == 0 or (north if step_y > 0 else south))
+            ):
                 continue
-            value = g[node] + _step_cost(flat, node, other, direction)
-            if stamp[other] == generation:
-                if value >= g[other]:
+            other = node + step_y * width + step_x
+            if flat[other] == 0:
+                continue
+            near = cells[other]
+            if near.stamp == generation + 1:
+                continue
+            value = cell.g + _step_cost(flat, node, other, direction)
+            if near.stamp == generation:
+                if value >= near.g:
                     continue
-                _unlink(other, (g[other] + rest[other]) % _RING, head, after, before)
+                _unlink(near, (near.g + near.rest) & _IN_RING, work)
             else:
-                stamp[other] = generation
-                rest[other] = _least_cost(other, goal, width, landmarks)
+                near.stamp = generation
+                near.rest = _least_cost(other, goal, width, landmarks, from_goal)
                 left += 1
-            g[other] = value
-            _link(other, (value + rest[other]) % _RING, head, after, before)
+            near.g = value
+            _link(other, near, (value + near.rest) & _IN_RING, work)
     return met
 
 
@@ -174,9 +207,9 @@ def _entered(flat, work, node, generation, width, height, last):  # type: ignore
         if x < 0 or y < 0 or x >= width or y >= height:
             continue
         source = y * width + x
-        if work.stamp[source] != generation + 1 or not _may_step(flat, width, height, source, direction):
+        if work.cells[source].stamp != generation + 1 or not _may_step(flat, width, height, source, direction):
             continue
-        if work.g[source] + _step_cost(flat, source, node, direction) == work.g[node]:
+        if work.cells[source].g + _step_cost(flat, source, node, direction) == work.cells[node].g:
             return direction
     return -1
 
@@ -307,13 +340,7 @@ class Router:
         self._cost = np.ascontiguousarray(cost, np.int32)
         self._free = self._cost > 0
         cells = cost.size
-        self._work = _Work(
-            g=np.zeros(cells, np.int64),
-            stamp=np.zeros(cells, np.int32),
-            rest=np.zeros(cells, np.int32),
-            after=np.zeros(cells, np.int32),
-            before=np.zeros(cells, np.int32),
-        )
+        self._work = _Work(np.zeros(cells, _CELL), np.empty(_RING, np.int32))
         self._generation = 0
         self._searches = 0
         self._landmarks = np.zeros((cells, 0), np.int32)
@@ -382,7 +409,7 @@ class Router:
         if first < 0 or last < 0 or not self._run(cost, first, last):
             return None
         cells = _backtrack(cost, self._work, first, last, self._generation)
-        g = self._work.g[cells]
+        g = self._work.cells["g"][cells]
         n = self.walkable.n
         points = np.column_stack([cells % n, cells // n]) + 0.5
         checks = shut is not None
@@ -442,8 +469,8 @@ class Router:
         metre = self.walkable.cell / (100 * _STRAIGHT)
         with self._lock:
             self._run(cost, first, -1)
-            reached = self._work.stamp == self._generation + 1
-            return np.where(reached, self._work.g * metre, np.inf).astype(np.float32).reshape(shape)
+            reached = self._work.cells["stamp"] == self._generation + 1
+            return np.where(reached, self._work.cells["g"] * metre, np.inf).astype(np.float32).reshape(shape)
 
     def _run(self, cost: NDArray[np.int32], first: int, last: int) -> bool:
         self._generation += 2
@@ -465,8 +492,8 @@ class Router:
         source = int(np.flatnonzero(nearest)[0])
         for k in range(_LANDMARKS):
             self._run(self._cost, source, -1)
-            final = self._work.stamp == self._generation + 1
-            costs[final, k] = self._work.g[final]
+            final = self._work.cells["stamp"] == self._generation + 1
+            costs[final, k] = self._work.cells["g"][final]
             # Of the first search only the farthest cell is wanted, for it lies at an edge.
             nearest = np.where(final, np.minimum(nearest, costs[:, k]) if k else costs[:, k], nearest)
             source = int(nearest.argmax())
