@@ -124,6 +124,29 @@ def test_landmarks_change_no_way(helsinki: World, trips: list[tuple[np.ndarray, 
         np.testing.assert_array_equal(one, two)
 
 
+def test_learned_costs_change_no_way(helsinki: World, trips: list[tuple[np.ndarray, np.ndarray]]) -> None:
+    plain, learned = Router(helsinki.walkable), Router(helsinki.walkable)
+    learned.learn_costs(trips[0][0])
+    learned.learn_costs(trips[1][1])
+    for k, (a, b) in enumerate(trips[2:12]):
+        closed = [(float((a[0] + b[0]) / 2), float((a[1] + b[1]) / 2), 2.0)] if k % 3 == 0 else []
+        for start, goal in ((trips[0][0], b), (a, trips[0][0]), (trips[1][1], b), (a, trips[1][1])):
+            one, two = plain.path(start, goal, closed=closed), learned.path(start, goal, closed=closed)
+            assert one is not None
+            assert two is not None
+            np.testing.assert_array_equal(one, two)
+
+
+def test_costs_are_learned_where_there_is_no_way_too() -> None:
+    grid = np.full((80, 80), OPEN, np.uint8)
+    grid[38:42, :] = BLOCKED
+    router = Router(WalkableMap(grid, 20.0))
+    router.learn_costs((0, -10))
+    assert router.path((0, -10), (0, 10)) is None
+    assert router.path((0, 10), (0, -10)) is None
+    assert router.path((0, -10), (5, -10)) is not None
+
+
 def test_threads_may_share_a_router(helsinki: World, trips: list[tuple[np.ndarray, np.ndarray]]) -> None:
     router = Router(helsinki.walkable)
     alone = [router.path(a, b) for a, b in trips]

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.community.hours import Span, open_spans
 from vico.community.usual_hours import usual_spans
+from vico.community.walks import Walks
 from vico.errors import EmptyInputError
 from vico.world.folder import World
 from vico.world.indoor_ways import IndoorWays
 from vico.world.model import Category, Place, Point2
-from vico.world.routing import Router
 from vico.world.walkable import CROSSING, ROADWAY
 
 #: Accommodation in which people stay for a while, not for good.
@@ -26,10 +25,6 @@ SPAWN_GAP = 2.0
 
 # A place that people can reach has its position on the walkable map, or a step beside it.
 _REACH = 2.0
-
-
-# Routes already found, for as long as their world is in use: the author's and the validator's are the same.
-_ROUTES: WeakKeyDictionary[World, dict[tuple[Point2, Point2], float]] = WeakKeyDictionary()
 
 
 class PlaceIndex:
@@ -47,8 +42,7 @@ class PlaceIndex:
         self.world = world
         self.weekday = weekday
         self.router = world.router
-        # Thousands of walks are measured on cells of a metre: a quarter of the cost, most within 2 % of the walk.
-        self._measure = Router(world.walkable.coarser())
+        self.walks = Walks.of(world)
         self.place_by_id = {p.id: p for p in world.places}
         self.buildings = {b.id: b for b in world.buildings}
         self.spot = {p.id: k for k, p in enumerate(world.places)}
@@ -58,7 +52,6 @@ class PlaceIndex:
         # From the street to the farthest room: whoever has come that far is there, whatever the room.
         self._inside = np.array([ways.seconds(p.rooms) for p in world.places], np.float64)
         self._estimates: dict[str, NDArray[np.int64]] = {}
-        self._seconds = _ROUTES.setdefault(world, {})
         self._reachable: dict[str, bool] = {}
 
     def reachable(self, place: Place) -> bool:
@@ -113,12 +106,7 @@ class PlaceIndex:
 
     def outdoors(self, a: str, b: str) -> float:
         """Seconds on foot between the doors of two places, at 1 m/s; infinite if there is no way."""
-        # There as back, and for all places behind one door.
-        start, goal = sorted((self.place_by_id[a].position[:2], self.place_by_id[b].position[:2]))
-        if (start, goal) not in self._seconds:
-            seconds = self._measure.seconds(start, goal)
-            self._seconds[start, goal] = self.router.seconds(start, goal) if math.isinf(seconds) else seconds
-        return self._seconds[start, goal]
+        return self.walks.between(self.place_by_id[a].position[:2], self.place_by_id[b].position[:2]).metres
 
     def minutes(self, a: str, b: str) -> int | None:
         """Minutes to allow for the walk between two places; None if there is no way.
