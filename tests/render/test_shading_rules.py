@@ -12,7 +12,12 @@ from vico.render.uniforms import camera_uniforms, light_uniforms
 from vico.render.visibility.fill import PictureSize, ScreenPoint, ScreenTriangle, fill, inverse_depth, triangle_number
 from vico.world.mesh import Material, Surface
 
-UP = np.array([0.0, 0.0, 1.0])
+ZERO, ONE = np.float32(0.0), np.float32(1.0)
+UP = ZERO, ZERO, ONE
+
+
+def single(*values: float) -> tuple[np.float32, ...]:
+    return tuple(np.float32(value) for value in values)
 
 
 def test_a_triangle_fills_the_pixels_whose_centres_it_holds_with_its_depth() -> None:
@@ -52,22 +57,22 @@ def test_the_nearer_triangle_wins_whatever_the_order() -> None:
     ],
 )
 def test_a_ball_darkens_what_lies_behind_it(point: tuple[float, float, float], expected: float) -> None:
-    assert _ball_shadow(*point, UP) == pytest.approx(expected)
+    assert _ball_shadow(*single(*point), *UP) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(
     ("point", "expected"), [((0.9, -0.9, -3.0), 1.0), ((0.9, -0.9, 1.5), 0.0), ((1.1, 0.0, -3.0), 0.0)]
 )
 def test_a_box_darkens_what_lies_behind_it(point: tuple[float, float, float], expected: float) -> None:
-    assert _box_shadow(*point, UP) == pytest.approx(expected)
+    assert _box_shadow(*single(*point), *UP) == pytest.approx(expected)
 
 
 def test_the_shadow_at_the_foot_fades_sideways_and_upwards() -> None:
     # The values follow from the rule: gain 1.5 (round) and 4 (box), edges at 2 and 1.25 half widths, 0.75 at most.
-    assert _contact_shadow(0.0, 0.0, 0.0, True) == pytest.approx(0.75)
-    assert _contact_shadow(1.0, 0.0, 0.25, True) == pytest.approx(1.5 * 0.5 * 0.5)
-    assert _contact_shadow(2.0, 0.0, 0.0, True) == 0.0
-    assert _contact_shadow(1.24, 1.0, 0.0, False) == pytest.approx(4 * 0.01 / 1.25)
+    assert _contact_shadow(*single(0.0, 0.0, 0.0), True) == pytest.approx(0.75)
+    assert _contact_shadow(*single(1.0, 0.0, 0.25), True) == pytest.approx(1.5 * 0.5 * 0.5)
+    assert _contact_shadow(*single(2.0, 0.0, 0.0), True) == 0.0
+    assert _contact_shadow(*single(1.24, 1.0, 0.0), False) == pytest.approx(4 * 0.01 / 1.25, rel=1e-4)
 
 
 def test_a_point_between_high_walls_sees_less_sky() -> None:

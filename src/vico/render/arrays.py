@@ -11,8 +11,8 @@ from vico.render.geometry import Clusters, Mesh
 from vico.render.records import BOX, MODEL_VIEW, TRIANGLE_SETUP
 from vico.render.textures import Textures
 
-# Spare keys behind a picture's last pixel: `fill` works in blocks.
-PAD = 8
+# Spare places behind a picture's last pixel: `fill` and shadows work in blocks.
+PAD = 32
 # Pixels along a tile of the coarse depth buffer, and tiles along a block of the coarser one above it.
 TILE, BLOCK = 8, 4
 # Triangles whose setup the shader keeps at hand; a power of two.
@@ -161,9 +161,9 @@ class Buffers(NamedTuple):
     slot
         Where in `drawn` an item is, -1: nowhere, int32.
     sun, contact
-        What moving things leave of the sun and of the light at the ground, 0..1, float32, shape ``(h * w,)``.
+        What moving things leave of the sun and of the light at the ground, 0..1, float32, shape ``(h * w + PAD,)``.
     real, whole
-        Fields of the shader's queue, float32 and uint32.
+        Fields of the shader's queue, float32 and uint32; scratch memory of the shadows before.
     sky_real, sky_whole
         The same for pixels that show the sky.
     setup, setup_number
@@ -195,7 +195,7 @@ class Buffers(NamedTuple):
 
     def fit(self, scene: SceneArrays, width: int, height: int) -> bool:
         """Return whether they are of this picture's size and large enough for the scene."""
-        if len(self.strip) != width or len(self.sun) != width * height:
+        if len(self.strip) != width or len(self.keys) != width * height + PAD:
             return False
         return len(self.candidate) >= _item_count(scene) and self.vertex.shape[1] >= _most_vertices(scene)
 
@@ -221,8 +221,8 @@ def buffers_for(scene: SceneArrays, width: int, height: int) -> Buffers:
         base=np.zeros(items + 1, np.int64),
         first_triangle=np.zeros(items, np.int32),
         slot=np.full(items, -1, np.int32),
-        sun=np.ones(pixels, np.float32),
-        contact=np.ones(pixels, np.float32),
+        sun=np.ones(pixels + PAD, np.float32),
+        contact=np.ones(pixels + PAD, np.float32),
         real=np.zeros(REAL_FIELDS * STRIDE, np.float32),
         whole=np.zeros(WHOLE_FIELDS * STRIDE, np.uint32),
         sky_real=np.zeros(REAL_FIELDS * STRIDE, np.float32),
