@@ -162,6 +162,8 @@ class Buffers(NamedTuple):
         Where in `drawn` an item is, -1: nowhere, int32.
     sun, contact
         What moving things leave of the sun and of the light at the ground, 0..1, float32, shape ``(h * w + PAD,)``.
+    changed
+        Whether a pixel differs from what is known of the picture, bool, shape ``(h * w + PAD,)``.
     real, whole
         Fields of the shader's queue, float32 and uint32; scratch memory of the shadows before.
     sky_real, sky_whole
@@ -186,6 +188,7 @@ class Buffers(NamedTuple):
     slot: NDArray[np.int32]
     sun: NDArray[np.float32]
     contact: NDArray[np.float32]
+    changed: NDArray[np.bool_]
     real: NDArray[np.float32]
     whole: NDArray[np.uint32]
     sky_real: NDArray[np.float32]
@@ -223,6 +226,7 @@ def buffers_for(scene: SceneArrays, width: int, height: int) -> Buffers:
         slot=np.full(items, -1, np.int32),
         sun=np.ones(pixels + PAD, np.float32),
         contact=np.ones(pixels + PAD, np.float32),
+        changed=np.zeros(pixels + PAD, np.bool_),
         real=np.zeros(REAL_FIELDS * STRIDE, np.float32),
         whole=np.zeros(WHOLE_FIELDS * STRIDE, np.uint32),
         sky_real=np.zeros(REAL_FIELDS * STRIDE, np.float32),

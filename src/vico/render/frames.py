@@ -144,16 +144,26 @@ def _render_cached(batch: _Batch, light: Light, cache: ViewCache, threads: int |
     deferred: dict[int, Callable[[], None]] = {}
 
     def take(k: int) -> None:
-        rgb, depth, segmentation = pictures = batch.pictures(k)
-        if cache.repeat(k, scene, uniforms[k], light, pictures):
+        camera = uniforms[k]
+        rgb, depth, segmentation = batch.pictures(k)
+        background = cache.background(k, scene, camera)
+        if background is not None and background.is_all(scene, camera, light):
+            cache.hits += 1
+            background.copy_to(rgb, depth, segmentation)
             return
         own = cache.defer_rgb
         buffers = cache.buffers(k, scene, width, height) if own else _buffers(scene, width, height)
-        drawn = _visibility_pass(scene, uniforms[k], buffers, depth, segmentation)
+        if background is not None:
+            drawn = background.draw(scene, camera, buffers)
+        else:
+            drawn = draw(scene.arrays, camera, buffers)
+        _write_depth_and_entities(scene, buffers, drawn, depth, segmentation)
 
         def finish() -> None:
-            _shading_pass(scene, uniforms[k], light, buffers, drawn, rgb)
-            cache.keep(k, scene, uniforms[k], light, pictures, buffers)
+            if background is not None:
+                background.shade(scene, camera, light, buffers, drawn, rgb)
+            else:
+                _shading_pass(scene, camera, light, buffers, drawn, rgb)
 
         if own:
             deferred[k] = finish
@@ -269,21 +279,19 @@ def _take(
     segmentation: NDArray[np.int32],
 ) -> None:
     buffers = _buffers(scene, int(camera["width"]), int(camera["height"]))
-    drawn = _visibility_pass(scene, camera, buffers, depth, segmentation)
+    drawn = draw(scene.arrays, camera, buffers)
+    _write_depth_and_entities(scene, buffers, drawn, depth, segmentation)
     if light is not None and rgb.size:
         _shading_pass(scene, camera, light, buffers, drawn, rgb)
 
 
-def _visibility_pass(
-    scene: Scene, camera: Record, buffers: Buffers, depth: NDArray[np.float32], segmentation: NDArray[np.int32]
-) -> int:
-    """Find what is visible; return how many items were drawn."""
-    drawn: int = draw(scene.arrays, camera, buffers)
+def _write_depth_and_entities(
+    scene: Scene, buffers: Buffers, drawn: int, depth: NDArray[np.float32], segmentation: NDArray[np.int32]
+) -> None:
     if depth.size:
         write_depth(buffers.keys, depth)
     if segmentation.size:
         write_entities(scene.arrays, buffers, drawn, segmentation)
-    return drawn
 
 
 def _shading_pass(
@@ -291,7 +299,7 @@ def _shading_pass(
 ) -> None:
     """Colour what is visible."""
     moving = cast_moving(scene.arrays, camera, light.uniforms, buffers, shadow_reach(camera), new_caster())
-    shade(scene.arrays, camera, light, buffers, drawn, moving, rgb)
+    shade(scene.arrays, camera, light, buffers, drawn, moving, False, rgb)
 
 
 def _buffers(scene: Scene, width: int, height: int) -> Buffers:

@@ -1,10 +1,8 @@
-"""What each camera saw last: a view in which nothing can have changed is copied, not rendered again."""
+"""What stays of a camera's last picture: where nothing has changed it is copied, else what moves is drawn anew."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,18 +10,21 @@ from numpy.typing import NDArray
 from vico.render.arrays import Buffers, buffers_for
 from vico.render.scene import Scene
 from vico.render.shading.light import Light
-from vico.render.shadows.moving import CoarseDepth, is_disturbed
+from vico.render.shading.shade import shade
+from vico.render.shadows.moving import CoarseDepth, cast_moving, is_disturbed, new_caster
 from vico.render.uniforms import Record
 from vico.render.visibility.culling import renew_tiles
+from vico.render.visibility.draw import draw_moving, draw_static, mark_changed, write_depth, write_entities
 
 _MOVING_SHADOW_METRES = 70.0
 
 
 class ViewCache:
-    """What each camera of a batch saw last, so that a view in which nothing can have changed is not rendered again.
+    """What each camera of a batch saw last, so that only what has changed is rendered again.
 
-    That is: a camera that stands still in a room, where nothing that moves comes into sight or darkens anything,
-    neither then nor now. Out of doors there is always somebody about. Copies equal new pictures bit for bit.
+    Of a camera that stands still, what never moves is kept with its colours; only what moves is drawn and shaded, and
+    what lies in its shadow. In a room where nothing that moves comes into sight or darkens anything, the picture is
+    copied. Either equals a new picture bit for bit.
 
     Parameters
     ----------
@@ -40,7 +41,8 @@ class ViewCache:
     def __init__(self, *, defer_rgb: bool = False) -> None:
         self.defer_rgb = defer_rgb
         self.hits = 0
-        self._known: dict[int, _CachedView] = {}
+        self._last: dict[int, bytes] = {}
+        self._known: dict[int, Background] = {}
         self._buffers: dict[int, Buffers] = {}
 
     def buffers(self, k: int, scene: Scene, width: int, height: int) -> Buffers:
@@ -48,43 +50,117 @@ class ViewCache:
         self._buffers[k] = fitting_buffers(self._buffers.get(k), scene, width, height)
         return self._buffers[k]
 
-    def repeat(self, k: int, scene: Scene, camera: Record, light: Light, into: Sequence[NDArray[Any]]) -> bool:
-        """Copy the last pictures of camera `k` if they are still right; return whether they are."""
-        known = self._known.get(k)
-        if known is None or known.of != (camera.tobytes(), scene.version) or known.light is not light:
-            return False
-        if [p.shape for p in known.pictures] != [p.shape for p in into] or known.is_disturbed(scene, camera):
-            return False
-        for old, new in zip(known.pictures, into, strict=True):
-            new[...] = old
-        self.hits += 1
-        return True
+    def background(self, k: int, scene: Scene, camera: Record) -> Background | None:
+        """Return what is kept of camera `k`'s view, to be made by its first `Background.draw`.
 
-    def keep(
-        self, k: int, scene: Scene, camera: Record, light: Light, pictures: Sequence[NDArray[Any]], buffers: Buffers
-    ) -> None:
-        """Remember pictures just taken with `buffers`, if they can be right again."""
+        None where nothing is worth keeping: out of doors, before a camera has stood still for one call.
+        """
+        of = camera.tobytes()
+        stands, self._last[k] = self._last.get(k) == of, of
+        known = self._known.get(k)
+        if known is not None and known.of == (of, scene.version):
+            return known
         self._known.pop(k, None)
-        if not camera["indoors"]:
-            return
-        renew_tiles(buffers, camera)
-        coarse = CoarseDepth(buffers.tiles.copy(), buffers.blocks.copy())
-        known = _CachedView((camera.tobytes(), scene.version), light, coarse, [p.copy() for p in pictures])
-        if not known.is_disturbed(scene, camera):
-            self._known[k] = known
+        if not stands and not camera["indoors"]:
+            return None
+        self._known[k] = Background((of, scene.version))
+        return self._known[k]
+
+
+@dataclass
+class Background:
+    """What a camera sees of all that never moves.
+
+    Attributes
+    ----------
+    of
+        Camera and version of the scene.
+    """
+
+    of: tuple[bytes, int]
+    _parts: _Parts | None = None
+    _light: Light | None = None
+    _rgb: NDArray[np.uint8] = field(default_factory=lambda: np.zeros(0, np.uint8))
+
+    def is_all(self, scene: Scene, camera: Record, light: Light) -> bool:
+        """Return whether it is the whole picture: in a room, if nothing that moves can be noticed."""
+        if self._parts is None or not self._is_lit(camera, light) or not camera["indoors"]:
+            return False
+        return not is_disturbed(scene.arrays, camera, light.uniforms, self._parts.coarse, shadow_reach(camera))
+
+    def copy_to(self, rgb: NDArray[np.uint8], depth: NDArray[np.float32], segmentation: NDArray[np.int32]) -> None:
+        """Copy the pictures, kinds that are not asked for being empty."""
+        assert self._parts is not None
+        rgb[...] = self._rgb
+        if depth.size:
+            write_depth(self._parts.keys, depth)
+        if segmentation.size:
+            segmentation[...] = self._parts.segmentation
+
+    def draw(self, scene: Scene, camera: Record, buffers: Buffers) -> int:
+        """Do as `vico.render.visibility.draw.draw`, what never moves being drawn only once."""
+        if self._parts is None:
+            self._parts = _drawn_parts(scene, camera, buffers)
+        else:
+            self._parts.copy_to(buffers)
+        drawn: int = draw_moving(scene.arrays, camera, buffers, self._parts.drawn)
+        return drawn
+
+    def shade(
+        self, scene: Scene, camera: Record, light: Light, buffers: Buffers, drawn: int, rgb: NDArray[np.uint8]
+    ) -> None:
+        """Colour what `draw` left, only where it is not what never moves in its own light."""
+        assert self._parts is not None
+        keys = self._parts.keys
+        if not self._is_lit(camera, light) or self._rgb.shape != rgb.shape:
+            self._rgb = np.empty_like(rgb)
+            alone = buffers._replace(keys=keys)
+            shade(scene.arrays, camera, light, alone, self._parts.drawn, False, False, self._rgb)
+            self._light = light
+        rgb[...] = self._rgb
+        moving = cast_moving(scene.arrays, camera, light.uniforms, buffers, shadow_reach(camera), new_caster())
+        mark_changed(buffers, keys, moving)
+        shade(scene.arrays, camera, light, buffers, drawn, moving, True, rgb)
+
+    def _is_lit(self, camera: Record, light: Light) -> bool:
+        """Return whether the colours are those of this light; rooms have lamps of their own, always the same."""
+        return self._light is light or (self._light is not None and bool(camera["indoors"]))
 
 
 @dataclass(frozen=True)
-class _CachedView:
-    """Pictures, what they were taken of, and the coarse depths of what is seen."""
+class _Parts:
+    """A picture without what moves: parts of `Buffers` after `draw_static`, how many items were drawn, its entities."""
 
-    of: tuple[bytes, int]
-    light: Light
+    drawn: int
+    keys: NDArray[np.uint64]
+    codes: NDArray[np.int32]
+    base: NDArray[np.int64]
+    first_triangle: NDArray[np.int32]
     coarse: CoarseDepth
-    pictures: list[NDArray[Any]]
+    segmentation: NDArray[np.int32]
 
-    def is_disturbed(self, scene: Scene, camera: Record) -> bool:
-        return is_disturbed(scene.arrays, camera, self.light.uniforms, self.coarse, shadow_reach(camera))
+    def copy_to(self, buffers: Buffers) -> None:
+        buffers.keys[:] = self.keys
+        buffers.drawn[: self.drawn] = self.codes
+        buffers.base[: self.drawn + 1] = self.base
+        buffers.first_triangle[: self.drawn] = self.first_triangle
+
+
+def _drawn_parts(scene: Scene, camera: Record, buffers: Buffers) -> _Parts:
+    """Draw what never moves into `buffers`; return a copy of it."""
+    drawn: int = draw_static(scene.arrays, camera, buffers)
+    renew_tiles(buffers, camera)
+    segmentation = np.empty((int(camera["height"]), int(camera["width"])), np.int32)
+    write_entities(scene.arrays, buffers, drawn, segmentation)
+    return _Parts(
+        drawn,
+        buffers.keys.copy(),
+        buffers.drawn[:drawn].copy(),
+        buffers.base[: drawn + 1].copy(),
+        buffers.first_triangle[:drawn].copy(),
+        CoarseDepth(buffers.tiles.copy(), buffers.blocks.copy()),
+        segmentation,
+    )
 
 
 def shadow_reach(camera: Record) -> float:

@@ -127,13 +127,15 @@ class _TextureWindow(NamedTuple):
 
 
 @kernel
-def shade(scene: Any, camera: Any, light: Any, buffers: Any, drawn: int, any_moving: bool, out: Any) -> None:
-    """Colour every pixel of one camera's picture.
+def shade(
+    scene: Any, camera: Any, light: Any, buffers: Any, drawn: int, any_moving: bool, partly: bool, out: Any
+) -> None:
+    """Colour every pixel of one camera's picture, or `partly` the runs of pixels that `mark_changed` touched.
 
     `drawn` is what `draw` returned, `any_moving` what `cast_moving` did.
     """
     # Everything is looked up once, out here: taking an array out of a tuple costs as much as shading a pixel.
-    keys, setups, known = buffers.keys, buffers.setup, buffers.setup_number
+    keys, setups, known, changed = buffers.keys, buffers.setup, buffers.setup_number, buffers.changed
     real, whole, sky_real, sky_whole = buffers.real, buffers.whole, buffers.sky_real, buffers.sky_whole
     queue, sky_queue = PixelQueue(real, whole), PixelQueue(sky_real, sky_whole)
     moving = MovingShadows(buffers.sun, buffers.contact, any_moving)
@@ -150,26 +152,24 @@ def shade(scene: Any, camera: Any, light: Any, buffers: Any, drawn: int, any_mov
     known[:] = 0
     queued, sky_queued, taps = 0, 0, 0
     for row in range(camera.height):
-        left = _left_ray(camera, row)
         offset = row * width
-        column = 0
+        left = _left_ray(camera, row)
+        column = width if partly and not changed[offset : offset + width].any() else 0
         while column < width:
             number = triangle_number(keys[offset + column])
             end = _end_of_run(keys, offset, column, width)
+            # With its neighbours: if one of them is new, the run may have been a longer one.
+            if partly and not changed[offset + max(column - 1, 0) : offset + min(end + 1, width)].any():
+                column = end
+                continue
             if number == 0 and indoors:
                 _write_background(flat_out, offset + column, offset + end)
                 column = end
                 continue
             if number == 0:
-                while column < end:
-                    ray = _ray_at(left, camera, column)
-                    _queue_sky(sky_real, sky_whole, sky_queued & _POSITION, ray, eye, offset + column)
-                    count = min(end - column, RUN)
-                    sky_queued += count
-                    column += count
-                    if sky_queued > QUEUE - RUN:
-                        finish_sky(sky, sky_queue, sky_queued, flat_out)
-                        sky_queued = 0
+                run = (offset, column, end)
+                sky_queued = _queue_sky_run(sky, sky_queue, sky_queued, left, camera, eye, run, flat_out)
+                column = end
                 continue
             slot = number & np.uint32(SETUPS - 1)
             setup = setups[slot]
@@ -283,6 +283,31 @@ def _queue_sky(real: Any, whole: Any, at: int, ray: Any, eye: Any, pixel: int) -
         real[V + at + i] = min(max(v, _ZERO), rim)
     for i in range(RUN):
         whole[PIXEL + at + i] = pixel + i
+
+
+@inlined
+def _queue_sky_run(
+    sky: Any,
+    queue: Any,
+    queued: int,
+    left: Any,
+    camera: Any,
+    eye: Any,
+    run: Any,
+    out: Any,
+) -> int:
+    """Lay pixels that show the sky into their queue, which is worked off when it is full; return how many it holds."""
+    offset, column, end = run
+    while column < end:
+        ray = _ray_at(left, camera, column)
+        _queue_sky(queue.real, queue.whole, queued & _POSITION, ray, eye, offset + column)
+        count = min(end - column, RUN)
+        queued += count
+        column += count
+        if queued > QUEUE - RUN:
+            finish_sky(sky, queue, queued, out)
+            queued = 0
+    return queued
 
 
 @inlined

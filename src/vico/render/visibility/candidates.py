@@ -26,18 +26,25 @@ _BUCKETS_PER_ROOT_METRE = 20.0
 
 
 @kernel
-def list_candidates(scene: Any, camera: Any, buffers: Any) -> int:
-    """Write what may be in view to `buffers.ordered`, nearest first, and return how many entries there are.
+def list_static(scene: Any, camera: Any, buffers: Any) -> int:
+    """Write what may be in view of what never moves to `buffers.ordered`, nearest first; return how many entries.
 
     Entries count clusters, groups of static instances, instances that move, avatars, in this order. What is in a group
     is looked at when its turn comes: most groups are hidden by then.
     """
     set_world_view(camera, buffers.model_view)
     found = _list_clusters(scene, camera, buffers)
-    first = len(scene.cluster_where)
-    found = _list_groups(scene, camera, buffers, first, found)
-    first += len(scene.instances.groups.where)
-    found = _list_moving(scene, camera, buffers, first, found)
+    found = _list_groups(scene, camera, buffers, len(scene.cluster_where), found)
+    _sort_by_bucket(buffers.candidate, buffers.bucket, buffers.ordered, found)
+    return found
+
+
+@kernel
+def list_moving(scene: Any, camera: Any, buffers: Any) -> int:
+    """Do as `list_static` for what moves."""
+    set_world_view(camera, buffers.model_view)
+    first = len(scene.cluster_where) + len(scene.instances.groups.where)
+    found = _list_instances(scene, camera, buffers, first, 0)
     first += scene.counts.instances - scene.counts.static_instances
     found = _list_avatars(scene, camera, buffers, first, found)
     _sort_by_bucket(buffers.candidate, buffers.bucket, buffers.ordered, found)
@@ -107,7 +114,7 @@ def _list_groups(scene: Any, camera: Any, buffers: Any, first: int, found: int) 
 
 
 @inlined
-def _list_moving(scene: Any, camera: Any, buffers: Any, first: int, found: int) -> int:
+def _list_instances(scene: Any, camera: Any, buffers: Any, first: int, found: int) -> int:
     start, end = scene.counts.static_instances, scene.counts.instances
     spheres, owners, where = scene.instances.sphere, scene.instances.entity, scene.instances.where
     candidate, bucket = buffers.candidate, buffers.bucket

@@ -1,7 +1,8 @@
 """The visibility pass: which triangle is seen in which pixel, and how near it is.
 
-Clusters and instances are drawn front to back into a buffer of keys (see `vico.render.visibility.fill`); a coarse
-buffer of the farthest depth in each 8 x 8 tile tells which of the later ones are hidden as a whole.
+What never moves is drawn first, then what moves, so that the former can be kept. Clusters and instances are drawn front
+to back into a buffer of keys (see `vico.render.visibility.fill`); a coarse buffer of the farthest depth in each 8 x 8
+tile tells which of the later ones are hidden as a whole.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from vico.render.arrays import INVERSE_DEPTH, SCREEN_X, SCREEN_Y, VIEW_X, VIEW_Y, VIEW_Z
 from vico.render.compiled import inlined, kernel
 from vico.render.records import CUTOUT, DOUBLE_SIDED
-from vico.render.visibility.candidates import list_candidates, members
+from vico.render.visibility.candidates import list_moving, list_static, members
 from vico.render.visibility.culling import (
     in_view,
     is_hidden,
@@ -49,8 +50,29 @@ def draw(scene: Any, camera: Any, buffers: Any) -> int:
 
     `buffers.drawn` lists them, `buffers.base` the first number of each one's triangles (from 1 up; the end follows).
     """
-    _clear(scene, camera, buffers)
-    found = list_candidates(scene, camera, buffers)
+    return int(draw_moving(scene, camera, buffers, draw_static(scene, camera, buffers)))
+
+
+@kernel
+def draw_static(scene: Any, camera: Any, buffers: Any) -> int:
+    """Draw what never moves, and nothing else; see `draw`."""
+    _clear(camera, buffers)
+    return int(_draw_listed(scene, camera, buffers, list_static(scene, camera, buffers), 0))
+
+
+@kernel
+def draw_moving(scene: Any, camera: Any, buffers: Any, drawn: int) -> int:
+    """Add what moves to a picture in which `drawn` items are that never do; see `draw`."""
+    buffers.slot[len(scene.cluster_where) + scene.counts.static_instances :] = -1
+    found = list_moving(scene, camera, buffers)
+    if found:
+        renew_tiles(buffers, camera)
+    return int(_draw_listed(scene, camera, buffers, found, drawn))
+
+
+@kernel
+def _draw_listed(scene: Any, camera: Any, buffers: Any, found: int, drawn: int) -> int:
+    """Draw the first `found` entries of `buffers.ordered` behind the `drawn` items that are there; return how many."""
     clusters, groups = len(scene.cluster_where), len(scene.instances.groups.low)
     static_instances = scene.counts.static_instances
     owners, places, spheres = scene.instances.entity, scene.instances.where, scene.instances.sphere
@@ -60,7 +82,7 @@ def draw(scene: Any, camera: Any, buffers: Any) -> int:
     drawn_codes, base, firsts, slots = buffers.drawn, buffers.base, buffers.first_triangle, buffers.slot
     # Larger pictures take longer to look over.
     patience = max(1, camera.width * camera.height // _PIXELS)
-    drawn, number, since, asked = 0, 1, 0, 0
+    number, since, asked = base[drawn], 0, 0
     for k in range(found):
         entry = ordered[k]
         # Few triangles may hide much (a room's walls), so questions asked count, too.
@@ -99,13 +121,13 @@ def draw(scene: Any, camera: Any, buffers: Any) -> int:
 
 
 @inlined
-def _clear(scene: Any, camera: Any, buffers: Any) -> None:
-    """Nothing is seen before the far plane, and nothing that moves is drawn yet."""
+def _clear(camera: Any, buffers: Any) -> None:
+    """Nothing is drawn yet before the far plane."""
     empty = np.uint64(np.float32(1.0 / camera.far).view(np.uint32)) << np.uint64(32)
     buffers.keys[:] = empty
     buffers.tiles[:] = np.uint32(empty >> np.uint64(32))
     buffers.blocks[:] = np.uint32(empty >> np.uint64(32))
-    buffers.slot[len(scene.cluster_where) + scene.counts.static_instances :] = -1
+    buffers.base[0] = 1
 
 
 @inlined
@@ -297,6 +319,21 @@ def item_of(base: Any, drawn: int, number: int) -> int:
         else:
             high = middle
     return low
+
+
+@kernel
+def mark_changed(buffers: Any, kept: Any, any_moving: bool) -> None:
+    """Mark in `buffers.changed` what shows something else than the keys `kept`, or lies in a moving thing's shadow.
+
+    `any_moving` is what `cast_moving` returned.
+    """
+    keys, sun, contact, changed = buffers.keys, buffers.sun, buffers.contact, buffers.changed
+    one = np.float32(1.0)
+    for i in range(len(changed)):
+        changed[i] = keys[i] != kept[i]
+    if any_moving:
+        for i in range(len(changed)):
+            changed[i] |= (sun[i] != one) | (contact[i] != one)
 
 
 @kernel
