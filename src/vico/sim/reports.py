@@ -20,8 +20,9 @@ def reports(state: SimulationState, check: OverlapCheck | None) -> dict[str, Any
     dict
         ``rescued``: how many vehicles were taken out of jams, and the first of them by name, place, time, how long
         they had stood and why; ``stuck``: the same of who gets nowhere now; ``reentered``: how often cars that had
-        left the map came back in; ``physics`` where there are robots: engine and frames; ``overlaps`` where they were
-        checked, see `vico.sim.overlaps.OverlapCheck`.
+        left the map came back in; ``buses`` where there are buses or bicycles: how late, see
+        `vico.sim.transit.TransitSystem.lateness`; ``physics`` where there are robots: engine and frames; ``overlaps``
+        where they were checked, see `vico.sim.overlaps.OverlapCheck`.
     """
     traffic = state.traffic
     rescued, stuck = (traffic.jams.rescued(), traffic.stuck()) if traffic is not None else ([], [])
@@ -34,6 +35,8 @@ def reports(state: SimulationState, check: OverlapCheck | None) -> dict[str, Any
         "stuck": {"count": len(stuck), "who": [_told(jam, state.second - now, state) for jam in stuck]},
         "reentered": traffic.reentered if traffic is not None else 0,
     }
+    if state.transit is not None:
+        found["buses"] = state.transit.lateness()
     if state.robots is not None:
         found["physics"] = state.robots.physics_record()
     return found if check is None else found | {"overlaps": check.record()}

@@ -15,7 +15,7 @@ from vico.sim.avatars import Avatars
 from vico.sim.base import SimulationBase
 from vico.sim.bodies import STEP_HEIGHT, TALLEST, Bodies, HasBodies, Subsystem
 from vico.sim.carrying import DeckPose, HasDecks
-from vico.sim.environment import Environment
+from vico.sim.environment import Conditions, Environment
 from vico.sim.events import Events
 from vico.sim.indoor import Indoor, near_door
 from vico.sim.periods import TICKS_PER_SECOND
@@ -63,6 +63,9 @@ class TrafficSystem(Subsystem, Protocol):
     @property
     def reentered(self) -> int:
         """How often cars that had left the map came back in."""
+
+    def set_conditions(self, conditions: Conditions) -> None:
+        """Have everybody drive and walk as it is outdoors now; told before every sub-step."""
 
     def stuck(self) -> list[Jam]:
         """Who gets nowhere now."""

@@ -55,6 +55,8 @@ def report_robots(state: SimulationState) -> None:
 
 def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _AllBodies, watch: StopWatch) -> int:
     """Advance all but robots by a sub-step; return how many avatars were stopped."""
+    if state.traffic is not None:
+        state.traffic.set_conditions(state.environment.conditions)
     _advance_subsystem(state.traffic, "traffic", bodies, watch)
     _advance_subsystem(state.transit, "transit", bodies, watch)
     gone = periods.since_begun(state.tick)[: len(state.people)]

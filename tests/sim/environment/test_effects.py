@@ -10,8 +10,10 @@ import pytest
 import toy_city
 from vico.envs import EnvSpec
 from vico.errors import InputError
+from vico.sim.actions import apply_actions
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
+from vico.sim.state import Vehicle
 
 FOG = {"weather": [{"at": "00:00", "kind": "fog", "visibility": 25.0}]}
 
@@ -55,6 +57,19 @@ def test_on_snow_a_step_gets_less_far_and_indoors_it_does_not() -> None:
         walked[weather] = float(np.linalg.norm((sim.state.people.position[0] - before[0])[:2]))
     assert walked["clear"] == pytest.approx(1.0, abs=0.02)
     assert walked["snow"] == pytest.approx(0.88, abs=0.02)
+
+
+def test_who_rides_a_bicycle_gets_less_far_on_ice_than_on_snow_and_than_on_dry_ground() -> None:
+    ridden = {}
+    for weather in ("clear", "snow", "freezing_rain"):
+        sim = simulation(weather=weather, date="2026-01-15", start=12 * 3600)
+        face_to_face(sim, 20.0)
+        sim.state.people.vehicle[0] = Vehicle.BIKE
+        apply_actions({sim.agents[0]: {"type": "move_forward", "distance": 3.0}}, {}, sim.state)
+        ridden[weather] = float(sim.state.people.move_left[0])
+    assert ridden == {
+        "clear": pytest.approx(3.0), "snow": pytest.approx(2.25), "freezing_rain": pytest.approx(1.8)
+    }  # fmt: skip
 
 
 def test_weather_changes_no_step_indoors() -> None:

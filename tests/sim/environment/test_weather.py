@@ -14,7 +14,7 @@ from vico.sim.environment import Environment, Sky, Weather, weather_kinds
 from vico.sim.environment.climate import usual_temperature
 from vico.sim.environment.effects import CLEAR_SIGHT
 from vico.sim.environment.forecast import Changing, Site, forecast_of
-from vico.sim.environment.ground import aged, cover, wetness
+from vico.sim.environment.ground import Ground, aged, cover, iciness, wetness
 
 HELSINKI = Site(60.17, 24.94, 172)
 JANUARY = Site(60.17, 24.94, 15)
@@ -110,34 +110,55 @@ def test_unknown_weather_is_refused_with_what_there_is() -> None:
 
 
 def test_rain_wets_the_ground_and_sun_dries_it() -> None:
-    water, snow = aged(0.0, 0.0, weather_kinds()["rain"].weather(12.0), 600.0)
-    assert wetness(water) == 1.0
+    ground = aged(Ground(), weather_kinds()["rain"].weather(12.0), 600.0)
+    assert wetness(ground.water) == 1.0
     for _ in range(6 * 8):
-        water, snow = aged(water, snow, weather_kinds()["clear"].weather(20.0), 600.0)
-    assert (water, snow) == (0.0, 0.0)
+        ground = aged(ground, weather_kinds()["clear"].weather(20.0), 600.0)
+    assert ground == Ground()
 
 
 def test_snow_lies_while_it_freezes_and_melts_into_water() -> None:
-    water, snow = 0.0, 0.0
+    ground = Ground()
     for _ in range(12):
-        water, snow = aged(water, snow, weather_kinds()["snow"].weather(-5.0), 600.0)
-    assert cover(snow) == 1.0
-    assert water == 0.0
-    water, after = aged(water, snow, weather_kinds()["clear"].weather(8.0), 3600.0)
-    assert after < snow
-    assert water > 0
+        ground = aged(ground, weather_kinds()["snow"].weather(-5.0), 600.0)
+    assert cover(ground.snow) == 1.0
+    assert ground.water == 0.0
+    after = aged(ground, weather_kinds()["clear"].weather(8.0), 3600.0)
+    assert after.snow < ground.snow
+    assert after.water > 0
+
+
+def test_wet_ground_freezes_in_a_cold_night_and_thaws() -> None:
+    ground = Ground(water=0.5)
+    for _ in range(12):
+        ground = aged(ground, weather_kinds()["clear"].weather(-4.0), 600.0)
+    assert iciness(ground.ice) == 1.0
+    assert ground.water + ground.ice == pytest.approx(0.5)
+    thawed = aged(ground, weather_kinds()["clear"].weather(6.0), 3600.0)
+    assert thawed.ice == 0.0 < thawed.water
+
+
+def test_rain_below_zero_freezes_where_it_falls() -> None:
+    glazed = aged(Ground(), weather_kinds()["freezing_rain"].weather(-3.0), 1800.0)
+    assert glazed.water == 0.0
+    assert iciness(glazed.ice) == 1.0
 
 
 def test_conditions_get_worse_with_weather_and_dark() -> None:
     fair, rain, snow, fog = (environment(kind).conditions for kind in ("fair", "rain", "snow", "fog"))
+    ice = environment("freezing_rain").conditions
     assert fair.sight == CLEAR_SIGHT
     assert fair.driving == 1.0
-    assert fair.friction > rain.friction > snow.friction
+    assert fair.friction > rain.friction > snow.friction > ice.friction
     assert fair.hard_braking == 8.0
     assert snow.hard_braking == pytest.approx(0.25 * 9.81)
-    assert fair.driving > rain.driving > snow.driving >= 0.6
+    assert ice.hard_braking == pytest.approx(0.1 * 9.81)
+    assert fair.driving > rain.driving > snow.driving >= 0.5
+    assert fair.time_gap == 1.0 < rain.time_gap < snow.time_gap < ice.time_gap
+    assert fair.traction > rain.traction > snow.traction > ice.traction
+    assert fair.cycling == 1.0 > rain.cycling > snow.cycling > ice.cycling
     assert fog.safe_speed < fair.safe_speed
-    assert snow.walking < fair.walking == 1.0
+    assert ice.walking < snow.walking < fair.walking == 1.0
     thick = environment({"weather": [{"at": "08:00", "kind": "fog", "visibility": 30.0}]}).conditions
     assert thick.sight == pytest.approx(12.0)
     # Whoever drives at the safe speed stops within what he sees: one second and full braking.

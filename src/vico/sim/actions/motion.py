@@ -28,9 +28,13 @@ def check_move_forward(values: Values, i: int, state: SimulationState) -> Refusa
 
 
 def move_forward(values: Values, i: int, state: SimulationState) -> None:
-    """Walk or ride straight ahead over the coming second; on snow one gets less far."""
+    """Walk or ride straight ahead over the coming second; on snow and ice one gets less far."""
     p = state.people
-    gets_on = state.environment.conditions.walking if p.room[i] < 0 else 1.0
+    outdoors = state.environment.conditions
+    if p.room[i] >= 0:
+        gets_on = 1.0
+    else:
+        gets_on = outdoors.cycling if p.vehicle[i] == Vehicle.BIKE else outdoors.walking
     p.move_left[i] = values["distance"] * gets_on
     p.move_speed[i] = values["distance"] * gets_on
     p.pitch[i] = LEVEL_GAZE

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vico.errors import InputError
 from vico.sim.environment.effects import Conditions, conditions
 from vico.sim.environment.forecast import Forecast, Site, forecast_of
-from vico.sim.environment.ground import aged, cover, settled, wetness
+from vico.sim.environment.ground import Ground, aged, cover, iciness, settled, wetness
 from vico.sim.environment.sky import Sky
 from vico.sim.environment.weather import NAMES, Weather, blended, kind_of_weather
 
@@ -41,7 +41,7 @@ class Environment:
         # When a change that was called for begins and ends, and the weather before and after it; none: never.
         self._change = np.full(2, np.inf)
         self._before_after = np.zeros((2, len(NAMES)))
-        self._ground = settled(Weather.of(self._forecast.at(second)))
+        self._ground = np.array(settled(Weather.of(self._forecast.at(second))))
         self._lamps = np.ones(1)
         self._second = np.array([second])
 
@@ -66,8 +66,7 @@ class Environment:
         before = int(self._second[0])
         self._second += seconds
         for _ in range(int(self._second[0]) // _AGES_EVERY - before // _AGES_EVERY):
-            water, snow = self._ground.tolist()
-            self._ground[:] = aged(water, snow, self.weather, _AGES_EVERY)
+            self._ground[:] = aged(Ground(*self._ground.tolist()), self.weather, _AGES_EVERY)
         self._forget()
 
     # What it is like.
@@ -93,6 +92,11 @@ class Environment:
         return cover(float(self._ground[1]))
 
     @property
+    def ice(self) -> float:
+        """Share of open ground under ice, 0..1."""
+        return iciness(float(self._ground[2]))
+
+    @property
     def lamps(self) -> float:
         """Share of the lamps that are lit when it is dark, 0..1."""
         return float(self._lamps[0])
@@ -112,6 +116,7 @@ class Environment:
             visibility=weather.visibility,
             wet=self.wet,
             cover=self.snow_cover,
+            ice=self.ice,
             dark=self.dark,
             lamps=self.lamps,
         )
@@ -122,6 +127,7 @@ class Environment:
             **self.weather.record(),
             "wet": round(self.wet, 3),
             "snow_cover": round(self.snow_cover, 3),
+            "ice": round(self.ice, 3),
             "dark": round(self.dark, 3),
         }
 

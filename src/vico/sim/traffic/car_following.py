@@ -13,10 +13,9 @@ from vico.sim.traffic.path import footprint
 from vico.sim.traffic.route import NEVER, is_lane_of_stop
 from vico.sim.traffic.state import NONE
 
-COMFORTABLE_BRAKING = 2.0  # m/s^2
+COMFORTABLE_BRAKING = 2.0  # m/s^2 on dry ground; what vehicles do now is `vehicle.braking`
+TIME_GAP = 1.2  # s on dry ground; now: `vehicle.time_gap`
 
-_HARD_BRAKING = 8.0  # m/s^2
-_HEADWAY = 1.2  # s
 _JAM_GAP = 1.8  # m kept behind a leader that stands
 _LEAST_GAP = 0.3  # no step leaves less to the leader, m
 _BEFORE_JUNCTION, _BEFORE_LANE_END = 0.6, 1.0  # m kept before a junction that is not granted, and a path's end
@@ -25,15 +24,15 @@ _LEAST_SPEED = 0.02  # slower is standing, m/s
 
 
 @compiled
-def look_ahead(speed):  # type: ignore[no-untyped-def]
-    """Return how far ahead a vehicle minds what is there: braking distance, headway and a little more, metres."""
-    return speed * speed / (2 * COMFORTABLE_BRAKING) + speed * _HEADWAY + 8.0
+def look_ahead(vehicle):  # type: ignore[no-untyped-def]
+    """Return how far ahead a vehicle minds what is there: braking distance, time gap and a little more, metres."""
+    return vehicle.speed * vehicle.speed / (2 * vehicle.braking) + vehicle.speed * vehicle.time_gap + 8.0
 
 
 @compiled
-def braking_distance(speed):  # type: ignore[no-untyped-def]
+def braking_distance(vehicle):  # type: ignore[no-untyped-def]
     """Return the metres a vehicle needs to stop comfortably, and a little more."""
-    return speed * speed / (2 * COMFORTABLE_BRAKING) + 8.0
+    return vehicle.speed * vehicle.speed / (2 * vehicle.braking) + 8.0
 
 
 @compiled
@@ -84,14 +83,14 @@ def stop_and_speed_limit(net, vehicle, look, stop_distance, wanted):  # type: ig
             stop = max(ahead - _BEFORE_JUNCTION, 0.0)
             break
         limit = min(net.lanes[lane].speed * vehicle.speed_factor, vehicle.target_speed if is_bus else wanted)
-        limit_now = min(limit_now, np.sqrt(limit * limit + 2 * COMFORTABLE_BRAKING * max(ahead, 0.0)))
+        limit_now = min(limit_now, np.sqrt(limit * limit + 2 * vehicle.braking * max(ahead, 0.0)))
         if is_lane_of_stop(net, vehicle, k + 1):
             stop = ahead + vehicle.stop_offset
         ahead += net.lanes[lane].length
     if is_bus and stop >= NEVER and ahead < look:
         stop = max(ahead - _BEFORE_LANE_END, 0.0)  # the route goes on in the lane beside: wait for room to change
     if stop < NEVER:
-        limit_now = min(limit_now, np.sqrt(2 * COMFORTABLE_BRAKING * stop))
+        limit_now = min(limit_now, np.sqrt(2 * vehicle.braking * stop))
     return stop, limit_now
 
 
@@ -105,31 +104,34 @@ def leader_speed(shapes, leader, view, front):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def idm_acceleration(speed, desired, greatest, gap, leading):  # type: ignore[no-untyped-def]
+def idm_acceleration(vehicle, desired, gap, leading):  # type: ignore[no-untyped-def]
     """Return the Intelligent Driver Model's acceleration, m/s^2.
 
     Parameters
     ----------
-    speed, desired
-        The vehicle's own and the one it would like, m/s.
-    greatest
-        Its greatest acceleration, m/s^2.
+    desired
+        The speed the vehicle would like, m/s.
     gap, leading
         Metres to the leader (`NO_GAP` for none) and its speed, m/s.
     """
+    speed, greatest = vehicle.speed, vehicle.acceleration
     rate = greatest * (1.0 - (speed / max(desired, 0.1)) ** 4)
     if gap < NO_GAP:
-        wish = speed * _HEADWAY + speed * (speed - leading) / (2 * np.sqrt(greatest * COMFORTABLE_BRAKING))
+        wish = speed * vehicle.time_gap + speed * (speed - leading) / (2 * np.sqrt(greatest * vehicle.braking))
         rate -= greatest * ((_JAM_GAP + max(wish, 0.0)) / max(gap, 0.05)) ** 2
     return rate
 
 
 @compiled
-def next_speed(speed, rate, limit, gap, stop, dt):  # type: ignore[no-untyped-def]
-    """Return the speed after `dt` seconds: the model's, within the limit, short of the leader and of the stop."""
-    new = max(speed + max(rate, -_HARD_BRAKING) * dt, 0.0)
+def next_speed(vehicle, rate, limit, gap, stop, dt):  # type: ignore[no-untyped-def]
+    """Return the speed after `dt` seconds: the model's, within the limit, short of the leader and of the stop.
+
+    The last two hold even where no tyre brakes so hard: vehicles never touch.
+    """
+    speed, hardest = vehicle.speed, vehicle.hard_braking
+    new = max(speed + max(rate, -hardest) * dt, 0.0)
     if new > limit:
-        new = max(limit, speed - _HARD_BRAKING * dt)
+        new = max(limit, speed - hardest * dt)
     if gap < NO_GAP:
         new = min(new, max(gap - _LEAST_GAP, 0.0) / dt)
     if stop < NEVER:

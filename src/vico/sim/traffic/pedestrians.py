@@ -255,7 +255,7 @@ def may_step_to(tx, ty, x, y, shapes, near):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _walk(paths, walker, shapes, b, near, is_waiting, dt):  # type: ignore[no-untyped-def]
+def _walk(paths, walker, shapes, b, near, is_waiting, pace, dt):  # type: ignore[no-untyped-def]
     """Take a pedestrian, body b, a step towards its point; return the metres walked."""
     x, y = shapes.x[b], shapes.y[b]
     point = follow_point(paths, walker)
@@ -265,7 +265,7 @@ def _walk(paths, walker, shapes, b, near, is_waiting, dt):  # type: ignore[no-un
         return 0.0
     is_jammed = walker.jammed_time > _JAMMED_AFTER
     heading, free = best_heading(x, y, point, paths.walkways[walker.walkway], shapes, near, is_jammed)
-    speed = walker.preferred_speed * min(1.0, free / 0.6)
+    speed = walker.preferred_speed * pace * min(1.0, free / 0.6)
     step = min(speed * dt, away if is_waiting else speed * dt)
     tx, ty = x + np.cos(heading) * step, y + np.sin(heading) * step
     if step <= 0.004 or not may_step_to(tx, ty, x, y, shapes, near):
@@ -303,8 +303,11 @@ def asked_to_go(fleet, first, n):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, dt):  # type: ignore[no-untyped-def]
-    """Advance all pedestrians by `dt` seconds; their bodies follow those of the vehicles in `shapes`, and in `grid`."""
+def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, pace, dt):  # type: ignore[no-untyped-def]
+    """Advance all pedestrians by `dt` seconds; their bodies follow those of the vehicles in `shapes`, and in `grid`.
+
+    They walk at `pace` times the speed each prefers.
+    """
     first = len(fleet)
     asked = asked_to_go(fleet, first, len(pedestrians))
     buffer = np.empty(len(shapes.x), np.int64)
@@ -321,7 +324,7 @@ def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, dt):
             walker.leaving_crossing = NONE
         if asked[i] and walker.stuck_time > 2.5:
             _turn_round(paths, walker, x, y)  # it waits for us, and is in our way
-        step = _walk(paths, walker, shapes, b, near, is_waiting, dt)
+        step = _walk(paths, walker, shapes, b, near, is_waiting, pace, dt)
         if step == 0.0:
             shapes.vx[b] = shapes.vy[b] = 0.0
         walker.speed = step / dt

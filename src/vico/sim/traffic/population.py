@@ -13,7 +13,9 @@ from vico.assets.vehicles import CAR_KINDS, vehicle_prototypes, vehicle_size
 from vico.errors import InputError
 from vico.seeds import rng
 from vico.sim.bodies import BUS, CAR, PEDESTRIAN, STEP_HEIGHT, Bodies, Drawn
+from vico.sim.environment import Conditions
 from vico.sim.neighbours import neighbour_grid
+from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
 from vico.sim.traffic.jams import STUCK_AFTER, Jam, JamLog, entity_before
 from vico.sim.traffic.junctions import mark_busy_crossings
 from vico.sim.traffic.network import TrafficNetwork
@@ -45,7 +47,7 @@ _DRIFT = 2.0 * TOP_SPEED  # nobody moves faster, m/s
 _TRIES = 400  # places tried for a car or pedestrian
 #: Share of each kind of car.
 _SHARE = {"hatchback": 0.3, "sedan": 0.27, "suv": 0.23, "van": 0.12, "taxi": 0.08}
-_CAR_ACCELERATION, _BUS_ACCELERATION = 1.6, 1.1  # m/s^2
+_CAR_ACCELERATION, _BUS_ACCELERATION, _HARD_BRAKING = 1.6, 1.1, 8.0  # m/s^2, on dry ground
 _CAR_SPEED_FACTORS, _BUS_SPEED_FACTOR = (0.85, 1.05), 0.95
 
 
@@ -97,7 +99,12 @@ class Traffic:
         self.cars, self.buses, self.pedestrians = cars, len(buses.buses), pedestrians
         self.vehicles = self.cars + self.buses
         self.first_entity = first_entity
-        self._net, self._paths = network.with_routes(buses.routes), network.walked
+        net = network.with_routes(buses.routes)
+        # A copy of one's own: how fast lanes are driven follows the weather of the run.
+        self._net, self._paths = net._replace(lanes=net.lanes.copy()), network.walked
+        self._speed_limits = net.lanes["speed"].copy()
+        self._conditions: Conditions | None = None
+        self._walking_pace = 1.0
         self._prototypes = [f"{kind}_{colour}" for kind, colours in CAR_KINDS.items() for colour in colours] + ["bus"]
         self._vehicles = new_fleet(self.vehicles, seed)
         self.fleet = self._vehicles.view(np.recarray)
@@ -130,6 +137,8 @@ class Traffic:
         fleet, car, bus = self.fleet, slice(0, self.cars), slice(self.cars, None)
         fleet.length, fleet.half_width, fleet.overhang, fleet.wheelbase = length, width / 2, overhang, wheelbase
         fleet.acceleration[car], fleet.acceleration[bus] = _CAR_ACCELERATION, _BUS_ACCELERATION
+        self._dry_acceleration = fleet.acceleration.copy()
+        fleet.braking, fleet.hard_braking, fleet.time_gap = COMFORTABLE_BRAKING, _HARD_BRAKING, TIME_GAP
         fleet.speed_factor[car] = random.uniform(*_CAR_SPEED_FACTORS, self.cars)
         fleet.speed_factor[bus] = _BUS_SPEED_FACTOR
         fleet.route[car], fleet.route[bus] = NONE, buses.buses
@@ -238,6 +247,19 @@ class Traffic:
             velocity=np.column_stack([self.shapes.vx, self.shapes.vy]),
         )
 
+    def set_conditions(self, conditions: Conditions) -> None:
+        """Have everybody drive and walk as it is outdoors now: part of the environment's state, not of this one's."""
+        if conditions == self._conditions:
+            return
+        self._conditions = conditions
+        net, fleet = self._net, self.fleet
+        np.minimum(self._speed_limits * conditions.driving, conditions.safe_speed, out=net.lanes["speed"])
+        np.minimum(self._dry_acceleration, conditions.traction, out=fleet.acceleration)
+        fleet.braking = COMFORTABLE_BRAKING * conditions.braking
+        fleet.hard_braking = conditions.hard_braking
+        fleet.time_gap = TIME_GAP * conditions.time_gap
+        self._walking_pace = conditions.walking
+
     def advance(self, dt: float, obstacles: Bodies) -> None:
         """Advance everybody by `dt` seconds; nobody touches anybody, `obstacles` (all other bodies) among them."""
         mine, others = self.shapes, shapes_of(obstacles, self.height)
@@ -246,7 +268,7 @@ class Traffic:
         mark_busy_crossings(net, fleet, junctions)
         widest = float(np.max(everybody.half_length + everybody.half_width, initial=0.0))
         grid = neighbour_grid(everybody.x, everybody.y, _CELL, widest + _DRIFT * dt)
-        advance_pedestrians(self._paths, self._walkers, junctions, fleet, everybody, grid, dt)
+        advance_pedestrians(self._paths, self._walkers, junctions, fleet, everybody, grid, self._walking_pace, dt)
         junctions.vehicle_wait[:] = 0.0
         count_per_street(net, fleet, self._street_load)
         advance_vehicles(net, fleet, junctions, everybody, grid, self._street_load, dt)

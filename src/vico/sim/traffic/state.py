@@ -52,14 +52,17 @@ LANE = np.dtype(
     align=True,
 )
 
-#: What does not change about a vehicle.
+#: What does not change about a vehicle, or follows from the weather.
 VEHICLE_PARAMETERS: list[tuple[Any, ...]] = [
     ("index", _I),  # its row in the fleet, and its body in `Shapes`
     ("length", _F),  # of its outline, m
     ("half_width", _F),  # of its outline, m
     ("overhang", _F),  # from its front to the front axle, m
     ("wheelbase", _F),  # between its axles, m
-    ("acceleration", _F),  # greatest, m/s^2
+    ("acceleration", _F),  # greatest, m/s^2; this and the next three follow the weather
+    ("braking", _F),  # that its driver likes, m/s^2
+    ("hard_braking", _F),  # the most its tyres can do, m/s^2
+    ("time_gap", _F),  # that its driver keeps behind another vehicle, s
     ("speed_factor", _F),  # share of the speed limit it drives at
     ("route", _I),  # bus route it follows, NONE for cars
 ]
@@ -131,7 +134,9 @@ PEDESTRIAN_RECORD = np.dtype(
 
 
 class LaneNetwork(NamedTuple):
-    """The lanes vehicles drive, in the order of `LaneGraph`, and the routes of the buses; never changes.
+    """The lanes vehicles drive, in the order of `LaneGraph`, and the routes of the buses.
+
+    Only the lanes' speeds change, in the copy that each `Traffic` has: they follow the weather.
 
     Attributes
     ----------

@@ -60,7 +60,8 @@ from vico.sim.traffic.random_stream import next_random
 from vico.sim.traffic.route import advance_lane, plan_lanes
 from vico.sim.traffic.state import NONE
 
-STANDING = 0.1  # slower is standing, m/s
+STANDING = 0.1  # slower is standing, m/s ...
+_STARTED = 0.95  # ... where a vehicle gains so much in a step: slower than this share of what it can gain
 
 _REVERSE = 0.6  # m/s
 _BLOCKER_GAP = 3.0  # m within which a leader is what a standing vehicle stands before
@@ -90,14 +91,14 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
     for v in range(len(fleet)):
         vehicle = fleet[v]
         lane, speed, is_bus = vehicle.lane, vehicle.speed, vehicle.route >= 0
-        look = look_ahead(speed)
+        look = look_ahead(vehicle)
         path_ends = plan_lanes(net, vehicle, street_load, look + vehicle.length + 12.0)
         if hesitates(net, vehicle):
             vehicle.granted_count = 0
             release_junctions(net, junctions, vehicle)
 
         stop_distance = distance_to_stop(vehicle)
-        request = next_junction_request(net, vehicle, stop_distance, braking_distance(speed), path_ends)
+        request = next_junction_request(net, vehicle, stop_distance, braking_distance(vehicle), path_ends)
         view = _look_around(net, vehicle, request, (path_buffer, buffers[0]), beyond)
         gap, leader = find_leader(view, vehicle.offset, look, buffers[1])
         # Who is behind another vehicle does not ask: it would hold the junction that the other one needs.
@@ -114,8 +115,8 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         stop, limit = stop_and_speed_limit(net, vehicle, look, stop_distance, wanted)
         gap, leader = mind_only_before(stop, gap, leader)
         leading = leader_speed(shapes, leader, view, vehicle.offset + gap)
-        rate = idm_acceleration(speed, wanted, vehicle.acceleration, gap, leading)
-        move = next_speed(speed, rate, limit, gap, stop, dt) * dt
+        rate = idm_acceleration(vehicle, wanted, gap, leading)
+        move = next_speed(vehicle, rate, limit, gap, stop, dt) * dt
         move, gap, leader = _move_without_contact(net, vehicle, view, move, gap, leader)
         vehicle.speed = move / dt
         if backs_up[v] and move == 0.0:
@@ -126,12 +127,13 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         else:
             shapes.vx[v] = shapes.vy[v] = 0.0
 
-        vehicle.blocker = leader if gap < _BLOCKER_GAP and vehicle.speed < STANDING else NONE
+        is_standing = vehicle.speed < _standing_speed(vehicle, dt)
+        vehicle.blocker = leader if gap < _BLOCKER_GAP and is_standing else NONE
         release_junctions(net, junctions, vehicle)
         vehicle.time_since_lane_change += dt
-        vehicle.stopped_time = vehicle.stopped_time + dt if vehicle.speed < STANDING else 0.0
+        vehicle.stopped_time = vehicle.stopped_time + dt if is_standing else 0.0
         if is_bus:
-            _arrive_at_stop(vehicle, stop_distance)
+            _arrive_at_stop(vehicle, stop_distance, is_standing)
         elif is_refused and _gives_up_waiting(vehicle, dt):
             vehicle.planned_count = vehicle.granted_count
 
@@ -146,10 +148,19 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
 
 
 @compiled
+def _standing_speed(vehicle, dt):  # type: ignore[no-untyped-def]
+    """Return the speed below which a vehicle stands, m/s.
+
+    On snow and ice one that has just set off is so slow that it would be taken for one that does not get going.
+    """
+    return min(STANDING, _STARTED * vehicle.acceleration * dt)
+
+
+@compiled
 def _look_around(net, vehicle, request, scratch, beyond):  # type: ignore[no-untyped-def]
     """Return what a vehicle sees: bodies near it, and its path, farther where it may have to see beyond a junction."""
     path_buffer, body_buffer = scratch
-    look, length = look_ahead(vehicle.speed), vehicle.length
+    look, length = look_ahead(vehicle), vehicle.length
     far, reach = look, look + length + 6.0
     if request.planned_index >= 0:
         # Who asks has to see the place beyond the junction where it will stand.
@@ -205,9 +216,9 @@ def _move_vehicle(vehicle, shapes, view, move, dt):  # type: ignore[no-untyped-d
 
 
 @compiled
-def _arrive_at_stop(vehicle, stop_distance):  # type: ignore[no-untyped-def]
+def _arrive_at_stop(vehicle, stop_distance, is_standing):  # type: ignore[no-untyped-def]
     """Open a bus's doors where it stands at its stop."""
-    if stop_distance < 0.5 and vehicle.speed < STANDING:
+    if stop_distance < 0.5 and is_standing:
         vehicle.at_stop = True
     if vehicle.at_stop:
         vehicle.stopped_time = 0.0

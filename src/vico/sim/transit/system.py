@@ -54,6 +54,9 @@ class TransitSystem:
         ``(buses, CAPACITY)``; the caller's numbers.
     taken
         Departures each line has begun since the first one of the first day.
+    stops_served, late_total, late_most
+        How often each bus has come to a stop, the sum of the seconds by which it was late there (earlier counts as
+        less), and the most.
     bicycles
         The bicycles to rent, and who rides them.
     """
@@ -69,6 +72,8 @@ class TransitSystem:
         self.begun = np.array(plan.begun)
         self.riders = np.full((buses, CAPACITY), -1, np.int32)
         self.taken = np.array([next_departure(line, second) for line in transit.lines], np.int64)
+        self.stops_served = np.zeros(buses, np.int64)
+        self.late_total, self.late_most = np.zeros(buses), np.zeros(buses)
         self.bicycles = Bicycles(transit.bike_stations, traffic, first_entity=first_bike)
         for bus in range(buses):
             gone, line = second - self.begun[bus], plan.line_of_bus[bus]
@@ -98,9 +103,26 @@ class TransitSystem:
             if not fleet.at_stop[v]:
                 self.dwell[bus] = DWELL
                 continue
+            if self.dwell[bus] == DWELL:
+                self._note_arrival(bus)
             self.dwell[bus] = max(self.dwell[bus] - dt, 0.0)
             if self.may_leave_stop(bus):
                 self._leave_stop(bus)
+
+    def _note_arrival(self, bus: int) -> None:
+        late = float(self.clock[0]) - self._due(bus, int(self.stop[bus]))
+        self.stops_served[bus] += 1
+        self.late_total[bus] += late
+        self.late_most[bus] = max(self.late_most[bus], late)
+
+    def lateness(self) -> dict[str, float]:
+        """Return how often buses came to a stop, and the seconds they were late there: mean and most."""
+        arrivals = int(self.stops_served.sum())
+        return {
+            "arrivals": arrivals,
+            "late_mean": round(float(self.late_total.sum()) / max(arrivals, 1), 1),
+            "late_most": round(float(self.late_most.max(initial=0.0)), 1),
+        }
 
     def may_leave_stop(self, bus: int) -> bool:
         """Return whether a bus that stands at a stop leaves it now.
@@ -145,10 +167,13 @@ class TransitSystem:
         fleet.stop_route_index[v] = self._plan.places[line][stop]
         fleet.stop_offset[v] = self._plan.offsets[line][stop]
         fleet.at_stop[v] = False
-        timetable = self.line_of(bus)
-        due = self.begun[bus] + timetable.travel[stop or len(timetable.stops)]
-        left = max(due - self.clock[0] - _START_STOP, 1.0)
+        left = max(self._due(bus, stop) - self.clock[0] - _START_STOP, 1.0)
         fleet.target_speed[v] = min(max(self._metres(bus, stop) / left, PACE[0]), PACE[1])
+
+    def _due(self, bus: int, stop: int) -> float:
+        """Return the second at which a bus that drives to a stop should be there."""
+        timetable = self.line_of(bus)
+        return float(self.begun[bus]) + timetable.travel[stop or len(timetable.stops)]
 
     def _metres(self, bus: int, stop: int) -> float:
         """How far a bus has to drive to a stop, metres."""
@@ -266,7 +291,7 @@ class TransitSystem:
         return sorted(rows, key=lambda row: row[1])
 
 
-_STATE = ("clock", "dwell", "stop", "begun", "riders", "taken")
+_STATE = ("clock", "dwell", "stop", "begun", "riders", "taken", "stops_served", "late_total", "late_most")
 
 
 def _beside(pose: NDArray[np.float64], ahead: Sequence[float], right: float) -> NDArray[np.float64]:
