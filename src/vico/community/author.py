@@ -11,7 +11,7 @@ import numpy as np
 
 from vico.clock import clock_of
 from vico.community.biography import Biographer, lifestyle_of
-from vico.community.groups import Meeting, form_groups
+from vico.community.groups import Meeting, form_groups, meetings_by_member
 from vico.community.model import Community, Group, Resident, ResidentAppearance, WorldIdentity
 from vico.community.people import Household, ResidentDraft, Wardrobe, draw_character, draw_households
 from vico.community.place_index import PlaceIndex
@@ -141,10 +141,11 @@ def _draft(index: PlaceIndex, count: int, seed: int, attempt: int, day: date) ->
     biographer = Biographer(stream("biographies"), index)
     looks = _looks(stream("looks"), households)
     spawns = index.spawn_points([s.home for s in drafts])
+    joined = meetings_by_member(meetings)
     people = []
     for draft, spawn in zip(drafts, spawns, strict=True):
         chance = rng(seed, "community", "details", attempt, draft.id)
-        mine = [m for m in meetings if any(x is draft for x in m.members)]
+        mine = joined.get(draft.id, [])
         assert draft.personality is not None
         people.append(
             Resident(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from heapq import heapify, heappop, heapreplace
 
@@ -188,6 +188,15 @@ def _options(rng: np.random.Generator, index: PlaceIndex, circles: Sequence[Circ
                 if any(a <= start and end <= b for a, b in spans):
                     meetings.append(Meeting(circle, place, start, end))
     return meetings
+
+
+def meetings_by_member(meetings: Iterable[Meeting]) -> dict[str, list[Meeting]]:
+    """Return the meetings of each, by the ids of those who are in any."""
+    found: dict[str, list[Meeting]] = {}
+    for meeting in meetings:
+        for member in meeting.members:
+            found.setdefault(member.id, []).append(meeting)
+    return found
 
 
 def form_groups(rng: np.random.Generator, index: PlaceIndex, drafts: Sequence[ResidentDraft]) -> list[Meeting]:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.community.hours import Span, open_spans
+from vico.community.ride_times import RideTimes
 from vico.community.usual_hours import usual_spans
 from vico.community.walks import Walks
 from vico.errors import EmptyInputError
@@ -53,6 +55,11 @@ class PlaceIndex:
         self._inside = np.array([ways.seconds(p.rooms) for p in world.places], np.float64)
         self._estimates: dict[str, NDArray[np.int64]] = {}
         self._reachable: dict[str, bool] = {}
+
+    @cached_property
+    def rides(self) -> RideTimes:
+        """Trips by bus and bicycle."""
+        return RideTimes(self.world.transit, self.walks)
 
     def reachable(self, place: Place) -> bool:
         """Whether a place can be reached on foot from the map's edge."""

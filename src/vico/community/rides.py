@@ -16,10 +16,9 @@ from vico.clock import DAY, clock_of, seconds_of_day
 from vico.community.hours import staffed
 from vico.community.model import ActivityTag, Group, ItemType, Mode, Resident, ScheduleItem
 from vico.community.place_index import PlaceIndex
-from vico.community.ride_estimates import RideEstimates
+from vico.community.ride_times import RideTrip
 from vico.rules import BIKE_RATE, BUS_FARE, WALK_SPEED
 from vico.world.model import Place
-from vico.world.trips import Leg, Trip
 
 #: Seconds kept for doors and for others on the pavement when setting out, as for walks.
 SETTING_OUT = 20.0
@@ -79,15 +78,26 @@ class Habits:
         return seconds + price * self.money + self.bother[mode]
 
 
-def first_ride(index: PlaceIndex, ends: tuple[str, str], mode: Mode, set_out: float, cash: float) -> float:
+def first_ride(index: PlaceIndex, ends: tuple[str, str], mode: Mode, times: tuple[float, float], cash: float) -> float:
     """Return the second of the day at which somebody is at a place who sets out by bus or bicycle at one.
 
     From the farthest room of the one place to the farthest room of the other; infinite if there is no such ride.
+
+    Parameters
+    ----------
+    times
+        When they set out, and when they want to be there: if one ride is enough for that, it is taken; else they may
+        change.
     """
+    set_out, due = times
     a, b = (index.place_by_id[end] for end in ends)
     depart = set_out + index.indoors(a.id)
+    ride = index.rides.first((a.position[:2], b.position[:2]), mode, depart, cash)
+    if ride is not None and ride.arrive + index.indoors(b.id) <= due:
+        return ride.arrive + index.indoors(b.id)
     trip = index.world.trips.plan(a.position[:2], b.position[:2], depart, modes=(mode.value,), cash=cash)
-    return math.inf if trip is None else trip.arrive + index.indoors(b.id)
+    arrivals = [found.arrive + index.indoors(b.id) for found in (ride, trip) if found is not None]
+    return min(arrivals, default=math.inf)
 
 
 class _Racks:
@@ -99,12 +109,10 @@ class _Racks:
         self._bikes = np.array([[station.bikes] * (DAY // 60 + 1) for station in stations], np.int64)
         self._most = np.array([station.capacity for station in stations], np.int64)
 
-    def serve(self, ride: Leg) -> bool:
+    def serve(self, ride: RideTrip) -> bool:
         """Take the bicycle and the place for a ride; False, and nothing taken, where there is none to the day's end."""
-        assert ride.origin is not None
-        assert ride.destination is not None
         a, b = self._number[ride.origin], self._number[ride.destination]
-        gone, back = (min(int(second) // 60, DAY // 60) for second in (ride.depart, ride.arrive))
+        gone, back = (min(int(second) // 60, DAY // 60) for second in (ride.taken, ride.left))
         if self._bikes[a, gone:].min() < 1 or self._bikes[b, back:].max() >= self._most[b]:
             return False
         self._bikes[a, gone:] -= 1
@@ -131,13 +139,9 @@ def with_rides(
     stream
         Gives each resident's random stream, by id.
     """
-    world = index.world
-    if not world.transit.lines and len(world.transit.bike_stations) < 2:
+    if not index.rides.any:
         return list(residents)
-    world.trips.remember(index.place_by_id[item.place].position for r in residents for item in r.schedule if item.place)
-    means = _Means(
-        index, RideEstimates(world), _Racks(index), {(group.place, group.start, group.end) for group in groups}
-    )
+    means = _Means(index, _Racks(index), {(group.place, group.start, group.end) for group in groups})
     return [
         resident.model_copy(update={"schedule": means.day(resident, Habits.of(resident, stream(resident.id)))})
         for resident in residents
@@ -149,7 +153,7 @@ class _Ride:
     """A ride somebody may take: what it costs them, and when they set out, second of the day."""
 
     mode: Mode
-    trip: Trip
+    trip: RideTrip
     cost: float
     set_out: int
 
@@ -165,7 +169,6 @@ class _Means:
     """
 
     index: PlaceIndex
-    estimates: RideEstimates
     racks: _Racks
     meetings: set[tuple[str | None, str, str]]
 
@@ -198,12 +201,18 @@ class _Means:
         most = habits.of_walk(walk)
         indoors = self.index.indoors(ends[0].id) + self.index.indoors(ends[1].id)
         for mode in habits.bother:
-            least = self.estimates.seconds(*ends, mode, on_foot=habits.walking) + habits.walking * indoors
-            if habits.of_ride(mode, least + RESERVE[mode], _LEAST_PRICE[mode]) >= most:
-                continue
             # Who has to set out earlier than this loses more than is won.
             spare = most - habits.of_ride(mode, (habits.walking - 1.0) * indoors, _LEAST_PRICE[mode])
-            trip = self._trip(ends, mode, (seconds_of_day(way.end) - spare, way), float(resident.cash))
+            not_before = max(seconds_of_day(way.end) - spare, seconds_of_day(way.start))
+            trip = self.index.rides.last(
+                (ends[0].position[:2], ends[1].position[:2]),
+                mode,
+                (
+                    not_before + self.index.indoors(ends[0].id) + SETTING_OUT,
+                    seconds_of_day(way.end) - self.index.indoors(ends[1].id) - RESERVE[mode],
+                ),
+                float(resident.cash),
+            )
             if trip is None:
                 continue
             set_out = trip.depart - self.index.indoors(ends[0].id) - SETTING_OUT
@@ -215,32 +224,9 @@ class _Means:
                 found.append(_Ride(mode, trip, cost, max(seconds_of_day(way.start), math.floor(set_out / 60) * 60)))
         return min(found, key=lambda ride: ride.cost, default=None)
 
-    def _trip(
-        self, ends: tuple[Place, Place], mode: Mode, when: tuple[float, ScheduleItem], cash: float
-    ) -> Trip | None:
-        """Return the ride that sets out last of those that are there in time; None if there is none.
-
-        Parameters
-        ----------
-        when
-            Second of the day before which one does not set out, and the way as it is planned.
-        """
-        (a, b), (not_before, way) = ends, when
-        trip = self.index.world.trips.plan(
-            a.position[:2],
-            b.position[:2],
-            max(not_before, seconds_of_day(way.start)) + self.index.indoors(a.id) + SETTING_OUT,
-            modes=(mode.value,),
-            cash=cash,
-            arrive_by=seconds_of_day(way.end) - self.index.indoors(b.id) - RESERVE[mode],
-            closed=self.estimates.unlikely_stations(a, b) if mode is Mode.BIKE else (),
-        )
-        # One ride is enough: who changes is stranded too easily.
-        return trip if trip is not None and trip.modes.count(mode.value) == 1 else None
-
     def _is_to_be_had(self, ride: _Ride) -> bool:
         """Take the bicycle for a ride; False where others have planned with it."""
-        return all(self.racks.serve(leg) for leg in ride.trip.legs if leg.mode == Mode.BIKE)
+        return ride.mode is Mode.BUS or self.racks.serve(ride.trip)
 
     def _may_stay(self, resident: Resident, item: ScheduleItem, until: int) -> bool:
         """Return whether somebody may be where they are until a second of the day."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from vico.community.catalogue import errands, kind_sets, ways_of_life
 from vico.community.day import MIDNIGHT, Block, Day
-from vico.community.groups import Meeting
+from vico.community.groups import Meeting, meetings_by_member
 from vico.community.homelife import Homelife, fill_day
 from vico.community.model import ActivityTag, ItemType, ScheduleItem
 from vico.community.people import Household, ResidentDraft
@@ -79,9 +79,9 @@ class DayWriter:
         """
         days: dict[str, Day] = {}
         people = [s for h in households for s in h.members]
+        joined = meetings_by_member(groups)
         for draft in people:
-            mine = [g for g in groups if any(m.id == draft.id for m in g.members)]
-            days[draft.id] = self._frame(draft, mine)
+            days[draft.id] = self._frame(draft, joined.get(draft.id, []))
         for household in households:
             self._together([(m, days[m.id]) for m in household.members], household.kind)
         for draft in people:

@@ -218,7 +218,8 @@ class _Check:
                 return
         else:
             what, start = f"way by {item.mode}", seconds_of_day(item.start)
-            needed = first_ride(self.index, (a, b), item.mode, start, r.cash) - start
+            times = start, seconds_of_day(item.end)
+            needed = first_ride(self.index, (a, b), item.mode, times, r.cash) - start
             if math.isinf(needed):
                 self.say(where, f"no {item.mode} goes {names}", "walk, or choose a place that can be reached so")
                 return

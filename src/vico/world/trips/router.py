@@ -53,22 +53,9 @@ class Trips:
         self.walk_speed = walk_speed
         self._kept: dict[tuple[str, str], Way] = {}
         self._networks: dict[tuple[bool, bool], TripNetwork] = {}
-        self._remembered: dict[Point2, str] = {}
         self._known = {
             r.id for part in (self.transit.stops, self.transit.lines, self.transit.bike_stations) for r in part
         }
-
-    def remember(self, points: Iterable[ArrayLike]) -> None:
-        """Keep the ways between some points, stops and stations once they are found: they will be asked about again.
-
-        Parameters
-        ----------
-        points
-            ENU metres. Answers stay the same; only trips that begin or end exactly there are planned sooner.
-        """
-        for point in points:
-            x, y = _point(point)
-            self._remembered[x, y] = f"{x!r} {y!r}"
 
     def plan(
         self,
@@ -176,7 +163,7 @@ class Trips:
         ways = Ways(
             self.router,
             [*network.points, *ends],
-            [*network.ids, *(self._remembered.get(end) for end in ends)],
+            [*network.ids, None, None],
             self._kept,
             walk_speed=self.walk_speed,
             blocked=self._blocked(circles) if circles else None,
