@@ -9,6 +9,7 @@ import pytest
 
 import toy_city
 from vico.sim.config import SimConfig
+from vico.sim.observations import distinct_entities
 from vico.sim.simulation import Simulation
 
 Seen = tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]
@@ -86,3 +87,13 @@ def test_the_pose_is_position_and_unit_gaze(seen: Seen) -> None:
 def test_views_are_the_same_each_time(sim: Simulation, seen: Seen) -> None:
     again = sim.observe()[0]
     assert all(np.array_equal(again[name]["rgb"], seen[0][name]["rgb"]) for name in again)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (3, 40), (70, 33), (64, 256), (7, 100)])
+def test_every_entity_in_a_picture_is_found(shape: tuple[int, int]) -> None:
+    generator = np.random.default_rng(5)
+    image = np.repeat(np.repeat(generator.integers(0, 9, shape), 5, axis=0), 9, axis=1)[: shape[0], : shape[1]]
+    image = image.astype(np.int32)
+    for _ in range(30):
+        image[generator.integers(shape[0]), generator.integers(shape[1])] = generator.integers(10, 10_000)
+    assert distinct_entities(image) == np.unique(image[image > 0]).tolist()

@@ -56,6 +56,7 @@ class MovingShadows(NamedTuple):
 
 _ZERO, _HALF, _ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)
 _TINY = np.float32(1e-12)
+_UNIT, _EIGHT, _TWO_CHANNELS = np.uint32(1), np.uint32(8), np.uint32(0xFF00FF)
 _TONE_SCALE = np.float32((TONE_STEPS - 1) / TONE_RANGE)
 _TONE_LAST = np.float32(TONE_STEPS - 1)
 # sRGB to linear light as a polynomial of the byte / 255: off by less than 0.003.
@@ -73,14 +74,16 @@ def look_up(texels: Any, real: Any, whole: Any, along: Any) -> None:
         floor_x, floor_y = np.floor(x), np.floor(y)
         real[_F + i], real[_G + i] = x - floor_x, y - floor_y
         whole[_I0 + i], whole[_I1 + i] = np.int32(floor_x), np.int32(floor_y)
+    # Every sum is cut to 32 bits at once: else the compiler calculates with 64, in twice as many steps.
     for i in range(QUEUE):
-        columns = whole[COLUMNS + i]
-        left, right = whole[_I0 + i] & (columns - 1), (whole[_I0 + i] + 1) & (columns - 1)
-        rows = whole[ROWS + i]
-        upper = whole[START + i] + (whole[_I1 + i] & (rows - 1)) * columns
-        lower = whole[START + i] + ((whole[_I1 + i] + 1) & (rows - 1)) * columns
-        whole[_I0 + i], whole[_I1 + i] = upper + left, upper + right
-        whole[_I2 + i], whole[_I3 + i] = lower + left, lower + right
+        last_column, last_row = np.uint32(whole[COLUMNS + i] - _UNIT), np.uint32(whole[ROWS + i] - _UNIT)
+        left = np.uint32(whole[_I0 + i] & last_column)
+        right = np.uint32(np.uint32(whole[_I0 + i] + _UNIT) & last_column)
+        row, next_row = whole[_I1 + i] & last_row, np.uint32(whole[_I1 + i] + _UNIT) & last_row
+        upper = np.uint32(whole[START + i] + np.uint32(row * whole[COLUMNS + i]))
+        lower = np.uint32(whole[START + i] + np.uint32(next_row * whole[COLUMNS + i]))
+        whole[_I0 + i], whole[_I1 + i] = np.uint32(upper + left), np.uint32(upper + right)
+        whole[_I2 + i], whole[_I3 + i] = np.uint32(lower + left), np.uint32(lower + right)
     for i in range(QUEUE):
         whole[_T0 + i] = texels[whole[_I0 + i]]
         whole[_T1 + i] = texels[whole[_I1 + i]]
@@ -88,17 +91,21 @@ def look_up(texels: Any, real: Any, whole: Any, along: Any) -> None:
         whole[_T3 + i] = texels[whole[_I3 + i]]
     for i in range(QUEUE):
         f, g = np.int32(real[_F + i] * np.float32(256.0)), np.int32(real[_G + i] * np.float32(256.0))
-        wd = np.int32((f * g) >> 8)
+        wd = np.int32(np.int32(f * g) >> np.int32(8))
         wb, wc = np.int32(f - wd), np.int32(g - wd)
-        wa = np.int32(256 - f - wc)
+        wa = np.int32(np.int32(np.int32(256) - f) - wc)
         a, b, c, d = whole[_T0 + i], whole[_T1 + i], whole[_T2 + i], whole[_T3 + i]
-        whole[_PAIR + i] = (a & 0xFF00FF) * wa + (b & 0xFF00FF) * wb + (c & 0xFF00FF) * wc + (d & 0xFF00FF) * wd
-        whole[_MIDDLE + i] = (
-            ((a >> 8) & 0xFF00FF) * wa
-            + ((b >> 8) & 0xFF00FF) * wb
-            + ((c >> 8) & 0xFF00FF) * wc
-            + ((d >> 8) & 0xFF00FF) * wd
-        )
+        whole[_PAIR + i] = _weighed(a, b, c, d, np.uint32(wa), np.uint32(wb), np.uint32(wc), np.uint32(wd))
+        a, b, c, d = a >> _EIGHT, b >> _EIGHT, c >> _EIGHT, d >> _EIGHT
+        whole[_MIDDLE + i] = _weighed(a, b, c, d, np.uint32(wa), np.uint32(wb), np.uint32(wc), np.uint32(wd))
+
+
+@inlined
+def _weighed(a: Any, b: Any, c: Any, d: Any, wa: Any, wb: Any, wc: Any, wd: Any) -> Any:
+    """Return the weighed sum of two channels of four texels."""
+    first = np.uint32(np.uint32(np.uint32(a & _TWO_CHANNELS) * wa) + np.uint32(np.uint32(b & _TWO_CHANNELS) * wb))
+    second = np.uint32(np.uint32(np.uint32(c & _TWO_CHANNELS) * wc) + np.uint32(np.uint32(d & _TWO_CHANNELS) * wd))
+    return np.uint32(first + second)
 
 
 @kernel

@@ -56,7 +56,7 @@ _POSITION = 511
 
 
 class _Eye(NamedTuple):
-    """The camera in single precision: where it is, and the step between the rays of neighbouring columns."""
+    """Where the camera is, and the step between neighbouring columns' rays: in single precision, then in double."""
 
     x: Any
     y: Any
@@ -64,6 +64,9 @@ class _Eye(NamedTuple):
     step_x: Any
     step_y: Any
     step_z: Any
+    exact_step_x: float
+    exact_step_y: float
+    exact_step_z: float
 
 
 class _Ray(NamedTuple):
@@ -168,7 +171,7 @@ def shade(
                 continue
             if number == 0:
                 run = (offset, column, end)
-                sky_queued = _queue_sky_run(sky, sky_queue, sky_queued, left, camera, eye, run, flat_out)
+                sky_queued = _queue_sky_run(sky, sky_queue, sky_queued, left, eye, run, flat_out)
                 column = end
                 continue
             slot = number & np.uint32(SETUPS - 1)
@@ -182,12 +185,12 @@ def shade(
                 count = min(end - column, RUN)
                 # The block's middle stands for what changes slowly: level of the texture, share of the sky.
                 middle = _middle_of_block(planes, column + 0.5 * (count - 1))
-                ray = _ray_at(left, camera, column)
+                ray = _ray_at(left, eye, column)
                 window = _texture_window(setup, planes, middle, materials, texel_start, camera.most_taps)
                 taps = max(taps, window.taps)
                 open_sky = _ONE
                 if not indoors:
-                    x, y, z = _before_surface(setup, middle, ray, 0.5 * (count - 1), camera)
+                    x, y, z = _before_surface(setup, middle, _ray_at(left, eye, column + 0.5 * (count - 1)), camera)
                     open_sky = np.float32(sky_visibility(relief_height, relief_frame, x, y, z))
                 at = queued & _POSITION
                 _queue_places(real, at, setup, planes, column, ray, eye, window)
@@ -235,6 +238,9 @@ def _eye(camera: Any) -> Any:
         np.float32(camera.right_x * pixel),
         np.float32(camera.right_y * pixel),
         np.float32(camera.right_z * pixel),
+        camera.right_x * pixel,
+        camera.right_y * pixel,
+        camera.right_z * pixel,
     )
 
 
@@ -251,13 +257,10 @@ def _left_ray(camera: Any, row: int) -> Any:
 
 
 @inlined
-def _ray_at(left: Any, camera: Any, column: int) -> Any:
+def _ray_at(left: Any, eye: Any, column: Any) -> Any:
     """Return the ray through a column's centre."""
-    pixel = 1.0 / camera.focal
     return _Ray(
-        left.x + column * camera.right_x * pixel,
-        left.y + column * camera.right_y * pixel,
-        left.z + column * camera.right_z * pixel,
+        left.x + column * eye.exact_step_x, left.y + column * eye.exact_step_y, left.z + column * eye.exact_step_z
     )
 
 
@@ -286,20 +289,11 @@ def _queue_sky(real: Any, whole: Any, at: int, ray: Any, eye: Any, pixel: int) -
 
 
 @inlined
-def _queue_sky_run(
-    sky: Any,
-    queue: Any,
-    queued: int,
-    left: Any,
-    camera: Any,
-    eye: Any,
-    run: Any,
-    out: Any,
-) -> int:
+def _queue_sky_run(sky: Any, queue: Any, queued: int, left: Any, eye: Any, run: Any, out: Any) -> int:
     """Lay pixels that show the sky into their queue, which is worked off when it is full; return how many it holds."""
     offset, column, end = run
     while column < end:
-        ray = _ray_at(left, camera, column)
+        ray = _ray_at(left, eye, column)
         _queue_sky(queue.real, queue.whole, queued & _POSITION, ray, eye, offset + column)
         count = min(end - column, RUN)
         queued += count
@@ -348,20 +342,19 @@ def _texture_window(setup: Any, planes: Any, middle: Any, materials: Any, texel_
     uy, vy = (k0 * setup.first_u + k1 * setup.second_u) * wide, (k0 * setup.first_v + k1 * setup.second_v) * high
     long_x, long_y = ux * ux + vx * vx, uy * uy + vy * vy
     longest = max(long_x, long_y)
-    level, taps = 0, 1
-    if longest > 1.2:
-        # The footprint is a slanted ellipse: several samples along it instead of one blur over it.
-        area = abs(ux * vy - uy * vx)
-        ratio = longest / max(area, 0.0625 * longest)
-        taps = 1 if ratio < 2.0 else (2 if ratio < 5.0 or most_taps < 4 else 4)
-        level = min(max(_log2(longest / (taps * taps) * 1.4) >> 1, 0), levels - 1)
+    # The footprint is a slanted ellipse: several samples along it instead of one blur over it. Without branches, which
+    # would be foreseen wrongly, and without divisions, for which all that follows would wait.
+    area = max(abs(ux * vy - uy * vx), 0.0625 * longest)
+    two = (longest > 1.2) & (longest >= 2.0 * area)
+    four = two & (longest >= 5.0 * area) & (most_taps >= 4)
+    taps = 4 if four else (2 if two else 1)
+    between = 0.0625 if four else (0.25 if two else 1.0)
+    level = min(max(_log2(longest * between * 1.4) >> 1, 0), levels - 1)
     columns = 1 << max(material.log2_width - level, 0)
     rows = 1 << max(material.log2_height - level, 0)
-    du, dv = _ZERO, _ZERO
-    if taps > 1:
-        across = long_x >= long_y
-        du = np.float32((ux if across else uy) / wide * columns)
-        dv = np.float32((vx if across else vy) / high * rows)
+    across, several = long_x >= long_y, 1.0 if two else 0.0
+    du = np.float32((ux if across else uy) * (several / wide) * columns)
+    dv = np.float32((vx if across else vy) * (several / high) * rows)
     u = np.float32(setup.u - np.floor(setup.u + middle.first * setup.first_u + middle.second * setup.second_u))
     v = np.float32(setup.v - np.floor(setup.v + middle.first * setup.first_v + middle.second * setup.second_v))
     return _TextureWindow(np.uint32(texel_start[setup.material, level]), columns, rows, u, v, du, dv, taps)
@@ -374,13 +367,12 @@ def _log2(value: float) -> int:
 
 
 @inlined
-def _before_surface(setup: Any, middle: Any, ray: Any, half_count: float, camera: Any) -> Any:
-    """Return a point a little before the surface at a block's middle, world metres."""
+def _before_surface(setup: Any, middle: Any, ray: Any, camera: Any) -> Any:
+    """Return a point a little before the surface at a block's middle, world metres; `ray` goes through it."""
     depth = float(np.float32(setup.volume)) * middle.inverse
-    ahead = half_count * (1.0 / camera.focal)
-    x = camera.x + depth * (ray.x + ahead * camera.right_x) + _RELIEF_OFFSET * setup.normal[0, 0]
-    y = camera.y + depth * (ray.y + ahead * camera.right_y) + _RELIEF_OFFSET * setup.normal[0, 1]
-    z = camera.z + depth * (ray.z + ahead * camera.right_z)
+    x = camera.x + depth * ray.x + _RELIEF_OFFSET * setup.normal[0, 0]
+    y = camera.y + depth * ray.y + _RELIEF_OFFSET * setup.normal[0, 1]
+    z = camera.z + depth * ray.z
     return x, y, z
 
 
@@ -399,9 +391,7 @@ def sky_visibility(height: Any, frame: Any, x: float, y: float, z: float) -> flo
     one = np.uint32(1)
     low = height[j, i] + a * (height[j, i + one] - height[j, i])
     high = height[j + one, i] + a * (height[j + one, i + one] - height[j + one, i])
-    deep = low + b * (high - low) - z
-    if deep <= 0.0:
-        return 1.0
+    deep = max(low + b * (high - low) - z, 0.0)
     return 1.0 - _RELIEF_SHARE * deep / (deep + _RELIEF_DEPTH)
 
 

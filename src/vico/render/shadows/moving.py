@@ -38,6 +38,8 @@ _TALLEST = np.float32(2.2)
 _ZERO, _ONE, _TWO, _THREE, _TINY = (np.float32(value) for value in (0.0, 1.0, 2.0, 3.0, 1e-9))
 # Pixels that are looked at together, and the fields of the scratch memory of a block.
 _BLOCK = PAD
+# A pixel's number, masked so that the compiler knows it is not negative.
+_INDEX = 0x7FFFFFFF
 _DEPTH, _REACHED, _ABOVE, _UNIT_A, _UNIT_B, _UNIT_C, _LEFT = (k * STRIDE for k in range(7))
 _INVERSE_SOFT_BALL, _INVERSE_SOFT_BOX = np.float32(1.0 / _SOFT_BALL), np.float32(1.0 / _SOFT_BOX)
 
@@ -179,6 +181,11 @@ def set_caster(scene: Any, k: int, camera: Any, light: Any, reach: float, caster
             return False
         _set_avatar_axes(scene, avatar, caster)
     else:
+        sphere = scene.instances.sphere[k]
+        dx, dy, dz = sphere.x - camera.x, sphere.y - camera.y, sphere.z - camera.z
+        if dx * dx + dy * dy + dz * dz > (reach + 0.1) * (reach + 0.1):
+            # Its centre is the caster's, but for rounding: most are far from a room, and go no further.
+            return False
         _set_instance_axes(scene, k, caster)
     if not _is_near(caster, camera, reach):
         return False
@@ -233,63 +240,89 @@ def _darken(camera: Any, buffers: Any, caster: Any, own: int, own_end: int) -> N
     """
     # Taken out of their tuple once: that costs as much as a block.
     keys, real, sun, contact = buffers.keys, buffers.real, buffers.sun, buffers.contact
-    to_unit, sun_way, indoors = caster.to_unit, caster.sun, camera.indoors != 0
-    for row in range(caster.first_row, caster.end_row):
-        for column in range(caster.first_column, caster.end_column, _BLOCK):
-            pixel = np.uint64(row * camera.width + column)
+    sun_way, is_round, indoors, width = caster.sun, caster.is_round != 0, camera.indoors != 0, camera.width
+    first_row, end_row, first_column, end_column = (
+        caster.first_row,
+        caster.end_row,
+        caster.first_column,
+        caster.end_column,
+    )
+    line_a, line_b, line_c = _unit_line(camera, caster, 0), _unit_line(camera, caster, 1), _unit_line(camera, caster, 2)
+    height = _line(camera, 0.0, 0.0, 1.0, -caster.foot)
+    tallest = np.float32(_TALLEST * caster.half_height)
+    for row in range(first_row, end_row):
+        for column in range(first_column, end_column, _BLOCK):
+            pixel = (row * width + column) & _INDEX
             _unpack_block(keys, pixel, np.uint32(own), np.uint32(own_end), real)
-            _height_of_block(camera, caster, row, column, real)
-            _place_block(camera, to_unit, row, column, real)
+            _lay_line(height, row, column, _ABOVE, real)
+            _take_out_unreached(tallest, real)
+            _lay_line(line_a, row, column, _UNIT_A, real)
+            _lay_line(line_b, row, column, _UNIT_B, real)
             if not indoors:
-                _shadow_of_block(sun_way, caster.is_round, real)
-                _multiply(sun, pixel, caster.end_column - column, real)
-            _contact_of_block(caster.is_round, real)
-            _multiply(contact, pixel, caster.end_column - column, real)
+                _lay_line(line_c, row, column, _UNIT_C, real)
+                _shadow_of_block(sun_way, is_round, real)
+                _multiply(sun, pixel, end_column - column, real)
+            _contact_of_block(is_round, real)
+            _multiply(contact, pixel, end_column - column, real)
+
+
+class _Line(NamedTuple):
+    """A coordinate of what is seen: depth times (start + row steps + column steps), plus that of the eye."""
+
+    start: float
+    row_step: float
+    column_step: float
+    eye: Any
+
+
+@inlined
+def _line(camera: Any, x: float, y: float, z: float, offset: float) -> Any:
+    """Return the coordinate that is a vector's product with a place in the world, plus `offset`."""
+    pixel = 1.0 / camera.focal
+    ahead = x * camera.forward_x + y * camera.forward_y + z * camera.forward_z
+    aside = (x * camera.right_x + y * camera.right_y + z * camera.right_z) * pixel
+    below = (x * camera.down_x + y * camera.down_y + z * camera.down_z) * pixel
+    start = ahead + (0.5 - camera.centre_x) * aside + (0.5 - camera.centre_y) * below
+    return _Line(start, below, aside, np.float32(x * camera.x + y * camera.y + z * camera.z + offset))
+
+
+@inlined
+def _unit_line(camera: Any, caster: Any, axis: int) -> Any:
+    """Return a coordinate in the caster's unit frame."""
+    row = caster.to_unit[axis]
+    return _line(camera, row[0], row[1], row[2], row[3])
+
+
+@inlined
+def _lay_line(line: Any, row: int, column: int, field: int, real: Any) -> None:
+    """Lay a coordinate of a block's pixels into the scratch memory."""
+    start, step = np.float32(line.start + row * line.row_step + column * line.column_step), np.float32(line.column_step)
+    eye = line.eye
+    for i in range(_BLOCK):
+        real[field + i] = eye + real[_DEPTH + i] * (start + np.float32(i) * step)
 
 
 @inlined
 def _unpack_block(keys: Any, pixel: Any, own: Any, own_end: Any, real: Any) -> None:
     """Lay depths into the scratch memory, and 1 for what is seen there and is not the caster itself, else 0."""
     for i in range(_BLOCK):
-        real[_DEPTH + i] = _ONE / inverse_depth(keys[pixel + np.uint64(i)])
+        real[_DEPTH + i] = _ONE / inverse_depth(keys[pixel + i])
     for i in range(_BLOCK):
-        number = triangle_number(keys[pixel + np.uint64(i)])
+        number = triangle_number(keys[pixel + i])
         other = (number != np.uint32(0)) & ((number < own) | (number >= own_end))
         real[_REACHED + i] = _ONE if other else _ZERO
 
 
 @inlined
-def _height_of_block(camera: Any, caster: Any, row: int, column: int, real: Any) -> None:
-    """Lay heights above the caster's foot, and take what is too high or too low for its shadow out."""
-    tallest = np.float32(_TALLEST * caster.half_height)
-    start, step = _along_row(camera, 0.0, 0.0, 1.0, row, column)
-    eye = np.float32(camera.z - caster.foot)
+def _take_out_unreached(tallest: Any, real: Any) -> None:
+    """Leave what is too high or too low for the caster's shadow."""
     for i in range(_BLOCK):
-        above = eye + real[_DEPTH + i] * (start + np.float32(i) * step)
-        real[_ABOVE + i] = above
+        above = real[_ABOVE + i]
         real[_REACHED + i] = real[_REACHED + i] if (above <= tallest) & (above >= -_DEEPEST) else _ZERO
 
 
 @inlined
-def _place_block(camera: Any, to_unit: Any, row: int, column: int, real: Any) -> None:
-    """Lay places in the caster's unit frame."""
-    for axis in range(3):
-        x, y, z = to_unit[axis, 0], to_unit[axis, 1], to_unit[axis, 2]
-        start, step = _along_row(camera, x, y, z, row, column)
-        eye = np.float32(x * camera.x + y * camera.y + z * camera.z + to_unit[axis, 3])
-        if axis == 0:
-            for i in range(_BLOCK):
-                real[_UNIT_A + i] = eye + real[_DEPTH + i] * (start + np.float32(i) * step)
-        elif axis == 1:
-            for i in range(_BLOCK):
-                real[_UNIT_B + i] = eye + real[_DEPTH + i] * (start + np.float32(i) * step)
-        else:
-            for i in range(_BLOCK):
-                real[_UNIT_C + i] = eye + real[_DEPTH + i] * (start + np.float32(i) * step)
-
-
-@inlined
-def _shadow_of_block(sun: Any, is_round: int, real: Any) -> None:
+def _shadow_of_block(sun: Any, is_round: bool, real: Any) -> None:
     """Lay what the caster leaves of the sun."""
     sun_a, sun_b, sun_c = np.float32(sun[0]), np.float32(sun[1]), np.float32(sun[2])
     if is_round:
@@ -303,7 +336,7 @@ def _shadow_of_block(sun: Any, is_round: int, real: Any) -> None:
 
 
 @inlined
-def _contact_of_block(is_round: int, real: Any) -> None:
+def _contact_of_block(is_round: bool, real: Any) -> None:
     """Lay what the caster leaves of the light at the ground."""
     if is_round:
         for i in range(_BLOCK):
@@ -319,18 +352,7 @@ def _contact_of_block(is_round: int, real: Any) -> None:
 def _multiply(light: Any, pixel: Any, count: int, real: Any) -> None:
     """Take the caster's share of light from the first `count` pixels of a block."""
     for i in range(_BLOCK):
-        light[pixel + np.uint64(i)] *= real[_LEFT + i] if i < count else _ONE
-
-
-@inlined
-def _along_row(camera: Any, x: float, y: float, z: float, row: int, column: int) -> Any:
-    """Return a vector's product with the rays of a row, of depth 1: at a column, and its step."""
-    pixel = 1.0 / camera.focal
-    cu, cv = (column + 0.5 - camera.centre_x) * pixel, (row + 0.5 - camera.centre_y) * pixel
-    ahead = x * camera.forward_x + y * camera.forward_y + z * camera.forward_z
-    aside = x * camera.right_x + y * camera.right_y + z * camera.right_z
-    below = x * camera.down_x + y * camera.down_y + z * camera.down_z
-    return np.float32(ahead + cu * aside + cv * below), np.float32(aside * pixel)
+        light[pixel + i] *= real[_LEFT + i] if i < count else _ONE
 
 
 @inlined

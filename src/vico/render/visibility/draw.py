@@ -350,21 +350,23 @@ def write_depth(keys: Any, depth: Any) -> None:
 @kernel
 def write_entities(scene: Any, buffers: Any, drawn: int, out: Any) -> None:
     """Write the entity of every pixel; 0 where nothing was hit."""
-    flat = out.reshape(-1)
-    clusters = len(scene.cluster_where)
-    last, entity, low, high, item = 0, 0, 0, 0, 0
+    # Taken out of their tuples once: that costs as much as a pixel.
+    flat, keys, base, codes, firsts = out.reshape(-1), buffers.keys, buffers.base, buffers.drawn, buffers.first_triangle
+    entities, owners = scene.mesh.entity, scene.instances.entity
+    clusters, end_instance = len(scene.cluster_where), len(scene.cluster_where) + scene.counts.instances
+    last, entity, low, high, item = np.uint32(0), np.int32(0), 0, 0, 0
     for i in range(flat.size):
-        number = int(triangle_number(buffers.keys[i]))
+        number = triangle_number(keys[i])
         if number != last:
             last = number
             if number == 0:
-                entity = 0
+                entity = np.int32(0)
             else:
                 if number < low or number >= high:
-                    item = item_of(buffers.base, drawn, number)
-                    low, high = buffers.base[item], buffers.base[item + 1]
-                entity = scene.mesh.entity[buffers.first_triangle[item] + number - low]
-                code = buffers.drawn[item]
-                if entity == 0 and clusters <= code < clusters + scene.counts.instances:
-                    entity = scene.instances.entity[code - clusters]
+                    item = item_of(base, drawn, int(number))
+                    low, high = base[item], base[item + 1]
+                entity = entities[firsts[item] + int(number) - low]
+                code = codes[item]
+                if entity == 0 and clusters <= code < end_instance:
+                    entity = owners[code - clusters]
         flat[i] = entity
