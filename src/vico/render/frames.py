@@ -16,9 +16,11 @@ from numpy.typing import NDArray
 from vico.errors import InputError
 from vico.render.arrays import Buffers
 from vico.render.cameras import Cameras
+from vico.render.lighting import Lighting
 from vico.render.scene import Scene
 from vico.render.shading.light import Light
 from vico.render.shading.shade import shade
+from vico.render.shading.weather import draw_weather
 from vico.render.shadows.moving import cast_moving, new_caster
 from vico.render.uniforms import Record, camera_uniforms
 from vico.render.view_cache import ViewCache, fitting_buffers, shadow_reach
@@ -162,6 +164,7 @@ def _render_cached(batch: _Batch, light: Light, cache: ViewCache, threads: int |
         def finish() -> None:
             if background is not None:
                 background.shade(scene, camera, light, buffers, drawn, rgb)
+                draw_weather(camera, light, buffers.keys, scene.moment, rgb)
             else:
                 _shading_pass(scene, camera, light, buffers, drawn, rgb)
 
@@ -206,7 +209,8 @@ def render_top_down(scene: Scene, half: float, pixels: int, *, samples: int = 2)
     )
     light = scene.light()
     without_haze = light.uniforms.copy()
-    without_haze["haze_per_metre"] = 0.0
+    for name in ("haze_per_metre", "wet", "rain", "snowfall"):
+        without_haze[name] = 0.0
     clear = light._replace(uniforms=without_haze)
     picture = np.empty((pixels, pixels, 3), np.uint8)
 
@@ -231,7 +235,9 @@ def warm_up() -> None:
     scene.place(["leaf"], np.eye(4)[None], [2])
     scene.set_rigid([0], np.eye(4)[None], [3])
     scene.set_skinned(plain.positions, plain.normals, plain.triangles, plain.colour, plain.entity)
-    render(scene, Cameras(np.zeros((1, 3)), np.array([[1.0, 0, 0]]), width=16, height=16), threads=1)
+    for light in (Lighting(), Lighting(wet=1.0, rain=1.0, snowfall=1.0)):
+        scene.lighting = light
+        render(scene, Cameras(np.zeros((1, 3)), np.array([[1.0, 0, 0]]), width=16, height=16), threads=1)
 
 
 _local = threading.local()
@@ -300,6 +306,7 @@ def _shading_pass(
     """Colour what is visible."""
     moving = cast_moving(scene.arrays, camera, light.uniforms, buffers, shadow_reach(camera), new_caster())
     shade(scene.arrays, camera, light, buffers, drawn, moving, False, rgb)
+    draw_weather(camera, light, buffers.keys, scene.moment, rgb)
 
 
 def _buffers(scene: Scene, width: int, height: int) -> Buffers:

@@ -43,6 +43,10 @@ class Lighting:
         How far lit windows and lamps are switched on, 0..1.
     exposure
         Factor on everything before tone mapping.
+    wet, snow_cover
+        How wet open ground is, and how far under snow, 0..1.
+    rain, snowfall
+        Water that falls, mm/h.
     """
 
     sun_direction: Colour = (-0.45, -0.55, 0.75)
@@ -56,6 +60,10 @@ class Lighting:
     clouds: float = 0.45
     lamps: float = 0.0
     exposure: float = 0.78
+    wet: float = 0.0
+    snow_cover: float = 0.0
+    rain: float = 0.0
+    snowfall: float = 0.0
 
     @classmethod
     def at(

@@ -132,6 +132,10 @@ LIGHT_UNIFORMS = np.dtype(
         ("cloud_shade_red", f4),
         ("cloud_shade_green", f4),
         ("cloud_shade_blue", f4),
+        ("wet", f4),  # how wet ground is, 0..1
+        ("snow_cover", f4),  # share of what looks up that is under snow, 0..1
+        ("rain", f4),  # mm/h of water
+        ("snowfall", f4),
     ],
     align=True,
 )
@@ -167,11 +171,11 @@ TRIANGLE_SETUP = np.dtype(
         ("texture_width", f4),  # of the finest level, texels
         ("texture_height", f4),
         ("material", i4),
-        ("flags", i4),  # bits FLAT_NORMAL, PLAIN_COLOUR and TWO_SIDED
+        ("flags", i4),  # bits FLAT_NORMAL, PLAIN_COLOUR, TWO_SIDED and SHELTERED (nothing lies on it)
     ],
     align=True,
 )
-FLAT_NORMAL, PLAIN_COLOUR, TWO_SIDED = 1, 2, 4
+FLAT_NORMAL, PLAIN_COLOUR, TWO_SIDED, SHELTERED = 1, 2, 4, 8
 
 # Something that moves, as it casts a shadow.
 CASTER = np.dtype(

@@ -60,6 +60,11 @@ class Scene:
     lighting
         The light of the moment; assign `Scene.lighting` to change it.
 
+    Attributes
+    ----------
+    moment
+        Seconds; decides where drops and flakes are in pictures taken now.
+
     Notes
     -----
     Changing the scene while `render` runs in another thread is not safe; rendering from several threads is.
@@ -106,6 +111,7 @@ class Scene:
         self._static_size = len(mesh.triangle), len(mesh.x)
         self._lighting = lighting or Lighting()
         self._light: Light | None = None
+        self.moment = 0.0
         self._shadow_key: tuple[float, ...] | None = None
         self._shadow: ShadowMap | None = None
         self._relief: ReliefMap | None = None

@@ -65,6 +65,8 @@ def light_uniforms(light: Lighting) -> Record:
     cloud = (np.asarray(light.ambient) * 1.05 + np.asarray(light.sun_colour) * 0.16) * light.exposure
     _set_colour(uniforms, "cloud_lit", cloud)
     _set_colour(uniforms, "cloud_shade", cloud * 0.60)
+    for name in ("wet", "snow_cover", "rain", "snowfall"):
+        uniforms[name] = getattr(light, name)
     return uniforms
 
 

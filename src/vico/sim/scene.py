@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -30,6 +31,7 @@ from vico.world.mesh import Surface
 
 # The sun moves slowly: the light is set anew this often, seconds.
 _LIGHT_EVERY = 60.0
+_ICE_SHINES = 0.6  # as much as wet ground does
 
 
 class _Motion(NamedTuple):
@@ -170,9 +172,11 @@ class SceneRenderer:
 
     def _set_light(self, state: SimulationState) -> None:
         moment = state.second // _LIGHT_EVERY
-        weather = state.environment.weather
+        environment, weather = state.environment, state.environment.weather
         # All that decides the light: a restore or a change of weather may come within the same minute.
-        lit = (moment, weather.clouds, weather.rain, weather.snow, weather.visibility, state.environment.lamps)
+        ground = environment.wet, environment.snow_cover, environment.ice
+        lit = (moment, weather.clouds, weather.rain, weather.snow, weather.visibility, environment.lamps, *ground)
+        self._scene.moment = state.second
         if lit != self._lit:
             self._lit = lit
             self._scene.lighting = _lighting(state.environment, moment * _LIGHT_EVERY)
@@ -229,7 +233,7 @@ def _lighting(environment: Environment, second: float) -> Lighting:
     """Return the light that a moment's sun, moon and weather make."""
     sky, weather = environment.sky, environment.weather
     held = np.floor(second / SHADOW_STEP) * SHADOW_STEP
-    return Lighting.under(
+    light = Lighting.under(
         tuple(sky.sun(second).tolist()),
         held_sun=tuple(sky.sun(held).tolist()),
         moon=tuple(sky.moon(held).tolist()),
@@ -239,6 +243,9 @@ def _lighting(environment: Environment, second: float) -> Lighting:
         visibility=weather.visibility,
         lamps=environment.lamps,
     )
+    cover = environment.snow_cover
+    wet = max(environment.wet, _ICE_SHINES * environment.ice) * (1.0 - cover)
+    return replace(light, wet=wet, snow_cover=cover, rain=weather.rain, snowfall=weather.snow)
 
 
 def _motion_of_agents(state: SimulationState) -> _Motion:

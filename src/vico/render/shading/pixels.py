@@ -266,6 +266,26 @@ def light_room(camera: Any, real: Any, whole: Any) -> None:
 
 
 @kernel
+def cover_ground(light: Any, real: Any) -> None:
+    """Darken wet ground, and whiten by snow what looks up; below 0, `SKY` says of a place that nothing lies on it."""
+    wet, snow = np.float32(0.45) * light.wet, light.snow_cover
+    white, blue_white = np.float32(0.86), np.float32(0.90)
+    for i in range(QUEUE):
+        nz, sky = real[NZ + i], real[SKY + i]
+        lies = _ONE if sky > _ZERO else _ZERO
+        real[SKY + i] = abs(sky)
+        ground = min(max(nz * np.float32(8.0) - np.float32(6.6), _ZERO), _ONE)
+        dark = _ONE - lies * wet * (np.float32(0.3) + np.float32(0.7) * ground)
+        share = min(max((nz - np.float32(0.25)) * np.float32(2.2), _ZERO), _ONE)
+        share = lies * snow * share * share * (np.float32(3.0) - np.float32(2.0) * share)
+        bare = (_ONE - share) * dark
+        real[RED + i] = real[RED + i] * bare + white * share
+        real[GREEN + i] = real[GREEN + i] * bare + white * share
+        real[BLUE + i] = real[BLUE + i] * bare + blue_white * share
+        real[SHINE + i] *= _ONE - share
+
+
+@kernel
 def finish(light: Any, camera: Any, texels: Any, queue: Any, moving: Any, count: int, taps: int, out: Any) -> None:
     """Colour the first `count` places of the queue and write their pixels; `out` has one dimension."""
     real, whole, tone = queue.real, queue.whole, light.tone
@@ -278,6 +298,8 @@ def finish(light: Any, camera: Any, texels: Any, queue: Any, moving: Any, count:
     if camera.indoors:
         light_room(camera, real, whole)
     else:
+        if light.uniforms.snow_cover > _ZERO or light.uniforms.wet > _ZERO:
+            cover_ground(light.uniforms, real)
         sun_visibility(light.uniforms, light.shadow, real, whole)
         light_outdoors(light.uniforms, camera, real, whole)
     for i in range(count):

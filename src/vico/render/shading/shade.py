@@ -12,7 +12,7 @@ import numpy as np
 
 from vico.render.arrays import QUEUE, RUN, SETUPS, STRIDE
 from vico.render.compiled import inlined, kernel
-from vico.render.records import FLAT_NORMAL, PLAIN_COLOUR, TWO_SIDED
+from vico.render.records import FLAT_NORMAL, PLAIN_COLOUR, SHELTERED, TWO_SIDED
 from vico.render.shading.pixels import (
     AROUND,
     BLUE,
@@ -147,6 +147,7 @@ def shade(
     relief_frame = _ReliefFrame(relief.x, relief.y, relief.texels_per_metre)
     lamp_exposure = light.uniforms.lamp_exposure
     indoors, width, eye = camera.indoors != 0, camera.width, _eye(camera)
+    is_covered = light.uniforms.snow_cover > _ZERO or light.uniforms.wet > _ZERO
     flat_out = out.reshape(-1)
     _clear(real, whole)
     _clear(sky_real, sky_whole)
@@ -192,6 +193,8 @@ def shade(
                 if not indoors:
                     x, y, z = _before_surface(setup, middle, _ray_at(left, eye, column + 0.5 * (count - 1)), camera)
                     open_sky = np.float32(sky_visibility(relief_height, relief_frame, x, y, z))
+                    if is_covered and setup.flags & SHELTERED:
+                        open_sky = -open_sky  # `cover_ground` puts it right again
                 at = queued & _POSITION
                 _queue_places(real, at, setup, planes, column, ray, eye, window)
                 _queue_colours(real, at, setup)
