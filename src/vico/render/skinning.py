@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from vico.assets.people import PARENTS, SkinnedBody
 from vico.io.compiled import compiled
+from vico.threads import for_each
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,11 @@ def skin(
         np.ascontiguousarray(positions, np.float64),
         np.ascontiguousarray(yaws, np.float64),
     )
-    _skin(bodies, poses, PARENTS, vertices, normals)
+    # Each thread some of the bodies, which is the same as one thread all of them.
+    bounds = np.linspace(0, len(batch), min(_PARTS, max(len(batch), 1)) + 1).astype(np.int64)
+    for_each(
+        lambda k: _skin(bodies, poses, PARENTS, (bounds[k], bounds[k + 1]), (vertices, normals)), range(len(bounds) - 1)
+    )
     return vertices, normals
 
 
@@ -195,16 +200,20 @@ class _Poses(NamedTuple):
     yaws: NDArray[np.float64]
 
 
+# Bodies are shared out among threads in so many parts.
+_PARTS = 4
+
 # fastmath is safe here: pictures come of it, never state.
 _fast: Any = compiled(nogil=True, fastmath=True, error_model="numpy")
 _fast_inlined: Any = compiled(nogil=True, fastmath=True, error_model="numpy", forceinline=True)
 
 
 @_fast
-def _skin(bodies: Any, poses: Any, parents: Any, out_vertices: Any, out_normals: Any) -> None:
-    count = len(parents)
-    starts = bodies.starts
-    for i in range(len(poses.yaws)):
+def _skin(bodies: Any, poses: Any, parents: Any, which: Any, out: Any) -> None:
+    """Write vertices and normals of the bodies from the first to before the second of `which`."""
+    count, starts = len(parents), bodies.starts
+    out_vertices, out_normals = out
+    for i in range(which[0], which[1]):
         turned = np.empty((count, 3, 3), np.float64)
         placed = np.empty((count, 3), np.float64)
         forward_kinematics(poses.rotations[i], bodies.joints[i], parents, poses.offsets[i], turned, placed)

@@ -161,34 +161,19 @@ def _kept(state: SimulationState) -> SimulationState:
 
 def distinct_entities(image: NDArray[np.int32]) -> list[int]:
     """Return the entities that a picture shows, ascending."""
-    return [int(value) for value in np.unique(_corners(image)) if value > 0]
-
-
-_BLOCK = 32
+    flat, width = np.ravel(image), image.shape[1]
+    # Beneath the first row, an entity's first pixel is unlike the one before it and the one above; few others are.
+    first, below = flat[:width], flat[width:]
+    marks = np.empty(len(below), np.bool_)
+    _mark_corners(below, flat[width - 1 : -1], flat[: len(below)], marks)
+    found = np.concatenate([first, below[np.flatnonzero(marks)]])
+    return [int(value) for value in np.unique(found) if value > 0]
 
 
 @compiled(nogil=True)
-def _corners(image):  # type: ignore[no-untyped-def]
-    """Return the values of pixels unlike their left and upper neighbours: every value's first pixel, and few more."""
-    height, width = image.shape
-    found = [image[0, 0]]
-    for row in range(height):
-        line, above = image[row], image[max(row - 1, 0)]
-        for first in range(0, width, _BLOCK):
-            end = min(first + _BLOCK, width)
-            # Whole blocks at a time, which is vector code: most hold none. Of the first row all values are taken.
-            alike = 0
-            if first > 0 and row > 0 and end - first == _BLOCK:
-                here, left, upper = line[first:end], line[first - 1 : end - 1], above[first:end]
-                for i in range(_BLOCK):
-                    alike += (here[i] == left[i]) | (here[i] == upper[i])
-            if alike == _BLOCK:
-                continue
-            for column in range(first, end):
-                value = line[column]
-                if (column == 0 or value != line[column - 1]) and (row == 0 or value != above[column]):
-                    found.append(value)
-    return np.array(found)
+def _mark_corners(here, left, above, marks):  # type: ignore[no-untyped-def]
+    for i in range(len(marks)):
+        marks[i] = (here[i] != left[i]) & (here[i] != above[i])
 
 
 def facing_of(yaw: float, pitch: float) -> tuple[float, float, float]:

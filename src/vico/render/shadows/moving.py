@@ -40,6 +40,8 @@ _ZERO, _ONE, _TWO, _THREE, _TINY = (np.float32(value) for value in (0.0, 1.0, 2.
 _BLOCK = PAD
 # A pixel's number, masked so that the compiler knows it is not negative.
 _INDEX = 0x7FFFFFFF
+# What rounding may move a caster's centre by, and far more, metres.
+_SLACK = 0.1
 _DEPTH, _REACHED, _ABOVE, _UNIT_A, _UNIT_B, _UNIT_C, _LEFT = (k * STRIDE for k in range(7))
 _INVERSE_SOFT_BALL, _INVERSE_SOFT_BOX = np.float32(1.0 / _SOFT_BALL), np.float32(1.0 / _SOFT_BOX)
 
@@ -100,6 +102,23 @@ def _is_near(caster: Any, camera: Any, reach: float) -> bool:
     centre = caster.centre
     gx, gy, gz = centre[0] - camera.x, centre[1] - camera.y, centre[2] - camera.z
     return not gx * gx + gy * gy + gz * gz > reach * reach
+
+
+@inlined
+def _is_sphere_far(sphere: Any, camera: Any, reach: float) -> bool:
+    """Return whether `_is_near` is false of a thing with this bounding sphere: a quick first test."""
+    # The sphere's centre is the caster's, but for rounding.
+    x, y, z = float(sphere.x) - camera.x, float(sphere.y) - camera.y, float(sphere.z) - camera.z
+    return x * x + y * y + z * z > (reach + _SLACK) * (reach + _SLACK)
+
+
+@inlined
+def _is_box_far(low: Any, high: Any, camera: Any, reach: float) -> bool:
+    """Return whether `_is_near` is false of an avatar with these bounds: a quick first test."""
+    x = 0.5 * (float(low[0]) + high[0]) - camera.x
+    y = 0.5 * (float(low[1]) + high[1]) - camera.y
+    z = 0.5 * (float(low[2]) + high[2]) - camera.z
+    return x * x + y * y + z * z > (reach + _SLACK) * (reach + _SLACK)
 
 
 @inlined
@@ -181,11 +200,6 @@ def set_caster(scene: Any, k: int, camera: Any, light: Any, reach: float, caster
             return False
         _set_avatar_axes(scene, avatar, caster)
     else:
-        sphere = scene.instances.sphere[k]
-        dx, dy, dz = sphere.x - camera.x, sphere.y - camera.y, sphere.z - camera.z
-        if dx * dx + dy * dy + dz * dz > (reach + 0.1) * (reach + 0.1):
-            # Its centre is the caster's, but for rounding: most are far from a room, and go no further.
-            return False
         _set_instance_axes(scene, k, caster)
     if not _is_near(caster, camera, reach):
         return False
@@ -215,10 +229,17 @@ def cast_moving(scene: Any, camera: Any, light: Any, buffers: Any, reach: float,
     through it, the darker, which softens the rim. Only casters within `reach` metres are taken. Return whether there
     were any.
     """
+    # Taken out of their tuples once: that costs as much as a caster that is far away.
     clusters, base, slots = len(scene.cluster_where), buffers.base, buffers.slot
+    spheres, lows, highs = scene.instances.sphere, scene.avatars.low, scene.avatars.high
+    instances = scene.counts.instances
     started = False
-    for k in range(scene.counts.static_instances, scene.counts.instances + scene.counts.avatars):
-        if not set_caster(scene, k, camera, light, reach, caster):
+    for k in range(scene.counts.static_instances, instances + scene.counts.avatars):
+        if k < instances:
+            far = _is_sphere_far(spheres[k], camera, reach)
+        else:
+            far = _is_box_far(lows[k - instances], highs[k - instances], camera, reach)
+        if far or not set_caster(scene, k, camera, light, reach, caster):
             continue
         if not started:
             buffers.sun[:] = np.float32(1.0)
@@ -404,8 +425,8 @@ def _contact_shadow(a: Any, b: Any, away: Any, is_round: bool) -> Any:
 
 
 @inlined
-def _may_box_be_seen(camera: Any, coarse: Any, box: Any) -> bool:
-    return in_view(box, camera) and not is_hidden(box, camera, coarse.tiles, coarse.blocks)
+def _may_box_be_seen(camera: Any, tiles: Any, blocks: Any, box: Any) -> bool:
+    return in_view(box, camera) and not is_hidden(box, camera, tiles, blocks)
 
 
 @kernel
@@ -415,14 +436,14 @@ def _may_instance_be_noticed(
     """Return whether an instance that moves may be seen, or its shadow."""
     spheres, owners, places = scene.instances.sphere, scene.instances.entity, scene.instances.where
     matrices, prototype = scene.instances.matrix, scene.instances.prototype
-    lows, highs = scene.prototypes.low, scene.prototypes.high
+    lows, highs, tiles, blocks = scene.prototypes.low, scene.prototypes.high, coarse.tiles, coarse.blocks
     for k in range(scene.counts.static_instances, scene.counts.instances):
         if is_instance_in_view(spheres[k], owners[k], places[k], camera):
             set_instance_view(matrices[k], camera, model_view)
             set_box(model_view, lows[prototype[k]], highs[prototype[k]], box)
-            if _may_box_be_seen(camera, coarse, box):
+            if _may_box_be_seen(camera, tiles, blocks, box):
                 return True
-        if set_caster(scene, k, camera, light, reach, caster):
+        if not _is_sphere_far(spheres[k], camera, reach) and set_caster(scene, k, camera, light, reach, caster):
             return True
     return False
 
@@ -432,13 +453,15 @@ def _may_avatar_be_noticed(scene: Any, camera: Any, coarse: Any, model_view: Any
     """Return whether an avatar may be seen, or its shadow."""
     set_world_view(camera, model_view)
     low, high = np.zeros(3), np.zeros(3)
+    lows, highs, tiles, blocks = scene.avatars.low, scene.avatars.high, coarse.tiles, coarse.blocks
+    owners, spans, hidden = scene.mesh.entity, scene.avatars.span, camera.hidden_entity
     for k in range(scene.counts.avatars):
-        if is_avatar_hidden(scene, k, camera):
+        if hidden != 0 and owners[spans[k].first_triangle] == hidden:
             continue
         for axis in range(3):
-            low[axis], high[axis] = float(scene.avatars.low[k, axis]), float(scene.avatars.high[k, axis])
+            low[axis], high[axis] = float(lows[k, axis]), float(highs[k, axis])
         set_box(model_view, low, high, box)
-        if _may_box_be_seen(camera, coarse, box):
+        if _may_box_be_seen(camera, tiles, blocks, box):
             return True
         # The floor around somebody's feet, which is all that they darken in a room.
         for axis in range(2):
@@ -447,6 +470,6 @@ def _may_avatar_be_noticed(scene: Any, camera: Any, coarse: Any, model_view: Any
             low[axis], high[axis] = middle - 2.01 * half, middle + 2.01 * half
         low[2], high[2] = low[2] - 0.51, low[2] + 0.51
         set_box(model_view, low, high, box)
-        if _may_box_be_seen(camera, coarse, box):
+        if _may_box_be_seen(camera, tiles, blocks, box):
             return True
     return False
