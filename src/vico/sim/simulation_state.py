@@ -130,6 +130,9 @@ class RobotSystem(Subsystem, Protocol):
             Length of that sub-step, seconds; None if the slice is all of it.
         """
 
+    def set_grip(self, grip: float) -> None:
+        """Have robots grip the ground with a share of what they do on dry ground, 0..1; told before every sub-step."""
+
     def control_period(self, robot: int) -> float:
         """How often the robot's model wants to be controlled, seconds."""
 

@@ -57,6 +57,8 @@ def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _A
     """Advance all but robots by a sub-step; return how many avatars were stopped."""
     if state.traffic is not None:
         state.traffic.set_conditions(state.environment.conditions)
+    if state.robots is not None:
+        state.robots.set_grip(state.environment.conditions.grip)
     _advance_subsystem(state.traffic, "traffic", bodies, watch)
     _advance_subsystem(state.transit, "transit", bodies, watch)
     gone = periods.since_begun(state.tick)[: len(state.people)]

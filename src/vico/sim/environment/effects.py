@@ -72,6 +72,11 @@ class Conditions(NamedTuple):
     walking: float
     cycling: float
 
+    @property
+    def grip(self) -> float:
+        """Friction as a share of that on dry ground."""
+        return self.friction / _DRY
+
 
 def conditions(
     *,

@@ -102,6 +102,9 @@ class PhysicsEngine(Protocol):
     def left_out(self) -> int:
         """How many bodies near robots found no place in the last call of `set_dynamic_obstacles`."""
 
+    def set_friction(self, share: float) -> None:
+        """Have ground, tyres and feet grip with this share of their friction on dry ground from now on, 0..1."""
+
     # Free rigid objects.
 
     def place_object(self, slot: int, thing: RigidObject) -> None:

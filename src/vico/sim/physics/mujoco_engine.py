@@ -251,6 +251,12 @@ class MujocoEngine:
         movers = self._movers
         place_bodies(movers.poses(), movers.entity, self.compiled.mover_mocap, self._mocap_pos, self._mocap_quat)
 
+    def set_friction(self, share: float) -> None:
+        """Have ground, tyres and feet grip with this share of their friction on dry ground."""
+        if self._parameters.grip[0] != share:
+            self._parameters.grip[0] = share
+            self._parameters.changed()
+
     # Free rigid objects.
 
     def place_object(self, slot: int, thing: RigidObject) -> None:

@@ -23,6 +23,8 @@ class Parameters:
         Half extents of people and vehicles, metres, shape ``(movers, 3)``.
     object_half, object_mass
         Half extents, metres, shape ``(objects, 3)``, and kilograms, shape ``(objects,)``.
+    grip
+        Share of their dry friction that ground, tyres and feet have, shape ``(1,)``.
     numbers
         All of these in one array, of which they are views; whoever writes to any of them says so by `changed`.
     token
@@ -32,14 +34,15 @@ class Parameters:
     def __init__(self, scene: CompiledScene) -> None:
         self._scene = scene
         servos, movers, objects = len(scene.servos), len(scene.mover_body), len(scene.object_body)
-        shapes = [(servos,), (servos,), (movers, 3), (objects, 3), (objects,)]
+        shapes = [(servos,), (servos,), (movers, 3), (objects, 3), (objects,), (1,)]
         ends = np.cumsum([int(np.prod(shape)) for shape in shapes])
         # One array, so that two engines' numbers are compared at once.
         self.numbers = np.zeros(int(ends[-1]))
         parts = [part.reshape(shape) for part, shape in zip(np.split(self.numbers, ends[:-1]), shapes, strict=True)]
-        self.stiffness, self.damping, self.mover_half, self.object_half, self.object_mass = parts
+        self.stiffness, self.damping, self.mover_half, self.object_half, self.object_mass, self.grip = parts
         self.stiffness[:], self.damping[:] = scene.stiffness, scene.damping
         self.mover_half[:], self.object_half[:], self.object_mass[:] = 0.25, OBJECT_HALF, OBJECT_MASS
+        self.grip[:] = 1.0
         self.token = object()
 
     def changed(self) -> None:
@@ -61,6 +64,7 @@ class Parameters:
         model.actuator_gainprm[s.servos, 0] = self.stiffness
         model.actuator_biasprm[s.servos, 1] = -self.stiffness
         model.actuator_biasprm[s.servos, 2] = -self.damping
+        model.geom_friction[s.gripping, 0] = s.dry_friction * self.grip
         people = s.capacity.people
         size = self.mover_half.copy()
         size[:people, 1], size[:people, 2] = self.mover_half[:people, 2], 0.0  # cylinders: radius, half height
@@ -92,7 +96,7 @@ class Parameters:
     def copy_from(self, other: Parameters) -> None:
         """Take over what another engine of the same scene, with objects or without, says of all but objects."""
         self.stiffness[:], self.damping[:] = other.stiffness, other.damping
-        self.mover_half[:] = other.mover_half
+        self.mover_half[:], self.grip[:] = other.mover_half, other.grip
         self.changed()
 
     def restore(self, numbers: NDArray[np.float64]) -> None:

@@ -187,6 +187,11 @@ class CompiledScene:
         joint = m.body_jntadr[self.object_body]
         self.object_pose = _run_of(np.add.outer(m.jnt_qposadr[joint], np.arange(7)).ravel())
         self.object_motion = _run_of(np.add.outer(m.jnt_dofadr[joint], np.arange(6)).ravel())
+        # What grips more or less by weather: the ground, and tyres and feet, whose friction goes before the ground's.
+        on_robot = np.isin(m.geom_bodyid, np.concatenate([np.zeros(0, int), *(r.link_bodies for r in self.robots)]))
+        is_ground = m.geom_bodyid == m.body("ground").id
+        self.gripping = np.flatnonzero(is_ground | (on_robot & (m.geom_priority > 0)))
+        self.dry_friction = np.array(m.geom_friction[self.gripping, 0])
         self._kinds: dict[bytes, KindIndex] = {}
         self._full: CompiledScene | None = None
         self._index_contacts()

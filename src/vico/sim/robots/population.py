@@ -30,6 +30,8 @@ from vico.world.model import FIRST_BODY
 
 # What the arrays hold: members of an enumeration are slow to look up at every frame.
 _MOTORS, _FALLEN = int(Mode.MOTORS), int(RobotStatus.FALLEN)
+# Digits of the grip that robots are told: weather that changes writes it into physics seldom.
+_GRIP_DIGITS = 2
 
 
 class RobotPopulation:
@@ -226,6 +228,10 @@ class RobotPopulation:
             fallen=_FALLEN in arrays.status.tolist(),
             loose_objects=self._loose.moving,
         )
+
+    def set_grip(self, grip: float) -> None:
+        """Have robots grip the ground with a share of what they do on dry ground, 0..1; told before every sub-step."""
+        self.engine.set_friction(round(grip, _GRIP_DIGITS))
 
     def attach_objects(self, objects: MovableObjects) -> None:
         """Have physics move things that lie near robots, or fall; before the first step."""
