@@ -13,6 +13,11 @@ from vico.community.place_index import PlaceIndex
 MIDNIGHT = 24 * 60
 
 
+def in_fives(minutes: float) -> int:
+    """Return the nearest multiple of five minutes."""
+    return round(float(minutes) / 5) * 5
+
+
 @dataclass
 class Block:
     """Something to do at a place, from `start` to `end`, minutes of the day.

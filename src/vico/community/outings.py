@@ -1,0 +1,322 @@
+"""What people go out for: together with those they live with, then alone, where it fits into their days."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vico.community.catalogue import errands, kind_sets, ways_of_life
+from vico.community.day import MIDNIGHT, Block, Day, in_fives
+from vico.community.model import ActivityTag, ItemType
+from vico.community.people import ResidentDraft
+from vico.community.place_index import PlaceIndex, kind_of
+from vico.world.model import Category, Place
+
+# Roles of blocks that are meals.
+_MEALS = ("breakfast", "lunch", "dinner")
+
+Companions = Sequence[tuple[ResidentDraft, Day]]
+
+
+@dataclass(frozen=True)
+class Outing:
+    """Something to go out for.
+
+    Attributes
+    ----------
+    activity
+        What it is, in words; may hang on the place.
+    kinds
+        Kinds of places for it, best first.
+    minutes
+        Least and most it takes.
+    role, tag
+        As in `Block`.
+    """
+
+    activity: str | Callable[[Place], str]
+    kinds: Iterable[str]
+    minutes: tuple[int, int]
+    role: str = "outing"
+    tag: ActivityTag | None = None
+
+
+class Outings:
+    """Chooses outings, and knows how many went where: a place draws fewer when many are there already.
+
+    Parameters
+    ----------
+    rng
+        Decides what is left open.
+    index
+        Places, walks and hours.
+    """
+
+    def __init__(self, rng: np.random.Generator, index: PlaceIndex) -> None:
+        self._rng = rng
+        self._index = index
+        self._visits: Counter[str] = Counter()
+        self._kinds, self._errands, self._outings_to = kind_sets(), errands().errands, errands().kinds
+        public = [c for c in Category if c not in (Category.ACCOMMODATION, Category.TRANSIT)]
+        self._by_kind: dict[str, list[Place]] = {}
+        for place in index.places(public):
+            self._by_kind.setdefault(kind_of(place), []).append(place)
+
+    def put(self, day: Day, block: Block) -> None:
+        """Put a block into a day in which it fits."""
+        if not day.add(block):
+            raise ValueError(f"{block} does not fit between {day.blocks}")
+        self._visits[block.place] += 1
+
+    def near(self, anchor: str, kinds: Iterable[str], within: float = 700.0) -> list[Place]:
+        """Return at most six places of some kinds, drawn by nearness to `anchor` and by how few were there today."""
+        found = [p for k in dict.fromkeys(kinds) for p in self._by_kind.get(k, ()) if p.id != anchor]
+        metres = np.array([self._index.metres(anchor, p.id) for p in found])
+        keep = [k for k in range(len(found)) if metres[k] <= within]
+        if not keep:
+            return []
+        sizes = Counter(kind_of(found[k]) for k in keep)
+        weights = np.array(
+            [
+                np.exp(-metres[k] / 220) * 0.5 ** self._visits[found[k].id] / sizes[kind_of(found[k])] ** 0.5
+                for k in keep
+            ]
+        )
+        picks = self._rng.choice(len(keep), min(6, len(keep)), replace=False, p=weights / weights.sum())
+        return [found[keep[int(k)]] for k in picks]
+
+    def plan_together(self, members: Companions, kind: str) -> None:
+        """Let those who share a home do something together, if their days allow."""
+        if len(members) < 2 or kind == "guest":
+            return
+        rng = self._rng
+        (a, first), (b, _) = members[0], members[1]
+        plans: list[tuple[str, ItemType, tuple[str, ...], int, tuple[int, int], str]] = []
+        if kind == "couple" and a.status == b.status == "retired":
+            plans.append(
+                (
+                    "Take a walk",
+                    ItemType.MAIN,
+                    self._kinds["green"],
+                    5 * int(rng.integers(7, 13)),
+                    (540, 1020),
+                    "outing",
+                )
+            )
+        if kind == "couple" and rng.random() < 0.5:
+            plans.append(
+                (
+                    "Have dinner",
+                    ItemType.MEAL,
+                    self._outings_to.dinner[:2],
+                    5 * int(rng.integers(11, 17)),
+                    (1050, 1290),
+                    "dinner",
+                )
+            )
+        if kind in ("flatmates", "siblings") and rng.random() < 0.5:
+            plans.append(("Have a drink", ItemType.MAIN, ("pub", "bar", "cafe"), 60, (1050, 1320), "outing"))
+        if kind == "parent" and rng.random() < 0.7:
+            plans.append(("Have dinner", ItemType.MEAL, self._outings_to.dinner[:2], 60, (1050, 1260), "dinner"))
+        for text, item, kinds, minutes, window, role in plans:
+            if role == "dinner" and any(_dines(day) for _, day in members[:2]):
+                continue
+            for place in self.near(a.home, kinds)[:4]:
+                spans = self._index.hours(place)
+                common = set(first.starts(place.id, minutes, window, spans))
+                for _, other in members[1:2]:
+                    common &= set(other.starts(place.id, minutes, window, spans))
+                if not common:
+                    continue
+                start = sorted(common)[int(rng.integers(len(common)))]
+                if all(day.fits(start, start + minutes, place.id) for _, day in members[:2]):
+                    for me, day in members[:2]:
+                        partner = b if me is a else a
+                        self.put(
+                            day, Block(start, start + minutes, item, f"{text} with {partner.first}", place.id, role)
+                        )
+                    break
+
+    def _go(
+        self, day: Day, outing: Outing, window: tuple[int, int], *, anchor: str | None = None, soon: bool = False
+    ) -> bool:
+        """Add an outing where it fits in the window, minutes; `soon`: as early as possible."""
+        low, high = outing.minutes
+        for place in self.near(anchor or day.home, outing.kinds)[:4]:
+            if place.id in {b.place for b in day.blocks}:
+                continue
+            length = 5 * int(self._rng.integers(low // 5, high // 5 + 1))
+            starts = day.starts(place.id, length, window, self._index.hours(place))
+            if starts:
+                start = starts[0] if soon else starts[int(self._rng.integers(len(starts)))]
+                words = outing.activity if isinstance(outing.activity, str) else outing.activity(place)
+                kind = ItemType.MEAL if outing.role in _MEALS else ItemType.MAIN
+                if day.add(Block(start, start + length, kind, words, place.id, outing.role, outing.tag)):
+                    self._visits[place.id] += 1
+                    return True
+        return False
+
+    def plan_alone(self, draft: ResidentDraft, day: Day) -> None:
+        """Let somebody go out before, beside and after what is fixed in their day, as suits their way of life."""
+        rng = self._rng
+        wake = next(b for b in day.blocks if b.role == "sleep").end
+        leave = min((b.start for b in day.blocks if b.role in ("work", "group")), default=11 * 60)
+        work = draft.workplace or day.home
+        done = draft.shift[1] if draft.shift and draft.shift[0] < 12 * 60 else 15 * 60
+        breakfasts_in_company = any(b.type is ItemType.MEAL and b.start < 12 * 60 for b in day.blocks)
+        if rng.random() < (0.6 if draft.status == "guest" else 0.3) and not breakfasts_in_company:
+            self._go(
+                day,
+                Outing("Have breakfast", self._kinds["cafes"][:3], (20, 30), role="breakfast"),
+                (wake + 20, min(leave, wake + 150)),
+                anchor=work,
+            )
+        elif leave >= 9 * 60 + 10 and wake <= 7 * 60 + 50 and rng.random() < 0.9:
+            self._before_the_day(day, (max(wake + 30, 7 * 60 + 55), min(leave, 8 * 60 + 55)))
+        {"retired": self._retired, "freelancer": self._freelancer, "guest": self._guest}.get(
+            draft.status, self._after_work
+        )(draft, day, wake, done)
+
+    def _before_the_day(self, day: Day, window: tuple[int, int]) -> None:
+        """Let those who have an hour in the morning go out for bread or air."""
+        if self._rng.random() < 0.5 and self._go(
+            day,
+            Outing(
+                "Fetch fresh bread", ("bakery", "convenience", "supermarket", "kiosk"), (5, 10), tag=ActivityTag.SHOP
+            ),
+            window,
+            soon=True,
+        ):
+            return
+        self._go(day, Outing("Take a turn in the fresh air", self._kinds["green"], (15, 25)), window, soon=True)
+
+    def _hobby(self, draft: ResidentDraft, day: Day, window: tuple[int, int]) -> bool:
+        for k in self._rng.permutation(len(draft.hobbies)):
+            hobby = draft.hobbies[int(k)]
+            if not hobby.out:
+                continue
+            minutes = (115, 130) if "cinema" in hobby.kinds or "theatre" in hobby.kinds else (45, 85)
+            if self._go(day, Outing(hobby.out, hobby.kinds, minutes, tag=hobby.about), window):
+                return True
+        return False
+
+    def _errand(self, day: Day, window: tuple[int, int], *, soon: bool = False) -> bool:
+        kinds = list(self._errands)
+        chosen = [kinds[int(k)] for k in self._rng.choice(len(kinds), 4, replace=False)]
+        return any(
+            self._go(
+                day,
+                Outing(
+                    self._errands[kind], (kind,), (30, 45) if kind == "hairdresser" else (10, 20), tag=ActivityTag.SHOP
+                ),
+                window,
+                soon=soon,
+            )
+            for kind in chosen
+        )
+
+    def _after_work(self, draft: ResidentDraft, day: Day, wake: int, done: int) -> None:
+        rng, work = self._rng, draft.workplace or day.home
+        late = draft.shift is not None and draft.shift[0] >= 12 * 60
+        free = (wake + 60, draft.shift[0]) if late and draft.shift else (done, 21 * 60 + 30)
+        if rng.random() < 0.6:
+            self._hobby(draft, day, free)
+        if rng.random() < 0.45:
+            self._go(
+                day,
+                Outing("Buy groceries", self._outings_to.groceries, (10, 25), tag=ActivityTag.SHOP),
+                free,
+                anchor=work,
+                soon=True,
+            )
+        elif rng.random() < 0.5:
+            self._errand(day, free, soon=True)
+        if not late and not _dines(day) and rng.random() < 0.2:
+            self._go(
+                day,
+                Outing("Have dinner", self._outings_to.dinner, (40, 60), role="dinner"),
+                (17 * 60 + 15, 20 * 60 + 30),
+            )
+
+    def _retired(self, draft: ResidentDraft, day: Day, wake: int, done: int) -> None:
+        rng = self._rng
+        if rng.random() < 0.75:
+            early = max(wake + 50, 7 * 60 + 50)
+            self._go(
+                day, Outing("Take the morning walk", self._kinds["green"], (25, 40)), (early, 9 * 60 + 15), soon=True
+            )
+        if rng.random() < 0.7:
+            self._go(
+                day,
+                Outing("Do the day's shopping", self._outings_to.groceries, (20, 35), tag=ActivityTag.SHOP),
+                (8 * 60 + 30, 12 * 60),
+            )
+        if rng.random() < 0.4:
+            self._go(
+                day, Outing("Have lunch", self._outings_to.lunch[:1], (45, 60), role="lunch"), (11 * 60 + 30, 14 * 60)
+            )
+        self._hobby(draft, day, (13 * 60, 17 * 60 + 30))
+        if rng.random() < 0.6:
+            self._errand(day, (9 * 60 + 30, 16 * 60))
+
+    def _freelancer(self, draft: ResidentDraft, day: Day, wake: int, done: int) -> None:
+        rng = self._rng
+        desk, cafe = next((f.at_desk, f.at_cafe) for f in ways_of_life().freelancer if f.title == draft.occupation)
+        self._go(
+            day,
+            Outing(cafe, (*self._kinds["cafes"], "library", "coworking_space"), (75, 110), role="work"),
+            (9 * 60 + 30, 16 * 60),
+        )
+        start = in_fives(wake + 75 + float(rng.integers(0, 40)))
+        for window in ((start, 12 * 60 + 15), (13 * 60, 17 * 60 + 30)):
+            for minutes in (150, 120, 90, 60):
+                starts = day.starts(day.home, minutes, window, [(0, MIDNIGHT)])
+                block = Block(starts[0], starts[0] + minutes, ItemType.MAIN, desk, day.home, "work") if starts else None
+                if block is not None and day.add(block):
+                    break
+        if rng.random() < 0.5:
+            self._go(day, Outing("Have lunch", self._outings_to.lunch, (30, 45), role="lunch"), (11 * 60 + 30, 14 * 60))
+        if rng.random() < 0.6:
+            self._hobby(draft, day, (16 * 60, 21 * 60 + 30))
+        if rng.random() < 0.6:
+            self._go(
+                day,
+                Outing("Buy groceries", self._outings_to.groceries, (15, 25), tag=ActivityTag.SHOP),
+                (15 * 60, 20 * 60),
+            )
+        else:
+            self._errand(day, (9 * 60, 18 * 60))
+
+    def _guest(self, draft: ResidentDraft, day: Day, wake: int, done: int) -> None:
+        rng = self._rng
+        desk = next(g.activity for g in ways_of_life().guest if g.title == draft.occupation)
+        starts = day.starts(day.home, 90, (wake + 60, 12 * 60), [(0, MIDNIGHT)]) or day.starts(
+            day.home, 60, (14 * 60, 19 * 60), [(0, MIDNIGHT)]
+        )
+        if starts:
+            length = 90 if starts[0] < 12 * 60 else 60
+            day.add(Block(starts[0], starts[0] + length, ItemType.MAIN, desk, day.home, "work"))
+        self._go(day, Outing("Have lunch", self._outings_to.lunch[:1], (40, 60), role="lunch"), (11 * 60 + 30, 14 * 60))
+        if not _dines(day):
+            self._go(
+                day, Outing("Have dinner", self._outings_to.dinner[:1], (55, 75), role="dinner"), (18 * 60, 21 * 60)
+            )
+        for _ in range(2 + int(rng.integers(2))):
+            self._go(day, Outing(_sight, self._outings_to.sights, (30, 75), tag=ActivityTag.VISIT), (9 * 60, 18 * 60))
+        self._errand(day, (10 * 60, 18 * 60))
+
+
+def _sight(place: Place) -> str:
+    if kind_of(place) in kind_sets()["green"]:
+        return "Sit in the open and look around"
+    return {"place_of_worship": "Look at the building and sit quietly", "marketplace": "Look over the stalls"}.get(
+        kind_of(place), "Look at the exhibition"
+    )
+
+
+def _dines(day: Day) -> bool:
+    """Whether dinner is settled."""
+    return any(b.type is ItemType.MEAL and b.start >= 17 * 60 for b in day.blocks)
