@@ -53,6 +53,8 @@ _RELIEF_DEPTH, _RELIEF_SHARE = 5.0, 0.62
 _ZERO, _HALF, _ONE, _TINY = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(1e-12)
 # A position in the queue, masked so that the compiler knows it is not negative.
 _POSITION = 511
+# The same for pixels.
+_INDEX = 0x7FFFFFFF
 
 
 class _Eye(NamedTuple):
@@ -215,9 +217,9 @@ def shade(
 @inlined
 def _end_of_run(keys: Any, offset: int, column: int, width: int) -> int:
     """Return the column after the last one that shows the same triangle."""
-    number = triangle_number(keys[offset + column])
+    number = triangle_number(keys[(offset + column) & _INDEX])
     end = column + 1
-    while end < width and triangle_number(keys[offset + end]) == number:
+    while end < width and triangle_number(keys[(offset + end) & _INDEX]) == number:
         end += 1
     return end
 

@@ -17,6 +17,8 @@ _NUMBER_BITS = np.uint64(32)
 _NUMBER_MASK = np.uint64(0xFFFFFFFF)
 _RUN = 8
 _OPAQUE = np.uint32(0x80000000)
+# An index, masked so that the compiler knows it is not negative: else it allows for indices from the end.
+_INDEX, _LONG_INDEX = 0x7FFFFFFF, 0x7FFFFFFFFFFF
 
 
 class PictureSize(NamedTuple):
@@ -144,11 +146,12 @@ def fill(keys: Any, size: Any, t: Any, number: int) -> None:
         offset = row * size.width + first
         # Blocks of a fixed length become straight vector code; past the span's end a key of 0 changes nothing.
         for block in range(0, last - first, _RUN):
+            at, ahead, left_over = (offset + block) & _INDEX, np.float32(block), last - first - block
             for i in range(_RUN):
-                w = min(max(start + step * np.float32(block + i), low), high)
+                w = min(max(start + step * (ahead + np.float32(i)), low), high)
                 key = (np.uint64(np.float32(w).view(np.uint32)) << _NUMBER_BITS) | mark
-                key = key if block + i < last - first else np.uint64(0)
-                keys[offset + block + i] = max(keys[offset + block + i], key)
+                key = key if i < left_over else np.uint64(0)
+                keys[at + i] = max(keys[at + i], key)
 
 
 @inlined
@@ -199,10 +202,11 @@ def fill_cutout(keys: Any, size: Any, t: Any, number: int, textures: Any, index:
             x = column + 0.5 - x0
             w = min(max(w0 + w_across * x + w_down * (y - y0), low), high)
             key = (np.uint64(np.float32(w).view(np.uint32)) << _NUMBER_BITS) | np.uint64(number)
-            if key <= keys[row * size.width + column]:
+            at = (row * size.width + column) & _INDEX
+            if key <= keys[at]:
                 continue
             depth = 1.0 / w
             i = int(np.floor((p0 + p_across * x + p_down * (y - y0)) * depth)) & (columns - 1)
             j = int(np.floor((q0 + q_across * x + q_down * (y - y0)) * depth)) & (rows - 1)
-            if texels[start + j * columns + i] >= _OPAQUE:
-                keys[row * size.width + column] = key
+            if texels[(start + j * columns + i) & _LONG_INDEX] >= _OPAQUE:
+                keys[at] = key
