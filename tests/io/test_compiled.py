@@ -163,7 +163,7 @@ def test_folders_of_old_sources_are_swept(town: Path) -> None:
     folders = {path.name for path in cache.iterdir()}
     assert fresh.name in folders
     assert not any(f"town.drive-{number:024x}" in folders for number in range(12))
-    assert len(folders) == 3
+    assert len(folders) == 2
 
 
 def test_the_digest_follows_imports_of_packages_and_in_brackets(town: Path) -> None:

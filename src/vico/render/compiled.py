@@ -10,5 +10,6 @@ from typing import Any
 
 from vico.io.compiled import compiled
 
-kernel: Any = compiled(nogil=True, error_model="numpy")
-inlined: Any = compiled(nogil=True, error_model="numpy", forceinline=True)
+# Optimised alone before it is linked: drawing is a fifth slower without.
+kernel: Any = compiled(nogil=True, error_model="numpy", optimised_alone=True)
+inlined: Any = compiled(nogil=True, error_model="numpy", forceinline=True, optimised_alone=True)
