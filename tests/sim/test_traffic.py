@@ -11,7 +11,11 @@ from vico.errors import InputError
 from vico.sim.bodies import OBJECT, RESIDENT, Bodies
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
+from vico.sim.traffic.backing_up import vehicles_backing_up
 from vico.sim.traffic.pedestrians import place_pedestrian
+from vico.sim.traffic.route import step_back_lane
+from vico.sim.traffic.shapes import Shapes
+from vico.sim.traffic.state import LaneNetwork, Records, new_fleet
 from vico.world.heights import HeightField
 from vico.world.walkways import SIDEWALK
 
@@ -272,3 +276,57 @@ def test_pedestrians_go_round_a_cyclist_as_long_as_the_bicycle() -> None:
     start = len(overlapping(Bodies.joined([traffic.bodies(), cyclists]), 0.0))
     assert start == 0
     assert _run(traffic, 120, cyclists) == 0
+
+
+def _bus_in_a_junction_beside_a_car(x: float, y: float, yaw: float) -> tuple[LaneNetwork, Records, Shapes]:
+    """A bus that turns in a junction, its middle in the origin, headed east, and a car that both stand and touch."""
+    net = TrafficNetwork.of(road_city().lanes).driven
+    lanes = net.lanes
+    fleet = new_fleet(2, 0)
+    fleet["lane"] = np.flatnonzero(lanes["junction"] >= 0)[0], np.flatnonzero(lanes["inside"] < 0)[0]
+    fleet["length"], fleet["stopped_time"], fleet["blocker"] = (12.0, 4.7), 5.0, (1, -1)
+    sides = np.array([[6.0, 2.35], [1.27, 0.9]])
+    place, none = np.array([[0.0, x], [0.0, y], [0.0, yaw]]), np.zeros(2)
+    return net, fleet, Shapes(*place, *sides, none, none, none + 2.0, none.copy(), none.copy())
+
+
+def test_a_car_beside_a_turning_bus_backs_up_and_stays_there_until_the_bus_has_gone() -> None:
+    net, fleet, shapes = _bus_in_a_junction_beside_a_car(-4.0, 2.3, 0.25)
+    assert vehicles_backing_up(net, fleet, shapes, 0.1).tolist() == [False, True]
+    assert fleet["gives_way_to"].tolist() == [-1, 0]
+    # The bus rolls: the car has nothing to back up for, and does not come back into its way either.
+    fleet["blocker"][0], fleet["stopped_time"][0] = -1, 0.0
+    assert vehicles_backing_up(net, fleet, shapes, 0.1).tolist() == [False, False]
+    assert fleet["gives_way_to"].tolist() == [-1, 0]
+    shapes.x[0] += 20.0
+    vehicles_backing_up(net, fleet, shapes, 0.1)
+    assert fleet["gives_way_to"].tolist() == [-1, -1]
+
+
+def test_a_car_ahead_in_the_queue_does_not_back_up() -> None:
+    net, fleet, shapes = _bus_in_a_junction_beside_a_car(9.0, 0.0, 0.0)
+    assert not vehicles_backing_up(net, fleet, shapes, 0.1).any()
+    assert fleet["gives_way_to"].tolist() == [-1, -1]
+
+
+def test_nobody_lets_another_one_pass_for_ever() -> None:
+    net, fleet, shapes = _bus_in_a_junction_beside_a_car(-4.0, 2.3, 0.25)
+    vehicles_backing_up(net, fleet, shapes, 0.1)
+    fleet["stopped_time"] = 0.0
+    for _ in range(300):
+        fleet["blocker"][0] = -1
+        vehicles_backing_up(net, fleet, shapes, 0.1)
+    assert fleet["gives_way_to"].tolist() == [-1, -1]
+
+
+def test_who_backed_onto_the_lane_before_plans_to_take_its_lane_again() -> None:
+    fleet, net = new_fleet(1, 0), TrafficNetwork.of(road_city().lanes).driven
+    vehicle = fleet.view(np.recarray)[0]
+    before, lane, onward = 3, int(net.next[net.lanes[3]["first_next"]]), 5
+    vehicle.lane, vehicle.offset, vehicle.previous_lanes[0] = lane, -0.4, before
+    vehicle.planned_lanes[0], vehicle.planned_count = onward, 1
+    step_back_lane(net, fleet[0])
+    assert (vehicle.lane, vehicle.planned_count) == (before, 2)
+    assert vehicle.planned_lanes[:2].tolist() == [lane, onward]
+    assert vehicle.offset == pytest.approx(net.lanes[before]["length"] - 0.4)
+    assert vehicle.previous_lanes[0] == -1

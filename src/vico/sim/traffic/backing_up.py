@@ -1,28 +1,51 @@
-"""Who backs up: a vehicle that keeps another one from leaving a junction, or stands head to head with it."""
+"""Who backs up: a vehicle that keeps another one from leaving a junction, or stands head to head with it.
+
+Having made room it stays where it is until the other one has passed: it would be in its way again.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from vico.io.compiled import compiled
+from vico.sim.traffic.state import NONE
 
 _BACK_UP_AFTER = 3.0  # s that both have stood
 _ALIKE = 0.85  # cosine of the angle between two headings that count as the same
 _QUEUE = 6  # vehicles behind one another that make room
+_ROOM = 6.0  # m that are left behind a vehicle that lets another one pass: it may have to back up farther
+_AWAY = 3.0  # m between two vehicles' outer circles from which on they have passed each other
+_GIVES_WAY_FOR = 25.0  # s after which a vehicle that lets another one pass does no longer
 
 
 @compiled
 def _keep_each_other(vehicle, other):  # type: ignore[no-untyped-def]
     """Return whether both, one behind the other, have stood for a while, and not at a stop."""
+    if other.gives_way_to == vehicle.index:
+        return True
     return not other.at_stop and vehicle.stopped_time >= _BACK_UP_AFTER and other.stopped_time >= _BACK_UP_AFTER
+
+
+@compiled
+def _plans_over(vehicle, lane):  # type: ignore[no-untyped-def]
+    """Return whether a vehicle is going to take a lane."""
+    for k in range(vehicle.planned_count):
+        if vehicle.planned_lanes[k] == lane:
+            return True
+    return False
 
 
 @compiled
 def _gives_way_head_on(net, vehicle, other):  # type: ignore[no-untyped-def]
     """Return whether `other`, of two in each other's way, backs up.
 
-    The one outside the junction does; a car rather than a bus; the higher number.
+    Who already does; else the one that follows the other's way; the one outside the junction; a car rather than a bus;
+    the higher number.
     """
+    if other.gives_way_to == vehicle.index or vehicle.gives_way_to == other.index:
+        return other.gives_way_to == vehicle.index
+    if _plans_over(other, vehicle.lane) != _plans_over(vehicle, other.lane):
+        return _plans_over(other, vehicle.lane)
     inside, other_inside = net.lanes[vehicle.lane].junction >= 0, net.lanes[other.lane].junction >= 0
     is_shorter = other.length < vehicle.length
     is_later = other.length == vehicle.length and other.index > vehicle.index
@@ -30,17 +53,47 @@ def _gives_way_head_on(net, vehicle, other):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def vehicles_backing_up(net, fleet, shapes):  # type: ignore[no-untyped-def]
-    """Return for each vehicle whether it backs up in this step, bool, shape ``(vehicles,)``."""
+def _drives_before(shapes, other, vehicle):  # type: ignore[no-untyped-def]
+    """Return whether `other` is ahead of a vehicle and headed as it is, as in a queue; beside it, it is in its way."""
+    v, o = vehicle.index, other.index
+    c, s = np.cos(shapes.yaw[v]), np.sin(shapes.yaw[v])
+    ahead = (shapes.x[o] - shapes.x[v]) * c + (shapes.y[o] - shapes.y[v]) * s
+    return np.cos(shapes.yaw[v] - shapes.yaw[o]) >= _ALIKE and ahead > vehicle.length / 2
+
+
+@compiled
+def _have_passed(shapes, vehicle, other):  # type: ignore[no-untyped-def]
+    """Return whether a vehicle that lets another one pass need not wait for it any more."""
+    v, o = vehicle.index, other.index
+    if other.blocker == v:
+        return False
+    apart = np.hypot(shapes.x[o] - shapes.x[v], shapes.y[o] - shapes.y[v])
+    # Behind it, it is in nobody's way however near it is.
+    ahead = (shapes.x[o] - shapes.x[v]) * np.cos(shapes.yaw[v]) + (shapes.y[o] - shapes.y[v]) * np.sin(shapes.yaw[v])
+    return ahead < 0.0 or apart > (vehicle.length + other.length) / 2 + _AWAY
+
+
+@compiled
+def vehicles_backing_up(net, fleet, shapes, dt):  # type: ignore[no-untyped-def]
+    """Return for each vehicle whether it backs up in this step, bool, shape ``(vehicles,)``; note whom it lets pass."""
+    for vehicle in fleet:
+        o = vehicle.gives_way_to
+        if o == NONE:
+            continue
+        vehicle.gave_way_for += dt
+        if vehicle.gave_way_for > _GIVES_WAY_FOR or _have_passed(shapes, vehicle, fleet[o]):
+            vehicle.gives_way_to = NONE
     backs_up = np.zeros(len(fleet), np.bool_)
     for v in range(len(fleet)):
         vehicle, b = fleet[v], fleet[v].blocker
         if not 0 <= b < len(fleet) or not _keep_each_other(vehicle, fleet[b]):
             continue
-        if fleet[b].blocker == v:
+        if fleet[b].blocker == v or fleet[b].gives_way_to == v:
             backs_up[b] = _gives_way_head_on(net, vehicle, fleet[b])
-        elif np.cos(shapes.yaw[v] - shapes.yaw[b]) < _ALIKE and net.lanes[vehicle.lane].junction >= 0:
+        elif net.lanes[vehicle.lane].junction >= 0 and not _drives_before(shapes, fleet[b], vehicle):
             backs_up[b] = True
+        if backs_up[b] and fleet[b].gives_way_to == NONE:
+            fleet[b].gives_way_to, fleet[b].gave_way_for = v, 0.0
     # Who stands close behind one that backs up backs up, too.
     for _ in range(_QUEUE):
         for v in range(len(fleet)):
@@ -48,3 +101,11 @@ def vehicles_backing_up(net, fleet, shapes):  # type: ignore[no-untyped-def]
             if 0 <= b < len(fleet) and backs_up[b] and fleet[v].route < 0 and fleet[v].stopped_time > 0.0:
                 backs_up[v] = backs_up[v] or np.cos(shapes.yaw[v] - shapes.yaw[b]) > _ALIKE
     return backs_up
+
+
+@compiled
+def leaves_room_for(fleet, v, gap, leader):  # type: ignore[no-untyped-def]
+    """Return whether vehicle v, `gap` metres behind its leader, stays there because that one lets another one pass."""
+    if not 0 <= leader < len(fleet) or gap > _ROOM:
+        return False
+    return fleet[leader].gives_way_to != NONE and fleet[leader].gives_way_to != v

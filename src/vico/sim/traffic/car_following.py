@@ -15,6 +15,7 @@ from vico.sim.traffic.state import NONE
 
 COMFORTABLE_BRAKING = 2.0  # m/s^2 on dry ground; what vehicles do now is `vehicle.braking`
 TIME_GAP = 1.2  # s on dry ground; now: `vehicle.time_gap`
+CLOSING_UP = 1.2  # m nearer to its leader than usual stands who would else stand in a junction
 
 _JAM_GAP = 1.8  # m kept behind a leader that stands
 _LEAST_GAP = 0.3  # no step leaves less to the leader, m

@@ -113,9 +113,9 @@ def _has_to_be_let_out(holder, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _somebody_waited_longer(junctions, vehicle, junction):  # type: ignore[no-untyped-def]
-    """Return whether it is another vehicle's turn."""
-    return junctions.longest_wait[junction] > max(vehicle.junction_wait + _QUEUE_LEAD, _QUEUE_LEAST)
+def _is_overtaken(longest_wait, vehicle):  # type: ignore[no-untyped-def]
+    """Return whether it is the turn of another vehicle, that has waited so long."""
+    return longest_wait > max(vehicle.junction_wait + _QUEUE_LEAD, _QUEUE_LEAST)
 
 
 @compiled
@@ -185,14 +185,19 @@ def may_enter_junction(net, fleet, junctions, vehicle, request, leave, view):  #
         taken = holder >= 0 and holder != vehicle.index
         if taken and _has_to_be_let_out(fleet[holder], vehicle):
             lets_out = True
-        elif taken or _somebody_waited_longer(junctions, vehicle, junction):
+        elif taken or (holder < 0 and _is_overtaken(junctions.longest_wait[junction], vehicle)):
             vehicle.queued_junction = junction
             return False
         if yields_to_pedestrians(net, junctions, vehicle, lane):
             yields = True
     if yields or not _exit_is_long_enough(vehicle, request, leave):
         return False
+    # Shorter vehicles, and those with a shorter way, would else take whatever room there is for ever.
+    lane = vehicle.planned_lanes[leave.last] if leave.start >= 0.0 else NONE
+    if lane >= 0 and _is_overtaken(junctions.longest_exit_wait[lane], vehicle):
+        return False
     if not _exit_is_free(vehicle, leave, view, len(fleet)):
+        vehicle.queued_exit = lane
         return False
     return not lets_out or _way_is_free(vehicle, leave, view, len(fleet))
 
@@ -229,6 +234,15 @@ def request_junctions(net, fleet, junctions, vehicle, request, view):  # type: i
 def hesitates(net, vehicle):  # type: ignore[no-untyped-def]
     """Return whether a vehicle was let into a junction but has not got going: then it is in everybody's way."""
     return vehicle.granted_count > 0 and vehicle.stopped_time > _HESITATION and net.lanes[vehicle.lane].junction < 0
+
+
+@compiled
+def holds_junction(vehicle):  # type: ignore[no-untyped-def]
+    """Return whether a vehicle holds any junction."""
+    for h in range(HELD_JUNCTIONS):
+        if vehicle.held_junctions[h] >= 0:
+            return True
+    return False
 
 
 @compiled
@@ -275,10 +289,13 @@ def release_all_junctions(junctions, vehicle):  # type: ignore[no-untyped-def]
 
 @compiled
 def note_longest_waits(fleet, junctions):  # type: ignore[no-untyped-def]
-    """Note how long the first in each junction's queue has waited."""
+    """Note how long the first in each junction's queue has waited, and the first that lacks room on each lane."""
     junctions.longest_wait[:] = 0.0
+    junctions.longest_exit_wait[:] = 0.0
     for vehicle in fleet:
-        queued = vehicle.queued_junction
+        lane, queued = vehicle.queued_exit, vehicle.queued_junction
+        if lane >= 0:
+            junctions.longest_exit_wait[lane] = max(junctions.longest_exit_wait[lane], vehicle.junction_wait)
         if queued >= 0:
             junctions.longest_wait[queued] = max(junctions.longest_wait[queued], vehicle.junction_wait)
 

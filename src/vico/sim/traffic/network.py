@@ -80,7 +80,7 @@ def _lane_network(lanes: LaneGraph, walks: Walkways) -> LaneNetwork:
         "junction": lanes.zone,
         "inside": lanes.inside,
         "edge": lanes.edge,
-        "closed": _closed_to_cars(lanes, leaves),
+        "closed": _closed_to_cars(lanes, leaves, u_turn),
         "left": lanes.left,
         "right": lanes.right,
         "first_next": lanes.next_first[:-1],
@@ -143,10 +143,11 @@ def lanes_to_start_on(lanes: LaneGraph, net: LaneNetwork) -> tuple[NDArray[np.in
     return starts, entries if len(entries) else starts.astype(np.int32)
 
 
-def _closed_to_cars(lanes: LaneGraph, leaves: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _closed_to_cars(lanes: LaneGraph, leaves: NDArray[np.bool_], u_turn: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return the lanes cars keep off: those of buses, and pockets that lead neither off the map nor back.
 
-    Cars that found the way into such a pocket would gather there.
+    Cars that found the way into such a pocket would gather there. That one could turn back in it does not count, unless
+    there is nothing else to do: cars go on as long as they can.
     """
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import breadth_first_order, connected_components
@@ -157,6 +158,9 @@ def _closed_to_cars(lanes: LaneGraph, leaves: NDArray[np.bool_]) -> NDArray[np.b
     a, b = np.repeat(np.arange(n), np.diff(lanes.next_first)), lanes.next
     driven = ~(lanes.buses_only[a] | lanes.buses_only[b])
     a, b = a[driven], b[driven]
+    onward = np.bincount(a, weights=~u_turn[b], minlength=n) > 0
+    taken = ~(u_turn[b] & onward[a])
+    a, b = a[taken], b[taken]
     _, part = connected_components(csr_matrix((np.ones(len(a)), (a, b)), shape=(n, n)), connection="strong")
     streets = part == np.argmax(np.bincount(part, weights=lanes.length * ~lanes.buses_only))
     # Backwards from one more node, which stands for having got out.

@@ -112,7 +112,7 @@ class Traffic:
         self._bodies: Bodies | None = None  # as they stand since they last moved; asked for by everybody
         self._walkers = new_pedestrians(pedestrians, seed)
         self.pedestrian_state = self._walkers.view(np.recarray)
-        self.junctions = new_junctions(lanes.zones, len(self.walks))
+        self.junctions = new_junctions(lanes.zones, len(self.walks), len(lanes))
         self.jams = JamLog(first_entity)
         self._entities = np.zeros(0, np.int32)  # of all bodies of the last step, in the order of its shapes
         self.shapes = self._new_shapes()

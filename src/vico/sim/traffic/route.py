@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from vico.io.compiled import compiled
 from vico.sim.traffic.random_stream import next_random
-from vico.sim.traffic.state import NONE, PLANNED_LANES, PREVIOUS_LANES
+from vico.sim.traffic.state import HELD_JUNCTIONS, NONE, PLANNED_LANES, PREVIOUS_LANES
 
 NEVER = 1e9  # distance to a stop that there is not, m
 STANDING_ROOM = 1.5  # room kept behind a vehicle that has left a junction, m
 _DEAD_END, _JUNCTION_AGAIN, _BEEN_THERE, _TURN_BACK = 4.0, 2.0, 50.0, 1e6  # costs, in vehicles on a street
+_LESS_PICKY = 5.0  # s of waiting that count like a vehicle on a street
 
 
 @compiled
@@ -41,7 +42,8 @@ def _is_dead_end(net, street):  # type: ignore[no-untyped-def]
 @compiled
 def _lane_cost(net, vehicle, option, street, street_load):  # type: ignore[no-untyped-def]
     """Return what speaks against taking lane `option` to `street`: vehicles there, and ways that lead nowhere new."""
-    cost = street_load[net.lanes[street].edge] + next_random(vehicle)
+    # The longer it has waited to go its way, the less it minds where another one leads.
+    cost = street_load[net.lanes[street].edge] + next_random(vehicle) * (1.0 + vehicle.junction_wait / _LESS_PICKY)
     if _is_dead_end(net, street):
         cost += _DEAD_END  # only when everywhere else is busy
     # Out of a junction, not round and round in it, and not back to where the car waits.
@@ -142,6 +144,36 @@ def advance_lane(net, vehicle):  # type: ignore[no-untyped-def]
         vehicle.planned_count -= 1
         vehicle.granted_count = max(vehicle.granted_count - 1, 0)
         advance_on_route(net, vehicle)
+
+
+@compiled
+def can_step_back(net, vehicle):  # type: ignore[no-untyped-def]
+    """Return whether a vehicle that backs up may do so onto the lane it came from: a car, and not into a junction.
+
+    A junction that it holds it may back into.
+    """
+    before = vehicle.previous_lanes[0]
+    if before == NONE or vehicle.route >= 0 or vehicle.planned_count == PLANNED_LANES or vehicle.lateral_offset != 0.0:
+        return False
+    junction = net.lanes[before].junction
+    holds = junction < 0
+    for h in range(HELD_JUNCTIONS):
+        holds = holds or vehicle.held_junctions[h] == junction
+    return holds
+
+
+@compiled
+def step_back_lane(net, vehicle):  # type: ignore[no-untyped-def]
+    """Step back to the lane before, onto which a vehicle has backed up."""
+    for k in range(vehicle.planned_count, 0, -1):
+        vehicle.planned_lanes[k] = vehicle.planned_lanes[k - 1]
+    vehicle.planned_lanes[0] = vehicle.lane
+    vehicle.planned_count += 1
+    vehicle.lane = vehicle.previous_lanes[0]
+    vehicle.offset += net.lanes[vehicle.lane].length
+    for k in range(PREVIOUS_LANES - 1):
+        vehicle.previous_lanes[k] = vehicle.previous_lanes[k + 1]
+    vehicle.previous_lanes[PREVIOUS_LANES - 1] = NONE
 
 
 @compiled

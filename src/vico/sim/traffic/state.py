@@ -81,9 +81,12 @@ VEHICLE_STATE: list[tuple[Any, ...]] = [
     ("lane_change_distance", _F),  # driven since that lane change began, m
     ("blocker", _I),  # body it stands behind, an index into the step's `Shapes`; NONE while it drives
     ("target_speed", _F),  # most it drives, m/s: what a bus's timetable asks for
+    ("gives_way_to", _I),  # vehicle it backed up for and lets pass now, NONE for nobody
+    ("gave_way_for", _F),  # how long it has let that one pass, s
     ("stopped_time", _F),  # how long it has stood, s; 0 at a bus stop
     ("junction_wait", _F),  # how long it has stood before a junction it asked for and did not get, s
     ("queued_junction", _I),  # junction cluster that somebody else has, or has waited longer for; else NONE
+    ("queued_exit", _I),  # lane beyond the junction on which there is no room for it to stand; else NONE
     ("time_since_lane_change", _F),  # s
     ("route_index", _I),  # buses: position of its lane in its route
     ("stop_route_index", _I),  # buses: position in its route of the lane with the next stop
@@ -201,6 +204,9 @@ class JunctionState(NamedTuple):
         Longest that a vehicle in the queue for the cluster has waited, seconds, shape ``(clusters,)``.
     crossing_busy
         Whether a vehicle is on the crossing or has been let over it.
+    longest_exit_wait
+        Longest that a vehicle has waited for room to stand on the lane, having left a junction, seconds, shape
+        ``(lanes,)``.
     """
 
     holder: Ints
@@ -209,6 +215,7 @@ class JunctionState(NamedTuple):
     vehicle_wait: Floats
     longest_wait: Floats
     crossing_busy: NDArray[np.bool_]
+    longest_exit_wait: Floats
 
 
 @dataclass(frozen=True)
@@ -234,7 +241,16 @@ def new_fleet(n: int, seed: int) -> Records:
     """Return `n` vehicles, dtype `VEHICLE`, that have no parameters and no place yet."""
     fleet = np.zeros(n, VEHICLE)
     fleet["index"] = np.arange(n)
-    for name in ("previous_lanes", "planned_lanes", "held_junctions", "blocker", "queued_junction", "stop_route_index"):
+    for name in (
+        "previous_lanes",
+        "planned_lanes",
+        "held_junctions",
+        "blocker",
+        "gives_way_to",
+        "queued_junction",
+        "queued_exit",
+        "stop_route_index",
+    ):
         fleet[name] = NONE
     fleet["target_speed"] = TOP_SPEED
     fleet["random"] = _random_streams(seed, "turns", n)
@@ -253,7 +269,7 @@ def new_pedestrians(n: int, seed: int) -> Records:
     return walkers
 
 
-def new_junctions(clusters: int, walkways: int) -> JunctionState:
+def new_junctions(clusters: int, walkways: int, lanes: int) -> JunctionState:
     """Return the state of junctions nobody is in and crossings nobody is on."""
     return JunctionState(
         holder=np.full(max(clusters, 1), NONE, np.int32),
@@ -262,6 +278,7 @@ def new_junctions(clusters: int, walkways: int) -> JunctionState:
         vehicle_wait=np.zeros(walkways),
         longest_wait=np.zeros(max(clusters, 1)),
         crossing_busy=np.zeros(walkways, np.bool_),
+        longest_exit_wait=np.zeros(lanes),
     )
 
 

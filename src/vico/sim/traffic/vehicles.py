@@ -11,8 +11,9 @@ import numpy as np
 from vico.io.compiled import compiled
 from vico.sim.footprints import Rectangle
 from vico.sim.neighbours import search
-from vico.sim.traffic.backing_up import vehicles_backing_up
+from vico.sim.traffic.backing_up import leaves_room_for, vehicles_backing_up
 from vico.sim.traffic.car_following import (
+    CLOSING_UP,
     braking_distance,
     desired_speed,
     distance_to_stop,
@@ -25,6 +26,7 @@ from vico.sim.traffic.car_following import (
 )
 from vico.sim.traffic.junctions import (
     hesitates,
+    holds_junction,
     next_junction_request,
     note_longest_waits,
     release_all_junctions,
@@ -57,7 +59,7 @@ from vico.sim.traffic.path import (
     vehicle_outline,
 )
 from vico.sim.traffic.random_stream import next_random
-from vico.sim.traffic.route import advance_lane, plan_lanes
+from vico.sim.traffic.route import advance_lane, can_step_back, plan_lanes, step_back_lane
 from vico.sim.traffic.state import NONE
 
 STANDING = 0.1  # slower is standing, m/s ...
@@ -84,7 +86,7 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         Vehicles on each street, shape ``(streets,)``.
     """
     note_longest_waits(fleet, junctions)
-    backs_up = vehicles_backing_up(net, fleet, shapes)
+    backs_up = vehicles_backing_up(net, fleet, shapes, dt)
     buffers = np.empty(len(shapes.x), NEARBY_BODY), np.empty(len(shapes.x), NEARBY_BODY)
     beyond = Surroundings(shapes, grid, np.empty(len(shapes.x), np.int64), np.empty(len(shapes.x), NEARBY_BODY))
     path_buffer = np.empty(PATH_POINTS, PATH_POINT)
@@ -103,7 +105,7 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         gap, leader = find_leader(view, vehicle.offset, look, buffers[1])
         # Who is behind another vehicle does not ask: it would hold the junction that the other one needs.
         is_behind = 0 <= leader < len(fleet) and gap < request.distance
-        vehicle.queued_junction = NONE
+        vehicle.queued_junction = vehicle.queued_exit = NONE
         is_refused = (
             request.planned_index >= 0
             and not is_behind
@@ -115,15 +117,21 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         stop, limit = stop_and_speed_limit(net, vehicle, look, stop_distance, wanted)
         gap, leader = mind_only_before(stop, gap, leader)
         leading = leader_speed(shapes, leader, view, vehicle.offset + gap)
-        rate = idm_acceleration(vehicle, wanted, gap, leading)
+        # Who is still in a junction closes up, so that it gets out of it.
+        behind = gap + CLOSING_UP if holds_junction(vehicle) else gap
+        rate = idm_acceleration(vehicle, wanted, behind, leading)
         move = next_speed(vehicle, rate, limit, gap, stop, dt) * dt
+        if backs_up[v] or vehicle.gives_way_to != NONE or leaves_room_for(fleet, v, gap, leader):
+            move = 0.0  # it would be in the way again
         move, gap, leader = _move_without_contact(net, vehicle, view, move, gap, leader)
         vehicle.speed = move / dt
         if backs_up[v] and move == 0.0:
-            move = _move_back(vehicle, view, dt)
+            move = _move_back(net, vehicle, view, dt)
         if move != 0.0:
             _move_vehicle(vehicle, shapes, view, move, dt)
             advance_lane(net, vehicle)
+            if vehicle.offset < 0.0:
+                step_back_lane(net, vehicle)
         else:
             shapes.vx[v] = shapes.vy[v] = 0.0
 
@@ -191,12 +199,13 @@ def _move_without_contact(net, vehicle, view, move, gap, leader):  # type: ignor
 
 
 @compiled
-def _move_back(vehicle, view, dt):  # type: ignore[no-untyped-def]
+def _move_back(net, vehicle, view, dt):  # type: ignore[no-untyped-def]
     """Return the move of a vehicle that backs up, metres; 0 where it would touch a body."""
-    if vehicle.granted_count > 0 or vehicle.offset <= 0.5:
-        return 0.0
     move = -_REVERSE * dt
-    is_blocked = touched_at(view.path, view.outline, vehicle.offset + move, view.nearby, TOUCH, TOUCH) >= 0
+    if vehicle.granted_count > 0 or (vehicle.offset + move < 0.0 and not can_step_back(net, vehicle)):
+        return 0.0
+    # Whoever backs up stands as near as may be to what it backs away from.
+    is_blocked = touched_at(view.path, view.outline, vehicle.offset + move, view.nearby, TOUCH / 4, TOUCH / 4) >= 0
     return 0.0 if is_blocked else move
 
 
@@ -247,6 +256,7 @@ def place_vehicle(net, fleet, v, lane, offset, shapes, air):  # type: ignore[no-
             shapes.x[v], shapes.y[v] = before
             return False
     vehicle.lane, vehicle.offset, vehicle.planned_count, vehicle.lateral_offset = lane, offset, 0, 0.0
+    vehicle.gives_way_to = NONE
     vehicle.previous_lanes[:] = NONE
     vehicle.speed = vehicle.stopped_time = vehicle.junction_wait = 0.0
     vehicle.time_since_lane_change = vehicle.lane_change_distance = 0.0
