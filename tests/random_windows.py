@@ -192,11 +192,11 @@ def try_window(window: Window, keep: Path | None = None) -> Trial:
         except VicoError as error:
             state, what, detail = "refused", (f"{type(error).__name__}: {error}",), traceback.format_exc()
         except Exception as error:  # any: what is looked for
-            state, what, detail = "traceback", (_frame(error),), traceback.format_exc()
+            state, what, detail = "traceback", (frame_of(error),), traceback.format_exc()
     return Trial(window, state, what, time.perf_counter() - start, dropped, detail)
 
 
-def _frame(error: Exception) -> str:
+def frame_of(error: Exception) -> str:
     """The exception, and the innermost line of the package that it came through."""
     ours = [f for f in traceback.extract_tb(error.__traceback__) if f"{os.sep}vico{os.sep}" in f.filename]
     where = "outside"

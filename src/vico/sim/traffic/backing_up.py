@@ -29,10 +29,10 @@ def _keep_each_other(vehicle, other):  # type: ignore[no-untyped-def]
 @compiled
 def _plans_over(vehicle, lane):  # type: ignore[no-untyped-def]
     """Return whether a vehicle is going to take a lane."""
+    takes = False
     for k in range(vehicle.planned_count):
-        if vehicle.planned_lanes[k] == lane:
-            return True
-    return False
+        takes = takes or vehicle.planned_lanes[k] == lane
+    return takes
 
 
 @compiled

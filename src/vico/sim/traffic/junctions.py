@@ -239,10 +239,10 @@ def hesitates(net, vehicle):  # type: ignore[no-untyped-def]
 @compiled
 def holds_junction(vehicle):  # type: ignore[no-untyped-def]
     """Return whether a vehicle holds any junction."""
+    holds = False
     for h in range(HELD_JUNCTIONS):
-        if vehicle.held_junctions[h] >= 0:
-            return True
-    return False
+        holds = holds or vehicle.held_junctions[h] >= 0
+    return holds
 
 
 @compiled
