@@ -57,6 +57,21 @@ def test_who_rides_sets_out_later_than_on_foot_and_never_for_a_short_way(
             assert seconds_of_day(way.end) - seconds_of_day(way.start) <= 60 * on_foot
 
 
+def test_who_takes_the_bus_has_a_minute_to_spare_on_the_way_to_the_stop(
+    helsinki_city: World, people: Community
+) -> None:
+    index = PlaceIndex(helsinki_city, people.date.weekday())
+    taken = rides(people, Mode.BUS)
+    assert taken
+    for resident, (before, way, after) in taken:
+        a, b = (index.place_by_id[item.place or ""] for item in (before, after))
+        doors = a.position[:2], b.position[:2]
+        late = seconds_of_day(way.start) + index.indoors(a.id) + 60.0
+        found = index.rides.first(doors, Mode.BUS, late, resident.cash)
+        assert found is not None
+        assert found.arrive + index.indoors(b.id) <= seconds_of_day(way.end)
+
+
 def test_no_more_bicycles_are_planned_with_than_a_station_has(helsinki_city: World, people: Community) -> None:
     index = PlaceIndex(helsinki_city, people.date.weekday())
     moves: dict[str, list[tuple[float, int]]] = {}

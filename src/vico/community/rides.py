@@ -22,6 +22,9 @@ from vico.world.model import Place
 
 #: Seconds kept for doors and for others on the pavement when setting out, as for walks.
 SETTING_OUT = 20.0
+#: Seconds that one sets out sooner besides, which nobody minds: who stands somewhere on a square has farther to go, and
+#: who comes to the stop seconds late waits for the next bus.
+SOONER = {Mode.BUS: 60.0, Mode.BIKE: 0.0}
 #: Seconds kept in hand at the end: buses are up to two minutes late, bicycles are ridden around others.
 RESERVE = {Mode.BUS: 120.0, Mode.BIKE: 60.0}
 # Shorter ways are walked, seconds.
@@ -203,7 +206,7 @@ class _Means:
         for mode in habits.bother:
             # Who has to set out earlier than this loses more than is won.
             spare = most - habits.of_ride(mode, (habits.walking - 1.0) * indoors, _LEAST_PRICE[mode])
-            not_before = max(seconds_of_day(way.end) - spare, seconds_of_day(way.start))
+            not_before = max(seconds_of_day(way.end) - spare, seconds_of_day(way.start) + SOONER[mode])
             trip = self.index.rides.last(
                 (ends[0].position[:2], ends[1].position[:2]),
                 mode,
@@ -221,7 +224,8 @@ class _Means:
             cost = habits.of_ride(mode, seconds, trip.price)
             if cost < most:
                 # Schedules have whole minutes.
-                found.append(_Ride(mode, trip, cost, max(seconds_of_day(way.start), math.floor(set_out / 60) * 60)))
+                leave = max(seconds_of_day(way.start), math.floor((set_out - SOONER[mode]) / 60) * 60)
+                found.append(_Ride(mode, trip, cost, leave))
         return min(found, key=lambda ride: ride.cost, default=None)
 
     def _is_to_be_had(self, ride: _Ride) -> bool:
