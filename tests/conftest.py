@@ -35,6 +35,29 @@ EXTRACT = Path(__file__).parents[1] / "src" / "vico" / "data" / "helsinki.osm.pb
 SHARED = Path(__file__).parents[2] / "shared" / "data"
 
 
+# Files whose tests take longest: they start processes, build worlds of their own, run to the end and again.
+_LONG = ("test_examples.py", "test_readme.py", "test_resume.py", "test_episodes.py", "test_stages.py")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Order the tests so that two processes wait as little as may be, for each other and at the end.
+
+    Each begins at its part of the list. The first one makes the city; meanwhile the second one makes what the rest
+    needs, and then does what takes long, so that what is left at the end is short and can be shared out.
+    """
+
+    def needs(item: pytest.Item, fixture: str) -> bool:
+        return fixture in getattr(item, "fixturenames", ())
+
+    city = [item for item in items if needs(item, "helsinki_city")]
+    people = [item for item in items if needs(item, "helsinki_people") and item not in city][:1]
+    long = [item for item in items if item.path.name in _LONG and item not in city]
+    taken = set(map(id, city + people + long))
+    rest = [item for item in items if id(item) not in taken]
+    before_half = max(len(items) // 2 - len(city), 0)
+    items[:] = city + rest[:before_half] + people + long + rest[before_half:]
+
+
 @pytest.fixture(scope="session")
 def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shared]:
     """Make a folder once for all processes of this run: ``shared(name, make)``. No test may change what lies there."""
