@@ -12,6 +12,7 @@ from vico.sim.actions.check import check
 from vico.sim.actions.model import Refusal
 from vico.sim.avatars import clearances
 from vico.sim.config import SimConfig
+from vico.sim.overlaps import overlapping
 from vico.sim.simulation import Simulation
 from vico.sim.state import RADIUS, Posture
 from vico.sim.transit import BIKE_ASTRAY, BIKE_RATE, FARE
@@ -228,6 +229,29 @@ def test_who_gets_off_stands_beside_the_bicycle(sim: Simulation) -> None:
     standing = transit.bicycles.standing_bodies(np.array([bike]))
     assert clearances(sim.state.people.position[0, :2], standing).min() >= RADIUS
     assert np.hypot(*(transit.bicycles.xy[bike] - sim.state.people.position[0, :2])) < 8.0
+
+
+def test_a_bicycle_left_takes_the_room_its_rider_took_with_it(sim: Simulation) -> None:
+    transit = sim.state.transit
+    assert transit is not None
+    bike = on_a_bicycle(sim)
+    rider, left = sim.state.people.bodies(), transit.bicycles.standing_bodies(np.array([bike]))
+    for name in ("half_length", "half_width", "rounding", "yaw"):
+        assert np.array_equal(getattr(left, name), getattr(rider, name)), name
+    assert np.array_equal(left.position[:, :2], rider.position[:, :2])
+
+
+def test_bicycles_left_end_to_end_do_not_overlap(sim: Simulation) -> None:
+    transit = sim.state.transit
+    assert transit is not None
+    on_a_bicycle(sim)
+    both = np.array([0, 1])
+    ahead = transit.bicycles.standing_bodies(both[:1]).half_length[0] - RADIUS
+    # The ends' circles touch at half past one, where rectangles would have corners.
+    reach = np.array([ahead + 2 * RADIUS * np.cos(np.pi / 4) + ahead, 2 * RADIUS * np.sin(np.pi / 4)])
+    transit.bicycles.carry(0, 0.0, 0.0, 0.0)
+    transit.bicycles.carry(1, *(reach + 0.002), 0.0)
+    assert overlapping(transit.bicycles.standing_bodies(both)) == []
 
 
 def test_bicycles_are_named_wherever_they_stand(sim: Simulation) -> None:

@@ -20,6 +20,8 @@ KINDS = ("resident", "assistant", "robot", "car", "bus", "bicycle", "pedestrian"
 RESIDENT, ASSISTANT, ROBOT, CAR, BUS, BICYCLE, PEDESTRIAN, OBJECT = range(len(KINDS))
 #: By kind: whether it is a person.
 IS_PERSON = np.isin(np.arange(len(KINDS)), (RESIDENT, ASSISTANT, PEDESTRIAN))
+#: By kind: whether its footprint is round at the ends. A bicycle left standing takes the room its rider took with it.
+IS_ROUND = IS_PERSON | (np.arange(len(KINDS)) == BICYCLE)
 #: People step over what is no higher than this, metres: the lowest part of a person's extent is in nobody's way.
 STEP_HEIGHT = 0.1
 #: Nobody on the ground reaches as high as this, metres, on foot or in the saddle.
@@ -42,9 +44,9 @@ class Bodies:
     yaw
         Radians, float64, shape ``(n,)``.
     half_length, half_width
-        Half the footprint's extents along and across its heading, metres, float64, shape ``(n,)``. People have a round
-        footprint: all that is within `half_width` of a line as long as leaves `half_length` in all; a disc on foot, a
-        stadium on a bicycle. Everything else has a rectangle.
+        Half the footprint's extents along and across its heading, metres, float64, shape ``(n,)``. People and
+        bicycles have a round footprint: all that is within `half_width` of a line as long as leaves `half_length` in
+        all; a disc on foot, a stadium with a bicycle. Everything else has a rectangle.
     height
         From the underside to the top, metres, float64, shape ``(n,)``.
     velocity
@@ -70,12 +72,12 @@ class Bodies:
 
     @property
     def rounding(self) -> NDArray[np.float64]:
-        """Radius of the footprints' round ends, metres: `half_width` for people, 0 for rectangles; shape ``(n,)``.
+        """Radius of the footprints' round ends, metres: 0 for rectangles, `half_width` for the rest; shape ``(n,)``.
 
         A footprint is all that is within `rounding` of its core, a rectangle of `half_length` and `half_width` less
-        `rounding`: a point for people on foot, a line for cyclists.
+        `rounding`: a point for people on foot, a line for cyclists and bicycles.
         """
-        return np.where(self.person, self.half_width, 0.0)
+        return np.where(IS_ROUND[self.kind], self.half_width, 0.0)
 
     @property
     def bottom(self) -> NDArray[np.float64]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
-from vico.sim.bodies import STEP_HEIGHT, Bodies
+from vico.sim.bodies import Bodies
 
 #: Spaces that are no rooms: the street, and buses, whose riders take no room.
 OUTDOORS, IN_BUS = -1, -2
@@ -58,26 +58,27 @@ def records_of(bodies: Bodies, space: NDArray[Any] | int = OUTDOORS) -> NDArray[
     """Return bodies as kernels take them, dtype `BODY`; extents in ENU metres, `space` one for all or one each."""
     found = np.empty(len(bodies), BODY)
     found["entity"], found["space"] = bodies.entity, space
-    columns = (bodies.position, bodies.yaw, bodies.half_length, bodies.half_width, bodies.height, bodies.velocity)
+    half = np.column_stack([bodies.half_length, bodies.half_width])
+    extent = np.column_stack([bodies.bottom, bodies.top])
+    columns = (bodies.position, bodies.yaw, half, bodies.rounding, extent, bodies.velocity)
     # One layout for all: another one would have to be compiled.
-    _fill(found, *(np.ascontiguousarray(column, np.float64) for column in columns), bodies.person)
+    _fill(found, *(np.ascontiguousarray(column, np.float64) for column in columns))
     return found
 
 
 @compiled
-def _fill(found, position, yaw, half_length, half_width, height, velocity, person):  # type: ignore[no-untyped-def]
+def _fill(found, position, yaw, half, rounding, extent, velocity):  # type: ignore[no-untyped-def]
     # Compiled, for it is quicker, and NumPy's own cosine differs between processors in its last digit.
     for k in range(len(found)):
         one = found[k]
         one.index = k
         one.x, one.y = position[k, 0], position[k, 1]
         one.cos, one.sin = math.cos(yaw[k]), math.sin(yaw[k])
-        one.half_length, one.half_width = half_length[k], half_width[k]
-        one.rounding = half_width[k] if person[k] else 0.0
+        one.half_length, one.half_width = half[k, 0], half[k, 1]
+        one.rounding = rounding[k]
         u, v = one.half_length - one.rounding, one.half_width - one.rounding
         one.radius = math.sqrt(u * u + v * v) + one.rounding
-        one.bottom = position[k, 2] + STEP_HEIGHT * person[k]
-        one.top = position[k, 2] + height[k]
+        one.bottom, one.top = extent[k, 0], extent[k, 1]
         one.vx, one.vy = velocity[k, 0], velocity[k, 1]
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.io.compiled import compiled
-from vico.sim.bodies import IS_PERSON, Bodies
+from vico.sim.bodies import IS_ROUND, Bodies
 from vico.sim.footprints import Rectangle, point_gap
 
 Array = NDArray[Any]
@@ -59,7 +59,7 @@ def _neighbours(found, count, parts, own, reach):  # type: ignore[no-untyped-def
             continue
         one = found[count]
         one.x, one.y, one.yaw, one.vx, one.vy = x, y, yaw[k], velocity[k, 0], velocity[k, 1]
-        one.rounding = half_width[k] if IS_PERSON[kind[k]] else 0.0
+        one.rounding = half_width[k] if IS_ROUND[kind[k]] else 0.0
         one.half_length, one.half_width = half_length[k] - one.rounding, half_width[k] - one.rounding
         count += 1
     return count

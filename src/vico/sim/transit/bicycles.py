@@ -18,6 +18,7 @@ from vico.assets.vehicles import BICYCLE_SIZE
 from vico.errors import InputError
 from vico.rules import BIKE_REACH, STATION_REACH, ride_price
 from vico.sim.bodies import BICYCLE, Bodies, Drawn
+from vico.sim.state import RADIUS, RIDER_REACH
 from vico.sim.traffic import Traffic
 from vico.world.model import BikeStation
 
@@ -73,7 +74,10 @@ class Bicycles:
         return self.standing_bodies(np.flatnonzero((self.rider < 0) & (self.station < 0)))
 
     def standing_bodies(self, bikes: NDArray[np.int64]) -> Bodies:
-        """Return the bodies some bicycles have, or would have, standing where they are."""
+        """Return the bodies some bicycles have, or would have, standing where they are.
+
+        They keep the footprint they had with their riders: who could ride there has room to leave the bicycle there.
+        """
         n = len(bikes)
         if not n:
             return Bodies.none()
@@ -82,8 +86,8 @@ class Bicycles:
             kind=np.full(n, BICYCLE, np.int8),
             position=np.column_stack([self.xy[bikes], self._height(self.xy[bikes])]),
             yaw=self.yaw[bikes],
-            half_length=np.full(n, BICYCLE_SIZE[0] / 2),
-            half_width=np.full(n, BICYCLE_SIZE[1] / 2),
+            half_length=np.full(n, RIDER_REACH + RADIUS),
+            half_width=np.full(n, RADIUS),
             height=np.full(n, BICYCLE_SIZE[2]),
             velocity=np.zeros((n, 2)),
         )
