@@ -107,6 +107,7 @@ class ReasonCode(IntEnum):
     NO_VEHICLE = 74
     NO_TRANSIT = 75
     MOVING = 76
+    CLOSED = 77
 
 
 _CODE_NAMES = {int(code): code.name.lower() if code else "" for code in ReasonCode}

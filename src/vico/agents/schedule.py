@@ -35,6 +35,9 @@ _STROLL = 30.0
 _STROLLING = ("leisure", "visit")
 _RUNNING = ("exercise",)
 _EATING = ("meal_home", "meal_out")
+# Where a place is closed, another one of its kind within so many metres will do, but for what binds one to the place.
+_OTHER_NEAR = 400.0
+_BOUND = ("work", "study")
 # How often who is stopped indoors steps aside instead of trying again.
 _GIVE_WAY = 0.5
 _STROLL_SPEED, _RUN_SPEED = 0.9, 1.9
@@ -96,6 +99,8 @@ class ScheduleFollower:
         self._paused_until = -math.inf
         # Whether the last action was to go in somewhere.
         self._went_in = False
+        # Where it goes for a stay instead of a place that is closed: the stay, and the places that were thought of.
+        self._instead: tuple[Stay | None, list[str]] = None, []
 
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the action for the coming second."""
@@ -137,6 +142,8 @@ class ScheduleFollower:
             "stroll": None if self._stroll is None else list(self._stroll),
             "paused_until": None if math.isinf(self._paused_until) else self._paused_until,
             "went_in": self._went_in,
+            "instead": self._instead[1],
+            "instead_of": None if self._instead[0] is None else self._stays.index(self._instead[0]),
         }
 
     def restore(self, state: AgentState) -> None:
@@ -157,6 +164,8 @@ class ScheduleFollower:
         self._stroll = None if stroll is None else (float(stroll[0]), float(stroll[1]))
         paused = state["paused_until"]
         self._paused_until, self._went_in = -math.inf if paused is None else paused, state["went_in"]
+        stay = state["instead_of"]
+        self._instead = None if stay is None else self._stays[stay], [str(name) for name in state["instead"]]
 
     def _decide(self, observation: Observation, info: Info) -> Action:
         state = observation["state"]
@@ -164,7 +173,7 @@ class ScheduleFollower:
         stay = self._stay_at(state["time"] % DAY)
         if stay is None:
             return {"type": "wait"}
-        place = self._map.place_by_id[stay.place]
+        place = self._open_place(stay, observation, info)
         if state["vehicle"]:
             return self._travel(observation, info, stay, place)
         if self._posture != "lying":
@@ -185,6 +194,35 @@ class ScheduleFollower:
             if second >= stay.leave:
                 current = stay
         return current or (self._stays[0] if self._stays else None)
+
+    def _open_place(self, stay: Stay, observation: Observation, info: Info) -> PublicPlace:
+        """Return the place of a stay, or where one goes instead as it is known to be closed: as near by, or home."""
+        for_stay, thought_of = self._instead
+        if for_stay is not stay:
+            self._instead, thought_of = (None, []), []
+        place = self._map.place_by_id[thought_of[-1] if thought_of else stay.place]
+        closed = {name for event in info.get("events", ()) if event["goes_on"] for name in event["closed_places"]}
+        # Who is in may stay.
+        if place.id not in closed or observation["state"]["place"] == place.id:
+            return place
+        thought_of = [*(thought_of or [place.id]), self._other_place(stay, closed.union(thought_of))]
+        self._instead = stay, thought_of
+        return self._map.place_by_id[thought_of[-1]]
+
+    def _other_place(self, stay: Stay, closed: Collection[str]) -> str:
+        """Return where one goes who finds a place closed: the nearest of its kind, but not for work, or home."""
+        wanted = self._map.place_by_id[stay.place]
+        if stay.tag not in _BOUND:
+            near = self._map.places_near(wanted.position, _OTHER_NEAR)
+            for place in near:
+                if (
+                    place.kind == wanted.kind
+                    and place.id not in closed
+                    and (place.building is None) == (wanted.building is None)
+                ):
+                    return place.id
+        home = next((one.place for one in self._stays if one.type == "sleep"), stay.place)
+        return stay.place if home in closed else home
 
     def _is_there(self, observation: Observation, place: PublicPlace) -> bool:
         state = observation["state"]

@@ -159,6 +159,8 @@ class RunOptions:
         Hours that clocks are ahead of UTC there; without it, as the time zone of 15 degrees the world lies in.
     weather
         A kind of weather, "changing", or a weather file (.json).
+    events
+        Of the city: none, "changing", or a file of events (.json).
     steps
         Seconds to simulate.
     robots
@@ -202,6 +204,7 @@ class RunOptions:
     date: str = "2026-06-21"
     utc_offset: float | None = None
     weather: str = "fair"
+    events: str = "none"
     steps: int = 1800
     robots: CommaSeparated = "husky,go2"
     cars: int = 30

@@ -72,8 +72,8 @@ def run(options: RunOptions) -> int:
     return _judged(metrics)
 
 
-def weather_of(text: str) -> str | dict[str, Any]:
-    """Return the weather that an option names: itself, or the content of a weather file."""
+def named_or_read(text: str) -> str | dict[str, Any]:
+    """Return what an option names, of weather or events: itself, or the content of a file."""
     return read_json(Path(text)) if text.endswith(".json") else text
 
 
@@ -120,7 +120,8 @@ class _Job:
             start=seconds_of_day(options.start),
             date=options.date,
             utc_offset=options.utc_offset,
-            weather=weather_of(options.weather),
+            weather=named_or_read(options.weather),
+            events=named_or_read(options.events),
             robots=_names(options.robots),
             errands=True,
             cars=options.cars,

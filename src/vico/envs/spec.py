@@ -35,6 +35,7 @@ class EnvOptions(TypedDict, total=False):
     date: str
     utc_offset: float | None
     weather: str | Mapping[str, Any]
+    events: str | Mapping[str, Any]
     periods: Mapping[str, float | str]
     max_steps: int
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from vico.errors import InputError
 from vico.rules import DOOR_REACH
 from vico.sim.appointments import Appointment, appointments
+from vico.sim.environment import EventSites
 from vico.sim.indoor import Indoor
 from vico.sim.robots.scene import RobotScene
 from vico.sim.traffic.network import TrafficNetwork
@@ -95,6 +96,11 @@ class SimulationBase:
     def router(self) -> Router:
         """Finds ways on the walkable map."""
         return self.world.router
+
+    @cached_property
+    def event_sites(self) -> EventSites:
+        """Where events can be."""
+        return EventSites(self.world)
 
     @cached_property
     def place_index(self) -> dict[str, int]:

@@ -38,6 +38,8 @@ class SimSettings:
         Hours that clocks are ahead of UTC there; None: as the time zone of 15 degrees the world lies in.
     weather
         A kind of weather (`vico.sim.environment.weather_kinds`), ``"changing"``, or the content of a weather file.
+    events
+        Of the city: ``"none"``, ``"changing"``, or the content of a file of events (docs/events.md).
     periods
         How often agents act and observe, seconds by agent's name; 1 s where nothing else is said. For robots also
         ``"model"``, which is the control period of the robot's model, and the name ``"robots"`` for all of them.
@@ -56,6 +58,7 @@ class SimSettings:
     date: str = "2026-06-21"
     utc_offset: float | None = None
     weather: str | Mapping[str, Any] = "fair"
+    events: str | Mapping[str, Any] = "none"
     periods: Mapping[str, float | str] = field(default_factory=dict)
 
 

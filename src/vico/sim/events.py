@@ -29,6 +29,7 @@ KINDS = (
     "agent_failed",
     "task_complete",
     "robot",
+    "city",
 )
 
 

@@ -12,7 +12,7 @@ from vico.sim.avatars import Avatars
 from vico.sim.base import SimulationBase
 from vico.sim.bodies import ASSISTANT, KINDS, RESIDENT
 from vico.sim.config import SimConfig
-from vico.sim.environment import Environment, Sky
+from vico.sim.environment import Agenda, Environment, Sky
 from vico.sim.events import Events
 from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.simulation_state import SimulationState
@@ -64,7 +64,9 @@ def initial_state(
 def _environment(base: SimulationBase, config: SimConfig) -> Environment:
     origin = base.world.manifest.origin
     sky = Sky.over(origin.lat, origin.lon, config.date, config.utc_offset)
-    return Environment(sky, config.weather, seed=config.seed, second=float(config.start))
+    second = float(config.start)
+    agenda = Agenda(base.event_sites, config.events, seed=config.seed, second=second)
+    return Environment(sky, config.weather, seed=config.seed, second=second, agenda=agenda)
 
 
 def _people(residents: Sequence[Resident], config: SimConfig) -> People:

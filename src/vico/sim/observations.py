@@ -112,9 +112,9 @@ def observe(
         Observation by name (``rgb``, ``depth``, ``segmentation``, ``extrinsics``, ``intrinsics`` only for those who
         see; ``sensors`` for robots; ``pose``, ``events``, ``state`` for everybody), and info by name: ``entities``,
         kind and name of what the pictures show, by entity; ``action_code``; ``weather`` outdoors
-        (`vico.sim.environment`); for residents ``in_view``, what is in view by sight lines
-        (`vico.sim.perception.InView`), the same with and without pictures. Each is made when it is first asked for, of
-        the state as it is now.
+        (`vico.sim.environment`); ``events`` of the city that it knows of, where a run has any (`vico.sim.city`); for
+        residents ``in_view``, what is in view by sight lines (`vico.sim.perception.InView`), the same with and without
+        pictures. Each is made when it is first asked for, of the state as it is now.
     """
     names = state.names
     chosen = range(len(names)) if who is None else who

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from vico.crowd import Crowd
 from vico.rules import ActionStatus, code_name
 from vico.sim.bodies import RESIDENT, Bodies
+from vico.sim.city import ANNOUNCED, known_events
 from vico.sim.moves import eye_height
 from vico.sim.perception import OUTDOORS, AllInView, Eyes, in_view, opaque_grid
 from vico.sim.simulation_state import SimulationState
@@ -52,6 +53,7 @@ class Told:
         self._eyes_of = {i: k for k, i in enumerate(self._residents.tolist())}
         self._in_view = look_about(state, stances, self._residents)
         self._weather = state.environment.record()
+        self._events = {i: known_events(state, i, stances[i]) for i in who} if len(state.environment.agenda) else {}
 
     def observation(self, name: str) -> dict[str, Any]:
         """Return one agent's observation."""
@@ -68,7 +70,9 @@ class Told:
         i = self._index[name]
         p = self._state.people
         code = code_name(p.reason_code.item(i)) if i < len(p) else self._robots[i]["action_code"]
-        found = {"action_code": code, "weather": self._weather}
+        found: dict[str, Any] = {"action_code": code, "weather": self._weather}
+        if i in self._events:
+            found["events"] = self._events[i]
         if i not in self._eyes_of:
             return found
         view = self._in_view.of(self._eyes_of[i])
@@ -83,6 +87,8 @@ class Told:
         p, n = self._state.people, len(self.poses)
         heard = np.zeros(n, bool)
         heard[[self._index[name] for name in self._heard]] = True
+        # What is going on in the city may concern them, too.
+        heard[[i for i, known in self._events.items() if any(one["known"] != ANNOUNCED for one in known)]] = True
         view = self._in_view
         # The first bodies are the people's, in their order; who else is in view is no agent one would speak to.
         people = view.body < len(p)

@@ -7,10 +7,11 @@ from functools import cache
 import numpy as np
 import pytest
 
+import toy_city
 from road_city import HALF, road_city
 from vico.sim.bodies import RESIDENT, Bodies
 from vico.sim.config import SimConfig
-from vico.sim.environment import Conditions, Environment, Sky
+from vico.sim.environment import Agenda, Conditions, Environment, EventSites, Sky
 from vico.sim.overlaps import overlapping
 from vico.sim.simulation import Simulation
 from vico.sim.traffic import Traffic, TrafficNetwork
@@ -25,7 +26,8 @@ FIFTY = 50 / 3.6
 
 @cache
 def conditions(kind: str) -> Conditions:
-    return Environment(Sky.over(60.17, 24.94, "2026-01-15"), kind, seed=0, second=12 * 3600.0).conditions
+    agenda = Agenda(EventSites(toy_city.world()))
+    return Environment(Sky.over(60.17, 24.94, "2026-01-15"), kind, seed=0, second=12 * 3600.0, agenda=agenda).conditions
 
 
 @cache

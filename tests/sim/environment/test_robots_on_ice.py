@@ -5,17 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import toy_city
 from robot_field import field
 from vico.sim.bodies import Bodies
 from vico.sim.config import SimConfig
-from vico.sim.environment import Environment, Sky
+from vico.sim.environment import Agenda, Environment, EventSites, Sky
 from vico.sim.robots import RobotPopulation, RobotStatus
 from vico.sim.simulation import Simulation
 from vico.world.folder import World
 
 
 def grip_in(kind: str) -> float:
-    return Environment(Sky.over(60.17, 24.94, "2026-01-15"), kind, seed=0, second=12 * 3600.0).conditions.grip
+    agenda = Agenda(EventSites(toy_city.world()))
+    return Environment(
+        Sky.over(60.17, 24.94, "2026-01-15"), kind, seed=0, second=12 * 3600.0, agenda=agenda
+    ).conditions.grip
 
 
 def robot_in(kind: str, weather: str) -> RobotPopulation:

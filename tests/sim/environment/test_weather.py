@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+import toy_city
 from vico.clock import DAY
 from vico.errors import InputError, SchemaError
-from vico.sim.environment import Environment, Sky, Weather, weather_kinds
+from vico.sim.environment import Agenda, Environment, EventSites, Sky, Weather, weather_kinds
 from vico.sim.environment.climate import usual_temperature
 from vico.sim.environment.effects import CLEAR_SIGHT
 from vico.sim.environment.forecast import Changing, Site, forecast_of
@@ -21,7 +22,8 @@ JANUARY = Site(60.17, 24.94, 15)
 
 
 def environment(wanted: Any = "fair", *, hour: float = 12.0, date: str = "2026-06-21") -> Environment:
-    return Environment(Sky.over(60.17, 24.94, date), wanted, seed=0, second=hour * 3600)
+    agenda = Agenda(EventSites(toy_city.world()))
+    return Environment(Sky.over(60.17, 24.94, date), wanted, seed=0, second=hour * 3600, agenda=agenda)
 
 
 def test_every_kind_of_weather_is_weather() -> None:

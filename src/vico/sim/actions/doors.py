@@ -54,10 +54,13 @@ def _refuse_entrance(name: str, i: int, state: SimulationState) -> Refusal | Non
     if place.entrance is None or not place.rooms:
         return Refusal(ReasonCode.NO_DOOR, f"enter: {place.name} is in the open; there is nothing to enter")
     away = float(np.hypot(*(state.base.doors[state.place_index[name]] - state.people.position[i, :2])))
-    if away <= DOOR_REACH:
+    if away > DOOR_REACH:
+        sentence = f"enter: the entrance of {place.name} is {away:.1f} m away; {DOOR_REACH:g} m or less is needed"
+        return Refusal(ReasonCode.TOO_FAR, sentence)
+    closure = state.environment.agenda.effects.shut.get(name)
+    if closure is None:
         return None
-    sentence = f"enter: the entrance of {place.name} is {away:.1f} m away; {DOOR_REACH:g} m or less is needed"
-    return Refusal(ReasonCode.TOO_FAR, sentence)
+    return Refusal(ReasonCode.CLOSED, f"enter: {place.name} is closed ({closure.event.title})")
 
 
 def _room_behind(name: str, i: int, state: SimulationState) -> int:

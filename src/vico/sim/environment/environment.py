@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
@@ -10,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import InputError
+from vico.sim.environment.agenda import Agenda
+from vico.sim.environment.city_event import CityEvent, Region
 from vico.sim.environment.effects import Conditions, conditions
 from vico.sim.environment.forecast import Forecast, Site, forecast_of
 from vico.sim.environment.ground import Ground, aged, cover, iciness, settled, wetness
@@ -21,7 +24,7 @@ _AGES_EVERY = 60
 
 
 class Environment:
-    """Weather, ground and light of a run; part of its state.
+    """Weather, ground, light and events of a run; part of its state.
 
     Parameters
     ----------
@@ -33,10 +36,17 @@ class Environment:
         Decides weather that changes by itself.
     second
         Seconds since midnight of the first day; the ground is as it would be after hours of the weather then.
+    agenda
+        The run's events.
+
+    Attributes
+    ----------
+    sky, agenda
+        Those.
     """
 
-    def __init__(self, sky: Sky, wanted: str | Mapping[str, Any], *, seed: int, second: float) -> None:
-        self.sky = sky
+    def __init__(self, sky: Sky, wanted: str | Mapping[str, Any], *, seed: int, second: float, agenda: Agenda) -> None:
+        self.sky, self.agenda = sky, agenda
         self._forecast: Forecast = forecast_of(wanted, Site(sky.lat, sky.lon, sky.day_of_year), seed)
         # When a change that was called for begins and ends, and the weather before and after it; none: never.
         self._change = np.full(2, np.inf)
@@ -53,21 +63,30 @@ class Environment:
             "before_after": self._before_after,
             "ground": self._ground,
             "lamps": self._lamps,
+            **self.agenda.arrays(),
         }
 
     def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
         """Go back to what `arrays` held."""
-        for name, array in self.arrays().items():
+        for array, name in (
+            (self._second, "second"),
+            (self._change, "change"),
+            (self._before_after, "before_after"),
+            (self._ground, "ground"),
+            (self._lamps, "lamps"),
+        ):
             array[:] = arrays[name]
+        self.agenda.restore(arrays, float(self._second[0]))
         self._forget()
 
     def advance(self, seconds: float) -> None:
-        """Go on by some seconds; the ground gets wet or dry every minute."""
+        """Go on by some seconds; the ground gets wet or dry every minute, and events begin and end."""
         before = int(self._second[0])
         self._second += seconds
         for _ in range(int(self._second[0]) // _AGES_EVERY - before // _AGES_EVERY):
             self._ground[:] = aged(Ground(*self._ground.tolist()), self.weather, _AGES_EVERY)
         self._forget()
+        self.agenda.advance(float(self._second[0]))
 
     # What it is like.
 
@@ -168,6 +187,68 @@ class Environment:
             raise InputError(f"lamps: a share of {share} is lit; it has to be 0..1")
         self._lamps[0] = share
         self._forget()
+
+    def start_event(
+        self,
+        kind: str,
+        *,
+        place: str = "",
+        street: str = "",
+        region: Region | None = None,
+        minutes: float = math.inf,
+        name: str = "",
+        **numbers: Any,
+    ) -> int:
+        """Let an event begin in the city, now; everybody and everything takes notice from the next second on.
+
+        Parameters
+        ----------
+        kind
+            As docs/events.md lists them.
+        place, street, region
+            Where: a place's id or name, a street's name, or x, y and radius, ENU metres.
+        minutes
+            How long it goes on, unless `end_event` ends it.
+        name
+            What it is called.
+        **numbers
+            Further fields of `vico.sim.environment.CityEvent`.
+
+        Returns
+        -------
+        int
+            The event's id.
+
+        Raises
+        ------
+        InputError
+            If there is no such kind or place, or a number is out of range.
+        """
+        now = float(self._second[0])
+        if unknown := set(numbers) - {"noise", "walkways"}:
+            raise InputError(f"events: {sorted(unknown)[0]!r} is no number of an event; there are noise, walkways")
+        if not minutes > 0:
+            raise InputError(f"events: {kind}: for {minutes:g} minutes; it has to be more than 0")
+        end = now + 60.0 * minutes
+        event = CityEvent(
+            kind=kind, place=place, street=street, region=region, begin=now, end=end, name=name, **numbers
+        )
+        return self.agenda.start(event, now)
+
+    def end_event(self, number: int) -> None:
+        """Let an event of the city be over now, or never begin.
+
+        Parameters
+        ----------
+        number
+            Its id, as `start_event` returned it; events that were planned count from 1.
+
+        Raises
+        ------
+        InputError
+            If there is no such event, or it is over.
+        """
+        self.agenda.end(number, float(self._second[0]))
 
     def _forget(self) -> None:
         for name in ("weather", "dark", "conditions"):

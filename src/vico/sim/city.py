@@ -1,0 +1,78 @@
+"""What events of the city mean to those who are there: who learns of which, and what the run tells of them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.sim.environment import Occurrence
+from vico.sim.simulation_state import SimulationState
+
+#: How those know of an event who were told of it beforehand.
+ANNOUNCED = "announced"
+#: How near a notice at a door can be read, metres.
+NOTICE = 5.0
+
+
+def report_city_events(state: SimulationState) -> None:
+    """Note which events have begun or ended."""
+    agenda = state.environment.agenda
+    if not len(agenda):
+        return
+    for one, what in agenda.news():
+        told = {name: value for name, value in one.event.record().items() if name != "kind" and value}
+        told |= {"event": one.id, "event_kind": one.event.kind}
+        state.events.add("city", "", f"{one.event.title} {what}", one.middle, **told)
+
+
+def known_events(state: SimulationState, i: int, pose: NDArray[np.float64]) -> list[dict[str, Any]]:
+    """Return what somebody knows of events: of those announced, of closed places at whose doors they stand.
+
+    Parameters
+    ----------
+    i
+        The agent's index.
+    pose
+        Its pose, as from `vico.sim.observations.poses`.
+    """
+    agenda = state.environment.agenda
+    if not len(agenda):
+        return []
+    outdoors = i >= len(state.people) or state.people.room.item(i) < 0
+    found = {one.id: _told(one, ANNOUNCED, state) for one in agenda.announced}
+    for one in agenda.going_on if outdoors else ():
+        how = _noticed(one, pose, state)
+        if how:
+            found[one.id] = _told(one, how, state)
+    return [found[number] for number in sorted(found)]
+
+
+def _noticed(one: Occurrence, pose: NDArray[np.float64], state: SimulationState) -> str:
+    """Return how somebody outdoors notices an event: by a notice, by seeing it; "" if not at all."""
+    doors = [state.base.doors[state.place_index[place]] for place in _shut_by(one, state)]
+    if any(math.hypot(*(door - pose[:2])) <= NOTICE for door in doors):
+        return "notice"
+    return ""
+
+
+def _shut_by(one: Occurrence, state: SimulationState) -> list[str]:
+    return [place for place, by in state.environment.agenda.effects.shut.items() if by.id == one.id]
+
+
+def _told(one: Occurrence, how: str, state: SimulationState) -> dict[str, Any]:
+    """Return what is known of an event by whoever knows of it."""
+    event = one.event
+    return {
+        "id": one.id,
+        "kind": event.kind,
+        "name": event.title,
+        "known": how,
+        "position": [round(value, 3) for value in one.middle.tolist()],
+        "begin": event.begin,
+        "end": event.end if math.isfinite(event.end) else None,
+        "goes_on": event.goes_on(state.second),
+        "closed_places": _shut_by(one, state),
+    }

@@ -1,0 +1,226 @@
+"""The events of a run: those that were asked for when it began, those that were called for since, and what they do."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.clock import DAY
+from vico.errors import InputError
+from vico.sim.environment.city_event import CityEvent, planned_events
+from vico.sim.environment.event_kinds import EventKind, kind_of_event
+from vico.sim.environment.event_schedule import events_of_day
+from vico.sim.environment.event_sites import EventSites
+
+#: The names of no events at all, and of events that come by themselves.
+NO_EVENTS, CHANGING_EVENTS = "none", "changing"
+
+_WAITS, _GOES_ON, _IS_OVER = range(3)
+
+
+@dataclass(frozen=True)
+class Occurrence:
+    """An event of a run.
+
+    Attributes
+    ----------
+    id
+        Counts from 1; an event keeps it.
+    """
+
+    id: int
+    event: CityEvent
+    kind: EventKind
+    middle: NDArray[np.float64]
+
+
+class EventEffects(NamedTuple):
+    """What the events that go on do, together.
+
+    Attributes
+    ----------
+    shut
+        Ids of places that are closed, each with the event that closes it.
+    """
+
+    shut: Mapping[str, Occurrence]
+
+
+_NOTHING = EventEffects({})
+
+
+class Agenda:
+    """The events of a run; part of its state.
+
+    Parameters
+    ----------
+    sites
+        Of the world.
+    wanted
+        ``"none"``, ``"changing"``, or the content of a file of events.
+    seed
+        Decides events that come by themselves.
+    second
+        Seconds since midnight of the first day.
+
+    Raises
+    ------
+    InputError
+        If it is none of these, or names what the world has not.
+    """
+
+    def __init__(
+        self, sites: EventSites, wanted: str | Mapping[str, Any] = NO_EVENTS, *, seed: int = 0, second: float = 0.0
+    ) -> None:
+        self.sites = sites
+        self._seed, self._changing = seed, wanted == CHANGING_EVENTS
+        self._events: list[CityEvent] = []
+        # How far each was told of: whether that it began, and that it is over.
+        self._told: list[int] = []
+        self._known: dict[int, Occurrence] = {}
+        self._now: tuple[int, ...] = ()
+        self._going_on: list[Occurrence] = []
+        self._effects = _NOTHING
+        self._day = int(second // DAY)
+        if isinstance(wanted, str):
+            if wanted not in (NO_EVENTS, CHANGING_EVENTS):
+                raise InputError(
+                    f"events: {wanted!r} is not known; take {NO_EVENTS}, {CHANGING_EVENTS}, or a file of events"
+                )
+            found = events_of_day(sites, seed, self._day) if self._changing else []
+        else:
+            found = planned_events(wanted)
+            for k, event in enumerate(found):
+                try:
+                    sites.check(event)
+                except InputError as error:
+                    raise InputError(f"events: events.{k}: {str(error).removeprefix('events: ')}") from None
+        self._add(found)
+        self._refresh(second)
+
+    def _add(self, events: Sequence[CityEvent]) -> None:
+        self._events += events
+        self._told += [_WAITS] * len(events)
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the events as bytes; nothing as long as there are none."""
+        if not self._events:
+            return {}
+        listed = [event.record() | {"told": told} for event, told in zip(self._events, self._told, strict=True)]
+        text = json.dumps({"day": self._day, "events": listed}, sort_keys=True, ensure_ascii=False)
+        return {"events": np.frombuffer(text.encode(), np.uint8)}
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]], second: float) -> None:
+        """Go back to what `arrays` held, at a moment."""
+        listed: list[dict[str, Any]] = []
+        if "events" in arrays:
+            content = json.loads(np.asarray(arrays["events"], np.uint8).tobytes().decode())
+            listed, self._day = content["events"], content["day"]
+        self._told = [event.pop("told") for event in listed]
+        self._events = [CityEvent.of(event) for event in listed]
+        self._known, self._now, self._going_on, self._effects = {}, (), [], _NOTHING
+        self._refresh(second)
+
+    def advance(self, second: float) -> None:
+        """Go on to a moment, seconds after the first midnight."""
+        if self._changing and int(second // DAY) != self._day:
+            self._day = int(second // DAY)
+            self._add(events_of_day(self.sites, self._seed, self._day))
+        if self._events:
+            self._refresh(second)
+
+    def news(self) -> list[tuple[Occurrence, str]]:
+        """Return which events have begun or ended since this was last asked, each with ``"begins"`` or ``"ends"``."""
+        found: list[tuple[Occurrence, str]] = []
+        for k, told in enumerate(self._told):
+            now = self._phase(k)
+            # What was called off before it began is no news.
+            if told == _WAITS and now == _GOES_ON:
+                found.append((self._occurrence(k), "begins"))
+            if told == _GOES_ON and now == _IS_OVER:
+                found.append((self._occurrence(k), "ends"))
+            self._told[k] = max(told, now)
+        return found
+
+    def _phase(self, k: int) -> int:
+        event = self._events[k]
+        return _WAITS if self._second < event.begin else _GOES_ON if self._second < event.end else _IS_OVER
+
+    def _occurrence(self, k: int) -> Occurrence:
+        if k not in self._known:
+            event = self._events[k]
+            self._known[k] = Occurrence(k + 1, event, kind_of_event(event.kind), self.sites.middle(event))
+        return self._known[k]
+
+    def __len__(self) -> int:
+        return len(self._events)
+
+    @property
+    def going_on(self) -> Sequence[Occurrence]:
+        """The events that go on now, by id."""
+        return self._going_on
+
+    @property
+    def announced(self) -> Sequence[Occurrence]:
+        """The events that everybody knows of and that are not over, by id."""
+        return [
+            one
+            for k in range(len(self._events))
+            if self._phase(k) != _IS_OVER and (one := self._occurrence(k)).kind.announced
+        ]
+
+    @property
+    def effects(self) -> EventEffects:
+        """What the events that go on do."""
+        return self._effects
+
+    def start(self, event: CityEvent, second: float) -> int:
+        """Let an event take place; return its id.
+
+        Raises
+        ------
+        InputError
+            If it names what the world has not.
+        """
+        self.sites.check(event)
+        self._add([event])
+        self._refresh(second)
+        return len(self._events)
+
+    def end(self, number: int, second: float) -> None:
+        """Let an event be over now.
+
+        Raises
+        ------
+        InputError
+            If there is no such event, or it has ended.
+        """
+        if not 1 <= number <= len(self._events):
+            raise InputError(f"events: there is no event {number}; there are {len(self._events)} so far")
+        event = self._events[number - 1]
+        if second >= event.end:
+            raise InputError(f"events: event {number} ({event.title}) is over already")
+        # One that was still to come never happens.
+        self._events[number - 1] = replace(event, begin=min(event.begin, second), end=second)
+        self._known.pop(number - 1, None)
+        self._refresh(second)
+
+    def _refresh(self, second: float) -> None:
+        """Find which events go on, and what they do."""
+        self._second = second
+        now = tuple(k for k, event in enumerate(self._events) if event.goes_on(second))
+        if now != self._now:
+            self._now = now
+            self._going_on = [self._occurrence(k) for k in now]
+            self._effects = effects_of(self._going_on, self.sites) if now else _NOTHING
+
+
+def effects_of(going_on: Sequence[Occurrence], sites: EventSites) -> EventEffects:
+    """Return what events do together."""
+    shut = {place.id: one for one in reversed(going_on) for place in sites.places_of(one.event)}
+    return EventEffects(shut)

@@ -1,0 +1,144 @@
+"""Events of the city: files of them, how they are kept, and what each does beside the same run without it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import toy_city
+from vico.agents.schedule import followers_of
+from vico.errors import VicoError
+from vico.sim.config import SimConfig
+from vico.sim.environment import Agenda, EventSites, event_kinds
+from vico.sim.recorder import Recorder
+from vico.sim.recording import read_run
+from vico.sim.simulation import Simulation
+from vico.world.folder import World
+from vico.world.public import PublicMap
+
+CLOSED = {"events": [{"kind": "closure", "place": "Hat Shop", "begin": "08:00", "end": "09:00", "name": "stocktaking"}]}
+
+
+def simulation(events: Any = "none", **options: Any) -> Simulation:
+    return Simulation(
+        toy_city.world(), toy_city.community(), SimConfig(seed=3, assistants=1, observe=(), events=events, **options)
+    )
+
+
+def at_the_shop(sim: Simulation) -> dict[str, Any]:
+    """Put the assistant at the shop's door; return its info."""
+    people = sim.state.people
+    people.position[-1, :2], people.room[-1], people.place[-1] = (5.0, 4.0), -1, -1
+    return sim.observe()[1]["assistant_0"]
+
+
+# What it says when something is wrong.
+
+
+@pytest.mark.parametrize(
+    ("events", "says"),
+    [
+        ("sometimes", "'sometimes' is not known; take none, changing"),
+        ({"event": []}, "events: field required; see docs/events.md"),
+        (
+            {"events": [{"kind": "closure", "begin": "09:00", "place": 7}]},
+            "events.0.place: input should be a valid str",
+        ),
+        ({"events": [{"kind": "carnival", "begin": "09:00"}]}, "events.0: 'carnival' is no kind of event; there are"),
+        ({"events": [{"kind": "closure", "begin": "09:00"}]}, "events.0: closure: where is it? give place"),
+        ({"events": [{"kind": "closure", "begin": "9 am", "place": "x"}]}, "events.0: "),
+        ({"events": [{"kind": "closure", "begin": "09:00", "place": "Hat"}]}, "no place has the id or name 'Hat'"),
+        ({"events": [{"kind": "road_works", "begin": "09:00", "street": "A"}]}, "events.0: no street is called 'A'"),
+        ({"events": [{"kind": "closure", "begin": "09:00", "place": "Hat Shop", "noise": 200.0}]}, "200 dB"),
+        ({"events": [{"kind": "closure", "begin": "09:00", "street": "A", "place": "B"}]}, "can't be at a street"),
+    ],
+)
+def test_a_file_of_events_that_is_wrong_is_refused_with_what_and_where(events: Any, says: str) -> None:
+    with pytest.raises(VicoError, match=f"^events: .*{says.replace('?', '.')}"):
+        Agenda(EventSites(toy_city.world()), events)
+
+
+# How they are kept.
+
+
+def test_a_run_without_events_has_nothing_of_them_in_its_state() -> None:
+    assert not [name for name in simulation().arrays() if "events" in name and name != "events.heard"]
+
+
+def test_events_are_saved_restored_and_hashed() -> None:
+    sim = simulation(start=8 * 3600)
+    number = sim.state.environment.start_event("closure", place="place_shop", minutes=10)
+    before, digest = sim.snapshot(), sim.state_hash()
+    sim.state.environment.end_event(number)
+    assert sim.state_hash() != digest
+    sim.step({})
+    sim.restore(before)
+    assert sim.state_hash() == digest
+    assert [one.id for one in sim.state.environment.agenda.going_on] == [number]
+    assert sim.state.environment.start_event("closure", place="place_cafe") == number + 1
+
+
+def test_a_recording_tells_when_events_began_and_ended(tmp_path: Path) -> None:
+    sim = simulation(CLOSED, start=9 * 3600 - 2)
+    with Recorder(tmp_path / "run", sim, sources={"world": "", "community": ""}, wanted=3) as recorder:
+        recorder.begin({})
+        for _ in range(3):
+            recorder.write(sim.step({}))
+    run = read_run(tmp_path / "run")
+    told = [(event["step"], event["text"]) for event in run.events if event["kind"] == "city"]
+    assert [text for _, text in told] == ["stocktaking begins", "stocktaking ends"]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_events_that_come_by_themselves_are_the_same_for_a_seed_and_others_for_another(
+    seed: int, helsinki: World
+) -> None:
+    sites = EventSites(helsinki)
+    listed = [Agenda(sites, "changing", seed=k).arrays().get("events", b"") for k in (seed, seed, seed + 1)]
+    assert bytes(listed[0]) == bytes(listed[1]) != bytes(listed[2])
+    assert {event["kind"] for event in json.loads(bytes(listed[0]))["events"]} <= set(event_kinds())
+
+
+# What they do.
+
+
+@pytest.mark.parametrize(("events", "status", "known"), [("none", "ok", []), (CLOSED, "refused", ["notice"])])
+def test_nobody_gets_into_a_place_that_is_closed_and_who_stands_there_knows(
+    events: Any, status: str, known: list[str]
+) -> None:
+    sim = simulation(events, start=8 * 3600)
+    info = at_the_shop(sim)
+    assert [event["known"] for event in info.get("events", [])] == known
+    result = sim.step({"assistant_0": {"type": "enter", "place": "place_shop"}})
+    assert result.observations["assistant_0"]["state"]["action_status"] == status
+    assert result.infos["assistant_0"]["action_code"] == ("closed" if known else "")
+
+
+def day_of_two(events: Any, *, together: bool) -> tuple[list[str], str]:
+    """Return where the two who go to the shop are after two minutes, and the last hash."""
+    sim = simulation(events, start=8 * 3600 - 5)
+    agents = followers_of(toy_city.community(), PublicMap.from_world(toy_city.world()), seed=3)
+    group = next(iter(agents.values())).group
+    assert group is not None
+    observations, infos = sim.observe()
+    result = None
+    for _ in range(90):
+        if together:
+            actions: dict[str, Any] = group.act_for(list(agents), observations, infos)
+        else:
+            actions = {name: agent.act(observations[name], infos[name]) for name, agent in agents.items()}
+        result = sim.step(actions)
+        observations, infos = result.observations, result.infos
+    assert result is not None
+    return [observations[f"resident_{k}"]["state"]["place"] for k in range(2)], result.hash
+
+
+def test_residents_who_find_the_shop_closed_go_home_whether_asked_alone_or_together() -> None:
+    shut = {"events": [{"kind": "closure", "place": "place_shop", "begin": "07:00"}]}
+    assert day_of_two("none", together=True)[0] == ["place_shop"] * 2
+    alone, together = (day_of_two(shut, together=together) for together in (False, True))
+    assert alone == together
+    assert alone[0] == ["place_cafe"] * 2
