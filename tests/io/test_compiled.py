@@ -111,6 +111,23 @@ def test_a_function_or_constant_of_another_file_that_changes_is_compiled_anew(to
     assert run(town)[:2] == (5.0, 0)
 
 
+def test_a_function_is_compiled_once_for_all_constants_of_a_type(town: Path) -> None:
+    change(town / "drive.py", "slower(car.speed)", "slower(times(times(car.speed, 1), 2))")
+    change(town / "drive.py", "import LIMIT, slower", "import LIMIT, slower, times")
+    change(
+        town / "rules.py", "@compiled", "@compiled\ndef times(speed, factor):\n    return speed * factor\n\n@compiled"
+    )
+    program = _RUN + "from vico.io.compiled import _Callee\nimport gc\n"
+    program += "print([len(one.overloads) for one in gc.get_objects() if isinstance(one, _Callee)"
+    program += " and one.__name__ == 'times'])"
+    paths = os.pathsep.join([str(town.parent), *(path for path in sys.path if path)])
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(town.parent / "cache"), "PYTHONPATH": paths}
+    printed = subprocess.run(
+        [sys.executable, "-B", "-c", program], env=environment, check=True, capture_output=True, text=True
+    ).stdout
+    assert printed == "10.0 0\n[1]\n"
+
+
 def test_sources_that_are_back_find_their_code(town: Path) -> None:
     run(town)
     change(town / "rules.py", "speed - 1.0", "speed - 2.0")

@@ -40,7 +40,9 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import register_pass
 from numba.core.environment import lookup_environment
 from numba.core.registry import CPUDispatcher
+from numba.core.targetconfig import ConfigStack
 from numba.core.typed_passes import NativeLowering
+from numba.core.types.misc import unliteral
 
 from vico.io.cache import cache_folder
 
@@ -172,6 +174,12 @@ class _Callee(CPUDispatcher):  # type: ignore[misc]
         compiler = _OptimisedCalleeCompiler if optimised else _CalleeCompiler
         super().__init__(function, targetoptions={**options, "no_cpython_wrapper": True}, pipeline_class=compiler)
 
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Compile for arguments of some types, once for all constants of a type: the caller's optimiser knows them."""
+        return super().get_call_template(
+            [unliteral(one) for one in args], {name: unliteral(one) for name, one in kws.items()}
+        )
+
     def add_overload(self, cres: Any) -> None:
         """Keep what was compiled for arguments of some types; unlike numba's own, hidden from who calls from Python."""
         self.overloads[tuple(cres.signature.args)] = cres
@@ -255,6 +263,12 @@ class _KernelCompiler(CompilerBase):  # type: ignore[misc]
 
 def _pipeline(state: Any, lowering: type) -> Any:
     """Return numba's own passes, but for the one that turns typed code into LLVM's."""
+    # numba compiles its own functions (empty, min, sorts) anew for callers whose flags differ. Those that do not matter
+    # to them are what they are in numba's own callers, so that each is compiled once a process.
+    seen_by_callees = ConfigStack().top()
+    for flag in ("release_gil", "no_cfunc_wrapper", "inline"):
+        seen_by_callees.discard(flag)
+    seen_by_callees.no_cpython_wrapper = True
     manager = DefaultPassBuilder.define_nopython_pipeline(state)
     manager.passes = [(lowering if one is NativeLowering else one, told) for one, told in manager.passes]
     manager.finalize()
