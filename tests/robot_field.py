@@ -56,7 +56,11 @@ def field(*walls: tuple[float, float, float, float], height: HeightField | None 
         entrances=[],
         rooms=[],
         transit=Transit(stops=[], lines=[], bike_stations=[], origin={}),
-        layers={"collision": [box((sx, sy, 5.0), (cx, cy, 2.0)) for cx, cy, sx, sy in walls]},
+        layers={
+            "collision": [box((sx, sy, 5.0), (cx, cy, 2.0)) for cx, cy, sx, sy in walls],
+            "buildings": [],
+            "roofs": [],
+        },
     )
 
 

@@ -226,6 +226,19 @@ def test_rotors_lift_hold_and_turn_a_robot(name: str) -> None:
     assert engine.base(0).angular_velocity_body[2] == pytest.approx(0.004 * 0.5 / (0.4**2 / 6), rel=0.03)
 
 
+def test_robots_of_a_kind_are_pushed_in_one_call_as_each_alone(name: str) -> None:
+    wrench = np.array([[0.0, 0.0, 12.0, 0.0, 0.0, 0.001], [0.1, 0.0, 11.0, 0.0, 0.0, 0.0]])
+    engines = [engine_of(name, None, (DRONE, DRONE), (0, 0, 0), (5, 0, 0)) for _ in range(2)]
+    engines[0].thrust_all(np.array([0, 1]), "front", wrench)
+    for robot in (0, 1):
+        engines[1].thrust(robot, ["front"], wrench[robot : robot + 1, :3], wrench[robot : robot + 1, 3:])
+    for engine in engines:
+        engine.step(5)
+    for robot in (0, 1):
+        assert np.array_equal(engines[0].base(robot).position, engines[1].base(robot).position)
+    assert engines[0].base(0).position[2] > 0.0
+
+
 def test_a_site_nobody_has_is_refused(name: str) -> None:
     engine = engine_of(name, None, (DRONE,))
     with pytest.raises(InputError, match="no site 'up'; it has front, left, back, right"):

@@ -133,8 +133,11 @@ def _pictures(
 ) -> Iterator[tuple[Observation, dict[int, dict[str, str]]]]:
     """Yield the pictures of some agents, and kind and name of what they show."""
     order = list(seeing)
-    cameras = stances[order].copy()
-    cameras[:, 2] += camera_heights(state)[order]
+    cameras = stances.copy()
+    cameras[:, 2] += camera_heights(state)
+    if state.robots is not None:
+        cameras[len(state.people) :] = state.robots.cameras()
+    cameras = cameras[order]
     own = state.people.entity
     if state.robots is not None:
         own = np.concatenate([own, state.robots.bodies().entity])

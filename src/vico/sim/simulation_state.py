@@ -133,6 +133,9 @@ class RobotSystem(Subsystem, Protocol):
     def set_grip(self, grip: float) -> None:
         """Have robots grip the ground with a share of what they do on dry ground, 0..1; told before every sub-step."""
 
+    def set_wind(self, east: float, north: float) -> None:
+        """Have the mean wind 10 m above ground blow with so many m/s towards east and north; told like the grip."""
+
     def control_period(self, robot: int) -> float:
         """How often the robot's model wants to be controlled, seconds."""
 
@@ -148,6 +151,21 @@ class RobotSystem(Subsystem, Protocol):
     def go_to(self, robot: int, xy: NDArray[np.float64]) -> bool:
         """Have the robot go to a point; False if there is no way."""
 
+    def flies(self, robot: int) -> bool:
+        """Return whether the robot flies."""
+
+    def flight_refusal(self, robot: int, target: NDArray[np.float64]) -> str:
+        """Why a robot that flies can't fly to a point, ENU metres; "" if it can."""
+
+    def can_land(self, robot: int, xy: NDArray[np.float64] | None = None) -> bool:
+        """Return whether a robot that flies can land at a point, or where it is."""
+
+    def fly_to(self, robot: int, target: NDArray[np.float64]) -> None:
+        """Have a robot fly to a point and hover there."""
+
+    def land(self, robot: int, xy: NDArray[np.float64] | None = None) -> None:
+        """Have a robot that flies land at a point, or where it is."""
+
     def follow_body(self, robot: int, entity: int) -> None:
         """Have the robot keep near a body, wherever that goes outdoors."""
 
@@ -162,6 +180,9 @@ class RobotSystem(Subsystem, Protocol):
 
     def observation(self, robot: int) -> dict[str, NDArray[Any]]:
         """Return what the robot's sensors give, by name."""
+
+    def cameras(self) -> NDArray[np.float64]:
+        """Where each robot's camera is, ENU metres, and the unit vector it looks along, shape ``(n, 6)``."""
 
     def camera_heights(self) -> NDArray[np.float64]:
         """Height of each robot's camera above the ground it stands on, metres."""

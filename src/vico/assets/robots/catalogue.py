@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from vico.assets.packages import Package
+from vico.assets.robots.drone import drone
 from vico.assets.robots.go2 import go2
 from vico.assets.robots.husky import husky
 from vico.assets.robots.model import RobotModel
 from vico.assets.robots.packs import GO2_PACKAGE, HUSKY_PACKAGE
 from vico.errors import InputError
 
-_MAKERS: dict[str, Callable[[bool], RobotModel]] = {"go2": go2, "husky": husky}
+_MAKERS: dict[str, Callable[[bool], RobotModel]] = {"drone": drone, "go2": go2, "husky": husky}
 
 
 def robot_names() -> tuple[str, ...]:

@@ -32,8 +32,9 @@ BUMPER = "bumper"
 #: ground and meet those from the side.
 FOOT_CONTACT = ("0.01 1", "0.9 0.95 0.001")
 
-#: What a motor follows: an angle (rad), a speed (rad/s), or a force or torque (N, Nm).
-Servo = Literal["position", "velocity", "force"]
+#: What a motor follows: an angle (rad), a speed (rad/s), a force or torque (N, Nm), or the speed of a rotor in the air
+#: (rad/s), of which `RobotModel.rotors` says what it does.
+Servo = Literal["position", "velocity", "force", "rotor"]
 #: Seconds that control periods are multiples of.
 TICK = 0.01
 
@@ -68,8 +69,9 @@ class ActionSpace:
     Attributes
     ----------
     drives
-        What a vector is: targets of all motors in their order (``motors``), or a velocity vx, vy (m/s, in the base's
-        frame) and wz (rad/s, to the left) that the robot's controller follows (``velocity``).
+        What a vector is: targets of all motors in their order (``motors``), or a velocity that the robot's controller
+        follows (``velocity``): vx, vy (m/s, along its heading and to the left of it) and wz (rad/s, to the left);
+        robots that fly take vx, vy, vz (m/s, up) and wz.
     entries, units
         Name and unit of each number.
     low, high
@@ -92,6 +94,12 @@ def velocity_space(forward: float, sideways: float, turn: float) -> ActionSpace:
     return ActionSpace("velocity", ("vx", "vy", "wz"), ("m/s", "m/s", "rad/s"), -high, high)
 
 
+def flight_space(sideways: float, climb: float, turn: float) -> ActionSpace:
+    """Return the space of velocities of what flies: m/s ahead, aside and up, and radians a second of turning."""
+    high = np.array([sideways, sideways, climb, turn])
+    return ActionSpace("velocity", ("vx", "vy", "vz", "wz"), ("m/s", "m/s", "m/s", "rad/s"), -high, high)
+
+
 @dataclass(frozen=True)
 class Sensors:
     """What a robot feels.
@@ -108,6 +116,12 @@ class Sensors:
         Links that feel whether they touch anything.
     camera
         Camera in the frame of the base, metres; it looks along +x. None: it has none.
+    camera_pitch
+        Radians the camera looks up (negative: down); it is held level otherwise.
+    rotors
+        Whether it measures the speeds of its rotors.
+    battery
+        Whether it knows how full its battery is.
     """
 
     joints: bool = True
@@ -115,6 +129,9 @@ class Sensors:
     odometry: bool = True
     contacts: tuple[str, ...] = ()
     camera: tuple[float, float, float] | None = None
+    camera_pitch: float = 0.0
+    rotors: bool = False
+    battery: bool = False
 
 
 @dataclass(frozen=True)
@@ -188,6 +205,74 @@ class FourLegs:
 
 
 @dataclass(frozen=True)
+class RotorModel:
+    """Rotors that carry a robot, the air's drag, and the battery.
+
+    Attributes
+    ----------
+    site
+        Site of `RobotModel.mjcf` at the origin of the base, along its axes, at which all forces act.
+    links
+        Links that turn with the rotors, in the order of the motors: they are drawn so.
+    places
+        Middles of the rotors in the frame of the base, metres, shape ``(rotors, 3)``.
+    turns
+        1 for rotors that turn to the left seen from above, -1 for others, shape ``(rotors,)``.
+    thrust
+        Newtons for each (rad/s)^2.
+    moment
+        Torque of a rotor, against its turning, for each newton of its thrust, metres.
+    speed_up, slow_down
+        Time constants of a rotor's speed, seconds.
+    rotor_drag
+        Newtons for each m/s of air across a rotor and each rad/s that it turns with.
+    drag_area
+        Drag coefficient times area of all the rest, square metres.
+    radius
+        Of a rotor, metres.
+    efficiency
+        Share of the battery's power that goes into the air that rotors push down.
+    idle_power
+        What everything but the rotors takes, watts.
+    capacity
+        Of the battery, joules.
+    """
+
+    site: str
+    links: tuple[str, ...]
+    places: NDArray[np.float64]
+    turns: NDArray[np.float64]
+    thrust: float
+    moment: float
+    speed_up: float
+    slow_down: float
+    rotor_drag: float
+    drag_area: float
+    radius: float
+    efficiency: float
+    idle_power: float
+    capacity: float
+
+
+@dataclass(frozen=True)
+class Quadrotor:
+    """Four rotors or more, controlled from positions down to rotor speeds.
+
+    Attributes
+    ----------
+    mass, inertia
+        Of the robot, kg and kg m^2 about its axes, shape ``(3,)``.
+    tilt
+        The most it tilts, radians.
+    """
+
+    mass: float
+    inertia: NDArray[np.float64]
+    tilt: float
+    name: str = "quadrotor"
+
+
+@dataclass(frozen=True)
 class NoController:
     """Nothing follows velocities: whoever drives the robot commands its motors."""
 
@@ -232,6 +317,8 @@ class RobotModel:
         How far ahead on its way it steers for, and how near the end it has arrived, metres.
     fallen_below
         Cosine of the tilt at which it counts as fallen; None: it can't fall.
+    rotors
+        What carries it in the air; None: it does not fly.
     shapes
         Surfaces by link, in the link's frame; links are bodies of `mjcf`.
 
@@ -262,6 +349,7 @@ class RobotModel:
     lookahead: float = 0.7
     arrival: float = 0.3
     fallen_below: float | None = 0.7
+    rotors: RotorModel | None = None
 
     def __post_init__(self) -> None:
         def need(good: bool, what: str) -> None:
@@ -272,7 +360,7 @@ class RobotModel:
         need(len(self.rest) == len(self.joints), f"{len(self.rest)} angles at rest for {len(self.joints)} joints")
         need(bool(self.action_spaces), "it has no action space; name at least one")
         for name, space in self.action_spaces.items():
-            wanted = len(self.motors) if space.drives == "motors" else 3
+            wanted = len(self.motors) if space.drives == "motors" else (3 if self.rotors is None else 4)
             sizes = {len(space.entries), len(space.units), len(space.low), len(space.high)}
             need(sizes == {wanted}, f"action space {name!r} needs {wanted} entries, units and bounds")
             need(bool(np.all(space.low <= space.high)), f"action space {name!r} has a lower bound above the upper one")
@@ -280,6 +368,11 @@ class RobotModel:
         need(
             velocity == (self.controller.name != NoController.name),
             "an action space of velocities and a controller that follows them go together",
+        )
+        flies = self.rotors is not None
+        need(
+            all((servo == "rotor") == flies for servo in self.servos),
+            "what has rotors has no other motors, nor others it",
         )
         ticks = round(self.control_period / TICK)
         need(
@@ -294,7 +387,7 @@ class RobotModel:
 
     @cached_property
     def velocity_limit(self) -> NDArray[np.float64] | None:
-        """Fastest it is driven: vx, vy, m/s, and wz, rad/s, shape ``(3,)``; None if it follows no velocities."""
+        """Fastest it is driven: vx, vy (and vz), m/s, and wz, rad/s; None if it follows no velocities."""
         found = [space.high for space in self.action_spaces.values() if space.drives == "velocity"]
         return found[0] if found else None
 
@@ -306,6 +399,11 @@ class RobotModel:
                 return space.low, space.high
         count = len(self.motors)
         return np.full(count, -np.inf), np.full(count, np.inf)
+
+    @property
+    def driven(self) -> tuple[str, ...]:
+        """The motors that are actuators of `mjcf`: all but rotors."""
+        return () if self.rotors is not None else self.motors
 
     @cached_property
     def stance(self) -> NDArray[np.float64]:

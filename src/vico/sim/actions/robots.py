@@ -52,6 +52,36 @@ def check_follow(values: Values, robot: int, state: SimulationState) -> Refusal 
     return _refuse_without_velocities("follow", robot, state)
 
 
+def check_fly_to(values: Values, robot: int, state: SimulationState) -> Refusal | None:
+    """Judge flying to a point: the robot flies, and nothing is there."""
+    robots = _robots(state)
+    if not robots.flies(robot):
+        return Refusal(ReasonCode.NOT_ABLE, "fly_to: this robot does not fly; it takes go_to")
+    reason = robots.flight_refusal(robot, np.array(values["target"], np.float64))
+    return Refusal(ReasonCode.BLOCKED, f"fly_to: {reason}") if reason else None
+
+
+def fly_to(values: Values, robot: int, state: SimulationState) -> None:
+    """Send a robot that flies to a point."""
+    _robots(state).fly_to(robot, np.array(values["target"], np.float64))
+
+
+def check_land(values: Values, robot: int, state: SimulationState) -> Refusal | None:
+    """Judge landing: the robot flies, and what is below is even."""
+    robots, target = _robots(state), values.get("target")
+    if not robots.flies(robot):
+        return Refusal(ReasonCode.NOT_ABLE, "land: this robot does not fly")
+    if robots.can_land(robot, None if target is None else np.array(target[:2])):
+        return None
+    return Refusal(ReasonCode.BLOCKED, "land: what is there is not even enough to land on")
+
+
+def land(values: Values, robot: int, state: SimulationState) -> None:
+    """Have a robot that flies land."""
+    target = values.get("target")
+    _robots(state).land(robot, None if target is None else np.array(target[:2], np.float64))
+
+
 def follow(values: Values, robot: int, state: SimulationState) -> None:
     """Have a robot keep near somebody."""
     robots, agent = _robots(state), state.names.index(values["agent"])
@@ -116,6 +146,24 @@ ROBOTS = (
         "stop",
         "Have a robot stand still.",
         stop,
+        when=Situation(0),
+        actors=Actors.ROBOTS,
+    ),
+    ActionType(
+        "fly_to",
+        "Have a robot that flies fly to a point outdoors, over or round what stands in between, and hover there.",
+        fly_to,
+        check_fly_to,
+        {"target": Field("point")},
+        when=Situation(0),
+        actors=Actors.ROBOTS,
+    ),
+    ActionType(
+        "land",
+        "Have a robot that flies land where it is, or at a point, on even ground or a flat roof.",
+        land,
+        check_land,
+        {"target": Field("point", required=False)},
         when=Situation(0),
         actors=Actors.ROBOTS,
     ),

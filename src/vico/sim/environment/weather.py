@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from typing import Annotated
 
@@ -57,6 +58,12 @@ class Weather:
     def of(cls, values: NDArray[np.float64]) -> Weather:
         """Return the weather that `array` described."""
         return cls(**dict(zip(NAMES, values.tolist(), strict=True)))
+
+    @property
+    def wind_vector(self) -> tuple[float, float]:
+        """How fast the air moves towards east and towards north, m/s."""
+        towards = math.radians(self.wind_from + 180.0)
+        return self.wind * math.sin(towards), self.wind * math.cos(towards)
 
     def record(self) -> dict[str, float]:
         """Return the fields by name, rounded for people to read."""

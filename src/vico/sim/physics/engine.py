@@ -88,6 +88,15 @@ class PhysicsEngine(Protocol):
             If the robot has no such site, or a number is not finite.
         """
 
+    def thrust_all(self, robots: NDArray[np.int64], site: str, wrenches: NDArray[np.float64]) -> None:
+        """Push several robots of one kind at the site of one name from now on; see `thrust`.
+
+        Parameters
+        ----------
+        wrenches
+            Force and torque in the frame of each site, N and Nm, shape ``(k, 6)``.
+        """
+
     # Everybody else.
 
     def set_dynamic_obstacles(self, obstacles: Bodies, dt: float) -> None:

@@ -88,7 +88,8 @@ class MujocoEngine:
             position, quaternion = standing_pose(scene.height, model, place)
             self._qpos[index.root : index.root + 7] = [*position, *quaternion]
             self._qpos[index.angle] = model.rest
-            self._data.ctrl[index.motor] = model.stance
+            if model.driven:
+                self._data.ctrl[index.motor] = model.stance
         self._forget()
         self._move_movers()
 
@@ -230,6 +231,10 @@ class MujocoEngine:
                     f"it has {', '.join(known) or 'none'}"
                 )
             self._data.ctrl[known[site]] = values
+
+    def thrust_all(self, robots: NDArray[np.int64], site: str, wrenches: NDArray[np.float64]) -> None:
+        """Push several robots of one kind at the site of one name from now on."""
+        self._ctrl[self.compiled.kind(robots).thrusters[site]] = wrenches
 
     # Everybody else.
 

@@ -43,11 +43,11 @@ class RobotIndex:
 
     def __init__(self, model: Any, index: int, robot: RobotModel) -> None:
         prefix = f"r{index}/"
-        motors = np.array([model.actuator(prefix + motor).id for motor in robot.motors], np.int64)
-        joints = [_joint_of(model, prefix + joint, driven=joint in robot.motors) for joint in robot.joints]
+        motors = np.array([model.actuator(prefix + motor).id for motor in robot.driven], np.int64)
+        joints = [_joint_of(model, prefix + joint, driven=joint in robot.driven) for joint in robot.joints]
         base = model.body(prefix + "base")
         self.motor = motors
-        self.servo = motors[[servo == "position" for servo in robot.servos]]
+        self.servo = motors[[servo == "position" for servo in robot.servos]] if robot.driven else motors
         self.angle, self.rate = _run_of(model.jnt_qposadr[joints]), _run_of(model.jnt_dofadr[joints])
         self.root = int(model.jnt_qposadr[int(base.jntadr[0])])
         self.root_speed = int(model.jnt_dofadr[int(base.jntadr[0])])
@@ -82,6 +82,8 @@ class KindIndex:
         Positions and speeds of their joints, shape ``(k, joints)``.
     motor
         Their actuators, shape ``(k, motors)``.
+    thrusters
+        Actuators of each site, by its name, shape ``(k, 6)``.
     """
 
     def __init__(self, robots: Sequence[RobotIndex], coordinates: int) -> None:
@@ -90,6 +92,10 @@ class KindIndex:
         self.angle = np.array([everything[robot.angle] for robot in robots])
         self.rate = np.array([everything[robot.rate] for robot in robots])
         self.motor = np.array([robot.motor for robot in robots])
+        self.thrusters = {
+            site: np.array([robot.thrusters[site] for robot in robots])
+            for site in (robots[0].thrusters if robots else ())
+        }
 
 
 class SharedModel:

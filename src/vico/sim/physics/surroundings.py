@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Protocol
 
 import numpy as np
@@ -72,30 +73,35 @@ def _is_convex(surface: Surface) -> bool:
     return bool((ahead <= 0.002 * size + 1e-9).all())
 
 
-def static_scene_of(world: Ground) -> StaticScene:
+def static_scene_of(world: Ground, *, flying: bool = False) -> StaticScene:
     """Everything of a world that robots can touch.
 
     Convex solids of the layer ``collision`` that reach down to where robots are, and solid objects outdoors: stems as
     cylinders, the rest as boxes.
+
+    Parameters
+    ----------
+    flying
+        Some of the robots fly: all of it counts, as high as it is.
     """
-    height = world.height
+    height, reach = world.height, math.inf if flying else _REACH
     hulls = []
     for surface in world.surfaces("collision"):
         for points in convex_parts(surface):
             flat = np.ptp(points, axis=0).min() < 1e-3
-            if not flat and points[:, 2].min() < float(height(points[:, :2]).max()) + _REACH:
+            if not flat and points[:, 2].min() < float(height(points[:, :2]).max()) + reach:
                 hulls.append(points)
-    boxes, pillars = _objects(world.objects, height)
+    boxes, pillars = _objects(world.objects, height, reach)
     return StaticScene(height, tuple(hulls), boxes, pillars)
 
 
-def _objects(objects: Objects, height: HeightField) -> tuple[NDArray[Any], NDArray[Any]]:
+def _objects(objects: Objects, height: HeightField, reach: float) -> tuple[NDArray[Any], NDArray[Any]]:
     chosen = objects.where(objects.solid & objects.outdoors & (objects.size_z > _FLAT))
     stem = np.array([_STEMS.get(str(kind), 0.0) for kind in chosen.kind])
     ground = height(chosen.position) if len(chosen) else np.zeros(0)
     # Only what robots can reach matters, and from a little below ground, for the ground is not level.
     low = np.minimum(chosen.z, ground) - 0.3
-    half = (np.minimum(chosen.z + chosen.size_z, chosen.z + _REACH) - low) / 2
+    half = (np.minimum(chosen.z + chosen.size_z, chosen.z + reach) - low) / 2
     boxes = np.column_stack([chosen.x, chosen.y, low + half, chosen.yaw, chosen.size_x / 2, chosen.size_y / 2, half])
     pillars = np.column_stack([chosen.x, chosen.y, low + half, stem, half])
     return boxes[stem == 0.0], pillars[stem > 0.0]

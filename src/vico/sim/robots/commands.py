@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vico.errors import InputError
+from vico.sim.robots import flying
 from vico.sim.robots.state import Mode, RobotRun
 from vico.sim.robots.ways import way_to
 
@@ -33,6 +34,7 @@ def command(run: RobotRun, robot: int, vector: ArrayLike, space: str = "") -> No
     chosen = model.action_spaces[name]
     if values.shape != (len(chosen),) or not np.isfinite(values).all():
         raise InputError(f"control: {model.title} takes {len(chosen)} finite numbers, not {values.tolist()}")
+    flying.settle(run, robot)
     run.arrays.command[robot] = 0.0
     run.arrays.command[robot, : len(values)] = np.clip(values, chosen.low, chosen.high)
     run.set_mode(robot, Mode.MOTORS if chosen.drives == "motors" else Mode.VELOCITY)
@@ -41,10 +43,12 @@ def command(run: RobotRun, robot: int, vector: ArrayLike, space: str = "") -> No
 def drive(run: RobotRun, robot: int, velocity: ArrayLike) -> None:
     """Follow a velocity (vx, vy, wz): metres a second in the base's frame, radians a second to the left.
 
+    Robots that fly take (vx, vy, vz, wz).
+
     Raises
     ------
     InputError
-        If the robot follows no velocities, or these are not three finite numbers.
+        If the robot follows no velocities, or these are not so many finite numbers.
     """
     model = run.scene.models[robot]
     spaces = [name for name, space in model.action_spaces.items() if space.drives == "velocity"]
@@ -54,12 +58,19 @@ def drive(run: RobotRun, robot: int, velocity: ArrayLike) -> None:
 
 
 def stop(run: RobotRun, robot: int) -> None:
-    """Stand still."""
+    """Stand still, or hover."""
+    flying.settle(run, robot)
     run.set_mode(robot, Mode.IDLE)
 
 
 def go_to(run: RobotRun, robot: int, goal: NDArray[np.float64]) -> bool:
     """Take a way to a point, ENU metres; return False, and change nothing, if there is none."""
+    if run.scene.models[robot].rotors is not None:
+        target = flying.cruise_point(run, goal)
+        if run.scene.airspace.refusal(target):
+            return False
+        flying.fly_to(run, robot, target)
+        return True
     path = way_to(run, robot, goal)
     if path is None:
         return False
@@ -73,12 +84,14 @@ def take(run: RobotRun, robot: int, path: ArrayLike) -> None:
     Raises
     ------
     InputError
-        If it is none, or the robot follows no velocities.
+        If it is none, or the robot follows no velocities, or flies.
     """
     points = np.ascontiguousarray(path, np.float64)
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not np.isfinite(points).all():
         raise InputError(f"follow: a path is two or more finite points x, y, not {points.shape}")
     _need_velocities(run, robot, "follow")
+    if run.scene.models[robot].rotors is not None:
+        raise InputError(f"follow: {run.scene.models[robot].title} flies: send it to points")
     run.followers[robot].begin(points)
     run.set_mode(robot, Mode.ROUTE)
 
@@ -92,6 +105,7 @@ def follow_body(run: RobotRun, robot: int, entity: int) -> None:
         If the robot follows no velocities.
     """
     _need_velocities(run, robot, "follow")
+    flying.settle(run, robot)
     run.followers[robot].end()
     run.set_mode(robot, Mode.FOLLOW)
     run.arrays.leader[robot] = entity

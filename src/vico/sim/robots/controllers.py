@@ -8,6 +8,7 @@ from vico.assets.robots import RobotModel
 from vico.errors import InputError
 from vico.sim.robots.controller import DirectMotors, MotorController
 from vico.sim.robots.legs import Legs
+from vico.sim.robots.quadrotor import FourRotors
 from vico.sim.robots.wheels import SkidSteer
 
 #: Makers of controllers by name.
@@ -15,6 +16,7 @@ CONTROLLERS: dict[str, Callable[[RobotModel], MotorController]] = {
     "motors": DirectMotors,
     "skid_steer": SkidSteer,
     "four_legs": Legs,
+    "quadrotor": FourRotors,
 }
 
 

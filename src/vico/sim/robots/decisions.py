@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from vico.sim.bodies import Bodies
 from vico.sim.robots import commands
+from vico.sim.robots.flying import decide_flight
 from vico.sim.robots.navigation import GAP, SIGHT, NearbyBodies
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.state import Mode, RobotRun
@@ -33,9 +34,16 @@ def decide(run: RobotRun, dt: float, obstacles: Bodies, mine: Bodies, *, errands
     """
     arrays = run.arrays
     arrays.velocity[:] = 0.0
+    flying: set[int] = set()
+    everybody: Bodies | None = None
+    for flight in run.flights:
+        if flight is not None:
+            everybody = everybody or Bodies.joined([obstacles, mine])
+            decide_flight(run, flight, dt, everybody, errands=errands)
+            flying.update(flight.robots.tolist())
     around: NearbyBodies | None = None
     for robot, mode in enumerate(arrays.mode.tolist()):
-        if arrays.status[robot] == _FALLEN or mode == _MOTORS:
+        if robot in flying or arrays.status[robot] == _FALLEN or mode == _MOTORS:
             continue
         if mode == _IDLE:
             if errands:

@@ -11,6 +11,7 @@ from vico.assets.robots import RobotModel
 from vico.exact import apply_matrix
 from vico.sim.bodies import Bodies, Drawn
 from vico.sim.carrying import DeckPose
+from vico.sim.robots.flying import flight_of
 from vico.sim.robots.state import RobotRun
 from vico.world.mesh import Surface
 
@@ -25,7 +26,8 @@ def bodies_of(run: RobotRun) -> Bodies:
     position = np.array([base.position for base in bases]).reshape(-1, 3)
     ground = run.scene.world.height(position)
     bottom = position[:, 2] - outlines.stand
-    position[:, 2] = np.where(bottom > ground + _AIRBORNE, bottom, ground)
+    in_the_air = (bottom > ground + _AIRBORNE) | run.scene.outlines.flies
+    position[:, 2] = np.where(in_the_air, bottom, ground)
     return Bodies(
         run.entities,
         outlines.kind,
@@ -57,15 +59,42 @@ def drawn_links(run: RobotRun) -> Drawn:
         index += [names.index(f"robot/{model.name}/{link}") for link in model.shapes]
         entity += [int(run.entities[i])] * len(model.shapes)
         transforms.append(run.engine.links(i))
+        if model.rotors is not None:
+            _turn_rotors(run, i, model, transforms[-1])
     return Drawn(
         names, np.array(index, np.int32), np.concatenate(transforms).astype(np.float32), np.array(entity, np.int32)
     )
 
 
+def _turn_rotors(run: RobotRun, robot: int, model: RobotModel, transforms: NDArray[np.float64]) -> None:
+    """Turn the links that turn with rotors as far as these have turned."""
+    found = flight_of(run, robot)
+    assert found is not None
+    assert model.rotors is not None
+    flight, row = found
+    links, turned = list(model.shapes), flight.arrays.turned[row] * model.rotors.turns
+    for link, angle in zip(model.rotors.links, turned.tolist(), strict=True):
+        pose = transforms[links.index(link)]
+        c, s = np.cos(angle), np.sin(angle)
+        pose[:3, :2] = np.stack([c * pose[:3, 0] + s * pose[:3, 1], c * pose[:3, 1] - s * pose[:3, 0]], axis=1)
+
+
+def cameras(run: RobotRun) -> NDArray[np.float64]:
+    """Where each robot's camera is, ENU metres, and the unit vector it looks along, shape ``(n, 6)``.
+
+    They are held level but for their pitch. Without a camera: at the base's origin.
+    """
+    found = np.empty((len(run.scene), 6))
+    for robot, model in enumerate(run.scene.models):
+        yaw, pitch = run.engine.base(robot).yaw, model.sensors.camera_pitch
+        found[robot, :3] = _eye(run, robot)
+        found[robot, 3:] = np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch)
+    return found
+
+
 def camera_heights(run: RobotRun) -> NDArray[np.float64]:
     """Height of each robot's camera above its body's bottom, metres; of the base's where there is no camera."""
-    eyes = np.array([_eye(run, i) for i in range(len(run.scene))]).reshape(-1, 3)
-    return np.asarray(eyes[:, 2] - bodies_of(run).position[:, 2])
+    return np.asarray(cameras(run)[:, 2] - bodies_of(run).position[:, 2])
 
 
 def _eye(run: RobotRun, robot: int) -> NDArray[np.float64]:

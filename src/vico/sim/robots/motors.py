@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from vico.sim.robots.path_follower import RobotStatus
+from vico.sim.robots.rotors import Flight, Phase
 from vico.sim.robots.scene import RobotGroup
 from vico.sim.robots.state import Mode, RobotRun
 
 _MOTORS, _FALLEN = int(Mode.MOTORS), int(RobotStatus.FALLEN)
+_LANDED = int(Phase.LANDED)
 
 
 def velocities(run: RobotRun, group: RobotGroup) -> np.ndarray | None:
@@ -20,6 +22,32 @@ def velocities(run: RobotRun, group: RobotGroup) -> np.ndarray | None:
     if np.any((arrays.status[robots] == _FALLEN) | (arrays.mode[robots] == _MOTORS)):
         return None
     return arrays.velocity[robots]
+
+
+def command_rotors(run: RobotRun, flight: Flight, group: RobotGroup, memory: np.ndarray) -> None:
+    """Tell the rotors of a kind of robots what speeds to have for its period; all that are in the air in one call.
+
+    Parameters
+    ----------
+    memory
+        What the group's controller remembers, shape ``(k, controller.memory)``; updated in place.
+    """
+    arrays, robots, a = run.arrays, group.robots, flight.arrays
+    fallen, motors = arrays.status[robots] == _FALLEN, arrays.mode[robots] == _MOTORS
+    led = ~fallen & ~motors & (a.phase != _LANDED)
+    if led.all():
+        a.wanted[:] = group.controller.targets(run.engine.motion(robots), a.setpoint, memory)
+        return
+    rows = led.nonzero()[0]
+    if len(rows):
+        setpoint, mine = a.setpoint[rows], memory[rows]
+        a.wanted[rows] = group.controller.targets(run.engine.motion(robots[rows]), setpoint, mine)
+        a.setpoint[rows], memory[rows] = setpoint, mine
+    memory[~led] = 0.0
+    a.wanted[~led] = 0.0
+    told = motors & ~fallen
+    a.wanted[told] = arrays.command[robots[told], : len(group.model.motors)]
+    arrays.lying[robots[fallen]] += group.model.control_period
 
 
 def command_motors(run: RobotRun, group: RobotGroup, memory: np.ndarray, velocity: np.ndarray | None) -> None:

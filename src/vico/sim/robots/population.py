@@ -14,10 +14,10 @@ from vico.sim.bodies import Bodies, Drawn
 from vico.sim.carrying import DeckPose
 from vico.sim.physics.frames import FrameCount, FrameNeeds, frame_length
 from vico.sim.physics.loose import LooseObjects
-from vico.sim.robots import commands, drawing, sensing
+from vico.sim.robots import commands, drawing, flying, sensing
 from vico.sim.robots.decisions import decide
 from vico.sim.robots.falls import watch_falls
-from vico.sim.robots.motors import command_motors, velocities
+from vico.sim.robots.motors import command_motors, command_rotors, velocities
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.scene import RobotScene
 from vico.sim.robots.spawns import spawns
@@ -32,6 +32,8 @@ from vico.world.model import FIRST_BODY
 _MOTORS, _FALLEN = int(Mode.MOTORS), int(RobotStatus.FALLEN)
 # Digits of the grip that robots are told: weather that changes writes it into physics seldom.
 _GRIP_DIGITS = 2
+# Metres above ground below which robots that fly come near things that lie there.
+_LOW_FLIGHT = 4.0
 
 
 class RobotPopulation:
@@ -147,11 +149,33 @@ class RobotPopulation:
 
     def has_way(self, robot: int, xy: ArrayLike) -> bool:
         """Return whether there is a way to a point that is wide enough for a robot."""
+        if self.flies(robot):
+            return not self.scene.airspace.refusal(flying.cruise_point(self.run, np.asarray(xy, np.float64)))
         return way_to(self.run, robot, np.asarray(xy, np.float64)) is not None
 
     def go_to(self, robot: int, xy: ArrayLike) -> bool:
         """Find a way to a point and take it; False, and nothing changes, if there is none."""
         return commands.go_to(self.run, robot, np.asarray(xy, np.float64))
+
+    def flies(self, robot: int) -> bool:
+        """Return whether a robot flies."""
+        return self.models[robot].rotors is not None
+
+    def flight_refusal(self, robot: int, target: ArrayLike) -> str:
+        """Why a robot that flies can't fly to a point, ENU metres; "" if it can."""
+        return self.scene.airspace.refusal(np.asarray(target, np.float64))
+
+    def can_land(self, robot: int, xy: ArrayLike | None = None) -> bool:
+        """Return whether a robot that flies can land at a point, or where it is."""
+        return self.scene.airspace.is_flat(self.run.position(robot) if xy is None else xy)
+
+    def fly_to(self, robot: int, target: ArrayLike) -> None:
+        """Fly to a point, ENU metres, over or round what stands in between, and hover there."""
+        flying.fly_to(self.run, robot, np.asarray(target, np.float64))
+
+    def land(self, robot: int, xy: ArrayLike | None = None) -> None:
+        """Land at a point, or where it is."""
+        flying.land(self.run, robot, None if xy is None else np.asarray(xy, np.float64))
 
     def follow(self, robot: int, path: ArrayLike) -> None:
         """Follow a polyline, ENU metres, shape ``(k, 2)``, ``k >= 2``."""
@@ -183,7 +207,7 @@ class RobotPopulation:
         if since == 0.0:
             self.engine.set_dynamic_obstacles(obstacles, whole)
             decide(self.run, whole, obstacles, self.bodies(), errands=self.errands)
-            self._loose.update(np.array([self.run.position(i) for i in range(len(self))]))
+            self._loose.update(self._near_ground())
             arrays = self.run.arrays
             arrays.left_out[:] = np.maximum(arrays.left_out, (self.engine.left_out, self._loose.left_out))
         self._step(ticks, round((whole - since) / TICK))
@@ -201,24 +225,46 @@ class RobotPopulation:
         now, owed = int(arrays.tick[0]), int(arrays.owed[0]) + ticks
         left += owed - ticks
         needs = self._needs()  # decided between sub-steps, not within
-        orders = [(g, memory, velocities(self.run, g)) for g, memory in zip(groups, self.run.memory, strict=True)]
+        orders = [
+            (group, memory, velocities(self.run, group) if flight is None else None, flight)
+            for group, memory, flight in zip(groups, self.run.memory, self.run.flights, strict=True)
+        ]
+        flights = [flight for flight in self.run.flights if flight is not None]
+        # Rotors that stand need nothing told to them often.
+        busy = [group for group, _, _, flight in orders if flight is None or flight.in_the_air]
         lengths: dict[int, float] = {}  # of frames, by the ticks there are for one
         arrays.owed[0] = owed
         while owed:
-            room = min(left, *[group.period - now % group.period for group in groups])
+            room = min([left, *[group.period - now % group.period for group in busy]])
             if room not in lengths:
                 lengths[room] = frame_length(needs, room * TICK)
             frame = lengths[room]
             taken = round(frame / TICK)
             if taken > owed:
                 return
-            for group, memory, velocity in orders:
-                if now % group.period == 0:
+            for group, memory, velocity, flight in orders:
+                if now % group.period != 0:
+                    continue
+                if flight is not None:
+                    command_rotors(self.run, flight, group, memory)
+                else:
                     command_motors(self.run, group, memory, velocity)
+            for flight in flights:
+                flight.push(self.engine, frame, now * TICK)
             self.engine.step(frame=frame)
             now, owed, left = now + taken, owed - taken, left - taken
             arrays.frames[0 if taken == 1 else 1] += 1
             arrays.tick[0], arrays.owed[0] = now, owed
+
+    def _near_ground(self) -> NDArray[np.float64]:
+        """Where the robots are that things can be near to: those high up in the air are not."""
+        positions = np.array([self.run.position(i) for i in range(len(self))])
+        flights = [flight.robots for flight in self.run.flights if flight is not None]
+        if not flights:
+            return positions
+        flying = np.zeros(len(self), np.bool_)
+        flying[np.concatenate(flights)] = True
+        return positions[~flying | (positions[:, 2] < self.world.height(positions) + _LOW_FLIGHT)]
 
     def _needs(self) -> FrameNeeds:
         """Return what decides how long a frame is."""
@@ -232,6 +278,12 @@ class RobotPopulation:
     def set_grip(self, grip: float) -> None:
         """Have robots grip the ground with a share of what they do on dry ground, 0..1; told before every sub-step."""
         self.engine.set_friction(round(grip, _GRIP_DIGITS))
+
+    def set_wind(self, east: float, north: float) -> None:
+        """Have the mean wind 10 m above ground blow with so many m/s towards east and north; told like the grip."""
+        for flight in self.run.flights:
+            if flight is not None:
+                flight.arrays.wind[:] = east, north
 
     def attach_objects(self, objects: MovableObjects) -> None:
         """Have physics move things that lie near robots, or fall; before the first step."""
@@ -274,6 +326,10 @@ class RobotPopulation:
     def draw(self) -> Drawn:
         """Poses of all links."""
         return drawing.drawn_links(self.run)
+
+    def cameras(self) -> NDArray[np.float64]:
+        """Where each robot's camera is, ENU metres, and the unit vector it looks along, shape ``(n, 6)``."""
+        return drawing.cameras(self.run)
 
     def camera_heights(self) -> NDArray[np.float64]:
         """Height of each robot's camera above its position, metres."""

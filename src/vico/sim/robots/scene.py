@@ -13,6 +13,7 @@ from vico.assets.robots import TICK, RobotModel, robot_model
 from vico.sim.bodies import ROBOT
 from vico.sim.physics import DEFAULT_ENGINE, PhysicsEngine, PhysicsScene, make_scene
 from vico.sim.physics.surroundings import static_scene_of
+from vico.sim.robots.airspace import Airspace
 from vico.sim.robots.controller import MotorController
 from vico.sim.robots.controllers import controller_for
 from vico.world.folder import World
@@ -56,6 +57,8 @@ class Outlines:
         Of the boxes, metres.
     stand
         Height of a standing robot's base above the ground, metres.
+    flies
+        Whether they fly: they are where they are, and not on the ground below.
     """
 
     kind: NDArray[np.int8]
@@ -63,6 +66,7 @@ class Outlines:
     half_width: NDArray[np.float64]
     height: NDArray[np.float64]
     stand: NDArray[np.float64]
+    flies: NDArray[np.bool_]
 
 
 class RobotScene:
@@ -111,12 +115,21 @@ class RobotScene:
     def outlines(self) -> Outlines:
         """The robots' outlines; not to be written to."""
         sizes = [(m.half_length, m.half_width, m.height, m.stand) for m in self.models]
-        return Outlines(np.full(len(self), ROBOT, np.int8), *np.array(sizes, np.float64).reshape(-1, 4).T.copy())
+        flies = np.array([model.rotors is not None for model in self.models], np.bool_)
+        columns = np.array(sizes, np.float64).reshape(-1, 4).T.copy()
+        kind = np.full(len(self), ROBOT, np.int8)
+        return Outlines(kind, columns[0], columns[1], columns[2], columns[3], flies)
 
     @cached_property
     def physics(self) -> PhysicsScene:
         """Ground, solids and robots as physics has them, compiled when they are first needed."""
-        return make_scene(DEFAULT_ENGINE, static_scene_of(self.world), self.models)
+        flying = any(model.rotors is not None for model in self.models)
+        return make_scene(DEFAULT_ENGINE, static_scene_of(self.world, flying=flying), self.models)
+
+    @cached_property
+    def airspace(self) -> Airspace:
+        """Heights of everything, and ways over it, made when they are first needed."""
+        return Airspace(self.world)
 
     @property
     def router(self) -> Router:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
+from vico.sim.robots.flying import flight_of
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.state import RobotRun
 
@@ -34,6 +35,10 @@ def readings_of(model: RobotModel) -> dict[str, Reading]:
     if s.odometry:
         found["base_pose"] = Reading((7,), -endless, endless)
         found["base_velocity"] = Reading((3,), -endless, endless)
+    if s.rotors:
+        found["rotor_speed"] = Reading((len(model.motors),), 0.0, endless)
+    if s.battery:
+        found["battery"] = Reading((1,), 0.0, 1.0)
     if s.contacts:
         found["contacts"] = Reading((len(s.contacts),), 0.0, endless)
     return found
@@ -48,8 +53,8 @@ def observation(run: RobotRun, robot: int) -> dict[str, NDArray[Any]]:
         ``fallen`` (0 or 1); of joints ``joint_position`` and ``joint_velocity`` (rad, rad/s, order of the model's
         joints); of the IMU, in the base's frame, ``angular_velocity`` (rad/s), ``specific_force`` (acceleration
         without gravity's, m/s2: 9.81 upwards at rest) and ``gravity`` (its direction); of odometry ``base_pose``
-        (x, y, z, quaternion w, x, y, z) and ``base_velocity`` (ENU, m/s); ``contacts``, newtons on each link that
-        feels.
+        (x, y, z, quaternion w, x, y, z) and ``base_velocity`` (ENU, m/s); ``rotor_speed`` (rad/s, in the order of the
+        motors); ``battery``, how full it is, 0..1; ``contacts``, newtons on each link that feels.
     """
     s, base = run.scene.models[robot].sensors, run.engine.base(robot)
     found: dict[str, NDArray[Any]] = {
@@ -65,6 +70,13 @@ def observation(run: RobotRun, robot: int) -> dict[str, NDArray[Any]]:
     if s.odometry:
         found["base_pose"] = np.concatenate([base.position, base.quaternion])
         found["base_velocity"] = base.velocity.copy()
+    flown = flight_of(run, robot) if s.rotors or s.battery else None
+    if flown is not None:
+        flight, row = flown
+        if s.rotors:
+            found["rotor_speed"] = flight.arrays.speed[row].copy()
+        if s.battery:
+            found["battery"] = flight.arrays.charge[row : row + 1].copy()
     if s.contacts:
         links = run.engine.link_names(robot)
         forces = run.engine.contacts().link_forces(robot, len(links))

@@ -15,7 +15,9 @@ from vico.seeds import rng
 from vico.sim.bodies import Bodies
 from vico.sim.physics import PhysicsEngine
 from vico.sim.robots.path_follower import PathFollower, RobotStatus
+from vico.sim.robots.rotors import Flight
 from vico.sim.robots.scene import RobotScene
+from vico.sim.robots.wind import gusts_of
 from vico.sim.state import REASON_LENGTH
 
 
@@ -26,7 +28,7 @@ class Mode(IntEnum):
 
 
 #: What can happen to a robot.
-NOTES = ("arrived", "blocked", "fallen", "recovered", "lost")
+NOTES = ("arrived", "blocked", "fallen", "recovered", "lost", "landed", "battery_low")
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,8 @@ class RobotArrays:
     command
         The vector it was commanded by: motor targets or a velocity, by its mode; float64, shape ``(n, widest)``.
     velocity
-        What its controller follows until the next decision, vx, vy, wz, float64, shape ``(n, 3)``.
+        What its controller follows until the next decision, vx, vy, wz, float64, shape ``(n, 3)``; those of robots that
+        fly follow setpoints.
     leader
         Entity it follows, 0 for nobody, int32, shape ``(n,)``.
     lying
@@ -140,6 +143,8 @@ class RobotRun:
         What each group's controller remembers, float64, shape ``(k, controller.memory)``.
     followers
         Take each robot along its way.
+    flights
+        What changes of each group besides if it flies, else None.
     pending
         Robot, and index into `NOTES`, of what happened since it was last asked.
     """
@@ -151,12 +156,19 @@ class RobotRun:
     arrays: RobotArrays
     memory: list[NDArray[np.float64]] = field(init=False)
     followers: list[PathFollower] = field(init=False)
+    flights: list[Flight | None] = field(init=False)
     pending: list[tuple[int, int]] = field(default_factory=list)
     known_bodies: Bodies | None = None
 
     def __post_init__(self) -> None:
         self.memory = [np.zeros((len(group.robots), group.controller.memory)) for group in self.scene.groups]
         self.followers = [PathFollower(model) for model in self.scene.models]
+        self.flights = [
+            None
+            if group.model.rotors is None
+            else Flight(group.model, group.robots, self.scene.world.height, gusts_of(self.seed))
+            for group in self.scene.groups
+        ]
 
     def position(self, robot: int) -> NDArray[np.float64]:
         """Origin of a robot's base, ENU metres, shape ``(3,)``."""
@@ -189,6 +201,9 @@ class RobotRun:
         found = {f"engine_{key}": value for key, value in self.engine.arrays().items()}
         found |= {name: value.copy() for name, value in vars(self.arrays).items()}
         found |= {f"memory_{k}": memory.copy() for k, memory in enumerate(self.memory)}
+        for k, flight in enumerate(self.flights):
+            if flight is not None:
+                found |= {f"flight_{k}_{name}": value for name, value in flight.saved().items()}
         numbers = [follower.numbers() for follower in self.followers]
         return found | {
             "pending": np.array(self.pending, np.int64).reshape(-1, 2),
@@ -213,6 +228,10 @@ class RobotRun:
         self.engine.restore({key[7:]: value for key, value in arrays.items() if key.startswith("engine_")})
         for name, value in mine.items():
             value[...] = arrays[name]
+        for k, flight in enumerate(self.flights):
+            if flight is not None:
+                start = f"flight_{k}_"
+                flight.restore({key[len(start) :]: value for key, value in arrays.items() if key.startswith(start)})
         self.pending = [(int(a), int(b)) for a, b in arrays["pending"]]
         starts = np.concatenate([[0], arrays["path_ends"]]).astype(int)
         for i, follower in enumerate(self.followers):

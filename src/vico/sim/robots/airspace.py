@@ -1,0 +1,251 @@
+"""What stands how high in a world, and ways through the air over it or round it."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import ndimage
+
+from vico.io.compiled import compiled
+from vico.world.folder import World
+from vico.world.routing import Router
+from vico.world.walkable import BLOCKED, SIDEWALK, WalkableMap
+
+Array = NDArray[np.float64]
+
+_CELL = 0.5
+#: Metres kept above what is flown over, and beside it; between a robot that hovers and anything else.
+OVER, BESIDE, HOVER = 3.0, 2.0, 0.8
+#: Highest above ground: where most countries end the air that anybody may fly in.
+CEILING = 120.0
+# Metres by which a spot to land on may be uneven, and within which it has to be even.
+_UNEVEN, _SPOT = 0.25, 0.5
+# Cells of the map on which ways round things are found, in cells of this one.
+_COARSE = 4
+# Speeds by which ways are compared, m/s: sideways, up and down.
+_SPEEDS = (6.0, 3.0, 1.5)
+
+
+@compiled
+def _raise_triangles(tops, half, corners):  # type: ignore[no-untyped-def]
+    """Raise all cells that triangles may cover to their heights there."""
+    n = len(tops)
+    for t in range(len(corners)):
+        c = corners[t]
+        low_x, high_x = min(c[0, 0], c[1, 0], c[2, 0]), max(c[0, 0], c[1, 0], c[2, 0])
+        low_y, high_y = min(c[0, 1], c[1, 1], c[2, 1]), max(c[0, 1], c[1, 1], c[2, 1])
+        low_z, high_z = min(c[0, 2], c[1, 2], c[2, 2]), max(c[0, 2], c[1, 2], c[2, 2])
+        ux, uy, uz = c[1, 0] - c[0, 0], c[1, 1] - c[0, 1], c[1, 2] - c[0, 2]
+        vx, vy, vz = c[2, 0] - c[0, 0], c[2, 1] - c[0, 1], c[2, 2] - c[0, 2]
+        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        for row in range(max(int((low_y + half) / _CELL), 0), min(int((high_y + half) / _CELL), n - 1) + 1):
+            y = (row + 0.5) * _CELL - half
+            for column in range(max(int((low_x + half) / _CELL), 0), min(int((high_x + half) / _CELL), n - 1) + 1):
+                x = (column + 0.5) * _CELL - half
+                # Outside of an edge by more than half a cell's diagonal.
+                outside = False
+                for k in range(3):
+                    a, b = c[k], c[(k + 1) % 3]
+                    ex, ey = b[0] - a[0], b[1] - a[1]
+                    size = math.hypot(ex, ey)
+                    side = (ex * (y - a[1]) - ey * (x - a[0])) * (1.0 if nz >= 0.0 else -1.0)
+                    outside = outside or (size > 1e-9 and side < -0.71 * _CELL * size)
+                if outside:
+                    continue
+                z = high_z
+                if abs(nz) > 1e-3 * (abs(nx) + abs(ny) + abs(nz)):
+                    slope = (abs(nx) + abs(ny)) / abs(nz)
+                    z = c[0, 2] - (nx * (x - c[0, 0]) + ny * (y - c[0, 1])) / nz + 0.5 * _CELL * slope
+                    z = min(max(z, low_z), high_z)
+                tops[row, column] = max(tops[row, column], z)
+
+
+def _corners(world: World, layers: tuple[str, ...]) -> Array:
+    found = [np.zeros((0, 3, 3))]
+    for layer in layers:
+        for surface in world.surfaces(layer):
+            if len(surface.triangles):
+                found.append(surface.positions[surface.triangles].astype(np.float64))
+    return np.concatenate(found)
+
+
+class Airspace:
+    """Heights of everything that stands in a world, and ways over it or round it.
+
+    Parameters
+    ----------
+    world
+        Where.
+
+    Attributes
+    ----------
+    tops
+        How high anything reaches in each cell of half a metre, ENU metres, float64, shape ``(n, n)``, row = y.
+    solid
+        The same of ground and collision bodies alone.
+    """
+
+    def __init__(self, world: World) -> None:
+        self.half, self.ground = float(world.half), world.height
+        n = round(2 * self.half / _CELL)
+        axis = (np.arange(n) + 0.5) * _CELL - self.half
+        xx, yy = np.meshgrid(axis, axis)
+        self._floor = np.asarray(self.ground(np.stack([xx, yy], axis=-1)), np.float64)
+        self.solid = self._floor.copy()
+        _raise_triangles(self.solid, self.half, _corners(world, ("collision",)))
+        self.tops = self.solid.copy()
+        _raise_triangles(self.tops, self.half, _corners(world, ("buildings", "roofs")))
+        objects = world.objects.where(world.objects.outdoors)
+        for x, y, z, a, b in zip(
+            objects.x.tolist(),
+            objects.y.tolist(),
+            (objects.z + objects.size_z).tolist(),
+            (objects.size_x / 2).tolist(),
+            (objects.size_y / 2).tolist(),
+            strict=True,
+        ):
+            part = self._window(x, y, math.hypot(a, b) if abs(a - b) > 0.05 * a else a)
+            self.tops[part] = np.maximum(self.tops[part], z)
+
+        self._highest = float(self.tops.max())
+
+    # Heights.
+
+    def _window(self, x: float, y: float, reach: float) -> tuple[slice, slice]:
+        low = np.floor((np.array([y, x]) - reach + self.half) / _CELL).astype(int)
+        high = np.floor((np.array([y, x]) + reach + self.half) / _CELL).astype(int) + 1
+        rows, columns = np.clip(np.stack([low, high], axis=1), 0, len(self.tops)).tolist()
+        return slice(*rows), slice(*columns)
+
+    def inside(self, xy: ArrayLike) -> bool:
+        """Return whether a point lies in the world, with room to fly."""
+        return bool(np.all(np.abs(np.asarray(xy, np.float64)[:2]) < self.half - BESIDE))
+
+    def top(self, xy: ArrayLike, reach: float = HOVER) -> float:
+        """How high anything reaches within so many metres of a point, ENU metres."""
+        x, y = (float(v) for v in np.asarray(xy, np.float64)[:2])
+        around = self.tops[self._window(x, y, reach)]
+        return float(around.max()) if around.size else self._highest
+
+    def highest(self, start: ArrayLike, end: ArrayLike, beside: float = BESIDE) -> float:
+        """How high anything reaches along a straight line and so far beside it, ENU metres."""
+        a, b = np.asarray(start, np.float64)[:2], np.asarray(end, np.float64)[:2]
+        away = float(np.hypot(*(b - a)))
+        shares = np.linspace(0.0, 1.0, max(2, math.ceil(away / max(beside, _CELL)) + 1))
+        return max(self.top(a + share * (b - a), 1.2 * beside) for share in shares.tolist())
+
+    def is_clear(self, start: Array, end: Array, gap: float = HOVER) -> bool:
+        """Return whether a straight line keeps so far above everything."""
+        away = float(np.linalg.norm(end - start))
+        shares = np.linspace(0.0, 1.0, max(2, math.ceil(away / 1.0) + 1))
+        points = start + shares[:, None] * (end - start)
+        return all(self.top(point, 1.0) + gap <= point[2] for point in points)
+
+    @cached_property
+    def flat(self) -> NDArray[np.bool_]:
+        """Where one can land: it is even, and what is seen there is solid; shape ``(n, n)``."""
+        size = 2 * round(_SPOT / _CELL) + 1
+        rough = ndimage.maximum_filter(self.tops, size) - ndimage.minimum_filter(self.tops, size)
+        flat = (rough < _UNEVEN) & (np.abs(self.tops - self.solid) < 0.05)
+        margin = math.ceil(BESIDE / _CELL)
+        inner = np.zeros_like(flat)
+        inner[margin:-margin, margin:-margin] = flat[margin:-margin, margin:-margin]
+        return inner
+
+    def is_flat(self, xy: ArrayLike) -> bool:
+        """Return whether one can land at a point."""
+        if not self.inside(xy):
+            return False
+        column, row = np.floor((np.asarray(xy, np.float64)[:2] + self.half) / _CELL).astype(int)
+        return bool(self.flat[row, column])
+
+    def flat_near(self, xy: ArrayLike, reach: float = 30.0) -> Array | None:
+        """Return the nearest spot to land on, ENU metres, shape ``(2,)``; None if there is none within reach."""
+        point = np.asarray(xy, np.float64)[:2]
+        if self.is_flat(point):
+            return point.copy()
+        rows, columns = self._window(float(point[0]), float(point[1]), reach)
+        found = np.argwhere(self.flat[rows, columns])
+        if not len(found):
+            return None
+        spots = (found[:, ::-1] + [columns.start, rows.start] + 0.5) * _CELL - self.half
+        away = np.hypot(*(spots - point).T)
+        best = int(away.argmin())
+        return spots[best].copy() if away[best] <= reach else None
+
+    # Ways.
+
+    def refusal(self, target: Array) -> str:
+        """Why nobody can fly to a point; "" if one can."""
+        if not self.inside(target):
+            return "that is outside of the world, or at its very edge"
+        top, ceiling = self.top(target), float(self.ground(target)) + CEILING
+        if target[2] < top + HOVER:
+            return f"{target[2]:.1f} m is in or less than {HOVER:g} m above what is there, which reaches {top:.1f} m"
+        if target[2] > ceiling:
+            return f"{target[2]:.1f} m is higher than {CEILING:g} m above the ground there"
+        return ""
+
+    def route(self, start: Array, target: Array) -> Array:
+        """Return the faster of the ways over what stands between two points and round it.
+
+        Returns
+        -------
+        ndarray
+            Corners, from the first one that is not `start` to `target`, ENU metres, shape ``(k, 3)``.
+        """
+        if self.is_clear(start, target):
+            return target[None].copy()
+        lead = self._out_from_under(start)
+        begin = lead[-1] if len(lead) else start
+        over = self._over(begin, target)
+        around = self._around(begin, target)
+        ways = [way for way in (over, around) if way is not None]
+        best = min(ways, key=lambda way: _duration(np.vstack([begin, way])))
+        return np.vstack([lead, best])
+
+    def _out_from_under(self, start: Array) -> Array:
+        """Return where to go first when something is overhead: the nearest place open to the sky."""
+        if self.top(start, 0.5) <= start[2] + 0.3:
+            return np.zeros((0, 3))
+        rows, columns = self._window(float(start[0]), float(start[1]), 20.0)
+        free = ndimage.maximum_filter(self.tops[rows, columns], 3) <= self._floor[rows, columns] + 1.0
+        found = np.argwhere(free)
+        if not len(found):
+            return np.zeros((0, 3))
+        spots = (found[:, ::-1] + [columns.start, rows.start] + 0.5) * _CELL - self.half
+        best = spots[int(np.hypot(*(spots - start[:2]).T).argmin())]
+        return np.array([[*best, max(start[2], float(self.ground(best)) + 1.5)]])
+
+    def _over(self, start: Array, target: Array) -> Array:
+        height = max(self.highest(start, target) + OVER, start[2], target[2])
+        return np.array([[*start[:2], height], [*target[:2], height], target])
+
+    def _around(self, start: Array, target: Array) -> Array | None:
+        height = max(start[2], target[2], self.top(start) + OVER, self.top(target) + OVER)
+        n = len(self.tops) // _COARSE * _COARSE
+        coarse = self.tops[:n, :n].reshape(n // _COARSE, _COARSE, n // _COARSE, _COARSE).max(axis=(1, 3))
+        free = ndimage.maximum_filter(coarse, 3) + OVER / 2 <= height
+        kinds = np.where(free, SIDEWALK, BLOCKED).astype(np.uint8)
+        cell = _CELL * _COARSE
+        grid = WalkableMap(kinds, n * _CELL / 2, cell)
+        shift = n * _CELL / 2 - self.half  # of a side that is no multiple of a coarse cell
+        path = Router(grid).path(start[:2] - shift, target[:2] - shift)
+        if path is None:
+            return None
+        path = path + shift
+        if float(np.hypot(*(path[-1] - target[:2]))) > 2 * cell:
+            return None
+        middle = np.column_stack([path, np.full(len(path), height)])
+        return np.vstack([[*start[:2], height], middle, [*target[:2], height], target])
+
+
+def _duration(way: Array) -> float:
+    """Seconds that a way takes."""
+    steps = np.diff(way, axis=0)
+    level = np.hypot(steps[:, 0], steps[:, 1]) / _SPEEDS[0]
+    rise = np.where(steps[:, 2] > 0.0, steps[:, 2] / _SPEEDS[1], -steps[:, 2] / _SPEEDS[2])
+    return float(np.maximum(level, rise).sum())

@@ -1,0 +1,379 @@
+"""What robots that fly do for the next sub-step: along their ways, over whoever is below, down to the ground."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.errors import InputError
+from vico.sim.bodies import Bodies
+from vico.sim.robots.airspace import BESIDE, CEILING, HOVER
+from vico.sim.robots.path_follower import RobotStatus
+from vico.sim.robots.rotors import HEADING, POSITION, TURNING, VELOCITY, Flight, Phase
+from vico.sim.robots.state import Mode, RobotRun
+
+Array = NDArray[np.float64]
+
+_LANDED, _FLYING, _LANDING = (int(phase) for phase in Phase)
+_IDLE, _VELOCITY, _MOTORS, _ROUTE, _FOLLOW = (int(mode) for mode in Mode)
+_FALLEN = int(RobotStatus.FALLEN)
+#: Metres above what is there at which `go_to` ends, and that a landing begins above.
+CRUISE, APPROACH = 10.0, 4.0
+#: Metres a second squared it speeds up and brakes with along its way; a corner counts as reached so near, metres.
+_BRAKE, _CORNER = 1.5, 0.6
+# Metres a second it comes down with, far above what is below and near it; metres that is.
+_SINK, _TOUCH, _NEAR = 1.5, 0.4, 3.0
+# Seconds without sinking, slower than so many metres a second, after which it has landed.
+_CALM, _STILL = 0.5, 0.08
+# Metres above and beside people and vehicles that it keeps to; seconds their motion is foreseen.
+_ABOVE, _ASIDE, _FORESIGHT = 1.5, 1.5, 1.5
+# Metres behind and above whom it follows, how far that one has to go for another way to be found.
+_BEHIND, _HIGHER, _DRIFT = 4.0, 5.0, 3.0
+# Seconds without getting nearer after which a way counts as blocked; share of its battery at which it lands.
+_PATIENCE, _LOW = 30.0, 0.1
+_ERRAND_REST, _ERRAND_HEIGHT = 5.0, 15.0
+
+
+def flight_of(run: RobotRun, robot: int) -> tuple[Flight, int] | None:
+    """Return the flight a robot is part of, and its row in that; None if it does not fly."""
+    for flight in run.flights:
+        if flight is not None and robot in flight.robots:
+            return flight, flight.row(robot)
+    return None
+
+
+def _flight(run: RobotRun, robot: int, what: str) -> tuple[Flight, int]:
+    found = flight_of(run, robot)
+    if found is None:
+        raise InputError(f"{what}: {run.scene.models[robot].title} does not fly")
+    return found
+
+
+# Commands.
+
+
+def cruise_point(run: RobotRun, xy: Array) -> Array:
+    """Where `go_to` ends: above what stands at a point."""
+    return np.array([*xy[:2], run.scene.airspace.top(xy) + CRUISE])
+
+
+def fly_to(run: RobotRun, robot: int, target: Array, *, lands: bool = False) -> None:
+    """Fly to a point, over or round what stands in between, and hover or land there.
+
+    Raises
+    ------
+    InputError
+        If it does not fly, or nobody can fly there.
+    """
+    flight, row = _flight(run, robot, "fly_to")
+    refusal = run.scene.airspace.refusal(target)
+    if refusal:
+        raise InputError(f"fly_to: {refusal}")
+    settle(run, robot)
+    run.set_mode(robot, Mode.ROUTE)
+    _begin(run, robot, flight, row, target)
+    flight.arrays.lands[row] = lands
+
+
+def land(run: RobotRun, robot: int, xy: Array | None = None) -> None:
+    """Land where it is, or at a point; on what is even, ground or roof.
+
+    Raises
+    ------
+    InputError
+        If it does not fly, or what is there is not even.
+    """
+    flight, row = _flight(run, robot, "land")
+    here = run.position(robot)
+    spot = here[:2].copy() if xy is None else np.asarray(xy, np.float64)[:2]
+    if flight.arrays.phase[row] == _LANDED and xy is None:
+        return
+    space = run.scene.airspace
+    if not space.is_flat(spot):
+        raise InputError("land: what is there is not even enough to land on")
+    if float(np.hypot(*(spot - here[:2]))) < 1.0:
+        run.set_mode(robot, Mode.ROUTE)
+        flight.arrays.phase[row] = _LANDING
+        flight.arrays.calm[row] = 0.0
+        flight.ways[row] = np.array([[*spot, space.top(spot)]])
+        flight.arrays.setpoint[row, VELOCITY] = 0.0
+        flight.arrays.setpoint[row, POSITION] = [*spot, here[2]]
+        return
+    fly_to(run, robot, np.array([*spot, space.top(spot) + APPROACH]), lands=True)
+
+
+def settle(run: RobotRun, robot: int) -> None:
+    """Hover where it is, or stay on the ground; whoever begins something else for a robot asks for it first."""
+    found = flight_of(run, robot)
+    if found is None:
+        return
+    flight, row = found
+    a = flight.arrays
+    flight.ways[row] = np.zeros((0, 3))
+    a.leg[row], a.lands[row], a.calm[row], a.held[row] = 0, False, 0.0, 0.0
+    if a.phase[row] == _LANDING:
+        a.phase[row] = _FLYING
+    base = run.engine.base(robot)
+    a.setpoint[row, POSITION] = base.position
+    a.setpoint[row, VELOCITY] = 0.0
+    a.setpoint[row, HEADING], a.setpoint[row, TURNING] = base.yaw, 0.0
+
+
+def _begin(run: RobotRun, robot: int, flight: Flight, row: int, target: Array) -> None:
+    flight.ways[row] = run.scene.airspace.route(run.position(robot), target)
+    flight.arrays.leg[row] = 0
+    flight.arrays.held[row] = [0.0, math.inf]
+    flight.arrays.phase[row] = _FLYING
+
+
+# Decisions.
+
+
+def decide_flight(run: RobotRun, flight: Flight, dt: float, everybody: Bodies, *, errands: bool) -> None:
+    """Set what the robots of a flight follow for the next `dt` seconds."""
+    for row, robot in enumerate(flight.robots.tolist()):
+        mode = int(run.arrays.mode[robot])
+        if run.arrays.status[robot] == _FALLEN or mode == _MOTORS:
+            flight.arrays.phase[row] = _FLYING if mode == _MOTORS else _LANDED
+            continue
+        _watch_battery(run, flight, row, robot)
+        if mode == _IDLE and errands:
+            _rest(run, flight, row, robot, dt)
+        others = _below_and_beside(everybody, int(run.entities[robot]), run.position(robot))
+        if mode == _IDLE:
+            flight.arrays.setpoint[row, VELOCITY] = 0.0
+        elif mode == _VELOCITY:
+            _hold_velocity(run, flight, row, robot)
+        elif mode == _FOLLOW:
+            _keep_near(run, flight, row, robot, everybody)
+        elif flight.arrays.phase[row] == _LANDING:
+            _come_down(run, flight, row, robot, others, dt)
+            continue
+        else:
+            _keep_to_way(run, flight, row, robot, dt)
+        _keep_above(run, flight, row, robot, others)
+
+
+def _watch_battery(run: RobotRun, flight: Flight, row: int, robot: int) -> None:
+    """Have it land near where it is when its battery is low."""
+    a = flight.arrays
+    if a.warned[row] or a.charge[row] > _LOW or a.phase[row] != _FLYING:
+        return
+    a.warned[row] = True
+    run.note(robot, "battery_low")
+    spot = run.scene.airspace.flat_near(run.position(robot))
+    if spot is not None:
+        land(run, robot, spot)
+
+
+def _rest(run: RobotRun, flight: Flight, row: int, robot: int, dt: float) -> None:
+    """Let time pass until the next errand; with a low battery there is none."""
+    arrays = run.arrays
+    arrays.rest[robot] += dt
+    if flight.arrays.warned[row] or not (arrays.rest[robot] > _ERRAND_REST or arrays.errand[robot] == 0):
+        return
+    arrays.rest[robot] = 0.0
+    arrays.errand[robot] += 1
+    goals, space = run.scene.goals, run.scene.airspace
+    away = np.hypot(*(goals - run.position(robot)[:2]).T)
+    order = run.errand_stream(robot).permutation(np.flatnonzero((away > 40.0) & (away < 250.0)))
+    for index in order[:5]:
+        target = np.array([*goals[index], space.top(goals[index]) + _ERRAND_HEIGHT])
+        if not space.refusal(target):
+            fly_to(run, robot, target)
+            return
+
+
+def _hold_velocity(run: RobotRun, flight: Flight, row: int, robot: int) -> None:
+    """Follow the velocity asked for: along and across its heading, and up."""
+    a, base = flight.arrays, run.engine.base(robot)
+    vx, vy, vz, wz = run.arrays.command[robot, :4].tolist()
+    if a.phase[row] == _LANDED and vz <= 0.0:
+        return
+    a.phase[row] = _FLYING
+    c, s = math.cos(base.yaw), math.sin(base.yaw)
+    a.setpoint[row, VELOCITY] = c * vx - s * vy, s * vx + c * vy, vz
+    a.setpoint[row, TURNING] = wz
+    run.arrays.status[robot] = RobotStatus.MOVING
+
+
+def _keep_to_way(run: RobotRun, flight: Flight, row: int, robot: int, dt: float) -> None:
+    """Follow the way, and say when it ends or can't be flown."""
+    a, status = flight.arrays, _steer(run, flight, row, robot, dt)
+    run.arrays.status[robot] = status
+    if status == RobotStatus.ARRIVED and a.lands[row]:
+        target = flight.ways[row][-1]
+        a.phase[row], a.calm[row] = _LANDING, 0.0
+        flight.ways[row] = target[None].copy()
+        run.arrays.status[robot] = RobotStatus.MOVING
+    elif status in (RobotStatus.ARRIVED, RobotStatus.BLOCKED):
+        target = flight.ways[row][-1].copy()
+        run.note(robot, "arrived" if status == RobotStatus.ARRIVED else "blocked")
+        settle(run, robot)
+        if status == RobotStatus.ARRIVED:
+            a.setpoint[row, POSITION] = target
+        run.arrays.mode[robot] = Mode.IDLE
+        run.arrays.rest[robot] = 0.0
+
+
+def _steer(run: RobotRun, flight: Flight, row: int, robot: int, dt: float) -> RobotStatus:
+    """Aim along the way; return how that goes."""
+    a, base = flight.arrays, run.engine.base(robot)
+    way, leg = flight.ways[row], int(a.leg[row])
+    away = float(np.linalg.norm(way[leg] - base.position))
+    last = leg == len(way) - 1
+    speed = float(np.linalg.norm(base.velocity))
+    if last and away < flight.model.arrival + 0.02 * float(np.hypot(*a.wind)) and speed < 0.7:
+        return RobotStatus.ARRIVED
+    if not last and away < _CORNER:
+        a.leg[row] = leg = leg + 1
+        a.held[row] = [0.0, math.inf]
+        away = float(np.linalg.norm(way[leg] - base.position))
+    _note_progress(a.held[row], away, dt)
+    _aim(flight, row, base.position, way, leg)
+    return RobotStatus.BLOCKED if a.held[row, 0] > _PATIENCE else RobotStatus.MOVING
+
+
+def _note_progress(held: Array, away: float, dt: float) -> None:
+    """Count how long it has come no nearer."""
+    if away < held[1] - 0.5:
+        held[:] = 0.0, away
+    else:
+        held[0] += dt
+
+
+def _aim(flight: Flight, row: int, position: Array, way: Array, leg: int) -> None:
+    """Follow a leg of a way: beside it back to it, along it as fast as it can stop at its end, nose ahead."""
+    a, reach = flight.arrays, flight.model.velocity_limit
+    assert reach is not None
+    end = way[leg]
+    start = way[leg - 1] if leg else position
+    along = end - start
+    length = float(np.linalg.norm(along))
+    along = along / length if length > 1e-6 else np.zeros(3)
+    done = min(max(float((position - start) @ along), 0.0), length)
+    left = length - done
+    speed = math.sqrt(2.0 * _BRAKE * max(left - 0.1, 0.0))
+    level, rise = math.hypot(along[0], along[1]), float(along[2])
+    for part, limit in ((level, float(reach[0])), (max(rise, 0.0), float(reach[2])), (max(-rise, 0.0), _SINK)):
+        if part > 1e-6:
+            speed = min(speed, limit / part)
+    a.setpoint[row, VELOCITY] = speed * along
+    a.setpoint[row, POSITION] = start + done * along
+    if level * left > 2.0:
+        _turn(a.setpoint[row], math.atan2(along[1], along[0]), float(reach[3]))
+    else:
+        a.setpoint[row, TURNING] = 0.0
+
+
+def _turn(setpoint: Array, heading: float, fastest: float) -> None:
+    """Turn towards a heading."""
+    error = (heading - setpoint[HEADING] + math.pi) % (2.0 * math.pi) - math.pi
+    setpoint[TURNING] = min(max(1.5 * error, -fastest), fastest)
+
+
+def _come_down(run: RobotRun, flight: Flight, row: int, robot: int, others: Bodies, dt: float) -> None:
+    """Sink onto the spot; wait above it while anybody is there."""
+    a, base = flight.arrays, run.engine.base(robot)
+    spot = flight.ways[row][-1]
+    above = float(base.position[2]) - flight.model.stand - run.scene.airspace.top(spot, 0.5)
+    a.setpoint[row, :2], a.setpoint[row, 3:5], a.setpoint[row, TURNING] = spot[:2], 0.0, 0.0
+    floor = _floor(others, base.position, np.zeros(3))
+    if above > 0.3 and base.position[2] - flight.model.stand - 0.3 < floor:
+        run.arrays.status[robot] = RobotStatus.WAITING
+        a.setpoint[row, 2] = floor + flight.model.stand
+        a.setpoint[row, 5] = 0.0
+        return
+    run.arrays.status[robot] = RobotStatus.MOVING
+    a.setpoint[row, 5] = -_SINK if above > _NEAR else -_TOUCH
+    still = above < 1.0 and abs(float(base.velocity[2])) < _STILL
+    a.calm[row] = a.calm[row] + dt if still else 0.0
+    if a.calm[row] > _CALM:
+        settle(run, robot)
+        a.phase[row] = _LANDED
+        run.arrays.mode[robot] = Mode.IDLE
+        run.arrays.status[robot] = RobotStatus.ARRIVED
+        run.arrays.rest[robot] = 0.0
+        run.note(robot, "landed")
+
+
+def _below_and_beside(everybody: Bodies, own: int, position: Array) -> Bodies:
+    """Everybody else within some metres."""
+    away = np.hypot(*(everybody.position[:, :2] - position[:2]).T) - everybody.half_length
+    return everybody.where(np.flatnonzero((away < 20.0) & (everybody.entity != own)))
+
+
+def _floor(others: Bodies, position: Array, velocity: Array) -> float:
+    """How high it has to keep because of whoever is below it, or soon will be, ENU metres; -inf for nobody."""
+    if not len(others):
+        return -math.inf
+    least = np.full(len(others), np.inf)
+    for later in (0.0, 0.5 * _FORESIGHT, _FORESIGHT):
+        gap = others.position[:, :2] + others.velocity * later - (position[:2] + velocity[:2] * later)
+        least = np.minimum(least, np.hypot(gap[:, 0], gap[:, 1]) - others.half_length)
+    near = least < _ASIDE
+    return float((others.top[near]).max()) + _ABOVE if near.any() else -math.inf
+
+
+def _keep_above(run: RobotRun, flight: Flight, row: int, robot: int, others: Bodies) -> None:
+    """Climb, and come no nearer, while anybody is below or ahead."""
+    a, base = flight.arrays, run.engine.base(robot)
+    if a.phase[row] == _LANDED:
+        return
+    _keep_inside(run, a.setpoint[row], base.position)
+    bottom = float(base.position[2]) - flight.model.stand
+    floor = _floor(others, base.position, a.setpoint[row, VELOCITY])
+    if a.setpoint[row, 5] < 0.0 and bottom - 0.5 < floor:
+        a.setpoint[row, 5] = 0.0
+    if bottom < floor:
+        a.setpoint[row, VELOCITY] = 0.0, 0.0, 2.0
+        a.setpoint[row, POSITION] = base.position
+        if run.arrays.mode[robot] != _IDLE:
+            run.arrays.status[robot] = RobotStatus.WAITING
+
+
+def _keep_inside(run: RobotRun, setpoint: Array, position: Array) -> None:
+    """Fly neither out of the world nor too high."""
+    half = run.scene.airspace.half - BESIDE
+    ceiling = float(run.scene.world.height(position)) + CEILING
+    for axis, (low, high) in enumerate(((-half, half), (-half, half), (-math.inf, ceiling))):
+        outwards = setpoint[3 + axis]
+        if (position[axis] > high and outwards > 0.0) or (position[axis] < low and outwards < 0.0):
+            setpoint[3 + axis] = 0.0
+            setpoint[axis] = min(max(setpoint[axis], low), high)
+
+
+def _keep_near(run: RobotRun, flight: Flight, row: int, robot: int, everybody: Bodies) -> None:
+    """Fly behind and above the leader; hover where it can't be found."""
+    a, arrays, position = flight.arrays, run.arrays, run.position(robot)
+    found = np.flatnonzero(everybody.entity == arrays.leader[robot])
+    arrays.status[robot] = RobotStatus.WAITING
+    a.setpoint[row, VELOCITY] = 0.0
+    a.setpoint[row, TURNING] = 0.0
+    if not len(found):
+        return
+    leader, top = everybody.position[found[0]], float(everybody.top[found[0]])
+    away = position[:2] - leader[:2]
+    far = float(np.hypot(*away))
+    goal = np.array([*(leader[:2] + away * (_BEHIND / far if far > 0.1 else 1.0)), top + _HIGHER])
+    reach = flight.model.velocity_limit
+    assert reach is not None
+    if far > 0.5:
+        _turn(a.setpoint[row], math.atan2(-away[1], -away[0]), float(reach[3]))
+    space = run.scene.airspace
+    goal[2] = max(goal[2], space.top(goal) + HOVER)
+    if np.linalg.norm(goal - position) < 1.5 and not len(flight.ways[row]):
+        a.phase[row] = _FLYING
+        a.setpoint[row, POSITION] = position + np.clip(goal - position, -1.0, 1.0)
+        return
+    stale = not len(flight.ways[row]) or np.linalg.norm(flight.ways[row][-1] - goal) > _DRIFT
+    if stale and not space.refusal(goal):
+        _begin(run, robot, flight, row, goal)
+    if len(flight.ways[row]):
+        status = _steer(run, flight, row, robot, 0.0)
+        arrays.status[robot] = status
+        if status == RobotStatus.ARRIVED:
+            flight.ways[row] = np.zeros((0, 3))
+            arrays.status[robot] = RobotStatus.WAITING
