@@ -91,6 +91,14 @@ def test_processes_that_start_at_once_compile_each_function_once(town: Path) -> 
     assert printed == ["7.0 0\n", "7.0 1\n"]
 
 
+def _printed(town: Path, program: str) -> str:
+    paths = os.pathsep.join([str(town.parent), *(path for path in sys.path if path)])
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(town.parent / "cache"), "PYTHONPATH": paths}
+    return subprocess.run(
+        [sys.executable, "-B", "-c", program], env=environment, check=True, capture_output=True, text=True
+    ).stdout
+
+
 def change(file: Path, old: str, new: str) -> None:
     text = file.read_text()
     assert old in text
@@ -120,12 +128,16 @@ def test_a_function_is_compiled_once_for_all_constants_of_a_type(town: Path) -> 
     program = _RUN + "from vico.io.compiled import _Callee\nimport gc\n"
     program += "print([len(one.overloads) for one in gc.get_objects() if isinstance(one, _Callee)"
     program += " and one.__name__ == 'times'])"
-    paths = os.pathsep.join([str(town.parent), *(path for path in sys.path if path)])
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(town.parent / "cache"), "PYTHONPATH": paths}
-    printed = subprocess.run(
-        [sys.executable, "-B", "-c", program], env=environment, check=True, capture_output=True, text=True
-    ).stdout
-    assert printed == "10.0 0\n[1]\n"
+    assert _printed(town, program) == "10.0 0\n[1]\n"
+
+
+def test_what_does_not_fit_a_slice_is_refused(town: Path) -> None:
+    change(town / "rules.py", "return speed - 1.0", "speed[:2] = speed[2:]\n    return speed[0]")
+    program = (
+        "import numpy as np\nfrom town.drive import slower\nprint(slower(np.arange(4.0)))\n"
+        "try:\n    slower(np.zeros(5))\nexcept ValueError as error:\n    print(error)\n"
+    )
+    assert _printed(town, program) == "2.0\ncannot assign slice from input of different size\n"
 
 
 def test_sources_that_are_back_find_their_code(town: Path) -> None:

@@ -43,6 +43,8 @@ from numba.core.registry import CPUDispatcher
 from numba.core.targetconfig import ConfigStack
 from numba.core.typed_passes import NativeLowering
 from numba.core.types.misc import unliteral
+from numba.extending import overload
+from numba.np import arrayobj
 
 from vico.io.cache import cache_folder
 
@@ -185,6 +187,24 @@ class _Callee(CPUDispatcher):  # type: ignore[misc]
         self.overloads[tuple(cres.signature.args)] = cres
 
 
+def _refuse_slice(src_shapes: Any, index_shape: Any) -> None:
+    """Say, in compiled code, that an array does not fit where it is to be put: without the shapes."""
+    raise NotImplementedError
+
+
+overload(_refuse_slice)(arrayobj.ol_raise_with_shape_context_generic)
+
+
+@contextmanager
+def _brief_refusals() -> Iterator[None]:
+    """Let slices refuse briefly what does not fit: numba's message of shapes compiles half of what strings can do."""
+    numbas, arrayobj.raise_with_shape_context = arrayobj.raise_with_shape_context, _refuse_slice
+    try:
+        yield
+    finally:
+        arrayobj.raise_with_shape_context = numbas
+
+
 class _CalleeLibrary(JITCodeLibrary):  # type: ignore[misc]
     """Code of a function and all it calls, neither optimised nor loaded: callers link it."""
 
@@ -215,7 +235,8 @@ class _CalleeLowering(NativeLowering):  # type: ignore[misc]
     def run_pass(self, state: Any) -> bool:
         state.library = self._library(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
-        super().run_pass(state)
+        with _brief_refusals():
+            super().run_pass(state)
         lowered = state["cr"]
         key = object()  # under which numba finds it; an address in memory otherwise
         state.targetctx.insert_user_function(key, lowered.fndesc, [state.library])
@@ -235,7 +256,8 @@ class _KernelLowering(NativeLowering):  # type: ignore[misc]
     _name = "vico_kernel_lowering"
 
     def run_pass(self, state: Any) -> bool:
-        super().run_pass(state)
+        with _brief_refusals():
+            super().run_pass(state)
         # Those of callees, too: they were not in memory when numba would have set them.
         for variable in state.library._final_module.global_variables:
             if variable.name.startswith("_ZN08NumbaEnv") and (environment := lookup_environment(variable.name)):
