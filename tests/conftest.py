@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import io
 import json
 import os
@@ -27,6 +28,8 @@ settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.register_profile("search", deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeatable"))
 
+# What tests import and share is never garbage: it need not be looked through over and over.
+gc.set_threshold(20_000, 20, 20)
 os.environ["VICO_OVERPASS"] = "off"  # tests ask no server but their own
 # A test with a cache folder of its own need not compile everything anew, nor a process that it starts.
 numba.config.CACHE_DIR = os.environ.setdefault("NUMBA_CACHE_DIR", str(compiled_folder()))

@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ import pytest
 
 import toy_city
 import vico
+from counting import Counter
 from vico.agents.single import make_single
 from vico.envs.workers import Call, WorkerError, Workers
 from vico.errors import InputError
@@ -23,30 +23,6 @@ from vico.errors import InputError
 OPTIONS: dict[str, Any] = {"cars": 2, "pedestrians": 2, "observe": "none", "max_steps": 4}
 WALK = {"type": "move_forward", "distance": 1.0}
 TURN = {"type": "turn_left", "degrees": 20.0}
-
-
-class Counter:
-    """Counts, fails, or never comes back."""
-
-    def __init__(self, start: int) -> None:
-        self.number = start
-
-    def add(self, n: int) -> int:
-        """Add to the number."""
-        self.number += n
-        return self.number
-
-    def fail(self) -> None:
-        """Divide by zero."""
-        self.number = 1 // 0
-
-    def refuse(self) -> None:
-        """Say what to mend."""
-        raise InputError("counter: refused; ask for something else")
-
-    def hang(self) -> None:
-        """Wait for what never happens."""
-        threading.Event().wait()
 
 
 def counters(*starts: int) -> Workers:
@@ -129,7 +105,7 @@ def test_workers_keep_their_objects_and_answer_in_order() -> None:
 @pytest.mark.parametrize(
     ("method", "told"),
     [
-        ("fail", r"(?s)counter worker 1 of 2 failed in fail: ZeroDivisionError: .*test_vector"),
+        ("fail", r"(?s)counter worker 1 of 2 failed in fail: ZeroDivisionError: .*counting"),
         ("refuse", r"counter worker 1 of 2 failed in refuse: counter: refused; ask for something else$"),
     ],
 )

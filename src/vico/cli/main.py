@@ -9,6 +9,7 @@ Each verb imports what it needs when it runs, so `vico --help` is quick.
 from __future__ import annotations
 
 import errno
+import gc
 import logging
 import os
 import sys
@@ -436,6 +437,7 @@ def _configure_logging(given: list[str]) -> list[str]:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; a sentence for whatever goes wrong, never a traceback."""
+    gc.set_threshold(20_000, 20, 20)  # what is imported is never garbage: imports alone take a seventh less
     given = _configure_logging(sys.argv[1:] if arguments is None else arguments)
     if given == ["--version"]:
         print(__version__)
