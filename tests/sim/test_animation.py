@@ -1,5 +1,6 @@
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +10,19 @@ from vico.assets.people import J, body_of, random_appearance
 from vico.errors import InputError
 from vico.render.skinning import batch_bodies, skin
 from vico.seeds import rng
-from vico.sim.animation import CLIPS, clip_index, hand_frames, hand_position, pose, stride_length, style_of
+from vico.sim.animation import (
+    CLIPS,
+    LONGEST_BLEND,
+    Transition,
+    clip_index,
+    ground_under_feet,
+    hand_frames,
+    hand_position,
+    pose,
+    stride_length,
+    style_of,
+)
+from vico.sim.animation.standing import TURN_CYCLE
 
 LOOKS = [random_appearance(rng(5, "walker", k)) for k in range(6)]
 BODIES = [body_of(look, source="procedural") for look in LOOKS]
@@ -36,7 +49,7 @@ def feet(person: int, side: str) -> NDArray[np.int64]:
 
 
 @pytest.mark.parametrize(("clip", "speed"), [("walk", 0.3), ("walk", 1.0), ("walk", 1.8), ("carry", 1.0), ("run", 2.5)])
-def test_a_planted_foot_stays_within_two_centimetres_while_the_body_moves_on(clip: str, speed: float) -> None:
+def test_a_planted_foot_stays_within_half_a_centimetre_while_the_body_moves_on(clip: str, speed: float) -> None:
     stride = stride_length(np.full(N, clip_index(clip)), np.full(N, speed), STYLE["height"])
     # The left foot is flat on the ground in this part of its stance.
     duty = 0.36 if clip == "run" else 0.62
@@ -46,7 +59,7 @@ def test_a_planted_foot_stays_within_two_centimetres_while_the_body_moves_on(cli
     assert travelled > 0.06
     for person in range(N):
         sole = feet(person, "left")
-        assert np.linalg.norm(after[sole] - before[sole], axis=1).max() < 0.02
+        assert np.linalg.norm(after[sole] - before[sole], axis=1).max() < 0.005
 
 
 @pytest.mark.parametrize(
@@ -183,3 +196,76 @@ def test_poses_have_the_same_bytes_in_a_fresh_process() -> None:
     )
     runs = {subprocess.run([sys.executable, "-c", program], capture_output=True, check=True).stdout for _ in range(2)}
     assert len(runs) == 1
+
+
+def rises(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A slope of 8 % that ends at a kerb of 12 cm."""
+    return 0.08 * points[:, 0] + np.where(points[:, 0] > 0.4, 0.12, 0.0)
+
+
+@pytest.mark.parametrize("clip", ["walk", "carry"])
+def test_soles_keep_to_slopes_and_kerbs_within_a_centimetre(clip: str) -> None:
+    number, speed = np.full(N, clip_index(clip)), np.full(N, 1.2)
+    stride = stride_length(number, speed, STYLE["height"])
+    for x in np.linspace(-1.2, 1.2, 49):
+        places = np.column_stack([np.full(N, x), np.zeros(N), rises(np.full((N, 2), x))])
+        moves = number, x / stride % 1.0, speed, STYLE
+        ground = ground_under_feet(*moves, (places, np.zeros(N)), rises)
+        rotations, offsets = pose(*moves, ground=ground)
+        vertices = skin(CROWD, rotations, offsets, places, np.zeros(N))[0].astype(np.float64)
+        for person in range(N):
+            lowest = np.inf
+            for side in ("left", "right"):
+                sole = vertices[feet(person, side)]
+                # Where a foot crosses the kerb's edge, whether it is over it is a matter of millimetres.
+                sole = sole[np.abs(sole[:, 0] - 0.4) > 0.08]
+                if len(sole):
+                    lowest = min(lowest, float((sole[:, 2] - rises(sole)).min()))
+            assert lowest > -0.01
+            assert lowest < 0.012 or abs(x - 0.4) < 0.8
+
+
+def changed(was: str, now: str, since: float, phase: float, speed: tuple[float, float] = (1.0, 1.0)) -> Any:
+    """Everybody's rotations so long after one motion became another."""
+    after = Transition(np.full(N, clip_index(was)), np.full(N, 0.2), np.full(N, speed[0]), np.full(N, since))
+    return pose(np.full(N, clip_index(now)), np.full(N, phase), np.full(N, speed[1]), STYLE, after=after)
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "start"),
+    [
+        ("idle", "walk", 0.2914),
+        ("walk", "idle", 0.0),
+        ("walk", "run", 0.2),
+        ("idle", "sit", 0.0),
+        ("talk", "walk", 0.2914),
+    ],
+)
+def test_a_motion_begins_as_the_one_before_ended(was: str, now: str, start: float) -> None:
+    rotations, offsets = changed(was, now, 0.0, start)
+    before, shifts = pose(np.full(N, clip_index(was)), np.full(N, 0.2), np.full(N, 1.0), STYLE)
+    # Feet in the new motion may be turned a little otherwise.
+    np.testing.assert_allclose(rotations, before, atol=0.03)
+    np.testing.assert_allclose(offsets, shifts, atol=0.01)
+    ended, _ = changed(was, now, LONGEST_BLEND, 0.4)
+    np.testing.assert_array_equal(ended, pose(np.full(N, clip_index(now)), np.full(N, 0.4), np.full(N, 1.0), STYLE)[0])
+
+
+def test_feet_that_stand_do_not_turn_with_who_turns_on_the_spot() -> None:
+    turn = np.full(N, clip_index("turn"))
+    soles = []
+    for phase in (0.05, 0.25, 0.45):
+        rotations, offsets = pose(turn, np.full(N, phase), np.zeros(N), STYLE)
+        yaw = np.full(N, (phase - 0.25) * TURN_CYCLE)
+        soles.append(skin(CROWD, rotations, offsets, np.zeros((N, 3)), yaw)[0])
+    for person in range(N):
+        left = feet(person, "left")
+        assert np.linalg.norm(soles[2][left] - soles[0][left], axis=1).max() < 0.01
+
+
+def test_people_who_wait_do_not_move_in_unison() -> None:
+    idle = np.full(N, clip_index("idle"))
+    course = np.array([pose(idle, np.zeros(N), np.zeros(N), STYLE, second=t)[0][:, J["head"]] for t in range(0, 60, 2)])
+    moved = np.abs(np.diff(course, axis=0)).max(axis=2) > 0.03
+    assert moved.any(axis=0).all()
+    assert not (moved == moved[:, :1]).all()

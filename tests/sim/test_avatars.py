@@ -123,3 +123,25 @@ def test_people_stop_a_little_before_a_robot_that_physics_may_move() -> None:
     assert "stopped by robot" in result.observations["assistant_0"]["state"]["action_reason"]
     gap = clearances(sim.state.people.position[0], sim.state.robots.bodies())[0] - RADIUS
     assert 0.025 < gap < 0.05
+
+
+def test_the_state_knows_which_motion_came_before_and_how_it_ended(sim: Simulation) -> None:
+    sim.scenario.place_agent("assistant_0", (-20.0, -15.0))
+    run_at(sim, "assistant_0", 1.0, 2)
+    p = sim.state.people
+    assert CLIPS[p.clip[0]] == "walk"
+    ended = float(p.phase[0])
+    sim.advance(0.2)
+    assert (CLIPS[p.clip[0]], CLIPS[p.clip_before[0]]) == ("idle", "walk")
+    assert p.phase_before[0] == ended
+    assert p.pace_before[0] == pytest.approx(1.0, abs=0.1)
+    assert p.clip_time[0] == pytest.approx(0.2)
+
+
+def test_strides_change_with_the_pace_and_not_with_what_is_left_of_the_way(sim: Simulation) -> None:
+    sim.scenario.place_agent("assistant_0", (-20.0, -15.0))
+    paces = []
+    for distance in (1.0, 1.0, 0.5):
+        run_at(sim, "assistant_0", distance, 1)
+        paces.append(round(float(sim.state.people.pace[0]), 2))
+    assert paces == [1.0, 1.0, 0.5]

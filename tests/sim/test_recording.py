@@ -18,7 +18,7 @@ import pytest
 import toy_city
 from vico.agents.schedule import followers_of
 from vico.errors import EmptyInputError, InputError, MissingFileError, SchemaError
-from vico.sim.animation import pose
+from vico.sim.animation import Transition, pose
 from vico.sim.config import SimConfig
 from vico.sim.recorder import Recorder
 from vico.sim.recording import PosedPeople, read_run
@@ -343,8 +343,9 @@ def test_joint_poses_are_those_that_were_drawn(path: Path) -> None:
         sim.restore(run.checkpoint(step).arrays)
         p, posed = sim.state.people, people.at(step)
         assert posed.entity.tolist() == p.entity.tolist()
-        speed = np.hypot(p.velocity[:, 0], p.velocity[:, 1])
-        rotations, offsets = pose(p.clip, p.phase, speed, renderer._style)  # type: ignore[attr-defined]
+        after = Transition(p.clip_before, p.phase_before, p.pace_before, p.clip_time)
+        style = renderer._style  # type: ignore[attr-defined]
+        rotations, offsets = pose(p.clip, p.phase, p.pace, style, second=sim.state.second, after=after)
         assert posed.rotations.shape == (len(p), 55, 3)
         assert np.abs(posed.rotations - rotations).max() < 0.01
         assert np.abs(posed.offsets - offsets).max() < 0.002

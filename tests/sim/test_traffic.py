@@ -166,7 +166,7 @@ def test_pedestrians_walk_about_as_fast_as_people_out_of_buildings_and_within_re
     assert not len(shapely.STRtree(road_city().solids).query(people, predicate="within")[0])
     ways = shapely.union_all([shapely.LineString(traffic.walks.line(i)) for i in range(len(traffic.walks))])
     assert shapely.distance(people, ways).max() < 2.5
-    _, walked = traffic.gait
+    walked = traffic.pedestrian_state.distance_walked
     assert 0.8 < np.median(walked) / 300 < 1.5
 
 

@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
 from vico.rules import ActionStatus, ReasonCode
-from vico.sim.animation import CLIPS
+from vico.sim.animation import CLIPS, LONGEST_BLEND
+from vico.sim.animation.blending import is_gait
+from vico.sim.animation.gait import RUN_START, WALK_START
+from vico.sim.animation.standing import TURN_CYCLE, TURN_START
 from vico.sim.animation.stride import stride_of
 from vico.sim.bodies import Bodies
 from vico.sim.collisions import SolidMap, sweep
@@ -25,6 +28,7 @@ CLIP = {name: i for i, name in enumerate(CLIPS)}
 
 _CYCLES_PER_SECOND = 0.5
 _STANDING, _FASTEST_WALK = 0.01, 1.6  # m/s
+_SAME_PACE = 0.02  # m/s by which another speed asks for other strides
 # As plain numbers, for kernels.
 _IDLE, _SIT, _SLEEP, _TURN, _WALK, _RUN, _CARRY, _RIDE_BIKE, _RIDE_BUS = (
     CLIP[name] for name in ("idle", "sit", "sleep", "turn", "walk", "run", "carry", "ride_bike", "ride_bus")
@@ -38,12 +42,24 @@ class _Motion(NamedTuple):
 
     velocity: NDArray[np.float64]
     move_speed: NDArray[np.float64]
-    turn_left: NDArray[np.float64]
+    turned: NDArray[np.float64]
     posture: NDArray[np.int8]
     vehicle: NDArray[np.int8]
     held: NDArray[np.int32]
     action_clip: NDArray[np.int16]
     height: NDArray[np.float64]
+
+
+class _Clips(NamedTuple):
+    """Which clip shows somebody, and which did before; columns of `People`."""
+
+    clip: NDArray[np.int16]
+    phase: NDArray[np.float64]
+    pace: NDArray[np.float64]
+    clip_before: NDArray[np.int16]
+    phase_before: NDArray[np.float64]
+    pace_before: NDArray[np.float64]
+    clip_time: NDArray[np.float64]
 
 
 class Avatars:
@@ -121,6 +137,7 @@ class Avatars:
             return
         moving = (p.move_left > 0.0) | (p.turn_left != 0.0)
         p.velocity[:] = 0.0
+        turned = np.zeros(len(p))
         if moving.any():
             # Turning comes first, within the first half of the second, so that a walk starts in the new direction.
             turn = p.turn_left * share
@@ -129,6 +146,7 @@ class Avatars:
             bodies = np.concatenate([records_of(p.bodies_of(slice(None)), self.space()), obstacles])
             moved, contact = sweep(distance, turn, p.yaw, bodies, self.solids)
             p.position[:, 0], p.position[:, 1] = bodies["x"][: len(p)], bodies["y"][: len(p)]
+            turned = turn
             hit = contact != 0
             p.turn_left -= turn
             p.move_left -= moved
@@ -138,7 +156,7 @@ class Avatars:
             p.contact[hit] = contact[hit]
             p.velocity[:] = (p.position[:, :2] - before) / dt
             self.settle(np.flatnonzero(moved > 0.0))
-        self._animate(dt)
+        self._animate(turned, dt)
 
     def settle(self, who: NDArray[np.int64]) -> None:
         """Put feet on the ground or the floor."""
@@ -148,12 +166,11 @@ class Avatars:
         indoors = who[p.room[who] >= 0]
         p.position[indoors, 2] = self._indoor.floors_at(p.room[indoors], p.position[indoors])
 
-    def _animate(self, dt: float) -> None:
+    def _animate(self, turned: NDArray[np.float64], dt: float) -> None:
         p = self.people
-        _advance_clips(
-            _Motion(p.velocity, p.move_speed, p.turn_left, p.posture, p.vehicle, p.held, p.action_clip, p.height),
-            p.clip, p.phase, dt,
-        )  # fmt: skip
+        motion = _Motion(p.velocity, p.move_speed, turned, p.posture, p.vehicle, p.held, p.action_clip, p.height)
+        before = p.clip_before, p.phase_before, p.pace_before, p.clip_time
+        _advance_clips(motion, _Clips(p.clip, p.phase, p.pace, *before), dt)
 
 
 @compiled
@@ -169,24 +186,49 @@ def _clip_of(motion, k, speed):  # type: ignore[no-untyped-def]
         return np.int64(motion.action_clip[k])
     if motion.posture[k] == _SITTING and motion.vehicle[k] == _IN_BUS:
         return _RIDE_BUS
-    if motion.turn_left[k] != 0.0:
-        return _TURN
     if motion.posture[k] == _STANDING_UP:
-        return _IDLE
+        return _TURN if motion.turned[k] != 0.0 else _IDLE
     return _SIT if motion.posture[k] == _SITTING else _SLEEP
 
 
 @compiled
-def _advance_clips(motion, clip, phase, dt):  # type: ignore[no-untyped-def]
-    """Choose everybody's clip and go on in it by `dt` seconds; `clip` and `phase` are changed in place."""
-    for k in range(len(clip)):
+def _begin_clip(clips, k, now, pace):  # type: ignore[no-untyped-def]
+    """Begin another clip: gaits go on from the feet, the others from their start."""
+    was = clips.clip[k]
+    clips.clip_before[k], clips.phase_before[k], clips.pace_before[k] = was, clips.phase[k], clips.pace[k]
+    clips.clip[k], clips.clip_time[k] = now, 0.0
+    if is_gait(now):
+        clips.pace[k] = pace
+    if is_gait(now) and is_gait(was):
+        return
+    start = 0.0
+    if is_gait(now):
+        start = RUN_START if now == _RUN else WALK_START
+        if was == _TURN and clips.phase[k] > 0.5:
+            start += 0.5  # the left foot is in the air: the right one is below the hips
+    elif now == _TURN:
+        start = TURN_START
+    clips.phase[k] = start
+
+
+@compiled
+def _advance_clips(motion, clips, dt):  # type: ignore[no-untyped-def]
+    """Choose everybody's clip and go on in it by `dt` seconds; `clips` are changed in place."""
+    for k in range(len(clips.clip)):
         vx, vy = motion.velocity[k, 0], motion.velocity[k, 1]
         speed = math.sqrt(vx * vx + vy * vy)
         now = _clip_of(motion, k, speed)
-        if now != clip[k]:
-            clip[k], phase[k] = now, 0.0
-        stride = stride_of(now, speed, motion.height[k])
-        phase[k] = (phase[k] + (dt * _CYCLES_PER_SECOND if stride == np.inf else speed * dt / stride)) % 1.0
+        # Whom something stops, or who arrives, takes a shorter way in this sub-step, not shorter strides.
+        pace = max(motion.move_speed[k], speed)
+        if now != clips.clip[k] or (is_gait(now) and abs(pace - clips.pace[k]) > _SAME_PACE):
+            _begin_clip(clips, k, now, pace)
+        clips.clip_time[k] = min(clips.clip_time[k] + dt, LONGEST_BLEND)
+        stride = stride_of(now, clips.pace[k], motion.height[k])
+        if now == _TURN:
+            on = motion.turned[k] / TURN_CYCLE
+        else:
+            on = dt * _CYCLES_PER_SECOND if stride == np.inf else speed * dt / stride
+        clips.phase[k] = (clips.phase[k] + on) % 1.0
 
 
 def free_ground(

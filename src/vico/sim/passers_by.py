@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.people import PASSERS_BY, Appearance, passer_by
 from vico.seeds import rng
-from vico.sim.animation import clip_index, stride_length
+from vico.sim.animation import Transition, clip_index, stride_length
+from vico.sim.animation.gait import WALK_START
+from vico.sim.traffic.state import PedestrianGaits
 
 
 def looks_of_strangers(seed: int, count: int) -> list[Appearance]:
@@ -24,23 +28,34 @@ def manner_of_pedestrian(pedestrian: int) -> str:
     return f"pedestrian_{pedestrian}"
 
 
-def pedestrian_motion(
-    speed: NDArray[np.float64], walked: NDArray[np.float64], height: NDArray[np.float64], second: float
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+class PedestrianMotion(NamedTuple):
+    """Motions of pedestrians, as `vico.sim.animation.pose` takes them; arrays of one number each."""
+
+    clip: NDArray[np.int64]
+    phase: NDArray[np.float64]
+    pace: NDArray[np.float64]
+    after: Transition
+
+
+def pedestrian_motion(gaits: PedestrianGaits, height: NDArray[np.float64], second: float) -> PedestrianMotion:
     """Return motion and place in its cycle of each pedestrian: they walk, or stand and breathe.
 
     Parameters
     ----------
-    speed, walked
-        Metres a second, and metres walked so far, shape ``(n,)``.
+    gaits
+        How they walk.
     height
         Stature, metres, shape ``(n,)``.
     second
         Seconds since midnight of the first day.
     """
-    moving = speed > 0.05
-    clip = np.where(moving, clip_index("walk"), clip_index("idle"))
-    stride = np.where(moving, stride_length(clip, speed, height), 2.0)
+    walk, idle = clip_index("walk"), clip_index("idle")
+    walking = gaits.time > 0.0
+    stride = stride_length(walk, gaits.pace, height)
+    in_stride = (WALK_START + gaits.walked / stride) % 1.0
     # People at rest breathe by the clock, each at their own time.
-    at_rest = second * 0.5 + np.arange(len(speed)) * 0.37
-    return clip, np.where(moving, walked / stride, at_rest) % 1.0
+    at_rest = (second * 0.5 + np.arange(len(walking)) * 0.37) % 1.0
+    after = Transition(
+        np.where(walking, idle, walk), np.where(walking, at_rest, in_stride), gaits.pace, np.abs(gaits.time)
+    )
+    return PedestrianMotion(np.where(walking, walk, idle), np.where(walking, in_stride, at_rest), gaits.pace, after)

@@ -16,7 +16,15 @@ from vico.render.lighting import SHADOW_STEP
 from vico.render.skinning import BodyBatch, batch_bodies, skin
 from vico.render.world_scene import scene_of
 from vico.seeds import rng
-from vico.sim.animation import STYLE, hand_frames, pose, style_of
+from vico.sim.animation import (
+    LONGEST_BLEND,
+    STYLE,
+    Transition,
+    ground_under_feet,
+    hand_frames,
+    pose,
+    style_of,
+)
 from vico.sim.bodies import Drawn
 from vico.sim.config import SimConfig
 from vico.sim.environment import Environment
@@ -44,18 +52,24 @@ class _Motion(NamedTuple):
     phase
         Place in the cycle, 0..1 and on, float64.
     speed
-        Over the ground, metres a second, float64.
+        That its strides are those of, metres a second, float64.
+    after
+        What they did before.
     position
         Feet, ENU metres, float64, shape ``(n, 3)``.
     yaw
         Radians, counter-clockwise from east, float64.
+    on_ground
+        Whether they stand in the street, not on a floor or a vehicle, bool.
     """
 
     clip: NDArray[np.int64]
     phase: NDArray[np.float64]
     speed: NDArray[np.float64]
+    after: Transition
     position: NDArray[np.float64]
     yaw: NDArray[np.float64]
+    on_ground: NDArray[np.bool_]
 
 
 class RenderedSimulation(Protocol):
@@ -186,7 +200,7 @@ class SceneRenderer:
         motion = _motion_of_agents(state)
         if state.traffic is not None:
             motion = _joined_motion(motion, self._motion_of_pedestrians(state))
-        rotations, offsets = pose(motion.clip, motion.phase, motion.speed, self._style)
+        rotations, offsets = self._poses(motion, state.second)
         bodies = self._bodies
         vertices, normals = skin(bodies, rotations, offsets, motion.position, motion.yaw)
         self._scene.set_skinned(vertices, normals, bodies.triangles, bodies.colour, bodies.entity)
@@ -200,13 +214,35 @@ class SceneRenderer:
             _joined([d.entity for d in drawn], (0,), np.int32),
         )
 
+    def _poses(self, motion: _Motion, second: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return everybody's joint rotations and pelvis shifts, their feet on the ground as it is under each."""
+        after = motion.after
+        now, before = (
+            self._ground(motion, m.clip, m.phase, m.speed) if count else None
+            for m, count in ((motion, len(motion.clip)), (after, int((after.since < LONGEST_BLEND).sum())))
+        )
+        after = after._replace(ground=now if before is None else before)
+        moves = motion.clip, motion.phase, motion.speed, self._style
+        return pose(*moves, second=second, after=after, ground=now)
+
+    def _ground(
+        self, motion: _Motion, clip: NDArray[np.int64], phase: NDArray[np.float64], speed: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the ground under everybody's feet in a motion."""
+        place = motion.position, motion.yaw
+        ground = ground_under_feet(clip, phase, speed, self._style, place, self._sim.world.height)
+        ground[~motion.on_ground] = 0.0
+        return ground
+
     def _motion_of_pedestrians(self, state: SimulationState) -> _Motion:
         """Return how the pedestrians of the traffic move."""
         assert state.traffic is not None
         walkers = state.traffic.walkers
-        speed, walked = state.traffic.gait
-        clip, phase = pedestrian_motion(speed, walked, self._height[len(state.people) :], state.second)
-        return _Motion(clip, phase, speed, walkers.position, walkers.yaw)
+        clip, phase, pace, after = pedestrian_motion(
+            state.traffic.gait, self._height[len(state.people) :], state.second
+        )
+        on_ground = np.ones(len(clip), np.bool_)
+        return _Motion(clip, phase, pace, after, walkers.position, walkers.yaw, on_ground)
 
     def _objects(self, state: SimulationState, rotations: NDArray[np.float32], offsets: NDArray[np.float32]) -> Drawn:
         """Return the movable objects: where they lie, or hanging from the hand that holds them."""
@@ -251,14 +287,17 @@ def _lighting(environment: Environment, second: float) -> Lighting:
 def _motion_of_agents(state: SimulationState) -> _Motion:
     """Return how residents and assistants move; who sits in a bus sits as the seat stands, wherever they look."""
     p = state.people
-    speed = np.hypot(p.velocity[:, 0], p.velocity[:, 1])
     in_seat = (p.vehicle == Vehicle.BUS) & (p.posture == Posture.SITTING)
     yaw = np.where(in_seat, p.vehicle_yaw, p.yaw)
-    return _Motion(p.clip.astype(np.int64), p.phase.copy(), speed, p.position.copy(), yaw)
+    after = Transition(p.clip_before.astype(np.int64), p.phase_before.copy(), p.pace_before.copy(), p.clip_time.copy())
+    on_ground = (p.room < 0) & (p.vehicle == Vehicle.NONE)
+    return _Motion(p.clip.astype(np.int64), p.phase.copy(), p.pace.copy(), after, p.position.copy(), yaw, on_ground)
 
 
 def _joined_motion(a: _Motion, b: _Motion) -> _Motion:
-    return _Motion(*(np.concatenate(pair) for pair in zip(a, b, strict=True)))
+    after = Transition(*(np.concatenate(pair) for pair in zip(a.after[:-1], b.after[:-1], strict=True)))
+    joined = {name: np.concatenate([getattr(a, name), getattr(b, name)]) for name in _Motion._fields if name != "after"}
+    return _Motion(after=after, **joined)
 
 
 def _nothing() -> None:

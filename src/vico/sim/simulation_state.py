@@ -22,6 +22,7 @@ from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.snapshot import arrays_of
 from vico.sim.state import RADIUS, REASON_LENGTH, MovableObjects, People, Vehicle
 from vico.sim.traffic.jams import Jam, JamLog
+from vico.sim.traffic.state import PedestrianGaits
 from vico.sim.transit import TransitSystem
 from vico.world.folder import World
 from vico.world.mesh import Surface
@@ -53,8 +54,8 @@ class TrafficSystem(Subsystem, Protocol):
         """The pedestrians alone."""
 
     @property
-    def gait(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Speed (m/s) and distance walked so far (m) of each pedestrian."""
+    def gait(self) -> PedestrianGaits:
+        """How each pedestrian walks."""
 
     @property
     def jams(self) -> JamLog:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import SchemaError
+from vico.sim.animation import LONGEST_BLEND
 from vico.sim.bodies import OBJECT, Bodies
 from vico.sim.quaternions import matrix_of, quaternion_of, upright
 
@@ -103,6 +104,13 @@ class People(ArrayState):
     clip, phase
         Index into `vico.sim.animation.CLIPS`, int16, and the position in that clip, cycles 0..1, float64; shape
         ``(n,)``.
+    pace
+        Speed that the strides of the clip are those of, metres a second, float64, shape ``(n,)``.
+    clip_before, phase_before, pace_before
+        The clip before the present one, where it ended and its pace, as those; shape ``(n,)``. Another pace of a gait
+        counts as another clip.
+    clip_time
+        Seconds since the clip began, counted up to `vico.sim.animation.LONGEST_BLEND`, float64, shape ``(n,)``.
     action_clip
         Clip that the last action asked for, -1 for none, int16, shape ``(n,)``: it outlasts the motion until the next
         action.
@@ -143,6 +151,11 @@ class People(ArrayState):
     turn_left: NDArray[np.float64]
     clip: NDArray[np.int16]
     phase: NDArray[np.float64]
+    pace: NDArray[np.float64]
+    clip_before: NDArray[np.int16]
+    phase_before: NDArray[np.float64]
+    pace_before: NDArray[np.float64]
+    clip_time: NDArray[np.float64]
     action_clip: NDArray[np.int16]
     posture: NDArray[np.int8]
     room: NDArray[np.int32]
@@ -176,6 +189,11 @@ class People(ArrayState):
             turn_left=np.zeros(n),
             clip=np.zeros(n, np.int16),
             phase=np.zeros(n),
+            pace=np.zeros(n),
+            clip_before=np.zeros(n, np.int16),
+            phase_before=np.zeros(n),
+            pace_before=np.zeros(n),
+            clip_time=np.full(n, LONGEST_BLEND),
             action_clip=np.full(n, -1, np.int16),
             posture=np.zeros(n, np.int8),
             room=np.full(n, -1, np.int32),

@@ -1,14 +1,28 @@
 """How people move: a library of procedural motions on the 55 joints, computed for everybody in one call.
 
 A motion is a function of a phase in 0..1 (one cycle; two steps when walking), so it can be stopped, resumed, replayed
-and stretched. Gaits are driven from the feet: a planted foot stays where it is while the body passes over it, legs
-follow by two-bone inverse kinematics, the pelvis rides as high as the legs allow. The caller advances the phase by
-distance / `stride_length`, so feet never slide.
+and stretched. Gaits are driven from the feet: a planted foot rolls over the ground where it stands, kerb or slope,
+while the body passes over it, legs follow by two-bone inverse kinematics, the pelvis rides as high as the legs allow.
+The caller advances the phase by distance / `stride_length`, so feet never slide.
 """
 
+from vico.sim.animation.blending import LONGEST_BLEND
+from vico.sim.animation.footing import ground_under_feet
 from vico.sim.animation.names import CLIPS, clip_index
-from vico.sim.animation.posing import hand_frames, hand_position, pose
+from vico.sim.animation.posing import Transition, hand_frames, hand_position, pose
 from vico.sim.animation.stride import stride_length
 from vico.sim.animation.style import STYLE, style_of
 
-__all__ = ["CLIPS", "STYLE", "clip_index", "hand_frames", "hand_position", "pose", "stride_length", "style_of"]
+__all__ = [
+    "CLIPS",
+    "LONGEST_BLEND",
+    "STYLE",
+    "Transition",
+    "clip_index",
+    "ground_under_feet",
+    "hand_frames",
+    "hand_position",
+    "pose",
+    "stride_length",
+    "style_of",
+]

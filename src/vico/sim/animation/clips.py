@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
+from vico.sim.animation.blending import (
+    LONGEST_BLEND,
+    blend_time,
+    duty_of,
+    is_gait,
+    lie_down,
+    stand_by_steps,
+    step_taken,
+    walk_on,
+    write_feet,
+)
 from vico.sim.animation.gait import run, walk
 from vico.sim.animation.limbs import BodyPose, curl_fingers
 from vico.sim.animation.names import (
@@ -18,29 +30,132 @@ from vico.sim.animation.names import (
     RUN,
     SIT,
     SLEEP,
+    TURN,
     WALK,
 )
-from vico.sim.animation.rotations import Array, axis_angle
+from vico.sim.animation.rotations import Array, axis_angle, smoothstep
 from vico.sim.animation.seated import ride_bike, sit, sleep, step_up
-from vico.sim.animation.standing import stand
+from vico.sim.animation.standing import TURN_CYCLE, TURN_START, stand
+
+
+class Course(NamedTuple):
+    """How far everybody is in a motion.
+
+    Attributes
+    ----------
+    clip
+        Motion numbers, int64, shape ``(n,)``.
+    phase
+        Place in its cycle, 0..1, float64, shape ``(n,)``.
+    stride
+        Metres a cycle covers, float64, shape ``(n,)``.
+    ground
+        See `vico.sim.animation.footing.ground_under_feet`.
+    """
+
+    clip: NDArray[np.int64]
+    phase: NDArray[np.float64]
+    stride: NDArray[np.float64]
+    ground: NDArray[np.float64]
+
+
+class Circumstances(NamedTuple):
+    """What poses depend on beside motion and manner.
+
+    Attributes
+    ----------
+    before
+        The motion that this one follows, a `Course`.
+    since
+        Seconds since then, float64, shape ``(n,)``.
+    speed
+        Metres a second that the strides are those of, float64, shape ``(n,)``.
+    second
+        Of the clock.
+    """
+
+    before: Course
+    since: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    second: float
 
 
 @compiled
-def animate(clips: Array, phase: Array, stride: Array, style: Array, rotations: Array, offsets: Array) -> None:
+def animate(course: Any, around: Any, style: Array, rotations: Array, offsets: Array) -> None:
     """Write everybody's joint rotations and pelvis shifts; see `vico.sim.animation.pose`."""
-    for i in range(len(clips)):
-        joints = style[i].joints
-        local = np.zeros((len(joints), 3, 3))
-        for j in range(len(joints)):
-            local[j, 0, 0] = local[j, 1, 1] = local[j, 2, 2] = 1.0
-        body = BodyPose(local, np.zeros(3), joints, style[i])
-        for side in range(2):
-            curl_fingers(body, side, 0.38, 0.2)
-        _move(body, clips[i], phase[i] - np.floor(phase[i]), stride[i])
-        for j in range(len(joints)):
-            axis_angle(local[j], rotations[i, j])
+    for i in range(len(course.clip)):
+        one = style[i]
+        joints, count = one.joints, len(one.joints)
+        # Made here, for compiled functions cannot return records.
+        body = BodyPose(np.zeros((count, 3, 3)), np.zeros(3), joints, one, around.second, course.ground[i])
+        _pose_one(body, course.clip[i], course.phase[i], course.stride[i])
+        if around.since[i] < LONGEST_BLEND:
+            _blend(body, i, course, around)
+        for j in range(count):
+            axis_angle(body.local[j], rotations[i, j])
         for r in range(3):
             offsets[i, r] = body.shift[r]
+
+
+@compiled
+def _blend(body: Any, i: int, course: Any, around: Any) -> None:
+    """Let one person's motion show that which came before it."""
+    before, since = around.before, around.since[i]
+    was, now = before.clip[i], course.clip[i]
+    u = since / blend_time(was, now)
+    count = len(body.joints)
+    old = BodyPose(np.zeros((count, 3, 3)), np.zeros(3), body.joints, body.style, body.second, before.ground[i])
+    if is_gait(now):
+        if since * around.speed[i] < course.stride[i] and not _off_their_feet(was):
+            _set_out(body, old, i, course, around)
+        return
+    if u >= 1:
+        return
+    _pose_one(old, was, before.phase[i], before.stride[i])
+    if _off_their_feet(was) or _off_their_feet(now):
+        lie_down(body, old, u)
+    else:
+        # Turning began at TURN_START, and it goes on from there as far as the body has turned.
+        turned = ((course.phase[i] - TURN_START + 0.5) % 1.0 - 0.5) * TURN_CYCLE if now == TURN else 0.0
+        stand_by_steps(body, old, turned, u)
+
+
+@compiled
+def _off_their_feet(clip: int) -> bool:
+    return clip in (SLEEP, RIDE_BIKE, RIDE_BUS)
+
+
+@compiled
+def _set_out(body: Any, old: Any, i: int, course: Any, around: Any) -> None:
+    """Blend into a gait, or from one pace of it to another."""
+    before, since = around.before, around.since[i]
+    was, now, stride = before.clip[i], course.clip[i], course.stride[i]
+    gone = since * around.speed[i] / stride
+    first = course.phase[i] - gone  # where the gait began
+    ankles, feet = np.empty((2, 2, 3)), np.empty((2, 3, 3))
+    start = BodyPose(np.zeros_like(body.local), np.zeros(3), body.joints, body.style, body.second, np.zeros((2, 2, 2)))
+    level = BodyPose(np.zeros_like(body.local), np.zeros(3), body.joints, body.style, body.second, start.ground)
+    _pose_one(level, was, before.phase[i], before.stride[i])
+    write_feet(level, ankles[0], feet)
+    _pose_one(start, now, first, stride)
+    write_feet(start, ankles[1], feet)
+    _pose_one(old, was, before.phase[i] + (gone if is_gait(was) else 0.0), before.stride[i])
+    steps = np.empty(2)
+    for side in range(2):
+        at = (first + 0.5 * side) % 1.0
+        steps[side] = step_taken(at, at + gone, duty_of(now))
+    walk_on(body, old, ankles[0] - ankles[1], steps, smoothstep(min(since / blend_time(was, now), 1.0)))
+
+
+@compiled
+def _pose_one(body: Any, clip: int, phase: float, stride: float) -> None:
+    """Write one person's pose in a motion."""
+    local = body.local
+    for j in range(len(local)):
+        local[j, 0, 0] = local[j, 1, 1] = local[j, 2, 2] = 1.0
+    for side in range(2):
+        curl_fingers(body, side, 0.38, 0.2)
+    _move(body, clip, phase - np.floor(phase), stride)
 
 
 @compiled

@@ -14,14 +14,21 @@ from vico.io.compiled import compiled
 from vico.sim.animation.limbs import (
     ANKLE,
     FOOT,
+    HERE,
+    LEVEL,
+    NEXT,
     PELVIS,
+    SIGN,
+    TILT,
     bend_trunk,
     grip,
     hang_arm,
     highest_pelvis,
     place_foot,
+    sole_depth,
+    sole_roll,
 )
-from vico.sim.animation.rotations import X, Y, Z, compose, hermite, rotation_about, smoothstep
+from vico.sim.animation.rotations import Array, X, Y, Z, compose, hermite, rotation_about, smoothstep
 
 _TAU = 2 * np.pi
 
@@ -41,6 +48,8 @@ class Gait(NamedTuple):
         How far a foot is raised in mid-swing, metres.
     ahead_share
         Share of the stance that lies before the hips.
+    out
+        How far the toes are turned out, radians.
     """
 
     stride: float
@@ -49,70 +58,122 @@ class Gait(NamedTuple):
     push: float
     lift: float
     ahead_share: float
+    out: float
 
 
 class FootPose(NamedTuple):
-    """The ankle before the hips and above the floor, metres; the foot's pitch and its toes' bend, radians."""
+    """The ankle before the hips, outward and above the floor, metres; the foot's pitch and its toes' bend, radians."""
 
     x: float
+    y: float
     z: float
     pitch: float
     toes: float
 
 
-@compiled
-def _on_heel(flat: float, pitch: float, behind: float, tall: float) -> tuple[float, float]:
-    """Return the ankle's x and z when the foot, flat at x = `flat`, is pitched about its heel."""
-    c, s = np.cos(pitch), np.sin(pitch)
-    return flat - behind + c * behind + s * tall, -s * behind + c * tall
+# Of the cycle that a foot is on the ground, walking and running, and of that the share that lies before the hips.
+WALK_DUTY, RUN_DUTY = 0.62, 0.36
+_WALK_AHEAD, _RUN_AHEAD = 0.47, 0.42
+#: Place in the cycle at which the left foot stands below the hips: where a walk or run starts from standing.
+WALK_START, RUN_START = WALK_DUTY * _WALK_AHEAD, RUN_DUTY * _RUN_AHEAD
 
 
 @compiled
-def _on_ball(flat: float, pitch: float, ahead: float, ball: float, tall: float) -> tuple[float, float]:
-    """Return the same about the ball of the foot, whose joint is `ahead` of the ankle and `ball` above the floor."""
-    c, s = np.cos(pitch), np.sin(pitch)
-    return flat + ahead - c * ahead + s * (tall - ball), ball + s * ahead + c * (tall - ball)
+def _planted(body: Any, side: int, flat: float, pitch: float, gait: Any) -> Any:
+    """Return a foot that rolls over the ground where it stands flat with its ankle at x = `flat`."""
+    return _rolled(body, side, flat, pitch, gait.out, body.ground[side, HERE])
+
+
+@compiled
+def _rolled(body: Any, side: int, flat: float, pitch: float, out: float, ground: Array) -> Any:
+    x, z = sole_roll(body.style, side, pitch), sole_depth(body.style, side, pitch)
+    level, tilt = ground[LEVEL], ground[TILT]
+    c, s = np.cos(tilt), np.sin(tilt)
+    ahead = c * x + s * z
+    return FootPose(
+        flat + np.cos(out) * ahead, np.sin(out) * ahead, level - s * x + c * z, pitch + tilt, max(pitch, 0.0)
+    )
+
+
+@compiled
+def foothold(p: float, gait: Any) -> tuple[float, float]:
+    """Return how far before the hips a foot stands or stood last, and where it comes down next, metres."""
+    here = gait.stride * (gait.duty * gait.ahead_share - p)
+    return here, here if p < gait.duty else here + gait.stride
+
+
+@compiled
+def gait_of_walk(stride: float, style: Any) -> Any:
+    """Return the gait of somebody who walks with such strides."""
+    tall = style.height
+    vigour = min(stride / (0.73 * tall), 1.5)
+    strike, push = 0.34 * min(vigour, 1.15), 0.72 * min(vigour, 1.2)
+    return Gait(stride, WALK_DUTY, strike, push, 0.035 * tall * vigour, _WALK_AHEAD, style.toe_out)
+
+
+@compiled
+def gait_of_run(stride: float, style: Any) -> Any:
+    """Return the gait of somebody who runs with such strides."""
+    return Gait(stride, RUN_DUTY, 0.12, 0.95, 0.155 * style.height, _RUN_AHEAD, 0.5 * style.toe_out)
 
 
 @compiled
 def foot_of_gait(body: Any, side: int, p: float, gait: Any) -> Any:
     """Return one foot of a gait at its own phase (0 = it touches down), a `FootPose`."""
-    joints, style, duty, stride, push = body.joints, body.style, gait.duty, gait.stride, gait.push
-    tall, ahead = joints[ANKLE[side], Z], joints[FOOT[side], X] - joints[ANKLE[side], X]
-    ball, behind = joints[FOOT[side], Z], style.heel_length
-    first = stride * duty * gait.ahead_share
+    duty = gait.duty
+    if p >= duty:
+        return _swing(body, side, (p - duty) / (1 - duty), gait)
+    flat, _ = foothold(p, gait)
     flat_from, rise_from = 0.16 * duty, 0.52 * duty
-    if p < duty:
-        flat = first - stride * p
-        if p < flat_from:
-            pitch = -gait.strike * (1 - smoothstep(p / flat_from))
-            x, z = _on_heel(flat, pitch, behind, tall)
-            return FootPose(x, z, pitch, 0.0)
-        if p < rise_from:
-            return FootPose(flat, tall, 0.0, 0.0)
+    pitch = 0.0
+    if p < flat_from:
+        pitch = -gait.strike * (1 - smoothstep(p / flat_from))
+    elif p > rise_from:
         t = (p - rise_from) / (duty - rise_from)
-        pitch = push * t * t
-        x, z = _on_ball(flat, pitch, ahead, ball, tall)
-        return FootPose(x, z, pitch, pitch)
-    t = (p - duty) / (1 - duty)
-    x0, z0 = _on_ball(first - stride * duty, push, ahead, ball, tall)
-    x1, z1 = _on_heel(first, -gait.strike, behind, tall)
-    slope = -stride * (1 - duty)
-    x = hermite(x0, x1, 0.35 * slope, slope, t)
-    pitch = hermite(push, -gait.strike, 1.6 * push, 0.0, t)
-    rise = np.sin(np.pi * t)
-    z = z0 + (z1 - z0) * smoothstep(t) + gait.lift * rise * rise
-    # Neither toes nor heel touch the floor while the foot swings.
+        pitch = gait.push * t * t
+    return _planted(body, side, flat, pitch, gait)
+
+
+@compiled
+def _swing(body: Any, side: int, t: float, gait: Any) -> Any:
+    """Return a foot on its way from where its toes left the ground to where its heel comes down, t = 0..1."""
+    joints, style, push, ground = body.joints, body.style, gait.push, body.ground[side]
+    first, _ = foothold(0.0, gait)
+    last, _ = foothold(gait.duty, gait)
+    off = _rolled(body, side, last, push, gait.out, ground[HERE])
+    down = _rolled(body, side, first, -gait.strike, gait.out, ground[NEXT])
+    # The body goes on over a foot that has not left yet or has come down: over the ground both ends are at rest.
+    slope = -gait.stride * (1 - gait.duty)
+    x = hermite(off.x, down.x, slope, slope, t)
+    y = off.y + (down.y - off.y) * smoothstep(t)
+    pitch = hermite(off.pitch, down.pitch, 1.6 * push, 0.0, t)
     toes = push * (1 - smoothstep(2.2 * t))
-    reach = style.toe_length
-    low = min(
-        -np.sin(pitch) * ahead
-        - np.cos(pitch) * (tall - ball)
-        - ball
-        - np.sin(max(pitch - toes, 0.0)) * (reach - ahead),
-        np.sin(pitch) * behind - np.cos(pitch) * tall,
-    )
-    return FootPose(x, max(z, -low + 0.012 * rise), pitch, toes)
+    rise = np.sin(np.pi * t)
+    # Up a kerb the foot rises first and goes ahead then; down it goes ahead first.
+    step = ground[NEXT, LEVEL] - ground[HERE, LEVEL]
+    kerb = min(abs(step) / 0.1, 1.0)
+    early = smoothstep((1 + 0.6 * kerb) * t - (0.0 if step > 0 else 0.6 * kerb))
+    z = off.z + (down.z - off.z) * early + gait.lift * rise * (0.25 + 0.75 * rise) + 0.3 * abs(step) * rise * rise
+    # Neither toes nor heel touch the ground while the foot swings.
+    floor = ground[HERE, LEVEL] + step * early
+    tilt = ground[HERE, TILT] + (ground[NEXT, TILT] - ground[HERE, TILT]) * t
+    level = pitch - tilt
+    ahead = joints[FOOT[side], X] - joints[ANKLE[side], X]
+    reach = np.sin(max(level - toes, 0.0)) * (style.toe_length - ahead)
+    clear = 0.015 * smoothstep(10 * t) * smoothstep(8 * (1 - t))
+    lowest = floor + np.cos(tilt) * (sole_depth(style, side, level) + reach) + clear
+    return FootPose(x, y, max(z, lowest), pitch, toes)
+
+
+@compiled
+def ground_between(body: Any, p: float, gait: Any) -> float:
+    """Return the height that the body rides over: between the feet, and smooth where the ground is not."""
+    total = 0.0
+    for side in range(2):
+        t = smoothstep((((p + 0.5 * side) % 1.0) - gait.duty) / (1 - gait.duty))
+        here, after = body.ground[side, HERE, LEVEL], body.ground[side, NEXT, LEVEL]
+        total += here + (after - here) * t
+    return 0.5 * total
 
 
 @compiled
@@ -132,18 +193,18 @@ def walk(body: Any, p: float, stride: float, carrying: bool) -> None:
     shift[X] = 0.006 * vigour * np.sin(2 * _TAU * p)
     ankles = np.empty((2, 3))
     pitch, toes = np.empty(2), np.empty(2)
-    gait = Gait(stride, 0.62, 0.34 * min(vigour, 1.15), 0.72 * min(vigour, 1.2), 0.035 * tall * vigour, 0.47)
+    gait = gait_of_walk(stride, style)
     for side in range(2):
         own = (p + 0.5 * side) % 1.0
         foot = foot_of_gait(body, side, own, gait)
         ankles[side, X], ankles[side, Z] = joints[ANKLE[side], X] + foot.x, foot.z
-        ankles[side, Y] = joints[ANKLE[side], Y] * style.foot_spread
+        ankles[side, Y] = joints[ANKLE[side], Y] * style.foot_spread + SIGN[side] * foot.y
         pitch[side], toes[side] = foot.pitch, foot.toes
     # The pelvis rides on the stiffer leg; a soft minimum keeps the path round.
     high = np.empty(2)
     for side in range(2):
         high[side] = highest_pelvis(body, side, ankles[side], 0.992)
-    low, top = min(high[0], high[1]), -(0.005 + 0.011 * vigour * vigour) * tall
+    low, top = min(high[0], high[1]), ground_between(body, p, gait) - (0.005 + 0.011 * vigour * vigour) * tall
     gap = abs(high[0] - high[1])
     low -= 0.006 * np.exp(-gap / 0.012)
     shift[Z] = min(low, top) if low < top - 0.004 else top - 0.004 * np.exp(-(low - top + 0.004) / 0.004)
@@ -172,10 +233,10 @@ def run(body: Any, p: float, stride: float) -> None:
     shift[Y] = 0.5 * style.sway * np.sin(_TAU * p)
     ankles = np.empty((2, 3))
     pitch, toes = np.empty(2), np.empty(2)
-    duty = 0.36
-    gait = Gait(stride, duty, 0.12, 0.95, 0.155 * tall, 0.42)
+    duty = RUN_DUTY
+    gait = gait_of_run(stride, style)
     # Lowest in mid-stance, highest in mid-flight.
-    shift[Z] = -0.035 * tall - 0.022 * tall * np.cos(2 * _TAU * (p - 0.5 * duty))
+    shift[Z] = ground_between(body, p, gait) - 0.035 * tall - 0.022 * tall * np.cos(2 * _TAU * (p - 0.5 * duty))
     for side in range(2):
         own = (p + 0.5 * side) % 1.0
         foot = foot_of_gait(body, side, own, gait)
@@ -184,7 +245,7 @@ def run(body: Any, p: float, stride: float) -> None:
         kick = np.sin(np.pi * min(swing * 1.5, 1.0))
         ankles[side, X] = joints[ANKLE[side], X] + foot.x - 0.05 * tall * kick
         ankles[side, Z] = foot.z + 0.05 * tall * kick
-        ankles[side, Y] = joints[ANKLE[side], Y] * 0.6
+        ankles[side, Y] = joints[ANKLE[side], Y] * 0.6 + SIGN[side] * foot.y
         pitch[side], toes[side] = foot.pitch + 0.5 * kick, foot.toes
         # A flying leg binds less and less, so that landing does not jolt the pelvis.
         slack = 1.5 * tall * max(min(own - duty, 1 - own), 0.0)

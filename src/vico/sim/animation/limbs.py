@@ -28,6 +28,7 @@ from vico.sim.animation.rotations import (
     rotation_about,
     two_bone_ik,
 )
+from vico.sim.animation.style import SOLE_PITCHES
 
 LEFT, RIGHT = 0, 1
 # +1 on the left, -1 on the right.
@@ -59,12 +60,45 @@ class BodyPose(NamedTuple):
         In the T-pose, body frame, metres, shape ``(55, 3)``.
     style
         A `STYLE` record.
+    second
+        Of the clock, for those who stand and wait.
+    ground
+        Under each foot (left, right), where it stands or stood last and where it comes down next: height above the
+        body's origin, metres, and slope, radians, toes down; shape ``(2, 2, 2)``.
     """
 
     local: NDArray[np.float64]
     shift: NDArray[np.float64]
     joints: NDArray[np.float64]
     style: Any
+    second: float
+    ground: NDArray[np.float64]
+
+
+# Of `BodyPose.ground`.
+HERE, NEXT = 0, 1
+LEVEL, TILT = 0, 1
+_FIRST_PITCH, _PITCHES = SOLE_PITCHES[0], len(SOLE_PITCHES)
+_PITCH_STEP = SOLE_PITCHES[1] - SOLE_PITCHES[0]
+
+
+@compiled
+def _at_pitch(table: Array, pitch: float) -> float:
+    at = min(max((pitch - _FIRST_PITCH) / _PITCH_STEP, 0.0), _PITCHES - 1.001)
+    k = int(at)
+    return table[k] + (at - k) * (table[k + 1] - table[k])
+
+
+@compiled
+def sole_depth(style: Any, side: int, pitch: float) -> float:
+    """Return how far a foot so pitched reaches below its ankle, metres."""
+    return _at_pitch(style.sole_depth[side], pitch)
+
+
+@compiled
+def sole_roll(style: Any, side: int, pitch: float) -> float:
+    """Return how far the ankle is before where it is above a flat foot when the sole has rolled to a pitch, metres."""
+    return _at_pitch(style.sole_roll[side], pitch)
 
 
 @compiled
@@ -98,7 +132,7 @@ def hang_arm(local: Array, side: int, off: float, swing: float, bend: float, twi
 
 
 @compiled
-def _joint_in_body(body: Any, joint: int) -> tuple[Any, Any]:
+def joint_in_body(body: Any, joint: int) -> tuple[Any, Any]:
     """Return where a joint is and how its parent is turned, by following the chain from the pelvis."""
     local, shift, joints = body.local, body.shift, body.joints
     chain = np.empty(12, np.int64)
@@ -124,7 +158,7 @@ def reach(body: Any, side: int, goal: Array, pole: Array) -> None:
     """Bring a wrist to a point of the body's frame, the elbow towards `pole`."""
     local, joints = body.local, body.joints
     shoulder, elbow, wrist = SHOULDER[side], ELBOW[side], WRIST[side]
-    start, parent = _joint_in_body(body, shoulder)
+    start, parent = joint_in_body(body, shoulder)
     first = np.sqrt(((joints[elbow] - joints[shoulder]) ** 2).sum())
     second = np.sqrt(((joints[wrist] - joints[elbow]) ** 2).sum())
     upper, lower, hinge = two_bone_ik(start, goal, pole, first, second)
@@ -147,12 +181,12 @@ def reach_by(body: Any, side: int, goal: Array, pole: Array, share: float) -> No
     local = body.local
     shoulder, elbow = local[SHOULDER[side]].copy(), local[ELBOW[side]].copy()
     reach(body, side, goal, pole)
-    local[SHOULDER[side]] = _part_way(shoulder, local[SHOULDER[side]], share)
-    local[ELBOW[side]] = _part_way(elbow, local[ELBOW[side]], share)
+    local[SHOULDER[side]] = part_way(shoulder, local[SHOULDER[side]], share)
+    local[ELBOW[side]] = part_way(elbow, local[ELBOW[side]], share)
 
 
 @compiled
-def _part_way(a: Array, b: Array, share: float) -> NDArray[Any]:
+def part_way(a: Array, b: Array, share: float) -> Array:
     """Return the rotation that is a share of the way from one to another."""
     way, step = np.empty(3), np.empty((3, 3))
     axis_angle(relative_rotation(a, b), way)
@@ -163,13 +197,20 @@ def _part_way(a: Array, b: Array, share: float) -> NDArray[Any]:
 @compiled
 def place_foot(body: Any, side: int, ankle: Array, pitch: float, out: float, toes: float) -> None:
     """Bring an ankle to a point; the foot pitched toes down, turned out, its toes bent up; radians."""
+    sign = SIGN[side]
+    foot = compose(rotation_about(Z, sign * out), rotation_about(Y, pitch))
+    bend_leg(body, side, ankle, foot, np.array([1.0, sign * np.sin(out), 0.0]))
+    body.local[FOOT[side]] = rotation_about(Y, -toes)
+
+
+@compiled
+def bend_leg(body: Any, side: int, ankle: Array, foot: Array, pole: Array) -> None:
+    """Bring an ankle to a point, the foot turned in the body's frame as `foot` says, the knee towards `pole`."""
     local, shift, joints = body.local, body.shift, body.joints
     hip, knee = HIP[side], KNEE[side]
-    sign = SIGN[side]
     start = joints[PELVIS] + shift + rotate(local[PELVIS], joints[hip] - joints[PELVIS])
     first = np.sqrt(((joints[knee] - joints[hip]) ** 2).sum())
     second = np.sqrt(((joints[ANKLE[side]] - joints[knee]) ** 2).sum())
-    pole = np.array([1.0, sign * np.sin(out), 0.0])
     upper, lower, hinge = two_bone_ik(start, ankle, pole, first, second)
     thigh, shin = np.empty((3, 3)), np.empty((3, 3))
     # Knees bend backward about +y: the hinge turns the thigh into the shin.
@@ -177,11 +218,9 @@ def place_foot(body: Any, side: int, ankle: Array, pitch: float, out: float, toe
     thigh[:, 0] = cross(hinge, -upper)
     shin[:, 1], shin[:, 2] = hinge, -lower
     shin[:, 0] = cross(hinge, -lower)
-    foot = compose(rotation_about(Z, sign * out), rotation_about(Y, pitch))
     local[hip] = relative_rotation(local[PELVIS], thigh)
     local[knee] = relative_rotation(thigh, shin)
     local[ANKLE[side]] = relative_rotation(shin, foot)
-    local[FOOT[side]] = rotation_about(Y, -toes)
 
 
 @compiled
@@ -209,16 +248,34 @@ def bend_trunk(local: Array, lean: float, roll: float, yaw: float, nod: float, s
 
 
 @compiled
-def stand_on_feet(body: Any, lifts: Array) -> None:
-    """Stand on both feet wherever the pelvis is; `lifts` raises each foot, metres."""
-    shift, joints, style = body.shift, body.joints, body.style
-    high = 0.0
-    ankles = np.empty((2, 3))
+def stance(style: Any, side: int) -> tuple[float, float]:
+    """Return where a foot stands at rest: its ankle's x and y, metres."""
+    joints = style.joints
+    x = joints[ANKLE[side], X] + (0.02 if side == 0 else -0.02) * style.asymmetry
+    return x, joints[ANKLE[side], Y] * (0.6 + 0.5 * style.foot_spread)
+
+
+@compiled
+def stand_on_feet(body: Any, lifts: Array, pivots: Array) -> None:
+    """Stand on both feet wherever the pelvis is.
+
+    `lifts` raises each foot, metres; `pivots` says how far each, and the spot where it stands, is turned to the left,
+    radians.
+    """
+    shift, ground, style = body.shift, body.ground, body.style
+    high = 0.5 * (ground[0, HERE, LEVEL] + ground[1, HERE, LEVEL])
+    ankles, pitch = np.empty((2, 3)), np.empty(2)
     for side in range(2):
-        ankles[side, X] = joints[ANKLE[side], X] + (0.02 if side == 0 else -0.02) * style.asymmetry
-        ankles[side, Y] = joints[ANKLE[side], Y] * (0.6 + 0.5 * style.foot_spread)
-        ankles[side, Z] = joints[ANKLE[side], Z] + lifts[side]
+        x, y = stance(style, side)
+        c, s = np.cos(pivots[side]), np.sin(pivots[side])
+        level, tilt = ground[side, HERE, LEVEL], ground[side, HERE, TILT]
+        # Standing on a slope the shin stays upright: the foot turns about the ankle alone.
+        pitch[side] = min(lifts[side] * 3, 0.5) + tilt
+        depth = sole_depth(style, side, min(lifts[side] * 3, 0.5))
+        ankles[side, X], ankles[side, Y] = c * x - s * y + np.sin(tilt) * depth, s * x + c * y
+        ankles[side, Z] = level + np.cos(tilt) * depth + lifts[side]
         high = min(high, highest_pelvis(body, side, ankles[side], 0.999))
     shift[Z] = min(shift[Z], high)
     for side in range(2):
-        place_foot(body, side, ankles[side], min(lifts[side] * 3, 0.5), 1.6 * style.toe_out, 0.0)
+        out = 1.6 * style.toe_out + SIGN[side] * pivots[side]
+        place_foot(body, side, ankles[side], pitch[side], out, 0.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from vico.assets.people import JOINTS, PARENTS, J, SkinnedBody
 from vico.io.compiled import compiled
 from vico.render.skinning import forward_kinematics
-from vico.sim.animation.clips import animate
+from vico.sim.animation.blending import LONGEST_BLEND
+from vico.sim.animation.clips import Circumstances, Course, animate
 from vico.sim.animation.limbs import WRIST
 from vico.sim.animation.stride import stride_length
 from vico.sim.animation.style import KERNEL_STYLE
@@ -18,8 +19,35 @@ from vico.sim.animation.style import KERNEL_STYLE
 _KNUCKLE = (J["left_middle1"], J["right_middle1"])
 
 
+class Transition(NamedTuple):
+    """What people did before their present motion.
+
+    Attributes
+    ----------
+    clip, phase, speed
+        As in `pose`, of the motion before; its phase when it ended.
+    since
+        Seconds since then, shape ``(n,)``.
+    ground
+        As in `pose`, of the motion before.
+    """
+
+    clip: NDArray[Any]
+    phase: NDArray[Any]
+    speed: NDArray[Any]
+    since: NDArray[Any]
+    ground: NDArray[np.float64] | None = None
+
+
 def pose(
-    clip: NDArray[Any], phase: NDArray[Any], speed: NDArray[Any], style: NDArray[Any]
+    clip: NDArray[Any],
+    phase: NDArray[Any],
+    speed: NDArray[Any],
+    style: NDArray[Any],
+    *,
+    second: float = 0.0,
+    after: Transition | None = None,
+    ground: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Pose everybody.
 
@@ -33,6 +61,12 @@ def pose(
         Metres a second over the ground, shape ``(n,)``; the stride follows from it as in `stride_length`.
     style
         Of `style_of`, one a person, shape ``(n,)``.
+    second
+        Of the clock: who stands or sits shifts their weight and looks about by it, each in their own time.
+    after
+        What they did before, which for half a second shows in what they do now; None: nothing else.
+    ground
+        Of `ground_under_feet`; None: level ground at the height where everybody is.
 
     Returns
     -------
@@ -41,13 +75,36 @@ def pose(
     offsets
         Shift of the pelvis from its place in the T-pose, body frame, metres, float32, shape ``(n, 3)``.
     """
-    numbers = np.ascontiguousarray(clip, np.int64)
     people = style.astype(KERNEL_STYLE)
-    stride = stride_length(numbers, np.asarray(speed, np.float64), people["height"])
-    rotations = np.zeros((len(numbers), len(JOINTS), 3), np.float32)
-    offsets = np.zeros((len(numbers), 3), np.float32)
-    animate(numbers, np.ascontiguousarray(phase, np.float64), stride, people, rotations, offsets)
+    now = _course(clip, phase, speed, people, ground)
+    before, since = now, np.full(len(people), LONGEST_BLEND)
+    if after is not None:
+        before = _course(after.clip, after.phase, after.speed, people, after.ground)
+        since = np.ascontiguousarray(after.since, np.float64)
+    rotations = np.zeros((len(people), len(JOINTS), 3), np.float32)
+    offsets = np.zeros((len(people), 3), np.float32)
+    animate(
+        now,
+        Circumstances(before, since, np.ascontiguousarray(speed, np.float64), float(second)),
+        people,
+        rotations,
+        offsets,
+    )
     return rotations, offsets
+
+
+def _course(
+    clip: NDArray[Any],
+    phase: NDArray[Any],
+    speed: NDArray[Any],
+    people: NDArray[Any],
+    ground: NDArray[np.float64] | None,
+) -> Course:
+    """Return motions as kernels take them."""
+    numbers = np.ascontiguousarray(clip, np.int64)
+    stride = stride_length(numbers, np.asarray(speed, np.float64), people["height"])
+    under = np.zeros((len(people), 2, 2, 2)) if ground is None else np.ascontiguousarray(ground, np.float64)
+    return Course(numbers, np.ascontiguousarray(phase, np.float64), stride, under)
 
 
 def hand_frames(

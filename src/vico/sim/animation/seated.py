@@ -11,13 +11,16 @@ from vico.sim.animation.limbs import (
     ANKLE,
     FOOT,
     HEAD,
+    HERE,
     HIP,
     KNEE,
     LEFT,
+    LEVEL,
     PELVIS,
     RIGHT,
     SIGN,
     SPINE3,
+    TILT,
     WRIST,
     bend_trunk,
     grip,
@@ -25,11 +28,20 @@ from vico.sim.animation.limbs import (
     place_foot,
     reach,
     reach_by,
+    sole_depth,
     stand_on_feet,
 )
 from vico.sim.animation.rotations import X, Y, Z, compose, rotation_about
 
 _TAU = 2 * np.pi
+
+
+@compiled
+def seated_foot(style: Any, side: int) -> tuple[float, float]:
+    """Return where the ankle of somebody is who sits: its x and y, metres."""
+    joints = style.joints
+    thigh = joints[HIP[side], Z] - joints[KNEE[side], Z]
+    return 0.98 * thigh + 0.03, joints[ANKLE[side], Y] * 1.25
 
 
 @compiled
@@ -43,9 +55,10 @@ def sit(body: Any, p: float) -> None:
     shift[Z] = seat - joints[HIP[LEFT], Z]
     local[PELVIS] = rotation_about(Y, -0.12)
     for side in range(2):
-        thigh = joints[HIP[side], Z] - joints[KNEE[side], Z]
-        ankle = np.array([0.98 * thigh + 0.03, joints[ANKLE[side], Y] * 1.25, joints[ANKLE[side], Z]])
-        place_foot(body, side, ankle, 0.0, 1.5 * style.toe_out, 0.0)
+        x, y = seated_foot(style, side)
+        level, tilt = body.ground[side, HERE, LEVEL], body.ground[side, HERE, TILT]
+        ankle = np.array([x, y, level + sole_depth(style, side, 0.0)])
+        place_foot(body, side, ankle, tilt, 1.5 * style.toe_out, 0.0)
     bend_trunk(local, 0.10 + 0.008 * breath, 0.0, 0.0, 0.04, 0.6 * style.age_share)
     for side in range(2):
         sign = SIGN[side]
@@ -114,7 +127,7 @@ def step_up(body: Any, p: float) -> None:
     local[PELVIS] = rotation_about(Y, 0.08)
     shift[Y] = 0.03 * strength
     shift[Z] = -0.004
-    stand_on_feet(body, lifts)
+    stand_on_feet(body, lifts, np.zeros(2))
     bend_trunk(local, 0.15 * strength + style.trunk_lean, 0.0, 0.0, 0.05, 0.5 * style.age_share)
     for side in range(2):
         hang_arm(local, side, style.arm_abduction, 0.1, style.elbow_bend, 0.2)

@@ -20,10 +20,14 @@ from vico.sim.animation.limbs import (
     reach_by,
     stand_on_feet,
 )
-from vico.sim.animation.names import DRINK, EAT, PICK, PUT, REACH, TALK, TURN, WAVE
+from vico.sim.animation.names import DRINK, EAT, IDLE, PICK, PUT, REACH, STAND, TALK, TURN, WAVE
 from vico.sim.animation.rotations import X, Y, Z, compose, rotation_about, smoothstep
 
 _TAU = 2 * np.pi
+#: Angle that a cycle of `turn`, two steps, turns the body by, radians; the cycle runs backward to the right.
+TURN_CYCLE = np.radians(120.0)
+#: Place in it at which both feet point ahead.
+TURN_START = 0.25
 
 
 @compiled
@@ -53,7 +57,7 @@ def _stand_upright(body: Any, p: float, clip: int) -> None:
     breath = np.sin(_TAU * p)
     side_lean = (style.asymmetry - 0.5) * 2
     strength = _strength(p)
-    lifts = np.zeros(2)
+    lifts, pivots = np.zeros(2), np.zeros(2)
     lean, yaw, nod, crouch = 0.35 * style.trunk_lean, 0.0, 0.0, 0.0
     shift[Y] = 0.02 * side_lean
     roll = np.radians(2.0) * side_lean
@@ -67,17 +71,56 @@ def _stand_upright(body: Any, p: float, clip: int) -> None:
     elif clip in (EAT, DRINK):
         nod = (0.10 if clip == EAT else -0.22) * strength
     elif clip == TURN:
-        lifts[LEFT] = 0.06 * max(np.sin(_TAU * p), 0.0)
-        lifts[RIGHT] = 0.06 * max(-np.sin(_TAU * p), 0.0)
-        shift[Y] = -0.03 * np.sin(_TAU * p)
+        for side in range(2):
+            lifts[side], pivots[side] = _pivot((p + 0.5 * side) % 1.0)
+        shift[Y] = 0.025 * np.sin(_TAU * p)
+    elif clip in (IDLE, STAND):
+        weight, yaw, glance = _restless(body)
+        shift[Y], roll = shift[Y] + 0.028 * weight, roll + np.radians(2.5) * weight
+        nod = glance
     local[PELVIS] = compose(rotation_about(X, -roll), rotation_about(Y, 0.35 * (lean - 0.35 * style.trunk_lean)))
     shift[Z] = -0.004 - crouch
     shift[X] = -0.45 * crouch
-    stand_on_feet(body, lifts)
+    stand_on_feet(body, lifts, pivots)
     bend_trunk(local, lean + 0.008 * breath, 1.3 * roll, yaw, nod, 0.6 * style.age_share - 0.006 * breath)
     for side in range(2):
         swing = 0.04 + 0.02 * SIGN[side] * side_lean
         hang_arm(local, side, style.arm_abduction + 0.01 * breath, swing, style.elbow_bend, 0.2)
+
+
+@compiled
+def _pivot(p: float) -> tuple[float, float]:
+    """Return lift and turn of a foot while the body turns on the spot: it stays for half a cycle, then steps after."""
+    quarter = 0.25 * TURN_CYCLE
+    if p < 0.5:
+        return 0.0, quarter * (1 - 4 * p)
+    t = 2 * p - 1
+    return 0.045 * np.sin(np.pi * t) ** 2, quarter * (2 * smoothstep(t) - 1)
+
+
+@compiled
+def _whim(second: float, every: float, stream: float, rhythm: float) -> float:
+    """Return a number in -1..1 that rests, and is another one about every so many seconds."""
+    at = second / every + 17.0 * rhythm
+    k = np.floor(at)
+    numbers = np.empty(2)
+    for j in range(2):
+        wild = np.sin((k - 1 + j) * 12.9898 + stream * 78.233 + rhythm * 37.719) * 43758.5453
+        numbers[j] = 2 * (wild - np.floor(wild)) - 1
+    # The change takes a second and a half.
+    return numbers[0] + (numbers[1] - numbers[0]) * smoothstep((at - k) * every / 1.5)
+
+
+@compiled
+def _restless(body: Any) -> Any:
+    """Return where the weight is (-1 right, 1 left), where the head turns and how it nods, of who stands and waits."""
+    style, second = body.style, body.second
+    rhythm = style.rhythm
+    weight = _whim(second, 6.0 + 5.0 * style.asymmetry, 1.0, rhythm)
+    look = _whim(second, 4.0 + 3.0 * rhythm, 2.0, rhythm)
+    # Mostly people look ahead.
+    away = 0.9 * (look - 0.35 * min(max(look / 0.35, -1.0), 1.0))
+    return weight, away, 0.12 * _whim(second, 5.5, 3.0, rhythm) ** 2
 
 
 @compiled

@@ -51,7 +51,7 @@ def stride_length(
         np.asarray(clip, np.int64), np.asarray(speed, np.float64), np.asarray(height, np.float64)
     )
     found = np.empty(number.shape)
-    _strides(number.ravel(), v.ravel(), tall.ravel(), found.reshape(-1))
+    _strides(number.flatten(), v.flatten(), tall.flatten(), found.reshape(-1))
     return found
 
 

@@ -5,8 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vico.assets.people import JOINTS, J, SkinnedBody
+
+#: Pitches of a foot, toes down, at which `sole_depth` is measured, radians. Toes that would reach into the ground bend.
+SOLE_PITCHES = np.linspace(-0.5, 1.0, 31)
 
 
 def _style(real: type[np.floating[Any]]) -> np.dtype[np.void]:
@@ -21,9 +25,12 @@ def _style(real: type[np.floating[Any]]) -> np.dtype[np.void]:
             ("hip_turn", real),  # with the step, radians
             ("elbow_bend", real),  # at rest, radians
             ("asymmetry", real),  # which foot bears the weight at rest, how the head is held; 0..1
+            ("rhythm", real),  # when weight is shifted and where the eyes go, of people who stand and wait; 0..1
             ("age_share", real),  # 0 up to 55 years, 1 from 90; the old stoop
             ("heel_length", real),  # how far the sole reaches behind the ankle, metres
             ("toe_length", real),  # ... and before it
+            ("sole_depth", real, (2, len(SOLE_PITCHES))),  # below the ankle, of a foot so pitched, metres
+            ("sole_roll", real, (2, len(SOLE_PITCHES))),  # how far the ankle goes ahead while the sole rolls so, metres
             ("height", real),  # stature, metres
             ("joints", real, (len(JOINTS), 3)),  # T-pose, body frame (x forward, y left, z up), metres
         ],
@@ -46,6 +53,7 @@ _DRAWN = (
     "hip_turn",
     "elbow_bend",
     "asymmetry",
+    "rhythm",
 )
 
 
@@ -79,7 +87,10 @@ def style_of(body: SkinnedBody, generator: np.random.Generator | None = None, *,
     style["hip_turn"] = np.radians(5 + 1.5 * draw["hip_turn"])
     style["elbow_bend"] = np.radians(18 + 6 * draw["elbow_bend"])
     style["asymmetry"] = 0.5 + 0.25 * draw["asymmetry"]
+    style["rhythm"] = (0.5 + 0.37 * draw["rhythm"]) % 1.0
     style["age_share"] = old
+    for k, side in enumerate(("left", "right")):
+        style["sole_depth"][k], style["sole_roll"][k] = _sole(body, side)
     # Measured from the lowest vertices: how far the sole reaches behind the ankle and before it.
     feet = body.vertices[body.vertices[:, 2] < 0.03 * body.height]
     ankle = body.rest_joints[J["left_ankle"], 0]
@@ -88,3 +99,38 @@ def style_of(body: SkinnedBody, generator: np.random.Generator | None = None, *,
     style["height"] = body.height
     style["joints"] = body.joints
     return style
+
+
+def _sole(body: SkinnedBody, side: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return `sole_depth` and `sole_roll` of a foot.
+
+    The skin of a foot that bends is no wheel and no hinge: the sole's own points say where the ankle has to be for the
+    lowest of them to rest on the ground.
+    """
+    ankle, foot = J[f"{side}_ankle"], J[f"{side}_foot"]
+    own = np.flatnonzero((body.weight_joints[:, 0] == ankle) | (body.weight_joints[:, 0] == foot))
+    own = own[body.vertices[own, 2] < 0.05 * body.height]
+    if not len(own):
+        return np.full(len(SOLE_PITCHES), body.joints[ankle, 2]), np.zeros(len(SOLE_PITCHES))
+    # Each vertex as each of its joints would have it at rest; then those of ankle and toes turn.
+    joints = body.weight_joints[own]
+    away = body.vertices[own][:, None] - body.rest_joints[joints]
+    placed = np.einsum("vkrc,vkc->vkr", body.frames[joints], away) + body.joints[joints]
+    x, z = (placed[:, :, axis] - body.joints[ankle, axis] for axis in (0, 2))
+    ball_x, ball_z = (body.joints[foot, axis] - body.joints[ankle, axis] for axis in (0, 2))
+    shares = [body.weights[own] * (joints == joint) for joint in (ankle, foot)]
+    shares.append(body.weights[own] - shares[0] - shares[1])
+    (heel_x, toes_x, still_x), (heel_z, toes_z, still_z) = (
+        [(share * axis).sum(axis=1) for share in shares] for axis in (x, z)
+    )
+    s, c = np.sin(SOLE_PITCHES)[:, None], np.cos(SOLE_PITCHES)[:, None]
+    # Toes bend as much as the foot is pitched down: they stay level before the joint that bends.
+    level, toes = (SOLE_PITCHES > 0)[:, None], shares[1].sum(axis=1)
+    level_x, level_z = (c * ball_x + s * ball_z - ball_x) * toes, (c * ball_z - s * ball_x - ball_z) * toes
+    sole = np.empty((len(SOLE_PITCHES), 2, len(own)))
+    sole[:, 0] = c * heel_x + s * heel_z + still_x + np.where(level, toes_x + level_x, c * toes_x + s * toes_z)
+    sole[:, 1] = c * heel_z - s * heel_x + still_z + np.where(level, toes_z + level_z, c * toes_z - s * toes_x)
+    bearing = (sole[1:, 1] + sole[:-1, 1]).argmin(axis=1)
+    steps = np.arange(len(bearing))
+    roll = np.concatenate([[0.0], np.cumsum(sole[steps, 0, bearing] - sole[steps + 1, 0, bearing])])
+    return -sole[:, 1].min(axis=1), roll - roll[np.abs(SOLE_PITCHES).argmin()]

@@ -14,7 +14,7 @@ from vico.assets.motions.rotations import matrices_of, vectors_of
 from vico.assets.people import Appearance, body_of
 from vico.errors import InputError
 from vico.seeds import rng
-from vico.sim.animation import STYLE, pose, style_of
+from vico.sim.animation import STYLE, Transition, pose, style_of
 from vico.sim.passers_by import looks_of_strangers, manner_of_pedestrian
 from vico.sim.recording.run import Run
 
@@ -45,6 +45,8 @@ class JointPoses:
 class PosedPeople:
     """Gives the joint poses of everybody on legs at any step of a run: residents, assistants and pedestrians.
 
+    They are those that were drawn, but as on level ground.
+
     Parameters
     ----------
     run
@@ -65,8 +67,7 @@ class PosedPeople:
             If the step was not recorded, or one of `entities` was not there as a person.
         """
         people = self._run.columns("people", step, step)
-        bodies = self._run.columns("bodies", step, step)
-        speeds = dict(zip(bodies["entity"].tolist(), bodies["speed"].tolist(), strict=True))
+        second = float(self._run.columns("steps", step, step)["time"][0])
         there = {entity: row for row, entity in enumerate(people["entity"].tolist())}
         wanted = list(there) if entities is None else list(entities)
         absent = [entity for entity in wanted if entity not in there]
@@ -74,8 +75,9 @@ class PosedPeople:
             raise InputError(f"{self._run.path}: at step {step} there is no person with the number {absent[0]}")
         rows = [there[entity] for entity in wanted]
         style = np.array([self._style(entity) for entity in wanted], STYLE)
-        speed = np.array([speeds[entity] for entity in wanted])
-        rotations, offsets = pose(people["clip"][rows], people["phase"][rows], speed, style)
+        mine = {name: values[rows] for name, values in people.items()}
+        after = Transition(*(mine[name] for name in ("clip_before", "phase_before", "pace_before", "clip_time")))
+        rotations, offsets = pose(mine["clip"], mine["phase"], mine["pace"], style, second=second, after=after)
         return JointPoses(np.array(wanted, np.int32), rotations, offsets, style["joints"])
 
     def _style(self, entity: int) -> Any:

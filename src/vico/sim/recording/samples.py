@@ -85,13 +85,14 @@ class StepSamples:
     def _people(self, step: int) -> Rows:
         """Return the motion of everybody who has legs."""
         state, p = self._sim.state, self._sim.state.people
-        parts: list[tuple[NDArray[Any], ...]] = [(p.entity, p.clip, p.phase)]
+        before = p.clip_before, p.phase_before, p.pace_before, p.clip_time
+        parts: list[tuple[NDArray[Any], ...]] = [(p.entity, p.clip, p.phase, p.pace, *before)]
         if state.traffic is not None:
-            speed, walked = state.traffic.gait
-            motion = pedestrian_motion(speed, walked, self._stature, state.second)
-            parts.append((state.traffic.walkers.entity, *motion))
-        entity, clip, phase = (np.concatenate(column) for column in zip(*parts, strict=True))
-        return {"entity": entity, "step": np.full(len(entity), step), "clip": clip, "phase": phase}
+            motion = pedestrian_motion(state.traffic.gait, self._stature, state.second)
+            parts.append((state.traffic.walkers.entity, *motion[:-1], *motion.after[:-1]))
+        names = "entity", "clip", "phase", "pace", "clip_before", "phase_before", "pace_before", "clip_time"
+        rows = {name: np.concatenate(column) for name, column in zip(names, zip(*parts, strict=True), strict=True)}
+        return rows | {"step": np.full(len(rows["entity"]), step)}
 
     def _add(self, name: str, rows: Rows) -> None:
         # Copies, for the state's arrays go on changing; they are scaled all at once when they are written.

@@ -34,14 +34,18 @@ class Column(NamedTuple):
     unit
         What a stored 1 stands for, in the column's quantity: 0.001 for millimetres of metres; 0.0 for what is not
         scaled.
+    absent
+        What stands for the column in runs that were recorded without it; None: there are none.
     """
 
     kind: pa.DataType
     unit: float = 0.0
+    absent: float | None = None
 
 
 _WHOLE, _SMALL, _TEXT = Column(pa.int32()), Column(pa.int8()), Column(pa.string())
 _METRES, _TURN = Column(pa.int32(), 1e-3), Column(pa.int32(), 1e-4)
+_PHASE, _PACE = Column(pa.int32(), 1e-4), Column(pa.int32(), 1e-3, 1.0)
 
 #: Tables by name; columns by name. Positions are to the millimetre, angles to 0.1 mrad.
 TABLES: dict[str, dict[str, Column]] = {
@@ -63,7 +67,17 @@ TABLES: dict[str, dict[str, Column]] = {
         "yaw": _TURN,
         "speed": Column(pa.int32(), 1e-3),
     },
-    "people": {"entity": _WHOLE, "step": _WHOLE, "clip": _SMALL, "phase": Column(pa.int32(), 1e-4)},
+    "people": {
+        "entity": _WHOLE,
+        "step": _WHOLE,
+        "clip": _SMALL,
+        "phase": _PHASE,
+        "pace": _PACE,
+        "clip_before": Column(pa.int8(), absent=0.0),
+        "phase_before": _PHASE._replace(absent=0.0),
+        "pace_before": _PACE,
+        "clip_time": Column(pa.int32(), 1e-2, 10.0),
+    },
     "agents": {
         "entity": _WHOLE,
         "step": _WHOLE,
@@ -139,6 +153,8 @@ def empty_table(name: str) -> pa.Table:
 
 def column_values(table: pa.Table, key: str, column: Column) -> NDArray[Any]:
     """Return a column's values in its quantity: metres, radians, text as objects."""
+    if column.absent is not None and key not in table.column_names:
+        return np.full(len(table), column.absent)
     values = table[key].to_numpy()
     if column.unit:
         return np.where(values == -_LARGEST, np.nan, values * column.unit)

@@ -15,7 +15,7 @@ from vico.sim.neighbours import search
 from vico.sim.traffic.path import project_on_polyline
 from vico.sim.traffic.random_stream import next_random
 from vico.sim.traffic.shapes import disc_touches, distance_to, is_disc, share_level
-from vico.sim.traffic.state import NONE
+from vico.sim.traffic.state import GAIT_TIME, NONE
 from vico.world.lanes import lane_pose
 from vico.world.walkways import CORNER as _CORNER_KIND
 from vico.world.walkways import CROSSING as _CROSSING_KIND
@@ -293,6 +293,16 @@ def _note_progress(paths, walker, x, y, is_waiting, dt):  # type: ignore[no-unty
 
 
 @compiled
+def _note_gait(walker, is_walking, dt):  # type: ignore[no-untyped-def]
+    """Count the time since somebody set out, upward, or stopped, downward."""
+    if is_walking and walker.gait_time < 0.0:
+        walker.gait_time, walker.set_out = 0.0, walker.distance_walked
+    elif not is_walking and walker.gait_time > 0.0:
+        walker.gait_time = 0.0
+    walker.gait_time = min(max(walker.gait_time + (dt if is_walking else -dt), -GAIT_TIME), GAIT_TIME)
+
+
+@compiled
 def asked_to_go(fleet, first, n):  # type: ignore[no-untyped-def]
     """Return which of the `n` walkers from body `first` on a vehicle stands before, waiting for them to go."""
     asked = np.zeros(n, np.bool_)
@@ -328,6 +338,7 @@ def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, pace
         if step == 0.0:
             shapes.vx[b] = shapes.vy[b] = 0.0
         walker.speed = step / dt
+        _note_gait(walker, step > 0.0, dt)
         walker.distance_walked += step
         _note_progress(paths, walker, shapes.x[b], shapes.y[b], is_waiting, dt)
 

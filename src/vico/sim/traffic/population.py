@@ -28,6 +28,7 @@ from vico.sim.traffic.state import (
     TOP_SPEED,
     VEHICLE_STATE,
     BusRoutes,
+    PedestrianGaits,
     new_fleet,
     new_junctions,
     new_pedestrians,
@@ -348,9 +349,11 @@ class Traffic:
         return self.bodies().where(np.arange(self.vehicles, len(self.shapes.x)))
 
     @property
-    def gait(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Speed (m/s) and distance walked so far (m) of each pedestrian: what sets a walking clip's rate and phase."""
-        return self.pedestrian_state.speed.copy(), self.pedestrian_state.distance_walked.copy()
+    def gait(self) -> PedestrianGaits:
+        """How each pedestrian walks: what sets a walking clip's rate and phase."""
+        walkers = self.pedestrian_state
+        walked = walkers.distance_walked - walkers.set_out
+        return PedestrianGaits(walkers.preferred_speed.copy(), walked, walkers.gait_time.copy())
 
 
 def shapes_of(bodies: Bodies, ground: HeightField) -> Shapes:

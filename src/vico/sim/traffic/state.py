@@ -114,6 +114,8 @@ WALKWAY = np.dtype(
     align=True,
 )
 
+#: Longest time that `gait_time` counts, s.
+GAIT_TIME = 2.0
 #: A pedestrian; it follows a point that runs a little ahead of it along its walkway.
 PEDESTRIAN_RECORD = np.dtype(
     [
@@ -124,6 +126,8 @@ PEDESTRIAN_RECORD = np.dtype(
         ("preferred_speed", _F),  # m/s
         ("speed", _F),  # measured over the last step, m/s
         ("distance_walked", _F),  # since the start, m
+        ("set_out", _F),  # `distance_walked` when it last set out, m
+        ("gait_time", _F),  # since it set out, or since it stopped if negative, s; counted up to `GAIT_TIME`
         ("stuck_time", _F),  # within a metre of `progress_xy` since it last turned round, s
         ("jammed_time", _F),  # within a metre of `progress_xy`, s
         ("progress_xy", _F, (2,)),  # where it last got on, m
@@ -134,6 +138,24 @@ PEDESTRIAN_RECORD = np.dtype(
     ],
     align=True,
 )
+
+
+class PedestrianGaits(NamedTuple):
+    """How pedestrians walk; one number of each.
+
+    Attributes
+    ----------
+    pace
+        Speed that each prefers and that strides are those of, metres a second.
+    walked
+        Metres since it last set out.
+    time
+        Seconds since then, or since it stopped if negative; counted up to `GAIT_TIME`.
+    """
+
+    pace: NDArray[np.float64]
+    walked: NDArray[np.float64]
+    time: NDArray[np.float64]
 
 
 class LaneNetwork(NamedTuple):
@@ -265,6 +287,7 @@ def new_pedestrians(n: int, seed: int) -> Records:
     walkers["lateral_share"] = random.uniform(0.1, 0.95, n)
     walkers["preferred_speed"] = random.uniform(1.0, 1.5, n)
     walkers["leaving_crossing"] = NONE
+    walkers["gait_time"] = -GAIT_TIME
     walkers["random"] = _random_streams(seed, "ways", n)
     return walkers
 
