@@ -11,10 +11,10 @@ import numpy as np
 from vico.agents.base import Action, Info, Observation
 from vico.agents.state import AgentState
 from vico.agents.stays import RUN
-from vico.agents.wayfinding import Walker
+from vico.agents.wayfinding import Walker, closed_ground
 from vico.rules import BIKE_SPEED, BUS_DWELL, STATION_REACH, WALK_SPEED, ReasonCode, code_name
 from vico.world.public import PublicMap
-from vico.world.trips import AHEAD, MODES, Leg, Trip
+from vico.world.trips import AHEAD, MODES, Closure, Leg, Trip
 from vico.world.walkable import ROADWAY
 
 # This near to where one waits for a bus, or to a rack, is there, metres. At a stop others may stand in the spot: then a
@@ -81,6 +81,8 @@ class Traveller:
         # Whether no trip to the goal was begun yet; and how one means to make it.
         self._fresh = True
         self._ride: tuple[str, float] | None = None
+        # Ground that events close, as the agent is told anew in every step.
+        self._ground: list[tuple[float, float, float]] = []
         self._asked = ""
         self._tries = 0
         self._last: tuple[float, float] | None = None
@@ -155,7 +157,7 @@ class Traveller:
             self.stop()
             self._goal = goal
         self._notice(observation)
-        self._ride = ride
+        self._ride, self._ground = ride, closed_ground(info)
         action = self._act(goal, observation, info, speed)
         self._asked = "" if action is None else str(action["type"])
         return action
@@ -218,10 +220,11 @@ class Traveller:
         meant, self._fresh = self._ride if self._fresh else None, False
         if meant is not None:
             mode, due = meant
-            trip = self._map.trips.plan(here, goal, now, modes=(mode,), cash=cash)
+            trip = self._map.trips.plan(here, goal, now, modes=(mode,), cash=cash, closed=self._ground)
             if trip is not None and trip.arrive <= due:
                 return trip
-        return self._map.trips.plan(here, goal, now, modes=self._modes, cash=cash, closed=self._closed)
+        closed: list[Closure] = [*self._closed, *self._ground]
+        return self._map.trips.plan(here, goal, now, modes=self._modes, cash=cash, closed=closed)
 
     def _pace(self, observation: Observation, speed: float) -> float:
         """Return the speed on foot at which the bus that comes next is not missed, if that can be done."""

@@ -54,6 +54,9 @@ class Walker:
         self._stepped = False
         self._aside: list[Action] = []
         self._closed: list[tuple[float, float, float]] = []
+        # Ground that events close, as far as the agent knows: circles, and the cells within.
+        self._avoided: list[tuple[float, float, float]] = []
+        self._shut: NDArray[np.bool_] | None = None
 
     def state(self) -> AgentState:
         """Return the way under way and what is known to be in it; the generator is its owner's to save."""
@@ -66,6 +69,7 @@ class Walker:
             "stepped": self._stepped,
             "aside": [dict(action) for action in self._aside],
             "closed": np.array(self._closed, np.float64).reshape(-1, 3),
+            "avoided": np.array(self._avoided, np.float64).reshape(-1, 3),
         }
 
     def restore(self, state: AgentState) -> None:
@@ -77,6 +81,7 @@ class Walker:
         self._stepped = state["stepped"]
         self._aside = [dict(action) for action in state["aside"]]
         self._closed = [(float(x), float(y), float(radius)) for x, y, radius in state["closed"]]
+        self._avoid([(float(x), float(y), float(radius)) for x, y, radius in state["avoided"]])
 
     def stop(self) -> None:
         """Forget the way."""
@@ -114,6 +119,10 @@ class Walker:
         """
         x, y = observation["pose"][:2].tolist()
         position = (x, y)
+        avoided = closed_ground(info)
+        if avoided != self._avoided:
+            self._goal = None
+            self._avoid(avoided)
         if goal != self._goal:
             self._goal, self._closed, self._blocked = goal, [], 0
             self._aside = []
@@ -133,12 +142,20 @@ class Walker:
             return None
         return self._step(position, speed, observation, info)
 
+    def _avoid(self, ground: list[tuple[float, float, float]]) -> None:
+        """Plan no way over some ground, circles, from now on."""
+        self._avoided = ground
+        self._shut = self._map.walkable.cells_within(ground) if ground else None
+
     def _plan(self, position: Point) -> None:
         assert self._goal is not None
-        path = self._map.router.path(position, self._goal, closed=self._closed)
+        path = self._map.router.path(position, self._goal, blocked=self._shut, closed=self._closed)
         if path is None and self._closed:
             # What stood in the way may have moved on by now.
             self._closed = []
+            path = self._map.router.path(position, self._goal, blocked=self._shut)
+        if path is None and self._avoided:
+            # Whoever lives where it is closed gets there nevertheless.
             path = self._map.router.path(position, self._goal)
         self._take([] if path is None else path.tolist())
         self._next = 1 if len(self._path) > 1 else 0
@@ -147,7 +164,7 @@ class Walker:
         """Go back to the way a little further on, which is found sooner than all of it anew; else find a new one."""
         ahead = next((k for k in range(self._next, len(self._path)) if self._along(k) >= _REJOIN), None)
         if ahead is not None:
-            path = self._map.router.path(position, self._path[ahead], closed=self._closed)
+            path = self._map.router.path(position, self._path[ahead], blocked=self._shut, closed=self._closed)
             points = [] if path is None else path.tolist()
             detour = sum(math.dist(p, q) for p, q in pairwise(points)) - math.dist(position, self._path[ahead])
             if points and detour <= _DETOUR:
@@ -231,6 +248,12 @@ class Walker:
                     self._aside = [{"type": turn, "degrees": degrees}, {"type": "move_forward", "distance": reach}]
                     return
         self._plan(position)
+
+
+def closed_ground(info: Info) -> list[tuple[float, float, float]]:
+    """Return the ground that events close now, as far as one knows of them: x, y and radius, ENU metres."""
+    known = [event for event in info.get("events", ()) if event["goes_on"]]
+    return [(x, y, radius) for event in known for x, y, radius in event["closed_ground"]]
 
 
 def _ahead(position: Point, yaw: float, reach: float) -> Point:

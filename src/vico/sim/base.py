@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from vico.errors import InputError
 from vico.rules import DOOR_REACH
 from vico.sim.appointments import Appointment, appointments
-from vico.sim.environment import EventSites
+from vico.sim.environment import CityEvent, EventSites
+from vico.sim.environment.event_spots import Spot
 from vico.sim.indoor import Indoor
 from vico.sim.robots.scene import RobotScene
 from vico.sim.traffic.network import TrafficNetwork
@@ -100,7 +101,12 @@ class SimulationBase:
     @cached_property
     def event_sites(self) -> EventSites:
         """Where events can be."""
-        return EventSites(self.world)
+        return EventSites(self.world, lambda: self.streets.walks)
+
+    @cached_property
+    def event_spots(self) -> dict[CityEvent, list[Spot]]:
+        """Where the things of events stand, of those that were asked for so far."""
+        return {}
 
     @cached_property
     def place_index(self) -> dict[str, int]:

@@ -17,15 +17,26 @@ ANNOUNCED = "announced"
 NOTICE = 5.0
 
 
-def report_city_events(state: SimulationState) -> None:
-    """Note which events have begun or ended."""
+def follow_city_events(state: SimulationState) -> None:
+    """Let everybody take notice of events that have begun or ended: traffic, what stands there, and the log."""
     agenda = state.environment.agenda
     if not len(agenda):
         return
-    for one, what in agenda.news():
+    news = agenda.news()
+    if news and state.traffic is not None:
+        state.traffic.set_shut(agenda.effects.lanes, agenda.effects.walkways)
+        state.traffic.drop_shut_plans()
+    state.things.follow(state)
+    for one, what in news:
         told = {name: value for name, value in one.event.record().items() if name != "kind" and value}
         told |= {"event": one.id, "event_kind": one.event.kind}
         state.events.add("city", "", f"{one.event.title} {what}", one.middle, **told)
+
+
+def has_news(state: SimulationState) -> bool:
+    """Return whether an event has begun or ended within the last second."""
+    agenda = state.environment.agenda
+    return len(agenda) > 0 and agenda.changed
 
 
 def known_events(state: SimulationState, i: int, pose: NDArray[np.float64]) -> list[dict[str, Any]]:
@@ -75,4 +86,5 @@ def _told(one: Occurrence, how: str, state: SimulationState) -> dict[str, Any]:
         "end": event.end if math.isfinite(event.end) else None,
         "goes_on": event.goes_on(state.second),
         "closed_places": _shut_by(one, state),
+        "closed_ground": [list(circle) for circle in one.circles],
     }

@@ -91,9 +91,16 @@ def noise_at(state: SimulationState, place: NDArray[np.float64]) -> float:
         42.0 + 12.0 * math.log10(1.0 + weather.rain),
         45.0 + 50.0 * math.log10(max(weather.wind, 1.0) / 8),
     ]
+    for one, loud in state.environment.agenda.effects.noises:
+        levels.append(heard_from(loud, float(np.linalg.norm(one.middle - place))))
     if state.traffic is not None:
         levels += _of_vehicles(state.traffic.bodies(), place)
     return 10.0 * math.log10(sum(10.0 ** (level / 10.0) for level in levels))
+
+
+def heard_from(loud: float, away: float) -> float:
+    """Return how loud it is somewhere, dB, of what is so loud 10 m away."""
+    return loud - 20.0 * math.log10(max(away, _NEAREST) / 10.0)
 
 
 def _of_vehicles(bodies: Bodies, place: NDArray[np.float64]) -> list[float]:

@@ -197,6 +197,10 @@ class SceneRenderer:
 
     def _set_moving(self, state: SimulationState) -> None:
         """Put everything that moves where it is now."""
+        if not set(state.things.prototypes()) <= set(self._scene.names):
+            # An event has begun whose things nobody had reckoned with.
+            self._scene, self._lit = scene_of(self._sim.world, prototypes=_shapes(self._sim)), ()
+            self._set_light(state)
         motion = _motion_of_agents(state)
         if state.traffic is not None:
             motion = _joined_motion(motion, self._motion_of_pedestrians(state))
@@ -205,6 +209,8 @@ class SceneRenderer:
         vertices, normals = skin(bodies, rotations, offsets, motion.position, motion.yaw)
         self._scene.set_skinned(vertices, normals, bodies.triangles, bodies.colour, bodies.entity)
         drawn = [s.draw() for s in (state.traffic, state.transit, state.robots) if s is not None]
+        if len(state.things):
+            drawn.append(state.things.draw())
         if len(state.objects):
             drawn.append(self._objects(state, rotations, offsets))
         index = [np.array([self._scene.names[d.prototypes[i]] for i in d.index], np.int32) for d in drawn]
@@ -310,7 +316,7 @@ def _shapes(sim: RenderedSimulation) -> dict[str, Sequence[Surface]]:
     for system in (sim.state.traffic, sim.state.transit, sim.state.robots):
         if system is not None:
             shapes |= system.prototypes()
-    return shapes | dict(sim.shapes)
+    return shapes | sim.state.things.prototypes() | dict(sim.shapes)
 
 
 def _joined(parts: list[NDArray[Any]], empty: tuple[int, ...], kind: Any) -> NDArray[Any]:

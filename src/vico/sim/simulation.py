@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from vico.errors import InputError
 from vico.sim.actions import AgentFault, apply_actions
 from vico.sim.base import SimulationBase
-from vico.sim.city import report_city_events
+from vico.sim.city import follow_city_events
 from vico.sim.config import SimConfig
 from vico.sim.divergence import kept_if_diverged
 from vico.sim.events import Event
@@ -190,7 +190,7 @@ class Simulation:
                 self.metrics.collisions += advance_ticks(state, ticks_now, self.periods, watch)
             if state.tick % TICKS_PER_SECOND == 0:
                 state.environment.advance(1.0)
-                report_city_events(state)
+                follow_city_events(state)
                 self.punctuality.watch(state)
             watch.lap("bookkeeping")
 

@@ -16,6 +16,7 @@ from vico.sim.base import SimulationBase
 from vico.sim.bodies import STEP_HEIGHT, TALLEST, Bodies, HasBodies, Subsystem
 from vico.sim.carrying import DeckPose, HasDecks
 from vico.sim.environment import Conditions, Environment
+from vico.sim.event_things import EventThings
 from vico.sim.events import Events
 from vico.sim.indoor import Indoor, near_door
 from vico.sim.periods import TICKS_PER_SECOND
@@ -67,6 +68,15 @@ class TrafficSystem(Subsystem, Protocol):
 
     def set_conditions(self, conditions: Conditions) -> None:
         """Have everybody drive and walk as it is outdoors now; told before every sub-step."""
+
+    def set_shut(self, lanes: NDArray[np.bool_] | None, walkways: NDArray[np.bool_] | None) -> None:
+        """Have cars keep off some lanes, and pedestrians off some walkways (masks); told before every sub-step."""
+
+    def drop_shut_plans(self) -> None:
+        """Have cars plan anew that were about to drive where it is shut since."""
+
+    def is_taken(self, lanes: NDArray[np.bool_]) -> bool:
+        """Whether a car is on some lanes (a mask), or on its way there."""
 
     def stuck(self) -> list[Jam]:
         """Who gets nowhere now."""
@@ -220,6 +230,8 @@ class SimulationState:
         What happened in the step, and what agents heard.
     environment
         Weather, ground and light outdoors.
+    things
+        What stands in the city because of events.
     traffic, transit, robots
         Subsystems with a state of their own; None where a run has none.
     entities
@@ -238,6 +250,7 @@ class SimulationState:
     avatars: Avatars
     events: Events
     environment: Environment
+    things: EventThings = field(default_factory=EventThings)
     traffic: TrafficSystem | None = None
     transit: TransitSystem | None = None
     robots: RobotSystem | None = None
@@ -288,8 +301,9 @@ class SimulationState:
         return everything.where(bottom < TALLEST)
 
     def owners(self) -> list[HasBodies]:
-        """Who has bodies: traffic, transit, movable objects, avatars, robots; those of them that there are."""
-        owners = (self.traffic, self.transit, self.objects, self.avatars, self.robots)
+        """Who has bodies: traffic, transit, objects, things of events, avatars, robots; those of them there are."""
+        things = self.things if len(self.things) else None
+        owners = (self.traffic, self.transit, self.objects, things, self.avatars, self.robots)
         return [owner for owner in owners if owner is not None]
 
     def carriers(self) -> list[HasDecks]:
@@ -322,7 +336,8 @@ class SimulationState:
 
     def entity(self, entity: int) -> dict[str, str]:
         """Return kind and name of an entity of the world or of this run."""
-        return self.entities.get(entity) or self.world.entities.get(entity) or {"kind": "unknown", "name": str(entity)}
+        known = self.entities.get(entity) or self.world.entities.get(entity) or self.things.entity(entity)
+        return known or {"kind": "unknown", "name": str(entity)}
 
     def same_space(self, i: int, j: int) -> bool:
         """Whether two people are in the same room, the same bus, or both in the street."""
@@ -396,6 +411,7 @@ class SimulationState:
             "objects": self.objects,
             "events": self.events,
             "environment": self.environment,
+            "things": self.things,
             "traffic": self.traffic,
             "transit": self.transit,
             "robots": self.robots,

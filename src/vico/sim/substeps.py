@@ -57,6 +57,8 @@ def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _A
     """Advance all but robots by a sub-step; return how many avatars were stopped."""
     if state.traffic is not None:
         state.traffic.set_conditions(state.environment.conditions)
+        effects = state.environment.agenda.effects
+        state.traffic.set_shut(effects.lanes, effects.walkways)
     if state.robots is not None:
         state.robots.set_grip(state.environment.conditions.grip)
         state.robots.set_wind(*state.environment.weather.wind_vector)

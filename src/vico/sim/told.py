@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vico.crowd import Crowd
 from vico.rules import ActionStatus, code_name
 from vico.sim.bodies import RESIDENT, Bodies
-from vico.sim.city import ANNOUNCED, known_events
+from vico.sim.city import ANNOUNCED, has_news, known_events
 from vico.sim.moves import eye_height
 from vico.sim.perception import OUTDOORS, AllInView, Eyes, in_view, opaque_grid
 from vico.sim.simulation_state import SimulationState
@@ -88,6 +88,8 @@ class Told:
         heard = np.zeros(n, bool)
         heard[[self._index[name] for name in self._heard]] = True
         # What is going on in the city may concern them, too.
+        if has_news(self._state):
+            heard[:] = True
         heard[[i for i, known in self._events.items() if any(one["known"] != ANNOUNCED for one in known)]] = True
         view = self._in_view
         # The first bodies are the people's, in their order; who else is in view is no agent one would speak to.

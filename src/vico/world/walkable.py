@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import math
 import zipfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -71,6 +72,14 @@ class WalkableMap:
         """Class under points, shape ``(...)``; outside the square everything is blocked."""
         cells = self.cell_of(xy)
         return np.where(self.inside(xy), self.cls[cells[..., 1], cells[..., 0]], BLOCKED).astype(np.uint8)
+
+    def cells_within(self, circles: Sequence[tuple[float, float, float]]) -> NDArray[np.bool_]:
+        """Return the cells whose centres lie in one of some circles (x, y, radius, ENU metres), shape ``(n, n)``."""
+        axis = self.centre_of(np.arange(self.n))
+        found = np.zeros((self.n, self.n), bool)
+        for x, y, radius in circles:
+            found |= (axis[None, :] - x) ** 2 + (axis[:, None] - y) ** 2 <= radius * radius
+        return found
 
     def is_connected(self, xy: ArrayLike) -> NDArray[np.bool_]:
         """Which points lie in cells that can be reached on foot from the edge of the map."""

@@ -6,13 +6,18 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import shapely
 
 import toy_city
 from vico.agents.schedule import followers_of
+from vico.agents.wayfinding import Walker
 from vico.errors import VicoError
+from vico.seeds import rng
 from vico.sim.config import SimConfig
-from vico.sim.environment import Agenda, EventSites, event_kinds
+from vico.sim.environment import Agenda, CityEvent, EventSites, event_kinds
+from vico.sim.hearing import noise_at
 from vico.sim.recorder import Recorder
 from vico.sim.recording import read_run
 from vico.sim.simulation import Simulation
@@ -142,3 +147,123 @@ def test_residents_who_find_the_shop_closed_go_home_whether_asked_alone_or_toget
     alone, together = (day_of_two(shut, together=together) for together in (False, True))
     assert alone == together
     assert alone[0] == ["place_cafe"] * 2
+
+
+# Road works.
+
+STREET = "Mikonkatu"
+
+
+def traffic(world: World, events: Any = "none") -> Simulation:
+    config = SimConfig(seed=1, cars=20, pedestrians=20, transit=False, observe=(), events=events, start=8 * 3600)
+    return Simulation(world, None, config)
+
+
+@pytest.fixture(scope="module")
+def works(helsinki: World) -> dict[str, Any]:
+    """The same two minutes with and without road works, which begin after ten seconds; and a snapshot of the middle.
+
+    Cars that are there, or behind those in a street that leads nowhere else, need half a minute to drive out.
+    """
+    found: dict[str, Any] = {}
+    for name in ("none", "works"):
+        sim = traffic(helsinki)
+        sites = sim.base.event_sites
+        event = CityEvent(kind="road_works", street=STREET, begin=0.0, end=1.0)
+        closed, walks = sites.lanes_of(event), sites.walkways_of(event)
+        sim.check_overlaps()
+        entered, before, on_foot = 0, np.zeros(20, bool), []
+        for step in range(120):
+            if name == "works" and step == 10:
+                sim.state.environment.start_event("road_works", street=STREET, walkways=True)
+            if name == "works" and step == 60:
+                found["snapshot"] = sim.snapshot()
+            result = sim.step({})
+            assert sim.state.traffic is not None
+            assert sim.overlap_check is not None
+            now = closed[sim.state.traffic.fleet.lane]
+            entered += int((now & ~before).sum()) if step > 45 else 0
+            before = now
+            on_foot.append(int(walks[sim.state.traffic.pedestrian_state.walkway].sum()))
+        found[name] = {
+            "entered": entered,
+            "on_foot": sum(on_foot[60:]),
+            "teleports": int(sim.state.traffic.fleet.teleports.sum()),
+            "overlaps": sim.overlap_check.count,
+            "hash": result.hash,
+            "things": len(sim.state.things),
+            "sim": sim,
+        }
+    return found
+
+
+def test_no_car_drives_into_a_street_that_is_dug_up_and_none_vanishes(works: dict[str, Any]) -> None:
+    assert works["none"]["entered"] >= 3
+    assert works["works"]["entered"] == 0
+    for run in ("none", "works"):
+        assert (works[run]["teleports"], works[run]["overlaps"]) == (0, 0)
+    assert (works["none"]["things"], works["works"]["things"]) == (0, 2)
+
+
+def test_pedestrians_leave_walkways_that_are_closed(works: dict[str, Any]) -> None:
+    assert works["none"]["on_foot"] > 50
+    assert works["works"]["on_foot"] < 0.2 * works["none"]["on_foot"]
+
+
+def test_a_run_with_road_works_goes_on_from_a_snapshot_to_the_same_hash(works: dict[str, Any], helsinki: World) -> None:
+    sim = traffic(helsinki)
+    sim.restore(works["snapshot"])
+    for _ in range(60):
+        digest = sim.step({}).hash
+    assert digest == works["works"]["hash"]
+
+
+def test_ways_lead_round_a_closed_walkway(works: dict[str, Any], helsinki: World) -> None:
+    agenda = works["works"]["sim"].state.environment.agenda
+    ground = agenda.effects.ground
+    street = agenda.sites.street(agenda.going_on[0].event)
+    ends = [shapely.get_coordinates(part)[[0, -1]] for part in shapely.get_parts(shapely.line_merge(street))]
+    start, goal = max(ends, key=lambda pair: float(np.hypot(*(pair[0] - pair[1]))))
+    trips = helsinki.trips
+    free = trips.plan(start, goal, 8 * 3600, modes=("walk",))
+    round_it = trips.plan(start, goal, 8 * 3600, modes=("walk",), closed=ground)
+    assert free is not None
+    assert round_it is not None
+    assert round_it.seconds > free.seconds + 10.0
+    walked = round_it.legs[0].polyline
+    inside = [np.hypot(*(walked[1:-1] - (x, y)).T).min() < radius - 1.0 for x, y, radius in ground]
+    assert not any(inside)
+
+
+def test_residents_walk_round_what_they_know_is_closed(helsinki: World, works: dict[str, Any]) -> None:
+    """A walker finds another way as soon as it is told, and its old one when that is over."""
+    sites = works["works"]["sim"].base.event_sites
+    street = sites.street(CityEvent(kind="road_works", street=STREET, begin=0.0, end=1.0))
+    start, goal = shapely.get_coordinates(shapely.line_merge(street))[[0, -1]].tolist()
+    walker = Walker(PublicMap.from_world(helsinki), rng(0, "walker"))
+    ground = [list(circle) for circle in works["works"]["sim"].state.environment.agenda.effects.ground]
+    events = [{"goes_on": True, "closed_ground": ground}]
+    told: list[dict[str, Any]] = [{}, {"events": events}, {}]
+    observation = {"pose": np.array([*start, 0.0, 1.0, 0.0, 0.0]), "state": {"action_status": "ok"}}
+    left = []
+    for info in told:
+        walker.towards((goal[0], goal[1]), 1.0, observation, info | {"entities": {}, "in_view": Nobody()})
+        left.append(walker.remaining(observation["pose"]))
+    assert left[1] > left[0] + 3.0
+    assert left[2] == left[0]
+
+
+class Nobody:
+    """In view."""
+
+    def nearest(self, _: Any) -> float:
+        return np.inf
+
+
+def test_road_works_drown_what_is_said_beside_them(works: dict[str, Any]) -> None:
+    sim = works["works"]["sim"]
+    one = sim.state.environment.agenda.going_on[0]
+    beside, far = (one.middle + np.array(away) for away in ([10.0, 0.0, 1.5], [-120.0, -120.0, 1.5]))
+    assert noise_at(sim.state, beside) > 77.0
+    assert noise_at(sim.state, far) < 65.0
+    assert noise_at(works["none"]["sim"].state, beside) < 72.0

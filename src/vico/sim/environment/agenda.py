@@ -31,12 +31,22 @@ class Occurrence:
     ----------
     id
         Counts from 1; an event keeps it.
+    middle
+        The point it is at, ENU metres.
+    circles
+        Ground that it closes to people: x, y and radius, ENU metres.
     """
 
     id: int
     event: CityEvent
     kind: EventKind
     middle: NDArray[np.float64]
+    circles: tuple[tuple[float, float, float], ...]
+
+    @property
+    def noise(self) -> float:
+        """How loud it is 10 m from its middle, dB; 0 for not at all."""
+        return self.kind.noise if self.event.noise is None else self.event.noise
 
 
 class EventEffects(NamedTuple):
@@ -46,9 +56,21 @@ class EventEffects(NamedTuple):
     ----------
     shut
         Ids of places that are closed, each with the event that closes it.
+    lanes
+        Which lanes of the world cars keep off, shape ``(lanes,)``; None for none.
+    walkways
+        Which walkways that traffic has are closed; None for none.
+    ground
+        Ground nobody is to walk on: x, y and radius of circles, ENU metres; as `Trips.plan` takes them.
+    noises
+        Events that can be heard, each with its dB at 10 m.
     """
 
     shut: Mapping[str, Occurrence]
+    lanes: NDArray[np.bool_] | None = None
+    walkways: NDArray[np.bool_] | None = None
+    ground: tuple[tuple[float, float, float], ...] = ()
+    noises: tuple[tuple[Occurrence, float], ...] = ()
 
 
 _NOTHING = EventEffects({})
@@ -154,7 +176,10 @@ class Agenda:
     def _occurrence(self, k: int) -> Occurrence:
         if k not in self._known:
             event = self._events[k]
-            self._known[k] = Occurrence(k + 1, event, kind_of_event(event.kind), self.sites.middle(event))
+            kind, sites = kind_of_event(event.kind), self.sites
+            closes = bool(event.street) and (kind.walkways if event.walkways is None else event.walkways)
+            circles = tuple(sites.circles(event)) if closes else ()
+            self._known[k] = Occurrence(k + 1, event, kind, sites.middle(event), circles)
         return self._known[k]
 
     def __len__(self) -> int:
@@ -173,6 +198,11 @@ class Agenda:
             for k in range(len(self._events))
             if self._phase(k) != _IS_OVER and (one := self._occurrence(k)).kind.announced
         ]
+
+    @property
+    def changed(self) -> bool:
+        """Whether an event has begun or ended within the last second."""
+        return any(0 <= self._second - when <= 1 for event in self._events for when in (event.begin, event.end))
 
     @property
     def effects(self) -> EventEffects:
@@ -223,4 +253,18 @@ class Agenda:
 def effects_of(going_on: Sequence[Occurrence], sites: EventSites) -> EventEffects:
     """Return what events do together."""
     shut = {place.id: one for one in reversed(going_on) for place in sites.places_of(one.event)}
-    return EventEffects(shut)
+    closing = [one for one in going_on if one.circles]
+    loud = tuple((one, one.noise) for one in going_on if one.noise > 0)
+    return EventEffects(
+        shut,
+        _union([sites.lanes_of(one.event) for one in going_on if one.event.street and one.kind.lanes]),
+        _union([sites.walkways_of(one.event) for one in closing]),
+        tuple(circle for one in closing for circle in one.circles),
+        loud,
+    )
+
+
+def _union(masks: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_] | None:
+    """Return what is in any of some masks; None if nothing is."""
+    found = np.any(masks, axis=0) if masks else None
+    return found if found is not None and found.any() else None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +15,7 @@ from vico.sim.environment.city_event import CityEvent
 from vico.sim.environment.event_kinds import kind_of_event
 from vico.world.folder import World
 from vico.world.model import Category, Place, Road
+from vico.world.walkways import SIDEWALK, Walkways
 
 #: Places that close when the power is cut: all but homes and open ground.
 TRADE = (Category.FOOD, Category.STORE, Category.OFFICE, Category.ENTERTAINMENT)
@@ -30,10 +33,13 @@ class EventSites:
     ----------
     world
         Where they are.
+    walks
+        Gives the walkways that traffic has; None: the world's.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, walks: Callable[[], Walkways] | None = None) -> None:
         self._world = world
+        self._walks = walks or (lambda: world.lanes.walks)
 
     def check(self, event: CityEvent) -> None:
         """Refuse an event that names what is not there.
@@ -112,6 +118,24 @@ class EventSites:
         area = self.street(event).buffer(half, cap_style="flat")
         middles = lanes.at(np.arange(len(lanes)), lanes.length / 2)[:, :2]
         return np.asarray(shapely.contains_xy(area, middles)) & (lanes.inside < 0)
+
+    def walkways_of(self, event: CityEvent) -> NDArray[np.bool_]:
+        """Return which walkways of traffic lie along the street of an event, crossings and corners left open."""
+        walks = self._walks()
+        middles = np.array([walks.line(k)[len(walks.line(k)) // 2] for k in range(len(walks))]).reshape(-1, 2)
+        return np.asarray(shapely.contains_xy(self.ground(event), middles)) & (walks.kind == SIDEWALK)
+
+    def circles(self, event: CityEvent) -> list[tuple[float, float, float]]:
+        """Return the ground of a street's event as circles, x, y and radius, that do not reach beyond its ends."""
+        half = max(road.width for road in self._roads_of(event.street)) / 2 + _WALKWAY
+        found = []
+        for line in shapely.get_parts(shapely.line_merge(self.street(event))):
+            count = max(1, math.ceil((line.length - 2 * half) / half) + 1)
+            along = np.linspace(min(half, line.length / 2), max(line.length - half, line.length / 2), count)
+            found += [
+                (*xy, half) for xy in shapely.get_coordinates(shapely.line_interpolate_point(line, along)).tolist()
+            ]
+        return found
 
     def ground(self, event: CityEvent) -> shapely.Geometry:
         """Return the ground that an event takes up, metres."""

@@ -48,7 +48,8 @@ def change_to_emptier_lane(net, fleet, vehicle, view):  # type: ignore[no-untype
     lane = vehicle.lane
     here = _vehicles_on(fleet, lane)
     for beside in (net.lanes[lane].left, net.lanes[lane].right):
-        is_better = beside >= 0 and not net.lanes[beside].closed and _vehicles_on(fleet, beside) < here
+        is_open = beside >= 0 and not net.lanes[beside].closed and not net.lanes[beside].shut
+        is_better = is_open and _vehicles_on(fleet, beside) < here
         if is_better and change_lane(net, vehicle, beside, view):
             break
 

@@ -93,7 +93,7 @@ def _is_crossing_at(paths, node):  # type: ignore[no-untyped-def]
 def _choice_weight(paths, here, option, node):  # type: ignore[no-untyped-def]
     """Return how likely a walkway is taken at a meeting point: crossings less often, 0 for never."""
     is_corner = paths.walkways[option].kind == _CORNER
-    if option == here or (is_corner and paths.walkways[here].kind == _CORNER):
+    if option == here or paths.walkways[option].shut or (is_corner and paths.walkways[here].kind == _CORNER):
         return 0.0
     far = paths.walkways[option].start + paths.walkways[option].end - node
     return 0.5 if is_corner and _is_crossing_at(paths, far) else 1.0

@@ -20,7 +20,7 @@ from vico.sim.traffic.jams import STUCK_AFTER, Jam, JamLog, entity_before
 from vico.sim.traffic.junctions import mark_busy_crossings
 from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.traffic.pedestrians import RADIUS, advance_pedestrians, place_pedestrian
-from vico.sim.traffic.route import count_per_street
+from vico.sim.traffic.route import count_per_street, drop_shut_plans, is_taken, widen_shut
 from vico.sim.traffic.shapes import Shapes
 from vico.sim.traffic.state import (
     NONE,
@@ -101,8 +101,10 @@ class Traffic:
         self.vehicles = self.cars + self.buses
         self.first_entity = first_entity
         net = network.with_routes(buses.routes)
-        # A copy of one's own: how fast lanes are driven follows the weather of the run.
-        self._net, self._paths = net._replace(lanes=net.lanes.copy()), network.walked
+        # Copies of one's own: how fast lanes are driven follows the weather of the run, and what is shut its events.
+        self._net = net._replace(lanes=net.lanes.copy())
+        self._paths = network.walked._replace(walkways=network.walked.walkways.copy())
+        self._shut: tuple[NDArray[np.bool_] | None, NDArray[np.bool_] | None] = None, None
         self._speed_limits = net.lanes["speed"].copy()
         self._conditions: Conditions | None = None
         self._walking_pace = 1.0
@@ -118,7 +120,7 @@ class Traffic:
         self._entities = np.zeros(0, np.int32)  # of all bodies of the last step, in the order of its shapes
         self.shapes = self._new_shapes()
         self._street_load = np.zeros(len(lanes.edges), np.int32)
-        self._entries = network.entries
+        self._entries = self._all_entries = network.entries
         self._place_buses(buses.starts)
         self._place_cars(seed, network.starts)
         self._place_pedestrians(seed)
@@ -260,6 +262,36 @@ class Traffic:
         fleet.hard_braking = conditions.hard_braking
         fleet.time_gap = TIME_GAP * conditions.time_gap
         self._walking_pace = conditions.walking
+
+    def set_shut(self, lanes: NDArray[np.bool_] | None, walkways: NDArray[np.bool_] | None) -> None:
+        """Have cars keep off some lanes and pedestrians off some walkways: part of the environment's state.
+
+        Buses keep to their routes. Cars that are there drive on until they are out; nobody enters any more. Where a
+        street leads nowhere else, it is shut, too.
+
+        Parameters
+        ----------
+        lanes, walkways
+            Masks; None for none. The same arrays again cost nothing.
+        """
+        if lanes is self._shut[0] and walkways is self._shut[1]:
+            return
+        self._shut = lanes, walkways
+        shut = np.zeros(len(self._net.lanes), np.bool_) if lanes is None else lanes.copy()
+        if lanes is not None:
+            widen_shut(self._net, shut)
+        self._net.lanes["shut"] = shut
+        self._paths.walkways["shut"] = False if walkways is None else walkways
+        left = self._all_entries[~shut[self._all_entries]]
+        self._entries = left if len(left) else self._all_entries
+
+    def drop_shut_plans(self) -> None:
+        """Have cars plan anew that were about to drive where it is shut since."""
+        drop_shut_plans(self._net, self._vehicles)
+
+    def is_taken(self, lanes: NDArray[np.bool_]) -> bool:
+        """Return whether a car is on some lanes (a mask), or on its way there."""
+        return bool(is_taken(self._net, self._vehicles, lanes))
 
     def advance(self, dt: float, obstacles: Bodies) -> None:
         """Advance everybody by `dt` seconds; nobody touches anybody, `obstacles` (all other bodies) among them."""

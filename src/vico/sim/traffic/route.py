@@ -9,6 +9,7 @@ from vico.sim.traffic.state import HELD_JUNCTIONS, NONE, PLANNED_LANES, PREVIOUS
 NEVER = 1e9  # distance to a stop that there is not, m
 STANDING_ROOM = 1.5  # room kept behind a vehicle that has left a junction, m
 _DEAD_END, _JUNCTION_AGAIN, _BEEN_THERE, _TURN_BACK = 4.0, 2.0, 50.0, 1e6  # costs, in vehicles on a street
+_SHUT = 1e8  # only where there is no other way, turning back among them
 _LESS_PICKY = 5.0  # s of waiting that count like a vehicle on a street
 
 
@@ -56,6 +57,8 @@ def _lane_cost(net, vehicle, option, street, street_load):  # type: ignore[no-un
             cost += _BEEN_THERE
     if net.lanes[option].u_turn:
         cost += _TURN_BACK
+    if net.lanes[option].shut or net.lanes[street].shut:
+        cost += _SHUT
     return cost
 
 
@@ -182,3 +185,61 @@ def advance_on_route(net, vehicle):  # type: ignore[no-untyped-def]
     route = vehicle.route
     if route >= 0:
         vehicle.route_index = (vehicle.route_index + 1) % (net.route_first[route + 1] - net.route_first[route])
+
+
+@compiled
+def drop_shut_plans(net, fleet):  # type: ignore[no-untyped-def]
+    """Have cars plan anew that meant to drive on lanes that are shut now, unless they were let in already."""
+    for vehicle in fleet:
+        if vehicle.route >= 0:
+            continue
+        for k in range(vehicle.granted_count, vehicle.planned_count):
+            if net.lanes[vehicle.planned_lanes[k]].shut:
+                vehicle.planned_count = vehicle.granted_count
+                break
+
+
+@compiled
+def is_taken(net, fleet, lanes):  # type: ignore[no-untyped-def]
+    """Return whether a car is on one of some lanes (a mask), may still be with its rear, or will drive there."""
+    for vehicle in fleet:
+        if vehicle.route >= 0:
+            continue
+        if lanes[vehicle.lane]:
+            return True
+        behind = vehicle.length - vehicle.offset
+        for k in range(PREVIOUS_LANES):
+            before = vehicle.previous_lanes[k]
+            if behind <= 0.0 or before == NONE:
+                break
+            if lanes[before]:
+                return True
+            behind -= net.lanes[before].length
+        for k in range(vehicle.planned_count):
+            if lanes[vehicle.planned_lanes[k]]:
+                return True
+    return False
+
+
+@compiled
+def widen_shut(net, shut):  # type: ignore[no-untyped-def]
+    """Shut, besides, the lanes from which every way leads onto shut ones; `shut` is a mask, and is changed.
+
+    A car that drove in there would have to go through.
+    """
+    changed = True
+    while changed:
+        changed = False
+        for lane in range(len(shut)):
+            if shut[lane] or net.lanes[lane].leaves:
+                continue
+            ways = open_ways = 0
+            for k in range(net.lanes[lane].first_next, net.lanes[lane].end_next):
+                option = net.next[k]
+                street = _street_reached_by(net, option)
+                if net.lanes[option].closed or net.lanes[street].closed:
+                    continue
+                ways += 1
+                open_ways += not (shut[option] or shut[street])
+            if ways > 0 and open_ways == 0:
+                shut[lane] = changed = True

@@ -40,6 +40,7 @@ LANE = np.dtype(
         ("inside", _I),  # junction it lies in, NONE for street lanes
         ("edge", _I),  # street (one direction) it belongs to
         ("closed", _B),  # whether cars keep off
+        ("shut", _B),  # whether an event keeps cars off: they take it where there is no other way left
         ("left", _I),  # neighbour lanes in the same direction, NONE for none
         ("right", _I),
         ("first_next", _I),  # lanes that follow it: `next` from here ...
@@ -108,6 +109,7 @@ WALKWAY = np.dtype(
         ("reach_left", _F),  # the same for who has to get past somebody
         ("reach_right", _F),
         ("kind", np.uint8),  # SIDEWALK, CROSSING or CORNER
+        ("shut", _B),  # whether an event keeps people off
         ("start", _I),  # meeting points at its ends
         ("end", _I),
     ],
@@ -161,7 +163,7 @@ class PedestrianGaits(NamedTuple):
 class LaneNetwork(NamedTuple):
     """The lanes vehicles drive, in the order of `LaneGraph`, and the routes of the buses.
 
-    Only the lanes' speeds change, in the copy that each `Traffic` has: they follow the weather.
+    Only the lanes' speeds and `shut` change, in the copy that each `Traffic` has: they follow weather and events.
 
     Attributes
     ----------
@@ -189,7 +191,7 @@ class LaneNetwork(NamedTuple):
 
 
 class WalkwayNetwork(NamedTuple):
-    """Where pedestrians walk, in the order of `Walkways`; never changes.
+    """Where pedestrians walk, in the order of `Walkways`; only `shut` changes, in the copy that each `Traffic` has.
 
     Attributes
     ----------

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vico.errors import InputError
 from vico.rules import WALK_SPEED
@@ -166,7 +166,7 @@ class Trips:
             [*network.ids, None, None],
             self._kept,
             walk_speed=self.walk_speed,
-            blocked=self._blocked(circles) if circles else None,
+            blocked=self.router.walkable.cells_within(circles) if circles else None,
         )
         return Question(network, ways, "walk" in modes, math.inf if cash is None else cash, all_good=all_good)
 
@@ -176,15 +176,6 @@ class Trips:
         if (buses, bikes) not in self._networks:
             self._networks[buses, bikes] = TripNetwork(self.transit, buses=buses, bikes=bikes)
         return self._networks[buses, bikes]
-
-    def _blocked(self, circles: Sequence[tuple[float, float, float]]) -> NDArray[np.bool_]:
-        """Return the cells whose centres lie in one of some circles."""
-        walkable = self.router.walkable
-        axis = walkable.centre_of(np.arange(walkable.n))
-        blocked = np.zeros((walkable.n, walkable.n), bool)
-        for x, y, radius in circles:
-            blocked |= (axis[None, :] - x) ** 2 + (axis[:, None] - y) ** 2 <= radius * radius
-        return blocked
 
     def _trip(self, question: Question, last: Label, depart: float) -> Trip:
         legs = [
