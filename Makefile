@@ -12,10 +12,11 @@ DEV := worldgen,photos,usd,docs,dev
 	  || { echo "virtual-community needs Python 3.11 to 3.13; say which: make demo PYTHON=python3.12"; exit 1; }
 	$(PYTHON) -m venv .venv
 
-# $(call install,EXTRAS): pip would make byte code in one process, and none of what is in src.
+# $(call install,EXTRAS): pip would make byte code of all, in one process, and none of what is in src. UNUSED: never imported.
+UNUSED := /(tests?|sumo|OpenGL|pip|setuptools|mypyc?)/
 define install
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt -e '.[$(1)]'
-	@$(BIN)/python -W ignore -m compileall -qq -j 0 .venv/lib src || true  # some files of SUMO are of Python 2
+	@$(BIN)/python -m compileall -q -j 0 -x '$(UNUSED)' .venv/lib src
 endef
 
 .venv/demo: pyproject.toml constraints.txt | .venv/bin/python
