@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +13,7 @@ from numpy.typing import NDArray
 from vico.assets.shapes import ball, box, pose_matrix
 from vico.errors import InputError
 from vico.render import Cameras, Frames, Lighting, Scene, ViewCache, render
+from vico.render.frames import PendingView
 from vico.world.mesh import Material, Surface, joined
 
 
@@ -177,8 +180,8 @@ def test_a_camera_that_stands_sees_what_moves_as_one_that_has_just_come() -> Non
     assert cache.hits == 0
 
 
-def test_deferred_rgb_is_the_same() -> None:
-    scene, cache = _room(), ViewCache(defer_rgb=True)
+def test_deferred_pictures_are_the_same() -> None:
+    scene, cache = _room(), ViewCache(deferred=True)
     pose = np.eye(4)
     pose[:3, 3] = 30.0, 1.0, 0.0
     scene.set_rigid([scene.names["ball"]], pose[None], [7])
@@ -186,11 +189,31 @@ def test_deferred_rgb_is_the_same() -> None:
     at_once = render(scene, cameras)
     for k in range(3):
         later = render(scene, cameras, cache=cache)
-        assert np.array_equal(later.depth, at_once.depth)
-        assert np.array_equal(later.segmentation, at_once.segmentation)
-        assert len(later.pending) == (2 if k == 0 else 1)  # the room's view is repeated
+        for view in range(2):
+            later.wait_for(view)
+            for name in ("rgb", "depth", "segmentation"):
+                assert np.array_equal(getattr(later, name)[view], getattr(at_once, name)[view]), (k, view, name)
         later.wait()
-        assert np.array_equal(later.rgb, at_once.rgb)
+
+
+def test_whoever_waits_for_a_picture_takes_it_or_hears_what_went_wrong() -> None:
+    crew, begin = ThreadPoolExecutor(1), threading.Event()
+    taken: list[int] = []
+
+    def fail() -> None:
+        raise InputError("no picture")
+
+    with crew:
+        crew.submit(begin.wait)  # the only thread is busy
+        views = [PendingView(crew, lambda: taken.append(threading.get_ident())), PendingView(crew, fail)]
+        views[0].wait()
+        views[0].wait()
+        assert taken == [threading.get_ident()]
+        for _ in range(2):
+            with pytest.raises(InputError, match="no picture"):
+                views[1].wait()
+        begin.set()
+    assert len(taken) == 1
 
 
 def test_a_thin_far_pole_is_seen_where_its_centre_line_crosses_pixel_centres() -> None:

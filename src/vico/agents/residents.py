@@ -100,6 +100,9 @@ class Residents:
     ) -> dict[str, Action | Exception]:
         """Return the members' actions for the coming second; see `vico.agents.base.GroupAgent`."""
         crowd: Crowd | None = getattr(observations, "crowd", None)
+        # Members act on what is in view by sight lines: nobody waits for pictures.
+        observations = getattr(observations, "without_pictures", observations)
+        infos = getattr(infos, "without_pictures", infos)
         numbers = np.array([self._number[name] for name in names], np.int64)
         going_on = np.full(len(names), np.nan) if crowd is None else self._going_on(crowd, numbers)
         found: dict[str, Action | Exception] = {}

@@ -139,8 +139,8 @@ class _Job:
         goes_on = self._goes_on()
         with progress_bars() as report:
             report("setting the scene", 0, 1)
-            # Residents act on what they have in view and hear; mostly, the recorder alone looks at colours.
-            sim = Simulation(self.world, self.community, self.config, defer_rgb=True)
+            # Residents act on what they have in view and hear; mostly, the recorder alone looks at pictures.
+            sim = Simulation(self.world, self.community, self.config, defer_pictures=True)
             if options.check == "overlaps":
                 sim.check_overlaps()
             with closing(self._agents()) as agents:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
+from weakref import WeakSet
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,18 +20,44 @@ from vico.render.arrays import Buffers
 from vico.render.cameras import Cameras
 from vico.render.lighting import Lighting
 from vico.render.scene import Scene
-from vico.render.shading.light import Light
-from vico.render.shading.shade import shade
+from vico.render.shading.light import NO_LIGHT, Light
 from vico.render.shading.weather import draw_weather
-from vico.render.shadows.moving import cast_moving, new_caster
+from vico.render.shadows.moving import new_caster
 from vico.render.uniforms import Record, camera_uniforms
-from vico.render.view_cache import ViewCache, fitting_buffers, shadow_reach
-from vico.render.visibility.draw import draw, write_depth, write_entities
+from vico.render.view import NOTHING_KEPT, Pictures, take
+from vico.render.view_cache import ViewCache, fitting_buffers
 from vico.world.mesh import Material, Surface
 
 # Squares along a side of a picture from above.
 _SQUARES = 8
-_EMPTY_U8, _EMPTY_F32, _EMPTY_I32 = np.zeros(0, np.uint8), np.zeros(0, np.float32), np.zeros(0, np.int32)
+# Of as many dimensions as a picture: compiled code is made for that.
+_EMPTY_U8 = np.zeros((0, 0, 3), np.uint8)
+_EMPTY_F32, _EMPTY_I32 = np.zeros((0, 0), np.float32), np.zeros((0, 0), np.int32)
+
+
+_begun: WeakSet[PendingView] = WeakSet()
+
+
+class PendingView:
+    """One camera's pictures that a thread works on, or that wait for one; whoever waits for them takes them itself."""
+
+    def __init__(self, crew: ThreadPoolExecutor, take: Callable[[], None]) -> None:
+        self._take: Callable[[], None] | None = take
+        self._lock = threading.Lock()
+        _begun.add(self)
+        self._turn = crew.submit(self.wait)
+
+    def help(self) -> None:
+        """Take the pictures in this thread, unless another one is at it."""
+        if self._turn.cancel():
+            self.wait()
+
+    def wait(self) -> None:
+        """Return when they are there; raises what went wrong with them, to everybody who waits."""
+        with self._lock:
+            if self._take is not None:
+                self._take()
+                self._take = None
 
 
 @dataclass(frozen=True)
@@ -45,18 +73,25 @@ class Frames:
     segmentation
         Entity ids, 0 where nothing is hit, int32, shape ``(k, h, w)``.
     pending
-        Work on RGB that is still going on; empty unless it was deferred.
+        One a camera, of pictures that may still be worked on; empty unless that was deferred.
     """
 
     rgb: NDArray[np.uint8]
     depth: NDArray[np.float32]
     segmentation: NDArray[np.int32]
-    pending: tuple[Future[None], ...] = ()
+    pending: tuple[PendingView, ...] = ()
 
     def wait(self) -> None:
-        """Wait for RGB that is still being worked on; see ``defer_rgb`` of `ViewCache`."""
-        for rgb in self.pending:
-            rgb.result()
+        """Wait for all pictures that are still being worked on; see ``deferred`` of `ViewCache`."""
+        for view in self.pending:
+            view.help()
+        for view in self.pending:
+            view.wait()
+
+    def wait_for(self, k: int) -> None:
+        """Wait for camera `k`'s pictures."""
+        if self.pending:
+            self.pending[k].wait()
 
 
 def render(
@@ -96,11 +131,11 @@ def render(
         scene,
         cameras,
         light,
-        np.empty((*shape, 3), np.uint8) if rgb else _EMPTY_U8,
-        np.empty(shape, np.float32) if depth else _EMPTY_F32,
-        np.empty(shape, np.int32) if segmentation else _EMPTY_I32,
+        np.empty((*shape, 3) if rgb else (0, 0, 0, 3), np.uint8),
+        np.empty(shape if depth else (0, 0, 0), np.float32),
+        np.empty(shape if segmentation else (0, 0, 0), np.int32),
     )
-    pending: tuple[Future[None], ...] = ()
+    pending: tuple[PendingView, ...] = ()
     if light is not None and samples > 1:
         _for_each(lambda k: batch.render_smooth(k, light, samples), len(cameras), threads)
     elif light is not None and cache is not None:
@@ -121,61 +156,50 @@ class _Batch:
     depth: NDArray[np.float32]
     segmentation: NDArray[np.int32]
 
-    def pictures(self, k: int) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.int32]]:
+    def pictures(self, k: int) -> Pictures:
         """Return camera `k`'s part of each kind."""
-        return _part(self.rgb, k), _part(self.depth, k), _part(self.segmentation, k)
+        return Pictures(_part(self.rgb, k), _part(self.depth, k), _part(self.segmentation, k))
 
     def render(self, k: int) -> None:
-        _take(self.scene, _camera(self.scene, self.cameras, k, 1), self.light, *self.pictures(k))
+        _take(self.scene, _camera(self.scene, self.cameras, k, 1), self.light, self.pictures(k))
 
     def render_smooth(self, k: int, light: Light, samples: int) -> None:
         """Take the mean of several rays a pixel for RGB; depth and segmentation of the middle ray."""
         height, width = self.rgb.shape[1:3]
         wide = np.empty((height * samples, width * samples, 3), np.uint8)
-        _take(self.scene, _camera(self.scene, self.cameras, k, samples), light, wide, _EMPTY_F32, _EMPTY_I32)
+        only_rgb = Pictures(wide, _EMPTY_F32, _EMPTY_I32)
+        _take(self.scene, _camera(self.scene, self.cameras, k, samples), light, only_rgb)
         self.rgb[k] = _mean_of_blocks(wide, samples)
         if self.depth.size or self.segmentation.size:
-            _, depth, segmentation = self.pictures(k)
-            _take(self.scene, _camera(self.scene, self.cameras, k, 1), None, _EMPTY_U8, depth, segmentation)
+            without_rgb = self.pictures(k)._replace(rgb=_EMPTY_U8)
+            _take(self.scene, _camera(self.scene, self.cameras, k, 1), None, without_rgb)
 
 
-def _render_cached(batch: _Batch, light: Light, cache: ViewCache, threads: int | None) -> tuple[Future[None], ...]:
-    """Render what is not still right from the last call; return the work on RGB that was deferred."""
-    scene, width, height = batch.scene, batch.cameras.width, batch.cameras.height
-    uniforms = [_camera(scene, batch.cameras, k, 1) for k in range(len(batch.cameras))]
-    deferred: dict[int, Callable[[], None]] = {}
+def _render_cached(batch: _Batch, light: Light, cache: ViewCache, threads: int | None) -> tuple[PendingView, ...]:
+    """Render what is not still right from the last call; return the work that was deferred, one a camera."""
+    scene, cameras = batch.scene, batch.cameras
 
-    def take(k: int) -> None:
-        camera = uniforms[k]
-        rgb, depth, segmentation = batch.pictures(k)
+    def take_one(k: int) -> None:
+        camera, pictures = _camera(scene, cameras, k, 1), batch.pictures(k)
         background = cache.background(k, scene, camera)
-        if background is not None and background.is_all(scene, camera, light):
-            cache.hits += 1
-            background.copy_to(rgb, depth, segmentation)
+        if background is None:
+            _take(scene, camera, light, pictures)
             return
-        own = cache.defer_rgb
-        buffers = cache.buffers(k, scene, width, height) if own else _buffers(scene, width, height)
-        if background is not None:
-            drawn = background.draw(scene, camera, buffers)
+        buffers = _buffers(scene, cameras.width, cameras.height)
+        if background.take(scene, camera, light, buffers, pictures):
+            cache.hits += 1
         else:
-            drawn = draw(scene.arrays, camera, buffers)
-        _write_depth_and_entities(scene, buffers, drawn, depth, segmentation)
+            draw_weather(camera, light, buffers.keys, scene.moment, pictures.rgb)
 
-        def finish() -> None:
-            if background is not None:
-                background.shade(scene, camera, light, buffers, drawn, rgb)
-                draw_weather(camera, light, buffers.keys, scene.moment, rgb)
-            else:
-                _shading_pass(scene, camera, light, buffers, drawn, rgb)
-
-        if own:
-            deferred[k] = finish
-        else:
-            finish()
-
-    _for_each(take, len(uniforms), threads)
-    crew = _crew(min(threads or _available(), max(len(uniforms), 1)))
-    return tuple(crew.submit(deferred[k]) for k in sorted(deferred))
+    # Long ones first: with a short one at the end, no thread waits long for the others.
+    order = sorted(range(len(cameras)), key=cache.was_quick)
+    if not cache.deferred:
+        _for_each(lambda place: take_one(order[place]), len(order), threads)
+        return ()
+    # One thread fewer than processors: the program goes on, and works on pictures as soon as it waits for one.
+    crew = _crew(max(min((threads or _available()) - 1, len(order)), 1))
+    begun = {k: PendingView(crew, partial(take_one, k)) for k in order}
+    return tuple(begun[k] for k in range(len(order)))
 
 
 def _mean_of_blocks(wide: NDArray[np.uint8], samples: int) -> NDArray[np.uint8]:
@@ -217,7 +241,7 @@ def render_top_down(scene: Scene, half: float, pixels: int, *, samples: int = 2)
     def take(k: int) -> None:
         x, y = corners[k]
         square = np.empty((step * samples, step * samples, 3), np.uint8)
-        _take(scene, _camera(scene, cameras, k, samples), clear, square, _EMPTY_F32, _EMPTY_I32)
+        _take(scene, _camera(scene, cameras, k, samples), clear, Pictures(square, _EMPTY_F32, _EMPTY_I32))
         place = picture[y : y + step, x : x + step]
         place[:] = _mean_of_blocks(square, samples)[: place.shape[0], : place.shape[1]]
 
@@ -244,7 +268,7 @@ _local = threading.local()
 
 
 def _part(values: NDArray[Any], k: int) -> NDArray[Any]:
-    return values[k] if values.size else values
+    return values[k] if len(values) else np.zeros(values.shape[1:], values.dtype)
 
 
 def _for_each(task: Callable[[int], None], count: int, threads: int | None) -> None:
@@ -268,45 +292,26 @@ def _crew(workers: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(workers, "render")
 
 
-# A forked child has none of its parent's threads.
-os.register_at_fork(after_in_child=_crew.cache_clear)
+def _settle() -> None:
+    """Wait for all pictures that are being worked on."""
+    for view in tuple(_begun):
+        with suppress(Exception):  # told to whoever waits for the picture
+            view.wait()
+
+
+# A forked child has none of its parent's threads: nothing may be left for them to do.
+os.register_at_fork(before=_settle, after_in_child=_crew.cache_clear)
 
 
 def _camera(scene: Scene, cameras: Cameras, k: int, samples: int) -> Record:
     return camera_uniforms(cameras, k, samples, scene.room_of(cameras.position[k]))
 
 
-def _take(
-    scene: Scene,
-    camera: Record,
-    light: Light | None,
-    rgb: NDArray[np.uint8],
-    depth: NDArray[np.float32],
-    segmentation: NDArray[np.int32],
-) -> None:
+def _take(scene: Scene, camera: Record, light: Light | None, out: Pictures) -> None:
     buffers = _buffers(scene, int(camera["width"]), int(camera["height"]))
-    drawn = draw(scene.arrays, camera, buffers)
-    _write_depth_and_entities(scene, buffers, drawn, depth, segmentation)
-    if light is not None and rgb.size:
-        _shading_pass(scene, camera, light, buffers, drawn, rgb)
-
-
-def _write_depth_and_entities(
-    scene: Scene, buffers: Buffers, drawn: int, depth: NDArray[np.float32], segmentation: NDArray[np.int32]
-) -> None:
-    if depth.size:
-        write_depth(buffers.keys, depth)
-    if segmentation.size:
-        write_entities(scene.arrays, buffers, drawn, segmentation)
-
-
-def _shading_pass(
-    scene: Scene, camera: Record, light: Light, buffers: Buffers, drawn: int, rgb: NDArray[np.uint8]
-) -> None:
-    """Colour what is visible."""
-    moving = cast_moving(scene.arrays, camera, light.uniforms, buffers, shadow_reach(camera), new_caster())
-    shade(scene.arrays, camera, light, buffers, drawn, moving, False, rgb)
-    draw_weather(camera, light, buffers.keys, scene.moment, rgb)
+    take(scene.arrays, camera, NO_LIGHT if light is None else light, buffers, NOTHING_KEPT, True, new_caster(), out)
+    if light is not None and out.rgb.size:
+        draw_weather(camera, light, buffers.keys, scene.moment, out.rgb)
 
 
 def _buffers(scene: Scene, width: int, height: int) -> Buffers:

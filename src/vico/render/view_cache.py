@@ -10,13 +10,10 @@ from numpy.typing import NDArray
 from vico.render.arrays import Buffers, buffers_for
 from vico.render.scene import Scene
 from vico.render.shading.light import Light
-from vico.render.shading.shade import shade
-from vico.render.shadows.moving import CoarseDepth, cast_moving, is_disturbed, new_caster
+from vico.render.shadows.moving import CoarseDepth, is_disturbed, new_scratch
 from vico.render.uniforms import Record
-from vico.render.visibility.culling import renew_tiles
-from vico.render.visibility.draw import draw_moving, draw_static, mark_changed, write_depth, write_entities
-
-_MOVING_SHADOW_METRES = 70.0
+from vico.render.view import NOTHING_KEPT, Kept, Pictures, take
+from vico.render.visibility.draw import write_depth
 
 
 class ViewCache:
@@ -28,9 +25,9 @@ class ViewCache:
 
     Parameters
     ----------
-    defer_rgb
-        `render` returns when depth and segmentation are there, and lets threads work on RGB. It must not be read, nor
-        the scene be changed, before `Frames.wait`.
+    deferred
+        `render` returns at once, and lets threads work on the pictures. They must not be read, nor the scene be
+        changed, before `Frames.wait`.
 
     Attributes
     ----------
@@ -38,20 +35,18 @@ class ViewCache:
         How many views were copied so far.
     """
 
-    def __init__(self, *, defer_rgb: bool = False) -> None:
-        self.defer_rgb = defer_rgb
+    def __init__(self, *, deferred: bool = False) -> None:
+        self.deferred = deferred
         self.hits = 0
         self._last: dict[int, bytes] = {}
         self._known: dict[int, Background] = {}
-        self._buffers: dict[int, Buffers] = {}
 
-    def buffers(self, k: int, scene: Scene, width: int, height: int) -> Buffers:
-        """Return scratch memory that stays camera `k`'s until its RGB is there."""
-        self._buffers[k] = fitting_buffers(self._buffers.get(k), scene, width, height)
-        return self._buffers[k]
+    def was_quick(self, k: int) -> bool:
+        """Return whether something of camera `k`'s last view was kept: the next one may well take little time."""
+        return k in self._known
 
     def background(self, k: int, scene: Scene, camera: Record) -> Background | None:
-        """Return what is kept of camera `k`'s view, to be made by its first `Background.draw`.
+        """Return what is kept of camera `k`'s view, to be made by its first `Background.take`.
 
         None where nothing is worth keeping: out of doors, before a camera has stood still for one call.
         """
@@ -78,96 +73,60 @@ class Background:
     """
 
     of: tuple[bytes, int]
-    _parts: _Parts | None = None
+    _kept: Kept = NOTHING_KEPT
+    _coarse: CoarseDepth | None = None
+    _segmentation: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 0), np.int32))
     _light: Light | None = None
-    _rgb: NDArray[np.uint8] = field(default_factory=lambda: np.zeros(0, np.uint8))
 
-    def is_all(self, scene: Scene, camera: Record, light: Light) -> bool:
+    def take(self, scene: Scene, camera: Record, light: Light, buffers: Buffers, out: Pictures) -> bool:
+        """Take pictures of a camera, as little as possible being done anew; return whether they were but copied."""
+        scratch = new_scratch()
+        if self._is_all(scene, camera, light, scratch):
+            self._copy_to(out)
+            return True
+        caster = scratch[0]
+        if not self._is_lit(camera, light) or self._kept.rgb.shape != out.rgb.shape:
+            self._set(scene, camera, light, buffers, np.empty_like(out.rgb), caster)
+        take(scene.arrays, camera, light, buffers, self._kept, True, caster, out)
+        return False
+
+    def _is_all(self, scene: Scene, camera: Record, light: Light, scratch: tuple[Record, Record, Record]) -> bool:
         """Return whether it is the whole picture: in a room, if nothing that moves can be noticed."""
-        if self._parts is None or not self._is_lit(camera, light) or not camera["indoors"]:
+        if self._coarse is None or not self._is_lit(camera, light) or not camera["indoors"]:
             return False
-        return not is_disturbed(scene.arrays, camera, light.uniforms, self._parts.coarse, shadow_reach(camera))
+        return not is_disturbed(scene.arrays, camera, light.uniforms, self._coarse, scratch)
 
-    def copy_to(self, rgb: NDArray[np.uint8], depth: NDArray[np.float32], segmentation: NDArray[np.int32]) -> None:
-        """Copy the pictures, kinds that are not asked for being empty."""
-        assert self._parts is not None
-        rgb[...] = self._rgb
-        if depth.size:
-            write_depth(self._parts.keys, depth)
-        if segmentation.size:
-            segmentation[...] = self._parts.segmentation
+    def _copy_to(self, out: Pictures) -> None:
+        out.rgb[...] = self._kept.rgb
+        if out.depth.size:
+            write_depth(self._kept.keys, out.depth)
+        if out.segmentation.size:
+            out.segmentation[...] = self._segmentation
 
-    def draw(self, scene: Scene, camera: Record, buffers: Buffers) -> int:
-        """Do as `vico.render.visibility.draw.draw`, what never moves being drawn only once."""
-        if self._parts is None:
-            self._parts = _drawn_parts(scene, camera, buffers)
-        else:
-            self._parts.copy_to(buffers)
-        drawn: int = draw_moving(scene.arrays, camera, buffers, self._parts.drawn)
-        return drawn
-
-    def shade(
-        self, scene: Scene, camera: Record, light: Light, buffers: Buffers, drawn: int, rgb: NDArray[np.uint8]
+    def _set(
+        self, scene: Scene, camera: Record, light: Light, buffers: Buffers, rgb: NDArray[np.uint8], caster: Record
     ) -> None:
-        """Colour what `draw` left, only where it is not what never moves in its own light."""
-        assert self._parts is not None
-        keys = self._parts.keys
-        if not self._is_lit(camera, light) or self._rgb.shape != rgb.shape:
-            self._rgb = np.empty_like(rgb)
-            alone = buffers._replace(keys=keys)
-            shade(scene.arrays, camera, light, alone, self._parts.drawn, False, False, self._rgb)
-            self._light = light
-        rgb[...] = self._rgb
-        moving = cast_moving(scene.arrays, camera, light.uniforms, buffers, shadow_reach(camera), new_caster())
-        mark_changed(buffers, keys, moving)
-        shade(scene.arrays, camera, light, buffers, drawn, moving, True, rgb)
+        """Draw what never moves, if it isn't drawn yet, and colour it."""
+        kept = self._kept._replace(rgb=NOTHING_KEPT.rgb)
+        segmentation = np.empty((rgb.shape[:2]) if self._coarse is None else (0, 0), np.int32)
+        out = Pictures(rgb, np.zeros((0, 0), np.float32), segmentation)
+        drawn = take(scene.arrays, camera, light, buffers, kept, False, caster, out)
+        self._light = light
+        if self._coarse is not None:
+            self._kept = kept._replace(rgb=rgb)
+            return
+        self._coarse, self._segmentation = CoarseDepth(buffers.tiles.copy(), buffers.blocks.copy()), segmentation
+        self._kept = Kept(
+            buffers.keys.copy(),
+            buffers.drawn[:drawn].copy(),
+            buffers.base[: drawn + 1].copy(),
+            buffers.first_triangle[:drawn].copy(),
+            rgb,
+        )
 
     def _is_lit(self, camera: Record, light: Light) -> bool:
         """Return whether the colours are those of this light; rooms have lamps of their own, always the same."""
         return self._light is light or (self._light is not None and bool(camera["indoors"]))
-
-
-@dataclass(frozen=True)
-class _Parts:
-    """A picture without what moves: parts of `Buffers` after `draw_static`, how many items were drawn, its entities."""
-
-    drawn: int
-    keys: NDArray[np.uint64]
-    codes: NDArray[np.int32]
-    base: NDArray[np.int64]
-    first_triangle: NDArray[np.int32]
-    coarse: CoarseDepth
-    segmentation: NDArray[np.int32]
-
-    def copy_to(self, buffers: Buffers) -> None:
-        buffers.keys[:] = self.keys
-        buffers.drawn[: self.drawn] = self.codes
-        buffers.base[: self.drawn + 1] = self.base
-        buffers.first_triangle[: self.drawn] = self.first_triangle
-
-
-def _drawn_parts(scene: Scene, camera: Record, buffers: Buffers) -> _Parts:
-    """Draw what never moves into `buffers`; return a copy of it."""
-    drawn: int = draw_static(scene.arrays, camera, buffers)
-    renew_tiles(buffers, camera)
-    segmentation = np.empty((int(camera["height"]), int(camera["width"])), np.int32)
-    write_entities(scene.arrays, buffers, drawn, segmentation)
-    return _Parts(
-        drawn,
-        buffers.keys.copy(),
-        buffers.drawn[:drawn].copy(),
-        buffers.base[: drawn + 1].copy(),
-        buffers.first_triangle[:drawn].copy(),
-        CoarseDepth(buffers.tiles.copy(), buffers.blocks.copy()),
-        segmentation,
-    )
-
-
-def shadow_reach(camera: Record) -> float:
-    """Return how near moving things must be to cast a shadow into a view, metres: in a room, those in it or close."""
-    if not camera["indoors"]:
-        return _MOVING_SHADOW_METRES
-    return float(np.hypot(camera["room_half_length"], camera["room_half_width"])) * 2.0 + 1.0
 
 
 def fitting_buffers(known: Buffers | None, scene: Scene, width: int, height: int) -> Buffers:

@@ -107,8 +107,8 @@ class Runner:
         for hook in self.hooks:
             hook.begin(observations)
         while sim.metrics.steps < steps and not until():
-            if sim.defer_rgb and self._looked_at:
-                sim.rgb_waiter()()
+            if sim.defer_pictures and self._looked_at:
+                sim.picture_waiter()()
             gathered = self.agents.gather(observations, infos)
             actions: dict[str, Action] = {}
             for name, action in gathered.actions.items():

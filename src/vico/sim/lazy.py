@@ -44,15 +44,47 @@ class LazyByName(Mapping[str, T]):
         return f"{type(self).__name__}({list(self._made)})"
 
 
-class Observations(LazyByName[dict[str, Any]]):
-    """Observations by agent's name; those that nobody asks for are never made.
+class ByAgent(LazyByName[dict[str, Any]]):
+    """Observations or infos by agent's name; those that nobody asks for are never made.
+
+    Parameters
+    ----------
+    make_plain
+        Makes what needs no pictures.
+    make_seen
+        Makes the rest, once they are there.
+
+    Attributes
+    ----------
+    without_pictures
+        The same for those who do not look at pictures, and need not wait for them.
+    """
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        make_plain: Callable[[str], dict[str, Any]],
+        make_seen: Callable[[str], dict[str, Any]],
+    ) -> None:
+        self.without_pictures = LazyByName(names, make_plain)
+        super().__init__(names, lambda name: make_plain(name) | make_seen(name))
+
+
+class Observations(ByAgent):
+    """Observations by agent's name.
 
     Attributes
     ----------
     crowd
-        The same as arrays.
+        The same as arrays, without pictures.
     """
 
-    def __init__(self, names: Sequence[str], make: Callable[[str], dict[str, Any]], crowd: Crowd) -> None:
-        super().__init__(names, make)
+    def __init__(
+        self,
+        names: Sequence[str],
+        make_plain: Callable[[str], dict[str, Any]],
+        make_seen: Callable[[str], dict[str, Any]],
+        crowd: Crowd,
+    ) -> None:
+        super().__init__(names, make_plain, make_seen)
         self.crowd = crowd

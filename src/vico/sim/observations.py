@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
-from vico.sim.lazy import LazyByName, Observations
+from vico.sim.lazy import ByAgent, Observations
 from vico.sim.moves import eye_height
 from vico.sim.simulation_state import SimulationState
 from vico.sim.told import Told
@@ -36,6 +36,8 @@ class Views:
         World (ENU metres) to camera (x right, y down, z forward), float64, shape ``(k, 4, 4)``.
     intrinsics
         Camera matrix, pixels, the same for all, float64, shape ``(3, 3)``.
+    wait_for
+        Returns when the pictures of camera ``k`` are there; they may be worked on until then.
     """
 
     rgb: NDArray[np.uint8]
@@ -43,6 +45,7 @@ class Views:
     segmentation: NDArray[np.int32]
     extrinsics: NDArray[np.float64]
     intrinsics: NDArray[np.float64]
+    wait_for: Callable[[int], None] = lambda k: None
 
 
 class ObservationRenderer(Protocol):
@@ -64,8 +67,8 @@ class ObservationRenderer(Protocol):
     def names(self, entities: Sequence[int]) -> dict[int, dict[str, str]]:
         """Return kind and name of entities that can be seen."""
 
-    def rgb_waiter(self) -> Callable[[], None]:
-        """Return what to call, from any thread, to wait for the RGB of the last `render`."""
+    def picture_waiter(self) -> Callable[[], None]:
+        """Return what to call, from any thread, to wait for the pictures of the last `render`."""
 
     def rebind(self, sim: Any) -> ObservationRenderer:
         """Return a renderer of another simulation that keeps as much of the scene as it can."""
@@ -98,13 +101,16 @@ def observe(
     renderer: ObservationRenderer | None,
     *,
     who: Sequence[int] | None = None,
-) -> tuple[Observations, Mapping[str, dict[str, Any]]]:
+    waits: bool = True,
+) -> tuple[Observations, ByAgent]:
     """Return observations and infos of all agents; those in `seeing` get pictures, rendered in one call.
 
     Parameters
     ----------
     who
         Indices of the agents that observe; None for all. Those in `seeing` are among them.
+    waits
+        Whether an observation that is asked for waits for its pictures; else see `ObservationRenderer.picture_waiter`.
 
     Returns
     -------
@@ -114,24 +120,60 @@ def observe(
         kind and name of what the pictures show, by entity; ``action_code``; ``weather`` outdoors
         (`vico.sim.environment`); ``events`` of the city that it knows of, where a run has any (`vico.sim.city`); for
         residents ``in_view``, what is in view by sight lines (`vico.sim.perception.InView`), the same with and without
-        pictures. Each is made when it is first asked for, of the state as it is now.
+        pictures. Each is made when it is first asked for, of the state as it is now, and waits for its pictures; those
+        of ``without_pictures`` have and await none.
     """
     names = state.names
     chosen = range(len(names)) if who is None else who
     told = Told(_kept(state), poses(state), chosen)
-    pictures, seen = {}, {}
+    seen = None
     if renderer is not None and len(seeing):
-        for i, (picture, entities) in zip(seeing, _pictures(state, seeing, told.poses, renderer), strict=True):
-            pictures[names[i]], seen[names[i]] = picture, entities
+        seen = _Pictures(_rendered(state, seeing, told.poses, renderer), renderer, [names[i] for i in seeing])
     asked = [names[i] for i in chosen]
-    observations = Observations(asked, lambda name: told.observation(name) | pictures.get(name, {}), told.crowd())
-    return observations, LazyByName(asked, lambda name: {"entities": seen.get(name, {})} | told.info(name))
+
+    def pictures(name: str) -> Observation:
+        return seen.of(name, waits=waits) if seen is not None else {}
+
+    def entities(name: str) -> dict[str, Any]:
+        return {"entities": seen.entities(name) if seen is not None else {}}
+
+    return Observations(asked, told.observation, pictures, told.crowd()), ByAgent(asked, told.info, entities)
 
 
-def _pictures(
+class _Pictures:
+    """What some agents see, by their names in the order of the views."""
+
+    def __init__(self, views: Views, renderer: ObservationRenderer, names: Sequence[str]) -> None:
+        self._views, self._renderer = views, renderer
+        self._place = {name: k for k, name in enumerate(names)}
+
+    def of(self, name: str, *, waits: bool) -> Observation:
+        """Return an agent's pictures; nothing where it has none."""
+        if (k := self._place.get(name)) is None:
+            return {}
+        views = self._views
+        if waits:
+            views.wait_for(k)
+        return {
+            "rgb": views.rgb[k],
+            "depth": views.depth[k],
+            "segmentation": views.segmentation[k],
+            "extrinsics": views.extrinsics[k],
+            "intrinsics": views.intrinsics,
+        }
+
+    def entities(self, name: str) -> dict[int, dict[str, str]]:
+        """Return kind and name of what an agent's pictures show, by entity."""
+        if (k := self._place.get(name)) is None:
+            return {}
+        self._views.wait_for(k)
+        return self._renderer.names(distinct_entities(self._views.segmentation[k]))
+
+
+def _rendered(
     state: SimulationState, seeing: Sequence[int], stances: NDArray[np.float64], renderer: ObservationRenderer
-) -> Iterator[tuple[Observation, dict[int, dict[str, str]]]]:
-    """Yield the pictures of some agents, and kind and name of what they show."""
+) -> Views:
+    """Return views of some agents."""
     order = list(seeing)
     cameras = stances.copy()
     cameras[:, 2] += camera_heights(state)
@@ -141,16 +183,7 @@ def _pictures(
     own = state.people.entity
     if state.robots is not None:
         own = np.concatenate([own, state.robots.bodies().entity])
-    views = renderer.render(state, cameras, np.asarray(own[order], np.int32))
-    for k in range(len(order)):
-        picture = {
-            "rgb": views.rgb[k],
-            "depth": views.depth[k],
-            "segmentation": views.segmentation[k],
-            "extrinsics": views.extrinsics[k],
-            "intrinsics": views.intrinsics,
-        }
-        yield picture, renderer.names(distinct_entities(views.segmentation[k]))
+    return renderer.render(state, cameras, np.asarray(own[order], np.int32))
 
 
 def _kept(state: SimulationState) -> SimulationState:

@@ -273,7 +273,7 @@ class Recorder:
         self._samples.take(bodies, self._hash, result, actions)
         watch = time.perf_counter()
         pictures = {name: seen["rgb"] for name, seen in observations.items() if "rgb" in seen}
-        self._films.add(step, pictures, sim.rgb_waiter())
+        self._films.add(step, pictures, sim.picture_waiter())
         seconds = sim.metrics.seconds
         seconds["films"] = seconds.get("films", 0.0) + time.perf_counter() - watch
 

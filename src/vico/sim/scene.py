@@ -84,10 +84,6 @@ class RenderedSimulation(Protocol):
         """What the run is asked to be."""
 
     @property
-    def defer_rgb(self) -> bool:
-        """Whether `render` may return before RGB is there."""
-
-    @property
     def state(self) -> SimulationState:
         """Everybody and everything, as it is now."""
 
@@ -130,7 +126,7 @@ class SceneRenderer:
         self._sim = sim
         self._lit: tuple[float, ...] = ()
         self.wait()
-        self._cache = ViewCache(defer_rgb=sim.defer_rgb)
+        self._cache = ViewCache(deferred=True)
         self._load_bodies(sim)
 
     def _load_bodies(self, sim: RenderedSimulation) -> None:
@@ -153,24 +149,25 @@ class SceneRenderer:
         self._height = np.array([body.height for body in bodies], np.float64)
 
     def render(self, state: SimulationState, poses: NDArray[np.float64], own: NDArray[np.int32]) -> Views:
-        """Render one view for each pose in one call; see `ObservationRenderer.render`."""
+        """Begin to render one view for each pose in one call; see `ObservationRenderer.render`."""
         self.wait()
         self._set_light(state)
         self._set_moving(state)
         side = self._image
         cameras = Cameras(poses[:, :3], poses[:, 3:], width=side, height=side, hidden_entity=own)
         frames = render(self._scene, cameras, cache=self._cache)
-        self._frames = frames if self._cache.defer_rgb else None
-        return Views(frames.rgb, frames.depth, frames.segmentation, cameras.extrinsics, cameras.intrinsics)
+        self._frames = frames
+        pictures = frames.rgb, frames.depth, frames.segmentation
+        return Views(*pictures, cameras.extrinsics, cameras.intrinsics, frames.wait_for)
 
     def wait(self) -> None:
-        """Wait for RGB that is still being worked on."""
+        """Wait for pictures that are still being worked on."""
         if self._frames is not None:
             self._frames.wait()
             self._frames = None
 
-    def rgb_waiter(self) -> Callable[[], None]:
-        """Return what to call, from any thread, to wait for the RGB of the last `render`."""
+    def picture_waiter(self) -> Callable[[], None]:
+        """Return what to call, from any thread, to wait for the pictures of the last `render`."""
         return self._frames.wait if self._frames is not None else _nothing
 
     def render_cameras(self, state: SimulationState, cameras: Cameras, *, samples: int = 2) -> NDArray[np.uint8]:

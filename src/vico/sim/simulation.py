@@ -19,7 +19,7 @@ from vico.sim.config import SimConfig
 from vico.sim.divergence import kept_if_diverged
 from vico.sim.events import Event
 from vico.sim.initial_state import initial_state
-from vico.sim.lazy import Observations
+from vico.sim.lazy import ByAgent, Observations
 from vico.sim.metrics import Metrics, StopWatch
 from vico.sim.observations import ObservationRenderer, observe
 from vico.sim.overlaps import OverlapCheck
@@ -52,7 +52,7 @@ class StepResult:
     """
 
     observations: Observations
-    infos: Mapping[str, dict[str, Any]]
+    infos: ByAgent
     events: list[Event]
     hash: str
 
@@ -72,9 +72,10 @@ class Simulation:
         What never changes about the world; None takes the one that is kept with the world.
     renderer
         Renders what agents see; None makes the usual one the first time it is needed.
-    defer_rgb
-        RGB of observations is worked on while the next step goes on: faster where nobody but a recorder looks at it.
-        It must not be read before what `Simulation.rgb_waiter` returns was called.
+    defer_pictures
+        Observations do not wait for their pictures, which must not be read before what `Simulation.picture_waiter`
+        returns was called: for a recorder that looks at them later. Otherwise, pictures are worked on while the
+        simulation goes on, and are there as soon as somebody asks for the observation that they are of.
 
     Attributes
     ----------
@@ -97,7 +98,7 @@ class Simulation:
         *,
         base: SimulationBase | None = None,
         renderer: ObservationRenderer | None = None,
-        defer_rgb: bool = False,
+        defer_pictures: bool = False,
     ) -> None:
         if community is not None and community.world.digest != world.digest:
             raise InputError(
@@ -107,7 +108,7 @@ class Simulation:
         self.base = base or SimulationBase.of(world)
         self.base.require(world)
         self.world = world
-        self.defer_rgb = defer_rgb
+        self.defer_pictures = defer_pictures
         self.community = community
         self.config = config or SimConfig()
         self.metrics = Metrics()
@@ -211,13 +212,14 @@ class Simulation:
         due = self.periods.due(self.state.tick)
         return [name for name, now in zip(self.agents, due.tolist(), strict=True) if now]
 
-    def observe(self, who: Sequence[str] | None = None) -> tuple[Observations, Mapping[str, dict[str, Any]]]:
+    def observe(self, who: Sequence[str] | None = None) -> tuple[Observations, ByAgent]:
         """Return observations and infos as things stand, of all agents or of some."""
         watch = StopWatch(self.metrics.seconds)
         names = self.agents
         asked = None if who is None or len(who) == len(names) else _indices(tuple(who), names)
         seeing = self.seeing if asked is None else [i for i in self.seeing if i in asked]
-        result = observe(self.state, seeing, self.renderer if seeing else None, who=asked)
+        renderer = self.renderer if seeing else None
+        result = observe(self.state, seeing, renderer, who=asked, waits=not self.defer_pictures)
         watch.lap("observations")
         return result
 
@@ -233,9 +235,9 @@ class Simulation:
         self._attached = True
         return self._renderer
 
-    def rgb_waiter(self) -> Callable[[], None]:
-        """Return what to call, from any thread, to wait for the RGB of the last observations."""
-        return self._renderer.rgb_waiter() if self._renderer is not None else lambda: None
+    def picture_waiter(self) -> Callable[[], None]:
+        """Return what to call, from any thread, to wait for the pictures of the last observations."""
+        return self._renderer.picture_waiter() if self._renderer is not None else lambda: None
 
     @property
     def existing_renderer(self) -> ObservationRenderer | None:

@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.render.records import LIGHT_UNIFORMS
+
 
 class ShadowMap(NamedTuple):
     """What the sun sees of the static scene.
@@ -62,3 +64,13 @@ class Light(NamedTuple):
     sky: NDArray[np.uint32]
     shadow: ShadowMap
     relief: ReliefMap
+
+
+#: For pictures without colours.
+NO_LIGHT = Light(
+    np.zeros(1, LIGHT_UNIFORMS)[0],
+    np.zeros(1, np.uint8),
+    np.zeros(1, np.uint32),
+    ShadowMap(np.zeros((1, 1), np.uint16), np.zeros((3, 4), np.float32)),
+    ReliefMap(np.zeros((1, 1), np.float32), 0.0, 0.0, 0.0),
+)

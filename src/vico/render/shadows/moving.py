@@ -27,6 +27,8 @@ _AVATAR_HALF_WIDTH = 0.30
 _SOFT_BALL, _SOFT_BOX = 0.22, 0.5
 # The longest shadow, metres; a sun this low casts no longer ones.
 _LONGEST_SHADOW, _LOWEST_SUN = 14.0, 0.08
+# Out of doors, what is further away than this casts no shadow, metres.
+_OUTDOOR_REACH = 70.0
 # Contact shadows: how far from the middle they reach (in half axes), how steeply they grow, how dark at most.
 _ROUND_EDGE, _BOX_EDGE, _ROUND_GAIN, _BOX_GAIN, _DARKEST = 2.0, 1.25, 1.5, 4.0, 0.75
 # Half the height of the layer at the ground in which they lie, metres.
@@ -58,16 +60,31 @@ def new_caster() -> Record:
     return np.zeros(1, CASTER)[0]
 
 
-def is_disturbed(scene: Any, camera: Record, light: Record, coarse: CoarseDepth, reach: float) -> bool:
+@inlined
+def _shadow_reach(camera: Any) -> float:
+    """Return how near moving things must be to cast a shadow into a view, metres: in a room, those in it or close."""
+    if camera.indoors == 0:
+        return _OUTDOOR_REACH
+    return np.sqrt(camera.room_half_length**2 + camera.room_half_width**2) * 2.0 + 1.0
+
+
+@kernel
+def is_disturbed(scene: Any, camera: Any, light: Any, coarse: Any, scratch: Any) -> bool:
     """Return whether a moving thing may be seen in a room, or darken something that is.
 
-    `coarse` is the depth of the room without such things: what lies behind all of it is hidden.
+    `coarse`, a `CoarseDepth`, is that of the room without such things: what lies behind all of it is hidden. `scratch`
+    is as from `new_scratch`.
     """
-    model_view, box = np.zeros(1, MODEL_VIEW)[0], np.zeros(1, BOX)[0]
-    return bool(
-        _may_instance_be_noticed(scene, camera, light, coarse, reach, new_caster(), model_view, box)
-        or _may_avatar_be_noticed(scene, camera, coarse, model_view, box)
-    )
+    caster, model_view, box = scratch
+    reach = _shadow_reach(camera)
+    if _may_instance_be_noticed(scene, camera, light, coarse, reach, caster, model_view, box):
+        return True
+    return bool(_may_avatar_be_noticed(scene, camera, coarse, model_view, box))
+
+
+def new_scratch() -> tuple[Record, Record, Record]:
+    """Return empty `CASTER`, `MODEL_VIEW` and `BOX` records."""
+    return new_caster(), np.zeros(1, MODEL_VIEW)[0], np.zeros(1, BOX)[0]
 
 
 @inlined
@@ -222,13 +239,13 @@ def is_avatar_hidden(scene: Any, avatar: int, camera: Any) -> bool:
 
 
 @kernel
-def cast_moving(scene: Any, camera: Any, light: Any, buffers: Any, reach: float, caster: Any) -> bool:
+def cast_moving(scene: Any, camera: Any, light: Any, buffers: Any, caster: Any) -> bool:
     """Darken `buffers.sun` and `buffers.contact` where moving things stand between a pixel and the sun or the ground.
 
     Rigid things cast the shadow of their bounding box, avatars that of an ellipsoid; the longer the light's way
-    through it, the darker, which softens the rim. Only casters within `reach` metres are taken. Return whether there
-    were any.
+    through it, the darker, which softens the rim. Far casters are passed over. Return whether there were any.
     """
+    reach = _shadow_reach(camera)
     # Taken out of their tuples once: that costs as much as a caster that is far away.
     clusters, base, slots = len(scene.cluster_where), buffers.base, buffers.slot
     spheres, lows, highs = scene.instances.sphere, scene.avatars.low, scene.avatars.high
