@@ -62,3 +62,10 @@ def test_getting_around_prints_trips_and_arrives(helsinki_path: Path) -> None:
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.name)
 def test_each_example_says_how_it_is_run(path: Path) -> None:
     assert f"python examples/{path.name} " in path.read_text()
+
+
+def test_events_close_a_street_and_cut_the_power(helsinki_path: Path) -> None:
+    printed = run("08_events.py", "--world", str(helsinki_path), "--street", "Mikonkatu", "--steps", "60")
+    assert "known (announced): new pipes" in printed
+    assert "2 barriers stand" in printed
+    assert "0 of 15 cars on Mikonkatu, 0 vanished" in printed

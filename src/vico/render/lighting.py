@@ -47,6 +47,8 @@ class Lighting:
         How wet open ground is, and how far under snow, 0..1.
     rain, snowfall
         Water that falls, mm/h.
+    unlit
+        Ground on which all that is fixed and shines is out: x, y and radius of a circle, ENU metres.
     """
 
     sun_direction: Colour = (-0.45, -0.55, 0.75)
@@ -64,6 +66,7 @@ class Lighting:
     snow_cover: float = 0.0
     rain: float = 0.0
     snowfall: float = 0.0
+    unlit: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @classmethod
     def at(

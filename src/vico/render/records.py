@@ -136,6 +136,9 @@ LIGHT_UNIFORMS = np.dtype(
         ("snow_cover", f4),  # share of what looks up that is under snow, 0..1
         ("rain", f4),  # mm/h of water
         ("snowfall", f4),
+        ("unlit_x", f4),  # circle on which all that is fixed and shines is out, metres
+        ("unlit_y", f4),
+        ("unlit_radius", f4),  # 0 for none
     ],
     align=True,
 )
@@ -171,11 +174,11 @@ TRIANGLE_SETUP = np.dtype(
         ("texture_width", f4),  # of the finest level, texels
         ("texture_height", f4),
         ("material", i4),
-        ("flags", i4),  # bits FLAT_NORMAL, PLAIN_COLOUR, TWO_SIDED and SHELTERED (nothing lies on it)
+        ("flags", i4),  # bits FLAT_NORMAL, PLAIN_COLOUR, TWO_SIDED, SHELTERED (nothing lies on it), MOVES
     ],
     align=True,
 )
-FLAT_NORMAL, PLAIN_COLOUR, TWO_SIDED, SHELTERED = 1, 2, 4, 8
+FLAT_NORMAL, PLAIN_COLOUR, TWO_SIDED, SHELTERED, MOVES = 1, 2, 4, 8, 16
 
 # Something that moves, as it casts a shadow.
 CASTER = np.dtype(

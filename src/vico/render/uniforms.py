@@ -67,6 +67,7 @@ def light_uniforms(light: Lighting) -> Record:
     _set_colour(uniforms, "cloud_shade", cloud * 0.60)
     for name in ("wet", "snow_cover", "rain", "snowfall"):
         uniforms[name] = getattr(light, name)
+    uniforms["unlit_x"], uniforms["unlit_y"], uniforms["unlit_radius"] = light.unlit
     return uniforms
 
 

@@ -9,12 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.sim.environment import Occurrence
+from vico.sim.hearing import heard_from
+from vico.sim.perception import is_clear, opaque_grid
 from vico.sim.simulation_state import SimulationState
 
 #: How those know of an event who were told of it beforehand.
 ANNOUNCED = "announced"
 #: How near a notice at a door can be read, metres.
 NOTICE = 5.0
+#: How loud an event has to be to be noticed, dB: 10 more than a street.
+HEARD = 55.0
+# Things are looked at so far above their feet, by eyes so far above the ground, metres.
+_LOOKED_AT, _EYES = np.array([0.0, 0.0, 0.8]), np.array([0.0, 0.0, 1.5])
 
 
 def follow_city_events(state: SimulationState) -> None:
@@ -66,7 +72,18 @@ def _noticed(one: Occurrence, pose: NDArray[np.float64], state: SimulationState)
     doors = [state.base.doors[state.place_index[place]] for place in _shut_by(one, state)]
     if any(math.hypot(*(door - pose[:2])) <= NOTICE for door in doors):
         return "notice"
-    return ""
+    if one.noise and heard_from(one.noise, float(np.linalg.norm(one.middle - pose[:3]))) > HEARD:
+        return "heard"
+    return "seen" if _is_seen(one, pose, state) else ""
+
+
+def _is_seen(one: Occurrence, pose: NDArray[np.float64], state: SimulationState) -> bool:
+    """Return whether one of an event's things is within sight, whichever way one looks, and nothing hides it."""
+    things = state.things.of_event(one.id)
+    eye = pose[:3] + _EYES
+    near = np.hypot(*(things.position[:, :2] - eye[:2]).T) <= state.environment.sight_of(things.position)
+    grid = opaque_grid(state.world)
+    return any(is_clear(eye, at + _LOOKED_AT, grid) for at in things.position[near])
 
 
 def _shut_by(one: Occurrence, state: SimulationState) -> list[str]:

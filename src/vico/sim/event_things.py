@@ -86,6 +86,10 @@ class EventThings:
         """Return everything that stands."""
         return self._bodies
 
+    def of_event(self, number: int) -> Bodies:
+        """Return what stands for one event."""
+        return self._bodies.where((self._bodies.entity - FIRST_THING) // THINGS_EACH == number)
+
     def draw(self) -> Drawn:
         """Return what to draw."""
         things = list(self._standing.values())

@@ -186,7 +186,16 @@ class SceneRenderer:
         environment, weather = state.environment, state.environment.weather
         # All that decides the light: a restore or a change of weather may come within the same minute.
         ground = environment.wet, environment.snow_cover, environment.ice
-        lit = (moment, weather.clouds, weather.rain, weather.snow, weather.visibility, environment.lamps, *ground)
+        lit: tuple[float, ...] = (
+            moment,
+            weather.clouds,
+            weather.rain,
+            weather.snow,
+            weather.visibility,
+            environment.lamps,
+            *ground,
+        )
+        lit += tuple(value for circle in environment.agenda.effects.dark for value in circle)
         self._scene.moment = state.second
         if lit != self._lit:
             self._lit = lit
@@ -284,7 +293,14 @@ def _lighting(environment: Environment, second: float) -> Lighting:
     )
     cover = environment.snow_cover
     wet = max(environment.wet, _ICE_SHINES * environment.ice) * (1.0 - cover)
-    return replace(light, wet=wet, snow_cover=cover, rain=weather.rain, snowfall=weather.snow)
+    return replace(
+        light, wet=wet, snow_cover=cover, rain=weather.rain, snowfall=weather.snow, unlit=_widest(environment)
+    )
+
+
+def _widest(environment: Environment) -> tuple[float, float, float]:
+    """Return the largest circle of ground on which the power is cut; a radius of 0 for none."""
+    return max(environment.agenda.effects.dark, key=lambda circle: circle[2], default=(0.0, 0.0, 0.0))
 
 
 def _motion_of_agents(state: SimulationState) -> _Motion:

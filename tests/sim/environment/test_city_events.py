@@ -17,6 +17,7 @@ from vico.errors import VicoError
 from vico.seeds import rng
 from vico.sim.config import SimConfig
 from vico.sim.environment import Agenda, CityEvent, EventSites, event_kinds
+from vico.sim.event_things import FIRST_THING, THINGS_EACH
 from vico.sim.hearing import noise_at
 from vico.sim.recorder import Recorder
 from vico.sim.recording import read_run
@@ -267,3 +268,55 @@ def test_road_works_drown_what_is_said_beside_them(works: dict[str, Any]) -> Non
     assert noise_at(sim.state, beside) > 77.0
     assert noise_at(sim.state, far) < 65.0
     assert noise_at(works["none"]["sim"].state, beside) < 72.0
+
+
+# Power cuts, markets, accidents.
+
+
+def test_when_the_power_is_cut_shops_close_and_bodies_are_seen_less_far() -> None:
+    seen = {}
+    for cut in (False, True):
+        sim = simulation(start=23 * 3600, date="2026-01-15", weather="clear")
+        if cut:
+            sim.state.environment.start_event("power_cut", region=(0.0, 0.0, 30.0))
+        people = sim.state.people
+        people.room[:] = people.place[:] = -1
+        people.position[:] = [[-38.0, -38.0 + k, 0.0] for k in range(len(people))]
+        people.position[0, :2], people.position[1, :2], people.yaw[0] = (-10.0, -20.0), (12.0, -20.0), 0.0
+        _, infos = sim.observe()
+        shut = sorted(sim.state.environment.agenda.effects.shut)
+        seen[cut] = [body.agent for body in infos["resident_0"]["in_view"]], shut
+    assert seen[False] == (["resident_1"], [])
+    assert seen[True] == ([], ["place_cafe", "place_shop"])
+
+
+def test_in_a_power_cut_windows_and_lamps_of_its_district_are_dark(helsinki: World) -> None:
+    night = SimConfig(seed=1, assistants=1, transit=False, start=23 * 3600, date="2026-01-15", image=64)
+    sim = Simulation(helsinki, None, night)
+    people = sim.state.people
+    people.position[0, :2], people.yaw[0] = (-35.7, 121.2), -1.5
+    bright = [sim.observe()[0]["assistant_0"]["rgb"].mean()]
+    number = sim.state.environment.start_event("power_cut", region=(0.0, 0.0, 400.0))
+    bright.append(sim.observe()[0]["assistant_0"]["rgb"].mean())
+    sim.state.environment.end_event(number)
+    bright.append(sim.observe()[0]["assistant_0"]["rgb"].mean())
+    assert bright[1] < 0.9 * bright[0]
+    assert bright[2] == bright[0]
+
+
+def test_stalls_stand_at_a_market_and_cars_at_an_accident_and_touch_nobody(helsinki: World) -> None:
+    sim = traffic(helsinki)
+    sim.check_overlaps()
+    market = sim.state.environment.start_event("market", region=(60.0, -120.0, 60.0))
+    crash = sim.state.environment.start_event("accident", street=STREET)
+    for _ in range(60):
+        sim.step({})
+    things = sim.state.things.bodies()
+    of_event = (things.entity - FIRST_THING) // THINGS_EACH
+    assert [int((of_event == number).sum()) for number in (market, crash)] == [8, 2]
+    assert [sim.state.entity(int(entity))["kind"] for entity in things.entity[of_event == crash]] == ["car"] * 2
+    sim.state.environment.end_event(market)
+    sim.step({})
+    assert len(sim.state.things) == 2
+    assert sim.overlap_check is not None
+    assert sim.overlap_check.count == 0

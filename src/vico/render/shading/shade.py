@@ -12,7 +12,7 @@ import numpy as np
 
 from vico.render.arrays import QUEUE, RUN, SETUPS, STRIDE
 from vico.render.compiled import inlined, kernel
-from vico.render.records import FLAT_NORMAL, PLAIN_COLOUR, SHELTERED, TWO_SIDED
+from vico.render.records import FLAT_NORMAL, MOVES, PLAIN_COLOUR, SHELTERED, TWO_SIDED
 from vico.render.shading.pixels import (
     AROUND,
     BLUE,
@@ -151,6 +151,7 @@ def shade(
     indoors, width, eye = camera.indoors != 0, camera.width, _eye(camera)
     is_covered = light.uniforms.snow_cover > _ZERO or light.uniforms.wet > _ZERO
     flat_out = out.reshape(-1)
+    unlit = _Circle(light.uniforms.unlit_x, light.uniforms.unlit_y, light.uniforms.unlit_radius)
     _clear(real, whole)
     _clear(sky_real, sky_whole)
     for i in range(STRIDE):
@@ -191,17 +192,18 @@ def shade(
                 ray = _ray_at(left, eye, column)
                 window = _texture_window(setup, planes, middle, materials, texel_start, camera.most_taps)
                 taps = max(taps, window.taps)
-                open_sky = _ONE
+                open_sky, own = _ONE, shine
                 if not indoors:
                     x, y, z = _before_surface(setup, middle, _ray_at(left, eye, column + 0.5 * (count - 1)), camera)
                     open_sky = np.float32(sky_visibility(relief_height, relief_frame, x, y, z))
+                    own = _own_light(setup, shine, unlit, x, y)
                     if is_covered and setup.flags & SHELTERED:
                         open_sky = -open_sky  # `cover_ground` puts it right again
                 at = queued & _POSITION
                 _queue_places(real, at, setup, planes, column, ray, eye, window)
                 _queue_colours(real, at, setup)
                 _queue_normals(real, at, setup, eye)
-                _queue_constants(real, at, window.du, window.dv, open_sky, shine)
+                _queue_constants(real, at, window.du, window.dv, open_sky, own)
                 _queue_addresses(whole, at, window, offset + column)
                 queued += count
                 column += count
@@ -212,6 +214,22 @@ def shade(
         finish(light, camera, texels, queue, moving, queued, taps, flat_out)
     if sky_queued:
         finish_sky(sky, sky_queue, sky_queued, flat_out)
+
+
+class _Circle(NamedTuple):
+    """Ground on which the power is cut, metres."""
+
+    x: Any
+    y: Any
+    radius: Any
+
+
+@inlined
+def _own_light(setup: Any, shine: Any, unlit: Any, x: Any, y: Any) -> Any:
+    """Return what a surface shines at a point: nothing where the power is cut, unless it moves."""
+    if unlit.radius <= _ZERO or setup.flags & MOVES:
+        return shine
+    return _ZERO if (x - unlit.x) ** 2 + (y - unlit.y) ** 2 <= unlit.radius**2 else shine
 
 
 @inlined

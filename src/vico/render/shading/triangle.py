@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from vico.render.compiled import inlined
-from vico.render.records import DOUBLE_SIDED, FLAT_NORMAL, PLAIN_COLOUR, SHELTERED, TWO_SIDED
+from vico.render.records import DOUBLE_SIDED, FLAT_NORMAL, MOVES, PLAIN_COLOUR, SHELTERED, TWO_SIDED
 from vico.render.visibility.culling import set_instance_view, set_world_view
 from vico.render.visibility.draw import item_of
 
@@ -44,6 +44,7 @@ def set_up_triangle(scene: Any, camera: Any, buffers: Any, drawn: int, number: i
     is_person = code >= clusters + scene.counts.instances
     setup.flags = (FLAT_NORMAL if flat else 0) | (PLAIN_COLOUR if plain else 0) | (TWO_SIDED if both else 0)
     setup.flags |= SHELTERED if is_person else 0
+    setup.flags |= MOVES if code >= clusters + scene.counts.static_instances else 0
 
 
 @inlined

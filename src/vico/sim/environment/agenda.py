@@ -64,6 +64,8 @@ class EventEffects(NamedTuple):
         Ground nobody is to walk on: x, y and radius of circles, ENU metres; as `Trips.plan` takes them.
     noises
         Events that can be heard, each with its dB at 10 m.
+    dark
+        Where lamps, windows and signs are out: x, y and radius of circles, ENU metres.
     """
 
     shut: Mapping[str, Occurrence]
@@ -71,6 +73,7 @@ class EventEffects(NamedTuple):
     walkways: NDArray[np.bool_] | None = None
     ground: tuple[tuple[float, float, float], ...] = ()
     noises: tuple[tuple[Occurrence, float], ...] = ()
+    dark: tuple[tuple[float, float, float], ...] = ()
 
 
 _NOTHING = EventEffects({})
@@ -261,6 +264,7 @@ def effects_of(going_on: Sequence[Occurrence], sites: EventSites) -> EventEffect
         _union([sites.walkways_of(one.event) for one in closing]),
         tuple(circle for one in closing for circle in one.circles),
         loud,
+        tuple(one.event.region for one in going_on if one.kind.dark and one.event.region is not None),
     )
 
 

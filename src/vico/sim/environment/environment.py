@@ -128,6 +128,9 @@ class Environment:
     @cached_property
     def conditions(self) -> Conditions:
         """What it is like for whoever moves or looks outdoors."""
+        return self._conditions(self.lamps)
+
+    def _conditions(self, lamps: float) -> Conditions:
         weather = self.weather
         return conditions(
             rain=weather.rain,
@@ -137,8 +140,19 @@ class Environment:
             cover=self.snow_cover,
             ice=self.ice,
             dark=self.dark,
-            lamps=self.lamps,
+            lamps=lamps,
         )
+
+    def sight_of(self, points: NDArray[np.float64]) -> float | NDArray[np.float64]:
+        """Return how far off what is at some points outdoors (ENU metres, shape ``(n, 3)``) is noticed, metres.
+
+        One for all, unless lamps are out somewhere.
+        """
+        dark = self.agenda.effects.dark
+        if not dark:
+            return self.conditions.sight
+        unlit = np.any([np.hypot(points[:, 0] - x, points[:, 1] - y) <= radius for x, y, radius in dark], axis=0)
+        return np.where(unlit, self._conditions(0.0).sight, self.conditions.sight)
 
     def record(self) -> dict[str, Any]:
         """Return what anybody outdoors notices: the weather, the ground, and how dark it is."""

@@ -8,9 +8,16 @@ import numpy as np
 
 from vico.sim.environment.agenda import Occurrence
 from vico.sim.environment.event_sites import EventSites
+from vico.world.walkable import ROADWAY
 
 # A barrier stands so far within its lane, metres, or in its middle if that is nearer.
 _INTO_LANE = 4.0
+#: What stands across closed lanes.
+BARRIER = "road_barrier"
+# Stalls stand so far apart, with so much free ground around the middle of each, and of a stage, metres.
+_APART, _STALL_ROOM, _STAGE_ROOM = 5.0, 2.2, 5.0
+# Cars that have run into each other: metres between their middles, and radians that the one behind is askew.
+_CAR_APART, _ASKEW = 5.6, 0.2
 
 
 class Spot(NamedTuple):
@@ -24,13 +31,54 @@ class Spot(NamedTuple):
 
 def spots_of(one: Occurrence, sites: EventSites) -> list[Spot]:
     """Return where an event's things stand, always in the same order."""
-    return [spot for model in one.kind.things if one.kind.lanes for spot in _before_lanes(model, one, sites)]
+    if not one.kind.lanes:
+        return _over_ground(one, sites)
+    models = list(one.kind.things)
+    if models == [BARRIER]:
+        return _before_lanes(BARRIER, one, sites)
+    return _on_a_lane(models, one, sites)
+
+
+def _over_ground(one: Occurrence, sites: EventSites) -> list[Spot]:
+    """Return spots on a grid round the middle, the nearest first, as many as there is open ground for."""
+    models = [model for model, count in one.kind.things.items() for _ in range(count)]
+    reach = one.kind.radius if one.event.region is None else one.event.region[2]
+    steps = np.arange(-np.floor(reach / _APART), np.floor(reach / _APART) + 1) * _APART
+    grid = np.array([(x, y) for x in steps for y in steps if x * x + y * y <= reach * reach]).reshape(-1, 2)
+    grid = grid[np.lexsort((grid[:, 1], grid[:, 0], np.round(np.hypot(*grid.T), 3)))]
+    points = grid + one.middle[:2]
+    walkable = sites.world.walkable
+    free = walkable.is_connected(points) & (
+        walkable.clearance_at(points) >= (_STAGE_ROOM if len(models) == 1 else _STALL_ROOM)
+    )
+    free &= walkable.class_at(points) != ROADWAY
+    chosen = points[free][: len(models)]
+    return [Spot(model, float(x), float(y), 0.0) for model, (x, y) in zip(models, chosen, strict=False)]
+
+
+def _on_a_lane(models: list[str], one: Occurrence, sites: EventSites) -> list[Spot]:
+    """Return spots one behind the other in the middle of the longest closed lane that no bus takes, askew."""
+    lanes, closed = sites.world.lanes, sites.lanes_of(one.event)
+    usable = [k for k in np.flatnonzero(closed).tolist() if k not in _lanes_of_buses(sites)]
+    if not usable or not models:
+        return []
+    lane = max(usable, key=lambda k: (float(lanes.length[k]), -k))
+    found = []
+    for k, model in enumerate(models):
+        x, y, yaw = lanes.at(lane, max(float(lanes.length[lane]) / 2 - _CAR_APART * k, 0.0)).tolist()
+        found.append(Spot(model, x, y, yaw + _ASKEW * k))
+    return found
+
+
+def _lanes_of_buses(sites: EventSites) -> set[int]:
+    index = sites.world.lanes.index
+    return {index[lane] for line in sites.world.transit.lines for lane in line.lanes if lane in index}
 
 
 def _before_lanes(model: str, one: Occurrence, sites: EventSites) -> list[Spot]:
     """Return a spot across each closed lane where cars could drive in; buses' lanes stay free."""
     lanes, closed = sites.world.lanes, sites.lanes_of(one.event)
-    buses = {lanes.index[lane] for line in sites.world.transit.lines for lane in line.lanes if lane in lanes.index}
+    buses = _lanes_of_buses(sites)
     found = []
     for lane in np.flatnonzero(closed).tolist():
         through = [k for k in lanes.preceding(lane).tolist() if lanes.inside[k] < 0 and closed[k]]

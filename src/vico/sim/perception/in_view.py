@@ -190,7 +190,7 @@ def in_view(
     opaque: OpaqueGrid,
     entities: Mapping[int, Mapping[str, str]],
     *,
-    sight: float = SIGHT,
+    sight: float | NDArray[np.float64] = SIGHT,
 ) -> AllInView:
     """Return what each agent has in view.
 
@@ -203,7 +203,7 @@ def in_view(
     entities
         Name and agent of each body by entity.
     sight
-        How far bodies are noticed outdoors, metres; at most `SIGHT`.
+        How far off bodies are noticed outdoors, metres, one for all or one each; at most `SIGHT`.
     """
     looked_at = bodies.position + np.column_stack([np.zeros((len(bodies), 2)), _LOOKED_AT * bodies.height])
     keys = _keys(looked_at, spaces)
@@ -211,9 +211,9 @@ def in_view(
     who, what, far = _pairs(
         np.column_stack([eyes.position, np.cos(eyes.yaw), np.sin(eyes.yaw)]),
         np.column_stack([eyes.entity, eyes.space]).astype(np.int64),
-        looked_at,
+        np.column_stack([looked_at, np.broadcast_to(sight, len(bodies))]),
         np.column_stack([bodies.entity, spaces]).astype(np.int64),
-        np.array([SIGHT, math.cos(_HALF_ANGLE), _FREE_END, opaque.half, opaque.cell, sight]),
+        np.array([SIGHT, math.cos(_HALF_ANGLE), _FREE_END, opaque.half, opaque.cell]),
         opaque.top,
         keys[by_key],
         by_key,
@@ -271,10 +271,10 @@ def _pairs(eyes, mine, targets, theirs, limits, top, keys, order):  # type: igno
 @compiled
 def _distance_in_view(eye, target, outdoors, limits, top):  # type: ignore[no-untyped-def]
     """Return how far away a point in the same space is, metres; -1 if it is out of view."""
-    farthest, cosine, free_end, half, cell, sight = limits
+    farthest, cosine, free_end, half, cell = limits
     dx, dy = target[0] - eye[0], target[1] - eye[1]
     away = math.sqrt(dx * dx + dy * dy)
-    if away > (sight if outdoors else farthest) or dx * eye[3] + dy * eye[4] < cosine * away:
+    if away > (target[3] if outdoors else farthest) or dx * eye[3] + dy * eye[4] < cosine * away:
         return -1.0
     if outdoors and not _is_clear(eye, target, away, free_end, half, cell, top):
         return -1.0
