@@ -9,6 +9,7 @@ import numpy as np
 
 from vico.io.compiled import compiled
 from vico.sim.traffic.leader import NO_GAP
+from vico.sim.traffic.letting_in import room_to_change
 from vico.sim.traffic.path import footprint
 from vico.sim.traffic.route import NEVER, is_lane_of_stop
 from vico.sim.traffic.state import NONE
@@ -52,11 +53,11 @@ def desired_speed(net, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def stop_and_speed_limit(net, vehicle, look, stop_distance, wanted):  # type: ignore[no-untyped-def]
+def stop_and_speed_limit(net, vehicle, look, stop_distance, let_in_distance, wanted):  # type: ignore[no-untyped-def]
     """Return where a vehicle has to stop and how fast it may be now.
 
-    It stops at its bus stop, before a junction it may not enter, and at its path's end; it slows down in time for
-    lower limits ahead.
+    It stops at its bus stop, before a junction it may not enter, where it lets a bus in, and at its path's end; it
+    slows down in time for lower limits ahead.
 
     Parameters
     ----------
@@ -64,6 +65,8 @@ def stop_and_speed_limit(net, vehicle, look, stop_distance, wanted):  # type: ig
         Metres ahead that count.
     stop_distance
         Metres to a bus stop on its own lane, `NEVER` for none.
+    let_in_distance
+        Metres to where it lets a bus in, `NEVER` for none.
     wanted
         Desired speed on its own lane, m/s.
 
@@ -88,8 +91,12 @@ def stop_and_speed_limit(net, vehicle, look, stop_distance, wanted):  # type: ig
         if is_lane_of_stop(net, vehicle, k + 1):
             stop = ahead + vehicle.stop_offset
         ahead += net.lanes[lane].length
-    if is_bus and stop >= NEVER and ahead < look:
-        stop = max(ahead - _BEFORE_LANE_END, 0.0)  # the route goes on in the lane beside: wait for room to change
+    if is_bus and stop >= NEVER:
+        # The route goes on in the lane beside: wait for room to change.
+        ahead -= room_to_change(net, vehicle) if vehicle.planned_count == 0 else _BEFORE_LANE_END
+        if ahead < look:
+            stop = max(ahead, 0.0)
+    stop = min(stop, let_in_distance)
     if stop < NEVER:
         limit_now = min(limit_now, np.sqrt(2 * vehicle.braking * stop))
     return stop, limit_now

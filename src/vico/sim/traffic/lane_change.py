@@ -6,11 +6,13 @@ import numpy as np
 
 from vico.io.compiled import compiled
 from vico.sim.traffic.leader import ANY_BODY, TOUCH, touched_at
+from vico.sim.traffic.letting_in import lane_to_change_to
 from vico.sim.traffic.path import PATH_POINT, changing_lane, lane_polyline, point_on_path, project_on_polyline
-from vico.sim.traffic.route import advance_on_route, route_lane
+from vico.sim.traffic.route import advance_on_route
 from vico.sim.traffic.state import NONE
 
 _REAR_GAP, _FRONT_GAP = 7.0, 8.0  # m that have to be free on the other lane behind the front's place and ahead of it
+_LET_IN_GAP, _CUT_IN_GAP = 2.0, 3.0  # m behind a bus that is let in, and ahead of it
 _VEHICLE_GAP, _PERSON_GAP = 0.1, 0.3  # m kept sideways on the other lane
 _LANE_POINTS = 64
 _QUEUE_GAP, _QUEUE_SPEED = 15.0, 0.5  # m, share of the desired speed: nearer and slower leaders are a queue
@@ -57,26 +59,28 @@ def change_to_emptier_lane(net, fleet, vehicle, view):  # type: ignore[no-untype
 @compiled
 def change_as_route_does(net, vehicle, view):  # type: ignore[no-untyped-def]
     """Move a bus to the neighbour lane where its route goes on, if it does and there is a gap."""
-    lane = vehicle.lane
-    beside = route_lane(net, vehicle, 1)
-    is_beside = beside == net.lanes[lane].left or beside == net.lanes[lane].right
-    if is_beside and change_lane(net, vehicle, beside, view):
+    beside = lane_to_change_to(net, vehicle)
+    if beside >= 0 and change_lane(net, vehicle, beside, view):
         advance_on_route(net, vehicle)
 
 
 @compiled
-def is_gap_accepted(net, target, offset, lateral_offset, view):  # type: ignore[no-untyped-def]
+def is_gap_accepted(net, target, offset, lateral_offset, is_let_in, view):  # type: ignore[no-untyped-def]
     """Return whether nobody is in the way on lane `target`, from a gap behind to the end of the lane change.
 
     Parameters
     ----------
     offset, lateral_offset
         Where the vehicle is now, seen from that lane: metres along it and to the left of it.
+    is_let_in
+        Whether others make room for it.
     """
     path = lane_polyline(net, target, np.empty(_LANE_POINTS, PATH_POINT))
     straight = changing_lane(view.outline, 0.0, 0.0)
+    # A bus is let in: who is behind it waits for it, and it may wait for who is ahead of it.
+    behind, ahead = (_REAR_GAP, _FRONT_GAP + view.outline.length) if not is_let_in else (_LET_IN_GAP, _CUT_IN_GAP)
     for i in range(9):
-        there = offset - _REAR_GAP + (_REAR_GAP + _FRONT_GAP + view.outline.length) * i / 8
+        there = offset - behind + (behind + ahead) * i / 8
         if there > net.lanes[target].length:
             continue
         if touched_at(path, straight, there, view.nearby, _VEHICLE_GAP, _PERSON_GAP) >= 0:
@@ -100,7 +104,7 @@ def change_lane(net, vehicle, target, view):  # type: ignore[no-untyped-def]
     offset, lateral_offset = project_on_polyline(net.points, net.along, lane.first_point, lane.end_point, x, y)
     if offset < length + 2.0 or offset > lane.length - 1.0:
         return False
-    if not is_gap_accepted(net, target, offset, lateral_offset, view):
+    if not is_gap_accepted(net, target, offset, lateral_offset, vehicle.route >= 0, view):
         return False
     vehicle.lane, vehicle.offset, vehicle.planned_count = target, offset, 0
     vehicle.lateral_offset, vehicle.lane_change_distance = lateral_offset, 0.0

@@ -48,6 +48,7 @@ from vico.sim.traffic.leader import (
     touched_at,
     touches,
 )
+from vico.sim.traffic.letting_in import distance_to_let_in, places_to_let_in
 from vico.sim.traffic.path import (
     LANE_CHANGE,
     PATH_POINT,
@@ -59,7 +60,7 @@ from vico.sim.traffic.path import (
     vehicle_outline,
 )
 from vico.sim.traffic.random_stream import next_random
-from vico.sim.traffic.route import advance_lane, can_step_back, plan_lanes, step_back_lane
+from vico.sim.traffic.route import NEVER, advance_lane, can_step_back, plan_lanes, step_back_lane
 from vico.sim.traffic.state import NONE
 
 STANDING = 0.1  # slower is standing, m/s ...
@@ -69,6 +70,7 @@ _REVERSE = 0.6  # m/s
 _BLOCKER_GAP = 3.0  # m within which a leader is what a standing vehicle stands before
 _CREEP = 1.0  # a vehicle that is refused a junction waits for it below this speed, m/s
 _OTHER_WAY_AFTER = 15.0  # s of waiting for a junction after which a car looks for another way, every 50 steps
+_BEFORE_JUNCTION = 1.0  # m before a lane's end at which a bus taken out of a jam goes on
 _BEYOND_JUNCTION = 60.0  # m seen beyond a junction that is asked for
 
 
@@ -87,6 +89,7 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
     """
     note_longest_waits(fleet, junctions)
     backs_up = vehicles_backing_up(net, fleet, shapes, dt)
+    places = places_to_let_in(net, fleet, shapes)
     buffers = np.empty(len(shapes.x), NEARBY_BODY), np.empty(len(shapes.x), NEARBY_BODY)
     beyond = Surroundings(shapes, grid, np.empty(len(shapes.x), np.int64), np.empty(len(shapes.x), NEARBY_BODY))
     path_buffer = np.empty(PATH_POINTS, PATH_POINT)
@@ -99,12 +102,12 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
             vehicle.granted_count = 0
             release_junctions(net, junctions, vehicle)
 
-        stop_distance = distance_to_stop(vehicle)
+        stop_distance, let_in_distance = distance_to_stop(vehicle), distance_to_let_in(vehicle, places)
         request = next_junction_request(net, vehicle, stop_distance, braking_distance(vehicle), path_ends)
         view = _look_around(net, vehicle, request, (path_buffer, buffers[0]), beyond)
         gap, leader = find_leader(view, vehicle.offset, look, buffers[1])
         # Who is behind another vehicle does not ask: it would hold the junction that the other one needs.
-        is_behind = 0 <= leader < len(fleet) and gap < request.distance
+        is_behind = (0 <= leader < len(fleet) and gap < request.distance) or let_in_distance < request.distance
         vehicle.queued_junction = vehicle.queued_exit = NONE
         is_refused = (
             request.planned_index >= 0
@@ -114,7 +117,7 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         vehicle.junction_wait = vehicle.junction_wait + dt if is_refused and speed < _CREEP else 0.0
 
         wanted = desired_speed(net, vehicle)
-        stop, limit = stop_and_speed_limit(net, vehicle, look, stop_distance, wanted)
+        stop, limit = stop_and_speed_limit(net, vehicle, look, stop_distance, let_in_distance, wanted)
         gap, leader = mind_only_before(stop, gap, leader)
         leading = leader_speed(shapes, leader, view, vehicle.offset + gap)
         # Who is still in a junction closes up, so that it gets out of it.
@@ -149,7 +152,8 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         if vehicle.lane != lane:
             continue
         if is_bus:
-            if not vehicle.at_stop and vehicle.planned_count == 0:
+            # Not before its stop, where its route goes on in the lane beside after that: it would drive past it.
+            if not vehicle.at_stop and vehicle.planned_count == 0 and stop_distance >= NEVER:
                 change_as_route_does(net, vehicle, view)
         elif 0 <= leader < len(fleet) and wants_lane_change(net, vehicle, gap, leading, wanted):
             change_to_emptier_lane(net, fleet, vehicle, view)
@@ -272,23 +276,41 @@ def has_left_map(net, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _bring_to_stop(net, fleet, v, junctions, shapes):  # type: ignore[no-untyped-def]
-    """Put a bus at the stop it drives to, if that is free; its riders come along."""
+def _bring_on(net, fleet, v, junctions, shapes):  # type: ignore[no-untyped-def]
+    """Put a bus at the stop it drives to, else where its route is free nearest before it; its riders come along."""
     vehicle = fleet[v]
     if vehicle.stop_route_index < 0:
         return
-    lane = net.route[net.route_first[vehicle.route] + vehicle.stop_route_index]
-    if place_vehicle(net, fleet, v, lane, vehicle.stop_offset, shapes, 1.0):
-        vehicle.route_index = vehicle.stop_route_index
-        release_all_junctions(junctions, vehicle)
-        vehicle.teleports += 1
+    first = net.route_first[vehicle.route]
+    size = net.route_first[vehicle.route + 1] - first
+    for back in range(size):
+        index = (vehicle.stop_route_index - back) % size
+        if back > 0 and index == vehicle.route_index:
+            return  # it would get nowhere
+        lane = net.route[first + index]
+        offset = vehicle.stop_offset if back == 0 else net.lanes[lane].length - _BEFORE_JUNCTION
+        if (back == 0 or _can_stand_on(net, vehicle, lane, net.route[first + (index + 1) % size])) and place_vehicle(
+            net, fleet, v, lane, offset, shapes, 1.0
+        ):
+            vehicle.route_index = index
+            release_all_junctions(junctions, vehicle)
+            vehicle.teleports += 1
+            return
+
+
+@compiled
+def _can_stand_on(net, vehicle, lane, following):  # type: ignore[no-untyped-def]
+    """Return whether a bus fits on a lane, between junctions, that its route leaves at its end."""
+    street = net.lanes[lane]
+    fits = street.inside < 0 and street.junction < 0 and street.length > vehicle.length + _BEFORE_JUNCTION + 1.0
+    return fits and following != street.left and following != street.right
 
 
 @compiled
 def bring_back(net, fleet, junctions, shapes, entries, entry_speed, patience):  # type: ignore[no-untyped-def]
     """Bring cars that left the map, or stood still for longer than `patience`, back in where the map begins.
 
-    Buses that stood still for so long, not at a stop, go on from the stop they drove to.
+    Buses that stood still for so long, not at a stop, go on from the stop they drove to, or before it where it is free.
 
     Parameters
     ----------
@@ -303,7 +325,7 @@ def bring_back(net, fleet, junctions, shapes, entries, entry_speed, patience):  
         vehicle = fleet[v]
         if vehicle.route >= 0:
             if vehicle.stopped_time >= patience:
-                _bring_to_stop(net, fleet, v, junctions, shapes)
+                _bring_on(net, fleet, v, junctions, shapes)
             continue
         if len(entries) == 0:
             continue

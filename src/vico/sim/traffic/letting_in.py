@@ -1,0 +1,66 @@
+"""Buses that have to change lanes where their route does wait for room in time, and are let in by who comes behind."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vico.io.compiled import compiled
+from vico.sim.traffic.path import LANE_CHANGE, project_on_polyline
+from vico.sim.traffic.route import NEVER, route_lane
+
+_REAR_GAP = 4.0  # m behind a bus that are left for it
+_CLOSER = 1.5  # m nearer to a bus than that, a vehicle still stays behind it
+_AFTER_ANOTHER = 2.0  # m driven straight between two lane changes
+
+
+@compiled
+def lane_to_change_to(net, vehicle):  # type: ignore[no-untyped-def]
+    """Return the neighbour lane on which a bus's route goes on, -1 where it goes straight on; buses only."""
+    beside = route_lane(net, vehicle, 1)
+    lane = net.lanes[vehicle.lane]
+    return beside if beside == lane.left or beside == lane.right else -1
+
+
+@compiled
+def room_to_change(net, vehicle):  # type: ignore[no-untyped-def]
+    """Return the metres before its lane's end at which a bus waits for room in the lane beside.
+
+    So many that it ends this lane change, and those that follow it, before the junction.
+    """
+    change = LANE_CHANGE + vehicle.length
+    room, lane = change, route_lane(net, vehicle, 1)
+    for k in range(2, 5):
+        beside = route_lane(net, vehicle, k)
+        if beside != net.lanes[lane].left and beside != net.lanes[lane].right:
+            break
+        room, lane = room + change + _AFTER_ANOTHER + vehicle.length, beside
+    return room
+
+
+@compiled
+def places_to_let_in(net, fleet, shapes):  # type: ignore[no-untyped-def]
+    """Return for each lane where vehicles stop to let a bus in that waits beside it: metres along it, else `NEVER`."""
+    places = np.full(len(net.lanes), NEVER)
+    for vehicle in fleet:
+        if vehicle.route < 0 or vehicle.at_stop or vehicle.planned_count > 0 or vehicle.lateral_offset != 0.0:
+            continue
+        is_stop_ahead = vehicle.stop_route_index == vehicle.route_index and vehicle.stop_offset > vehicle.offset - 1.0
+        beside = lane_to_change_to(net, vehicle)
+        if beside < 0 or is_stop_ahead:
+            continue
+        v, lane = vehicle.index, net.lanes[beside]
+        x, y = shapes.x[v], shapes.y[v]
+        middle, _ = project_on_polyline(net.points, net.along, lane.first_point, lane.end_point, x, y)
+        places[beside] = min(places[beside], middle - vehicle.length / 2 - _REAR_GAP)
+    return places
+
+
+@compiled
+def distance_to_let_in(vehicle, places):  # type: ignore[no-untyped-def]
+    """Return the metres to where a vehicle stops to let a bus in on its lane; `NEVER` if it need not or cannot.
+
+    Who has a junction ahead drives on: it would keep the bus and others from it.
+    """
+    distance = places[vehicle.lane] - vehicle.offset
+    is_too_late = distance + _CLOSER < vehicle.speed * vehicle.speed / (2 * vehicle.braking)
+    return NEVER if is_too_late or vehicle.granted_count > 0 else max(distance, 0.0)
