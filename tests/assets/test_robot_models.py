@@ -44,7 +44,7 @@ def posed(name: str, packs: bool) -> list[Surface]:
 
 
 def test_an_unknown_robot_is_refused_with_the_names_of_the_known_ones() -> None:
-    with pytest.raises(InputError, match="robot 'spot' is not known; choose among drone, go2, husky"):
+    with pytest.raises(InputError, match="robot 'spot' is not known; choose among drone, go2, husky, manipulator"):
         robot_model("spot")
 
 

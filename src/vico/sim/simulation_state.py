@@ -177,6 +177,27 @@ class RobotSystem(Subsystem, Protocol):
     def land(self, robot: int, xy: NDArray[np.float64] | None = None) -> None:
         """Have a robot that flies land at a point, or where it is."""
 
+    def has_arm(self, robot: int) -> bool:
+        """Return whether the robot has an arm."""
+
+    def in_hand(self, robot: int) -> int:
+        """Return the entity of what the robot's hand holds; 0 for nothing."""
+
+    def can_grasp(self, robot: int, size: NDArray[np.float64]) -> bool:
+        """Return whether the robot's jaw is wide enough for a thing of some extents, metres."""
+
+    def reach(self, robot: int, target: NDArray[np.float64]) -> None:
+        """Have the robot bring its hand to a point."""
+
+    def pick(self, robot: int, entity: int) -> None:
+        """Have the robot pick a thing up."""
+
+    def place(self, robot: int, target: NDArray[np.float64] | int) -> None:
+        """Have the robot put down what it holds, at a point or on a deck."""
+
+    def offer(self, robot: int, person: NDArray[np.float64]) -> None:
+        """Have the robot hold out what it holds to a person at a point, until it is taken."""
+
     def follow_body(self, robot: int, entity: int) -> None:
         """Have the robot keep near a body, wherever that goes outdoors."""
 

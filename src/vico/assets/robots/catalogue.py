@@ -8,11 +8,17 @@ from vico.assets.packages import Package
 from vico.assets.robots.drone import drone
 from vico.assets.robots.go2 import go2
 from vico.assets.robots.husky import husky
+from vico.assets.robots.manipulator import manipulator
 from vico.assets.robots.model import RobotModel
 from vico.assets.robots.packs import GO2_PACKAGE, HUSKY_PACKAGE
 from vico.errors import InputError
 
-_MAKERS: dict[str, Callable[[bool], RobotModel]] = {"drone": drone, "go2": go2, "husky": husky}
+_MAKERS: dict[str, Callable[[bool], RobotModel]] = {
+    "drone": drone,
+    "go2": go2,
+    "husky": husky,
+    "manipulator": manipulator,
+}
 
 
 def robot_names() -> tuple[str, ...]:

@@ -273,6 +273,31 @@ class Quadrotor:
 
 
 @dataclass(frozen=True)
+class MobileManipulator:
+    """A base that drives and turns, and an arm with a jaw on it.
+
+    Attributes
+    ----------
+    places, axes
+        Of the arm's joints: each in the frame of the one before it, the first in the base's; metres, shape ``(n, 3)``.
+    low, high
+        Bounds of those joints, rad, shape ``(n,)``.
+    grip
+        Middle between the pads, along the last joint's z, metres; the jaw opens along its y.
+    opening
+        Way of each finger, metres.
+    """
+
+    places: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    grip: float
+    opening: float
+    name: str = "mobile_manipulator"
+
+
+@dataclass(frozen=True)
 class NoController:
     """Nothing follows velocities: whoever drives the robot commands its motors."""
 

@@ -8,7 +8,7 @@ from typing import Any
 from vico.rules import ActionStatus, ReasonCode, code_name
 from vico.sim.actions.check import check
 from vico.sim.actions.model import Command
-from vico.sim.actions.table import ACTIONS
+from vico.sim.actions.table import form_of
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import REASON_LENGTH
 
@@ -53,7 +53,8 @@ def _is_wait(action: object) -> bool:
 def perform(command: Command, agent: int, state: SimulationState) -> None:
     """Do what `check` allowed. The state must be the one it was checked against."""
     people = len(state.people)
-    ACTIONS[command.kind].perform(command.values, agent if agent < people else agent - people, state)
+    robot = agent >= people
+    form_of(command.kind, robot=robot).perform(command.values, agent - people if robot else agent, state)
 
 
 def _note_fault(fault: AgentFault, agent: int, state: SimulationState) -> None:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from vico.rules import ReasonCode
 from vico.sim.actions.fields import FORMS, short
 from vico.sim.actions.model import ActionType, Command, Refusal, Situation
-from vico.sim.actions.table import ACTIONS, PEOPLE_ACTIONS, ROBOT_ACTIONS
+from vico.sim.actions.table import ACTIONS, PEOPLE_ACTIONS, ROBOT_ACTIONS, form_of
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture, Vehicle
 
@@ -30,22 +30,23 @@ def check(action: object, agent: int, state: SimulationState) -> Command | Refus
     Command or Refusal
         What to do, or why not.
     """
-    command = parse(action)
+    people = len(state.people)
+    is_robot = agent >= people
+    command = parse(action, robot=is_robot)
     if isinstance(command, Refusal):
         return command
-    kind, people = ACTIONS[command.kind], len(state.people)
-    is_robot = agent >= people
+    kind = form_of(command.kind, robot=is_robot)
     refusal = (
         _refuse_actor(kind, is_robot=is_robot)
         or (None if is_robot else _refuse_situation(kind, agent, state))
-        or _refuse_range(command)
+        or _refuse_range(kind, command)
         or kind.check(command.values, agent - people if is_robot else agent, state)
     )
     return refusal or command
 
 
-def parse(action: object) -> Command | Refusal:
-    """Judge the form of an action alone: its type, its fields and their types."""
+def parse(action: object, *, robot: bool = False) -> Command | Refusal:
+    """Judge the form of an action of a person, or a robot, alone: its type, its fields and their types."""
     if not isinstance(action, Mapping):
         sentence = f"an action is a dict with a 'type', not {type(action).__name__}"
         return Refusal(ReasonCode.NOT_AN_ACTION, sentence)
@@ -53,7 +54,7 @@ def parse(action: object) -> Command | Refusal:
     if not isinstance(kind, str) or kind not in ACTIONS:
         sentence = f"unknown action type {short(kind)}; types are {', '.join(ACTIONS)}"
         return Refusal(ReasonCode.UNKNOWN_TYPE, sentence)
-    expected = ACTIONS[kind].fields
+    expected = form_of(kind, robot=robot).fields
     odd = [short(name) for name in action if name != "type" and name not in expected]
     if odd:
         known = ", ".join(expected) or "none"
@@ -115,10 +116,10 @@ def _refuse_situation(kind: ActionType, i: int, state: SimulationState) -> Refus
     return None
 
 
-def _refuse_range(command: Command) -> Refusal | None:
+def _refuse_range(kind: ActionType, command: Command) -> Refusal | None:
     """Refuse numbers out of their field's bounds."""
     for name, value in command.values.items():
-        field = ACTIONS[command.kind].fields[name]
+        field = kind.fields[name]
         if not field.in_range(value):
             sentence = f"{command.kind}: {name} {value:g} is out of range; {field.range}"
             return Refusal(ReasonCode.OUT_OF_RANGE, sentence)

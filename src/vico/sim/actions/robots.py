@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vico.assets.robots import ActionSpace
 from vico.rules import ReasonCode
@@ -95,6 +96,95 @@ def stop(values: Values, robot: int, state: SimulationState) -> None:
     _robots(state).stop(robot)
 
 
+def _refuse_without_arm(action: str, robot: int, state: SimulationState) -> Refusal | None:
+    if _robots(state).has_arm(robot):
+        return None
+    return Refusal(ReasonCode.NOT_ABLE, f"{action}: this robot has no arm")
+
+
+def _refuse_without_way(action: str, point: NDArray[np.float64], robot: int, state: SimulationState) -> Refusal | None:
+    if _robots(state).has_way(robot, point[:2]):
+        return None
+    return Refusal(ReasonCode.BLOCKED, f"{action}: no way there that is wide enough for this robot")
+
+
+def check_reach(values: Values, robot: int, state: SimulationState) -> Refusal | None:
+    """Judge reaching: the robot has an arm, and there is a way."""
+    target = np.array(values["target"], np.float64)
+    return _refuse_without_arm("reach", robot, state) or _refuse_without_way("reach", target, robot, state)
+
+
+def reach(values: Values, robot: int, state: SimulationState) -> None:
+    """Bring a robot's hand to a point."""
+    _robots(state).reach(robot, np.array(values["target"], np.float64))
+
+
+def check_pick(values: Values, robot: int, state: SimulationState) -> Refusal | None:
+    """Judge picking: an arm with nothing in hand, and a thing outdoors that nobody holds and the jaw is wide for."""
+    robots, objects = _robots(state), state.objects
+    refusal = _refuse_without_arm("pick", robot, state)
+    if refusal is not None:
+        return refusal
+    if robots.in_hand(robot):
+        return Refusal(ReasonCode.HAND_FULL, f"pick: the hand holds {robots.in_hand(robot)} already")
+    k = objects.index(values["object"])
+    if k < 0:
+        return Refusal(ReasonCode.NOT_PORTABLE, f"pick: {values['object']} is nothing that can be carried")
+    if objects.holder[k] or objects.room[k] >= 0:
+        return Refusal(ReasonCode.HELD_ALREADY, f"pick: {objects.names[k]} is held by somebody, or indoors")
+    if not robots.can_grasp(robot, objects.size[k]):
+        return Refusal(ReasonCode.NOT_PORTABLE, f"pick: {objects.names[k]} is wider than the jaw")
+    return _refuse_without_way("pick", objects.position[k], robot, state)
+
+
+def pick(values: Values, robot: int, state: SimulationState) -> None:
+    """Have a robot pick a thing up."""
+    _robots(state).pick(robot, int(values["object"]))
+
+
+def check_place(values: Values, robot: int, state: SimulationState) -> Refusal | None:
+    """Judge placing: something in hand, and a point, or a deck, to put it on."""
+    robots, target = _robots(state), values["target"]
+    refusal = _refuse_without_arm("place", robot, state)
+    if refusal is None and not robots.in_hand(robot):
+        refusal = Refusal(ReasonCode.HAND_EMPTY, "place: the hand is empty")
+    if refusal is not None:
+        return refusal
+    if isinstance(target, int):
+        if robots.deck(target) is None:
+            return Refusal(ReasonCode.UNKNOWN_TARGET, f"place: {target} has no deck")
+        return None
+    return _refuse_without_way("place", np.array(target, np.float64), robot, state)
+
+
+def place(values: Values, robot: int, state: SimulationState) -> None:
+    """Have a robot put down what it holds."""
+    target = values["target"]
+    _robots(state).place(robot, target if isinstance(target, int) else np.array(target, np.float64))
+
+
+def check_hand_over(values: Values, robot: int, state: SimulationState) -> Refusal | None:
+    """Judge handing over: something in hand, and a person outdoors."""
+    robots = _robots(state)
+    refusal = _refuse_without_arm("hand_over", robot, state)
+    if refusal is None and not robots.in_hand(robot):
+        refusal = Refusal(ReasonCode.HAND_EMPTY, "hand_over: the hand is empty")
+    if refusal is not None:
+        return refusal
+    if values["agent"] not in state.people.names:
+        return Refusal(ReasonCode.UNKNOWN_AGENT, f"hand_over: no person is called {short(values['agent'])}")
+    i = state.people.names.index(values["agent"])
+    if state.people.room[i] >= 0:
+        return Refusal(ReasonCode.ELSEWHERE, f"hand_over: {values['agent']} is indoors")
+    return _refuse_without_way("hand_over", state.people.position[i], robot, state)
+
+
+def hand_over(values: Values, robot: int, state: SimulationState) -> None:
+    """Have a robot hold out to a person what it holds, until they pick it."""
+    i = state.people.names.index(values["agent"])
+    _robots(state).offer(robot, state.people.position[i].copy())
+
+
 def _refuse_without_velocities(action: str, robot: int, state: SimulationState) -> Refusal | None:
     spaces = _robots(state).action_spaces(robot)
     if any(space.drives == "velocity" for space in spaces.values()):
@@ -164,6 +254,46 @@ ROBOTS = (
         land,
         check_land,
         {"target": Field("point", required=False)},
+        when=Situation(0),
+        actors=Actors.ROBOTS,
+    ),
+    ActionType(
+        "reach",
+        "Have a robot with an arm bring its hand to a point, pointing down.",
+        reach,
+        check_reach,
+        {"target": Field("point")},
+        when=Situation(0),
+        actors=Actors.ROBOTS,
+    ),
+    ActionType(
+        "place",
+        "Have a robot put what it holds down at a point, or on the deck of the robot with an entity.",
+        place,
+        check_place,
+        {"target": Field("target")},
+        when=Situation(0),
+        actors=Actors.ROBOTS,
+    ),
+)
+
+#: What robots with arms do under names that people's actions have, too.
+ARMS = (
+    ActionType(
+        "pick",
+        "Have a robot with an arm pick a thing up from the ground, a table or the like.",
+        pick,
+        check_pick,
+        {"object": Field("integer")},
+        when=Situation(0),
+        actors=Actors.ROBOTS,
+    ),
+    ActionType(
+        "hand_over",
+        "Have a robot hold out what it holds to a person, until they take it with `pick`.",
+        hand_over,
+        check_hand_over,
+        {"agent": Field("name")},
         when=Situation(0),
         actors=Actors.ROBOTS,
     ),

@@ -8,7 +8,7 @@ from vico.sim.actions.hands import HANDS
 from vico.sim.actions.model import ActionType, Actors
 from vico.sim.actions.motion import MOTION
 from vico.sim.actions.posture import POSTURE
-from vico.sim.actions.robots import ROBOTS
+from vico.sim.actions.robots import ARMS, ROBOTS
 from vico.sim.actions.speech import REPORTS, SPEECH
 from vico.sim.actions.vehicles import VEHICLES
 
@@ -18,16 +18,24 @@ _ALL = (*MOTION, *HANDS, *DOORS, *VEHICLES, *SPEECH, *POSTURE, *REPORTS, *ROBOTS
 ACTIONS: dict[str, ActionType] = {action.name: action for action in _ALL}
 #: Names of the actions that people may do, and robots.
 PEOPLE_ACTIONS = tuple(action.name for action in _ALL if Actors.PEOPLE in action.actors)
-ROBOT_ACTIONS = tuple(action.name for action in _ALL if Actors.ROBOTS in action.actors)
+ROBOT_ACTIONS = tuple(action.name for action in (*_ALL, *ARMS) if Actors.ROBOTS in action.actors)
+#: What robots do otherwise than people do it, by name.
+_AS_ROBOT = {action.name: action for action in ARMS}
+
+
+def form_of(name: str, *, robot: bool) -> ActionType:
+    """Return what an action is for a robot, or for a person."""
+    return _AS_ROBOT.get(name, ACTIONS[name]) if robot else ACTIONS[name]
 
 
 def actions_markdown() -> str:
     """Return the table of all actions for the documentation: name, fields with ranges, what it does."""
     lines = ["| type | fields | what it does |", "|---|---|---|"]
-    for action in ACTIONS.values():
+    for action in (*ACTIONS.values(), *ARMS):
         fields = "; ".join(
             f"`{name}`{'' if field.required else ' (optional)'}: {field.range or FORMS[field.kind]}"
             for name, field in action.fields.items()
         )
-        lines.append(f"| `{action.name}` | {fields} | {action.summary} |")
+        who = " (robots)" if action in ARMS else ""
+        lines.append(f"| `{action.name}`{who} | {fields} | {action.summary} |")
     return "\n".join(lines) + "\n"

@@ -72,5 +72,5 @@ class FrameCount:
         return {
             "fine": {"seconds": FINE, "frames": self.fine},
             "coarse": {"seconds": COARSE, "frames": self.coarse},
-            "rule": "fine where motors are commanded, robots have fallen or hold things, or things fall or are pushed",
+            "rule": "fine where motors are commanded, robots fly, fell or hold things, or things fall or are pushed",
         }

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vico.errors import InputError
-from vico.sim.robots import flying
+from vico.sim.robots import flying, tasks
 from vico.sim.robots.state import Mode, RobotRun
 from vico.sim.robots.ways import way_to
 
@@ -35,6 +35,7 @@ def command(run: RobotRun, robot: int, vector: ArrayLike, space: str = "") -> No
     if values.shape != (len(chosen),) or not np.isfinite(values).all():
         raise InputError(f"control: {model.title} takes {len(chosen)} finite numbers, not {values.tolist()}")
     flying.settle(run, robot)
+    tasks.abandon(run, robot)
     run.arrays.command[robot] = 0.0
     run.arrays.command[robot, : len(values)] = np.clip(values, chosen.low, chosen.high)
     run.set_mode(robot, Mode.MOTORS if chosen.drives == "motors" else Mode.VELOCITY)
@@ -60,6 +61,7 @@ def drive(run: RobotRun, robot: int, velocity: ArrayLike) -> None:
 def stop(run: RobotRun, robot: int) -> None:
     """Stand still, or hover."""
     flying.settle(run, robot)
+    tasks.abandon(run, robot)
     run.set_mode(robot, Mode.IDLE)
 
 
@@ -92,6 +94,7 @@ def take(run: RobotRun, robot: int, path: ArrayLike) -> None:
     _need_velocities(run, robot, "follow")
     if run.scene.models[robot].rotors is not None:
         raise InputError(f"follow: {run.scene.models[robot].title} flies: send it to points")
+    tasks.abandon(run, robot)
     run.followers[robot].begin(points)
     run.set_mode(robot, Mode.ROUTE)
 
@@ -106,6 +109,7 @@ def follow_body(run: RobotRun, robot: int, entity: int) -> None:
     """
     _need_velocities(run, robot, "follow")
     flying.settle(run, robot)
+    tasks.abandon(run, robot)
     run.followers[robot].end()
     run.set_mode(robot, Mode.FOLLOW)
     run.arrays.leader[robot] = entity

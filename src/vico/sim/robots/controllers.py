@@ -8,6 +8,7 @@ from vico.assets.robots import RobotModel
 from vico.errors import InputError
 from vico.sim.robots.controller import DirectMotors, MotorController
 from vico.sim.robots.legs import Legs
+from vico.sim.robots.manipulator import ArmOnWheels
 from vico.sim.robots.quadrotor import FourRotors
 from vico.sim.robots.wheels import SkidSteer
 
@@ -16,6 +17,7 @@ CONTROLLERS: dict[str, Callable[[RobotModel], MotorController]] = {
     "motors": DirectMotors,
     "skid_steer": SkidSteer,
     "four_legs": Legs,
+    "mobile_manipulator": ArmOnWheels,
     "quadrotor": FourRotors,
 }
 

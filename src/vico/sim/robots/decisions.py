@@ -11,10 +11,11 @@ from vico.sim.robots.flying import decide_flight
 from vico.sim.robots.navigation import GAP, SIGHT, NearbyBodies
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.state import Mode, RobotRun
+from vico.sim.robots.tasks import decide_task, handled
 from vico.sim.robots.ways import next_errand, way_to
 
 # What the states' arrays hold: members of an enumeration are slow to look up in the control loop.
-_IDLE, _VELOCITY, _MOTORS, _ROUTE, _FOLLOW = (int(mode) for mode in Mode)
+_IDLE, _VELOCITY, _MOTORS, _ROUTE, _FOLLOW, _TASK = (int(mode) for mode in Mode)
 _FALLEN = int(RobotStatus.FALLEN)
 #: Seconds a robot on errands rests between two.
 _REST = 5.0
@@ -50,13 +51,19 @@ def decide(run: RobotRun, dt: float, obstacles: Bodies, mine: Bodies, *, errands
                 _rest(run, robot, dt)
             continue
         around = around or NearbyBodies(obstacles, mine)
-        others = around.near(robot, SIGHT + 4)
+        in_hand = handled(run, robot)
+        if in_hand:
+            others = NearbyBodies(obstacles.where(obstacles.entity != in_hand), mine).near(robot, SIGHT + 4)
+        else:
+            others = around.near(robot, SIGHT + 4)
         if mode == _VELOCITY:
             _hold_velocity(run, robot, others)
         elif mode == _ROUTE:
             _keep_to_way(run, robot, others, dt)
         elif mode == _FOLLOW:
             _keep_near(run, robot, others, dt, around.bodies)
+        elif mode == _TASK and decide_task(run, robot, around.bodies, dt):
+            _drive_to_work(run, robot, others, dt)
 
 
 def _rest(run: RobotRun, robot: int, dt: float) -> None:
@@ -100,6 +107,14 @@ def _steer(run: RobotRun, robot: int, others: NDArray[np.void], dt: float) -> Ro
     if follower.wants_detour:
         follower.detoured(way_to(run, robot, follower.path[-1], follower.closed(base, others)))
     return follower.status
+
+
+def _drive_to_work(run: RobotRun, robot: int, others: NDArray[np.void], dt: float) -> None:
+    """Follow the way to where an arm has something to do; where it can't be gone, that has to do."""
+    status = _steer(run, robot, others, dt)
+    run.arrays.status[robot] = status
+    if status in (RobotStatus.ARRIVED, RobotStatus.BLOCKED):
+        run.followers[robot].end()
 
 
 def _keep_near(run: RobotRun, robot: int, others: NDArray[np.void], dt: float, everyone: Bodies) -> None:

@@ -17,7 +17,7 @@ from vico.sim.robots.state import Mode, RobotRun
 Array = NDArray[np.float64]
 
 _LANDED, _FLYING, _LANDING = (int(phase) for phase in Phase)
-_IDLE, _VELOCITY, _MOTORS, _ROUTE, _FOLLOW = (int(mode) for mode in Mode)
+_IDLE, _VELOCITY, _MOTORS, _ROUTE, _FOLLOW, _ = (int(mode) for mode in Mode)
 _FALLEN = int(RobotStatus.FALLEN)
 #: Metres above what is there at which `go_to` ends, and that a landing begins above.
 CRUISE, APPROACH = 10.0, 4.0

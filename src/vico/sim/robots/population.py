@@ -14,7 +14,7 @@ from vico.sim.bodies import Bodies, Drawn
 from vico.sim.carrying import DeckPose
 from vico.sim.physics.frames import FrameCount, FrameNeeds, frame_length
 from vico.sim.physics.loose import LooseObjects
-from vico.sim.robots import commands, drawing, flying, sensing
+from vico.sim.robots import commands, drawing, flying, sensing, tasks
 from vico.sim.robots.decisions import decide
 from vico.sim.robots.falls import watch_falls
 from vico.sim.robots.motors import command_motors, command_rotors, velocities
@@ -23,6 +23,7 @@ from vico.sim.robots.scene import RobotScene
 from vico.sim.robots.spawns import spawns
 from vico.sim.robots.state import NOTES, Mode, RobotArrays, RobotEvent, RobotRun
 from vico.sim.robots.ways import way_to
+from vico.sim.robots.work import Kind
 from vico.sim.state import MovableObjects
 from vico.world.folder import World
 from vico.world.mesh import Surface
@@ -177,6 +178,37 @@ class RobotPopulation:
         """Land at a point, or where it is."""
         flying.land(self.run, robot, None if xy is None else np.asarray(xy, np.float64))
 
+    def has_arm(self, robot: int) -> bool:
+        """Return whether a robot has an arm."""
+        return tasks.work_of(self.run, robot) is not None
+
+    def in_hand(self, robot: int) -> int:
+        """Return the entity of what a robot's hand holds; 0 for nothing."""
+        return tasks.in_hand(self.run, robot)
+
+    def can_grasp(self, robot: int, size: NDArray[np.float64]) -> bool:
+        """Return whether a robot's jaw is wide enough for a thing of some extents, metres."""
+        return tasks.can_grasp(self.run, robot, size)
+
+    def offer(self, robot: int, person: ArrayLike) -> None:
+        """Hold out what the hand holds to a person who stands at a point, ENU metres, until it is taken."""
+        tasks.offer(self.run, robot, np.asarray(person, np.float64))
+
+    def reach(self, robot: int, target: ArrayLike) -> None:
+        """Bring the hand to a point, ENU metres."""
+        tasks.begin(self.run, robot, Kind.REACH, np.asarray(target, np.float64))
+
+    def pick(self, robot: int, entity: int) -> None:
+        """Pick a thing up from above."""
+        tasks.pick(self.run, robot, entity)
+
+    def place(self, robot: int, target: ArrayLike | int) -> None:
+        """Put what the hand holds down at a point, ENU metres, or on the deck of the robot with an entity."""
+        if isinstance(target, int):
+            tasks.place_on(self.run, robot, target)
+            return
+        tasks.begin(self.run, robot, Kind.PLACE, np.asarray(target, np.float64))
+
     def follow(self, robot: int, path: ArrayLike) -> None:
         """Follow a polyline, ENU metres, shape ``(k, 2)``, ``k >= 2``."""
         commands.take(self.run, robot, path)
@@ -272,6 +304,7 @@ class RobotPopulation:
         return FrameNeeds(
             motor_commands=_MOTORS in arrays.mode.tolist(),
             fallen=_FALLEN in arrays.status.tolist(),
+            manipulation=any(work is not None and work.busy for work in self.run.work),
             loose_objects=self._loose.moving,
         )
 
@@ -288,6 +321,7 @@ class RobotPopulation:
     def attach_objects(self, objects: MovableObjects) -> None:
         """Have physics move things that lie near robots, or fall; before the first step."""
         self._loose = LooseObjects(self.engine, objects)
+        self.run.objects = objects
 
     def physics_record(self) -> dict[str, Any]:
         """Return what a run reports of its physics: frames, and how many were near robots and found no room in it."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.assets.robots import MobileManipulator
 from vico.errors import SchemaError
 from vico.seeds import rng
 from vico.sim.bodies import Bodies
@@ -18,17 +19,31 @@ from vico.sim.robots.path_follower import PathFollower, RobotStatus
 from vico.sim.robots.rotors import Flight
 from vico.sim.robots.scene import RobotScene
 from vico.sim.robots.wind import gusts_of
-from vico.sim.state import REASON_LENGTH
+from vico.sim.robots.work import Work
+from vico.sim.state import REASON_LENGTH, MovableObjects
 
 
 class Mode(IntEnum):
     """Who decides what a robot does."""
 
-    IDLE, VELOCITY, MOTORS, ROUTE, FOLLOW = range(5)
+    IDLE, VELOCITY, MOTORS, ROUTE, FOLLOW, TASK = range(6)
 
 
 #: What can happen to a robot.
-NOTES = ("arrived", "blocked", "fallen", "recovered", "lost", "landed", "battery_low")
+NOTES = (
+    "arrived",
+    "blocked",
+    "fallen",
+    "recovered",
+    "lost",
+    "landed",
+    "battery_low",
+    "reached",
+    "picked",
+    "placed",
+    "handed_over",
+    "failed",
+)
 
 
 @dataclass(frozen=True)
@@ -145,6 +160,10 @@ class RobotRun:
         Take each robot along its way.
     flights
         What changes of each group besides if it flies, else None.
+    work
+        Tasks of each group's arms, None if it has none.
+    objects
+        Things that can be picked.
     pending
         Robot, and index into `NOTES`, of what happened since it was last asked.
     """
@@ -157,6 +176,8 @@ class RobotRun:
     memory: list[NDArray[np.float64]] = field(init=False)
     followers: list[PathFollower] = field(init=False)
     flights: list[Flight | None] = field(init=False)
+    work: list[Work | None] = field(init=False)
+    objects: MovableObjects = field(default_factory=MovableObjects.none)
     pending: list[tuple[int, int]] = field(default_factory=list)
     known_bodies: Bodies | None = None
 
@@ -167,6 +188,10 @@ class RobotRun:
             None
             if group.model.rotors is None
             else Flight(group.model, group.robots, self.scene.world.height, gusts_of(self.seed))
+            for group in self.scene.groups
+        ]
+        self.work = [
+            Work(group.model, group.robots) if isinstance(group.model.controller, MobileManipulator) else None
             for group in self.scene.groups
         ]
 
@@ -186,7 +211,7 @@ class RobotRun:
             a.status[robot] = RobotStatus.IDLE if mode == Mode.IDLE else RobotStatus.MOVING
         if mode != Mode.FOLLOW:
             a.leader[robot] = 0
-        if mode not in (Mode.ROUTE, Mode.FOLLOW):
+        if mode not in (Mode.ROUTE, Mode.FOLLOW, Mode.TASK):
             self.followers[robot].end()
 
     def errand_stream(self, robot: int) -> np.random.Generator:
@@ -204,6 +229,9 @@ class RobotRun:
         for k, flight in enumerate(self.flights):
             if flight is not None:
                 found |= {f"flight_{k}_{name}": value for name, value in flight.saved().items()}
+        for k, work in enumerate(self.work):
+            if work is not None:
+                found |= {f"work_{k}_{name}": value for name, value in work.saved().items()}
         numbers = [follower.numbers() for follower in self.followers]
         return found | {
             "pending": np.array(self.pending, np.int64).reshape(-1, 2),
@@ -232,6 +260,10 @@ class RobotRun:
             if flight is not None:
                 start = f"flight_{k}_"
                 flight.restore({key[len(start) :]: value for key, value in arrays.items() if key.startswith(start)})
+        for k, work in enumerate(self.work):
+            if work is not None:
+                start = f"work_{k}_"
+                work.restore({key[len(start) :]: value for key, value in arrays.items() if key.startswith(start)})
         self.pending = [(int(a), int(b)) for a, b in arrays["pending"]]
         starts = np.concatenate([[0], arrays["path_ends"]]).astype(int)
         for i, follower in enumerate(self.followers):

@@ -1,0 +1,133 @@
+"""Where an arm's hand is, and which angles bring it to a pose: damped least squares from several starts."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.io.compiled import compiled
+
+Array = NDArray[np.float64]
+
+_DAMPING, _STEPS, _LONGEST = 0.03, 60, 0.25
+_STARTS = 12
+
+
+class Chain(NamedTuple):
+    """Joints of an arm, as in `vico.assets.robots.MobileManipulator`."""
+
+    places: Array
+    axes: Array
+    low: Array
+    high: Array
+    grip: float
+
+
+@compiled
+def hand_pose(chain, angles, origins, directions, out):  # type: ignore[no-untyped-def]
+    """Write the hand's rotation (columns 0-2) and position (column 3) in the base's frame, and each joint's place."""
+    r = np.eye(3)
+    p = np.zeros(3)
+    for k in range(len(angles)):
+        for i in range(3):
+            step = 0.0
+            for j in range(3):
+                step += r[i, j] * chain.places[k, j]
+            p[i] += step
+        for i in range(3):
+            origins[k, i] = p[i]
+            directions[k, i] = r[i, 0] * chain.axes[k, 0] + r[i, 1] * chain.axes[k, 1] + r[i, 2] * chain.axes[k, 2]
+        c, s = math.cos(angles[k]), math.sin(angles[k])
+        for i in range(3):
+            a, b, d = r[i, 0], r[i, 1], r[i, 2]
+            if chain.axes[k, 2] > 0.5:  # about z
+                r[i, 0], r[i, 1] = c * a + s * b, c * b - s * a
+            else:  # about y
+                r[i, 0], r[i, 2] = c * a - s * d, s * a + c * d
+    for i in range(3):
+        out[i, :3] = r[i]
+        out[i, 3] = p[i] + r[i, 2] * chain.grip
+
+
+@compiled
+def _damped_step(jacobian, error, change):  # type: ignore[no-untyped-def]
+    """Write J^T (J J^T + d^2)^-1 error: by Cholesky's factors, in one order everywhere."""
+    n = jacobian.shape[1]
+    lower, half = np.zeros((6, 6)), np.empty(6)
+    for i in range(6):
+        for j in range(i + 1):
+            total = _DAMPING**2 if i == j else 0.0
+            for k in range(n):
+                total += jacobian[i, k] * jacobian[j, k]
+            for k in range(j):
+                total -= lower[i, k] * lower[j, k]
+            lower[i, j] = math.sqrt(total) if i == j else total / lower[j, j]
+    for i in range(6):
+        total = error[i]
+        for k in range(i):
+            total -= lower[i, k] * half[k]
+        half[i] = total / lower[i, i]
+    for i in range(5, -1, -1):
+        total = half[i]
+        for k in range(i + 1, 6):
+            total -= lower[k, i] * half[k]
+        half[i] = total / lower[i, i]
+    for k in range(n):
+        total = 0.0
+        for i in range(6):
+            total += jacobian[i, k] * half[i]
+        change[k] = total
+
+
+@compiled
+def solve(chain, angles, goal, steps):  # type: ignore[no-untyped-def]
+    """Bring the hand nearer to a pose, in place; return what is left, metres and radians summed."""
+    n = len(angles)
+    origins, directions, pose = np.empty((n, 3)), np.empty((n, 3)), np.empty((3, 4))
+    jacobian, error, change = np.empty((6, n)), np.empty(6), np.empty(n)
+    left = 1e9
+    for _ in range(steps):
+        hand_pose(chain, angles, origins, directions, pose)
+        for i in range(3):
+            error[i] = goal[i, 3] - pose[i, 3]
+            error[3 + i] = 0.0
+        for axis in range(3):
+            for i in range(3):
+                j, k = (i + 1) % 3, (i + 2) % 3
+                error[3 + i] += 0.5 * (pose[j, axis] * goal[k, axis] - pose[k, axis] * goal[j, axis])
+        left = math.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
+        left += math.sqrt(error[3] ** 2 + error[4] ** 2 + error[5] ** 2)
+        if left < 1e-4:
+            break
+        for k in range(n):
+            for i in range(3):
+                a, b = (i + 1) % 3, (i + 2) % 3
+                jacobian[i, k] = directions[k, a] * (pose[b, 3] - origins[k, b]) - directions[k, b] * (
+                    pose[a, 3] - origins[k, a]
+                )
+                jacobian[3 + i, k] = directions[k, i]
+        _damped_step(jacobian, error, change)
+        most = np.abs(change).max()
+        share = min(1.0, _LONGEST / most) if most > 0.0 else 0.0
+        for k in range(n):
+            angles[k] = min(max(angles[k] + share * change[k], chain.low[k]), chain.high[k])
+    return left
+
+
+def reach_pose(chain: Chain, goal: Array, near: Array) -> Array | None:
+    """Return angles that bring the hand to a pose in the base's frame, shape ``(3, 4)``; None if none are found.
+
+    The first start is `near`; of several solutions the nearest to it counts.
+    """
+    stream = np.random.Generator(np.random.PCG64(7))
+    best: tuple[float, Array] | None = None
+    for start in range(_STARTS):
+        angles = near.copy() if start == 0 else stream.uniform(0.7 * chain.low, 0.7 * chain.high)
+        if solve(chain, angles, goal, _STEPS) < 2e-3:
+            far = float(np.abs(angles - near).max())
+            if best is None or far < best[0]:
+                best = far, angles
+    return None if best is None else best[1]

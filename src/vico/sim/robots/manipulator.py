@@ -1,0 +1,56 @@
+"""A base that drives and turns with an arm on it: all robots of a kind at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vico.assets.robots import MobileManipulator, RobotModel
+from vico.io.compiled import compiled
+from vico.sim.physics.records import Motion
+from vico.sim.robots.arm import Chain
+from vico.sim.robots.controller import Array, MotorController
+
+#: Entries of its memory: where the arm's servos are told to be and where they go, both less the model's rest; the
+#: speeds of the base as far as they were let through.
+ARM_NOW, ARM_GOAL, DRIVEN = slice(0, 9), slice(9, 18), slice(18, 20)
+#: Of joints, rad/s; of fingers, m/s.
+JOINT_SPEED, FINGER_SPEED = 0.9, 0.12
+_SPEED_UP, _TURN_UP = 0.8, 2.0
+
+
+@compiled
+def _all(rest, fastest, slew, command, memory):  # type: ignore[no-untyped-def]
+    out = np.empty((len(command), len(rest) + 2))
+    n = len(rest)
+    for k in range(len(command)):
+        longest = 1.0
+        for j in range(n):
+            longest = max(longest, abs(memory[k, n + j] - memory[k, j]) / fastest[j])
+        for j in range(n):
+            memory[k, j] += (memory[k, n + j] - memory[k, j]) / longest
+            out[k, j] = rest[j] + memory[k, j]
+        for j in range(2):
+            goal = command[k, 0] if j == 0 else command[k, 2]
+            before = memory[k, 2 * n + j]
+            memory[k, 2 * n + j] = before + min(max(goal - before, -slew[j]), slew[j])
+            out[k, n + j] = memory[k, 2 * n + j]
+    return out
+
+
+class ArmOnWheels(MotorController):
+    """Drives the base by velocities, and brings the arm to where a task wants it."""
+
+    memory = 20
+
+    def __init__(self, model: RobotModel) -> None:
+        super().__init__(model)
+        c, period = model.controller, model.control_period
+        assert isinstance(c, MobileManipulator)
+        self.chain = Chain(c.places, c.axes, c.low, c.high, c.grip)
+        self._fastest = np.array([JOINT_SPEED] * 7 + [FINGER_SPEED] * 2) * period
+        self._slew = np.array([_SPEED_UP, _TURN_UP]) * period
+
+    def targets(self, motion: Motion, command: Array, memory: Array) -> Array:
+        """Arm angles, fingers, and speeds of the base."""
+        found: Array = _all(self.model.rest, self._fastest, self._slew, command, memory)
+        return found

@@ -1,0 +1,471 @@
+"""Arms at work: reach, pick and place with inverse kinematics and real contact. Nothing is glued to a hand.
+
+A task drives near its object, plans where the hand has to go in the frame of the base as it stands there, moves the arm
+along those ways, and says how it went. What a hand holds it holds by friction.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.errors import InputError
+from vico.exact import apply_matrix
+from vico.sim.bodies import Bodies
+from vico.sim.physics.records import Base
+from vico.sim.quaternions import matrix_of
+from vico.sim.robots.arm import Chain, hand_pose, reach_pose, solve
+from vico.sim.robots.drawing import deck_of
+from vico.sim.robots.manipulator import ARM_GOAL, ARM_NOW
+from vico.sim.robots.path_follower import RobotStatus
+from vico.sim.robots.state import Mode, RobotRun
+from vico.sim.robots.ways import way_to
+from vico.sim.robots.work import Kind, Stage, Work
+from vico.sim.state import MovableObjects
+
+Array = NDArray[np.float64]
+
+
+#: Metres from the base's middle to what the hand reaches for, tried one after the other; how exact that is.
+STANDOFFS, _EXACT = (0.60, 0.54, 0.66), 0.03
+#: Metres the hand comes from above, and lifts; room beside a thing for each finger.
+ABOVE, LIFT, ROOM = 0.14, 0.16, 0.02
+#: Where the hand carries what it holds, in the base's frame, and its tilts that are tried, rad.
+CARRY = np.array([0.46, -0.17, 0.78])
+_TILTS = (0.0, 0.25, -0.25, 0.5, -0.5)
+_NEAR, _NEAR_ENOUGH, _STRAIGHT, _TURN = 1.1, 2.2, 0.25, 0.9
+_DONE = {Kind.PICK: "picked", Kind.PLACE: "placed", Kind.OFFER: "handed_over"}
+# Metres from the edge of a deck that things are put at.
+_FROM_EDGE = 0.16
+# Metres before a person, and above the ground there, that things are held out to them.
+_ARM_LENGTH, _HELD_OUT = 0.45, 0.95
+_STEP = 0.012  # metres between two points of a straight way of the hand
+_GRIP_TIME, _STALE, _SETTLED = 1.2, 25.0, 0.02
+_PEOPLE = 0.9  # metres ahead of the base in which nobody may be
+
+
+def work_of(run: RobotRun, robot: int) -> tuple[Work, int, Array] | None:
+    """Return the work a robot is part of, its row in that, and its controller's memory; None without an arm."""
+    for group, work, memory in zip(run.scene.groups, run.work, run.memory, strict=True):
+        if work is not None and robot in group.robots:
+            row = work.row(robot)
+            return work, row, memory[row]
+    return None
+
+
+def _work(run: RobotRun, robot: int, what: str) -> tuple[Work, int, Array]:
+    found = work_of(run, robot)
+    if found is None:
+        raise InputError(f"{what}: {run.scene.models[robot].title} has no arm")
+    return found
+
+
+# Commands.
+
+
+def begin(run: RobotRun, robot: int, kind: Kind, target: Array, entity: int = 0) -> None:
+    """Begin a task.
+
+    Raises
+    ------
+    InputError
+        If the robot has no arm.
+    """
+    work, row, _ = _work(run, robot, kind.name.lower())
+    a = work.arrays
+    a.kind[row], a.stage[row], a.entity[row], a.target[row] = kind, Stage.GO, entity, target
+    a.timer[row], a.tries[row] = 0.0, 0
+    run.set_mode(robot, Mode.TASK)
+    here = run.position(robot)
+    if float(np.hypot(*(target - here)[:2])) > _NEAR:
+        path = way_to(run, robot, target)
+        if path is not None:
+            run.followers[robot].begin(path)
+
+
+def pick(run: RobotRun, robot: int, entity: int) -> None:
+    """Begin to pick a thing up.
+
+    Raises
+    ------
+    InputError
+        If the robot has no arm, or there is no such thing.
+    """
+    found = _object(run, entity)
+    if found is None:
+        raise InputError(f"pick: there is no thing {entity}")
+    objects, k = found
+    begin(run, robot, Kind.PICK, objects.position[k].copy(), entity)
+
+
+def offer(run: RobotRun, robot: int, person: Array) -> None:
+    """Begin to hold out what is held to a person who stands at a point.
+
+    Raises
+    ------
+    InputError
+        If the robot has no arm.
+    """
+    away = run.position(robot)[:2] - person[:2]
+    away = away / max(float(np.hypot(*away)), 1e-6)
+    begin(run, robot, Kind.OFFER, person + np.array([*(away * _ARM_LENGTH), _HELD_OUT]))
+
+
+def place_on(run: RobotRun, robot: int, entity: int) -> None:
+    """Begin to put what is held on a robot's deck.
+
+    Raises
+    ------
+    InputError
+        If the robot has no arm, or nobody has such a deck.
+    """
+    spot = deck_spot(run, robot, entity)
+    if spot is None:
+        raise InputError(f"place: {entity} has no deck")
+    begin(run, robot, Kind.PLACE, spot, entity)
+
+
+def abandon(run: RobotRun, robot: int) -> None:
+    """Leave a task: the arm stays where it is, and holds what it holds."""
+    found = work_of(run, robot)
+    if found is not None:
+        work, row, memory = found
+        work.arrays.kind[row] = Kind.NOTHING
+        memory[ARM_GOAL] = memory[ARM_NOW]
+
+
+def in_hand(run: RobotRun, robot: int) -> int:
+    """Entity of the thing that a robot's hand holds; 0 for none. What slipped out, or was taken, is held no more."""
+    found = work_of(run, robot)
+    if found is None:
+        return 0
+    work, row, _ = found
+    held = work.arrays.held[row]
+    thing = _object(run, int(held[0])) if held[0] else None
+    # Of a thing that is being handed over its taker says so.
+    if thing is not None and work.arrays.kind[row] not in (Kind.PLACE, Kind.OFFER):
+        objects, k = thing
+        if objects.holder[k] or _depth_below_hand(run, robot, work, objects, k) is None:
+            held[:] = 0.0
+    return int(held[0])
+
+
+def can_grasp(run: RobotRun, robot: int, size: Array) -> bool:
+    """Return whether a jaw is wide enough for the narrower of a thing's level sides."""
+    work, _, _ = _work(run, robot, "pick")
+    return float(np.min(size[:2])) / 2 + ROOM <= work.opening
+
+
+def handled(run: RobotRun, robot: int) -> int:
+    """Entity of the thing that a robot holds or is about to pick, which is not in its way; 0 for none."""
+    found = work_of(run, robot)
+    if found is None:
+        return 0
+    work, row, _ = found
+    held = in_hand(run, robot)
+    picking = int(work.arrays.entity[row]) if work.arrays.kind[row] == Kind.PICK else 0
+    return held or picking
+
+
+def deck_spot(run: RobotRun, robot: int, entity: int) -> Array | None:
+    """Where on the deck of the robot with an entity another one can put something, ENU metres; None without a deck."""
+    deck = deck_of(run, entity)
+    if deck is None:
+        return None
+    x, y, _ = apply_matrix(run.position(robot) - deck.position, deck.rotation.T) - deck.centre
+    half = np.array([deck.length, deck.width]) / 2 - _FROM_EDGE
+    spot = deck.centre + np.array([min(max(x, -half[0]), half[0]), min(max(y, -half[1]), half[1]), 0.0])
+    return np.asarray(deck.position + apply_matrix(spot, deck.rotation))
+
+
+# Decisions.
+
+
+def decide_task(run: RobotRun, robot: int, everybody: Bodies, dt: float) -> bool:
+    """Go on with a robot's task; return whether it is still driving to where that is."""
+    found = work_of(run, robot)
+    assert found is not None
+    work, row, memory = found
+    a = work.arrays
+    run.arrays.status[robot] = RobotStatus.MOVING
+    stage = Stage(int(a.stage[row]))
+    if stage == Stage.GO:
+        away = float(np.hypot(*(a.target[row] - run.position(robot))[:2]))
+        waits = run.followers[robot].status == RobotStatus.WAITING and away < _NEAR_ENOUGH
+        if away > _NEAR and len(run.followers[robot].path) and not waits:
+            return True
+        run.followers[robot].end()
+        _next(work, row, Stage.ALIGN)
+        return False
+    a.timer[row] += dt
+    if a.timer[row] > _STALE:
+        _finish(run, robot, work, row, "failed")
+        return False
+    if stage == Stage.ALIGN:
+        _align(run, robot, work, row, everybody)
+    elif stage == Stage.PLAN:
+        _plan(run, robot, work, row, memory)
+    elif stage == Stage.GRIP and a.kind[row] == Kind.OFFER:
+        _wait_for_taker(run, work, row, memory)
+    elif stage == Stage.GRIP:
+        _grip(work, row, memory)
+    else:
+        _move(run, robot, work, row, memory)
+    return False
+
+
+def _next(work: Work, row: int, stage: Stage) -> None:
+    work.arrays.stage[row], work.arrays.timer[row] = stage, 0.0
+
+
+def _finish(run: RobotRun, robot: int, work: Work, row: int, what: str) -> None:
+    run.note(robot, what)
+    abandon(run, robot)
+    run.arrays.mode[robot] = Mode.IDLE
+    run.arrays.status[robot] = RobotStatus.ARRIVED if what != "failed" else RobotStatus.BLOCKED
+
+
+def _in_base(base: Base, point: Array) -> Array:
+    """Return a point in the frame of the base."""
+    return np.asarray(apply_matrix(point - base.position, base.rotation.T))
+
+
+def _align(run: RobotRun, robot: int, work: Work, row: int, everybody: Bodies) -> None:
+    """Turn to the target and stand so far off it that the arm reaches it."""
+    a, base = work.arrays, run.engine.base(robot)
+    x, y, _ = _in_base(base, a.target[row])
+    standoff = STANDOFFS[int(a.tries[row]) % len(STANDOFFS)]
+    error = math.atan2(y, x)
+    missing = math.hypot(x, y) - standoff
+    velocity = run.arrays.velocity[robot]
+    if abs(error) > 0.08:
+        velocity[2] = min(max(1.5 * error, -_TURN), _TURN)
+    elif abs(missing) > _EXACT:
+        velocity[0] = min(max(1.0 * missing, -_STRAIGHT), _STRAIGHT)
+        velocity[2] = 1.0 * error
+        if velocity[0] > 0.0 and _somebody_ahead(run, robot, base, everybody):
+            velocity[:] = 0.0
+            run.arrays.status[robot] = RobotStatus.WAITING
+    elif abs(float(base.velocity[0])) + abs(float(base.velocity[1])) < 0.02:
+        _next(work, row, Stage.PLAN)
+
+
+def _somebody_ahead(run: RobotRun, robot: int, base: Base, everybody: Bodies) -> bool:
+    ahead = base.position[:2] + base.rotation[:2, 0] * _PEOPLE / 2
+    away = np.hypot(*(everybody.position[:, :2] - ahead).T) - everybody.half_length
+    return bool(np.any((away < _PEOPLE / 2) & everybody.person))
+
+
+def _object(run: RobotRun, entity: int) -> tuple[MovableObjects, int] | None:
+    objects = run.objects
+    found = np.flatnonzero(objects.entity == entity)
+    return (objects, int(found[0])) if len(found) else None
+
+
+def _downward(x: Array, along: Array, tilt: float) -> Array:
+    """Pose of a hand at a point that points down and opens along a level direction, tilted about that."""
+    c, s = math.cos(tilt), math.sin(tilt)
+    side = np.array([along[1], -along[0], 0.0])
+    z = -c * np.array([0.0, 0.0, 1.0]) + s * side
+    y = np.array([along[0], along[1], 0.0])
+    return np.column_stack([np.cross(y, z), y, z, x])
+
+
+def _plan(run: RobotRun, robot: int, work: Work, row: int, memory: Array) -> None:
+    """Plan the arm's way from where the base stands now, or try another standoff."""
+    a, base = work.arrays, run.engine.base(robot)
+    kind = Kind(int(a.kind[row]))
+    if kind == Kind.PLACE and a.entity[row]:
+        spot = deck_spot(run, robot, int(a.entity[row]))
+        if spot is not None:
+            a.target[row] = spot
+    goals = _goals(run, work, row, base, kind)
+    opening = work.opening
+    if goals is not None and kind == Kind.PICK:
+        goals, opening = goals[:-1], goals[-1][0, 3]
+    way = None if goals is None else _way(work, memory, goals, straight=kind in (Kind.PICK, Kind.PLACE))
+    if way is None:
+        a.tries[row] += 1
+        if a.tries[row] >= len(STANDOFFS):
+            _finish(run, robot, work, row, "failed")
+        else:
+            _next(work, row, Stage.ALIGN)
+        return
+    work.ways[row], a.turn_at[row] = way
+    a.point[row] = 0
+    if kind == Kind.PICK:
+        memory[ARM_GOAL][7:] = opening
+    _next(work, row, Stage.MOVE)
+
+
+def _goals(run: RobotRun, work: Work, row: int, base: Base, kind: Kind) -> list[Array] | None:
+    """Poses of the hand that would do, in the base's frame; of a pick last one with the opening in its corner."""
+    a = work.arrays
+    target = a.target[row]
+    if kind == Kind.PICK:
+        found = _object(run, int(a.entity[row]))
+        return None if found is None else _grasps(work, base, *found)
+    if kind == Kind.PLACE:
+        target = target + np.array([0.0, 0.0, a.held[row, 1] + 0.01])
+    at = _in_base(base, target)
+    out = at[:2] / max(float(np.hypot(*at[:2])), 1e-6)
+    aside = np.array([-out[1], out[0]])
+    return [_downward(at, aside * sign, tilt) for tilt in _TILTS for sign in (1.0, -1.0)]
+
+
+def _grasps(work: Work, base: Base, objects: MovableObjects, k: int) -> list[Array] | None:
+    """Grasps of a thing from above, across its narrower side first."""
+    turn = matrix_of(objects.orientation[k])
+    size = objects.size[k]
+    middle = objects.position[k] + turn[:, 2] * size[2] / 2
+    upright = int(np.abs(turn[2]).argmax())
+    sides = sorted((axis for axis in range(3) if axis != upright), key=lambda axis: float(size[axis]))
+    half = float(size[upright]) / 2
+    # The pads, 7 cm high, hold the upper part of what is high, and do not touch the ground beside what is low.
+    grip = np.array([0.0, 0.0, max(half - 0.06, 0.035 + 0.01 - half)]) + middle
+    found: list[Array] = []
+    for axis in sides:
+        opening = float(size[axis]) / 2 + ROOM
+        if opening > work.opening:
+            continue
+        along = apply_matrix(turn[:, axis], base.rotation.T)[:2]
+        along = along / max(float(np.hypot(*along)), 1e-6)
+        at = _in_base(base, grip)
+        found += [_downward(at, along * sign, tilt) for tilt in _TILTS for sign in (1.0, -1.0)]
+        last = np.zeros((3, 4))
+        last[0, 3] = opening
+        return [*found, last]
+    return None
+
+
+def _way(work: Work, memory: Array, goals: list[Array], *, straight: bool) -> tuple[Array, int] | None:
+    """Angles from above a pose down to it and up again, of the first pose that can be reached; and where it is down."""
+    now = work.model.rest[:7] + memory[ARM_NOW][:7]
+    for goal in goals:
+        above = goal.copy()
+        above[2, 3] += ABOVE if straight else 0.0
+        first = reach_pose(work.chain, above, now)
+        if first is None:
+            continue
+        if not straight:
+            return np.stack([first]), 0
+        down = _line(work.chain, first, above, goal)
+        if down is None:
+            continue
+        return np.concatenate([first[None], down, down[::-1], first[None]]), len(down)
+    return None
+
+
+def _line(chain: Chain, angles: Array, start: Array, end: Array) -> Array | None:
+    """Angles along a straight way of the hand, shape ``(m, 7)``; None if it can't be gone."""
+    count = max(2, math.ceil(float(np.linalg.norm(end[:, 3] - start[:, 3])) / _STEP))
+    found, now = [], angles.copy()
+    for k in range(1, count + 1):
+        goal = start + (end - start) * (k / count)
+        before = now.copy()
+        if solve(chain, now, goal, 30) > 4e-3 or np.abs(now - before).max() > 0.35:
+            return None
+        found.append(now.copy())
+    return np.array(found)
+
+
+def _move(run: RobotRun, robot: int, work: Work, row: int, memory: Array) -> None:
+    """Go along the arm's way; close or open where it is down, and end where it ends."""
+    a, way = work.arrays, work.ways[row]
+    point, stage = int(a.point[row]), int(a.stage[row])
+    rest = work.model.rest[:7]
+    end = int(a.turn_at[row]) if stage == Stage.MOVE else len(way) - 1
+    now = memory[ARM_NOW][:7] + rest
+    # As far ahead as is gone until this is asked again.
+    while point < end and float(np.abs(way[point] - now).max()) < 0.06:
+        point += 1
+    a.point[row] = point
+    memory[ARM_GOAL][:7] = way[point] - rest
+    angles = run.engine.joints(robot)[0][:7]
+    there = point == end and float(np.abs(way[end] - angles).max()) < _SETTLED
+    if not there:
+        return
+    kind = Kind(int(a.kind[row]))
+    if stage == Stage.MOVE and kind == Kind.REACH:
+        _finish(run, robot, work, row, "reached")
+    elif stage == Stage.MOVE:
+        _next(work, row, Stage.GRIP)
+    elif stage == Stage.LIFT:
+        _after_lift(run, robot, work, row, memory, kind)
+    else:
+        _finish(run, robot, work, row, _DONE[kind])
+
+
+def _grip(work: Work, row: int, memory: Array) -> None:
+    """Close past the thing, against the fingers' largest force, or open; then lift."""
+    a = work.arrays
+    memory[ARM_GOAL][7:] = 0.0 if a.kind[row] == Kind.PICK else work.opening
+    if a.timer[row] > _GRIP_TIME:
+        _next(work, row, Stage.LIFT)
+
+
+def _wait_for_taker(run: RobotRun, work: Work, row: int, memory: Array) -> None:
+    """Hold on until somebody else holds the thing; then open."""
+    a = work.arrays
+    found = _object(run, int(a.held[row, 0]))
+    if found is not None and not found[0].holder[found[1]]:
+        return
+    memory[ARM_GOAL][7:] = work.opening
+    a.held[row] = 0.0
+    _next(work, row, Stage.LIFT)
+
+
+def _after_lift(run: RobotRun, robot: int, work: Work, row: int, memory: Array, kind: Kind) -> None:
+    """Look whether the thing came along, or stayed; bring the arm to where it is carried."""
+    a = work.arrays
+    if kind in (Kind.PLACE, Kind.OFFER):
+        a.held[row] = 0.0
+        memory[ARM_GOAL][7:] = 0.0
+        work.ways[row] = work.model.rest[None, :7].copy()
+    else:
+        found = _object(run, int(a.entity[row]))
+        depth = None if found is None else _depth_below_hand(run, robot, work, *found)
+        if found is None or depth is None:
+            memory[ARM_GOAL][7:] = work.opening
+            a.tries[row] += 1
+            a.held[row] = 0.0
+            if a.tries[row] >= len(STANDOFFS):
+                _finish(run, robot, work, row, "failed")
+            else:
+                _next(work, row, Stage.ALIGN)
+            return
+        a.held[row] = float(a.entity[row]), depth
+        work.ways[row] = _way_to_carry(work.chain, memory[ARM_NOW][:7] + work.model.rest[:7])
+    a.point[row] = 0
+    _next(work, row, Stage.TUCK)
+
+
+def _way_to_carry(chain: Chain, now: Array) -> Array:
+    """Angles from where the arm is to where it carries: straight, or else however the hand points down there."""
+    poses = np.empty((7, 3)), np.empty((7, 3)), np.empty((3, 4))
+    hand_pose(chain, now, *poses)
+    goal = poses[2].copy()
+    goal[:, 3] = CARRY
+    goal[2, 3] = max(CARRY[2], float(poses[2][2, 3]))
+    way = _line(chain, now, poses[2], goal)
+    if way is not None:
+        return way
+    turns = np.arange(8) * np.pi / 4
+    poses_there = (_downward(goal[:, 3], np.array([math.cos(turn), math.sin(turn)]), 0.0) for turn in turns)
+    found = [angles for pose in poses_there if (angles := reach_pose(chain, pose, now)) is not None]
+    return min(found, key=lambda angles: float(np.abs(angles - now).max()))[None] if found else now[None]
+
+
+def _depth_below_hand(run: RobotRun, robot: int, work: Work, objects: MovableObjects, k: int) -> float | None:
+    """How far a held thing's underside is below the grip, metres; None if it is not between the fingers."""
+    base = run.engine.base(robot)
+    poses = np.empty((7, 3)), np.empty((7, 3)), np.empty((3, 4))
+    hand_pose(work.chain, run.engine.joints(robot)[0][:7].copy(), *poses)
+    hand = apply_matrix(poses[2][:, 3], base.rotation) + base.position
+    middle = objects.position[k] + matrix_of(objects.orientation[k])[:, 2] * objects.size[k, 2] / 2
+    if float(np.hypot(*(middle - hand)[:2])) > 0.15 or abs(float(middle[2] - hand[2])) > 0.25:
+        return None
+    half = np.abs(matrix_of(objects.orientation[k])[2]) * objects.size[k] / 2
+    return float(hand[2] - (middle[2] - half.sum()))
