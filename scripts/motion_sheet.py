@@ -22,11 +22,12 @@ from vico.render import Cameras, Lighting, Scene, render
 from vico.render.skinning import batch_bodies, skin
 from vico.seeds import rng
 from vico.sim.animation import CLIPS, Transition, clip_index, ground_under_feet, pose, style_of
+from vico.sim.animation.blending import is_seated
 from vico.world.mesh import Material, Surface
 
 MOMENTS = 8
 APART, TALL = 30.0, 2.1  # metres
-SPEEDS = {"walk": 1.2, "carry": 1.0, "run": 2.5}
+SPEEDS = {"walk": 1.2, "carry": 1.0, "carry_left": 1.0, "carry_right": 1.0, "run": 2.5}
 TRANSITIONS = (("idle", "walk"), ("walk", "idle"), ("walk", "run"), ("idle", "sit"), ("sit", "idle"), ("idle", "talk"))
 LOOKS = (
     Appearance(age=31, height=1.74, top="jacket", top_colour=(150, 60, 50)),
@@ -88,7 +89,8 @@ def row(name: str, look: Appearance, height: int) -> NDArray[np.uint8]:
     vertices, normals = skin(batch, rotations, offsets, spots + places, turn)
     solid = [box((-40, 40), (-40, 300), 0.0)]
     solid += [box((0.0, 1.2), (y - 0.4, y + 0.4), 0.12) for y in spots[:, 1] if uphill]
-    solid += [box((-0.32, 0.12), (y - 0.25, y + 0.25), 0.45) for y in spots[:, 1] if clip in ("sit", "ride_bus")]
+    seated = is_seated(clip_index(clip)) or clip == "ride_bus"
+    solid += [box((-0.32, 0.12), (y - 0.25, y + 0.25), 0.45) for y in spots[:, 1] if seated]
     scene = Scene(solid, lighting=Lighting(), prototypes={"bicycle": [bicycle()]})
     if clip == "ride_bike":
         frames = np.tile(np.eye(4), (MOMENTS, 1, 1))

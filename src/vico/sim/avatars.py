@@ -30,9 +30,13 @@ _CYCLES_PER_SECOND = 0.5
 _STANDING, _FASTEST_WALK = 0.01, 1.6  # m/s
 _SAME_PACE = 0.02  # m/s by which another speed asks for other strides
 # As plain numbers, for kernels.
-_IDLE, _SIT, _SLEEP, _TURN, _WALK, _RUN, _CARRY, _RIDE_BIKE, _RIDE_BUS = (
-    CLIP[name] for name in ("idle", "sit", "sleep", "turn", "walk", "run", "carry", "ride_bike", "ride_bus")
+_IDLE, _SIT, _SLEEP, _TURN, _WALK, _RUN, _CARRY, _RIDE_BIKE, _RIDE_BUS, _STAND = (
+    CLIP[name] for name in ("idle", "sit", "sleep", "turn", "walk", "run", "carry", "ride_bike", "ride_bus", "stand")
 )
+_CARRY_LEFT, _CARRY_RIGHT = CLIP["carry_left"], CLIP["carry_right"]
+# What a gesture is on a chair: most are made there too, for others one stays seated; who gets in sits down after it.
+_ON_A_CHAIR = np.array([CLIP.get(f"sit_{name}", _SIT) for name in CLIPS])
+_ON_A_CHAIR[CLIP["enter_vehicle"]] = CLIP["enter_vehicle"]
 _STANDING_UP, _SITTING = int(Posture.STANDING), int(Posture.SITTING)
 _IN_BUS, _ON_BIKE = int(Vehicle.BUS), int(Vehicle.BIKE)
 
@@ -181,14 +185,20 @@ def _clip_of(motion, k, speed):  # type: ignore[no-untyped-def]
     if speed > _STANDING:
         if motion.move_speed[k] > _FASTEST_WALK:
             return _RUN
-        return _CARRY if motion.held[k, 0] > 0 or motion.held[k, 1] > 0 else _WALK
+        left, right = motion.held[k, 0] > 0, motion.held[k, 1] > 0
+        if left and right:
+            return _CARRY
+        if left:
+            return _CARRY_LEFT
+        return _CARRY_RIGHT if right else _WALK
+    sits = motion.posture[k] == _SITTING
     if motion.action_clip[k] >= 0:
-        return np.int64(motion.action_clip[k])
-    if motion.posture[k] == _SITTING and motion.vehicle[k] == _IN_BUS:
-        return _RIDE_BUS
+        return _ON_A_CHAIR[motion.action_clip[k]] if sits else np.int64(motion.action_clip[k])
+    if motion.vehicle[k] == _IN_BUS:
+        return _RIDE_BUS if sits else _STAND
     if motion.posture[k] == _STANDING_UP:
         return _TURN if motion.turned[k] != 0.0 else _IDLE
-    return _SIT if motion.posture[k] == _SITTING else _SLEEP
+    return _SIT if sits else _SLEEP
 
 
 @compiled

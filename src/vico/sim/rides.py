@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vico.assets.bus import BUS_FLOOR
 from vico.sim.avatars import clearances, cyclist_fits, free_ground
 from vico.sim.bodies import Bodies
-from vico.sim.moves import follow_hands, wrapped
+from vico.sim.moves import follow_hands, gesture, wrapped
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import RADIUS, Posture, Vehicle
 from vico.sim.transit import FARE, TransitSystem
@@ -38,6 +38,7 @@ def board(i: int, state: SimulationState) -> None:
     line = transit.line_of(bus)
     state.events.add("boarding", p.names[i], f"boards bus {line.name}", p.position[i], line=line.id, fare=FARE)
     p.vehicle_yaw[i] = p.yaw[i] = transit.bus_pose(bus)[2]
+    gesture("enter_vehicle", i, state)
     _seat(i, state, transit)
 
 
@@ -53,6 +54,7 @@ def alight(i: int, state: SimulationState) -> None:
     p.posture[i] = Posture.STANDING
     p.position[i, :2] = spot
     p.yaw[i] = wrapped(float(transit.bus_pose(bus)[2]) - math.pi / 2)
+    gesture("exit_vehicle", i, state)
     state.avatars.settle(np.array([i]))
     follow_hands(state)
     state.events.add("alighting", p.names[i], f"gets off at {stop}", p.position[i], stop=stop)
@@ -89,6 +91,7 @@ def dismount(i: int, state: SimulationState) -> None:
     p.owed[i] += price - paid
     p.vehicle[i], p.vehicle_entity[i] = Vehicle.NONE, 0
     p.position[i, :2] = spot
+    gesture("exit_vehicle", i, state)
     state.avatars.settle(np.array([i]))
     follow_hands(state)
     costs = {"price": round(price, 2)} | ({"owed": round(price - paid, 2)} if paid < price else {})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from vico.rules import EARSHOT
 from vico.sim.actions.fields import Field
 from vico.sim.actions.model import ActionType, Situation, Values
@@ -9,13 +11,26 @@ from vico.sim.hearing import hearers_of
 from vico.sim.moves import gesture
 from vico.sim.simulation_state import SimulationState
 
+#: Nobody talks with hands to people farther off, metres.
+_TALKING_DISTANCE = 4.0
+
 
 def communicate(values: Values, i: int, state: SimulationState) -> None:
     """Say something to everybody near in the same space; noise and corners keep some from hearing it."""
     p = state.people
     heard = hearers_of(state, i, values.get("range", EARSHOT))
     state.events.say(p.names[i], values["text"], p.position[i], heard.hearers, heard.missed)
-    gesture("talk", i, state)
+    gesture("talk" if _is_near(heard.hearers, i, state) else "wave", i, state)
+
+
+def _is_near(listeners: list[str], i: int, state: SimulationState) -> bool:
+    """Return whether somebody listens from so near that one talks with them; to those farther off one waves."""
+    p = state.people
+    people = [p.names.index(name) for name in listeners if name in p.names]
+    if not people:
+        return True
+    away = np.hypot(*(p.position[people, :2] - p.position[i, :2]).T)
+    return float(away.min()) <= _TALKING_DISTANCE
 
 
 def task_complete(values: Values, i: int, state: SimulationState) -> None:

@@ -23,7 +23,7 @@ from vico.sim.animation.limbs import (
     part_way,
     sole_depth,
 )
-from vico.sim.animation.names import CARRY, RUN, SIT, SLEEP, WALK
+from vico.sim.animation.names import CARRY, CARRY_LEFT, CARRY_RIGHT, RUN, SIT, SIT_EAT, SIT_TALK, SLEEP, WALK
 from vico.sim.animation.rotations import Array, X, Y, Z, compose, rotate, rotation_about, smoothstep
 
 #: Longest that one motion shows in the next, seconds.
@@ -36,13 +36,19 @@ _STEP_LIFT, _FULL_STEP = 0.03, 0.15
 @compiled
 def is_gait(clip: int) -> bool:
     """Return whether a motion walks or runs."""
-    return clip in (WALK, CARRY, RUN)
+    return clip in (WALK, CARRY, CARRY_LEFT, CARRY_RIGHT, RUN)
+
+
+@compiled
+def is_seated(clip: int) -> bool:
+    """Return whether a motion is made sitting on a chair."""
+    return clip == SIT or SIT_TALK <= clip <= SIT_EAT
 
 
 @compiled
 def blend_time(before: int, clip: int) -> float:
     """Return how long joints take from one motion to another, seconds; feet may take to the end of their step."""
-    if before in (SIT, SLEEP) or clip in (SIT, SLEEP):
+    if is_seated(before) != is_seated(clip) or before == SLEEP or clip == SLEEP:
         return _DOWN_OR_UP
     if is_gait(clip):
         return _INTO_GAIT

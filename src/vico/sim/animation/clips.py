@@ -23,19 +23,23 @@ from vico.sim.animation.gait import run, walk
 from vico.sim.animation.limbs import BodyPose, curl_fingers
 from vico.sim.animation.names import (
     CARRY,
+    CARRY_LEFT,
+    CARRY_RIGHT,
     ENTER_VEHICLE,
     EXIT_VEHICLE,
     RIDE_BIKE,
     RIDE_BUS,
     RUN,
     SIT,
+    SIT_EAT,
+    SIT_TALK,
     SLEEP,
     TURN,
     WALK,
 )
 from vico.sim.animation.rotations import Array, axis_angle, smoothstep
 from vico.sim.animation.seated import ride_bike, sit, sleep, step_up
-from vico.sim.animation.standing import TURN_CYCLE, TURN_START, stand
+from vico.sim.animation.standing import TURN_CYCLE, TURN_START, gesture_seated, stand
 
 
 class Course(NamedTuple):
@@ -160,8 +164,8 @@ def _pose_one(body: Any, clip: int, phase: float, stride: float) -> None:
 
 @compiled
 def _move(body: Any, clip: int, p: float, stride: float) -> None:
-    if clip in (WALK, CARRY):
-        walk(body, p, stride, clip == CARRY)
+    if clip in (WALK, CARRY, CARRY_LEFT, CARRY_RIGHT):
+        walk(body, p, stride, (clip in (CARRY, CARRY_LEFT), clip in (CARRY, CARRY_RIGHT)))
     elif clip == RUN:
         run(body, p, stride)
     elif clip == SLEEP:
@@ -170,6 +174,9 @@ def _move(body: Any, clip: int, p: float, stride: float) -> None:
         ride_bike(body, p)
     elif clip in (SIT, RIDE_BUS):
         sit(body, p)
+    elif SIT_TALK <= clip <= SIT_EAT:
+        sit(body, p)
+        gesture_seated(body, p, clip)
     elif clip in (ENTER_VEHICLE, EXIT_VEHICLE):
         step_up(body, p)
     else:

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
-from vico.sim.animation.blending import is_gait
+from vico.sim.animation.blending import is_gait, is_seated
 from vico.sim.animation.gait import foothold, gait_of_run, gait_of_walk
 from vico.sim.animation.limbs import ANKLE, stance
-from vico.sim.animation.names import RUN, SIT
+from vico.sim.animation.names import RUN
 from vico.sim.animation.rotations import Y
 from vico.sim.animation.seated import seated_foot
 from vico.sim.animation.stride import stride_length
@@ -81,7 +81,7 @@ def _feet(clip: Any, phase: Any, stride: Any, style: Any, ends: Any) -> None:
                 y = ankle[Y] * (0.6 if clip[i] == RUN else one.foot_spread)
                 here, after = foothold((phase[i] + 0.5 * side) % 1.0, gait)
                 here, after = here + ankle[0], after + ankle[0]
-            elif clip[i] == SIT:
+            elif is_seated(clip[i]):
                 here, y = seated_foot(one, side)
                 after = here
             else:

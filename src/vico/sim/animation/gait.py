@@ -177,8 +177,8 @@ def ground_between(body: Any, p: float, gait: Any) -> float:
 
 
 @compiled
-def walk(body: Any, p: float, stride: float, carrying: bool) -> None:
-    """Walk: the pelvis rides as high as the stiffer leg allows, arms swing against the legs or carry something."""
+def walk(body: Any, p: float, stride: float, carrying: tuple[bool, bool]) -> None:
+    """Walk: the pelvis rides as high as the stiffer leg allows, arms swing against the legs unless they carry."""
     local, shift, joints, style = body.local, body.shift, body.joints, body.style
     tall = style.height
     # Longer strides swing, bob and turn more; 1 at an ordinary walk.
@@ -210,14 +210,20 @@ def walk(body: Any, p: float, stride: float, carrying: bool) -> None:
     shift[Z] = min(low, top) if low < top - 0.004 else top - 0.004 * np.exp(-(low - top + 0.004) / 0.004)
     for side in range(2):
         place_foot(body, side, ankles[side], pitch[side], style.toe_out, toes[side])
-    bend_trunk(local, style.trunk_lean + 0.02 * vigour * double, 0.0, 1.7 * turned, 0.0, 0.5 * style.age_share)
+    # Who carries on one side leans to the other.
+    aside = 0.05 * (int(carrying[0]) - int(carrying[1]))
+    bend_trunk(local, style.trunk_lean + 0.02 * vigour * double, aside, 1.7 * turned, 0.0, 0.5 * style.age_share)
     swing = style.arm_swing * vigour
     for side in range(2):
         beat = np.cos(_TAU * (p + 0.5 * side) + 0.25)
         forward = -swing * beat - 0.06
         bend = style.elbow_bend + max(forward, 0.0) * 0.9
-        if carrying:
+        if carrying[0] and carrying[1]:
             hang_arm(local, side, style.arm_abduction + 0.05, 0.35 * forward + 0.12, style.elbow_bend + 0.5, 0.1)
+            grip(body, side, 0.9)
+        elif carrying[side]:
+            # A weight pulls the arm straight, and keeps it from swinging.
+            hang_arm(local, side, style.arm_abduction + 0.04, 0.25 * forward, 0.5 * style.elbow_bend, 0.1)
             grip(body, side, 0.9)
         else:
             hang_arm(local, side, style.arm_abduction, forward, bend, 0.15)

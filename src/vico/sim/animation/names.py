@@ -25,6 +25,12 @@ CLIPS = (
     "stand",
     "enter_vehicle",
     "exit_vehicle",
+    "carry_left",
+    "carry_right",
+    "sit_talk",
+    "sit_wave",
+    "sit_drink",
+    "sit_eat",
 )
 _INDEX = {name: index for index, name in enumerate(CLIPS)}
 
@@ -44,4 +50,5 @@ def clip_index(name: str) -> int:
 
 
 IDLE, WALK, RUN, TURN, SIT, SLEEP, TALK, WAVE, PICK, PUT, REACH, DRINK, EAT, CARRY = range(14)
-RIDE_BIKE, RIDE_BUS, STAND, ENTER_VEHICLE, EXIT_VEHICLE = range(14, 19)
+RIDE_BIKE, RIDE_BUS, STAND, ENTER_VEHICLE, EXIT_VEHICLE, CARRY_LEFT, CARRY_RIGHT = range(14, 21)
+SIT_TALK, SIT_WAVE, SIT_DRINK, SIT_EAT = range(21, 25)

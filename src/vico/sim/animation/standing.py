@@ -20,7 +20,21 @@ from vico.sim.animation.limbs import (
     reach_by,
     stand_on_feet,
 )
-from vico.sim.animation.names import DRINK, EAT, IDLE, PICK, PUT, REACH, STAND, TALK, TURN, WAVE
+from vico.sim.animation.names import (
+    DRINK,
+    EAT,
+    IDLE,
+    PICK,
+    PUT,
+    REACH,
+    SIT_EAT,
+    SIT_TALK,
+    SIT_WAVE,
+    STAND,
+    TALK,
+    TURN,
+    WAVE,
+)
 from vico.sim.animation.rotations import X, Y, Z, compose, rotation_about, smoothstep
 
 _TAU = 2 * np.pi
@@ -35,13 +49,35 @@ def stand(body: Any, p: float, clip: int) -> None:
     """Stand on both feet, and make the gesture of a motion."""
     _stand_upright(body, p, clip)
     if clip == TALK:
-        _talk(body, p)
+        _talk(body, p, 0.0)
     elif clip == WAVE:
-        _wave(body, p)
+        _wave(body, p, 0.0)
     elif clip in (PICK, PUT, REACH):
         _reach_out(body, p, clip)
     elif clip in (DRINK, EAT):
-        _consume(body, p, clip)
+        _consume(body, p, clip, 0.0)
+    elif clip == STAND:
+        _hold_on(body)
+
+
+@compiled
+def gesture_seated(body: Any, p: float, clip: int) -> None:
+    """Make a gesture on a chair, as it is made standing."""
+    low = body.shift[Z]
+    if clip == SIT_TALK:
+        _talk(body, p, low + 0.06 * body.style.height)  # above the thighs
+    elif clip == SIT_WAVE:
+        _wave(body, p, low)
+    else:
+        _consume(body, p, EAT if clip == SIT_EAT else DRINK, low)
+
+
+@compiled
+def _hold_on(body: Any) -> None:
+    """Hold on to a rail overhead, as those do who find no seat."""
+    tall = body.style.height
+    reach(body, RIGHT, np.array([0.10 * tall, -0.12 * tall, 1.02 * tall]), np.array([0.2, -1.0, -0.3]))
+    grip(body, RIGHT, 1.0)
 
 
 @compiled
@@ -130,28 +166,28 @@ def _outward(side: int) -> Any:
 
 
 @compiled
-def _talk(body: Any, p: float) -> None:
+def _talk(body: Any, p: float, low: float) -> None:
     """Beat with the right hand, lively people with both."""
     tall, asymmetry = body.style.height, body.style.asymmetry
     out = np.zeros(3)
     beat, slow = np.sin(2 * _TAU * p + 3 * asymmetry), np.sin(_TAU * p)
-    out[X], out[Y], out[Z] = 0.22 * tall, -0.14 * tall, (0.62 + 0.035 * beat) * tall
+    out[X], out[Y], out[Z] = 0.22 * tall, -0.14 * tall, (0.62 + 0.035 * beat) * tall + low
     out[Y] -= 0.03 * tall * slow
     reach(body, RIGHT, out, _outward(RIGHT))
     if asymmetry > 0.4:
-        out[X], out[Y], out[Z] = 0.20 * tall, 0.13 * tall, (0.60 - 0.03 * beat) * tall
+        out[X], out[Y], out[Z] = 0.20 * tall, 0.13 * tall, (0.60 - 0.03 * beat) * tall + low
         reach(body, LEFT, out, _outward(LEFT))
     body.local[WRIST[RIGHT]] = rotation_about(Y, -0.5)
 
 
 @compiled
-def _wave(body: Any, p: float) -> None:
+def _wave(body: Any, p: float, low: float) -> None:
     """Raise the right hand and sweep it thrice."""
     tall = body.style.height
     out = np.zeros(3)
     up = smoothstep(3.5 * p) * smoothstep(3.5 * (1 - p))
     sweep = np.sin(3 * _TAU * p)
-    out[X], out[Y], out[Z] = 0.10 * tall, (-0.20 - 0.045 * sweep) * tall, 0.98 * tall
+    out[X], out[Y], out[Z] = 0.10 * tall, (-0.20 - 0.045 * sweep) * tall, 0.98 * tall + low
     reach_by(body, RIGHT, out, np.array([0.0, -1.0, -0.4]), up)
     body.local[WRIST[RIGHT]] = rotation_about(X, 0.35 * sweep * up)
     grip(body, RIGHT, 0.35 * (1 - up))
@@ -170,15 +206,15 @@ def _reach_out(body: Any, p: float, clip: int) -> None:
 
 
 @compiled
-def _consume(body: Any, p: float, clip: int) -> None:
+def _consume(body: Any, p: float, clip: int, low: float) -> None:
     """Bring the right hand to the mouth; who eats holds a plate in the left."""
     tall, strength = body.style.height, _strength(p)
     out = np.zeros(3)
-    out[X], out[Y], out[Z] = 0.125 * tall, -0.035 * tall, 0.845 * tall
+    out[X], out[Y], out[Z] = 0.125 * tall, -0.035 * tall, 0.845 * tall + low
     reach_by(body, RIGHT, out, np.array([0.2, -0.6, -1.0]), strength)
     body.local[WRIST[RIGHT]] = rotation_about(Y, -0.5 * strength)
     grip(body, RIGHT, 0.85)
     if clip == EAT:
-        out[X], out[Y], out[Z] = 0.20 * tall, 0.05 * tall, 0.66 * tall
+        out[X], out[Y], out[Z] = 0.20 * tall, 0.05 * tall, 0.66 * tall + low
         reach(body, LEFT, out, _outward(LEFT))
         grip(body, LEFT, 0.7)

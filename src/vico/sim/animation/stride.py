@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
-from vico.sim.animation.names import CARRY, RIDE_BIKE, RUN, WALK
+from vico.sim.animation.names import CARRY, CARRY_LEFT, CARRY_RIGHT, RIDE_BIKE, RUN, WALK
 
 _TURN_OF_CRANKS = 4.0  # metres
 _SLOWEST = 0.15  # shorter strides than at this speed nobody takes, m/s
@@ -17,7 +17,7 @@ _SLOWEST = 0.15  # shorter strides than at this speed nobody takes, m/s
 @compiled
 def stride_of(clip, speed, height):  # type: ignore[no-untyped-def]
     """Return the metres one cycle of one motion covers; see `stride_length`."""
-    if clip in (WALK, CARRY):
+    if clip in (WALK, CARRY, CARRY_LEFT, CARRY_RIGHT):
         return 0.727 * height * max(speed, _SLOWEST) ** 0.45
     if clip == RUN:
         return height * (0.62 + 0.20 * speed)
