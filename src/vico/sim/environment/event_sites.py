@@ -76,7 +76,7 @@ class EventSites:
         if named:
             ids = ", ".join(place.id for place in named[:_SHOWN])
             raise InputError(f"events: {len(named)} places are called {wanted!r}; give an id, such as {ids}")
-        raise InputError(f"events: no place has the id or name {wanted!r}; vico world places lists them")
+        raise InputError(f"events: no place has the id or name {wanted!r}; the world's places.json lists them")
 
     def places_of(self, event: CityEvent) -> list[Place]:
         """Return the places an event shuts."""
