@@ -164,6 +164,7 @@ def test_riders_are_seen_through_the_windows(helsinki_city: World) -> None:
         np.array([[*(rider[:2] + 4.0 * beside), rider[2] + 1.3, *-beside, 0.0]]),
         np.array([0], np.int32),
     )
+    views.wait_for(0)
     assert int((views.segmentation == sim.state.people.entity[0]).sum()) > 100
 
 
