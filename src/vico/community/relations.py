@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from vico.community.groups import Meeting
 from vico.community.model import Relation, RelationKind
@@ -118,6 +117,8 @@ def _tie_neighbours(
     rng: np.random.Generator, network: _Network, index: PlaceIndex, people: Sequence[ResidentDraft]
 ) -> None:
     positions = np.array([index.place_by_id[s.home].position[:2] for s in people])
+    from scipy.spatial import cKDTree  # slow to import, and most who import this build no community
+
     near = cKDTree(positions).query_pairs(_NEXT_DOOR, output_type="ndarray")
     homes: dict[str, list[int]] = {}
     for k, s in enumerate(people):

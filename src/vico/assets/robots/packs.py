@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import trimesh
 from defusedxml.ElementTree import parse
 
 from vico.assets.packages import Package, Tags, installed
@@ -74,6 +73,8 @@ def _read_baked(path: Path) -> dict[str, list[Surface]] | None:
 
 def _light(path: Path, triangles: int, colour: tuple[int, int, int], scale: float = 1.0) -> Surface:
     """Read an OBJ or STL file as a light surface."""
+    import trimesh  # a seventh of a second that most processes need not spend
+
     mesh = trimesh.load(path, process=False, force="mesh", skip_materials=True)
     mesh.merge_vertices(merge_tex=True, merge_norm=True, digits_vertex=6)
     points, faces, _ = thinned(np.asarray(mesh.vertices) * scale, np.asarray(mesh.faces), triangles)
