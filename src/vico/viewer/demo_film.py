@@ -30,7 +30,7 @@ _COLOURS = {
     "bicycle": (0, 158, 115),
     "pedestrian": (122, 133, 144),
 }
-_LABELS = {"resident": "residents", "robot": "robots", "car": "cars", "bus": "bus", "pedestrian": "passers-by"}
+_LABELS = {"resident": "residents", "robot": "robots", "car": "cars", "bus": "buses", "pedestrian": "passers-by"}
 _TILE = 264
 _LEFT = HEIGHT + 8
 
