@@ -11,10 +11,10 @@ from __future__ import annotations
 import json
 import os
 import tomllib
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -125,14 +125,38 @@ def parse_record(text: str, kind: type[R], *, source: str = "data", guide: str =
     SchemaError
         As `read_record`.
     """
-    help_page = f"; see {guide}" if guide else ""
     try:
-        # By way of JSON: it has one kind of list, which fits tuples and lists alike under strict types.
-        return kind.model_validate_json(json.dumps(tomllib.loads(text)))
+        plain = json.dumps(tomllib.loads(text))
     except (tomllib.TOMLDecodeError, TypeError) as error:
-        raise SchemaError(f"{source}: not valid TOML ({error}){help_page}") from None
+        raise SchemaError(f"{source}: not valid TOML ({error}){_pointer(guide)}") from None
+    return _checked(plain, kind, source, guide)
+
+
+def record_of(content: Mapping[str, Any], kind: type[R], *, source: str = "data", guide: str = "") -> R:
+    """Return plain data, as JSON holds it, as a record; the other parameters as `parse_record` has them.
+
+    Raises
+    ------
+    SchemaError
+        If it holds what JSON has not, or a field is unknown, missing or of another type.
+    """
+    try:
+        plain = json.dumps(content)
+    except TypeError as error:
+        raise SchemaError(f"{source}: JSON has no such values ({error}){_pointer(guide)}") from None
+    return _checked(plain, kind, source, guide)
+
+
+def _checked(plain: str, kind: type[R], source: str, guide: str) -> R:
+    try:
+        # JSON has one kind of list, which fits tuples and lists alike under strict types.
+        return kind.model_validate_json(plain)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"]) or "the whole file"
         more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
-        raise SchemaError(f"{source}: {where}: {first['msg'].lower()}{more}{help_page}") from None
+        raise SchemaError(f"{source}: {where}: {first['msg'].lower()}{more}{_pointer(guide)}") from None
+
+
+def _pointer(guide: str) -> str:
+    return f"; see {guide}" if guide else ""

@@ -48,7 +48,7 @@ def at_the_shop(sim: Simulation) -> dict[str, Any]:
     ("events", "says"),
     [
         ("sometimes", "'sometimes' is not known; take none, changing"),
-        ({"event": []}, "events: field required; see docs/events.md"),
+        ({"event": []}, "events: field required .and 1 more.; see docs/events.md"),
         (
             {"events": [{"kind": "closure", "begin": "09:00", "place": 7}]},
             "events.0.place: input should be a valid str",

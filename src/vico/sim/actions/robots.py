@@ -33,10 +33,8 @@ def control(values: Values, robot: int, state: SimulationState) -> None:
 
 def check_go_to(values: Values, robot: int, state: SimulationState) -> Refusal | None:
     """Judge going to a point: the robot drives or walks, and there is a way."""
-    refusal = _refuse_without_velocities("go_to", robot, state)
-    if refusal is None and not _robots(state).has_way(robot, np.array(values["target"][:2])):
-        return Refusal(ReasonCode.BLOCKED, "go_to: no way there that is wide enough for this robot")
-    return refusal
+    target = np.array(values["target"], np.float64)
+    return _refuse_without_velocities("go_to", robot, state) or _refuse_without_way("go_to", target, robot, state)
 
 
 def go_to(values: Values, robot: int, state: SimulationState) -> None:
@@ -51,6 +49,14 @@ def check_follow(values: Values, robot: int, state: SimulationState) -> Refusal 
     if values["agent"] == _robots(state).names[robot]:
         return Refusal(ReasonCode.SELF, "follow: that is yourself")
     return _refuse_without_velocities("follow", robot, state)
+
+
+def follow(values: Values, robot: int, state: SimulationState) -> None:
+    """Have a robot keep near somebody."""
+    robots, agent = _robots(state), state.names.index(values["agent"])
+    people = len(state.people)
+    entity = state.people.entity[agent] if agent < people else robots.bodies().entity[agent - people]
+    robots.follow_body(robot, int(entity))
 
 
 def check_fly_to(values: Values, robot: int, state: SimulationState) -> Refusal | None:
@@ -83,14 +89,6 @@ def land(values: Values, robot: int, state: SimulationState) -> None:
     _robots(state).land(robot, None if target is None else np.array(target[:2], np.float64))
 
 
-def follow(values: Values, robot: int, state: SimulationState) -> None:
-    """Have a robot keep near somebody."""
-    robots, agent = _robots(state), state.names.index(values["agent"])
-    people = len(state.people)
-    entity = state.people.entity[agent] if agent < people else robots.bodies().entity[agent - people]
-    robots.follow_body(robot, int(entity))
-
-
 def stop(values: Values, robot: int, state: SimulationState) -> None:
     """Have a robot stand still."""
     _robots(state).stop(robot)
@@ -100,6 +98,13 @@ def _refuse_without_arm(action: str, robot: int, state: SimulationState) -> Refu
     if _robots(state).has_arm(robot):
         return None
     return Refusal(ReasonCode.NOT_ABLE, f"{action}: this robot has no arm")
+
+
+def _refuse_unless_holding(action: str, robot: int, state: SimulationState) -> Refusal | None:
+    refusal = _refuse_without_arm(action, robot, state)
+    if refusal is None and not _robots(state).in_hand(robot):
+        refusal = Refusal(ReasonCode.HAND_EMPTY, f"{action}: the hand is empty")
+    return refusal
 
 
 def _refuse_without_way(action: str, point: NDArray[np.float64], robot: int, state: SimulationState) -> Refusal | None:
@@ -144,14 +149,12 @@ def pick(values: Values, robot: int, state: SimulationState) -> None:
 
 def check_place(values: Values, robot: int, state: SimulationState) -> Refusal | None:
     """Judge placing: something in hand, and a point, or a deck, to put it on."""
-    robots, target = _robots(state), values["target"]
-    refusal = _refuse_without_arm("place", robot, state)
-    if refusal is None and not robots.in_hand(robot):
-        refusal = Refusal(ReasonCode.HAND_EMPTY, "place: the hand is empty")
+    target = values["target"]
+    refusal = _refuse_unless_holding("place", robot, state)
     if refusal is not None:
         return refusal
     if isinstance(target, int):
-        if robots.deck(target) is None:
+        if _robots(state).deck(target) is None:
             return Refusal(ReasonCode.UNKNOWN_TARGET, f"place: {target} has no deck")
         return None
     return _refuse_without_way("place", np.array(target, np.float64), robot, state)
@@ -165,10 +168,7 @@ def place(values: Values, robot: int, state: SimulationState) -> None:
 
 def check_hand_over(values: Values, robot: int, state: SimulationState) -> Refusal | None:
     """Judge handing over: something in hand, and a person outdoors."""
-    robots = _robots(state)
-    refusal = _refuse_without_arm("hand_over", robot, state)
-    if refusal is None and not robots.in_hand(robot):
-        refusal = Refusal(ReasonCode.HAND_EMPTY, "hand_over: the hand is empty")
+    refusal = _refuse_unless_holding("hand_over", robot, state)
     if refusal is not None:
         return refusal
     if values["agent"] not in state.people.names:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field
 
 from vico.clock import DAY, seconds_of_day
-from vico.errors import InputError, SchemaError
+from vico.errors import InputError
+from vico.io.data_files import DataRecord, record_of
 from vico.sim.environment.event_kinds import kind_of_event
 
 _GUIDE = "docs/events.md"
@@ -91,10 +91,10 @@ class CityEvent:
         return cls(**(dict(record) | parsed))
 
 
-class _Line(BaseModel):
+class _Line(DataRecord):
     """An event in a file of events."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(allow_inf_nan=False)
 
     kind: str
     begin: str
@@ -108,9 +108,7 @@ class _Line(BaseModel):
     walkways: bool | None = None
 
 
-class _File(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
+class _File(DataRecord):
     events: tuple[_Line, ...] = Field(max_length=1000)
 
 
@@ -124,12 +122,7 @@ def planned_events(record: Mapping[str, Any], *, source: str = "events") -> list
     InputError
         If it names a kind that is not known, or a number is out of range.
     """
-    try:
-        lines = _File.model_validate_json(json.dumps(record)).events
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "the whole file"
-        raise SchemaError(f"{source}: {where}: {first['msg'].lower()}; see {_GUIDE}") from None
+    lines = record_of(record, _File, source=source, guide=_GUIDE).events
     return [_event(line, f"{source}: events.{k}") for k, line in enumerate(lines)]
 
 

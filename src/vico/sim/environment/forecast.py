@@ -5,7 +5,6 @@ A forecast is fixed when a run begins, and any moment of it can be asked for wit
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -13,10 +12,11 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
 from vico.clock import DAY, seconds_of_day
 from vico.errors import InputError, SchemaError
+from vico.io.data_files import DataRecord, record_of
 from vico.seeds import rng
 from vico.sim.environment.climate import usual_temperature
 from vico.sim.environment.weather import NAMES, Weather, WeatherKind, blended, kind_of_weather, weather_kinds
@@ -110,10 +110,8 @@ class Changing:
         return np.array(times), kinds, winds
 
 
-class _Change(BaseModel):
+class _Change(DataRecord):
     """A line of a weather file."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
     at: str
     day: int = Field(default=0, ge=0)
@@ -128,9 +126,7 @@ class _Change(BaseModel):
     temperature: float | None = None
 
 
-class _File(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
+class _File(DataRecord):
     weather: tuple[_Change, ...] = Field(min_length=1)
 
 
@@ -170,12 +166,7 @@ def planned(record: Mapping[str, Any], site: Site, *, source: str = "weather") -
     InputError
         If it names a kind that is not known, or a number is out of range.
     """
-    try:
-        lines = _File.model_validate_json(json.dumps(record)).weather
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "the whole file"
-        raise SchemaError(f"{source}: {where}: {first['msg'].lower()}; see docs/weather.md") from None
+    lines = record_of(record, _File, source=source, guide="docs/weather.md").weather
     changes: list[tuple[float, float, Weather]] = []
     for k, line in enumerate(lines):
         begin = float(line.day * DAY + seconds_of_day(line.at))

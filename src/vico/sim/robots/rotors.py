@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.robots import RobotModel
 from vico.io.compiled import compiled
 from vico.sim.physics import PhysicsEngine
+from vico.sim.robots.ways_of_many import OnTheirWays
 from vico.sim.robots.wind import Gusts, air_at
 from vico.world.heights import HeightField
 
 AIR_DENSITY = 1.225
 _STILL = 1e-3  # rad/s below which a rotor stands
-_NO_WAY = np.zeros((0, 3))
 #: Entries of a setpoint: position (ENU, metres), velocity (m/s), heading (rad) and turning (rad/s).
 POSITION, VELOCITY, HEADING, TURNING, SETPOINT = slice(0, 3), slice(3, 6), 6, 7, 8
 
@@ -93,7 +90,7 @@ class FlightArrays:
 
 
 @dataclass
-class Flight:
+class Flight(OnTheirWays):
     """The robots of a kind that flies.
 
     Attributes
@@ -112,16 +109,15 @@ class Flight:
         Corners of the way that each flies, ENU metres, shape ``(m, 3)``.
     """
 
-    model: RobotModel
-    robots: NDArray[np.int64]
+    width = 3
+
     ground: HeightField
     gusts: Gusts
     arrays: FlightArrays = field(init=False)
-    ways: list[NDArray[np.float64]] = field(init=False)
 
     def __post_init__(self) -> None:
         self.arrays = FlightArrays.landed(len(self.robots), len(self.model.motors))
-        self.ways = [_NO_WAY] * len(self.robots)
+        self.ways = [self.no_way()] * len(self.robots)
         r = self.model.rotors
         assert r is not None
         self._lift = (r.thrust, r.moment, r.rotor_drag, 0.5 * AIR_DENSITY * r.drag_area)
@@ -130,10 +126,6 @@ class Flight:
         disc = 2.0 * AIR_DENSITY * math.pi * r.radius**2
         self._power = (1.0 / (math.sqrt(disc) * r.efficiency), r.idle_power, r.capacity)
         self._places, self._turns, self._site = r.places, r.turns, r.site
-
-    def row(self, robot: int) -> int:
-        """Row of a robot in the arrays."""
-        return int(np.flatnonzero(self.robots == robot)[0])
 
     @property
     def in_the_air(self) -> bool:
@@ -153,21 +145,6 @@ class Flight:
             seconds,
         )
         engine.thrust_all(self.robots, self._site, wrenches)
-
-    def saved(self) -> dict[str, NDArray[Any]]:
-        """Every number that decides the future, copied."""
-        found = {name: value.copy() for name, value in vars(self.arrays).items()}
-        return found | {
-            "way_ends": np.cumsum([len(way) for way in self.ways], dtype=np.int64),
-            "ways": np.concatenate([_NO_WAY, *self.ways]),
-        }
-
-    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Go back to what `saved` returned."""
-        for name, value in vars(self.arrays).items():
-            value[...] = arrays[name]
-        starts = np.concatenate([[0], arrays["way_ends"]]).astype(int)
-        self.ways = [arrays["ways"][starts[k] : starts[k + 1]].copy() for k in range(len(self.ways))]
 
 
 @compiled

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.robots import MobileManipulator, RobotModel
+from vico.assets.robots import MobileManipulator
 from vico.sim.robots.arm import Chain
+from vico.sim.robots.ways_of_many import OnTheirWays
 
 Array = NDArray[np.float64]
 
@@ -81,7 +80,7 @@ class TaskArrays:
 
 
 @dataclass
-class Work:
+class Work(OnTheirWays):
     """The tasks of the robots of a kind that has arms.
 
     Attributes
@@ -96,10 +95,9 @@ class Work:
         Angles of the arm that are gone through, rad, shape ``(m, 7)`` each.
     """
 
-    model: RobotModel
-    robots: NDArray[np.int64]
+    width = 7
+
     arrays: TaskArrays = field(init=False)
-    ways: list[Array] = field(init=False)
 
     def __post_init__(self) -> None:
         c = self.model.controller
@@ -107,28 +105,9 @@ class Work:
         self.chain = Chain(c.places, c.axes, c.low, c.high, c.grip)
         self.opening = c.opening
         self.arrays = TaskArrays.idle(len(self.robots))
-        self.ways = [np.zeros((0, 7))] * len(self.robots)
+        self.ways = [self.no_way()] * len(self.robots)
 
     @property
     def busy(self) -> bool:
         """Whether any of them works or holds something."""
         return bool(self.arrays.kind.any() or self.arrays.held[:, 0].any())
-
-    def row(self, robot: int) -> int:
-        """Row of a robot in the arrays."""
-        return int(np.flatnonzero(self.robots == robot)[0])
-
-    def saved(self) -> dict[str, NDArray[Any]]:
-        """Every number that decides the future, copied."""
-        found = {name: value.copy() for name, value in vars(self.arrays).items()}
-        return found | {
-            "way_ends": np.cumsum([len(way) for way in self.ways], dtype=np.int64),
-            "ways": np.concatenate([np.zeros((0, 7)), *self.ways]),
-        }
-
-    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Go back to what `saved` returned."""
-        for name, value in vars(self.arrays).items():
-            value[...] = arrays[name]
-        starts = np.concatenate([[0], arrays["way_ends"]]).astype(int)
-        self.ways = [arrays["ways"][starts[k] : starts[k + 1]].copy() for k in range(len(self.ways))]
