@@ -115,37 +115,38 @@ class EventThings:
     def follow(self, state: City) -> None:
         """Clear away what stands for events that are over, and set up what is missing where there is room by now."""
         agenda = state.environment.agenda
-        before = len(self._standing)
         going_on = {one.id: one for one in agenda.going_on}
         kept = {e: thing for e, thing in self._standing.items() if (e - FIRST_THING) // THINGS_EACH in going_on}
-        self._standing = kept
-        changed = len(kept) != before
+        if len(kept) != len(self._standing):
+            self._stand(kept)
         for one in going_on.values():
-            changed |= self._set_up(one, state)
-        if changed:
-            self._standing = dict(sorted(self._standing.items()))
-            self._bodies = self._joined()
+            # At once, so that the next event's things keep clear of them.
+            if more := self._missing(one, state):
+                self._stand(self._standing | more)
 
-    def _set_up(self, one: Occurrence, state: City) -> bool:
-        """Set up what is missing of an event's things; return whether there was any."""
+    def _stand(self, things: dict[int, _Thing]) -> None:
+        """Have these things stand, and no others."""
+        self._standing = dict(sorted(things.items()))
+        self._bodies = self._joined()
+
+    def _missing(self, one: Occurrence, state: City) -> dict[int, _Thing]:
+        """Return what is missing of an event's things and can be set up now, by entity."""
         first = FIRST_THING + THINGS_EACH * one.id
         spots = _spots(one, state)
         missing = [k for k in range(len(spots)) if first + k not in self._standing]
         if not missing:
-            return False
+            return {}
         closed = state.environment.agenda.effects.lanes
         # As long as a car has to drive out of the street, nothing is put in its way.
         if one.kind.lanes and state.traffic is not None and closed is not None and state.traffic.is_taken(closed):
-            return False
+            return {}
         others = records_of(state.obstacles())
-        done = False
-        for k in missing:
-            thing = _Thing.at(spots[k], state)
-            if len(others) and gaps(thing.outline(), others).min() < _ROOM:
-                continue
-            self._standing[first + k] = thing
-            done = True
-        return done
+        things = {first + k: _Thing.at(spots[k], state) for k in missing}
+        return {
+            entity: thing
+            for entity, thing in things.items()
+            if not len(others) or gaps(thing.outline(), others).min() >= _ROOM
+        }
 
     def _joined(self) -> Bodies:
         things = list(self._standing.values())

@@ -320,3 +320,40 @@ def test_stalls_stand_at_a_market_and_cars_at_an_accident_and_touch_nobody(helsi
     assert len(sim.state.things) == 2
     assert sim.overlap_check is not None
     assert sim.overlap_check.count == 0
+
+
+def test_a_concert_has_a_stage_and_a_demonstration_a_street_and_both_are_loud(helsinki: World) -> None:
+    sim = traffic(helsinki)
+    environment = sim.state.environment
+    quiet = noise_at(sim.state, np.array([60.0, -110.0, 1.5]))
+    concert = environment.start_event("concert", region=(60.0, -120.0, 60.0))
+    assert noise_at(sim.state, np.array([60.0, -110.0, 1.5])) > max(quiet + 15.0, 90.0)
+    march = environment.start_event("demonstration", street=STREET)
+    shut = environment.agenda.effects.lanes
+    assert shut is not None
+    event = CityEvent(kind="demonstration", street=STREET, begin=0.0, end=1.0)
+    assert np.array_equal(shut, sim.base.event_sites.lanes_of(event))
+    assert shut.any()
+    middle = environment.agenda.going_on[1].middle
+    assert noise_at(sim.state, middle + np.array([0.0, 10.0, 1.5])) > 80.0
+    sim.step({})
+    things = sim.state.things.bodies()
+    assert ((things.entity - FIRST_THING) // THINGS_EACH).tolist() == [concert]
+    environment.end_event(march)
+    assert environment.agenda.effects.lanes is None
+
+
+def test_things_of_two_events_do_not_stand_in_each_other(helsinki: World) -> None:
+    sim = traffic(helsinki)
+    sim.check_overlaps()
+    first, second = (sim.state.environment.start_event("concert", region=(60.0, -120.0, 60.0)) for _ in range(2))
+    sim.step({})
+    standing = ((sim.state.things.bodies().entity - FIRST_THING) // THINGS_EACH).tolist()
+    assert standing == [first]
+    # When the first one is over, there is room for the second one's stage.
+    sim.state.environment.end_event(first)
+    sim.step({})
+    standing = ((sim.state.things.bodies().entity - FIRST_THING) // THINGS_EACH).tolist()
+    assert standing == [second]
+    assert sim.overlap_check is not None
+    assert sim.overlap_check.count == 0
