@@ -24,6 +24,7 @@ from vico.sim.recording import read_run
 from vico.sim.simulation import Simulation
 from vico.world.folder import World
 from vico.world.public import PublicMap
+from vico.world.walkable import CROSSING, ROADWAY
 
 CLOSED = {"events": [{"kind": "closure", "place": "Hat Shop", "begin": "08:00", "end": "09:00", "name": "stocktaking"}]}
 
@@ -357,3 +358,19 @@ def test_things_of_two_events_do_not_stand_in_each_other(helsinki: World) -> Non
     assert standing == [second]
     assert sim.overlap_check is not None
     assert sim.overlap_check.count == 0
+
+
+@pytest.mark.parametrize("kind", ["market", "concert"])
+def test_nothing_of_a_market_or_concert_stands_in_a_street(helsinki: World, kind: str) -> None:
+    sim = traffic(helsinki)
+    sim.state.environment.start_event(kind, region=(0.0, 0.0, 140.0))
+    sim.step({})
+    things = sim.state.things.bodies()
+    assert len(things)
+    for x, y, yaw, half_length, half_width in zip(
+        *things.position[:, :2].T, things.yaw, things.half_length, things.half_width, strict=True
+    ):
+        u, v = np.meshgrid(np.linspace(-half_length, half_length, 9), np.linspace(-half_width, half_width, 9))
+        c, s = np.cos(yaw), np.sin(yaw)
+        ground = helsinki.walkable.class_at(np.stack([x + c * u - s * v, y + s * u + c * v], axis=-1))
+        assert not np.isin(ground, (ROADWAY, CROSSING)).any()

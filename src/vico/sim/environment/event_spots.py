@@ -8,7 +8,7 @@ import numpy as np
 
 from vico.sim.environment.agenda import Occurrence
 from vico.sim.environment.event_sites import EventSites
-from vico.world.walkable import ROADWAY
+from vico.world.walkable import CROSSING, ROADWAY
 
 # A barrier stands so far within its lane, metres, or in its middle if that is nearer.
 _INTO_LANE = 4.0
@@ -16,6 +16,8 @@ _INTO_LANE = 4.0
 BARRIER = "road_barrier"
 # Stalls stand so far apart, with so much free ground around the middle of each, and of a stage, metres.
 _APART, _STALL_ROOM, _STAGE_ROOM = 5.0, 2.2, 5.0
+# Directions in which it is asked what is there.
+_AROUND = np.array([(np.cos(a), np.sin(a)) for a in np.arange(12) * np.pi / 6])
 # Cars that have run into each other: metres between their middles, and radians that the one behind is askew.
 _CAR_APART, _ASKEW = 5.6, 0.2
 
@@ -47,11 +49,12 @@ def _over_ground(one: Occurrence, sites: EventSites) -> list[Spot]:
     grid = np.array([(x, y) for x in steps for y in steps if x * x + y * y <= reach * reach]).reshape(-1, 2)
     grid = grid[np.lexsort((grid[:, 1], grid[:, 0], np.round(np.hypot(*grid.T), 3)))]
     points = grid + one.middle[:2]
+    room = _STAGE_ROOM if len(models) == 1 else _STALL_ROOM
     walkable = sites.world.walkable
-    free = walkable.is_connected(points) & (
-        walkable.clearance_at(points) >= (_STAGE_ROOM if len(models) == 1 else _STALL_ROOM)
-    )
-    free &= walkable.class_at(points) != ROADWAY
+    free = walkable.is_connected(points) & (walkable.clearance_at(points) >= room)
+    # Not even their edges stand in a street.
+    around = points[:, None] + np.concatenate([np.zeros((1, 2)), room / 2 * _AROUND, room * _AROUND])
+    free &= ~np.isin(walkable.class_at(around), (ROADWAY, CROSSING)).any(axis=1)
     chosen = points[free][: len(models)]
     return [Spot(model, float(x), float(y), 0.0) for model, (x, y) in zip(models, chosen, strict=False)]
 
