@@ -169,6 +169,8 @@ class RunOptions:
         How many cars drive around.
     pedestrians
         How many people nobody plays walk around.
+    junctions
+        Who may be in a junction: one vehicle at a time, or those who are not in each other's way (shared).
     observe
         Whose views are rendered: all, none, or names separated by commas.
     assistants
@@ -209,6 +211,7 @@ class RunOptions:
     robots: CommaSeparated = "husky,go2"
     cars: int = 30
     pedestrians: int = 30
+    junctions: Literal["one", "shared"] = "one"
     observe: CommaSeparated = "all"
     assistants: int = 0
     agent: Annotated[str, tyro.conf.arg(metavar="MODULE:NAME")] = ""

@@ -126,6 +126,7 @@ class _Job:
             errands=True,
             cars=options.cars,
             pedestrians=options.pedestrians,
+            junctions=options.junctions,
             observe=None if options.observe == "all" else _names(options.observe),
         )
         place = read_world(world)

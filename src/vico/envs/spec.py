@@ -29,6 +29,7 @@ class EnvOptions(TypedDict, total=False):
     errands: bool
     cars: int
     pedestrians: int
+    junctions: str
     transit: bool
     observe: str | tuple[str, ...]
     image: int

@@ -8,6 +8,7 @@ from typing import Any
 
 from vico.clock import DAY
 from vico.errors import InputError
+from vico.sim.traffic.junction_rule import JunctionRule
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +29,9 @@ class SimSettings:
         Robots that nobody controls go from place to place.
     cars, pedestrians
         Vehicles and people nobody plays.
+    junctions
+        Who may be in a junction: ``"one"`` or ``"shared"``
+        (`vico.sim.traffic.junction_rule.JunctionRule`).
     transit
         Whether buses and bicycles are there.
     image
@@ -53,6 +57,7 @@ class SimSettings:
     errands: bool = False
     cars: int = 0
     pedestrians: int = 0
+    junctions: str = "one"
     transit: bool = True
     image: int = 256
     date: str = "2026-06-21"
@@ -82,6 +87,8 @@ class SimConfig(SimSettings):
             value = getattr(self, name)
             if value is not None and value < 0:
                 raise InputError(f"simulation: {name} is {value}; it has to be 0 or more")
+        if self.junctions not in list(JunctionRule):
+            raise InputError(f"simulation: junctions is {self.junctions!r}; take {', '.join(JunctionRule)}")
         if not 0 <= self.start < DAY:
             raise InputError(f"simulation: start is second {self.start} of the day; it has to be 0..{DAY - 1}")
         if not 16 <= self.image <= 1024:

@@ -20,8 +20,9 @@ def reports(state: SimulationState, check: OverlapCheck | None) -> dict[str, Any
     dict
         ``rescued``: how many vehicles were taken out of jams, and the first of them by name, place, time, how long
         they had stood and why; ``stuck``: the same of who gets nowhere now; ``reentered``: how often cars that had
-        left the map came back in; ``buses`` where there are buses or bicycles: how late, see
-        `vico.sim.transit.TransitSystem.lateness`; ``physics`` where there are robots: engine and frames; ``overlaps``
+        left the map came back in; ``junctions``: by which rule vehicles enter them;
+        ``buses`` where there are buses or bicycles: how late, see `vico.sim.transit.TransitSystem.lateness`;
+        ``physics`` where there are robots: engine and frames; ``overlaps``
         where they were checked, see `vico.sim.overlaps.OverlapCheck`.
     """
     traffic = state.traffic
@@ -35,6 +36,8 @@ def reports(state: SimulationState, check: OverlapCheck | None) -> dict[str, Any
         "stuck": {"count": len(stuck), "who": [_told(jam, state.second - now, state) for jam in stuck]},
         "reentered": traffic.reentered if traffic is not None else 0,
     }
+    if traffic is not None:
+        found["junctions"] = str(traffic.junction_rule)
     if state.transit is not None:
         found["buses"] = state.transit.lateness()
     if state.robots is not None:

@@ -23,6 +23,7 @@ from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.snapshot import arrays_of
 from vico.sim.state import RADIUS, REASON_LENGTH, MovableObjects, People, Vehicle
 from vico.sim.traffic.jams import Jam, JamLog
+from vico.sim.traffic.junction_rule import JunctionRule
 from vico.sim.traffic.state import PedestrianGaits
 from vico.sim.transit import TransitSystem
 from vico.world.folder import World
@@ -57,6 +58,10 @@ class TrafficSystem(Subsystem, Protocol):
     @property
     def gait(self) -> PedestrianGaits:
         """How each pedestrian walks."""
+
+    @property
+    def junction_rule(self) -> JunctionRule:
+        """Who may be in a junction."""
 
     @property
     def jams(self) -> JamLog:

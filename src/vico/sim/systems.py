@@ -13,7 +13,7 @@ from vico.sim.bodies import Bodies
 from vico.sim.config import SimConfig
 from vico.sim.robots import RobotPopulation
 from vico.sim.state import FIRST_BIKE, FIRST_ROBOT, FIRST_TRAFFIC
-from vico.sim.traffic import Traffic
+from vico.sim.traffic import JunctionRule, Traffic
 from vico.sim.transit import BusPlan, TransitSystem
 
 # Robots start where there is this much free ground, and this far from everybody, metres.
@@ -36,6 +36,7 @@ def traffic_and_transit_of(base: SimulationBase, config: SimConfig) -> tuple[Tra
         seed=config.seed,
         first_entity=FIRST_TRAFFIC,
         buses=plan.bus_routes,
+        junction_rule=JunctionRule(config.junctions),
     )
     if not has_transit:
         return traffic, None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -16,6 +17,7 @@ from vico.world.walkways import CROSSING, Walkways
 _U_TURN = 2.6  # rad
 _BORDER = 6.0  # how far from the outermost point of the streets the map's edge counts as reached, m
 _LEAST_WALK = 60.0  # m of connected sidewalk that are worth walking along
+_CONFLICT = 1.45  # m to each side of a lane's centre line that a turning car takes
 _CAR_HALF_WIDTH, _CROSSING_MARGIN, _PAST_CROSSING = 0.9, 0.3, 0.5  # m
 
 
@@ -55,12 +57,35 @@ class TrafficNetwork:
         driven = _lane_network(lanes, walks)
         return cls(lanes, walks, driven, walkway_network(walks), *lanes_to_start_on(lanes, driven))
 
-    def with_routes(self, routes: Sequence[Sequence[int]]) -> LaneNetwork:
-        """Return the lanes as kernels take them, with the lane numbers of each bus route's round."""
+    @cached_property
+    def conflicts(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """`conflict_first` and `conflict` of `LaneNetwork`: which lanes of a junction cars cannot drive at once."""
+        lanes = self.lanes
+        inside = np.flatnonzero(lanes.zone >= 0)
+        swept = shapely.buffer([shapely.LineString(lanes.line(int(i))) for i in inside], _CONFLICT, cap_style="flat")
+        a, b = shapely.STRtree(swept).query(swept, predicate="intersects") if len(inside) else np.zeros((2, 0), int)
+        a, b = np.concatenate([inside[a], inside]), np.concatenate([inside[b], inside])
+        a, b = np.unique(np.stack([a, b])[:, lanes.zone[a] == lanes.zone[b]], axis=1)
+        first = np.zeros(len(lanes) + 1, np.int32)
+        first[1:] = np.cumsum(np.bincount(a, minlength=len(lanes)))
+        return first, b.astype(np.int32)
+
+    def with_routes(self, routes: Sequence[Sequence[int]], *, shared: bool = False) -> LaneNetwork:
+        """Return the lanes as kernels take them, with the lane numbers of each bus route's round.
+
+        Parameters
+        ----------
+        shared
+            Whether several vehicles may be in a junction: which lanes are in each other's way counts only then.
+        """
+        conflicts = self.conflicts if shared else (self.driven.conflict_first, self.driven.conflict)
         first = np.zeros(len(routes) + 1, np.int32)
         first[1:] = np.cumsum([len(route) for route in routes])
         return self.driven._replace(
-            route_first=first, route=np.array([lane for route in routes for lane in route], np.int32)
+            conflict_first=conflicts[0],
+            conflict=conflicts[1],
+            route_first=first,
+            route=np.array([lane for route in routes for lane in route], np.int32),
         )
 
 
@@ -96,6 +121,8 @@ def _lane_network(lanes: LaneGraph, walks: Walkways) -> LaneNetwork:
         points=lanes.points,
         along=lanes.along,
         next=lanes.next,
+        conflict_first=np.zeros(len(lanes) + 1, np.int32),
+        conflict=np.zeros(0, np.int32),
         crossings=crossings,
         crossings_cleared=cleared,
         route_first=np.zeros(1, np.int32),

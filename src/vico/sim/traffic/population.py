@@ -16,8 +16,9 @@ from vico.sim.bodies import BUS, CAR, PEDESTRIAN, STEP_HEIGHT, Bodies, Drawn
 from vico.sim.environment import Conditions
 from vico.sim.neighbours import neighbour_grid
 from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
+from vico.sim.traffic.crossings import mark_busy_crossings
 from vico.sim.traffic.jams import STUCK_AFTER, Jam, JamLog, entity_before
-from vico.sim.traffic.junctions import mark_busy_crossings
+from vico.sim.traffic.junction_rule import JunctionRule
 from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.traffic.pedestrians import RADIUS, advance_pedestrians, place_pedestrian
 from vico.sim.traffic.route import count_per_street, drop_shut_plans, is_taken, widen_shut
@@ -69,6 +70,8 @@ class Traffic:
         Entities are numbered from here: cars, then buses, then pedestrians.
     buses
         Their routes and where they start.
+    junction_rule
+        Who may be in a junction.
 
     Attributes
     ----------
@@ -93,6 +96,7 @@ class Traffic:
         seed: int,
         first_entity: int,
         buses: BusRoutes | None = None,
+        junction_rule: JunctionRule = JunctionRule.ONE,
     ) -> None:
         buses = buses or BusRoutes()
         lanes = network.lanes
@@ -100,7 +104,8 @@ class Traffic:
         self.cars, self.buses, self.pedestrians = cars, len(buses.buses), pedestrians
         self.vehicles = self.cars + self.buses
         self.first_entity = first_entity
-        net = network.with_routes(buses.routes)
+        self.junction_rule = junction_rule
+        net = network.with_routes(buses.routes, shared=junction_rule.is_shared)
         # Copies of one's own: how fast lanes are driven follows the weather of the run, and what is shut its events.
         self._net = net._replace(lanes=net.lanes.copy())
         self._paths = network.walked._replace(walkways=network.walked.walkways.copy())
@@ -115,7 +120,7 @@ class Traffic:
         self._bodies: Bodies | None = None  # as they stand since they last moved; asked for by everybody
         self._walkers = new_pedestrians(pedestrians, seed)
         self.pedestrian_state = self._walkers.view(np.recarray)
-        self.junctions = new_junctions(lanes.zones, len(self.walks), len(lanes))
+        self.junctions = new_junctions(lanes.zones, len(self.walks), len(lanes), shared=junction_rule.is_shared)
         self.jams = JamLog(first_entity)
         self._entities = np.zeros(0, np.int32)  # of all bodies of the last step, in the order of its shapes
         self.shapes = self._new_shapes()
@@ -227,8 +232,8 @@ class Traffic:
         """Return the arrays of the state by name, not copied."""
         found = {f"fleet.{field[0]}": self._vehicles[field[0]] for field in VEHICLE_STATE}
         found |= {f"pedestrians.{field}": self._walkers[field] for field in PEDESTRIAN_RECORD.fields or ()}
-        for name, part in (("junctions", self.junctions), ("shapes", self.shapes)):
-            found |= {f"{name}.{field}": array for field, array in zip(part._fields, part, strict=True)}
+        for name, part in (("junctions", self.junctions.arrays()), ("shapes", self.shapes._asdict())):
+            found |= {f"{name}.{field}": array for field, array in part.items()}
         return found | {f"jams.{name}": array for name, array in self.jams.arrays().items()}
 
     def bodies(self) -> Bodies:

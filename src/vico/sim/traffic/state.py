@@ -26,6 +26,7 @@ PLANNED_LANES = 48  # lanes ahead that can be planned
 HELD_JUNCTIONS = 6  # junctions a vehicle can hold at once
 TOP_SPEED = 13.9  # m/s, whatever the street allows
 NONE = -1  # no lane, junction, route, body: wherever an index may be missing
+SEVERAL = -2  # more than one vehicle
 
 _F, _I, _B = np.float64, np.int32, np.bool_
 
@@ -49,6 +50,7 @@ LANE = np.dtype(
         ("end_crossing", _I),  # ... to before here
         ("u_turn", _B),  # whether it turns back
         ("leaves", _B),  # whether it ends where the map cuts the street off
+        ("light", np.uint8),  # what its signal shows who wants onto it: DARK, GREEN, AMBER or RED
     ],
     align=True,
 )
@@ -110,6 +112,7 @@ WALKWAY = np.dtype(
         ("reach_right", _F),
         ("kind", np.uint8),  # SIDEWALK, CROSSING or CORNER
         ("shut", _B),  # whether an event keeps people off
+        ("light", np.uint8),  # crossings: what its signal shows, as that of a lane
         ("start", _I),  # meeting points at its ends
         ("end", _I),
     ],
@@ -163,7 +166,8 @@ class PedestrianGaits(NamedTuple):
 class LaneNetwork(NamedTuple):
     """The lanes vehicles drive, in the order of `LaneGraph`, and the routes of the buses.
 
-    Only the lanes' speeds and `shut` change, in the copy that each `Traffic` has: they follow weather and events.
+    Only the lanes' speeds, `shut` and `light` change, in the copy that each `Traffic` has: they follow weather, events
+    and the time.
 
     Attributes
     ----------
@@ -173,6 +177,10 @@ class LaneNetwork(NamedTuple):
         Points of the lanes' centre lines, metres, shape ``(p, 2)``, and their distances along their lanes.
     next
         Lanes that follow another one, lane by lane.
+    conflict_first, conflict
+        Lanes of the same junction cluster that cross, join or come too near lane ``i``, itself among them:
+        ``conflict[conflict_first[i]:conflict_first[i + 1]]``; none for lanes between junctions, nor where every
+        junction has one occupant.
     crossings, crossings_cleared
         Crossings that lanes run over (indices of walkways), lane by lane, and the distance along the lane at which a
         vehicle's rear has passed each, metres.
@@ -184,6 +192,8 @@ class LaneNetwork(NamedTuple):
     points: Floats
     along: Floats
     next: Ints
+    conflict_first: Ints
+    conflict: Ints
     crossings: Ints
     crossings_cleared: Floats
     route_first: Ints
@@ -191,7 +201,9 @@ class LaneNetwork(NamedTuple):
 
 
 class WalkwayNetwork(NamedTuple):
-    """Where pedestrians walk, in the order of `Walkways`; only `shut` changes, in the copy that each `Traffic` has.
+    """Where pedestrians walk, in the order of `Walkways`.
+
+    `shut` and `light` change, in the copy that each `Traffic` has.
 
     Attributes
     ----------
@@ -211,13 +223,40 @@ class WalkwayNetwork(NamedTuple):
     meeting: Ints
 
 
+class Claims(NamedTuple):
+    """Who has a right to what in junctions that several vehicles may be in: worked out anew in each step.
+
+    Attributes
+    ----------
+    exclusive
+        Junction clusters that have one occupant at a time, bool, shape ``(clusters,)``.
+    any_shared
+        Whether there are others.
+    alone
+        Vehicle that has a cluster to itself, being long; `NONE` for none, int32, shape ``(clusters,)``.
+    taken_by
+        Vehicle that has been let into a junction over the lane, `NONE` for nobody, `SEVERAL` for more than one, int32,
+        shape ``(lanes,)``.
+    longest_lane_wait
+        Longest that a vehicle in the queue for a shared cluster has waited that wants to take the lane, seconds, shape
+        ``(lanes,)``.
+    """
+
+    exclusive: NDArray[np.bool_]
+    any_shared: bool
+    alone: Ints
+    taken_by: Ints
+    longest_lane_wait: Floats
+
+
 class JunctionState(NamedTuple):
     """Who is in each junction cluster, and who wants over each crossing.
 
     Attributes
     ----------
     holder
-        Vehicle that has the junction cluster to itself, `NONE` for nobody, int32, shape ``(clusters,)``.
+        Vehicle that has the junction cluster to itself, `NONE` for nobody, int32, shape ``(clusters,)``; one of them
+        where several may be in it.
     walkers_on
         Pedestrians on each crossing or just off it, int32, shape ``(walkways,)`` as everything about crossings.
     walker_wait
@@ -225,12 +264,15 @@ class JunctionState(NamedTuple):
     vehicle_wait
         Longest that a vehicle which lets pedestrians go first has waited, seconds.
     longest_wait
-        Longest that a vehicle in the queue for the cluster has waited, seconds, shape ``(clusters,)``.
+        Longest that a vehicle in the queue for the cluster has waited, seconds, shape ``(clusters,)``; where several
+        may be in it, one that wants it to itself.
     crossing_busy
         Whether a vehicle is on the crossing or has been let over it.
     longest_exit_wait
         Longest that a vehicle has waited for room to stand on the lane, having left a junction, seconds, shape
         ``(lanes,)``.
+    claims
+        Not part of the state.
     """
 
     holder: Ints
@@ -240,6 +282,11 @@ class JunctionState(NamedTuple):
     longest_wait: Floats
     crossing_busy: NDArray[np.bool_]
     longest_exit_wait: Floats
+    claims: Claims
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the arrays of the state by name, not copied."""
+        return {name: array for name, array in self._asdict().items() if name != "claims"}
 
 
 @dataclass(frozen=True)
@@ -294,16 +341,31 @@ def new_pedestrians(n: int, seed: int) -> Records:
     return walkers
 
 
-def new_junctions(clusters: int, walkways: int, lanes: int) -> JunctionState:
-    """Return the state of junctions nobody is in and crossings nobody is on."""
+def new_junctions(clusters: int, walkways: int, lanes: int, *, shared: bool = False) -> JunctionState:
+    """Return the state of junctions nobody is in and crossings nobody is on.
+
+    Parameters
+    ----------
+    shared
+        Whether several vehicles may be in a junction.
+    """
+    clusters = max(clusters, 1)
+    claims = Claims(
+        exclusive=np.full(clusters, not shared),
+        any_shared=shared,
+        alone=np.full(clusters, NONE, np.int32),
+        taken_by=np.full(lanes, NONE, np.int32),
+        longest_lane_wait=np.zeros(lanes),
+    )
     return JunctionState(
-        holder=np.full(max(clusters, 1), NONE, np.int32),
+        holder=np.full(clusters, NONE, np.int32),
         walkers_on=np.zeros(walkways, np.int32),
         walker_wait=np.zeros(walkways),
         vehicle_wait=np.zeros(walkways),
-        longest_wait=np.zeros(max(clusters, 1)),
+        longest_wait=np.zeros(clusters),
         crossing_busy=np.zeros(walkways, np.bool_),
         longest_exit_wait=np.zeros(lanes),
+        claims=claims,
     )
 
 

@@ -24,15 +24,8 @@ from vico.sim.traffic.car_following import (
     next_speed,
     stop_and_speed_limit,
 )
-from vico.sim.traffic.junctions import (
-    hesitates,
-    holds_junction,
-    next_junction_request,
-    note_longest_waits,
-    release_all_junctions,
-    release_junctions,
-    request_junctions,
-)
+from vico.sim.traffic.claims import holds_junction, note_claims, release_all_junctions, release_junctions
+from vico.sim.traffic.junctions import hesitates, next_junction_request, request_junctions
 from vico.sim.traffic.lane_change import (
     change_as_route_does,
     change_to_emptier_lane,
@@ -87,7 +80,7 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
     street_load
         Vehicles on each street, shape ``(streets,)``.
     """
-    note_longest_waits(fleet, junctions)
+    note_claims(net, fleet, junctions)
     backs_up = vehicles_backing_up(net, fleet, shapes, dt)
     places = places_to_let_in(net, fleet, shapes)
     buffers = np.empty(len(shapes.x), NEARBY_BODY), np.empty(len(shapes.x), NEARBY_BODY)
