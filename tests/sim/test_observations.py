@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 import pytest
 
 import toy_city
-from vico.sim.config import SimConfig
+from vico.envs import CommunityEnv, EnvSpec
+from vico.errors import InputError
+from vico.sim.config import SimConfig, SimSettings
+from vico.sim.eyes import CLASSES
 from vico.sim.observations import distinct_entities
 from vico.sim.simulation import Simulation
 
@@ -97,3 +101,34 @@ def test_every_entity_in_a_picture_is_found(shape: tuple[int, int]) -> None:
     for _ in range(30):
         image[generator.integers(shape[0]), generator.integers(shape[1])] = generator.integers(10, 10_000)
     assert distinct_entities(image) == np.unique(image[image > 0]).tolist()
+
+
+def test_each_agent_sees_through_its_own_lens_what_was_asked_for() -> None:
+    config = SimConfig(
+        assistants=2,
+        robots=("husky",),
+        residents=0,
+        image=32,
+        outputs=("semantic", "rgb", "flow", "normals"),
+        cameras={"robots": {"projection": "panorama"}, "assistant_1": {"width": 48, "height": 20}},
+    )
+    spec = EnvSpec(**{field.name: getattr(config, field.name) for field in fields(SimSettings)})
+    env = CommunityEnv(toy_city.world(), toy_city.community(), spec=spec)
+    env.sim.scenario.place_agent("assistant_0", (0.0, -15.0), yaw=0.0)
+    env.sim.scenario.place_agent("assistant_1", (3.0, -15.0), yaw=0.0)
+    observations, _ = env.reset()
+    for name, seen in observations.items():
+        assert env.observation_space(name).contains(seen)
+    assert observations["assistant_1"]["rgb"].shape == (20, 48, 3)
+    assert observations["robot_0"]["flow"].shape == (32, 64, 2)
+    assert "depth" not in observations["assistant_0"]
+    seen = observations["assistant_0"]["semantic"]
+    assert {CLASSES[k] for k in np.unique(seen)} >= {"person", "nothing"}
+    turned = env.step({"assistant_0": {"type": "turn_left", "degrees": 6.0}})[0]["assistant_0"]
+    # Turning to the left moves what is far away to the right.
+    assert np.median(turned["flow"][..., 0]) == pytest.approx(2.0, abs=0.3)
+
+
+def test_a_camera_of_nobody_is_refused() -> None:
+    with pytest.raises(InputError, match="nobody is called 'robot_9'"):
+        Simulation(toy_city.world(), None, SimConfig(cameras={"robot_9": {}}, assistants=1)).observe()

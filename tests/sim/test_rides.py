@@ -165,7 +165,7 @@ def test_riders_are_seen_through_the_windows(helsinki_city: World) -> None:
         np.array([0], np.int32),
     )
     views.wait_for(0)
-    assert int((views.segmentation == sim.state.people.entity[0]).sum()) > 100
+    assert int((views.pictures["segmentation"][0] == sim.state.people.entity[0]).sum()) > 100
 
 
 def on_a_bicycle(sim: Simulation) -> int:

@@ -173,6 +173,12 @@ class RunOptions:
         Who may be in a junction: one vehicle at a time, or those who are not in each other's way (shared).
     observe
         Whose views are rendered: all, none, or names separated by commas.
+    outputs
+        What they are given: rgb, depth, segmentation, normals, flow, semantic, separated by commas.
+    keep
+        Which of these are recorded as arrays (views/AGENT/STEP.npz), beside the film of what each agent saw.
+    cameras
+        A file (.json) of lenses by agent, model of robot, or residents, assistants, robots: docs/pictures.md.
     assistants
         How many avatars take part that are nobody's resident: assistant_0, ...
     agent
@@ -213,6 +219,9 @@ class RunOptions:
     pedestrians: int = 30
     junctions: Literal["one", "shared"] = "one"
     observe: CommaSeparated = "all"
+    outputs: CommaSeparated = "rgb,depth,segmentation"
+    keep: CommaSeparated = "none"
+    cameras: Path | None = None
     assistants: int = 0
     agent: Annotated[str, tyro.conf.arg(metavar="MODULE:NAME")] = ""
     deadline: float = 60.0

@@ -128,6 +128,8 @@ class _Job:
             pedestrians=options.pedestrians,
             junctions=options.junctions,
             observe=None if options.observe == "all" else _names(options.observe),
+            outputs=_names(options.outputs),
+            cameras=read_json(options.cameras) if options.cameras is not None else {},
         )
         place = read_world(world)
         people = read_community(community, place)
@@ -149,6 +151,7 @@ class _Job:
                 report("setting the scene", 1, 1)
                 faults = FaultLog()
                 how: Any = {"sources": self.sources, "wanted": steps, "states_every": every or None}
+                how["keep"] = _names(options.keep)
                 how["notes"] = {"command": self._command(), "faults": faults.record()}
                 if goes_on:
                     recorder, checkpoint = Recorder.resume(self.out, sim, **how)
@@ -177,6 +180,7 @@ class _Job:
     def _command(self) -> dict[str, Any]:
         """Return the options that decide the run, as JSON has them."""
         kept = asdict(self.options) | self.sources
+        kept["cameras"] = None if self.options.cameras is None else str(self.options.cameras)
         return {name: value for name, value in kept.items() if name not in _NOT_KEPT}
 
     def _goes_on(self) -> bool:

@@ -20,6 +20,7 @@ from vico.errors import InputError
 from vico.seeds import rng
 from vico.sim.actions import AgentFault
 from vico.sim.events import Event
+from vico.sim.eyes import lenses_of
 from vico.sim.simulation import Simulation
 from vico.world.folder import World, read_world
 from vico.world.public import PublicMap
@@ -84,10 +85,12 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         people = self.sim.state.people.names
         robots = self.sim.state.robots
         numbers = {} if robots is None else {name: k for k, name in enumerate(robots.names)}
+        lenses = lenses_of(self.sim.state, self.config)
         self._observation_spaces = {
             name: observation_space(
-                self.config.image if name in seeing else None,
+                lenses[name] if name in seeing else None,
                 robots.readings(numbers[name]) if robots is not None and name in numbers else None,
+                outputs=self.config.outputs,
             )
             for name in self.possible_agents
         }

@@ -17,6 +17,7 @@ from gymnasium import spaces
 from vico.rules import LONGEST_TEXT
 from vico.sim.actions import ACTIONS, PEOPLE_ACTIONS
 from vico.sim.actions.fields import Field
+from vico.sim.eyes import USUAL_OUTPUTS, Lens, shape_of
 from vico.sim.robots import ActionSpace, Reading
 
 _PHRASES = ("Hello!", "Good morning.", "Excuse me.", "Thank you.", "See you later.", "Do you need help?")
@@ -116,15 +117,19 @@ def _number(low: float, high: float, *shape: int, dtype: Any = np.float64) -> sp
     return spaces.Box(low, high, shape, dtype)
 
 
-def observation_space(image: int | None, readings: Mapping[str, Reading] | None = None) -> spaces.Dict:
+def observation_space(
+    lens: Lens | None, readings: Mapping[str, Reading] | None = None, *, outputs: Sequence[str] = USUAL_OUTPUTS
+) -> spaces.Dict:
     """Return the space of an agent's observations.
 
     Parameters
     ----------
-    image
-        Side of its pictures, pixels; None: it is given none.
+    lens
+        Of its pictures; None: it is given none.
     readings
         What a robot's sensors give; None for people.
+    outputs
+        What its pictures show.
     """
     far, entity = 1e7, 2**31 - 1
     point = ListSpace(NumberSpace(-far, far))
@@ -160,15 +165,26 @@ def observation_space(image: int | None, readings: Mapping[str, Reading] | None 
     }
     if readings is not None:
         parts["sensors"] = sensor_space(readings)
-    if image is not None:
-        parts |= {
-            "rgb": spaces.Box(0, 255, (image, image, 3), np.uint8),
-            "depth": _number(0.0, np.inf, image, image, dtype=np.float32),
-            "segmentation": spaces.Box(0, entity, (image, image), np.int32),
-            "extrinsics": _number(-np.inf, np.inf, 4, 4),
-            "intrinsics": _number(-np.inf, np.inf, 3, 3),
-        }
+    if lens is not None:
+        parts |= {name: _picture(name, lens, entity) for name in outputs}
+        parts["extrinsics"] = _number(-np.inf, np.inf, 4, 4)
+        parts["intrinsics"] = _number(-np.inf, np.inf, 3, 3)
     return spaces.Dict(parts)
+
+
+def _picture(output: str, lens: Lens, entity: int) -> spaces.Box:
+    """Return the space of one kind of picture; entities are numbers up to `entity`."""
+    bounds = {
+        "rgb": (0, 255),
+        "depth": (0.0, np.inf),
+        "segmentation": (0, entity),
+        "normals": (-1.001, 1.001),
+        "flow": (-np.inf, np.inf),
+        "semantic": (0, 255),
+    }
+    low, high = bounds[output]
+    shape, kind = shape_of(output, lens)
+    return spaces.Box(low, high, shape, kind)
 
 
 #: Values of ``where`` in a learner's action: where a thing is put down.

@@ -33,6 +33,8 @@ class EnvOptions(TypedDict, total=False):
     transit: bool
     observe: str | tuple[str, ...]
     image: int
+    outputs: tuple[str, ...]
+    cameras: Mapping[str, Mapping[str, Any]]
     date: str
     utc_offset: float | None
     weather: str | Mapping[str, Any]

@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from typing import Any
 from weakref import WeakSet
@@ -20,6 +20,8 @@ from vico.render.arrays import Buffers
 from vico.render.cameras import Cameras
 from vico.render.lighting import Lighting
 from vico.render.scene import Scene
+from vico.render.sensors.past import NO_PAST, PastPlaces
+from vico.render.sensors.surface import write_surface
 from vico.render.shading.light import NO_LIGHT, Light
 from vico.render.shading.weather import draw_weather
 from vico.render.shadows.moving import new_caster
@@ -33,7 +35,7 @@ _SQUARES = 8
 # Of as many dimensions as a picture: compiled code is made for that.
 _EMPTY_U8 = np.zeros((0, 0, 3), np.uint8)
 _EMPTY_F32, _EMPTY_I32 = np.zeros((0, 0), np.float32), np.zeros((0, 0), np.int32)
-
+_NO_NORMALS, _NO_PLACES = np.zeros((0, 0, 0, 3), np.float32), np.zeros((0, 0, 0, 3), np.float64)
 
 _begun: WeakSet[PendingView] = WeakSet()
 
@@ -72,6 +74,11 @@ class Frames:
         Metres along the optical axis, 0 where nothing is hit before `Cameras.far`, float32, shape ``(k, h, w)``.
     segmentation
         Entity ids, 0 where nothing is hit, int32, shape ``(k, h, w)``.
+    normals
+        Unit vectors in the world's axes, 0 where nothing is hit, float32, shape ``(k, h, w, 3)``.
+    places
+        Where the seen points were before, from where the eye was then, world's axes, metres, float64, shape
+        ``(k, h, w, 3)``; NaN for what was not there.
     pending
         One a camera, of pictures that may still be worked on; empty unless that was deferred.
     """
@@ -79,6 +86,8 @@ class Frames:
     rgb: NDArray[np.uint8]
     depth: NDArray[np.float32]
     segmentation: NDArray[np.int32]
+    normals: NDArray[np.float32] = field(default_factory=lambda: _NO_NORMALS)
+    places: NDArray[np.float64] = field(default_factory=lambda: _NO_PLACES)
     pending: tuple[PendingView, ...] = ()
 
     def wait(self) -> None:
@@ -94,6 +103,33 @@ class Frames:
             self.pending[k].wait()
 
 
+@dataclass(frozen=True, kw_only=True)
+class PictureRequest:
+    """What pictures of a scene are to show, beside where they are taken from.
+
+    Attributes
+    ----------
+    rgb, depth, segmentation, normals
+        Whether each is wanted; see `Frames`.
+    past
+        What was where when each camera looked last; empty where nobody asks for `Frames.places`.
+    samples
+        RGB is the mean of ``samples * samples`` rays a pixel: 1 for observations, 2 or more for pictures to look at.
+        All else always comes from the ray through the pixel's centre.
+    """
+
+    rgb: bool = True
+    depth: bool = True
+    segmentation: bool = True
+    normals: bool = False
+    past: tuple[PastPlaces, ...] = ()
+    samples: int = 1
+
+    def __post_init__(self) -> None:
+        if self.samples < 1:
+            raise InputError(f"render: samples is {self.samples}; it must be at least 1")
+
+
 def render(
     scene: Scene,
     cameras: Cameras,
@@ -105,44 +141,56 @@ def render(
     threads: int | None = None,
     cache: ViewCache | None = None,
 ) -> Frames:
-    """Take a picture with every camera.
-
-    Parameters
-    ----------
-    samples
-        RGB is the mean of ``samples * samples`` rays a pixel: 1 for observations, 2 or more for pictures to look at.
-        Depth and segmentation always come from the ray through the pixel's centre.
-    threads
-        How many cameras are worked on at once; by default as many as there are processors to run on. The pictures do
-        not depend on it.
-    cache
-        What the same cameras saw in the last call: a view in which nothing can have changed is copied.
+    """Take a picture with every camera; see `PictureRequest` and `take_pictures`.
 
     Raises
     ------
     InputError
         If `samples` is less than 1.
     """
-    if samples < 1:
-        raise InputError(f"render: samples is {samples}; it must be at least 1")
+    request = PictureRequest(rgb=rgb, depth=depth, segmentation=segmentation, samples=samples)
+    return take_pictures(scene, cameras, request, threads=threads, cache=cache)
+
+
+def take_pictures(
+    scene: Scene,
+    cameras: Cameras,
+    request: PictureRequest,
+    *,
+    threads: int | None = None,
+    cache: ViewCache | None = None,
+) -> Frames:
+    """Take pictures with every camera.
+
+    Parameters
+    ----------
+    threads
+        How many cameras are worked on at once; by default as many as there are processors to run on. The pictures do
+        not depend on it.
+    cache
+        What the same cameras saw in the last call: a view in which nothing can have changed is copied.
+    """
     shape = len(cameras), cameras.height, cameras.width
-    light = scene.light() if rgb else None
+    light = scene.light() if request.rgb else None
     batch = _Batch(
         scene,
         cameras,
         light,
-        np.empty((*shape, 3) if rgb else (0, 0, 0, 3), np.uint8),
-        np.empty(shape if depth else (0, 0, 0), np.float32),
-        np.empty(shape if segmentation else (0, 0, 0), np.int32),
+        np.empty((*shape, 3) if request.rgb else (0, 0, 0, 3), np.uint8),
+        np.empty(shape if request.depth else (0, 0, 0), np.float32),
+        np.empty(shape if request.segmentation else (0, 0, 0), np.int32),
+        np.empty((*shape, 3), np.float32) if request.normals else _NO_NORMALS,
+        np.empty((*shape, 3), np.float64) if request.past else _NO_PLACES,
+        request.past,
     )
     pending: tuple[PendingView, ...] = ()
-    if light is not None and samples > 1:
-        _for_each(lambda k: batch.render_smooth(k, light, samples), len(cameras), threads)
-    elif light is not None and cache is not None:
+    if light is not None and request.samples > 1:
+        _for_each(lambda k: batch.render_smooth(k, light, request.samples), len(cameras), threads)
+    elif cache is not None and (light is not None or cache.deferred):
         pending = _render_cached(batch, light, cache, threads)
     else:
         _for_each(batch.render, len(cameras), threads)
-    return Frames(batch.rgb, batch.depth, batch.segmentation, pending)
+    return Frames(batch.rgb, batch.depth, batch.segmentation, batch.normals, batch.places, pending)
 
 
 @dataclass(frozen=True)
@@ -155,13 +203,32 @@ class _Batch:
     rgb: NDArray[np.uint8]
     depth: NDArray[np.float32]
     segmentation: NDArray[np.int32]
+    normals: NDArray[np.float32]
+    places: NDArray[np.float64]
+    past: tuple[PastPlaces, ...]
+
+    @property
+    def reads_surfaces(self) -> bool:
+        """Whether normals or past places are asked for."""
+        return bool(len(self.normals) or len(self.places))
 
     def pictures(self, k: int) -> Pictures:
         """Return camera `k`'s part of each kind."""
         return Pictures(_part(self.rgb, k), _part(self.depth, k), _part(self.segmentation, k))
 
     def render(self, k: int) -> None:
-        _take(self.scene, _camera(self.scene, self.cameras, k, 1), self.light, self.pictures(k))
+        camera = _camera(self.scene, self.cameras, k, 1)
+        drawn = _take(self.scene, camera, self.light, self.pictures(k))
+        self._read_surfaces(k, camera, drawn)
+
+    def _read_surfaces(self, k: int, camera: Record, drawn: int) -> None:
+        """Write normals and past places of the picture that was just taken, where they are asked for."""
+        if self.reads_surfaces:
+            buffers = _buffers(self.scene, self.cameras.width, self.cameras.height)
+            past = self.past[k] if self.past else NO_PAST
+            write_surface(
+                self.scene.arrays, camera, buffers, drawn, past, _part(self.normals, k), _part(self.places, k)
+            )
 
     def render_smooth(self, k: int, light: Light, samples: int) -> None:
         """Take the mean of several rays a pixel for RGB; depth and segmentation of the middle ray."""
@@ -170,16 +237,21 @@ class _Batch:
         only_rgb = Pictures(wide, _EMPTY_F32, _EMPTY_I32)
         _take(self.scene, _camera(self.scene, self.cameras, k, samples), light, only_rgb)
         self.rgb[k] = _mean_of_blocks(wide, samples)
-        if self.depth.size or self.segmentation.size:
-            without_rgb = self.pictures(k)._replace(rgb=_EMPTY_U8)
-            _take(self.scene, _camera(self.scene, self.cameras, k, 1), None, without_rgb)
+        if self.depth.size or self.segmentation.size or self.reads_surfaces:
+            camera, without_rgb = _camera(self.scene, self.cameras, k, 1), self.pictures(k)._replace(rgb=_EMPTY_U8)
+            self._read_surfaces(k, camera, _take(self.scene, camera, None, without_rgb))
 
 
-def _render_cached(batch: _Batch, light: Light, cache: ViewCache, threads: int | None) -> tuple[PendingView, ...]:
+def _render_cached(
+    batch: _Batch, light: Light | None, cache: ViewCache, threads: int | None
+) -> tuple[PendingView, ...]:
     """Render what is not still right from the last call; return the work that was deferred, one a camera."""
     scene, cameras = batch.scene, batch.cameras
 
     def take_one(k: int) -> None:
+        if light is None or batch.reads_surfaces:
+            batch.render(k)
+            return
         camera, pictures = _camera(scene, cameras, k, 1), batch.pictures(k)
         background = cache.background(k, scene, camera)
         if background is None:
@@ -307,11 +379,15 @@ def _camera(scene: Scene, cameras: Cameras, k: int, samples: int) -> Record:
     return camera_uniforms(cameras, k, samples, scene.room_of(cameras.position[k]))
 
 
-def _take(scene: Scene, camera: Record, light: Light | None, out: Pictures) -> None:
+def _take(scene: Scene, camera: Record, light: Light | None, out: Pictures) -> int:
+    """Take pictures of one camera; return how many items were drawn."""
     buffers = _buffers(scene, int(camera["width"]), int(camera["height"]))
-    take(scene.arrays, camera, NO_LIGHT if light is None else light, buffers, NOTHING_KEPT, True, new_caster(), out)
+    drawn = take(
+        scene.arrays, camera, NO_LIGHT if light is None else light, buffers, NOTHING_KEPT, True, new_caster(), out
+    )
     if light is not None and out.rgb.size:
         draw_weather(camera, light, buffers.keys, scene.moment, out.rgb)
+    return int(drawn)
 
 
 def _buffers(scene: Scene, width: int, height: int) -> Buffers:

@@ -283,8 +283,12 @@ class Scene:
 
     def room_of(self, position: NDArray[np.float64]) -> Record | None:
         """Return the `ROOM` that holds a point, or None."""
-        number = int(_room_of(self.rooms, float(position[0]), float(position[1]), float(position[2])))
+        number = self.room_number(position)
         return self.rooms[number] if number >= 0 else None
+
+    def room_number(self, position: NDArray[np.float64]) -> int:
+        """Return the row of `rooms` that holds a point, or -1."""
+        return int(_room_of(self.rooms, float(position[0]), float(position[1]), float(position[2])))
 
     def _moving(self) -> Instances:
         moving = slice(int(self.arrays.counts["static_instances"]), int(self.arrays.counts["instances"]))

@@ -8,6 +8,8 @@ from typing import Any
 
 from vico.clock import DAY
 from vico.errors import InputError
+from vico.render.sensors.batch import USUAL_OUTPUTS, checked_outputs
+from vico.render.sensors.lens import Lens
 from vico.sim.traffic.junction_rule import JunctionRule
 
 
@@ -35,7 +37,13 @@ class SimSettings:
     transit
         Whether buses and bicycles are there.
     image
-        Side of the square images, pixels.
+        Side of the square images, pixels, of whom `cameras` say nothing about.
+    outputs
+        What those who see are given, some of `vico.render.sensors.batch.OUTPUTS`: colour, depth and segmentation
+        unless told; also normals, optical flow and classes.
+    cameras
+        Lenses that are not the usual one: records of `vico.render.sensors.lens.Lens` by agent's name, by model for
+        robots, or for all ``"residents"``, ``"assistants"`` or ``"robots"``; the first of these that is there holds.
     date
         On which the first day is, YYYY-MM-DD.
     utc_offset
@@ -60,6 +68,8 @@ class SimSettings:
     junctions: str = "one"
     transit: bool = True
     image: int = 256
+    outputs: tuple[str, ...] = USUAL_OUTPUTS
+    cameras: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     date: str = "2026-06-21"
     utc_offset: float | None = None
     weather: str | Mapping[str, Any] = "fair"
@@ -93,6 +103,9 @@ class SimConfig(SimSettings):
             raise InputError(f"simulation: start is second {self.start} of the day; it has to be 0..{DAY - 1}")
         if not 16 <= self.image <= 1024:
             raise InputError(f"simulation: images of {self.image} pixels are out of range; take 16..1024, such as 256")
+        object.__setattr__(self, "outputs", checked_outputs(self.outputs))
+        for record in self.cameras.values():
+            Lens.of(record, side=self.image)
 
     def record(self) -> dict[str, Any]:
         """Return the configuration as it goes into `run.json`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -26,23 +26,19 @@ class Views:
 
     Attributes
     ----------
-    rgb
-        sRGB, uint8, shape ``(k, h, w, 3)``.
-    depth
-        Metres along the optical axis, 0 where nothing is hit, float32, shape ``(k, h, w)``.
-    segmentation
-        Entity ids, 0 where nothing is hit, int32, shape ``(k, h, w)``.
+    pictures
+        By output (docs/pictures.md), one array a view: ``rgb``, sRGB, uint8, shape ``(h, w, 3)``; ``depth``, metres, 0
+        where nothing is hit, float32, shape ``(h, w)``; ``segmentation``, entity ids, 0 where nothing is hit, int32;
+        and what else was asked for.
     extrinsics
         World (ENU metres) to camera (x right, y down, z forward), float64, shape ``(k, 4, 4)``.
     intrinsics
-        Camera matrix, pixels, the same for all, float64, shape ``(3, 3)``.
+        Of each view's lens, pixels, float64, shape ``(k, 3, 3)``.
     wait_for
         Returns when the pictures of camera ``k`` are there; they may be worked on until then.
     """
 
-    rgb: NDArray[np.uint8]
-    depth: NDArray[np.float32]
-    segmentation: NDArray[np.int32]
+    pictures: Mapping[str, Sequence[NDArray[Any]]]
     extrinsics: NDArray[np.float64]
     intrinsics: NDArray[np.float64]
     wait_for: Callable[[int], None] = lambda k: None
@@ -115,9 +111,9 @@ def observe(
     Returns
     -------
     tuple
-        Observation by name (``rgb``, ``depth``, ``segmentation``, ``extrinsics``, ``intrinsics`` only for those who
-        see; ``sensors`` for robots; ``pose``, ``events``, ``state`` for everybody), and info by name: ``entities``,
-        kind and name of what the pictures show, by entity; ``action_code``; ``weather`` outdoors
+        Observation by name (the outputs asked for, ``extrinsics`` and ``intrinsics`` only for those who see;
+        ``sensors`` for robots; ``pose``, ``events``, ``state`` for everybody), and info by name: ``entities``, kind
+        and name of what segmentation shows, by entity; ``action_code``; ``weather`` outdoors
         (`vico.sim.environment`); ``events`` of the city that it knows of, where a run has any (`vico.sim.city`); for
         residents ``in_view``, what is in view by sight lines (`vico.sim.perception.InView`), the same with and without
         pictures. Each is made when it is first asked for, of the state as it is now, and waits for its pictures; those
@@ -154,20 +150,16 @@ class _Pictures:
         views = self._views
         if waits:
             views.wait_for(k)
-        return {
-            "rgb": views.rgb[k],
-            "depth": views.depth[k],
-            "segmentation": views.segmentation[k],
-            "extrinsics": views.extrinsics[k],
-            "intrinsics": views.intrinsics,
-        }
+        pictures = {name: arrays[k] for name, arrays in views.pictures.items()}
+        return pictures | {"extrinsics": views.extrinsics[k], "intrinsics": views.intrinsics[k]}
 
     def entities(self, name: str) -> dict[int, dict[str, str]]:
-        """Return kind and name of what an agent's pictures show, by entity."""
-        if (k := self._place.get(name)) is None:
+        """Return kind and name of what an agent's pictures show, by entity; nothing without segmentation."""
+        images = self._views.pictures.get("segmentation")
+        if (k := self._place.get(name)) is None or images is None:
             return {}
         self._views.wait_for(k)
-        return self._renderer.names(distinct_entities(self._views.segmentation[k]))
+        return self._renderer.names(distinct_entities(images[k]))
 
 
 def _rendered(

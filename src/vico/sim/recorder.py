@@ -5,7 +5,7 @@ from __future__ import annotations
 import resource
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
 from types import TracebackType
@@ -48,6 +48,8 @@ class Recorder:
         After how many steps a `checkpoint` is due; None for never.
     notes
         What else ``run.json`` is to hold, JSON values by name.
+    keep
+        Outputs that are recorded as arrays, beside the films.
 
     Attributes
     ----------
@@ -71,20 +73,31 @@ class Recorder:
         wanted: int,
         states_every: int | None = None,
         notes: Mapping[str, Any] | None = None,
+        keep: Sequence[str] = (),
     ) -> None:
         self.notes = dict(notes or {})
         if out.exists() and any(out.iterdir()):
             raise OutputExistsError(f"{out}: the folder is not empty; give another, or --force")
         with write_errors(out):
             out.mkdir(parents=True, exist_ok=True)
-        self._open(out, sim, sources=sources, wanted=wanted, states_every=states_every)
+        self._open(out, sim, sources=sources, wanted=wanted, states_every=states_every, keep=keep)
         with self._errors():
             self._write_manifest("running")
             write_json(out / AGENTS, {"agents": agents_record(sim)})
 
     def _open(
-        self, out: Path, sim: Simulation, *, sources: Mapping[str, str], wanted: int, states_every: int | None
+        self,
+        out: Path,
+        sim: Simulation,
+        *,
+        sources: Mapping[str, str],
+        wanted: int,
+        states_every: int | None,
+        keep: Sequence[str],
     ) -> None:
+        unknown = [name for name in keep if name not in sim.config.outputs]
+        if unknown:
+            raise InputError(f"{out}: {unknown[0]!r} is to be kept, but the run is not asked for it (outputs)")
         if states_every is not None and states_every < 1:
             raise InputError(f"{out}: a checkpoint every {states_every} steps; it has to be 1 or more, or None")
         # Held as long as this process lives, so that nobody takes the run for one that was killed.
@@ -94,6 +107,7 @@ class Recorder:
         self._closed = False
         self._samples = StepSamples(sim)
         self._films = ViewFilms(out)
+        self._keep = tuple(keep)
         self._hash = sim.state_hash()
         self._began = time.perf_counter()
         self._earlier, self._resumed = 0.0, False
@@ -109,6 +123,7 @@ class Recorder:
         wanted: int,
         states_every: int | None = None,
         notes: Mapping[str, Any] | None = None,
+        keep: Sequence[str] = (),
     ) -> tuple[Self, Checkpoint]:
         """Go on with an interrupted run from its last checkpoint; what was recorded after it is dropped.
 
@@ -118,7 +133,7 @@ class Recorder:
             Folder of the run.
         sim
             Made in the same way as the recorded one; it is set to the checkpoint's state.
-        sources, wanted, states_every, notes
+        sources, wanted, states_every, notes, keep
             As for a new recorder.
 
         Returns
@@ -147,7 +162,7 @@ class Recorder:
         sim.restore(checkpoint.arrays)
         self = cls.__new__(cls)
         self.notes = dict(notes or {})
-        self._open(out, sim, sources=sources, wanted=wanted, states_every=states_every)
+        self._open(out, sim, sources=sources, wanted=wanted, states_every=states_every, keep=keep)
         with self._errors():
             drop_after(out, checkpoint.step)
             drop_checkpoints_after(out, checkpoint.step)
@@ -273,7 +288,11 @@ class Recorder:
         self._samples.take(bodies, self._hash, result, actions)
         watch = time.perf_counter()
         pictures = {name: seen["rgb"] for name, seen in observations.items() if "rgb" in seen}
-        self._films.add(step, pictures, sim.picture_waiter())
+        arrays = {
+            name: {output: seen[output] for output in self._keep if output in seen}
+            for name, seen in (observations.items() if self._keep else ())
+        }
+        self._films.add(step, pictures, sim.picture_waiter(), {name: kept for name, kept in arrays.items() if kept})
         seconds = sim.metrics.seconds
         seconds["films"] = seconds.get("films", 0.0) + time.perf_counter() - watch
 

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from vico.assets.people import Appearance, body_of
 from vico.community.model import Resident
-from vico.render import Cameras, Frames, Lighting, ViewCache, render
+from vico.render import Cameras, Lighting, render
 from vico.render.lighting import SHADOW_STEP
+from vico.render.sensors.batch import PictureSet, Viewers
+from vico.render.sensors.lens import Lens
 from vico.render.skinning import BodyBatch, batch_bodies, skin
 from vico.render.world_scene import scene_of
 from vico.seeds import rng
@@ -28,6 +30,7 @@ from vico.sim.animation import (
 from vico.sim.bodies import Drawn
 from vico.sim.config import SimConfig
 from vico.sim.environment import Environment
+from vico.sim.eyes import SemanticClasses, lenses_by_entity
 from vico.sim.observations import Views
 from vico.sim.passers_by import looks_of_strangers, manner_of_pedestrian, pedestrian_motion
 from vico.sim.quaternions import matrix_of
@@ -109,15 +112,14 @@ class SceneRenderer:
     """
 
     def __init__(self, sim: RenderedSimulation) -> None:
-        self._image = sim.config.image
-        self._frames: Frames | None = None
+        self._pictures: PictureSet | None = None
         self._scene = scene_of(sim.world, prototypes=_shapes(sim))
         self._attach(sim)
 
     def rebind(self, sim: RenderedSimulation) -> SceneRenderer:
         """Return a renderer of another simulation: with this scene if it has all that is to be seen, else a new one."""
         known = set(_shapes(sim)) <= set(self._scene.names)
-        if sim.world is not self._sim.world or not known or sim.config.image != self._image:
+        if sim.world is not self._sim.world or not known:
             return SceneRenderer(sim)
         self._attach(sim)
         return self
@@ -126,7 +128,9 @@ class SceneRenderer:
         self._sim = sim
         self._lit: tuple[float, ...] = ()
         self.wait()
-        self._cache = ViewCache(deferred=True)
+        self._viewers = Viewers(self._scene, sim.config.outputs, SemanticClasses(sim).of_image)
+        self._lenses = lenses_by_entity(sim.state, sim.config)
+        self._usual_lens = Lens.of({}, side=sim.config.image)
         self._load_bodies(sim)
 
     def _load_bodies(self, sim: RenderedSimulation) -> None:
@@ -153,22 +157,21 @@ class SceneRenderer:
         self.wait()
         self._set_light(state)
         self._set_moving(state)
-        side = self._image
-        cameras = Cameras(poses[:, :3], poses[:, 3:], width=side, height=side, hidden_entity=own)
-        frames = render(self._scene, cameras, cache=self._cache)
-        self._frames = frames
-        pictures = frames.rgb, frames.depth, frames.segmentation
-        return Views(*pictures, cameras.extrinsics, cameras.intrinsics, frames.wait_for)
+        lenses = [self._lenses.get(entity, self._usual_lens) for entity in own.tolist()]
+        taken = self._viewers.take(poses, own, lenses, second=state.second)
+        self._pictures = taken
+        extrinsics = Cameras(poses[:, :3], poses[:, 3:]).extrinsics
+        return Views(taken.pictures, extrinsics, taken.intrinsics, taken.wait_for)
 
     def wait(self) -> None:
         """Wait for pictures that are still being worked on."""
-        if self._frames is not None:
-            self._frames.wait()
-            self._frames = None
+        if self._pictures is not None:
+            self._pictures.wait()
+            self._pictures = None
 
     def picture_waiter(self) -> Callable[[], None]:
         """Return what to call, from any thread, to wait for the pictures of the last `render`."""
-        return self._frames.wait if self._frames is not None else _nothing
+        return self._pictures.wait if self._pictures is not None else _nothing
 
     def render_cameras(self, state: SimulationState, cameras: Cameras, *, samples: int = 2) -> NDArray[np.uint8]:
         """Render any cameras, RGB only, smoothed by `samples` squared; uint8, shape ``(k, h, w, 3)``."""
@@ -206,6 +209,7 @@ class SceneRenderer:
         if not set(state.things.prototypes()) <= set(self._scene.names):
             # An event has begun whose things nobody had reckoned with.
             self._scene, self._lit = scene_of(self._sim.world, prototypes=_shapes(self._sim)), ()
+            self._viewers.scene = self._scene
             self._set_light(state)
         motion = _motion_of_agents(state)
         if state.traffic is not None:

@@ -22,12 +22,13 @@ KEY = 20
 class ViewFilm:
     """One agent's film: H.264 in fragments of 20 frames, so that what is written can be played at any time."""
 
-    def __init__(self, path: Path, side: int) -> None:
+    def __init__(self, path: Path, width: int, height: int) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         flags = {"movflags": "frag_keyframe+empty_moov+default_base_moof", "flush_packets": "1"}
         self._container: Any = av.open(str(path), "w", options=flags)
         self._stream = self._container.add_stream("libx264", rate=RATE)
-        self._stream.width = self._stream.height = side
+        # The encoder wants even sides: a last odd row or column is left out.
+        self._stream.width, self._stream.height = width // 2 * 2, height // 2 * 2
         self._stream.pix_fmt = "yuv420p"
         self._stream.time_base = Fraction(1, RATE)
         # One thread and no look-ahead: the films must not fight the simulation for cores.
@@ -37,8 +38,9 @@ class ViewFilm:
         self._stream.options |= {"g": str(KEY), "sc_threshold": "0"}
 
     def add(self, number: int, picture: NDArray[np.uint8]) -> None:
-        """Append a picture, uint8, shape ``(side, side, 3)``; `number` grows, and says when it is shown."""
-        frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
+        """Append a picture, uint8, shape ``(h, w, 3)``; `number` grows, and says when it is shown."""
+        even = picture[: self._stream.height, : self._stream.width]
+        frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(even), format="rgb24")
         frame.pts, frame.time_base = number, Fraction(1, RATE)
         self._container.mux(self._stream.encode(frame))
 
@@ -64,11 +66,20 @@ class ViewFilms:
         self._crew = ThreadPoolExecutor(1, "films")
         self._filming: Future[None] | None = None
 
-    def add(self, step: int, pictures: Mapping[str, NDArray[np.uint8]], wait: Callable[[], None]) -> None:
-        """Append a step's pictures, by agent; they may be read once `wait` has returned."""
+    def add(
+        self,
+        step: int,
+        pictures: Mapping[str, NDArray[np.uint8]],
+        wait: Callable[[], None],
+        arrays: Mapping[str, Mapping[str, NDArray[Any]]] | None = None,
+    ) -> None:
+        """Append a step's pictures, by agent; they may be read once `wait` has returned.
+
+        `arrays` are what is kept beside the film, by agent and output.
+        """
         self._finish_filming()
-        if pictures:
-            self._filming = self._crew.submit(self._film, step, pictures, wait)
+        if pictures or arrays:
+            self._filming = self._crew.submit(self._film, step, pictures, wait, arrays or {})
 
     def end_part(self) -> None:
         """Finish all files; what comes then begins others."""
@@ -84,11 +95,21 @@ class ViewFilms:
         finally:
             self._crew.shutdown()
 
-    def _film(self, step: int, pictures: Mapping[str, NDArray[np.uint8]], wait: Callable[[], None]) -> None:
+    def _film(
+        self,
+        step: int,
+        pictures: Mapping[str, NDArray[np.uint8]],
+        wait: Callable[[], None],
+        arrays: Mapping[str, Mapping[str, NDArray[Any]]],
+    ) -> None:
         wait()
+        for name, kept in arrays.items():
+            (self._folder / name).mkdir(parents=True, exist_ok=True)
+            with (self._folder / name / f"{step:08d}.npz").open("wb") as file:
+                np.savez_compressed(file, allow_pickle=False, **kept)
         for name, picture in pictures.items():
             if name not in self._films:
-                self._films[name] = step, ViewFilm(self._folder / name / f"{step:08d}.mp4", picture.shape[0])
+                self._films[name] = step, ViewFilm(self._folder / name / f"{step:08d}.mp4", *picture.shape[1::-1])
             first, film = self._films[name]
             film.add(step - first, picture)
 
@@ -115,7 +136,7 @@ class View:
         self._last = last
 
     def frames(self, wanted: Collection[int] | None = None) -> Iterator[tuple[int, NDArray[np.uint8]]]:
-        """Yield step and picture (uint8, shape ``(side, side, 3)``) of the steps `wanted`, in order; None for all.
+        """Yield step and picture (uint8, shape ``(h, w, 3)``) of the steps `wanted`, in order; None for all.
 
         Steps at which the agent observed nothing are left out.
         """
@@ -151,7 +172,8 @@ def views_of(run: Path, names: list[str], last: int) -> dict[str, View]:
 
 
 def drop_views_after(run: Path, step: int) -> None:
-    """Delete the parts of films that begin after a step."""
-    for path in (run / VIEWS).glob("*/*.mp4"):
-        if int(path.stem) > step:
-            path.unlink()
+    """Delete the parts of films that begin after a step, and arrays of later steps."""
+    for pattern in ("*/*.mp4", "*/*.npz"):
+        for path in (run / VIEWS).glob(pattern):
+            if int(path.stem) > step:
+                path.unlink()

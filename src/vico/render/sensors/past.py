@@ -1,0 +1,113 @@
+"""Where things were when somebody last looked: what optical flow is measured from."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.render.scene import Scene
+
+
+class PastPlaces(NamedTuple):
+    """Where what moves was, in the order of a scene as it is now.
+
+    Attributes
+    ----------
+    matrix
+        Upper rows of the model-to-world transforms of moving instances, float32, shape ``(n, 3, 4)``.
+    known
+        Whether each of them was there, bool, shape ``(n,)``.
+    x, y, z
+        Vertices of the avatars, world metres, float32; none where they were others.
+    eye
+        Where the camera was, world metres, float64, shape ``(3,)``.
+    """
+
+    matrix: NDArray[np.float32]
+    known: NDArray[np.bool_]
+    x: NDArray[np.float32]
+    y: NDArray[np.float32]
+    z: NDArray[np.float32]
+    eye: NDArray[np.float64]
+
+
+_NONE = np.zeros(0, np.float32)
+#: For pictures that nobody asks the past of.
+NO_PAST = PastPlaces(np.zeros((0, 3, 4), np.float32), np.zeros(0, np.bool_), _NONE, _NONE, _NONE, np.zeros(3))
+
+
+class Placement(NamedTuple):
+    """Where everything that moves is at one moment.
+
+    Attributes
+    ----------
+    entity, prototype
+        Of moving instances, int32, shape ``(n,)``.
+    matrix
+        float32, shape ``(n, 3, 4)``.
+    x, y, z
+        Vertices of the avatars, world metres, float32.
+    owner
+        Entity and first vertex of each avatar, int64, shape ``(a, 2)``.
+    """
+
+    entity: NDArray[np.int32]
+    prototype: NDArray[np.int32]
+    matrix: NDArray[np.float32]
+    x: NDArray[np.float32]
+    y: NDArray[np.float32]
+    z: NDArray[np.float32]
+    owner: NDArray[np.int64]
+
+
+def placement_of(scene: Scene) -> Placement:
+    """Return a copy of where everything that moves is in a scene."""
+    arrays = scene.arrays
+    moving = slice(int(arrays.counts["static_instances"]), int(arrays.counts["instances"]))
+    instances, mesh, spans = arrays.instances, arrays.mesh, arrays.avatars.span
+    first = int(spans["first_vertex"].min()) if len(spans) else 0
+    vertices = slice(first, int(spans["end_vertex"].max(initial=0)))
+    owner = np.column_stack([mesh.entity[spans["first_triangle"]], spans["first_vertex"]]).astype(np.int64)
+    return Placement(
+        instances.entity[moving].copy(),
+        instances.prototype[moving].copy(),
+        instances.matrix[moving].copy(),
+        mesh.x[vertices].copy(),
+        mesh.y[vertices].copy(),
+        mesh.z[vertices].copy(),
+        owner,
+    )
+
+
+def past_places(before: Placement, now: Placement, eye: NDArray[np.float64]) -> PastPlaces:
+    """Return where what is there `now` was `before`, seen from an eye that was at `eye` then.
+
+    Things are told by entity and prototype, several of one kind by their order.
+    """
+    place, known = matched(before, now)
+    matrix = before.matrix[place] if len(before.matrix) else now.matrix
+    same = len(before.x) == len(now.x) and np.array_equal(before.owner, now.owner)
+    x, y, z = (before.x, before.y, before.z) if same else (_NONE, _NONE, _NONE)
+    return PastPlaces(np.ascontiguousarray(matrix), known, x, y, z, eye)
+
+
+def matched(before: Placement, now: Placement) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return the row of `before` for each moving instance of `now`, and whether there is one (else it is 0)."""
+    old, new = _keys(before), _keys(now)
+    order = np.lexsort(old.T[::-1])
+    rows = {tuple(old[k]): int(k) for k in order.tolist()}
+    place = np.array([rows.get(tuple(key), -1) for key in new], np.int64).reshape(-1)
+    return np.maximum(place, 0), place >= 0
+
+
+def _keys(placement: Placement) -> NDArray[np.int64]:
+    """Return entity, prototype and how many such came before, of each moving instance; shape ``(n, 3)``."""
+    pair = placement.entity.astype(np.int64) << 32 | placement.prototype.astype(np.int64)
+    order = np.argsort(pair, kind="stable")
+    ranked = pair[order]
+    first = np.searchsorted(ranked, ranked, side="left")
+    turn = np.empty(len(pair), np.int64)
+    turn[order] = np.arange(len(pair)) - first
+    return np.column_stack([placement.entity, placement.prototype, turn]).astype(np.int64)
