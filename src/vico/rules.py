@@ -39,6 +39,14 @@ EARSHOT = 10.0
 LONGEST_TEXT = 1000
 
 
+def walking_factor(snow_cover: float, ice: float) -> float:
+    """Return the share of the usual speed that people walk at, on ground so far covered by snow or ice, 0..1.
+
+    By how much is an assumption of ours.
+    """
+    return 1.0 - max(0.12 * snow_cover, 0.25 * ice)
+
+
 class ActionStatus(IntEnum):
     """How the last action went. Observations give the name in lower case, as ``action_status``."""
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from typing import Any, Protocol
 
 from vico.agents.base import Action, Info, Observation
+from vico.agents.change_of_plans import ChangeOfPlans
 from vico.agents.conversation import Acquaintance, Conversation, Speaker
 from vico.agents.indoor_walk import IndoorWalker
 from vico.agents.residents import Residents
@@ -35,9 +35,8 @@ _STROLL = 30.0
 _STROLLING = ("leisure", "visit")
 _RUNNING = ("exercise",)
 _EATING = ("meal_home", "meal_out")
-# Where a place is closed, another one of its kind within so many metres will do, but for what binds one to the place.
-_OTHER_NEAR = 400.0
-_BOUND = ("work", "study")
+# One looks out of the window again after so many seconds, if nothing happens before: in snow one sets out earlier.
+_LOOK_OUT = 900.0
 # How often who is stopped indoors steps aside instead of trying again.
 _GIVE_WAY = 0.5
 _STROLL_SPEED, _RUN_SPEED = 0.9, 1.9
@@ -89,18 +88,18 @@ class ScheduleFollower:
         self._aside: list[Action] = []
         self._conversation = Conversation(resident, known, generator)
         self._posture = "standing"
-        self._changes = sorted(stay.leave for stay in self._stays)
+        self._changes = ChangeOfPlans(public_map, self._stays, seed=seed, name=resident.id)
         # So that not everybody takes a sip at once.
         self._offset = int(generator.integers(_ROUND))
         self._tried: set[str] = set()
+        # The stay it has come for, and the id of where it spends it.
         self._arrived: Stay | None = None
+        self._arrived_at = ""
         self._stroll: tuple[float, float] | None = None
         # When a stroll goes on, seconds.
         self._paused_until = -math.inf
         # Whether the last action was to go in somewhere.
         self._went_in = False
-        # Where it goes for a stay instead of a place that is closed: the stay, and the places that were thought of.
-        self._instead: tuple[Stay | None, list[str]] = None, []
 
     def act(self, observation: Observation, info: Info) -> Action:
         """Return the action for the coming second."""
@@ -139,11 +138,11 @@ class ScheduleFollower:
             "posture": self._posture,
             "tried": sorted(self._tried),
             "arrived": None if arrived is None else self._stays.index(arrived),
+            "arrived_at": self._arrived_at,
             "stroll": None if self._stroll is None else list(self._stroll),
             "paused_until": None if math.isinf(self._paused_until) else self._paused_until,
             "went_in": self._went_in,
-            "instead": self._instead[1],
-            "instead_of": None if self._instead[0] is None else self._stays.index(self._instead[0]),
+            "changes": self._changes.state(),
         }
 
     def restore(self, state: AgentState) -> None:
@@ -160,20 +159,20 @@ class ScheduleFollower:
         arrived, stroll = state["arrived"], state["stroll"]
         self._aside = [dict(action) for action in state["aside"]]
         self._posture, self._tried = state["posture"], set(state["tried"])
-        self._arrived = None if arrived is None else self._stays[arrived]
+        self._arrived, self._arrived_at = None if arrived is None else self._stays[arrived], str(state["arrived_at"])
         self._stroll = None if stroll is None else (float(stroll[0]), float(stroll[1]))
         paused = state["paused_until"]
         self._paused_until, self._went_in = -math.inf if paused is None else paused, state["went_in"]
-        stay = state["instead_of"]
-        self._instead = None if stay is None else self._stays[stay], [str(name) for name in state["instead"]]
+        self._changes.restore(state["changes"])
 
     def _decide(self, observation: Observation, info: Info) -> Action:
         state = observation["state"]
         self._posture = state["posture"]
+        self._changes.notice(info)
         stay = self._stay_at(state["time"] % DAY)
         if stay is None:
             return {"type": "wait"}
-        place = self._open_place(stay, observation, info)
+        place = self._changes.place_of(stay, info, state["place"])
         if state["vehicle"]:
             return self._travel(observation, info, stay, place)
         if self._posture != "lying":
@@ -191,38 +190,9 @@ class ScheduleFollower:
     def _stay_at(self, second: float) -> Stay | None:
         current = None
         for stay in self._stays:
-            if second >= stay.leave:
+            if second >= stay.leave - self._changes.lead(stay):
                 current = stay
         return current or (self._stays[0] if self._stays else None)
-
-    def _open_place(self, stay: Stay, observation: Observation, info: Info) -> PublicPlace:
-        """Return the place of a stay, or where one goes instead as it is known to be closed: as near by, or home."""
-        for_stay, thought_of = self._instead
-        if for_stay is not stay:
-            self._instead, thought_of = (None, []), []
-        place = self._map.place_by_id[thought_of[-1] if thought_of else stay.place]
-        closed = {name for event in info.get("events", ()) if event["goes_on"] for name in event["closed_places"]}
-        # Who is in may stay.
-        if place.id not in closed or observation["state"]["place"] == place.id:
-            return place
-        thought_of = [*(thought_of or [place.id]), self._other_place(stay, closed.union(thought_of))]
-        self._instead = stay, thought_of
-        return self._map.place_by_id[thought_of[-1]]
-
-    def _other_place(self, stay: Stay, closed: Collection[str]) -> str:
-        """Return where one goes who finds a place closed: the nearest of its kind, but not for work, or home."""
-        wanted = self._map.place_by_id[stay.place]
-        if stay.tag not in _BOUND:
-            near = self._map.places_near(wanted.position, _OTHER_NEAR)
-            for place in near:
-                if (
-                    place.kind == wanted.kind
-                    and place.id not in closed
-                    and (place.building is None) == (wanted.building is None)
-                ):
-                    return place.id
-        home = next((one.place for one in self._stays if one.type == "sleep"), stay.place)
-        return stay.place if home in closed else home
 
     def _is_there(self, observation: Observation, place: PublicPlace) -> bool:
         state = observation["state"]
@@ -231,13 +201,14 @@ class ScheduleFollower:
         x, y = observation["pose"][:2]
         away = math.hypot(x - place.position[0], y - place.position[1])
         # Who came for a walk may go about once there.
-        mine = self._arrived is not None and self._arrived.place == place.id
+        mine = self._arrived is not None and self._arrived_at == place.id
         return not state["room"] and away <= (2 * _STROLL if mine else _OPEN_REACH)
 
     def _stay(self, observation: Observation, info: Info, stay: Stay, place: PublicPlace) -> Action:
         """Live at the place; out in the open, those who came to move about do."""
-        if self._arrived != stay:
-            self._arrived, self._stroll, self._paused_until = stay, None, -math.inf
+        if (self._arrived, self._arrived_at) != (stay, place.id):
+            self._arrived, self._arrived_at = stay, place.id
+            self._stroll, self._paused_until = None, -math.inf
             self._walker.stop()
             self._traveller.stop()
         time = observation["state"]["time"]
@@ -248,6 +219,10 @@ class ScheduleFollower:
             return up
         if time < self._paused_until:
             return self._rest(time, self._paused_until)
+        watched = self._changes.watched(place)
+        if watched is not None:
+            self._paused_until = time + int(self._rng.integers(20, 90))
+            return {"type": "look_at", "target": list(watched)}
         if self._stroll is None:
             spot = self._map.walkable.random_point(self._rng, near=place.position[:2], radius=_STROLL)
             self._stroll = (float(spot[0]), float(spot[1]))
@@ -289,12 +264,11 @@ class ScheduleFollower:
             self.stride, self.walks_until = Stride(*ahead, pace, stay.due, x, y, least, most), self._next_stay(time)
 
     def _next_stay(self, time: float) -> float:
-        """Return when the next stay begins, or the next day."""
+        """Return when the next stay begins, or the next day, or it is time to look out of the window again."""
         of_day = time % DAY
-        later = bisect_right(self._changes, of_day)
-        change = self._changes[later] if later < len(self._changes) else DAY
+        change = next((second for second in self._changes.changes() if second > of_day), DAY)
         # A little early, for the rounding: being asked for nothing costs little.
-        return time - of_day + change - 1e-3
+        return time + min(change - of_day, _LOOK_OUT) - 1e-3
 
     def _become(self, posture: str) -> Action:
         if posture == self._posture:
@@ -364,7 +338,8 @@ class ScheduleFollower:
         left, time_left = self._traveller.remaining(observation["pose"]), stay.due - state["time"] % DAY
         ride = None if stay.mode == "walk" else (stay.mode, float(state["time"]) + time_left)
         pace = pace_in_time(left, time_left)
-        action = self._traveller.towards(goal, observation, info, speed=pace, ride=ride)
+        without = self._changes.avoided_modes
+        action = self._traveller.towards(goal, observation, info, speed=pace, ride=ride, without=without)
         if action is not None:
             return action
         return {"type": "enter", "place": place.id} if place.id in state["accessible_places"] else {"type": "wait"}

@@ -81,6 +81,7 @@ class Traveller:
         # Whether no trip to the goal was begun yet; and how one means to make it.
         self._fresh = True
         self._ride: tuple[str, float] | None = None
+        self._without: tuple[str, ...] = ()
         # Ground that events close, as the agent is told anew in every step.
         self._ground: list[tuple[float, float, float]] = []
         self._asked = ""
@@ -140,6 +141,7 @@ class Traveller:
         *,
         speed: float = WALK_SPEED,
         ride: tuple[str, float] | None = None,
+        without: Collection[str] = (),
     ) -> Action | None:
         """Return the next action on the way to a point; None once there, or if there is no way.
 
@@ -152,12 +154,14 @@ class Traveller:
         ride
             Mode that is meant, and the second of the day by which one wants to be there: if a trip by it is there in
             time, that is made. Where it fails (a bus gone or full, a rack empty) the trip that arrives first is.
+        without
+            Modes that one does not choose now; what was begun is gone on with.
         """
         if goal != self._goal:
             self.stop()
             self._goal = goal
         self._notice(observation)
-        self._ride, self._ground = ride, closed_ground(info)
+        self._ride, self._without, self._ground = ride, tuple(without), closed_ground(info)
         action = self._act(goal, observation, info, speed)
         self._asked = "" if action is None else str(action["type"])
         return action
@@ -218,13 +222,14 @@ class Traveller:
         state = observation["state"]
         here, now, cash = observation["pose"][:2], float(state["time"]), float(state["cash"])
         meant, self._fresh = self._ride if self._fresh else None, False
-        if meant is not None:
+        if meant is not None and meant[0] not in self._without:
             mode, due = meant
             trip = self._map.trips.plan(here, goal, now, modes=(mode,), cash=cash, closed=self._ground)
             if trip is not None and trip.arrive <= due:
                 return trip
         closed: list[Closure] = [*self._closed, *self._ground]
-        return self._map.trips.plan(here, goal, now, modes=self._modes, cash=cash, closed=closed)
+        modes = tuple(mode for mode in self._modes if mode not in self._without)
+        return self._map.trips.plan(here, goal, now, modes=modes, cash=cash, closed=closed)
 
     def _pace(self, observation: Observation, speed: float) -> float:
         """Return the speed on foot at which the bus that comes next is not missed, if that can be done."""

@@ -18,6 +18,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from vico.rules import walking_factor
+
 #: How far anybody is noticed by daylight in clear air, metres.
 CLEAR_SIGHT = 40.0
 
@@ -123,6 +125,6 @@ def conditions(
         time_gap=1.0 + 0.5 * (1.0 - braking),
         driving=max(1.0 - slower, _SLOWEST),
         safe_speed=safe,
-        walking=1.0 - max(0.12 * cover, 0.25 * ice),
+        walking=walking_factor(cover, ice),
         cycling=1.0 - max(0.25 * cover, 0.40 * ice, 0.05 * min(rain / 8.0, 1.0)),
     )

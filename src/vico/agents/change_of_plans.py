@@ -1,0 +1,228 @@
+"""Where a stay of the day takes place after all: elsewhere where a place is closed, in a storm, or to see what is on.
+
+What is decided follows from what the resident is told (closed places, weather, events) and from traits that the run's
+seed gives: how much rain, wind, cold and heat somebody stands, and whether somebody goes to see what is on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vico.agents.base import Info
+from vico.agents.state import AgentState
+from vico.agents.stays import Stay
+from vico.rules import walking_factor
+from vico.seeds import rng
+from vico.world.model import Category, Point3
+from vico.world.public import PublicMap, PublicPlace
+
+# Where a place is closed, another one of its kind within so many metres will do, but for what binds one to the place.
+_OTHER_NEAR = 400.0
+_BOUND = ("work", "study")
+# What takes place in the open only as long as the weather allows.
+_FOR_PLEASURE = ("leisure", "visit", "exercise")
+#: Where one goes instead of a park in the rain.
+_SHELTERS = {"arts_centre", "bar", "books", "cafe", "cinema", "community_centre", "department_store", "fitness_centre"}
+_SHELTERS |= {"gallery", "library", "mall", "museum", "pub", "sports_centre"}
+# Which stays are spent at what is on, within so many metres of where one would be, by this share of people.
+_ATTRACTED = {"market": ("leisure", "shop"), "concert": ("leisure",)}
+_WORTH_IT, _CURIOUS = 600.0, 0.4
+# What one stands before and looks at, so far above the ground, metres.
+_WATCHED, _STAGE_HEIGHT = ("concert",), 2.0
+# How far from its middle one stands or strolls about, metres.
+_NEAREST, _FARTHEST = 5.0, 14.0
+
+
+class Tolerance(NamedTuple):
+    """How much bad weather somebody stands outdoors for pleasure or on a bicycle.
+
+    Attributes
+    ----------
+    rain
+        Water that falls as rain, mm/h; of snow a third of it.
+    wind
+        m/s, 10 m above ground.
+    cold, heat
+        Degrees Celsius.
+    """
+
+    rain: float
+    wind: float
+    cold: float
+    heat: float
+
+    @classmethod
+    def of(cls, seed: int, name: str) -> Tolerance:
+        """Return a resident's own; from fair-weather people to those whom little keeps in."""
+        low, high = np.array([0.5, 10.0, -12.0, 31.0]), np.array([6.0, 18.0, -2.0, 39.0])
+        return cls(*rng(seed, "tolerance of weather", name).uniform(low, high).tolist())
+
+    def is_exceeded(self, weather: Mapping[str, float]) -> bool:
+        """Return whether it is too bad outdoors."""
+        return (
+            max(weather["rain"], 3.0 * weather["snow"]) > self.rain
+            or weather["wind"] > self.wind
+            or not self.cold <= weather["temperature"] <= self.heat
+        )
+
+
+class Attraction(NamedTuple):
+    """What somebody thinks of an event: whether to go, the spot where one would be, and what one would look at."""
+
+    comes: bool
+    place: PublicPlace
+    watched: Point3 | None
+
+
+class ChangeOfPlans:
+    """Where a resident spends a stay, and when it sets out, as things are.
+
+    Parameters
+    ----------
+    public_map
+        Places.
+    stays
+        Of the day.
+    seed, name
+        Of the run, and of the resident.
+    """
+
+    def __init__(self, public_map: PublicMap, stays: Sequence[Stay], *, seed: int, name: str) -> None:
+        self._map, self._stays = public_map, stays
+        self._seed, self._name = seed, name
+        self._tolerance = Tolerance.of(seed, name)
+        # Where one goes for a stay instead of its place: the stay, and the places that were thought of.
+        self._instead: tuple[Stay | None, list[str]] = None, []
+        # What was heard of the weather last: how fast one walks, and whether it is too bad to cycle.
+        self._walking, self._keeps_off_bicycles = 1.0, False
+        self._planned = sorted(stay.leave for stay in stays)
+        # Whether one goes to what is on, where one would stand, and what one would look at.
+        self._events: dict[int, Attraction] = {}
+
+    def state(self) -> AgentState:
+        """Return what decides where stays take place, beside what is told anew."""
+        stay, places = self._instead
+        return {
+            "instead": list(places),
+            "instead_of": None if stay is None else self._stays.index(stay),
+            "walking": self._walking,
+            "keeps_off_bicycles": self._keeps_off_bicycles,
+        }
+
+    def restore(self, state: AgentState) -> None:
+        """Go on with what `state` returned."""
+        stay = state["instead_of"]
+        self._instead = None if stay is None else self._stays[stay], [str(name) for name in state["instead"]]
+        self._walking, self._keeps_off_bicycles = float(state["walking"]), bool(state["keeps_off_bicycles"])
+
+    def notice(self, info: Info) -> None:
+        """Take note of the weather."""
+        weather = info.get("weather")
+        if weather is None:
+            return
+        self._walking = walking_factor(weather["snow_cover"], weather["ice"])
+        slippery = weather["ice"] > 0.1 or weather["snow_cover"] > 0.3
+        self._keeps_off_bicycles = slippery or self._tolerance.is_exceeded(weather)
+
+    @property
+    def avoided_modes(self) -> tuple[str, ...]:
+        """Modes that one does not choose in such weather."""
+        return ("bike",) if self._keeps_off_bicycles else ()
+
+    def lead(self, stay: Stay) -> float:
+        """Return how many seconds earlier one sets out for a stay than planned, as it is slow to walk."""
+        return (stay.due - stay.leave) * (1.0 / self._walking - 1.0)
+
+    def changes(self) -> Sequence[float]:
+        """Return when one sets out for each stay, seconds of the day, in ascending order."""
+        if self._walking == 1.0:
+            return self._planned
+        return sorted(stay.leave - self.lead(stay) for stay in self._stays)
+
+    def watched(self, place: PublicPlace) -> Point3 | None:
+        """Return the point that those look at who came to a place; None where there is none."""
+        return next((one.watched for one in self._events.values() if one.place is place), None)
+
+    def place_of(self, stay: Stay, info: Info, inside: str) -> PublicPlace:
+        """Return where one spends a stay, told this; `inside` is the id of the place one is in, or ""."""
+        attraction = self._attraction(stay, info)
+        if attraction is not None:
+            return attraction
+        if self._instead[0] is not stay:
+            self._instead = None, []
+        thought_of = self._instead[1]
+        place = self._map.place_by_id[thought_of[-1] if thought_of else stay.place]
+        closed = {name for event in info.get("events", ()) if event["goes_on"] for name in event["closed_places"]}
+        # Who is in may stay.
+        if place.id in closed and inside != place.id:
+            return self._goes(stay, [*(thought_of or [place.id]), self._other(stay, closed.union(thought_of))])
+        if place.building is None and self._is_too_bad(stay, info):
+            return self._goes(stay, [*(thought_of or [place.id]), self._shelter(place, closed, stay)])
+        return place
+
+    def _goes(self, stay: Stay, places: list[str]) -> PublicPlace:
+        self._instead = stay, places
+        return self._map.place_by_id[places[-1]]
+
+    def _other(self, stay: Stay, closed: Collection[str]) -> str:
+        """Return where one goes who finds a place closed: the nearest of its kind, but not for work, or home."""
+        wanted = self._map.place_by_id[stay.place]
+        if stay.tag not in _BOUND:
+            near = self._map.places_near(wanted.position, _OTHER_NEAR)
+            for place in near:
+                if (
+                    place.kind == wanted.kind
+                    and place.id not in closed
+                    and (place.building is None) == (wanted.building is None)
+                ):
+                    return place.id
+        home = self._home(stay)
+        return stay.place if home in closed else home
+
+    def _shelter(self, wanted: PublicPlace, closed: Collection[str], stay: Stay) -> str:
+        """Return where one spends a stay that was to be in the open: the nearest café or museum, say, or home."""
+        near = self._map.places_near(wanted.position, _OTHER_NEAR)
+        roofs = (p.id for p in near if p.building is not None and p.kind in _SHELTERS and p.id not in closed)
+        return next(roofs, self._home(stay))
+
+    def _home(self, stay: Stay) -> str:
+        return next((one.place for one in self._stays if one.type == "sleep"), stay.place)
+
+    def _is_too_bad(self, stay: Stay, info: Info) -> bool:
+        weather = info.get("weather")
+        return stay.tag in _FOR_PLEASURE and weather is not None and self._tolerance.is_exceeded(weather)
+
+    def _attraction(self, stay: Stay, info: Info) -> PublicPlace | None:
+        """Return where something is on that one goes to see instead, or None."""
+        found = None
+        for event in info.get("events", ()):
+            if not event["goes_on"] or stay.tag not in _ATTRACTED.get(event["kind"], ()):
+                continue
+            if event["id"] not in self._events:
+                self._events[event["id"]] = self._thought_of(event)
+            thought = self._events[event["id"]]
+            planned = self._map.place_by_id[stay.place].position
+            if thought.comes and math.dist(planned[:2], thought.place.position[:2]) <= _WORTH_IT:
+                found = thought.place
+        return None if found is None or self._is_too_bad(stay, info) else found
+
+    def _thought_of(self, event: Mapping[str, Any]) -> Attraction:
+        """Return whether one goes to an event, and the spot where one would stand; the same whenever it is asked."""
+        generator = rng(self._seed, "what is on", self._name, event["id"])
+        comes = bool(generator.random() < _CURIOUS)
+        x, y, z = event["position"]
+        spot = np.array([x, y])
+        # Around it, on ground where one can stand: what is on may stand in the middle itself.
+        for _ in range(8):
+            turn, away = generator.uniform(0.0, math.tau), generator.uniform(_NEAREST, _FARTHEST)
+            near = np.array([x + away * math.cos(turn), y + away * math.sin(turn)])
+            if self._map.walkable.is_connected(near):
+                spot = near
+                break
+        at = (float(spot[0]), float(spot[1]), float(z))
+        place = PublicPlace(f"event {event['id']}", event["name"], Category.OPEN, event["kind"], None, at, None)
+        return Attraction(comes, place, (x, y, z + _STAGE_HEIGHT) if event["kind"] in _WATCHED else None)
