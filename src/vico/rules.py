@@ -116,6 +116,7 @@ class ReasonCode(IntEnum):
     NO_TRANSIT = 75
     MOVING = 76
     CLOSED = 77
+    NO_SEAT = 78
 
 
 _CODE_NAMES = {int(code): code.name.lower() if code else "" for code in ReasonCode}

@@ -15,6 +15,7 @@ from vico.assets.shapes import box
 from vico.sim.actions import ACTIONS, Command, Refusal, actions_markdown, check
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
+from vico.sim.state import Posture
 
 RESIDENTS = ("resident_0", "resident_1")
 
@@ -225,7 +226,7 @@ def test_nobody_can_be_heard_beyond_ten_metres(sim: Simulation) -> None:
 
 
 def test_who_sleeps_has_to_wake_before_walking(sim: Simulation) -> None:
-    act(sim, "resident_0", type="sleep")
+    sim.state.people.posture[0] = Posture.LYING
     assert "asleep" in act(sim, "resident_0", type="move_forward", distance=1)["action_reason"]
     act(sim, "resident_0", type="wake")
     assert act(sim, "resident_0", type="turn_right", degrees=90)["action_status"] == "ok"

@@ -12,6 +12,7 @@ from vico.agents.change_of_plans import ChangeOfPlans
 from vico.agents.conversation import Acquaintance, Conversation, Speaker
 from vico.agents.indoor_walk import IndoorWalker
 from vico.agents.residents import Residents
+from vico.agents.resting import SeatSeeker
 from vico.agents.state import AgentState, generator_state, restore_generator
 from vico.agents.stays import Item, Stay, stays_of, with_ways
 from vico.agents.strides import Stride, pace_in_time
@@ -28,7 +29,7 @@ _MANY = 40
 # Open places are reached this close to their position, metres.
 _OPEN_REACH = 3.0
 # How often people at rest do something, seconds, and when it all comes round again.
-_EAT_EVERY, _MOVE_EVERY, _DRINK_EVERY = 6, 40, 90
+_EAT_EVERY, _MOVE_EVERY, _DRINK_EVERY = 6, 180, 90
 _ROUND = math.lcm(_EAT_EVERY, _MOVE_EVERY, _DRINK_EVERY)
 # Those who came out for a walk or a run stay within this distance of the place, metres.
 _STROLL = 30.0
@@ -85,6 +86,9 @@ class ScheduleFollower:
         self._walker = Walker(public_map, generator)
         self._traveller = Traveller(public_map, generator)
         self._indoors = IndoorWalker()
+        self._seeker = SeatSeeker(self._step_towards)
+        # Whether it is about to sit down.
+        self._seeks = False
         self._aside: list[Action] = []
         self._conversation = Conversation(resident, known, generator)
         self._posture = "standing"
@@ -133,6 +137,8 @@ class ScheduleFollower:
             "walker": self._walker.state(),
             "traveller": self._traveller.state() if self._traveller.plans else None,
             "indoors": self._indoors.state(),
+            "seeker": self._seeker.state(),
+            "seeks": self._seeks,
             "conversation": self._conversation.state(),
             "aside": [dict(action) for action in self._aside],
             "posture": self._posture,
@@ -155,6 +161,8 @@ class ScheduleFollower:
         if state["traveller"] is not None:
             self._traveller.restore(state["traveller"])
         self._indoors.restore(state["indoors"])
+        self._seeker.restore(state["seeker"])
+        self._seeks = bool(state["seeks"])
         self._conversation.restore(state["conversation"])
         arrived, stroll = state["arrived"], state["stroll"]
         self._aside = [dict(action) for action in state["aside"]]
@@ -209,11 +217,12 @@ class ScheduleFollower:
         if (self._arrived, self._arrived_at) != (stay, place.id):
             self._arrived, self._arrived_at = stay, place.id
             self._stroll, self._paused_until = None, -math.inf
+            self._seeks = False
             self._walker.stop()
             self._traveller.stop()
         time = observation["state"]["time"]
         if place.building is not None or stay.tag not in (*_STROLLING, *_RUNNING):
-            return self._live(stay, time)
+            return self._live(stay, observation, info)
         up = self._get_up()
         if up is not None:
             return up
@@ -234,23 +243,46 @@ class ScheduleFollower:
         self._go_on(time, pace, stay, (place.position, 0.0, 2 * _STROLL))
         return action
 
-    def _live(self, stay: Stay, time: float) -> Action:
+    def _live(self, stay: Stay, observation: Observation, info: Info) -> Action:
         """Do what one came for."""
+        time: float = observation["state"]["time"]
         second = math.floor(time)
         tick = second + self._offset
         if stay.type == "sleep":
-            return self._rest(time, math.inf) if self._posture == "lying" else self._become("lying")
-        if stay.type == "meal" or stay.tag in _EATING:
-            if self._posture != "sitting":
-                return self._become("sitting")
-            bite = "" if tick % _EAT_EVERY else "drink" if self._rng.random() < 0.3 else "eat"
-            return self._rest(time, second + _EAT_EVERY - tick % _EAT_EVERY, bite or "wait")
+            return self._sleep(observation, info)
         if self._posture == "lying":
             return self._become("standing")
+        eats = stay.type == "meal" or stay.tag in _EATING
+        if self._posture == "sitting":
+            self._seeks = False
+        elif eats or self._seeks:
+            step = self._seeker.towards("sit", observation, info)
+            self._seeks = step is not None
+            if step is not None:
+                return step
+        if eats:
+            bite = "" if tick % _EAT_EVERY else "drink" if self._rng.random() < 0.3 else "eat"
+            return self._rest(time, second + _EAT_EVERY - tick % _EAT_EVERY, bite or "wait")
         if tick % _MOVE_EVERY == 0 and self._rng.random() < 0.5:
-            return self._become("sitting" if self._posture == "standing" else "standing")
+            if self._posture == "sitting":
+                return self._become("standing")
+            self._seeks = True
+            return {"type": "wait"}
         rest = second + min(_MOVE_EVERY - tick % _MOVE_EVERY, _DRINK_EVERY - tick % _DRINK_EVERY)
         return self._rest(time, rest, "wait" if tick % _DRINK_EVERY else "drink")
+
+    def _sleep(self, observation: Observation, info: Info) -> Action:
+        """Go to bed; who finds none sits down, and looks for one again later."""
+        time: float = observation["state"]["time"]
+        if self._posture == "lying":
+            return self._rest(time, math.inf)
+        step = self._seeker.towards("lie", observation, info)
+        if step is None and self._posture == "standing":
+            step = self._seeker.towards("sit", observation, info)
+        if step is not None:
+            return step
+        later = self._seeker.again("lie")
+        return self._rest(time, later if self._posture == "sitting" else min(later, self._seeker.again("sit")))
 
     def _rest(self, time: float, until: float, now: str = "wait") -> Action:
         """Wait, maybe after a sip or a bite, and say until when nothing else will come of being asked."""
@@ -296,6 +328,19 @@ class ScheduleFollower:
         if out is None:
             return {"type": "wait"}
         outside = out["to"] == "outside"
+        step = self._step_towards(out["position"], 1.9 if outside else 0.9, observation, info)
+        if step is not None:
+            return step
+        if outside:
+            self._tried = set()
+            return {"type": "exit"}
+        return {"type": "enter", "place": out["to"]}
+
+    def _step_towards(self, point: Sequence[float], near: float, observation: Observation, info: Info) -> Action | None:
+        """Return the next action on the way to a point of the room, or near by outdoors; None once within `near` m."""
+        state = observation["state"]
+        if not state["room"]:
+            return self._walker.towards((float(point[0]), float(point[1])), _STROLL_SPEED, observation, info)
         if self._aside:
             return self._aside.pop()
         if state["action_status"] == "collision" and self._rng.random() < _GIVE_WAY:
@@ -304,13 +349,7 @@ class ScheduleFollower:
             side = "turn_left" if self._rng.random() < 0.5 else "turn_right"
             return {"type": side, "degrees": float(self._rng.uniform(60.0, 170.0))}
         self._indoors.notice(observation, info)
-        step = self._indoors.towards(observation, out["position"], near=1.9 if outside else 0.9)
-        if step is not None:
-            return step
-        if outside:
-            self._tried = set()
-            return {"type": "exit"}
-        return {"type": "enter", "place": out["to"]}
+        return self._indoors.towards(observation, point, near=near)
 
     def _walk(self, observation: Observation, info: Info, stay: Stay, place: PublicPlace) -> Action:
         self._arrived = None

@@ -11,12 +11,16 @@ from vico.community.model import ItemType, Mode, ScheduleItem
 
 @dataclass(frozen=True)
 class Appointment:
-    """Being at a place from `due` until `until`, seconds of the day, and by what one means to get there."""
+    """Being at a place from `due` until `until`, seconds of the day, and by what one means to get there.
+
+    `asleep` are the stretches of it that one sleeps, seconds of the day.
+    """
 
     place: int
     due: int
     until: int
     mode: Mode = Mode.WALK
+    asleep: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -40,10 +44,11 @@ def appointments(schedule: Sequence[ScheduleItem], places: dict[str, int]) -> li
             continue
         place, due = places[item.place], seconds_of_day(item.start)
         until = seconds_of_day(item.end)
+        asleep = ((due, until),) if item.type is ItemType.SLEEP else ()
         if stays and stays[-1].place == place:
-            stays[-1] = replace(stays[-1], until=until)
+            stays[-1] = replace(stays[-1], until=until, asleep=stays[-1].asleep + asleep)
         else:
-            stays.append(Appointment(place, due, until, mode))
+            stays.append(Appointment(place, due, until, mode, asleep))
         mode = Mode.WALK
     return stays
 

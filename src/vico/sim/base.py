@@ -12,6 +12,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from vico.assets.models.furniture import furniture_models
+from vico.assets.models.street import street_models
 from vico.errors import InputError
 from vico.rules import DOOR_REACH
 from vico.sim.appointments import Appointment, appointments
@@ -19,6 +21,7 @@ from vico.sim.environment import CityEvent, EventSites
 from vico.sim.environment.event_spots import Spot
 from vico.sim.indoor import Indoor
 from vico.sim.robots.scene import RobotScene
+from vico.sim.seats import Seats
 from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.transit import BusPlan, plan_buses
 from vico.world.folder import World
@@ -78,6 +81,12 @@ class SimulationBase:
     def indoor(self) -> Indoor:
         """All rooms as arrays."""
         return Indoor.from_world(self.world.rooms, self.world.places, self.world.objects)
+
+    @cached_property
+    def seats(self) -> Seats:
+        """Where people sit and lie."""
+        models = street_models() | furniture_models()
+        return Seats.of(self.world.objects, models, self.indoor, self.world.height)
 
     @cached_property
     def solids(self) -> list[shapely.Polygon]:

@@ -8,10 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.sim.animation.seated import seat_height
 from vico.sim.avatars import CLIP, free_ground
 from vico.sim.carrying import carry_along
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import LEVEL_GAZE, Posture
+
+# Who gets up finds a place to stand within so many metres of the seat's front.
+_STEP_ASIDE = 1.5
 
 
 def wrapped(angle: float) -> float:
@@ -22,7 +26,7 @@ def wrapped(angle: float) -> float:
 def eye_height(state: SimulationState) -> NDArray[np.float64]:
     """Height of everyone's eyes above the ground, metres, shape ``(n,)``."""
     p = state.people
-    share = np.select([p.posture == Posture.SITTING, p.posture == Posture.LYING], [0.68, 0.35], 0.93)
+    share = np.select([p.posture == Posture.SITTING, p.posture == Posture.LYING], [0.68, 0.13], 0.93)
     return np.asarray(p.height * share)
 
 
@@ -61,11 +65,69 @@ def spot_outside(i: int, state: SimulationState) -> NDArray[np.float64] | None:
 def put_outdoors(i: int, spot: NDArray[np.float64], yaw: float, state: SimulationState) -> None:
     """Stand someone on the ground outdoors."""
     p = state.people
-    p.room[i] = p.place[i] = -1
+    p.room[i] = p.place[i] = p.seat[i] = -1
+    p.posture[i] = Posture.STANDING
+    p.moved[i] = 0.0
     p.position[i, :2] = spot
     p.yaw[i] = wrapped(yaw)
     p.pitch[i] = LEVEL_GAZE
     state.avatars.settle(np.array([i]))
+    follow_hands(state)
+
+
+def take_seat(i: int, seat: int, state: SimulationState) -> None:
+    """Have someone sit down on a seat, or lie down on a bed, that is free."""
+    p, seats = state.people, state.seats
+    was = _frame(i, state)
+    x, y, z = seats.position[seat]
+    lies = bool(seats.lies[seat])
+    p.seat[i] = seat
+    p.posture[i] = Posture.LYING if lies else Posture.SITTING
+    p.position[i] = x, y, z if lies else z - float(seat_height(p.height[i]))
+    p.yaw[i] = wrapped(float(seats.yaw[seat]))
+    p.pitch[i] = LEVEL_GAZE
+    _note_move(i, was, state)
+
+
+def spot_beside_seat(i: int, state: SimulationState) -> NDArray[np.float64] | None:
+    """Where someone who sits or lies would stand who gets up, ENU metres, shape ``(3,)``; None if there is no room."""
+    p, seats = state.people, state.seats
+    seat, room = int(p.seat[i]), int(p.room[i])
+    if seat < 0:
+        return p.position[i].copy()
+    before = seats.before(seat)
+    if room >= 0:
+        spot = state.indoor.free_spot(room, before[:2], state.taken_in(room, without=i))
+    else:
+        free = free_ground(state.world.walkable, before, state.obstacles_to(i), within=_STEP_ASIDE)
+        spot = None if free is None else np.array([*free, float(state.world.height(free))])
+    if spot is None or math.hypot(spot[0] - before[0], spot[1] - before[1]) > _STEP_ASIDE:
+        return None
+    return spot
+
+
+def get_up(i: int, spot: NDArray[np.float64], state: SimulationState) -> None:
+    """Have someone get up and stand at a spot, as `spot_beside_seat` finds it."""
+    p = state.people
+    was = _frame(i, state)
+    p.posture[i], p.seat[i] = Posture.STANDING, -1
+    p.position[i], p.yaw[i] = spot, wrapped(was[3])
+    _note_move(i, was, state)
+
+
+def _frame(i: int, state: SimulationState) -> tuple[float, float, float, float]:
+    """Return where a body is drawn: x, y, z and heading; who sits looks about without turning on the seat."""
+    p = state.people
+    x, y, z = p.position[i].tolist()
+    return x, y, z, float(p.yaw[i]) if p.seat[i] < 0 else float(state.seats.yaw[p.seat[i]])
+
+
+def _note_move(i: int, was: tuple[float, float, float, float], state: SimulationState) -> None:
+    """Note where a body was, in the frame it is in now."""
+    x, y, z, yaw = _frame(i, state)
+    dx, dy = was[0] - x, was[1] - y
+    c, s = math.cos(yaw), math.sin(yaw)
+    state.people.moved[i] = c * dx + s * dy, c * dy - s * dx, was[2] - z, wrapped(was[3] - yaw)
     follow_hands(state)
 
 

@@ -146,7 +146,11 @@ def overlaps_of(state: SimulationState) -> list[Overlap]:
     records = np.concatenate(
         [avatars, _on_slopes(others, state.world.height), records_of(objects.bodies_of(lying), objects.room[lying])]
     )
+    # Who sits or lies is in furniture, and shoulder to shoulder with others; each place has one person by rule.
+    seated = set(people.entity[people.seat >= 0].tolist())
     found = [(records[i], int(records[j]["entity"]), depth) for i, j, depth in pairs(records, TOLERANCE)]
+    found = [it for it in found if int(it[0]["entity"]) not in seated or it[1] not in seated]
+    avatars = avatars[~np.isin(avatars["entity"], people.entity[people.seat >= 0])]
     inside = persons_in_solids(avatars, state.avatars.solids, TOLERANCE)
     found += [(avatars[i], FURNITURE if furniture else WALL, depth) for i, furniture, depth in inside]
     found += _in_one_seat(avatars[avatars["space"] == IN_BUS], state)

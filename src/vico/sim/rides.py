@@ -38,6 +38,7 @@ def board(i: int, state: SimulationState) -> None:
     line = transit.line_of(bus)
     state.events.add("boarding", p.names[i], f"boards bus {line.name}", p.position[i], line=line.id, fare=FARE)
     p.vehicle_yaw[i] = p.yaw[i] = transit.bus_pose(bus)[2]
+    p.moved[i] = 0.0
     gesture("enter_vehicle", i, state)
     _seat(i, state, transit)
 

@@ -24,6 +24,7 @@ from vico.sim.animation import (
     Transition,
     ground_under_feet,
     hand_frames,
+    joint_places,
     pose,
     style_of,
 )
@@ -42,6 +43,8 @@ from vico.world.mesh import Surface
 
 # The sun moves slowly: the light is set anew this often, seconds.
 _LIGHT_EVERY = 60.0
+# Feet of who sits reach so far below where they would be on a seat of one's own height, and above, metres.
+_FEET_HANG, _FEET_RISE = 0.1, 0.3
 _ICE_SHINES = 0.6  # as much as wet ground does
 
 
@@ -64,6 +67,9 @@ class _Motion(NamedTuple):
         Radians, counter-clockwise from east, float64.
     on_ground
         Whether they stand in the street, not on a floor or a vehicle, bool.
+    rise, rise_before
+        How far whoever sits is, or was before, above the height at which their feet would rest on the floor, metres,
+        float64; 0 for others.
     """
 
     clip: NDArray[np.int64]
@@ -73,6 +79,8 @@ class _Motion(NamedTuple):
     position: NDArray[np.float64]
     yaw: NDArray[np.float64]
     on_ground: NDArray[np.bool_]
+    rise: NDArray[np.float64]
+    rise_before: NDArray[np.float64]
 
 
 class RenderedSimulation(Protocol):
@@ -211,9 +219,7 @@ class SceneRenderer:
             self._scene, self._lit = scene_of(self._sim.world, prototypes=_shapes(self._sim)), ()
             self._viewers.scene = self._scene
             self._set_light(state)
-        motion = _motion_of_agents(state)
-        if state.traffic is not None:
-            motion = _joined_motion(motion, self._motion_of_pedestrians(state))
+        motion = self._motion(state)
         rotations, offsets = self._poses(motion, state.second)
         bodies = self._bodies
         vertices, normals = skin(bodies, rotations, offsets, motion.position, motion.yaw)
@@ -230,24 +236,43 @@ class SceneRenderer:
             _joined([d.entity for d in drawn], (0,), np.int32),
         )
 
+    def _motion(self, state: SimulationState) -> _Motion:
+        """Return how everybody on legs moves."""
+        motion = _motion_of_agents(state)
+        return motion if state.traffic is None else _joined_motion(motion, self._motion_of_pedestrians(state))
+
+    def motions(self, state: SimulationState) -> tuple[_Motion, NDArray[np.float64]]:
+        """Return how everybody moves, and where their joints are, body frame, metres, shape ``(n, 55, 3)``."""
+        motion = self._motion(state)
+        rotations, offsets = self._poses(motion, state.second)
+        return motion, joint_places(self._bodies.joints, rotations, offsets)
+
     def _poses(self, motion: _Motion, second: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return everybody's joint rotations and pelvis shifts, their feet on the ground as it is under each."""
         after = motion.after
         now, before = (
-            self._ground(motion, m.clip, m.phase, m.speed) if count else None
-            for m, count in ((motion, len(motion.clip)), (after, int((after.since < LONGEST_BLEND).sum())))
+            self._ground(motion, (m.clip, m.phase, m.speed), rise) if count else None
+            for m, rise, count in (
+                (motion, motion.rise, len(motion.clip)),
+                (after, motion.rise_before, int((after.since < LONGEST_BLEND).sum())),
+            )
         )
         after = after._replace(ground=now if before is None else before)
         moves = motion.clip, motion.phase, motion.speed, self._style
         return pose(*moves, second=second, after=after, ground=now)
 
     def _ground(
-        self, motion: _Motion, clip: NDArray[np.int64], phase: NDArray[np.float64], speed: NDArray[np.float64]
+        self,
+        motion: _Motion,
+        course: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]],
+        rise: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Return the ground under everybody's feet in a motion."""
+        """Return the ground under everybody's feet in a motion: clip, phase and speed."""
         place = motion.position, motion.yaw
-        ground = ground_under_feet(clip, phase, speed, self._style, place, self._sim.world.height)
+        ground = ground_under_feet(*course, self._style, place, self._sim.world.height)
         ground[~motion.on_ground] = 0.0
+        # From high seats feet hang; a step is there for them on stools.
+        ground[~motion.on_ground, :, :, 0] = -np.clip(rise[~motion.on_ground], -_FEET_RISE, _FEET_HANG)[:, None, None]
         return ground
 
     def _motion_of_pedestrians(self, state: SimulationState) -> _Motion:
@@ -258,7 +283,9 @@ class SceneRenderer:
             state.traffic.gait, self._height[len(state.people) :], state.second
         )
         on_ground = np.ones(len(clip), np.bool_)
-        return _Motion(clip, phase, pace, after, walkers.position, walkers.yaw, on_ground)
+        still = np.zeros(len(clip))
+        after = after._replace(moved=np.zeros((len(clip), 4)))
+        return _Motion(clip, phase, pace, after, walkers.position, walkers.yaw, on_ground, still, still)
 
     def _objects(self, state: SimulationState, rotations: NDArray[np.float32], offsets: NDArray[np.float32]) -> Drawn:
         """Return the movable objects: where they lie, or hanging from the hand that holds them."""
@@ -312,13 +339,24 @@ def _motion_of_agents(state: SimulationState) -> _Motion:
     p = state.people
     in_seat = (p.vehicle == Vehicle.BUS) & (p.posture == Posture.SITTING)
     yaw = np.where(in_seat, p.vehicle_yaw, p.yaw)
-    after = Transition(p.clip_before.astype(np.int64), p.phase_before.copy(), p.pace_before.copy(), p.clip_time.copy())
-    on_ground = (p.room < 0) & (p.vehicle == Vehicle.NONE)
-    return _Motion(p.clip.astype(np.int64), p.phase.copy(), p.pace.copy(), after, p.position.copy(), yaw, on_ground)
+    before = p.clip_before.astype(np.int64), p.phase_before.copy(), p.pace_before.copy(), p.clip_time.copy()
+    after = Transition(*before, moved=p.moved.copy())
+    on_ground = (p.room < 0) & (p.vehicle == Vehicle.NONE) & (p.seat < 0)
+    rise = np.zeros(len(p))
+    sitting = np.flatnonzero(p.seat >= 0)
+    if len(sitting):
+        seat = p.seat[sitting]
+        yaw[sitting] = state.seats.yaw[seat]
+        rise[sitting] = p.position[sitting, 2] - state.seats.floor[seat]
+    # Who gets up comes down from the seat to the floor.
+    rise_before = np.where(p.seat < 0, p.moved[:, 2], 0.0)
+    place = p.position.copy(), yaw, on_ground, rise, rise_before
+    return _Motion(p.clip.astype(np.int64), p.phase.copy(), p.pace.copy(), after, *place)
 
 
 def _joined_motion(a: _Motion, b: _Motion) -> _Motion:
-    after = Transition(*(np.concatenate(pair) for pair in zip(a.after[:-1], b.after[:-1], strict=True)))
+    pairs = {name: (getattr(a.after, name), getattr(b.after, name)) for name in Transition._fields if name != "ground"}
+    after = Transition(**{name: np.concatenate(pair) for name, pair in pairs.items()})
     joined = {name: np.concatenate([getattr(a, name), getattr(b, name)]) for name in _Motion._fields if name != "after"}
     return _Motion(after=after, **joined)
 

@@ -20,6 +20,7 @@ from vico.sim.event_things import EventThings
 from vico.sim.events import Events
 from vico.sim.indoor import Indoor, near_door
 from vico.sim.periods import TICKS_PER_SECOND
+from vico.sim.seats import Seats
 from vico.sim.snapshot import arrays_of
 from vico.sim.state import RADIUS, REASON_LENGTH, MovableObjects, People, Vehicle
 from vico.sim.traffic.jams import Jam, JamLog
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
     from vico.sim.robots.sensing import Reading
 
 
+# A thing that lies so near to the middle of a seat leaves no room to sit, metres.
+_ON_SEAT = 0.25
 # By number: looking an enumeration's member up costs more than all the rest.
 _ON_FOOT = int(Vehicle.NONE)
 
@@ -296,6 +299,11 @@ class SimulationState:
         return self.base.indoor
 
     @property
+    def seats(self) -> Seats:
+        """The world's seats and beds."""
+        return self.base.seats
+
+    @property
     def place_index(self) -> Mapping[str, int]:
         """Index of each place in ``world.places`` by id."""
         return self.base.place_index
@@ -412,6 +420,17 @@ class SimulationState:
         things = objects.bodies_of(lying[objects.room[lying] == room])
         things = things.where(things.height > STEP_HEIGHT)
         return np.vstack([self.people.position[inside], *(_points_of(things, k) for k in range(len(things)))])
+
+    def seats_taken(self) -> NDArray[np.bool_]:
+        """Return which of `seats` nobody else can have: somebody is there, or a thing lies on them; shape ``(m,)``."""
+        seats, objects, mine = self.seats, self.objects, self.people.seat
+        taken = np.zeros(len(seats), np.bool_)
+        taken[mine[mine >= 0]] = True
+        for k in np.flatnonzero(objects.holder == 0).tolist():
+            here = seats.in_room(int(objects.room[k]))
+            away = np.abs(seats.position[here] - objects.position[k])
+            taken[here] |= (away[:, :2].max(axis=1, initial=0.0) < _ON_SEAT) & (away[:, 2] < _ON_SEAT)
+        return taken
 
     def obstacles_to(self, i: int) -> Bodies:
         """Every body outdoors but person `i`'s."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vico.errors import InputError
 from vico.sim.appointments import Appointment, whereabouts
 from vico.sim.avatars import free_ground
-from vico.sim.moves import place_in_room, put_outdoors
+from vico.sim.moves import place_in_room, put_outdoors, take_seat
 from vico.sim.simulation_state import SimulationState
 
 _PASSAGES = ("hall", "corridor", "stairs", "lift", "storage", "bathroom", "washroom", "shower_room")
@@ -32,6 +32,8 @@ def place_residents(state: SimulationState, days: Sequence[Sequence[Appointment]
             raise InputError(f"{name}: no item of the schedule names a place of this world; check the community")
         if where.share >= 1.0 or where.origin == where.place:
             place_at(i, where.place, state)
+            if any(begin <= second < end for stay in stays for begin, end in stay.asleep):
+                put_to_bed(i, state)
             continue
         path = state.base.way(where.origin, where.place)
         if path is None or len(path) < 2 or where.share <= 0.0:
@@ -59,6 +61,23 @@ def place_at(i: int, index: int, state: SimulationState) -> None:
     if spot is None:
         raise InputError(f"{state.people.names[i]}: {place.name} is full, and so is the ground in front of it")
     put_outdoors(i, spot, 0.0, state)
+
+
+def put_to_bed(i: int, state: SimulationState) -> None:
+    """Lay someone into the first free bed of the place they are in, if it has one."""
+    p, seats, indoor = state.people, state.seats, state.indoor
+    if p.place[i] < 0:
+        return
+    taken = state.seats_taken()
+    for name in state.world.places[int(p.place[i])].rooms:
+        room = indoor.index[name]
+        inside = seats.in_room(room)
+        free = np.flatnonzero(seats.lies[inside] & ~taken[inside])
+        if len(free):
+            p.room[i] = room
+            take_seat(i, inside.start + int(free[0]), state)
+            p.moved[i] = 0.0
+            return
 
 
 def along(path: NDArray[np.float64], share: float) -> tuple[NDArray[np.float64], float]:

@@ -116,6 +116,11 @@ class People(ArrayState):
         action.
     posture
         A `Posture`, int8, shape ``(n,)``.
+    seat
+        Index of the place one sits or lies on (`vico.sim.seats.Seats`), -1 for none, int32, shape ``(n,)``.
+    moved
+        Where the body was when it last sat down, lay down or got up, in its frame of now: x, y, z, metres, and yaw,
+        radians, float64, shape ``(n, 4)``.
     room, place
         Index of the room and place the avatar is in, -1 outdoors, int32, shape ``(n,)``.
     vehicle, vehicle_entity
@@ -158,6 +163,8 @@ class People(ArrayState):
     clip_time: NDArray[np.float64]
     action_clip: NDArray[np.int16]
     posture: NDArray[np.int8]
+    seat: NDArray[np.int32]
+    moved: NDArray[np.float64]
     room: NDArray[np.int32]
     place: NDArray[np.int32]
     vehicle: NDArray[np.int8]
@@ -196,6 +203,8 @@ class People(ArrayState):
             clip_time=np.full(n, LONGEST_BLEND),
             action_clip=np.full(n, -1, np.int16),
             posture=np.zeros(n, np.int8),
+            seat=np.full(n, -1, np.int32),
+            moved=np.zeros((n, 4)),
             room=np.full(n, -1, np.int32),
             place=np.full(n, -1, np.int32),
             vehicle=np.zeros(n, np.int8),

@@ -14,6 +14,7 @@ from vico.sim.bodies import RESIDENT, Bodies
 from vico.sim.city import ANNOUNCED, has_news, known_events
 from vico.sim.moves import eye_height
 from vico.sim.perception import OUTDOORS, AllInView, Eyes, in_view, opaque_grid
+from vico.sim.seats import find_rest
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture, Vehicle
 
@@ -52,6 +53,7 @@ class Told:
         self._residents = chosen[state.people.kind[chosen] == RESIDENT]
         self._eyes_of = {i: k for k, i in enumerate(self._residents.tolist())}
         self._in_view = look_about(state, stances, self._residents)
+        self._seats_taken: NDArray[np.bool_] | None = None
         self._weather = state.environment.record()
         self._events = {i: known_events(state, i, stances[i]) for i in who} if len(state.environment.agenda) else {}
 
@@ -80,7 +82,21 @@ class Told:
             indoor = self._state.indoor
             view.room = indoor.boxes[room]
             view.furniture = indoor.furniture[indoor.furniture_start[room] : indoor.furniture_start[room + 1]]
-        return found | {"in_view": view}
+        return found | {"in_view": view, "rest": self._rest(i)}
+
+    def _rest(self, i: int) -> dict[str, Any]:
+        """Return the nearest free seat and bed, or the way there; none while one rides, sits or lies."""
+        p, state = self._state.people, self._state
+        if p.vehicle.item(i) != Vehicle.NONE or p.posture.item(i) == Posture.LYING:
+            return {"sit": None, "lie": None}
+        if self._seats_taken is None:
+            self._seats_taken = state.seats_taken()
+        here = p.position[i], p.room.item(i)
+        found = {
+            name: find_rest(state.seats, state.indoor, here, self._seats_taken, lies=lies)
+            for name, lies in (("sit", False), ("lie", True))
+        }
+        return {name: None if rest is None else rest._asdict() for name, rest in found.items()}
 
     def crowd(self) -> Crowd:
         """Return all agents' observations as arrays."""

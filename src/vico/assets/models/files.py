@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from vico.assets.models.model import Model, Top
+from vico.assets.models.model import Model, Seat, Top
 from vico.assets.models.parts import Palette, Scope, surfaces_of
 from vico.assets.models.schema import Assembly, ModelEntry, ModelFile, Parts
 from vico.errors import InputError, SchemaError
@@ -54,7 +54,7 @@ def _model(name: str, entry: ModelEntry, file: ModelFile, where: str) -> Model:
     parts = base.parts
     if parts is None:  # the schema sees to it
         raise SchemaError(f"{here}: neither parts nor like; see {GUIDE}")
-    top = entry.top or base.top
+    top, seat = entry.top or base.top, entry.seat or base.seat
     solid = next((given for given in (entry.solid, base.solid) if given is not None), file.solid)
     return Model(
         name,
@@ -64,6 +64,7 @@ def _model(name: str, entry: ModelEntry, file: ModelFile, where: str) -> Model:
         solid,
         entry.foot or base.foot,
         None if top is None else Top(top.kind, top.height, top.size, top.centre),
+        None if seat is None else Seat(seat.kind == "lie", seat.height, seat.size, seat.centre),
     )
 
 

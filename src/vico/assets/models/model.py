@@ -35,6 +35,42 @@ class Top:
 
 
 @dataclass(frozen=True)
+class Seat:
+    """Where people sit or lie on a model, looking along its +x; who lies has the head at -x.
+
+    Attributes
+    ----------
+    lies
+        Whether one lies there: a bed.
+    height
+        Of what one sits or lies on above the foot, metres.
+    size
+        Extent along x and y, metres: wide ones have several places side by side.
+    centre
+        Its middle, from the model's origin, metres.
+    """
+
+    lies: bool
+    height: float
+    size: tuple[float, float]
+    centre: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def places(self) -> list[tuple[float, float]]:
+        """Where people's hips are, one a place, from the model's origin, metres."""
+        count = max(1, int(self.size[1] / (_LYING_WIDTH if self.lies else _SITTING_WIDTH) + 1e-9))
+        pitch = self.size[1] / count
+        first = self.centre[1] - 0.5 * (count - 1) * pitch
+        return [(self.centre[0], first + k * pitch) for k in range(count)]
+
+
+# Kinds of tops that are seats.
+_SEATS = ("chair", "sofa")
+# Width of a place, metres.
+_SITTING_WIDTH, _LYING_WIDTH = 0.48, 0.7
+
+
+@dataclass(frozen=True)
 class Model:
     """A prototype: origin at the middle of its foot, z up, +x forward (the side people use it from), metres.
 
@@ -52,6 +88,8 @@ class Model:
         Extent along x and y of the part that stands in people's way, metres; None: the whole outline.
     top
         What things can lie on, if anything.
+    own_seat
+        Where people sit or lie where that is not its `top`.
     build
         Makes its surfaces; called once, when they are first asked for.
     """
@@ -63,6 +101,17 @@ class Model:
     solid: bool = True
     foot: tuple[float, float] | None = None
     top: Top | None = None
+    own_seat: Seat | None = None
+
+    @property
+    def seat(self) -> Seat | None:
+        """Where people sit or lie on it: as its entry says, or on a top that is a chair's, a sofa's or a bed's."""
+        if self.own_seat is not None or self.top is None:
+            return self.own_seat
+        if self.top.kind == "bed":
+            # Pillows are no place to put things on, but to lie on.
+            return Seat(True, self.top.height, self.top.size, (0.0, self.top.centre[1]))
+        return Seat(False, self.top.height, self.top.size, self.top.centre) if self.top.kind in _SEATS else None
 
     @cached_property
     def surfaces(self) -> list[Surface]:

@@ -222,6 +222,15 @@ class TopEntry(DataRecord):
     centre: Corner = (0.0, 0.0)
 
 
+class SeatEntry(DataRecord):
+    """Where people sit or lie; see `Seat`."""
+
+    kind: Literal["sit", "lie"] = "sit"
+    height: Length
+    size: tuple[Length, Length]
+    centre: Corner = (0.0, 0.0)
+
+
 class Assembly(DataRecord):
     """Parts that several models of a file use; its own colours may be given anew at each use."""
 
@@ -234,7 +243,7 @@ class ModelEntry(DataRecord):
 
     Attributes
     ----------
-    kind, group, solid, foot, top
+    kind, group, solid, foot, top, seat
         See `Model`; the kind is the model's name if not given, group and solid are the file's.
     colours
         Names that hold in this model's parts alone: what a variant may change.
@@ -246,6 +255,7 @@ class ModelEntry(DataRecord):
     solid: bool | None = None
     foot: tuple[Length, Length] | None = None
     top: TopEntry | None = None
+    seat: SeatEntry | None = None
     colours: dict[ColourName, ColourSpec] = Field(default_factory=dict)
     parts: Parts | None = None
 

@@ -2,34 +2,92 @@
 
 from __future__ import annotations
 
-from vico.rules import ReasonCode
-from vico.sim.actions.model import ActionType, Actors, Perform, Refusal, Situation, Values
-from vico.sim.moves import gesture
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.rules import REACH, ReasonCode
+from vico.sim.actions.fields import Field
+from vico.sim.actions.model import ActionType, Actors, Check, Perform, Refusal, Situation, Values
+from vico.sim.moves import gesture, get_up, spot_beside_seat, take_seat
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture
 
+_TARGET = Field("integer", required=False, slot="entity")
 _ON_FURNITURE = Situation.ON_FOOT | Situation.SEATED
+
+
+def _check_rest(posture: Posture) -> Check:
+    """Return what judges sitting or lying down: a free seat or bed within reach."""
+
+    def check(values: Values, i: int, state: SimulationState) -> Refusal | None:
+        if state.people.posture[i] == posture:
+            return None
+        found = _seat_for(posture, values, i, state)
+        return found if isinstance(found, Refusal) else None
+
+    return check
+
+
+def _seat_for(posture: Posture, values: Values, i: int, state: SimulationState) -> int | Refusal:
+    """Return the free seat or bed nearest to a person, of the thing that was asked for if one was; or why none."""
+    p, seats = state.people, state.seats
+    lies, asked = posture == Posture.LYING, values.get("target")
+    verb, what = ("sleep", "bed") if lies else ("sit", "seat")
+    near = seats.near(_feet(i, state), int(p.room[i]), lies=lies)
+    if asked is not None:
+        near = near[seats.entity[near] == asked]
+        what = f"{what} with the number {asked}"
+    if not len(near):
+        return Refusal(ReasonCode.NO_SEAT, f"{verb}: no {what} within {REACH} m")
+    free = near[~state.seats_taken()[near]]
+    if not len(free):
+        return Refusal(ReasonCode.NO_SEAT, f"{verb}: no {what} within {REACH} m is free")
+    return int(free[0])
+
+
+def _feet(i: int, state: SimulationState) -> NDArray[np.float64]:
+    """Return where a person is on the floor: who sits may lie down at once."""
+    p = state.people
+    x, y, z = p.position[i]
+    return np.array([x, y, z if p.seat[i] < 0 else state.seats.floor[p.seat[i]]])
+
+
+def _check_getting_up(verb: str, i: int, state: SimulationState) -> Refusal | None:
+    if spot_beside_seat(i, state) is None:
+        return Refusal(ReasonCode.NO_FREE_SPOT, f"{verb}: no room to stand; somebody is in the way")
+    return None
 
 
 def check_stand(values: Values, i: int, state: SimulationState) -> Refusal | None:
     """Judge standing up."""
     if state.people.posture[i] == Posture.SITTING:
-        return None
+        return _check_getting_up("stand", i, state)
     return Refusal(ReasonCode.NOT_SEATED, "stand: not seated")
 
 
 def check_wake(values: Values, i: int, state: SimulationState) -> Refusal | None:
     """Judge waking up."""
     if state.people.posture[i] == Posture.LYING:
-        return None
+        return _check_getting_up("wake", i, state)
     return Refusal(ReasonCode.NOT_ASLEEP, "wake: not asleep")
 
 
-def _take(posture: Posture) -> Perform:
+def _rest(posture: Posture) -> Perform:
     def perform(values: Values, i: int, state: SimulationState) -> None:
-        state.people.posture[i] = posture
+        if state.people.posture[i] == posture:
+            return
+        seat = _seat_for(posture, values, i, state)
+        assert isinstance(seat, int)
+        take_seat(i, seat, state)
 
     return perform
+
+
+def _rise(values: Values, i: int, state: SimulationState) -> None:
+    """Get up, and stand beside the seat or the bed."""
+    spot = spot_beside_seat(i, state)
+    assert spot is not None
+    get_up(i, spot, state)
 
 
 def _show(clip: str) -> Perform:
@@ -44,10 +102,24 @@ def wait(values: Values, i: int, state: SimulationState) -> None:
 
 
 POSTURE = (
-    ActionType("sit", "Sit down.", _take(Posture.SITTING), when=_ON_FURNITURE),
-    ActionType("stand", "Stand up.", _take(Posture.STANDING), check_stand, when=_ON_FURNITURE),
-    ActionType("sleep", "Lie down and sleep.", _take(Posture.LYING), when=_ON_FURNITURE | Situation.ASLEEP),
-    ActionType("wake", "Wake and get up.", _take(Posture.STANDING), check_wake, when=_ON_FURNITURE | Situation.ASLEEP),
+    ActionType(
+        "sit",
+        "Sit down on the nearest free seat within 1.5 m, or on a certain one.",
+        _rest(Posture.SITTING),
+        _check_rest(Posture.SITTING),
+        {"target": _TARGET},
+        when=_ON_FURNITURE,
+    ),
+    ActionType("stand", "Stand up from a seat.", _rise, check_stand, when=_ON_FURNITURE),
+    ActionType(
+        "sleep",
+        "Lie down on the nearest free bed within 1.5 m, or on a certain one, and sleep.",
+        _rest(Posture.LYING),
+        _check_rest(Posture.LYING),
+        {"target": _TARGET},
+        when=_ON_FURNITURE | Situation.ASLEEP,
+    ),
+    ActionType("wake", "Wake and get up.", _rise, check_wake, when=_ON_FURNITURE | Situation.ASLEEP),
     ActionType("drink", "Drink something.", _show("drink"), when=_ON_FURNITURE | Situation.IN_BUS),
     ActionType("eat", "Eat something.", _show("eat"), when=_ON_FURNITURE | Situation.IN_BUS),
     ActionType("wait", "Do nothing.", wait, when=Situation.ANY, actors=Actors.PEOPLE | Actors.ROBOTS),

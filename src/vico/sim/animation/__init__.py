@@ -9,7 +9,7 @@ The caller advances the phase by distance / `stride_length`, so feet never slide
 from vico.sim.animation.blending import LONGEST_BLEND
 from vico.sim.animation.footing import ground_under_feet
 from vico.sim.animation.names import CLIPS, clip_index
-from vico.sim.animation.posing import Transition, hand_frames, hand_position, pose
+from vico.sim.animation.posing import Transition, hand_frames, hand_position, joint_places, pose
 from vico.sim.animation.stride import stride_length
 from vico.sim.animation.style import STYLE, style_of
 
@@ -22,6 +22,7 @@ __all__ = [
     "ground_under_feet",
     "hand_frames",
     "hand_position",
+    "joint_places",
     "pose",
     "stride_length",
     "style_of",

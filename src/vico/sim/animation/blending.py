@@ -17,6 +17,7 @@ from vico.sim.animation.limbs import (
     HERE,
     LEVEL,
     NEXT,
+    PELVIS,
     bend_leg,
     highest_pelvis,
     joint_in_body,
@@ -81,14 +82,29 @@ def blend_joints(body: Any, before: Any, share: float) -> None:
 
 
 @compiled
-def lie_down(body: Any, before: Any, u: float) -> None:
-    """Blend into a motion off one's feet, or out of it: nothing reaches into the floor."""
-    blend_joints(body, before, smoothstep(u))
-    lowest = 0.0
+def changes_seat(before: int, clip: int) -> bool:
+    """Return whether somebody sits down, lies down or gets up between two motions."""
+    return is_seated(before) != is_seated(clip) or (before == SLEEP) != (clip == SLEEP)
+
+
+@compiled
+def move_frame(body: Any, moved: Array) -> None:
+    """Pose a body as it was in another frame: that is at `moved` x, y, z in this one, and turned by `moved` yaw."""
+    turn, pelvis = rotation_about(Z, moved[3]), body.joints[PELVIS]
+    body.shift[:] = rotate(turn, pelvis + body.shift) + moved[:3] - pelvis
+    body.local[PELVIS] = compose(turn, body.local[PELVIS])
+
+
+@compiled
+def lie_down(body: Any, before: Any, u: float, floor: float) -> None:
+    """Blend into a motion off one's feet, or out of it: nothing reaches into the floor, or into a bed above `floor`."""
+    share = smoothstep(u)
+    blend_joints(body, before, share)
+    lowest = floor * (1 - share)
     for side in range(2):
         ankle, _ = joint_in_body(body, ANKLE[side])
         lowest = min(lowest, ankle[Z] - sole_depth(body.style, side, 0.0))
-    body.shift[Z] -= lowest
+    body.shift[Z] -= lowest - floor * (1 - share)
 
 
 @compiled

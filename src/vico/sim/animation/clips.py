@@ -11,9 +11,11 @@ from vico.io.compiled import compiled
 from vico.sim.animation.blending import (
     LONGEST_BLEND,
     blend_time,
+    changes_seat,
     duty_of,
     is_gait,
     lie_down,
+    move_frame,
     stand_by_steps,
     step_taken,
     walk_on,
@@ -37,7 +39,7 @@ from vico.sim.animation.names import (
     TURN,
     WALK,
 )
-from vico.sim.animation.rotations import Array, axis_angle, smoothstep
+from vico.sim.animation.rotations import Array, Z, axis_angle, smoothstep
 from vico.sim.animation.seated import ride_bike, sit, sleep, step_up
 from vico.sim.animation.standing import TURN_CYCLE, TURN_START, gesture_seated, stand
 
@@ -72,6 +74,8 @@ class Circumstances(NamedTuple):
         The motion that this one follows, a `Course`.
     since
         Seconds since then, float64, shape ``(n,)``.
+    moved
+        Where the body was then, in its frame of now: x, y, z, metres, and yaw, radians, float64, shape ``(n, 4)``.
     speed
         Metres a second that the strides are those of, float64, shape ``(n,)``.
     second
@@ -80,6 +84,7 @@ class Circumstances(NamedTuple):
 
     before: Course
     since: NDArray[np.float64]
+    moved: NDArray[np.float64]
     speed: NDArray[np.float64]
     second: float
 
@@ -116,8 +121,10 @@ def _blend(body: Any, i: int, course: Any, around: Any) -> None:
     if u >= 1:
         return
     _pose_one(old, was, before.phase[i], before.stride[i])
+    if changes_seat(was, now):
+        move_frame(old, around.moved[i])
     if _off_their_feet(was) or _off_their_feet(now):
-        lie_down(body, old, u)
+        lie_down(body, old, u, min(around.moved[i, Z], 0.0) if now == SLEEP else 0.0)
     else:
         # Turning began at TURN_START, and it goes on from there as far as the body has turned.
         turned = ((course.phase[i] - TURN_START + 0.5) % 1.0 - 0.5) * TURN_CYCLE if now == TURN else 0.0

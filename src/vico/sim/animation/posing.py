@@ -30,6 +30,9 @@ class Transition(NamedTuple):
         Seconds since then, shape ``(n,)``.
     ground
         As in `pose`, of the motion before.
+    moved
+        Where bodies were before they sat down, lay down or got up, in their frames of now: x, y, z, metres, and yaw,
+        radians, shape ``(n, 4)``; None: where they are.
     """
 
     clip: NDArray[Any]
@@ -37,6 +40,7 @@ class Transition(NamedTuple):
     speed: NDArray[Any]
     since: NDArray[Any]
     ground: NDArray[np.float64] | None = None
+    moved: NDArray[np.float64] | None = None
 
 
 def pose(
@@ -78,14 +82,16 @@ def pose(
     people = style.astype(KERNEL_STYLE)
     now = _course(clip, phase, speed, people, ground)
     before, since = now, np.full(len(people), LONGEST_BLEND)
+    moved = np.zeros((len(people), 4))
     if after is not None:
+        moved = moved if after.moved is None else np.ascontiguousarray(after.moved, np.float64)
         before = _course(after.clip, after.phase, after.speed, people, after.ground)
         since = np.ascontiguousarray(after.since, np.float64)
     rotations = np.zeros((len(people), len(JOINTS), 3), np.float32)
     offsets = np.zeros((len(people), 3), np.float32)
     animate(
         now,
-        Circumstances(before, since, np.ascontiguousarray(speed, np.float64), float(second)),
+        Circumstances(before, since, moved, np.ascontiguousarray(speed, np.float64), float(second)),
         people,
         rotations,
         offsets,
@@ -127,6 +133,19 @@ def hand_frames(
     frames = np.zeros((len(rotations), 2, 4, 4))
     _hands(np.ascontiguousarray(joints, np.float64), rotations, offsets, PARENTS, frames)
     return frames
+
+
+def joint_places(
+    joints: NDArray[Any], rotations: NDArray[np.float32], offsets: NDArray[np.float32]
+) -> NDArray[np.float64]:
+    """Return where everybody's joints are, body frame, metres, shape ``(n, 55, 3)``; arguments as of `hand_frames`."""
+    places = np.empty((len(rotations), len(PARENTS), 3))
+    turned = np.empty((len(PARENTS), 3, 3))
+    for i in range(len(rotations)):
+        forward_kinematics(
+            rotations[i], np.ascontiguousarray(joints[i], np.float64), PARENTS, offsets[i], turned, places[i]
+        )
+    return places
 
 
 def hand_position(

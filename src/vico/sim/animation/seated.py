@@ -37,6 +37,12 @@ _TAU = 2 * np.pi
 
 
 @compiled
+def seat_height(tall: float) -> float:
+    """Return how high the seat is that somebody sits on, above the body's origin, metres: lower for the small."""
+    return min(0.45, 0.27 * tall)
+
+
+@compiled
 def seated_foot(style: Any, side: int) -> tuple[float, float]:
     """Return where the ankle of somebody is who sits: its x and y, metres."""
     joints = style.joints
@@ -50,8 +56,8 @@ def sit(body: Any, p: float) -> None:
     local, shift, joints, style = body.local, body.shift, body.joints, body.style
     tall = style.height
     breath = np.sin(_TAU * p)
-    # Hip joints sit a hand above the seat; seats are 0.45 m high, lower for the small.
-    seat = min(0.45, 0.27 * tall) + 0.052 * tall
+    # Hip joints sit a hand above the seat.
+    seat = seat_height(tall) + 0.052 * tall
     shift[Z] = seat - joints[HIP[LEFT], Z]
     local[PELVIS] = rotation_about(Y, -0.12)
     for side in range(2):

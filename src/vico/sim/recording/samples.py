@@ -89,7 +89,7 @@ class StepSamples:
         parts: list[tuple[NDArray[Any], ...]] = [(p.entity, p.clip, p.phase, p.pace, *before)]
         if state.traffic is not None:
             motion = pedestrian_motion(state.traffic.gait, self._stature, state.second)
-            parts.append((state.traffic.walkers.entity, *motion[:-1], *motion.after[:-1]))
+            parts.append((state.traffic.walkers.entity, *motion[:-1], *motion.after[:4]))
         names = "entity", "clip", "phase", "pace", "clip_before", "phase_before", "pace_before", "clip_time"
         rows = {name: np.concatenate(column) for name, column in zip(names, zip(*parts, strict=True), strict=True)}
         return rows | {"step": np.full(len(rows["entity"]), step)}

@@ -1,0 +1,200 @@
+"""Seats and beds: where people sit and lie, one person a place, and where they stand before it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vico.assets.models.model import Model
+from vico.rules import REACH
+from vico.sim.indoor import Indoor
+from vico.world.heights import HeightField
+from vico.world.objects import Objects
+
+#: A seat that is further up or down than this is on another level, metres.
+_LEVEL = 0.6
+#: Who gets up stands so far before the hips, metres.
+STEP_OFF = 0.55
+#: A bed's edge may be this much nearer than the hips of whoever lies in it, metres.
+_HALF_BED = 1.2
+#: Who walks to where one stands before a seat stops so much short of it, metres.
+_SHORT = 0.3
+#: Outdoors, benches so near are found, metres.
+_BENCH = 15.0
+#: Rooms that are looked through for a seat, and seats of a room that are tried for a way to them.
+_ROOMS, _TRIED = 24, 6
+
+
+class Rest(NamedTuple):
+    """A free seat or bed, or the way to one.
+
+    Attributes
+    ----------
+    entity
+        Of the seat.
+    door
+        Id of the next room on the way; empty where it is in this one.
+    stand
+        Where one stands before it, ENU metres; the door's position where it is in another room.
+    """
+
+    entity: int
+    door: str
+    stand: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Seats:
+    """All places of a world where somebody can sit or lie, by room; outdoors (room -1) first.
+
+    Attributes
+    ----------
+    entity
+        The thing one sits on, int32, shape ``(m,)``: a sofa has several places.
+    lies
+        Whether one lies there, bool, shape ``(m,)``.
+    position
+        Where the hips are, on the seat, ENU metres, float64, shape ``(m, 3)``.
+    floor
+        Height of the floor or the ground there, metres, shape ``(m,)``.
+    yaw
+        Where one looks, radians counter-clockwise from east, shape ``(m,)``; who lies has the head the other way.
+    room
+        Index of the room, -1 outdoors, ascending, int32, shape ``(m,)``.
+    """
+
+    entity: NDArray[np.int32]
+    lies: NDArray[np.bool_]
+    position: NDArray[np.float64]
+    floor: NDArray[np.float64]
+    yaw: NDArray[np.float64]
+    room: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, objects: Objects, models: Mapping[str, Model], indoor: Indoor, ground: HeightField) -> Seats:
+        """Find the seats among a world's things; those of models nobody knows are none."""
+        lots = [_places_of(objects, name, models[name]) for name in np.unique(objects.prototype) if name in models]
+        rows = np.concatenate([np.zeros((0, 6)), *lots])
+        # The number of a row's object: seats of one room stay in the objects' order.
+        owner = rows[:, 0].astype(np.int64)
+        room = np.array([indoor.index.get(str(name), -1) for name in objects.room[owner]], np.int32)
+        order = np.lexsort((np.arange(len(rows)), owner, room))
+        rows, owner, room = rows[order], owner[order], room[order]
+        floor = np.zeros(len(rows))
+        outdoors = room < 0
+        floor[outdoors] = ground(rows[outdoors, 1:3]) if outdoors.any() else 0.0
+        floor[~outdoors] = indoor.floors_at(room[~outdoors], rows[~outdoors, 1:3])
+        return cls(
+            np.asarray(objects.entity[owner], np.int32),
+            rows[:, 5] > 0,
+            np.ascontiguousarray(rows[:, 1:4]),
+            floor,
+            np.ascontiguousarray(rows[:, 4]),
+            room,
+        )
+
+    def __len__(self) -> int:
+        return len(self.entity)
+
+    def in_room(self, room: int) -> slice:
+        """Return which seats are in a room, or outdoors (-1)."""
+        first, last = np.searchsorted(self.room, (room, room + 1))
+        return slice(int(first), int(last))
+
+    def near(self, point: ArrayLike, room: int, *, lies: bool, reach: float = REACH) -> NDArray[np.int64]:
+        """Return the seats, or the beds, of a room within reach of a point on its floor, the nearest first."""
+        reach += _HALF_BED if lies else 0.0
+        x, y, z = np.asarray(point, np.float64)
+        here = self.in_room(room)
+        dx, dy = self.position[here, 0] - x, self.position[here, 1] - y
+        away = np.hypot(dx, dy)
+        found = np.flatnonzero((away <= reach) & (self.lies[here] == lies) & (np.abs(self.floor[here] - z) <= _LEVEL))
+        return here.start + found[np.argsort(away[found], kind="stable")]
+
+    def before(self, seat: int) -> NDArray[np.float64]:
+        """Return the point before a seat, or beside a bed, where one would best stand, ENU metres, shape ``(3,)``."""
+        x, y, _ = self.position[seat]
+        yaw = self.yaw[seat] + (0.5 * math.pi if self.lies[seat] else 0.0)
+        away = STEP_OFF + (0.3 if self.lies[seat] else 0.0)
+        return np.array([x + away * math.cos(yaw), y + away * math.sin(yaw), self.floor[seat]])
+
+
+def _places_of(objects: Objects, name: str, model: Model) -> NDArray[np.float64]:
+    """Return the places on all things of a model: object, x, y, z, yaw, whether one lies, float64, shape ``(k, 6)``."""
+    seat = model.seat
+    which = np.flatnonzero(objects.prototype == name)
+    if seat is None or not len(which):
+        return np.zeros((0, 6))
+    parts = []
+    c, s, scale = np.cos(objects.yaw[which]), np.sin(objects.yaw[which]), objects.scale[which]
+    for u, v in seat.places:
+        x = objects.x[which] + scale * (c * u - s * v)
+        y = objects.y[which] + scale * (s * u + c * v)
+        z = objects.z[which] + scale * seat.height
+        lies = np.full(len(which), float(seat.lies))
+        parts.append(np.column_stack([which, x, y, z, objects.yaw[which], lies]))
+    return np.concatenate(parts)
+
+
+def find_rest(
+    seats: Seats, indoor: Indoor, here: tuple[ArrayLike, int], taken: NDArray[np.bool_], *, lies: bool
+) -> Rest | None:
+    """Return the nearest free seat of one's room, else the way to the nearest room of the same place that has one.
+
+    Parameters
+    ----------
+    here
+        Where one is, ENU metres, and in which room (-1 outdoors: only benches near by are found).
+    taken
+        Which seats are no longer free, shape ``(m,)``.
+    """
+    point, room = here
+    if room < 0:
+        near = [k for k in seats.near(point, -1, lies=lies, reach=_BENCH).tolist() if not taken[k]]
+        return Rest(int(seats.entity[near[0]]), "", _triple(seats.before(near[0]))) if near else None
+    found = _free_in(seats, indoor, here, taken, lies=lies)
+    if found is not None:
+        seat, stand = found
+        return Rest(int(seats.entity[seat]), "", stand)
+    # The next rooms of the place, from the nearest on: each with the door of this room that leads towards it.
+    first_door = {room: -1}
+    queue = [room]
+    for now in queue:
+        for k, door in enumerate(indoor.doors[now]):
+            if door.to < 0 or door.to in first_door or indoor.place[door.to] != indoor.place[room]:
+                continue
+            first_door[door.to] = k if now == room else first_door[now]
+            queue.append(door.to)
+            found = _free_in(seats, indoor, (door.position, door.to), taken, lies=lies)
+            if found is not None:
+                way = indoor.doors[room][first_door[door.to]]
+                return Rest(int(seats.entity[found[0]]), indoor.rooms[way.to].id, way.position)
+        if len(queue) > _ROOMS:
+            return None
+    return None
+
+
+def _free_in(
+    seats: Seats, indoor: Indoor, here: tuple[ArrayLike, int], taken: NDArray[np.bool_], *, lies: bool
+) -> tuple[int, tuple[float, float, float]] | None:
+    """Return the free seat of a room that is nearest to a point and can be reached, and where one stands before it."""
+    point, room = here
+    inside = seats.in_room(room)
+    free = np.flatnonzero((seats.lies[inside] == lies) & ~taken[inside])
+    x, y = np.asarray(point, np.float64)[:2]
+    places = seats.position[inside][free]
+    order = np.argsort((places[:, 0] - x) ** 2 + (places[:, 1] - y) ** 2, kind="stable")
+    for seat in (inside.start + free[order[:_TRIED]]).tolist():
+        stand = indoor.free_spot(room, seats.before(seat)[:2], np.zeros((0, 3)))
+        if stand is not None and seat in seats.near(stand, room, lies=lies, reach=REACH - _SHORT):
+            return seat, _triple(stand)
+    return None
+
+
+def _triple(point: Sequence[float] | NDArray[np.float64]) -> tuple[float, float, float]:
+    return float(point[0]), float(point[1]), float(point[2])

@@ -1,0 +1,201 @@
+"""People sit and lie on seats and beds alone: free ones, one person a place, their hips on it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import toy_city
+from vico.agents.schedule import ScheduleFollower
+from vico.assets.people import J
+from vico.seeds import rng
+from vico.sim.config import SimConfig
+from vico.sim.scene import SceneRenderer
+from vico.sim.simulation import Simulation
+from vico.sim.state import Posture
+from vico.world.folder import World
+from vico.world.objects import Objects
+from vico.world.public import PublicMap
+
+FLOOR = toy_city.FLOOR
+
+
+def _piece(name: str, x: float, y: float, yaw: float, size: tuple[float, float, float], room: str) -> dict[str, Any]:
+    z = FLOOR if room else toy_city.SLOPE * x
+    return {
+        "id": f"{room}{name}{x}",
+        "entity": 300_000 + int(10 * (x + 50)),
+        "kind": name,
+        "group": "indoor" if room else "amenity",
+        "prototype": name,
+        "x": x,
+        "y": y,
+        "z": z,
+        "yaw": yaw,
+        "scale": 1.0,
+        "size_x": size[0],
+        "size_y": size[1],
+        "size_z": size[2],
+        "solid": True,
+        "room": room,
+    }
+
+
+def furnished() -> World:
+    """The toy city with a sofa in the café, a double bed in the room behind it, and a bench in the street."""
+    world = toy_city.world()
+    pieces = [
+        _piece("sofa", -8.4, 11.0, 0.0, (0.8, 1.9, 0.84), "r_cafe"),
+        _piece("bed_double", 1.0, 10.0, np.pi / 2, (2.04, 1.64, 0.95), "r_back"),
+        _piece("bench", -20.0, -15.0, 0.0, (0.6, 1.7, 0.9), ""),
+    ]
+    from vico.assets.models.furniture import furniture_models
+    from vico.assets.models.street import street_models
+
+    models = furniture_models() | street_models()
+    parts = {name: getattr(world, name) for name in ("height", "buildings", "places", "entrances", "rooms", "roads")}
+    parts |= {"transit": world.transit, "walkable": world.walkable}
+    layers = ("ground", "buildings", "roofs", "rooms", "collision")
+    return World(
+        world.manifest,
+        objects=Objects.joined([world.objects, Objects.from_rows(pieces)]),
+        layers={name: world.surfaces(name) for name in layers},
+        models=world.prototypes() | {name: models[name].surfaces for name in ("sofa", "bed_double", "bench")},
+        **parts,
+    )
+
+
+def act(sim: Simulation, agent: str, **action: Any) -> dict[str, Any]:
+    state: dict[str, Any] = sim.step({agent: action}).observations[agent]["state"]
+    return state
+
+
+def _hips(sim: Simulation) -> NDArray[np.float64]:
+    """Return where the first avatar's hips are drawn, ENU metres."""
+    scene = SceneRenderer(sim)
+    motion, joints = scene.motions(sim.state)
+    at = joints[0, [J["left_hip"], J["right_hip"]]].mean(axis=0)
+    c, s = np.cos(motion.yaw[0]), np.sin(motion.yaw[0])
+    found: NDArray[np.float64] = motion.position[0] + np.array([c * at[0] - s * at[1], s * at[0] + c * at[1], at[2]])
+    return found
+
+
+def test_one_sits_on_a_free_seat_within_reach_or_not_at_all() -> None:
+    sim = Simulation(furnished(), None, SimConfig(assistants=4, observe=()))
+    people = sim.state.people
+    for i in range(4):
+        sim.scenario.place_agent(f"assistant_{i}", (-18.9, -15.0 + 0.6 * (i - 1)))
+    assert act(sim, "assistant_0", type="sleep")["action_code"] == "no_seat"  # a bench is no bed
+    for i in range(3):
+        assert act(sim, f"assistant_{i}", type="sit")["posture"] == "sitting"
+    assert len(set(people.seat[:3].tolist())) == 3
+    refused = act(sim, "assistant_3", type="sit")
+    assert (refused["posture"], refused["action_code"]) == ("standing", "no_seat")
+    assert act(sim, "assistant_0", type="stand")["posture"] == "standing"
+    assert abs(float(people.position[0, 2]) - float(sim.world.height(people.position[0, :2]))) < 1e-6
+    sim.scenario.place_agent("assistant_3", (-18.9, -15.6))
+    assert act(sim, "assistant_3", type="sit")["posture"] == "sitting"
+    sim.scenario.place_agent("assistant_1", (10.0, -30.0))
+    assert act(sim, "assistant_1", type="sit")["action_code"] == "no_seat"
+
+
+def test_hips_are_on_the_seat_and_the_body_looks_as_the_seat_does() -> None:
+    sim = Simulation(furnished(), None, SimConfig(assistants=1, observe=()))
+    sim.scenario.place_agent("assistant_0", (-19.0, -15.0), yaw=np.pi)
+    act(sim, "assistant_0", type="sit")
+    seats, seat = sim.state.seats, int(sim.state.people.seat[0])
+    sim.advance(1.0)
+    hips = _hips(sim)
+    assert np.abs(hips[:2] - seats.position[seat, :2]).max() < 0.08
+    assert 0.05 < hips[2] - seats.position[seat, 2] < 0.14  # a hand above the seat
+    act(sim, "assistant_0", type="turn_left", degrees=90.0)
+    assert _hips(sim) == pytest.approx(hips, abs=0.01)
+
+
+def test_a_body_neither_jumps_nor_sinks_as_it_sits_down_and_gets_up() -> None:
+    sim = Simulation(furnished(), None, SimConfig(assistants=1, observe=()))
+    sim.scenario.place_agent("assistant_0", (-18.9, -15.4), yaw=2.0)
+    sim.advance(1.0)
+    scene = SceneRenderer(sim)
+    places = []
+
+    def note() -> None:
+        motion, joints = scene.motions(sim.state)
+        c, s = np.cos(motion.yaw[0]), np.sin(motion.yaw[0])
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        places.append(motion.position[0] + joints[0] @ turn.T)
+
+    for kind in ("sit", "stand"):
+        note()
+        sim.act({"assistant_0": {"type": kind}})
+        for _ in range(100):
+            sim.advance(0.01)
+            note()
+    moved = np.linalg.norm(np.diff(np.array(places), axis=0), axis=2)
+    # From over a metre away within 0.9 s: fast, but no jump.
+    assert moved[:, J["pelvis"]].max() < 0.2
+    ankles = np.array(places)[:, [J["left_ankle"], J["right_ankle"]]]
+    assert moved[:, [J["left_ankle"], J["right_ankle"]]].max() < 0.45
+    assert (ankles[:, :, 2] - sim.world.height(ankles.reshape(-1, 3)[:, :2]).reshape(-1, 2)).min() > 0.03
+
+
+def test_residents_go_to_bed_and_sit_where_there_are_seats() -> None:
+    world = furnished()
+    community = toy_city.community()
+    night = [toy_city.item("sleep", "00:00:00", "23:59:59", toy_city.CAFE)]
+    meal = [toy_city.item("meal", "00:00:00", "23:59:59", toy_city.CAFE)]
+    people = [r.model_copy(update={"schedule": night if k < 2 else meal}) for k, r in enumerate(community.residents)]
+    sim = Simulation(world, community.model_copy(update={"residents": people}), SimConfig(start=3600, observe=()))
+    # Who sleeps when the run begins lies in bed; got out of it, they go back.
+    assert sim.state.people.posture.tolist() == [Posture.LYING, Posture.LYING, Posture.STANDING]
+    act(sim, "resident_0", type="wake")
+    agents = {r.id: ScheduleFollower(r, PublicMap.from_world(world)) for r in people}
+    observations, infos = sim.observe()
+    for _ in range(40):
+        actions = {name: agents[name].act(observations[name], infos[name]) for name in agents}
+        result = sim.step(actions)
+        observations, infos = result.observations, result.infos
+    assert sim.state.people.posture.tolist() == [Posture.LYING, Posture.LYING, Posture.SITTING]
+    assert len(set(sim.state.people.seat.tolist())) == 3
+
+
+def test_random_people_never_sit_in_the_air() -> None:
+    sim = Simulation(furnished(), None, SimConfig(assistants=3, observe=()))
+    draw = rng(1, "sitting")
+    for i in range(3):
+        sim.scenario.place_agent(f"assistant_{i}", (-19.0, -15.0 + i))
+    kinds = ("sit", "stand", "sleep", "wake", "drink", "move_forward", "turn_left")
+    copy = None
+    for step in range(60):
+        actions = {}
+        for name in sim.due:
+            kind = str(draw.choice(kinds))
+            more = {"move_forward": {"distance": 0.4}, "turn_left": {"degrees": 120.0}}.get(kind, {})
+            actions[name] = {"type": kind, **more}
+        sim.step(actions)
+        people = sim.state.people
+        seated = people.posture != Posture.STANDING
+        assert (seated == (people.seat >= 0)).all()
+        taken = people.seat[people.seat >= 0].tolist()
+        assert len(set(taken)) == len(taken)
+        if step == 30:
+            copy = sim.snapshot()
+    assert copy is not None
+    end = sim.state_hash()
+    sim.restore(copy)
+    assert sim.state_hash() != end
+
+
+def test_a_thing_on_a_chair_keeps_people_off_it() -> None:
+    sim = Simulation(furnished(), None, SimConfig(assistants=1, observe=()))
+    state = sim.state
+    bench = state.seats.position[state.seats.in_room(-1)]
+    for k, place in enumerate(bench):
+        sim.scenario.add_object(f"box {k}", "box", [], place, size=(0.2, 0.2, 0.2))
+    sim.scenario.place_agent("assistant_0", (-19.0, -15.0))
+    assert act(sim, "assistant_0", type="sit")["action_code"] == "no_seat"
+    assert replace(state.seats).lies.sum() == 2
