@@ -20,7 +20,7 @@ import tyro
 from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
-from vico.cli.options import AssistantOptions, CommaSeparated, RunOptions, WorldBuildOptions
+from vico.cli.options import AssistantOptions, CommaSeparated, FilmOptions, RunOptions, StillOptions, WorldBuildOptions
 from vico.errors import VicoError, line_of, sentence_of
 from vico.io.files import reason_of
 from vico.version import __version__
@@ -254,6 +254,28 @@ def replay(path: Positional[Path], no_film: bool = False, world: Path | None = N
     from vico.cli import replay as verb
 
     return verb.replay(path, film=not no_film, world=world)
+
+
+@app.command(name="film")
+def film(options: Annotated[FilmOptions, FLAT]) -> int:
+    """Film somebody in a recorded run: it is simulated again with what was done in it, and looked at from beside.
+
+    Example: vico film morning --follow resident_3 --start 08:05 --stop 08:06 --out walk.mp4
+    """
+    from vico.cli import film as verb
+
+    return verb.film(options)
+
+
+@app.command(name="still")
+def still(options: Annotated[StillOptions, FLAT]) -> int:
+    """Take a picture of somebody in a recorded run.
+
+    Example: vico still morning --follow resident_3 --at 08:05 --view side --out walk.png
+    """
+    from vico.cli import film as verb
+
+    return verb.still(options)
 
 
 @app.command(name="demo")

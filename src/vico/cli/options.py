@@ -235,6 +235,86 @@ class RunOptions:
 
 
 @dataclass(frozen=True)
+class FilmOptions:
+    """What `vico film` is asked for.
+
+    Attributes
+    ----------
+    run
+        Run folder.
+    follow
+        Name of the agent that the camera follows.
+    out
+        File to write (.mp4).
+    size
+        WIDTHxHEIGHT, pixels.
+    start
+        HH:MM:SS, or seconds since the run began; without it, its beginning.
+    stop
+        Likewise; without it, its end.
+    fps
+        Frames a second.
+    view
+        From where.
+    samples
+        Rays a pixel, along each side: 1 is quick, 2 smooth.
+    world
+        The world it ran in, if it is no longer where it was.
+    force
+        Replace the file if it is there.
+    """
+
+    run: Positional[Path]
+    follow: str
+    out: Path = Path("film.mp4")
+    size: str = "1920x1080"
+    start: str = ""
+    stop: str = ""
+    fps: int = 25
+    view: Literal["behind", "eyes", "above", "side", "orbit"] = "behind"
+    samples: int = 2
+    world: Path | None = None
+    force: bool = False
+
+
+@dataclass(frozen=True)
+class StillOptions:
+    """What `vico still` is asked for.
+
+    Attributes
+    ----------
+    run
+        Run folder.
+    follow
+        Name of the agent in its middle.
+    at
+        HH:MM:SS, or seconds since the run began; without it, its end.
+    out
+        File to write (.png or .jpg).
+    size
+        WIDTHxHEIGHT, pixels.
+    view
+        From where.
+    samples
+        Rays a pixel, along each side.
+    world
+        The world it ran in, if it is no longer where it was.
+    force
+        Replace the file if it is there.
+    """
+
+    run: Positional[Path]
+    follow: str
+    at: str = ""
+    out: Path = Path("still.png")
+    size: str = "1920x1080"
+    view: Literal["behind", "eyes", "above", "side", "orbit"] = "behind"
+    samples: int = 3
+    world: Path | None = None
+    force: bool = False
+
+
+@dataclass(frozen=True)
 class AssistantOptions:
     """What `vico eval assistant` is asked for.
 

@@ -116,6 +116,8 @@ class PictureRequest:
     samples
         RGB is the mean of ``samples * samples`` rays a pixel: 1 for observations, 2 or more for pictures to look at.
         All else always comes from the ray through the pixel's centre.
+    moving
+        Whether what moves is there.
     """
 
     rgb: bool = True
@@ -124,6 +126,7 @@ class PictureRequest:
     normals: bool = False
     past: tuple[PastPlaces, ...] = ()
     samples: int = 1
+    moving: bool = True
 
     def __post_init__(self) -> None:
         if self.samples < 1:
@@ -182,6 +185,7 @@ def take_pictures(
         np.empty((*shape, 3), np.float32) if request.normals else _NO_NORMALS,
         np.empty((*shape, 3), np.float64) if request.past else _NO_PLACES,
         request.past,
+        request.moving,
     )
     pending: tuple[PendingView, ...] = ()
     if light is not None and request.samples > 1:
@@ -206,6 +210,7 @@ class _Batch:
     normals: NDArray[np.float32]
     places: NDArray[np.float64]
     past: tuple[PastPlaces, ...]
+    moving: bool
 
     @property
     def reads_surfaces(self) -> bool:
@@ -218,7 +223,7 @@ class _Batch:
 
     def render(self, k: int) -> None:
         camera = _camera(self.scene, self.cameras, k, 1)
-        drawn = _take(self.scene, camera, self.light, self.pictures(k))
+        drawn = _take(self.scene, camera, self.light, self.pictures(k), self.moving)
         self._read_surfaces(k, camera, drawn)
 
     def _read_surfaces(self, k: int, camera: Record, drawn: int) -> None:
@@ -235,11 +240,11 @@ class _Batch:
         height, width = self.rgb.shape[1:3]
         wide = np.empty((height * samples, width * samples, 3), np.uint8)
         only_rgb = Pictures(wide, _EMPTY_F32, _EMPTY_I32)
-        _take(self.scene, _camera(self.scene, self.cameras, k, samples), light, only_rgb)
+        _take(self.scene, _camera(self.scene, self.cameras, k, samples), light, only_rgb, self.moving)
         self.rgb[k] = _mean_of_blocks(wide, samples)
         if self.depth.size or self.segmentation.size or self.reads_surfaces:
             camera, without_rgb = _camera(self.scene, self.cameras, k, 1), self.pictures(k)._replace(rgb=_EMPTY_U8)
-            self._read_surfaces(k, camera, _take(self.scene, camera, None, without_rgb))
+            self._read_surfaces(k, camera, _take(self.scene, camera, None, without_rgb, self.moving))
 
 
 def _render_cached(
@@ -249,7 +254,7 @@ def _render_cached(
     scene, cameras = batch.scene, batch.cameras
 
     def take_one(k: int) -> None:
-        if light is None or batch.reads_surfaces:
+        if light is None or batch.reads_surfaces or not batch.moving:
             batch.render(k)
             return
         camera, pictures = _camera(scene, cameras, k, 1), batch.pictures(k)
@@ -379,11 +384,11 @@ def _camera(scene: Scene, cameras: Cameras, k: int, samples: int) -> Record:
     return camera_uniforms(cameras, k, samples, scene.room_of(cameras.position[k]))
 
 
-def _take(scene: Scene, camera: Record, light: Light | None, out: Pictures) -> int:
+def _take(scene: Scene, camera: Record, light: Light | None, out: Pictures, moving: bool = True) -> int:
     """Take pictures of one camera; return how many items were drawn."""
     buffers = _buffers(scene, int(camera["width"]), int(camera["height"]))
     drawn = take(
-        scene.arrays, camera, NO_LIGHT if light is None else light, buffers, NOTHING_KEPT, True, new_caster(), out
+        scene.arrays, camera, NO_LIGHT if light is None else light, buffers, NOTHING_KEPT, moving, new_caster(), out
     )
     if light is not None and out.rgb.size:
         draw_weather(camera, light, buffers.keys, scene.moment, out.rgb)

@@ -237,6 +237,15 @@ class Scene:
         self._replace(avatars=PosedAvatars(low, high, span))
         self.arrays.counts["avatars"] = len(span)
 
+    def repose(self, vertices: NDArray[np.float32], normals: NDArray[np.float32]) -> None:
+        """Move the avatars that are there to other places: as many vertices as `set_skinned` was given."""
+        span = self.arrays.avatars.span
+        low, high = np.zeros((len(span), 3), np.float32), np.zeros((len(span), 3), np.float32)
+        posed = np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(normals, np.float32)
+        if not _pose_avatars(self.arrays.mesh, *posed, self._static_size[1], span, low, high):
+            raise InputError("scene: a vertex of an avatar is not finite")
+        self._replace(avatars=PosedAvatars(low, high, span))
+
     def _clothe(
         self, mesh: Mesh, triangles: NDArray[np.int32], colour: NDArray[np.uint8], entity: NDArray[np.int32]
     ) -> NDArray[np.void]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vico.assets.people import Appearance, body_of
 from vico.community.model import Resident
-from vico.render import Cameras, Lighting, render
+from vico.render import Cameras, Lighting, Scene, render
 from vico.render.lighting import SHADOW_STEP
 from vico.render.sensors.batch import PictureSet, Viewers
 from vico.render.sensors.lens import Lens
@@ -181,12 +181,16 @@ class SceneRenderer:
         """Return what to call, from any thread, to wait for the pictures of the last `render`."""
         return self._pictures.wait if self._pictures is not None else _nothing
 
-    def render_cameras(self, state: SimulationState, cameras: Cameras, *, samples: int = 2) -> NDArray[np.uint8]:
-        """Render any cameras, RGB only, smoothed by `samples` squared; uint8, shape ``(k, h, w, 3)``."""
+    def show(self, state: SimulationState) -> Scene:
+        """Put light and everything that moves where they are in a state; return the scene, for cameras of one's own."""
         self.wait()
         self._set_light(state)
         self._set_moving(state)
-        return render(self._scene, cameras, depth=False, segmentation=False, samples=samples).rgb
+        return self._scene
+
+    def render_cameras(self, state: SimulationState, cameras: Cameras, *, samples: int = 2) -> NDArray[np.uint8]:
+        """Render any cameras, RGB only, smoothed by `samples` squared; uint8, shape ``(k, h, w, 3)``."""
+        return render(self.show(state), cameras, depth=False, segmentation=False, samples=samples).rgb
 
     def names(self, entities: Sequence[int]) -> dict[int, dict[str, str]]:
         """Return kind and name of entities."""

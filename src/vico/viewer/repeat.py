@@ -1,0 +1,121 @@
+"""A recorded run, simulated once more with what its agents did, and looked at between its steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import TypeAdapter
+
+from vico.community import Community, read_community
+from vico.errors import InputError, MissingFileError, SchemaError
+from vico.rules import ActionStatus
+from vico.sim.config import SimConfig
+from vico.sim.recording import Run
+from vico.sim.simulation import Simulation
+from vico.sim.simulation_state import SimulationState
+from vico.world.folder import World, read_world
+
+T = TypeVar("T")
+
+
+class RepeatedRun:
+    """Simulates a recorded run again: from a checkpoint, with the recorded actions, each step's hash compared.
+
+    Parameters
+    ----------
+    run
+        The recording.
+    world, community
+        That it was made with.
+
+    Attributes
+    ----------
+    sim
+        The simulation, at the step that was repeated last; nobody's views are rendered.
+
+    Raises
+    ------
+    SchemaError
+        If this version of vico, or another world or community, would make another run.
+    """
+
+    def __init__(self, run: Run, world: World, community: Community | None) -> None:
+        self.run = run
+        manifest = run.manifest
+        config = TypeAdapter(SimConfig).validate_python(manifest["config"])
+        self.sim = Simulation(world, community, config)
+        if self.sim.identity != manifest["identity"]:
+            raise SchemaError(
+                f"{run.path}: was made by {manifest['producer']} with another configuration, world or community than "
+                "this vico would take; record it anew"
+            )
+        self.sim.seeing = []
+        self._at = 0
+        if self.sim.state_hash() != run.hashes[0]:
+            raise self._differs(0)
+
+    @classmethod
+    def of_folders(cls, run: Run, *, world: Path | None = None, community: Path | None = None) -> RepeatedRun:
+        """Read world and community where the recording says they are, unless told.
+
+        Raises
+        ------
+        MissingFileError
+            If they are not there.
+        """
+        place = read_world(_folder(run, world, run.manifest["world"], "world"))
+        people = None
+        if run.manifest["community"] is not None:
+            people = read_community(_folder(run, community, run.manifest["community"], "community"), place)
+        return cls(run, place, people)
+
+    def go_to(self, step: int) -> None:
+        """Go to a step, from the checkpoint before it."""
+        kept = [k for k in self.run.checkpoints if k <= step]
+        if kept and (self._at > step or kept[-1] > self._at):
+            self.sim.restore(self.run.checkpoint(kept[-1]).arrays)
+            self._at = kept[-1]
+        if self._at > step:
+            raise InputError(f"{self.run.path}: step {step} is behind; repeat the run from its beginning")
+        while self._at < step:
+            self._step()
+
+    def moments(self, last: int, look: Callable[[SimulationState], T]) -> Iterator[list[T]]:
+        """Yield what `look` makes of each tenth of a second, a list a step, up to the step `last`."""
+        while self._at < last:
+            seen: list[T] = []
+            self.sim.state.on_substep = lambda seen=seen: seen.append(look(self.sim.state))
+            try:
+                self._step()
+            finally:
+                self.sim.state.on_substep = None
+            yield seen
+
+    def _step(self) -> None:
+        step = self._at + 1
+        actions: dict[str, Any] = {}
+        faults: dict[str, tuple[ActionStatus, str]] = {}
+        for name, record in self.run.at(step).agents.items():
+            if record.action is not None:
+                actions[name] = record.action
+            if record.status in ("late", "failed"):
+                faults[name] = ActionStatus[record.status.upper()], record.reason
+        result = self.sim.step(actions, faults)
+        self._at = step
+        if result.hash != self.run.hashes[step]:
+            raise self._differs(step)
+
+    def _differs(self, step: int) -> SchemaError:
+        return SchemaError(
+            f"{self.run.path}: simulated again, step {step} is another one than recorded: the run was changed while it "
+            f"went on, or made by another vico ({self.run.manifest['producer']}); record it anew"
+        )
+
+
+def _folder(run: Run, given: Path | None, source: dict[str, Any], what: str) -> Path:
+    folder = given or Path(source["path"])
+    if not (folder / f"{what}.json").exists():
+        raise MissingFileError(f"{run.path}: its {what} is no longer at {folder}; say where it is with --{what}")
+    return folder

@@ -1,0 +1,141 @@
+"""Films and stills of a recorded run: everything as it was, between the steps too, from beside whoever is followed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from vico.errors import InputError
+from vico.render.between import Moment, moment_of, show_between
+from vico.render.film import FilmWriter
+from vico.render.frames import PictureRequest, take_pictures
+from vico.sim.scene import SceneRenderer
+from vico.sim.simulation_state import SimulationState
+from vico.viewer.follow import FollowCamera, Target, target_between, target_of
+from vico.viewer.repeat import RepeatedRun
+
+
+@dataclass(frozen=True, kw_only=True)
+class FilmSettings:
+    """What a film shows.
+
+    Attributes
+    ----------
+    follow
+        Name of an agent.
+    view
+        One of `vico.viewer.follow.VIEWS`.
+    width, height
+        Pixels, even.
+    rate
+        Frames a second.
+    samples
+        Rays a pixel, along each side.
+    """
+
+    follow: str
+    view: str = "behind"
+    width: int = 1920
+    height: int = 1080
+    rate: int = 25
+    samples: int = 2
+
+    def __post_init__(self) -> None:
+        if self.width % 2 or self.height % 2 or not (64 <= self.width <= 7680 and 64 <= self.height <= 4320):
+            raise InputError(f"film: {self.width}x{self.height}; sides have to be even, 64x64 to 7680x4320")
+        if not 1 <= self.rate <= 120:
+            raise InputError(f"film: {self.rate} frames a second; 1 to 120 make sense")
+
+
+class _Seen(NamedTuple):
+    moment: Moment
+    target: Target
+
+
+def write_run_film(
+    path: Path,
+    repeated: RepeatedRun,
+    settings: FilmSettings,
+    *,
+    first: int,
+    last: int,
+    report: Callable[[int, int], None] = lambda done, all_of: None,
+) -> int:
+    """Film a run from step `first` to step `last`; return the number of frames.
+
+    Raises
+    ------
+    InputError
+        If the steps were not recorded, or nobody has the name.
+    """
+    if not 0 <= first < last <= repeated.run.last:
+        raise InputError(
+            f"film: steps {first} to {last}; the run has steps 0 to {repeated.run.last}, and a film needs two of them"
+        )
+    seconds = float(repeated.run.times[last] - repeated.run.times[first])
+    count = int(seconds * settings.rate)
+    with FilmWriter(path, rate=settings.rate, crf=20, threads=2) as film:
+        for number, frame in enumerate(_frames(repeated, settings, first, last)):
+            film.add(frame)
+            report(min(number + 1, count), count)
+        return film.frames
+
+
+def still(repeated: RepeatedRun, settings: FilmSettings, step: int) -> NDArray[np.uint8]:
+    """Return one picture of a step, uint8, shape ``(h, w, 3)``."""
+    if not 0 <= step <= repeated.run.last:
+        raise InputError(f"still: step {step}; the run has steps 0 to {repeated.run.last}")
+    repeated.go_to(step)
+    seen = _watcher(repeated, settings)(repeated.sim.state)
+    camera = FollowCamera(settings.view, settings.width, settings.height)
+    return _picture(seen, seen, 1.0, camera, settings, 1.0)
+
+
+def write_still(path: Path, repeated: RepeatedRun, settings: FilmSettings, step: int) -> None:
+    """Write one picture of a step as PNG or JPEG."""
+    if path.suffix not in (".png", ".jpg"):
+        raise InputError(f"{path}: stills are .png or .jpg files")
+    Image.fromarray(still(repeated, settings, step)).save(path, quality=92)
+
+
+def _watcher(repeated: RepeatedRun, settings: FilmSettings) -> Callable[[SimulationState], _Seen]:
+    renderer = repeated.sim.renderer
+    assert isinstance(renderer, SceneRenderer)
+
+    def look(state: SimulationState) -> _Seen:
+        return _Seen(moment_of(renderer.show(state), state.second), target_of(state, settings.follow))
+
+    return look
+
+
+def _frames(repeated: RepeatedRun, settings: FilmSettings, first: int, last: int) -> Iterator[NDArray[np.uint8]]:
+    target_of(repeated.sim.state, settings.follow)
+    repeated.go_to(first)
+    look = _watcher(repeated, settings)
+    camera = FollowCamera(settings.view, settings.width, settings.height)
+    before = look(repeated.sim.state)
+    start, number = before.moment.second, 0
+    for tenths in repeated.moments(last, look):
+        for after in tenths:
+            # In whole numbers, so that no frame is lost to rounding.
+            while (second := start + number / settings.rate) <= after.moment.second + 1e-9:
+                length = max(after.moment.second - before.moment.second, 1e-9)
+                share = min(max((second - before.moment.second) / length, 0.0), 1.0)
+                yield _picture(before, after, share, camera, settings, 1.0 / settings.rate)
+                number += 1
+            before = after
+
+
+def _picture(
+    before: _Seen, after: _Seen, share: float, camera: FollowCamera, settings: FilmSettings, dt: float
+) -> NDArray[np.uint8]:
+    scene = show_between(before.moment, after.moment, share)
+    eye = camera.look(scene, target_between(before.target, after.target, share), dt)
+    request = PictureRequest(depth=False, segmentation=False, samples=settings.samples)
+    return take_pictures(scene, eye, request, threads=1).rgb[0]

@@ -1,0 +1,147 @@
+"""Films of recorded runs: the same run once more, smooth between its steps, from a camera outside of walls."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import toy_city
+from vico.agents.schedule import followers_of
+from vico.assets.shapes import box, pose_matrix
+from vico.errors import InputError, SchemaError
+from vico.render import Scene
+from vico.render.between import between, moment_of, show_between
+from vico.render.film import read_film
+from vico.sim.config import SimConfig
+from vico.sim.recorder import Recorder
+from vico.sim.recording import Run, read_run
+from vico.sim.simulation import Simulation
+from vico.viewer.follow import FollowCamera, Target, target_between, target_of
+from vico.viewer.repeat import RepeatedRun
+from vico.viewer.run_film import FilmSettings, still, write_run_film
+from vico.world.mesh import joined
+from vico.world.public import PublicMap
+
+STEPS = 12
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """Some seconds of the toy city, with a checkpoint in the middle."""
+    config = SimConfig(start=8 * 3600 - 20, observe=())
+    sim = Simulation(toy_city.world(), toy_city.community(), config)
+    agents = followers_of(toy_city.community(), PublicMap.from_world(sim.world))
+    out = tmp_path_factory.mktemp("film") / "run"
+    with Recorder(out, sim, sources={}, wanted=STEPS, states_every=5) as recorder:
+        observations, infos = sim.observe()
+        recorder.begin(observations)
+        for _ in range(STEPS):
+            actions = {name: agent.act(observations[name], infos[name]) for name, agent in agents.items()}
+            result = sim.step(actions)
+            observations, infos = result.observations, result.infos
+            recorder.write(result, actions=actions)
+            if recorder.checkpoint_due:
+                recorder.checkpoint({})
+    return read_run(out)
+
+
+def repeated(run: Run) -> RepeatedRun:
+    return RepeatedRun(run, toy_city.world(), toy_city.community())
+
+
+def test_a_run_is_the_same_once_more_and_smooth_in_between(run: Run) -> None:
+    again = repeated(run)
+    again.go_to(7)
+    assert again.sim.state_hash() == run.hashes[7]
+    name = max(again.sim.state.people.names[:4], key=lambda who: _travelled(run, who))
+    seen = [target_of(again.sim.state, name)]
+    for tenths in again.moments(STEPS, lambda state: target_of(state, name)):
+        assert len(tenths) == 10
+        seen += tenths
+    assert again.sim.state_hash() == run.hashes[STEPS]
+    moved = [float(np.linalg.norm(b.position - a.position)) for a, b in itertools.pairwise(seen)]
+    assert 0 < max(moved) < 0.3
+
+
+def _travelled(run: Run, name: str) -> float:
+    entity = next(agent["entity"] for agent in run.agents if agent["name"] == name)
+    tracks = run.tracks(7, STEPS)
+    path = tracks.position[:, tracks.entity.tolist().index(entity), :2]
+    return float(np.nan_to_num(np.linalg.norm(np.diff(path, axis=0), axis=1)).sum())
+
+
+def test_a_film_has_all_its_frames_and_shows_who_is_followed(run: Run, tmp_path: Path) -> None:
+    settings = FilmSettings(follow="resident_0", width=96, height=64, rate=20, samples=1, view="behind")
+    frames = write_run_film(tmp_path / "film.mp4", repeated(run), settings, first=4, last=6)
+    assert frames == 41
+    shown = list(read_film(tmp_path / "film.mp4"))
+    assert len(shown) == 41
+    assert shown[0].shape == (64, 96, 3)
+    eyes = FilmSettings(follow="resident_0", width=96, height=64, view="eyes", samples=1)
+    assert still(repeated(run), eyes, 5).std() > 5
+
+
+def test_another_run_is_refused(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    again = repeated(run)
+    monkeypatch.setattr(type(run), "hashes", [*run.hashes[:3], "0" * 64, *run.hashes[4:]])
+    with pytest.raises(SchemaError, match="step 3 is another one than recorded"):
+        again.go_to(4)
+
+
+def test_who_is_not_there_cannot_be_followed(run: Run, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="nobody is called 'Bob'"):
+        write_run_film(tmp_path / "film.mp4", repeated(run), FilmSettings(follow="Bob"), first=0, last=2)
+    assert not list(tmp_path.iterdir())
+
+
+def test_half_way_is_half_turned_and_as_large() -> None:
+    a, b = pose_matrix(0, 0, 0, 0.2)[None, :3], pose_matrix(1.0, 0, 2.0, 0.8)[None, :3]
+    a, b = (m.astype(np.float32) * np.array([2, 2, 2, 1], np.float32) for m in (a, b))
+    half = between(a, b, 0.5)[0]
+    assert math.atan2(half[1, 0], half[0, 0]) == pytest.approx(0.5, abs=1e-4)
+    assert np.linalg.norm(half[:, 0]) == pytest.approx(2.0, abs=1e-4)
+    assert half[:, 3].tolist() == [0.5, 0.0, 1.0]
+
+
+def test_things_and_bodies_go_half_way_and_what_leaps_waits() -> None:
+    scene = Scene([], {"cube": [box((1, 1, 1), (0, 0, 0))]})
+    figure = box((0.5, 0.5, 1.8), (0, 0, 0.9)).of_entity(9)
+    moments = []
+    for x, leap in ((0.0, 0.0), (1.0, 50.0)):
+        scene.set_rigid([0, 0], np.array([pose_matrix(x, 0, 0, 0), pose_matrix(leap, 5, 0, 0)]), [1, 2])
+        vertices = (figure.positions + np.array([x, 0, 0])).astype(np.float32)
+        scene.set_skinned(vertices, figure.normals, figure.triangles, figure.colour, figure.entity)
+        moments.append(moment_of(scene, x))
+    show_between(*moments, 0.25)
+    assert scene.arrays.instances.matrix[:2, 0, 3].tolist() == [0.25, 0.0]
+    assert scene.arrays.avatars.low[0].tolist() == pytest.approx([0.0, -0.25, 0.0], abs=1e-6)
+    assert scene.moment == 0.25
+
+
+@pytest.mark.parametrize("view", ["behind", "side", "above", "orbit"])
+def test_the_camera_follows_smoothly_and_stays_before_walls(view: str) -> None:
+    """Along a street 5 m wide whose walls are nearer than the camera would like to be, round a corner."""
+    scene = Scene(joined([box((80, 1, 8), (0, 3, 4)), box((80, 1, 8), (0, -3, 4)), box((80, 80, 1), (0, 0, -0.5))]))
+    camera = FollowCamera(view, 64, 36)
+    last = None
+    for k in range(100):
+        yaw = 0.0 if k < 50 else math.pi / 2
+        target = Target(np.array([0.05 * k - 5.0, 1.5, 0.0]), yaw, 0.0, 1.6, 1)
+        eye = camera.look(scene, target, 0.04)
+        place = eye.position[0]
+        assert -2.45 < place[1] < 2.45
+        assert place[2] > 0.1
+        if last is not None:
+            assert np.linalg.norm(place - last) < (0.9 if view == "above" else 0.6)
+        last = place
+
+
+def test_through_a_door_the_camera_is_there_at_once() -> None:
+    a = Target(np.zeros(3), 0.0, 0.0, 1.6, 1)
+    b = a._replace(position=np.array([30.0, 0, 0]), room=3)
+    assert target_between(a, b, 0.9).position.tolist() == [0, 0, 0]
+    assert target_between(a, b, 1.0).position.tolist() == [30, 0, 0]
