@@ -1,40 +1,19 @@
 """Who may be in a junction, by each rule, on the streets of central Helsinki."""
 
-from functools import cache
-
 import numpy as np
 import pytest
 
-from road_city import HALF, road_city
+from helsinki_traffic import network, traffic_by
 from vico.errors import InputError
 from vico.sim.bodies import Bodies
 from vico.sim.config import SimConfig
 from vico.sim.overlaps import overlapping
-from vico.sim.traffic import JunctionRule, Traffic, TrafficNetwork
-from vico.world.heights import HeightField
-
-
-@cache
-def _network() -> TrafficNetwork:
-    city = road_city()
-    return TrafficNetwork.of(city.lanes, city.solids)
-
-
-def _traffic(rule: JunctionRule, cars: int = 60, pedestrians: int = 0) -> Traffic:
-    return Traffic(
-        _network(),
-        HeightField.flat(HALF),
-        cars=cars,
-        pedestrians=pedestrians,
-        seed=1,
-        first_entity=1_000_000,
-        junction_rule=rule,
-    )
+from vico.sim.traffic import JunctionRule
 
 
 def test_those_in_a_shared_junction_are_on_lanes_that_do_not_conflict() -> None:
-    traffic = _traffic(JunctionRule.SHARED)
-    first, conflict = _network().conflicts
+    traffic = traffic_by(JunctionRule.SHARED)
+    first, conflict = network().conflicts
     together = 0
     for _ in range(1200):
         traffic.advance(0.1, Bodies.none())
@@ -49,7 +28,7 @@ def test_those_in_a_shared_junction_are_on_lanes_that_do_not_conflict() -> None:
 def test_a_crowd_gets_on_faster_where_junctions_are_shared_and_nobody_touches_anybody() -> None:
     speeds = {}
     for rule in (JunctionRule.ONE, JunctionRule.SHARED):
-        traffic = _traffic(rule, 100, 100)
+        traffic = traffic_by(rule, 100, 100)
         driven = []
         for _ in range(900):
             traffic.advance(0.1, Bodies.none())
@@ -60,5 +39,5 @@ def test_a_crowd_gets_on_faster_where_junctions_are_shared_and_nobody_touches_an
 
 
 def test_an_unknown_rule_is_refused() -> None:
-    with pytest.raises(InputError, match="junctions is 'none'; take one, shared"):
+    with pytest.raises(InputError, match="junctions is 'none'; take one, shared, signals, both"):
         SimConfig(junctions="none")

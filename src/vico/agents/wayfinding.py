@@ -21,6 +21,8 @@ VEHICLES = ("car", "bus", "bicycle")
 _END = 0.2
 # At a kerb, people let vehicles pass that are nearer than this, metres, but not for ever, seconds.
 _CAR_NEAR, _PATIENCE = 9.0, 8
+# Red is waited for this long, seconds; and it counts this far beside its crossing, metres.
+_SIGNAL_PATIENCE, _BESIDE = 150, 0.5
 # Radius of what is taken to be closed where one keeps being stopped, and its growth each time, metres.
 _BLOCK, _GROW = 0.5, 0.4
 # Who stepped aside joins its way again this far on, metres, unless that is longer than straight on by so much.
@@ -219,6 +221,8 @@ class Walker:
         surface = self._map.walkable.class_of
         if surface(*position) in ROAD or surface(*ahead) not in ROAD:
             return False
+        if self._waited < _SIGNAL_PATIENCE and shows_red(ahead, info):
+            return True
         return self._waited < _PATIENCE and _nearest_vehicle(observation, info) < _CAR_NEAR
 
     def _meet_obstacle(self, position: Point, observation: Observation) -> None:
@@ -248,6 +252,20 @@ class Walker:
                     self._aside = [{"type": turn, "degrees": degrees}, {"type": "move_forward", "distance": reach}]
                     return
         self._plan(position)
+
+
+def shows_red(point: Point, info: Info) -> bool:
+    """Whether a point lies on a crossing whose signal tells people to wait."""
+    for signal in info.get("signals", ()):
+        if signal["for"] == "pedestrians" and signal["light"] in ("red", "amber"):
+            (x, y), (to_x, to_y) = signal["crossing"]
+            east, north = to_x - x, to_y - y
+            length = math.hypot(east, north)
+            along = ((point[0] - x) * east + (point[1] - y) * north) / max(length, 1e-9)
+            aside = abs((point[0] - x) * north - (point[1] - y) * east) / max(length, 1e-9)
+            if -_BESIDE <= along <= length + _BESIDE and aside <= signal["width"] / 2 + _BESIDE:
+                return True
+    return False
 
 
 def closed_ground(info: Info) -> list[tuple[float, float, float]]:

@@ -170,7 +170,8 @@ class RunOptions:
     pedestrians
         How many people nobody plays walk around.
     junctions
-        Who may be in a junction: one vehicle at a time, or those who are not in each other's way (shared).
+        Who may be in a junction: one vehicle at a time; those who are not in each other's way (shared); the same by
+        signals, where the map has them; or one at a time by signals (both).
     observe
         Whose views are rendered: all, none, or names separated by commas.
     outputs
@@ -217,7 +218,7 @@ class RunOptions:
     robots: CommaSeparated = "husky,go2"
     cars: int = 30
     pedestrians: int = 30
-    junctions: Literal["one", "shared"] = "one"
+    junctions: Literal["one", "shared", "signals", "both"] = "one"
     observe: CommaSeparated = "all"
     outputs: CommaSeparated = "rgb,depth,segmentation"
     keep: CommaSeparated = "none"

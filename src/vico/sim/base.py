@@ -26,6 +26,7 @@ from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.transit import BusPlan, plan_buses
 from vico.world.folder import World
 from vico.world.model import Entrance
+from vico.world.objects import Objects
 from vico.world.routing import Router
 
 if TYPE_CHECKING:
@@ -97,10 +98,15 @@ class SimulationBase:
         solids += [shapely.Polygon(corners) for corners in things.corners()]
         return [solid for solid in solids if solid.is_valid and not solid.is_empty]
 
+    @property
+    def _signal_poles(self) -> Objects:
+        objects = self.world.objects
+        return objects.where(np.asarray(objects.kind == "traffic_signals", bool))
+
     @cached_property
     def streets(self) -> TrafficNetwork:
         """What traffic moves on."""
-        return TrafficNetwork.of(self.world.lanes, self.solids)
+        return TrafficNetwork.of(self.world.lanes, self.solids, self._signal_poles)
 
     @cached_property
     def router(self) -> Router:

@@ -136,6 +136,17 @@ class Drawn:
     entity: NDArray[np.int32]
 
 
+def joined_drawn(parts: list[Drawn]) -> Drawn:
+    """Return shapes to draw as one lot."""
+    first = np.cumsum([0] + [len(part.prototypes) for part in parts[:-1]])
+    return Drawn(
+        [name for part in parts for name in part.prototypes],
+        np.concatenate([part.index + np.int32(k) for k, part in zip(first, parts, strict=True)]),
+        np.concatenate([part.transforms for part in parts]),
+        np.concatenate([part.entity for part in parts]),
+    )
+
+
 class HasBodies(Protocol):
     """Who takes up room."""
 

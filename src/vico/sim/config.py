@@ -32,7 +32,7 @@ class SimSettings:
     cars, pedestrians
         Vehicles and people nobody plays.
     junctions
-        Who may be in a junction: ``"one"`` or ``"shared"``
+        Who may be in a junction: ``"one"``, ``"shared"``, ``"signals"`` or ``"both"``
         (`vico.sim.traffic.junction_rule.JunctionRule`).
     transit
         Whether buses and bicycles are there.

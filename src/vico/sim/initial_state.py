@@ -48,6 +48,7 @@ def initial_state(
     # Nobody has a place yet: until then avatars are nowhere that could be in anybody's way.
     people.room[:] = _NOWHERE
     state.traffic, state.transit = systems.traffic_and_transit_of(base, config)
+    state.show_signals()
     robots = systems.robots_of(base, config, state.obstacles(), errands=config.errands)
     if robots is not None:
         robots.attach_objects(state.objects)

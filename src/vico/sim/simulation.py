@@ -192,6 +192,7 @@ class Simulation:
             if state.tick % TICKS_PER_SECOND == 0:
                 state.environment.advance(1.0)
                 follow_city_events(state)
+                state.show_signals()
                 self.punctuality.watch(state)
             watch.lap("bookkeeping")
 

@@ -25,6 +25,7 @@ from vico.sim.snapshot import arrays_of
 from vico.sim.state import RADIUS, REASON_LENGTH, MovableObjects, People, Vehicle
 from vico.sim.traffic.jams import Jam, JamLog
 from vico.sim.traffic.junction_rule import JunctionRule
+from vico.sim.traffic.signals import SignalsShown
 from vico.sim.traffic.state import PedestrianGaits
 from vico.sim.transit import TransitSystem
 from vico.world.folder import World
@@ -79,6 +80,12 @@ class TrafficSystem(Subsystem, Protocol):
 
     def set_shut(self, lanes: NDArray[np.bool_] | None, walkways: NDArray[np.bool_] | None) -> None:
         """Have cars keep off some lanes, and pedestrians off some walkways (masks); told before every sub-step."""
+
+    def set_signals(self, second: int, dark: tuple[tuple[float, float, float], ...]) -> None:
+        """Have signals show what they do at a second, and nothing where the power is cut; told every second."""
+
+    def signals_shown(self) -> SignalsShown | None:
+        """Return what all signals show now; None where they are not obeyed."""
 
     def drop_shut_plans(self) -> None:
         """Have cars plan anew that were about to drive where it is shut since."""
@@ -449,6 +456,12 @@ class SimulationState:
         self.tick = int(arrays["tick"][0])
         for name, part in self._parts().items():
             part.restore(arrays_of(arrays, name))
+        self.show_signals()
+
+    def show_signals(self) -> None:
+        """Have traffic's signals show what they do now."""
+        if self.traffic is not None:
+            self.traffic.set_signals(int(self.second), self.environment.agenda.effects.dark)
 
     def _parts(self) -> dict[str, HasArrays]:
         parts: dict[str, HasArrays | None] = {

@@ -18,6 +18,9 @@ from vico.sim.seats import find_rest
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture, Vehicle
 
+#: How far off signals are told of, metres.
+SIGNALS_REACH = 60.0
+
 # By number. Looking an enumeration's members up costs more than all the rest.
 _VEHICLES = {int(Vehicle.NONE): "", int(Vehicle.BUS): "bus", int(Vehicle.BIKE): "bike"}
 _POSTURES = {int(posture): posture.name.lower() for posture in Posture}
@@ -55,6 +58,7 @@ class Told:
         self._in_view = look_about(state, stances, self._residents)
         self._seats_taken: NDArray[np.bool_] | None = None
         self._weather = state.environment.record()
+        self._signals = state.traffic.signals_shown() if state.traffic is not None else None
         self._events = {i: known_events(state, i, stances[i]) for i in who} if len(state.environment.agenda) else {}
 
     def observation(self, name: str) -> dict[str, Any]:
@@ -75,6 +79,9 @@ class Told:
         found: dict[str, Any] = {"action_code": code, "weather": self._weather}
         if i in self._events:
             found["events"] = self._events[i]
+        if self._signals is not None and (i >= len(p) or p.room.item(i) < 0):
+            x, y = self.poses[i, :2].tolist()
+            found["signals"] = self._signals.near(x, y, SIGNALS_REACH)
         if i not in self._eyes_of:
             return found
         view = self._in_view.of(self._eyes_of[i])

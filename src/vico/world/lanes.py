@@ -6,7 +6,7 @@ Read from SUMO's `roads.net.xml` (https://sumo.dlr.de/docs/Networks/SUMO_Road_Ne
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -19,10 +19,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from vico.errors import MissingFileError, SchemaError
 from vico.io.compiled import compiled
+from vico.world.signals import SignalProgram, Signals, signal_program
 from vico.world.walkways import Walkways, walkways_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
+_Attributes = dict[str, str]
 
 # Junctions joined by a street shorter than a car and its gap can't be left one by one: they count as one.
 CLUSTER_GAP = 8.0
@@ -54,6 +56,8 @@ class LaneGraph:
         int32; where traffic keeps left the sides are the other way round.
     lefthand
         Whether traffic keeps left.
+    lights
+        What signals let vehicles and people into junctions, and by which programs.
     next_first, next, previous_first, previous
         Lanes that follow and precede lane ``i``: ``next[next_first[i]:next_first[i + 1]]``.
     junctions, junction_position, signals
@@ -88,6 +92,7 @@ class LaneGraph:
     zones: int
     walks: Walkways
     lefthand: bool = False
+    lights: Signals = field(default_factory=Signals.none)
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -229,11 +234,12 @@ def read_lanes(path: Path) -> LaneGraph:
     if not path.is_file():
         raise MissingFileError(f"{path}: no such file; build the world anew")
     try:
-        lanes, junctions, links, lefthand = _parsed(path)
+        lanes, junctions, links, programs, lefthand = _parsed(path)
+        driven = [lane for lane in lanes if (lane.cars or lane.buses) and lane.function in ("normal", "internal")]
+        lights = Signals.of(programs, links, {lane.id: i for i, lane in enumerate(driven)})
     except (ParseError, DefusedXmlException, KeyError, ValueError) as error:
         raise SchemaError(f"{path}: not a readable SUMO network ({error}); build the world anew") from None
-    driven = [lane for lane in lanes if (lane.cars or lane.buses) and lane.function in ("normal", "internal")]
-    return _assembled(driven, lanes, junctions, links, lefthand=lefthand)
+    return replace(_assembled(driven, lanes, junctions, links, lefthand=lefthand), lights=lights)
 
 
 def _clean_line(text: str) -> Floats:
@@ -250,10 +256,11 @@ def _allows(attributes: dict[str, str], who: str) -> bool:
     return who not in attributes.get("disallow", "").split() and attributes.get("disallow") != "all"
 
 
-def _parsed(path: Path) -> tuple[list[_Lane], list[dict[str, str]], list[dict[str, str]], bool]:
+def _parsed(path: Path) -> tuple[list[_Lane], list[_Attributes], list[_Attributes], list[SignalProgram], bool]:
     lanes: list[_Lane] = []
-    junctions: list[dict[str, str]] = []
-    links: list[dict[str, str]] = []
+    junctions: list[_Attributes] = []
+    links: list[_Attributes] = []
+    programs: list[SignalProgram] = []
     root: Any = None
     lefthand = False
     for event, element in iterparse(path, events=("start", "end"), forbid_dtd=True):
@@ -286,9 +293,11 @@ def _parsed(path: Path) -> tuple[list[_Lane], list[dict[str, str]], list[dict[st
             junctions.append(dict(element.attrib))
         elif element.tag == "connection":
             links.append(dict(element.attrib))
-        if element.tag in ("edge", "junction", "connection"):
+        elif element.tag == "tlLogic":
+            programs.append(signal_program(element.attrib, [dict(phase.attrib) for phase in element.findall("phase")]))
+        if element.tag in ("edge", "junction", "connection", "tlLogic"):
             root.clear()
-    return lanes, [j for j in junctions if j.get("type") != "internal"], links, lefthand
+    return lanes, [j for j in junctions if j.get("type") != "internal"], links, programs, lefthand
 
 
 def _csr(pairs: list[tuple[int, int]], n: int) -> tuple[Ints, Ints]:

@@ -11,15 +11,26 @@ class JunctionRule(StrEnum):
     Attributes
     ----------
     ONE
-        One vehicle at a time: the paper's rule.
+        One vehicle at a time; signals are not obeyed. The paper's rule.
     SHARED
-        Those whose lanes through it do not cross, join, or come too near each other; buses alone.
+        Those whose lanes through it do not cross, join, or come too near each other; buses alone; no signals.
+    SIGNALS
+        The same, and signals are obeyed where the map has them.
+    BOTH
+        One vehicle at a time, and signals are obeyed.
     """
 
     ONE = "one"
     SHARED = "shared"
+    SIGNALS = "signals"
+    BOTH = "both"
 
     @property
     def is_shared(self) -> bool:
         """Whether several vehicles may be in a junction."""
-        return self is JunctionRule.SHARED
+        return self in (JunctionRule.SHARED, JunctionRule.SIGNALS)
+
+    @property
+    def has_signals(self) -> bool:
+        """Whether signals are obeyed."""
+        return self in (JunctionRule.SIGNALS, JunctionRule.BOTH)

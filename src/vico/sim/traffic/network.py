@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from vico.sim.traffic.state import LANE, WALKWAY, LaneNetwork, WalkwayNetwork
 from vico.world.lanes import LaneGraph
+from vico.world.objects import Objects
 from vico.world.walkways import CROSSING, Walkways
 
 _U_TURN = 2.6  # rad
@@ -35,6 +36,8 @@ class TrafficNetwork:
         Both as kernels take them; `driven` without routes of buses.
     starts, entries
         Lanes cars can stand on at the start, and those they come back in on.
+    poles
+        Objects of the world on which signals are seen.
     """
 
     lanes: LaneGraph
@@ -43,19 +46,26 @@ class TrafficNetwork:
     walked: WalkwayNetwork
     starts: NDArray[np.int64]
     entries: NDArray[np.int32]
+    poles: Objects
 
     @classmethod
-    def of(cls, lanes: LaneGraph, solids: Sequence[shapely.Polygon] = ()) -> TrafficNetwork:
+    def of(
+        cls, lanes: LaneGraph, solids: Sequence[shapely.Polygon] = (), poles: Objects | None = None
+    ) -> TrafficNetwork:
         """Make the network of a world's lanes.
 
         Parameters
         ----------
         solids
             Footprints nobody walks through.
+        poles
+            Objects on which signals are seen.
         """
         walks = connected_walkways(lanes.walks.clear_of(list(solids)))
         driven = _lane_network(lanes, walks)
-        return cls(lanes, walks, driven, walkway_network(walks), *lanes_to_start_on(lanes, driven))
+        return cls(
+            lanes, walks, driven, walkway_network(walks), *lanes_to_start_on(lanes, driven), poles or Objects.none()
+        )
 
     @cached_property
     def conflicts(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:

@@ -15,7 +15,7 @@ from vico.sim.neighbours import search
 from vico.sim.traffic.path import project_on_polyline
 from vico.sim.traffic.random_stream import next_random
 from vico.sim.traffic.shapes import disc_touches, distance_to, is_disc, share_level
-from vico.sim.traffic.state import GAIT_TIME, NONE
+from vico.sim.traffic.state import AMBER, GAIT_TIME, NONE
 from vico.world.lanes import lane_pose
 from vico.world.walkways import CORNER as _CORNER_KIND
 from vico.world.walkways import CROSSING as _CROSSING_KIND
@@ -166,6 +166,8 @@ def advance_follow_point(paths, walker, junctions, is_asked, x, y, dt):  # type:
             walker.offset = min(max(offset, 0.0), paths.walkways[walkway].length)
             continue
         is_crossing = paths.walkways[following].kind == _CROSSING
+        if is_crossing and paths.walkways[following].light >= AMBER and not is_asked:
+            return True
         if is_crossing and must_wait_at_crossing(walker, junctions, following, is_asked):
             walker.crossing_wait += dt
             longest, spread = _GIVE_UP_CROSSING

@@ -12,7 +12,7 @@ from vico.assets.vehicle_parts import mirrored
 from vico.assets.vehicles import CAR_KINDS, vehicle_prototypes, vehicle_size
 from vico.errors import InputError
 from vico.seeds import rng
-from vico.sim.bodies import BUS, CAR, PEDESTRIAN, STEP_HEIGHT, Bodies, Drawn
+from vico.sim.bodies import BUS, CAR, PEDESTRIAN, STEP_HEIGHT, Bodies, Drawn, joined_drawn
 from vico.sim.environment import Conditions
 from vico.sim.neighbours import neighbour_grid
 from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
@@ -23,6 +23,8 @@ from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.traffic.pedestrians import RADIUS, advance_pedestrians, place_pedestrian
 from vico.sim.traffic.route import count_per_street, drop_shut_plans, is_taken, widen_shut
 from vico.sim.traffic.shapes import Shapes
+from vico.sim.traffic.signal_heads import SignalHeads
+from vico.sim.traffic.signals import Circles, SignalClock, SignalsShown
 from vico.sim.traffic.state import (
     NONE,
     PEDESTRIAN_RECORD,
@@ -124,6 +126,8 @@ class Traffic:
         self.jams = JamLog(first_entity)
         self._entities = np.zeros(0, np.int32)  # of all bodies of the last step, in the order of its shapes
         self.shapes = self._new_shapes()
+        self.signals = SignalClock(lanes, network.walks, seed) if junction_rule.has_signals else None
+        self._heads = SignalHeads(lanes, network.walks, network.poles, height) if self.signals else None
         self._street_load = np.zeros(len(lanes.edges), np.int32)
         self._entries = self._all_entries = network.entries
         self._place_buses(buses.starts)
@@ -290,6 +294,30 @@ class Traffic:
         left = self._all_entries[~shut[self._all_entries]]
         self._entries = left if len(left) else self._all_entries
 
+    def set_signals(self, second: int, dark: Circles) -> None:
+        """Have signals show what they do at a second: part of the time and the environment's state, not of this one's.
+
+        A junction whose signals are dark has one occupant at a time.
+
+        Parameters
+        ----------
+        second
+            Since midnight of the first day.
+        dark
+            Where the power is cut: x, y and radius of circles, ENU metres.
+        """
+        if self.signals is None:
+            return
+        clusters = self.signals.show(second, dark, self._net, self._paths)
+        if clusters is not None and self.junction_rule.is_shared:
+            exclusive = self.junctions.claims.exclusive
+            exclusive[:] = False
+            exclusive[clusters[clusters >= 0]] = True
+
+    def signals_shown(self) -> SignalsShown | None:
+        """Return what all signals show now; None where they are not obeyed."""
+        return None if self.signals is None else self.signals.shown(self._net, self._paths)
+
     def drop_shut_plans(self) -> None:
         """Have cars plan anew that were about to drive where it is shut since."""
         drop_shut_plans(self._net, self._vehicles)
@@ -352,7 +380,7 @@ class Traffic:
         ]
 
     def draw(self) -> Drawn:
-        """Cars and buses; pedestrians are drawn by whoever skins people."""
+        """Cars, buses and what signals show; pedestrians are drawn by whoever skins people."""
         m = self.vehicles
         c, s = np.cos(self.shapes.yaw[:m]), np.sin(self.shapes.yaw[:m])
         xy = np.column_stack([self.shapes.x[:m], self.shapes.y[:m]])
@@ -370,11 +398,16 @@ class Traffic:
         transforms[:, :2, 3], transforms[:, 2, 3] = xy, (front + back) / 2
         transforms[:, 3, 3] = 1.0
         entity = np.arange(self.first_entity, self.first_entity + m, dtype=np.int32)
-        return Drawn(self._prototypes, self.prototype, transforms, entity)
+        vehicles = Drawn(self._prototypes, self.prototype, transforms, entity)
+        if self._heads is None:
+            return vehicles
+        return joined_drawn([vehicles, self._heads.draw(self._net.lanes["light"], self._paths.walkways["light"])])
 
     def prototypes(self) -> dict[str, list[Surface]]:
-        """Models of the vehicles, by the names `draw` uses."""
+        """Models of the vehicles and signals, by the names `draw` uses."""
         models = vehicle_prototypes()
+        if self._heads is not None:
+            models = models | self._heads.prototypes()
         # Doors open to the kerb.
         return models | {"bus": [mirrored(part) for part in models["bus"]]} if self.lanes.lefthand else models
 

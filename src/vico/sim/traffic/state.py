@@ -27,6 +27,8 @@ HELD_JUNCTIONS = 6  # junctions a vehicle can hold at once
 TOP_SPEED = 13.9  # m/s, whatever the street allows
 NONE = -1  # no lane, junction, route, body: wherever an index may be missing
 SEVERAL = -2  # more than one vehicle
+#: What a signal shows.
+DARK, GREEN, AMBER, RED = 0, 1, 2, 3
 
 _F, _I, _B = np.float64, np.int32, np.bool_
 

@@ -54,6 +54,7 @@ from vico.sim.traffic.path import (
 )
 from vico.sim.traffic.random_stream import next_random
 from vico.sim.traffic.route import NEVER, advance_lane, can_step_back, plan_lanes, step_back_lane
+from vico.sim.traffic.signals import is_stopped_by_signal, loses_its_green
 from vico.sim.traffic.state import NONE
 
 STANDING = 0.1  # slower is standing, m/s ...
@@ -91,7 +92,7 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         lane, speed, is_bus = vehicle.lane, vehicle.speed, vehicle.route >= 0
         look = look_ahead(vehicle)
         path_ends = plan_lanes(net, vehicle, street_load, look + vehicle.length + 12.0)
-        if hesitates(net, vehicle):
+        if hesitates(net, vehicle) or loses_its_green(net, vehicle):
             vehicle.granted_count = 0
             release_junctions(net, junctions, vehicle)
 
@@ -102,9 +103,11 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         # Who is behind another vehicle does not ask: it would hold the junction that the other one needs.
         is_behind = (0 <= leader < len(fleet) and gap < request.distance) or let_in_distance < request.distance
         vehicle.queued_junction = vehicle.queued_exit = NONE
+        at_signal = request.planned_index >= 0 and is_stopped_by_signal(net, vehicle, request.planned_index)
         is_refused = (
             request.planned_index >= 0
             and not is_behind
+            and not at_signal
             and not request_junctions(net, fleet, junctions, vehicle, request, view)
         )
         vehicle.junction_wait = vehicle.junction_wait + dt if is_refused and speed < _CREEP else 0.0

@@ -1,0 +1,205 @@
+"""What signals show: fixed-time programs, each begun at its own second, that the time of day decides.
+
+Nothing of it is state: what a signal shows follows from the second, the seed, and where the power is cut.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.io.compiled import compiled
+from vico.seeds import rng
+from vico.sim.traffic.state import AMBER, DARK, GREEN, RED, LaneNetwork, WalkwayNetwork
+from vico.world.lanes import LaneGraph
+from vico.world.signals import SignalProgram
+from vico.world.walkways import Walkways
+
+_ALL_RED = 2  # s between one way's amber and another one's green
+_LONGEST_CYCLE, _LEAST_GREEN = 120, 8  # s: programs of many phases have shorter ones, but not shorter than that
+_CLEARING = 10  # s between the end of people's green and that of who crosses their way, in netconvert's programs
+_CLEARING_PACE = 1.0  # m/s at which everybody is over by then
+_LEAST_WALK = 5  # s of green that people have at least
+_AMBER_BRAKING = 1.4  # times as hard as drivers like they brake when a signal turns amber
+_LIGHTS = {"G": GREEN, "g": GREEN, "y": AMBER, "Y": AMBER, "o": DARK, "O": DARK}
+
+#: Names of what a signal shows.
+LIGHT_NAMES = {DARK: "dark", GREEN: "green", AMBER: "amber", RED: "red"}
+
+Circles = tuple[tuple[float, float, float], ...]
+
+
+class SignalsShown(NamedTuple):
+    """What every signal shows at a moment.
+
+    Attributes
+    ----------
+    position
+        Of the stop line's middle, or of a crossing's, ENU metres, float64, shape ``(n, 2)``.
+    light
+        DARK, GREEN, AMBER or RED, uint8, shape ``(n,)``.
+    crossing
+        Of a crossing's signal its ends and width: x, y, x, y, metres, float64, shape ``(n, 5)``; NaN for others.
+    """
+
+    position: NDArray[np.float64]
+    light: NDArray[np.uint8]
+    crossing: NDArray[np.float64]
+
+    def near(self, x: float, y: float, reach: float) -> list[dict[str, Any]]:
+        """Return the signals within `reach` metres of a point, as an agent's info has them."""
+        found = []
+        for k in np.flatnonzero(np.hypot(self.position[:, 0] - x, self.position[:, 1] - y) <= reach).tolist():
+            one: dict[str, Any] = {
+                "for": "vehicles" if np.isnan(self.crossing[k, 0]) else "pedestrians",
+                "light": LIGHT_NAMES[self.light.item(k)],
+                "position": np.round(self.position[k], 3).tolist(),
+            }
+            if one["for"] == "pedestrians":
+                ends = np.round(self.crossing[k], 3).tolist()
+                one |= {"crossing": [ends[:2], ends[2:4]], "width": ends[4]}
+            found.append(one)
+        return found
+
+
+class SignalClock:
+    """Shows on lanes and crossings what their signals show.
+
+    Parameters
+    ----------
+    lanes, walks
+        What they are on.
+    seed
+        Decides how far each program is at midnight.
+    """
+
+    def __init__(self, lanes: LaneGraph, walks: Walkways, seed: int) -> None:
+        lights, random = lanes.lights, rng(seed, "traffic", "signals")
+        crossing = {name: i for i, name in enumerate(walks.ids) if name}
+        there = [k for k, name in enumerate(lights.crossing) if name in crossing]
+        self.lane, self._lane_link = lights.lane, lights.lane_link
+        self.walkway = np.array([crossing[lights.crossing[k]] for k in there], np.int32)
+        self._walk_link = lights.crossing_link[there]
+        self._lane_program, self._walk_program = lights.lane_program, lights.crossing_program[there]
+        tables = [_table(program) for program in lights.programs]
+        for program, link, way in zip(
+            self._walk_program.tolist(), self._walk_link.tolist(), self.walkway.tolist(), strict=True
+        ):
+            _let_clear(tables[program][:, link], float(walks.length[way]))
+        self._cycle = np.array([len(table) for table in tables], np.int64)
+        self._links = np.array([table.shape[1] for table in tables], np.int64)
+        sizes = [table.size for table in tables]
+        self._first = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64)
+        self._flat = np.concatenate([table.ravel() for table in tables]) if tables else np.zeros(0, np.uint8)
+        self._offset = np.array([random.integers(len(table)) for table in tables], np.int64)
+        start = lanes.points[lanes.first[self.lane]].reshape(-1, 2)
+        ends = np.array([[*walks.line(int(i))[0], *walks.line(int(i))[-1], walks.width[i]] for i in self.walkway])
+        ends = ends.reshape(-1, 5)
+        self._place = np.concatenate([start, (ends[:, :2] + ends[:, 2:4]) / 2])
+        self._ends = np.concatenate([np.full((len(start), 5), np.nan), ends])
+        count = np.bincount(self._lane_program, minlength=len(tables))[:, None]
+        total = np.column_stack([np.bincount(self._lane_program, start[:, k], len(tables)) for k in range(2)])
+        self.position = total / np.maximum(count, 1)
+        self._zone = lanes.zone[self.lane]
+        self._shown: tuple[int, Circles] | None = None
+
+    def show(self, second: int, dark: Circles, net: LaneNetwork, paths: WalkwayNetwork) -> NDArray[np.int32] | None:
+        """Write what the signals show into lanes and walkways; the same again costs nothing.
+
+        Parameters
+        ----------
+        second
+            Since midnight.
+        dark
+            Where the power is cut: x, y and radius of circles, metres.
+
+        Returns
+        -------
+        ndarray or None
+            Junction clusters whose signals are dark, int32; None where nothing has changed.
+        """
+        if (second, dark) == self._shown:
+            return None
+        self._shown = second, dark
+        row = self._first + (second + self._offset) % self._cycle * self._links if len(self._cycle) else self._first
+        out = np.zeros(len(row), np.bool_)
+        for x, y, radius in dark:
+            out |= np.hypot(self.position[:, 0] - x, self.position[:, 1] - y) <= radius
+        for records, rows, program, link in (
+            (net.lanes, self.lane, self._lane_program, self._lane_link),
+            (paths.walkways, self.walkway, self._walk_program, self._walk_link),
+        ):
+            lit = self._flat[row[program] + link] if len(rows) else np.zeros(0, np.uint8)
+            records["light"][rows] = np.where(out[program], DARK, lit)
+        return np.unique(self._zone[out[self._lane_program]]).astype(np.int32)
+
+    def shown(self, net: LaneNetwork, paths: WalkwayNetwork) -> SignalsShown:
+        """Return what all of them show now, as `show` has written it."""
+        light = np.concatenate([net.lanes["light"][self.lane], paths.walkways["light"][self.walkway]])
+        return SignalsShown(self._place, light, self._ends)
+
+
+def _table(program: SignalProgram) -> NDArray[np.uint8]:
+    """Return what a program's links show in each second, with all of them red for a while after amber, (s, links)."""
+    phases = [np.array([_LIGHTS.get(letter, RED) for letter in state], np.uint8) for state in program.states]
+    rows: list[NDArray[np.uint8]] = []
+    for k, (phase, seconds) in enumerate(zip(phases, _shortened(program.seconds), strict=True)):
+        rows += [phase] * seconds
+        following = phases[(k + 1) % len(phases)]
+        if (phase == AMBER).any():
+            rows += [np.where((phase == GREEN) & (following == GREEN), GREEN, RED).astype(np.uint8)] * _ALL_RED
+    return np.array(rows)
+
+
+def _shortened(seconds: tuple[int, ...]) -> list[int]:
+    """Return the lengths of phases, shorter where the whole takes too long: many joined junctions in turn."""
+    long = [second for second in seconds if second > _LEAST_GREEN]
+    too_many = max(sum(seconds) - _LONGEST_CYCLE, 0)
+    share = max(1.0 - too_many / sum(long), 0.0) if long else 1.0
+    return [second if second <= _LEAST_GREEN else max(round(second * share), _LEAST_GREEN) for second in seconds]
+
+
+def _let_clear(column: NDArray[np.uint8], length: float) -> None:
+    """End people's green early enough for those who set out last to be over a crossing of some length, metres."""
+    early = int(np.ceil(length / _CLEARING_PACE)) - _CLEARING
+    green = column == GREEN
+    if early <= 0 or green.all():
+        return
+    for end in np.flatnonzero(green & ~np.roll(green, -1)).tolist():
+        run = 0
+        while green[end - run]:
+            run += 1
+        for k in range(min(early, run - _LEAST_WALK)):
+            column[end - k] = RED
+
+
+@compiled
+def is_stopped_by_signal(net, vehicle, k):  # type: ignore[no-untyped-def]
+    """Return whether the first signal in the junction of a vehicle's k-th planned lane stops it.
+
+    Who is in that junction already clears it.
+    """
+    junction = net.lanes[vehicle.planned_lanes[k]].junction
+    if net.lanes[vehicle.lane].junction == junction:
+        return False
+    for i in range(k, vehicle.planned_count):
+        lane = net.lanes[vehicle.planned_lanes[i]]
+        if lane.junction != junction:
+            break
+        if lane.light != DARK:
+            return lane.light != GREEN
+    return False
+
+
+@compiled
+def loses_its_green(net, vehicle):  # type: ignore[no-untyped-def]
+    """Return whether a vehicle that was let into a junction has not reached it, has no green any more, and can stop."""
+    distance = net.lanes[vehicle.lane].length - vehicle.offset
+    for k in range(vehicle.granted_count):
+        if net.lanes[vehicle.planned_lanes[k]].junction >= 0:
+            needed = vehicle.speed * vehicle.speed / (2 * _AMBER_BRAKING * vehicle.braking)
+            return distance > needed and is_stopped_by_signal(net, vehicle, k)
+        distance += net.lanes[vehicle.planned_lanes[k]].length
+    return False
