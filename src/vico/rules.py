@@ -10,6 +10,9 @@ WALK_SPEED = 1.0
 RUN_SPEED = 2.5
 BIKE_SPEED = 3.0
 
+# Children of five keep up with a stroll; the old slow down (Bohannon and Williams Andrews, Physiotherapy 97, 2011).
+_OLD, _OLD_PACE = (65.0, 75.0, 85.0, 95.0), (1.0, 0.92, 0.78, 0.70)
+
 #: How far a hand reaches along the ground, and above the feet, metres.
 REACH = 1.5
 REACH_UP = 2.2
@@ -120,6 +123,15 @@ class ReasonCode(IntEnum):
 
 
 _CODE_NAMES = {int(code): code.name.lower() if code else "" for code in ReasonCode}
+
+
+def walk_speed(age: float) -> float:
+    """Return how fast somebody of an age walks who has time, metres a second."""
+    if age <= _OLD[0]:
+        return WALK_SPEED
+    k = next((k for k in range(1, len(_OLD) - 1) if age < _OLD[k]), len(_OLD) - 1)
+    share = min(1.0, (age - _OLD[k - 1]) / (_OLD[k] - _OLD[k - 1]))
+    return WALK_SPEED * (_OLD_PACE[k - 1] + share * (_OLD_PACE[k] - _OLD_PACE[k - 1]))
 
 
 def ride_price(seconds: float, *, returned: bool) -> float:

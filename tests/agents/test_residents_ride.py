@@ -14,6 +14,7 @@ from vico.clock import clock_of, seconds_of_day
 from vico.community import Community, Mode, Resident, ScheduleItem, build_community, check_community
 from vico.community.place_index import PlaceIndex
 from vico.io.plain_data import decode, encode
+from vico.rules import walk_speed
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
 from vico.world.folder import World
@@ -50,8 +51,8 @@ def test_who_rides_sets_out_later_than_on_foot_and_never_for_a_short_way(
 ) -> None:
     index = PlaceIndex(helsinki_city, people.date.weekday())
     for mode in (Mode.BUS, Mode.BIKE):
-        for _, (before, way, after) in rides(people, mode):
-            on_foot = index.minutes(before.place or "", after.place or "")
+        for resident, (before, way, after) in rides(people, mode):
+            on_foot = index.minutes(before.place or "", after.place or "", walk_speed(resident.age))
             assert on_foot is not None
             assert on_foot >= 6
             assert seconds_of_day(way.end) - seconds_of_day(way.start) <= 60 * on_foot

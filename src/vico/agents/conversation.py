@@ -18,6 +18,8 @@ GREETING_PAUSE = 1200.0
 # A chat in passing ends after this many lines of one's own.
 _LINES = 2
 _RANGE = 8.0
+# Who is younger talks of other things, years.
+_GROWN_UP = 18
 
 
 class Speaker(Protocol):
@@ -32,6 +34,10 @@ class Speaker(Protocol):
         """Name of the person."""
 
     @property
+    def age(self) -> int:
+        """Years."""
+
+    @property
     def occupation(self) -> str:
         """What they do."""
 
@@ -42,12 +48,13 @@ class Speaker(Protocol):
 
 @dataclass(frozen=True)
 class Acquaintance:
-    """Somebody a resident knows: name, and what ties them (friend, colleague, ...; the note says more)."""
+    """Somebody a resident knows: name, what ties them (friend, colleague, ...; the note says more), and age, years."""
 
     agent: str
     name: str
     kind: str
     note: str
+    age: int = 35
 
     @property
     def first_name(self) -> str:
@@ -142,6 +149,8 @@ class Conversation:
 
     def _greetings(self, person: Acquaintance, time: float, errand: str) -> list[str]:
         other = person.first_name
+        if min(self._me.age, person.age) < _GROWN_UP:
+            return self._greetings_with_children(person, errand)
         hour = time % DAY / 3600
         hello = "Good morning" if hour < 11 else "Hello" if hour < 18 else "Good evening"
         lines = [
@@ -157,8 +166,25 @@ class Conversation:
             lines.append(f"{hello}, {other}! Is everything all right at home?")
         return lines
 
+    def _greetings_with_children(self, person: Acquaintance, errand: str) -> list[str]:
+        """Return what children say, and what is said to them."""
+        other = person.first_name
+        if self._me.age >= _GROWN_UP:
+            lines = [f"Hello, {other}! How was school?", f"Hi {other}! Where are you off to?"]
+            if person.kind != "family":
+                lines.append(f"Hello, {other}! You have grown again.")
+            return lines
+        lines = [f"Hi {other}! I'm {errand}.", f"Hello, {other}! Guess what: I'm {errand}!"]
+        if person.age < _GROWN_UP:
+            lines.append(f"Hey {other}! Are you coming out to play later?")
+            if self._me.hobbies:
+                lines.append(f"{other}! Shall we do some {self._hobby()} after school?")
+        return lines
+
     def _answers(self, person: Acquaintance, errand: str, *, last: bool) -> list[str]:
         other = person.first_name
+        if last and self._me.age < _GROWN_UP:
+            return [f"Bye, {other}!", f"See you, {other}!", f"Bye bye, {other}!"]
         if last:
             return [f"See you, {other}!", f"Take care, {other}.", f"Have a good one, {other}!"]
         lines = [
@@ -168,7 +194,7 @@ class Conversation:
         ]
         if self._me.hobbies:
             lines.append(f"All well, {other}. Looking forward to some {self._hobby()} later.")
-        if self._me.occupation:
+        if self._me.occupation and self._me.age >= _GROWN_UP:
             lines.append(f"Busy as ever, {other}: the life of a {self._me.occupation.lower()}.")
         return lines
 

@@ -15,7 +15,7 @@ from vico.agents.residents import Residents
 from vico.agents.resting import SeatSeeker
 from vico.agents.state import AgentState, generator_state, restore_generator
 from vico.agents.stays import Item, Stay, stays_of, with_ways
-from vico.agents.strides import Stride, pace_in_time
+from vico.agents.strides import Stride, pace_in_time, paces_of
 from vico.agents.travel import Traveller
 from vico.agents.wayfinding import Walker
 from vico.clock import DAY
@@ -80,8 +80,9 @@ class ScheduleFollower:
         self.stride: Stride | None = None
         self.walks_until = -math.inf
         self._name = resident.id
+        self._ease, self._haste = paces_of(resident.age)
         self._map = public_map
-        self._stays = with_ways(stays_of(resident.schedule, public_map.place_by_id), public_map)
+        self._stays = with_ways(stays_of(resident.schedule, public_map.place_by_id), public_map, self._ease)
         self._rng = generator
         self._walker = Walker(public_map, generator)
         self._traveller = Traveller(public_map, generator)
@@ -235,7 +236,7 @@ class ScheduleFollower:
         if self._stroll is None:
             spot = self._map.walkable.random_point(self._rng, near=place.position[:2], radius=_STROLL)
             self._stroll = (float(spot[0]), float(spot[1]))
-        pace = _RUN_SPEED if stay.tag in _RUNNING else _STROLL_SPEED
+        pace = min(_RUN_SPEED, self._haste) if stay.tag in _RUNNING else min(_STROLL_SPEED, self._ease)
         action = self._walker.towards(self._stroll, pace, observation, info)
         if action is None:
             self._stroll, self._paused_until = None, time + int(self._rng.integers(4, 16))
@@ -293,7 +294,8 @@ class ScheduleFollower:
         """Say what comes of being asked while it walks straight on; `around`: as `Stride.place_x` and on."""
         ahead, ((x, y, _), least, most) = self._walker.straight_on, around
         if ahead is not None:
-            self.stride, self.walks_until = Stride(*ahead, pace, stay.due, x, y, least, most), self._next_stay(time)
+            paces = pace, stay.due, self._ease, self._haste
+            self.stride, self.walks_until = Stride(*ahead, *paces, x, y, least, most), self._next_stay(time)
 
     def _next_stay(self, time: float) -> float:
         """Return when the next stay begins, or the next day, or it is time to look out of the window again."""
@@ -362,7 +364,7 @@ class ScheduleFollower:
         goal = (float(place.position[0]), float(place.position[1]))
         left = self._walker.remaining(observation["pose"])
         time_left = stay.due - state["time"] % DAY
-        action = self._walker.towards(goal, pace_in_time(left, time_left), observation, info)
+        action = self._walker.towards(goal, self._pace(left, time_left), observation, info)
         if action is not None:
             door = place.position if place.building is None else place.entrance or place.position
             near = _OPEN_REACH if place.building is None else DOOR_REACH
@@ -370,13 +372,16 @@ class ScheduleFollower:
             return action
         return {"type": "enter", "place": place.id} if place.id in state["accessible_places"] else {"type": "wait"}
 
+    def _pace(self, metres: float, seconds: float) -> float:
+        return pace_in_time(metres, seconds, self._ease, self._haste)
+
     def _travel(self, observation: Observation, info: Info, stay: Stay, place: PublicPlace) -> Action:
         """Go by bus or bicycle, as the schedule says; where that fails, as one gets there first."""
         state = observation["state"]
         goal = (float(place.position[0]), float(place.position[1]))
         left, time_left = self._traveller.remaining(observation["pose"]), stay.due - state["time"] % DAY
         ride = None if stay.mode == "walk" else (stay.mode, float(state["time"]) + time_left)
-        pace = pace_in_time(left, time_left)
+        pace = self._pace(left, time_left)
         without = self._changes.avoided_modes
         action = self._traveller.towards(goal, observation, info, speed=pace, ride=ride, without=without)
         if action is not None:
@@ -409,7 +414,9 @@ def followers_of(community: Any, public_map: PublicMap, *, seed: int = 0) -> dic
         first, second = relation.between
         for me, other in ((first, second), (second, first)):
             if me in residents and other in residents:
-                known[me].append(Acquaintance(other, residents[other].name, str(relation.kind), relation.note))
+                known[me].append(
+                    Acquaintance(other, residents[other].name, str(relation.kind), relation.note, residents[other].age)
+                )
     followers = {
         name: ScheduleFollower(resident, public_map, known=known[name], seed=seed)
         for name, resident in residents.items()

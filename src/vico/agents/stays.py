@@ -84,13 +84,19 @@ def stays_of(schedule: Iterable[Item], known: Mapping[str, object]) -> list[Stay
     return stays
 
 
-def with_ways(stays: Sequence[Stay], public_map: PublicMap) -> list[Stay]:
-    """Give those stays time for the way whose schedule has none: two doors of one building may lie streets apart."""
+def with_ways(stays: Sequence[Stay], public_map: PublicMap, pace: float = WALK) -> list[Stay]:
+    """Give those stays time for the way whose schedule has none: two doors of one building may lie streets apart.
+
+    Parameters
+    ----------
+    pace
+        How fast they walk, m/s.
+    """
     found = list(stays[:1])
     for before, stay in pairwise(stays):
         if stay.leave == stay.due and before.place != stay.place:
             places = public_map.place_by_id
-            way = public_map.router.seconds(places[before.place].position, places[stay.place].position, WALK)
+            way = public_map.router.seconds(places[before.place].position, places[stay.place].position, pace)
             if math.isfinite(way):
                 stay = replace(stay, leave=max(before.due, stay.due - way * (1.0 + SLACK_SHARE) - SLACK))
         found.append(stay)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.agents.stays import RUN, SLACK, SLACK_SHARE, WALK
+from vico.rules import walk_speed
 from vico.world.walkable import CROSSING, ROADWAY, WalkableMap
 
 #: Corners count as passed this close, metres.
@@ -38,6 +39,8 @@ class Stride(NamedTuple):
         Metres a second; NaN: as the time left until `due` asks for.
     due
         When to be there, second of the day.
+    ease, haste
+        Pace with time to spare, and when late, metres a second.
     place_x, place_y, least, most
         A point, ENU metres, and between which distances from it nothing changes, metres.
     """
@@ -47,6 +50,8 @@ class Stride(NamedTuple):
     left: float
     pace: float
     due: float
+    ease: float
+    haste: float
     place_x: float
     place_y: float
     least: float
@@ -61,17 +66,17 @@ def stride_lengths(
     Parameters
     ----------
     strides
-        Rows of `Stride`, shape ``(n, 9)``.
+        Rows of `Stride`, shape ``(n, 11)``.
     pose
         As observations have it, shape ``(n, 6)``.
     second
         Of the day.
     """
-    corner_x, corner_y, left, pace, due, place_x, place_y, least, most = strides.T
+    corner_x, corner_y, left, pace, due, ease, haste, place_x, place_y, least, most = strides.T
     x, y, heading_x, heading_y = pose[:, 0], pose[:, 1], pose[:, 3], pose[:, 4]
     east, north = corner_x - x, corner_y - y
     away = np.sqrt(east * east + north * north)
-    speed = np.where(np.isnan(pace), _paces(away + left, due - second), pace)
+    speed = np.where(np.isnan(pace), _paces(away + left, due - second, ease, haste), pace)
     far = np.hypot(x - place_x, y - place_y)
     goes = (away > np.maximum(speed, CORNER) + _MARGIN) & (far > least + _MARGIN) & (far < most - _MARGIN)
     scale = 1.0 / np.maximum(away, 1e-9)
@@ -84,12 +89,22 @@ def stride_lengths(
     return np.where(goes, speed, np.nan)
 
 
-def pace_in_time(metres: float, seconds: float) -> float:
+def paces_of(age: float) -> tuple[float, float]:
+    """Return how fast somebody goes who has time, and who is late, metres a second."""
+    ease = walk_speed(age)
+    # Past sixty people run less and less, and past ninety they walk quickly at most.
+    slower = min(max((age - 60.0) / 30.0, 0.0), 1.0)
+    return ease, RUN + (1.25 * ease - RUN) * slower
+
+
+def pace_in_time(metres: float, seconds: float, ease: float = WALK, haste: float = RUN) -> float:
     """Return how fast to walk, m/s: at ease while there is time, briskly when it gets short, and to run when late."""
-    return min(RUN, max(WALK, metres * (1.0 + SLACK_SHARE) / max(1.0, seconds - SLACK)))
+    return min(haste, max(ease, metres * (1.0 + SLACK_SHARE) / max(1.0, seconds - SLACK)))
 
 
-def _paces(metres: NDArray[np.float64], seconds: NDArray[np.float64]) -> NDArray[np.float64]:
+def _paces(
+    metres: NDArray[np.float64], seconds: NDArray[np.float64], ease: NDArray[np.float64], haste: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return the same as `pace_in_time`, to the last bit, for many."""
     needed = metres * (1.0 + SLACK_SHARE) / np.maximum(1.0, seconds - SLACK)
-    return np.asarray(np.minimum(RUN, np.maximum(WALK, needed)), np.float64)
+    return np.asarray(np.minimum(haste, np.maximum(ease, needed)), np.float64)

@@ -1,6 +1,7 @@
 """Who lives in a world: residents, groups, schedules, and the validator that keeps them grounded."""
 
 from vico.community.author import Author, build_community, procedural_author
+from vico.community.findings import CommunityFinding
 from vico.community.folder import digest_of, read_community, read_manifest, world_of, write_community
 from vico.community.model import (
     ActivityTag,
@@ -17,7 +18,7 @@ from vico.community.model import (
     ScheduleItem,
 )
 from vico.community.tags import with_tags
-from vico.community.validator import CommunityFinding, check_community
+from vico.community.validator import check_community
 
 __all__ = [
     "ActivityTag",

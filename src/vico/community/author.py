@@ -11,15 +11,21 @@ import numpy as np
 
 from vico.clock import clock_of
 from vico.community.biography import Biographer, lifestyle_of
+from vico.community.childhood import POCKET_MONEY
+from vico.community.findings import CommunityFinding
 from vico.community.groups import Meeting, form_groups, meetings_by_member
+from vico.community.households import draw_households
 from vico.community.model import Community, Group, Resident, ResidentAppearance, WorldIdentity
-from vico.community.people import Household, ResidentDraft, Wardrobe, draw_character, draw_households
+from vico.community.people import Household, ResidentDraft, draw_character
 from vico.community.place_index import PlaceIndex
+from vico.community.playmates import form_playmates
 from vico.community.relations import draw_relations
 from vico.community.rides import with_rides
 from vico.community.schedules import DayWriter
+from vico.community.schooling import assign_schools, plan_care, settle_care
 from vico.community.tags import with_tags
-from vico.community.validator import CommunityFinding, check_community
+from vico.community.validator import check_community
+from vico.community.wardrobe import Wardrobe
 from vico.community.work import assign_homes, assign_work, employers, study_places
 from vico.errors import EmptyInputError, InputError
 from vico.seeds import rng
@@ -134,8 +140,12 @@ def _draft(index: PlaceIndex, count: int, seed: int, attempt: int, day: date) ->
     for draft in drafts:
         draw_character(rng(seed, "community", "character", attempt, draft.id), draft, uses)
     assign_homes(stream("homes"), index, households)
-    assign_work(stream("work"), index, drafts)
-    meetings = form_groups(stream("groups"), index, drafts)
+    assign_schools(stream("schools"), index, households)
+    cares = plan_care(stream("care"), index, households)
+    assign_work(stream("work"), index, drafts, cares)
+    for care in cares:
+        settle_care(index, care)
+    meetings = form_groups(stream("groups"), index, drafts, form_playmates(stream("playmates"), index, cares))
     schedules, frequented = DayWriter(stream("days"), index).write(households, meetings)
     relations = draw_relations(stream("relations"), index, households, meetings, day.year)
     biographer = Biographer(stream("biographies"), index)
@@ -161,6 +171,7 @@ def _draft(index: PlaceIndex, count: int, seed: int, attempt: int, day: date) ->
                 lifestyle=lifestyle_of(chance, draft, schedules[draft.id]),
                 biography=biographer.write(draft, households[draft.household], mine),
                 cash=_cash(chance, draft),
+                household=f"household_{draft.household}",
                 home=draft.home,
                 workplace=draft.workplace,
                 known_places=_known(index, draft, frequented[draft.id], mine),
@@ -187,12 +198,17 @@ def _looks(chance: np.random.Generator, households: Sequence[Household]) -> dict
     looks: dict[str, ResidentAppearance] = {}
     for household in households:
         for k, draft in enumerate(household.members):
-            related = household.kind in ("parent", "siblings") and k > 0
-            looks[draft.id] = wardrobe.look_of(draft, looks[household.members[0].id] if related else None)
+            parents = [looks[adult.id] for adult in household.adults] if draft.child else []
+            if household.kind in ("parent", "siblings") and k > 0:
+                parents = [looks[household.members[0].id]]
+            looks[draft.id] = wardrobe.look_of(draft, parents)
     return looks
 
 
 def _cash(chance: np.random.Generator, draft: ResidentDraft) -> int:
+    if draft.child:
+        least, most = POCKET_MONEY
+        return int(np.clip(round(float(chance.normal(3 * (draft.age - 4), 3))), least, most))
     pay = {
         "worker": draft.job.pay if draft.job else 0.4,
         "freelancer": 0.45,

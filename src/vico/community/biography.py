@@ -8,6 +8,7 @@ import numpy as np
 
 from vico.clock import seconds_of_day
 from vico.community.catalogue import basic_values, biography_sentences, ways_of_life
+from vico.community.childhood import childhood, schools
 from vico.community.groups import Meeting
 from vico.community.model import ItemType, ScheduleItem
 from vico.community.people import Household, ResidentDraft
@@ -35,6 +36,8 @@ class Biographer:
         self._told: set[str] = set()
         self._sentences = biography_sentences()
         self._says = {value.name: value.says for value in basic_values()}
+        # A value of a user's own may have no words for children.
+        self._children_say = self._says | dict(childhood().says)
 
     def _turn(self, phrases: tuple[str, ...]) -> str:
         deck = self._decks.setdefault(phrases, [])
@@ -60,11 +63,11 @@ class Biographer:
         traits = join(draft.character.traits)
         hobbies = join([h.name for h in draft.hobbies])
         sentences = [self._work(draft), self._home(draft, household, words)]
+        says = self._children_say if draft.child else self._says
+        young = childhood().biography
         link = self._turn(self._sentences.character).replace("call {her}", "call {him}")
         sentences.append(
-            link.format(
-                **words, traits=traits, Traits=traits.capitalize(), says=self._turn(self._says[draft.values[0]])
-            )
+            link.format(**words, traits=traits, Traits=traits.capitalize(), says=self._turn(says[draft.values[0]]))
         )
         if groups:
             group = groups[0]
@@ -74,19 +77,26 @@ class Biographer:
             name = group.circle.name
             told = ""
             # The deck comes round again with many people: never the same words about the same group.
-            for _ in range(2 * len(self._sentences.group)):
-                told = self._turn(self._sentences.group).format(
+            phrases = young.group if draft.child else self._sentences.group
+            for _ in range(2 * len(phrases)):
+                told = self._turn(phrases).format(
                     **words, group=name[0].lower() + name[1:], place=group.place.name, When=when
                 )
                 if told not in self._told:
                     break
             self._told.add(told)
             sentences.append(told)
-        sentences.append(self._turn(self._sentences.hobbies).format(**words, hobbies=hobbies))
+        liked = young.hobbies if draft.child else self._sentences.hobbies
+        sentences.append(self._turn(liked).format(**words, hobbies=hobbies))
         return " ".join(sentences)
 
     def _work(self, draft: ResidentDraft) -> str:
         name, she = f"{draft.first} {draft.last}", draft.she
+        if draft.child:
+            school = next((one for one in schools() if one.title == draft.occupation), None)
+            told = self._turn(childhood().home_school.told if school is None else school.told)
+            where = "" if draft.workplace is None else self._name(draft.workplace)
+            return f"{name}, {draft.age}, {told.format(place=where)}."
         if draft.status == "worker":
             assert draft.job is not None
             first = self._turn(
@@ -137,7 +147,14 @@ class Biographer:
             "{She} lives on {her} own {home}.",
             "{She} rents two rooms {home}.",
         )
-        return self._turn(phrases).format(**words, home=where)
+        told = ""
+        for _ in phrases:
+            # In a house of many flats the same words come round: not for two neighbours, if that can be.
+            told = self._turn(phrases).format(**words, home=where)
+            if told not in self._told:
+                break
+        self._told.add(told)
+        return told
 
 
 def address(place: Place) -> str:
@@ -167,6 +184,9 @@ def rhythm_of(day: Sequence[ScheduleItem], *, works_late: bool = False) -> str:
 
 def lifestyle_of(rng: np.random.Generator, draft: ResidentDraft, day: Sequence[ScheduleItem]) -> str:
     """Return how somebody lives, in a sentence that their day agrees with."""
+    if draft.child:
+        told = childhood().biography.ways
+        return f"{rhythm_of(day)}; {join([told[int(k)] for k in rng.choice(len(told), 2, replace=False)])}."
     rhythm = rhythm_of(day, works_late=draft.shift is not None and draft.shift[0] >= 12 * 60)
     ways = []
     if any(h.active for h in draft.hobbies):

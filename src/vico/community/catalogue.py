@@ -19,9 +19,9 @@ from vico.world.model import Category
 
 Ages = tuple[int, int]
 Score = Annotated[float, Field(ge=-1.0, le=1.0)]
-Status = Literal["worker", "freelancer", "student", "retired", "guest"]
+Status = Literal["worker", "freelancer", "student", "retired", "guest", "pupil"]
 Shift = Literal["office", "bank", "school", "health", "hotel", "sport", "evening", "kitchen", "early", "shop", "day"]
-EVERYBODY: tuple[Status, ...] = ("worker", "freelancer", "student", "retired", "guest")
+ADULTS: tuple[Status, ...] = ("worker", "freelancer", "student", "retired", "guest")
 
 
 class Job(DataRecord):
@@ -199,9 +199,11 @@ class Circle(DataRecord):
     hobbies, values
         Who is drawn to it.
     statuses
-        Ways of life it is for.
+        Ways of life it is for; adults' unless given.
     ages
         Youngest and oldest, years.
+    small_children
+        Whether it is for those who go nowhere alone, and for who looks after them.
     slot
         Part of the day.
     meal
@@ -219,8 +221,9 @@ class Circle(DataRecord):
     minutes: Annotated[int, Field(gt=0)]
     hobbies: tuple[str, ...] = ()
     values: tuple[str, ...] = ()
-    statuses: tuple[Status, ...] = EVERYBODY
+    statuses: tuple[Status, ...] = ADULTS
     ages: Ages = (16, 90)
+    small_children: bool = False
     meal: bool = False
     tag: ActivityTag = ActivityTag.GROUP
 
@@ -237,6 +240,7 @@ class Leisure(DataRecord):
     hobby: tuple[Hobby, ...] = ()
     group: tuple[Circle, ...] = ()
     neighbours: Circle | None = None
+    playmates: Circle | None = None
 
 
 class Names(DataRecord):
@@ -366,6 +370,12 @@ def circles() -> tuple[Circle, ...]:
 def neighbours_circle() -> Circle:
     """Return the group of last resort, for which any place with room will do."""
     return [file.neighbours for _, file in _read("leisure", Leisure) if file.neighbours is not None][-1]
+
+
+@cached_data
+def playmates_circle() -> Circle:
+    """Return the group of last resort of small children, at the home of one of them."""
+    return [file.playmates for _, file in _read("leisure", Leisure) if file.playmates is not None][-1]
 
 
 @cached_data

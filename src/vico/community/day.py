@@ -9,6 +9,7 @@ from vico.clock import clock_of
 from vico.community.hours import Span, staffed
 from vico.community.model import ActivityTag, ItemType, ScheduleItem
 from vico.community.place_index import PlaceIndex
+from vico.rules import WALK_SPEED
 
 MIDNIGHT = 24 * 60
 
@@ -48,17 +49,29 @@ class Day:
         Gives the walks.
     home, workplace
         Place ids; `workplace` is None for those who have none.
+    pace
+        How fast they walk, m/s.
+
+    Attributes
+    ----------
+    out_until
+        Until when they go out alone, minutes.
+    barred
+        Kinds of places that are not for them.
     """
 
-    def __init__(self, index: PlaceIndex, home: str, workplace: str | None = None) -> None:
+    def __init__(self, index: PlaceIndex, home: str, workplace: str | None = None, *, pace: float = WALK_SPEED) -> None:
         self.index = index
+        self.pace = pace
+        self.out_until = MIDNIGHT
+        self.barred: frozenset[str] = frozenset()
         self.home = home
         self.workplace = workplace
         self.blocks: list[Block] = []
 
     def walk(self, a: str, b: str) -> int | None:
         """Return the minutes to allow for the walk between two places; None if there is no way."""
-        return self.index.minutes(a, b)
+        return self.index.minutes(a, b, self.pace)
 
     def open_spans(self, place: str) -> list[Span]:
         """Return from when until when one may be at a place, minutes: at home always, at work as staff may."""
@@ -107,11 +120,11 @@ class Day:
             if before is not None:
                 if before.end >= high:
                     break
-                low = max(low, before.end + self.index.estimate(before.place, place))
+                low = max(low, before.end + self.index.estimate(before.place, place, self.pace))
             if after is not None:
                 if min(high, after.start) - low < minutes:
                     continue
-                high = min(high, after.start - self.index.estimate(place, after.place))
+                high = min(high, after.start - self.index.estimate(place, after.place, self.pace))
             first = -(-low // step) * step
             found += [
                 s for s in range(first, high - minutes + 1, step) if any(a <= s and s + minutes <= b for a, b in spans)

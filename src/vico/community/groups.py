@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.community.catalogue import Circle, circles, neighbours_circle
+from vico.community.childhood import adults_only
 from vico.community.people import ResidentDraft
 from vico.community.place_index import PlaceIndex, kind_of
 from vico.errors import EmptyInputError
@@ -64,6 +65,10 @@ class _Attendance:
         self._lunch = np.array([m.slot == "lunch" for m in self._meetings], bool)
         self._names = np.array([m.circle.name for m in self._meetings])
         self._places = np.array([index.spot[m.place.id] for m in self._meetings], np.int64)
+        children = np.array([draft.child for draft in drafts], bool)
+        for k, meeting in enumerate(self._meetings):
+            if kind_of(meeting.place) in adults_only():
+                self._free[k] &= ~children
 
     def likes(self, k: int) -> NDArray[np.float64]:
         """How much a meeting appeals to everybody, 0 to whom it does not or who is not free; shape ``(people,)``."""
@@ -93,6 +98,9 @@ class _Timetable:
         Spots (`PlaceIndex.spot`); -1 for no work.
     start, end
         Working hours, minutes of the day.
+    duties
+        Start and end, minutes of the day, and spot of what else they have to do; -1 past the last of each; shape
+        ``(people, most duties, 3)``.
     early, late
         From when and until when they go out, minutes of the day.
     """
@@ -101,6 +109,7 @@ class _Timetable:
     work: NDArray[np.int64]
     start: NDArray[np.int64]
     end: NDArray[np.int64]
+    duties: NDArray[np.int64]
     early: NDArray[np.int64]
     late: NDArray[np.int64]
 
@@ -109,13 +118,19 @@ class _Timetable:
         shifts = [draft.shift or (-1, -1) for draft in drafts]
         start, end = (np.array([shift[k] for shift in shifts], np.int64) for k in (0, 1))
         works = [draft.workplace if draft.shift is not None else None for draft in drafts]
+        duties = np.full((len(drafts), max(len(draft.duties) for draft in drafts), 3), -1, np.int64)
+        for k, draft in enumerate(drafts):
+            for i, duty in enumerate(draft.duties):
+                duties[k, i] = duty.start, duty.end, index.spot[duty.place]
+        late = np.where((start >= 0) & (start <= 7 * 60), 20 * 60 + 30, 22 * 60)
         return cls(
             home=np.array([index.spot[draft.home] for draft in drafts], np.int64),
             work=np.array([-1 if work is None else index.spot[work] for work in works], np.int64),
             start=start,
             end=end,
+            duties=duties,
             early=np.where(end >= 21 * 60 + 30, 9 * 60 + 30, 7 * 60 + 30),
-            late=np.where((start >= 0) & (start <= 7 * 60), 20 * 60 + 30, 22 * 60),
+            late=np.minimum(late, [draft.home_by for draft in drafts]),
         )
 
     def free_for(self, index: PlaceIndex, meeting: Meeting) -> NDArray[np.bool_]:
@@ -129,17 +144,22 @@ class _Timetable:
             inside = (self.start + 120 <= start) & (end <= self.end - 90)
             short = (walk <= _MAX_LUNCH_WALK) & (self.end - self.start >= 360)
             beside = np.where(inside, short, beside)
-        return free & (beside | (self.work < 0))
+        free &= beside | (self.work < 0)
+        for duty in range(self.duties.shape[1]):
+            begins, ends, spot = self.duties[:, duty].T
+            walk = index.estimates(place, np.maximum(spot, 0))
+            free &= (ends + walk <= start) | (end + walk <= begins) | (spot < 0)
+        return free
 
 
 def _exactly(index: PlaceIndex, draft: ResidentDraft, meeting: Meeting, others: Sequence[Meeting]) -> bool:
     """Whether the walks really can be made in the time that was estimated."""
     place = meeting.place.id
-    stays = [(o.start, o.end, o.place.id) for o in others]
+    stays = [(o.start, o.end, o.place.id) for o in others] + [(d.start, d.end, d.place) for d in draft.duties]
     if draft.shift is not None and draft.workplace is not None:
         stays.append((*draft.shift, draft.workplace))
     for start, end, other in stays:
-        there, back = index.minutes(other, place), index.minutes(place, other)
+        there, back = index.minutes(other, place, draft.pace), index.minutes(place, other, draft.pace)
         if there is None or back is None:
             return False
         if start < meeting.start and meeting.end < end:
@@ -154,7 +174,7 @@ def _liking(draft: ResidentDraft, circle: Circle) -> float:
     """How much a circle appeals to somebody; 0 if it is not for them."""
     if draft.status not in circle.statuses and not (draft.shift and draft.shift[0] >= 12 * 60):
         return 0.0
-    if not circle.ages[0] <= draft.age <= circle.ages[1]:
+    if circle.small_children or not circle.ages[0] <= draft.age <= circle.ages[1]:
         return 0.0
     shared = len({h.name for h in draft.hobbies} & set(circle.hobbies))
     return 0.35 + 1.6 * shared + 0.5 * len(set(draft.values) & set(circle.values))
@@ -199,19 +219,28 @@ def meetings_by_member(meetings: Iterable[Meeting]) -> dict[str, list[Meeting]]:
     return found
 
 
-def form_groups(rng: np.random.Generator, index: PlaceIndex, drafts: Sequence[ResidentDraft]) -> list[Meeting]:
+def form_groups(
+    rng: np.random.Generator, index: PlaceIndex, drafts: Sequence[ResidentDraft], playmates: Sequence[Meeting] = ()
+) -> list[Meeting]:
     """Form 3 to 6 groups for every fifteen people so that everybody is in one that they like and can come to.
+
+    Parameters
+    ----------
+    playmates
+        Groups of small children and of who looks after them; these are in no others.
 
     Raises
     ------
     EmptyInputError
         If somebody can't be brought together with anybody: the world has too few places.
     """
-    wanted = max(1, round(len(drafts) * 4.4 / 15))
+    others = len(drafts) - sum(len(meeting.members) for meeting in playmates)
+    wanted = max(1, round(others * 4.4 / 15))
     choice = max(3, math.ceil(len(drafts) / 40))
-    options = _options(rng, index, circles(), choice)
+    options = _options(rng, index, [circle for circle in circles() if not circle.small_children], choice)
     noise = 1 + 0.25 * rng.random(len(options))
-    forming = _Forming(index, drafts, size=math.ceil(len(drafts) / wanted) + 1)
+    forming = _Forming(index, drafts, size=math.ceil(others / wanted) + 1)
+    forming.keep(playmates)
     forming.form_most_liked(options, noise.tolist(), wanted)
     forming.admit_lonely()
     spare = _options(rng, index, [neighbours_circle()], choice)
@@ -240,9 +269,18 @@ class _Forming:
         # Circles that were tried at a place, whether they came about or not.
         self._tried: set[tuple[str, str]] = set()
 
+    def keep(self, meetings: Sequence[Meeting]) -> None:
+        """Take over groups that there are; their members join no others."""
+        row = {draft.id: k for k, draft in enumerate(self._drafts)}
+        for meeting in meetings:
+            self.groups.append(meeting)
+            for member in meeting.members:
+                self._joined[row[member.id]].append(meeting)
+                self._counts[row[member.id]] = _MAX_MEMBERSHIPS
+
     def form_most_liked(self, options: Sequence[Meeting], weights: Sequence[float], wanted: int) -> None:
-        """Form the groups that most people like most, until there are `wanted` or none is left."""
-        ranking = _Ranking(self, options, weights)
+        """Form the groups that most people like most, until there are `wanted` more or none is left."""
+        ranking, wanted = _Ranking(self, options, weights), len(self.groups) + wanted
         while len(self.groups) < wanted and (k := ranking.best()) is not None:
             self._found(ranking, k, self._size)
 

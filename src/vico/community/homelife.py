@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from vico.community.catalogue import Pastime, at_home
+from vico.community.childhood import ALONE_FROM, childhood
 from vico.community.day import MIDNIGHT, Block, Day
 from vico.community.model import ActivityTag, ItemType
 from vico.community.people import ResidentDraft
@@ -29,6 +30,9 @@ class Homelife:
     def __init__(self, rng: np.random.Generator, draft: ResidentDraft) -> None:
         self._rng = rng
         self.dinner_at = 18 * 60 + 30
+        if draft.child:
+            self._as_child(draft)
+            return
         guest = draft.status == "guest"
         ways = at_home()
         pastimes = ways.pastimes
@@ -46,6 +50,18 @@ class Homelife:
         self.lunch = ways.guest_meals.lunch if guest else self._one(ways.lunch)
         self.dinner = ways.guest_meals.dinner if guest else self._one(ways.dinner)
         self.wind_down = self._one(ways.wind_down)
+
+    def _as_child(self, draft: ResidentDraft) -> None:
+        ways = childhood()
+        pastimes = ways.pastimes.small if draft.age < ALONE_FROM else ways.pastimes.big
+        hobbies = [Pastime(text=h.at_home, hours=_HOBBY_HOURS) for h in draft.hobbies if h.at_home]
+        others = [pastimes[int(k)] for k in self._rng.permutation(len(pastimes))]
+        first = [*hobbies, *others[:2]]
+        self._leisure = [first[int(k)] for k in self._rng.permutation(len(first))] + others[2:]
+        home = ways.at_home
+        self.morning, self.breakfast = self._one(home.morning), self._one(home.breakfast)
+        self.lunch, self.dinner = self._one(home.lunch), self._one(home.dinner)
+        self.wind_down = self._one(home.wind_down)
 
     def _one(self, options: tuple[str, ...]) -> str:
         return options[int(self._rng.integers(len(options)))]

@@ -139,9 +139,11 @@ class Resident(Record):
     values
         What matters most to them, the first most (Schwartz's ten basic values).
     cash
-        Money they carry, 100..1000.
+        Money they carry: 100..1000, children's pocket money 2..60.
+    household
+        Who has the same one shares a home; None where the author did not say.
     home, workplace, known_places
-        Ids of places; `workplace` is None for those who have none.
+        Ids of places; `workplace` is None for those who have none, and the school of pupils and students.
     spawn
         Where they stand when a simulation starts with them outdoors, ENU metres.
     """
@@ -158,6 +160,7 @@ class Resident(Record):
     lifestyle: str
     biography: str
     cash: int
+    household: Annotated[str, Field(pattern=r"^household_\d+$")] | None = None
     home: str
     workplace: str | None
     known_places: list[str]

@@ -17,6 +17,8 @@ from vico.world.model import Category, Place
 
 # Roles of blocks that are meals.
 _MEALS = ("breakfast", "lunch", "dinner")
+# Where children spend their pocket money.
+_SWEETS = ("kiosk", "convenience", "ice_cream", "bakery", "confectionery", "newsagent", "supermarket")
 
 Companions = Sequence[tuple[ResidentDraft, Day]]
 
@@ -145,7 +147,9 @@ class Outings:
     ) -> bool:
         """Add an outing where it fits in the window, minutes; `soon`: as early as possible."""
         low, high = outing.minutes
-        for place in self.near(anchor or day.home, outing.kinds)[:4]:
+        window = window[0], min(window[1], day.out_until)
+        kinds = [kind for kind in outing.kinds if kind not in day.barred]
+        for place in self.near(anchor or day.home, kinds)[:4] if window[1] - window[0] >= low else ():
             if place.id in {b.place for b in day.blocks}:
                 continue
             length = 5 * int(self._rng.integers(low // 5, high // 5 + 1))
@@ -162,12 +166,15 @@ class Outings:
     def plan_alone(self, draft: ResidentDraft, day: Day) -> None:
         """Let somebody go out before, beside and after what is fixed in their day, as suits their way of life."""
         rng = self._rng
+        if draft.child:
+            self._pupil(draft, day)
+            return
         wake = next(b for b in day.blocks if b.role == "sleep").end
-        leave = min((b.start for b in day.blocks if b.role in ("work", "group")), default=11 * 60)
+        leave = min((b.start for b in day.blocks if b.role in ("work", "group", "duty")), default=11 * 60)
         work = draft.workplace or day.home
         done = draft.shift[1] if draft.shift and draft.shift[0] < 12 * 60 else 15 * 60
         breakfasts_in_company = any(b.type is ItemType.MEAL and b.start < 12 * 60 for b in day.blocks)
-        if rng.random() < (0.6 if draft.status == "guest" else 0.3) and not breakfasts_in_company:
+        if rng.random() < (0.6 if draft.status == "guest" else 0.3) and not (breakfasts_in_company or draft.duties):
             self._go(
                 day,
                 Outing("Have breakfast", self._kinds["cafes"][:3], (20, 30), role="breakfast"),
@@ -217,6 +224,15 @@ class Outings:
             )
             for kind in chosen
         )
+
+    def _pupil(self, draft: ResidentDraft, day: Day) -> None:
+        """Let children who may go out alone do so after school."""
+        done = draft.shift[1] if draft.shift else 15 * 60
+        if self._rng.random() < 0.55:
+            self._hobby(draft, day, (done, 20 * 60))
+        if self._rng.random() < 0.2:
+            sweets = Outing("Buy sweets", _SWEETS, (5, 10), tag=ActivityTag.SHOP)
+            self._go(day, sweets, (done, 19 * 60), anchor=draft.workplace, soon=True)
 
     def _after_work(self, draft: ResidentDraft, day: Day, wake: int, done: int) -> None:
         rng, work = self._rng, draft.workplace or day.home

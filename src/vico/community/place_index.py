@@ -14,6 +14,7 @@ from vico.community.ride_times import RideTimes
 from vico.community.usual_hours import usual_spans
 from vico.community.walks import Walks
 from vico.errors import EmptyInputError
+from vico.rules import WALK_SPEED
 from vico.world.folder import World
 from vico.world.indoor_ways import IndoorWays
 from vico.world.model import Category, Place, Point2
@@ -115,22 +116,22 @@ class PlaceIndex:
         """Seconds on foot between the doors of two places, at 1 m/s; infinite if there is no way."""
         return self.walks.between(self.place_by_id[a].position[:2], self.place_by_id[b].position[:2]).metres
 
-    def minutes(self, a: str, b: str) -> int | None:
-        """Minutes to allow for the walk between two places; None if there is no way.
+    def minutes(self, a: str, b: str, pace: float = WALK_SPEED) -> int | None:
+        """Minutes to allow for the walk between two places at a pace in m/s; None if there is no way.
 
         A twentieth and twenty seconds more than the route takes (doors, others on the pavement), in whole minutes.
         """
-        seconds = self.seconds(a, b)
+        seconds = self.seconds(a, b) / pace
         if seconds == 0:
             return 0
         return None if math.isinf(seconds) else math.ceil((seconds * 1.05 + 20) / 60)
 
-    def estimate(self, a: str, b: str) -> int:
+    def estimate(self, a: str, b: str, pace: float = WALK_SPEED) -> int:
         """Minutes that a walk may take, before a route is asked for: streets are half as long again as the bee line."""
         if a == b:
             return 0
         inside = float(self._inside[self.spot[a]] + self._inside[self.spot[b]])
-        return math.ceil((self.metres(a, b) * 1.5 + inside * 1.05 + 45) / 60)
+        return math.ceil(((self.metres(a, b) * 1.5 + inside * 1.05) / pace + 45) / 60)
 
     def estimates(self, a: str, spots: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return `estimate` from a place to several, given as numbers of places (`spot`); the shape is theirs."""

@@ -16,6 +16,8 @@ from vico.community.place_index import PlaceIndex
 _NEXT_DOOR = 40.0
 
 _RANK = list(RelationKind)
+# Children have friends from this age, years; friends are of one age, to within so many years.
+_FRIENDS_FROM, _OF_ONE_AGE = 3, 2
 
 
 def draw_relations(
@@ -52,8 +54,10 @@ class _Network:
         kind, note = bond
         if self._order[a.id] > self._order[b.id]:
             a, b = b, a
-        # Nobody knew anybody before they were grown up, families aside.
-        oldest = min(a.age, b.age) - (0 if kind is RelationKind.FAMILY and note != "partners" else 16)
+        # Nobody knew anybody before they were grown up, families and playmates aside.
+        youngest = min(a.age, b.age)
+        from_age = 0 if kind is RelationKind.FAMILY and note != "partners" else _FRIENDS_FROM if youngest < 18 else 16
+        oldest = youngest - from_age
         since = self._year - int(np.clip(round(years), 0, max(0, oldest)))
         known = self._found.get((a.id, b.id))
         new = Relation(between=(a.id, b.id), kind=kind, note=note, strength=round(min(1.0, strength), 2), since=since)
@@ -85,10 +89,22 @@ def _tie_household(rng: np.random.Generator, network: _Network, household: House
             network.tie(a, b, bond, rng.uniform(0.85, 1.0), rng.uniform(1, youngest - 17))
         elif household.kind == "parent":
             network.tie(a, b, (RelationKind.FAMILY, "parent and child"), rng.uniform(0.8, 1.0), youngest)
+        elif household.kind == "family":
+            _tie_family(rng, network, a, b)
         elif household.kind == "siblings":
             network.tie(a, b, (RelationKind.FAMILY, "siblings"), rng.uniform(0.75, 0.95), youngest)
         else:
             network.tie(a, b, (RelationKind.FRIEND, "flatmates"), rng.uniform(0.6, 0.85), rng.uniform(0, 4))
+
+
+def _tie_family(rng: np.random.Generator, network: _Network, a: ResidentDraft, b: ResidentDraft) -> None:
+    if a.child and b.child:
+        bond, strength, years = "siblings", rng.uniform(0.6, 0.95), min(a.age, b.age)
+    elif a.child or b.child:
+        bond, strength, years = "parent and child", rng.uniform(0.85, 1.0), min(a.age, b.age)
+    else:
+        bond, strength, years = "partners", rng.uniform(0.8, 1.0), min(a.age, b.age) - 17
+    network.tie(a, b, (RelationKind.FAMILY, bond), strength, years)
 
 
 def _tie_group(rng: np.random.Generator, network: _Network, group: Meeting) -> None:
@@ -99,6 +115,10 @@ def _tie_group(rng: np.random.Generator, network: _Network, group: Meeting) -> N
         alike = len({h.name for h in a.hobbies} & {h.name for h in b.hobbies}) + len(set(a.values) & set(b.values))
         strength = rng.uniform(0.25, 0.55) + 0.07 * alike - 0.003 * abs(a.age - b.age)
         strength += 0.2 * (a.character.agreeableness + b.character.agreeableness - 1)
+        if a.child != b.child:
+            note = f"{bond[1]}, a child and a grown-up"
+            network.tie(a, b, (RelationKind.NEIGHBOUR, note), float(np.clip(strength, 0.15, 0.5)), rng.exponential(2))
+            continue
         network.tie(a, b, bond, float(np.clip(strength, 0.15, 0.9)), rng.exponential(3.5))
 
 
@@ -109,8 +129,23 @@ def _tie_colleagues(rng: np.random.Generator, network: _Network, people: Sequenc
             staff.setdefault(s.workplace, []).append(s)
     for colleagues in staff.values():
         for a, b in combinations(colleagues, 2):
+            if a.child and b.child:
+                _tie_pupils(rng, network, a, b)
+                continue
             note = "fellow students" if a.status == b.status == "student" else "work at the same place"
+            if a.child != b.child:
+                note = "pupil and teacher" if "teach" in f"{a.occupation} {b.occupation}" else "from the same school"
             network.tie(a, b, (RelationKind.COLLEAGUE, note), rng.uniform(0.3, 0.7), rng.exponential(3))
+
+
+def _tie_pupils(rng: np.random.Generator, network: _Network, a: ResidentDraft, b: ResidentDraft) -> None:
+    """Tie two of one school: those of an age are friends, the others know each other by sight at most."""
+    apart = abs(a.age - b.age)
+    if a.household == b.household or apart > _OF_ONE_AGE:
+        return
+    note = "in the same class" if apart == 0 else "go to the same school"
+    if apart == 0 or rng.random() < 0.4:
+        network.tie(a, b, (RelationKind.FRIEND, note), rng.uniform(0.3, 0.9) - 0.1 * apart, rng.exponential(3))
 
 
 def _tie_neighbours(
@@ -140,6 +175,8 @@ def describe_household(household: Household, draft: ResidentDraft, relations: Ma
     if not others:
         return ""
     names = " and ".join(o.first for o in others)
+    if household.kind == "family":
+        return _describe_family(household, draft)
     if household.kind == "couple":
         return f"with {draft.her} partner {names}"
     if household.kind == "parent":
@@ -154,3 +191,25 @@ def describe_household(household: Household, draft: ResidentDraft, relations: Ma
         word = "sister" if others[0].gender == "female" else "brother"
         return f"with {draft.her} {'younger' if draft.age > others[0].age else 'older'} {word} {names}"
     return f"with {relations.get('mates', 'flatmates') if len(others) > 1 else 'flatmate'} {names}"
+
+
+def _describe_family(household: Household, draft: ResidentDraft) -> str:
+    adults = [m.first for m in household.adults if m is not draft]
+    children = [m for m in household.children if m is not draft]
+    parts = []
+    if draft.child:
+        word = "parents" if len(adults) > 1 else "mother" if household.adults[0].gender == "female" else "father"
+        parts.append(f"{draft.her} {word} {' and '.join(adults)}")
+        for child in children:
+            elder = "twin" if child.age == draft.age else "older" if child.age > draft.age else "younger"
+            parts.append(f"{draft.her} {elder} {'sister' if child.gender == 'female' else 'brother'} {child.first}")
+    else:
+        parts += [f"{draft.her} partner {name}" for name in adults]
+        told = [f"{child.first} ({child.age})" for child in children]
+        one = "daughter" if children[0].gender == "female" else "son"
+        parts.append(f"{draft.her} {one if len(told) == 1 else 'children'} {_listed(told)}")
+    return f"with {_listed(parts)}"
+
+
+def _listed(parts: Sequence[str]) -> str:
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"

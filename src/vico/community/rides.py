@@ -9,15 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from vico.clock import DAY, clock_of, seconds_of_day
+from vico.community.childhood import ALONE_FROM
 from vico.community.hours import staffed
 from vico.community.model import ActivityTag, Group, ItemType, Mode, Resident, ScheduleItem
 from vico.community.place_index import PlaceIndex
 from vico.community.ride_times import RideTrip
-from vico.rules import BIKE_RATE, BUS_FARE, WALK_SPEED
+from vico.rules import BIKE_RATE, BUS_FARE, WALK_SPEED, walk_speed
 from vico.world.model import Place
 
 #: Seconds kept for doors and for others on the pavement when setting out, as for walks.
@@ -144,11 +146,23 @@ def with_rides(
     """
     if not index.rides.any:
         return list(residents)
-    means = _Means(index, _Racks(index), {(group.place, group.start, group.end) for group in groups})
+    meetings: set[tuple[str | None, str, str]] = {(group.place, group.start, group.end) for group in groups}
+    means = _Means(index, _Racks(index), meetings, _ways_with_children(residents))
     return [
         resident.model_copy(update={"schedule": means.day(resident, Habits.of(resident, stream(resident.id)))})
         for resident in residents
     ]
+
+
+def _ways_with_children(residents: Sequence[Resident]) -> set[tuple[str | None, str, str | None]]:
+    """Return the ways of small children: household, start, and where they go. They and who comes along walk."""
+    return {
+        (child.household, way.start, then.place)
+        for child in residents
+        if child.age < ALONE_FROM
+        for way, then in pairwise(child.schedule)
+        if way.type is ItemType.COMMUTE
+    }
 
 
 @dataclass(frozen=True)
@@ -169,18 +183,21 @@ class _Means:
     ----------
     meetings
         Place, start and end of all meetings.
+    on_foot
+        Household, start and goal of the ways that are walked in any case.
     """
 
     index: PlaceIndex
     racks: _Racks
     meetings: set[tuple[str | None, str, str]]
+    on_foot: set[tuple[str | None, str, str | None]]
 
     def day(self, resident: Resident, habits: Habits) -> list[ScheduleItem]:
         """Return a resident's day, with rides where they are worth it."""
         old = resident.schedule
         items: list[ScheduleItem] = []
         for k, item in enumerate(old):
-            if item.type is not ItemType.COMMUTE or not 0 < k < len(old) - 1:
+            if item.type is not ItemType.COMMUTE or not 0 < k < len(old) - 1 or self._walks(resident, item, old[k + 1]):
                 items.append(item)
                 continue
             ends = self.index.place_by_id[items[-1].place or ""], self.index.place_by_id[old[k + 1].place or ""]
@@ -195,9 +212,13 @@ class _Means:
             items.append(item.model_copy(update={"start": set_out, "mode": ride.mode, "activity": words}))
         return items
 
+    def _walks(self, resident: Resident, way: ScheduleItem, then: ScheduleItem) -> bool:
+        """Return whether somebody goes with small children."""
+        return resident.household is not None and (resident.household, way.start, then.place) in self.on_foot
+
     def _best(self, resident: Resident, habits: Habits, ends: tuple[Place, Place], way: ScheduleItem) -> _Ride | None:
         """Return the ride that costs somebody least on a way; None where to walk costs no more."""
-        walk = 60 * (self.index.minutes(ends[0].id, ends[1].id) or 0)
+        walk = 60 * (self.index.minutes(ends[0].id, ends[1].id, walk_speed(resident.age)) or 0)
         if walk < _SHORT:
             return None
         found: list[_Ride] = []

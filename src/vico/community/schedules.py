@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vico.community.catalogue import errands
+from vico.community.childhood import adults_only
 from vico.community.day import MIDNIGHT, Block, Day, in_fives
 from vico.community.groups import Meeting, meetings_by_member
 from vico.community.homelife import Homelife, fill_day
@@ -14,6 +15,7 @@ from vico.community.model import ActivityTag, ItemType, ScheduleItem
 from vico.community.outings import Companions, Outings
 from vico.community.people import Household, ResidentDraft
 from vico.community.place_index import PlaceIndex, kind_of
+from vico.community.school_days import SchoolDays
 from vico.world.model import Category
 
 
@@ -32,6 +34,7 @@ class DayWriter:
         self._rng = rng
         self._index = index
         self._outings = Outings(rng, index)
+        self._school = SchoolDays(rng, index, self._outings.put)
 
     def write(
         self, households: Sequence[Household], groups: Sequence[Meeting]
@@ -55,7 +58,8 @@ class DayWriter:
         lives = {s.id: Homelife(self._rng, s) for s in people}
         for household in households:
             # People under one roof eat at the same time, when both are in.
-            dinner = 5 * int(self._rng.integers(210, 236))
+            early, late = (207, 222) if household.children else (210, 236)
+            dinner = 5 * int(self._rng.integers(early, late))
             for member in household.members:
                 lives[member.id].dinner_at = dinner
                 fill_day(days[member.id], lives[member.id])
@@ -65,7 +69,10 @@ class DayWriter:
 
     def _frame(self, draft: ResidentDraft, groups: Sequence[Meeting]) -> Day:
         """Return a day with what is fixed: sleep, work with its break, groups."""
-        rng, day = self._rng, Day(self._index, draft.home, draft.workplace)
+        rng, day = self._rng, Day(self._index, draft.home, draft.workplace, pace=draft.pace)
+        day.out_until = draft.out_until
+        if draft.child:
+            day.barred = adults_only()
         lunch_group = None
         for group in groups:
             kind = ItemType.MEAL if group.circle.meal else ItemType.MAIN
@@ -73,11 +80,20 @@ class DayWriter:
             self._outings.put(day, Block(group.start, group.end, kind, text, group.place.id, "group", group.circle.tag))
             if draft.shift and draft.shift[0] < group.start and group.end < draft.shift[1]:
                 lunch_group = day.blocks[-1]
-        if draft.shift is not None:
+        for duty in draft.duties:
+            role = "home" if duty.place == draft.home else "duty"
+            self._outings.put(
+                day, Block(duty.start, duty.end, ItemType.MAIN, duty.activity, duty.place, role, ActivityTag.VISIT)
+            )
+        if draft.child:
+            self._school.write(draft, day)
+        elif draft.shift is not None:
             self._work(draft, day, lunch_group)
         first, last = day.blocks[0], day.blocks[-1]
         lead = day.walk(draft.home, first.place) or 0
-        if draft.status == "retired":
+        if draft.child:
+            natural, sleep = SchoolDays.sleep(rng, draft)
+        elif draft.status == "retired":
             natural, sleep = 360 + 90 * (1 - draft.early), 470
         elif draft.status == "student":
             natural, sleep = 430 + 90 * (1 - draft.early), 480

@@ -7,18 +7,21 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
 
 import numpy as np
 
 from vico.clock import seconds_of_day
+from vico.community.childhood import GROWN_UP, POCKET_MONEY
+from vico.community.findings import CommunityFinding
 from vico.community.hours import staffed
 from vico.community.jobs import job_of, jobs_at, works_at
 from vico.community.model import LAST, Community, ItemType, Mode, Resident, ScheduleItem
 from vico.community.place_index import SPAWN_GAP, PlaceIndex
 from vico.community.rides import first_ride
 from vico.community.tags import TAGS_OF_TYPE
+from vico.community.validator_households import households_of
 from vico.community.work import STUDY_KINDS
+from vico.rules import walk_speed
 from vico.world.folder import World
 from vico.world.model import Category, Place
 
@@ -29,25 +32,6 @@ _SLACK = 2.0
 _SPARE = 10 * 60
 
 
-@dataclass(frozen=True)
-class CommunityFinding:
-    """Something wrong.
-
-    Attributes
-    ----------
-    where
-        Path into the community: ``resident_3.schedule[5]``.
-    what
-        What is wrong, with the values.
-    mend
-        What to do about it.
-    """
-
-    where: str
-    what: str
-    mend: str
-
-
 def check_community(community: Community, world: World) -> list[CommunityFinding]:
     """Check that a community is grounded in a world.
 
@@ -55,7 +39,8 @@ def check_community(community: Community, world: World) -> list[CommunityFinding
     occupation and appear in the biography; known places exist and include all that are used; cash is 100..1000;
     schedules cover the day without gaps, walks are possible and long enough for the router, opening hours hold where
     they are given; groups meet at places that exist, and their members' schedules say so; everybody has a group;
-    relations join residents; and spawn points are reachable and 2 m apart.
+    relations join residents; children live with adults, go to school and nowhere that is not for them, and the small
+    ones go nowhere alone (`vico.community.validator_households`); and spawn points are reachable and 2 m apart.
 
     Returns
     -------
@@ -90,6 +75,7 @@ class _Check:
         for resident in self.community.residents:
             self.person(resident)
             self.schedule(resident)
+        self.found += households_of(self.community, self.index)
         self.groups()
         self.relations()
         self.spawns()
@@ -125,8 +111,9 @@ class _Check:
                 "choose an accommodation place as home",
             )
         self.workplace(r)
-        if not CASH[0] <= r.cash <= CASH[1]:
-            self.say(f"{r.id}.cash", f"{r.cash} is not in {CASH[0]}..{CASH[1]}", "give an amount in that range")
+        least, most = POCKET_MONEY if r.age < GROWN_UP else CASH
+        if not least <= r.cash <= most:
+            self.say(f"{r.id}.cash", f"{r.cash} is not in {least}..{most}", "give an amount in that range")
         for k, known in enumerate(r.known_places):
             self.place(f"{r.id}.known_places[{k}]", known)
         used = {r.home, *([r.workplace] if r.workplace else []), *(i.place for i in r.schedule if i.place)}
@@ -146,6 +133,9 @@ class _Check:
 
     def workplace(self, r: Resident) -> None:
         where, student = f"{r.id}.workplace", r.occupation.lower().startswith("student")
+        if r.age < GROWN_UP:
+            self.biography(r)
+            return  # their schools are looked at with their days
         if r.workplace is None:
             if (job_of(r.occupation) is not None and not _works_without_place(r.occupation)) or student:
                 self.say(where, f"{r.name} is {r.occupation!r} but has no workplace", "choose a place that employs one")
@@ -164,7 +154,11 @@ class _Check:
                 f"{r.name} is {r.occupation!r}, but {place.name} is a {place.kind} ({place.category.value})",
                 f"choose a place of another kind, or an occupation it employs: {jobs}",
             )
-        if place.name.casefold() not in r.biography.casefold():
+        self.biography(r)
+
+    def biography(self, r: Resident) -> None:
+        place = self.index.place_by_id.get(r.workplace or "")
+        if place is not None and place.name.casefold() not in r.biography.casefold():
             self.say(
                 f"{r.id}.biography",
                 f"it does not mention {r.name}'s workplace, {place.name}",
@@ -212,7 +206,7 @@ class _Check:
             return  # said already
         names = f"from {self.index.place_by_id[a].name} to {self.index.place_by_id[b].name}"
         if item.mode is None or item.mode is Mode.WALK:
-            what, needed = "walk", self.index.seconds(a, b)
+            what, needed = "walk", self.index.seconds(a, b) / walk_speed(r.age)
             if math.isinf(needed):
                 self.say(where, f"there is no way {names}", "choose a place that can be reached")
                 return

@@ -13,6 +13,7 @@ from vico.community.hours import Span, staffed_stretches
 from vico.community.jobs import jobs_at
 from vico.community.people import Household, ResidentDraft
 from vico.community.place_index import PlaceIndex, kind_of
+from vico.community.schooling import Care
 from vico.world.model import Category, Place
 
 #: Where students study. `workplace` of a student is one of these.
@@ -21,6 +22,8 @@ STUDY_KINDS = frozenset({"university", "college", "research_institute", "library
 # What any place with an open door offers: minutes before opening and after closing that staff are there, at most.
 _BEFORE, _AFTER = 45, 30
 _LATEST = 23 * 60 + 30
+# How often a parent looks for work that leaves time for the children, and how long such work is at least, minutes.
+_TRIES, _PART_TIME = 8, 4 * 60
 
 
 def assign_homes(rng: np.random.Generator, index: PlaceIndex, households: Sequence[Household]) -> None:
@@ -70,25 +73,27 @@ def _long_enough(spans: Sequence[Span]) -> bool:
     return any(start <= 11 * 60 and end >= 16 * 60 for start, end in spans)
 
 
-def assign_work(rng: np.random.Generator, index: PlaceIndex, drafts: Sequence[ResidentDraft]) -> None:
-    """Give everybody an occupation, and a workplace and hours to those who have one."""
-    offers: dict[str, list[Place]] = {}
-    offered: dict[str, Job] = {}
-    for place in employers(index):
-        for job in jobs_at(place):
-            offers.setdefault(job.title, []).append(place)
-            offered[job.title] = job
-    known = [job.title for job in trades()]
-    titles = [title for title in [*known, *sorted(set(offered) - set(known))] if title in offered]
+def assign_work(
+    rng: np.random.Generator, index: PlaceIndex, drafts: Sequence[ResidentDraft], cares: Sequence[Care] = ()
+) -> None:
+    """Give every adult an occupation, and a workplace and hours to those who have one.
+
+    Parameters
+    ----------
+    cares
+        Who has to take children to school and to fetch them: their hours lie between.
+    """
     ways = ways_of_life()
     study = study_places(index)
-    held: Counter[str] = Counter()
-    staff: Counter[str] = Counter()
-    late = 0
+    market = _JobMarket(rng, index)
+    held = market.held
+    caring = {care.carer.id: care for care in cares}
     for draft in drafts:
-        if draft.status == "worker":
-            late += _hire(rng, index, draft, [offered[t] for t in titles], offers, held, staff, late)
-        elif draft.status == "student":
+        if draft.status == "worker" and not market.hire(draft, caring.get(draft.id)):
+            draft.status = "freelancer"
+        if draft.status in ("worker", "pupil"):
+            continue
+        if draft.status == "student":
             place = study[int(rng.integers(len(study)))]
             options = ["music"] if kind_of(place) == "music_school" else list(ways.subjects)
             draft.subject = _rare(rng, options, held)
@@ -115,39 +120,88 @@ def _rare(rng: np.random.Generator, options: Sequence[str], held: Counter[str]) 
     return chosen
 
 
-def _hire(
-    rng: np.random.Generator,
-    index: PlaceIndex,
-    draft: ResidentDraft,
-    jobs: Sequence[Job],
-    offers: dict[str, list[Place]],
-    held: Counter[str],
-    staff: Counter[str],
-    late: int,
-) -> bool:
-    """Find somebody a job; returns whether it is in the evening."""
-    weights = np.zeros(len(jobs))
-    for k, job in enumerate(jobs):
-        low, high = job.ages
-        # Half the weight of a trade is its share of the places; the square root keeps the many shops from crowding out.
-        weights[k] = job.weight * len(offers[job.title]) ** 0.5 * 0.07 ** held[job.title]
-        weights[k] *= 1.0 if low <= draft.age <= high else 1e-6
-        weights[k] *= 0.25**late if job.shift == "evening" else 1.0
-        weights[k] *= 1.4 if job.shift in ("office", "bank", "school", "health") else 1.0
-    job = jobs[int(rng.choice(len(jobs), p=weights / weights.sum()))]
-    places = [p for p in offers[job.title] if p.id != draft.home] or offers[job.title]
-    # Some work where somebody of the community works already: that makes colleagues.
-    w = np.array([0.02 if staff[p.id] > 2 else 1 + 0.9 * len(places) * (staff[p.id] > 0) for p in places])
-    place = places[int(rng.choice(len(places), p=w / w.sum()))]
-    held[job.title] += 1
-    staff[place.id] += 1
-    draft.job, draft.occupation, draft.workplace = job, job.title, place.id
-    workdays = _workdays(index.hours(place))
-    start, end = _shift(rng, job.shift, workdays[int(rng.integers(len(workdays))) if len(workdays) > 1 else 0])
-    if end > 22 * 60:  # home before midnight, however far
-        end = min(end, 23 * 60 + 40 - (index.minutes(place.id, draft.home) or 0)) // 5 * 5
-    draft.shift = start, end
-    return draft.shift[1] > 21 * 60
+class _JobMarket:
+    """Jobs that the world has, and how many hold which.
+
+    Parameters
+    ----------
+    rng
+        Decides who gets what.
+
+    Attributes
+    ----------
+    held
+        How many have which occupation.
+    """
+
+    def __init__(self, rng: np.random.Generator, index: PlaceIndex) -> None:
+        self._rng, self._index = rng, index
+        self._offers: dict[str, list[Place]] = {}
+        offered: dict[str, Job] = {}
+        for place in employers(index):
+            for job in jobs_at(place):
+                self._offers.setdefault(job.title, []).append(place)
+                offered[job.title] = job
+        known = [job.title for job in trades()]
+        titles = [title for title in [*known, *sorted(set(offered) - set(known))] if title in offered]
+        self._jobs = [offered[title] for title in titles]
+        self._staff: Counter[str] = Counter()
+        self._late = 0
+        self.held: Counter[str] = Counter()
+
+    def hire(self, draft: ResidentDraft, care: Care | None) -> bool:
+        """Find somebody a job; False, and nothing changed, where none leaves time for the children."""
+        for _ in range(1 if care is None else _TRIES):
+            job = self._job(draft, by_day=care is not None)
+            place = self._place(draft, job)
+            shift = self._hours(draft, job, place)
+            if care is not None and care.stops:
+                free, until = care.free
+                there = self._index.minutes(care.stops[-1], place.id)
+                back = self._index.minutes(place.id, care.stops[0])
+                if there is None or back is None:
+                    continue
+                start = max(shift[0], 5 * math.ceil((free + there) / 5))
+                shift = start, min(shift[1], (until - back) // 5 * 5)
+                if shift[1] - shift[0] < _PART_TIME:
+                    continue
+            self._take(draft, job, place, shift)
+            return True
+        return False
+
+    def _take(self, draft: ResidentDraft, job: Job, place: Place, shift: tuple[int, int]) -> None:
+        draft.job, draft.occupation, draft.workplace, draft.shift = job, job.title, place.id, shift
+        self.held[job.title] += 1
+        self._staff[place.id] += 1
+        self._late += shift[1] > 21 * 60
+
+    def _job(self, draft: ResidentDraft, *, by_day: bool) -> Job:
+        weights = np.zeros(len(self._jobs))
+        for k, job in enumerate(self._jobs):
+            low, high = job.ages
+            # Half the weight of a trade is its share of the places; the square root keeps the many shops from
+            # crowding out.
+            weights[k] = job.weight * len(self._offers[job.title]) ** 0.5 * 0.07 ** self.held[job.title]
+            weights[k] *= 1.0 if low <= draft.age <= high else 1e-6
+            weights[k] *= (1e-6 if by_day else 0.25**self._late) if job.shift == "evening" else 1.0
+            weights[k] *= 1.4 if job.shift in ("office", "bank", "school", "health") else 1.0
+        return self._jobs[int(self._rng.choice(len(self._jobs), p=weights / weights.sum()))]
+
+    def _place(self, draft: ResidentDraft, job: Job) -> Place:
+        offers = self._offers[job.title]
+        places = [p for p in offers if p.id != draft.home] or offers
+        # Some work where somebody of the community works already: that makes colleagues.
+        staff = self._staff
+        w = np.array([0.02 if staff[p.id] > 2 else 1 + 0.9 * len(places) * (staff[p.id] > 0) for p in places])
+        return places[int(self._rng.choice(len(places), p=w / w.sum()))]
+
+    def _hours(self, draft: ResidentDraft, job: Job, place: Place) -> tuple[int, int]:
+        rng, index = self._rng, self._index
+        workdays = _workdays(index.hours(place))
+        start, end = _shift(rng, job.shift, workdays[int(rng.integers(len(workdays))) if len(workdays) > 1 else 0])
+        if end > 22 * 60:  # home before midnight, however far
+            end = min(end, 23 * 60 + 40 - (index.minutes(place.id, draft.home) or 0)) // 5 * 5
+        return start, end
 
 
 def _five(minutes: float) -> int:

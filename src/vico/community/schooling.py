@@ -1,0 +1,219 @@
+"""Where children go to school, and who takes the small ones there and fetches them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vico.community.childhood import ALONE_FROM, ESCORT_FROM, School, childhood, schools
+from vico.community.hours import Span, staffed
+from vico.community.people import Duty, Household, Lessons, ResidentDraft
+from vico.community.place_index import PlaceIndex, kind_of
+from vico.world.model import Place
+
+#: Monday to Friday there is school.
+SCHOOL_DAYS = range(5)
+# Lessons last at least so long, and are within these hours of the day, minutes.
+_LEAST, _EARLIEST, _LATEST = 150, 7 * 60 + 30, 17 * 60
+# How long one stays when one takes a child to school or fetches it, and how long before the lessons that is, minutes.
+_AT_THE_GATE = 5
+# Until when all small children are fetched, and how long one sees them in at home then, minutes.
+_LAST_FETCH, _SEEING_IN = 17 * 60 + 10, 10
+# When those who learn at home do, minutes of the day.
+_AT_HOME = (9 * 60, 14 * 60 + 30)
+# Until when children go out alone, and when they are back from meetings, minutes of the day by age.
+_AGES, _OUT, _BACK = (10, 13, 17), (18 * 60, 19 * 60, 21 * 60), (19 * 60 + 15, 20 * 60, 21 * 60 + 30)
+# When a parent who is alone with small children is back for the evening.
+_ALONE_WITH = 19 * 60
+
+
+def school_places(index: PlaceIndex) -> list[tuple[School, list[Place]]]:
+    """Return the places that there are for each kind of school, those open for long enough on the day."""
+    found = []
+    for school in schools():
+        places = [p for p in index.places() if kind_of(p) in school.kinds and _span(index, p) is not None]
+        found.append((school, places))
+    return found
+
+
+def _span(index: PlaceIndex, place: Place) -> Span | None:
+    """Return the opening hours that lessons fit in, minutes."""
+    spans = [(max(a, _EARLIEST), min(b, _LATEST)) for a, b in index.hours(place) if a <= 10 * 60]
+    return max((s for s in spans if s[1] - s[0] >= _LEAST), key=lambda s: s[1] - s[0], default=None)
+
+
+def assign_schools(rng: np.random.Generator, index: PlaceIndex, households: Sequence[Household]) -> None:
+    """Send every child to the nearest school for its age; where there is none, it learns at home."""
+    offers = school_places(index)
+    begins: dict[str, int] = {}
+    for household in households:
+        for child in household.children:
+            _to_school(rng, index, child, offers, begins)
+            child.out_until, child.home_by = (int(np.interp(child.age, _AGES, at)) for at in (_OUT, _BACK))
+            if child.age < ALONE_FROM:
+                child.out_until = 0
+        adults = household.adults
+        if len(adults) == 1 and any(child.age < ESCORT_FROM for child in household.children):
+            adults[0].home_by = adults[0].out_until = _ALONE_WITH
+
+
+def _to_school(
+    rng: np.random.Generator,
+    index: PlaceIndex,
+    child: ResidentDraft,
+    offers: Sequence[tuple[School, Sequence[Place]]],
+    begins: dict[str, int],
+) -> None:
+    fitting = [(school, places) for school, places in offers if school.ages[0] <= child.age <= school.ages[1]]
+    school, places = next(((school, places) for school, places in fitting if places), (None, ()))
+    near = sorted(places, key=lambda p: (index.metres(child.home, p.id), p.id))
+    place = next((p for p in near if index.minutes(child.home, p.id) is not None), None)
+    if school is None or place is None:
+        learn_at_home(index, child)
+        return
+    child.occupation, child.workplace = school.title, place.id
+    span = _span(index, place)
+    assert span is not None
+    # All of a school begin at the same time.
+    if place.id not in begins:
+        begins[place.id] = max(school.starts[int(rng.integers(len(school.starts)))], span[0] + 2 * _AT_THE_GATE)
+    start = begins[place.id]
+    end = min(start + school.minutes, span[1])
+    if index.weekday in SCHOOL_DAYS:
+        child.lessons = Lessons(school, place.id, start, end)
+        child.shift = start - 5 * int(rng.integers(1, 3)), end
+
+
+def learn_at_home(index: PlaceIndex, child: ResidentDraft) -> None:
+    """Let a child learn at home."""
+    child.occupation, child.workplace, child.shift = childhood().home_school.title, None, None
+    child.lessons = Lessons(None, None, *_AT_HOME) if index.weekday in SCHOOL_DAYS else None
+
+
+@dataclass
+class Care:
+    """What a grown-up does for the small children of a household on a school day.
+
+    Attributes
+    ----------
+    household, carer
+        Whose children, and who looks after them.
+    stops
+        Schools, in the order in which the carer comes by.
+    bring, latest
+        When they are there in the morning, and at the latest in the afternoon, minutes of the day.
+    """
+
+    household: Household
+    carer: ResidentDraft
+    stops: list[str] = field(default_factory=list)
+    bring: list[int] = field(default_factory=list)
+    latest: list[int] = field(default_factory=list)
+
+    @property
+    def small(self) -> list[ResidentDraft]:
+        """The children who go nowhere alone."""
+        return [child for child in self.household.children if child.age < ALONE_FROM]
+
+    @property
+    def at_home(self) -> bool:
+        """Whether somebody has to be at home in working hours."""
+        return any(child.lessons is not None and child.lessons.place is None for child in self.small)
+
+    @property
+    def free(self) -> tuple[int, int]:
+        """From when, at the last stop, until when, at the first one, the carer may be at work, minutes of the day."""
+        return self.bring[-1] + _AT_THE_GATE, self.latest[0]
+
+
+def plan_care(rng: np.random.Generator, index: PlaceIndex, households: Sequence[Household]) -> list[Care]:
+    """Find a carer for every household with small children, and when they have to be at which school."""
+    found = []
+    for household in households:
+        care = Care(household, household.members[0])
+        if not care.small:
+            continue
+        adults = household.adults
+        free = [adult for adult in adults if adult.status != "worker"] or adults
+        care.carer = free[int(rng.integers(len(free)))]
+        while not _plan_stops(index, care):
+            # Two schools too far apart: the child of the farther one learns at home.
+            last = care.stops[-1]
+            for child in care.small:
+                if child.workplace == last:
+                    learn_at_home(index, child)
+        if care.at_home:
+            care.carer.status = "freelancer"
+        found.append(care)
+    return found
+
+
+def _doors(index: PlaceIndex, place: Place) -> list[Span]:
+    """Return when parents find somebody at a school, minutes: as it says, else somewhat longer than is usual."""
+    given = index.given_hours(place)
+    return staffed(index.hours(place)) if given is None else given
+
+
+def _plan_stops(index: PlaceIndex, care: Care) -> bool:
+    """Set when the carer comes to which school; False if that can't be done."""
+    lessons = [child.lessons for child in care.small if child.lessons is not None and child.lessons.place is not None]
+    begin = {one.place: one.start for one in lessons if one.place is not None}
+    care.stops = sorted(begin, key=lambda place: (begin[place], place))
+    if not care.stops:
+        return True
+    hours = [_doors(index, index.place_by_id[stop]) for stop in care.stops]
+    walks = [index.minutes(a, b) for a, b in zip(care.stops, care.stops[1:], strict=False)]
+    if None in walks:
+        return False
+    ways = [_AT_THE_GATE + (walk or 0) for walk in walks]
+    bring = [begin[stop] - _AT_THE_GATE for stop in care.stops]
+    latest = [min(max(b for _, b in spans) - _AT_THE_GATE, _LAST_FETCH) for spans in hours]
+    for k in range(len(ways) - 1, -1, -1):
+        bring[k] = min(bring[k], bring[k + 1] - ways[k])
+        latest[k] = min(latest[k], latest[k + 1] - ways[k])
+    care.bring, care.latest = bring, latest
+    opens = [min(a for a, _ in spans) for spans in hours]
+    ends = [max(one.end for one in lessons if one.place == stop) for stop in care.stops]
+    return all(a <= b for a, b in zip(opens, bring, strict=True)) and all(
+        a <= b for a, b in zip(ends, latest, strict=True)
+    )
+
+
+def settle_care(index: PlaceIndex, care: Care) -> None:
+    """Write down, once the carer's working hours are known, when who takes and fetches the small children."""
+    if not care.stops:
+        return
+    words, carer, small = childhood().escort, care.carer, care.small
+    pupils = {stop: [child for child in small if child.workplace == stop] for stop in care.stops}
+    ready = 0
+    if carer.shift is not None and carer.workplace is not None:
+        ready = carer.shift[1] + (index.minutes(carer.workplace, care.stops[0]) or 0)
+    fetch: list[int] = []
+    for k, stop in enumerate(care.stops):
+        if k:
+            ready = fetch[-1] + _AT_THE_GATE + (index.minutes(care.stops[k - 1], stop) or 0)
+        fetch.append(max(ready, *(child.lessons.end for child in pupils[stop] if child.lessons is not None)))
+    morning, afternoon = [], []
+    for stop, arrive, leave in zip(care.stops, care.bring, fetch, strict=True):
+        names = " and ".join(child.first for child in pupils[stop])
+        morning.append(Duty(arrive, arrive + _AT_THE_GATE, words.bring.format(names=names), stop))
+        afternoon.append(Duty(leave, leave + _AT_THE_GATE, words.fetch.format(names=names), stop))
+        for child in pupils[stop]:
+            child.shift = arrive, leave + _AT_THE_GATE
+    home = fetch[-1] + _AT_THE_GATE + (index.minutes(care.stops[-1], carer.home) or 0)
+    names = " and ".join(child.first for child in small if child.shift is not None)
+    seeing_in = Duty(home, home + _SEEING_IN, words.bring_home.format(names=names), carer.home)
+    carer.duties = [*morning, *afternoon, seeing_in]
+    # Who is dropped later, or fetched sooner, comes along to the others' schools.
+    snack = Duty(home, home + _SEEING_IN, words.at_home, carer.home)
+    for k, stop in enumerate(care.stops):
+        for child in pupils[stop]:
+            child.duties = [*morning[:k], *afternoon[k + 1 :], snack]
+    for child in care.household.children:
+        if child not in small and child.shift is not None and child.workplace in care.stops:
+            # Older brothers and sisters at the same school come along in the morning.
+            child.shift = care.bring[care.stops.index(child.workplace)], child.shift[1]
+    # Alone the carer goes out only while the children are at school.
+    carer.out_until = fetch[0]
