@@ -10,6 +10,7 @@ from vico.cli.options import FilmOptions, StillOptions
 from vico.cli.output import progress_bars
 from vico.clock import seconds_of_day
 from vico.errors import InputError, OutputExistsError
+from vico.render.quality import RenderQuality
 from vico.sim.recording import Run, read_run
 from vico.viewer.repeat import RepeatedRun
 from vico.viewer.run_film import FilmSettings, write_run_film, write_still
@@ -27,6 +28,7 @@ def film(options: FilmOptions) -> int:
         height=height,
         rate=options.fps,
         samples=options.samples,
+        quality=RenderQuality.of(options.quality),
     )
     recorded = read_run(options.run)
     first = step_of(recorded, options.start, default=0)
@@ -47,7 +49,12 @@ def still(options: StillOptions) -> int:
     _check(options.out, force=options.force)
     width, height = size_of(options.size)
     settings = FilmSettings(
-        follow=options.follow, view=options.view, width=width, height=height, samples=options.samples
+        follow=options.follow,
+        view=options.view,
+        width=width,
+        height=height,
+        samples=options.samples,
+        quality=RenderQuality.of(options.quality),
     )
     recorded = read_run(options.run)
     step = step_of(recorded, options.at, default=recorded.last)

@@ -180,6 +180,8 @@ class RunOptions:
         Which of these are recorded as arrays (views/AGENT/STEP.npz), beside the film of what each agent saw.
     cameras
         A file (.json) of lenses by agent, model of robot, or residents, assistants, robots: docs/pictures.md.
+    quality
+        Of these pictures: plain, or fine (soft shadows, darker corners, smooth edges, mirroring glass).
     assistants
         How many avatars take part that are nobody's resident: assistant_0, ...
     agent
@@ -223,6 +225,7 @@ class RunOptions:
     outputs: CommaSeparated = "rgb,depth,segmentation"
     keep: CommaSeparated = "none"
     cameras: Path | None = None
+    quality: Literal["plain", "fine"] = "plain"
     assistants: int = 0
     agent: Annotated[str, tyro.conf.arg(metavar="MODULE:NAME")] = ""
     deadline: float = 60.0
@@ -259,6 +262,8 @@ class FilmOptions:
         From where.
     samples
         Rays a pixel, along each side: 1 is quick, 2 smooth.
+    quality
+        plain, or fine: soft shadows, darker corners, mirroring glass.
     world
         The world it ran in, if it is no longer where it was.
     force
@@ -274,6 +279,7 @@ class FilmOptions:
     fps: int = 25
     view: Literal["behind", "eyes", "above", "side", "orbit"] = "behind"
     samples: int = 2
+    quality: Literal["plain", "fine"] = "fine"
     world: Path | None = None
     force: bool = False
 
@@ -298,6 +304,8 @@ class StillOptions:
         From where.
     samples
         Rays a pixel, along each side.
+    quality
+        plain, or fine: soft shadows, darker corners, mirroring glass.
     world
         The world it ran in, if it is no longer where it was.
     force
@@ -311,6 +319,7 @@ class StillOptions:
     size: str = "1920x1080"
     view: Literal["behind", "eyes", "above", "side", "orbit"] = "behind"
     samples: int = 3
+    quality: Literal["plain", "fine"] = "fine"
     world: Path | None = None
     force: bool = False
 

@@ -129,6 +129,7 @@ class _Job:
             junctions=options.junctions,
             observe=None if options.observe == "all" else _names(options.observe),
             outputs=_names(options.outputs),
+            quality=options.quality,
             cameras=read_json(options.cameras) if options.cameras is not None else {},
         )
         place = read_world(world)

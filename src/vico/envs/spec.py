@@ -35,6 +35,7 @@ class EnvOptions(TypedDict, total=False):
     image: int
     outputs: tuple[str, ...]
     cameras: Mapping[str, Mapping[str, Any]]
+    quality: str | Mapping[str, bool]
     date: str
     utc_offset: float | None
     weather: str | Mapping[str, Any]

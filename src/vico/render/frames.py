@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
-from typing import Any
+from typing import Any, NamedTuple
 from weakref import WeakSet
 
 import numpy as np
@@ -19,9 +19,11 @@ from vico.errors import InputError
 from vico.render.arrays import Buffers
 from vico.render.cameras import Cameras
 from vico.render.lighting import Lighting
+from vico.render.quality import PLAIN, RenderQuality
 from vico.render.scene import Scene
 from vico.render.sensors.past import NO_PAST, PastPlaces
 from vico.render.sensors.surface import write_surface
+from vico.render.shading.finishing import occlude, smooth_edges
 from vico.render.shading.light import NO_LIGHT, Light
 from vico.render.shading.weather import draw_weather
 from vico.render.shadows.moving import new_caster
@@ -37,6 +39,8 @@ _EMPTY_U8 = np.zeros((0, 0, 3), np.uint8)
 _EMPTY_F32, _EMPTY_I32 = np.zeros((0, 0), np.float32), np.zeros((0, 0), np.int32)
 _NO_NORMALS, _NO_PLACES = np.zeros((0, 0, 0, 3), np.float32), np.zeros((0, 0, 0, 3), np.float64)
 
+# Soft shadows' rims, texels of the shadow map, and the light that marks glass by day.
+_SOFT_TEXELS, _LEAST_SHINE = 1.1, 1e-4
 _begun: WeakSet[PendingView] = WeakSet()
 
 
@@ -118,6 +122,8 @@ class PictureRequest:
         All else always comes from the ray through the pixel's centre.
     moving
         Whether what moves is there.
+    quality
+        What is done beyond a quick picture.
     """
 
     rgb: bool = True
@@ -127,6 +133,7 @@ class PictureRequest:
     past: tuple[PastPlaces, ...] = ()
     samples: int = 1
     moving: bool = True
+    quality: RenderQuality = PLAIN
 
     def __post_init__(self) -> None:
         if self.samples < 1:
@@ -174,7 +181,7 @@ def take_pictures(
         What the same cameras saw in the last call: a view in which nothing can have changed is copied.
     """
     shape = len(cameras), cameras.height, cameras.width
-    light = scene.light() if request.rgb else None
+    light = _light_of(scene.light(), request.quality) if request.rgb else None
     batch = _Batch(
         scene,
         cameras,
@@ -186,6 +193,7 @@ def take_pictures(
         np.empty((*shape, 3), np.float64) if request.past else _NO_PLACES,
         request.past,
         request.moving,
+        request.quality,
     )
     pending: tuple[PendingView, ...] = ()
     if light is not None and request.samples > 1:
@@ -195,6 +203,16 @@ def take_pictures(
     else:
         _for_each(batch.render, len(cameras), threads)
     return Frames(batch.rgb, batch.depth, batch.segmentation, batch.normals, batch.places, pending)
+
+
+class _How(NamedTuple):
+    """Whether what moves is drawn, and how carefully."""
+
+    moving: bool
+    quality: RenderQuality
+
+
+_USUAL = _How(True, PLAIN)
 
 
 @dataclass(frozen=True)
@@ -211,11 +229,16 @@ class _Batch:
     places: NDArray[np.float64]
     past: tuple[PastPlaces, ...]
     moving: bool
+    quality: RenderQuality
 
     @property
     def reads_surfaces(self) -> bool:
         """Whether normals or past places are asked for."""
         return bool(len(self.normals) or len(self.places))
+
+    @property
+    def _how(self) -> _How:
+        return _How(self.moving, self.quality)
 
     def pictures(self, k: int) -> Pictures:
         """Return camera `k`'s part of each kind."""
@@ -223,7 +246,7 @@ class _Batch:
 
     def render(self, k: int) -> None:
         camera = _camera(self.scene, self.cameras, k, 1)
-        drawn = _take(self.scene, camera, self.light, self.pictures(k), self.moving)
+        drawn = _take(self.scene, camera, self.light, self.pictures(k), self._how)
         self._read_surfaces(k, camera, drawn)
 
     def _read_surfaces(self, k: int, camera: Record, drawn: int) -> None:
@@ -240,11 +263,17 @@ class _Batch:
         height, width = self.rgb.shape[1:3]
         wide = np.empty((height * samples, width * samples, 3), np.uint8)
         only_rgb = Pictures(wide, _EMPTY_F32, _EMPTY_I32)
-        _take(self.scene, _camera(self.scene, self.cameras, k, samples), light, only_rgb, self.moving)
+        _take(
+            self.scene,
+            _camera(self.scene, self.cameras, k, samples),
+            light,
+            only_rgb,
+            _How(self.moving, replace(self.quality, smooth_edges=False)),
+        )
         self.rgb[k] = _mean_of_blocks(wide, samples)
         if self.depth.size or self.segmentation.size or self.reads_surfaces:
             camera, without_rgb = _camera(self.scene, self.cameras, k, 1), self.pictures(k)._replace(rgb=_EMPTY_U8)
-            self._read_surfaces(k, camera, _take(self.scene, camera, None, without_rgb, self.moving))
+            self._read_surfaces(k, camera, _take(self.scene, camera, None, without_rgb, self._how))
 
 
 def _render_cached(
@@ -254,7 +283,7 @@ def _render_cached(
     scene, cameras = batch.scene, batch.cameras
 
     def take_one(k: int) -> None:
-        if light is None or batch.reads_surfaces or not batch.moving:
+        if light is None or batch.reads_surfaces or not batch.moving or not batch.quality.is_plain:
             batch.render(k)
             return
         camera, pictures = _camera(scene, cameras, k, 1), batch.pictures(k)
@@ -384,15 +413,33 @@ def _camera(scene: Scene, cameras: Cameras, k: int, samples: int) -> Record:
     return camera_uniforms(cameras, k, samples, scene.room_of(cameras.position[k]))
 
 
-def _take(scene: Scene, camera: Record, light: Light | None, out: Pictures, moving: bool = True) -> int:
+def _take(scene: Scene, camera: Record, light: Light | None, out: Pictures, how: _How = _USUAL) -> int:
     """Take pictures of one camera; return how many items were drawn."""
     buffers = _buffers(scene, int(camera["width"]), int(camera["height"]))
     drawn = take(
-        scene.arrays, camera, NO_LIGHT if light is None else light, buffers, NOTHING_KEPT, moving, new_caster(), out
+        scene.arrays, camera, NO_LIGHT if light is None else light, buffers, NOTHING_KEPT, how.moving, new_caster(), out
     )
     if light is not None and out.rgb.size:
+        if how.quality.ambient_occlusion:
+            occlude(camera, buffers.keys, out.rgb)
+        if how.quality.smooth_edges:
+            smooth_edges(camera, buffers.keys, out.rgb)
         draw_weather(camera, light, buffers.keys, scene.moment, out.rgb)
     return int(drawn)
+
+
+def _light_of(light: Light, quality: RenderQuality) -> Light:
+    """Return the light with what the shader reads of switches."""
+    if not quality.soft_shadows and not quality.reflections:
+        return light
+    uniforms = light.uniforms.copy()
+    if quality.soft_shadows:
+        uniforms["shadow_softness"] = _SOFT_TEXELS
+    if quality.reflections:
+        uniforms["glass"] = 1.0
+        # Glass is told by what may shine, be it ever so little by day.
+        uniforms["lamp_exposure"] = max(float(uniforms["lamp_exposure"]), _LEAST_SHINE)
+    return light._replace(uniforms=uniforms)
 
 
 def _buffers(scene: Scene, width: int, height: int) -> Buffers:

@@ -136,6 +136,8 @@ LIGHT_UNIFORMS = np.dtype(
         ("snow_cover", f4),  # share of what looks up that is under snow, 0..1
         ("rain", f4),  # mm/h of water
         ("snowfall", f4),
+        ("shadow_softness", f4),  # radius of the blur of static shadows' rims, texels of their map; 0: none
+        ("glass", f4),  # share of what glass mirrors that is shown, 0..1
         ("unlit_x", f4),  # circle on which all that is fixed and shines is out, metres
         ("unlit_y", f4),
         ("unlit_radius", f4),  # 0 for none

@@ -8,6 +8,7 @@ from typing import Any
 
 from vico.clock import DAY
 from vico.errors import InputError
+from vico.render.quality import RenderQuality
 from vico.render.sensors.batch import USUAL_OUTPUTS, checked_outputs
 from vico.render.sensors.lens import Lens
 from vico.sim.traffic.junction_rule import JunctionRule
@@ -44,6 +45,8 @@ class SimSettings:
     cameras
         Lenses that are not the usual one: records of `vico.render.sensors.lens.Lens` by agent's name, by model for
         robots, or for all ``"residents"``, ``"assistants"`` or ``"robots"``; the first of these that is there holds.
+    quality
+        How carefully pictures are made: ``"plain"``, ``"fine"``, or switches of `vico.render.quality.RenderQuality`.
     date
         On which the first day is, YYYY-MM-DD.
     utc_offset
@@ -70,6 +73,7 @@ class SimSettings:
     image: int = 256
     outputs: tuple[str, ...] = USUAL_OUTPUTS
     cameras: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    quality: str | Mapping[str, bool] = "plain"
     date: str = "2026-06-21"
     utc_offset: float | None = None
     weather: str | Mapping[str, Any] = "fair"
@@ -104,6 +108,7 @@ class SimConfig(SimSettings):
         if not 16 <= self.image <= 1024:
             raise InputError(f"simulation: images of {self.image} pixels are out of range; take 16..1024, such as 256")
         object.__setattr__(self, "outputs", checked_outputs(self.outputs))
+        RenderQuality.of(self.quality)
         for record in self.cameras.values():
             Lens.of(record, side=self.image)
 

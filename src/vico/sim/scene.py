@@ -13,6 +13,7 @@ from vico.assets.people import Appearance, body_of
 from vico.community.model import Resident
 from vico.render import Cameras, Lighting, Scene, render
 from vico.render.lighting import SHADOW_STEP
+from vico.render.quality import RenderQuality
 from vico.render.sensors.batch import PictureSet, Viewers
 from vico.render.sensors.lens import Lens
 from vico.render.skinning import BodyBatch, batch_bodies, skin
@@ -136,7 +137,9 @@ class SceneRenderer:
         self._sim = sim
         self._lit: tuple[float, ...] = ()
         self.wait()
-        self._viewers = Viewers(self._scene, sim.config.outputs, SemanticClasses(sim).of_image)
+        self._viewers = Viewers(
+            self._scene, sim.config.outputs, SemanticClasses(sim).of_image, RenderQuality.of(sim.config.quality)
+        )
         self._lenses = lenses_by_entity(sim.state, sim.config)
         self._usual_lens = Lens.of({}, side=sim.config.image)
         self._load_bodies(sim)

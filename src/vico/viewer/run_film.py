@@ -15,6 +15,7 @@ from vico.errors import InputError
 from vico.render.between import Moment, moment_of, show_between
 from vico.render.film import FilmWriter
 from vico.render.frames import PictureRequest, take_pictures
+from vico.render.quality import FINE, RenderQuality
 from vico.sim.scene import SceneRenderer
 from vico.sim.simulation_state import SimulationState
 from vico.viewer.follow import FollowCamera, Target, target_between, target_of
@@ -37,6 +38,8 @@ class FilmSettings:
         Frames a second.
     samples
         Rays a pixel, along each side.
+    quality
+        How carefully pictures are made.
     """
 
     follow: str
@@ -45,6 +48,7 @@ class FilmSettings:
     height: int = 1080
     rate: int = 25
     samples: int = 2
+    quality: RenderQuality = FINE
 
     def __post_init__(self) -> None:
         if self.width % 2 or self.height % 2 or not (64 <= self.width <= 7680 and 64 <= self.height <= 4320):
@@ -137,5 +141,5 @@ def _picture(
 ) -> NDArray[np.uint8]:
     scene = show_between(before.moment, after.moment, share)
     eye = camera.look(scene, target_between(before.target, after.target, share), dt)
-    request = PictureRequest(depth=False, segmentation=False, samples=settings.samples)
+    request = PictureRequest(depth=False, segmentation=False, samples=settings.samples, quality=settings.quality)
     return take_pictures(scene, eye, request, threads=1).rgb[0]

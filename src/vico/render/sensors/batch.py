@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from vico.errors import InputError
 from vico.render.cameras import Cameras
 from vico.render.frames import Frames, PictureRequest, take_pictures
+from vico.render.quality import PLAIN, RenderQuality
 from vico.render.scene import Scene
 from vico.render.sensors.lens import CubeMap, Lens, cube_map
 from vico.render.sensors.past import PastPlaces, Placement, past_places, placement_of
@@ -60,11 +61,14 @@ class Viewers:
         See `OUTPUTS`; of ``semantic``, the classes are given by `classify`.
     classify
         Returns the classes (uint8) of a segmentation image.
+    quality
+        How carefully colours are made.
     """
 
     scene: Scene
     outputs: tuple[str, ...] = USUAL_OUTPUTS
     classify: Callable[[NDArray[np.int32]], NDArray[np.uint8]] | None = None
+    quality: RenderQuality = PLAIN
     _caches: dict[Lens, ViewCache] = field(default_factory=dict)
     _glances: dict[int, _Glance] = field(default_factory=dict)
 
@@ -132,6 +136,7 @@ class Viewers:
             segmentation="segmentation" in asked.outputs or "semantic" in asked.outputs,
             normals="normals" in asked.outputs,
             past=tuple(past),
+            quality=self.quality,
         )
         cache = self._caches.setdefault(lens, ViewCache(deferred=True))
         frames = take_pictures(self.scene, cameras, request, cache=cache)

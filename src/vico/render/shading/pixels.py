@@ -161,6 +161,79 @@ def sun_visibility(light: Any, shadow: Any, real: Any, whole: Any) -> None:
         real[_F + i] *= (low + b * (high - low)) * real[SUN + i]
 
 
+@kernel
+def soft_sun_visibility(light: Any, shadow: Any, real: Any, whole: Any) -> None:
+    """Do what `sun_visibility` does, with rims blurred over `light.shadow_softness` texels."""
+    if face_sun(light, real) <= _ZERO:
+        return
+    size = np.int32(shadow.closeness.shape[0])
+    flat = shadow.closeness.reshape(-1)
+    r = light.shadow_softness
+    for i in range(QUEUE):
+        real[_G + i] = _ZERO
+    for tap in range(_SOFT_TAPS):
+        du, dv = r * _SOFT_U[tap], r * _SOFT_V[tap]
+        _project_aside(shadow.matrix, size, du, dv, real, whole)
+        for i in range(QUEUE):
+            at = whole[_I0 + i]
+            below = at + np.uint32(size)
+            whole[_T0 + i], whole[_T1 + i] = flat[at], flat[at + np.uint32(1)]
+            whole[_T2 + i], whole[_T3 + i] = flat[below], flat[below + np.uint32(1)]
+        for i in range(QUEUE):
+            a, b, level = real[_A + i], real[_B + i], real[_LEVEL + i]
+            t0, t1 = np.float32(np.int32(whole[_T0 + i])), np.float32(np.int32(whole[_T1 + i]))
+            t2, t3 = np.float32(np.int32(whole[_T2 + i])), np.float32(np.int32(whole[_T3 + i]))
+            low = (_ONE - a if t0 <= level else _ZERO) + (a if t1 <= level else _ZERO)
+            high = (_ONE - a if t2 <= level else _ZERO) + (a if t3 <= level else _ZERO)
+            real[_G + i] += low + b * (high - low)
+    for i in range(QUEUE):
+        real[_F + i] *= np.float32(1.0 / _SOFT_TAPS) * real[_G + i] * real[SUN + i]
+
+
+# Where a soft shadow is looked up around a point, in its radius.
+_SOFT_TAPS = 4
+_SOFT_U = (np.float32(0.8), np.float32(-0.35), np.float32(-0.8), np.float32(0.35))
+_SOFT_V = (np.float32(0.35), np.float32(0.8), np.float32(-0.35), np.float32(-0.8))
+
+
+@kernel
+def mirror_surroundings(light: Any, camera: Any, real: Any, whole: Any) -> None:
+    """Let glass mirror the sky, or the walls across the street: change rows of the tone table in `whole`.
+
+    Glass is what may shine by night, and stands upright.
+    """
+    vx, vy, vz = np.float32(camera.x), np.float32(camera.y), np.float32(camera.z)
+    full = _ONE / max(light.lamp_exposure, _TINY)
+    haze_red, haze_green, haze_blue = light.haze_red, light.haze_green, light.haze_blue
+    zenith_red, zenith_green = light.ambient_red + light.tilt_red, light.ambient_green + light.tilt_green
+    zenith_blue = light.ambient_blue + light.tilt_blue
+    wall = np.float32(0.42)
+    wall_red, wall_green, wall_blue = wall * light.ambient_red, wall * light.ambient_green, wall * light.ambient_blue
+    for i in range(QUEUE):
+        gx, gy, gz = real[X + i] - vx, real[Y + i] - vy, real[Z + i] - vz
+        length = max(np.sqrt(gx * gx + gy * gy + gz * gz), _TINY)
+        nx, ny, nz = real[NX + i], real[NY + i], real[NZ + i]
+        facing = min(max(-(gx * nx + gy * ny + gz * nz) / length, _ZERO), _ONE)
+        grazing = _ONE - facing
+        fresnel = np.float32(0.10) + np.float32(0.9) * grazing * grazing * grazing * grazing * grazing
+        upright = min(max(_ONE - np.float32(3.0) * abs(nz), _ZERO), _ONE)
+        share = light.glass * min(real[SHINE + i] * full, _ONE) * upright * fresnel
+        up = gz / length + np.float32(2.0) * facing * nz
+        sky = min(max((up - np.float32(0.10)) * np.float32(3.0), _ZERO), _ONE)
+        high = min(max(np.float32(1.3) * up, _ZERO), _ONE)
+        red = wall_red + sky * (haze_red + high * (zenith_red - haze_red) - wall_red)
+        green = wall_green + sky * (haze_green + high * (zenith_green - haze_green) - wall_green)
+        blue = wall_blue + sky * (haze_blue + high * (zenith_blue - haze_blue) - wall_blue)
+        a, b, c = (
+            np.float32(np.int32(whole[_I0 + i])),
+            np.float32(np.int32(whole[_I1 + i])),
+            np.float32(np.int32(whole[_I2 + i])),
+        )
+        whole[_I0 + i] = np.int32(min(max(_ZERO, a + share * (red * _TONE_SCALE - a)), _TONE_LAST))
+        whole[_I1 + i] = np.int32(min(max(_ZERO, b + share * (green * _TONE_SCALE - b)), _TONE_LAST))
+        whole[_I2 + i] = np.int32(min(max(_ZERO, c + share * (blue * _TONE_SCALE - c)), _TONE_LAST))
+
+
 @inlined
 def face_sun(light: Any, real: Any) -> Any:
     """Leave in `real[_F:]` the cosine of the sun's slope on every place, 0 where it is behind; return the largest."""
@@ -176,8 +249,14 @@ def face_sun(light: Any, real: Any) -> Any:
 @inlined
 def _project_on_shadow_map(frame: Any, size: Any, real: Any, whole: Any) -> None:
     """Leave every place's texel in `whole[_I0:]`, its share of the next ones and its closeness to the sun in `real`."""
-    f00, f01, f02, f03 = frame[0, 0], frame[0, 1], frame[0, 2], frame[0, 3] - _HALF
-    f10, f11, f12, f13 = frame[1, 0], frame[1, 1], frame[1, 2], frame[1, 3] - _HALF
+    _project_aside(frame, size, _ZERO, _ZERO, real, whole)
+
+
+@inlined
+def _project_aside(frame: Any, size: Any, du: Any, dv: Any, real: Any, whole: Any) -> None:
+    """Do the same `du`, `dv` texels aside."""
+    f00, f01, f02, f03 = frame[0, 0], frame[0, 1], frame[0, 2], frame[0, 3] - _HALF + du
+    f10, f11, f12, f13 = frame[1, 0], frame[1, 1], frame[1, 2], frame[1, 3] - _HALF + dv
     f20, f21, f22, f23 = frame[2, 0], frame[2, 1], frame[2, 2], frame[2, 3]
     rim = np.float32(size - 1)
     # A little off the surface, or it would shade itself.
@@ -300,8 +379,13 @@ def finish(light: Any, camera: Any, texels: Any, queue: Any, moving: Any, count:
     else:
         if light.uniforms.snow_cover > _ZERO or light.uniforms.wet > _ZERO:
             cover_ground(light.uniforms, real)
-        sun_visibility(light.uniforms, light.shadow, real, whole)
+        if light.uniforms.shadow_softness > _ZERO:
+            soft_sun_visibility(light.uniforms, light.shadow, real, whole)
+        else:
+            sun_visibility(light.uniforms, light.shadow, real, whole)
         light_outdoors(light.uniforms, camera, real, whole)
+        if light.uniforms.glass > _ZERO:
+            mirror_surroundings(light.uniforms, camera, real, whole)
     for i in range(count):
         pixel = whole[PIXEL + i] * np.uint32(3)
         out[pixel] = tone[whole[_I0 + i]]

@@ -1,0 +1,258 @@
+"""What is done to a finished picture where asked: darker corners, smoother edges."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.render.compiled import inlined, kernel
+from vico.render.visibility.fill import inverse_depth, triangle_number
+
+# Ambient occlusion looks this far around a point, metres, at no more pixels than that.
+_REACH, _MOST_PIXELS = 0.55, 28.0
+_LOOKS = 3
+_LEAST_PIXELS = np.float32(1.7)  # what is farther away is left alone
+_STRENGTH, _BIAS = 1.15, 0.12
+# Sharper steps of brightness than this (of 255, and of the brighter one) are smoothed.
+_STEP, _SHARE = 8.0, 0.09
+# Neighbours begin to look in other directions.
+_TURNS = np.array([(math.cos(k), math.sin(k)) for k in np.arange(16) * (math.pi / 8) * 5], np.float32)
+_NUMBER = np.uint64(0xFFFFFFFF)
+_INDEX = 0x7FFFFFFF  # masked so, an index is not negative for all the compiler knows
+
+
+def occlude(camera: Any, keys: NDArray[np.uint64], rgb: NDArray[np.uint8]) -> None:
+    """Darken what lies in corners and beneath things, by what the picture shows around each point.
+
+    Parameters
+    ----------
+    camera
+        Its `CAMERA_UNIFORMS`.
+    keys
+        Of the picture's pixels, as the visibility pass left them.
+    rgb
+        sRGB, uint8, shape ``(h, w, 3)``; changed.
+    """
+    rows, columns = (int(camera["height"]) + 1) // 2, (int(camera["width"]) + 1) // 2
+    near, far = np.zeros((rows, columns), np.float32), np.zeros((rows, columns), np.float32)
+    open_, blurred = np.ones((rows, columns), np.float32), np.ones((rows, columns), np.float32)
+    _half_size(camera, keys, near)
+    _look_around(camera, near, _TURNS, open_)
+    _blur(near, open_, far, blurred)
+    _darken(camera, keys, near, blurred, rgb)
+
+
+@kernel
+def _half_size(camera: Any, keys: Any, near: Any) -> None:
+    """Write the inverse depth of every second pixel, 0 where nothing is seen."""
+    width = camera.width
+    for row in range(near.shape[0]):
+        for column in range(near.shape[1]):
+            key = keys[2 * row * width + 2 * column]
+            near[row, column] = inverse_depth(key) if triangle_number(key) != 0 else np.float32(0.0)
+
+
+@kernel
+def _look_around(camera: Any, near: Any, turns: Any, out: Any) -> None:
+    """Write how much of its surroundings is open above each point, 0..1."""
+    rows, columns = near.shape
+    flat = near.reshape(-1)
+    focal = np.float32(camera.focal * 0.5)
+    cx, cy = np.float32(camera.centre_x * 0.5 - 0.25), np.float32(camera.centre_y * 0.5 - 0.25)
+    widest = max(np.float32(_MOST_PIXELS), np.float32(0.05) * focal)
+    one, zero, reach = np.float32(1.0), np.float32(0.0), np.float32(_REACH)
+    for row in range(1, rows - 1):
+        for column in range(1, columns - 1):
+            w = near[row, column]
+            if w == zero:
+                continue
+            z = one / w
+            radius = min(reach * focal * w, widest)
+            if radius < _LEAST_PIXELS:
+                continue
+            x, y = (np.float32(column) - cx) / focal * z, (np.float32(row) - cy) / focal * z
+            # The plane that the pixel shows: of the two neighbours on each axis, the one that is on it.
+            left, right, up, down = (
+                near[row, column - 1],
+                near[row, column + 1],
+                near[row - 1, column],
+                near[row + 1, column],
+            )
+            sx = right - w if abs(right - w) < abs(w - left) else w - left
+            sy = down - w if abs(down - w) < abs(w - up) else w - up
+            # Inverse depth is a linear function of the picture; its steps are the plane's normal.
+            nx, ny = sx * focal, sy * focal
+            nz = w - sx * (np.float32(column) - cx) - sy * (np.float32(row) - cy)
+            scale = -one / max(np.sqrt(nx * nx + ny * ny + nz * nz), np.float32(1e-9))
+            nx, ny, nz = nx * scale, ny * scale, nz * scale
+            turn = turns[(row & 3) * 4 + (column & 3)]
+            hidden = zero
+            for k in range(_LOOKS):
+                length = radius * (np.float32(k) + np.float32(0.7)) / np.float32(_LOOKS)
+                # A golden angle from look to look.
+                a = turn[0] * _COS[k] - turn[1] * _SIN[k]
+                b = turn[1] * _COS[k] + turn[0] * _SIN[k]
+                i, j = (
+                    int(np.float32(column) + a * length + np.float32(0.5)),
+                    int(np.float32(row) + b * length + np.float32(0.5)),
+                )
+                if i < 0 or j < 0 or i >= columns or j >= rows:
+                    continue
+                v = flat[(j * columns + i) & _INDEX]
+                if v == zero:
+                    continue
+                d = one / v
+                dx, dy, dz = (np.float32(i) - cx) / focal * d - x, (np.float32(j) - cy) / focal * d - y, d - z
+                squared = dx * dx + dy * dy + dz * dz
+                above = (nx * dx + ny * dy + nz * dz) / np.sqrt(squared + np.float32(1e-6))
+                fade = max(one - squared / (np.float32(2.0) * reach * reach), zero)
+                hidden += max(above - np.float32(_BIAS), zero) * fade
+            out[row, column] = max(one - np.float32(_STRENGTH / _LOOKS) * hidden, np.float32(0.35))
+
+
+_COS = tuple(np.float32(math.cos(2.39996 * k)) for k in range(_LOOKS))
+_SIN = tuple(np.float32(math.sin(2.39996 * k)) for k in range(_LOOKS))
+
+
+@kernel
+def _blur(near: Any, values: Any, scratch: Any, out: Any) -> None:
+    """Write the mean over 4 x 4 pixels of about the same depth: the pattern in which neighbours look around."""
+    rows, columns = near.shape
+    one = np.float32(1.0)
+    for row in range(rows):
+        for column in range(columns):
+            w = near[row, column]
+            total = weight = np.float32(0.0)
+            for i in range(max(column - 1, 0), min(column + 3, columns)):
+                same = one if abs(near[row, i] - w) < np.float32(0.06) * w else np.float32(0.001)
+                total += same * values[row, i]
+                weight += same
+            scratch[row, column] = total / weight
+    for row in range(rows):
+        for column in range(columns):
+            w = near[row, column]
+            total = weight = np.float32(0.0)
+            for j in range(max(row - 1, 0), min(row + 3, rows)):
+                same = one if abs(near[j, column] - w) < np.float32(0.06) * w else np.float32(0.001)
+                total += same * scratch[j, column]
+                weight += same
+            out[row, column] = total / weight
+
+
+@kernel
+def _darken(camera: Any, keys: Any, near: Any, open_: Any, rgb: Any) -> None:
+    """Multiply the colours of 2 x 2 pixels by what their half-size pixel says, or one beside it that is as near."""
+    width, rows, columns = camera.width, near.shape[0], near.shape[1]
+    flat = rgb.reshape(-1)
+    for j in range(rows):
+        for i in range(columns):
+            share = open_[j, i]
+            right, below = min(i + 1, columns - 1), min(j + 1, rows - 1)
+            if min(min(share, open_[j, right]), min(open_[below, i], open_[below, right])) > np.float32(0.985):
+                continue
+            for row in range(2 * j, min(2 * j + 2, camera.height)):
+                for column in range(2 * i, min(2 * i + 2, width)):
+                    at = row * width + column
+                    if triangle_number(keys[at]) == 0:
+                        continue
+                    w = inverse_depth(keys[at])
+                    y, x = (below if row & 1 else j), (right if column & 1 else i)
+                    here = share
+                    if abs(near[y, x] - w) < np.float32(0.06) * w:
+                        here = open_[y, x]
+                        if abs(near[j, i] - w) < np.float32(0.06) * w:
+                            here = np.float32(0.5) * (here + share)
+                    for channel in range(3):
+                        flat[3 * at + channel] = np.uint8(np.float32(flat[3 * at + channel]) * here)
+
+
+def smooth_edges(camera: Any, keys: NDArray[np.uint64], rgb: NDArray[np.uint8]) -> None:
+    """Smooth the steps between one triangle and another along their edges; see `occlude`."""
+    bright = np.empty(rgb.shape[:2], np.float32)
+    _smooth(camera, keys, rgb.copy(), bright, rgb)
+
+
+@kernel
+def _smooth(camera: Any, keys: Any, source: Any, bright: Any, out: Any) -> None:
+    width, height = camera.width, camera.height
+    flat, flat_bright = source.reshape(-1), bright.reshape(-1)
+    for i in range(len(flat_bright)):
+        flat_bright[i] = np.float32(flat[3 * i + 1])  # green is most of what is bright
+    is_edge = np.empty(width, np.bool_)
+    for row in range(1, height - 1):
+        # Slices, so that the compiler makes vector code of the comparisons.
+        start = row * width
+        here = keys[start : start + width]
+        left, right = keys[start - 1 : start - 1 + width], keys[start + 1 : start + 1 + width]
+        above, below = keys[start - width : start], keys[start + width : start + 2 * width]
+        for i in range(width):
+            key = here[i]
+            other = (key ^ left[i]) | (key ^ right[i]) | (key ^ above[i]) | (key ^ below[i])
+            is_edge[i] = (other & _NUMBER) != np.uint64(0)
+        b0, b3, b4 = bright[row], bright[row - 1], bright[row + 1]
+        b1, b2 = flat_bright[start - 1 : start - 1 + width], flat_bright[start + 1 : start + 1 + width]
+        for i in range(width):
+            b = b0[i]
+            step = max(max(abs(b - b1[i]), abs(b - b2[i])), max(abs(b - b3[i]), abs(b - b4[i])))
+            is_edge[i] &= step > np.float32(_STEP)
+        for column in range(1, width - 1):
+            if is_edge[column]:
+                _smooth_pixel(source, bright, row, column, out)
+
+
+@inlined
+def _smooth_pixel(source: Any, bright: Any, row: int, column: int, out: Any) -> None:
+    """Mix a pixel with those along the edge that it lies on (after FXAA, T. Lottes)."""
+    nw, ne = bright[row - 1, column - 1], bright[row - 1, column + 1]
+    sw, se = bright[row + 1, column - 1], bright[row + 1, column + 1]
+    here = bright[row, column]
+    low, high = min(here, min(min(nw, ne), min(sw, se))), max(here, max(max(nw, ne), max(sw, se)))
+    if high - low < max(np.float32(_STEP), np.float32(_SHARE) * high):
+        return
+    dx, dy = (sw + se) - (nw + ne), (nw + sw) - (ne + se)
+    least = min(abs(dx), abs(dy)) + max((nw + ne + sw + se) * np.float32(0.03), np.float32(2.0))
+    dx = min(max(dx / least, -_FARTHEST), _FARTHEST)
+    dy = min(max(dy / least, -_FARTHEST), _FARTHEST)
+    y, x = np.float32(row), np.float32(column)
+    a0, a1, a2 = _mixed(source, y - dy * _SIXTH, x - dx * _SIXTH)
+    b0, b1, b2 = _mixed(source, y + dy * _SIXTH, x + dx * _SIXTH)
+    c0, c1, c2 = _mixed(source, y - dy * _HALF, x - dx * _HALF)
+    d0, d1, d2 = _mixed(source, y + dy * _HALF, x + dx * _HALF)
+    r, g, b = _HALF * (a0 + b0), _HALF * (a1 + b1), _HALF * (a2 + b2)
+    wide_r, wide_g = _HALF * (r + _HALF * (c0 + d0)), _HALF * (g + _HALF * (c1 + d1))
+    wide_b = _HALF * (b + _HALF * (c2 + d2))
+    # Where the far ends belong to something else, the near ones do.
+    if low <= wide_g <= high:
+        r, g, b = wide_r, wide_g, wide_b
+    out[row, column, 0], out[row, column, 1] = np.uint8(r + _HALF), np.uint8(g + _HALF)
+    out[row, column, 2] = np.uint8(b + _HALF)
+
+
+_SIXTH, _HALF, _FARTHEST = np.float32(1.0 / 6.0), np.float32(0.5), np.float32(4.0)
+
+
+@inlined
+def _weighed(source: Any, j: int, i: int, channel: int, shares: Any) -> Any:
+    upper = shares[0] * np.float32(source[j, i, channel]) + shares[1] * np.float32(source[j, i + 1, channel])
+    lower = shares[2] * np.float32(source[j + 1, i, channel]) + shares[3] * np.float32(source[j + 1, i + 1, channel])
+    return upper + lower
+
+
+@inlined
+def _mixed(source: Any, y: Any, x: Any) -> Any:
+    """Return the colour between pixels, mixed of four; beyond the rim, the rim's."""
+    rows, columns = source.shape[0], source.shape[1]
+    y = min(max(y, np.float32(0.0)), np.float32(rows) - np.float32(1.001))
+    x = min(max(x, np.float32(0.0)), np.float32(columns) - np.float32(1.001))
+    j, i = int(y), int(x)
+    t, s = y - np.float32(j), x - np.float32(i)
+    one = np.float32(1.0)
+    shares = (one - s) * (one - t), s * (one - t), (one - s) * t, s * t
+    return (
+        _weighed(source, j, i, 0, shares),
+        _weighed(source, j, i, 1, shares),
+        _weighed(source, j, i, 2, shares),
+    )
