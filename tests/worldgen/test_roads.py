@@ -175,10 +175,10 @@ def test_a_street_that_netconvert_refuses_costs_itself_alone(monkeypatch: pytest
     used = [street for street in streets if is_traffic_street(street)]
     bad, converted = used[len(used) // 2].way, netconvert._converted
 
-    def refusing(binary: Path, site: SiteFacts, some: Sequence[NetworkStreet]) -> RoadNetwork:
+    def refusing(binary: Path, site: SiteFacts, some: Sequence[NetworkStreet], height: None) -> RoadNetwork:
         if any(street.way == bad for street in some):
             raise netconvert.NetconvertError("road network: netconvert gave no network")
-        return converted(binary, site, some)
+        return converted(binary, site, some, height)
 
     monkeypatch.setattr(netconvert, "_converted", refusing)
     with listening() as losses:

@@ -90,11 +90,11 @@ class Bodies:
         return np.asarray(self.position[:, 2] + self.height, np.float64)
 
     def levels(self, ground: HeightField) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return `bottom` and `top` above the ground beneath each body, metres.
+        """Return `bottom` and `top` above the ground or the deck beneath each body, metres.
 
         For who looks far ahead: whoever stands further up the same street is on the same level.
         """
-        below = ground(self.position[:, :2])
+        below = ground.near(self.position)
         return self.bottom - below, self.top - below
 
     def where(self, chosen: NDArray[Any]) -> Bodies:

@@ -184,9 +184,9 @@ def _on_slopes(bodies: Bodies, ground: HeightField) -> NDArray[np.void]:
     """Return records whose extents follow the ground: on a slope a bus stands lower at one end than at its middle."""
     records = records_of(bodies)
     c, s = records["cos"], records["sin"]
-    here = ground(bodies.position[:, :2])
-    ends = np.array([ground(bodies.position[:, :2] + u * bodies.half_length[:, None] * np.column_stack([c, s]))
-                     for u in (-1.0, 1.0)])  # fmt: skip
+    here = ground.near(bodies.position)
+    along = bodies.half_length[:, None] * np.column_stack([c, s, np.zeros(len(c))])
+    ends = np.array([ground.near(bodies.position + u * along) for u in (-1.0, 1.0)])
     records["bottom"] -= here - np.minimum(here, ends.min(axis=0))
     records["top"] += np.maximum(here, ends.max(axis=0)) - here
     return records

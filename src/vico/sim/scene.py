@@ -276,7 +276,7 @@ class SceneRenderer:
     ) -> NDArray[np.float64]:
         """Return the ground under everybody's feet in a motion: clip, phase and speed."""
         place = motion.position, motion.yaw
-        ground = ground_under_feet(*course, self._style, place, self._sim.world.height)
+        ground = ground_under_feet(*course, self._style, place, self._sim.world.height.near)
         ground[~motion.on_ground] = 0.0
         # From high seats feet hang; a step is there for them on stools.
         ground[~motion.on_ground, :, :, 0] = -np.clip(rise[~motion.on_ground], -_FEET_RISE, _FEET_HANG)[:, None, None]

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vico.io.compiled import compiled
+from vico.world.decks import Decks
 
 EDGE_RANGE = 1.0
 """Metres of distance to an edge that a `Steps` field can tell; int8 127 stands for it."""
@@ -53,11 +54,14 @@ class HeightField:
         Half the side of the square covered, metres; the square is centred on the origin.
     steps
         Kerbs, quays and their like; None where there are none.
+    decks
+        Surfaces above and below the ground that people and vehicles use, too; None where there are none.
     """
 
     heights: NDArray[np.float32]
     half: float
     steps: Steps | None = None
+    decks: Decks | None = None
 
     @property
     def cell(self) -> float:
@@ -83,6 +87,27 @@ class HeightField:
             Metres, shape ``(...)``.
         """
         return self._look_up(xy, 0)
+
+    def near(self, xyz: ArrayLike) -> NDArray[np.float64]:
+        """Heights of the surfaces that bodies are on: of the ground, or of a deck or a tunnel that is nearer in height.
+
+        Parameters
+        ----------
+        xyz
+            ENU metres, shape ``(..., 3)``.
+
+        Returns
+        -------
+        ndarray
+            Metres, shape ``(...)``; those of the ground where there are no decks.
+        """
+        found = self._look_up(xyz, 0)
+        if self.decks is None:
+            return found
+        points = np.asarray(xyz, np.float64).reshape(-1, 3)
+        flat = found.reshape(-1)
+        self.decks.heights(points, flat)
+        return flat.reshape(found.shape)
 
     def smooth(self, xy: ArrayLike) -> NDArray[np.float64]:
         """Heights without kerbs and their like, shaped as those of a call."""
@@ -111,7 +136,7 @@ class HeightField:
         found: dict[str, NDArray[Any]] = {"heights": self.heights, "half": np.array(self.half, np.float64)}
         if self.steps is not None:
             found |= {"edge": self.steps.edge, "low": self.steps.low, "high": self.steps.high}
-        return found
+        return found if self.decks is None else found | self.decks.arrays()
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> HeightField:
@@ -120,12 +145,12 @@ class HeightField:
         if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.shape[0] < 2:
             raise ValueError(f"heights of shape {heights.shape}, not square")
         if "edge" not in arrays:
-            return cls(heights, float(arrays["half"]))
+            return cls(heights, float(arrays["half"]), decks=Decks.from_arrays(arrays))
         edge = np.ascontiguousarray(arrays["edge"], np.int8)
         low, high = (np.ascontiguousarray(arrays[name], np.int16) for name in ("low", "high"))
         if edge.ndim != 2 or edge.shape[0] != edge.shape[1] or not edge.shape == low.shape == high.shape:
             raise ValueError(f"steps of shapes {edge.shape}, {low.shape}, {high.shape}")
-        return cls(heights, float(arrays["half"]), Steps(edge, low, high))
+        return cls(heights, float(arrays["half"]), Steps(edge, low, high), Decks.from_arrays(arrays))
 
 
 @compiled

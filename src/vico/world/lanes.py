@@ -43,6 +43,8 @@ class LaneGraph:
     first, points, along
         Lane ``i``'s centre line is ``points[first[i]:first[i + 1]]``, shape ``(p, 2)``; `along` holds the metres from
         the lane's start at each of its points.
+    z
+        How high the lanes' points lie, metres, shape ``(p,)``: on the ground, on a deck or in a tunnel.
     length, width, speed
         Metres and metres a second, shape ``(n,)``.
     inside
@@ -74,6 +76,7 @@ class LaneGraph:
     first: Ints
     points: Floats
     along: Floats
+    z: Floats
     length: Floats
     width: Floats
     speed: Floats
@@ -215,6 +218,7 @@ class _Lane:
     function: str
     index: int
     line: Floats
+    z: Floats
     width: float
     speed: float
     walkers: bool
@@ -242,12 +246,16 @@ def read_lanes(path: Path) -> LaneGraph:
     return replace(_assembled(driven, lanes, junctions, links, lefthand=lefthand), lights=lights)
 
 
-def _clean_line(text: str) -> Floats:
-    """Return a shape without doubled points; a lane of no length gets a centimetre along x: a direction."""
-    line = np.array([[float(v) for v in pair.split(",")[:2]] for pair in text.split()])
-    keep = np.concatenate([[True], np.linalg.norm(np.diff(line, axis=0), axis=1) > 1e-6])
+def _clean_line(text: str) -> tuple[Floats, Floats]:
+    """Return a shape without doubled points, and heights; a lane of no length gets a centimetre along x: a direction.
+
+    Networks without heights are flat.
+    """
+    line = np.array([[*map(float, point.split(",")), 0.0][:3] for point in text.split()])
+    keep = np.concatenate([[True], np.linalg.norm(np.diff(line[:, :2], axis=0), axis=1) > 1e-6])
     line = line[keep]
-    return line if len(line) > 1 else np.array([line[0], line[0] + (0.01, 0.0)])
+    line = line if len(line) > 1 else np.array([line[0], line[0] + (0.01, 0.0, 0.0)])
+    return np.ascontiguousarray(line[:, :2]), np.ascontiguousarray(line[:, 2])
 
 
 def _allows(attributes: dict[str, str], who: str) -> bool:
@@ -275,13 +283,15 @@ def _parsed(path: Path) -> tuple[list[_Lane], list[_Attributes], list[_Attribute
             function = element.get("function", "normal")
             for child in element.findall("lane"):
                 attributes = dict(child.attrib)
+                line, z = _clean_line(attributes["shape"])
                 lanes.append(
                     _Lane(
                         id=attributes["id"],
                         edge=element.get("id"),
                         function=function,
                         index=int(attributes["index"]),
-                        line=_clean_line(attributes["shape"]),
+                        line=line,
+                        z=z,
                         width=float(attributes.get("width", 3.2)),
                         speed=float(attributes["speed"]),
                         walkers=_allows(attributes, "pedestrian"),
@@ -367,6 +377,7 @@ def _assembled(
         first=first,
         points=np.concatenate([np.zeros((0, 2)), *(lane.line for lane in driven)]),
         along=np.concatenate([np.zeros(0), *steps]),
+        z=np.concatenate([np.zeros(0), *(lane.z for lane in driven)]),
         length=length,
         width=np.array([lane.width for lane in driven]),
         speed=np.array([lane.speed for lane in driven]),
@@ -490,6 +501,7 @@ def _walks(lanes: list[_Lane], links: list[dict[str, str]], junctions: dict[str,
             lane.id,
             lane.function == "crossing",
             lane.line,
+            lane.z,
             lane.width,
             _junction_of(lane, junctions) if lane.function == "crossing" else -1,
         )

@@ -34,6 +34,8 @@ class Walkways:
         SIDEWALK, CROSSING or CORNER, uint8, shape ``(n,)``.
     first, points, along
         Stretch ``i``'s centre line is ``points[first[i]:first[i + 1]]``; `along` the metres from its start.
+    z
+        How high the points lie, metres, shape ``(p,)``: on the ground, on a deck or in a tunnel.
     length, width
         Metres, shape ``(n,)``.
     room
@@ -53,6 +55,7 @@ class Walkways:
     first: Ints
     points: Floats
     along: Floats
+    z: Floats
     length: Floats
     width: Floats
     room: Floats
@@ -93,6 +96,7 @@ class Walkways:
                 self.ids[i],
                 int(self.kind[i]),
                 self.line(i),
+                self.z[self.first[i] : self.first[i + 1]],
                 float(self.width[i]),
                 np.minimum(self.room[i], away[i] - _BODY),
                 np.minimum(self.reach[i], away[i] - _BODY),
@@ -115,9 +119,9 @@ class Walkways:
                     kept = tree.geometries[solid[which == i]]
                     beside = _distances(np.full(len(kept), part), kept).min(axis=0) - _BODY
                     room = np.clip(beside, 0.05, self.room[i])
-                    rows.append(
-                        replace(row, line=line, room=room, reach=np.clip(beside, 0.05, self.reach[i]), ends=ends)
-                    )
+                    z = _heights_along(row, lines[i], line)
+                    reach = np.clip(beside, 0.05, self.reach[i])
+                    rows.append(replace(row, line=line, z=z, room=room, reach=reach, ends=ends))
         return _packed(rows)
 
     def without(self, dropped: NDArray[np.bool_]) -> Walkways:
@@ -128,6 +132,7 @@ class Walkways:
                     self.ids[i],
                     int(self.kind[i]),
                     self.line(i),
+                    self.z[self.first[i] : self.first[i + 1]],
                     float(self.width[i]),
                     self.room[i],
                     self.reach[i],
@@ -146,6 +151,7 @@ class _Row:
     id: str
     kind: int
     line: Floats
+    z: Floats
     width: float
     room: Floats
     reach: Floats
@@ -154,7 +160,7 @@ class _Row:
 
 
 def walkways_of(
-    ways: list[tuple[str, bool, Floats, float, int]],
+    ways: list[tuple[str, bool, Floats, Floats, float, int]],
     corners: list[tuple[int, Floats, list[tuple[str, int]]]],
 ) -> Walkways:
     """Join sidewalks and crossings by the areas between them.
@@ -162,7 +168,7 @@ def walkways_of(
     Parameters
     ----------
     ways
-        Lane id, whether it is a crossing, centre line, width, junction (-1 for sidewalks).
+        Lane id, whether it is a crossing, centre line and its heights, width, junction (-1 for sidewalks).
     corners
         Junction, outline of the area, and the lane ends at it (lane id, 0 = its start, 1 = its end).
     """
@@ -177,13 +183,14 @@ def walkways_of(
             name,
             CROSSING if crossing else SIDEWALK,
             line,
+            z,
             width,
             room(width),
             room(width) + _STEP_OFF,
             junction,
             (2 * i, 2 * i + 1),
         )
-        for i, (name, crossing, line, width, junction) in enumerate(ways)
+        for i, (name, crossing, line, z, width, junction) in enumerate(ways)
     ]
     for place, outline, touching in corners:
         area = overlay.mended(shapely.Polygon(outline)) if len(outline) > 2 else shapely.Polygon()
@@ -195,10 +202,11 @@ def walkways_of(
                 start, end = ways[i][2][-side_a], ways[j][2][-side_b]
                 if np.linalg.norm(end - start) < 0.05:
                     end = end + np.array([0.05, 0.0])
-                width = min(ways[i][3], ways[j][3])
+                width = min(ways[i][4], ways[j][4])
                 ends = (2 * i + side_a, 2 * j + side_b)
                 path = _path_within(area, start, end)
-                rows.append(_Row("", CORNER, path, width, room(width), room(width) + _STEP_OFF, place, ends))
+                z = np.interp(_along(path), [0.0, _along(path)[-1]], [ways[i][3][-side_a], ways[j][3][-side_b]])
+                rows.append(_Row("", CORNER, path, z, width, room(width), room(width) + _STEP_OFF, place, ends))
     return _packed(rows)
 
 
@@ -218,11 +226,21 @@ def _distances(lines: NDArray[np.object_], solids: NDArray[np.object_]) -> Float
     return out
 
 
+def _along(line: Floats) -> Floats:
+    """Metres from the start of a line at each of its points."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+
+
+def _heights_along(row: _Row, whole: shapely.LineString, part: Floats) -> Floats:
+    """Heights of the points of a part of a stretch."""
+    return np.interp(shapely.line_locate_point(whole, shapely.points(part)), _along(row.line), row.z)
+
+
 def _packed(rows: list[_Row]) -> Walkways:
     n = len(rows)
     first = np.zeros(n + 1, np.int32)
     first[1:] = np.cumsum([len(row.line) for row in rows])
-    steps = [np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(row.line, axis=0), axis=1))]) for row in rows]
+    steps = [_along(row.line) for row in rows]
     used, renamed = np.unique(np.array([row.ends for row in rows], np.int64).reshape(-1), return_inverse=True)
     ends = renamed.reshape(-1, 2).astype(np.int32)
     meets: list[list[int]] = [[] for _ in range(len(used))]
@@ -237,6 +255,7 @@ def _packed(rows: list[_Row]) -> Walkways:
         first=first,
         points=np.concatenate([row.line for row in rows]) if n else np.zeros((0, 2)),
         along=np.concatenate(steps) if n else np.zeros(0),
+        z=np.concatenate([row.z for row in rows]) if n else np.zeros(0),
         length=np.array([s[-1] for s in steps]),
         width=np.array([row.width for row in rows]),
         room=np.array([row.room for row in rows]).reshape(-1, 2),

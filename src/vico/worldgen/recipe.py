@@ -74,9 +74,10 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     site = _left(site, stages)
     height = run("grading", graded, bare, site, streets)
     site = _left(site, stages)
-    write.terrain(height, flat=evidence.samples is None and tiles is None)
     bridges = run("bridges", bridges_of, site, height, streets)
     site = _left(site, stages)
+    levels = stages.digested(replace(height, decks=bridges.levels()))
+    write.terrain(levels, flat=evidence.samples is None and tiles is None)
 
     if tiles is not None:
         plans, fits = run("fit", plans_on_tiles, plans, tiles, height)
@@ -84,9 +85,9 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     built = run("buildings", buildings_from_plans, plans, site.osm, height, seed=seed)
     solids = stages.digested([*built.standing(height), *bridges.feet])
 
-    ways = run("ways", streets_from_osm, site, solids)
+    ways = run("ways", streets_from_osm, site, solids, bridges.usable)
     roads = run("roads", roads_from_osm, site, ways)
-    lanes = write.streets(roads, run("network", road_network, site, ways))
+    lanes = write.streets(roads, run("network", road_network, site, ways, levels))
     feeds = list(evidence.feeds)
     mapped = run("transit", transit_from_osm, site, lanes, height, solids=solids, seed=seed, feeds=feeds)
     with stages.timed("waiting"):
@@ -134,7 +135,7 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
 
     models, credits = models_of(objects, installed=request.sources.installed_things)
     parts = WorldParts(
-        height=height,
+        height=levels,
         buildings=buildings,
         places=indoors.places,
         entrances=entrances,

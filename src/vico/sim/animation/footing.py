@@ -41,7 +41,7 @@ def ground_under_feet(
     place
         Feet, ENU metres, shape ``(n, 3)``, and headings, radians, shape ``(n,)``.
     height
-        Heights of the ground at points of shape ``(m, 2)``.
+        Heights of the ground, or of the deck that is nearest, at points of shape ``(m, 3)``.
 
     Returns
     -------
@@ -56,10 +56,11 @@ def ground_under_feet(
     ends = np.empty((len(people), 2, 2, 2, 2))  # foot; here, next; heel, ball; x, y
     _feet(numbers, np.ascontiguousarray(phase, np.float64), stride, people, ends)
     c, s = np.cos(yaw)[:, None, None, None], np.sin(yaw)[:, None, None, None]
-    points = np.empty_like(ends)
+    points = np.empty((*ends.shape[:-1], 3))
     points[..., 0] = c * ends[..., 0] - s * ends[..., 1] + position[:, 0, None, None, None]
     points[..., 1] = s * ends[..., 0] + c * ends[..., 1] + position[:, 1, None, None, None]
-    found = height(points.reshape(-1, 2)).reshape(points.shape[:-1]) - position[:, 2, None, None, None]
+    points[..., 2] = position[:, 2, None, None, None]
+    found = height(points.reshape(-1, 3)).reshape(points.shape[:-1]) - position[:, 2, None, None, None]
     rise, run = found[..., 1] - found[..., 0], ends[..., 1, 0] - ends[..., 0, 0]
     edge = np.abs(rise) > _EDGE * run
     behind = (_HEEL * people["heel_length"][:, None, None]) / run

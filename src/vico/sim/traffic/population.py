@@ -19,6 +19,7 @@ from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
 from vico.sim.traffic.crossings import mark_busy_crossings
 from vico.sim.traffic.jams import STUCK_AFTER, Jam, JamLog, entity_before
 from vico.sim.traffic.junction_rule import JunctionRule
+from vico.sim.traffic.levels import TrafficLevels
 from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.traffic.pedestrians import RADIUS, advance_pedestrians, place_pedestrian
 from vico.sim.traffic.route import count_per_street, drop_shut_plans, is_taken, widen_shut
@@ -128,11 +129,14 @@ class Traffic:
         self.shapes = self._new_shapes()
         self.signals = SignalClock(lanes, network.walks, seed) if junction_rule.has_signals else None
         self._heads = SignalHeads(lanes, network.walks, network.poles, height) if self.signals else None
+        self._levels = TrafficLevels(height, lanes, network.walks, self._heights, self.shapes.bottom.copy())
         self._street_load = np.zeros(len(lanes.edges), np.int32)
         self._entries = self._all_entries = network.entries
         self._place_buses(buses.starts)
         self._place_cars(seed, network.starts)
         self._place_pedestrians(seed)
+        far = np.full(len(self.shapes.x), _FAR)
+        self._follow_levels(far, far)
 
     # -- start -------------------------------------------------------------------------------------------------------
 
@@ -238,6 +242,7 @@ class Traffic:
         found |= {f"pedestrians.{field}": self._walkers[field] for field in PEDESTRIAN_RECORD.fields or ()}
         for name, part in (("junctions", self.junctions.arrays()), ("shapes", self.shapes._asdict())):
             found |= {f"{name}.{field}": array for field, array in part.items()}
+        found |= self._levels.arrays()
         return found | {f"jams.{name}": array for name, array in self.jams.arrays().items()}
 
     def bodies(self) -> Bodies:
@@ -251,7 +256,7 @@ class Traffic:
         return Bodies(
             entity=self._own_entities,
             kind=self._kinds,
-            position=np.column_stack([xy, self.height(xy)]),
+            position=np.column_stack([xy, self._levels.heights(xy)]),
             yaw=self.shapes.yaw.copy(),
             half_length=self.shapes.half_length,
             half_width=self.shapes.half_width,
@@ -328,7 +333,7 @@ class Traffic:
 
     def advance(self, dt: float, obstacles: Bodies) -> None:
         """Advance everybody by `dt` seconds; nobody touches anybody, `obstacles` (all other bodies) among them."""
-        mine, others = self.shapes, shapes_of(obstacles, self.height)
+        mine, others = self.shapes, shapes_of(obstacles, self._levels)
         everybody = Shapes(*(np.concatenate([getattr(mine, f), getattr(others, f)]) for f in Shapes._fields))
         net, fleet, junctions = self._net, self._vehicles, self.junctions
         mark_busy_crossings(net, fleet, junctions)
@@ -341,9 +346,17 @@ class Traffic:
         self._entities = np.concatenate([self._own_entities, obstacles.entity])
         self.jams.elapsed += dt
         self._bring_back(everybody)
+        before = mine.x.copy(), mine.y.copy()
         for field in ("x", "y", "yaw", "vx", "vy"):
             getattr(mine, field)[:] = getattr(everybody, field)[: len(mine.x)]
+        self._follow_levels(*before)
         self._bodies = None
+
+    def _follow_levels(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
+        """Take everybody along the decks they are on, from where they were before."""
+        fleet, walkers, shapes = self._vehicles, self._walkers, self.shapes
+        places = (fleet["lane"], fleet["offset"]), (walkers["walkway"], walkers["offset"])
+        self._levels.follow((x, y), np.column_stack([shapes.x, shapes.y]), *places, (shapes.bottom, shapes.top))
 
     def _bring_back(self, everybody: Shapes) -> None:
         """Bring cars back in that left the map, and vehicles that were stuck for too long; the latter are noted."""
@@ -352,6 +365,7 @@ class Traffic:
         where = [(float(everybody.x[v]), float(everybody.y[v])) for v in due.tolist()]
         stood, before = stopped[due], teleports[due]
         blockers = [self._before(v) for v in due.tolist()]
+        self._levels.clear(due, (everybody.bottom, everybody.top))
         bring_back(self._net, self._vehicles, self.junctions, everybody, self._entries, _ENTRY_SPEED, PATIENCE)
         for k in np.flatnonzero(teleports[due] > before).tolist():
             self.jams.note_rescue(int(due[k]), where[k], float(stood[k]), blockers[k])
@@ -387,7 +401,7 @@ class Traffic:
         half = self.fleet.wheelbase / 2
         along = np.column_stack([c, s]) * half[:, None]
         # On slopes a vehicle stands on its axles: pitch follows the ground between them.
-        front, back = self.height(xy + along), self.height(xy - along)
+        front, back = (self._levels.at(xy + side, slice(0, m)) for side in (along, -along))
         slope = (front - back) / (2 * half) if m else np.zeros(0)
         size = np.sqrt(1.0 + slope**2)
         transforms = np.zeros((m, 4, 4), np.float32)
@@ -426,9 +440,9 @@ class Traffic:
         return PedestrianGaits(walkers.preferred_speed.copy(), walked, walkers.gait_time.copy())
 
 
-def shapes_of(bodies: Bodies, ground: HeightField) -> Shapes:
-    """Return bodies as the kernels take them, their extents in height above the ground."""
-    bottom, top = bodies.levels(ground)
+def shapes_of(bodies: Bodies, levels: TrafficLevels) -> Shapes:
+    """Return bodies as the kernels take them, their extents in height as `levels` compares them."""
+    bottom, top = levels.extents_of(bodies)
     return Shapes(
         x=np.ascontiguousarray(bodies.position[:, 0]),
         y=np.ascontiguousarray(bodies.position[:, 1]),

@@ -1,7 +1,7 @@
 """Which ways pass above a street and can't share the ground's one height with it.
 
 A bridge over water, a railway or nothing mapped is the ground there. A bridge over a street is not: the street keeps
-the ground, the deck is drawn above it, and nobody drives or walks on the deck.
+the ground, and the deck above it is a surface of its own, which is used where it comes down to the ground.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from vico.geo.osm import OsmData, OsmWay
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.tags import is_bridge, level_of
 
-OVER_A_STREET = "a bridge over another street: the ground has one height, and the street below has it"
-"""Why a road that `overpasses` names is left out of the traffic."""
+OVER_A_STREET = "a bridge over another street that comes down to the ground nowhere, or too steeply"
+"""Why a road that `overpasses` names is left out of the traffic, if it is."""
 
 _THROUGH = {
     f"{kind}{link}"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import importlib.metadata
+import math
 import os
 import re
 import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -18,6 +19,7 @@ import numpy as np
 from vico.errors import MissingExtraError, VicoError
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData
+from vico.world.heights import HeightField
 from vico.world.model import FAILED
 from vico.worldgen.facts.expendable import leave_out
 from vico.worldgen.facts.site import SiteFacts
@@ -60,6 +62,7 @@ _OPTIONS = {
 }
 # netconvert needs under a second for 800 m of a dense city; this only ends a hang.
 _LIMIT_SECONDS = 60
+_ABOVE_ALL, _PROFILE = 1e5, 10.0  # metres; between points of lanes on decks
 # So many streets may be left out because netconvert refuses them.
 _MOST_REFUSED = 3
 
@@ -99,7 +102,7 @@ def netconvert_binary() -> Path:
     )
 
 
-def road_network(site: SiteFacts, streets: Sequence[NetworkStreet]) -> RoadNetwork:
+def road_network(site: SiteFacts, streets: Sequence[NetworkStreet], height: HeightField | None = None) -> RoadNetwork:
     """Build the lane-level network of a window: lanes, junctions, sidewalks, crossings, signals.
 
     Parameters
@@ -108,6 +111,8 @@ def road_network(site: SiteFacts, streets: Sequence[NetworkStreet]) -> RoadNetwo
         The map and its facts; every street ends at the edge of its window.
     streets
         `streets_from_osm` of the same site.
+    height
+        The ground and the decks above it: lanes and walkways lie on them; without it all is flat.
 
     Returns
     -------
@@ -129,28 +134,30 @@ def road_network(site: SiteFacts, streets: Sequence[NetworkStreet]) -> RoadNetwo
     binary = netconvert_binary()
     for _ in range(_MOST_REFUSED):
         try:
-            return _converted(binary, site, used)
+            return _converted(binary, site, used, height)
         except NetconvertError as error:
-            culprit = _culprit(binary, site, used)
+            culprit = _culprit(binary, site, used, height)
             leave_out(f"w{culprit}", f"{FAILED}: {error}")
             used = [street for street in used if street.way != culprit]
-    return _converted(binary, site, used) if used else empty_network(osm.frame, osm.half)
+    return _converted(binary, site, used, height) if used else empty_network(osm.frame, osm.half)
 
 
-def _culprit(binary: Path, site: SiteFacts, streets: Sequence[NetworkStreet]) -> int:
+def _culprit(binary: Path, site: SiteFacts, streets: Sequence[NetworkStreet], height: HeightField | None) -> int:
     """Return the way with which streets that are converted together begin to fail, by halving: the list fails whole."""
     good, bad = 0, len(streets)
     while bad - good > 1:
         middle = (good + bad) // 2
         try:
-            _converted(binary, site, streets[:middle])
+            _converted(binary, site, streets[:middle], height)
             good = middle
         except NetconvertError:
             bad = middle
     return streets[bad - 1].way
 
 
-def _converted(binary: Path, site: SiteFacts, streets: Sequence[NetworkStreet]) -> RoadNetwork:
+def _converted(
+    binary: Path, site: SiteFacts, streets: Sequence[NetworkStreet], height: HeightField | None = None
+) -> RoadNetwork:
     """Run netconvert.
 
     Raises
@@ -161,12 +168,12 @@ def _converted(binary: Path, site: SiteFacts, streets: Sequence[NetworkStreet]) 
     osm = site.osm
     with tempfile.TemporaryDirectory(prefix="vico-roads-") as folder:
         work = Path(folder)
-        (work / "streets.osm").write_text(_osm_xml(osm, streets), encoding="utf-8")
+        (work / "streets.osm").write_text(_osm_xml(osm, streets, height), encoding="utf-8")
         (work / "types.xml").write_text(_types_xml(), encoding="utf-8")
         command = [
             str(binary), "--osm-files", "streets.osm", "--type-files", "types.xml", "--proj", osm.frame.proj4,
             "--output-file", "net.xml", "--opendrive-output", "roads.xodr", 
-            "--lefthand", str(site.left_driving).lower(),
+            "--lefthand", str(site.left_driving).lower(), "--osm.elevation", str(height is not None).lower(),
             *[part for key, value in _OPTIONS.items() for part in (f"--{key}", value)],
         ]  # fmt: skip
         environment = {"PATH": os.environ.get("PATH", ""), "LC_ALL": "C", "SUMO_HOME": str(binary.parent.parent)}
@@ -183,7 +190,8 @@ def _converted(binary: Path, site: SiteFacts, streets: Sequence[NetworkStreet]) 
             raise NetconvertError(
                 f"road network: netconvert gave no network ({said[0]}); exit status {done.returncode}"
             )
-        return RoadNetwork(_plain_net(net.read_bytes()), _plain_xodr(xodr.read_bytes()))
+        plain = _plain_net(net.read_bytes())
+        return RoadNetwork(plain if height is None else _laid(plain, height), _plain_xodr(xodr.read_bytes()))
 
 
 def empty_network(frame: LocalFrame, half: float) -> RoadNetwork:
@@ -221,6 +229,29 @@ east="{half:.3f}" west="{-half:.3f}">
 def _plain_net(content: bytes) -> bytes:
     """Without the comment that holds the time of generation, the paths and the options."""
     return re.sub(rb"<!--.*?-->\s*", b"", content, flags=re.DOTALL)
+
+
+_SHAPE = re.compile(rb'(<lane [^>]*? shape=")([^"]*)(")')
+
+
+def _laid(content: bytes, height: HeightField) -> bytes:
+    """Put every point of the lanes on the surface it is nearest to.
+
+    netconvert knows heights at the nodes of the map alone. Between them the ground is not straight, but it is clear
+    which of several surfaces above each other is meant.
+    """
+    shapes = [
+        np.array([[*map(float, point.split(b",")), 0.0][:3] for point in found.group(2).split()])
+        for found in _SHAPE.finditer(content)
+    ]
+    if not shapes:
+        return content
+    points = np.concatenate(shapes)
+    rows = iter(
+        [f"{x:.3f},{y:.3f},{z:.2f}" for (x, y, _), z in zip(points.tolist(), height.near(points).tolist(), strict=True)]
+    )
+    texts = iter([" ".join(next(rows) for _ in shape).encode() for shape in shapes])
+    return _SHAPE.sub(lambda found: found.group(1) + next(texts) + found.group(3), content)
 
 
 def _plain_xodr(content: bytes) -> bytes:
@@ -267,8 +298,30 @@ def _way_tags(street: NetworkStreet) -> dict[str, str]:
     return tags
 
 
-def _osm_xml(osm: OsmData, streets: Sequence[NetworkStreet]) -> str:
-    """Write an OSM file of just these streets."""
+def _levels(points: np.ndarray, on_deck: np.ndarray, height: HeightField | None) -> np.ndarray:
+    """Return how high nodes lie, metres: those of decks on the highest surface there is, the others on the ground."""
+    if height is None:
+        return np.zeros(len(points))
+    ground = height(points)
+    return np.where(on_deck, height.near(np.c_[points, np.where(on_deck, _ABOVE_ALL, ground)]), ground)
+
+
+def _with_profile(street: NetworkStreet, number: int) -> NetworkStreet:
+    """Return a street with more nodes, so that its lanes can follow the profile of the deck it lies on."""
+    nodes, points = [street.nodes[0]], [street.line[0]]
+    for k in range(1, len(street.nodes)):
+        run = street.line[k] - street.line[k - 1]
+        count = math.ceil(float(np.hypot(*run)) / _PROFILE)
+        for step in range(1, count):
+            nodes.append(2 * 10**15 + number * 10**6 + len(nodes))
+            points.append(street.line[k - 1] + run * (step / count))
+        nodes.append(street.nodes[k])
+        points.append(street.line[k])
+    return replace(street, nodes=nodes, line=np.array(points))
+
+
+def _osm_xml(osm: OsmData, streets: Sequence[NetworkStreet], height: HeightField | None) -> str:
+    """Write an OSM file of just these streets, their nodes with their heights where those are known."""
 
     # Parts of a cut way and the edge's new nodes need ids of their own; OSM's end far below these.
     def way_id(street: NetworkStreet) -> int:
@@ -277,16 +330,22 @@ def _osm_xml(osm: OsmData, streets: Sequence[NetworkStreet]) -> str:
     def node_id(node: int) -> int:
         return node if node > 0 else 10**15 - node
 
+    streets = [_with_profile(street, k) if street.deck else street for k, street in enumerate(streets)]
     points: dict[int, np.ndarray] = {}
+    decks: set[int] = set()
     for street in streets:
         for node, xy in zip(street.nodes, street.line, strict=True):
             points.setdefault(node_id(node), xy)
+        if street.deck:
+            decks.update(node_id(node) for node in street.nodes)
     signals = {n.id for n in osm.nodes if n.tags.get("highway") == "traffic_signals"}
     ids = sorted(points)
     lat, lon = osm.frame.to_geodetic(np.array([points[i] for i in ids]))
     rows = ['<?xml version="1.0" encoding="UTF-8"?>', '<osm version="0.6">']
-    for i, y, x in zip(ids, lat, lon, strict=True):
+    levels = _levels(np.array([points[i] for i in ids]), np.array([i in decks for i in ids]), height)
+    for i, y, x, z in zip(ids, lat, lon, levels, strict=True):
         tag = '<tag k="highway" v="traffic_signals"/>' if i in signals else ""
+        tag += "" if height is None else f'<tag k="ele" v="{z:.2f}"/>'
         rows.append(f'<node id="{i}" lat="{y:.9f}" lon="{x:.9f}">{tag}</node>')
     for street in sorted(streets, key=way_id):
         refs = "".join(f'<nd ref="{node_id(n)}"/>' for n in street.nodes)

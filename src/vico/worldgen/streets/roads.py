@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter, defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -70,6 +70,8 @@ class NetworkStreet:
     closed
         Why neither traffic nor walkers use it; None for the rest. A way under a roof or through a house
         (`covered`, `tunnel=building_passage`) lies on the ground and is open, unless the house as built stands across.
+    deck
+        Whether it lies on a deck above another street.
     """
 
     way: int
@@ -87,6 +89,7 @@ class NetworkStreet:
     layer: int
     tags: dict[str, str]
     closed: str | None = None
+    deck: bool = False
 
     @property
     def drivable(self) -> bool:
@@ -224,7 +227,9 @@ def _crossing(inner: NDArray[np.float64], outer: NDArray[np.float64], half: floa
     return np.asarray(inner + step * float(shares.min()))
 
 
-def streets_from_osm(site: SiteFacts, solids: Sequence[BaseGeometry] = ()) -> list[NetworkStreet]:
+def streets_from_osm(
+    site: SiteFacts, solids: Sequence[BaseGeometry] = (), usable: Set[int] = frozenset()
+) -> list[NetworkStreet]:
     """Return the streets and walkways of a window, cut at its edge.
 
     Parameters
@@ -233,6 +238,8 @@ def streets_from_osm(site: SiteFacts, solids: Sequence[BaseGeometry] = ()) -> li
         The map and its facts.
     solids
         What stands on the ground, metres.
+    usable
+        Ids of the ways above others whose decks can be used: those are open.
 
     Returns
     -------
@@ -247,7 +254,8 @@ def streets_from_osm(site: SiteFacts, solids: Sequence[BaseGeometry] = ()) -> li
             continue
         pieces, new_id = _cut(way, site.osm.half, new_id)
         with expendable(f"w{way.id}"):
-            streets += _parts(way, pieces, site, standing)
+            found = _parts(way, pieces, site, standing)
+            streets += [replace(s, deck=True, closed=None) if way.id in usable else s for s in found]
     return _medians_cleared(streets, lefthand=site.left_driving)
 
 
@@ -302,7 +310,7 @@ def _medians_cleared(streets: list[NetworkStreet], *, lefthand: bool) -> list[Ne
 
 
 def is_traffic_street(street: NetworkStreet) -> bool:
-    """Whether public traffic uses a street at ground level: what the road network is made of."""
+    """Whether public traffic uses a street: what the road network is made of."""
     if not street.drivable or street.access == "private" or street.closed is not None:
         return False
     if street.kind == "service":

@@ -21,6 +21,7 @@ from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import StreetPolygons, carriageway_width
 from vico.worldgen.facts.tags import is_bridge, number, on_the_ground
 from vico.worldgen.ground.grading import raised, ramp_slope
+from vico.worldgen.ground.kerbs import KERB
 from vico.worldgen.ground.profiles import Network
 
 Floats = NDArray[np.float64]
@@ -28,6 +29,7 @@ Floats = NDArray[np.float64]
 _SPACING = 3.0
 _ABREAST = 2.5  # metres between decks that lie as high as each other
 _PIER_EVERY = 22.0
+_KERBED_END, _TAPER = 3.5, 8.0  # metres: a street's kerbs go on under a deck, and run out where it has none
 FILLED = 2.6
 """Metres: a ramp lower than this is an embankment between walls."""
 
@@ -122,8 +124,24 @@ def decks_of(site: SiteFacts, terrain: HeightField) -> list[Deck]:
         if len(row) > 1:
             slab = SLAB_ON_FOOT if way.tags.get("highway") in ON_FOOT else SLAB
             ends = (times[int(row[0])] == 1, times[int(row[-1])] == 1)
-            decks.append(Deck(way, network.points[row], found[row], deck_width(way), slab, ends))
+            z = found[row]
+            if "highway" in way.tags and way.tags["highway"] != "steps":
+                z = _kerbed(network.points[row], z, ground[row], ends, terrain)
+            decks.append(Deck(way, network.points[row], z, deck_width(way), slab, ends))
     return decks
+
+
+def _kerbed(line: Floats, z: Floats, ground: Floats, ends: tuple[bool, bool], terrain: HeightField) -> Floats:
+    """Lower the middle of a deck by a kerb, as the street's is that leads onto it, pavements staying as high."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    drop = np.full(len(line), KERB)
+    within = np.ones(len(line), bool)
+    for end, away, k in ((ends[0], along, 0), (ends[1], along[-1] - along, -1)):
+        within &= away > _KERBED_END
+        if end and float(terrain.smooth(line[k]) - terrain(line[k])) < KERB / 2:
+            drop = np.minimum(drop, KERB * away / _TAPER)
+    lowered = z - drop
+    return np.where(within, np.maximum(lowered, ground + 0.02), lowered)
 
 
 def kept_clear(osm: OsmData, streets: StreetPolygons) -> BaseGeometry:

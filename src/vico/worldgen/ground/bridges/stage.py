@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from shapely import Polygon
 
+from vico.world.decks import Decks
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.worldgen.facts.site import SiteFacts
@@ -13,6 +14,7 @@ from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.ground.bridges.decks import Deck, decks_of, kept_clear, pier_feet
 from vico.worldgen.ground.bridges.portals import Portal, portal_feet, portal_surfaces, portals_of
 from vico.worldgen.ground.bridges.surfaces import bridge_surfaces
+from vico.worldgen.ground.bridges.usable import deck_surfaces, usable_decks
 
 
 @dataclass(frozen=True)
@@ -27,11 +29,18 @@ class Bridges:
         Mouths of tunnels.
     feet
         Where piers and mouths stand, for those who must not walk through them, metres.
+    usable
+        Ids of the ways whose decks can be driven or walked on.
     """
 
     decks: list[Deck]
     portals: list[Portal]
     feet: list[Polygon]
+    usable: frozenset[int] = frozenset()
+
+    def levels(self) -> Decks | None:
+        """Return the decks that can be used as surfaces of the world; None if there are none."""
+        return deck_surfaces(self.decks, self.usable)
 
     def surfaces(
         self, site: SiteFacts, terrain: HeightField, streets: StreetPolygons, window: Polygon
@@ -48,4 +57,4 @@ def bridges_of(site: SiteFacts, terrain: HeightField, streets: StreetPolygons) -
     decks = decks_of(site, terrain)
     portals = portals_of(site.osm, streets)
     feet = [*pier_feet(decks, terrain, kept_clear(site.osm, streets)), *portal_feet(portals)]
-    return Bridges(decks, portals, feet)
+    return Bridges(decks, portals, feet, usable_decks(site, decks, terrain))

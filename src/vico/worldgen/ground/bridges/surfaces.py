@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -13,7 +14,7 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
-from vico.geo.osm import OsmWay
+from vico.geo.osm import OsmWay, polygons_of
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface, joined
 from vico.worldgen.facts.expendable import expendable
@@ -23,6 +24,7 @@ from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.facts.tags import is_bridge, on_the_ground
 from vico.worldgen.ground.bridges.decks import FILLED, Deck, deck_walk, deck_width, kept_clear, left_normals, pier_boxes
 from vico.worldgen.ground.bridges.masonry import PARAPET, Masonry
+from vico.worldgen.ground.drape import triangulated
 from vico.worldgen.ground.kerbs import KERB
 from vico.worldgen.ground.stairs import RISE
 
@@ -44,7 +46,7 @@ def bridge_surfaces(
     for own, deck in enumerate(decks):
         with expendable(f"w{deck.way.id}"):
             drawn = Masonry()
-            _draw_deck(drawn, deck, terrain, window, keep_clear, partial(beside.reaches, own))
+            _draw_deck(drawn, deck, terrain, window, keep_clear, beside, own)
             stone.take(drawn)
     _draw_rails(stone, site, terrain, window)
     return joined(stone.surfaces())
@@ -80,6 +82,26 @@ class _Beside:
                 return True
         return False
 
+    def driven_beside(self, own: int) -> BaseGeometry:
+        """Return the carriageways of other decks that meet a deck at its height, metres."""
+        mine = self.decks[own]
+        found = []
+        for k in np.sort(self.tree.query(self.tree.geometries[own], predicate="dwithin", distance=_WIDEST)).tolist():
+            deck = self.decks[k]
+            if k == own or "highway" not in deck.way.tags or _on_foot(deck.way.tags):
+                continue
+            apart = np.hypot(*(mine.line[:, None] - deck.line[None]).transpose(2, 0, 1))
+            i, j = np.unravel_index(int(apart.argmin()), apart.shape)
+            if abs(float(mine.z[i] - deck.z[j])) < _STEP_BETWEEN:
+                found.append(overlay.mended(_driven(deck)))
+        return overlay.union_all(found)
+
+
+def _driven(deck: Deck) -> Polygon:
+    """Return where a deck's carriageway lies, metres."""
+    side = left_normals(deck.line) * (deck.width / 2 - deck_walk(deck.way.tags))
+    return Polygon(np.concatenate([deck.line + side, (deck.line - side)[::-1]]))
+
 
 def _draw_deck(
     stone: Masonry,
@@ -87,9 +109,12 @@ def _draw_deck(
     terrain: HeightField,
     window: Polygon,
     keep_clear: BaseGeometry,
-    beside: Callable[[Floats, Floats], bool],
+    decks: _Beside,
+    own: int,
 ) -> None:
     line, z = deck.line, deck.z
+    beside = partial(decks.reaches, own)
+    driven = decks.driven_beside(own)
     left = left_normals(line)
     tags = deck.way.tags
     top = "sidewalk" if tags.get("highway") in ON_FOOT else "ballast" if "highway" not in tags else "carriageway"
@@ -106,7 +131,7 @@ def _draw_deck(
         if stairs:
             _treads(stone, ra, rb, lb, la)
         elif top == "carriageway":
-            _road_top(stone, deck, (k, m), left)
+            _road_top(stone, deck, (k, m), left, driven)
         else:
             up = np.array([0.0, 0.0, KERB if top == "sidewalk" else 0.0])
             stone.add([ra + up, rb + up, lb + up, la + up], top)
@@ -131,8 +156,11 @@ def _draw_deck(
     _piers(stone, deck, left, terrain, keep_clear, reach)
 
 
-def _road_top(stone: Masonry, deck: Deck, ends: tuple[int, int], left: Floats) -> None:
-    """Build the carriageway of a piece of a deck between its raised pavements, or between ledges where it has none."""
+def _road_top(stone: Masonry, deck: Deck, ends: tuple[int, int], left: Floats, driven: BaseGeometry) -> None:
+    """Build the carriageway of a piece of a deck between its raised pavements, or between ledges where it has none.
+
+    Where other decks are `driven` on there is neither.
+    """
     k, m = ends
     walk = deck_walk(deck.way.tags)
     look = "sidewalk" if walk > 1.0 else "kerb"
@@ -145,9 +173,32 @@ def _road_top(stone: Masonry, deck: Deck, ends: tuple[int, int], left: Floats) -
     stone.add([at[k, -inner], at[m, -inner], at[m, inner], at[k, inner]], "carriageway")
     up = np.array([0.0, 0.0, KERB])
     for right, far in ((-deck.width / 2, -inner), (inner, deck.width / 2)):
-        stone.add([at[k, right] + up, at[m, right] + up, at[m, far] + up, at[k, far] + up], look)
-    stone.add([at[m, -inner], at[k, -inner], at[k, -inner] + up, at[m, -inner] + up], "kerb")
-    stone.add([at[k, inner], at[m, inner], at[m, inner] + up, at[k, inner] + up], "kerb")
+        corners = [at[k, right], at[m, right], at[m, far], at[k, far]]
+        kerb = [corners[2], corners[3]] if right < 0.0 else corners[:2]
+        if driven.intersects(Polygon([corner[:2] for corner in corners])):
+            _cut_pavement(stone, corners, driven, look)
+            continue
+        stone.add([corner + up for corner in corners], look)
+        stone.add([*kerb, kerb[1] + up, kerb[0] + up], "kerb")
+
+
+def _cut_pavement(stone: Masonry, corners: Sequence[Floats], driven: BaseGeometry, look: str) -> None:
+    """Build what is left of a raised quadrilateral beside what is `driven` on, with the faces of all its edges."""
+    start, end = corners[0], corners[1]
+    run = end[:2] - start[:2]
+
+    def lifted(xy: Floats, by: float) -> Floats:
+        share = np.clip((np.asarray(xy)[:2] - start[:2]) @ run / max(float(run @ run), 1e-9), 0.0, 1.0)
+        return np.r_[np.asarray(xy)[:2], start[2] + share * (end[2] - start[2]) + by]
+
+    left = overlay.difference(Polygon([corner[:2] for corner in corners]), driven)
+    for shape in polygons_of(left, 0.02):
+        flat, faces = triangulated([shape])
+        for a, b, c in flat[faces]:
+            stone.add([lifted(a, KERB), lifted(b, KERB), lifted(c, KERB), lifted(c, KERB)], look)
+        ring = np.asarray(shapely.geometry.polygon.orient(shape).exterior.coords)
+        for a, b in pairwise(ring):
+            stone.add([lifted(a, 0.0), lifted(b, 0.0), lifted(b, KERB), lifted(a, KERB)], "kerb")
 
 
 def _on_foot(tags: dict[str, str]) -> bool:

@@ -1,0 +1,168 @@
+"""Where traffic is on two levels: how high everybody is, and who is in whose way above and below decks.
+
+A body stays on the surface it came by, so its height is part of the state where a world has decks. Kernels compare
+extents in height that tell levels apart, but not the ups and downs of one street: whoever is on the ground has the
+extent above it; whoever is high on a deck is above all that passes below; and whoever is where the ground goes over
+into a deck, or on a street that leads onto one, is on both.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.sim.bodies import Bodies
+from vico.world.heights import HeightField
+from vico.world.lanes import LaneGraph
+from vico.world.walkways import Walkways
+
+_ABOVE_ALL = 1e5  # metres
+_OFF = 0.05  # metres from the ground at which somebody is on another surface
+_APART = 3.3  # metres above the ground from which on a deck lets pass whatever drives below it
+_REACH = 12.0  # metres: as high as extents on a deck reach
+_APPROACH = 60.0  # metres before a deck, and after it, where lanes and walkways count as part of both levels
+_JUMP = 5.0  # metres: who is so far away after a step was put there
+
+Floats = NDArray[np.float64]
+
+
+class TrafficLevels:
+    """Heights and extents of traffic's bodies, vehicles before pedestrians.
+
+    Parameters
+    ----------
+    height
+        The ground and its decks.
+    lanes, walks
+        Where traffic moves.
+    heights
+        Of the bodies, metres, shape ``(n,)``.
+    bottoms
+        How far above what it stands on each body begins, metres, shape ``(n,)``.
+    """
+
+    def __init__(
+        self, height: HeightField, lanes: LaneGraph, walks: Walkways, heights: Floats, bottoms: Floats
+    ) -> None:
+        self._height, self._lanes, self._walks = height, lanes, walks
+        self._heights, self._bottoms = heights, bottoms
+        self.any = height.decks is not None
+        self.z = np.zeros(len(heights) if self.any else 0)
+        if self.any:
+            self._lane_leads = _leads(
+                _raised(height, lanes), lanes.length, np.repeat(np.arange(len(lanes)), np.diff(lanes.next_first)),
+                lanes.next,
+            )  # fmt: skip
+            pairs = _meetings(walks)
+            self._walk_leads = _leads(_raised(height, walks), walks.length, pairs[:, 0], pairs[:, 1])
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return how high everybody is, where a world has decks: part of the state."""
+        return {"levels.z": self.z} if self.any else {}
+
+    def heights(self, xy: Floats) -> Floats:
+        """Return how high bodies at their places are, metres, shape ``(n,)``."""
+        return self._height.near(np.c_[xy, self.z]) if self.any else self._height(xy)
+
+    def at(self, xy: Floats, who: slice) -> Floats:
+        """Return how high points near some bodies are, metres: of the surface those are on."""
+        return self._height.near(np.c_[xy, self.z[who]]) if self.any else self._height(xy)
+
+    def follow(
+        self,
+        before: tuple[Floats, Floats],
+        xy: Floats,
+        lane: tuple[NDArray[Any], NDArray[Any]],
+        walkway: tuple[NDArray[Any], NDArray[Any]],
+        extents: tuple[Floats, Floats],
+    ) -> None:
+        """Take everybody along the surface they are on, and write their extents.
+
+        Parameters
+        ----------
+        before
+            x and y before the step, metres, shape ``(n,)``.
+        xy
+            Now, metres, shape ``(n, 2)``.
+        lane, walkway
+            Where vehicles and pedestrians are: lanes and offsets, walkways and offsets.
+        extents
+            `bottom` and `top` to write, metres, shape ``(n,)``.
+        """
+        if not self.any:
+            return
+        vehicles = len(lane[0])
+        jumped = np.hypot(xy[:, 0] - before[0], xy[:, 1] - before[1]) > _JUMP
+        for k in np.flatnonzero(jumped).tolist():
+            graph, (row, offset), i = (self._lanes, lane, k) if k < vehicles else (self._walks, walkway, k - vehicles)
+            self.z[k] = _height_on(graph, int(row[i]), float(offset[i]))
+        self.z[:] = self._height.near(np.c_[xy, self.z])
+        leads = np.concatenate([self._lane_leads[lane[0]], self._walk_leads[walkway[0]]])
+        extents[0][:], extents[1][:] = self._extents(xy, self.z, self._bottoms, self._heights, leads)
+
+    def extents_of(self, bodies: Bodies) -> tuple[Floats, Floats]:
+        """Return the extents of other bodies as kernels compare them, metres."""
+        bottom, top = bodies.levels(self._height)
+        if not self.any or not len(bodies):
+            return bottom, top
+        # Who stands is seen from both levels wherever it is not below a deck.
+        leads = bottom < _APART
+        position = bodies.position
+        surface = self._height.near(position)
+        return self._extents(position[:, :2], surface, bottom, top, leads)
+
+    def clear(self, who: NDArray[np.int64], extents: tuple[Floats, Floats]) -> None:
+        """Have some count as on every level: those that are put elsewhere in a step."""
+        if self.any:
+            extents[0][who], extents[1][who] = 0.0, _REACH
+
+    def _extents(
+        self, xy: Floats, z: Floats, bottom: Floats, top: Floats, leads: NDArray[np.bool_]
+    ) -> tuple[Floats, Floats]:
+        ground = self._height(xy)
+        above = self._height.near(np.c_[xy, np.full(len(xy), _ABOVE_ALL)]) > ground + _OFF
+        rise = z - ground
+        on_deck = rise > _OFF
+        high = on_deck & (rise >= _APART)
+        both = (on_deck & ~high) | (~on_deck & leads & ~above)
+        return np.where(high, _APART, bottom), np.where(high | both, np.maximum(_REACH, top), top)
+
+
+def _raised(height: HeightField, graph: LaneGraph | Walkways) -> NDArray[np.bool_]:
+    """Return which lanes or walkways leave the ground somewhere."""
+    off = np.abs(graph.z - height(graph.points)) > 1.0
+    rows = np.repeat(np.arange(len(graph)), np.diff(graph.first))
+    return np.bincount(rows, weights=off, minlength=len(graph)) > 0
+
+
+def _meetings(walks: Walkways) -> NDArray[np.int64]:
+    """Return the pairs of walkways that meet, shape ``(k, 2)``."""
+    pairs = [
+        (a, b)
+        for k in range(len(walks.meeting_first) - 1)
+        for a in walks.meeting[walks.meeting_first[k] : walks.meeting_first[k + 1]].tolist()
+        for b in walks.meeting[walks.meeting_first[k] : walks.meeting_first[k + 1]].tolist()
+        if a != b
+    ]
+    return np.array(pairs, np.int64).reshape(-1, 2)
+
+
+def _leads(raised: NDArray[np.bool_], length: Floats, start: NDArray[Any], end: NDArray[Any]) -> NDArray[np.bool_]:
+    """Return which lanes or walkways are raised, or lead to such in less than `_APPROACH` metres, or away from them."""
+    ahead, behind = np.where(raised, 0.0, np.inf), np.where(raised, 0.0, np.inf)
+    for _ in range(32):
+        before = ahead.copy(), behind.copy()
+        # Of the metres to a raised one, those of the ones between count.
+        np.minimum.at(ahead, start, before[0][end] + np.where(raised[end], 0.0, length[end]))
+        np.minimum.at(behind, end, before[1][start] + np.where(raised[start], 0.0, length[start]))
+        if np.array_equal(ahead, before[0]) and np.array_equal(behind, before[1]):
+            break
+    return np.minimum(ahead, behind) < _APPROACH
+
+
+def _height_on(graph: LaneGraph | Walkways, row: int, offset: float) -> float:
+    """Return how high a lane or walkway is, metres along it."""
+    own = slice(int(graph.first[row]), int(graph.first[row + 1]))
+    return float(np.interp(offset, graph.along[own], graph.z[own]))

@@ -1,0 +1,121 @@
+"""Surfaces above and below the ground that people and vehicles use: decks of bridges over streets, tunnels.
+
+The ground has one height at a point. Where a bridge passes over a street, or a tunnel under a hill, there is a second
+surface, and a body is on whichever is nearest to it in height: so it stays on the one it came by.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.io.compiled import compiled
+
+HEADROOM = 2.0
+"""Metres between the ground and a deck above it under which nobody can be: there the deck is all there is."""
+
+_ENDS = 0.5  # metres that a deck goes on beyond its ends, so that no gap is left in bends and at joints
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Decks:
+    """Strips with heights of their own.
+
+    Attributes
+    ----------
+    first, points
+        Strip ``i``'s middle is ``points[first[i]:first[i + 1]]``, ENU metres, float64, shape ``(p, 3)``.
+    half_width
+        From the middle to the edge, metres, shape ``(n,)``.
+    pavement, rise
+        How far from the middle the raised pavements begin, and how high they lie above the middle, metres, shape
+        ``(n,)``.
+    """
+
+    first: NDArray[np.int64]
+    points: Floats
+    half_width: Floats
+    pavement: Floats
+    rise: Floats
+
+    def __len__(self) -> int:
+        return len(self.half_width)
+
+    @classmethod
+    def of(cls, strips: Sequence[tuple[Floats, float, float, float]]) -> Decks:
+        """Make them of strips: points ``(k, 3)``, half the width, where pavements begin, and how high they lie."""
+        first = np.zeros(len(strips) + 1, np.int64)
+        first[1:] = np.cumsum([len(points) for points, *_ in strips])
+        sizes = np.array([rest for _, *rest in strips], np.float64).reshape(-1, 3)
+        points = np.concatenate([np.zeros((0, 3)), *(np.asarray(points, np.float64) for points, *_ in strips)])
+        return cls(first, points, *(np.ascontiguousarray(column) for column in sizes.T))
+
+    @cached_property
+    def box(self) -> Floats:
+        """West, south, east and north of all strips, metres."""
+        reach = float(self.half_width.max(initial=0.0)) + _ENDS
+        return np.concatenate([self.points[:, :2].min(axis=0) - reach, self.points[:, :2].max(axis=0) + reach])
+
+    def heights(self, points: Floats, ground: Floats) -> None:
+        """Replace heights of the ground (`ground`, metres) by those of the surfaces nearest to points, ``(n, 3)``."""
+        strips = self.first, self.points, self.half_width, self.pavement, self.rise, self.box
+        _nearest_surface(strips, np.ascontiguousarray(points, np.float64), ground)
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return them as named arrays, for a file."""
+        return {f"deck_{name}": getattr(self, name) for name in self.__dataclass_fields__}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> Decks | None:
+        """Return the decks of `arrays`, None if there are none; ValueError or KeyError where they make none."""
+        if "deck_first" not in arrays:
+            return None
+        first = np.ascontiguousarray(arrays["deck_first"], np.int64)
+        points, *sizes = (
+            np.ascontiguousarray(arrays[f"deck_{name}"], np.float64) for name in tuple(cls.__dataclass_fields__)[1:]
+        )
+        counts = np.diff(first)
+        if points.ndim != 2 or points.shape[1] != 3 or first[0] != 0 or first[-1] != len(points) or (counts < 2).any():
+            raise ValueError(f"decks of {len(points)} points, shape {points.shape}, cut at {first.tolist()}")
+        if any(size.shape != counts.shape for size in sizes):
+            raise ValueError(f"decks: {len(counts)} strips with sizes of shapes {[size.shape for size in sizes]}")
+        return cls(first, points, *sizes)
+
+
+@compiled
+def _nearest_surface(strips, places, ground):  # type: ignore[no-untyped-def]
+    """Replace `ground` by the height of the strip nearest to each place, where one is nearer."""
+    first, points, half_width, pavement, rise, box = strips
+    for k in range(len(places)):
+        px, py, pz = places[k, 0], places[k, 1], places[k, 2]
+        if px < box[0] or py < box[1] or px > box[2] or py > box[3]:
+            continue
+        best, low = ground[k], ground[k]
+        found = abs(pz - best)
+        for s in range(len(half_width)):
+            for m in range(first[s], first[s + 1] - 1):
+                ax, ay = points[m, 0], points[m, 1]
+                dx, dy = points[m + 1, 0] - ax, points[m + 1, 1] - ay
+                length = np.sqrt(dx * dx + dy * dy)
+                if length < 1e-6:
+                    continue
+                along = ((px - ax) * dx + (py - ay) * dy) / length
+                across = abs((px - ax) * dy - (py - ay) * dx) / length
+                if across > half_width[s] or along < -_ENDS or along > length + _ENDS:
+                    continue
+                t = min(max(along / length, 0.0), 1.0)
+                height = points[m, 2] + t * (points[m + 1, 2] - points[m, 2])
+                if across > pavement[s]:
+                    height += rise[s]
+                # Nobody is between the ground and a deck that lies low above it.
+                away = 0.0 if 0.0 <= height - low < HEADROOM and pz < height else abs(pz - height)
+                if away < found or (away == found and height > best):
+                    best, found = height, away
+        ground[k] = best
