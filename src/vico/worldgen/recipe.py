@@ -89,7 +89,7 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     roads = run("roads", roads_from_osm, site, ways)
     lanes = write.streets(roads, run("network", road_network, site, ways, levels))
     feeds = list(evidence.feeds)
-    mapped = run("transit", transit_from_osm, site, lanes, height, solids=solids, seed=seed, feeds=feeds)
+    mapped = run("transit", transit_from_osm, site, lanes, levels, solids=solids, seed=seed, feeds=feeds)
     with stages.timed("waiting"):
         transit = waiting_places(mapped, streets, lanes, height, solids)
     write.transit(transit)

@@ -30,6 +30,7 @@ from vico.worldgen.streets.roads import (
     NetworkStreet,
     is_traffic_street,
 )
+from vico.worldgen.streets.smoothing import without_kinks
 
 _NO_RAIL = (
     "rail rail_urban rail_electric rail_fast tram drone aircraft scooter container wheelchair subway cable_car ship"
@@ -190,7 +191,7 @@ def _converted(
             raise NetconvertError(
                 f"road network: netconvert gave no network ({said[0]}); exit status {done.returncode}"
             )
-        plain = _plain_net(net.read_bytes())
+        plain = without_kinks(_plain_net(net.read_bytes()))
         return RoadNetwork(plain if height is None else _laid(plain, height), _plain_xodr(xodr.read_bytes()))
 
 

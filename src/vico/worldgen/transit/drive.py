@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 
 BUS_LENGTH = 12.0
@@ -39,17 +40,22 @@ class Berth:
 class Kerbs:
     """Lanes along a kerb, long enough for a bus to stand clear of both junctions, from where one can come back.
 
+    Lanes on decks above other streets are none: who waits for a bus stands on the ground.
+
     Attributes
     ----------
     numbers
         The lanes.
     """
 
-    def __init__(self, lanes: LaneGraph) -> None:
+    def __init__(self, lanes: LaneGraph, height: HeightField) -> None:
         self.lanes = lanes
         round_metres = np.bincount(lanes.component, weights=lanes.length, minlength=1)
         goes_round = round_metres[lanes.component] > _LEAST_ROUND
         usable = (lanes.inside < 0) & (lanes.right < 0) & (lanes.length > BUS_LENGTH + 8.0) & goes_round
+        if height.decks is not None:
+            off = np.abs(lanes.z - height(lanes.points)) > 1.0
+            usable[np.repeat(np.arange(len(lanes)), np.diff(lanes.first))[off]] = False
         self.numbers = np.flatnonzero(usable)
         self.lines = np.array([shapely.LineString(lanes.line(int(i))) for i in self.numbers], object)
 

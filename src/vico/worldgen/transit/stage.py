@@ -127,7 +127,7 @@ def transit_from_osm(
         Lines are closed drives past two stops at least; `left_out` says why a route of the sources is none.
     """
     osm = site.osm
-    kerbs = Kerbs(lanes)
+    kerbs = Kerbs(lanes, height)
     mapped = _mapped_berths(osm, kerbs)
     timed, left_out = routes_from_gtfs(feeds)
     drawn, untold = routes_from_osm(osm, osm.half)
