@@ -57,12 +57,13 @@ def in_the_street() -> set[str]:
     watched.act(type="move_forward", distance=0.5)
     sim.scenario.place_agent("assistant_1", sim.state.people.position[0] + np.array([1.0, 0.0, 0.0]))
     watched.act(type="communicate", text="Hello!")
+    watched.act(type="wait")
     assert watched.act(type="hand_over", hand=1, agent="assistant_1") == "ok"
     watched.act(type="move_forward", distance=2.5)
     for kind in ("drink", "eat"):
         watched.act(type=kind)
     sim.state.people.posture[0] = Posture.SITTING
-    for kind in ("wait", "drink", "eat"):
+    for kind in ("drink", "eat", "wait", "wait"):
         watched.act(type=kind)
     watched.act(type="communicate", text="Hello from my chair!")
     sim.scenario.place_agent("assistant_1", (-15.0, -20.0))

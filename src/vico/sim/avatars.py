@@ -37,6 +37,8 @@ _CARRY_LEFT, _CARRY_RIGHT = CLIP["carry_left"], CLIP["carry_right"]
 # What a gesture is on a chair: most are made there too, for others one stays seated; who gets in sits down after it.
 _ON_A_CHAIR = np.array([CLIP.get(f"sit_{name}", _SIT) for name in CLIPS])
 _ON_A_CHAIR[CLIP["enter_vehicle"]] = CLIP["enter_vehicle"]
+# Motions that are brought to an end, and where in them that is.
+_FINISHED, _DONE = [CLIP[name] for name in ("drink", "eat", "talk")], 0.95
 _STANDING_UP, _SITTING = int(Posture.STANDING), int(Posture.SITTING)
 _IN_BUS, _ON_BIKE = int(Vehicle.BUS), int(Vehicle.BIKE)
 
@@ -119,7 +121,10 @@ class Avatars:
         p.contact[who] = 0
         p.reason[who] = ""
         p.reason_code[who] = ReasonCode.NONE
-        p.action_clip[who] = -1
+        # Who has a cup at the mouth puts it down again, and who has turned to somebody talks, unless they do otherwise.
+        begun = (p.clip == _TURN) | ((p.phase > 1.0 - _DONE) & (p.phase < _DONE))
+        goes_on = np.isin(p.action_clip, _FINISHED) & begun
+        p.action_clip[who & ~goes_on] = -1
 
     def space(self) -> NDArray[np.int32]:
         """Return the room each avatar is in, `OUTDOORS` or `IN_BUS`: only those of one space can touch."""
@@ -192,7 +197,7 @@ def _clip_of(motion, k, speed):  # type: ignore[no-untyped-def]
             return _CARRY_LEFT
         return _CARRY_RIGHT if right else _WALK
     sits = motion.posture[k] == _SITTING
-    if motion.action_clip[k] >= 0:
+    if motion.action_clip[k] >= 0 and (sits or motion.turned[k] == 0.0):
         return _ON_A_CHAIR[motion.action_clip[k]] if sits else np.int64(motion.action_clip[k])
     if motion.vehicle[k] == _IN_BUS:
         return _RIDE_BUS if sits else _STAND

@@ -46,6 +46,7 @@ _OF_KIND = {
     **dict.fromkeys(("truck", "van", "taxi"), "car"),
     **dict.fromkeys(("hedge", "shrub", "plant"), "tree"),
     **dict.fromkeys(("street_lamp", "bollard", "flagpole", "mast", "utility_pole", "pillar", "column"), "pole"),
+    "umbrella": "object",
     **dict.fromkeys(("traffic_signals", "sign", "bus_stop", "board"), "sign"),
 }
 

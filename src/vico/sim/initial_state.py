@@ -14,6 +14,7 @@ from vico.sim.bodies import ASSISTANT, KINDS, RESIDENT
 from vico.sim.config import SimConfig
 from vico.sim.environment import Agenda, Environment, Sky
 from vico.sim.events import Events
+from vico.sim.holding import habit_of, take_umbrella
 from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import FIRST_ASSISTANT, FIRST_RESIDENT, FIRST_ROBOT, MovableObjects, People
@@ -59,6 +60,7 @@ def initial_state(
     spawn.place_residents(state, days, config.start)
     for i in range(len(residents), len(people)):
         spawn.place_anywhere(i, state, rng(config.seed, "spawn", people.names[i]))
+    take_umbrella(slice(None), state)
     return state
 
 
@@ -79,6 +81,7 @@ def _people(residents: Sequence[Resident], config: SimConfig) -> People:
     for i, resident in enumerate(residents):
         people.cash[i] = float(resident.cash)
         people.height[i] = resident.appearance["height"]
+    people.umbrella_habit[:] = [habit_of(config.seed, name) for name in names]
     return people
 
 

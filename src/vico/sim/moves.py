@@ -131,9 +131,10 @@ def _note_move(i: int, was: tuple[float, float, float, float], state: Simulation
     follow_hands(state)
 
 
-def gesture(clip: str, i: int, state: SimulationState) -> None:
-    """Show a motion while standing or sitting."""
+def gesture(clip: str, i: int, state: SimulationState, *, hand: int = 1) -> None:
+    """Show a motion while standing or sitting, made with the left (0) or the right hand."""
     state.people.action_clip[i] = CLIP[clip]
+    state.people.gesture_hand[i] = hand
 
 
 def follow_hands(state: SimulationState) -> None:

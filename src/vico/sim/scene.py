@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.assets.models.in_hand import in_hand_models
 from vico.assets.people import Appearance, body_of
 from vico.community.model import Resident
 from vico.render import Cameras, Lighting, Scene, render
@@ -22,20 +23,20 @@ from vico.seeds import rng
 from vico.sim.animation import (
     LONGEST_BLEND,
     STYLE,
+    Hands,
     Transition,
     ground_under_feet,
-    hand_frames,
     joint_places,
     pose,
     style_of,
 )
-from vico.sim.bodies import Drawn
 from vico.sim.config import SimConfig
 from vico.sim.environment import Environment
 from vico.sim.eyes import SemanticClasses, lenses_by_entity
+from vico.sim.hands_scene import Holders, draw_in_hands, hands_of_agents, hands_of_pedestrians
+from vico.sim.holding import habit_of
 from vico.sim.observations import Views
 from vico.sim.passers_by import looks_of_strangers, manner_of_pedestrian, pedestrian_motion
-from vico.sim.quaternions import matrix_of
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture, Vehicle
 from vico.threads import in_order
@@ -71,6 +72,8 @@ class _Motion(NamedTuple):
     rise, rise_before
         How far whoever sits is, or was before, above the height at which their feet would rest on the floor, metres,
         float64; 0 for others.
+    hands
+        What they hold.
     """
 
     clip: NDArray[np.int64]
@@ -82,6 +85,7 @@ class _Motion(NamedTuple):
     on_ground: NDArray[np.bool_]
     rise: NDArray[np.float64]
     rise_before: NDArray[np.float64]
+    hands: Hands
 
 
 class RenderedSimulation(Protocol):
@@ -162,6 +166,8 @@ class SceneRenderer:
         ]
         self._style = np.stack(style) if style else np.zeros(0, STYLE)
         self._height = np.array([body.height for body in bodies], np.float64)
+        self._entities = np.array([*entities, *walkers], np.int32)
+        self._habit = np.array([habit_of(sim.config.seed, name) for name in names[len(entities) :]], np.float64)
 
     def render(self, state: SimulationState, poses: NDArray[np.float64], own: NDArray[np.int32]) -> Views:
         """Begin to render one view for each pose in one call; see `ObservationRenderer.render`."""
@@ -234,8 +240,7 @@ class SceneRenderer:
         drawn = [s.draw() for s in (state.traffic, state.transit, state.robots) if s is not None]
         if len(state.things):
             drawn.append(state.things.draw())
-        if len(state.objects):
-            drawn.append(self._objects(state, rotations, offsets))
+        drawn += draw_in_hands(state, self._holders(motion, rotations, offsets))
         index = [np.array([self._scene.names[d.prototypes[i]] for i in d.index], np.int32) for d in drawn]
         self._scene.set_rigid(
             _joined(index, (0,), np.int32),
@@ -247,6 +252,20 @@ class SceneRenderer:
         """Return how everybody on legs moves."""
         motion = _motion_of_agents(state)
         return motion if state.traffic is None else _joined_motion(motion, self._motion_of_pedestrians(state))
+
+    def _holders(self, motion: _Motion, rotations: NDArray[np.float32], offsets: NDArray[np.float32]) -> Holders:
+        place = motion.position, motion.yaw, motion.clip, motion.phase, motion.hands
+        return Holders(self._bodies.joints, rotations, offsets, *place, self._height, self._entities)
+
+    @property
+    def scene(self) -> Scene:
+        """What is rendered."""
+        return self._scene
+
+    def holders(self, state: SimulationState) -> Holders:
+        """Return everybody as they are posed, with what their hands hold."""
+        motion = self._motion(state)
+        return self._holders(motion, *self._poses(motion, state.second))
 
     def motions(self, state: SimulationState) -> tuple[_Motion, NDArray[np.float64]]:
         """Return how everybody moves, and where their joints are, body frame, metres, shape ``(n, 55, 3)``."""
@@ -266,7 +285,7 @@ class SceneRenderer:
         )
         after = after._replace(ground=now if before is None else before)
         moves = motion.clip, motion.phase, motion.speed, self._style
-        return pose(*moves, second=second, after=after, ground=now)
+        return pose(*moves, second=second, after=after, ground=now, hands=motion.hands)
 
     def _ground(
         self,
@@ -292,27 +311,8 @@ class SceneRenderer:
         on_ground = np.ones(len(clip), np.bool_)
         still = np.zeros(len(clip))
         after = after._replace(moved=np.zeros((len(clip), 4)))
-        return _Motion(clip, phase, pace, after, walkers.position, walkers.yaw, on_ground, still, still)
-
-    def _objects(self, state: SimulationState, rotations: NDArray[np.float32], offsets: NDArray[np.float32]) -> Drawn:
-        """Return the movable objects: where they lie, or hanging from the hand that holds them."""
-        objects, p = state.objects, state.people
-        names = sorted(set(objects.prototypes))
-        transforms = np.zeros((len(objects), 4, 4))
-        transforms[:, :3, :3] = matrix_of(objects.orientation)
-        transforms[:, 3, 3] = 1.0
-        transforms[:, :3, 3] = objects.position
-        held = np.flatnonzero(objects.hand >= 0)
-        if len(held):
-            palms = hand_frames(self._bodies.joints[: len(p)], rotations[: len(p)], offsets[: len(p)])
-            for k in held:
-                i = int(np.flatnonzero(p.entity == objects.holder[k])[0])
-                x, y, z = palms[i, objects.hand[k], :3, 3]
-                cy, sy = np.cos(p.yaw[i]), np.sin(p.yaw[i])
-                hanging = z - objects.size[k, 2]
-                transforms[k, :3, 3] = p.position[i] + np.array([cy * x - sy * y, sy * x + cy * y, hanging])
-        index = np.array([names.index(name) for name in objects.prototypes], np.int32)
-        return Drawn(names, index, transforms.astype(np.float32), objects.entity)
+        hands = hands_of_pedestrians(self._habit, state.environment.weather.rain)
+        return _Motion(clip, phase, pace, after, walkers.position, walkers.yaw, on_ground, still, still, hands)
 
 
 def _lighting(environment: Environment, second: float) -> Lighting:
@@ -357,15 +357,17 @@ def _motion_of_agents(state: SimulationState) -> _Motion:
         rise[sitting] = p.position[sitting, 2] - state.seats.floor[seat]
     # Who gets up comes down from the seat to the floor.
     rise_before = np.where(p.seat < 0, p.moved[:, 2], 0.0)
-    place = p.position.copy(), yaw, on_ground, rise, rise_before
+    place = p.position.copy(), yaw, on_ground, rise, rise_before, hands_of_agents(state)
     return _Motion(p.clip.astype(np.int64), p.phase.copy(), p.pace.copy(), after, *place)
 
 
 def _joined_motion(a: _Motion, b: _Motion) -> _Motion:
     pairs = {name: (getattr(a.after, name), getattr(b.after, name)) for name in Transition._fields if name != "ground"}
     after = Transition(**{name: np.concatenate(pair) for name, pair in pairs.items()})
-    joined = {name: np.concatenate([getattr(a, name), getattr(b, name)]) for name in _Motion._fields if name != "after"}
-    return _Motion(after=after, **joined)
+    hands = Hands(*(np.concatenate(pair) for pair in zip(a.hands, b.hands, strict=True)))
+    plain = [name for name in _Motion._fields if name not in ("after", "hands")]
+    joined = {name: np.concatenate([getattr(a, name), getattr(b, name)]) for name in plain}
+    return _Motion(after=after, hands=hands, **joined)
 
 
 def _nothing() -> None:
@@ -378,7 +380,8 @@ def _shapes(sim: RenderedSimulation) -> dict[str, Sequence[Surface]]:
     for system in (sim.state.traffic, sim.state.transit, sim.state.robots):
         if system is not None:
             shapes |= system.prototypes()
-    return shapes | sim.state.things.prototypes() | dict(sim.shapes)
+    in_hand = {name: model.surfaces for name, model in in_hand_models().items()}
+    return shapes | in_hand | sim.state.things.prototypes() | dict(sim.shapes)
 
 
 def _joined(parts: list[NDArray[Any]], empty: tuple[int, ...], kind: Any) -> NDArray[Any]:

@@ -22,7 +22,7 @@ from vico.sim.indoor import Indoor, near_door
 from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.seats import Seats
 from vico.sim.snapshot import arrays_of
-from vico.sim.state import RADIUS, REASON_LENGTH, MovableObjects, People, Vehicle
+from vico.sim.state import FIRST_OBJECT, FIRST_UMBRELLA, RADIUS, REASON_LENGTH, MovableObjects, People, Vehicle
 from vico.sim.traffic.jams import Jam, JamLog
 from vico.sim.traffic.junction_rule import JunctionRule
 from vico.sim.traffic.signals import SignalsShown
@@ -377,6 +377,8 @@ class SimulationState:
 
     def entity(self, entity: int) -> dict[str, str]:
         """Return kind and name of an entity of the world or of this run."""
+        if FIRST_UMBRELLA <= entity < FIRST_OBJECT:
+            return {"kind": "umbrella", "name": "umbrella"}
         known = self.entities.get(entity) or self.world.entities.get(entity) or self.things.entity(entity)
         return known or {"kind": "unknown", "name": str(entity)}
 

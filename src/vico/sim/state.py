@@ -21,6 +21,9 @@ FIRST_ASSISTANT = 1_010_000
 FIRST_ROBOT = 1_020_000
 FIRST_TRAFFIC = 1_100_000
 FIRST_BIKE = 1_200_000
+# Umbrellas, one for each person: by the person's place among the agents, and among the pedestrians.
+FIRST_UMBRELLA = 1_300_000
+FIRST_PEDESTRIAN_UMBRELLA = 1_320_000
 FIRST_OBJECT = 1_900_000
 
 RADIUS = 0.25
@@ -127,6 +130,13 @@ class People(ArrayState):
         A `Vehicle`, int8, and the entity number of the one ridden (0 for none), int32; shape ``(n,)``.
     vehicle_yaw
         Heading of the bus at the last sub-step, radians, float64, shape ``(n,)``.
+    gesture_hand
+        Hand that the last action was made with, 0 left, 1 right, int8, shape ``(n,)``.
+    hold, hold_share
+        What the arms hold up beside the motion, a `vico.sim.animation.Hold`, int8, and how far they have come to it,
+        0..1, float64; shape ``(n,)``.
+    umbrella, umbrella_habit
+        Whether one has an umbrella along, bool, and how little one minds rain, 0..1, float64; shape ``(n,)``.
     held
         Entities in the left and right hand, 0 for none, int32, shape ``(n, 2)``.
     cash
@@ -170,6 +180,11 @@ class People(ArrayState):
     vehicle: NDArray[np.int8]
     vehicle_entity: NDArray[np.int32]
     vehicle_yaw: NDArray[np.float64]
+    gesture_hand: NDArray[np.int8]
+    hold: NDArray[np.int8]
+    hold_share: NDArray[np.float64]
+    umbrella: NDArray[np.bool_]
+    umbrella_habit: NDArray[np.float64]
     held: NDArray[np.int32]
     cash: NDArray[np.float64]
     owed: NDArray[np.float64]
@@ -210,6 +225,11 @@ class People(ArrayState):
             vehicle=np.zeros(n, np.int8),
             vehicle_entity=np.zeros(n, np.int32),
             vehicle_yaw=np.zeros(n),
+            gesture_hand=np.ones(n, np.int8),
+            hold=np.zeros(n, np.int8),
+            hold_share=np.zeros(n),
+            umbrella=np.zeros(n, np.bool_),
+            umbrella_habit=np.ones(n),
             held=np.zeros((n, 2), np.int32),
             cash=np.zeros(n),
             owed=np.zeros(n),

@@ -6,9 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from vico.assets.models.files import GUIDE
 from vico.assets.models.parts import Scope, surfaces_of
-from vico.assets.models.schema import MovableEntry, MovableFile
+from vico.assets.models.schema import Grip, MovableEntry, MovableFile
 from vico.assets.shapes import Colour
 from vico.errors import InputError, SchemaError
 from vico.io.data_files import cached_data, data_files, read_record
@@ -72,6 +75,22 @@ def movable_colours() -> dict[str, Colour]:
 def movable_prototype(kind: str, colour: str) -> str:
     """Return the name of the prototype of a thing, e.g. ``good/backpack/red``."""
     return f"good/{kind}/{colour}"
+
+
+#: Smaller ones are carried in a hand, ones as wide and as deep as the second before the chest, metres.
+_IN_HAND, _IN_ARMS = 0.22, 0.26
+
+
+def movable_grip(prototype: str, size: ArrayLike) -> Grip:
+    """Return how a thing is carried: as its entry says, else by its extents, metres, shape ``(3,)``."""
+    kind = prototype.split("/")[1] if prototype.startswith("good/") else ""
+    entry = _entries().get(kind)
+    if entry is not None and entry.entry.grip is not None:
+        return entry.entry.grip
+    small, middle, large = sorted(np.asarray(size, np.float64).tolist())
+    if large <= _IN_HAND or (middle <= 0.5 * _IN_HAND and large <= 2 * _IN_HAND):
+        return "hand"
+    return "arms" if middle >= _IN_ARMS and small >= 0.5 * _IN_ARMS else "handle"
 
 
 def movable_surfaces(kind: str, colour: str) -> list[Surface]:

@@ -21,6 +21,7 @@ Corner = tuple[Number, Number]
 Rgb = tuple[Channel, Channel, Channel]
 ColourName = Annotated[str, Field(strict=True, min_length=1, max_length=40)]
 ColourSpec = ColourName | Rgb
+Grip = Literal["handle", "hand", "arms"]
 Category = Literal["amenity", "natural", "transit", "indoor"]
 
 
@@ -277,9 +278,13 @@ class ModelFile(DataRecord):
 
 
 class MovableEntry(DataRecord):
-    """A thing people carry: `sentence` names it in instructions ("a {colour} backpack"); `size` is at rest."""
+    """A thing people carry: `sentence` names it in instructions ("a {colour} backpack"); `size` is at rest.
+
+    `grip` says how it is carried: hanging from its handle, in one hand around its middle, or before the chest.
+    """
 
     sentence: str
+    grip: Grip | None = None
     size: tuple[Length, Length, Length]
     parts: Parts
 

@@ -7,6 +7,7 @@ import numpy as np
 from vico.rules import DOOR_REACH, INNER_DOOR_REACH, ReasonCode
 from vico.sim.actions.fields import Field, short
 from vico.sim.actions.model import ActionType, Refusal, Values
+from vico.sim.holding import take_umbrella
 from vico.sim.indoor import near_door
 from vico.sim.moves import place_in_room, put_outdoors, spot_outside
 from vico.sim.simulation_state import SimulationState
@@ -104,6 +105,7 @@ def leave(values: Values, i: int, state: SimulationState) -> None:
     spot = spot_outside(i, state)
     assert spot is not None
     assert place.entrance is not None
+    take_umbrella(i, state)
     put_outdoors(i, spot, state.entrances[place.entrance].facing, state)
     state.events.add("exit", p.names[i], f"leaves {place.name}", p.position[i], place=place.id)
 

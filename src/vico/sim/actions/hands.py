@@ -79,7 +79,7 @@ def pick(values: Values, i: int, state: SimulationState) -> None:
     p, objects = state.people, state.objects
     k = objects.index(values["object"])
     _hold(k, i, values["hand"], state)
-    gesture("pick", i, state)
+    gesture("pick", i, state, hand=values["hand"])
     state.events.add("pick", p.names[i], f"picks up {objects.names[k]}", p.position[i], object=int(objects.entity[k]))
 
 
@@ -106,7 +106,7 @@ def put(values: Values, i: int, state: SimulationState) -> None:
     deck = state.deck(spot.carrier)
     if deck is not None and spot.offset is not None:
         lay_down(deck, spot.carrier, k, spot.offset, objects)
-    gesture("put", i, state)
+    gesture("put", i, state, hand=values["hand"])
     beside = f" beside {state.entity(spot.beside)['name']}" if spot.beside else ""
     said, entity = f"puts down {objects.names[k]}{beside}", int(objects.entity[k])
     state.events.add("put", p.names[i], said, objects.position[k], object=entity)
@@ -140,7 +140,7 @@ def hand_over(values: Values, i: int, state: SimulationState) -> None:
     k = objects.index(int(p.held[i, values["hand"]]))
     p.held[i, values["hand"]] = 0
     _hold(k, j, 0 if not p.held[j, 0] else 1, state)
-    gesture("reach", i, state)
+    gesture("reach", i, state, hand=values["hand"])
     state.events.add(
         "hand_over",
         p.names[i],

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from vico.rules import REACH, ReasonCode
 from vico.sim.actions.fields import Field
 from vico.sim.actions.model import ActionType, Actors, Check, Perform, Refusal, Situation, Values
+from vico.sim.holding import free_hand
 from vico.sim.moves import gesture, get_up, spot_beside_seat, take_seat
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture
@@ -92,9 +93,21 @@ def _rise(values: Values, i: int, state: SimulationState) -> None:
 
 def _show(clip: str) -> Perform:
     def perform(values: Values, i: int, state: SimulationState) -> None:
-        gesture(clip, i, state)
+        hand = free_hand(i, state)
+        gesture(clip, i, state, hand=1 if hand is None else hand)
 
     return perform
+
+
+def check_hand(kind: str) -> Check:
+    """Return what judges eating or drinking: a hand for it."""
+
+    def check(values: Values, i: int, state: SimulationState) -> Refusal | None:
+        if free_hand(i, state) is None:
+            return Refusal(ReasonCode.HAND_FULL, f"{kind}: both hands are full")
+        return None
+
+    return check
 
 
 def wait(values: Values, i: int, state: SimulationState) -> None:
@@ -120,7 +133,7 @@ POSTURE = (
         when=_ON_FURNITURE | Situation.ASLEEP,
     ),
     ActionType("wake", "Wake and get up.", _rise, check_wake, when=_ON_FURNITURE | Situation.ASLEEP),
-    ActionType("drink", "Drink something.", _show("drink"), when=_ON_FURNITURE | Situation.IN_BUS),
-    ActionType("eat", "Eat something.", _show("eat"), when=_ON_FURNITURE | Situation.IN_BUS),
+    ActionType("drink", "Drink something.", _show("drink"), check_hand("drink"), when=_ON_FURNITURE | Situation.IN_BUS),
+    ActionType("eat", "Eat something.", _show("eat"), check_hand("eat"), when=_ON_FURNITURE | Situation.IN_BUS),
     ActionType("wait", "Do nothing.", wait, when=Situation.ANY, actors=Actors.PEOPLE | Actors.ROBOTS),
 )

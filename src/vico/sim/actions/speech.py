@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from vico.rules import EARSHOT
 from vico.sim.actions.fields import Field
 from vico.sim.actions.model import ActionType, Situation, Values
+from vico.sim.bodies import RESIDENT
 from vico.sim.hearing import hearers_of
-from vico.sim.moves import gesture
+from vico.sim.holding import free_hand
+from vico.sim.moves import gesture, wrapped
 from vico.sim.simulation_state import SimulationState
+from vico.sim.state import Posture, Vehicle
 
 #: Nobody talks with hands to people farther off, metres.
 _TALKING_DISTANCE = 4.0
+#: Who looks so nearly at another one faces them, radians.
+_FACES = math.radians(15.0)
 
 
 def communicate(values: Values, i: int, state: SimulationState) -> None:
@@ -20,17 +27,36 @@ def communicate(values: Values, i: int, state: SimulationState) -> None:
     p = state.people
     heard = hearers_of(state, i, values.get("range", EARSHOT))
     state.events.say(p.names[i], values["text"], p.position[i], heard.hearers, heard.missed)
-    gesture("talk" if _is_near(heard.hearers, i, state) else "wave", i, state)
+    hand = free_hand(i, state)
+    near = _listeners_near(heard.hearers, i, state)
+    gesture("wave" if near is None else "talk", i, state, hand=1 if hand is None else hand)
+    for j in near or []:
+        if p.kind[j] == RESIDENT:
+            _face(j, i, state)
+    if near:
+        _face(i, near[0], state)
 
 
-def _is_near(listeners: list[str], i: int, state: SimulationState) -> bool:
-    """Return whether somebody listens from so near that one talks with them; to those farther off one waves."""
+def _face(i: int, j: int, state: SimulationState) -> None:
+    """Turn someone who stands still to somebody else."""
+    p = state.people
+    if p.move_left[i] or p.turn_left[i] or p.posture[i] != Posture.STANDING or p.vehicle[i] != Vehicle.NONE:
+        return
+    dx, dy = p.position[j, :2] - p.position[i, :2]
+    turn = wrapped(math.atan2(dy, dx) - float(p.yaw[i]))
+    if abs(turn) > _FACES:
+        p.turn_left[i] = turn
+
+
+def _listeners_near(listeners: list[str], i: int, state: SimulationState) -> list[int] | None:
+    """Return which people listen from so near that one talks with them, the nearest first; None if all are farther."""
     p = state.people
     people = [p.names.index(name) for name in listeners if name in p.names]
     if not people:
-        return True
+        return []
     away = np.hypot(*(p.position[people, :2] - p.position[i, :2]).T)
-    return float(away.min()) <= _TALKING_DISTANCE
+    near = [people[k] for k in np.argsort(away, kind="stable") if away[k] <= _TALKING_DISTANCE]
+    return near or None
 
 
 def task_complete(values: Values, i: int, state: SimulationState) -> None:

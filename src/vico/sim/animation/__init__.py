@@ -7,9 +7,11 @@ The caller advances the phase by distance / `stride_length`, so feet never slide
 """
 
 from vico.sim.animation.blending import LONGEST_BLEND
+from vico.sim.animation.clips import Hands
 from vico.sim.animation.footing import ground_under_feet
+from vico.sim.animation.holds import Hold
 from vico.sim.animation.names import CLIPS, clip_index
-from vico.sim.animation.posing import Transition, hand_frames, hand_position, joint_places, pose
+from vico.sim.animation.posing import Transition, free_hands, hand_frames, hand_position, joint_places, pose
 from vico.sim.animation.stride import stride_length
 from vico.sim.animation.style import STYLE, style_of
 
@@ -17,8 +19,11 @@ __all__ = [
     "CLIPS",
     "LONGEST_BLEND",
     "STYLE",
+    "Hands",
+    "Hold",
     "Transition",
     "clip_index",
+    "free_hands",
     "ground_under_feet",
     "hand_frames",
     "hand_position",

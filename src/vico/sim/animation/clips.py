@@ -22,6 +22,7 @@ from vico.sim.animation.blending import (
     write_feet,
 )
 from vico.sim.animation.gait import run, walk
+from vico.sim.animation.holds import hold_up
 from vico.sim.animation.limbs import BodyPose, curl_fingers
 from vico.sim.animation.names import (
     CARRY,
@@ -65,6 +66,27 @@ class Course(NamedTuple):
     ground: NDArray[np.float64]
 
 
+class Hands(NamedTuple):
+    """What people do with their hands beside the motion.
+
+    Attributes
+    ----------
+    gesture
+        Which hand makes gestures, 0 left, 1 right, int64, shape ``(n,)``.
+    hold
+        How something is held, a `vico.sim.animation.holds.Hold`, int64, shape ``(n,)``.
+    share
+        How far the arms have come to hold it so, 0..1, float64, shape ``(n,)``.
+    width
+        Of what is held before the chest, metres, float64, shape ``(n,)``.
+    """
+
+    gesture: NDArray[np.int64]
+    hold: NDArray[np.int64]
+    share: NDArray[np.float64]
+    width: NDArray[np.float64]
+
+
 class Circumstances(NamedTuple):
     """What poses depend on beside motion and manner.
 
@@ -80,6 +102,8 @@ class Circumstances(NamedTuple):
         Metres a second that the strides are those of, float64, shape ``(n,)``.
     second
         Of the clock.
+    hands
+        See `Hands`.
     """
 
     before: Course
@@ -87,6 +111,7 @@ class Circumstances(NamedTuple):
     moved: NDArray[np.float64]
     speed: NDArray[np.float64]
     second: float
+    hands: Hands
 
 
 @compiled
@@ -95,11 +120,14 @@ def animate(course: Any, around: Any, style: Array, rotations: Array, offsets: A
     for i in range(len(course.clip)):
         one = style[i]
         joints, count = one.joints, len(one.joints)
+        hand = around.hands.gesture[i]
         # Made here, for compiled functions cannot return records.
-        body = BodyPose(np.zeros((count, 3, 3)), np.zeros(3), joints, one, around.second, course.ground[i])
+        body = BodyPose(np.zeros((count, 3, 3)), np.zeros(3), joints, one, around.second, course.ground[i], hand)
         _pose_one(body, course.clip[i], course.phase[i], course.stride[i])
         if around.since[i] < LONGEST_BLEND:
             _blend(body, i, course, around)
+        if around.hands.share[i] > 0:
+            hold_up(body, around.hands.hold[i], around.hands.share[i], around.hands.width[i])
         for j in range(count):
             axis_angle(body.local[j], rotations[i, j])
         for r in range(3):
@@ -113,7 +141,9 @@ def _blend(body: Any, i: int, course: Any, around: Any) -> None:
     was, now = before.clip[i], course.clip[i]
     u = since / blend_time(was, now)
     count = len(body.joints)
-    old = BodyPose(np.zeros((count, 3, 3)), np.zeros(3), body.joints, body.style, body.second, before.ground[i])
+    old = BodyPose(
+        np.zeros((count, 3, 3)), np.zeros(3), body.joints, body.style, body.second, before.ground[i], body.hand
+    )
     if is_gait(now):
         if since * around.speed[i] < course.stride[i] and not _off_their_feet(was):
             _set_out(body, old, i, course, around)
@@ -144,8 +174,12 @@ def _set_out(body: Any, old: Any, i: int, course: Any, around: Any) -> None:
     gone = since * around.speed[i] / stride
     first = course.phase[i] - gone  # where the gait began
     ankles, feet = np.empty((2, 2, 3)), np.empty((2, 3, 3))
-    start = BodyPose(np.zeros_like(body.local), np.zeros(3), body.joints, body.style, body.second, np.zeros((2, 2, 2)))
-    level = BodyPose(np.zeros_like(body.local), np.zeros(3), body.joints, body.style, body.second, start.ground)
+    start = BodyPose(
+        np.zeros_like(body.local), np.zeros(3), body.joints, body.style, body.second, np.zeros((2, 2, 2)), body.hand
+    )
+    level = BodyPose(
+        np.zeros_like(body.local), np.zeros(3), body.joints, body.style, body.second, start.ground, body.hand
+    )
     _pose_one(level, was, before.phase[i], before.stride[i])
     write_feet(level, ankles[0], feet)
     _pose_one(start, now, first, stride)

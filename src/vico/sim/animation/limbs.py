@@ -65,6 +65,8 @@ class BodyPose(NamedTuple):
     ground
         Under each foot (left, right), where it stands or stood last and where it comes down next: height above the
         body's origin, metres, and slope, radians, toes down; shape ``(2, 2, 2)``.
+    hand
+        That makes gestures: 0 left, 1 right.
     """
 
     local: NDArray[np.float64]
@@ -73,6 +75,7 @@ class BodyPose(NamedTuple):
     style: Any
     second: float
     ground: NDArray[np.float64]
+    hand: int
 
 
 # Of `BodyPose.ground`.

@@ -11,7 +11,7 @@ from vico.assets.people import JOINTS, PARENTS, J, SkinnedBody
 from vico.io.compiled import compiled
 from vico.render.skinning import forward_kinematics
 from vico.sim.animation.blending import LONGEST_BLEND
-from vico.sim.animation.clips import Circumstances, Course, animate
+from vico.sim.animation.clips import Circumstances, Course, Hands, animate
 from vico.sim.animation.limbs import WRIST
 from vico.sim.animation.stride import stride_length
 from vico.sim.animation.style import KERNEL_STYLE
@@ -52,6 +52,7 @@ def pose(
     second: float = 0.0,
     after: Transition | None = None,
     ground: NDArray[np.float64] | None = None,
+    hands: Hands | None = None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Pose everybody.
 
@@ -71,6 +72,8 @@ def pose(
         What they did before, which for half a second shows in what they do now; None: nothing else.
     ground
         Of `ground_under_feet`; None: level ground at the height where everybody is.
+    hands
+        What people hold, and the hand they make gestures with; None: nothing, and the right one.
 
     Returns
     -------
@@ -91,12 +94,25 @@ def pose(
     offsets = np.zeros((len(people), 3), np.float32)
     animate(
         now,
-        Circumstances(before, since, moved, np.ascontiguousarray(speed, np.float64), float(second)),
+        Circumstances(
+            before,
+            since,
+            moved,
+            np.ascontiguousarray(speed, np.float64),
+            float(second),
+            hands or free_hands(len(people)),
+        ),
         people,
         rotations,
         offsets,
     )
     return rotations, offsets
+
+
+def free_hands(people: int) -> Hands:
+    """Return the hands of people who hold nothing."""
+    nothing = np.zeros(people)
+    return Hands(np.ones(people, np.int64), np.zeros(people, np.int64), nothing, nothing)
 
 
 def _course(

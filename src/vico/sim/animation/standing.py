@@ -8,7 +8,6 @@ import numpy as np
 
 from vico.io.compiled import compiled
 from vico.sim.animation.limbs import (
-    LEFT,
     PELVIS,
     RIGHT,
     SIGN,
@@ -167,54 +166,51 @@ def _outward(side: int) -> Any:
 
 @compiled
 def _talk(body: Any, p: float, low: float) -> None:
-    """Beat with the right hand, lively people with both."""
-    tall, asymmetry = body.style.height, body.style.asymmetry
-    out = np.zeros(3)
+    """Beat with one hand, lively people with both."""
+    tall, asymmetry, hand = body.style.height, body.style.asymmetry, body.hand
+    sign, out = SIGN[hand], np.zeros(3)
     beat, slow = np.sin(2 * _TAU * p + 3 * asymmetry), np.sin(_TAU * p)
-    out[X], out[Y], out[Z] = 0.22 * tall, -0.14 * tall, (0.62 + 0.035 * beat) * tall + low
-    out[Y] -= 0.03 * tall * slow
-    reach(body, RIGHT, out, _outward(RIGHT))
+    out[X], out[Y], out[Z] = 0.22 * tall, sign * (0.14 + 0.03 * slow) * tall, (0.62 + 0.035 * beat) * tall + low
+    reach(body, hand, out, _outward(hand))
     if asymmetry > 0.4:
-        out[X], out[Y], out[Z] = 0.20 * tall, 0.13 * tall, (0.60 - 0.03 * beat) * tall + low
-        reach(body, LEFT, out, _outward(LEFT))
-    body.local[WRIST[RIGHT]] = rotation_about(Y, -0.5)
+        out[X], out[Y], out[Z] = 0.20 * tall, -sign * 0.13 * tall, (0.60 - 0.03 * beat) * tall + low
+        reach(body, 1 - hand, out, _outward(1 - hand))
+    body.local[WRIST[hand]] = rotation_about(Y, -0.5)
 
 
 @compiled
 def _wave(body: Any, p: float, low: float) -> None:
-    """Raise the right hand and sweep it thrice."""
-    tall = body.style.height
-    out = np.zeros(3)
+    """Raise a hand and sweep it thrice."""
+    tall, hand = body.style.height, body.hand
+    sign, out = SIGN[hand], np.zeros(3)
     up = smoothstep(3.5 * p) * smoothstep(3.5 * (1 - p))
     sweep = np.sin(3 * _TAU * p)
-    out[X], out[Y], out[Z] = 0.10 * tall, (-0.20 - 0.045 * sweep) * tall, 0.98 * tall + low
-    reach_by(body, RIGHT, out, np.array([0.0, -1.0, -0.4]), up)
-    body.local[WRIST[RIGHT]] = rotation_about(X, 0.35 * sweep * up)
-    grip(body, RIGHT, 0.35 * (1 - up))
+    out[X], out[Y], out[Z] = 0.10 * tall, sign * (0.20 + 0.045 * sweep) * tall, 0.98 * tall + low
+    reach_by(body, hand, out, np.array([0.0, sign, -0.4]), up)
+    body.local[WRIST[hand]] = rotation_about(X, -sign * 0.35 * sweep * up)
+    grip(body, hand, 0.35 * (1 - up))
 
 
 @compiled
 def _reach_out(body: Any, p: float, clip: int) -> None:
     """Reach for something before the body, or on the ground; a hand opens to put and closes to pick."""
-    tall, strength = body.style.height, _strength(p)
+    tall, strength, hand = body.style.height, _strength(p), body.hand
     out = np.zeros(3)
     level = 0.12 if clip != REACH else 0.66
     ahead = 0.24 if clip != REACH else 0.33
-    out[X], out[Y], out[Z] = ahead * tall, -0.06 * tall, level * tall
-    reach_by(body, RIGHT, out, _outward(RIGHT), strength)
-    grip(body, RIGHT, 0.35 + 0.55 * (strength if clip == PUT else 1 - strength))
+    out[X], out[Y], out[Z] = ahead * tall, SIGN[hand] * 0.06 * tall, level * tall
+    reach_by(body, hand, out, _outward(hand), strength)
+    grip(body, hand, 0.35 + 0.55 * (strength if clip == PUT else 1 - strength))
 
 
 @compiled
 def _consume(body: Any, p: float, clip: int, low: float) -> None:
-    """Bring the right hand to the mouth; who eats holds a plate in the left."""
-    tall, strength = body.style.height, _strength(p)
-    out = np.zeros(3)
-    out[X], out[Y], out[Z] = 0.125 * tall, -0.035 * tall, 0.845 * tall + low
-    reach_by(body, RIGHT, out, np.array([0.2, -0.6, -1.0]), strength)
-    body.local[WRIST[RIGHT]] = rotation_about(Y, -0.5 * strength)
-    grip(body, RIGHT, 0.85)
-    if clip == EAT:
-        out[X], out[Y], out[Z] = 0.20 * tall, 0.05 * tall, 0.66 * tall + low
-        reach(body, LEFT, out, _outward(LEFT))
-        grip(body, LEFT, 0.7)
+    """Bring a hand to the mouth and back."""
+    tall, strength, hand = body.style.height, _strength(p), body.hand
+    sign, out = SIGN[hand], np.zeros(3)
+    out[X], out[Y], out[Z] = 0.14 * tall, sign * 0.14 * tall, 0.62 * tall + low
+    reach(body, hand, out, _outward(hand))
+    out[X], out[Y], out[Z] = 0.125 * tall, sign * 0.035 * tall, (0.845 if clip == EAT else 0.825) * tall + low
+    reach_by(body, hand, out, np.array([0.2, sign * 0.6, -1.0]), strength)
+    body.local[WRIST[hand]] = rotation_about(Y, -0.5 * strength)
+    grip(body, hand, 0.85)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -99,6 +99,11 @@ class Environment:
             return Weather.of(self._forecast.at(now))
         share = 1.0 if now >= end else (now - begin) / (end - begin)
         return Weather.of(blended(self._before_after[0], self._before_after[1], share))
+
+    def rain_within(self, ahead: Sequence[float]) -> float:
+        """Return the most rain now and at some moments ahead, seconds, as far as it is forecast, mm/h."""
+        now = float(self._second[0])
+        return max(self.weather.rain, *(Weather.of(self._forecast.at(now + seconds)).rain for seconds in ahead))
 
     @property
     def wet(self) -> float:

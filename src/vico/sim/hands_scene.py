@@ -1,0 +1,208 @@
+"""What is drawn in people's hands: what they carry, umbrellas, and what they eat and drink."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.assets.models.in_hand import umbrellas
+from vico.assets.models.movable import movable_grip
+from vico.sim.animation import Hands, Hold, clip_index, hand_frames
+from vico.sim.bodies import Drawn
+from vico.sim.holding import bearable_rain, carries_umbrella
+from vico.sim.quaternions import matrix_of
+from vico.sim.simulation_state import SimulationState
+from vico.sim.state import FIRST_PEDESTRIAN_UMBRELLA, FIRST_UMBRELLA
+from vico.world.model import Category
+
+_DRINKS = (clip_index("drink"), clip_index("sit_drink"))
+_EATS = (clip_index("eat"), clip_index("sit_eat"))
+# Cups and glasses tip so far at the mouth, radians.
+_TIP = 0.8
+# Umbrellas are made for people so tall, metres; the fist is so far below the canopy.
+_MADE_FOR, _SHAFT = 1.75, 0.8
+# Pedestrians have their umbrellas up when it rains so much more than they bear, mm/h.
+_RAIN_MORE = 0.15
+
+
+class Holders(NamedTuple):
+    """Everybody who may have something in hand, one row a person; agents first, then pedestrians.
+
+    Attributes
+    ----------
+    joints, rotations, offsets
+        As `vico.sim.animation.hand_frames` takes them.
+    position, yaw
+        Where bodies stand, ENU metres and radians, shapes ``(n, 3)`` and ``(n,)``.
+    clip, phase
+        Of their motions, shape ``(n,)``.
+    hands
+        What they hold.
+    height
+        Stature, metres, shape ``(n,)``.
+    entity
+        Shape ``(n,)``.
+    """
+
+    joints: NDArray[np.float32]
+    rotations: NDArray[np.float32]
+    offsets: NDArray[np.float32]
+    position: NDArray[np.float64]
+    yaw: NDArray[np.float64]
+    clip: NDArray[np.int64]
+    phase: NDArray[np.float64]
+    hands: Hands
+    height: NDArray[np.float64]
+    entity: NDArray[np.int32]
+
+    def palms(self, rows: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return where the palms of some are, body frame, metres, shape ``(k, 2, 3)``, left and right."""
+        return hand_frames(self.joints[rows], self.rotations[rows], self.offsets[rows])[:, :, :3, 3]
+
+    def world(self, rows: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return points of body frames, shape ``(k, 3)``, in the world's."""
+        c, s = np.cos(self.yaw[rows]), np.sin(self.yaw[rows])
+        x, y = c * points[:, 0] - s * points[:, 1], s * points[:, 0] + c * points[:, 1]
+        return self.position[rows] + np.column_stack([x, y, points[:, 2]])
+
+
+def hands_of_agents(state: SimulationState) -> Hands:
+    """Return what agents do with their hands beside their motions."""
+    p, objects = state.people, state.objects
+    width = np.zeros(len(p))
+    for k in np.flatnonzero(objects.hand >= 0).tolist():
+        width[p.entity == objects.holder[k]] = objects.size[k, 1]
+    return Hands(p.gesture_hand.astype(np.int64), p.hold.astype(np.int64), p.hold_share.copy(), width)
+
+
+def hands_of_pedestrians(habit: NDArray[np.float64], rain: float) -> Hands:
+    """Return what pedestrians do with their hands, by how little each minds rain, 0..1, and the rain, mm/h."""
+    n = len(habit)
+    share = np.clip((rain - bearable_rain(habit)) / _RAIN_MORE, 0.0, 1.0) * carries_umbrella(habit)
+    return Hands(np.ones(n, np.int64), np.full(n, int(Hold.UMBRELLA_RIGHT)), share, np.zeros(n))
+
+
+def draw_in_hands(state: SimulationState, who: Holders) -> list[Drawn]:
+    """Return what is drawn in everybody's hands, and the movable objects that lie about."""
+    drawn = [_umbrellas(state, who), _meals(state, who)]
+    if len(state.objects):
+        drawn.append(_objects(state, who))
+    return [lot for lot in drawn if lot is not None]
+
+
+def _umbrellas(state: SimulationState, who: Holders) -> Drawn | None:
+    hold = who.hands.hold
+    is_umbrella = (hold == int(Hold.UMBRELLA_LEFT)) | (hold == int(Hold.UMBRELLA_RIGHT))
+    rows = np.flatnonzero(is_umbrella & (who.hands.share > 0.25))
+    if not len(rows):
+        return None
+    side = np.where(hold[rows] == int(Hold.UMBRELLA_LEFT), 0, 1)
+    fist = who.palms(rows)[np.arange(len(rows)), side]
+    size = np.clip(who.height[rows] / _MADE_FOR, 0.65, 1.1)
+    # The canopy is above the head, and opens when the arm is half up.
+    above = np.column_stack([0.02 - 0.75 * fist[:, 0], -0.75 * fist[:, 1], _SHAFT * size])
+    up = above / np.linalg.norm(above, axis=1)[:, None]
+    ahead = np.column_stack([up[:, 2], np.zeros(len(rows)), -up[:, 0]])
+    ahead /= np.linalg.norm(ahead, axis=1)[:, None]
+    opened = np.clip((who.hands.share[rows] - 0.25) / 0.75, 0.0, 1.0)
+    wide = size * (0.1 + 0.9 * opened)
+    axes = np.stack([ahead * wide[:, None], np.cross(up, ahead) * wide[:, None], up * size[:, None]], axis=2)
+    names, agents = umbrellas(), len(state.people)
+    number = np.where(rows < agents, FIRST_UMBRELLA + rows, FIRST_PEDESTRIAN_UMBRELLA + rows - agents)
+    return Drawn(
+        names,
+        (rows * 7 // 3 % len(names)).astype(np.int32),
+        _transforms(who, rows, axes, fist),
+        number.astype(np.int32),
+    )
+
+
+def _meals(state: SimulationState, who: Holders) -> Drawn | None:
+    agents = len(state.people)
+    drinks, eats = np.isin(who.clip[:agents], _DRINKS), np.isin(who.clip[:agents], _EATS)
+    rows = np.flatnonzero(drinks | eats)
+    if not len(rows):
+        return None
+    hand = who.hands.gesture[rows]
+    fist = who.palms(rows)[np.arange(len(rows)), hand]
+    raised = np.sin(np.pi * who.phase[rows]) ** 2
+    names, index = [], []
+    axes = np.zeros((len(rows), 3, 3))
+    for k, i in enumerate(rows.tolist()):
+        names.append(drink_of(i, state) if drinks[i] else food_of(i, state))
+        index.append(k)
+        # Cups tip towards the face; food points at it.
+        tip = -_TIP * float(raised[k]) if drinks[i] else 0.0
+        c, s, way = np.cos(tip), np.sin(tip), 1.0 if drinks[i] else -1.0
+        axes[k] = np.array([[way * c, 0.0, s], [0.0, way, 0.0], [-way * s, 0.0, c]])
+    entity = np.asarray(who.entity[rows], np.int32)
+    return Drawn(names, np.array(index, np.int32), _transforms(who, rows, axes, fist), entity)
+
+
+def drink_of(i: int, state: SimulationState) -> str:
+    """Return the model that a person drinks from: by the place, and outdoors from a bottle or a paper cup."""
+    p = state.people
+    if p.room[i] < 0:
+        return "water_bottle" if p.entity[i] % 2 else "paper_cup"
+    place = state.world.places[int(p.place[i])] if p.place[i] >= 0 else None
+    kind = "" if place is None else place.kind
+    if kind in ("pub", "bar", "nightclub", "biergarten"):
+        return "beer_glass"
+    if place is not None and place.category is Category.FOOD and kind != "cafe":
+        return "water_glass"
+    return "mug"
+
+
+def food_of(i: int, state: SimulationState) -> str:
+    """Return the model of what a person eats: with a fork where one sits at a restaurant's table or at home."""
+    p = state.people
+    place = state.world.places[int(p.place[i])] if p.room[i] >= 0 and p.place[i] >= 0 else None
+    served = place is not None and (place.kind in ("restaurant", "apartments", "hotel"))
+    return "fork" if served and p.seat[i] >= 0 else "sandwich"
+
+
+def _objects(state: SimulationState, who: Holders) -> Drawn:
+    """Return the movable objects: where they lie, or in the hand or the arms that hold them."""
+    objects, p = state.objects, state.people
+    names = sorted(set(objects.prototypes))
+    transforms = np.zeros((len(objects), 4, 4))
+    transforms[:, :3, :3] = matrix_of(objects.orientation)
+    transforms[:, 3, 3] = 1.0
+    transforms[:, :3, 3] = objects.position
+    for k in np.flatnonzero(objects.hand >= 0).tolist():
+        row = np.flatnonzero(p.entity == objects.holder[k])[:1]
+        transforms[k, :3, 3] = who.world(row, carried_at(k, int(row[0]), state, who)[None])[0]
+    index = np.array([names.index(name) for name in objects.prototypes], np.int32)
+    return Drawn(names, index, transforms.astype(np.float32), objects.entity)
+
+
+def carried_at(k: int, i: int, state: SimulationState, who: Holders) -> NDArray[np.float64]:
+    """Return where the middle of the underside of what a person carries is, body frame, metres, shape ``(3,)``."""
+    objects = state.objects
+    size = objects.size[k]
+    grip = movable_grip(objects.prototypes[k], size)
+    palms = who.palms(np.array([i]))[0]
+    mine = palms[objects.hand[k]]
+    at = np.array([mine[0], mine[1], mine[2] - (0.5 if grip == "hand" else 1.0) * size[2]])
+    if state.people.hold[i] == int(Hold.BEFORE_CHEST):
+        between = palms.mean(axis=0) - np.array([0.0, 0.0, 0.4 * size[2]])
+        at += (between - at) * who.hands.share[i]
+    at[2] = max(at[2], 0.02)
+    return np.asarray(at, np.float64)
+
+
+def _transforms(
+    who: Holders, rows: NDArray[np.int64], axes: NDArray[np.float64], points: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """Return frames given in body frames, shapes ``(k, 3, 3)`` and ``(k, 3)``, in the world's, ``(k, 4, 4)``."""
+    c, s = np.cos(who.yaw[rows]), np.sin(who.yaw[rows])
+    turn = np.zeros((len(rows), 3, 3))
+    turn[:, 0, 0] = turn[:, 1, 1] = c
+    turn[:, 1, 0], turn[:, 0, 1], turn[:, 2, 2] = s, -s, 1.0
+    frames = np.zeros((len(rows), 4, 4))
+    frames[:, :3, :3] = turn @ axes
+    frames[:, :3, 3] = who.world(rows, points)
+    frames[:, 3, 3] = 1.0
+    return frames.astype(np.float32)
