@@ -88,7 +88,7 @@ def test_looking_for_solids_only_where_they_are_near_changes_nothing() -> None:
 
 def test_an_engine_nobody_knows_and_one_that_is_not_installed_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = StaticScene(HeightField.flat(50.0))
-    with pytest.raises(InputError, match="no engine 'bullet'; choose among mujoco"):
+    with pytest.raises(InputError, match="no engine 'bullet'; choose among genesis, mujoco"):
         make_scene("bullet", scene, [])
     monkeypatch.setitem(factory._ENGINES, "warp", ("no_such_package", "pip install vico[warp]", "x", "y"))
     with pytest.raises(InputError, match=r"needs the package no_such_package.*: pip install vico\[warp\]"):

@@ -165,6 +165,8 @@ class RunOptions:
         Seconds to simulate.
     robots
         Names, separated by commas; none for no robots.
+    physics
+        Engine that moves robots: mujoco, or genesis (an extra).
     cars
         How many cars drive around.
     pedestrians
@@ -218,6 +220,7 @@ class RunOptions:
     events: str = "none"
     steps: int = 1800
     robots: CommaSeparated = "husky,go2"
+    physics: Literal["mujoco", "genesis"] = "mujoco"
     cars: int = 30
     pedestrians: int = 30
     junctions: Literal["one", "shared", "signals", "both"] = "one"

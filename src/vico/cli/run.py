@@ -123,6 +123,7 @@ class _Job:
             weather=named_or_read(options.weather),
             events=named_or_read(options.events),
             robots=_names(options.robots),
+            physics=options.physics,
             errands=True,
             cars=options.cars,
             pedestrians=options.pedestrians,

@@ -20,6 +20,7 @@ from vico.sim.appointments import Appointment, appointments
 from vico.sim.environment import CityEvent, EventSites
 from vico.sim.environment.event_spots import Spot
 from vico.sim.indoor import Indoor
+from vico.sim.physics import DEFAULT_ENGINE
 from vico.sim.robots.scene import RobotScene
 from vico.sim.seats import Seats
 from vico.sim.traffic.network import TrafficNetwork
@@ -181,13 +182,14 @@ class SimulationBase:
             self._bus_plans[second] = plan_buses(self.world.transit, self.world.lanes, float(second))
         return self._bus_plans[second]
 
-    def robot_scene(self, kinds: Sequence[str]) -> RobotScene:
-        """Return what is fixed about robots of some kinds, in their order."""
-        if tuple(kinds) not in self._robot_scenes:
+    def robot_scene(self, kinds: Sequence[str], physics: str = DEFAULT_ENGINE) -> RobotScene:
+        """Return what is fixed about robots of some kinds, in their order, in a physics engine."""
+        key = (physics, *kinds)
+        if key not in self._robot_scenes:
             if len(self._robot_scenes) >= _SCENES:
                 self._robot_scenes.clear()
-            self._robot_scenes[tuple(kinds)] = RobotScene(self.world, kinds, router=self.router)
-        return self._robot_scenes[tuple(kinds)]
+            self._robot_scenes[key] = RobotScene(self.world, kinds, router=self.router, physics=physics)
+        return self._robot_scenes[key]
 
     def way(self, origin: int, goal: int) -> NDArray[np.float64] | None:
         """Return the way on foot from one place to another, by their indices; None if there is none."""

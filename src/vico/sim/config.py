@@ -13,6 +13,9 @@ from vico.render.sensors.batch import USUAL_OUTPUTS, checked_outputs
 from vico.render.sensors.lens import Lens
 from vico.sim.traffic.junction_rule import JunctionRule
 
+#: As `vico.sim.physics.factory` has them, which is slow to import.
+PHYSICS_ENGINES = ("mujoco", "genesis")
+
 
 @dataclass(frozen=True, kw_only=True)
 class SimSettings:
@@ -28,6 +31,8 @@ class SimSettings:
         Avatars under test, without home or schedule.
     robots
         Model names; robot ``i`` is the agent ``robot_i``.
+    physics
+        Engine that moves them: ``"mujoco"``, or ``"genesis"`` (an extra, see docs/physics.md).
     errands
         Robots that nobody controls go from place to place.
     cars, pedestrians
@@ -65,6 +70,7 @@ class SimSettings:
     residents: int | None = None
     assistants: int = 0
     robots: tuple[str, ...] = ()
+    physics: str = "mujoco"
     errands: bool = False
     cars: int = 0
     pedestrians: int = 0
@@ -103,6 +109,8 @@ class SimConfig(SimSettings):
                 raise InputError(f"simulation: {name} is {value}; it has to be 0 or more")
         if self.junctions not in list(JunctionRule):
             raise InputError(f"simulation: junctions is {self.junctions!r}; take {', '.join(JunctionRule)}")
+        if self.physics not in PHYSICS_ENGINES:
+            raise InputError(f"simulation: no physics {self.physics!r}; choose among {', '.join(PHYSICS_ENGINES)}")
         if not 0 <= self.start < DAY:
             raise InputError(f"simulation: start is second {self.start} of the day; it has to be 0..{DAY - 1}")
         if not 16 <= self.image <= 1024:

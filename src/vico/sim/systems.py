@@ -72,5 +72,5 @@ def robots_of(base: SimulationBase, config: SimConfig, others: Bodies, *, errand
         seed=config.seed,
         first_entity=FIRST_ROBOT,
         errands=errands,
-        scene=base.robot_scene(config.robots),
+        scene=base.robot_scene(config.robots, config.physics),
     )

@@ -16,8 +16,21 @@ from vico.sim.physics.records import Capacity, StaticScene
 
 #: By name: the package an engine needs, how to install it, and the class of its scenes. Engines are imported when they
 #: are first asked for.
-_ENGINES = {"mujoco": ("mujoco", "pip install mujoco", "vico.sim.physics.mujoco_physics", "MujocoScene")}
+_ENGINES = {
+    "mujoco": ("mujoco", "pip install mujoco", "vico.sim.physics.mujoco_physics", "MujocoScene"),
+    "genesis": (
+        "genesis",
+        "pip install 'virtual-community[genesis]'",
+        "vico.sim.physics.genesis_scene",
+        "GenesisScene",
+    ),
+}
 DEFAULT_ENGINE = "mujoco"
+
+
+def known_engines() -> tuple[str, ...]:
+    """Names of all engines, the default one first."""
+    return tuple(_ENGINES)
 
 
 def engine_names() -> tuple[str, ...]:

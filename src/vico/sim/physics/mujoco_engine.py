@@ -251,6 +251,14 @@ class MujocoEngine:
         """How many bodies near robots found no place."""
         return int(self._movers.left_out[0])
 
+    def follow_movers(self, movers: KinematicBodies) -> None:
+        """Have people and vehicles be where those of another engine are."""
+        self._movers.restore(movers.arrays())
+        self._parameters.mover_half[:] = movers.half
+        self._parameters.changed()
+        self._move_movers()
+        self._forget()
+
     def _move_movers(self) -> None:
         """Put kinematic bodies where they are now, and who is nobody out of the way."""
         movers = self._movers

@@ -87,19 +87,32 @@ def _set_options(spec: Any) -> None:
     spec.option.impratio = FRICTION[COARSE]
 
 
-def _add_robot(spec: Any, index: int, model: RobotModel) -> None:
+def robot_spec(model: RobotModel) -> Any:
+    """Return a robot alone, as MuJoCo's specification: its outline marked, all that touches told to meet solids.
+
+    Raises
+    ------
+    InputError
+        If its base does not float.
+    """
     robot = mujoco.MjSpec.from_string(model.mjcf)
-    _set_options(robot)
     root = robot.body("base")
     if not any(joint.type == mujoco.mjtJoint.mjJNT_FREE for joint in root.joints):
         raise InputError(f"physics: the body 'base' of robot {model.name!r} has no free joint; give it one")
-    root.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER
-    root.pos = [10.0 * index, 0.0, model.stand]
     for geom in robot.geoms:
         if geom.name == BUMPER:
             geom.group = _OUTLINES
         if geom.contype or geom.conaffinity & (TOUCH | BUMP):
             geom.contype |= SOLID
+    return robot
+
+
+def _add_robot(spec: Any, index: int, model: RobotModel) -> None:
+    robot = robot_spec(model)
+    _set_options(robot)
+    root = robot.body("base")
+    root.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER
+    root.pos = [10.0 * index, 0.0, model.stand]
     for site in robot.sites:
         for axis in range(6):
             gear = [0.0] * 6
@@ -119,7 +132,7 @@ def _add_scene(spec: Any, scene: StaticScene) -> None:
     """Ground as one body, solids as the world's own."""
     ground, world = spec.worldbody.add_body(name="ground"), spec.worldbody
     bits = {"contype": 0, "conaffinity": SOLID}
-    heights, half = _grid(scene)
+    heights, half = ground_grid(scene)
     low, high = float(heights.min()), float(heights.max())
     if high - low < 1e-4:
         ground.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[half, half, 1.0], pos=[0, 0, low], **_SOLID)
@@ -148,12 +161,12 @@ def _add_scene(spec: Any, scene: StaticScene) -> None:
         world.add_geom(type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[radius, length, 0], pos=[x, y, z], **bits)
 
 
-def _grid(scene: StaticScene) -> tuple[NDArray[np.float64], float]:
-    """Heights of the ground on a square grid, and half the side of that."""
+def ground_grid(scene: StaticScene, *, kerbs: bool = True) -> tuple[NDArray[np.float64], float]:
+    """Heights of the ground on a square grid, and half the side of that; without kerbs, its cells are 2 m or more."""
     field = scene.height
     if field.heights.shape[0] != field.heights.shape[1]:
         raise InputError("physics: the height field has to be square")
-    if field.steps is None:
+    if field.steps is None or not kerbs:
         count = min(field.heights.shape[0], round(2 * field.half / _CELL) + 1)
     else:
         count = min(field.steps.edge.shape[0], round(2 * field.half / _KERB_CELL) + 1)

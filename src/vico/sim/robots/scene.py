@@ -82,6 +82,8 @@ class RobotScene:
         Use installed packages' models; False: our own alone.
     router
         Finds ways; made from the world's walkable map when it is first needed if it is not given.
+    physics
+        Name of the physics engine.
 
     Attributes
     ----------
@@ -96,12 +98,21 @@ class RobotScene:
         If a model is not known.
     """
 
-    def __init__(self, world: World, kinds: Sequence[str], *, packs: bool = True, router: Router | None = None) -> None:
+    def __init__(
+        self,
+        world: World,
+        kinds: Sequence[str],
+        *,
+        packs: bool = True,
+        router: Router | None = None,
+        physics: str = DEFAULT_ENGINE,
+    ) -> None:
         self.world = world
         self.kinds = tuple(kinds)
         self.models = tuple(robot_model(kind, packs=packs) for kind in kinds)
         self.groups = _groups(self.models)
         self._router = router
+        self._engine = physics
         self._narrow: dict[float, NDArray[np.bool_]] = {}
 
     def __len__(self) -> int:
@@ -124,7 +135,7 @@ class RobotScene:
     def physics(self) -> PhysicsScene:
         """Ground, solids and robots as physics has them, compiled when they are first needed."""
         flying = any(model.rotors is not None for model in self.models)
-        return make_scene(DEFAULT_ENGINE, static_scene_of(self.world, flying=flying), self.models)
+        return make_scene(self._engine, static_scene_of(self.world, flying=flying), self.models)
 
     @cached_property
     def airspace(self) -> Airspace:

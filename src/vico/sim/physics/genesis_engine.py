@@ -1,0 +1,345 @@
+"""The paper's physics engine: Genesis, an extra.
+
+A run in a scene that Genesis has built. Its numbers lie in that scene while it is stepped, and are kept here while
+another run of the same scene is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.errors import InputError, SchemaError
+from vico.sim.bodies import Bodies
+from vico.sim.physics.frames import COARSE
+from vico.sim.physics.genesis_contacts import contacts_of, read_contacts
+from vico.sim.physics.genesis_objects import ObjectSlots
+from vico.sim.physics.genesis_rays import RayTwin
+from vico.sim.physics.movers import KinematicBodies
+from vico.sim.physics.mujoco_model import standing_pose
+from vico.sim.physics.mujoco_views import base_motion, motion_of
+from vico.sim.physics.records import Base, Contacts, Imu, Motion, ObjectMotion, PhysicsError, RigidObject
+
+if TYPE_CHECKING:
+    from vico.sim.physics.genesis_scene import GenesisScene
+
+_GRAVITY = np.array([0.0, 0.0, 9.81])
+
+
+class GenesisEngine:
+    """One run in a built scene; see `vico.sim.physics.engine.PhysicsEngine`.
+
+    Parameters
+    ----------
+    scene
+        What is fixed.
+    places
+        Where each robot stands at first: x, y, yaw, shape ``(n, 3)``.
+    """
+
+    def __init__(self, scene: GenesisScene, places: NDArray[np.float64]) -> None:
+        places = np.asarray(places, np.float64)
+        if places.shape != (len(scene.models), 3):
+            raise InputError(f"physics: {len(scene.models)} robots need as many places x, y, yaw, not {places.shape}")
+        self._scene = scene
+        self._movers = KinematicBodies(scene.capacity)
+        self._slots = ObjectSlots(scene.capacity.objects)
+        self._kept: dict[str, NDArray[Any]] = scene.pristine
+        self._gain, self._bias, self._limit = scene.gain.copy(), scene.bias.copy(), scene.limit.copy()
+        self._wrench = [np.zeros((len(robot.sites), 6)) for robot in scene.robots]
+        self._grip = np.ones(1)
+        # What the last frame leaves for sensors.
+        self._velocity_before, self._frame = np.zeros((len(scene.models), 3)), np.zeros(1)
+        self._forces = np.zeros(len(scene.speeds))
+        self._contacts: NDArray[np.float64] | None = np.zeros((0, 9))
+        self._twin: RayTwin | None = None
+        self._hold()
+        for index, model, place in zip(scene.robots, scene.models, places, strict=True):
+            position, quaternion = standing_pose(scene.height, model, place)
+            scene.positions[index.root : index.root + 7] = [*position, *quaternion]
+            scene.positions[index.angle] = model.rest
+            self._gain[index.driven], self._bias[index.driven] = index.gain, index.bias
+            self._limit[index.driven] = index.limit
+            scene.state["dyn_state.dofs.ctrl_mode"][index.driven, 0] = index.mode
+            self._follow(index, model.stance if model.driven else np.zeros(0))
+        self._put_parameters()
+        self._note()
+
+    # Taking turns.
+
+    def _hold(self) -> None:
+        """Have Genesis be in this run's state."""
+        scene = self._scene
+        if scene.holder is self:
+            return
+        if scene.holder is not None:
+            scene.holder._leave()
+        scene.load(self._kept)
+        scene.holder = self
+        self._put_parameters()
+
+    def _leave(self) -> None:
+        """Take this run's state with it: another one's comes."""
+        self._last_contacts()
+        self._kept = self._scene.save()
+
+    def _put_parameters(self) -> None:
+        """Write what differs from run to run and that Genesis takes for the model."""
+        scene = self._scene
+        scene.gain[:], scene.bias[:], scene.limit[:] = self._gain, self._bias, self._limit
+        scene.grip[scene.gripping] = self._grip[0]
+        scene.built.shapes.resize(scene.mover_geom, 2.0 * self._movers.half)
+        self._slots.put(scene)
+        self._move_movers()
+
+    def _note(self) -> None:
+        """Keep what queries answer from."""
+        self._qpos, self._qvel = self._scene.positions.copy(), self._scene.speeds.copy()
+        self._bases: list[Base] = []
+
+    # Robots.
+
+    def link_names(self, robot: int) -> tuple[str, ...]:
+        """Names of a robot's links, base first."""
+        return self._scene.link_names(robot)
+
+    def base(self, robot: int) -> Base:
+        """Where a robot's base is and how it moves."""
+        if not self._bases:
+            rows = base_motion(self._qpos, self._qvel, self._scene.first)
+            self._bases = [Base(*row) for row in zip(*rows, strict=True)]
+        return self._bases[robot]
+
+    def joints(self, robot: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Positions and speeds of the joints."""
+        index = self._scene.robots[robot]
+        return self._qpos[index.angle], self._qvel[index.rate]
+
+    def motion(self, robots: NDArray[np.int64]) -> Motion:
+        """Motion of several robots of one kind."""
+        chosen = [self._scene.robots[robot] for robot in robots.tolist()]
+        angle, rate = np.array([one.angle for one in chosen]), np.array([one.rate for one in chosen])
+        return Motion(*motion_of(self._qpos, self._qvel, self._scene.first[robots], angle, rate))
+
+    def motor_forces(self, robot: int) -> NDArray[np.float64]:
+        """Torques of the motors in the last step."""
+        index = self._scene.robots[robot]
+        return index.motor_forces(self._forces[index.driven])
+
+    def imu(self, robot: int) -> Imu:
+        """Angular velocity, and acceleration without gravity's, in the base's frame."""
+        base, frame = self.base(robot), float(self._frame[0])
+        gained = base.velocity - self._velocity_before[robot]
+        acceleration = gained / frame if frame > 0.0 else np.zeros(3)
+        return Imu(base.angular_velocity_body.copy(), base.rotation.T @ (acceleration + _GRAVITY))
+
+    def links(self, robot: int) -> NDArray[np.float64]:
+        """Poses of the links, shape ``(n, 4, 4)``."""
+        scene = self._scene
+        with scene.lock:
+            self._hold()
+            scene.place_links()
+            return scene.poses(scene.robots[robot].shown)
+
+    def command(self, robot: int, targets: NDArray[np.float64], gains: tuple[float, float] | None = None) -> None:
+        """Set what the servos follow, and how stiffly: Nm/rad and Nms/rad."""
+        index = self._scene.robots[robot]
+        with self._scene.lock:
+            self._hold()
+            self._follow(index, np.asarray(targets, np.float64))
+            if gains is not None:
+                stiff = index.driven[index.servo]
+                self._gain[stiff], self._bias[stiff, 1], self._bias[stiff, 2] = gains[0], -gains[0], -gains[1]
+                self._scene.gain[stiff], self._scene.bias[stiff] = self._gain[stiff], self._bias[stiff]
+
+    def _follow(self, index: Any, targets: NDArray[np.float64]) -> None:
+        if not len(index.driven):
+            return
+        wanted = index.targets(targets)
+        for name in ("ctrl_pos", "ctrl_vel", "ctrl_force"):
+            self._scene.state[f"dyn_state.dofs.{name}"][index.driven, 0] = 0.0
+        for mode, name in enumerate(("ctrl_pos", "ctrl_vel", "ctrl_force")):
+            mine = index.mode == mode
+            self._scene.state[f"dyn_state.dofs.{name}"][index.driven[mine], 0] = wanted[mine]
+
+    def command_all(
+        self, robots: NDArray[np.int64], targets: NDArray[np.float64], gains: Sequence[tuple[float, float] | None]
+    ) -> None:
+        """Set what the servos of several robots of one kind follow."""
+        for robot, values, wanted in zip(robots.tolist(), targets, gains, strict=True):
+            self.command(robot, values, wanted)
+
+    def thrust(
+        self, robot: int, sites: Sequence[str], forces: NDArray[np.float64], torques: NDArray[np.float64] | None = None
+    ) -> None:
+        """Push a robot at named sites from now on; in the frames of the sites."""
+        known = self._scene.robots[robot].sites
+        wrench = np.zeros((len(sites), 6))
+        wrench[:, :3] = forces
+        if torques is not None:
+            wrench[:, 3:] = torques
+        if not np.isfinite(wrench).all():
+            raise InputError(f"physics: forces on robot {robot} have to be finite, not {wrench.tolist()}")
+        for site, values in zip(sites, wrench, strict=True):
+            if site not in known:
+                raise InputError(
+                    f"physics: robot {robot} ({self._scene.models[robot].name}) has no site {site!r}; "
+                    f"it has {', '.join(known) or 'none'}"
+                )
+            self._wrench[robot][known[site]] = values
+
+    def thrust_all(self, robots: NDArray[np.int64], site: str, wrenches: NDArray[np.float64]) -> None:
+        """Push several robots of one kind at the site of one name from now on."""
+        for robot, values in zip(robots.tolist(), wrenches, strict=True):
+            self._wrench[robot][self._scene.robots[robot].sites[site]] = values
+
+    # Everybody else.
+
+    def set_dynamic_obstacles(self, obstacles: Bodies, dt: float) -> None:
+        """Take people and vehicles near robots; they arrive `dt` seconds from now."""
+        before = self._movers.half.copy()
+        with self._scene.lock:
+            self._hold()
+            self._movers.set(obstacles, dt, self._qpos[self._scene.first[:, :1] + np.arange(2)])
+            changed = np.flatnonzero((before != self._movers.half).any(axis=1))
+            if len(changed):
+                self._scene.built.shapes.resize(self._scene.mover_geom[changed], 2.0 * self._movers.half[changed])
+            self._move_movers()
+
+    @property
+    def left_out(self) -> int:
+        """How many bodies near robots found no place."""
+        return int(self._movers.left_out[0])
+
+    def _move_movers(self) -> None:
+        """Put kinematic bodies where they are now, and who is nobody out of the way."""
+        self._scene.place_movers(self._movers.poses(), self._movers.entity)
+
+    def set_friction(self, share: float) -> None:
+        """Have ground, tyres and feet grip with this share of their friction on dry ground."""
+        with self._scene.lock:
+            self._hold()
+            self._grip[0] = share
+            self._scene.grip[self._scene.gripping] = share
+
+    # Free rigid objects.
+
+    def place_object(self, slot: int, thing: RigidObject) -> None:
+        """Put an object into a slot."""
+        with self._scene.lock:
+            self._hold()
+            self._slots.place(self._scene, slot, thing)
+            self._note()
+
+    def remove_object(self, slot: int) -> None:
+        """Take an object out of the scene."""
+        with self._scene.lock:
+            self._hold()
+            self._slots.remove(self._scene, slot)
+            self._note()
+
+    def objects(self) -> ObjectMotion:
+        """Where all objects are."""
+        return self._slots.motion(self._scene, self._qpos, self._qvel)
+
+    def clearance_below(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Metres from each point straight down to what is there; inf for nothing, -inf inside of something."""
+        if self._twin is None:
+            self._twin = RayTwin(self._scene)
+        self._twin.mirror(self._qpos, self._movers, self.objects(), self._slots)
+        return self._twin.clearance_below(points)
+
+    # Time.
+
+    def step(self, frames: int = 1, *, frame: float = COARSE) -> None:
+        """Move on by some frames; people and vehicles move first, at every one."""
+        scene = self._scene
+        with scene.lock:
+            self._hold()
+            for _ in range(frames):
+                if self._movers.moving:
+                    self._movers.advance(frame)
+                    self._move_movers()
+                self._velocity_before[:] = scene.speeds[scene.first[:, 1:] + np.arange(3)]
+                said = scene.step(frame, self._wrench)
+                self._contacts = None
+                self._slots.watch(scene, frame)
+                if said or not math.isfinite(float(np.add.reduce(scene.speeds))):
+                    raise PhysicsError(f"physics: the robots' motion diverged{said}; report it with the snapshot")
+            self._frame[0] = frame
+            self._forces[:] = scene.applied
+            self._note()
+
+    def _last_contacts(self) -> NDArray[np.float64]:
+        """Links, position, normal and force of the last step's contacts."""
+        if self._contacts is None:
+            self._contacts = read_contacts(self._scene.solver)
+        return self._contacts
+
+    def contacts(self) -> Contacts:
+        """Who touched whom in the last step."""
+        return contacts_of(self._scene, self._last_contacts(), self._movers.entity)
+
+    # State.
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Everything that decides the future, and what sensors answer from."""
+        scene = self._scene
+        with scene.lock:
+            self._hold()
+            contacts = self._last_contacts().copy()
+            kept = scene.save()
+        wrench = np.concatenate([np.zeros((0, 6)), *self._wrench])
+        return {
+            **{f"genesis_{name}": array for name, array in kept.items()},
+            "gain": self._gain.copy(),
+            "bias": self._bias.copy(),
+            "wrench": wrench,
+            "grip": self._grip.copy(),
+            "velocity_before": self._velocity_before.copy(),
+            "frame": self._frame.copy(),
+            "forces": self._forces.copy(),
+            "contacts": contacts,
+            **self._slots.arrays(),
+            **self._movers.arrays(),
+        }
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go back to what `arrays` held.
+
+        Raises
+        ------
+        SchemaError
+            If it belongs to other robots or surroundings, or to another engine.
+        """
+        scene = self._scene
+        kept = {name: arrays.get(f"genesis_{name}") for name in scene.pristine}
+        rows = ("contact_rows", *scene.sparse)
+        if any(
+            array is None or (name not in rows and array.shape != scene.pristine[name].shape)
+            for name, array in kept.items()
+        ):
+            raise SchemaError(
+                "physics: the saved state belongs to other robots or surroundings, or to another engine; start with "
+                "the same ones"
+            )
+        with scene.lock:
+            self._movers.restore(arrays)
+            self._slots.restore(arrays)
+            self._gain[:], self._bias[:], self._grip[:] = arrays["gain"], arrays["bias"], arrays["grip"]
+            first = 0
+            for wrench in self._wrench:
+                wrench[:] = arrays["wrench"][first : first + len(wrench)]
+                first += len(wrench)
+            self._velocity_before[:], self._frame[:] = arrays["velocity_before"], arrays["frame"]
+            self._forces[:], self._contacts = arrays["forces"], np.array(arrays["contacts"])
+            if scene.holder is not None and scene.holder is not self:
+                scene.holder._leave()
+            scene.load({name: np.asarray(array) for name, array in kept.items()})
+            scene.holder = self
+            self._put_parameters()
+            self._note()
