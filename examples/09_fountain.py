@@ -102,7 +102,7 @@ class Water:
         Middle of the basin's floor, ENU metres.
     """
 
-    CELLS, DROPS = 56, 4
+    CELLS, DROPS = 56, 6
 
     def __init__(self, place: np.ndarray) -> None:
         self.place, n = place, self.CELLS
@@ -184,7 +184,7 @@ def main() -> None:
     pictures = flow(arguments.seconds, arguments.settle)
     print(f"{len(pictures)} pictures of {len(pictures[0])} particles")
 
-    drop = ball((0.3 * GRAIN,) * 3, colour=SPRAY, sides=6, rings=3)
+    drop = ball((0.34 * GRAIN,) * 3, colour=SPRAY, sides=6, rings=3)
     models = {"basin": basin(), "drop": [drop]}
     scene = scene_of(world, rooms=False, prototypes=models, lighting=Lighting.at(15.5 * 3600, lat=60.0, clouds=0.3))
     frame = np.eye(4)

@@ -54,6 +54,8 @@ class GenesisIndex:
         Sites by name: row in `site_link` and the others.
     site_link, site_place, site_turn
         Link of each site, and its place and rotation in the frame of that.
+    gripping
+        Shapes whose friction goes before that of what they touch (tyres, feet), int64.
     weightless, lift
         Links whose weight is carried for them, and the force that does, N, shape ``(n, 3)``.
     """
@@ -73,6 +75,7 @@ class GenesisIndex:
         self.rate = np.array([self._dof[name] for name in measured], np.int64)
         self._index_motors(model, spec)
         self._index_sites(spec, of)
+        self.gripping = _gripping(spec, entity)
         carried = np.flatnonzero(spec.body_gravcomp > 0.0)
         self.weightless = np.array([of[spec.body(k).name] for k in carried.tolist()], np.int64)
         self.lift = np.zeros((len(carried), 3))
@@ -140,6 +143,17 @@ class GenesisIndex:
     def motor_forces(self, forces: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the motors' forces, given the driven joints'."""
         return self._joint_of.T @ forces
+
+
+def _gripping(spec: Any, entity: Any) -> NDArray[np.int64]:
+    """Return shapes with a priority. Genesis has those of a link that touch anything in MuJoCo's order."""
+    found: list[int] = []
+    for link in entity.links:
+        body = spec.body(link.name)
+        first, count = int(body.geomadr[0]), int(body.geomnum[0])
+        touching = [k for k in range(first, first + count) if spec.geom_contype[k] or spec.geom_conaffinity[k]]
+        found += [geom.idx for geom, k in zip(link.geoms, touching, strict=True) if spec.geom_priority[k] > 0]
+    return np.array(found, np.int64)
 
 
 def _servos(model: RobotModel) -> list[str]:

@@ -111,11 +111,9 @@ class GenesisScene:
         self.object_entity = np.array([links[k].entity.idx for k in self.built.objects.tolist()], np.int64)
         self.object_q = np.array([links[k].q_start for k in self.built.objects.tolist()], np.int64)
         self.object_v = np.array([links[k].dof_start for k in self.built.objects.tolist()], np.int64)
-        fixed = set(np.flatnonzero(self.party == Party.SCENE).tolist())
-        grips = [geom.idx for geom in geoms if geom.link.idx not in self.built.movers]
-        # What grips more or less by weather: the ground and solids, and all of robots.
-        on_robot = set(np.flatnonzero(self.party == Party.ROBOT).tolist())
-        self.gripping = np.array([k for k in grips if geoms[k].link.idx in fixed | on_robot], np.int64)
+        # What grips more or less by weather: the ground, and tyres and feet.
+        grips = [geom.idx for geom in geoms if self.party[geom.link.idx] == Party.SCENE]
+        self.gripping = np.concatenate([np.array(grips, np.int64), *(robot.gripping for robot in self.robots)])
 
     def save(self) -> dict[str, NDArray[Any]]:
         """Return a copy of what Genesis carries from one step to the next.
