@@ -40,6 +40,8 @@ BUS_DOORS = ((3.95, 5.35), (-0.75, 0.65), (-4.2, -2.9))
 _LENGTH, _WIDTH, _HEIGHT = BUS_SIZE
 _REAR, _NOSE, _HALF = -_LENGTH / 2, _LENGTH / 2, _WIDTH / 2
 # Sides are straight between these.
+#: Middles of the outer faces of the left lamps, in front and at the rear, metres.
+BUS_LAMPS = ((_NOSE + 0.04, _HALF - 0.38, 0.72), (_REAR - 0.02, _HALF - 0.3, 0.9))
 _STRAIGHT = (_REAR + 0.18, _NOSE - 0.35)
 _LOW, _BELT, _LINTEL, _EAVES = 0.32, 1.12, 2.46, 2.62
 _CEILING = 2.6

@@ -9,11 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.bus import BUS_AXLES, BUS_SIZE, bus
+from vico.assets.bus import BUS_AXLES, BUS_LAMPS, BUS_SIZE, bus
 from vico.assets.shapes import Colour, box
 from vico.assets.vehicle_parts import (
     GLASS,
@@ -124,6 +125,24 @@ def vehicle_size(name: str) -> tuple[float, float, float, float, float]:
         return (*BICYCLE_SIZE, 0.33, 1.08)
     build = _BUILDS[kind]
     return build.length, build.width, build.height, build.overhang, build.wheelbase
+
+
+class LampPlaces(NamedTuple):
+    """Where a vehicle's left lamps are, in its model's frame, metres: the middles of their outer faces."""
+
+    front: tuple[float, float, float]
+    rear: tuple[float, float, float]
+
+
+def lamp_places(kind: str) -> LampPlaces:
+    """Return where the lamps of a kind of car, or of the bus, are."""
+    if kind == "bus":
+        return LampPlaces(*BUS_LAMPS)
+    build = _BUILDS[kind]
+    _, _, high, nose = build.lower[-1]
+    _, _, rear_high, stern = build.lower[0]
+    tip, tail = build.length / 2 + 0.02, -build.length / 2 + 0.01
+    return LampPlaces((tip, nose - 0.13, high - 0.08), (tail, stern - 0.09, rear_high - 0.02))
 
 
 @cache

@@ -60,6 +60,10 @@ class TrafficSystem(Subsystem, Protocol):
         """The pedestrians alone."""
 
     @property
+    def lights(self) -> NDArray[np.uint8]:
+        """Which lights each vehicle shows, bits as `vico.sim.traffic.lights` has them."""
+
+    @property
     def gait(self) -> PedestrianGaits:
         """How each pedestrian walks."""
 

@@ -19,6 +19,7 @@ from vico.sim.state import MovableObjects
 
 if TYPE_CHECKING:
     from vico.sim.simulation import Simulation, StepResult
+    from vico.sim.simulation_state import TrafficSystem
 
 Rows = Mapping[str, Any]
 _SORTED = json.JSONEncoder(sort_keys=True)
@@ -66,7 +67,7 @@ class StepSamples:
         sim, step = self._sim, self._sim.metrics.steps
         self.steps.append(step)
         self._add("steps", {"step": [step], "hash": [digest], **_counts(sim)})
-        self._add("bodies", _bodies(step, bodies))
+        self._add("bodies", _bodies(step, bodies, sim.state.traffic))
         self._add("people", self._people(step))
         self._add("agents", _agents(step, sim, actions))
         if sim.state.robots is not None:
@@ -133,7 +134,12 @@ def _counts(sim: Simulation) -> Rows:
     }
 
 
-def _bodies(step: int, bodies: Bodies) -> Rows:
+def _bodies(step: int, bodies: Bodies, traffic: TrafficSystem | None) -> Rows:
+    lights = np.zeros(len(bodies), np.uint8)
+    if traffic is not None and len(traffic.lights):
+        vehicles = traffic.bodies().entity[: len(traffic.lights)]
+        # They are there in their own order.
+        lights[np.isin(bodies.entity, vehicles)] = traffic.lights
     return {
         "entity": bodies.entity,
         "step": np.full(len(bodies), step),
@@ -142,6 +148,7 @@ def _bodies(step: int, bodies: Bodies) -> Rows:
         "z": bodies.position[:, 2],
         "yaw": (bodies.yaw + np.pi) % (2 * np.pi) - np.pi,
         "speed": np.hypot(bodies.velocity[:, 0], bodies.velocity[:, 1]),
+        "lights": lights,
     }
 
 

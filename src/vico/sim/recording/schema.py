@@ -66,6 +66,7 @@ TABLES: dict[str, dict[str, Column]] = {
         "z": _METRES,
         "yaw": _TURN,
         "speed": Column(pa.int32(), 1e-3),
+        "lights": Column(pa.int8(), absent=0.0),
     },
     "people": {
         "entity": _WHOLE,

@@ -15,7 +15,7 @@ from vico.world.lanes import LaneGraph
 from vico.world.objects import Objects
 from vico.world.walkways import CROSSING, Walkways
 
-_U_TURN = 2.6  # rad
+_U_TURN, _TURN = 2.6, 0.6  # rad
 _BORDER = 6.0  # how far from the outermost point of the streets the map's edge counts as reached, m
 _LEAST_WALK = 60.0  # m of connected sidewalk that are worth walking along
 _CONFLICT = 1.45  # m to each side of a lane's centre line that a turning car takes
@@ -105,7 +105,8 @@ def _lane_network(lanes: LaneGraph, walks: Walkways) -> LaneNetwork:
     leaves = (lanes.inside < 0) & _at_border(lanes, lanes.first[1:] - 1)
     n = np.arange(len(lanes))
     turn = lanes.at(n, lanes.length)[:, 2] - lanes.at(n, 0.0)[:, 2]
-    u_turn = (lanes.inside >= 0) & (np.abs((turn + np.pi) % (2 * np.pi) - np.pi) > _U_TURN)
+    turn = (turn + np.pi) % (2 * np.pi) - np.pi
+    u_turn = (lanes.inside >= 0) & (np.abs(turn) > _U_TURN)
     records = np.zeros(len(lanes), LANE)
     for name, values in {
         "first_point": lanes.first[:-1],
@@ -123,6 +124,7 @@ def _lane_network(lanes: LaneGraph, walks: Walkways) -> LaneNetwork:
         "first_crossing": crossings_first[:-1],
         "end_crossing": crossings_first[1:],
         "u_turn": u_turn,
+        "turn": np.where((lanes.inside >= 0) & (np.abs(turn) > _TURN), np.sign(turn), 0),
         "leaves": leaves,
     }.items():
         records[name] = values

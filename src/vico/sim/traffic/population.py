@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.assets.vehicle_lights import lit_lamps, night_lamps
 from vico.assets.vehicle_parts import mirrored
 from vico.assets.vehicles import CAR_KINDS, vehicle_prototypes, vehicle_size
 from vico.errors import InputError
@@ -20,6 +21,7 @@ from vico.sim.traffic.crossings import mark_busy_crossings
 from vico.sim.traffic.jams import STUCK_AFTER, Jam, JamLog, entity_before
 from vico.sim.traffic.junction_rule import JunctionRule
 from vico.sim.traffic.levels import TrafficLevels
+from vico.sim.traffic.lights import LampDrawing
 from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.traffic.pedestrians import RADIUS, advance_pedestrians, place_pedestrian
 from vico.sim.traffic.route import count_per_street, drop_shut_plans, is_taken, widen_shut
@@ -130,6 +132,7 @@ class Traffic:
         self.signals = SignalClock(lanes, network.walks, seed) if junction_rule.has_signals else None
         self._heads = SignalHeads(lanes, network.walks, network.poles, height) if self.signals else None
         self._levels = TrafficLevels(height, lanes, network.walks, self._heights, self.shapes.bottom.copy())
+        self._lamps = LampDrawing([self._prototypes[k].split("_")[0] for k in self.prototype])
         self._street_load = np.zeros(len(lanes.edges), np.int32)
         self._entries = self._all_entries = network.entries
         self._place_buses(buses.starts)
@@ -413,19 +416,27 @@ class Traffic:
         transforms[:, 3, 3] = 1.0
         entity = np.arange(self.first_entity, self.first_entity + m, dtype=np.int32)
         vehicles = Drawn(self._prototypes, self.prototype, transforms, entity)
-        if self._heads is None:
-            return vehicles
-        return joined_drawn([vehicles, self._heads.draw(self._net.lanes["light"], self._paths.walkways["light"])])
+        parts = [vehicles, self._lamps.draw(self.fleet.lights, float(self.jams.elapsed[0]), vehicles)]
+        if self._heads is not None:
+            parts.append(self._heads.draw(self._net.lanes["light"], self._paths.walkways["light"]))
+        return joined_drawn(parts)
 
     def prototypes(self) -> dict[str, list[Surface]]:
         """Models of the vehicles and signals, by the names `draw` uses."""
         models = vehicle_prototypes()
+        models = models | {name: [*models[name], night_lamps(name.split("_")[0])] for name in self._prototypes}
+        models = models | lit_lamps()
         if self._heads is not None:
             models = models | self._heads.prototypes()
         # Doors open to the kerb.
         return models | {"bus": [mirrored(part) for part in models["bus"]]} if self.lanes.lefthand else models
 
     # -- what others ask ---------------------------------------------------------------------------------------------
+
+    @property
+    def lights(self) -> NDArray[np.uint8]:
+        """Which lights each vehicle shows, bits as `vico.sim.traffic.lights` has them; cars, then buses."""
+        return np.asarray(self.fleet.lights, np.uint8)
 
     @property
     def walkers(self) -> Bodies:

@@ -51,6 +51,7 @@ LANE = np.dtype(
         ("first_crossing", _I),  # crossings it runs over: `crossings` from here ...
         ("end_crossing", _I),  # ... to before here
         ("u_turn", _B),  # whether it turns back
+        ("turn", np.int8),  # in junctions: 1 where it turns left, -1 right, 0 straight on
         ("leaves", _B),  # whether it ends where the map cuts the street off
         ("light", np.uint8),  # what its signal shows who wants onto it: DARK, GREEN, AMBER or RED
     ],
@@ -97,6 +98,7 @@ VEHICLE_STATE: list[tuple[Any, ...]] = [
     ("stop_route_index", _I),  # buses: position in its route of the lane with the next stop
     ("stop_offset", _F),  # buses: the stop's distance along that lane, m
     ("at_stop", _B),  # buses: whether it stands at its stop with its doors open
+    ("lights", np.uint8),  # lights it shows: bits as `vico.sim.traffic.lights` has them
     ("laps", _I),  # cars: how often it has left the map and come back in
     ("teleports", _I),  # cars: how often it was taken out of a jam and brought back in at the map's edge
     ("random", np.uint64),  # state of its stream of random numbers

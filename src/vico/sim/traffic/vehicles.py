@@ -42,6 +42,7 @@ from vico.sim.traffic.leader import (
     touches,
 )
 from vico.sim.traffic.letting_in import distance_to_let_in, places_to_let_in
+from vico.sim.traffic.lights import shown_lights
 from vico.sim.traffic.path import (
     LANE_CHANGE,
     PATH_POINT,
@@ -137,6 +138,7 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         is_standing = vehicle.speed < _standing_speed(vehicle, dt)
         vehicle.blocker = leader if gap < _BLOCKER_GAP and is_standing else NONE
         release_junctions(net, junctions, vehicle)
+        vehicle.lights = shown_lights(net, vehicle, speed, dt)
         vehicle.time_since_lane_change += dt
         vehicle.stopped_time = vehicle.stopped_time + dt if is_standing else 0.0
         if is_bus:
