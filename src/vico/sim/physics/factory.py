@@ -21,7 +21,7 @@ _ENGINES = {
     "genesis": (
         "genesis",
         "pip install 'virtual-community[genesis]'",
-        "vico.sim.physics.genesis_scene",
+        "vico.sim.physics.genesis_physics",
         "GenesisScene",
     ),
 }

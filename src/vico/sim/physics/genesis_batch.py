@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import InputError
 from vico.sim.physics.frames import COARSE
-
-if TYPE_CHECKING:
-    from vico.sim.physics.genesis_scene import GenesisScene
+from vico.sim.physics.genesis_engine import GenesisEngine
+from vico.sim.physics.genesis_scene import BuiltScene
 
 
 class GenesisBatch:
@@ -33,10 +32,10 @@ class GenesisBatch:
         Only one is used.
     """
 
-    def __init__(self, scene: GenesisScene, copies: int, places: NDArray[np.float64], *, threads: int = 0) -> None:
+    def __init__(self, scene: BuiltScene, copies: int, places: NDArray[np.float64], *, threads: int = 0) -> None:
         if copies < 1 or threads < 0:
             raise InputError(f"physics: a batch needs 1 or more copies and 0 or more threads, not {copies}, {threads}")
-        self.engines = [scene.engine(places) for _ in range(copies)]
+        self.engines = [GenesisEngine(scene, places) for _ in range(copies)]
 
     def __len__(self) -> int:
         return len(self.engines)

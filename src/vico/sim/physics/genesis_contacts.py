@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.sim.physics.genesis_scene import BuiltScene
 from vico.sim.physics.records import Contacts, Party
-
-if TYPE_CHECKING:
-    from vico.sim.physics.genesis_scene import GenesisScene
 
 
 def read_contacts(solver: Any) -> NDArray[np.float64]:
@@ -31,7 +29,7 @@ def read_contacts(solver: Any) -> NDArray[np.float64]:
     return kept
 
 
-def contacts_of(scene: GenesisScene, kept: NDArray[np.float64], entity: NDArray[np.int32]) -> Contacts:
+def contacts_of(scene: BuiltScene, kept: NDArray[np.float64], entity: NDArray[np.int32]) -> Contacts:
     """Return contacts as the protocol has them, given who stands in each place for movers."""
     links = kept[:, :2].astype(np.int64)
     party, owner = scene.party[links], scene.owner[links]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +19,11 @@ from vico.sim.physics.frames import COARSE
 from vico.sim.physics.genesis_contacts import contacts_of, read_contacts
 from vico.sim.physics.genesis_objects import ObjectSlots
 from vico.sim.physics.genesis_rays import RayTwin
+from vico.sim.physics.genesis_scene import BuiltScene
 from vico.sim.physics.movers import KinematicBodies
 from vico.sim.physics.mujoco_model import standing_pose
 from vico.sim.physics.mujoco_views import base_motion, motion_of
 from vico.sim.physics.records import Base, Contacts, Imu, Motion, ObjectMotion, PhysicsError, RigidObject
-
-if TYPE_CHECKING:
-    from vico.sim.physics.genesis_scene import GenesisScene
 
 _GRAVITY = np.array([0.0, 0.0, 9.81])
 
@@ -41,7 +39,7 @@ class GenesisEngine:
         Where each robot stands at first: x, y, yaw, shape ``(n, 3)``.
     """
 
-    def __init__(self, scene: GenesisScene, places: NDArray[np.float64]) -> None:
+    def __init__(self, scene: BuiltScene, places: NDArray[np.float64]) -> None:
         places = np.asarray(places, np.float64)
         if places.shape != (len(scene.models), 3):
             raise InputError(f"physics: {len(scene.models)} robots need as many places x, y, yaw, not {places.shape}")
@@ -77,12 +75,12 @@ class GenesisEngine:
         if scene.holder is self:
             return
         if scene.holder is not None:
-            scene.holder._leave()
+            scene.holder.leave()
         scene.load(self._kept)
         scene.holder = self
         self._put_parameters()
 
-    def _leave(self) -> None:
+    def leave(self) -> None:
         """Take this run's state with it: another one's comes."""
         self._last_contacts()
         self._kept = self._scene.save()
@@ -338,7 +336,7 @@ class GenesisEngine:
             self._velocity_before[:], self._frame[:] = arrays["velocity_before"], arrays["frame"]
             self._forces[:], self._contacts = arrays["forces"], np.array(arrays["contacts"])
             if scene.holder is not None and scene.holder is not self:
-                scene.holder._leave()
+                scene.holder.leave()
             scene.load({name: np.asarray(array) for name, array in kept.items()})
             scene.holder = self
             self._put_parameters()

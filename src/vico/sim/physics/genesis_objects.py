@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import InputError, SchemaError
+from vico.sim.physics.genesis_scene import BuiltScene
 from vico.sim.physics.mujoco_model import parked_object
 from vico.sim.physics.records import ObjectMotion, RigidObject
-
-if TYPE_CHECKING:
-    from vico.sim.physics.genesis_scene import GenesisScene
 
 #: Slower than this, m/s and rad/s, for so many seconds an object rests.
 _SLOW, _CALM_TIME = 0.03, 0.2
@@ -46,7 +44,7 @@ class ObjectSlots:
         if not 0 <= slot < len(self.present):
             raise InputError(f"physics: there is no slot {slot} for objects; there are {len(self.present)}")
 
-    def place(self, scene: GenesisScene, slot: int, thing: RigidObject) -> None:
+    def place(self, scene: BuiltScene, slot: int, thing: RigidObject) -> None:
         """Put an object into a slot."""
         self.check(slot)
         size = np.asarray(thing.size, np.float64)
@@ -60,7 +58,7 @@ class ObjectSlots:
         scene.positions[q : q + 7] = np.concatenate([thing.position, thing.quaternion])
         scene.speeds[v : v + 6] = np.concatenate([thing.velocity, thing.angular_velocity_body])
 
-    def remove(self, scene: GenesisScene, slot: int) -> None:
+    def remove(self, scene: BuiltScene, slot: int) -> None:
         """Take an object out of the scene."""
         self.check(slot)
         if not self.present[slot]:
@@ -71,13 +69,13 @@ class ObjectSlots:
         scene.positions[q : q + 7] = [*parked_object(slot), 1.0, 0.0, 0.0, 0.0]
         scene.speeds[v : v + 6] = 0.0
 
-    def put(self, scene: GenesisScene) -> None:
+    def put(self, scene: BuiltScene) -> None:
         """Write extents and masses of all slots into a scene that another run had."""
         scene.weightless[scene.object_entity] = 1.0
         for slot in np.flatnonzero(self.present).tolist():
             self._write(scene, slot)
 
-    def _write(self, scene: GenesisScene, slot: int) -> None:
+    def _write(self, scene: BuiltScene, slot: int) -> None:
         scene.weightless[scene.object_entity[slot]] = 0.0
         scene.built.shapes.resize(scene.object_geom[slot : slot + 1], self.size[slot : slot + 1])
         link, squares, mass = [int(scene.built.objects[slot])], self.size[slot] ** 2, float(self.mass[slot])
@@ -85,13 +83,13 @@ class ObjectSlots:
         scene.solver.set_links_mass([mass], link)
         scene.solver.set_links_inertia(inertia[None], link)
 
-    def watch(self, scene: GenesisScene, seconds: float) -> None:
+    def watch(self, scene: BuiltScene, seconds: float) -> None:
         """Note who was slow in the last so many seconds."""
         if self.present.any():
             motion = scene.speeds[scene.object_v[:, None] + np.arange(6)]
             self.calm = np.where(np.abs(motion).max(axis=1) < _SLOW, self.calm + seconds, 0.0)
 
-    def motion(self, scene: GenesisScene, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> ObjectMotion:
+    def motion(self, scene: BuiltScene, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> ObjectMotion:
         """Where all objects are."""
         pose = qpos[scene.object_q[:, None] + np.arange(7)].reshape(-1, 7)
         motion = qvel[scene.object_v[:, None] + np.arange(6)].reshape(-1, 6)

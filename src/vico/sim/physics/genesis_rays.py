@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.sim.physics.genesis_objects import ObjectSlots
+from vico.sim.physics.genesis_scene import BuiltScene
 from vico.sim.physics.movers import KinematicBodies
 from vico.sim.physics.mujoco_engine import MujocoEngine
 from vico.sim.physics.mujoco_scene import CompiledScene
 from vico.sim.physics.records import ObjectMotion, RigidObject
-
-if TYPE_CHECKING:
-    from vico.sim.physics.genesis_objects import ObjectSlots
-    from vico.sim.physics.genesis_scene import GenesisScene
 
 
 class RayTwin:
@@ -26,7 +22,7 @@ class RayTwin:
         In Genesis; the twin is compiled when it is first asked, and shared.
     """
 
-    def __init__(self, scene: GenesisScene) -> None:
+    def __init__(self, scene: BuiltScene) -> None:
         if scene.twin is None:
             scene.twin = CompiledScene(scene.static, scene.models, scene.capacity)
         self._scene = scene

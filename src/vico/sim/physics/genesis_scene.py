@@ -1,18 +1,16 @@
-"""Genesis behind the protocols: a scene that is built once, and that its engines take turns to use."""
+"""A scene that Genesis has built, which its engines take turns to use."""
 
 from __future__ import annotations
 
 import threading
 import warnings
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.sim.physics.frames import COARSE, FINE
-from vico.sim.physics.genesis_batch import GenesisBatch
-from vico.sim.physics.genesis_engine import GenesisEngine
 from vico.sim.physics.genesis_index import GenesisIndex
 from vico.sim.physics.genesis_model import build_scene
 from vico.sim.physics.genesis_runtime import genesis, state_of, view
@@ -25,8 +23,15 @@ from vico.sim.quaternions import matrix_of
 STEPS = {FINE: 2, COARSE: 2}
 
 
-class GenesisScene:
-    """See `vico.sim.physics.engine.PhysicsScene`.
+class Holder(Protocol):
+    """A run whose state is in a scene."""
+
+    def leave(self) -> None:
+        """Take the state along: another one's comes."""
+
+
+class BuiltScene:
+    """Ground, solids, robots and parked bodies, built.
 
     Genesis keeps one state to a built scene, and building one takes half a minute in a city; so engines take turns:
     whoever steps puts its state there first, unless it is there already.
@@ -56,8 +61,6 @@ class GenesisScene:
         What each link belongs to, as `Party`; the robot, mover or slot; and the number of a robot's link.
     """
 
-    name = "genesis"
-
     def __init__(self, static: StaticScene, models: tuple[RobotModel, ...], capacity: Capacity) -> None:
         self.static, self.models, self.capacity = static, models, capacity
         self.height = static.height
@@ -68,7 +71,7 @@ class GenesisScene:
         pairs = zip(models, self.built.specs, self.built.robots, strict=True)
         self.robots = [GenesisIndex(model, spec, entity) for model, spec, entity in pairs]
         self.first = np.array([(robot.root, robot.root_speed) for robot in self.robots], np.int64).reshape(-1, 2)
-        self.holder: GenesisEngine | None = None
+        self.holder: Holder | None = None
         self.twin: CompiledScene | None = None
         self.lock = threading.RLock()
         solver = self.built.solver
@@ -220,14 +223,6 @@ class GenesisScene:
     def site_names(self, robot: int) -> tuple[str, ...]:
         """Names of the sites a robot can be pushed at."""
         return tuple(self.robots[robot].sites)
-
-    def engine(self, places: NDArray[np.float64]) -> GenesisEngine:
-        """Return a new state with robots standing at `places`."""
-        return GenesisEngine(self, places)
-
-    def batch(self, copies: int, places: NDArray[np.float64], *, threads: int = 0) -> GenesisBatch:
-        """Return many copies of a new state, which take turns on one thread."""
-        return GenesisBatch(self, copies, places, threads=threads)
 
 
 _WRENCH = (slice(0, 3), slice(3, 6))
