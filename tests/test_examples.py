@@ -69,3 +69,11 @@ def test_events_close_a_street_and_cut_the_power(helsinki_path: Path) -> None:
     assert "known (announced): new pipes" in printed
     assert "2 barriers stand" in printed
     assert "0 of 15 cars on Mikonkatu, 0 vanished" in printed
+
+
+@pytest.mark.slow
+def test_a_scene_of_the_film_is_filmed(helsinki_path: Path, tmp_path: Path) -> None:
+    small = ("--residents", "20", "--size", "128x72", "--samples", "1", "--scenes", "street")
+    printed = run("09_film.py", "--world", str(helsinki_path), "--out", str(tmp_path / "film"), *small)
+    assert "walks to work, from step" in printed
+    assert printed.endswith("film.mp4: 17 s\n")

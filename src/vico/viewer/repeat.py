@@ -29,6 +29,8 @@ class RepeatedRun:
         The recording.
     world, community
         That it was made with.
+    setup
+        What was done to the simulation before its first step, such as adding objects.
 
     Attributes
     ----------
@@ -41,11 +43,19 @@ class RepeatedRun:
         If this version of vico, or another world or community, would make another run.
     """
 
-    def __init__(self, run: Run, world: World, community: Community | None) -> None:
+    def __init__(
+        self,
+        run: Run,
+        world: World,
+        community: Community | None,
+        *,
+        setup: Callable[[Simulation], None] = lambda sim: None,
+    ) -> None:
         self.run = run
         manifest = run.manifest
         config = TypeAdapter(SimConfig).validate_python(manifest["config"])
         self.sim = Simulation(world, community, config)
+        setup(self.sim)
         if self.sim.identity != manifest["identity"]:
             raise SchemaError(
                 f"{run.path}: was made by {manifest['producer']} with another configuration, world or community than "

@@ -78,17 +78,29 @@ def write_run_film(
     InputError
         If the steps were not recorded, or nobody has the name.
     """
+    frames = film_frames(repeated, settings, first=first, last=last)
+    seconds = float(repeated.run.times[last] - repeated.run.times[first])
+    count = int(seconds * settings.rate)
+    with FilmWriter(path, rate=settings.rate, crf=20, threads=2) as film:
+        for number, frame in enumerate(frames):
+            film.add(frame)
+            report(min(number + 1, count), count)
+        return film.frames
+
+
+def film_frames(repeated: RepeatedRun, settings: FilmSettings, *, first: int, last: int) -> Iterator[NDArray[np.uint8]]:
+    """Return the frames of a film of a run from step `first` to step `last`, each uint8, shape ``(h, w, 3)``.
+
+    Raises
+    ------
+    InputError
+        If the steps were not recorded, or nobody has the name.
+    """
     if not 0 <= first < last <= repeated.run.last:
         raise InputError(
             f"film: steps {first} to {last}; the run has steps 0 to {repeated.run.last}, and a film needs two of them"
         )
-    seconds = float(repeated.run.times[last] - repeated.run.times[first])
-    count = int(seconds * settings.rate)
-    with FilmWriter(path, rate=settings.rate, crf=20, threads=2) as film:
-        for number, frame in enumerate(_frames(repeated, settings, first, last)):
-            film.add(frame)
-            report(min(number + 1, count), count)
-        return film.frames
+    return _frames(repeated, settings, first, last)
 
 
 def still(repeated: RepeatedRun, settings: FilmSettings, step: int) -> NDArray[np.uint8]:

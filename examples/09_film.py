@@ -1,0 +1,372 @@
+"""A day of a city in two minutes of film: seven scenes, each a recorded run of the same people with the same seed.
+
+python examples/09_film.py --world out/demo/world --out out/film [--residents 50] [--scenes school,bus]
+
+The morning street, a child on the way to school, a bus ride seen from inside, a shop, robots at work, rain at dusk, the
+lit night. Each scene is simulated and recorded (`vico replay` opens the runs), then filmed from the recording with
+`vico.viewer.run_film`. Two minutes of 1280 x 720 take a core about half an hour.
+"""
+
+import argparse
+import math
+from collections.abc import Callable, Iterator
+from contextlib import closing, suppress
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from vico.agents.schedule import Stay, followers_of, stays_of
+from vico.agents.travel import Traveller
+from vico.assets.shapes import box
+from vico.clock import DAY, clock_of
+from vico.community import Community, build_community
+from vico.render.film import FilmWriter
+from vico.runner.faults import FaultLog
+from vico.runner.gather import Gatherer
+from vico.runner.loop import Hook, Runner, Step
+from vico.runner.recording import RecordedRun
+from vico.seeds import rng
+from vico.sim.config import SimConfig
+from vico.sim.recorder import Recorder
+from vico.sim.recording import read_run
+from vico.sim.simulation import Simulation
+from vico.viewer.repeat import RepeatedRun
+from vico.viewer.run_film import FilmSettings, film_frames
+from vico.world.folder import World, read_world
+from vico.world.public import PublicMap
+
+RATE = 25
+ROBOTS = ("manipulator", "husky", "go2", "h1", "drone")
+PASSENGERS = 6
+PARCEL = (0.12, 0.18, 0.2)
+AUTUMN = {"date": "2026-10-20", "utc_offset": 3.0}
+
+
+class Enough(Exception):
+    """A scene has been played."""
+
+
+@dataclass
+class Scene:
+    """A part of the film.
+
+    Attributes
+    ----------
+    caption
+        What is written below it.
+    start
+        Second of the day at which its run begins.
+    follow, view
+        Who is seen, and from where (`vico.viewer.follow.VIEWS`).
+    seconds
+        How long it is.
+    begins
+        Whether it begins, asked in every second of the run.
+    config
+        What its run has of its own.
+    setup
+        What is done before its first step.
+    players
+        Who acts beside the residents.
+    """
+
+    caption: str
+    start: float
+    follow: str
+    view: str = "behind"
+    seconds: int = 17
+    begins: Callable[[Simulation], bool] = lambda sim: sim.metrics.steps >= 10
+    config: dict = field(default_factory=dict)
+    setup: Callable[[Simulation], None] = lambda sim: None
+    players: dict = field(default_factory=dict)
+
+
+class UntilPlayed(Hook):
+    """Notes when a scene begins, and ends its run once it has been played; after an hour it gives up."""
+
+    def __init__(self, scene: Scene, sim: Simulation) -> None:
+        self.scene, self.sim, self.first = scene, sim, -1
+
+    def stepped(self, step: Step) -> None:
+        """Look whether it begins or is over."""
+        if self.first < 0 and self.scene.begins(self.sim):
+            self.first = step.number
+        if self.first >= 0 and step.number >= self.first + self.scene.seconds:
+            raise Enough
+        if step.number >= 3600:
+            raise SystemExit(f"the scene {self.scene.caption!r} did not come about within an hour")
+
+
+class Passenger:
+    """An assistant who rides a bus from one stop of a line to another, half a round away."""
+
+    def __init__(self, public_map: PublicMap, seed: int, number: int) -> None:
+        stops = {stop.id: stop.wait for stop in public_map.stops}
+        line = max(public_map.lines, key=lambda line: line.travel[-1])
+        self.here, goal = (stops[line.stops[k]] for k in (1, 1 + len(line.stops) // 2))
+        self.goal = float(goal[0]), float(goal[1])
+        self.traveller = Traveller(public_map, rng(seed, "passenger", number), modes=("walk", "bus"))
+
+    def act(self, observation: dict, info: dict) -> dict:
+        """Go on with the trip."""
+        return self.traveller.towards(self.goal, observation, info) or {"type": "wait"}
+
+
+class Crew:
+    """Robots that load a parcel: the manipulator picks it up and puts it on the Husky, which comes and drives off.
+
+    The Go2 and the H1 come to see it, the drone comes last and hovers above.
+    """
+
+    def __init__(self) -> None:
+        self.sim: Simulation | None = None
+        self.spot = np.zeros(2)
+        self.sent: dict[str, str] = {}
+
+    def setup(self, sim: Simulation) -> None:
+        """Lay the parcel before the manipulator."""
+        self.sim, self.sent = sim, {}
+        robots = sim.state.robots.bodies()
+        yaw = float(robots.yaw[0])
+        ahead = np.array([math.cos(yaw), math.sin(yaw), 0.0])
+        self.parcel = int(
+            sim.scenario.add_object(
+                "parcel", "parcel", [box(PARCEL, (0, 0, PARCEL[2] / 2))], robots.position[0] + 1.2 * ahead, size=PARCEL
+            )
+        )
+        self.spot = robots.position[0, :2] + 2.2 * ahead[:2]
+
+    def act_as(self, name: str, order: Callable[[], dict | None]) -> "Robot":
+        """Return a robot that is told what `order` says, once for each order."""
+        return Robot(self, name, order)
+
+    def near(self, robot: int, metres: float) -> bool:
+        """Whether a robot is near the spot."""
+        position = self.sim.state.robots.bodies().position[robot, :2]
+        return bool(np.hypot(*(position - self.spot)) < metres)
+
+    def holds(self) -> bool:
+        """Whether the manipulator holds the parcel."""
+        return self.sim.state.robots.in_hand(0) == self.parcel
+
+    def beside(self, degrees: float, metres: float, height: float = 0.0) -> list[float]:
+        """Return a point beside the spot where one can stand, ENU metres."""
+        for turn in range(0, 360, 20):
+            angle = math.radians(degrees + turn)
+            point = self.spot + metres * np.array([math.cos(angle), math.sin(angle)])
+            if self.sim.world.walkable.is_connected(point) and self.sim.world.walkable.clearance_at(point) > 0.6:
+                break
+        return [float(point[0]), float(point[1]), float(self.sim.world.height(point)) + height]
+
+    def manipulator(self) -> dict | None:
+        """Wait for the Husky; pick the parcel up, and put it on the deck."""
+        if not self.near(1, 1.5):
+            return None
+        if not self.holds() and "place" not in self.sent.get("manipulator", ""):
+            return {"type": "pick", "object": self.parcel}
+        return {"type": "place", "target": int(self.sim.state.robots.bodies().entity[1])}
+
+    def husky(self) -> dict | None:
+        """Come, and drive off with the parcel."""
+        if "place" in self.sent.get("manipulator", "") and not self.holds():
+            return {"type": "go_to", "target": self.beside(90.0, 15.0)}
+        return {"type": "go_to", "target": self.beside(0.0, 0.4)}
+
+    def players(self) -> dict:
+        """Return who plays which robot."""
+        orders = {
+            "manipulator": self.manipulator,
+            "husky": self.husky,
+            "go2": lambda: {"type": "go_to", "target": self.beside(60.0, 3.5)},
+            "h1": lambda: {"type": "go_to", "target": self.beside(-60.0, 3.5)},
+            "drone": lambda: {"type": "fly_to", "target": self.beside(180.0, 4.0, 4.0)},
+        }
+        return {f"robot_{k}": self.act_as(name, orders[name]) for k, name in enumerate(ROBOTS)}
+
+
+@dataclass
+class Robot:
+    """One of the crew: it is told an order when it is another one than before."""
+
+    crew: Crew
+    name: str
+    order: Callable[[], dict | None]
+
+    def act(self, observation: dict, info: dict) -> dict:
+        """Return the order, or wait."""
+        order = self.order()
+        said = str(order)
+        if order is None or self.crew.sent.get(self.name) == said:
+            return {"type": "wait"}
+        self.crew.sent[self.name] = said
+        return order
+
+
+def stays(resident, world: World) -> list[Stay]:
+    """Return where somebody is to be by when."""
+    return stays_of(resident.schedule, {place.id: place for place in world.places})
+
+
+def way(resident, world: World, stay: Stay, before: str) -> float:
+    """Return how far it is to a stay from the place of the one before, metres, as the crow flies."""
+    places = {place.id: place for place in world.places}
+    return math.dist(places[stay.place].position[:2], places[before].position[:2])
+
+
+def anybody(resident, stay: Stay) -> bool:
+    """Take whoever it is."""
+    return True
+
+
+def on_the_way(community: Community, world: World, early: str, late: str, wanted: Callable) -> tuple[str, Stay]:
+    """Return who has the longest walk that begins between two hours, and to which stay."""
+    first, last = (int(hour[:2]) * 3600 + int(hour[3:]) * 60 for hour in (early, late))
+    found = []
+    for resident in community.residents:
+        days = stays(resident, world)
+        for before, stay in pairwise(days):
+            if first <= stay.leave <= last and stay.mode == "walk" and wanted(resident, stay):
+                found.append((way(resident, world, stay, before.place), resident.id, stay))
+    if not found:
+        raise SystemExit(f"nobody of the community is on such a way between {early} and {late}; take more residents")
+    _, name, stay = max(found, key=lambda one: (one[0], one[1]))
+    return name, stay
+
+
+def outdoors(name: str, seconds: int) -> Callable[[Simulation], bool]:
+    """Return whether somebody has been outdoors for some seconds."""
+    since = [0]
+
+    def begins(sim: Simulation) -> bool:
+        people = sim.state.people
+        since[0] = since[0] + 1 if people.room[people.names.index(name)] < 0 else 0
+        return since[0] >= seconds
+
+    return begins
+
+
+def arrived(name: str, place: str) -> Callable[[Simulation], bool]:
+    """Return whether somebody is in a place."""
+    return lambda sim: sim.state.people.place[sim.state.people.names.index(name)] == sim.state.place_index[place]
+
+
+def in_a_moving_bus(sim: Simulation) -> bool:
+    """Return whether all passengers are in the bus, and it is on its way."""
+    transit, aboard = sim.state.transit, sim.state.people.vehicle[-PASSENGERS:] > 0
+    return bool(aboard.all()) and all(transit.stopped_at(bus) is None for bus in range(transit.traffic.buses)
+                                      if transit.aboard(bus))  # fmt: skip
+
+
+def scenes(world: World, community: Community, public_map: PublicMap, seed: int) -> dict[str, Scene]:
+    """Return the scenes of the film, in their order."""
+    people = {resident.id: resident for resident in community.residents}
+
+    def walk(early: str, late: str, caption: str, wanted=lambda who, stay: True, view="behind", **config) -> Scene:
+        name, stay = on_the_way(community, world, early, late, wanted)
+        return Scene(
+            caption.format(people[name].name), stay.leave - 20, name, view, begins=outdoors(name), config=config
+        )
+
+    def riding(sim: Simulation) -> bool:
+        people = sim.state.people
+        return (
+            bool(people.vehicle[people.names.index("assistant_0")])
+            and sim.state.transit.traffic.fleet["speed"][sim.state.transit.traffic.cars :].max() > 3.0
+        )
+
+    def shopping(who, stay: Stay) -> bool:
+        return stay.tag == "shop" and who.age >= 16
+
+    riders, crew = [Passenger(public_map, seed, k) for k in range(PASSENGERS)], Crew()
+    shopper, stay = on_the_way(community, world, "08:00", "20:00", shopping)
+
+    def at_the_stop(sim: Simulation) -> None:
+        for k, rider in enumerate(riders):
+            sim.scenario.place_agent(f"assistant_{k}", rider.here)
+        sim.state.people.cash[-PASSENGERS:] = 20.0
+
+    return {
+        "street": walk("07:40", "09:30", "Morning: {} walks to work", lambda who, stay: stay.tag == "work", after=20),
+        "school": walk("06:30", "09:00", "{} goes to school", lambda who, stay: who.age < 14 and stay.tag == "study"),
+        "bus": Scene(
+            "In the bus", 9 * 3600, f"assistant_{PASSENGERS - 1}", "eyes", 17, in_a_moving_bus,
+            {"assistants": PASSENGERS}, at_the_stop, {f"assistant_{k}": rider for k, rider in enumerate(riders)},
+        ),
+        "shop": Scene(
+            f"{people[shopper].name} shops", stay.leave - 5, shopper, "behind", 16, arrived(shopper, stay.place)
+        ),
+        "robots": Scene(
+            "Robots at work", 11 * 3600, "robot_0", "orbit", 22, lambda sim: crew.near(1, 1.5),
+            {"robots": ROBOTS}, crew.setup, crew.players(),
+        ),
+        "rain": walk("17:20", "18:10", "Rain at dusk", after=20, weather="rain", **AUTUMN),
+        "night": walk("19:00", "22:00", "The lit night", after=60, weather="clear", **AUTUMN),
+    }  # fmt: skip
+
+
+def play(scene: Scene, out: Path, world: World, community: Community, seed: int) -> tuple[RepeatedRun, int]:
+    """Simulate and record a scene; return it, and the step at which it begins."""
+    options = {"cars": 40, "pedestrians": 80, "junctions": "signals", **scene.config}
+    config = SimConfig(seed=seed, start=int(scene.start) % DAY, observe=(), **options)
+    sim = Simulation(world, community, config)
+    scene.setup(sim)
+    followers = followers_of(community, PublicMap.from_world(world), seed=seed)
+    faults, played = FaultLog(), UntilPlayed(scene, sim)
+    agents = Gatherer(followers | scene.players, trusted=[*followers, *scene.players])
+    with closing(agents), Recorder(out, sim, sources={}, wanted=3600) as recorder:
+        with suppress(Enough):
+            Runner(sim, agents, hooks=[RecordedRun(recorder, faults), played], faults=faults).run(3600)
+        recorder.close()
+    return RepeatedRun(read_run(out), world, community, setup=scene.setup), played.first
+
+
+def captioned(frames: Iterator[np.ndarray], scene: Scene, second: float) -> Iterator[np.ndarray]:
+    """Write what is seen, and when, into the lower left corner."""
+    for number, frame in enumerate(frames):
+        picture = Image.fromarray(frame)
+        draw, height = ImageDraw.Draw(picture), frame.shape[0]
+        text = f"{clock_of(int(second + number / RATE) % DAY)[:5]}   {scene.caption}"
+        draw.text(
+            (height // 24, height - height // 12), text, (255, 255, 255), ImageFont.load_default(height // 26),
+            stroke_width=max(height // 360, 1), stroke_fill=(0, 0, 0),
+        )  # fmt: skip
+        yield np.asarray(picture)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--world", type=Path, required=True)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--residents", type=int, default=50)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--size", default="1280x720")
+    parser.add_argument("--samples", type=int, default=2, help="rays a pixel, along each side")
+    parser.add_argument("--scenes", default="", help="only these, separated by commas")
+    arguments = parser.parse_args()
+
+    world = read_world(arguments.world)
+    community = build_community(world, residents=arguments.residents, seed=arguments.seed)
+    public_map = PublicMap.from_world(world)
+    width, height = (int(side) for side in arguments.size.split("x"))
+    chosen = scenes(world, community, public_map, arguments.seed)
+    if arguments.scenes:
+        chosen = {name: chosen[name] for name in arguments.scenes.split(",")}
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    with FilmWriter(arguments.out / "film.mp4", rate=RATE, crf=20, threads=2) as film:
+        for name, scene in chosen.items():
+            repeated, first = play(scene, arguments.out / name, world, community, arguments.seed)
+            settings = FilmSettings(
+                follow=scene.follow, view=scene.view, width=width, height=height, rate=RATE, samples=arguments.samples
+            )
+            frames = film_frames(repeated, settings, first=first, last=repeated.run.last)
+            for frame in captioned(frames, scene, float(repeated.run.times[first])):
+                film.add(frame)
+            print(f"{name}: {scene.caption}, from step {first} of {arguments.out / name}", flush=True)
+    print(f"{arguments.out / 'film.mp4'}: {film.frames / RATE:.0f} s")
+
+
+if __name__ == "__main__":
+    main()
