@@ -184,6 +184,8 @@ class RunOptions:
         A file (.json) of lenses by agent, model of robot, or residents, assistants, robots: docs/pictures.md.
     quality
         Of these pictures: plain, or fine (soft shadows, darker corners, smooth edges, mirroring glass).
+    renderer
+        What makes them: cpu, or gl for OpenGL (the extra "gl").
     assistants
         How many avatars take part that are nobody's resident: assistant_0, ...
     agent
@@ -229,6 +231,7 @@ class RunOptions:
     keep: CommaSeparated = "none"
     cameras: Path | None = None
     quality: Literal["plain", "fine"] = "plain"
+    renderer: Literal["cpu", "gl"] = "cpu"
     assistants: int = 0
     agent: Annotated[str, tyro.conf.arg(metavar="MODULE:NAME")] = ""
     deadline: float = 60.0

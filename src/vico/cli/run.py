@@ -131,6 +131,7 @@ class _Job:
             observe=None if options.observe == "all" else _names(options.observe),
             outputs=_names(options.outputs),
             quality=options.quality,
+            renderer=options.renderer,
             cameras=read_json(options.cameras) if options.cameras is not None else {},
         )
         place = read_world(world)

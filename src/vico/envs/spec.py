@@ -36,6 +36,7 @@ class EnvOptions(TypedDict, total=False):
     outputs: tuple[str, ...]
     cameras: Mapping[str, Mapping[str, Any]]
     quality: str | Mapping[str, bool]
+    renderer: str
     date: str
     utc_offset: float | None
     weather: str | Mapping[str, Any]

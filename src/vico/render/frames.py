@@ -181,7 +181,7 @@ def take_pictures(
         What the same cameras saw in the last call: a view in which nothing can have changed is copied.
     """
     shape = len(cameras), cameras.height, cameras.width
-    light = _light_of(scene.light(), request.quality) if request.rgb else None
+    light = light_of(scene.light(), request.quality) if request.rgb else None
     batch = _Batch(
         scene,
         cameras,
@@ -428,7 +428,7 @@ def _take(scene: Scene, camera: Record, light: Light | None, out: Pictures, how:
     return int(drawn)
 
 
-def _light_of(light: Light, quality: RenderQuality) -> Light:
+def light_of(light: Light, quality: RenderQuality) -> Light:
     """Return the light with what the shader reads of switches."""
     if not quality.soft_shadows and not quality.reflections:
         return light

@@ -9,7 +9,7 @@ from typing import Any
 from vico.clock import DAY
 from vico.errors import InputError
 from vico.render.quality import RenderQuality
-from vico.render.sensors.batch import USUAL_OUTPUTS, checked_outputs
+from vico.render.sensors.batch import RENDERERS, USUAL_OUTPUTS, checked_outputs
 from vico.render.sensors.lens import Lens
 from vico.sim.traffic.junction_rule import JunctionRule
 
@@ -52,6 +52,8 @@ class SimSettings:
         robots, or for all ``"residents"``, ``"assistants"`` or ``"robots"``; the first of these that is there holds.
     quality
         How carefully pictures are made: ``"plain"``, ``"fine"``, or switches of `vico.render.quality.RenderQuality`.
+    renderer
+        What makes pictures: ``"cpu"``, or ``"gl"`` for OpenGL (extra ``gl``); they agree but for rounding.
     date
         On which the first day is, YYYY-MM-DD.
     utc_offset
@@ -80,6 +82,7 @@ class SimSettings:
     outputs: tuple[str, ...] = USUAL_OUTPUTS
     cameras: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     quality: str | Mapping[str, bool] = "plain"
+    renderer: str = "cpu"
     date: str = "2026-06-21"
     utc_offset: float | None = None
     weather: str | Mapping[str, Any] = "fair"
@@ -117,6 +120,8 @@ class SimConfig(SimSettings):
             raise InputError(f"simulation: images of {self.image} pixels are out of range; take 16..1024, such as 256")
         object.__setattr__(self, "outputs", checked_outputs(self.outputs))
         RenderQuality.of(self.quality)
+        if self.renderer not in RENDERERS:
+            raise InputError(f"simulation: renderer {self.renderer!r}; it has to be one of {', '.join(RENDERERS)}")
         for record in self.cameras.values():
             Lens.of(record, side=self.image)
 

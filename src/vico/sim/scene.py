@@ -142,7 +142,11 @@ class SceneRenderer:
         self._lit: tuple[float, ...] = ()
         self.wait()
         self._viewers = Viewers(
-            self._scene, sim.config.outputs, SemanticClasses(sim).of_image, RenderQuality.of(sim.config.quality)
+            self._scene,
+            sim.config.outputs,
+            SemanticClasses(sim).of_image,
+            RenderQuality.of(sim.config.quality),
+            sim.config.renderer,
         )
         self._lenses = lenses_by_entity(sim.state, sim.config)
         self._usual_lens = Lens.of({}, side=sim.config.image)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,10 @@ from vico.render.sensors.lens import CubeMap, Lens, cube_map
 from vico.render.sensors.past import PastPlaces, Placement, past_places, placement_of
 from vico.render.view_cache import ViewCache
 
+if TYPE_CHECKING:
+    from vico.render.gl.renderer import GlRenderer
+
+RENDERERS = ("cpu", "gl")
 #: What can be asked for, and what is given where nobody asks.
 OUTPUTS = ("rgb", "depth", "segmentation", "normals", "flow", "semantic")
 USUAL_OUTPUTS = ("rgb", "depth", "segmentation")
@@ -63,12 +67,16 @@ class Viewers:
         Returns the classes (uint8) of a segmentation image.
     quality
         How carefully colours are made.
+    renderer
+        ``"cpu"``, or ``"gl"`` for OpenGL (`vico.render.gl`).
     """
 
     scene: Scene
     outputs: tuple[str, ...] = USUAL_OUTPUTS
     classify: Callable[[NDArray[np.int32]], NDArray[np.uint8]] | None = None
     quality: RenderQuality = PLAIN
+    renderer: str = "cpu"
+    _gl: GlRenderer | None = None
     _caches: dict[Lens, ViewCache] = field(default_factory=dict)
     _glances: dict[int, _Glance] = field(default_factory=dict)
 
@@ -138,9 +146,18 @@ class Viewers:
             past=tuple(past),
             quality=self.quality,
         )
-        cache = self._caches.setdefault(lens, ViewCache(deferred=True))
-        frames = take_pictures(self.scene, cameras, request, cache=cache)
+        frames = self._rendered(lens, cameras, request)
         return _Part(lens, cube, members, frames)
+
+    def _rendered(self, lens: Lens, cameras: Cameras, request: PictureRequest) -> Frames:
+        if self.renderer == "cpu":
+            cache = self._caches.setdefault(lens, ViewCache(deferred=True))
+            return take_pictures(self.scene, cameras, request, cache=cache)
+        from vico.render.gl.renderer import GlRenderer
+
+        if self._gl is None or self._gl.scene is not self.scene:
+            self._gl = GlRenderer(self.scene)
+        return self._gl.take(cameras, request)
 
     def _looked_back(
         self, position: NDArray[np.float64], rotation: NDArray[np.float64], own: NDArray[np.int32], second: float

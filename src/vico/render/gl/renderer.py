@@ -1,0 +1,409 @@
+"""Takes pictures by OpenGL: uploads a scene's arrays as they are, culls with numpy, draws, and reads back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.errors import InputError, MissingExtraError
+from vico.render.arrays import ANYWHERE, INDOORS, OUTDOORS, SceneArrays
+from vico.render.cameras import Cameras
+from vico.render.frames import Frames, PictureRequest, light_of
+from vico.render.lighting import TONE_RANGE, TONE_STEPS
+from vico.render.scene import Scene
+from vico.render.shading.finishing import occlude, smooth_edges
+from vico.render.shading.light import Light
+from vico.render.shading.sky import SKY_SIZE
+from vico.render.shading.weather import draw_weather
+from vico.render.textures import LEVELS
+from vico.render.uniforms import Record, camera_uniforms
+
+_HERE = Path(__file__).parent
+_NOBODY = 1
+# Smaller than this across is not drawn, pixels; as the other renderer has it.
+_LEAST_PIXELS = 0.8
+
+
+class GlRenderer:
+    """Takes pictures of one scene by OpenGL 4.5, through EGL: no window is needed.
+
+    What moves throws no shadows, and flow is not measured.
+
+    Parameters
+    ----------
+    scene
+        It may change between pictures, as everywhere.
+
+    Raises
+    ------
+    MissingExtraError
+        If moderngl, or a driver, is not there.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self._gl = _context()
+        self._program = self._gl.program(*_sources("surface"))
+        self._sky = self._gl.program(*_sources("sky"))
+        self._empty = self._gl.vertex_array(self._program, [])
+        self._empty_sky = self._gl.vertex_array(self._sky, [])
+        self._buffers: dict[str, Any] = {}
+        # The arrays themselves: a number of theirs may be another array's one day.
+        self._uploaded: dict[str, NDArray[Any]] = {}
+        self._kept: dict[str, Any] = {}
+        self._targets: dict[tuple[int, int], Any] = {}
+
+    @property
+    def device(self) -> str:
+        """Name of what draws."""
+        return str(self._gl.info["GL_RENDERER"])
+
+    def take(self, cameras: Cameras, request: PictureRequest) -> Frames:
+        """Take pictures with every camera; see `vico.render.frames.take_pictures`.
+
+        Raises
+        ------
+        InputError
+            If past places are asked for: that is left to the other renderer.
+        """
+        if request.past:
+            raise InputError("render: OpenGL measures no flow; take the renderer cpu, or leave flow out")
+        shape = len(cameras), cameras.height, cameras.width
+        frames = Frames(
+            np.empty((*shape, 3) if request.rgb else (0, 0, 0, 3), np.uint8),
+            np.empty(shape if request.depth else (0, 0, 0), np.float32),
+            np.empty(shape if request.segmentation else (0, 0, 0), np.int32),
+            np.empty((*shape, 3) if request.normals else (0, 0, 0, 3), np.float32),
+        )
+        light = light_of(self.scene.light(), request.quality)
+        self._upload(self.scene.arrays, light)
+        for k in range(len(cameras)):
+            self._take_one(cameras, k, request, light, frames)
+        return frames
+
+    def _take_one(self, cameras: Cameras, k: int, request: PictureRequest, light: Light, frames: Frames) -> None:
+        samples = request.samples
+        room = self.scene.room_of(cameras.position[k])
+        camera = camera_uniforms(cameras, k, 1, room)
+        camera["most_taps"] = 2 if samples == 1 else 4
+        if samples > 1 and request.rgb:
+            fine = camera_uniforms(cameras, k, samples, room)
+            wide = self._draw(fine, light, moving=request.moving).colours()
+            blocks = wide.reshape(cameras.height, samples, cameras.width, samples, 3).astype(np.float32)
+            rgb = np.round(blocks.mean(axis=(1, 3))).astype(np.uint8)
+        target = self._draw(camera, light, moving=request.moving)
+        if len(frames.depth):
+            frames.depth[k] = target.depth()
+        if len(frames.segmentation):
+            frames.segmentation[k] = target.entities()
+        if len(frames.normals):
+            frames.normals[k] = target.normals()
+        if request.rgb:
+            if samples == 1:
+                rgb = target.colours()
+            keys = _keys(target.depth(), target.entities())
+            if request.quality.ambient_occlusion:
+                occlude(camera, keys, rgb)
+            if request.quality.smooth_edges and samples == 1:
+                smooth_edges(camera, keys, rgb)
+            draw_weather(camera, light, keys, self.scene.moment, rgb)
+            frames.rgb[k] = rgb
+
+    def _draw(self, camera: Record, light: Light, *, moving: bool) -> _Target:
+        """Draw what a camera sees."""
+        width, height = int(camera["width"]), int(camera["height"])
+        target = self._targets.get((width, height))
+        if target is None:
+            target = self._targets[width, height] = _Target(self._gl, width, height)
+        target.clear()
+        for binding, buffer in self._buffers.values():
+            buffer.bind_to_storage_buffer(binding)
+        view = _view_uniforms(camera)
+        self._gl.disable(self._gl.DEPTH_TEST)
+        _set(self._sky, view | {"size": SKY_SIZE, "indoors": int(camera["indoors"])})
+        self._empty_sky.render(self._gl.TRIANGLES, vertices=3)
+        self._gl.enable(self._gl.DEPTH_TEST)
+        self._gl.disable(self._gl.CULL_FACE)
+        self._gl.depth_func, self._gl.front_face = "<", "cw"
+        self._kept["closeness"].use(0)
+        self._kept["relief"].use(1)
+        _set(self._program, view | _light_uniforms(light) | {"closeness": 0, "relief": 1, "levels_each": LEVELS})
+        counts = self.scene.arrays.counts
+        _set(self._program, {"first_moving": int(counts["static_instances"]), "is_person": 0, "is_instance": 0})
+        for start, end in _cluster_ranges(self.scene.arrays, camera):
+            self._render(start, end - start)
+        _set(self._program, {"is_instance": 1})
+        self._draw_instances(camera, moving=moving)
+        if moving and int(counts["avatars"]):
+            spans = self.scene.arrays.avatars.span
+            _set(self._program, {"is_instance": 0, "is_person": 1})
+            self._render(
+                int(spans["first_triangle"][0]), int(spans["end_triangle"][-1]) - int(spans["first_triangle"][0])
+            )
+        return target
+
+    def _draw_instances(self, camera: Record, *, moving: bool) -> None:
+        code, number = _instances_in_view(self.scene.arrays, camera, moving=moving)
+        if not len(number):
+            return
+        order = np.argsort(code, kind="stable")
+        code, number = code[order], number[order].astype(np.int32)
+        self._buffer("chosen", 8, number)
+        self._buffers["chosen"][1].bind_to_storage_buffer(8)
+        starts = np.flatnonzero(np.diff(code, prepend=-1))
+        ends = np.append(starts[1:], len(code))
+        levels = self.scene.arrays.prototypes.levels
+        for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
+            span = levels[code[start] // 3, code[start] % 3]
+            _set(self._program, {"first": start})
+            triangles = int(span["end_triangle"]) - int(span["first_triangle"])
+            self._render(int(span["first_triangle"]), triangles, end - start)
+
+    def _render(self, base: int, triangles: int, instances: int = 1) -> None:
+        if triangles > 0:
+            self._program["base"].value = base
+            self._empty.render(self._gl.TRIANGLES, vertices=3 * triangles, instances=instances)
+
+    # Uploading.
+
+    def _upload(self, arrays: SceneArrays, light: Light) -> None:
+        """Bring what has changed onto the card; what never moves only once."""
+        mesh, textures, instances = arrays.mesh, arrays.textures, arrays.instances
+        fresh = self._uploaded.get("mesh") is not mesh.vertex
+        self._uploaded["mesh"] = mesh.vertex
+        if fresh:
+            self._buffer("vertices", 0, mesh.vertex)
+            self._buffer("triangles", 1, mesh.triangle)
+            self._buffer("entities", 2, mesh.entity)
+            self._buffer("materials", 3, textures.materials)
+            self._buffer("starts", 4, textures.start.astype(np.int32))
+            self._buffer("texels", 5, textures.texels)
+        elif int(arrays.counts["avatars"]):
+            spans = arrays.avatars.span
+            first, last = int(spans["first_vertex"].min()), int(spans["end_vertex"].max())
+            self._buffers["vertices"][1].write(mesh.vertex[first:last].tobytes(), offset=first * mesh.vertex.itemsize)
+            first, last = int(spans["first_triangle"].min()), int(spans["end_triangle"].max())
+            self._buffers["triangles"][1].write(
+                mesh.triangle[first:last].tobytes(), offset=first * mesh.triangle.itemsize
+            )
+            self._buffers["entities"][1].write(mesh.entity[first:last].tobytes(), offset=first * 4)
+        count = int(arrays.counts["instances"])
+        self._buffer("matrices", 6, np.ascontiguousarray(instances.matrix[: max(count, 1)]))
+        self._buffer("owners", 7, np.ascontiguousarray(instances.entity[: max(count, 1)]))
+        if self._uploaded.get("light") is not light.sky:
+            self._uploaded["light"] = light.sky
+            self._buffer("tone", 9, light.tone.astype(np.int32))
+            self._buffer("sky", 10, light.sky)
+        self._texture("closeness", light.shadow.closeness, "u2")
+        self._texture("relief", light.relief.height, "f4")
+
+    def _buffer(self, name: str, binding: int, values: NDArray[Any]) -> None:
+        data = np.ascontiguousarray(values).tobytes() or bytes(64)
+        known = self._buffers.get(name)
+        if known is not None and known[1].size == len(data):
+            known[1].write(data)
+            return
+        if known is not None:
+            known[1].release()
+        self._buffers[name] = binding, self._gl.buffer(data)
+
+    def _texture(self, name: str, values: NDArray[Any], kind: str) -> None:
+        if self._uploaded.get(name) is values:
+            return
+        self._uploaded[name] = values
+        if name in self._kept:
+            self._kept[name].release()
+        height, width = values.shape
+        texture = self._gl.texture((width, height), 1, np.ascontiguousarray(values).tobytes(), dtype=kind, alignment=1)
+        texture.filter = self._gl.NEAREST, self._gl.NEAREST
+        self._kept[name] = texture
+
+
+class _Target:
+    """A frame buffer with all outputs; its first row is the picture's upper one."""
+
+    def __init__(self, gl: Any, width: int, height: int) -> None:
+        size = width, height
+        self._shape = height, width
+        self._planes = [
+            gl.texture(size, 4, dtype="f1"),
+            gl.texture(size, 1, dtype="f4"),
+            gl.texture(size, 1, dtype="i4"),
+            gl.texture(size, 4, dtype="f4"),
+        ]
+        for plane in self._planes:
+            plane.filter = gl.NEAREST, gl.NEAREST
+        self._buffer = gl.framebuffer(self._planes, gl.depth_texture(size))
+
+    def clear(self) -> None:
+        self._buffer.use()
+        self._buffer.clear(depth=1.0)
+
+    def colours(self) -> NDArray[np.uint8]:
+        return np.ascontiguousarray(self._read(0, np.uint8, 4)[..., :3])
+
+    def depth(self) -> NDArray[np.float32]:
+        return self._read(1, np.float32, 1)[..., 0]
+
+    def entities(self) -> NDArray[np.int32]:
+        return self._read(2, np.int32, 1)[..., 0]
+
+    def normals(self) -> NDArray[np.float32]:
+        return self._read(3, np.float32, 4)[..., :3]
+
+    def _read(self, plane: int, kind: Any, channels: int) -> NDArray[Any]:
+        return np.frombuffer(self._planes[plane].read(), kind).reshape(*self._shape, channels).copy()
+
+
+def _context() -> Any:
+    try:
+        import moderngl
+    except ImportError:
+        raise MissingExtraError(
+            "the renderer gl needs moderngl: pip install 'vico[gl]', or take the renderer cpu"
+        ) from None
+    try:
+        context = moderngl.create_standalone_context(backend="egl", require=450)
+    except Exception as error:  # whatever a driver says
+        raise MissingExtraError(
+            f"the renderer gl finds no OpenGL 4.5 through EGL ({error}); install a driver (Debian: apt install libegl1 "
+            "libgl1-mesa-dri), or take the renderer cpu"
+        ) from None
+    return context
+
+
+def _sources(name: str) -> tuple[str, str]:
+    """Return the sources of a program's vertex and fragment shader."""
+    return (_HERE / f"{name}.vert").read_text(), (_HERE / f"{name}.frag").read_text()
+
+
+def _keys(depth: NDArray[np.float32], entity: NDArray[np.int32]) -> NDArray[np.uint64]:
+    """Return keys as the visibility pass leaves them, as far as what comes after shading looks at them."""
+    seen = depth > 0
+    inverse = np.where(seen, 1.0 / np.where(seen, depth, 1.0), 0.0).astype(np.float32)
+    number = np.where(seen, np.maximum(entity, _NOBODY), 0).astype(np.uint64)
+    keys = (inverse.view(np.uint32).astype(np.uint64) << np.uint64(32)) | number
+    return np.concatenate([keys.reshape(-1), np.zeros(64, np.uint64)])
+
+
+def _set(program: Any, values: dict[str, Any]) -> None:
+    """Set uniforms; what the compiler has left out of a program is left out."""
+    for name, value in values.items():
+        if name in program:
+            program[name].value = value
+
+
+def _vector(record: Record, name: str, parts: str = "xyz") -> tuple[float, ...]:
+    return tuple(float(record[f"{name}_{part}"]) for part in parts)
+
+
+def _colour(record: Record, name: str) -> tuple[float, ...]:
+    return tuple(float(record[f"{name}_{part}"]) for part in ("red", "green", "blue"))
+
+
+def _view_uniforms(camera: Record) -> dict[str, Any]:
+    focal = float(camera["focal"])
+    return {
+        "eye": (float(camera["x"]), float(camera["y"]), float(camera["z"])),
+        "right": _vector(camera, "right"),
+        "down": _vector(camera, "down"),
+        "forward": _vector(camera, "forward"),
+        "scale": (2.0 * focal / float(camera["width"]), 2.0 * focal / float(camera["height"])),
+        "near": float(camera["near"]),
+        "far": float(camera["far"]),
+        "indoors": int(camera["indoors"]),
+        "hidden": int(camera["hidden_entity"]),
+        "most_taps": int(camera["most_taps"]),
+        "room_place": (*_vector(camera, "room"), float(camera["room_cos"])),
+        "room_size": (
+            float(camera["room_half_length"]),
+            float(camera["room_half_width"]),
+            float(camera["room_height"]),
+            float(camera["room_sin"]),
+        ),
+    }
+
+
+def _light_uniforms(light: Light) -> dict[str, Any]:
+    u = light.uniforms
+    relief = light.relief
+    return {
+        "sun": _vector(u, "sun"),
+        "sun_colour": _colour(u, "sun"),
+        "ambient": _colour(u, "ambient"),
+        "tilt": _colour(u, "tilt"),
+        "haze": _colour(u, "haze"),
+        "side": _vector(u, "side", "xy"),
+        "unlit": (float(u["unlit_x"]), float(u["unlit_y"]), float(u["unlit_radius"])),
+        "haze_per_metre": float(u["haze_per_metre"]),
+        "lamp_exposure": float(u["lamp_exposure"]),
+        "wet": float(u["wet"]),
+        "snow_cover": float(u["snow_cover"]),
+        "softness": float(u["shadow_softness"]),
+        "glass": float(u["glass"]),
+        "tone_scale": (TONE_STEPS - 1) / TONE_RANGE,
+        "shadow_frame": tuple(float(v) for v in light.shadow.matrix.T.reshape(-1)),
+        "relief_frame": (float(relief.x), float(relief.y), float(relief.texels_per_metre)),
+    }
+
+
+def _axes(camera: Record) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return where a camera is, and its axes as rows."""
+    place = np.array([camera["x"], camera["y"], camera["z"]], np.float64)
+    return place, np.array([_vector(camera, name) for name in ("right", "down", "forward")])
+
+
+def _are_in_view(centre: NDArray[Any], radius: NDArray[Any], camera: Record) -> NDArray[np.bool_]:
+    """Return which spheres a camera may see."""
+    place, axes = _axes(camera)
+    across, down, ahead = ((centre - place) @ axes.T).T
+    tangents = (0.5 * float(camera[side]) / float(camera["focal"]) for side in ("width", "height"))
+    seen = (ahead + radius > camera["near"]) & (ahead - radius < camera["far"])
+    for aside, tangent in zip((np.abs(across), np.abs(down)), tangents, strict=True):
+        seen &= aside - ahead * tangent <= radius * np.sqrt(1.0 + tangent * tangent)
+    return np.asarray(seen)
+
+
+def _cluster_ranges(arrays: SceneArrays, camera: Record) -> list[tuple[int, int]]:
+    """Return ranges of triangles of the clusters in view, neighbours joined."""
+    clusters = arrays.clusters
+    if not len(clusters.low):
+        return []
+    low, high = clusters.low.astype(np.float64), clusters.high.astype(np.float64)
+    radius = np.linalg.norm(high - low, axis=1) / 2
+    seen = _are_in_view((low + high) / 2, radius, camera)
+    seen &= arrays.cluster_where == (INDOORS if camera["indoors"] else OUTDOORS)
+    first, end = clusters.span["first_triangle"][seen], clusters.span["end_triangle"][seen]
+    if not len(first):
+        return []
+    breaks = np.flatnonzero(first[1:] != end[:-1]) + 1
+    starts, ends = np.concatenate([[0], breaks]), np.append(breaks, len(first)) - 1
+    return list(zip(first[starts].tolist(), end[ends].tolist(), strict=True))
+
+
+def _instances_in_view(
+    arrays: SceneArrays, camera: Record, *, moving: bool
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return three times the prototype plus the level of detail, and the number, of each instance in view."""
+    count = int(arrays.counts["instances" if moving else "static_instances"])
+    instances, prototypes = arrays.instances, arrays.prototypes
+    sphere = instances.sphere[:count]
+    centre = np.stack([sphere["x"], sphere["y"], sphere["z"]], axis=1).astype(np.float64)
+    radius = sphere["radius"].astype(np.float64)
+    seen = _are_in_view(centre, radius, camera)
+    where = instances.where[:count]
+    seen &= (where == ANYWHERE) | (where == (INDOORS if camera["indoors"] else OUTDOORS))
+    place, axes = _axes(camera)
+    ahead = (centre - place) @ axes[2]
+    seen &= ~(2.0 * radius * float(camera["focal"]) < _LEAST_PIXELS * ahead)
+    number = np.flatnonzero(seen)
+    model = instances.prototype[number].astype(np.int64)
+    extent = (prototypes.high[model] - prototypes.low[model]).astype(np.float64)
+    scale = np.linalg.norm(instances.matrix[number][:, :, 0], axis=1)
+    pixels = np.linalg.norm(extent, axis=1) * scale * float(camera["focal"]) / np.maximum(ahead[number], camera["near"])
+    limits = prototypes.pixels[model]
+    level = np.where(pixels < limits[:, 1], np.where(pixels < limits[:, 2], 2, 1), 0)
+    return 3 * model + level, number

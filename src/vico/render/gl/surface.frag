@@ -1,0 +1,179 @@
+#version 450
+// What `vico.render.shading` does, pixel by pixel; see there for why.
+layout(std430, binding = 3) readonly buffer Materials { int materials[]; };  // MATERIAL: 4 whole numbers, 1 real
+layout(std430, binding = 4) readonly buffer Starts { int starts[]; };
+layout(std430, binding = 5) readonly buffer Texels { uint texels[]; };
+layout(std430, binding = 9) readonly buffer Tone { int tone[]; };
+
+uniform usampler2D closeness;
+uniform sampler2D relief;
+uniform mat4x3 shadow_frame;
+uniform vec3 relief_frame;  // corner, texels a metre
+uniform vec3 eye, sun, sun_colour, ambient, tilt, haze, unlit;
+uniform vec2 side;
+uniform float near, far, haze_per_metre, lamp_exposure, wet, snow_cover, softness, glass, tone_scale;
+uniform vec4 room_place, room_size;  // centre and cosine of the yaw; half length, half width, height, sine
+uniform int indoors, hidden, most_taps, levels_each, is_person;
+
+in vec3 place;
+in vec3 normal;
+in vec3 colour;
+in vec2 uv;
+in float depth;
+flat in int material, entity, moves;
+
+layout(location = 0) out vec4 out_colour;
+layout(location = 1) out float out_depth;
+layout(location = 2) out int out_entity;
+layout(location = 3) out vec4 out_normal;
+
+vec4 texel(int start, int columns, int rows, int i, int j) {
+    uint t = texels[start + (j & (rows - 1)) * columns + (i & (columns - 1))];
+    return vec4(t & 255u, (t >> 8) & 255u, (t >> 16) & 255u, t >> 24);
+}
+
+vec4 look_up(int start, int columns, int rows, vec2 at) {
+    vec2 low = floor(at), f = at - low;
+    int i = int(low.x), j = int(low.y);
+    return mix(mix(texel(start, columns, rows, i, j), texel(start, columns, rows, i + 1, j), f.x),
+               mix(texel(start, columns, rows, i, j + 1), texel(start, columns, rows, i + 1, j + 1), f.x), f.y);
+}
+
+// Colour in linear light, and alpha.
+vec4 albedo(int log2_width, int log2_height, int levels, vec2 dx, vec2 dy) {
+    vec2 size = vec2(1 << log2_width, 1 << log2_height);
+    dx *= size;
+    dy *= size;
+    float long_x = dot(dx, dx), long_y = dot(dy, dy), longest = max(long_x, long_y);
+    float area = max(abs(dx.x * dy.y - dy.x * dx.y), 0.0625 * longest);
+    bool two = longest > 1.2 && longest >= 2.0 * area;
+    bool four = two && longest >= 5.0 * area && most_taps >= 4;
+    int taps = four ? 4 : (two ? 2 : 1);
+    float between = four ? 0.0625 : (two ? 0.25 : 1.0);
+    int level = clamp((int(floatBitsToUint(longest * between * 1.4) >> 23) - 127) >> 1, 0, levels - 1);
+    int columns = 1 << max(log2_width - level, 0), rows = 1 << max(log2_height - level, 0);
+    vec2 step = two ? (long_x >= long_y ? dx : dy) / size * vec2(columns, rows) : vec2(0.0);
+    int start = starts[material * levels_each + level];
+    vec4 sum = vec4(0.0);
+    for (int k = 0; k < taps; k++) {
+        float along = (float(k) + 0.5) / float(taps) - 0.5;
+        sum += look_up(start, columns, rows, fract(uv) * vec2(columns, rows) - 0.5 + along * step);
+    }
+    vec4 c = sum / (float(taps) * 255.0);
+    return vec4(c.rgb * (0.012522878 + c.rgb * (0.682171111 + c.rgb * 0.305306011)), c.a);
+}
+
+bool is_hole(int log2_width, int log2_height, int levels, vec2 dx, vec2 dy) {
+    float area = abs(dx.x * dy.y - dx.y * dy.x) * float(1 << log2_width) * float(1 << log2_height);
+    int level = 0;
+    while (level < levels - 1 && area > 2.0) {
+        area *= 0.25;
+        level++;
+    }
+    int columns = 1 << max(log2_width - level, 0), rows = 1 << max(log2_height - level, 0);
+    vec2 at = floor(uv * vec2(columns, rows));
+    return texel(starts[material * levels_each + level], columns, rows, int(at.x), int(at.y)).w < 128.0;
+}
+
+float sky_share(vec3 at, vec3 n) {
+    vec2 p = (at.xy + 1.2 * n.xy - relief_frame.xy) * relief_frame.z - 0.5;
+    vec2 size = vec2(textureSize(relief, 0));
+    if (any(lessThan(p, vec2(0.0))) || any(greaterThanEqual(p, size - 1.0))) return 1.0;
+    ivec2 i = ivec2(p);
+    vec2 f = p - vec2(i);
+    float low = mix(texelFetch(relief, i, 0).r, texelFetch(relief, i + ivec2(1, 0), 0).r, f.x);
+    float high = mix(texelFetch(relief, i + ivec2(0, 1), 0).r, texelFetch(relief, i + ivec2(1, 1), 0).r, f.x);
+    float deep = max(mix(low, high, f.y) - at.z, 0.0);
+    return 1.0 - 0.62 * deep / (deep + 5.0);
+}
+
+float lit_at(ivec2 i, float level) {
+    return float(texelFetch(closeness, i, 0).r) <= level ? 1.0 : 0.0;
+}
+
+float sun_share(vec3 at, vec3 n, vec2 aside) {
+    vec3 p = shadow_frame * vec4(at + 0.2 * n, 1.0);
+    vec2 q = p.xy - 0.5 + aside;
+    vec2 size = vec2(textureSize(closeness, 0));
+    if (any(lessThan(q, vec2(0.0))) || any(greaterThanEqual(q, size - 1.0))) return 1.0;
+    ivec2 i = ivec2(q);
+    vec2 f = q - vec2(i);
+    return mix(mix(lit_at(i, p.z), lit_at(i + ivec2(1, 0), p.z), f.x),
+               mix(lit_at(i + ivec2(0, 1), p.z), lit_at(i + ivec2(1, 1), p.z), f.x), f.y);
+}
+
+vec3 in_room(vec3 at, vec3 n, vec3 base) {
+    vec3 p = at - room_place.xyz;
+    float c = room_place.w, s = room_size.w, height = room_size.z;
+    float lz = 0.92 * height - p.z;
+    float squared = p.x * p.x + p.y * p.y + lz * lz;
+    float facing = (lz * n.z - p.x * n.x - p.y * n.y) / sqrt(squared + 1e-6);
+    float lamp = 0.62 * max(facing, 0.0) / (1.0 + squared * 2.0 / (dot(room_size.xy, room_size.xy) + 6.0));
+    float a = room_size.x - abs(p.x * c + p.y * s), b = room_size.y - abs(p.y * c - p.x * s);
+    float up = min(p.z, height - p.z);
+    float second = max(max(min(a, b), min(max(a, b), up)), 0.0);
+    float corner = 1.0 - 0.30 / (1.0 + second * second * 9.0);
+    return base * (0.36 + 0.05 * n.z + 0.03 * n.x + lamp) * corner * vec3(1.04, 1.0, 0.93);
+}
+
+void main() {
+    int log2_width = materials[5 * material], log2_height = materials[5 * material + 1];
+    int levels = materials[5 * material + 2], flags = materials[5 * material + 3];
+    float emission = intBitsToFloat(materials[5 * material + 4]);
+    bool both = (flags & 2) != 0;
+    vec2 dx = dFdx(uv), dy = dFdy(uv);
+    if (depth >= far || (hidden != 0 && entity == hidden) || (!gl_FrontFacing && !both)) discard;
+    if ((flags & 1) != 0 && (levels == 0 || is_hole(log2_width, log2_height, levels, dx, dy))) discard;
+    vec3 n = normalize(normal), at = eye + place;
+    if (both && dot(n, place) > 0.0) n = -n;
+    vec4 base = vec4(colour, 1.0);
+    if (levels > 0) {
+        vec4 found = albedo(log2_width, log2_height, levels, dx, dy);
+        base = vec4(base.rgb * found.rgb, found.a);
+    }
+    vec3 light;
+    if (indoors != 0) {
+        light = in_room(at, n, base.rgb);
+    } else {
+        bool dark = unlit.z > 0.0 && moves == 0 && distance(at.xy, unlit.xy) <= unlit.z;
+        float shine = dark ? 0.0 : emission * lamp_exposure * base.a;
+        if (is_person == 0) {
+            float ground = clamp(n.z * 8.0 - 6.6, 0.0, 1.0);
+            float share = clamp((n.z - 0.25) * 2.2, 0.0, 1.0);
+            share = snow_cover * share * share * (3.0 - 2.0 * share);
+            float bare = (1.0 - share) * (1.0 - 0.45 * wet * (0.3 + 0.7 * ground));
+            base.rgb = base.rgb * bare + vec3(0.86, 0.86, 0.90) * share;
+            shine *= 1.0 - share;
+        }
+        float facing = max(dot(n, sun), 0.0);
+        if (facing > 0.0) {
+            if (softness > 0.0) {
+                facing *= 0.25 * (sun_share(at, n, softness * vec2(0.8, 0.35)) + sun_share(at, n, softness * vec2(-0.35, 0.8))
+                    + sun_share(at, n, softness * vec2(-0.8, -0.35)) + sun_share(at, n, softness * vec2(0.35, -0.8)));
+            } else {
+                facing *= sun_share(at, n, vec2(0.0));
+            }
+        }
+        float length_ = length(place), thick = length_ * haze_per_metre;
+        float clear = 1.0 / (1.0 + thick * (1.0 + thick * (0.5 + thick * 0.1666)));
+        float toward = max(dot(place, sun) / max(length_, 1e-12), 0.0);
+        float glow = 0.10 * toward * toward * toward;
+        vec3 around = (ambient + n.z * tilt + dot(n.xy, side)) * sky_share(at, n);
+        light = base.rgb * (facing * sun_colour + around + shine * vec3(1.0, 0.86, 0.62));
+        light = (1.0 - clear) * (haze + glow * sun_colour) + clear * light;
+        if (glass > 0.0) {
+            float front = clamp(-dot(place, n) / max(length_, 1e-12), 0.0, 1.0);
+            float fresnel = 0.10 + 0.9 * pow(1.0 - front, 5.0);
+            float share = glass * min(shine / max(lamp_exposure, 1e-12), 1.0) * clamp(1.0 - 3.0 * abs(n.z), 0.0, 1.0) * fresnel;
+            float up = place.z / max(length_, 1e-12) + 2.0 * front * n.z;
+            vec3 sky = mix(haze, ambient + tilt, clamp(1.3 * up, 0.0, 1.0));
+            light = mix(light, mix(0.42 * ambient, sky, clamp((up - 0.10) * 3.0, 0.0, 1.0)), share);
+        }
+    }
+    ivec3 row = ivec3(clamp(light * tone_scale, vec3(0.0), vec3(4095.0)));
+    out_colour = vec4(tone[row.r], tone[row.g], tone[row.b], 255.0) / 255.0;
+    out_depth = depth;
+    out_entity = entity;
+    out_normal = vec4(n, 0.0);
+    gl_FragDepth = log2(depth / near) / log2(far / near);
+}

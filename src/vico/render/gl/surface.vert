@@ -1,0 +1,49 @@
+#version 450
+// One invocation a corner: everything is pulled out of the scene's own arrays.
+layout(std430, binding = 0) readonly buffer Vertices { float vertices[]; };
+layout(std430, binding = 1) readonly buffer Triangles { ivec4 triangles[]; };
+layout(std430, binding = 2) readonly buffer Entities { int entities[]; };
+layout(std430, binding = 6) readonly buffer Matrices { float matrices[]; };
+layout(std430, binding = 7) readonly buffer Owners { int owners[]; };
+layout(std430, binding = 8) readonly buffer Chosen { int chosen[]; };
+
+uniform int base, first, is_instance, is_person, first_moving;
+uniform vec3 eye, right, down, forward;
+uniform vec2 scale;  // 2 * focal / size of the picture
+uniform float near;
+
+out vec3 place;  // from the eye, world's axes
+out vec3 normal;
+out vec3 colour;
+out vec2 uv;
+out float depth;
+flat out int material, entity, moves;
+
+void main() {
+    int number = base + gl_VertexID / 3;
+    ivec4 triangle = triangles[number];
+    int at = 12 * triangle[gl_VertexID % 3];
+    vec3 position = vec3(vertices[at], vertices[at + 1], vertices[at + 2]);
+    normal = vec3(vertices[at + 3], vertices[at + 4], vertices[at + 5]);
+    uv = vec2(vertices[at + 6], vertices[at + 7]);
+    colour = vec3(vertices[at + 8], vertices[at + 9], vertices[at + 10]);
+    material = triangle.w;
+    entity = entities[number];
+    moves = is_person;
+    if (is_instance != 0) {
+        int i = chosen[first + gl_InstanceID], m = 12 * i;
+        vec3 x = vec3(matrices[m], matrices[m + 4], matrices[m + 8]);
+        vec3 y = vec3(matrices[m + 1], matrices[m + 5], matrices[m + 9]);
+        vec3 z = vec3(matrices[m + 2], matrices[m + 6], matrices[m + 10]);
+        vec3 origin = vec3(matrices[m + 3], matrices[m + 7], matrices[m + 11]);
+        place = x * position.x + y * position.y + z * position.z + (origin - eye);
+        normal = x * normal.x + y * normal.y + z * normal.z;
+        if (entity == 0) entity = owners[i];
+        moves = i >= first_moving ? 1 : 0;
+    } else {
+        place = position - eye;
+    }
+    depth = dot(place, forward);
+    // Rows of the picture go down: its first one is the lowest of the frame buffer.
+    gl_Position = vec4(dot(place, right) * scale.x, dot(place, down) * scale.y, depth - 2.0 * near, depth);
+}

@@ -1,0 +1,126 @@
+"""OpenGL beside the processor: the same scene, pixel by pixel. Left out where moderngl or a driver is missing."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vico.assets.shapes import ball, box, pose_matrix
+from vico.errors import InputError, MissingExtraError
+from vico.render import Cameras, Lighting, Scene
+from vico.render.frames import PictureRequest, take_pictures
+from vico.render.gl.renderer import GlRenderer
+from vico.render.quality import FINE
+from vico.render.sensors.batch import Viewers
+from vico.render.sensors.lens import Lens
+from vico.sim.config import SimConfig
+from vico.world.mesh import Material, joined
+
+DAY, NIGHT = Lighting.at(15 * 3600), Lighting.at(23 * 3600, clouds=0.8)
+OUTSIDE = Cameras(np.array([[-14.0, -6.0, 2.0]]), np.array([[1.0, 0.4, -0.1]]), width=160, height=120, hidden_entity=8)
+INSIDE = Cameras(np.array([[100.0, 1.0, 1.6]]), np.array([[0.7, -1.0, -0.2]]), width=160, height=120)
+
+
+def scene() -> Scene:
+    """Textured blocks, cut-out leaves, many levels of detail, things and bodies that move, and a room far away."""
+    generator = np.random.Generator(np.random.PCG64(4))
+    brick = Material("brick", generator.integers(60, 200, (64, 64, 4)).astype(np.uint8), emission=1.0)
+    ground = Material("ground", generator.integers(100, 160, (64, 64, 3)).astype(np.uint8))
+    holes = np.full((32, 32, 4), 120, np.uint8)
+    holes[..., 3] = np.where(generator.random((32, 32)) < 0.5, 255, 0)
+    leaf = Material("leaf", holes, cutout=True, double_sided=True)
+    floor = box((80, 80, 1), (0, 0, -0.5)).of_entity(2)
+    static = [replace(floor, material=ground, uv=floor.positions[:, :2] / 2)]
+    for k in range(12):
+        x, y, z = generator.uniform((-10, -20, 1), (30, 20, 6))
+        block = box((3, 2, 2 * z), (x, y, z)).of_entity(10 + k)
+        static.append(replace(block, material=brick, uv=(block.positions[:, [0, 2]] + block.positions[:, 1:2]) / 3))
+    room = [box((8, 0.2, 3), (100, -3, 1.5)), box((8, 8, 0.2), (100, 0, -0.1)), box((0.2, 8, 3), (104, 0, 1.5))]
+    crown = ball((1.5, 1.5, 1.5), (0, 0, 2), colour=(80, 140, 60), sides=14, rings=10)
+    models = {
+        "tree": [replace(crown, material=leaf, uv=crown.positions[:, :2])],
+        "cube": [box((1, 1, 1), (0, 0, 0.5), colour=(200, 40, 40))],
+    }
+    made = Scene(
+        joined(static), models, indoor=[s.of_entity(60) for s in room], rooms=[[100, 0, 0, 4, 4, 3, 0.0]], lighting=DAY
+    )
+    places = [pose_matrix(*generator.uniform((-8, -18), (30, 18)), 0, k) for k in range(40)]
+    made.place(["tree"] * 40, np.array(places), np.arange(100, 140))
+    made.place(["cube"], np.array([pose_matrix(102, -1, 0, 0.4)]), [70], indoor=True)
+    index = made.names["cube"]
+    made.set_rigid([index] * 2, np.array([pose_matrix(-8, -3, 0, 0.3), pose_matrix(-9, 0, 0, 1)]), [5, 8])
+    figure = ball((0.3, 0.3, 0.9), (-7, -5, 0.9), colour=(90, 120, 200)).of_entity(9)
+    made.set_skinned(figure.positions, figure.normals, figure.triangles, figure.colour, figure.entity)
+    return made
+
+
+@pytest.fixture(scope="module")
+def both() -> tuple[Scene, GlRenderer]:
+    made = scene()
+    try:
+        return made, GlRenderer(made)
+    except MissingExtraError as error:
+        pytest.skip(str(error))
+
+
+WET = replace(DAY, wet=0.8, rain=2.0)
+
+
+@pytest.mark.parametrize(
+    ("cameras", "light", "request_"),
+    [
+        (OUTSIDE, DAY, PictureRequest(normals=True)),
+        (OUTSIDE, NIGHT, PictureRequest(normals=True)),
+        (OUTSIDE, WET, PictureRequest(normals=True, quality=FINE)),
+        (OUTSIDE, DAY, PictureRequest(normals=True, samples=2)),
+        (INSIDE, DAY, PictureRequest(normals=True)),
+    ],
+    ids=["day", "night", "rain, fine", "smooth", "room"],
+)
+def test_both_renderers_take_the_same_pictures(
+    both: tuple[Scene, GlRenderer], cameras: Cameras, light: Lighting, request_: PictureRequest
+) -> None:
+    made, gl = both
+    made.lighting = light
+    wanted, got = take_pictures(made, cameras, request_), gl.take(cameras, request_)
+    same = wanted.segmentation == got.segmentation
+    assert same.mean() > 0.995
+    assert len(np.unique(wanted.segmentation)) > (2 if cameras is INSIDE else 15)
+    assert 8 not in got.segmentation
+    assert np.percentile(np.abs(wanted.depth - got.depth)[same], 99) < 1e-3
+    assert np.percentile(np.abs(wanted.normals - got.normals)[same], 99) < 1e-2
+    # What moves throws no shadow there.
+    assert np.abs(wanted.rgb.astype(int) - got.rgb).mean() < 1.0
+
+
+def test_what_moves_is_moved_there_too(both: tuple[Scene, GlRenderer]) -> None:
+    made, gl = both
+    index = made.names["cube"]
+    made.set_rigid([index], np.array([pose_matrix(-9, -4, 0, 0.3)]), [5])
+    figure = ball((0.3, 0.3, 0.9), (-8, -2, 0.9), colour=(90, 120, 200)).of_entity(9)
+    made.set_skinned(figure.positions, figure.normals, figure.triangles, figure.colour, figure.entity)
+    wanted, got = take_pictures(made, OUTSIDE, PictureRequest()), gl.take(OUTSIDE, PictureRequest())
+    assert (wanted.segmentation == got.segmentation).mean() > 0.995
+    assert ((wanted.segmentation == 9) | (wanted.segmentation == 5)).sum() > 100
+
+
+def test_flow_is_left_to_the_processor(both: tuple[Scene, GlRenderer]) -> None:
+    viewers = Viewers(both[0], ("rgb", "flow"), renderer="gl")
+    with pytest.raises(InputError, match="OpenGL measures no flow"):
+        viewers.take(np.array([[0.0, 0, 2, 1, 0, 0]]), np.array([0], np.int32), [Lens()])
+
+
+def test_without_moderngl_a_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "moderngl", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'vico\[gl\]'"):
+        GlRenderer(Scene([]))
+
+
+@pytest.mark.parametrize("wanted", ["vulkan", "", 3])
+def test_other_renderers_are_refused(wanted: Any) -> None:
+    with pytest.raises(InputError, match="renderer"):
+        SimConfig(renderer=wanted)
