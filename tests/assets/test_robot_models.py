@@ -22,7 +22,7 @@ needs_go2 = pytest.mark.skipif(
 needs_husky = pytest.mark.skipif(
     installed(HUSKY_PACKAGE) is None, reason="the Husky package is not installed (vico assets install robots)"
 )
-MODELS = [("drone", False), ("husky", False), ("go2", False)]
+MODELS = [("drone", False), ("husky", False), ("go2", False), ("h1", False)]
 
 
 def posed(name: str, packs: bool) -> list[Surface]:
@@ -44,11 +44,11 @@ def posed(name: str, packs: bool) -> list[Surface]:
 
 
 def test_an_unknown_robot_is_refused_with_the_names_of_the_known_ones() -> None:
-    with pytest.raises(InputError, match="robot 'spot' is not known; choose among drone, go2, husky, manipulator"):
+    with pytest.raises(InputError, match="robot 'spot' is not known; choose among drone, go2, h1, husky, manipulator"):
         robot_model("spot")
 
 
-@pytest.mark.parametrize(("name", "kilograms"), [("drone", 2.064), ("husky", 50.0), ("go2", 15.0)])
+@pytest.mark.parametrize(("name", "kilograms"), [("drone", 2.064), ("husky", 50.0), ("go2", 15.0), ("h1", 51.4)])
 def test_our_models_weigh_what_their_makers_publish(name: str, kilograms: float) -> None:
     compiled = mujoco.MjSpec.from_string(robot_model(name, packs=False).mjcf).compile()
     assert compiled.body_mass.sum() == pytest.approx(kilograms, rel=0.02)

@@ -21,7 +21,7 @@ def motion(kind: str, packs: bool, count: int) -> Motion:
 
 
 @pytest.mark.parametrize("packs", PACKS)
-@pytest.mark.parametrize("kind", ["go2", "husky"])
+@pytest.mark.parametrize("kind", ["go2", "h1", "husky"])
 def test_a_batch_of_robots_is_each_robot_alone(kind: str, packs: bool) -> None:
     count = 7
     controller = controller_for(robot_model(kind, packs=packs))

@@ -40,7 +40,7 @@ def gap(robots: RobotPopulation, persons: Bodies) -> float:
 
 
 def test_an_unknown_robot_is_refused() -> None:
-    with pytest.raises(InputError, match="'rover' is not known; choose among drone, go2, husky, manipulator"):
+    with pytest.raises(InputError, match="'rover' is not known; choose among drone, go2, h1, husky, manipulator"):
         RobotPopulation(field(), ["rover"])
 
 

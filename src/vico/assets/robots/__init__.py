@@ -20,6 +20,7 @@ from vico.assets.robots.model import (
     RotorModel,
     Sensors,
     SkidSteering,
+    TwoLegs,
     flight_space,
     velocity_space,
 )
@@ -43,6 +44,7 @@ __all__ = [
     "RotorModel",
     "Sensors",
     "SkidSteering",
+    "TwoLegs",
     "flight_space",
     "register_robot",
     "robot_model",

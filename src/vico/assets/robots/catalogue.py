@@ -7,15 +7,17 @@ from collections.abc import Callable
 from vico.assets.packages import Package
 from vico.assets.robots.drone import drone
 from vico.assets.robots.go2 import go2
+from vico.assets.robots.h1 import h1
 from vico.assets.robots.husky import husky
 from vico.assets.robots.manipulator import manipulator
 from vico.assets.robots.model import RobotModel
-from vico.assets.robots.packs import GO2_PACKAGE, HUSKY_PACKAGE
+from vico.assets.robots.packs import GO2_PACKAGE, H1_PACKAGE, HUSKY_PACKAGE
 from vico.errors import InputError
 
 _MAKERS: dict[str, Callable[[bool], RobotModel]] = {
     "drone": drone,
     "go2": go2,
+    "h1": h1,
     "husky": husky,
     "manipulator": manipulator,
 }
@@ -70,4 +72,4 @@ def robot_model(name: str, *, packs: bool = True) -> RobotModel:
 
 def robot_packages() -> tuple[Package, ...]:
     """Return the packages that richer robots are read from."""
-    return GO2_PACKAGE, HUSKY_PACKAGE
+    return GO2_PACKAGE, H1_PACKAGE, HUSKY_PACKAGE

@@ -205,6 +205,30 @@ class FourLegs:
 
 
 @dataclass(frozen=True)
+class TwoLegs:
+    """Two legs of five joints (hip yaw, roll and pitch, knee, ankle; left, right), and a network that corrects steps.
+
+    Attributes
+    ----------
+    weights, biases
+        Of dense layers with ELU between them, float32, shapes ``(inputs, outputs)`` and ``(outputs,)``.
+    stride
+        Seconds of two steps.
+    mass
+        Of the robot, kg.
+    hoist
+        Site of `RobotModel.mjcf` by which it is lifted when it has fallen, along the axes of its base.
+    """
+
+    weights: tuple[NDArray[np.float32], ...] = field(repr=False)
+    biases: tuple[NDArray[np.float32], ...] = field(repr=False)
+    stride: float
+    mass: float
+    hoist: str
+    name: str = "two_legs"
+
+
+@dataclass(frozen=True)
 class RotorModel:
     """Rotors that carry a robot, the air's drag, and the battery.
 

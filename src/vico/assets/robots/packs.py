@@ -41,6 +41,15 @@ HUSKY_PACKAGE = Package(
     tags=Tags("manylinux2014_x86_64", "311", "cp311"),
     size_limit=10_000_000,
 )
+H1_PACKAGE = Package(
+    name="robosuite-models",
+    version="1.0.0",
+    sha256=("f764c44aef7fb36c8ebd2c4f27119678da6d662a419ca4f6f8a96dc4cbbf405d",),
+    licence="BSD-3-Clause",
+    credits="H1: Unitree Robotics.",
+    members=("robosuite_models/assets/robots/h1/LICENSE", "robosuite_models/assets/robots/h1/meshes/*"),
+    size_limit=30_000_000,
+)
 # Raise when what is baked changes, so that older caches are left alone.
 _BAKE = 4
 # The policy's legs, and the share of an output unit each joint moves, from the policy's deployment configuration.
@@ -108,6 +117,31 @@ def husky_shapes(wheel_radius: float) -> dict[str, list[Surface]] | None:
     wheel = [_light(meshes / "wheel.stl", 900, dark, wheel_radius / 0.17775)]
     shapes = {"base": joined(base)}
     shapes |= dict.fromkeys(("front_left", "front_right", "rear_left", "rear_right"), wheel)
+    write_glb(path, dict(shapes))
+    return read_glb(path)
+
+
+def h1_shapes(arms: Mapping[str, np.ndarray]) -> dict[str, list[Surface]] | None:
+    """H1's meshes by link, pelvis, torso and arms (placed by `arms`) as one; None without the package."""
+    folder = installed(H1_PACKAGE)
+    if folder is None:
+        return None
+    path = _baked("h1", H1_PACKAGE)
+    shapes = _read_baked(path)
+    if shapes is not None:
+        return shapes
+    meshes = folder / "robosuite_models" / "assets" / "robots" / "h1" / "meshes"
+    black, white = (50, 52, 56), (232, 234, 236)
+    base = [
+        _light(meshes / "pelvis.STL", 350, black),
+        _light(meshes / "torso_link.STL", 1600, black),
+        _light(meshes / "logo_link.STL", 120, white),
+    ]
+    base += [_light(meshes / f"{link}_link.STL", 300, black).moved(pose) for link, pose in arms.items()]
+    shapes = {"base": joined(base)}
+    for side in ("left", "right"):
+        for link in ("hip_yaw", "hip_roll", "hip_pitch", "knee", "ankle"):
+            shapes[f"{side}_{link}"] = [_light(meshes / f"{side}_{link}_link.STL", 260, black)]
     write_glb(path, dict(shapes))
     return read_glb(path)
 

@@ -61,6 +61,21 @@ class MotorController:
         """Return targets and gains for a robot that fell `lying` seconds ago; None: commands go on."""
         return self.model.stance, None
 
+    def lift(self, lying: float, base: Base, above_ground: float) -> tuple[str, Array] | None:
+        """Return how a robot is lifted that fell `lying` seconds ago: a site, and force and torque there; None: not.
+
+        Parameters
+        ----------
+        above_ground
+            Height of the base above the ground, metres.
+
+        Returns
+        -------
+        tuple or None
+            Name of a site, and newtons and newton metres in its frame, shape ``(2, 3)``.
+        """
+        return None
+
     def stands(self, lying: float, base: Base, angles: Array, above_ground: float) -> bool:
         """Return whether a fallen robot whose base is upright again stands.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from vico.sim.robots.controller import MotorController
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.state import Mode, RobotRun
@@ -40,10 +42,13 @@ def _watch_standing(run: RobotRun, robot: int, tilted: float) -> None:
 def _watch_lying(run: RobotRun, robot: int, controller: MotorController, dt: float) -> None:
     arrays, base = run.arrays, run.engine.base(robot)
     lying = float(arrays.lying[robot])
-    above = float(base.position[2]) - float(run.scene.world.height(base.position))
+    above = run.above_ground(robot)
     upright = float(base.rotation[2, 2]) > _UPRIGHT
     if upright and controller.stands(lying, base, run.engine.joints(robot)[0], above):
         arrays.status[robot] = RobotStatus.MOVING if arrays.mode[robot] != Mode.IDLE else RobotStatus.IDLE
+        lift = controller.lift(0.0, base, above)
+        if lift is not None:  # let go
+            run.engine.thrust(robot, lift[:1], np.zeros((1, 3)))
         arrays.lying[robot] = 0.0
         run.note(robot, "recovered")
     elif lying - dt <= _GIVE_UP < lying:

@@ -77,6 +77,9 @@ def command_motors(run: RobotRun, group: RobotGroup, memory: np.ndarray, velocit
         lying = None
         if fallen[row]:
             lying = group.controller.lying_targets(float(arrays.lying[robot]), run.engine.base(robot))
+            lift = group.controller.lift(float(arrays.lying[robot]), run.engine.base(robot), run.above_ground(robot))
+            if lift is not None:
+                run.engine.thrust(robot, lift[:1], lift[1][:1], lift[1][1:])
             arrays.lying[robot] += group.model.control_period
         if lying is not None:
             run.engine.command(robot, *lying)

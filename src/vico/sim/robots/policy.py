@@ -34,7 +34,7 @@ def _elu(values):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _dense(inputs, weights, bias, last):  # type: ignore[no-untyped-def]
+def dense(inputs, weights, bias, last):  # type: ignore[no-untyped-def]
     """One layer of all robots, shape ``(k, outputs)``.
 
     Summed input by input: vectorised over outputs, in one order whatever the machine's BLAS and however many robots.
@@ -94,7 +94,7 @@ def _evaluate(layers, motion, command, memory, pose):  # type: ignore[no-untyped
     seen = _observe_all(motion, command, memory, pose)
     x = np.minimum(np.maximum(seen, -_LIMIT), _LIMIT).astype(np.float32)
     for index in range(len(layers)):
-        x = _dense(x, layers[index][0], layers[index][1], index == len(layers) - 1)
+        x = dense(x, layers[index][0], layers[index][1], index == len(layers) - 1)
     out = np.empty((len(seen), 12))
     for robot in range(len(seen)):
         for k in range(12):

@@ -199,6 +199,11 @@ class RobotRun:
         """Origin of a robot's base, ENU metres, shape ``(3,)``."""
         return self.engine.base(robot).position
 
+    def above_ground(self, robot: int) -> float:
+        """Height of a robot's base above the ground, metres."""
+        position = self.engine.base(robot).position
+        return float(position[2]) - float(self.scene.world.height(position))
+
     def note(self, robot: int, kind: str) -> None:
         """Keep that something happened to a robot."""
         self.pending.append((robot, NOTES.index(kind)))
