@@ -29,6 +29,10 @@ BUS_DOOR_REACH = 3.0
 #: How wide a bus is, and how far behind its front the middle of its front door, metres.
 BUS_WIDTH, BUS_DOOR_BEHIND_FRONT = 2.55, 1.35
 BUS_CAPACITY = 60
+#: Trams: sections coupled to one, their length, and their width, metres; doors and fares are as with buses.
+TRAM_SECTIONS = 3
+TRAM_SECTION = 8.4
+TRAM_WIDTH = 2.4
 
 #: Bicycles: how near one gets on, metres; the price of a started minute, and of leaving it farther from a station with
 #: a free place than `STATION_REACH` metres.

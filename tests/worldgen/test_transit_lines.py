@@ -82,7 +82,7 @@ def test_timetables_come_before_the_map_and_keep_names_colours_and_departures() 
     # Those after midnight come first; between them and the morning's there are none.
     assert line.departures[0] == 0
     assert sorted(set(np.diff(line.departures).tolist())) == [120, 1080, 4 * 3600 + 1080]
-    assert "tram T9: rails are not driven" in [what.reason for what in transit.left_out]
+    assert "tram T9: its rails are not on the map, or not chosen" in [what.reason for what in transit.left_out]
 
 
 def test_buses_leave_when_the_timetable_says() -> None:

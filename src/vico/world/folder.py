@@ -202,6 +202,8 @@ class World:
             found[room.entity] = {"kind": "room", "name": f"{room.kind} {room.id}"}
         for stop in self.transit.stops:
             found[stop.entity] = {"kind": "bus_stop", "name": stop.name}
+        for tram_stop in self.transit.tram_stops:
+            found[tram_stop.entity] = {"kind": "tram_stop", "name": tram_stop.name}
         for station in self.transit.bike_stations:
             found[station.entity] = {"kind": "bike_station", "name": station.name}
         objects = self.objects

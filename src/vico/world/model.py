@@ -340,6 +340,45 @@ class BikeStation(Record):
     bikes: int
 
 
+class TramStop(Record):
+    """A stop of trams. `wait` is where people stand."""
+
+    id: str
+    entity: int
+    name: str
+    wait: Point3
+
+
+class TramLine(Record):
+    """A line on rails in one direction: trams come in where its track begins and go out where it ends.
+
+    Attributes
+    ----------
+    kind
+        tram, light_rail or rail.
+    track
+        Centre line of the track in the direction it is driven, ENU metres.
+    stops
+        Stop ids in the order they are served; none where trams only pass.
+    offsets
+        Metres along the track at which a tram's front comes to rest at each stop.
+    departures
+        Seconds of the day at which a tram's front is where the track begins.
+    travel
+        Scheduled seconds from then to its arrival at each stop, then to its front being where the track ends.
+    """
+
+    id: str
+    name: str
+    kind: str
+    colour: str
+    track: list[Point2]
+    stops: list[str]
+    offsets: list[float]
+    departures: list[int]
+    travel: list[float]
+
+
 class Transit(Record):
     """`transit.json`: stops, lines, bicycle stations, and where each came from (osm, gtfs, planned).
 
@@ -347,6 +386,8 @@ class Transit(Record):
     ----------
     left_out
         Routes of the sources that no line drives, with the reason.
+    tram_stops, tram_lines
+        What runs on rails; none in worlds built before there were any.
     """
 
     stops: list[Stop]
@@ -354,6 +395,8 @@ class Transit(Record):
     bike_stations: list[BikeStation]
     origin: dict[str, str]
     left_out: list[Dropped] = []
+    tram_stops: list[TramStop] = []
+    tram_lines: list[TramLine] = []
 
 
 class Road(Record):

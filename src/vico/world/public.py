@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vico.world.folder import World
 from vico.world.heights import HeightField
-from vico.world.model import BikeStation, Category, Line, Point3, Ring, Stop, Transit
+from vico.world.model import BikeStation, Category, Line, Point3, Ring, Stop, TramLine, TramStop, Transit
 from vico.world.routing import Router
 from vico.world.trips import Trips
 from vico.world.walkable import WalkableMap
@@ -67,6 +67,8 @@ class PublicMap:
     lines: list[Line]
     bike_stations: list[BikeStation] = field(default_factory=list)
     shared_router: Router | None = field(default=None, repr=False, compare=False)
+    tram_stops: list[TramStop] = field(default_factory=list)
+    tram_lines: list[TramLine] = field(default_factory=list)
 
     @classmethod
     def from_world(cls, world: World) -> PublicMap:
@@ -90,6 +92,8 @@ class PublicMap:
             transit.lines,
             transit.bike_stations,
             world.router,
+            transit.tram_stops,
+            transit.tram_lines,
         )
 
     @cached_property
@@ -99,8 +103,15 @@ class PublicMap:
 
     @cached_property
     def transit(self) -> Transit:
-        """Stops, lines with their timetables, and bicycle stations."""
-        return Transit(stops=self.stops, lines=self.lines, bike_stations=self.bike_stations, origin={})
+        """Stops, lines with their timetables, on rails too, and bicycle stations."""
+        return Transit(
+            stops=self.stops,
+            lines=self.lines,
+            bike_stations=self.bike_stations,
+            origin={},
+            tram_stops=self.tram_stops,
+            tram_lines=self.tram_lines,
+        )
 
     @cached_property
     def trips(self) -> Trips:

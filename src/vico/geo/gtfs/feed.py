@@ -67,7 +67,7 @@ class Feed:
     day
         The day whose timetable it is, ISO 8601; empty where nothing runs in the window.
     stops, routes, patterns
-        Those of buses and trams that stop in the window, sorted by id; patterns of trams are not among them.
+        Those of buses and trams that stop in the window, sorted by id.
     attribution
         Who publishes it, as the feed says.
     broken

@@ -136,7 +136,7 @@ class _Reader:
         patterns: list[Pattern] = []
         if chosen is not None:
             running = self._running(trips, chosen)
-            patterns = self._patterns({k: t for k, t in running.items() if routes[t.route].kind == "bus"}, stops)
+            patterns = self._patterns(running, stops)
         used = {s for p in patterns for s in p.stops} | {c[1] for t in trips.values() for c in t.calls if c[1] in stops}
         names = {stop: parents.get(stop, "") for stop in used}
         return Feed(

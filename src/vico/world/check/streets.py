@@ -7,10 +7,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from vico.rules import BUS_DOOR_BEHIND_FRONT, BUS_DOOR_REACH, BUS_WIDTH
+from vico.rules import BUS_DOOR_BEHIND_FRONT, BUS_DOOR_REACH, BUS_WIDTH, TRAM_SECTIONS
 from vico.world.check.finding import WorldFinding
 from vico.world.folder import World
 from vico.world.model import Stop
+from vico.world.rails import TRAM_LENGTH, Track, tram_door
 
 # Metres beside the place to wait where one may stand instead.
 _BESIDE = 1.0
@@ -76,3 +77,25 @@ def check_transit(world: World) -> Iterator[WorldFinding]:
                 yield WorldFinding("line misses stop", line.id, f"{name} is not on its way")
         if len(line.travel) != len(line.stops) + 1 or any(np.diff(line.travel) <= 0):
             yield WorldFinding("line timetable", line.id, "its times do not increase from stop to stop and back")
+
+
+def check_rails(world: World) -> Iterator[WorldFinding]:
+    """Check that trams call at stops of their own tracks, in order and in time, where people can wait."""
+    transit = world.transit
+    stops = {stop.id: stop for stop in transit.tram_stops}
+    for line in transit.tram_lines:
+        if len(line.track) < 2 or len(line.offsets) != len(line.stops) or any(name not in stops for name in line.stops):
+            yield WorldFinding("line lost", line.id, "it has no track, or stops that are not there")
+            continue
+        track = Track(line.track)
+        beyond = any(not TRAM_LENGTH <= offset <= track.length for offset in line.offsets)
+        if beyond or any(np.diff(line.offsets) <= 0):
+            yield WorldFinding("line misses stop", line.id, "its stops do not follow one another on its track")
+        if len(line.travel) != len(line.stops) + 1 or any(np.diff(line.travel) <= 0):
+            yield WorldFinding("line timetable", line.id, "its times do not increase from stop to stop")
+        for name, offset in zip(line.stops, line.offsets, strict=True):
+            wait = stops[name].wait
+            doors = [tram_door(track, offset, k, side)[0] for k in range(2 * TRAM_SECTIONS) for side in (1.0, -1.0)]
+            away = min(math.dist(door, wait[:2]) for door in doors)
+            if away > BUS_DOOR_REACH:
+                yield WorldFinding("stop out of reach", name, f"the tram's doors are {away:.1f} m from where one waits")

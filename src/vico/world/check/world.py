@@ -15,7 +15,7 @@ from vico.world.check.finding import WorldFinding
 from vico.world.check.objects import check_clearances, check_objects
 from vico.world.check.places import check_entrances, check_places
 from vico.world.check.rooms import check_containers, check_indoors, check_rooms
-from vico.world.check.streets import check_roads, check_transit
+from vico.world.check.streets import check_rails, check_roads, check_transit
 from vico.world.folder import World, world_files
 from vico.world.model import FAILED, FAULT, TRIED
 
@@ -56,6 +56,8 @@ def check_world(world: World) -> list[WorldFinding]:
         check_clearances,
         check_roads,
         check_transit,
+        check_rails,
+        check_rails,
         check_entities,
         check_dropped,
     ):
@@ -80,6 +82,7 @@ def _located(world: World, findings: list[WorldFinding]) -> list[WorldFinding]:
             at |= {container.id: container.centre[:2] for container in room.containers}
         at |= dict(zip(world.objects.id.tolist(), world.objects.position[:, :2].tolist(), strict=True))
         at |= {stop.id: stop.wait[:2] for stop in world.transit.stops}
+        at |= {stop.id: stop.wait[:2] for stop in world.transit.tram_stops}
         lanes = world.lanes
         for k, name in enumerate(lanes.ids):
             at[name] = tuple(lanes.line(k)[0, :2].tolist())

@@ -16,6 +16,7 @@ from vico.geo.osm import OsmData, OsmRelation, Tags
 from vico.world.model import Dropped
 from vico.worldgen.facts.expendable import expendable
 
+NOT_ON_THE_MAP = "its rails are not on the map, or not chosen"
 _SAME_STOP = 60.0  # metres within which a platform and a stop position of one name are one stop
 _BESIDE = 35.0  # and of any name, where one follows the other in the relation
 _GONE = ("disused", "abandoned", "proposed", "construction", "razed", "removed")
@@ -118,7 +119,7 @@ def routes_from_gtfs(feeds: Sequence[Feed]) -> tuple[list[Route], list[Dropped]]
         groups: dict[tuple[str, str], list[GtfsRoute]] = defaultdict(list)
         for route in feed.routes:
             if route.kind == "tram":
-                dropped.append(Dropped(id=f"gtfs:{route.id}", reason=f"tram {route.name}: rails are not driven"))
+                dropped.append(Dropped(id=f"gtfs:{route.id}", reason=f"tram {route.name}: {NOT_ON_THE_MAP}"))
             else:
                 groups[route.name, route.agency].append(route)
         for (name, _), members in groups.items():

@@ -22,7 +22,8 @@ from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.transit.bikes import FIRST_STATION, bike_stations
 from vico.worldgen.transit.drive import BUS_LENGTH, Berth, Drive, Kerbs, merged
 from vico.worldgen.transit.plan import MAX_LOOP, MAX_STOPS, MIN_STOPS, planned_berths, planned_loop
-from vico.worldgen.transit.routes import Pole, Route, routes_from_gtfs, routes_from_osm
+from vico.worldgen.transit.rails import trams_from_osm
+from vico.worldgen.transit.routes import NOT_ON_THE_MAP, Pole, Route, routes_from_gtfs, routes_from_osm
 from vico.worldgen.transit.times import (
     BUS_SPEED,
     DWELL,
@@ -173,6 +174,11 @@ def transit_from_osm(
         with expendable(line.ids[0] if line.ids else name):
             lines.append(_record(k, line, stops))
     stations, racks = bike_stations(site, lanes, walks, height, seed)
+    tram_stops, tram_lines, off_rails = trams_from_osm(
+        site, height, solids=solids or [], feeds=feeds, first_entity=FIRST_STOP + len(kept)
+    )
+    on_rails = {f"tram {line.name}: {NOT_ON_THE_MAP}" for line in tram_lines}
+    left_out = [what for what in left_out if what.reason not in on_rails] + off_rails
     origins = dict.fromkeys("planned" if line.route is None else line.route.origin for line in chosen)
     return Transit(
         stops=list(stops.values()),
@@ -180,6 +186,8 @@ def transit_from_osm(
         bike_stations=stations,
         origin={"stops": names, "lines": " and ".join(origins) or "none", "bike_stations": racks},
         left_out=left_out,
+        tram_stops=tram_stops,
+        tram_lines=tram_lines,
     )
 
 

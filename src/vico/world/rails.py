@@ -1,0 +1,123 @@
+"""Tracks as trams drive them: where a section stands, how fast bends allow, and how long a run takes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vico.rules import TRAM_SECTION, TRAM_SECTIONS, TRAM_WIDTH
+from vico.world.model import Point2
+
+#: Metres between the points a track is known at.
+STEP = 0.5
+#: Length of a tram, metres.
+TRAM_LENGTH = TRAM_SECTIONS * TRAM_SECTION
+#: Metres a second at most in a street, and metres a second squared that trams speed up and brake with, and that
+#: who stands in one is to feel at most in a bend.
+TRAM_SPEED, TRAM_ACCELERATION, TRAM_BRAKING = 9.0, 1.0, 1.1
+_SIDEWAYS = 0.9
+_SLOWEST = 2.5  # m/s, however tight the bend
+#: Doors on both sides of a section, metres ahead of its middle.
+TRAM_DOORS = (2.3, -2.3)
+#: Metres from a section's middle to where it rests on the track, ahead and behind.
+_PIVOT = 2.9
+_AIR = 0.12  # metres kept on either side
+
+
+class Track:
+    """The track of a tram line, known every `STEP` metres.
+
+    Parameters
+    ----------
+    line
+        Its centre line, ENU metres, shape ``(n, 2)``.
+
+    Attributes
+    ----------
+    length
+        Metres.
+    xy
+        Points every `STEP` metres, shape ``(m, 2)``.
+    half_width
+        How far from each of them a tram reaches to the sides that passes it, with some air, metres, shape ``(m,)``.
+    speed
+        How fast trams drive there, m/s, shape ``(m,)``: they brake ahead of bends.
+    """
+
+    def __init__(self, line: Sequence[Point2] | NDArray[np.float64]) -> None:
+        points = np.asarray(line, np.float64).reshape(-1, 2)
+        steps = np.hypot(*np.diff(points, axis=0).T)
+        keep = np.concatenate([[True], steps > 1e-6])
+        points = points[keep]
+        self._along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+        self._points = points
+        self.length = float(self._along[-1])
+        s = np.arange(math.floor(self.length / STEP) + 1) * STEP
+        self.xy = self.at(s)
+        reach = TRAM_SECTION / 2
+        before, here, after = self.at(s - reach), self.xy, self.at(s + reach)
+        turn = _angle(here - before, after - here)
+        bend = np.abs(turn) / reach
+        self.half_width = TRAM_WIDTH / 2 + _AIR + np.minimum(TRAM_SECTION**2 / 8 * bend, 1.0)
+        fast = np.clip(np.sqrt(_SIDEWAYS / np.maximum(bend, 1e-3)), _SLOWEST, TRAM_SPEED)
+        # A bend counts for as long as any part of the tram is in it.
+        wide = int(TRAM_LENGTH / STEP)
+        self.speed = np.array([fast[max(0, k - wide) : k + 1].min() for k in range(len(fast))])
+        for k in range(len(self.speed) - 2, -1, -1):
+            self.speed[k] = min(self.speed[k], math.sqrt(self.speed[k + 1] ** 2 + 2 * TRAM_BRAKING * STEP))
+
+    def at(self, s: ArrayLike) -> NDArray[np.float64]:
+        """Points at distances along the track, metres, straight on beyond its ends; shape ``(..., 2)``."""
+        s = np.asarray(s, np.float64)
+        inside = np.clip(s, 0.0, self.length)
+        xy = np.stack([np.interp(inside, self._along, self._points[:, k]) for k in (0, 1)], axis=-1)
+        over = (s - inside)[..., None]
+        first, last = self._ends
+        return np.asarray(xy + np.where(over < 0, first, last) * over, np.float64)
+
+    @cached_property
+    def _ends(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Directions in which the track begins and ends."""
+        first, last = self._points[1] - self._points[0], self._points[-1] - self._points[-2]
+        return first / np.hypot(*first), last / np.hypot(*last)
+
+    def section(self, front: ArrayLike) -> NDArray[np.float64]:
+        """x, y, yaw of the middle of a section whose front is at a distance along the track; shape ``(..., 3)``."""
+        middle = np.asarray(front, np.float64) - TRAM_SECTION / 2
+        a, b = self.at(middle - _PIVOT), self.at(middle + _PIVOT)
+        way = b - a
+        return np.concatenate([(a + b) / 2, np.arctan2(way[..., 1], way[..., 0])[..., None]], axis=-1)
+
+    def seconds(self, start: float, end: float, *, standing: bool = True) -> float:
+        """How long a tram takes from one distance along the track to another, braking to a stand there if need be."""
+        s = np.arange(start, max(end, start + STEP), STEP)
+        limit = np.interp(s, np.arange(len(self.speed)) * STEP, self.speed)
+        speed = np.minimum(limit, np.sqrt(0.25 + 2 * TRAM_ACCELERATION * (s - start)))
+        if standing:
+            speed = np.minimum(speed, np.sqrt(0.25 + 2 * TRAM_BRAKING * (end - s)))
+        return float((STEP / np.maximum(speed, 0.5)).sum())
+
+
+def tram_door(track: Track, offset: float, door: int, side: float) -> tuple[Point2, Point2]:
+    """Where a door of a tram that stands with its front at `offset` is, and where its middle line is there.
+
+    Parameters
+    ----------
+    door
+        Counted from the front, two a section.
+    side
+        1 for the right side, -1 for the left one.
+    """
+    section, which = divmod(door, len(TRAM_DOORS))
+    x, y, yaw = track.section(offset - section * TRAM_SECTION)
+    x, y = x + math.cos(yaw) * TRAM_DOORS[which], y + math.sin(yaw) * TRAM_DOORS[which]
+    aside = side * TRAM_WIDTH / 2
+    return (float(x + math.sin(yaw) * aside), float(y - math.cos(yaw) * aside)), (float(x), float(y))
+
+
+def _angle(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)), np.float64)
