@@ -1,4 +1,4 @@
-"""Travelling: follows a planned trip leg by leg, on foot, by bus and by bicycle, and plans anew when it fails."""
+"""Travelling: follows a planned trip leg by leg, on foot, by bus, tram and bicycle, and plans anew when it fails."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from vico.agents.state import AgentState
 from vico.agents.stays import RUN
 from vico.agents.wayfinding import Walker, closed_ground
 from vico.rules import BIKE_SPEED, BUS_DWELL, STATION_REACH, WALK_SPEED, ReasonCode, code_name
+from vico.world.model import Line, Stop, TramLine, TramStop
 from vico.world.public import PublicMap
 from vico.world.trips import AHEAD, MODES, Closure, Leg, Trip
 from vico.world.walkable import ROADWAY
@@ -36,6 +37,9 @@ _STILL, _STANDS = 0.05, 3
 _TRIES = 4
 # How often one tries to turn a bicycle where it is narrow before leaving it there.
 _PUSHES = 40
+
+#: Modes in which one is taken along.
+_RIDDEN = ("bus", "tram")
 
 _NO_VEHICLE, _NO_FREE_SPOT, _NO_MONEY = (
     code_name(code) for code in (ReasonCode.NO_VEHICLE, ReasonCode.NO_FREE_SPOT, ReasonCode.NO_MONEY)
@@ -127,7 +131,7 @@ class Traveller:
     @property
     def waits_for_bus(self) -> bool:
         """Whether it stands at a stop until its bus comes."""
-        return self.trip is not None and self._leg < len(self.trip.legs) and self.trip.legs[self._leg].mode == "bus"
+        return self.trip is not None and self._leg < len(self.trip.legs) and self.trip.legs[self._leg].mode in _RIDDEN
 
     def remaining(self, position: Sequence[float]) -> float:
         """Metres still to walk on the present leg."""
@@ -181,7 +185,7 @@ class Traveller:
         leg = self._leg_on_foot(goal, observation)
         if leg is None:
             return None
-        if leg.mode == "bus":
+        if leg.mode in _RIDDEN:
             return self._board(leg, observation, info)
         if leg.mode == "bike":
             return self._mount(leg, observation, info)
@@ -235,7 +239,7 @@ class Traveller:
         """Return the speed on foot at which the bus that comes next is not missed, if that can be done."""
         trip = self.trip
         ride = trip.legs[self._leg + 1] if trip is not None and self._leg + 1 < len(trip.legs) else None
-        if ride is None or ride.mode != "bus":
+        if ride is None or ride.mode not in _RIDDEN:
             return speed
         left = ride.depart - AHEAD - float(observation["state"]["time"])
         return max(speed, min(RUN, self.remaining(observation["pose"]) / max(left, 1.0)))
@@ -260,7 +264,8 @@ class Traveller:
         if now > leg.depart + _LATE:
             return self._plan_anew()
         # Which line a bus is of can't be seen: where several stop the time tells.
-        others = [line for line in self._map.lines if leg.origin in line.stops and line.id != leg.line]
+        lines: list[Line | TramLine] = [*self._map.lines, *self._map.tram_lines]
+        others = [line for line in lines if leg.origin in line.stops and line.id != leg.line]
         if others and now < leg.depart - _EARLY:
             return {"type": "wait"}
         if self._asked == "enter_bus" and state["action_code"] == _NO_VEHICLE and now > leg.depart - BUS_DWELL:
@@ -296,7 +301,7 @@ class Traveller:
         """Stay in until the bus stands where one wants to get off."""
         trip = self.trip
         leg = trip.legs[self._leg] if trip is not None and self._leg < len(trip.legs) else None
-        if leg is None or leg.mode != "bus":
+        if leg is None or leg.mode not in _RIDDEN:
             return {"type": "exit_bus"}
         if _away(observation, leg.end) <= _BUS_AT_STOP:
             return {"type": "exit_bus"}
@@ -307,8 +312,10 @@ class Traveller:
 
     def _is_off_the_line(self, leg: Leg, observation: Observation) -> bool:
         """Return whether the bus stands at a stop of other lines only: it is not the one that was meant."""
-        near = [stop.id for stop in self._map.stops if _away(observation, stop.wait) <= _BUS_AT_STOP]
-        mine = next(line.stops for line in self._map.lines if line.id == leg.line)
+        stops: list[Stop | TramStop] = [*self._map.stops, *self._map.tram_stops]
+        lines: list[Line | TramLine] = [*self._map.lines, *self._map.tram_lines]
+        near = [stop.id for stop in stops if _away(observation, stop.wait) <= _BUS_AT_STOP]
+        mine = next(line.stops for line in lines if line.id == leg.line)
         return bool(near) and not any(stop in mine for stop in near)
 
     # -- bicycles ----------------------------------------------------------------------------------------------------

@@ -45,6 +45,7 @@ BUS_LAMPS = ((_NOSE + 0.04, _HALF - 0.38, 0.72), (_REAR - 0.02, _HALF - 0.3, 0.9
 _STRAIGHT = (_REAR + 0.18, _NOSE - 0.35)
 _LOW, _BELT, _LINTEL, _EAVES = 0.32, 1.12, 2.46, 2.62
 _CEILING = 2.6
+_LEAF = 0.7  # width of a door leaf
 # The lining's distance from the skin; it is drawn from within only.
 _LINING = 0.05
 # Windows and the pillars between them.
@@ -92,10 +93,7 @@ def _panes(side: str) -> list[tuple[float, float]]:
     if side == "left":
         return panes
     clear = [(a, b) for a, b in panes if all(b < c or a > d for c, d in BUS_DOORS)]
-    for a, b in BUS_DOORS:
-        middle = (a + b) / 2
-        clear += [(a + 0.06, middle - 0.03), (middle + 0.03, b - 0.06)]
-    return sorted(clear)
+    return sorted([*clear, *BUS_DOORS])
 
 
 def _wall(side: str) -> list[Surface]:
@@ -106,11 +104,19 @@ def _wall(side: str) -> list[Surface]:
     for a, b in zip(cuts[::2], cuts[1::2], strict=True):
         parts.append(panel(a, b, y, _BELT, _LINTEL, _WHITE))
         parts.append(_inward(a, b, inner, _BELT, _LINTEL))
-    parts.append(panel(*_STRAIGHT, y, _LOW, _BELT, _WHITE))
+    for a, b in _between_doors(side, *_STRAIGHT):
+        parts.append(panel(a, b, y, _LOW, _BELT, _WHITE))
+        parts.append(_inward(a, b, inner, BUS_FLOOR, _BELT))
     parts.append(panel(*_STRAIGHT, y, _LINTEL, _EAVES, _WHITE))
     parts.append(_inward(*_STRAIGHT, inner, _LINTEL, _CEILING))
-    parts.append(_inward(*_STRAIGHT, inner, BUS_FLOOR, _BELT))
     return parts
+
+
+def _between_doors(side: str, start: float, end: float) -> list[tuple[float, float]]:
+    """Return the stretches of a side below the windows, from x to x: the right one is open at its doors."""
+    doors = [x for door in sorted(BUS_DOORS) for x in door] if side == "right" else []
+    edges = [start, *doors, end]
+    return list(zip(edges[::2], edges[1::2], strict=True))
 
 
 def _inward(x0: float, x1: float, y: float, z0: float, z1: float) -> Surface:
@@ -192,7 +198,12 @@ def _furniture() -> list[Surface]:
 def _outside(paint: Colour, sign: Colour) -> list[Surface]:
     """Make stripe, wheels, lights, doors' frames, signs and bumpers."""
     axle = _NOSE - BUS_AXLES[0]
-    sides: list[Surface] = [panel(_REAR + 0.2, _NOSE - 0.4, _HALF + 0.003, _LOW, _BELT - 0.16, paint)]
+    sides: list[Surface] = []
+    stripes = []
+    for side in ("left", "right"):
+        for a, b in _between_doors(side, _REAR + 0.2, _NOSE - 0.4):
+            stripe = panel(a, b, _HALF + 0.003, _LOW, _BELT - 0.16, paint)
+            stripes.append(stripe if side == "left" else mirrored(stripe))
     for x in (axle, axle - BUS_AXLES[1]):
         sides.append(arch(x, _HALF + 0.006, 0.58, _LOW))
         sides += wheel(x, _HALF + 0.012, 0.48, 0.3)
@@ -200,16 +211,8 @@ def _outside(paint: Colour, sign: Colour) -> list[Surface]:
     sides.append(box((0.12, 0.36, 0.18), (_NOSE - 0.02, _HALF - 0.38, 0.72), colour=HEADLIGHT))
     sides.append(box((0.10, 0.12, 0.18), (_NOSE - 0.05, _HALF - 0.16, 0.72), colour=INDICATOR))
     sides.append(box((0.10, 0.10, 0.36), (_NOSE - 0.1, _HALF, 2.2), colour=TRIM))
-    parts = both_sides(sides)
-    doors: list[Surface] = []
-    for a, b in BUS_DOORS:
-        middle = (a + b) / 2
-        doors.append(panel(a, b, _HALF + 0.007, _LOW + 0.02, _BELT, TRIM))
-        doors.append(panel(a, b, _HALF + 0.007, _LINTEL, _EAVES - 0.04, TRIM))
-        for x in (a, middle - 0.03, b - 0.06):
-            doors.append(panel(x, x + 0.06, _HALF + 0.007, _LOW + 0.02, _EAVES - 0.04, TRIM))
-        for c, d in ((a + 0.06, middle - 0.03), (middle + 0.03, b - 0.06)):
-            doors.append(panel(c, d, _HALF + 0.011, _LOW + 0.16, _BELT - 0.06, GLASS))
+    parts = both_sides(sides) + stripes
+    doors = [panel(a, b, _HALF + 0.007, _LINTEL, _EAVES - 0.04, TRIM) for a, b in BUS_DOORS]
     doors.append(panel(2.0, 3.4, _HALF + 0.014, _LINTEL + 0.01, _EAVES - 0.01, sign))
     parts += [mirrored(part) for part in doors]
     back, nose = _REAR - 0.012, _NOSE + 0.012
@@ -222,6 +225,29 @@ def _outside(paint: Colour, sign: Colour) -> list[Surface]:
     parts.append(box((0.08, _WIDTH - 0.5, 0.28), (_NOSE - 0.02, 0, 0.46), colour=TRIM))
     parts.append(box((0.08, _WIDTH - 0.5, 0.34), (_REAR + 0.02, 0, 0.5), colour=paint))
     return parts
+
+
+def bus_door_leaves() -> tuple[list[tuple[float, float, float]], float]:
+    """Return the leaves of the doors when closed (middle x, y, and which way along x each slides); their width."""
+    leaves = []
+    for a, b in BUS_DOORS:
+        middle = (a + b) / 2
+        leaves += [(middle + way * _LEAF / 2, -_HALF - 0.004, way) for way in (-1.0, 1.0)]
+    return leaves, _LEAF
+
+
+def bus_leaf() -> Surface:
+    """Make a door leaf, its middle at the origin: a frame with glass below, seen from both sides."""
+    half, y = _LEAF / 2, 0.004
+    strips = [
+        panel(-half, half, y, _LOW + 0.02, _LOW + 0.16, TRIM),
+        panel(-half, half, y, _BELT - 0.06, _BELT, TRIM),
+        panel(-half, half, y, _LINTEL - 0.06, _LINTEL, TRIM),
+        panel(-half, -half + 0.05, y, _LOW + 0.16, _LINTEL - 0.06, TRIM),
+        panel(half - 0.05, half, y, _LOW + 0.16, _LINTEL - 0.06, TRIM),
+        panel(-half + 0.05, half - 0.05, y, _LOW + 0.16, _BELT - 0.06, GLASS),
+    ]
+    return one_surface(both_sides(strips))
 
 
 def bus(paint: Colour = (0, 114, 178), sign: Colour = (246, 170, 30)) -> Surface:

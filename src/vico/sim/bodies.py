@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 
-KINDS = ("resident", "assistant", "robot", "car", "bus", "bicycle", "pedestrian", "object", "fixture")
-RESIDENT, ASSISTANT, ROBOT, CAR, BUS, BICYCLE, PEDESTRIAN, OBJECT, FIXTURE = range(len(KINDS))
+KINDS = ("resident", "assistant", "robot", "car", "bus", "bicycle", "pedestrian", "object", "fixture", "tram")
+RESIDENT, ASSISTANT, ROBOT, CAR, BUS, BICYCLE, PEDESTRIAN, OBJECT, FIXTURE, TRAM = range(len(KINDS))
 #: By kind: whether it is a person.
 IS_PERSON = np.isin(np.arange(len(KINDS)), (RESIDENT, ASSISTANT, PEDESTRIAN))
 #: By kind: whether its footprint is round at the ends. A bicycle left standing takes the room its rider took with it.

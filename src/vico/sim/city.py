@@ -30,7 +30,10 @@ def follow_city_events(state: SimulationState) -> None:
         return
     news = agenda.news()
     if news and state.traffic is not None:
-        state.traffic.set_shut(agenda.effects.lanes, agenda.effects.walkways)
+        walkways = agenda.effects.walkways
+        if state.transit is not None:
+            walkways = state.transit.shut_walkways(walkways)
+        state.traffic.set_shut(agenda.effects.lanes, walkways)
         state.traffic.drop_shut_plans()
     state.things.follow(state)
     for one, what in news:

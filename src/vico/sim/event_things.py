@@ -18,11 +18,12 @@ from vico.sim.bodies import CAR, FIXTURE, Bodies, Drawn
 from vico.sim.environment import Environment, Occurrence
 from vico.sim.environment.event_spots import Spot, spots_of
 from vico.sim.footprints import Rectangle, gaps, records_of
+from vico.sim.state import FIRST_THING
 from vico.world.folder import World
 from vico.world.mesh import Surface
 
 #: Entities of an event's things: so many numbers for each event.
-FIRST_THING, THINGS_EACH = 1_300_000, 100
+THINGS_EACH = 100
 # Things are set up where this much is free around them, metres.
 _ROOM = 0.5
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.sim.bodies import BUS, CAR, Bodies
+from vico.sim.bodies import BUS, CAR, TRAM, Bodies
 from vico.sim.moves import eye_height
 from vico.sim.perception import is_clear, opaque_grid
 from vico.sim.simulation_state import SimulationState
@@ -95,6 +95,8 @@ def noise_at(state: SimulationState, place: NDArray[np.float64]) -> float:
         levels.append(heard_from(loud, float(np.linalg.norm(one.middle - place))))
     if state.traffic is not None:
         levels += _of_vehicles(state.traffic.bodies(), place)
+    if state.transit is not None:
+        levels += _of_vehicles(state.transit.bodies(), place)
     return 10.0 * math.log10(sum(10.0 ** (level / 10.0) for level in levels))
 
 
@@ -105,13 +107,13 @@ def heard_from(loud: float, away: float) -> float:
 
 def _of_vehicles(bodies: Bodies, place: NDArray[np.float64]) -> list[float]:
     """Return how loud each vehicle that is near is there, dB."""
-    driven = (bodies.kind == CAR) | (bodies.kind == BUS)
+    driven = (bodies.kind == CAR) | (bodies.kind == BUS) | (bodies.kind == TRAM)
     away = np.linalg.norm(bodies.position - place, axis=1)
     levels = []
     for k in np.flatnonzero(driven & (away < _FAR)).tolist():
         speed = max(float(np.hypot(*bodies.velocity[k])), 0.1)
         level = max(_CAR + 30.0 * math.log10(speed / _PASSING_SPEED), _ENGINE)
-        level += _BUS_MORE if bodies.kind[k] == BUS else 0.0
+        level += _BUS_MORE if bodies.kind[k] in (BUS, TRAM) else 0.0
         levels.append(level - 20.0 * math.log10(max(float(away[k]), _NEAREST) / _PASSING))
     return levels
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from vico.rules import TRAM_SECTIONS
 from vico.seeds import rng
 from vico.sim import spawn, systems
 from vico.sim.appointments import Appointment
@@ -102,6 +103,8 @@ def _entities(state: SimulationState, residents: Sequence[Resident], config: Sim
     # Bicycles in their stations are nobody's obstacle, but are seen.
     for k, entity in enumerate(state.transit.bicycles.entities().tolist() if state.transit is not None else []):
         found[entity] = {"kind": "bicycle", "name": f"bicycle {k}"}
+    for k, entity in enumerate(state.transit.trams.entities().tolist() if state.transit is not None else []):
+        found[entity] = {"kind": "tram", "name": f"tram {k // TRAM_SECTIONS}"}
     for k, name in enumerate(state.robots.names if state.robots is not None else []):
         found[FIRST_ROBOT + k] |= {"name": f"{config.robots[k].partition(':')[0]} {k}", "agent": name}
     return found

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
+from vico.rules import TRAM_SECTIONS
 from vico.sim.bodies import Bodies
 from vico.sim.collisions import WALL, SolidMap, gap_to, map_gap, room_gap
 from vico.sim.footprints import IN_BUS, OUTDOORS, body_gap, can_touch, records_of
 from vico.sim.neighbours import neighbour_grid, search
-from vico.sim.state import RADIUS
+from vico.sim.state import FIRST_TRAM, FIRST_UMBRELLA, RADIUS
 from vico.world.heights import HeightField
 
 if TYPE_CHECKING:
@@ -151,10 +152,19 @@ def overlaps_of(state: SimulationState) -> list[Overlap]:
     found = [(records[i], int(records[j]["entity"]), depth) for i, j, depth in pairs(records, TOLERANCE)]
     found = [it for it in found if int(it[0]["entity"]) not in seated or it[1] not in seated]
     avatars = avatars[~np.isin(avatars["entity"], people.entity[people.seat >= 0])]
+    found = [row for row in found if not _are_coupled(int(row[0]["entity"]), row[1])]
     inside = persons_in_solids(avatars, state.avatars.solids, TOLERANCE)
     found += [(avatars[i], FURNITURE if furniture else WALL, depth) for i, furniture, depth in inside]
     found += _in_one_seat(avatars[avatars["space"] == IN_BUS], state)
     return [_overlap(one, other, float(depth)) for one, other, depth in found]
+
+
+def _are_coupled(one: int, other: int) -> bool:
+    """Whether two bodies are sections of one tram: in bends their corners reach into the bellows."""
+    first, last = min(one, other), max(one, other)
+    if first < FIRST_TRAM or last >= FIRST_UMBRELLA:
+        return False
+    return (first - FIRST_TRAM) // TRAM_SECTIONS == (last - FIRST_TRAM) // TRAM_SECTIONS
 
 
 def _in_one_seat(riders: NDArray[np.void], state: SimulationState) -> list[tuple[Any, int, float]]:

@@ -40,6 +40,8 @@ def reports(state: SimulationState, check: OverlapCheck | None) -> dict[str, Any
         found["junctions"] = str(traffic.junction_rule)
     if state.transit is not None:
         found["buses"] = state.transit.lateness()
+        if len(state.transit.trams):
+            found["trams"] = state.transit.tram_lateness()
     if state.robots is not None:
         found["physics"] = state.robots.physics_record()
     return found if check is None else found | {"overlaps": check.record()}

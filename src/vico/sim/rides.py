@@ -35,9 +35,9 @@ def board(i: int, state: SimulationState) -> None:
     p.cash[i] -= transit.board(bus, i)
     p.vehicle[i], p.vehicle_entity[i] = Vehicle.BUS, transit.entity_of(bus)
     p.posture[i] = Posture.SITTING if transit.is_seated(bus, i) else Posture.STANDING
-    line = transit.line_of(bus)
-    state.events.add("boarding", p.names[i], f"boards bus {line.name}", p.position[i], line=line.id, fare=FARE)
-    p.vehicle_yaw[i] = p.yaw[i] = transit.bus_pose(bus)[2]
+    what, line, name = transit.service_of(bus)
+    state.events.add("boarding", p.names[i], f"boards {what} {name}", p.position[i], line=line, fare=FARE)
+    p.vehicle_yaw[i] = p.yaw[i] = transit.seat(bus, i)[2]
     p.moved[i] = 0.0
     gesture("enter_vehicle", i, state)
     _seat(i, state, transit)
@@ -49,12 +49,12 @@ def alight(i: int, state: SimulationState) -> None:
     bus = bus_of(i, state, transit)
     spot = spot_beside(bus, state, transit)
     assert spot is not None
-    stop = transit.stopped_at(bus)
+    stop, facing = transit.stopped_at(bus), float(transit.seat(bus, i)[2])
     transit.alight(bus, i)
     p.vehicle[i], p.vehicle_entity[i] = Vehicle.NONE, 0
     p.posture[i] = Posture.STANDING
     p.position[i, :2] = spot
-    p.yaw[i] = wrapped(float(transit.bus_pose(bus)[2]) - math.pi / 2)
+    p.yaw[i] = wrapped(facing - math.pi / 2)
     gesture("exit_vehicle", i, state)
     state.avatars.settle(np.array([i]))
     follow_hands(state)
@@ -104,9 +104,13 @@ def follow(state: SimulationState) -> None:
     transit, p = state.transit, state.people
     if transit is None:
         return
-    for i in np.flatnonzero(p.vehicle == Vehicle.BUS):
-        _seat(int(i), state, transit)
-    for i in np.flatnonzero(p.vehicle == Vehicle.BIKE):
+    for i in np.flatnonzero(p.vehicle == Vehicle.BUS).tolist():
+        bus = bus_of(i, state, transit)
+        if transit.ends(bus) and spot_beside(bus, state, transit) is not None:
+            alight(i, state)
+        else:
+            _seat(i, state, transit)
+    for i in np.flatnonzero(p.vehicle == Vehicle.BIKE).tolist():
         bike = int(p.vehicle_entity[i]) - transit.bicycles.first_entity
         transit.bicycles.carry(bike, float(p.position[i, 0]), float(p.position[i, 1]), float(p.yaw[i]))
 
@@ -127,7 +131,7 @@ def _transit(state: SimulationState) -> TransitSystem:
 
 def bus_of(i: int, state: SimulationState, transit: TransitSystem) -> int:
     """Return the index of the bus that person `i` rides in."""
-    return int(state.people.vehicle_entity[i]) - transit.entity_of(0)
+    return transit.with_entity(int(state.people.vehicle_entity[i]))
 
 
 def spot_beside(bus: int, state: SimulationState, transit: TransitSystem) -> NDArray[np.float64] | None:

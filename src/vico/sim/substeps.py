@@ -58,7 +58,9 @@ def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _A
     if state.traffic is not None:
         state.traffic.set_conditions(state.environment.conditions)
         effects = state.environment.agenda.effects
-        state.traffic.set_shut(effects.lanes, effects.walkways)
+        transit = state.transit
+        walkways = effects.walkways if transit is None else transit.shut_walkways(effects.walkways)
+        state.traffic.set_shut(effects.lanes, walkways)
     if state.robots is not None:
         state.robots.set_grip(state.environment.conditions.grip)
         state.robots.set_wind(*state.environment.weather.wind_vector)

@@ -12,7 +12,7 @@ from vico.sim.base import SimulationBase
 from vico.sim.bodies import Bodies
 from vico.sim.config import SimConfig
 from vico.sim.robots import RobotPopulation
-from vico.sim.state import FIRST_BIKE, FIRST_ROBOT, FIRST_TRAFFIC
+from vico.sim.state import FIRST_BIKE, FIRST_ROBOT, FIRST_TRAFFIC, FIRST_TRAM
 from vico.sim.traffic import JunctionRule, Traffic
 from vico.sim.transit import BusPlan, TransitSystem
 
@@ -24,7 +24,9 @@ _ROBOT_APART = 1.5
 def traffic_and_transit_of(base: SimulationBase, config: SimConfig) -> tuple[Traffic | None, TransitSystem | None]:
     """Cars and pedestrians, buses and bicycles; None for what nobody asked for, or the world has not."""
     world = base.world
-    has_transit = config.transit and bool(world.transit.lines or world.transit.bike_stations)
+    has_transit = config.transit and bool(
+        world.transit.lines or world.transit.bike_stations or world.transit.tram_lines
+    )
     if not has_transit and not config.cars and not config.pedestrians:
         return None, None
     plan = base.bus_plan(config.start) if has_transit else BusPlan()
@@ -40,7 +42,9 @@ def traffic_and_transit_of(base: SimulationBase, config: SimConfig) -> tuple[Tra
     )
     if not has_transit:
         return traffic, None
-    return traffic, TransitSystem(world.transit, traffic, plan, second=float(config.start), first_bike=FIRST_BIKE)
+    second = float(config.start)
+    transit = TransitSystem(world.transit, traffic, plan, second=second, first_bike=FIRST_BIKE, first_tram=FIRST_TRAM)
+    return traffic, transit
 
 
 def robots_of(base: SimulationBase, config: SimConfig, others: Bodies, *, errands: bool) -> RobotPopulation | None:

@@ -14,6 +14,8 @@ from vico.world.model import Point2
 
 #: Metres between the points a track is known at.
 STEP = 0.5
+#: Metres around each of the points across a track that a tram sweeps.
+ACROSS_REACH = 0.36
 #: Length of a tram, metres.
 TRAM_LENGTH = TRAM_SECTIONS * TRAM_SECTION
 #: Metres a second at most in a street, and metres a second squared that trams speed up and brake with, and that
@@ -44,6 +46,8 @@ class Track:
         Points every `STEP` metres, shape ``(m, 2)``.
     half_width
         How far from each of them a tram reaches to the sides that passes it, with some air, metres, shape ``(m,)``.
+    across
+        Points from side to side at each of them, each `ACROSS_REACH` from the next one's reach, shape ``(m, 4, 2)``.
     speed
         How fast trams drive there, m/s, shape ``(m,)``: they brake ahead of bends.
     """
@@ -63,6 +67,10 @@ class Track:
         turn = _angle(here - before, after - here)
         bend = np.abs(turn) / reach
         self.half_width = TRAM_WIDTH / 2 + _AIR + np.minimum(TRAM_SECTION**2 / 8 * bend, 1.0)
+        way = np.gradient(self.xy, axis=0) if len(self.xy) > 1 else np.ones((1, 2))
+        way /= np.maximum(np.hypot(*way.T), 1e-9)[:, None]
+        share = np.linspace(-1.0, 1.0, 4)[None, :] * (self.half_width - ACROSS_REACH)[:, None]
+        self.across = self.xy[:, None] + share[..., None] * np.column_stack([-way[:, 1], way[:, 0]])[:, None]
         fast = np.clip(np.sqrt(_SIDEWAYS / np.maximum(bend, 1e-3)), _SLOWEST, TRAM_SPEED)
         # A bend counts for as long as any part of the tram is in it.
         wide = int(TRAM_LENGTH / STEP)

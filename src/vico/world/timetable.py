@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from dataclasses import dataclass
+from typing import ClassVar
 
 from vico.clock import DAY
 from vico.rules import BUS_DWELL
-from vico.world.model import Line
+from vico.world.model import Line, TramLine
 
 
 def departure(line: Line, number: int) -> int:
@@ -53,6 +54,8 @@ class LineTimes:
     line: Line
     buses: int
     departures: tuple[float, ...]
+    #: Whether who stays in comes round again.
+    round: ClassVar[bool] = True
 
     @classmethod
     def of(cls, line: Line) -> LineTimes:
@@ -83,3 +86,35 @@ class LineTimes:
         before = self.leaves(0, stop) - self.begins(0)
         days, of_the_day = divmod(second - before, DAY)
         return bisect_left(self.departures, of_the_day) + len(self.departures) * int(days)
+
+
+@dataclass(frozen=True)
+class TramTimes:
+    """The times that a tram line keeps in one direction, trams by number from the first of the first day on.
+
+    Attributes
+    ----------
+    line
+        Whose times they are; it has a departure.
+    """
+
+    line: TramLine
+    round: ClassVar[bool] = False
+
+    def begins(self, number: int) -> float:
+        """When a tram comes in where the track begins, seconds from the midnight before the first."""
+        days, of_the_day = divmod(number, len(self.line.departures))
+        return self.line.departures[of_the_day] + DAY * days
+
+    def arrives(self, number: int, stop: int) -> float:
+        """When a tram comes to a stop of its line."""
+        return self.begins(number) + self.line.travel[stop]
+
+    def leaves(self, number: int, stop: int) -> float:
+        """When a tram leaves a stop of its line."""
+        return self.arrives(number, stop) + BUS_DWELL
+
+    def next_round(self, stop: int, second: float) -> int:
+        """Return the number of the first tram that leaves a stop at a time or after it."""
+        days, of_the_day = divmod(second - self.line.travel[stop] - BUS_DWELL, DAY)
+        return bisect_left(self.line.departures, of_the_day) + len(self.line.departures) * int(days)

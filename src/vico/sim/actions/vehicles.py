@@ -7,7 +7,7 @@ from vico.sim import rides
 from vico.sim.actions.model import ActionType, Refusal, Situation, Values
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Vehicle
-from vico.sim.transit import BIKE_RATE, BIKE_REACH, CAPACITY, DOOR_REACH, FARE
+from vico.sim.transit import BIKE_RATE, BIKE_REACH, DOOR_REACH, FARE
 
 _NO_TRANSIT = "this run has no transit"
 
@@ -23,8 +23,9 @@ def check_enter_bus(values: Values, i: int, state: SimulationState) -> Refusal |
     bus = transit.bus_at(p.position[i])
     if bus is None:
         return Refusal(ReasonCode.NO_VEHICLE, f"enter_bus: no bus stands with a door within {DOOR_REACH:g} m")
-    if transit.aboard(bus) >= CAPACITY:
-        return Refusal(ReasonCode.FULL, "enter_bus: the bus is full")
+    if transit.aboard(bus) >= transit.capacity(bus):
+        what, _, name = transit.service_of(bus)
+        return Refusal(ReasonCode.FULL, f"enter_bus: {what} {name} is full with {transit.capacity(bus)} people")
     return _refuse_unless_paid("enter_bus", "the fare is", FARE, i, state)
 
 
@@ -90,13 +91,13 @@ def _refuse_unless_on_foot_outdoors(kind: str, i: int, state: SimulationState) -
 VEHICLES = (
     ActionType(
         "enter_bus",
-        "Board a bus that stands with a door near; the fare is 2.",
+        "Board a bus or tram that stands with a door near; the fare is 2.",
         lambda values, i, state: rides.board(i, state),
         check_enter_bus,
     ),
     ActionType(
         "exit_bus",
-        "Get off the bus at a stop.",
+        "Get off the bus or tram at a stop.",
         lambda values, i, state: rides.alight(i, state),
         check_exit_bus,
         when=Situation.ON_FOOT | Situation.IN_BUS,

@@ -13,17 +13,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.assets.bus import BUS_SIZE, bus_places
+from vico.assets.bus import BUS_SIZE, bus_door_leaves, bus_leaf, bus_places
+from vico.assets.tram import tram_places, tram_prototypes
 from vico.assets.vehicles import vehicle_prototypes
 from vico.errors import InputError
 from vico.rules import BUS_CAPACITY as CAPACITY
 from vico.rules import BUS_DOOR_REACH as DOOR_REACH
 from vico.rules import BUS_DWELL as DWELL
 from vico.rules import BUS_FARE as FARE
+from vico.rules import TRAM_SECTIONS
 from vico.sim.bodies import Bodies, Drawn
+from vico.sim.state import FIRST_TRAM
 from vico.sim.traffic import Traffic
 from vico.sim.transit.bicycles import Bicycles
 from vico.sim.transit.bus_plan import BusPlan
+from vico.sim.transit.doors import DOOR_TIME, leaf_transforms, moved_doors
+from vico.sim.transit.trams import Trams
 from vico.world.mesh import Surface
 from vico.world.model import Line, Transit
 from vico.world.timetable import departure, next_departure
@@ -32,6 +37,7 @@ from vico.world.timetable import departure, next_departure
 # that had to drive faster than its time asks for would leave the next stop before it is due, without who comes on time.
 PACE = (2.5, 10.0)
 _START_STOP = 10.0
+_LAST_CALL = 3.0  # seconds before a tram goes out of the city at which everybody gets off
 # Doors on a bus's right side, metres ahead of its centre.
 DOORS = (4.65, -0.05, -3.55)
 
@@ -57,11 +63,24 @@ class TransitSystem:
     stops_served, late_total, late_most
         How often each bus has come to a stop, the sum of the seconds by which it was late there (earlier counts as
         less), and the most.
+    open
+        How far each bus's doors are open, 0..1.
     bicycles
         The bicycles to rent, and who rides them.
+    trams
+        What runs on rails. Where a bus is asked for, numbers from the number of buses on are trams.
     """
 
-    def __init__(self, transit: Transit, traffic: Traffic, plan: BusPlan, *, second: float, first_bike: int) -> None:
+    def __init__(
+        self,
+        transit: Transit,
+        traffic: Traffic,
+        plan: BusPlan,
+        *,
+        second: float,
+        first_bike: int,
+        first_tram: int = FIRST_TRAM,
+    ) -> None:
         self.transit, self.traffic = transit, traffic
         self._plan = plan
         self._vehicle = np.arange(traffic.cars, traffic.cars + traffic.buses)
@@ -74,7 +93,9 @@ class TransitSystem:
         self.taken = np.array([next_departure(line, second) for line in transit.lines], np.int64)
         self.stops_served = np.zeros(buses, np.int64)
         self.late_total, self.late_most = np.zeros(buses), np.zeros(buses)
+        self.open = np.ones(buses)
         self.bicycles = Bicycles(transit.bike_stations, traffic, first_entity=first_bike)
+        self.trams = Trams(transit.tram_lines, traffic, second=float(second), first_entity=first_tram)
         for bus in range(buses):
             gone, line = second - self.begun[bus], plan.line_of_bus[bus]
             if self.stop[bus] == 0 and 0.0 < gone < transit.lines[line].travel[1]:
@@ -83,23 +104,37 @@ class TransitSystem:
             self._send(bus, int(self.stop[bus]))
             traffic.fleet.at_stop[self._vehicle[bus]] = True
 
+        self._on_tracks = self.trams.walkways_on_tracks()
+        self._shut: tuple[NDArray[np.bool_] | None, NDArray[np.bool_] | None] = None, None
+
+    def shut_walkways(self, shut: NDArray[np.bool_] | None) -> NDArray[np.bool_] | None:
+        """Return a mask of walkways nobody is to walk on with those added that lie on tracks; the same for the same."""
+        if not self._on_tracks.any():
+            return shut
+        if self._shut[1] is None or shut is not self._shut[0]:
+            self._shut = shut, self._on_tracks if shut is None else shut | self._on_tracks
+        return self._shut[1]
+
     # -- the subsystem contract --------------------------------------------------------------------------------------
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Every number that decides the future; the buses' own motion is among the traffic's."""
-        return {name: getattr(self, name).copy() for name in _STATE} | self.bicycles.arrays()
+        return {name: getattr(self, name).copy() for name in _STATE} | self.bicycles.arrays() | self.trams.arrays()
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Go back to what `arrays` held."""
         for name in _STATE:
             getattr(self, name)[...] = arrays[name]
         self.bicycles.restore(arrays)
+        self.trams.restore(arrays)
 
     def advance(self, dt: float, obstacles: Bodies) -> None:
         """Advance the timetable by `dt` seconds; the buses themselves move with the traffic."""
         self.clock += dt
         fleet = self.traffic.fleet
+        self.trams.advance(float(self.clock[0]), dt, obstacles)
         for bus, v in enumerate(self._vehicle.tolist()):
+            self.open[bus] = moved_doors(float(self.open[bus]), self._holds_doors(bus, v), dt)
             if not fleet.at_stop[v]:
                 self.dwell[bus] = DWELL
                 continue
@@ -109,6 +144,14 @@ class TransitSystem:
             if self.may_leave_stop(bus):
                 self._leave_stop(bus)
 
+    def _holds_doors(self, bus: int, v: int) -> bool:
+        """Whether a bus wants its doors open: at a stop, until shortly before it leaves."""
+        if not self.traffic.fleet.at_stop[v]:
+            return False
+        if self.dwell[bus] > DOOR_TIME:
+            return True
+        return bool(self.stop[bus] == 0 and self._next_departure(bus) - self.clock[0] > DOOR_TIME)
+
     def _note_arrival(self, bus: int) -> None:
         late = float(self.clock[0]) - self._due(bus, int(self.stop[bus]))
         self.stops_served[bus] += 1
@@ -117,12 +160,11 @@ class TransitSystem:
 
     def lateness(self) -> dict[str, float]:
         """Return how often buses came to a stop, and the seconds they were late there: mean and most."""
-        arrivals = int(self.stops_served.sum())
-        return {
-            "arrivals": arrivals,
-            "late_mean": round(float(self.late_total.sum()) / max(arrivals, 1), 1),
-            "late_most": round(float(self.late_most.max(initial=0.0)), 1),
-        }
+        return _lateness(self.stops_served, self.late_total, self.late_most)
+
+    def tram_lateness(self) -> dict[str, float]:
+        """Return the same of trams."""
+        return _lateness(self.trams.stops_served, self.trams.late_total, self.trams.late_most)
 
     def may_leave_stop(self, bus: int) -> bool:
         """Return whether a bus that stands at a stop leaves it now.
@@ -149,16 +191,35 @@ class TransitSystem:
         self._send(bus, int(self.stop[bus]))
 
     def bodies(self) -> Bodies:
-        """Return the bicycles left astray; buses are among the traffic's bodies."""
-        return self.bicycles.bodies()
+        """Return the bicycles left astray, and trams; buses are among the traffic's bodies."""
+        trams = self.trams.bodies()
+        return Bodies.joined([self.bicycles.bodies(), trams]) if len(trams) else self.bicycles.bodies()
 
     def draw(self) -> Drawn:
-        """All bicycles, ridden ones too; buses are drawn with the traffic."""
-        return self.bicycles.draw()
+        """All bicycles, ridden ones too, trams, and doors; buses are drawn with the traffic."""
+        bikes, trams, buses = self.bicycles.draw(), self.trams.draw(), self.traffic.buses
+        leaves, width = bus_door_leaves()
+        if self.traffic.lanes.lefthand:
+            leaves = [(x, -y, way) for x, y, way in leaves]
+        bases = self.traffic.draw().transforms[self.traffic.cars :].astype(np.float64) if buses else np.zeros((0, 4, 4))
+        doors = Drawn(
+            ["bus_leaf"],
+            np.zeros(len(leaves) * buses, np.int32),
+            leaf_transforms(bases, leaves, self.open, width).astype(np.float32),
+            np.tile(self.traffic.first_entity + self._vehicle, len(leaves)).astype(np.int32),
+        )
+        names = [*bikes.prototypes, *doors.prototypes, *trams.prototypes]
+        return Drawn(
+            names,
+            np.concatenate([bikes.index, doors.index + 1, trams.index + 2]),
+            np.concatenate([bikes.transforms, doors.transforms, trams.transforms]),
+            np.concatenate([bikes.entity, doors.entity, trams.entity]),
+        )
 
     def prototypes(self) -> dict[str, list[Surface]]:
-        """Return the shape of a bicycle."""
-        return {"bicycle": vehicle_prototypes()["bicycle"]}
+        """Return the shapes of bicycles, doors and trams."""
+        shapes = {"bicycle": vehicle_prototypes()["bicycle"], "bus_leaf": [bus_leaf()]}
+        return shapes | tram_prototypes()
 
     # -- buses -------------------------------------------------------------------------------------------------------
 
@@ -191,6 +252,9 @@ class TransitSystem:
 
     def stopped_at(self, bus: int) -> str | None:
         """Id of the stop at which a bus stands with its doors open, None while it drives."""
+        tram = bus - self.traffic.buses
+        if tram >= 0:
+            return self.trams.stopped_at(tram)
         if not self.traffic.fleet.at_stop[self._vehicle[bus]]:
             return None
         return self.line_of(bus).stops[int(self.stop[bus])]
@@ -199,9 +263,24 @@ class TransitSystem:
         """Return the line a bus serves."""
         return self.transit.lines[self._plan.line_of_bus[bus]]
 
+    def service_of(self, bus: int) -> tuple[str, str, str]:
+        """Return what a vehicle is, bus or tram, and id and name of its line."""
+        tram = bus - self.traffic.buses
+        line = self.trams.lines[self.trams.line_of[tram]] if tram >= 0 else self.line_of(bus)
+        return "tram" if tram >= 0 else "bus", line.id, line.name
+
     def entity_of(self, bus: int) -> int:
-        """Return a bus's entity."""
+        """Return a bus's entity; of a tram that of its first section."""
+        tram = bus - self.traffic.buses
+        if tram >= 0:
+            return int(self.trams.entities()[tram * TRAM_SECTIONS])
         return int(self.traffic.first_entity + self._vehicle[bus])
+
+    def with_entity(self, entity: int) -> int:
+        """Return the number of the bus or tram that has an entity."""
+        if entity >= self.trams.first_entity:
+            return self.traffic.buses + (entity - self.trams.first_entity) // TRAM_SECTIONS
+        return entity - self.traffic.first_entity - self.traffic.cars
 
     def bus_pose(self, bus: int) -> NDArray[np.float64]:
         """x, y, yaw of a bus's centre."""
@@ -213,16 +292,22 @@ class TransitSystem:
         """1 where the kerb is on the right of a lane, -1 where traffic keeps left."""
         return -1.0 if self.traffic.lanes.lefthand else 1.0
 
-    def doors(self, bus: int) -> NDArray[np.float64]:
-        """Where a bus's doors are, on the side of the kerb, metres, shape ``(3, 2)``."""
-        return _beside(self.bus_pose(bus), DOORS, BUS_SIZE[1] / 2 * self._kerb)
+    def doors(self, bus: int, out: float = 0.0) -> NDArray[np.float64]:
+        """Where a bus's doors are, on the side of the kerb, or `out` metres before them, shape ``(doors, 2)``."""
+        tram = bus - self.traffic.buses
+        if tram >= 0:
+            return self.trams.doors(tram, out)
+        return _beside(self.bus_pose(bus), DOORS, (BUS_SIZE[1] / 2 + out) * self._kerb)
 
     def exit_spots(self, bus: int) -> NDArray[np.float64]:
-        """Points half a metre outside each door, where riders get off if they are free, shape ``(3, 2)``."""
-        return _beside(self.bus_pose(bus), DOORS, (BUS_SIZE[1] / 2 + 0.5) * self._kerb)
+        """Points half a metre outside each door, where riders get off if they are free, shape ``(doors, 2)``."""
+        return self.doors(bus, out=0.5)
 
     def seat(self, bus: int, rider: int) -> NDArray[np.float64]:
         """x, y, yaw of where a rider is; `rider` is the caller's number for them."""
+        tram = bus - self.traffic.buses
+        if tram >= 0:
+            return self.trams.seat(tram, self._place_of(bus, rider))
         x, y, yaw = self.bus_pose(bus)
         ahead, left = bus_places()[0][self._place_of(bus, rider)]
         left *= self._kerb
@@ -231,24 +316,34 @@ class TransitSystem:
 
     def is_seated(self, bus: int, rider: int) -> bool:
         """Return whether a rider has a seat; the others stand."""
-        return self._place_of(bus, rider) < bus_places()[1]
+        seats = bus_places()[1] if bus < self.traffic.buses else tram_places()[1]
+        return self._place_of(bus, rider) < seats
 
     def aboard(self, bus: int) -> int:
         """Return how many ride in a bus."""
-        return int((self.riders[bus] >= 0).sum())
+        return int((self._riders_of(bus) >= 0).sum())
+
+    def capacity(self, bus: int) -> int:
+        """Return how many a bus takes."""
+        return len(self._riders_of(bus))
+
+    def _riders_of(self, bus: int) -> NDArray[np.int32]:
+        tram = bus - self.traffic.buses
+        return self.riders[bus] if tram < 0 else self.trams.riders[tram]
 
     def _place_of(self, bus: int, rider: int) -> int:
-        return int(np.flatnonzero(self.riders[bus] == rider)[0])
+        return int(np.flatnonzero(self._riders_of(bus) == rider)[0])
 
     def bus_at(self, xy: ArrayLike, reach: float = DOOR_REACH) -> int | None:
         """Return the bus that stands at a stop with the nearest door within `reach` of a point; None without one."""
         point = np.asarray(xy, np.float64)[:2]
         best: tuple[float, int] | None = None
-        for bus in range(self.traffic.buses):
-            if self.traffic.fleet.at_stop[self._vehicle[bus]]:
-                away = float(np.linalg.norm(self.doors(bus) - point, axis=1).min())
-                if away <= reach and (best is None or away < best[0]):
-                    best = (away, bus)
+        standing = np.flatnonzero(self.traffic.fleet.at_stop[self._vehicle]).tolist()
+        standing += (self.trams.standing + self.traffic.buses).tolist()
+        for bus in standing:
+            away = float(np.linalg.norm(self.doors(bus) - point, axis=1).min())
+            if away <= reach and (best is None or away < best[0]):
+                best = (away, bus)
         return None if best is None else best[1]
 
     def board(self, bus: int, rider: int) -> float:
@@ -261,11 +356,17 @@ class TransitSystem:
         """
         if self.stopped_at(bus) is None:
             raise InputError("enter_bus: the bus is not at a stop")
-        free = np.flatnonzero(self.riders[bus] < 0)
+        riders = self._riders_of(bus)
+        free = np.flatnonzero(riders < 0)
         if not len(free):
             raise InputError("enter_bus: the bus is full")
-        self.riders[bus, free[0]] = rider
+        riders[free[0]] = rider
         return FARE
+
+    def ends(self, bus: int) -> bool:
+        """Return whether a tram is about to leave its last stop: it takes nobody out of the city."""
+        tram = bus - self.traffic.buses
+        return tram >= 0 and self.trams.ends(tram) and bool(self.trams.dwell[tram] <= _LAST_CALL)
 
     def alight(self, bus: int, rider: int) -> None:
         """Let a rider off.
@@ -277,7 +378,7 @@ class TransitSystem:
         """
         if self.stopped_at(bus) is None:
             raise InputError("exit_bus: the bus is moving")
-        self.riders[bus, self._place_of(bus, rider)] = -1
+        self._riders_of(bus)[self._place_of(bus, rider)] = -1
 
     def arrivals(self, stop: str) -> list[tuple[str, float]]:
         """Scheduled buses at a stop from now on: line name and seconds from now, the next three of each line."""
@@ -291,7 +392,16 @@ class TransitSystem:
         return sorted(rows, key=lambda row: row[1])
 
 
-_STATE = ("clock", "dwell", "stop", "begun", "riders", "taken", "stops_served", "late_total", "late_most")
+_STATE = ("clock", "dwell", "stop", "begun", "riders", "taken", "stops_served", "late_total", "late_most", "open")
+
+
+def _lateness(served: NDArray[np.int64], total: NDArray[np.float64], most: NDArray[np.float64]) -> dict[str, float]:
+    arrivals = int(served.sum())
+    return {
+        "arrivals": arrivals,
+        "late_mean": round(float(total.sum()) / max(arrivals, 1), 1),
+        "late_most": round(float(most.max(initial=0.0)), 1),
+    }
 
 
 def _beside(pose: NDArray[np.float64], ahead: Sequence[float], right: float) -> NDArray[np.float64]:

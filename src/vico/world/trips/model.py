@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vico.world.model import Point2
 
 #: Ways to get about.
-MODES = ("walk", "bus", "bike")
+MODES = ("walk", "bus", "tram", "bike")
 
 #: Something out of use: the id of a line, a stop or a bicycle station, or a circle of ground: x, y, radius, metres.
 Closure = str | tuple[float, float, float]
@@ -23,7 +23,7 @@ class Leg:
     Attributes
     ----------
     mode
-        walk, bus or bike.
+        walk, bus, tram or bike.
     start, end
         ENU metres: of a ride the stops or stations.
     polyline
@@ -37,7 +37,7 @@ class Leg:
     price
         What the ride costs.
     line
-        Id of the bus line; None for other modes.
+        Id of the bus or tram line; None for other modes.
     origin, destination
         Ids of the stops or stations where the ride begins and ends; None on foot.
     """

@@ -9,8 +9,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from vico.rules import BIKE_SPEED, BUS_FARE, ride_price
-from vico.world.model import Point2, Transit
-from vico.world.timetable import LineTimes
+from vico.world.model import Point2, Stop, TramStop, Transit
+from vico.world.timetable import LineTimes, TramTimes
 
 #: Seconds that each takes: getting into a bus, out of it, on and off a bicycle. An agent acts once a second.
 BOARD = ALIGHT = MOUNT = DISMOUNT = 1.0
@@ -61,7 +61,7 @@ class TripNetwork:
         Stops, lines and stations.
     closed
         Ids of what is out of use.
-    buses, bikes
+    buses, bikes, trams
         Whether there are any.
 
     Attributes
@@ -77,12 +77,21 @@ class TripNetwork:
     """
 
     def __init__(
-        self, transit: Transit, closed: Collection[str] = (), *, buses: bool = True, bikes: bool = True
+        self,
+        transit: Transit,
+        closed: Collection[str] = (),
+        *,
+        buses: bool = True,
+        bikes: bool = True,
+        trams: bool = True,
     ) -> None:
         lines = [line for line in transit.lines if line.id not in closed and len(line.stops) > 1 and line.departures]
-        self.lines = [LineTimes.of(line) for line in lines] if buses else []
+        self.lines: list[LineTimes | TramTimes] = [LineTimes.of(line) for line in lines] if buses else []
+        on_rails = [line for line in transit.tram_lines if line.id not in closed and len(line.stops) > 1]
+        self.lines += [TramTimes(line) for line in on_rails if line.departures and trams]
         served = {stop for times in self.lines for stop in times.line.stops} - set(closed)
-        stops = [stop for stop in transit.stops if stop.id in served]
+        every: list[Stop | TramStop] = [*transit.stops, *transit.tram_stops]
+        stops = [stop for stop in every if stop.id in served]
         stations = [station for station in transit.bike_stations if station.id not in closed] if bikes else []
         self.ids = [stop.id for stop in stops] + [station.id for station in stations]
         self.points: list[Point2] = [(s.wait[0], s.wait[1]) for s in stops]
@@ -107,14 +116,15 @@ class TripNetwork:
         return len(self.ids)
 
     def bus_rides(self, node: int, ready: float) -> Iterator[Ride]:
-        """Yield the rides with the next bus of every line that stops at a node, for who is there from `ready` on."""
+        """Yield the rides with the next bus or tram of every line that stops at a node, for who is there at `ready`."""
         for number, k in self._calls[node]:
             times = self.lines[number]
             stops = times.line.stops
             n = len(stops)
-            turn = times.next_round(k, ready + BOARD + (AHEAD if k else 0.0))
-            leaves, onward = times.leaves(turn, k), times.leaves(turn, n)
-            for last in range(k + 1, k + n):
+            waits = times.round and k == 0
+            turn = times.next_round(k, ready + BOARD + (0.0 if waits else AHEAD))
+            leaves, onward = times.leaves(turn, k), times.leaves(turn, n) if times.round else 0.0
+            for last in range(k + 1, k + n if times.round else n):
                 to = self._number.get(stops[last % n])
                 # At the end of its round the bus stands at the first stop until its next departure.
                 arrives = times.arrives(turn, last) if last <= n else onward + times.line.travel[last - n]
@@ -136,10 +146,10 @@ class TripNetwork:
         """Return the speed as the crow flies that no bus exceeds between two stops, m/s."""
         fastest = 0.0
         for times in self.lines:
-            stops = [*times.line.stops, times.line.stops[0]]
+            stops = [*times.line.stops, *times.line.stops[:1]] if times.round else times.line.stops
             known = [
                 (self.points[self._number[s]], t)
-                for s, t in zip(stops, times.line.travel, strict=True)
+                for s, t in zip(stops, times.line.travel[: len(stops)], strict=True)
                 if s in self._number
             ]
             for (a, start), (b, end) in pairwise(known):

@@ -1,4 +1,4 @@
-"""Planning trips: one router for everybody, on foot, by bus and by bicycle."""
+"""Planning trips: one router for everybody, on foot, by bus, by tram and by bicycle."""
 
 from __future__ import annotations
 
@@ -52,10 +52,9 @@ class Trips:
         self.transit = place.transit
         self.walk_speed = walk_speed
         self._kept: dict[tuple[str, str], Way] = {}
-        self._networks: dict[tuple[bool, bool], TripNetwork] = {}
-        self._known = {
-            r.id for part in (self.transit.stops, self.transit.lines, self.transit.bike_stations) for r in part
-        }
+        self._networks: dict[tuple[bool, bool, bool], TripNetwork] = {}
+        t = self.transit
+        self._known = {r.id for part in (t.stops, t.lines, t.bike_stations, t.tram_stops, t.tram_lines) for r in part}
 
     def plan(
         self,
@@ -157,7 +156,7 @@ class Trips:
             raise InputError(
                 f"trips: nothing is called {sorted(unknown)[0]!r}; close a line, a stop or a station by its id"
             )
-        network = self._network(ids, buses="bus" in modes, bikes="bike" in modes)
+        network = self._network(ids, buses="bus" in modes, bikes="bike" in modes, trams="tram" in modes)
         circles = [closure for closure in closed if not isinstance(closure, str)]
         ends = [_point(start), _point(goal)]
         ways = Ways(
@@ -170,12 +169,12 @@ class Trips:
         )
         return Question(network, ways, "walk" in modes, math.inf if cash is None else cash, all_good=all_good)
 
-    def _network(self, closed: set[str], *, buses: bool, bikes: bool) -> TripNetwork:
+    def _network(self, closed: set[str], *, buses: bool, bikes: bool, trams: bool) -> TripNetwork:
         if closed:
-            return TripNetwork(self.transit, closed, buses=buses, bikes=bikes)
-        if (buses, bikes) not in self._networks:
-            self._networks[buses, bikes] = TripNetwork(self.transit, buses=buses, bikes=bikes)
-        return self._networks[buses, bikes]
+            return TripNetwork(self.transit, closed, buses=buses, bikes=bikes, trams=trams)
+        if (buses, bikes, trams) not in self._networks:
+            self._networks[buses, bikes, trams] = TripNetwork(self.transit, buses=buses, bikes=bikes, trams=trams)
+        return self._networks[buses, bikes, trams]
 
     def _trip(self, question: Question, last: Label, depart: float) -> Trip:
         legs = [
@@ -193,12 +192,14 @@ class Trips:
             return Leg("walk", start, end, way.path, label.parent.arrive, label.arrive, way.metres)
         if ride.line == -1:
             way = ways.way(a, b)
-            path, metres, line = way.path, way.metres, None
+            path, metres, line, mode = way.path, way.metres, None, "bike"
         else:
             path = np.array(network.bus_stops_between(ride), np.float64)
-            metres, line = float(np.hypot(*np.diff(path, axis=0).T).sum()), network.lines[ride.line].line.id
+            times = network.lines[ride.line]
+            metres, line = float(np.hypot(*np.diff(path, axis=0).T).sum()), times.line.id
+            mode = "bus" if times.round else "tram"
         return Leg(
-            "bike" if line is None else "bus",
+            mode,
             start,
             end,
             path,

@@ -1,0 +1,97 @@
+"""Where tracks cross, meet or lie too close for two trams: stretches that one tram at a time may be on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.world.rails import STEP, TRAM_LENGTH, Track
+
+#: Tracks nearer than this to one another, metres, are one where they lead the same way.
+_SAME = 0.6
+_ALIGNED = 0.5  # radians
+#: Between two zones of a track there has to be room for a tram and this much more, metres, or they are one.
+_ROOM = 6.0
+
+
+@dataclass(frozen=True)
+class Zone:
+    """A stretch of a track, metres along it, that is part of the zone with a number."""
+
+    number: int
+    start: float
+    end: float
+
+
+def zones_of(tracks: Sequence[Track]) -> tuple[list[list[Zone]], int]:
+    """Find the zones of several tracks.
+
+    Returns
+    -------
+    tuple
+        Zones of each track in the order they come, and how many there are in all.
+    """
+    contested = _contested(tracks)
+    runs: list[tuple[int, int, int]] = []
+    for k, mask in enumerate(contested):
+        runs += [(k, a, b) for a, b in _runs(mask)]
+    joined = _joined(tracks, runs)
+    names = sorted(set(joined))
+    number = {name: k for k, name in enumerate(names)}
+    found: list[list[Zone]] = [[] for _ in tracks]
+    for (k, a, b), name in zip(runs, joined, strict=True):
+        found[k].append(Zone(number[name], a * STEP, b * STEP))
+    return found, len(names)
+
+
+def _contested(tracks: Sequence[Track]) -> list[NDArray[np.bool_]]:
+    """Mark the points of each track where a tram on another one could be in the way, other than ahead of it."""
+    marks = [np.zeros(len(track.xy), np.bool_) for track in tracks]
+    for i, one in enumerate(tracks):
+        heading = _heading(one)
+        for j, other in enumerate(tracks):
+            if i == j:
+                continue
+            d2 = np.hypot(one.xy[:, None, 0] - other.xy[None, :, 0], one.xy[:, None, 1] - other.xy[None, :, 1])
+            reach = one.half_width[:, None] + other.half_width[None, :]
+            nearest = d2.argmin(axis=1)
+            turn = np.abs((heading - _heading(other)[nearest] + np.pi) % (2 * np.pi) - np.pi)
+            same = (d2.min(axis=1) < _SAME) & (turn < _ALIGNED)
+            marks[i] |= (d2 < reach).any(axis=1) & ~same
+    return marks
+
+
+def _heading(track: Track) -> NDArray[np.float64]:
+    way = np.gradient(track.xy, axis=0)
+    return np.asarray(np.arctan2(way[:, 1], way[:, 0]), np.float64)
+
+
+def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last point of each run of marks; runs without room for a tram between them are one."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    room = int((TRAM_LENGTH + _ROOM) / STEP)
+    found: list[tuple[int, int]] = []
+    for a, b in zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True):
+        if found and a - found[-1][1] < room:
+            found[-1] = found[-1][0], b
+        else:
+            found.append((a, b))
+    return found
+
+
+def _joined(tracks: Sequence[Track], runs: Sequence[tuple[int, int, int]]) -> list[int]:
+    """Give runs of several tracks that are in each other's way one name."""
+    name = list(range(len(runs)))
+    for p, (i, a, b) in enumerate(runs):
+        for q in range(p):
+            j, c, d = runs[q]
+            one, other = tracks[i].xy[a : b + 1], tracks[j].xy[c : d + 1]
+            away = np.hypot(one[:, None, 0] - other[None, :, 0], one[:, None, 1] - other[None, :, 1])
+            reach = tracks[i].half_width[a : b + 1, None] + tracks[j].half_width[None, c : d + 1]
+            if bool((away < reach).any()) and name[p] != name[q]:
+                old, new = max(name[p], name[q]), min(name[p], name[q])
+                name = [new if n == old else n for n in name]
+    return name

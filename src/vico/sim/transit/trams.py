@@ -1,0 +1,508 @@
+"""Trams: long vehicles on rails that keep a timetable, stop for whatever is in their way, and carry people.
+
+A tram is where its front is along its track; its sections stand on the track behind it. It never moves into anybody:
+what is in its way ahead, or is about to be, it brakes for, and stands before it. Where tracks cross or meet one tram at
+a time is let in (`vico.sim.transit.tram_zones`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from vico.assets.tram import TRAM_BELLOWS, TRAM_CAPACITY, TRAM_HEIGHT, tram_door_leaves, tram_places, tram_prototypes
+from vico.clock import DAY
+from vico.io.compiled import compiled
+from vico.rules import BUS_DWELL, TRAM_SECTION, TRAM_SECTIONS, TRAM_WIDTH
+from vico.sim.bodies import TRAM, Bodies, Drawn
+from vico.sim.traffic import Traffic
+from vico.sim.transit.doors import DOOR_TIME, leaf_transforms, moved_doors
+from vico.sim.transit.tram_zones import zones_of
+from vico.world.mesh import Surface
+from vico.world.model import TramLine
+from vico.world.rails import (
+    ACROSS_REACH,
+    STEP,
+    TRAM_ACCELERATION,
+    TRAM_BRAKING,
+    TRAM_DOORS,
+    TRAM_LENGTH,
+    TRAM_SPEED,
+    Track,
+)
+from vico.world.walkways import SIDEWALK
+
+#: Where the front of a tram is that is not in the city.
+AWAY = -1.0
+_WALKER, _ON_TRACK = 0.25, 6  # m beside a tram that walkers keep; metres on a track that make a walkway part of it
+_WAITS = 0.5  # seconds left of a stop that a tram keeps while somebody has yet to get off
+_EDGE = 3.0  # metres from the city's edge within which tracks lead out of it
+_TOUCH = 0.03  # metres that are too near
+_BEFORE = 1.2  # metres kept to what stands ahead
+_FAR = 1e7  # metres to what is not there
+_LOOK = TRAM_SPEED**2 / (2 * TRAM_BRAKING) + 6.0  # metres ahead that are watched
+_SOON = 1.2  # seconds: who will be in the way by then is in the way
+_SLOW = 3.0  # m/s at least that a timetable asks for
+_ALIKE = 40.0  # metres of track that have to be free to come in
+_AT = 0.4  # metres from its stopping point at which a tram has arrived
+
+
+class Trams:
+    """All trams of a run, those that are not in the city among them.
+
+    Attributes
+    ----------
+    front
+        Distance of each tram's front along its line's track, metres, `AWAY` out of the city.
+    speed
+        m/s.
+    stop
+        Index of the stop it stands at or drives to; as many as there are: to the end of the track.
+    dwell
+        Seconds it still stands at its stop; 0 on the way.
+    open
+        How far its doors are open, 0..1.
+    due
+        Second of the day (counted on past midnight) at which it should have come in.
+    riders
+        Who is at each place, -1 for nobody, int32, shape ``(trams, TRAM_CAPACITY)``.
+    begun
+        Departures that each line has begun since the first one of the first day.
+    holder
+        Tram in each zone, -1 for nobody.
+    stops_served, late_total, late_most
+        As those of `vico.sim.transit.system.TransitSystem`.
+    """
+
+    def __init__(self, lines: Sequence[TramLine], traffic: Traffic, *, second: float, first_entity: int) -> None:
+        self.lines = list(lines)
+        self.tracks = [Track(line.track) for line in lines]
+        self.first_entity = first_entity
+        self._traffic = traffic
+        self._half = traffic.height.half
+        # Where the map ends at the city's edge trams drive out of it; where rails end within, they are gone there.
+        self._ends = [
+            track.length + (TRAM_LENGTH if float(np.abs(track.xy[-1]).max()) > self._half - _EDGE else 0.0)
+            for track in self.tracks
+        ]
+        zones, count = zones_of(self.tracks)
+        self._zones = zones
+        slots = [min(math.ceil((line.travel[-1] + 240.0) / _headway(line)) + 1, 8) for line in lines]
+        self.line_of = np.repeat(np.arange(len(lines)), slots).astype(np.int32)
+        n = len(self.line_of)
+        self.front, self.speed = np.full(n, AWAY), np.zeros(n)
+        self.stop = np.zeros(n, np.int32)
+        self.dwell, self.open, self.due = np.zeros(n), np.zeros(n), np.zeros(n)
+        self.riders = np.full((n, TRAM_CAPACITY), -1, np.int32)
+        self.holder = np.full(count, -1, np.int32)
+        self.stops_served = np.zeros(n, np.int64)
+        self.late_total, self.late_most = np.zeros(n), np.zeros(n)
+        self.begun = np.array([_first_after(line, second) for line in lines], np.int64)
+        self._bodies: Bodies | None = None
+        self._entities = first_entity + np.arange(n * TRAM_SECTIONS, dtype=np.int32)
+        self._set_out(second)
+
+    def __len__(self) -> int:
+        return len(self.front)
+
+    # -- state -------------------------------------------------------------------------------------------------------
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Every number that decides the future; none where there are no trams."""
+        return {f"tram_{name}": getattr(self, name).copy() for name in _STATE} if len(self) else {}
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go back to what `arrays` held."""
+        for name in _STATE if len(self) else ():
+            getattr(self, name)[...] = arrays[f"tram_{name}"]
+        self._bodies = None
+
+    # -- time --------------------------------------------------------------------------------------------------------
+
+    def advance(self, now: float, dt: float, obstacles: Bodies) -> None:
+        """Move all trams on by `dt` seconds up to the second `now`; none comes nearer to anybody than it may."""
+        if not len(self):
+            return
+        self._packed_others = _packed(obstacles)
+        self._look_about()
+        self._come_in(now)
+        for tram in np.flatnonzero(self.front > AWAY).tolist():
+            if self.dwell[tram] > 0.0:
+                self._stand(tram, now, dt)
+            else:
+                self._drive(tram, now, dt)
+
+    def _come_in(self, now: float) -> None:
+        """Have the trams that are due come in, where the track begins."""
+        for number, line in enumerate(self.lines):
+            due = _departure(line, int(self.begun[number]))
+            if now < due:
+                continue
+            free = np.flatnonzero((self.line_of == number) & (self.front <= AWAY))
+            if not len(free):
+                continue
+            tram = int(free[0])
+            if self._gap(tram, 0.0, _ALIKE) < _ALIKE or not self._fits(tram, 0.0):
+                continue
+            self.front[tram], self.speed[tram], self.stop[tram], self.due[tram] = 0.0, _SLOW, 0, due
+            self.begun[number] += 1
+            self._moved()
+
+    def _stand(self, tram: int, now: float, dt: float) -> None:
+        # It does not leave before its time, nor its last stop before everybody is off.
+        time = self.due[tram] + self.lines[self.line_of[tram]].travel[self.stop[tram]] + BUS_DWELL
+        least = _WAITS if self.ends(tram) and (self.riders[tram] >= 0).any() else 0.0
+        self.dwell[tram] = max(self.dwell[tram] - dt, least, time - now)
+        self.open[tram] = moved_doors(float(self.open[tram]), self.dwell[tram] > DOOR_TIME, dt)
+        if self.dwell[tram] == 0.0:
+            self.open[tram] = 0.0
+            self.stop[tram] += 1
+
+    def _drive(self, tram: int, now: float, dt: float) -> None:
+        number = int(self.line_of[tram])
+        line, track, front = self.lines[number], self.tracks[number], float(self.front[tram])
+        stop = int(self.stop[tram])
+        ends = stop >= len(line.stops)
+        target = self._ends[number] + 1.0 if ends else line.offsets[stop]
+        limit = float(track.speed[min(int(front / STEP), len(track.speed) - 1)])
+        left = self.due[tram] + line.travel[stop] - now
+        wanted = max(min(target, track.length) - front, 0.0) / max(left - 6.0, 1.0)
+        limit = min(limit, max(wanted * 1.1, _SLOW))
+        free = min(self._gap(tram, front, _LOOK), self._zone_ahead(tram, number, front))
+        if not ends:
+            limit = min(limit, math.sqrt(2 * TRAM_BRAKING * max(target - front, 0.0)) + 0.15)
+        limit = min(limit, math.sqrt(2 * TRAM_BRAKING * max(free, 0.0)))
+        speed = min(float(self.speed[tram]) + TRAM_ACCELERATION * dt, limit)
+        way = min(speed * dt, max(free, 0.0), max(target - front, 0.0))
+        if way > 0.0 and not self._fits(tram, front + way):
+            way = 0.0
+        self.speed[tram] = way / dt
+        self.front[tram] = front + way
+        if way > 0.0:
+            self._moved()
+        self._leave_zones(tram, number)
+        if ends:
+            if front + way >= self._ends[number]:
+                self._go_out(tram)
+        elif target - front - way < _AT:
+            self.dwell[tram] = BUS_DWELL
+            self.speed[tram] = 0.0
+            late = now - self.due[tram] - line.travel[stop]
+            self.stops_served[tram] += 1
+            self.late_total[tram] += late
+            self.late_most[tram] = max(self.late_most[tram], late)
+
+    def _moved(self) -> None:
+        """Have those who go next see where the trams are now."""
+        self._bodies = None
+        self._look_about()
+
+    def _go_out(self, tram: int) -> None:
+        self.front[tram], self.speed[tram] = AWAY, 0.0
+        self._moved()
+        self.holder[self.holder == tram] = -1
+
+    def _gap(self, tram: int, front: float, look: float) -> float:
+        """Metres of track ahead of a front that nobody is on, or comes onto within a moment; `look` at most."""
+        track = self.tracks[int(self.line_of[tram])]
+        first = int(max(front, 0.0) / STEP) + 1
+        points = track.across[first : first + int(look / STEP) + 2]
+        taken = int(_first_taken(points, *self._but(tram), ACROSS_REACH, _SOON))
+        return look if taken == len(points) else max((first + taken) * STEP - front - _BEFORE, 0.0)
+
+    def _fits(self, tram: int, front: float) -> bool:
+        """Return whether no section touches anybody with the front there: in bends they swing to the sides."""
+        poses = self.tracks[self.line_of[tram]].section(front - np.arange(TRAM_SECTIONS) * TRAM_SECTION)
+        c, s = np.cos(poses[:, 2])[:, None], np.sin(poses[:, 2])[:, None]
+        u, v = _OUTLINE[:, 0], _OUTLINE[:, 1]
+        outline = np.stack([poses[:, 0, None] + c * u - s * v, poses[:, 1, None] + s * u + c * v], axis=-1)
+        outline = np.ascontiguousarray(outline[self._is_inside(poses)])
+        return bool(_first_taken(outline, *self._but(tram), _TOUCH, 0.0) == len(outline))
+
+    def _but(self, tram: int) -> tuple[NDArray[np.float64], int, int]:
+        """Return everybody, packed, and which of them is the tram itself."""
+        own = self._around[tram]
+        return self._everybody, int(own[0]), int(own[1])
+
+    def _look_about(self) -> None:
+        """Note where everybody is: the trams as they stand now, and all others."""
+        bodies = self.bodies()
+        trams = (bodies.entity - self.first_entity) // TRAM_SECTIONS
+        first = np.searchsorted(trams, np.arange(len(self)))
+        last = np.searchsorted(trams, np.arange(len(self)), side="right")
+        self._around = np.column_stack([first, last - first])
+        self._everybody = np.concatenate([_packed(bodies), self._packed_others])
+
+    def _zone_ahead(self, tram: int, number: int, front: float) -> float:
+        """Metres to the next zone that another tram is in; those that are free are taken in passing."""
+        for zone in self._zones[number]:
+            ahead = zone.start - front - _BEFORE
+            if front - TRAM_LENGTH > zone.end or self.holder[zone.number] == tram:
+                continue
+            if ahead > _LOOK:
+                break
+            if self.holder[zone.number] >= 0:
+                return max(ahead, 0.0) if ahead > -_BEFORE else _FAR
+            self.holder[zone.number] = tram
+        return _FAR
+
+    def _leave_zones(self, tram: int, number: int) -> None:
+        rear = self.front[tram] - TRAM_LENGTH
+        for zone in self._zones[number]:
+            if rear > zone.end and self.holder[zone.number] == tram and not self._returns(tram, number, zone.number):
+                self.holder[zone.number] = -1
+
+    def _returns(self, tram: int, number: int, zone: int) -> bool:
+        """Whether another stretch of a zone lies ahead of a tram within sight."""
+        front = self.front[tram]
+        return any(
+            z.number == zone and z.end > front - TRAM_LENGTH and z.start < front + _LOOK for z in self._zones[number]
+        )
+
+    def _set_out(self, second: float) -> None:
+        """Put the trams that are under way at the start where they are by the timetable, as far as there is room."""
+        self._packed_others = _packed(self._traffic.bodies())
+        self._look_about()
+        for number, line in enumerate(self.lines):
+            for back in (1, 2, 3):
+                due = _departure(line, int(self.begun[number]) - back)
+                if 0.0 < second - due < line.travel[-1] - 20.0:
+                    self._place(number, due, second - due)
+
+    def _place(self, number: int, due: float, gone: float) -> None:
+        """Put a tram where it is so many seconds after it came in; nowhere if there is no room, or tracks meet."""
+        line, track = self.lines[number], self.tracks[number]
+        stops, times = [0.0, *line.offsets, track.length], [0.0, *line.travel]
+        k = int(np.searchsorted(times, gone, side="right")) - 1
+        stands = BUS_DWELL * (k > 0)
+        share = max(gone - times[k] - stands, 0.0) / (times[k + 1] - times[k] - stands)
+        front = stops[k] + share * (stops[k + 1] - stops[k])
+        meets = any(zone.start - _BEFORE < front and front - TRAM_LENGTH < zone.end for zone in self._zones[number])
+        free = np.flatnonzero((self.line_of == number) & (self.front <= AWAY))
+        if front < TRAM_LENGTH or not len(free) or meets:
+            return
+        tram = int(free[0])
+        if self._gap(tram, front - TRAM_LENGTH, TRAM_LENGTH + 2.0) < TRAM_LENGTH + 2.0:
+            return
+        self.front[tram], self.stop[tram], self.due[tram] = front, k, due
+        self._moved()
+
+    # -- what others see ---------------------------------------------------------------------------------------------
+
+    def sections(self, trams: NDArray[np.int64]) -> NDArray[np.float64]:
+        """x, y, yaw of each section of some trams, the front one first; shape ``(n, TRAM_SECTIONS, 3)``."""
+        behind = np.arange(TRAM_SECTIONS) * TRAM_SECTION
+        found = [self.tracks[self.line_of[tram]].section(self.front[tram] - behind) for tram in trams.tolist()]
+        return np.array(found, np.float64).reshape(-1, TRAM_SECTIONS, 3)
+
+    def bodies(self) -> Bodies:
+        """Return the sections that are in the city."""
+        if self._bodies is None:
+            self._bodies = self._bodies_now()
+        return self._bodies
+
+    def _shown(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+        """Tram, section and x, y, yaw of every section that reaches into the city."""
+        trams = np.flatnonzero(self.front > AWAY)
+        if not len(trams):
+            none = np.zeros(0, np.int64)
+            return none, none, np.zeros((0, 3))
+        poses = self.sections(trams)
+        which, section = np.nonzero(self._is_inside(poses))
+        return trams[which], section, poses[which, section]
+
+    def _is_inside(self, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return which sections reach into the city, by x, y, yaw of their middles, shape ``(..., 3)``."""
+        way = np.stack([np.cos(poses[..., 2]), np.sin(poses[..., 2])], axis=-1) * (TRAM_SECTION / 2)
+        ends = np.abs(np.stack([poses[..., :2] + way, poses[..., :2] - way])).max(axis=-1)
+        return np.asarray((ends < self._half).any(axis=0), np.bool_)
+
+    def _bodies_now(self) -> Bodies:
+        trams, section, pose = self._shown()
+        n = len(trams)
+        if not n:
+            return Bodies.none()
+        speed = self.speed[trams]
+        return Bodies(
+            entity=self._entities[trams * TRAM_SECTIONS + section],
+            kind=np.full(n, TRAM, np.int8),
+            position=np.column_stack([pose[:, :2], self._traffic.height(pose[:, :2])]),
+            yaw=pose[:, 2],
+            half_length=np.full(n, TRAM_SECTION / 2 - TRAM_BELLOWS),
+            half_width=np.full(n, TRAM_WIDTH / 2),
+            height=np.full(n, TRAM_HEIGHT),
+            velocity=speed[:, None] * np.column_stack([np.cos(pose[:, 2]), np.sin(pose[:, 2])]),
+        )
+
+    def entities(self) -> NDArray[np.int32]:
+        """Return the entities of all sections, those out of the city too."""
+        return self._entities
+
+    def prototypes(self) -> dict[str, list[Surface]]:
+        """Return the shapes `draw` refers to."""
+        return tram_prototypes() if len(self) else {}
+
+    def draw(self) -> Drawn:
+        """Return the sections and the leaves of their doors."""
+        trams, section, pose = self._shown()
+        n = len(trams)
+        names = sorted(tram_prototypes())
+        bases = _transforms(pose, self._traffic.height(pose[:, :2]) if n else np.zeros(0))
+        index = [np.array([names.index(_PART[k]) for k in section.tolist()], np.int32)]
+        leaves, width = tram_door_leaves()
+        kerb = 1.0 if self._traffic.lanes.lefthand else -1.0
+        parts = [bases]
+        for side in (kerb, -kerb):
+            # Only the side of the kerb opens.
+            share = self.open[trams] if side == kerb else np.zeros(n)
+            parts.append(leaf_transforms(bases, [leaf for leaf in leaves if leaf[1] * side > 0], share, width))
+        index.append(np.full(len(leaves) * n, names.index("tram_leaf"), np.int32))
+        entity = np.tile(self._entities[trams * TRAM_SECTIONS + section], len(leaves) + 1)
+        return Drawn(names, np.concatenate(index), np.concatenate(parts).astype(np.float32), entity)
+
+    def walkways_on_tracks(self) -> NDArray[np.bool_]:
+        """Mark the walkways, other than crossings, that lie on a track: nobody is to walk towards a tram there."""
+        walks = self._traffic.walks
+        found = np.zeros(len(walks), np.bool_)
+        if not len(self):
+            return found
+        points = np.concatenate([track.xy for track in self.tracks])
+        reach = np.concatenate([track.half_width for track in self.tracks])
+        for k in np.flatnonzero(walks.kind == SIDEWALK).tolist():
+            line = shapely.LineString(walks.line(k))
+            spots = shapely.get_coordinates(line.interpolate(np.arange(0.5, line.length, 1.0)))
+            if len(spots):
+                away = np.hypot(spots[:, None, 0] - points[None, :, 0], spots[:, None, 1] - points[None, :, 1])
+                found[k] = int((away < reach + _WALKER).any(axis=1).sum()) >= _ON_TRACK
+        return found
+
+    # -- riders ------------------------------------------------------------------------------------------------------
+
+    @property
+    def standing(self) -> NDArray[np.int64]:
+        """Trams that stand at a stop with their doors open."""
+        return np.flatnonzero(self.dwell > 0.0)
+
+    def stopped_at(self, tram: int) -> str | None:
+        """Id of the stop at which a tram stands with its doors open, None while it drives or is out of the city."""
+        if self.dwell[tram] <= 0.0:
+            return None
+        return self.lines[self.line_of[tram]].stops[int(self.stop[tram])]
+
+    def ends(self, tram: int) -> bool:
+        """Return whether a tram stands at its last stop in the city."""
+        return bool(self.dwell[tram] > 0.0 and self.stop[tram] == len(self.lines[self.line_of[tram]].stops) - 1)
+
+    def doors(self, tram: int, out: float = 0.0) -> NDArray[np.float64]:
+        """Where a tram's doors are on the side of the kerb, `out` metres outside them, shape ``(k, 2)``."""
+        side = (TRAM_WIDTH / 2 + out) * (-1.0 if self._traffic.lanes.lefthand else 1.0)
+        poses = self.sections(np.array([tram]))[0]
+        return np.array(
+            [
+                [x + a * math.cos(yaw) + side * math.sin(yaw), y + a * math.sin(yaw) - side * math.cos(yaw)]
+                for x, y, yaw in poses
+                for a in TRAM_DOORS
+            ]
+        )
+
+    def seat(self, tram: int, place: int) -> NDArray[np.float64]:
+        """x, y, yaw of a place in a tram."""
+        section, ahead, left = tram_places()[0][place]
+        x, y, yaw = self.sections(np.array([tram]))[0, int(section)]
+        c, s = math.cos(yaw), math.sin(yaw)
+        return np.array([x + ahead * c - left * s, y + ahead * s + left * c, yaw])
+
+
+_STATE = (
+    "front", "speed", "stop", "dwell", "open", "due", "riders", "begun", "holder", "stops_served", "late_total",
+    "late_most",
+)  # fmt: skip
+_PART = ("tram_front",) + ("tram_middle",) * (TRAM_SECTIONS - 2) + ("tram_rear",)
+
+
+def _headway(line: TramLine) -> float:
+    gaps = np.diff(line.departures)
+    return float(np.median(gaps)) if len(gaps) else DAY
+
+
+def _departure(line: TramLine, number: int) -> int:
+    days, of_the_day = divmod(number, len(line.departures))
+    return line.departures[of_the_day] + DAY * days
+
+
+def _first_after(line: TramLine, second: float) -> int:
+    days, of_the_day = divmod(second, DAY)
+    return int(np.searchsorted(line.departures, of_the_day)) + len(line.departures) * int(days)
+
+
+def _packed(bodies: Bodies) -> NDArray[np.float64]:
+    """Return footprints as `_first_taken` reads them: x, y, cos, sin, core half length and width, rounding, vx, vy."""
+    round_off = bodies.rounding
+    columns = (
+        bodies.position[:, 0], bodies.position[:, 1], np.cos(bodies.yaw), np.sin(bodies.yaw),
+        bodies.half_length - round_off, bodies.half_width - round_off, round_off,
+    )  # fmt: skip
+    return np.column_stack([*columns, bodies.velocity])
+
+
+@compiled
+def _first_taken(points, bodies, skip, skipped, within, soon):  # type: ignore[no-untyped-def]
+    """Return the first row of `points`, shape ``(n, k, 2)``, near a footprint now or in `soon` seconds; n for none.
+
+    Bodies from `skip` on, `skipped` of them, are left out.
+    """
+    found, n = len(points), len(points)
+    if n == 0:
+        return found
+    reach = 0.0
+    for i in (0, n - 1):
+        for k in range(points.shape[1]):
+            reach = max(reach, abs(points[i, k, 0] - points[0, 0, 0]) + abs(points[i, k, 1] - points[0, 0, 1]))
+    reach = 1.5 * reach + 16.0
+    for j in range(len(bodies)):
+        if skip <= j < skip + skipped:
+            continue
+        x, y, c, s, half, wide, rounding, vx, vy = bodies[j]
+        if abs(x - points[0, 0, 0]) > reach + half or abs(y - points[0, 0, 1]) > reach + half:
+            continue
+        for moment in range(2):
+            if moment == 1 and (soon == 0.0 or vx * vx + vy * vy < 0.09):
+                break
+            bx, by = x + moment * soon * vx, y + moment * soon * vy
+            for i in range(found):
+                for k in range(points.shape[1]):
+                    dx, dy = points[i, k, 0] - bx, points[i, k, 1] - by
+                    u = max(abs(dx * c + dy * s) - half, 0.0)
+                    v = max(abs(dy * c - dx * s) - wide, 0.0)
+                    if u * u + v * v < (within + rounding) ** 2:
+                        found = i
+                        break
+                if found == i:
+                    break
+    return found
+
+
+def _outline() -> NDArray[np.float64]:
+    """Points around a section, metres, so close that nobody fits between."""
+    half, wide = TRAM_SECTION / 2, TRAM_WIDTH / 2
+    along, across = np.linspace(-half, half, 24), np.linspace(-wide, wide, 8)
+    sides = [np.column_stack([along, np.full(24, y)]) for y in (-wide, wide)]
+    ends = [np.column_stack([np.full(8, x), across]) for x in (-half, half)]
+    return np.concatenate([*sides, *ends])
+
+
+_OUTLINE = _outline()
+
+
+def _transforms(pose: NDArray[np.float64], ground: NDArray[np.float64]) -> NDArray[np.float64]:
+    n = len(pose)
+    found = np.tile(np.eye(4), (n, 1, 1))
+    c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+    found[:, 0, 0], found[:, 0, 1], found[:, 1, 0], found[:, 1, 1] = c, -s, s, c
+    found[:, :2, 3], found[:, 2, 3] = pose[:, :2], ground
+    return found
