@@ -157,8 +157,10 @@ class ChangeOfPlans:
         thought_of = self._instead[1]
         place = self._map.place_by_id[thought_of[-1] if thought_of else stay.place]
         closed = {name for event in info.get("events", ()) if event["goes_on"] for name in event["closed_places"]}
-        # Who is in may stay.
-        if place.id in closed and inside != place.id:
+        # Who is in may stay when an event closes the place, but not after its hours.
+        over = set(info.get("closed_now", ()))
+        closed |= over
+        if place.id in over or (place.id in closed and inside != place.id):
             return self._goes(stay, [*(thought_of or [place.id]), self._other(stay, closed.union(thought_of))])
         if place.building is None and self._is_too_bad(stay, info):
             return self._goes(stay, [*(thought_of or [place.id]), self._shelter(place, closed, stay)])

@@ -161,6 +161,8 @@ class RunOptions:
         A kind of weather, "changing", or a weather file (.json).
     events
         Of the city: none, "changing", or a file of events (.json).
+    opening_hours
+        Places keep the hours that the map says.
     steps
         Seconds to simulate.
     robots
@@ -220,6 +222,7 @@ class RunOptions:
     utc_offset: float | None = None
     weather: str = "fair"
     events: str = "none"
+    opening_hours: bool = False
     steps: int = 1800
     robots: CommaSeparated = "husky,go2"
     physics: Literal["mujoco", "genesis"] = "mujoco"

@@ -122,6 +122,7 @@ class _Job:
             utc_offset=options.utc_offset,
             weather=named_or_read(options.weather),
             events=named_or_read(options.events),
+            opening_hours=options.opening_hours,
             robots=_names(options.robots),
             physics=options.physics,
             errands=True,

@@ -62,6 +62,8 @@ class SimSettings:
         A kind of weather (`vico.sim.environment.weather_kinds`), ``"changing"``, or the content of a weather file.
     events
         Of the city: ``"none"``, ``"changing"``, or the content of a file of events (docs/events.md).
+    opening_hours
+        Whether places keep the hours that the map says, on the community's weekday, or the date's without one.
     periods
         How often agents act and observe, seconds by agent's name; 1 s where nothing else is said. For robots also
         ``"model"``, which is the control period of the robot's model, and the name ``"robots"`` for all of them.
@@ -87,6 +89,7 @@ class SimSettings:
     utc_offset: float | None = None
     weather: str | Mapping[str, Any] = "fair"
     events: str | Mapping[str, Any] = "none"
+    opening_hours: bool = False
     periods: Mapping[str, float | str] = field(default_factory=dict)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from datetime import date
 from typing import TYPE_CHECKING
 
 from vico.rules import TRAM_SECTIONS
@@ -16,6 +17,7 @@ from vico.sim.config import SimConfig
 from vico.sim.environment import Agenda, Environment, Sky
 from vico.sim.events import Events
 from vico.sim.holding import habit_of, take_umbrella
+from vico.sim.openings import OpeningHours
 from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import FIRST_ASSISTANT, FIRST_RESIDENT, FIRST_ROBOT, MovableObjects, People
@@ -27,7 +29,11 @@ _NOWHERE = 2**30
 
 
 def initial_state(
-    base: SimulationBase, residents: Sequence[Resident], days: Sequence[Sequence[Appointment]], config: SimConfig
+    base: SimulationBase,
+    residents: Sequence[Resident],
+    days: Sequence[Sequence[Appointment]],
+    config: SimConfig,
+    weekday: int | None = None,
 ) -> SimulationState:
     """Make the state before the first step.
 
@@ -35,6 +41,8 @@ def initial_state(
     ----------
     residents, days
         Who takes part, and their appointments: residents start where these put them.
+    weekday
+        Of their days, 0 Monday .. 6 Sunday; None: that of the run's date.
 
     Raises
     ------
@@ -47,6 +55,9 @@ def initial_state(
     tick = config.start * TICKS_PER_SECOND
     environment = _environment(base, config)
     state = SimulationState(base, people, MovableObjects.none(), avatars, events, environment, tick=tick)
+    if config.opening_hours:
+        weekday = date.fromisoformat(config.date).weekday() if weekday is None else weekday
+        state.openings = OpeningHours(base.world.places, weekday, residents, days)
     # Nobody has a place yet: until then avatars are nowhere that could be in anybody's way.
     people.room[:] = _NOWHERE
     state.traffic, state.transit = systems.traffic_and_transit_of(base, config)

@@ -114,7 +114,8 @@ class Simulation:
         self.metrics = Metrics()
         self.residents = list(community.residents)[: self.config.residents] if community is not None else []
         days = self.base.days(community)[: len(self.residents)] if community is not None else []
-        self.state = initial_state(self.base, self.residents, days, self.config)
+        weekday = None if community is None else community.date.weekday()
+        self.state = initial_state(self.base, self.residents, days, self.config, weekday)
         self.periods = _periods(self.state, self.config)
         self.punctuality = Punctuality.of(days, self.config.start)
         self.scenario, self.ground_truth = Scenario(self.state), GroundTruth(self.state)

@@ -19,6 +19,7 @@ from vico.sim.environment import Conditions, Environment
 from vico.sim.event_things import EventThings
 from vico.sim.events import Events
 from vico.sim.indoor import Indoor, near_door
+from vico.sim.openings import OpeningHours
 from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.seats import Seats
 from vico.sim.snapshot import arrays_of
@@ -274,6 +275,8 @@ class SimulationState:
         What stands in the city because of events.
     traffic, transit, robots
         Subsystems with a state of their own; None where a run has none.
+    openings
+        When places are open; None in a run that does not ask.
     entities
         Kind and name of every body of the run by entity number, and the agent's name of those that have one.
     shapes
@@ -294,6 +297,7 @@ class SimulationState:
     traffic: TrafficSystem | None = None
     transit: TransitSystem | None = None
     robots: RobotSystem | None = None
+    openings: OpeningHours | None = None
     tick: int = 0
     entities: dict[int, dict[str, str]] = field(default_factory=dict)
     shapes: dict[str, list[Surface]] = field(default_factory=dict)
@@ -416,6 +420,10 @@ class SimulationState:
             {"to": "outside" if d.to < 0 else rooms[d.to].id, "position": list(d.position)}
             for d in self.indoor.doors[room]
         ]
+
+    def is_locked_out(self, i: int, place: str) -> bool:
+        """Return whether a place is shut now to person `i`, by its hours."""
+        return self.openings is not None and not self.openings.lets_in(i, place, self.second)
 
     def taken_in(self, room: int, *, without: int = -1) -> NDArray[np.float64]:
         """Where nobody can stand in a room: who stands there already, and points of what lies in the way.

@@ -27,6 +27,16 @@ _POSTURES = {int(posture): posture.name.lower() for posture in Posture}
 _STATUSES = {int(status): status.name.lower() for status in ActionStatus}
 
 
+def _closed_to(state: SimulationState, i: int) -> list[str]:
+    """Return the places that are closed to somebody now: the one they are in, or those at whose doors they stand."""
+    p, places = state.people, state.world.places
+    if (place := p.place.item(i)) >= 0:
+        near = [place]
+    else:
+        near = [] if p.vehicle.item(i) else state.base.entrances_near(*p.position[i, :2].tolist())
+    return [places[k].id for k in near if state.is_locked_out(i, places[k].id)]
+
+
 class Told:
     """What agents are told of a moment, but for pictures.
 
@@ -59,6 +69,8 @@ class Told:
         self._seats_taken: NDArray[np.bool_] | None = None
         self._weather = state.environment.record()
         self._signals = state.traffic.signals_shown() if state.traffic is not None else None
+        asks = range(people) if state.openings is not None else ()
+        self._closed = {i: closed for i in asks if (closed := _closed_to(state, i))}
         self._events = {i: known_events(state, i, stances[i]) for i in who} if len(state.environment.agenda) else {}
 
     def observation(self, name: str) -> dict[str, Any]:
@@ -82,6 +94,8 @@ class Told:
         if self._signals is not None and (i >= len(p) or p.room.item(i) < 0):
             x, y = self.poses[i, :2].tolist()
             found["signals"] = self._signals.near(x, y, SIGNALS_REACH)
+        if i in self._closed:
+            found["closed_now"] = self._closed[i]
         if i not in self._eyes_of:
             return found
         view = self._in_view.of(self._eyes_of[i])
@@ -113,6 +127,7 @@ class Told:
         # What is going on in the city may concern them, too.
         if has_news(self._state):
             heard[:] = True
+        heard[list(self._closed)] = True
         heard[[i for i, known in self._events.items() if any(one["known"] != ANNOUNCED for one in known)]] = True
         view = self._in_view
         # The first bodies are the people's, in their order; who else is in view is no agent one would speak to.

@@ -60,7 +60,10 @@ def _refuse_entrance(name: str, i: int, state: SimulationState) -> Refusal | Non
         return Refusal(ReasonCode.TOO_FAR, sentence)
     closure = state.environment.agenda.effects.shut.get(name)
     if closure is None:
-        return None
+        if not state.is_locked_out(i, name):
+            return None
+        assert state.openings is not None
+        return Refusal(ReasonCode.CLOSED, f"enter: {place.name} is closed now; it is {state.openings.hours(name)}")
     return Refusal(ReasonCode.CLOSED, f"enter: {place.name} is closed ({closure.event.title})")
 
 
