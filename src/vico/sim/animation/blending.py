@@ -23,6 +23,7 @@ from vico.sim.animation.limbs import (
     joint_in_body,
     part_way,
     sole_depth,
+    sole_roll,
 )
 from vico.sim.animation.names import CARRY, CARRY_LEFT, CARRY_RIGHT, RUN, SIT, SIT_EAT, SIT_TALK, SLEEP, WALK
 from vico.sim.animation.rotations import Array, X, Y, Z, compose, rotate, rotation_about, smoothstep
@@ -30,6 +31,8 @@ from vico.sim.animation.rotations import Array, X, Y, Z, compose, rotate, rotati
 #: Longest that one motion shows in the next, seconds.
 LONGEST_BLEND = 1.3
 _INTO_GAIT, _OUT_OF_GAIT, _DOWN_OR_UP, _OTHERWISE = 0.3, 0.5, 0.9, 0.45
+# A swing of which less than this share is left changes nothing any more; steps are taken before a cycle is over.
+_TOO_LATE, _CYCLE = 0.4, 0.99
 _FIRST_UNTIL, _SECOND_FROM = 0.55, 0.45
 _STEP_LIFT, _FULL_STEP = 0.03, 0.15
 
@@ -135,10 +138,20 @@ def stand_by_steps(body: Any, before: Any, turned: float, u: float) -> None:
 
 
 @compiled
-def walk_on(body: Any, before: Any, off: Any, steps: Array, share: float) -> None:
+def roll_of(body: Any, side: int, foot: Array) -> Array:
+    """Return where the ankle of a foot so turned is from where the foot stands flat, body frame, metres."""
+    pitch = np.arcsin(min(max(-foot[2, 0], -1.0), 1.0))
+    ahead = sole_roll(body.style, side, pitch) / np.sqrt(foot[0, 0] ** 2 + foot[1, 0] ** 2 + 1e-9)
+    return np.array([ahead * foot[0, 0], ahead * foot[1, 0], sole_depth(body.style, side, pitch)])
+
+
+@compiled
+def walk_on(body: Any, before: Any, off: Any, steps: Array, flying: Array, share: float) -> None:
     """Blend into a gait: a foot on the ground stays where it is and comes to the gait's own place with its next step.
 
-    `off` is how far the ankles, and `steps` how far each foot is in taking that step, 0..1, of this moment.
+    `off` is how far the spots were where the feet would be flat, and `steps` how far each foot is in taking that step,
+    0..1, of this moment. Soles roll over those spots while the feet turn from one motion to the other. A foot that flew
+    as the gait began comes down in its own place: `flying` is how far it is in that, 0..1, and 1 for the others.
     """
     ankles, feet, was, were = np.empty((2, 3)), np.empty((2, 3, 3)), np.empty((2, 3)), np.empty((2, 3, 3))
     write_feet(body, ankles, feet)
@@ -146,10 +159,15 @@ def walk_on(body: Any, before: Any, off: Any, steps: Array, share: float) -> Non
     blend_joints(body, before, share)
     for side in range(2):
         rest, rise = 1 - smoothstep(steps[side]), min(1 - smoothstep(2.5 * steps[side]), 1 - share)
+        if flying[side] < 1:
+            rest, rise = 1 - smoothstep(1.4 * flying[side]), 1 - smoothstep(flying[side])
+            ankles[side, Z] += _STEP_LIFT * body.style.height * np.sin(np.pi * flying[side]) ** 2
+        ankles[side] -= roll_of(body, side, feet[side])
+        feet[side] = part_way(were[side], feet[side], share)
+        ankles[side] += roll_of(body, side, feet[side])
         ankles[side, X] += rest * off[side, X]
         ankles[side, Y] += rest * off[side, Y]
         ankles[side, Z] += rise * off[side, Z]
-        feet[side] = part_way(were[side], feet[side], share)
         ground = min(body.ground[side, HERE, LEVEL], body.ground[side, NEXT, LEVEL])
         pitch = np.arcsin(min(max(-feet[side, 2, 0], -1.0), 1.0))
         ankles[side, Z] = max(ankles[side, Z], ground + sole_depth(body.style, side, pitch))
@@ -165,6 +183,10 @@ def step_taken(was: float, now: float, duty: float) -> float:
     gone = now - was
     left = duty - was if was < duty else 0.0
     swing = 1 - max(was, duty)
+    if duty == WALK_DUTY and swing < _TOO_LATE * (1 - duty):
+        # It comes down where it was about to; the next step brings it to its own place, before the cycle is over.
+        left = swing + duty
+        swing = min(1 - duty, _CYCLE - left)
     return min(max((gone - left) / swing, 0.0), 1.0)
 
 

@@ -16,6 +16,7 @@ from vico.sim.animation.blending import (
     is_gait,
     lie_down,
     move_frame,
+    roll_of,
     stand_by_steps,
     step_taken,
     walk_on,
@@ -173,7 +174,7 @@ def _set_out(body: Any, old: Any, i: int, course: Any, around: Any) -> None:
     was, now, stride = before.clip[i], course.clip[i], course.stride[i]
     gone = since * around.speed[i] / stride
     first = course.phase[i] - gone  # where the gait began
-    ankles, feet = np.empty((2, 2, 3)), np.empty((2, 3, 3))
+    ankles, feet = np.empty((2, 2, 3)), np.empty((2, 2, 3, 3))
     start = BodyPose(
         np.zeros_like(body.local), np.zeros(3), body.joints, body.style, body.second, np.zeros((2, 2, 2)), body.hand
     )
@@ -181,15 +182,21 @@ def _set_out(body: Any, old: Any, i: int, course: Any, around: Any) -> None:
         np.zeros_like(body.local), np.zeros(3), body.joints, body.style, body.second, start.ground, body.hand
     )
     _pose_one(level, was, before.phase[i], before.stride[i])
-    write_feet(level, ankles[0], feet)
+    write_feet(level, ankles[0], feet[0])
     _pose_one(start, now, first, stride)
-    write_feet(start, ankles[1], feet)
+    write_feet(start, ankles[1], feet[1])
     _pose_one(old, was, before.phase[i] + (gone if is_gait(was) else 0.0), before.stride[i])
-    steps = np.empty(2)
+    steps, flying = np.empty(2), np.ones(2)
+    share = min(since / blend_time(was, now), 1.0)
     for side in range(2):
+        for k in range(2):
+            ankles[k, side] -= roll_of(body, side, feet[k, side])
         at = (first + 0.5 * side) % 1.0
         steps[side] = step_taken(at, at + gone, duty_of(now))
-    walk_on(body, old, ankles[0] - ankles[1], steps, smoothstep(min(since / blend_time(was, now), 1.0)))
+        flew = is_gait(was) and (before.phase[i] + 0.5 * side) % 1.0 > duty_of(was)
+        if flew and at < duty_of(now):
+            flying[side], steps[side] = share, 1.0
+    walk_on(body, old, ankles[0] - ankles[1], steps, flying, smoothstep(share))
 
 
 @compiled
