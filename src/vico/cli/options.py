@@ -184,6 +184,8 @@ class RunOptions:
         Which of these are recorded as arrays (views/AGENT/STEP.npz), beside the film of what each agent saw.
     cameras
         A file (.json) of lenses by agent, model of robot, or residents, assistants, robots: docs/pictures.md.
+    wear
+        NAME=FILE.glb, separated by commas: heads and bodies of your own that people wear (docs/adding_people.md).
     quality
         Of these pictures: plain, or fine (soft shadows, darker corners, smooth edges, mirroring glass).
     renderer
@@ -233,6 +235,7 @@ class RunOptions:
     outputs: CommaSeparated = "rgb,depth,segmentation"
     keep: CommaSeparated = "none"
     cameras: Path | None = None
+    wear: CommaSeparated = ""
     quality: Literal["plain", "fine"] = "plain"
     renderer: Literal["cpu", "gl"] = "cpu"
     assistants: int = 0

@@ -134,6 +134,7 @@ class _Job:
             quality=options.quality,
             renderer=options.renderer,
             cameras=read_json(options.cameras) if options.cameras is not None else {},
+            worn=_worn(options.wear),
         )
         place = read_world(world)
         people = read_community(community, place)
@@ -290,6 +291,17 @@ def _cut_short(out: Path) -> dict[str, Any] | None:
 
 def _without_sources(command: Any) -> Any:
     return {n: v for n, v in command.items() if n not in ("world", "community")} if isinstance(command, dict) else None
+
+
+def _worn(text: str) -> dict[str, str]:
+    """Return files by agent's name, of ``NAME=FILE,...``."""
+    found = {}
+    for entry in _names(text):
+        name, is_pair, path = entry.partition("=")
+        if not is_pair or not Path(path).is_file():
+            raise InputError(f"run: --wear {entry!r}: give NAME=FILE.glb, a file that is there")
+        found[name] = str(Path(path).resolve())
+    return found
 
 
 def _names(text: str) -> tuple[str, ...]:

@@ -35,6 +35,7 @@ class EnvOptions(TypedDict, total=False):
     image: int
     outputs: tuple[str, ...]
     cameras: Mapping[str, Mapping[str, Any]]
+    worn: Mapping[str, str]
     quality: str | Mapping[str, bool]
     renderer: str
     date: str

@@ -50,6 +50,8 @@ class SimSettings:
     cameras
         Lenses that are not the usual one: records of `vico.render.sensors.lens.Lens` by agent's name, by model for
         robots, or for all ``"residents"``, ``"assistants"`` or ``"robots"``; the first of these that is there holds.
+    worn
+        Files (.glb) of heads and bodies that people wear, by agent's name; docs/adding_people.md.
     quality
         How carefully pictures are made: ``"plain"``, ``"fine"``, or switches of `vico.render.quality.RenderQuality`.
     renderer
@@ -83,6 +85,7 @@ class SimSettings:
     image: int = 256
     outputs: tuple[str, ...] = USUAL_OUTPUTS
     cameras: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    worn: Mapping[str, str] = field(default_factory=dict)
     quality: str | Mapping[str, bool] = "plain"
     renderer: str = "cpu"
     date: str = "2026-06-21"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from vico.assets.models.in_hand import in_hand_models
 from vico.assets.people import Appearance, body_of
 from vico.community.model import Resident
+from vico.errors import InputError
 from vico.render import Cameras, Lighting, Scene, render
 from vico.render.lighting import SHADOW_STEP
 from vico.render.quality import RenderQuality
@@ -162,6 +164,14 @@ class SceneRenderer:
         looks += looks_of_strangers(sim.config.seed, len(strangers) + len(walkers))
         made = dict(zip(dict.fromkeys(looks), in_order(body_of, dict.fromkeys(looks)), strict=True))
         bodies = [made[look] for look in looks]
+        for name, path in sim.config.worn.items():
+            from vico.assets.people.worn import worn  # few wear anything of their own
+
+            if name not in state.people.names:
+                people = ", ".join(state.people.names) or "none"
+                raise InputError(f"worn: nobody is called {name!r}; there are {people}")
+            k = state.people.names.index(name)
+            bodies[k] = worn(bodies[k], Path(path))
         self._bodies: BodyBatch = batch_bodies(bodies, [*entities, *walkers])
         names = [*state.people.names, *(manner_of_pedestrian(k) for k in range(len(walkers)))]
         style = [

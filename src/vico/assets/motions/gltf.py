@@ -44,7 +44,7 @@ def read_gltf_motion(path: Path, *, animation: str = "") -> MotionClip:
     except FileNotFoundError:
         raise MissingFileError(f"{path}: no such file") from None
     with faults_told(str(path)):
-        rig = _Rig(GltfFile.of(data, lambda uri: _beside(path, uri)))
+        rig = Rig(GltfFile.of(data, lambda uri: _beside(path, uri)))
         name, tracks = rig.tracks(animation)
         times = _times(tracks)
         moving = rig.moving(tracks, times)
@@ -84,7 +84,7 @@ def _times(tracks: Tracks) -> NDArray[np.float64]:
     return first + np.arange(count) / _RATE
 
 
-class _Rig:
+class Rig:
     """The nodes of a document, parents before children."""
 
     def __init__(self, file: GltfFile) -> None:
@@ -105,6 +105,8 @@ class _Rig:
             raise GltfFault("has nodes that are their own ancestors; export it anew")
         place = {k: at for at, k in enumerate(order)}
         self._order, self._nodes = order, [nodes[k] for k in order]
+        #: Where each node of the document is among these.
+        self.place = place
         self.parents = np.array([place[int(above[k])] if above[k] >= 0 else -1 for k in order], np.int64)
         self.names = tuple(str(node.get("name", f"node {k}")) for k, node in zip(order, self._nodes, strict=True))
 
@@ -156,7 +158,7 @@ class _Rig:
             return standing
         place = {k: at for at, k in enumerate(self._order)}
         joints = [place[k] for k in skins[0]["joints"]]
-        bound = np.linalg.inv(_matrices(self._file, skins[0]["inverseBindMatrices"], len(joints)))
+        bound = np.linalg.inv(bound_matrices(self._file, skins[0]["inverseBindMatrices"], len(joints)))
         top = min(joints)
         above = standing[self.parents[top]] if self.parents[top] >= 0 else np.eye(4)
         rest = standing.copy()
@@ -169,7 +171,7 @@ class _Rig:
         return rest
 
 
-def _matrices(file: GltfFile, index: int, count: int) -> NDArray[np.float64]:
+def bound_matrices(file: GltfFile, index: int, count: int) -> NDArray[np.float64]:
     """Return an accessor's 4 x 4 matrices."""
     found = np.asarray(file.accessor(index), np.float64)
     if found.shape != (count, 16) or not np.isfinite(found).all():
