@@ -23,6 +23,7 @@ from vico.worldgen.ground.terrain import flat_terrain
 from vico.worldgen.streets.netconvert import road_network
 from vico.worldgen.streets.polygons import road_polygons
 from vico.worldgen.streets.roads import is_traffic_street, streets_from_osm
+from vico.worldgen.transit.drive import Kerbs
 
 HALF = 180.0
 
@@ -149,3 +150,15 @@ def test_a_height_field_with_decks_is_read_as_it_was_written() -> None:
     places = np.random.default_rng(0).uniform(-60.0, 60.0, (500, 3)) * [1.0, 0.2, 0.1]
     assert np.array_equal(again.near(places), height.near(places))
     assert (height.near(places) - height(places)).max() > CLEARANCE
+
+
+def test_nobody_walks_into_a_ramp_or_waits_for_a_bus_on_a_deck() -> None:
+    bridges, height, lanes = _levels()
+    x = np.arange(-40.0, 40.0, 0.5)
+    places = np.c_[x, np.zeros_like(x)]
+    rise = height.near(np.c_[places, np.full(len(x), 1e3)]) - height(places)
+    low = shapely.contains_xy(shapely.union_all(bridges.low).buffer(1.6), *places.T)
+    assert low[(rise > 0.5) & (rise < 2.2)].all()
+    assert not low[rise > CLEARANCE].any()
+    for lane in Kerbs(lanes, height).numbers.tolist():
+        assert np.abs(lanes.z[lanes.first[lane] : lanes.first[lane + 1]]).max() < 1.0

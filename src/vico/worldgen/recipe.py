@@ -107,7 +107,7 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
         seed=seed,
     )
     write.outdoors(outdoors, dropped)
-    walkable = run("walkable", walkable_from_site, site, streets, solids, outdoors)
+    walkable = run("walkable", walkable_from_site, site, streets, [*solids, *bridges.low], outdoors)
     write.walkable(walkable)
 
     places, entrances, dropped = run(

@@ -48,7 +48,8 @@ class SignalHeads:
         aside = (lanes.width[before[own]] / 2 + _BESIDE) * (1.0 if lanes.lefthand else -1.0)
         turn = stops[own, 2]
         posts = stops[own, :2] + aside[:, None] * np.column_stack([-np.sin(turn), np.cos(turn)])
-        posts = np.column_stack([posts, height(posts)])
+        ends = lanes.z[lanes.first[before[own] + 1] - 1]
+        posts = np.column_stack([posts, height.near(np.column_stack([posts, ends]))])
         # Lenses for vehicles on poles and posts, those for people; then the posts.
         self._lane = rows[np.concatenate([stop_of[driven], own])]
         self._walkway = walked[walk_of[seen]]

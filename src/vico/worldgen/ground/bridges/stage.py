@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from shapely import Polygon
@@ -14,7 +15,7 @@ from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.ground.bridges.decks import Deck, decks_of, kept_clear, pier_feet
 from vico.worldgen.ground.bridges.portals import Portal, portal_feet, portal_surfaces, portals_of
 from vico.worldgen.ground.bridges.surfaces import bridge_surfaces
-from vico.worldgen.ground.bridges.usable import deck_surfaces, usable_decks
+from vico.worldgen.ground.bridges.usable import deck_surfaces, low_parts, usable_decks
 
 
 @dataclass(frozen=True)
@@ -31,12 +32,15 @@ class Bridges:
         Where piers and mouths stand, for those who must not walk through them, metres.
     usable
         Ids of the ways whose decks can be driven or walked on.
+    low
+        Where decks lie too low for people to pass under them, metres.
     """
 
     decks: list[Deck]
     portals: list[Portal]
     feet: list[Polygon]
     usable: frozenset[int] = frozenset()
+    low: Sequence[Polygon] = ()
 
     def levels(self) -> Decks | None:
         """Return the decks that can be used as surfaces of the world; None if there are none."""
@@ -57,4 +61,4 @@ def bridges_of(site: SiteFacts, terrain: HeightField, streets: StreetPolygons) -
     decks = decks_of(site, terrain)
     portals = portals_of(site.osm, streets)
     feet = [*pier_feet(decks, terrain, kept_clear(site.osm, streets)), *portal_feet(portals)]
-    return Bridges(decks, portals, feet, usable_decks(site, decks, terrain))
+    return Bridges(decks, portals, feet, usable_decks(site, decks, terrain), low_parts(decks, terrain))

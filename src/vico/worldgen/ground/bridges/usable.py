@@ -7,18 +7,21 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely import Polygon
 
 from vico.geo.osm import OsmWay
-from vico.world.decks import Decks
+from vico.world.decks import HEADROOM, Decks
 from vico.world.heights import HeightField
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.levels import ON_FOOT
 from vico.worldgen.facts.site import SiteFacts
-from vico.worldgen.ground.bridges.decks import Deck, deck_walk
+from vico.worldgen.ground.bridges.decks import Deck, deck_walk, left_normals
 from vico.worldgen.ground.kerbs import KERB
 
 _LANDED = 0.35  # metres from the ground at which the end of a deck counts as down
 _STEEPEST, _STEEPEST_ON_FOOT = 0.13, 0.25  # slopes of what can be driven and walked up; stairs may be steeper
 _STEEPEST_STAIRS = 1.1
+_ON_THE_GROUND = 0.3  # metres
 
 
 def usable_decks(site: SiteFacts, decks: Sequence[Deck], terrain: HeightField) -> frozenset[int]:
@@ -60,6 +63,20 @@ def deck_surfaces(decks: Sequence[Deck], usable: Collection[int]) -> Decks | Non
             rise = 0.0 if kind == "steps" else KERB
             strips.append((np.c_[deck.line, deck.z], half, pavement if kind != "steps" else half, rise))
     return Decks.of(strips) if strips else None
+
+
+def low_parts(decks: Sequence[Deck], terrain: HeightField) -> list[Polygon]:
+    """Return where decks lie too low for people to pass under them, and too high to be the ground, metres."""
+    found: list[Polygon] = []
+    for deck in decks:
+        with expendable(f"w{deck.way.id}"):
+            side = left_normals(deck.line) * deck.width / 2
+            rise = deck.z - terrain(deck.line)
+            low = (rise > _ON_THE_GROUND) & (rise - deck.slab < HEADROOM)
+            for k in np.flatnonzero(low[:-1] & low[1:]).tolist():
+                ends = deck.line[k : k + 2]
+                found.append(Polygon(np.concatenate([ends + side[k : k + 2], (ends - side[k : k + 2])[::-1]])))
+    return [shape for shape in found if shape.is_valid]
 
 
 def _bridges(ways: dict[int, OsmWay]) -> list[list[int]]:
