@@ -1,5 +1,6 @@
 """A bridge over a street: two levels of lanes and walkways, each where the ground or the deck is."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -49,9 +50,16 @@ def _town() -> OsmData:
     return OsmData(LocalFrame(60.169, 24.9435), HALF, 60.0, [], ways, [], [])
 
 
+def _long_bridge() -> OsmData:
+    """The same with a bridge that leads over a second street and out of the map."""
+    others = [way for way in _town().ways if way.id not in (3, 4)]
+    bridge = _way(3, [(-40, 0), (100, 0), (200, 0)], highway="secondary", bridge="yes", layer="1")
+    return replace(_town(), ways=[*others, bridge])
+
+
 @cache
-def _levels() -> tuple[Bridges, HeightField, LaneGraph]:
-    site = site_facts(_town())
+def _levels(make: Callable[[], OsmData] = _town) -> tuple[Bridges, HeightField, LaneGraph]:
+    site = site_facts(make())
     streets = road_polygons(site)
     ground = graded(flat_terrain(half=HALF), site, streets)
     bridges = bridges_of(site, ground, streets)
@@ -117,6 +125,23 @@ def test_traffic_drives_and_walks_on_both_levels_and_nobody_is_in_the_way_of_the
     assert seen == {(False, False), (False, True), (True, False), (True, True)}
     assert crossed_at_once > 20
     assert float(traffic.fleet.stopped_time.max()) < 30.0
+
+
+def test_who_comes_in_on_a_deck_at_the_edge_of_the_map_minds_who_is_there() -> None:
+    bridges, height, lanes = _levels(_long_bridge)
+    assert bridges.usable == {3}
+    network = TrafficNetwork.of(lanes)
+    (deck,) = (int(i) for i in network.entries if lanes.z[lanes.first[i]] > CLEARANCE)
+    traffic = Traffic(
+        replace(network, entries=np.array([deck], np.int32)), height, cars=50, pedestrians=0, seed=2, first_entity=1
+    )
+    # Somebody stands where the only way in is.
+    x, y, _ = lanes.at(deck, 3.0)
+    place = np.array([[x, y, float(height.near(np.array([x, y, 10.0])))]])
+    standing = replace(traffic.bodies().where(np.array([0])), entity=np.array([999], np.int32), position=place)
+    for _ in range(400):
+        traffic.advance(0.1, standing)
+        assert overlapping(Bodies.joined([traffic.bodies(), standing])) == []
 
 
 def test_heights_of_bodies_are_part_of_the_state() -> None:
