@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from vico.assets.bus import BUS_DOORS, bus_door_leaves
 from vico.assets.vehicles import vehicle_prototypes, vehicle_size
 
 NAMES = sorted(vehicle_prototypes())
@@ -36,12 +37,18 @@ def test_faces_look_outward(name: str) -> None:
 
 
 def test_doors_of_the_bus_are_on_its_right() -> None:
-    """Door frames are the dark panels that reach from floor to eaves."""
+    """Two leaves a door fill what its side leaves open there."""
+    leaves, width = bus_door_leaves()
+    assert len(leaves) == 2 * len(BUS_DOORS)
+    assert all(y < 0 for _, y, _ in leaves)
     (bus,) = vehicle_prototypes()["bus"]
     corners = bus.positions[bus.triangles]
-    tall = (np.ptp(corners[:, :, 2], axis=1) > 2.0) & (np.abs(corners[:, :, 1]).min(1) > 1.2)
-    assert tall.any()
-    assert (corners[tall][:, :, 1] < 0).all()
+    flat = np.abs(np.ptp(corners[:, :, 1], axis=1)) < 1e-6
+    walls = corners[flat & (np.abs(corners[:, 0, 1]) > 1.2) & (np.ptp(corners[:, :, 2], axis=1) > 0.4)]
+    for x, _, _ in leaves:
+        over = (walls[:, :, 0].min(axis=1) < x - width / 4) & (walls[:, :, 0].max(axis=1) > x + width / 4)
+        low = walls[over & (walls[:, :, 2].max(axis=1) < 1.5)]
+        assert (low[:, 0, 1] > 0).all()
 
 
 def test_cars_come_in_many_kinds_and_colours() -> None:

@@ -74,10 +74,10 @@ def test_calls_are_cut_to_the_window_and_times_filled_in(tmp_path: Path) -> None
     assert [round(x) for x, _ in one.line] == [-204, 202]
 
 
-def test_trams_are_listed_but_have_no_pattern(tmp_path: Path) -> None:
+def test_trams_are_listed_with_their_patterns(tmp_path: Path) -> None:
     feed = read(tmp_path, TABLES)
     assert [(route.name, route.kind) for route in feed.routes] == [("7", "bus"), ("T", "tram")]
-    assert {pattern.route for pattern in feed.patterns} == {"r"}
+    assert {pattern.route for pattern in feed.patterns} == {"r", "t"}
     assert feed.routes[0].colour == "#00ff7f"
     assert feed.attribution == "City Buses"
 
