@@ -121,8 +121,7 @@ def write_still(path: Path, repeated: RepeatedRun, settings: FilmSettings, step:
 
 
 def _watcher(repeated: RepeatedRun, settings: FilmSettings) -> Callable[[SimulationState], _Seen]:
-    renderer = repeated.sim.renderer
-    assert isinstance(renderer, SceneRenderer)
+    renderer = SceneRenderer(repeated.sim, detail="full")
 
     def look(state: SimulationState) -> _Seen:
         return _Seen(moment_of(renderer.show(state), state.second), target_of(state, settings.follow))

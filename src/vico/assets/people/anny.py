@@ -287,14 +287,16 @@ def _head(fit: _Fitting) -> list[BodyPart]:
     head = fit.piece("head", look.skin)
     typical = fit.wardrobe["typical"][fit.wardrobe["rows.head"]].astype(np.float64)
     from_mouth = typical - fit.wardrobe["mouth"]
-    lips = (from_mouth[:, 1] / 0.024) ** 2 + (from_mouth[:, 2] / 0.0085) ** 2 < 1
-    lips &= from_mouth[:, 0] > -0.012
+    # Red in their middle and fading to the rim: colours spread to the next vertices, which are far at the corners.
+    away = np.hypot(from_mouth[:, 1] / 0.024, from_mouth[:, 2] / 0.0085)
+    redness = np.clip(1.7 * (1.0 - away), 0.0, 1.0) * (from_mouth[:, 0] > -0.012)
     skin = np.asarray(look.skin, np.float64)
     if look.beard:
         chin = (from_mouth[:, 2] < 0.014) & (from_mouth[:, 2] > -0.075) & (from_mouth[:, 0] > -0.085)
         chin &= np.abs(from_mouth[:, 1]) < 0.075
         head.colour[chin] = 0.75 * np.asarray(look.hair_colour) + 0.25 * skin
-    head.colour[lips] = skin * np.array([0.84, 0.66, 0.65])
+    lips, share = redness > 0, redness[redness > 0][:, None]
+    head.colour[lips] = (1 - share) * head.colour[lips] + share * skin * np.array([0.84, 0.66, 0.65])
     eyes = fit.piece("eyes", (232, 228, 224))
     for side in ("left", "right"):
         own = eyes.weights[:, J[f"{side}_eye"]] > 0.5

@@ -34,7 +34,7 @@ _SKULL = np.array(
 )
 _SIDES = 18
 # An eyebrow's way: angle, height above its level, distance from the skin.
-_BROW = ((0.16, -0.005, 0.010), (0.38, 0.012, 0.014), (0.62, -0.004, 0.016))
+_BROW = ((0.16, -0.005, 0.014), (0.36, 0.012, 0.034), (0.54, 0.002, 0.026))
 # A ponytail's way: height on the head, distance from it.
 _TAIL = ((0.74, 0.0), (0.74, 0.14), (0.56, 0.20), (0.40, 0.16), (0.40, 0.18))
 
