@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any, Protocol
 
 from vico.agents.base import Action, Info, Observation
+from vico.agents.buying import Buyer
 from vico.agents.change_of_plans import ChangeOfPlans
 from vico.agents.conversation import Acquaintance, Conversation, Speaker
 from vico.agents.indoor_walk import IndoorWalker
@@ -36,6 +37,7 @@ _STROLL = 30.0
 _STROLLING = ("leisure", "visit")
 _RUNNING = ("exercise",)
 _EATING = ("meal_home", "meal_out")
+_BUYING = ("shop", "meal_out")
 # One looks out of the window again after so many seconds, if nothing happens before: in snow one sets out earlier.
 _LOOK_OUT = 900.0
 # How often who is stopped indoors steps aside instead of trying again.
@@ -88,6 +90,7 @@ class ScheduleFollower:
         self._traveller = Traveller(public_map, generator)
         self._indoors = IndoorWalker()
         self._seeker = SeatSeeker(self._step_towards)
+        self._buyer = Buyer(self._step_towards)
         # Whether it is about to sit down.
         self._seeks = False
         self._aside: list[Action] = []
@@ -139,6 +142,7 @@ class ScheduleFollower:
             "traveller": self._traveller.state() if self._traveller.plans else None,
             "indoors": self._indoors.state(),
             "seeker": self._seeker.state(),
+            "buyer": self._buyer.state(),
             "seeks": self._seeks,
             "conversation": self._conversation.state(),
             "aside": [dict(action) for action in self._aside],
@@ -163,6 +167,7 @@ class ScheduleFollower:
             self._traveller.restore(state["traveller"])
         self._indoors.restore(state["indoors"])
         self._seeker.restore(state["seeker"])
+        self._buyer.restore(state["buyer"])
         self._seeks = bool(state["seeks"])
         self._conversation.restore(state["conversation"])
         arrived, stroll = state["arrived"], state["stroll"]
@@ -253,6 +258,12 @@ class ScheduleFollower:
             return self._sleep(observation, info)
         if self._posture == "lying":
             return self._become("standing")
+        if stay.tag in _BUYING:
+            step = self._buyer.towards(f"{stay.due:.0f} {stay.place}", observation, info)
+            if step is not None and self._posture == "sitting":
+                return self._become("standing")
+            if step is not None:
+                return step
         eats = stay.type == "meal" or stay.tag in _EATING
         if self._posture == "sitting":
             self._seeks = False

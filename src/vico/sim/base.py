@@ -23,6 +23,7 @@ from vico.sim.indoor import Indoor
 from vico.sim.physics import DEFAULT_ENGINE
 from vico.sim.robots.scene import RobotScene
 from vico.sim.seats import Seats
+from vico.sim.tills import Till, tills_of
 from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.transit import BusPlan, plan_buses
 from vico.world.folder import World
@@ -89,6 +90,11 @@ class SimulationBase:
         """Where people sit and lie."""
         models = street_models() | furniture_models()
         return Seats.of(self.world.objects, models, self.indoor, self.world.height)
+
+    @cached_property
+    def tills(self) -> dict[int, Till]:
+        """Tills of shops and cafés by room, and where people stand in line before them."""
+        return tills_of(self.world.places, self.indoor, self.world.objects)
 
     @cached_property
     def solids(self) -> list[shapely.Polygon]:

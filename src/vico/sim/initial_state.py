@@ -21,6 +21,7 @@ from vico.sim.openings import OpeningHours
 from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import FIRST_ASSISTANT, FIRST_RESIDENT, FIRST_ROBOT, MovableObjects, People
+from vico.sim.tills import Lines
 
 if TYPE_CHECKING:
     from vico.community.model import Resident
@@ -55,6 +56,7 @@ def initial_state(
     tick = config.start * TICKS_PER_SECOND
     environment = _environment(base, config)
     state = SimulationState(base, people, MovableObjects.none(), avatars, events, environment, tick=tick)
+    state.lines = Lines.of(len(people))
     if config.opening_hours:
         weekday = date.fromisoformat(config.date).weekday() if weekday is None else weekday
         state.openings = OpeningHours(base.world.places, weekday, residents, days)

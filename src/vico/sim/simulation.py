@@ -29,6 +29,7 @@ from vico.sim.scenario import GroundTruth, Scenario
 from vico.sim.simulation_state import SimulationState
 from vico.sim.snapshot import arrays_of, copied, identity, read_snapshot, state_hash, write_snapshot
 from vico.sim.substeps import advance_ticks
+from vico.sim.tills import advance_lines
 from vico.sim.timetable import Punctuality
 from vico.world.folder import World
 from vico.world.mesh import Surface
@@ -193,6 +194,7 @@ class Simulation:
             if state.tick % TICKS_PER_SECOND == 0:
                 state.environment.advance(1.0)
                 follow_city_events(state)
+                advance_lines(state)
                 state.show_signals()
                 self.punctuality.watch(state)
             watch.lap("bookkeeping")

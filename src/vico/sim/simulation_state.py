@@ -24,6 +24,7 @@ from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.seats import Seats
 from vico.sim.snapshot import arrays_of
 from vico.sim.state import FIRST_OBJECT, FIRST_UMBRELLA, RADIUS, REASON_LENGTH, MovableObjects, People, Vehicle
+from vico.sim.tills import Lines, Till
 from vico.sim.traffic.jams import Jam, JamLog
 from vico.sim.traffic.junction_rule import JunctionRule
 from vico.sim.traffic.signals import SignalsShown
@@ -275,6 +276,8 @@ class SimulationState:
         What stands in the city because of events.
     traffic, transit, robots
         Subsystems with a state of their own; None where a run has none.
+    lines
+        Who stands in line at tills.
     openings
         When places are open; None in a run that does not ask.
     entities
@@ -298,6 +301,7 @@ class SimulationState:
     transit: TransitSystem | None = None
     robots: RobotSystem | None = None
     openings: OpeningHours | None = None
+    lines: Lines = field(default_factory=lambda: Lines.of(0))
     tick: int = 0
     entities: dict[int, dict[str, str]] = field(default_factory=dict)
     shapes: dict[str, list[Surface]] = field(default_factory=dict)
@@ -312,6 +316,11 @@ class SimulationState:
     def indoor(self) -> Indoor:
         """The world's rooms as arrays."""
         return self.base.indoor
+
+    @property
+    def tills(self) -> Mapping[int, Till]:
+        """Tills by the index of their room."""
+        return self.base.tills
 
     @property
     def seats(self) -> Seats:
@@ -486,6 +495,7 @@ class SimulationState:
             "things": self.things,
             "traffic": self.traffic,
             "transit": self.transit,
+            "lines": self.lines,
             "robots": self.robots,
         }
         return {name: part for name, part in parts.items() if part is not None}

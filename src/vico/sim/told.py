@@ -17,6 +17,7 @@ from vico.sim.perception import OUTDOORS, AllInView, Eyes, in_view, opaque_grid
 from vico.sim.seats import find_rest
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture, Vehicle
+from vico.sim.tills import place_in_line
 
 #: How far off signals are told of, metres.
 SIGNALS_REACH = 60.0
@@ -25,6 +26,16 @@ SIGNALS_REACH = 60.0
 _VEHICLES = {int(Vehicle.NONE): "", int(Vehicle.BUS): "bus", int(Vehicle.BIKE): "bike"}
 _POSTURES = {int(posture): posture.name.lower() for posture in Posture}
 _STATUSES = {int(status): status.name.lower() for status in ActionStatus}
+
+
+def _till_of(state: SimulationState, i: int) -> dict[str, Any] | None:
+    """Return where somebody stands in line at the till of its room, or would join, and how many are before it there."""
+    room = state.people.room.item(i)
+    if room < 0 or room not in state.tills or (place := place_in_line(i, state)) is None:
+        return None
+    x, y = place[1].tolist()
+    waits = bool(state.lines.room[i] == room)
+    return {"stand": (x, y, float(state.indoor.floor[room])), "before": place[0], "waits": waits}
 
 
 def _closed_to(state: SimulationState, i: int) -> list[str]:
@@ -96,6 +107,8 @@ class Told:
             found["signals"] = self._signals.near(x, y, SIGNALS_REACH)
         if i in self._closed:
             found["closed_now"] = self._closed[i]
+        if i < len(p) and (till := _till_of(self._state, i)) is not None:
+            found["till"] = till
         if i not in self._eyes_of:
             return found
         view = self._in_view.of(self._eyes_of[i])

@@ -9,10 +9,11 @@ from vico.sim.actions.model import ActionType, Actors
 from vico.sim.actions.motion import MOTION
 from vico.sim.actions.posture import POSTURE
 from vico.sim.actions.robots import ARMS, ROBOTS
+from vico.sim.actions.shops import SHOPS
 from vico.sim.actions.speech import REPORTS, SPEECH
 from vico.sim.actions.vehicles import VEHICLES
 
-_ALL = (*MOTION, *HANDS, *DOORS, *VEHICLES, *SPEECH, *POSTURE, *REPORTS, *ROBOTS)
+_ALL = (*MOTION, *HANDS, *DOORS, *VEHICLES, *SPEECH, *POSTURE, *REPORTS, *ROBOTS, *SHOPS)
 
 #: Every action by name, in the order of their numbers in a learner's action.
 ACTIONS: dict[str, ActionType] = {action.name: action for action in _ALL}

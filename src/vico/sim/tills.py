@@ -1,0 +1,157 @@
+"""Tills of shops and cafés, and the lines of people before them: who is served next, and where each one stands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vico.sim.indoor import Indoor
+from vico.sim.state import RADIUS, ArrayState
+from vico.world.model import Category, Place
+from vico.world.objects import Objects
+
+if TYPE_CHECKING:
+    from vico.sim.simulation_state import SimulationState
+
+#: Seconds that serving somebody takes, and what they pay.
+SERVICE, PRICE = 12.0, 5.0
+#: People stand so far apart in a line, metres; who strays farther from their spot than `LOST` has left it.
+SPACING, LOST = 0.75, 2.5
+#: Who joins a line stands this near to its end, metres, and whoever is served this near to the till.
+AT_SPOT = 0.8
+_LONGEST = 6
+_BEFORE = 0.45  # metres between a counter and whoever is served
+_AIR = 0.03
+_KINDS = ("counter", "bar_counter", "pastry_case")
+_TRADE = (Category.STORE, Category.FOOD)
+
+
+@dataclass(frozen=True)
+class Till:
+    """A till: its room, and where people stand in line before it, whoever is served first; shape ``(k, 2)``."""
+
+    room: int
+    spots: NDArray[np.float64]
+
+
+def tills_of(places: Sequence[Place], indoor: Indoor, objects: Objects) -> dict[int, Till]:
+    """Find the till of each room of shops, cafés and restaurants that has one: the counter with the longest line."""
+    trade = {k for k, place in enumerate(places) if place.category in _TRADE}
+    found: dict[int, Till] = {}
+    for k in np.flatnonzero(np.isin(objects.kind, _KINDS)).tolist():
+        room = indoor.index.get(str(objects.room[k]), -1)
+        if room < 0 or int(indoor.place[room]) not in trade:
+            continue
+        x, y, yaw = (float(values[k]) for values in (objects.x, objects.y, objects.yaw))
+        spots = _line(room, (x, y, yaw, float(objects.size_x[k]) / 2), indoor)
+        if len(spots) and (room not in found or len(spots) > len(found[room].spots)):
+            found[room] = Till(room, spots)
+    return found
+
+
+def _line(room: int, counter: tuple[float, float, float, float], indoor: Indoor) -> NDArray[np.float64]:
+    """Return the longest straight line of spots that begins before a counter; empty if nobody can stand there."""
+    x, y, yaw, depth = counter
+    ahead = np.array([math.cos(yaw), math.sin(yaw)])
+    first = np.array([x, y]) + (depth + _BEFORE) * ahead
+    best = np.zeros((0, 2))
+    for turn in (0.0, math.pi / 2, -math.pi / 2):
+        c, s = math.cos(yaw + turn), math.sin(yaw + turn)
+        spots = []
+        for k in range(_LONGEST):
+            spot = first + k * SPACING * np.array([c, s])
+            if indoor.gap(room, (float(spot[0]), float(spot[1]))) < RADIUS + _AIR:
+                break
+            spots.append(spot)
+        if len(spots) > len(best):
+            best = np.array(spots)
+    return best
+
+
+@dataclass
+class Lines(ArrayState):
+    """Who stands in line.
+
+    Attributes
+    ----------
+    room
+        Room of the till that each person waits at, -1 for none, int32, shape ``(n,)``.
+    number
+        The order in which they joined, int64, shape ``(n,)``.
+    left
+        Seconds of service left, float64, shape ``(n,)``.
+    served
+        How often each person was served, int32, shape ``(n,)``.
+    """
+
+    room: NDArray[np.int32]
+    number: NDArray[np.int64]
+    left: NDArray[np.float64]
+    served: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, people: int) -> Self:
+        """Return the lines of so many people, none of whom waits."""
+        return cls(
+            np.full(people, -1, np.int32), np.zeros(people, np.int64), np.zeros(people), np.zeros(people, np.int32)
+        )
+
+    def waiting(self, room: int) -> list[int]:
+        """Return who stands in line at the till of a room, whoever is served next first."""
+        here = np.flatnonzero(self.room == room)
+        return [int(i) for i in here[np.argsort(self.number[here], kind="stable")]]
+
+    def join(self, i: int, room: int) -> None:
+        """Have a person stand at the end of a line."""
+        self.room[i], self.number[i], self.left[i] = room, int(self.number.max(initial=0)) + 1, SERVICE
+
+    def leave(self, i: int) -> None:
+        """Have a person stand in line no longer."""
+        self.room[i] = -1
+
+
+def place_in_line(i: int, state: SimulationState) -> tuple[int, NDArray[np.float64]] | None:
+    """Return how many are before a person at the till of its room, and where it stands, or would; None if nowhere."""
+    room = int(state.people.room[i])
+    till = state.tills.get(room)
+    if till is None:
+        return None
+    line = state.lines.waiting(room)
+    before = line.index(i) if i in line else len(line)
+    return (before, till.spots[before]) if before < len(till.spots) else None
+
+
+def advance_lines(state: SimulationState) -> None:
+    """Serve whoever is first in each line for a second; who has walked away has left the line."""
+    p, lines = state.people, state.lines
+    for room in sorted(set(lines.room[lines.room >= 0].tolist())):
+        spots = state.tills[room].spots
+        for i in lines.waiting(room):
+            place = lines.waiting(room).index(i)
+            if int(p.room[i]) != room or _away(p.position[i], spots[place]) > LOST + SPACING * place:
+                lines.leave(i)
+                state.events.add("queue", p.names[i], "leaves the line", p.position[i])
+        line = lines.waiting(room)
+        if line and _away(p.position[line[0]], spots[0]) <= AT_SPOT:
+            _serve(line[0], state)
+
+
+def _serve(i: int, state: SimulationState) -> None:
+    p, lines = state.people, state.lines
+    lines.left[i] -= 1.0
+    if lines.left[i] > 0.0:
+        return
+    paid = min(PRICE, float(p.cash[i]))
+    p.cash[i] -= paid
+    lines.leave(i)
+    lines.served[i] += 1
+    state.events.add("purchase", p.names[i], f"pays {paid:g} at the till", p.position[i], price=paid)
+
+
+def _away(position: ArrayLike, spot: NDArray[np.float64]) -> float:
+    return float(np.hypot(*(np.asarray(position, np.float64)[:2] - spot)))
