@@ -201,7 +201,9 @@ class TransitSystem:
         leaves, width = bus_door_leaves()
         if self.traffic.lanes.lefthand:
             leaves = [(x, -y, way) for x, y, way in leaves]
-        bases = self.traffic.draw().transforms[self.traffic.cars :].astype(np.float64) if buses else np.zeros((0, 4, 4))
+        # After the buses come signals.
+        cars = self.traffic.cars
+        bases = self.traffic.draw().transforms[cars : cars + buses].astype(np.float64)
         doors = Drawn(
             ["bus_leaf"],
             np.zeros(len(leaves) * buses, np.int32),
