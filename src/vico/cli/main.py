@@ -278,6 +278,30 @@ def still(options: Annotated[StillOptions, FLAT]) -> int:
     return verb.still(options)
 
 
+@app.command(name="score-pictures")
+def score_pictures(
+    pictures: Positional[Path],
+    photos: Path,
+    weights: Path,
+    scale: Literal["-1..1", "0..1", "0..255", "imagenet"] = "-1..1",
+    json: bool = False,
+) -> int:
+    """Say how much pictures look like photos: FID and KID by a feature network of your own.
+
+    Example: vico score-pictures stills --photos street_photos --weights inception_v3.onnx
+
+    Args:
+        pictures: Folder of pictures (.jpg, .png), folders in it too.
+        photos: Folder of photos.
+        weights: The network, an ONNX file: pictures in, features out. Needs the extra "scores".
+        scale: What it wants bytes to be turned into.
+        json: Print JSON.
+    """
+    from vico.cli import scores as verb
+
+    return verb.score(pictures, photos=photos, weights=weights, scale=scale, json=json)
+
+
 @app.command(name="demo")
 def demo(out: Path = Path("out/demo"), seed: int = 0, force: bool = False) -> int:
     """Do the main job once: build central Helsinki, people it, simulate half an hour, show it.
