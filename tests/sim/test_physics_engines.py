@@ -289,7 +289,7 @@ def test_a_thing_rests_on_a_kerb_a_deck_and_another_thing(name: str) -> None:
     engine = engine_of(name, kerb)
     engine.place_object(0, cube(6.0, 0.0, 0.5))
     engine.place_object(1, cube(6.0, 0.0, 1.0, size=0.2))
-    engine.place_object(2, cube(-0.1, 0.0, 0.7))
+    engine.place_object(2, cube(-0.02, 0.0, 0.7))
     engine.step(150)
     heights = engine.objects().position[:, 2]
     assert heights[0] == pytest.approx(0.12 + 0.15, abs=0.005)

@@ -28,6 +28,7 @@ GROUND_FRICTION, SMOOTH, OBJECT_FRICTION = 0.6, 0.01, 0.6
 _TILE = 40.0
 #: Collisions that are looked at in a step at most.
 _PAIRS = 400
+_GRID = 16
 _BITS = {"contype": TOUCH | BUMP, "conaffinity": TOUCH | BUMP | LIMB}
 
 
@@ -76,15 +77,17 @@ def build_scene(gs: Any, static: StaticScene, models: Sequence[RobotModel], capa
     _add_ground(gs, scene, static)
     solids = _Solids()
     solids.add(static)
-    city = scene.add_entity(_file(gs, solids.spec)) if solids.tiles else None
+    city = _add_model(gs, scene, solids.spec) if solids.tiles else None
     specs, robots = [], []
     for index, model in enumerate(models):
         spec = robot_spec(model)
         specs.append(spec.compile())
-        robots.append(scene.add_entity(_file(gs, spec, pos=(10.0 * index, 0.0, model.stand))))
-    rough = gs.materials.Rigid(friction=SMOOTH)
-    movers = [scene.add_entity(_mover(gs, k, k < capacity.people), material=rough) for k in range(_movers(capacity))]
-    objects = [scene.add_entity(_object(gs, k)) for k in range(capacity.objects)]
+        robots.append(_add_model(gs, scene, spec, (10.0 * index, 0.0, model.stand)))
+    movers = [
+        scene.add_entity(_mover(gs, k, k < capacity.people), material=_material(gs, SMOOTH))
+        for k in range(capacity.people + capacity.vehicles)
+    ]
+    objects = [_add_object(gs, scene, k) for k in range(capacity.objects)]
     scene.build()
     solver = scene.sim.rigid_solver
     shapes = Shapes(solver)
@@ -94,25 +97,33 @@ def build_scene(gs: Any, static: StaticScene, models: Sequence[RobotModel], capa
     return Built(scene, solver, robots, _links(movers), _links(objects), specs, shapes)
 
 
-def _movers(capacity: Capacity) -> int:
-    return capacity.people + capacity.vehicles
+def _material(gs: Any, friction: float | None = None) -> Any:
+    """Return a rigid material; without a friction, shapes have that of their model.
+
+    Genesis samples the distance around every shape on a grid, though none of ours needs it: on the coarsest it takes.
+    """
+    return gs.materials.Rigid(friction=friction, sdf_min_res=_GRID, sdf_max_res=_GRID)
 
 
 def _links(entities: list[Any]) -> NDArray[np.int64]:
     return np.array([entity.links[0].idx for entity in entities], np.int64)
 
 
-def _file(gs: Any, spec: Any, pos: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Any:
-    """Return a morph of a specification, without anything to look at."""
+def _add_model(gs: Any, scene: Any, spec: Any, place: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Any:
+    """Add a specification, without anything to look at."""
     spec.compile()
     # Aligned bodies have another frame than the one that the model says.
-    return gs.morphs.MJCF(file=spec.to_xml(), pos=pos, visualization=False, align=False, decimate=False)
+    morph = gs.morphs.MJCF(file=spec.to_xml(), pos=place, visualization=False, align=False, decimate=False)
+    entity = scene.add_entity(morph, material=_material(gs))
+    # What touches what holds between models, too: Genesis keeps to it within each alone.
+    entity._is_local_collision_mask = False
+    return entity
 
 
 def _add_ground(gs: Any, scene: Any, static: StaticScene) -> None:
     heights, half = ground_grid(static, kerbs=False)
     low, high = float(heights.min()), float(heights.max())
-    rough = gs.materials.Rigid(friction=GROUND_FRICTION)
+    rough = _material(gs, GROUND_FRICTION)
     if high - low < 1e-4:
         bits = {"contype": TOUCH, "conaffinity": TOUCH | LIMB}
         scene.add_entity(gs.morphs.Plane(pos=(0.0, 0.0, low), visualization=False, **bits), material=rough)
@@ -194,7 +205,7 @@ def parked_mover(index: int) -> tuple[float, float, float]:
     return PARKED_APART * index, 0.0, PARKED
 
 
-def _object(gs: Any, index: int) -> Any:
+def _add_object(gs: Any, scene: Any, index: int) -> Any:
     spec = mujoco.MjSpec()
     body = spec.worldbody.add_body(name="object", pos=[0.0, 0.0, 0.0])
     body.add_freejoint()
@@ -207,7 +218,7 @@ def _object(gs: Any, index: int) -> Any:
         contype=TOUCH | SOLID,
         conaffinity=TOUCH | LIMB,
     )
-    return _file(gs, spec, pos=(PARKED_APART * index, PARKED_APART, PARKED))
+    return _add_model(gs, scene, spec, (PARKED_APART * index, PARKED_APART, PARKED))
 
 
 # Of a unit box, as Genesis counts them: x slowest, z fastest.
