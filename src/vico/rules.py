@@ -16,6 +16,8 @@ _OLD, _OLD_PACE = (65.0, 75.0, 85.0, 95.0), (1.0, 0.92, 0.78, 0.70)
 #: How far a hand reaches along the ground, and above the feet, metres.
 REACH = 1.5
 REACH_UP = 2.2
+# ... of children, who are small: so many times their stature.
+_REACH_OF_STATURE = 1.35
 
 #: How near one has to be to go through an entrance, and through a door between rooms, metres.
 DOOR_REACH = 2.0
@@ -136,6 +138,11 @@ def walk_speed(age: float) -> float:
     k = next((k for k in range(1, len(_OLD) - 1) if age < _OLD[k]), len(_OLD) - 1)
     share = min(1.0, (age - _OLD[k - 1]) / (_OLD[k] - _OLD[k - 1]))
     return WALK_SPEED * (_OLD_PACE[k - 1] + share * (_OLD_PACE[k] - _OLD_PACE[k - 1]))
+
+
+def reach_up(height: float) -> float:
+    """Return how far above the feet the hands of somebody of a stature reach, metres."""
+    return min(REACH_UP, _REACH_OF_STATURE * height)
 
 
 def ride_price(seconds: float, *, returned: bool) -> float:

@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 from vico.assets.people import (
+    BAGS,
     BOTTOMS,
     HAIR,
+    HATS,
     JOINTS,
+    OVERS,
     PARENTS,
     SHOES,
     TOPS,
@@ -21,6 +24,7 @@ from vico.assets.people import (
     random_appearance,
 )
 from vico.assets.people.cutting import cut, decimated, open_loops
+from vico.assets.people.weather_clothes import dressed
 from vico.errors import InputError, MissingExtraError
 from vico.seeds import rng
 
@@ -98,7 +102,18 @@ def test_a_heavy_build_has_a_deeper_waist(source: str) -> None:
 
 
 @pytest.mark.parametrize("source", SOURCES)
-@pytest.mark.parametrize(("field", "choices"), [("hair", HAIR), ("top", TOPS), ("bottom", BOTTOMS), ("shoes", SHOES)])
+@pytest.mark.parametrize(
+    ("field", "choices"),
+    [
+        ("hair", HAIR),
+        ("top", TOPS),
+        ("bottom", BOTTOMS),
+        ("shoes", SHOES),
+        ("hat", HATS),
+        ("over", OVERS),
+        ("bag", BAGS),
+    ],
+)
 def test_every_choice_of_hair_and_clothes_makes_a_different_body(
     source: str, field: str, choices: tuple[str, ...]
 ) -> None:
@@ -109,14 +124,35 @@ def test_every_choice_of_hair_and_clothes_makes_a_different_body(
     assert len({fingerprint(choice) for choice in choices}) == len(choices)
 
 
+@pytest.mark.parametrize("source", SOURCES)
+def test_the_younger_the_larger_the_head(source: str) -> None:
+    eyes = []
+    for age, height in ((5, 1.1), (8, 1.28), (12, 1.5), (30, 1.75)):
+        body = body_of(Appearance(age=age, height=height), source=source, detail="full")  # type: ignore[arg-type]
+        eyes.append(float(body.joints[J["left_eye"], 2]) / body.height)
+    assert eyes == sorted(eyes)
+    assert eyes[0] < 0.922 < 0.93 < eyes[-1]
+
+
+def test_people_dress_for_the_weather() -> None:
+    summer = Appearance(top="t-shirt", bottom="shorts", shoes="sandals")
+    snow = dressed(summer, -5.0, snow=1.0)
+    assert (snow.top, snow.bottom, snow.shoes, snow.hat) == ("coat", "jeans", "boots", "beanie")
+    assert dressed(summer, 25.0) == summer
+    assert dressed(summer, 17.0, rain=2.0).top == "jacket"
+    assert dressed(Appearance(top="coat", age=80), 28.0).top == "t-shirt"
+    builder = Appearance(top="hoodie", over="vest", hat="hard hat")
+    assert dressed(builder, -5.0).hat == "hard hat"
+
+
 def test_an_appearance_survives_json() -> None:
     for look in CROWD:
         assert Appearance.from_dict(look.to_dict()) == look
 
 
 def test_an_unknown_field_is_named() -> None:
-    with pytest.raises(InputError, match="unknown field 'hat'"):
-        Appearance.from_dict({"hat": "bowler"})
+    with pytest.raises(InputError, match="unknown field 'monocle'"):
+        Appearance.from_dict({"monocle": True})
 
 
 @pytest.mark.parametrize(("field", "value"), [("height", 3.0), ("gender", 2), ("top", "toga"), ("ancestry", (0, 0, 0))])

@@ -5,10 +5,14 @@ from __future__ import annotations
 import re
 from datetime import date as Date  # the field of that name would hide it
 from enum import StrEnum
-from typing import Annotated, Literal
+from typing import (
+    Annotated,
+    Literal,
+    NotRequired,  # pydantic needs this one before Python 3.12
+)
 
 from pydantic import AfterValidator, ConfigDict, Field, with_config
-from typing_extensions import TypedDict  # pydantic needs this one before Python 3.12
+from typing_extensions import TypedDict
 
 from vico.clock import DAY, clock_of
 from vico.world.model import Point2, Record
@@ -92,11 +96,21 @@ class ScheduleItem(Record):
     mode: Mode | None = None
 
 
+Hair = Literal["bald", "crop", "short", "curly", "bob", "long", "ponytail", "bun"]
+Top = Literal["t-shirt", "shirt", "jumper", "hoodie", "jacket", "suit", "coat", "dress"]
+Bottom = Literal["trousers", "jeans", "shorts", "skirt", "leggings"]
+Shoes = Literal["trainers", "shoes", "boots", "sandals"]
+Hat = Literal["none", "cap", "beanie", "sun hat", "hard hat", "uniform cap", "toque"]
+Over = Literal["none", "vest", "apron"]
+Bag = Literal["none", "backpack", "shoulder bag"]
+
+
 @with_config(ConfigDict(extra="forbid"))
 class ResidentAppearance(TypedDict):
     """How a resident looks: the fields of `vico.assets.people.Appearance`, which makes a body of them.
 
-    A plain dictionary with checked keys, so that it can be handed to `Appearance.from_dict` as it is.
+    A plain dictionary with checked keys, so that it can be handed to `Appearance.from_dict` as it is. Who wears no hat,
+    nothing over their clothes and no bag may leave those out.
     """
 
     gender: Share
@@ -106,18 +120,24 @@ class ResidentAppearance(TypedDict):
     muscle: Share
     ancestry: tuple[Share, Share, Share]
     skin: Colour
-    hair: Literal["bald", "crop", "short", "curly", "bob", "long", "ponytail", "bun"]
+    hair: Hair
     hair_colour: Colour
     eyes: Colour
     beard: bool
     glasses: bool
-    top: Literal["t-shirt", "shirt", "jumper", "hoodie", "jacket", "suit", "coat", "dress"]
+    top: Top
     top_colour: Colour
     under_colour: Colour
-    bottom: Literal["trousers", "jeans", "shorts", "skirt", "leggings"]
+    bottom: Bottom
     bottom_colour: Colour
-    shoes: Literal["trainers", "shoes", "boots", "sandals"]
+    shoes: Shoes
     shoes_colour: Colour
+    hat: NotRequired[Hat]
+    hat_colour: NotRequired[Colour]
+    over: NotRequired[Over]
+    over_colour: NotRequired[Colour]
+    bag: NotRequired[Bag]
+    bag_colour: NotRequired[Colour]
 
 
 class Personality(Record):

@@ -131,9 +131,9 @@ def _is_blocked(core: Rectangle, was: Rectangle, space: int, solids: SolidMap) -
 
 
 @compiled
-def _body_in_way(core: Rectangle, was: Rectangle, bodies: Array, near: Array) -> int:
-    """Return the entity of the first of the bodies `near` that a move would touch, 0 if none does."""
-    reach = core.half_length + RADIUS
+def _body_in_way(me: Any, core: Rectangle, bodies: Array, near: Array) -> int:
+    """Return the entity of the first of the bodies `near` that avatar `me` would touch at a place, 0 if none."""
+    reach, was = core.half_length + me.rounding, core_of(me)
     for k in near:
         other = bodies[k]
         dx, dy = other.x - core.x, other.y - core.y
@@ -142,7 +142,7 @@ def _body_in_way(core: Rectangle, was: Rectangle, bodies: Array, near: Array) ->
             continue
         theirs = core_of(other)
         gap = rectangle_gap(core, theirs) - other.rounding
-        if gap < RADIUS and gap <= rectangle_gap(was, theirs) - other.rounding:
+        if gap < me.rounding and gap <= rectangle_gap(was, theirs) - other.rounding:
             return int(other.entity)
     return 0
 
@@ -151,10 +151,9 @@ def _body_in_way(core: Rectangle, was: Rectangle, bodies: Array, near: Array) ->
 def _blocker(me: Any, core: Rectangle, around: Any) -> int:
     """Entity that keeps avatar `me` from moving its core to a place; `WALL` for walls, edges, furniture, 0 if free."""
     solids, bodies, near = around
-    was = core_of(me)
-    if _is_blocked(core, was, me.space, solids):
+    if _is_blocked(core, core_of(me), me.space, solids):
         return WALL
-    return _body_in_way(core, was, bodies, near)
+    return _body_in_way(me, core, bodies, near)
 
 
 @compiled

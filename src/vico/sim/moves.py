@@ -18,6 +18,10 @@ from vico.sim.state import LEVEL_GAZE, Posture
 _STEP_ASIDE = 1.5
 
 
+# Where the eyes are by stature, metres and shares of it.
+_STATURES, _EYES = (1.1, 1.28, 1.45, 1.62), (0.905, 0.915, 0.923, 0.93)
+
+
 def wrapped(angle: float) -> float:
     """Return the same direction within -pi..pi."""
     return (angle + math.pi) % (2 * math.pi) - math.pi
@@ -26,7 +30,9 @@ def wrapped(angle: float) -> float:
 def eye_height(state: SimulationState) -> NDArray[np.float64]:
     """Height of everyone's eyes above the ground, metres, shape ``(n,)``."""
     p = state.people
-    share = np.select([p.posture == Posture.SITTING, p.posture == Posture.LYING], [0.68, 0.13], 0.93)
+    # Children's heads are large: their eyes are lower down.
+    upright = np.interp(p.height, _STATURES, _EYES)
+    share = np.select([p.posture == Posture.SITTING, p.posture == Posture.LYING], [0.68, 0.13], upright)
     return np.asarray(p.height * share)
 
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.people import PASSERS_BY, Appearance, passer_by
+from vico.assets.people.weather_clothes import dressed
+from vico.community.model import Resident
 from vico.seeds import rng
 from vico.sim.animation import Transition, clip_index, stride_length
 from vico.sim.animation.gait import WALK_START
+from vico.sim.environment.weather import Weather
 from vico.sim.traffic.state import PedestrianGaits
 
 
@@ -21,6 +25,13 @@ def looks_of_strangers(seed: int, count: int) -> list[Appearance]:
     """
     order = rng(seed, "looks").permutation(PASSERS_BY)
     return [passer_by(int(order[k % PASSERS_BY])) for k in range(count)]
+
+
+def looks_of(residents: Sequence[Resident], strangers: int, seed: int, weather: Weather) -> list[Appearance]:
+    """Return how people look who have dressed for the weather: residents, then strangers."""
+    looks = [Appearance.from_dict(resident.appearance) for resident in residents]
+    looks += looks_of_strangers(seed, strangers)
+    return [dressed(look, weather.temperature, weather.rain, weather.snow) for look in looks]
 
 
 def manner_of_pedestrian(pedestrian: int) -> str:

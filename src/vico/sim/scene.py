@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from vico.assets.models.in_hand import in_hand_models
 from vico.assets.people import Appearance, body_of
-from vico.community.model import Resident
 from vico.errors import InputError
 from vico.render import Cameras, Lighting, Scene, render
 from vico.render.lighting import SHADOW_STEP
@@ -39,7 +38,7 @@ from vico.sim.eyes import SemanticClasses, lenses_by_entity
 from vico.sim.hands_scene import Holders, draw_in_hands, hands_of_agents, hands_of_pedestrians
 from vico.sim.holding import habit_of
 from vico.sim.observations import Views
-from vico.sim.passers_by import looks_of_strangers, manner_of_pedestrian, pedestrian_motion
+from vico.sim.passers_by import manner_of_pedestrian, pedestrian_motion
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture, Vehicle
 from vico.threads import in_order
@@ -107,8 +106,8 @@ class RenderedSimulation(Protocol):
         """Everybody and everything, as it is now."""
 
     @property
-    def residents(self) -> Sequence[Resident]:
-        """Who lives there, in the order of their avatars."""
+    def looks(self) -> Sequence[Appearance]:
+        """How people look, in the order of their avatars, and after them the pedestrians."""
 
     @property
     def shapes(self) -> Mapping[str, Sequence[Surface]]:
@@ -161,11 +160,9 @@ class SceneRenderer:
     def _load_bodies(self, sim: RenderedSimulation) -> None:
         """Make everybody's body and what tells their movements apart."""
         state = sim.state
-        looks = [Appearance.from_dict(r.appearance) for r in sim.residents]
-        strangers = state.people.names[len(looks) :]
+        looks = list(sim.looks)
         entities = state.people.entity.tolist()
         walkers = state.traffic.walkers.entity.tolist() if state.traffic is not None else []
-        looks += looks_of_strangers(sim.config.seed, len(strangers) + len(walkers))
         made = dict(
             zip(
                 dict.fromkeys(looks), in_order(partial(body_of, detail=self._detail), dict.fromkeys(looks)), strict=True

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +36,7 @@ from vico.world.folder import World
 from vico.world.mesh import Surface
 
 if TYPE_CHECKING:
+    from vico.assets.people import Appearance
     from vico.community.model import Community
 
 
@@ -117,6 +119,7 @@ class Simulation:
         days = self.base.days(community)[: len(self.residents)] if community is not None else []
         weekday = None if community is None else community.date.weekday()
         self.state = initial_state(self.base, self.residents, days, self.config, weekday)
+        self._dressed_for = self.state.environment.weather
         self.periods = _periods(self.state, self.config)
         self.punctuality = Punctuality.of(days, self.config.start)
         self.scenario, self.ground_truth = Scenario(self.state), GroundTruth(self.state)
@@ -204,6 +207,15 @@ class Simulation:
         return nullcontext() if self.state.robots is None else kept_if_diverged(self, ticks / TICKS_PER_SECOND)
 
     # What agents see.
+
+    @cached_property
+    def looks(self) -> list[Appearance]:
+        """How people look, dressed for the weather at the start: residents, assistants, then pedestrians."""
+        from vico.sim.passers_by import looks_of  # needs the makers of bodies, which are slow to import
+
+        walkers = len(self.state.traffic.walkers) if self.state.traffic is not None else 0
+        strangers = len(self.state.people) - len(self.residents) + walkers
+        return looks_of(self.residents, strangers, self.config.seed, self._dressed_for)
 
     @property
     def agents(self) -> list[str]:

@@ -29,6 +29,8 @@ FIRST_THING = 1_300_000
 FIRST_OBJECT = 1_900_000
 
 RADIUS = 0.25
+# Who is less tall is narrower, metres.
+_NARROWER_BELOW = 1.5
 # People look a little down while they walk, radians.
 LEVEL_GAZE = -0.1
 REASON_LENGTH = 240
@@ -79,6 +81,11 @@ class ArrayState:
                     "restore it into a simulation of the same world, community and configuration"
                 )
             mine[...] = saved
+
+
+def body_radius(height: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return half the width that people of these statures take beside others, metres: children less than `RADIUS`."""
+    return np.asarray(RADIUS * np.minimum(height / _NARROWER_BELOW, 1.0))
 
 
 @dataclass
@@ -255,13 +262,14 @@ class People(ArrayState):
     def bodies_of(self, who: NDArray[np.int64] | slice) -> Bodies:
         """Bodies of the avatars with the given indices; a cyclist's is as long as the bicycle, see `Bodies`."""
         riding = self.vehicle[who] == Vehicle.BIKE
+        radius = body_radius(self.height[who])
         return Bodies(
             self.entity[who],
             self.kind[who],
             self.position[who],
             self.yaw[who],
-            np.where(riding, RIDER_REACH + RADIUS, RADIUS),
-            np.full(len(riding), RADIUS),
+            np.where(riding, RIDER_REACH + radius, radius),
+            radius,
             self.height[who],
             self.velocity[who],
         )

@@ -2,10 +2,13 @@
 
 from vico.assets.people.choice import PASSERS_BY, body_of, passer_by, random_appearance
 from vico.assets.people.model import (
+    BAGS,
     BOTTOMS,
     FINGERS,
     HAIR,
+    HATS,
     JOINTS,
+    OVERS,
     PARENTS,
     SHOES,
     TOPS,
@@ -21,10 +24,13 @@ from vico.assets.people.model import (
 )
 
 __all__ = [
+    "BAGS",
     "BOTTOMS",
     "FINGERS",
     "HAIR",
+    "HATS",
     "JOINTS",
+    "OVERS",
     "PARENTS",
     "PASSERS_BY",
     "SHOES",

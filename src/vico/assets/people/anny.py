@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.people.bake import ANCESTRIES, GENDERS, LEVELS, TARGETS, VERSION
+from vico.assets.people.accessories import worn_parts
+from vico.assets.people.bake import AGES, ANCESTRIES, GENDERS, LEVELS, TARGETS, VERSION
 from vico.assets.people.clothes import darker, front_of, hemmed
 from vico.assets.people.cutting import open_loops
 from vico.assets.people.heads import hairline, worn_on_head
@@ -37,6 +38,11 @@ _BOTTOMS: dict[str, tuple[float, float]] = {
     "leggings": (0.001, 0.000),
     "shorts": (0.008, 0.016),
 }
+
+
+# What the data's ages are, years: a baby, a child of about eleven, an adult, an elder. Shoulders and faces grow up
+# between eighteen and twenty-one, not later.
+_AGES = (1.0, 11.0, 21.0, 90.0)
 
 
 def baked_file() -> Path:
@@ -77,13 +83,15 @@ def _edges(path: Path, name: str) -> NDArray[np.int64]:
     return open_loops(_wardrobe(path)[f"triangles.{name}"].astype(np.int64))
 
 
+def _share_of_ages(age: float) -> list[float]:
+    """Return how much of each of the data's ages makes somebody of an age."""
+    return [float(np.interp(age, _AGES, np.eye(len(AGES))[k])) for k in range(len(AGES))]
+
+
 def _shares(look: Appearance) -> NDArray[np.float32]:
     """How much of each target makes this body."""
     genders = dict(zip(GENDERS, (1 - look.gender, look.gender), strict=True))
-    # The data know a child of about eleven, an adult of 25 and an elder of 90.
-    child = float(np.clip((25 - look.age) / 14, 0, 1))
-    old = float(np.clip((look.age - 25) / 65, 0, 1))
-    ages = {"child": child, "young": 1 - child - old, "old": old}
+    ages = dict(zip(AGES, _share_of_ages(look.age), strict=True))
 
     def levels(value: float) -> dict[str, float]:
         low, high = max(1 - 2 * value, 0.0), max(2 * value - 1, 0.0)
@@ -339,5 +347,7 @@ def body(look: Appearance) -> SkinnedBody:
         If the data are not installed.
     """
     fit = _Fitting(look, installed_file())
-    parts = [*_head(fit), fit.piece("hands", look.skin), *_lower(fit), *_upper(fit), *_feet(fit)]
+    clothes = [*_lower(fit), *_upper(fit)]
+    worn = worn_parts(look, fit.joints, clothes)
+    parts = [*_head(fit), fit.piece("hands", look.skin), *clothes, *_feet(fit), *worn]
     return skinned(parts, fit.joints, look.height)

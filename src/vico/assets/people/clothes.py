@@ -58,7 +58,7 @@ def front_of(
             heights = np.linspace(level(span[0]), level(span[1]), 12)
         at = (heights - heights[0]) / (heights[-1] - heights[0])
         middle, half = np.interp(at, (0, 1), centres) * h, np.interp(at, (0, 1), widths) * h
-        return _sewn(cloth, heights, middle, half, layer * thickness * h, colour)
+        return sewn(cloth, heights, middle, half, layer * thickness * h, colour)
 
     if look.top in _OPENING:
         low, narrow, wide = _OPENING[look.top]
@@ -78,7 +78,7 @@ def front_of(
     return []
 
 
-def _sewn(
+def sewn(
     cloth: BodyPart,
     heights: NDArray[np.float64],
     middle: NDArray[np.float64],
@@ -86,7 +86,19 @@ def _sewn(
     lift: float,
     colour: Colour,
 ) -> BodyPart:
-    """Return a strip up the front of `cloth`, five vertices wide."""
+    """Return a strip up the front of `cloth`, five vertices wide.
+
+    Parameters
+    ----------
+    cloth
+        What it is sewn to.
+    heights, middle, half
+        Of its rows, how far to the left of the middle it runs there, and half its width, metres.
+    lift
+        How far it lies off the cloth, metres.
+    colour
+        sRGB.
+    """
     columns = np.linspace(-1.0, 1.0, 5)
     y = (middle[:, None] + half[:, None] * columns).ravel()
     z = np.repeat(heights, len(columns))

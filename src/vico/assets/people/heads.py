@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.assets.people.accessories import COVERED, PRESSED, hat_parts
 from vico.assets.people.lofts import BodyPart, LoftRing, blend, blob, dense, loft, with_normals
 from vico.assets.people.model import Appearance, Colour, J
 
@@ -79,7 +80,7 @@ def head_parts(look: Appearance, size: float, stature: float) -> list[BodyPart]:
 
 def worn_on_head(look: Appearance, skull: Skull) -> list[BodyPart]:
     """Hair, eyebrows and glasses for any head."""
-    parts = [*_brows(look, skull), *_hair(look, skull)]
+    parts = [*_brows(look, skull), *_hair(look, skull), *hat_parts(look, skull)]
     return parts + _glasses(skull) if look.glasses else parts
 
 
@@ -214,6 +215,8 @@ def _cap(
             # Hair rises from the forehead instead of standing on it like a cap's brim.
             brow = 0.35 + 0.65 * min(max(k - 1, 0) / 2, 1.0) if abs(angle) < 1.2 else 1.0
             lift = thickness(share, abs(float(angle))) * brow * (k > 0) + wave * (k > 0)
+            if look.hat != "none" and share > COVERED:
+                lift = min(lift, PRESSED)
             # Below the cheekbone hair falls straight instead of following the neck.
             point = skull.at(max(share, 0.40), float(angle), lift)
             if k == 0:
@@ -224,7 +227,7 @@ def _cap(
             colours.append(np.asarray(look.hair_colour) * strand)
             low = float(np.clip((0.02 - share) / 0.35, 0, 1)) * 0.75
             shares.append(dense(blend({J["head"]: 1.0}, {J["neck"]: 0.4, J["spine3"]: 0.6}, low)))
-    crown = skull.at(1.0, 0.0, thickness(1.0, 0.0))
+    crown = skull.at(1.0, 0.0, min(thickness(1.0, 0.0), PRESSED if look.hat != "none" else np.inf))
     crown[:2] = skull.axis, 0
     points.append(crown)
     colours.append(np.asarray(look.hair_colour) * 1.0)
@@ -286,7 +289,8 @@ def _hair(look: Appearance, skull: Skull) -> list[BodyPart]:
     parts = [_cap(look, skull, line, lambda share, angle: 0.034, rows=8, rough=0.003)]
     if look.hair == "bun":
         knot = np.array([0.15, 0.16, 0.15]) * size
-        return [*parts, blob(skull.at(0.88, np.pi, 0.07), knot, head, look.hair_colour, sides=9, rings=6)]
+        low = 0.30 if look.hat != "none" else 0.0
+        return [*parts, blob(skull.at(0.88 - low, np.pi, 0.07), knot, head, look.hair_colour, sides=9, rings=6)]
     neck = {J["neck"]: 0.5, J["head"]: 0.5}
     path = [skull.at(share, np.pi, lift) for share, lift in _TAIL]
     path[-1][2] -= 0.25 * size

@@ -70,6 +70,12 @@ Hair = Literal["bald", "crop", "short", "curly", "bob", "long", "ponytail", "bun
 Top = Literal["t-shirt", "shirt", "jumper", "hoodie", "jacket", "suit", "coat", "dress"]
 Bottom = Literal["trousers", "jeans", "shorts", "skirt", "leggings"]
 Shoes = Literal["trainers", "shoes", "boots", "sandals"]
+Hat = Literal["none", "cap", "beanie", "sun hat", "hard hat", "uniform cap", "toque"]
+Over = Literal["none", "vest", "apron"]
+Bag = Literal["none", "backpack", "shoulder bag"]
+HATS: tuple[Hat, ...] = ("none", "cap", "beanie", "sun hat", "hard hat", "uniform cap", "toque")
+OVERS: tuple[Over, ...] = ("none", "vest", "apron")
+BAGS: tuple[Bag, ...] = ("none", "backpack", "shoulder bag")
 HAIR: tuple[Hair, ...] = ("bald", "crop", "short", "curly", "bob", "long", "ponytail", "bun")
 TOPS: tuple[Top, ...] = ("t-shirt", "shirt", "jumper", "hoodie", "jacket", "suit", "coat", "dress")
 BOTTOMS: tuple[Bottom, ...] = ("trousers", "jeans", "shorts", "skirt", "leggings")
@@ -94,10 +100,10 @@ class Appearance:
         0..1.
     ancestry
         Weights of African, Asian and European features; need not sum to 1.
-    skin, hair_colour, eyes, top_colour, under_colour, bottom_colour, shoes_colour
+    skin, hair_colour, eyes, top_colour, under_colour, bottom_colour, shoes_colour, hat_colour, over_colour, bag_colour
         sRGB, 0..255. `under_colour` is what shows under an open jacket, suit or coat.
-    hair, top, bottom, shoes
-        One of `HAIR`, `TOPS`, `BOTTOMS`, `SHOES`.
+    hair, top, bottom, shoes, hat, over, bag
+        One of `HAIR`, `TOPS`, `BOTTOMS`, `SHOES`, `HATS`, `OVERS` (what is worn over the top), `BAGS`.
     beard, glasses
         Whether worn.
     """
@@ -121,6 +127,12 @@ class Appearance:
     bottom_colour: Colour = (52, 64, 92)
     shoes: Shoes = "trainers"
     shoes_colour: Colour = (60, 60, 64)
+    hat: Hat = "none"
+    hat_colour: Colour = (52, 58, 72)
+    over: Over = "none"
+    over_colour: Colour = (236, 232, 222)
+    bag: Bag = "none"
+    bag_colour: Colour = (58, 66, 88)
 
     def __post_init__(self) -> None:
         """Refuse what no body can be made of."""
@@ -129,6 +141,7 @@ class Appearance:
             if not low <= getattr(self, name) <= high:
                 raise InputError(f"appearance: {name} {getattr(self, name)!r} is not in {low}..{high}")
         choices: dict[str, tuple[str, ...]] = {"hair": HAIR, "top": TOPS, "bottom": BOTTOMS, "shoes": SHOES}
+        choices |= {"hat": HATS, "over": OVERS, "bag": BAGS}
         for name, known in choices.items():
             if getattr(self, name) not in known:
                 raise InputError(f"appearance: {name} {getattr(self, name)!r} is not one of {', '.join(known)}")

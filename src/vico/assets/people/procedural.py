@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.assets.people.accessories import worn_parts
 from vico.assets.people.clothes import darker, front_of
 from vico.assets.people.heads import head_parts
 from vico.assets.people.lofts import BodyPart, LoftRing, Weights, blend, dense, loft, merged, skinned
@@ -29,10 +30,10 @@ class _Tailor:
         self.look = look
         self.h = look.height
         male = look.gender
-        child = float(np.clip((15 - look.age) / 9, 0, 1))
-        self.head = (0.132 + 0.034 * child) * self.h
+        child = float(np.clip((16 - look.age) / 11, 0, 1))
+        self.head = (0.132 + 0.040 * child) * self.h
         # The trunk makes room for a child's larger head.
-        self.trunk = 1 - 0.034 * child / 0.87
+        self.trunk = 1 - 0.040 * child / 0.87
         self.fat = (look.build - 0.45) * 2
         self.brawn = (look.muscle - 0.5) * 2 * (0.5 + 0.5 * male)
         self.shoulder_y = (0.098 + 0.012 * male + 0.004 * self.brawn - 0.004 * child) * self.h
@@ -403,8 +404,11 @@ def body(look: Appearance) -> SkinnedBody:
     """
     tailor = _Tailor(look)
     parts = _torso(tailor)
+    trunk = list(parts)
     for side in ("left", "right"):
-        parts += _leg(tailor, side)
-        parts += _arm(tailor, side)
+        legs = _leg(tailor, side)
+        trunk += legs[:1]
+        parts += [*legs, *_arm(tailor, side)]
+    parts += worn_parts(look, tailor.joints, trunk)
     parts += head_parts(look, tailor.head, tailor.h)
     return skinned(parts, tailor.joints, look.height)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.rules import REACH, REACH_UP, ReasonCode
+from vico.rules import REACH, ReasonCode, reach_up
 from vico.sim.actions.fields import Field, short
 from vico.sim.actions.model import ActionType, Refusal, Situation, Values
 from vico.sim.carrying import DeckPose, free_place, lay_down
@@ -69,7 +69,7 @@ def _refuse_out_of_reach(k: int, i: int, state: SimulationState) -> Refusal | No
     away = math.hypot(point[0] - p.position[i, 0], point[1] - p.position[i, 1])
     if away > REACH:
         return Refusal(ReasonCode.TOO_FAR, f"pick: {what} is {away:.1f} m away; reach is {REACH} m")
-    if not -0.5 <= point[2] - p.position[i, 2] <= REACH_UP:
+    if not -0.5 <= point[2] - p.position[i, 2] <= reach_up(float(p.height[i])):
         return Refusal(ReasonCode.TOO_HIGH_OR_LOW, f"pick: {what} is too high or too low to reach")
     return None
 
@@ -224,7 +224,7 @@ def _at_point(point: tuple[float, ...], i: int, thing: Thing, state: SimulationS
         if state.world.walkable.class_at((x, y)) == 0:
             return Refusal(ReasonCode.BLOCKED, "put: something solid is at that point")
         height = float(state.world.height((x, y)))
-    if not height - 0.5 <= z <= height + REACH_UP:
+    if not height - 0.5 <= z <= height + reach_up(float(p.height[i])):
         return Refusal(ReasonCode.TOO_HIGH_OR_LOW, f"put: the point is not above the surface there ({height:.2f} m)")
     spot = np.array([x, y, height])
     other = in_the_way(thing, spot, room, state)
@@ -246,7 +246,7 @@ def _on(container: Container, i: int, k: int, state: SimulationState) -> Placeme
     gap = box_gap(person[0], person[1], x, y, container.yaw, half[0], half[1])
     if gap > REACH:
         return Refusal(ReasonCode.TOO_FAR, f"put: the {container.kind} is {gap:.1f} m away; reach is {REACH} m")
-    if z - person[2] > REACH_UP:
+    if z - person[2] > reach_up(float(p.height[i])):
         return Refusal(ReasonCode.TOO_HIGH_OR_LOW, f"put: the {container.kind} is too high")
     margin = np.minimum(half * 0.9, np.hypot(objects.size[k, 0], objects.size[k, 1]) / 2)
     u = np.linspace(-half[0] + margin[0], half[0] - margin[0], max(1, int(2 * (half[0] - margin[0]) / _PITCH) + 1))

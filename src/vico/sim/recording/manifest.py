@@ -13,6 +13,7 @@ from vico.sim.recording.schema import MANIFEST, SCHEMA, SEGMENT_STEPS, VERSION
 from vico.version import __version__
 
 if TYPE_CHECKING:
+    from vico.assets.people import Appearance
     from vico.sim.simulation import Simulation
 
 
@@ -51,7 +52,7 @@ def agents_record(sim: Simulation) -> list[dict[str, Any]]:
                 "kind": "assistant" if person is None else "resident",
                 "entity": int(people.entity[i]),
                 "resident": None if person is None else person.id,
-                "person": None if person is None else _person(person, sim),
+                "person": None if person is None else _person(person, sim.looks[i], sim),
             }
         )
     if robots is not None:
@@ -116,7 +117,7 @@ def _is_names(value: object) -> bool:
     return isinstance(value, list) and all(isinstance(name, str) for name in value)
 
 
-def _person(resident: Any, sim: Simulation) -> dict[str, Any]:
+def _person(resident: Any, look: Appearance, sim: Simulation) -> dict[str, Any]:
     places = {place.id: place.name for place in sim.world.places}
     return {
         "name": resident.name,
@@ -124,7 +125,7 @@ def _person(resident: Any, sim: Simulation) -> dict[str, Any]:
         "gender": resident.gender,
         "occupation": resident.occupation,
         "biography": resident.biography,
-        "appearance": dict(resident.appearance),
+        "appearance": look.to_dict(),
         "schedule": [
             {
                 "type": str(item.type),
