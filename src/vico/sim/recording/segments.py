@@ -71,7 +71,7 @@ def read_table(segment: Segment, name: str) -> pa.Table:
     try:
         return pq.read_table(path, memory_map=False)
     except (pa.ArrowException, OSError) as error:
-        raise SchemaError(f"{path}: not readable ({error}); run it anew") from None
+        raise SchemaError(f"{path}: not readable ({' '.join(str(error).split())}); run it anew") from None
 
 
 def drop_after(run: Path, step: int) -> None:
