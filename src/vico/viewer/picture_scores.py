@@ -18,11 +18,10 @@ SCALES: dict[str, Callable[[NDArray[np.float32]], NDArray[np.float32]]] = {
     "0..255": lambda x: x,
     "0..1": lambda x: x / np.float32(255.0),
     "-1..1": lambda x: x / np.float32(127.5) - np.float32(1.0),
-    "imagenet": lambda x: (
-        (x / np.float32(255.0) - np.array([0.485, 0.456, 0.406], np.float32))
-        / np.array([0.229, 0.224, 0.225], np.float32)
-    ),
+    "imagenet": lambda x: np.asarray((x / np.float32(255.0) - _MEAN) / _SPREAD, np.float32),
 }
+_MEAN: Any = np.array([0.485, 0.456, 0.406], np.float32)
+_SPREAD: Any = np.array([0.229, 0.224, 0.225], np.float32)
 _SUFFIXES = (".jpg", ".jpeg", ".png")
 _BATCH = 16
 _SUBSETS, _SUBSET = 100, 1000
