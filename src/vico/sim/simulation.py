@@ -25,12 +25,12 @@ from vico.sim.metrics import Metrics, StopWatch
 from vico.sim.observations import ObservationRenderer, observe
 from vico.sim.overlaps import OverlapCheck
 from vico.sim.periods import TICKS_PER_SECOND, ControlPeriods, ticks_of
+from vico.sim.queues import advance_lines
 from vico.sim.reports import reports
 from vico.sim.scenario import GroundTruth, Scenario
 from vico.sim.simulation_state import SimulationState
 from vico.sim.snapshot import arrays_of, copied, identity, read_snapshot, state_hash, write_snapshot
 from vico.sim.substeps import advance_ticks
-from vico.sim.tills import advance_lines
 from vico.sim.timetable import Punctuality
 from vico.world.folder import World
 from vico.world.mesh import Surface

@@ -5,18 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from vico.sim.indoor import Indoor
 from vico.sim.state import RADIUS, ArrayState
 from vico.world.model import Category, Place
 from vico.world.objects import Objects
-
-if TYPE_CHECKING:
-    from vico.sim.simulation_state import SimulationState
 
 #: Seconds that serving somebody takes, and what they pay.
 SERVICE, PRICE = 12.0, 5.0
@@ -27,6 +24,7 @@ AT_SPOT = 0.8
 _LONGEST = 6
 _BEFORE = 0.45  # metres between a counter and whoever is served
 _AIR = 0.03
+_DOORWAY = 0.8  # metres from a door, and from who comes in by it, that a line keeps clear
 _KINDS = ("counter", "bar_counter", "pastry_case")
 _TRADE = (Category.STORE, Category.FOOD)
 
@@ -60,12 +58,14 @@ def _line(room: int, counter: tuple[float, float, float, float], indoor: Indoor)
     ahead = np.array([math.cos(yaw), math.sin(yaw)])
     first = np.array([x, y]) + (depth + _BEFORE) * ahead
     best = np.zeros((0, 2))
+    doors = np.array([p[:2] for d in indoor.doors[room] for p in (d.position, d.inside or d.position)]).reshape(-1, 2)
     for turn in (0.0, math.pi / 2, -math.pi / 2):
         c, s = math.cos(yaw + turn), math.sin(yaw + turn)
         spots = []
         for k in range(_LONGEST):
             spot = first + k * SPACING * np.array([c, s])
-            if indoor.gap(room, (float(spot[0]), float(spot[1]))) < RADIUS + _AIR:
+            in_the_way = bool((np.hypot(*(doors - spot).T) < _DOORWAY).any())
+            if in_the_way or indoor.gap(room, (float(spot[0]), float(spot[1]))) < RADIUS + _AIR:
                 break
             spots.append(spot)
         if len(spots) > len(best):
@@ -113,45 +113,3 @@ class Lines(ArrayState):
     def leave(self, i: int) -> None:
         """Have a person stand in line no longer."""
         self.room[i] = -1
-
-
-def place_in_line(i: int, state: SimulationState) -> tuple[int, NDArray[np.float64]] | None:
-    """Return how many are before a person at the till of its room, and where it stands, or would; None if nowhere."""
-    room = int(state.people.room[i])
-    till = state.tills.get(room)
-    if till is None:
-        return None
-    line = state.lines.waiting(room)
-    before = line.index(i) if i in line else len(line)
-    return (before, till.spots[before]) if before < len(till.spots) else None
-
-
-def advance_lines(state: SimulationState) -> None:
-    """Serve whoever is first in each line for a second; who has walked away has left the line."""
-    p, lines = state.people, state.lines
-    for room in sorted(set(lines.room[lines.room >= 0].tolist())):
-        spots = state.tills[room].spots
-        for i in lines.waiting(room):
-            place = lines.waiting(room).index(i)
-            if int(p.room[i]) != room or _away(p.position[i], spots[place]) > LOST + SPACING * place:
-                lines.leave(i)
-                state.events.add("queue", p.names[i], "leaves the line", p.position[i])
-        line = lines.waiting(room)
-        if line and _away(p.position[line[0]], spots[0]) <= AT_SPOT:
-            _serve(line[0], state)
-
-
-def _serve(i: int, state: SimulationState) -> None:
-    p, lines = state.people, state.lines
-    lines.left[i] -= 1.0
-    if lines.left[i] > 0.0:
-        return
-    paid = min(PRICE, float(p.cash[i]))
-    p.cash[i] -= paid
-    lines.leave(i)
-    lines.served[i] += 1
-    state.events.add("purchase", p.names[i], f"pays {paid:g} at the till", p.position[i], price=paid)
-
-
-def _away(position: ArrayLike, spot: NDArray[np.float64]) -> float:
-    return float(np.hypot(*(np.asarray(position, np.float64)[:2] - spot)))

@@ -14,10 +14,10 @@ from vico.sim.bodies import RESIDENT, Bodies
 from vico.sim.city import ANNOUNCED, has_news, known_events
 from vico.sim.moves import eye_height
 from vico.sim.perception import OUTDOORS, AllInView, Eyes, in_view, opaque_grid
+from vico.sim.queues import place_in_line
 from vico.sim.seats import find_rest
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture, Vehicle
-from vico.sim.tills import place_in_line
 
 #: How far off signals are told of, metres.
 SIGNALS_REACH = 60.0

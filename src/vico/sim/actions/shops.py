@@ -6,8 +6,9 @@ import numpy as np
 
 from vico.rules import ReasonCode
 from vico.sim.actions.model import ActionType, Refusal, Values
+from vico.sim.queues import place_in_line
 from vico.sim.simulation_state import SimulationState
-from vico.sim.tills import AT_SPOT, PRICE, SERVICE, place_in_line
+from vico.sim.tills import AT_SPOT, PRICE, SERVICE
 
 
 def check_queue(values: Values, i: int, state: SimulationState) -> Refusal | None:
