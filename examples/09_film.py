@@ -11,7 +11,7 @@ import argparse
 import math
 from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -143,6 +143,10 @@ class Crew:
         """Return a robot that is told what `order` says, once for each order."""
         return Robot(self, name, order)
 
+    def begins(self, sim: Simulation) -> bool:
+        """Whether the Husky has come."""
+        return self.near(1, 1.5)
+
     def near(self, robot: int, metres: float) -> bool:
         """Whether a robot is near the spot."""
         position = self.sim.state.robots.bodies().position[robot, :2]
@@ -163,7 +167,7 @@ class Crew:
 
     def manipulator(self) -> dict | None:
         """Wait for the Husky; pick the parcel up, and put it on the deck."""
-        if not self.near(1, 1.5):
+        if not self.begins(self.sim):
             return None
         if not self.holds() and "place" not in self.sent.get("manipulator", ""):
             return {"type": "pick", "object": self.parcel}
@@ -260,51 +264,81 @@ def in_a_moving_bus(sim: Simulation) -> bool:
                                       if transit.aboard(bus))  # fmt: skip
 
 
-def scenes(world: World, community: Community, public_map: PublicMap, seed: int) -> dict[str, Scene]:
-    """Return the scenes of the film, in their order."""
-    people = {resident.id: resident for resident in community.residents}
+def works(who, stay: Stay) -> bool:
+    """Take who goes to work."""
+    return stay.tag == "work"
 
-    def walk(early: str, late: str, caption: str, wanted=lambda who, stay: True, view="behind", **config) -> Scene:
-        name, stay = on_the_way(community, world, early, late, wanted)
+
+def learns(who, stay: Stay) -> bool:
+    """Take a child who goes to school."""
+    return who.age < 14 and stay.tag == "study"
+
+
+def shops(who, stay: Stay) -> bool:
+    """Take who goes shopping alone."""
+    return who.age >= 16 and stay.tag == "shop"
+
+
+@dataclass
+class Casting:
+    """Finds who plays in the scenes of the film, each a method; a film shows them in their order here."""
+
+    world: World
+    community: Community
+    seed: int
+
+    def walk(self, early: str, late: str, caption: str, wanted=anybody, *, view="behind", after=6, **config) -> Scene:
+        """Return a scene of somebody on the way."""
+        name, stay = on_the_way(self.community, self.world, early, late, wanted)
+        called = next(one.name for one in self.community.residents if one.id == name)
+        start = stay.leave - 20
+        return Scene(caption.format(called), start, name, view, begins=outdoors(name, after), config=config)
+
+    def street(self) -> Scene:
+        """Return the morning."""
+        return self.walk("07:40", "09:30", "Morning: {} walks to work", works, after=20)
+
+    def school(self) -> Scene:
+        """Return a child on the way to school."""
+        return self.walk("06:30", "09:00", "{} goes to school", learns)
+
+    def bus(self) -> Scene:
+        """Return a ride, seen by the last who got on."""
+        public_map = PublicMap.from_world(self.world)
+        riders = {f"assistant_{k}": Passenger(public_map, self.seed, k) for k in range(PASSENGERS)}
+
+        def setup(sim: Simulation) -> None:
+            for name, rider in riders.items():
+                sim.scenario.place_agent(name, rider.here)
+            sim.state.people.cash[-PASSENGERS:] = 20.0
+
+        config, last = {"assistants": PASSENGERS}, f"assistant_{PASSENGERS - 1}"
+        return Scene("In the bus", 9 * 3600, last, "eyes", 17, in_a_moving_bus, config, setup, riders)
+
+    def shop(self) -> Scene:
+        """Return somebody who shops."""
+        scene = self.walk("08:00", "20:00", "{} shops", shops)
+        _, stay = on_the_way(self.community, self.world, "08:00", "20:00", shops)
+        return replace(scene, begins=arrived(scene.follow, stay.place), seconds=16)
+
+    def robots(self) -> Scene:
+        """Return the crew at work."""
+        crew = Crew()
+        config = {"robots": ROBOTS}
         return Scene(
-            caption.format(people[name].name), stay.leave - 20, name, view, begins=outdoors(name), config=config
+            "Robots at work", 11 * 3600, "robot_0", "orbit", 22, crew.begins, config, crew.setup, crew.players()
         )
 
-    def riding(sim: Simulation) -> bool:
-        people = sim.state.people
-        return (
-            bool(people.vehicle[people.names.index("assistant_0")])
-            and sim.state.transit.traffic.fleet["speed"][sim.state.transit.traffic.cars :].max() > 3.0
-        )
+    def rain(self) -> Scene:
+        """Return an evening in the rain."""
+        return self.walk("17:20", "18:10", "Rain at dusk", after=20, weather="rain", **AUTUMN)
 
-    def shopping(who, stay: Stay) -> bool:
-        return stay.tag == "shop" and who.age >= 16
+    def night(self) -> Scene:
+        """Return somebody on the way home at night."""
+        return self.walk("19:00", "22:00", "The lit night", after=60, weather="clear", **AUTUMN)
 
-    riders, crew = [Passenger(public_map, seed, k) for k in range(PASSENGERS)], Crew()
-    shopper, stay = on_the_way(community, world, "08:00", "20:00", shopping)
 
-    def at_the_stop(sim: Simulation) -> None:
-        for k, rider in enumerate(riders):
-            sim.scenario.place_agent(f"assistant_{k}", rider.here)
-        sim.state.people.cash[-PASSENGERS:] = 20.0
-
-    return {
-        "street": walk("07:40", "09:30", "Morning: {} walks to work", lambda who, stay: stay.tag == "work", after=20),
-        "school": walk("06:30", "09:00", "{} goes to school", lambda who, stay: who.age < 14 and stay.tag == "study"),
-        "bus": Scene(
-            "In the bus", 9 * 3600, f"assistant_{PASSENGERS - 1}", "eyes", 17, in_a_moving_bus,
-            {"assistants": PASSENGERS}, at_the_stop, {f"assistant_{k}": rider for k, rider in enumerate(riders)},
-        ),
-        "shop": Scene(
-            f"{people[shopper].name} shops", stay.leave - 5, shopper, "behind", 16, arrived(shopper, stay.place)
-        ),
-        "robots": Scene(
-            "Robots at work", 11 * 3600, "robot_0", "orbit", 22, lambda sim: crew.near(1, 1.5),
-            {"robots": ROBOTS}, crew.setup, crew.players(),
-        ),
-        "rain": walk("17:20", "18:10", "Rain at dusk", after=20, weather="rain", **AUTUMN),
-        "night": walk("19:00", "22:00", "The lit night", after=60, weather="clear", **AUTUMN),
-    }  # fmt: skip
+SCENES = ("street", "school", "bus", "shop", "robots", "rain", "night")
 
 
 def play(scene: Scene, out: Path, world: World, community: Community, seed: int) -> tuple[RepeatedRun, int]:
@@ -344,19 +378,17 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--size", default="1280x720")
     parser.add_argument("--samples", type=int, default=2, help="rays a pixel, along each side")
-    parser.add_argument("--scenes", default="", help="only these, separated by commas")
+    parser.add_argument("--scenes", default=",".join(SCENES), help="which, separated by commas")
     arguments = parser.parse_args()
 
     world = read_world(arguments.world)
     community = build_community(world, residents=arguments.residents, seed=arguments.seed)
-    public_map = PublicMap.from_world(world)
+    casting = Casting(world, community, arguments.seed)
     width, height = (int(side) for side in arguments.size.split("x"))
-    chosen = scenes(world, community, public_map, arguments.seed)
-    if arguments.scenes:
-        chosen = {name: chosen[name] for name in arguments.scenes.split(",")}
     arguments.out.mkdir(parents=True, exist_ok=True)
     with FilmWriter(arguments.out / "film.mp4", rate=RATE, crf=20, threads=2) as film:
-        for name, scene in chosen.items():
+        for name in arguments.scenes.split(","):
+            scene = getattr(casting, name)()
             repeated, first = play(scene, arguments.out / name, world, community, arguments.seed)
             settings = FilmSettings(
                 follow=scene.follow, view=scene.view, width=width, height=height, rate=RATE, samples=arguments.samples
