@@ -37,10 +37,11 @@ from vico.viewer.repeat import RepeatedRun
 from vico.viewer.run_film import FilmSettings, film_frames
 from vico.world.folder import World, read_world
 from vico.world.public import PublicMap
+from vico.world.walkable import CROSSING, ROADWAY
 
 RATE = 25
 ROBOTS = ("manipulator", "husky", "go2", "h1", "drone")
-PASSENGERS = 6
+PASSENGERS, ROAD = 6, (CROSSING, ROADWAY)
 PARCEL = (0.12, 0.18, 0.2)
 AUTUMN = {"date": "2026-10-20", "utc_offset": 3.0}
 
@@ -220,6 +221,15 @@ def way(resident, world: World, stay: Stay, before: str) -> float:
     return math.dist(places[stay.place].position[:2], places[before].position[:2])
 
 
+def roomiest(world: World) -> np.ndarray:
+    """Return the point farthest from everything solid, off the roads and 100 m within the world."""
+    room = np.where(np.isin(world.walkable.cls, ROAD), 0.0, world.walkable.clearance)
+    margin = round(100.0 / world.walkable.cell)
+    inner = np.minimum(room[margin:-margin, margin:-margin], 12.0)
+    row, column = np.unravel_index(int(np.argmax(inner)), inner.shape)
+    return world.walkable.centre_of(np.array([column + margin, row + margin]))
+
+
 def anybody(resident, stay: Stay) -> bool:
     """Take whoever it is."""
     return True
@@ -322,11 +332,19 @@ class Casting:
         return replace(scene, begins=arrived(scene.follow, stay.place), seconds=16)
 
     def robots(self) -> Scene:
-        """Return the crew at work."""
-        crew = Crew()
-        config = {"robots": ROBOTS}
+        """Return the crew at work, on the square of the world with the most room."""
+        crew, middle = Crew(), roomiest(self.world)
+        around = {
+            "robot_0": (0, 0, 0),
+            "robot_1": (9, 1, 3),
+            "robot_2": (7, 7, -2),
+            "robot_3": (6, -7, 2),
+            "robot_4": (-6, 5, 0),
+        }
+        places = {name: (middle[0] + x, middle[1] + y, yaw) for name, (x, y, yaw) in around.items()}
+        config = {"robots": ROBOTS, "robot_places": places}
         return Scene(
-            "Robots at work", 11 * 3600, "robot_0", "orbit", 22, crew.begins, config, crew.setup, crew.players()
+            "Robots at work", 11 * 3600, "robot_0", "orbit", 22, config=config, setup=crew.setup, players=crew.players()
         )
 
     def rain(self) -> Scene:

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,8 +13,10 @@ import pytest
 from robot_field import HALF, PACKS, field, people
 from vico.errors import InputError
 from vico.sim.bodies import OBJECT, Bodies
+from vico.sim.config import SimConfig
 from vico.sim.robots import RobotPopulation, RobotStatus
 from vico.sim.robots.gait import LegGeometry, leg_angles
+from vico.sim.simulation import Simulation
 from vico.world.heights import HeightField
 
 #: Of Go2: lengths of thigh and shin 0.213 m, 0.0955 m from the hip to the leg (Unitree's description).
@@ -42,6 +45,33 @@ def gap(robots: RobotPopulation, persons: Bodies) -> float:
 def test_an_unknown_robot_is_refused() -> None:
     with pytest.raises(InputError, match="'rover' is not known; choose among drone, go2, h1, husky, manipulator"):
         RobotPopulation(field(), ["rover"])
+
+
+def test_robots_start_where_a_run_places_them_and_the_others_by_the_seed() -> None:
+    config = SimConfig(robots=("husky", "husky"), robot_places={"robot_1": (3.0, -2.0, 0.5)}, observe=(), seed=1)
+    robots = Simulation(field(), None, config).state.robots
+    assert robots is not None
+    bodies = robots.bodies()
+    assert bodies.position[1, :2] == pytest.approx([3.0, -2.0])
+    assert bodies.yaw[1] == pytest.approx(0.5)
+    assert np.hypot(*(bodies.position[0] - bodies.position[1])[:2]) > 3.0
+
+
+@pytest.mark.parametrize(
+    ("places", "says"),
+    [
+        ({"robot_7": (0, 0, 0)}, "nobody is called 'robot_7'; there are robot_0, robot_1"),
+        ({"robot_0": (0, 0)}, r"robot_0: \(0, 0\); give x, y"),
+        ({"robot_0": (0, float("nan"), 0)}, "give x, y"),
+        ({"robot_0": "here"}, "robot_0: 'here'; give x, y"),
+        ({"robot_0": (1e6, 0, 0)}, "there is no free ground"),
+        ({"robot_0": (0, 0, 0), "robot_1": (0.5, 0, 0)}, "robot_1 would stand in robot_0"),
+        ([1], "give a table of places by name"),
+    ],
+)
+def test_places_of_robots_that_make_no_sense_are_refused(places: Any, says: str) -> None:
+    with pytest.raises(InputError, match=f"robot_places: .*{says}"):
+        Simulation(field(), None, SimConfig(robots=("husky", "husky"), robot_places=places, observe=()))
 
 
 def test_husky_drives_ten_metres_straight() -> None:

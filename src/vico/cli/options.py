@@ -167,6 +167,8 @@ class RunOptions:
         Seconds to simulate.
     robots
         Names, separated by commas; none for no robots.
+    robot_places
+        File (.json) of where robots start: {"robot_0": [x, y, yaw]}; metres and radians. Without it by the seed.
     physics
         Engine that moves robots: mujoco, or genesis (an extra).
     cars
@@ -227,6 +229,7 @@ class RunOptions:
     opening_hours: bool = False
     steps: int = 1800
     robots: CommaSeparated = "husky,go2"
+    robot_places: Path | None = None
     physics: Literal["mujoco", "genesis"] = "mujoco"
     cars: int = 30
     pedestrians: int = 30

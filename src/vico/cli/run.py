@@ -124,6 +124,7 @@ class _Job:
             events=named_or_read(options.events),
             opening_hours=options.opening_hours,
             robots=_names(options.robots),
+            robot_places=read_json(options.robot_places) if options.robot_places is not None else {},
             physics=options.physics,
             errands=True,
             cars=options.cars,

@@ -230,8 +230,8 @@ def make(
     setup
         Called with the fresh `Simulation` at each reset.
     options
-        `seed`, `start`, `residents`, `assistants`, `robots`, `errands`, `cars`, `pedestrians`, `junctions`, `transit`,
-        `observe`, `image`, `periods` and `max_steps`, as `vico.envs.spec.EnvSpec` has them.
+        `seed`, `start`, `residents`, `assistants`, `robots`, `robot_places`, `errands`, `cars`, `pedestrians`,
+        `junctions`, `transit`, `observe`, `image`, `periods` and `max_steps`, as `vico.envs.spec.EnvSpec` has them.
 
     Raises
     ------

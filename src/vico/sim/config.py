@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -33,6 +34,8 @@ class SimSettings:
         Model names; robot ``i`` is the agent ``robot_i``.
     physics
         Engine that moves them: ``"mujoco"``, or ``"genesis"`` (an extra, see docs/physics.md).
+    robot_places
+        Where robots start, by name: x, y (ENU metres) and yaw (radians); the others start where the seed says.
     errands
         Robots that nobody controls go from place to place.
     cars, pedestrians
@@ -77,6 +80,7 @@ class SimSettings:
     assistants: int = 0
     robots: tuple[str, ...] = ()
     physics: str = "mujoco"
+    robot_places: Mapping[str, Sequence[float]] = field(default_factory=dict)
     errands: bool = False
     cars: int = 0
     pedestrians: int = 0
@@ -125,6 +129,7 @@ class SimConfig(SimSettings):
         if not 16 <= self.image <= 1024:
             raise InputError(f"simulation: images of {self.image} pixels are out of range; take 16..1024, such as 256")
         object.__setattr__(self, "outputs", checked_outputs(self.outputs))
+        object.__setattr__(self, "robot_places", _checked_places(self.robot_places))
         RenderQuality.of(self.quality)
         if self.renderer not in RENDERERS:
             raise InputError(f"simulation: renderer {self.renderer!r}; it has to be one of {', '.join(RENDERERS)}")
@@ -134,3 +139,19 @@ class SimConfig(SimSettings):
     def record(self) -> dict[str, Any]:
         """Return the configuration as it goes into `run.json`."""
         return asdict(self)
+
+
+def _checked_places(places: Any) -> dict[str, tuple[float, ...]]:
+    """Return where robots are to start, as floats: equal places are equal configurations."""
+    if not isinstance(places, Mapping):
+        raise InputError('robot_places: give a table of places by name, such as {"robot_0": [x, y, yaw]}')
+    found: dict[str, tuple[float, ...]] = {}
+    for name, values in places.items():
+        try:
+            place = tuple(float(value) for value in values)
+        except (TypeError, ValueError):
+            place = ()
+        if len(place) != 3 or not all(math.isfinite(value) for value in place):
+            raise InputError(f"robot_places: {name}: {values!r}; give x, y (ENU metres) and yaw (radians)")
+        found[str(name)] = place
+    return found

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,10 +17,13 @@ from vico.sim.robots import RobotPopulation
 from vico.sim.state import FIRST_BIKE, FIRST_ROBOT, FIRST_TRAFFIC, FIRST_TRAM
 from vico.sim.traffic import JunctionRule, Traffic
 from vico.sim.transit import BusPlan, TransitSystem
+from vico.world.folder import World
 
 # Robots start where there is this much free ground, and this far from everybody, metres.
 _ROBOT_ROOM = 1.0
 _ROBOT_APART = 1.5
+# Those with a place of their own need no more than this.
+_ROBOT_RADIUS = 0.6
 
 
 def traffic_and_transit_of(base: SimulationBase, config: SimConfig) -> tuple[Traffic | None, TransitSystem | None]:
@@ -58,23 +63,48 @@ def robots_of(base: SimulationBase, config: SimConfig, others: Bodies, *, errand
     if not config.robots:
         return None
     world = base.world
-    spawns: list[NDArray[np.float64]] = []
+    names = [f"robot_{i}" for i in range(len(config.robots))]
+    places = _given_places(config.robot_places, names, world)
     for i, kind in enumerate(config.robots):
+        if names[i] in places:
+            continue
         stream = rng(config.seed, "robot spawn", i)
         for _ in range(300):
             xy = world.walkable.random_point(stream, clearance=_ROBOT_ROOM)
-            far = all(np.hypot(*(xy - spawn[:2])) > 2 * _ROBOT_APART for spawn in spawns)
+            far = all(np.hypot(*(xy - place[:2])) > 2 * _ROBOT_APART for place in places.values())
             if far and (not len(others) or clearances(xy, others).min() > _ROBOT_APART):
                 break
         else:
             raise InputError(f"robots: no free ground for robot {i} ({kind}); take fewer robots")
-        spawns.append(np.array([*xy, stream.uniform(-np.pi, np.pi)]))
+        places[names[i]] = np.array([*xy, stream.uniform(-np.pi, np.pi)])
     return RobotPopulation(
         world,
         config.robots,
-        np.array(spawns),
+        np.array([places[name] for name in names]),
         seed=config.seed,
         first_entity=FIRST_ROBOT,
         errands=errands,
         scene=base.robot_scene(config.robots, config.physics),
     )
+
+
+def _given_places(
+    given: Mapping[str, Sequence[float]], names: Sequence[str], world: World
+) -> dict[str, NDArray[np.float64]]:
+    """Return where robots start that a run gives places, by name: x, y, yaw."""
+    found: dict[str, NDArray[np.float64]] = {}
+    for name, values in given.items():
+        if name not in names:
+            raise InputError(f"robot_places: nobody is called {name!r}; there are {', '.join(names)}")
+        place = np.array(values)
+        if not world.walkable.is_connected(place[:2]) or float(world.walkable.clearance_at(place[:2])) < _ROBOT_RADIUS:
+            raise InputError(
+                f"robot_places: {name}: at ({place[0]:.1f}, {place[1]:.1f}) there is no free ground that one gets away "
+                "from; give another place"
+            )
+        near = [other for other, at in found.items() if np.hypot(*(at - place)[:2]) < 2 * _ROBOT_RADIUS]
+        if near:
+            apart = 2 * _ROBOT_RADIUS
+            raise InputError(f"robot_places: {name} would stand in {near[0]}; give them places {apart} m apart")
+        found[name] = place
+    return found
