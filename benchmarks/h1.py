@@ -31,9 +31,14 @@ KERBS = (0.04, 0.08, 0.12)
 
 
 def team(world: World, count: int, *, x: float = -20.0, yaw: float = 0.0) -> RobotPopulation:
-    """Return robots beside each other, 3 m apart."""
-    y = 3.0 * (np.arange(count) - (count - 1) / 2)
-    return RobotPopulation(world, ["h1"] * count, np.column_stack([np.full(count, x), y, np.full(count, yaw)]))
+    """Return robots beside each other, 3 m apart and each a little further ahead, in other phases of their steps."""
+    k = np.arange(count)
+    places = np.column_stack([x + 0.09 * k, 3.0 * (k - (count - 1) / 2), np.full(count, yaw)])
+    robots = RobotPopulation(world, ["h1"] * count, places)
+    for robot in range(count):
+        robots.drive(robot, (0.08 * robot, 0.0, 0.0))
+    advance(robots, 0.7)
+    return robots
 
 
 def advance(robots: RobotPopulation, seconds: float) -> set[int]:
@@ -49,7 +54,7 @@ def speeds() -> list[str]:
     """Commanded and reached velocity over 10 s after 3 s."""
     lines = ["| commanded vx, vy (m/s), wz (rad/s) | reached | falls of 8 |", "|---|---|---|"]
     ahead = [(speed, 0.0, 0.0) for speed in (0.3, 0.5, 0.7, 1.0, -0.3)]
-    for command in [*ahead, (0.0, 0.2, 0.0), (0.0, 0.0, 0.4), (0.0, 0.0, 0.8), (0.5, 0.0, 0.5)]:
+    for command in [*ahead, (0.0, 0.1, 0.0), (0.0, 0.0, 0.4), (0.0, 0.0, 0.8), (0.5, 0.0, 0.5)]:
         robots = team(field(), 8, x=-15.0)
         for robot in range(8):
             robots.drive(robot, command)
@@ -99,11 +104,10 @@ def pushes() -> list[str]:
         shares = []
         for size in sizes:
             survived = 0
-            for delay in (3.0, 3.2):
+            for delay in (4.0, 4.2):
                 robots = team(field(), 8)
-                if any(command):
-                    for robot in range(8):
-                        robots.drive(robot, command)
+                for robot in range(8):
+                    robots.drive(robot, command)
                 advance(robots, delay)
                 for robot in range(8):
                     shove(robots, robot, size / 0.1, robot * np.pi / 4)

@@ -158,7 +158,7 @@ def h1(packs: bool = True) -> RobotModel:
         controller=TwoLegs(weights, biases, STRIDE, MASS, CHEST),
         action_spaces={
             "joints": ActionSpace("motors", JOINTS, ("rad",) * len(JOINTS), low, high),
-            "velocity": velocity_space(1.0, 0.2, 0.8),
+            "velocity": velocity_space(1.0, 0.1, 0.8),
         },
         control_period=0.02,
         sensors=Sensors(contacts=tuple(f"{side}_ankle" for side in SIDES), camera=_EYE, camera_pitch=_EYE_PITCH),
