@@ -20,6 +20,8 @@ _LINES = 2
 _RANGE = 8.0
 # Who is younger talks of other things, years.
 _GROWN_UP = 18
+# From this hour on one asks how school was.
+_SCHOOL_IS_OUT = 13
 
 
 class Speaker(Protocol):
@@ -150,7 +152,7 @@ class Conversation:
     def _greetings(self, person: Acquaintance, time: float, errand: str) -> list[str]:
         other = person.first_name
         if min(self._me.age, person.age) < _GROWN_UP:
-            return self._greetings_with_children(person, errand)
+            return self._greetings_with_children(person, errand, time % DAY / 3600)
         hour = time % DAY / 3600
         hello = "Good morning" if hour < 11 else "Hello" if hour < 18 else "Good evening"
         lines = [
@@ -166,11 +168,12 @@ class Conversation:
             lines.append(f"{hello}, {other}! Is everything all right at home?")
         return lines
 
-    def _greetings_with_children(self, person: Acquaintance, errand: str) -> list[str]:
+    def _greetings_with_children(self, person: Acquaintance, errand: str, hour: float) -> list[str]:
         """Return what children say, and what is said to them."""
         other = person.first_name
         if self._me.age >= _GROWN_UP:
-            lines = [f"Hello, {other}! How was school?", f"Hi {other}! Where are you off to?"]
+            school = "How was school?" if hour >= _SCHOOL_IS_OUT else "Have you got everything for school?"
+            lines = [f"Hello, {other}! {school}", f"Hi {other}! Where are you off to?"]
             if person.kind != "family":
                 lines.append(f"Hello, {other}! You have grown again.")
             return lines
