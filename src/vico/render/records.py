@@ -192,6 +192,7 @@ CASTER = np.dtype(
         ("reach", f8, (16, 3)),  # camera frame: corners of its box with a rim, and the same moved along its shadow
         ("half_height", f8),  # metres
         ("foot", f8),  # height of its lowest point
+        ("inverse_soft", f8),  # of the length of light's way through it that makes a full shadow, 1/m
         ("first_column", i8),  # of the picture's part that it may darken
         ("end_column", i8),
         ("first_row", i8),

@@ -23,8 +23,9 @@ from vico.render.visibility.fill import inverse_depth, triangle_number
 
 # An avatar's shadow is that of an ellipsoid of at most this half width, metres: arms and coats are thin.
 _AVATAR_HALF_WIDTH = 0.30
-# Lengths of the light's way through a unit ball and a unit box that make a full shadow.
-_SOFT_BALL, _SOFT_BOX = 0.22, 0.5
+# Lengths of the light's way through an avatar's ball and through a box that make a full shadow, metres; of what is
+# thinner, such as a robot's legs, its thinnest side does.
+_SOFT_BALL, _SOFT_BOX, _THINNEST = 0.22, 0.5, 0.02
 # The longest shadow, metres; a sun this low casts no longer ones.
 _LONGEST_SHADOW, _LOWEST_SUN = 14.0, 0.08
 # Out of doors, what is further away than this casts no shadow, metres.
@@ -45,7 +46,6 @@ _INDEX = 0x7FFFFFFF
 # What rounding may move a caster's centre by, and far more, metres.
 _SLACK = 0.1
 _DEPTH, _REACHED, _ABOVE, _UNIT_A, _UNIT_B, _UNIT_C, _LEFT = (k * STRIDE for k in range(7))
-_INVERSE_SOFT_BALL, _INVERSE_SOFT_BOX = np.float32(1.0 / _SOFT_BALL), np.float32(1.0 / _SOFT_BOX)
 
 
 class CoarseDepth(NamedTuple):
@@ -223,10 +223,21 @@ def set_caster(scene: Any, k: int, camera: Any, light: Any, reach: float, caster
     axes = caster.half_axes
     caster.half_height = abs(axes[2, 0]) + abs(axes[2, 1]) + abs(axes[2, 2])
     caster.foot = caster.centre[2] - caster.half_height
+    caster.inverse_soft = 1.0 / (_SOFT_BALL if avatar >= 0 else _soft_length(axes))
     if not _set_unit_frame(caster, light):
         return False
     _set_reach(caster, camera, light)
     return _set_screen_bounds(caster, camera)
+
+
+@inlined
+def _soft_length(half_axes: Any) -> float:
+    """Return the length of light's way through a box that makes a full shadow, metres."""
+    least = _SOFT_BOX
+    for axis in range(3):
+        x, y, z = half_axes[0, axis], half_axes[1, axis], half_axes[2, axis]
+        least = min(least, 2.0 * np.sqrt(x * x + y * y + z * z))
+    return max(least, _THINNEST)
 
 
 @inlined
@@ -278,6 +289,7 @@ def _darken(camera: Any, buffers: Any, caster: Any, own: int, own_end: int) -> N
     """
     # Taken out of their tuple once: that costs as much as a block.
     keys, real, sun, contact = buffers.keys, buffers.real, buffers.sun, buffers.contact
+    soft = np.float32(caster.inverse_soft)
     sun_way, is_round, indoors, width = caster.sun, caster.is_round != 0, camera.indoors != 0, camera.width
     first_row, end_row, first_column, end_column = (
         caster.first_row,
@@ -298,7 +310,7 @@ def _darken(camera: Any, buffers: Any, caster: Any, own: int, own_end: int) -> N
             _lay_line(line_b, row, column, _UNIT_B, real)
             if not indoors:
                 _lay_line(line_c, row, column, _UNIT_C, real)
-                _shadow_of_block(sun_way, is_round, real)
+                _shadow_of_block(sun_way, soft, is_round, real)
                 _multiply(sun, pixel, end_column - column, real)
             _contact_of_block(is_round, real)
             _multiply(contact, pixel, end_column - column, real)
@@ -360,16 +372,16 @@ def _take_out_unreached(tallest: Any, real: Any) -> None:
 
 
 @inlined
-def _shadow_of_block(sun: Any, is_round: bool, real: Any) -> None:
+def _shadow_of_block(sun: Any, soft: Any, is_round: bool, real: Any) -> None:
     """Lay what the caster leaves of the sun."""
     sun_a, sun_b, sun_c = np.float32(sun[0]), np.float32(sun[1]), np.float32(sun[2])
     if is_round:
         for i in range(_BLOCK):
-            shadow = _ball_shadow(real[_UNIT_A + i], real[_UNIT_B + i], real[_UNIT_C + i], sun_a, sun_b, sun_c)
+            shadow = _ball_shadow(real[_UNIT_A + i], real[_UNIT_B + i], real[_UNIT_C + i], sun_a, sun_b, sun_c, soft)
             real[_LEFT + i] = _ONE - shadow * real[_REACHED + i]
     else:
         for i in range(_BLOCK):
-            shadow = _box_shadow(real[_UNIT_A + i], real[_UNIT_B + i], real[_UNIT_C + i], sun_a, sun_b, sun_c)
+            shadow = _box_shadow(real[_UNIT_A + i], real[_UNIT_B + i], real[_UNIT_C + i], sun_a, sun_b, sun_c, soft)
             real[_LEFT + i] = _ONE - shadow * real[_REACHED + i]
 
 
@@ -401,7 +413,7 @@ def _shadow_of_way(near: Any, far: Any, soft: Any) -> Any:
 
 
 @inlined
-def _ball_shadow(a: Any, b: Any, c: Any, sun_a: Any, sun_b: Any, sun_c: Any) -> Any:
+def _ball_shadow(a: Any, b: Any, c: Any, sun_a: Any, sun_b: Any, sun_c: Any, soft: Any) -> Any:
     """Return the shadow of the unit ball at a point, all float32."""
     # Distances along the ray at which it enters and leaves the ball; where it misses, both are its nearest point's.
     qa = sun_a * sun_a + sun_b * sun_b + sun_c * sun_c
@@ -409,16 +421,16 @@ def _ball_shadow(a: Any, b: Any, c: Any, sun_a: Any, sun_b: Any, sun_c: Any) -> 
     qc = a * a + b * b + c * c - _ONE
     root = np.sqrt(max(qb * qb - qa * qc, _ZERO))
     inverse = _ONE / qa
-    return _shadow_of_way((-qb - root) * inverse, (-qb + root) * inverse, _INVERSE_SOFT_BALL)
+    return _shadow_of_way((-qb - root) * inverse, (-qb + root) * inverse, soft)
 
 
 @inlined
-def _box_shadow(a: Any, b: Any, c: Any, sun_a: Any, sun_b: Any, sun_c: Any) -> Any:
+def _box_shadow(a: Any, b: Any, c: Any, sun_a: Any, sun_b: Any, sun_c: Any, soft: Any) -> Any:
     """Return the shadow of the box with corners at +-1 at a point, all float32."""
     near_a, far_a = _slab(a, sun_a)
     near_b, far_b = _slab(b, sun_b)
     near_c, far_c = _slab(c, sun_c)
-    return _shadow_of_way(max(near_a, near_b, near_c), min(far_a, far_b, far_c), _INVERSE_SOFT_BOX)
+    return _shadow_of_way(max(near_a, near_b, near_c), min(far_a, far_b, far_c), soft)
 
 
 @inlined
