@@ -16,19 +16,23 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from vico.assets.models.in_hand import in_hand_models
+from vico.assets.models.movable import movable_surfaces
 from vico.assets.people import Appearance, body_of
 from vico.assets.vehicles import bicycle
 from vico.render import Cameras, Lighting, Scene, render
 from vico.render.skinning import batch_bodies, skin
 from vico.seeds import rng
-from vico.sim.animation import CLIPS, Transition, clip_index, ground_under_feet, pose, style_of
+from vico.sim.animation import CLIPS, Hands, Hold, Transition, clip_index, free_hands, ground_under_feet, pose, style_of
 from vico.sim.animation.blending import is_seated
+from vico.sim.hands_scene import Holders, draw_umbrellas
 from vico.world.mesh import Material, Surface
 
 MOMENTS = 8
 APART, TALL = 30.0, 2.1  # metres
 SPEEDS = {"walk": 1.2, "carry": 1.0, "carry_left": 1.0, "carry_right": 1.0, "run": 2.5}
 TRANSITIONS = (("idle", "walk"), ("walk", "idle"), ("walk", "run"), ("idle", "sit"), ("sit", "idle"), ("idle", "talk"))
+HELD = ("walk + umbrella", "idle + umbrella", "walk + parcel", "idle + parcel")
 LOOKS = (
     Appearance(age=31, height=1.74, top="jacket", top_colour=(150, 60, 50)),
     Appearance(gender=0.0, age=7, height=1.2, hair="ponytail", top_colour=(80, 140, 90)),
@@ -63,6 +67,7 @@ def row(name: str, look: Appearance, height: int) -> NDArray[np.uint8]:
     style = np.repeat(style_of(body, rng(1, "manner", name), age=look.age)[None], MOMENTS)
     spots = np.zeros((MOMENTS, 3))
     before, _, clip = name.rpartition(" > ")
+    clip, _, held = clip.partition(" + ")
     uphill = clip == "kerb"
     clip = "walk" if uphill else clip
     number = np.full(MOMENTS, clip_index(clip))
@@ -82,7 +87,11 @@ def row(name: str, look: Appearance, height: int) -> NDArray[np.uint8]:
         share = x / 1.32 % 1.0
     moves = number, share, speed, style
     under = ground_under_feet(*moves, (places, np.zeros(MOMENTS)), ground)
-    rotations, offsets = pose(*moves, second=100.0 + 3.0 * share[0], after=after, ground=under)
+    hands = free_hands(MOMENTS)
+    if held:
+        hold = {"umbrella": Hold.UMBRELLA_RIGHT, "parcel": Hold.BEFORE_CHEST}[held]
+        hands = Hands(hands.gesture, np.full(MOMENTS, int(hold)), np.ones(MOMENTS), np.full(MOMENTS, 0.3))
+    rotations, offsets = pose(*moves, second=100.0 + 3.0 * share[0], after=after, ground=under, hands=hands)
     spots[:, 1] = APART * np.arange(MOMENTS)
     batch = batch_bodies([body] * MOMENTS, [10 + k for k in range(MOMENTS)])
     turn = np.full(MOMENTS, 0.0)
@@ -91,13 +100,46 @@ def row(name: str, look: Appearance, height: int) -> NDArray[np.uint8]:
     solid += [box((0.0, 1.2), (y - 0.4, y + 0.4), 0.12) for y in spots[:, 1] if uphill]
     seated = is_seated(clip_index(clip)) or clip == "ride_bus"
     solid += [box((-0.32, 0.12), (y - 0.25, y + 0.25), 0.45) for y in spots[:, 1] if seated]
-    scene = Scene(solid, lighting=Lighting(), prototypes={"bicycle": [bicycle()]})
+    scene = Scene(solid, lighting=Lighting(), prototypes=_prototypes())
     if clip == "ride_bike":
         frames = np.tile(np.eye(4), (MOMENTS, 1, 1))
         frames[:, :3, 3] = spots
         scene.set_rigid(np.zeros(MOMENTS, np.int32), frames, np.full(MOMENTS, 5))
+    who = Holders(
+        batch.joints, rotations, offsets, spots + places, turn, number, share, hands,
+        np.full(MOMENTS, body.height), np.arange(MOMENTS, dtype=np.int32),
+    )  # fmt: skip
+    in_hand(scene, who, held or _MEALS.get(clip, ""))
     scene.set_skinned(vertices, normals, batch.triangles, batch.colour, batch.entity)
     return pictures(scene, spots, height)
+
+
+_MEALS = {"drink": "paper_cup", "eat": "sandwich", "sit_drink": "mug", "sit_eat": "sandwich"}
+
+
+def _prototypes() -> dict[str, list[Surface]]:
+    known = {name: model.surfaces for name, model in in_hand_models().items()}
+    return known | {"bicycle": [bicycle()], "parcel": movable_surfaces("parcel", "red")}
+
+
+def in_hand(scene: Scene, who: Holders, what: str) -> None:
+    """Put what people of a row hold into the scene."""
+    if not what:
+        return
+    rows = np.arange(MOMENTS)
+    if what == "umbrella":
+        drawn = draw_umbrellas(who, MOMENTS)
+        assert drawn is not None
+        frames, names = drawn.transforms, [drawn.prototypes[k] for k in drawn.index]
+    else:
+        palms = who.palms(rows)
+        points = palms.mean(axis=1) - np.array([0.0, 0.0, 0.12]) if what == "parcel" else palms[:, 1]
+        frames, names = np.tile(np.eye(4), (MOMENTS, 1, 1)), [what] * MOMENTS
+        if what == "sandwich":  # it points at the face
+            frames[:, :2, :2] *= -1.0
+        frames[:, :3, 3] = who.world(rows, points)
+    index = np.array([scene.names[name] for name in names], np.int32)
+    scene.set_rigid(index, np.asarray(frames, np.float64), np.full(MOMENTS, 7))
 
 
 def pictures(scene: Scene, spots: NDArray[np.float64], height: int) -> NDArray[np.uint8]:
@@ -118,7 +160,11 @@ def main() -> None:
     parser.add_argument("--height", type=int, default=150, help="of a person's picture, pixels")
     parser.add_argument("--columns", type=int, default=2, help="of rows beside each other")
     arguments = parser.parse_args()
-    names = arguments.clips.split(",") if arguments.clips else [*CLIPS, "kerb", *(f"{a} > {b}" for a, b in TRANSITIONS)]
+    names = (
+        arguments.clips.split(",")
+        if arguments.clips
+        else [*CLIPS, *HELD, "kerb", *(f"{a} > {b}" for a, b in TRANSITIONS)]
+    )
     drawn = [Image.fromarray(row(name, LOOKS[k % len(LOOKS)], arguments.height)) for k, name in enumerate(names)]
     wide, high = drawn[0].width + 6, drawn[0].height + 4
     rows = -(-len(names) // arguments.columns)
@@ -126,7 +172,7 @@ def main() -> None:
     for k, (name, picture) in enumerate(zip(names, drawn, strict=True)):
         ImageDraw.Draw(picture).text((4, 2), name, "black", ImageFont.load_default(13))
         sheet.paste(picture, (k // rows * wide, k % rows * high))
-    sheet.save(arguments.out, quality=80)
+    sheet.save(arguments.out, quality=60)
 
 
 if __name__ == "__main__":

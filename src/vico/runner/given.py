@@ -83,6 +83,8 @@ def own_map(public_map: PublicMap) -> PublicMap:
 def sent_info(info: Mapping[str, Any]) -> dict[str, Any]:
     """Return an info as plain data with text as keys, to be sent; `received_info` makes an info of it again."""
     sent = {name: value for name, value in info.items() if name not in ("entities", "in_view")}
+    if "rest" in sent:
+        sent["rest"] = dict(sent["rest"])
     sent["entities"] = [[entity, dict(about)] for entity, about in info.get("entities", {}).items()]
     sent["in_view"] = _listed(info["in_view"]).record() if "in_view" in info else None
     return sent

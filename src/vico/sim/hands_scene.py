@@ -86,13 +86,14 @@ def hands_of_pedestrians(habit: NDArray[np.float64], rain: float) -> Hands:
 
 def draw_in_hands(state: SimulationState, who: Holders) -> list[Drawn]:
     """Return what is drawn in everybody's hands, and the movable objects that lie about."""
-    drawn = [_umbrellas(state, who), _meals(state, who)]
+    drawn = [draw_umbrellas(who, len(state.people)), _meals(state, who)]
     if len(state.objects):
         drawn.append(_objects(state, who))
     return [lot for lot in drawn if lot is not None]
 
 
-def _umbrellas(state: SimulationState, who: Holders) -> Drawn | None:
+def draw_umbrellas(who: Holders, agents: int) -> Drawn | None:
+    """Return the umbrellas that are up, None without any; the first so many holders are agents."""
     hold = who.hands.hold
     is_umbrella = (hold == int(Hold.UMBRELLA_LEFT)) | (hold == int(Hold.UMBRELLA_RIGHT))
     rows = np.flatnonzero(is_umbrella & (who.hands.share > 0.25))
@@ -109,7 +110,7 @@ def _umbrellas(state: SimulationState, who: Holders) -> Drawn | None:
     opened = np.clip((who.hands.share[rows] - 0.25) / 0.75, 0.0, 1.0)
     wide = size * (0.1 + 0.9 * opened)
     axes = np.stack([ahead * wide[:, None], np.cross(up, ahead) * wide[:, None], up * size[:, None]], axis=2)
-    names, agents = umbrellas(), len(state.people)
+    names = umbrellas()
     number = np.where(rows < agents, FIRST_UMBRELLA + rows, FIRST_PEDESTRIAN_UMBRELLA + rows - agents)
     return Drawn(
         names,

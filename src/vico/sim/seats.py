@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,6 +46,37 @@ class Rest(NamedTuple):
     entity: int
     door: str
     stand: tuple[float, float, float]
+
+
+class Rests(Mapping[str, "dict[str, Any] | None"]):
+    """The nearest free seat (``sit``) and bed (``lie``), or None; looked for when somebody asks.
+
+    Parameters
+    ----------
+    find
+        Finds a seat (False) or a bed (True).
+    """
+
+    def __init__(self, find: Callable[[bool], Rest | None]) -> None:
+        self._find = find
+        self._found: dict[str, dict[str, Any] | None] = {}
+
+    def __getitem__(self, name: str) -> dict[str, Any] | None:
+        """Return a rest as plain data."""
+        if name not in ("sit", "lie"):
+            raise KeyError(name)
+        if name not in self._found:
+            rest = self._find(name == "lie")
+            self._found[name] = None if rest is None else rest._asdict()
+        return self._found[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Yield both names."""
+        return iter(("sit", "lie"))
+
+    def __len__(self) -> int:
+        """Return 2."""
+        return 2
 
 
 @dataclass(frozen=True)

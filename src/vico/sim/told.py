@@ -15,7 +15,7 @@ from vico.sim.city import ANNOUNCED, has_news, known_events
 from vico.sim.moves import eye_height
 from vico.sim.perception import OUTDOORS, AllInView, Eyes, in_view, opaque_grid
 from vico.sim.queues import place_in_line
-from vico.sim.seats import find_rest
+from vico.sim.seats import Rests, find_rest
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture, Vehicle
 
@@ -118,19 +118,18 @@ class Told:
             view.furniture = indoor.furniture[indoor.furniture_start[room] : indoor.furniture_start[room + 1]]
         return found | {"in_view": view, "rest": self._rest(i)}
 
-    def _rest(self, i: int) -> dict[str, Any]:
-        """Return the nearest free seat and bed, or the way there; none while one rides, sits or lies."""
+    def _rest(self, i: int) -> Rests:
+        """Return the nearest free seat and bed, or the way there; none while one rides or lies."""
         p, state = self._state.people, self._state
         if p.vehicle.item(i) != Vehicle.NONE or p.posture.item(i) == Posture.LYING:
-            return {"sit": None, "lie": None}
-        if self._seats_taken is None:
-            self._seats_taken = state.seats_taken()
+            return Rests(lambda lies: None)
         here = p.position[i], p.room.item(i)
-        found = {
-            name: find_rest(state.seats, state.indoor, here, self._seats_taken, lies=lies)
-            for name, lies in (("sit", False), ("lie", True))
-        }
-        return {name: None if rest is None else rest._asdict() for name, rest in found.items()}
+        return Rests(lambda lies: find_rest(state.seats, state.indoor, here, self._taken(), lies=lies))
+
+    def _taken(self) -> NDArray[np.bool_]:
+        if self._seats_taken is None:
+            self._seats_taken = self._state.seats_taken()
+        return self._seats_taken
 
     def crowd(self) -> Crowd:
         """Return all agents' observations as arrays."""

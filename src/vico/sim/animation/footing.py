@@ -19,9 +19,9 @@ from vico.sim.animation.stride import stride_length
 from vico.sim.animation.style import KERNEL_STYLE
 
 # Heel and ball of a foot, shares of its length behind the ankle and before it.
-_HEEL, _BALL = 0.7, 0.7
+_HEEL, _BALL = 1.0, 1.05
 # Steeper than this under one foot is an edge: the foot stands on it.
-_EDGE = 0.35
+_EDGE = 0.22
 
 
 def ground_under_feet(

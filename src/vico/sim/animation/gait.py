@@ -152,7 +152,7 @@ def _swing(body: Any, side: int, t: float, gait: Any) -> Any:
     # Up a kerb the foot rises first and goes ahead then; down it goes ahead first.
     step = ground[NEXT, LEVEL] - ground[HERE, LEVEL]
     kerb = min(abs(step) / 0.1, 1.0)
-    early = smoothstep((1 + 0.6 * kerb) * t - (0.0 if step > 0 else 0.6 * kerb))
+    early = smoothstep((1 + 1.6 * kerb) * t - (0.0 if step > 0 else 1.6 * kerb))
     z = off.z + (down.z - off.z) * early + gait.lift * rise * (0.25 + 0.75 * rise) + 0.3 * abs(step) * rise * rise
     # Neither toes nor heel touch the ground while the foot swings.
     floor = ground[HERE, LEVEL] + step * early
