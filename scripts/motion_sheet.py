@@ -104,7 +104,7 @@ def row(name: str, look: Appearance, height: int) -> NDArray[np.uint8]:
     if clip == "ride_bike":
         frames = np.tile(np.eye(4), (MOMENTS, 1, 1))
         frames[:, :3, 3] = spots
-        scene.set_rigid(np.zeros(MOMENTS, np.int32), frames, np.full(MOMENTS, 5))
+        scene.set_rigid(np.full(MOMENTS, scene.names["bicycle"], np.int32), frames, np.full(MOMENTS, 5))
     who = Holders(
         batch.joints, rotations, offsets, spots + places, turn, number, share, hands,
         np.full(MOMENTS, body.height), np.arange(MOMENTS, dtype=np.int32),
@@ -172,7 +172,7 @@ def main() -> None:
     for k, (name, picture) in enumerate(zip(names, drawn, strict=True)):
         ImageDraw.Draw(picture).text((4, 2), name, "black", ImageFont.load_default(13))
         sheet.paste(picture, (k // rows * wide, k % rows * high))
-    sheet.save(arguments.out, quality=60)
+    sheet.save(arguments.out, quality=34, optimize=True)
 
 
 if __name__ == "__main__":
