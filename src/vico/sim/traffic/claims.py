@@ -1,12 +1,14 @@
 """Who has been let into which junction, over which lanes, and who has waited longest for it.
 
-A junction has one occupant at a time, or those whose lanes through it are not in each other's way. A long vehicle has
+A junction has one occupant at a time, or those whose lanes through it are not in each other's way, and those who follow
+each other on one lane and find room for all of them beyond it. A long vehicle has
 it to itself even then: its rear leaves its lane in bends.
 """
 
 from __future__ import annotations
 
 from vico.io.compiled import compiled
+from vico.sim.traffic.route import STANDING_ROOM
 from vico.sim.traffic.state import HELD_JUNCTIONS, NONE, PREVIOUS_LANES, SEVERAL
 
 #: What stands against entering a junction: nothing, one who cannot leave it before, others.
@@ -75,7 +77,8 @@ def _is_taken(net, junctions, vehicle, lane):  # type: ignore[no-untyped-def]
         return True
     for c in range(net.conflict_first[lane], net.conflict_first[lane + 1]):
         by = claims.taken_by[net.conflict[c]]
-        if by != NONE and by != me:
+        # Whoever is on the same lane is followed.
+        if by != NONE and by != me and net.conflict[c] != lane:
             return True
     return False
 
@@ -129,10 +132,10 @@ def _note_taken(net, junctions, vehicle):  # type: ignore[no-untyped-def]
     if not is_inside:
         return
     taken = claims.taken_by
-    for k in range(vehicle.granted_count):
-        lane = vehicle.planned_lanes[k]
+    for k in range(-1, vehicle.granted_count):
+        lane = vehicle.lane if k < 0 else vehicle.planned_lanes[k]
         taken[lane] = _joined_by(taken[lane], vehicle)
-    taken[vehicle.lane] = _joined_by(taken[vehicle.lane], vehicle)
+        claims.to_come[lane] += vehicle.length + STANDING_ROOM
     rear = vehicle.offset - vehicle.length - 0.5
     k = 0
     while rear < 0.0 and k < PREVIOUS_LANES and vehicle.previous_lanes[k] != NONE:
@@ -234,6 +237,7 @@ def note_claims(net, fleet, junctions):  # type: ignore[no-untyped-def]
         claims.alone[:] = NONE
         claims.taken_by[:] = NONE
         claims.longest_lane_wait[:] = 0.0
+        claims.to_come[:] = 0.0
     for vehicle in fleet:
         if claims.any_shared:
             _note_taken(net, junctions, vehicle)

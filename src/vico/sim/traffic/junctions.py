@@ -16,6 +16,7 @@ from vico.sim.traffic.route import NEVER, STANDING_ROOM, is_lane_of_stop
 from vico.sim.traffic.state import NONE
 
 _HESITATION = 3.0  # s that a vehicle let in may stand before the junction goes back
+_APART = 3.0  # m between places where it is looked whether somebody stands there
 _GAP = 0.05  # m kept from others where a vehicle will stand
 _AROUND = 5.0  # more than a vehicle's corners leave its path, and another's its half length, m
 
@@ -45,6 +46,8 @@ class JunctionExit(NamedTuple):
     ----------
     last
         Number of planned lanes up to the last of the junctions.
+    to_come
+        Metres beyond it that those need who are ahead on its last lane.
     end
         Number of planned lanes looked at.
     clear
@@ -54,6 +57,7 @@ class JunctionExit(NamedTuple):
     """
 
     last: int
+    to_come: float
     end: int
     clear: float
     start: float
@@ -78,7 +82,7 @@ def next_junction_request(net, vehicle, stop_distance, braking_distance, path_en
 
 
 @compiled
-def _find_exit(net, vehicle, request):  # type: ignore[no-untyped-def]
+def _find_exit(net, junctions, vehicle, request):  # type: ignore[no-untyped-def]
     """Return where a vehicle can stand clear of junctions after those it asks for."""
     s = vehicle.offset + request.distance
     clear = 0.0
@@ -98,14 +102,18 @@ def _find_exit(net, vehicle, request):  # type: ignore[no-untyped-def]
         k += 1
         if clear >= vehicle.length + STANDING_ROOM:
             break
-    return JunctionExit(last, k, clear, start, s)
+    to_come = 0.0
+    lane = vehicle.planned_lanes[last - 1]
+    if last > request.planned_index and not junctions.claims.exclusive[net.lanes[lane].junction]:
+        to_come = junctions.claims.to_come[lane]
+    return JunctionExit(last, to_come, k, clear, start, s)
 
 
 @compiled
 def _exit_is_long_enough(vehicle, request, leave):  # type: ignore[no-untyped-def]
     """Return whether a vehicle fits behind the junctions; where a car leaves the map it need not."""
     leaves_map = request.path_ends and leave.end == vehicle.planned_count and vehicle.route < 0
-    return leave.clear >= vehicle.length + STANDING_ROOM or leaves_map
+    return leave.clear >= leave.to_come + vehicle.length + STANDING_ROOM or leaves_map
 
 
 @compiled
@@ -113,11 +121,12 @@ def _exit_is_free(vehicle, leave, view, vehicles):  # type: ignore[no-untyped-de
     """Return whether no vehicle is where this one would stand: whoever stands there may stay."""
     if leave.start < 0.0:
         return True
-    room = min(vehicle.length + STANDING_ROOM, max(leave.clear, 0.0))
+    room = min(leave.to_come + vehicle.length + STANDING_ROOM, max(leave.clear, 0.0))
     x, y, _, _ = point_on_path(view.path, leave.start + (room - vehicle.length) / 2)
     nearby = bodies_around(vehicle.index, x, y, (room + vehicle.length) / 2 + _AROUND, view.beyond)
-    for i in range(1, 6):
-        there = leave.start + room * i / 5
+    places = 5 + int(leave.to_come / _APART)
+    for i in range(1, places + 1):
+        there = leave.start + room * i / places
         if touched_at(view.path, view.outline, there, nearby, _GAP, _GAP, vehicles) >= 0:
             return False
     return True
@@ -172,7 +181,7 @@ def may_enter_junction(net, fleet, junctions, vehicle, request, leave, view):  #
 @compiled
 def request_junctions(net, fleet, junctions, vehicle, request, view):  # type: ignore[no-untyped-def]
     """Ask for the junctions ahead; return whether the vehicle has them now."""
-    leave = _find_exit(net, vehicle, request)
+    leave = _find_exit(net, junctions, vehicle, request)
     if not may_enter_junction(net, fleet, junctions, vehicle, request, leave, view):
         return False
     return take_junctions(net, junctions, vehicle, request.planned_index, leave.last)

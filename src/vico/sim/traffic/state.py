@@ -241,6 +241,8 @@ class Claims(NamedTuple):
     taken_by
         Vehicle that has been let into a junction over the lane, `NONE` for nobody, `SEVERAL` for more than one, int32,
         shape ``(lanes,)``.
+    to_come
+        Metres that those need to stand on who have been let in over the lane and are not beyond it, shape ``(lanes,)``.
     longest_lane_wait
         Longest that a vehicle in the queue for a shared cluster has waited that wants to take the lane, seconds, shape
         ``(lanes,)``.
@@ -250,6 +252,7 @@ class Claims(NamedTuple):
     any_shared: bool
     alone: Ints
     taken_by: Ints
+    to_come: Floats
     longest_lane_wait: Floats
 
 
@@ -359,6 +362,7 @@ def new_junctions(clusters: int, walkways: int, lanes: int, *, shared: bool = Fa
         any_shared=shared,
         alone=np.full(clusters, NONE, np.int32),
         taken_by=np.full(lanes, NONE, np.int32),
+        to_come=np.zeros(lanes),
         longest_lane_wait=np.zeros(lanes),
     )
     return JunctionState(
