@@ -3,7 +3,7 @@
 from functools import cache
 
 from road_city import HALF, road_city
-from vico.sim.traffic import JunctionRule, Traffic, TrafficNetwork
+from vico.sim.traffic import JunctionRule, Traffic, TrafficNetwork, TrafficSetup
 from vico.world.heights import HeightField
 
 
@@ -23,5 +23,5 @@ def traffic_by(rule: JunctionRule, cars: int = 60, pedestrians: int = 0) -> Traf
         pedestrians=pedestrians,
         seed=1,
         first_entity=1_000_000,
-        junction_rule=rule,
+        setup=TrafficSetup(rule),
     )

@@ -178,6 +178,8 @@ class RunOptions:
     junctions
         Who may be in a junction: one vehicle at a time; those who are not in each other's way (shared); the same by
         signals, where the map has them; or one at a time by signals (both).
+    traffic
+        File of cars and pedestrians that are placed by hand (.json), beside the others; none for none.
     observe
         Whose views are rendered: all, none, or names separated by commas.
     outputs
@@ -234,6 +236,7 @@ class RunOptions:
     cars: int = 30
     pedestrians: int = 30
     junctions: Literal["one", "shared", "signals", "both"] = "one"
+    traffic: str = "none"
     observe: CommaSeparated = "all"
     outputs: CommaSeparated = "rgb,depth,segmentation"
     keep: CommaSeparated = "none"

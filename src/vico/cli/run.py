@@ -130,6 +130,7 @@ class _Job:
             cars=options.cars,
             pedestrians=options.pedestrians,
             junctions=options.junctions,
+            traffic=named_or_read(options.traffic),
             observe=None if options.observe == "all" else _names(options.observe),
             outputs=_names(options.outputs),
             quality=options.quality,

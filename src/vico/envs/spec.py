@@ -30,6 +30,7 @@ class EnvOptions(TypedDict, total=False):
     cars: int
     pedestrians: int
     junctions: str
+    traffic: str | Mapping[str, Any]
     transit: bool
     observe: str | tuple[str, ...]
     image: int

@@ -43,6 +43,9 @@ class SimSettings:
     junctions
         Who may be in a junction: ``"one"``, ``"shared"``, ``"signals"`` or ``"both"``
         (`vico.sim.traffic.junction_rule.JunctionRule`).
+    traffic
+        Cars and pedestrians placed by hand, beside those: ``"none"``, or the content of a file of traffic
+        (docs/traffic.md).
     transit
         Whether buses and bicycles are there.
     image
@@ -85,6 +88,7 @@ class SimSettings:
     cars: int = 0
     pedestrians: int = 0
     junctions: str = "one"
+    traffic: str | Mapping[str, Any] = "none"
     transit: bool = True
     image: int = 256
     outputs: tuple[str, ...] = USUAL_OUTPUTS

@@ -15,7 +15,8 @@ from vico.sim.bodies import Bodies
 from vico.sim.config import SimConfig
 from vico.sim.robots import RobotPopulation
 from vico.sim.state import FIRST_BIKE, FIRST_ROBOT, FIRST_TRAFFIC, FIRST_TRAM
-from vico.sim.traffic import JunctionRule, Traffic
+from vico.sim.traffic import JunctionRule, Traffic, TrafficSetup
+from vico.sim.traffic.placed import placed_traffic
 from vico.sim.transit import BusPlan, TransitSystem
 from vico.world.folder import World
 
@@ -32,7 +33,9 @@ def traffic_and_transit_of(base: SimulationBase, config: SimConfig) -> tuple[Tra
     has_transit = config.transit and bool(
         world.transit.lines or world.transit.bike_stations or world.transit.tram_lines
     )
-    if not has_transit and not config.cars and not config.pedestrians:
+    setup = TrafficSetup(JunctionRule(config.junctions), placed_traffic(config.traffic))
+    by_hand = setup.placed.cars or setup.placed.pedestrians
+    if not has_transit and not config.cars and not config.pedestrians and not by_hand:
         return None, None
     plan = base.bus_plan(config.start) if has_transit else BusPlan()
     traffic = Traffic(
@@ -43,7 +46,7 @@ def traffic_and_transit_of(base: SimulationBase, config: SimConfig) -> tuple[Tra
         seed=config.seed,
         first_entity=FIRST_TRAFFIC,
         buses=plan.bus_routes,
-        junction_rule=JunctionRule(config.junctions),
+        setup=setup,
     )
     if not has_transit:
         return traffic, None

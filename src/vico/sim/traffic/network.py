@@ -139,6 +139,8 @@ def _lane_network(lanes: LaneGraph, walks: Walkways) -> LaneNetwork:
         crossings_cleared=cleared,
         route_first=np.zeros(1, np.int32),
         route=np.zeros(0, np.int32),
+        goal_edge=np.zeros(0, np.int32),
+        goal_next=np.zeros((0, len(lanes)), np.int32),
     )
 
 
@@ -156,7 +158,17 @@ def walkway_network(walks: Walkways) -> WalkwayNetwork:
         "end": walks.ends[:, 1],
     }.items():
         records[name] = values
-    return WalkwayNetwork(records, walks.first, walks.points, walks.along, walks.meeting_first, walks.meeting)
+    nodes = max(len(walks.meeting_first) - 1, 1)
+    return WalkwayNetwork(
+        walkways=records,
+        first=walks.first,
+        points=walks.points,
+        along=walks.along,
+        meeting_first=walks.meeting_first,
+        meeting=walks.meeting,
+        goal_walkway=np.zeros(0, np.int32),
+        goal_away=np.zeros((0, nodes)),
+    )
 
 
 def connected_walkways(walks: Walkways) -> Walkways:

@@ -100,8 +100,27 @@ def _choice_weight(paths, here, option, node):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _walkway_to_goal(paths, walker, node):  # type: ignore[no-untyped-def]
+    """Return the walkway at a meeting point that leads to a pedestrian's goal the shortest way, `NONE` for none."""
+    best, least = NONE, np.inf
+    for k in range(paths.meeting_first[node], paths.meeting_first[node + 1]):
+        option = paths.meeting[k]
+        if option == walker.walkway or paths.walkways[option].shut:
+            continue
+        far = paths.walkways[option].start + paths.walkways[option].end - node
+        away = paths.walkways[option].length + paths.goal_away[walker.goal, far]
+        if option == paths.goal_walkway[walker.goal]:
+            away = 0.0
+        if away < least:
+            best, least = option, away
+    return best
+
+
+@compiled
 def choose_next_walkway(paths, walker, node):  # type: ignore[no-untyped-def]
     """Return where a pedestrian goes on at a meeting point, `NONE` for nowhere."""
+    if walker.goal != NONE:
+        return _walkway_to_goal(paths, walker, node)
     here = walker.walkway
     total = 0.0
     for k in range(paths.meeting_first[node], paths.meeting_first[node + 1]):
@@ -140,6 +159,8 @@ def _enter_walkway(paths, walker, junctions, following, node):  # type: ignore[n
             junctions.walkers_on[walker.leaving_crossing] -= 1
         walker.leaving_crossing, walker.leaving_since = walkway, walker.distance_walked
     walker.walkway = following
+    while walker.goal != NONE and paths.goal_walkway[walker.goal] == following:
+        walker.goal = walker.goal + 1 if walker.goal + 1 < walker.goal_end else NONE
     if paths.walkways[following].start == node:
         walker.direction, walker.offset = 1, 0.0
     else:

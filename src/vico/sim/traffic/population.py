@@ -18,8 +18,8 @@ from vico.sim.environment import Conditions
 from vico.sim.neighbours import neighbour_grid
 from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
 from vico.sim.traffic.crossings import mark_busy_crossings
+from vico.sim.traffic.hand_placing import HandPlaced, TrafficSetup
 from vico.sim.traffic.jams import STUCK_AFTER, Jam, JamLog, entity_before
-from vico.sim.traffic.junction_rule import JunctionRule
 from vico.sim.traffic.levels import TrafficLevels
 from vico.sim.traffic.lights import LampDrawing
 from vico.sim.traffic.network import TrafficNetwork
@@ -75,8 +75,8 @@ class Traffic:
         Entities are numbered from here: cars, then buses, then pedestrians.
     buses
         Their routes and where they start.
-    junction_rule
-        Who may be in a junction.
+    setup
+        Who may be in a junction, and who is placed by hand.
 
     Attributes
     ----------
@@ -101,9 +101,11 @@ class Traffic:
         seed: int,
         first_entity: int,
         buses: BusRoutes | None = None,
-        junction_rule: JunctionRule = JunctionRule.ONE,
+        setup: TrafficSetup | None = None,
     ) -> None:
-        buses = buses or BusRoutes()
+        buses, setup = buses or BusRoutes(), setup or TrafficSetup()
+        junction_rule, placed = setup.junction_rule, setup.placed
+        cars, pedestrians = cars + len(placed.cars), pedestrians + len(placed.pedestrians)
         lanes = network.lanes
         self.lanes, self.height, self.walks = lanes, height, network.walks
         self.cars, self.buses, self.pedestrians = cars, len(buses.buses), pedestrians
@@ -112,8 +114,9 @@ class Traffic:
         self.junction_rule = junction_rule
         net = network.with_routes(buses.routes, shared=junction_rule.is_shared)
         # Copies of one's own: how fast lanes are driven follows the weather of the run, and what is shut its events.
-        self._net = net._replace(lanes=net.lanes.copy())
-        self._paths = network.walked._replace(walkways=network.walked.walkways.copy())
+        walked = network.walked._replace(walkways=network.walked.walkways.copy())
+        hand = HandPlaced.of(placed, lanes, network.walks, net._replace(lanes=net.lanes.copy()), walked)
+        self._net, self._paths = hand.net, hand.paths
         self._shut: tuple[NDArray[np.bool_] | None, NDArray[np.bool_] | None] = None, None
         self._speed_limits = net.lanes["speed"].copy()
         self._conditions: Conditions | None = None
@@ -121,7 +124,7 @@ class Traffic:
         self._prototypes = [f"{kind}_{colour}" for kind, colours in CAR_KINDS.items() for colour in colours] + ["bus"]
         self._vehicles = new_fleet(self.vehicles, seed)
         self.fleet = self._vehicles.view(np.recarray)
-        self._choose_vehicles(buses, seed)
+        self._choose_vehicles(buses, [car.model for car in placed.cars], seed)
         self._bodies: Bodies | None = None  # as they stand since they last moved; asked for by everybody
         self._walkers = new_pedestrians(pedestrians, seed)
         self.pedestrian_state = self._walkers.view(np.recarray)
@@ -136,20 +139,26 @@ class Traffic:
         self._street_load = np.zeros(len(lanes.edges), np.int32)
         self._entries = self._all_entries = network.entries
         self._place_buses(buses.starts)
-        self._place_cars(seed, network.starts)
-        self._place_pedestrians(seed)
+        hand.put_cars(self._vehicles, self.shapes)
+        hand.put_walkers(self._walkers, self.shapes, self.vehicles)
+        for i, one in enumerate(placed.pedestrians):
+            self.pedestrian_state.preferred_speed[i] = one.speed or self.pedestrian_state.preferred_speed[i]
+        self._place_cars(seed, network.starts, len(placed.cars))
+        self._place_pedestrians(seed, len(placed.pedestrians))
         far = np.full(len(self.shapes.x), _FAR)
         self._follow_levels(far, far)
 
     # -- start -------------------------------------------------------------------------------------------------------
 
-    def _choose_vehicles(self, buses: BusRoutes, seed: int) -> None:
-        """Give every vehicle a model and its parameters."""
+    def _choose_vehicles(self, buses: BusRoutes, models: Sequence[str], seed: int) -> None:
+        """Give every vehicle a model (the first ones those that are asked for) and its parameters."""
         random = rng(seed, "traffic", "makes")
         shares = np.array(
             [share for kind, colours in CAR_KINDS.items() for share in [_SHARE[kind] / len(colours)] * len(colours)]
         )
         cars, bus_model = random.choice(len(shares), self.cars, p=shares / shares.sum()), len(shares)
+        for v, model in enumerate(models):
+            cars[v] = self._prototypes.index(model) if model else cars[v]
         self.prototype = np.concatenate([cars, np.full(self.buses, bus_model)]).astype(np.int32)
         sizes = np.array([vehicle_size(name) for name in self._prototypes])[self.prototype].reshape(-1, 5)
         length, width, self._vehicle_height, overhang, wheelbase = sizes.T.copy()
@@ -194,12 +203,12 @@ class Traffic:
             if not self._place_vehicle(v, lane, offset, 1.0):
                 raise InputError(f"traffic: no room for bus {k} at its stop; run fewer buses on the line")
 
-    def _place_cars(self, seed: int, usable: NDArray[np.int64]) -> None:
+    def _place_cars(self, seed: int, usable: NDArray[np.int64], first: int) -> None:
         random = rng(seed, "traffic", "cars")
         if self.cars and not len(usable):
             raise InputError("traffic: the world has no street for cars; use --cars 0")
         share = self.lanes.length[usable] / self.lanes.length[usable].sum() if len(usable) else None
-        for v in range(self.cars):
+        for v in range(first, self.cars):
             for _ in range(_TRIES):
                 lane = int(random.choice(usable, p=share))
                 low, high = self.fleet.length[v] + 1.0, self.lanes.length[lane] - 1.5
@@ -208,13 +217,13 @@ class Traffic:
             else:
                 raise InputError(f"traffic: no room for car {v + 1} of {self.cars}; use fewer, as in --cars {v}")
 
-    def _place_pedestrians(self, seed: int) -> None:
+    def _place_pedestrians(self, seed: int, first: int) -> None:
         random = rng(seed, "traffic", "pedestrians")
         usable = np.flatnonzero((self.walks.kind == SIDEWALK) & (self.walks.length > 3.0))
         if self.pedestrians and not len(usable):
             raise InputError("traffic: the world has no sidewalk; use --pedestrians 0")
         share = self.walks.length[usable] / self.walks.length[usable].sum() if len(usable) else None
-        for i in range(self.pedestrians):
+        for i in range(first, self.pedestrians):
             for _ in range(_TRIES):
                 walkway = int(random.choice(usable, p=share))
                 offset, way = random.uniform(0.0, self.walks.length[walkway]), 1 if random.random() < 0.5 else -1

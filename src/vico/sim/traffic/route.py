@@ -63,11 +63,34 @@ def _lane_cost(net, vehicle, option, street, street_load):  # type: ignore[no-un
 
 
 @compiled
+def _goal_after(net, vehicle):  # type: ignore[no-untyped-def]
+    """Return the goal that a car drives to after its planned lanes, `NONE` for none."""
+    goal = vehicle.goal
+    if goal == NONE:
+        return NONE
+    for k in range(-1, vehicle.planned_count):
+        lane = vehicle.lane if k < 0 else vehicle.planned_lanes[k]
+        while goal < vehicle.goal_end and net.goal_edge[goal] == net.lanes[lane].edge:
+            goal += 1
+    return goal if goal < vehicle.goal_end else NONE
+
+
+@compiled
+def _pass_goal(net, vehicle):  # type: ignore[no-untyped-def]
+    """Note that a car that leaves its lane has been at its goal, if that is there."""
+    while vehicle.goal != NONE and net.goal_edge[vehicle.goal] == net.lanes[vehicle.lane].edge:
+        vehicle.goal = vehicle.goal + 1 if vehicle.goal + 1 < vehicle.goal_end else NONE
+
+
+@compiled
 def choose_next_lane(net, vehicle, lane, street_load):  # type: ignore[no-untyped-def]
     """Return the lane a car takes after `lane`: towards the street with fewer vehicles; `NONE` at the map's end."""
     best, best_cost = NONE, 1e18
     if net.lanes[lane].leaves:
         return NONE
+    goal = _goal_after(net, vehicle)
+    if goal != NONE and net.goal_next[goal, lane] != NONE:
+        return net.goal_next[goal, lane]
     for k in range(net.lanes[lane].first_next, net.lanes[lane].end_next):
         option = net.next[k]
         if net.lanes[option].closed:
@@ -138,6 +161,7 @@ def advance_lane(net, vehicle):  # type: ignore[no-untyped-def]
     """Step on to the planned lanes that a vehicle's front has reached."""
     while vehicle.offset > net.lanes[vehicle.lane].length and vehicle.planned_count > 0:
         vehicle.offset -= net.lanes[vehicle.lane].length
+        _pass_goal(net, vehicle)
         for k in range(PREVIOUS_LANES - 1, 0, -1):
             vehicle.previous_lanes[k] = vehicle.previous_lanes[k - 1]
         vehicle.previous_lanes[0] = vehicle.lane

@@ -98,6 +98,8 @@ VEHICLE_STATE: list[tuple[Any, ...]] = [
     ("stop_route_index", _I),  # buses: position in its route of the lane with the next stop
     ("stop_offset", _F),  # buses: the stop's distance along that lane, m
     ("at_stop", _B),  # buses: whether it stands at its stop with its doors open
+    ("goal", _I),  # cars: goal it drives to, an index into the network's; NONE for none
+    ("goal_end", _I),  # cars: the one after its last goal
     ("lights", np.uint8),  # lights it shows: bits as `vico.sim.traffic.lights` has them
     ("laps", _I),  # cars: how often it has left the map and come back in
     ("teleports", _I),  # cars: how often it was taken out of a jam and brought back in at the map's edge
@@ -141,6 +143,8 @@ PEDESTRIAN_RECORD = np.dtype(
         ("jammed_time", _F),  # within a metre of `progress_xy`, s
         ("progress_xy", _F, (2,)),  # where it last got on, m
         ("crossing_wait", _F),  # how long it has waited for a crossing, s
+        ("goal", _I),  # goal it walks to, an index into the network's; NONE for none
+        ("goal_end", _I),  # the one after its last goal
         ("leaving_crossing", _I),  # crossing its body may still be on, NONE for none
         ("leaving_since", _F),  # `distance_walked` when its point left that crossing, m
         ("random", np.uint64),  # state of its stream of random numbers
@@ -190,6 +194,9 @@ class LaneNetwork(NamedTuple):
         vehicle's rear has passed each, metres.
     route_first, route
         Lanes of bus route ``r``, a closed round: ``route[route_first[r]:route_first[r + 1]]``.
+    goal_edge, goal_next
+        Street of each goal of cars whose route is given, and the lane that leads to it from each lane, `NONE` for none,
+        int32, shapes ``(goals,)`` and ``(goals, lanes)``.
     """
 
     lanes: Records
@@ -202,6 +209,8 @@ class LaneNetwork(NamedTuple):
     crossings_cleared: Floats
     route_first: Ints
     route: Ints
+    goal_edge: Ints
+    goal_next: Ints
 
 
 class WalkwayNetwork(NamedTuple):
@@ -217,6 +226,9 @@ class WalkwayNetwork(NamedTuple):
         Walkway ``i``'s centre line is ``points[first[i]:first[i + 1]]``, metres; `along` the distances along it.
     meeting_first, meeting
         Walkways at meeting point ``k``: ``meeting[meeting_first[k]:meeting_first[k + 1]]``.
+    goal_walkway, goal_away
+        Walkway of each goal of pedestrians whose route is given, int32, shape ``(goals,)``, and how far it is from each
+        meeting point, metres, shape ``(goals, meeting points)``.
     """
 
     walkways: Records
@@ -225,6 +237,8 @@ class WalkwayNetwork(NamedTuple):
     along: Floats
     meeting_first: Ints
     meeting: Ints
+    goal_walkway: Ints
+    goal_away: Floats
 
 
 class Claims(NamedTuple):
@@ -328,6 +342,7 @@ def new_fleet(n: int, seed: int) -> Records:
         "queued_junction",
         "queued_exit",
         "stop_route_index",
+        "goal",
     ):
         fleet[name] = NONE
     fleet["target_speed"] = TOP_SPEED
@@ -342,7 +357,7 @@ def new_pedestrians(n: int, seed: int) -> Records:
     walkers["direction"] = 1
     walkers["lateral_share"] = random.uniform(0.1, 0.95, n)
     walkers["preferred_speed"] = random.uniform(1.0, 1.5, n)
-    walkers["leaving_crossing"] = NONE
+    walkers["leaving_crossing"] = walkers["goal"] = NONE
     walkers["gait_time"] = -GAIT_TIME
     walkers["random"] = _random_streams(seed, "ways", n)
     return walkers
