@@ -231,8 +231,8 @@ def make(
         Called with the fresh `Simulation` at each reset.
     options
         `seed`, `start`, `residents`, `assistants`, `robots`, `robot_places`, `errands`, `cars`, `pedestrians`,
-        `junctions`, `traffic`, `transit`, `observe`, `image`, `periods` and `max_steps`, as `vico.envs.spec.EnvSpec` has
-        them.
+        `junctions`, `traffic`, `transit`, `observe`, `image`, `periods` and `max_steps`, as `vico.envs.spec.EnvSpec`
+        has them.
 
     Raises
     ------
