@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import toy_city
-from vico.render import Frames
+from vico.render.sensors.batch import PictureSet
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
 
@@ -74,10 +74,10 @@ def test_who_does_not_look_at_pictures_waits_for_none(monkeypatch: pytest.Monkey
     result = sim.step({})
     whole, about = result.observations["resident_0"], result.infos["resident_0"]
 
-    def never(frames: Frames, k: int) -> None:
+    def never(pictures: PictureSet, k: int) -> None:
         raise AssertionError(f"waited for picture {k}")
 
-    monkeypatch.setattr(Frames, "wait_for", never)
+    monkeypatch.setattr(PictureSet, "wait_for", never)
     result = sim.step({})
     plain, told = result.observations.without_pictures["resident_0"], result.infos.without_pictures["resident_0"]
     assert set(whole) - set(plain) == {"rgb", "depth", "segmentation", "extrinsics", "intrinsics"}

@@ -245,18 +245,22 @@ class PictureSet:
         part, place = self._place[k]
         if part.cube is None:
             part.frames.wait_for(place)
-        if self._open[k]:
-            with self._locks[k]:
-                if self._open[k]:
-                    self._finish(k)
-                    self._open[k] = False
+        self._complete(k)
 
     def wait(self) -> None:
         """Return when all pictures are there."""
         for part, _ in self._place.values():
             part.frames.wait()
         for k in self._place:
-            self.wait_for(k)
+            self._complete(k)
+
+    def _complete(self, k: int) -> None:
+        """Work out what is derived from a viewer's rendered pictures, once, whoever asks."""
+        if self._open[k]:
+            with self._locks[k]:
+                if self._open[k]:
+                    self._finish(k)
+                    self._open[k] = False
 
     def _finish(self, k: int) -> None:
         part, place = self._place[k]
