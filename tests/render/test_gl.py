@@ -40,6 +40,8 @@ def scene() -> Scene:
         block = box((3, 2, 2 * z), (x, y, z)).of_entity(10 + k)
         static.append(replace(block, material=brick, uv=(block.positions[:, [0, 2]] + block.positions[:, 1:2]) / 3))
     room = [box((8, 0.2, 3), (100, -3, 1.5)), box((8, 8, 0.2), (100, 0, -0.1)), box((0.2, 8, 3), (104, 0, 1.5))]
+    pane = box((0.05, 2, 1), (103.85, -1.5, 1.5))
+    room.append(replace(pane, material=replace(ground, name="pane", emission=1.0), uv=pane.positions[:, 1:]))
     crown = ball((1.5, 1.5, 1.5), (0, 0, 2), colour=(80, 140, 60), sides=14, rings=10)
     models = {
         "tree": [replace(crown, material=leaf, uv=crown.positions[:, :2])],
@@ -94,6 +96,15 @@ def test_both_renderers_take_the_same_pictures(
     assert np.percentile(np.abs(wanted.depth - got.depth)[same], 99) < 1e-3
     assert np.percentile(np.abs(wanted.normals - got.normals)[same], 99) < 1e-2
     # What moves throws no shadow there.
+    assert np.abs(wanted.rgb.astype(int) - got.rgb).mean() < 1.0
+
+
+@pytest.mark.parametrize(("lamp", "daylight"), [(0.0, 1.0), (1.0, 0.0), (0.0, 0.0)])
+def test_rooms_are_lit_alike(both: tuple[Scene, GlRenderer], lamp: float, daylight: float) -> None:
+    made, gl = both
+    made.light_rooms(lamp, daylight)
+    wanted, got = take_pictures(made, INSIDE, PictureRequest()), gl.take(INSIDE, PictureRequest())
+    made.light_rooms(1.0, 1.0)
     assert np.abs(wanted.rgb.astype(int) - got.rgb).mean() < 1.0
 
 

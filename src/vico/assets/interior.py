@@ -26,6 +26,8 @@ _SKIRTING = 5  # rows of a wall's picture
 _STEPS = 8  # risers a flight
 FLOORS = tuple(_TILE)
 WALLS = ("plaster", "wallpaper", "tiled", "brick", "panels")
+#: Name of the windows' material.
+WINDOW = "room_window"
 
 
 @dataclass(frozen=True)
@@ -175,7 +177,7 @@ def window_material() -> Material:
         picture[:, part] = 240
     for part in (slice(0, 8), slice(120, 128)):
         picture[part] = 240
-    return Material("room_window", np.clip(picture, 0, 255).astype(np.uint8), emission=1.0)
+    return Material(WINDOW, np.clip(picture, 0, 255).astype(np.uint8), emission=1.0)
 
 
 @cache

@@ -46,6 +46,11 @@ def _spans_of(text: str) -> list[Span] | None:
     return spans
 
 
+def is_within(spans: Sequence[Span], minute: float) -> bool:
+    """Return whether a minute of the day, 0..1440, lies in one of some spans, those of the day before included."""
+    return any(start <= minute < end or start <= minute + MINUTES < end for start, end in spans)
+
+
 def weekly_hours(text: str) -> list[list[Span]] | None:
     """Read an `opening_hours` value.
 

@@ -60,6 +60,9 @@ ROOM = np.dtype(
         ("half_width", f8),
         ("height", f8),
         ("yaw", f8),  # radians, counter-clockwise from east
+        ("windows", f8),  # 1: it has some
+        ("lamp", f8),  # how far its lamps are switched on, 0..1
+        ("daylight", f8),  # that comes in by its windows, 1 = as much as by day
     ],
     align=True,
 )
@@ -93,6 +96,9 @@ CAMERA_UNIFORMS = np.dtype(
         ("room_height", f8),
         ("room_cos", f8),  # of its yaw
         ("room_sin", f8),
+        ("room_lamp", f4),  # share of its lamps' light
+        ("room_around", f4),  # share of the light that is all around in it
+        ("room_window", f4),  # share of the daylight picture that its windows show
         ("indoors", i8),  # 1: in a room, which is then all that is seen
         ("hidden_entity", i8),  # body that is not seen, 0: none
         ("most_taps", i8),  # texture samples a pixel on slanted surfaces, at most

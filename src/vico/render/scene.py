@@ -290,6 +290,19 @@ class Scene:
             self._light = Light(uniforms, tone, sky, self._shadow, self._relief)
         return self._light
 
+    def light_rooms(self, lamp: ArrayLike, daylight: float) -> None:
+        """Switch the rooms' lamps.
+
+        Parameters
+        ----------
+        lamp
+            How far each room's lamps are on, 0..1, shape ``(r,)``, or one for all.
+        daylight
+            Light outdoors, as a share of that by day: it comes in where there are windows.
+        """
+        self.rooms["lamp"] = lamp
+        self.rooms["daylight"] = daylight * self.rooms["windows"]
+
     def room_of(self, position: NDArray[np.float64]) -> Record | None:
         """Return the `ROOM` that holds a point, or None."""
         number = self.room_number(position)
@@ -364,8 +377,10 @@ class _Materials:
 def _rooms(boxes: NDArray[np.float64]) -> NDArray[np.void]:
     """Return `ROOM` records of rows in their order."""
     rooms = np.zeros(len(boxes), ROOM)
-    for name, column in zip(ROOM.fields or (), boxes.T, strict=True):
+    for name, column in zip(("x", "y", "z", "half_length", "half_width", "height", "yaw"), boxes.T, strict=True):
         rooms[name] = column
+    for name in ("windows", "lamp", "daylight"):
+        rooms[name] = 1.0
     return rooms
 
 

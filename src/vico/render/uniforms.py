@@ -16,6 +16,11 @@ Record = Any
 # Texture samples a pixel on slanted surfaces: of a quick picture, and of one to look at.
 _QUICK_TAPS, _FINE_TAPS = 2, 4
 
+# Light all around in a room whose lamps are out, as a share of that with lamps: none from windows, and by day.
+_UNLIT, _DAYLIT = 0.03, 0.75
+# Share of the daylight picture that windows show at night.
+_NIGHT_WINDOW = 0.05
+
 
 def camera_uniforms(cameras: Cameras, k: int, samples: int, room: Record | None) -> Record:
     """Return the `CAMERA_UNIFORMS` of one camera, whose picture has `samples` rows and columns for each pixel.
@@ -40,6 +45,10 @@ def camera_uniforms(cameras: Cameras, k: int, samples: int, room: Record | None)
         for name in ("x", "y", "z", "half_length", "half_width", "height"):
             camera[f"room_{name}"] = room[name]
         camera["room_cos"], camera["room_sin"] = np.cos(room["yaw"]), np.sin(room["yaw"])
+        lamp, daylight = float(room["lamp"]), float(room["daylight"])
+        camera["room_lamp"] = lamp
+        camera["room_around"] = lamp + (1.0 - lamp) * (_UNLIT + (_DAYLIT - _UNLIT) * daylight)
+        camera["room_window"] = _NIGHT_WINDOW + (1.0 - _NIGHT_WINDOW) * daylight
     return camera
 
 

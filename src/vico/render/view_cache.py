@@ -125,7 +125,7 @@ class Background:
         )
 
     def _is_lit(self, camera: Record, light: Light) -> bool:
-        """Return whether the colours are those of this light; rooms have lamps of their own, always the same."""
+        """Return whether the colours are those of this light; the camera says how a room is lit."""
         return self._light is light or (self._light is not None and bool(camera["indoors"]))
 
 

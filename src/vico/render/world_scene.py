@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vico.assets.interior import WINDOW
 from vico.render.lighting import Lighting
 from vico.render.scene import Scene
 from vico.world.mesh import Surface
@@ -41,6 +42,10 @@ def scene_of(
     ]
     models = {**world.prototypes(), **(prototypes or {})}
     scene = Scene(static, models, indoor=indoor, rooms=np.array(boxes).reshape(-1, 7), lighting=lighting)
+    if rooms:
+        glazed = [np.unique(s.entity) for s in indoor if s.material.name == WINDOW]
+        known = np.concatenate(glazed) if glazed else np.zeros(0, np.int32)
+        scene.rooms["windows"] = np.isin([room.entity for room in world.rooms], known)
     objects = world.objects
     taken = [k for k in range(len(objects.entity)) if rooms or not objects.room[k]]
     if taken:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from vico.clock import DAY
-from vico.community.hours import DAYS, MINUTES, Span, open_spans
+from vico.community.hours import DAYS, Span, is_within, open_spans
 from vico.community.model import ActivityTag, Resident
 from vico.sim.appointments import Appointment
 from vico.world.model import Place
@@ -56,8 +56,7 @@ class OpeningHours:
         spans = self._spans.get(place)
         if spans is None:
             return True
-        minute = second % DAY / 60.0
-        return any(start <= minute < end or start <= minute + MINUTES < end for start, end in spans)
+        return is_within(spans, second % DAY / 60.0)
 
     def lets_in(self, person: int, place: str, second: float) -> bool:
         """Return whether somebody may be at a place at a second."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from datetime import date
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Protocol
@@ -39,6 +40,7 @@ from vico.sim.hands_scene import Holders, draw_in_hands, hands_of_agents, hands_
 from vico.sim.holding import habit_of
 from vico.sim.observations import Views
 from vico.sim.passers_by import manner_of_pedestrian, pedestrian_motion
+from vico.sim.room_lamps import RoomLamps
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture, Vehicle
 from vico.threads import in_order
@@ -144,6 +146,7 @@ class SceneRenderer:
 
     def _attach(self, sim: RenderedSimulation) -> None:
         self._sim = sim
+        self._room_lamps = RoomLamps(sim.world, date.fromisoformat(sim.config.date).weekday())
         self._lit: tuple[float, ...] = ()
         self.wait()
         self._viewers = Viewers(
@@ -240,6 +243,7 @@ class SceneRenderer:
         )
         lit += tuple(value for circle in environment.agenda.effects.dark for value in circle)
         self._scene.moment = state.second
+        self._scene.light_rooms(self._room_lamps.lit(state), 1.0 - round(16.0 * environment.dark) / 16.0)
         if lit != self._lit:
             self._lit = lit
             self._scene.lighting = _lighting(state.environment, moment * _LIGHT_EVERY)

@@ -180,7 +180,7 @@ def look_about(state: SimulationState, stances: NDArray[np.float64], residents: 
     others = [owner.bodies() for owner in (state.traffic, state.transit, state.robots) if owner is not None]
     bodies = Bodies.joined([p.bodies_of(np.arange(len(p))), *others])
     spaces = np.concatenate([mine, np.full(len(bodies) - len(p), OUTDOORS)])
-    sight = state.environment.sight_of(bodies.position)
+    sight = state.environment.sight_of(bodies.position, spaces >= 0)
     return in_view(eyes, bodies, spaces, opaque_grid(state.world), state.entities, sight=sight)
 
 

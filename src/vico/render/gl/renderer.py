@@ -324,6 +324,7 @@ def _view_uniforms(camera: Record) -> dict[str, Any]:
             float(camera["room_height"]),
             float(camera["room_sin"]),
         ),
+        "room_light": tuple(float(camera[f"room_{name}"]) for name in ("lamp", "around", "window")),
     }
 
 

@@ -13,6 +13,7 @@ uniform vec3 eye, sun, sun_colour, ambient, tilt, haze, unlit;
 uniform vec2 side;
 uniform float near, far, haze_per_metre, lamp_exposure, wet, snow_cover, softness, glass, tone_scale;
 uniform vec4 room_place, room_size;  // centre and cosine of the yaw; half length, half width, height, sine
+uniform vec3 room_light;  // shares of lamps, of light all around, and of what windows show by day
 uniform int indoors, hidden, most_taps, levels_each, is_person;
 
 in vec3 place;
@@ -102,7 +103,7 @@ float sun_share(vec3 at, vec3 n, vec2 aside) {
                mix(lit_at(i + ivec2(0, 1), p.z), lit_at(i + ivec2(1, 1), p.z), f.x), f.y);
 }
 
-vec3 in_room(vec3 at, vec3 n, vec3 base) {
+vec3 in_room(vec3 at, vec3 n, vec3 base, float glass_) {
     vec3 p = at - room_place.xyz;
     float c = room_place.w, s = room_size.w, height = room_size.z;
     float lz = 0.92 * height - p.z;
@@ -113,7 +114,9 @@ vec3 in_room(vec3 at, vec3 n, vec3 base) {
     float up = min(p.z, height - p.z);
     float second = max(max(min(a, b), min(max(a, b), up)), 0.0);
     float corner = 1.0 - 0.30 / (1.0 + second * second * 9.0);
-    return base * (0.36 + 0.05 * n.z + 0.03 * n.x + lamp) * corner * vec3(1.04, 1.0, 0.93);
+    vec2 light = mix(room_light.xy, room_light.zz, min(glass_, 1.0));
+    vec3 tint = vec3(1.0 + 0.04 * room_light.x, 1.0, 1.0 - 0.07 * room_light.x);
+    return base * ((0.36 + 0.05 * n.z + 0.03 * n.x) * light.y + lamp * light.x) * corner * tint;
 }
 
 void main() {
@@ -133,7 +136,7 @@ void main() {
     }
     vec3 light;
     if (indoors != 0) {
-        light = in_room(at, n, base.rgb);
+        light = in_room(at, n, base.rgb, levels > 0 ? emission * base.a : 0.0);
     } else {
         bool dark = unlit.z > 0.0 && moves == 0 && distance(at.xy, unlit.xy) <= unlit.z;
         float shine = dark ? 0.0 : emission * lamp_exposure * base.a;

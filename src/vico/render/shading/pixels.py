@@ -318,13 +318,19 @@ def light_outdoors(light: Any, camera: Any, real: Any, whole: Any) -> None:
 
 @kernel
 def light_room(camera: Any, real: Any, whole: Any) -> None:
-    """Light places by a lamp under the ceiling's middle, corners dimmer: leave rows of the tone table in `whole`."""
+    """Light places by a lamp under the ceiling's middle, corners dimmer: leave rows of the tone table in `whole`.
+
+    What shines is a window: it shows the daylight, whatever the lamp does.
+    """
     cx, cy, cz = np.float32(camera.room_x), np.float32(camera.room_y), np.float32(camera.room_z)
     length, width = np.float32(camera.room_half_length), np.float32(camera.room_half_width)
     height = np.float32(camera.room_height)
     c, s = np.float32(camera.room_cos), np.float32(camera.room_sin)
     lamp_height = np.float32(0.92) * height
     fall = np.float32(2.0) / (length * length + width * width + np.float32(6.0))
+    all_lamp, all_around, window = camera.room_lamp, camera.room_around, camera.room_window
+    # Lamps are warm.
+    red, blue = _ONE + np.float32(0.04) * all_lamp, _ONE - np.float32(0.07) * all_lamp
     for i in range(QUEUE):
         px, py, pz = real[X + i] - cx, real[Y + i] - cy, real[Z + i] - cz
         nx, ny, nz = real[NX + i], real[NY + i], real[NZ + i]
@@ -337,11 +343,14 @@ def light_room(camera: Any, real: Any, whole: Any) -> None:
         # Distance to the second nearest of floor, ceiling and walls: small in edges and corners.
         second = max(max(min(a, b), min(max(a, b), up)), _ZERO)
         corner = _ONE - np.float32(0.30) / (_ONE + second * second * np.float32(9.0))
-        bright = (np.float32(0.36) + np.float32(0.05) * nz + np.float32(0.03) * nx + lamp) * corner
+        glass = min(real[SHINE + i], _ONE)
+        around = all_around + glass * (window - all_around)
+        lamp *= all_lamp + glass * (window - all_lamp)
+        bright = ((np.float32(0.36) + np.float32(0.05) * nz + np.float32(0.03) * nx) * around + lamp) * corner
         bright *= (np.float32(0.4) + np.float32(0.6) * real[AROUND + i]) * _TONE_SCALE
-        whole[_I0 + i] = np.int32(min(max(_ZERO, real[RED + i] * bright * np.float32(1.04)), _TONE_LAST))
+        whole[_I0 + i] = np.int32(min(max(_ZERO, real[RED + i] * bright * red), _TONE_LAST))
         whole[_I1 + i] = np.int32(min(max(_ZERO, real[GREEN + i] * bright), _TONE_LAST))
-        whole[_I2 + i] = np.int32(min(max(_ZERO, real[BLUE + i] * bright * np.float32(0.93)), _TONE_LAST))
+        whole[_I2 + i] = np.int32(min(max(_ZERO, real[BLUE + i] * bright * blue), _TONE_LAST))
 
 
 @kernel

@@ -184,7 +184,7 @@ def shade(
                 set_up_triangle(scene, camera, buffers, drawn, int(number), setup)
                 known[slot] = number
             planes = _planes_of_row(setup, row)
-            shine = setup.emission * lamp_exposure
+            shine = _shine(setup, materials, indoors, lamp_exposure)
             while column < end:
                 count = min(end - column, RUN)
                 # The block's middle stands for what changes slowly: level of the texture, share of the sky.
@@ -222,6 +222,14 @@ class _Circle(NamedTuple):
     x: Any
     y: Any
     radius: Any
+
+
+@inlined
+def _shine(setup: Any, materials: Any, indoors: bool, lamp_exposure: Any) -> Any:
+    """Return what a surface shines at most: indoors that of windows, which have a picture, and lamps have none."""
+    if indoors:
+        return setup.emission if materials[setup.material].levels > 0 else _ZERO
+    return setup.emission * lamp_exposure
 
 
 @inlined

@@ -29,6 +29,8 @@ _GRAVITY = 9.81
 _NOTICED = 0.4
 # In the dark, people are noticed this far off where no lamps are lit, metres.
 _UNLIT_SIGHT = 15.0
+# ... and in rooms without a lamp, to which little of the night comes in.
+_DARK_ROOM_SIGHT = 3.0
 _LAMPLIT = 0.75  # of the sight by day, where lamps are lit
 _REACTION = 1.0  # s
 # Half of a car's weight is on its driven wheels, and drivers use this share of what these can do.
@@ -78,6 +80,11 @@ class Conditions(NamedTuple):
     def grip(self) -> float:
         """Friction as a share of that on dry ground."""
         return self.friction / _DRY
+
+
+def sight_in_unlit_room(dark: float) -> float:
+    """Return how far off anybody is noticed in a room whose lamps are out, metres; `dark`: 0 by day, 1 at night."""
+    return CLEAR_SIGHT + (_DARK_ROOM_SIGHT - CLEAR_SIGHT) * dark
 
 
 def conditions(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vico.errors import InputError
 from vico.sim.environment.agenda import Agenda
 from vico.sim.environment.city_event import CityEvent, Region
-from vico.sim.environment.effects import Conditions, conditions
+from vico.sim.environment.effects import Conditions, conditions, sight_in_unlit_room
 from vico.sim.environment.forecast import Forecast, Site, forecast_of
 from vico.sim.environment.ground import Ground, aged, cover, iciness, settled, wetness
 from vico.sim.environment.sky import Sky
@@ -148,16 +148,29 @@ class Environment:
             lamps=lamps,
         )
 
-    def sight_of(self, points: NDArray[np.float64]) -> float | NDArray[np.float64]:
-        """Return how far off what is at some points outdoors (ENU metres, shape ``(n, 3)``) is noticed, metres.
+    def has_power(self, xy: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return whether lamps can be lit at some points, ENU metres, shape ``(n, >= 2)``."""
+        powered = np.full(len(xy), self.lamps > 0.0)
+        for x, y, radius in self.agenda.effects.dark:
+            powered &= np.hypot(xy[:, 0] - x, xy[:, 1] - y) > radius
+        return powered
 
-        One for all, unless lamps are out somewhere.
+    def sight_of(
+        self, points: NDArray[np.float64], indoors: NDArray[np.bool_] | None = None
+    ) -> float | NDArray[np.float64]:
+        """Return how far off what is at some points (ENU metres, shape ``(n, 3)``) is noticed, metres.
+
+        One for all, unless lamps are out somewhere. `indoors` says which points are in rooms, shape ``(n,)``; in those
+        it is pitch-dark at night when the power is cut.
         """
         dark = self.agenda.effects.dark
         if not dark:
             return self.conditions.sight
         unlit = np.any([np.hypot(points[:, 0] - x, points[:, 1] - y) <= radius for x, y, radius in dark], axis=0)
-        return np.where(unlit, self._conditions(0.0).sight, self.conditions.sight)
+        sight = np.where(unlit, self._conditions(0.0).sight, self.conditions.sight)
+        if indoors is not None:
+            sight[unlit & indoors] = sight_in_unlit_room(self.dark)
+        return sight
 
     def record(self) -> dict[str, Any]:
         """Return what anybody outdoors notices: the weather, the ground, and how dark it is."""

@@ -1,0 +1,85 @@
+"""In which rooms the lamps are on: by who is in and awake, by opening hours, and by the power."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.clock import DAY
+from vico.community.hours import MINUTES, Span, is_within, open_spans
+from vico.community.usual_hours import usual_spans
+from vico.sim.simulation_state import SimulationState
+from vico.sim.state import Posture
+from vico.world.folder import World
+from vico.world.model import Category, Place
+
+# Rooms that nobody in particular switches the light of.
+_SHARED = ("stairs", "lift", "corridor")
+# Rooms of places that are open where nobody but who sleeps there switches it.
+_PRIVATE = ("hotel_room",)
+_HOME = "apartments"
+# From this on it is dark outdoors (0 by day, 1 at night); before, lamps are on everywhere, as by day.
+_DUSK = 0.5
+# Opening hours are looked up anew this often, seconds.
+_LOOKED_UP_EVERY = 60.0
+
+
+class RoomLamps:
+    """Says which rooms of a world are lit.
+
+    By day all are, as far as there is power. At night those are that somebody is in who does not lie down, those of
+    places that are open (in their usual hours, where nobody says), and stairs, lifts and corridors.
+
+    Parameters
+    ----------
+    world
+        The world.
+    weekday
+        Of the first day, 0 Monday .. 6 Sunday.
+    """
+
+    def __init__(self, world: World, weekday: int) -> None:
+        number = {place.id: k for k, place in enumerate(world.places)}
+        self._xy = np.array([room.centre[:2] for room in world.rooms], np.float64).reshape(-1, 2)
+        self._place = np.array([number.get(room.place, -1) for room in world.rooms], np.int64)
+        self._shared = np.array([room.kind in _SHARED for room in world.rooms], bool) | (self._place < 0)
+        self._hours = [
+            (k, _hours_of(place, weekday))
+            for k, place in enumerate(world.places)
+            if place.rooms and place.kind != _HOME
+        ]
+        self._private = np.array([room.kind in _PRIVATE for room in world.rooms], bool)
+        self._places = len(world.places)
+        self._looked_up = -1.0
+        self._open = np.zeros(len(world.rooms), bool)
+
+    def lit(self, state: SimulationState) -> NDArray[np.bool_]:
+        """Return whether each room is lit now, shape ``(rooms,)``."""
+        environment = state.environment
+        powered = environment.has_power(self._xy)
+        if environment.dark < _DUSK:
+            return powered
+        lit = self._shared | self._is_open(state)
+        people = state.people
+        lit[people.room[(people.room >= 0) & (people.posture != Posture.LYING)]] = True
+        return lit & powered
+
+    def _is_open(self, state: SimulationState) -> NDArray[np.bool_]:
+        """Return whether each room belongs to a place that is open, shape ``(rooms,)``."""
+        moment = state.second // _LOOKED_UP_EVERY
+        if moment != self._looked_up:
+            self._looked_up = moment
+            are = np.zeros(self._places + 1, bool)  # the last one is for no place
+            minute = moment * _LOOKED_UP_EVERY % DAY / 60.0
+            for k, spans in self._hours:
+                are[k] = is_within(spans, minute)
+            self._open = are[self._place] & ~self._private
+        return self._open
+
+
+def _hours_of(place: Place, weekday: int) -> list[Span]:
+    """Return when a place that is nobody's home is open on a day."""
+    if place.category is Category.ACCOMMODATION:
+        return [(0, MINUTES)]
+    said = open_spans(place.opening_hours, weekday) if place.opening_hours else None
+    return usual_spans(place.kind, place.category) if said is None else said

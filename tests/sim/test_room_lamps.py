@@ -1,0 +1,78 @@
+"""Which rooms are lit: by the hour, by who is in, and by the power."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+import toy_city
+from vico.assets.interior import WINDOW
+from vico.assets.shapes import box
+from vico.render import Cameras, Scene, render
+from vico.sim.config import SimConfig
+from vico.sim.room_lamps import RoomLamps
+from vico.sim.simulation import Simulation
+from vico.sim.state import Posture
+from vico.world.mesh import Material
+
+CAFE, BACK, SHOP = range(3)
+
+
+def lit(hour: int, *, cut: bool = False, lies: bool = False) -> list[bool]:
+    """Which rooms of the toy city are lit with one person in the shop, on a winter Thursday."""
+    config = SimConfig(seed=3, assistants=1, observe=(), start=hour * 3600, date="2026-01-15", weather="clear")
+    state = Simulation(toy_city.world(), toy_city.community(), config).state
+    state.people.room[:] = -1
+    state.people.room[0], state.people.posture[0] = SHOP, Posture.LYING if lies else Posture.STANDING
+    if cut:
+        state.environment.start_event("power_cut", region=(-6.0, 11.0, 5.0))
+    return RoomLamps(state.world, 3).lit(state).tolist()
+
+
+def test_rooms_are_lit_by_day_when_they_are_open_and_when_somebody_is_awake_in_them() -> None:
+    assert lit(12) == [True, True, True]
+    assert lit(3) == [False, False, True]
+    assert lit(3, lies=True) == [False, False, False]
+    assert lit(18)[CAFE]
+
+
+def test_a_power_cut_puts_the_lamps_of_its_district_out_and_no_others() -> None:
+    assert lit(12, cut=True) == [False, True, True]
+
+
+def test_people_in_unlit_rooms_are_noticed_only_from_close_by() -> None:
+    config = SimConfig(seed=3, observe=(), start=23 * 3600, date="2026-01-15", weather="clear")
+    environment = Simulation(toy_city.world(), toy_city.community(), config).state.environment
+    environment.start_event("power_cut", region=(0.0, 0.0, 30.0))
+    points, indoors = np.zeros((2, 3)), np.array([True, False])
+    assert np.asarray(environment.sight_of(points, indoors)).tolist() == [3.0, 15.0]
+
+
+def room() -> Scene:
+    """A room with a grey floor and wall, and a white window in that."""
+    glass = Material(WINDOW, np.full((4, 4, 3), 255, np.uint8), emission=1.0)
+    wall, floor = box((0.2, 8, 3), (4, 0, 1.5), colour=(150, 150, 150)), box((8, 8, 0.2), (0, 0, -0.1))
+    pane = box((0.1, 2, 1), (3.9, 0, 1.5), colour=(255, 255, 255))
+    return Scene(
+        [],
+        indoor=[wall, floor, replace(pane, material=glass, uv=pane.positions[:, 1:])],
+        rooms=[[0, 0, 0, 4, 4, 3, 0.0]],
+    )
+
+
+def test_unlit_rooms_have_the_light_of_their_windows() -> None:
+    made = room()
+    camera = Cameras(np.array([[-3.0, 0, 1.6]]), np.array([[1.0, 0, 0]]), width=64, height=64)
+    seen = {}
+    for name, lamp, daylight in (("lamp", 1.0, 1.0), ("evening", 1.0, 0.0), ("day", 0.0, 1.0), ("night", 0.0, 0.0)):
+        made.light_rooms(lamp, daylight)
+        picture = render(made, camera).rgb[0].astype(int).mean(axis=2)
+        seen[name] = picture[32, 32], picture[48, 32]
+    pane, ground = ({name: both[k] for name, both in seen.items()} for k in (0, 1))
+    assert min(pane["lamp"], pane["day"]) > 150 > 80 > max(pane["evening"], pane["night"])
+    assert ground["lamp"] == ground["evening"] > ground["day"] > 3 * ground["night"]
+    # In one without windows it is as dark by day.
+    made.rooms["windows"] = 0.0
+    made.light_rooms(0.0, 1.0)
+    assert render(made, camera).rgb[0, 48, 32].mean() == ground["night"]
