@@ -12,6 +12,14 @@ import numpy as np
 
 from vico.io.compiled import compiled
 from vico.sim.neighbours import search
+from vico.sim.traffic.companions import (
+    goes_wrong_way,
+    keep_up,
+    note_distance,
+    wait_for_companions,
+    waits_for_companions,
+    walkway_to_leader,
+)
 from vico.sim.traffic.path import project_on_polyline
 from vico.sim.traffic.random_stream import next_random
 from vico.sim.traffic.shapes import disc_touches, distance_to, is_disc, share_level
@@ -33,12 +41,14 @@ _GAP, _GAP_WHEN_JAMMED = 0.1, 0.04  # kept from others, m
 _ANGLES = np.array([0.0, -0.35, 0.35, -0.7, 0.7, -1.1, 1.1, -1.6, 1.6, -2.3, 2.3, 3.1])
 _FORWARD = 9
 _CARS_FIRST_AFTER, _CARS_FIRST_UNTIL = 10.0, 12.0  # s waited by a car that goes first then, and by the pedestrian
+_LEFT_BEHIND = 15.0  # s after which a companion whose leader has crossed crosses, too
 _GIVE_UP_CROSSING = 20.0, 10.0  # s waited for a crossing before turning round, and more by `lateral_share`
 _OFF_CROSSING = 1.3  # m walked after which the body is off the crossing
 _TURN_RATE = 4.0  # rad/s
 _STRIDE_AHEAD = 0.4  # m ahead where a heading is tested against the walkway's sides
 _PROGRESS = 1.0  # who is farther from where it was has got on, m
 _STUCK_AFTER, _STUCK_SPREAD = 3.5, 3.0  # s without progress before turning round, and how much that varies
+_WAITS_BELOW = 0.3  # who walks at less than this share of its pace waits for somebody
 _CORNER, _CROSSING = int(_CORNER_KIND), int(_CROSSING_KIND)
 
 
@@ -141,8 +151,11 @@ def choose_next_walkway(paths, walker, node):  # type: ignore[no-untyped-def]
 def must_wait_at_crossing(walker, junctions, crossing, is_asked):  # type: ignore[no-untyped-def]
     """Return whether a pedestrian lets vehicles go first: those on the crossing, and one that has waited long.
 
-    Nobody waits for the vehicle that stands waiting for them: who is asked to go goes.
+    Nobody waits for the vehicle that stands waiting for them: who is asked to go goes. Who has been left behind by
+    others goes after a while: vehicles let pass who is on a crossing.
     """
+    if walker.leader != NONE and walker.crossing_wait > _LEFT_BEHIND:
+        return False
     cars_first = junctions.vehicle_wait[crossing] > _CARS_FIRST_AFTER and walker.crossing_wait < _CARS_FIRST_UNTIL
     return (junctions.crossing_busy[crossing] or cars_first) and not is_asked
 
@@ -168,8 +181,32 @@ def _enter_walkway(paths, walker, junctions, following, node):  # type: ignore[n
 
 
 @compiled
-def advance_follow_point(paths, walker, junctions, is_asked, x, y, dt):  # type: ignore[no-untyped-def]
-    """Move the followed point on until it is far enough ahead; return whether a crossing has to be waited for."""
+def _may_go_onto(paths, walker, junctions, is_asked, following, dt):  # type: ignore[no-untyped-def]
+    """Return whether a walker may go onto a walkway now; who may not counts the time, and gives up after a while."""
+    if paths.walkways[following].kind != _CROSSING:
+        return True
+    if (paths.walkways[following].light >= AMBER or waits_for_companions(walker)) and not is_asked:
+        return False
+    if not must_wait_at_crossing(walker, junctions, following, is_asked):
+        return True
+    walker.crossing_wait += dt
+    junctions.walker_wait[following] = max(junctions.walker_wait[following], walker.crossing_wait)
+    return False
+
+
+@compiled
+def _gives_up_crossing(walker):  # type: ignore[no-untyped-def]
+    """Return whether a walker has waited so long for a crossing that it turns round; who is led does not."""
+    longest, spread = _GIVE_UP_CROSSING
+    return walker.leader == NONE and walker.crossing_wait > longest + spread * walker.lateral_share
+
+
+@compiled
+def advance_follow_point(paths, walker, leader, junctions, is_asked, x, y, dt):  # type: ignore[no-untyped-def]
+    """Move the followed point on until it is far enough ahead; return whether there is something to wait for.
+
+    That is a crossing, or where the way forks who leads the walker (`leader`; the walker itself where nobody does).
+    """
     lead = _LEAD_WHEN_HINDERED if walker.jammed_time > _HINDERED_AFTER else _LEAD
     for _ in range(12):
         point = follow_point(paths, walker)
@@ -181,20 +218,19 @@ def advance_follow_point(paths, walker, junctions, is_asked, x, y, dt):  # type:
             walker.offset = offset
             continue
         node = paths.walkways[walkway].end if walker.direction > 0 else paths.walkways[walkway].start
-        following = choose_next_walkway(paths, walker, node)
+        if walker.leader != NONE:
+            following = walkway_to_leader(paths, walker, leader, node)
+            if following < 0:
+                return True
+        else:
+            following = choose_next_walkway(paths, walker, node)
         if following < 0:
             walker.direction = -walker.direction
             walker.offset = min(max(offset, 0.0), paths.walkways[walkway].length)
             continue
-        is_crossing = paths.walkways[following].kind == _CROSSING
-        if is_crossing and paths.walkways[following].light >= AMBER and not is_asked:
-            return True
-        if is_crossing and must_wait_at_crossing(walker, junctions, following, is_asked):
-            walker.crossing_wait += dt
-            longest, spread = _GIVE_UP_CROSSING
-            if walker.crossing_wait > longest + spread * walker.lateral_share:
+        if not _may_go_onto(paths, walker, junctions, is_asked, following, dt):
+            if _gives_up_crossing(walker):
                 _turn_round(paths, walker, x, y)
-            junctions.walker_wait[following] = max(junctions.walker_wait[following], walker.crossing_wait)
             return True
         _enter_walkway(paths, walker, junctions, following, node)
     return False
@@ -311,7 +347,7 @@ def _note_progress(paths, walker, x, y, is_waiting, dt):  # type: ignore[no-unty
     walker.stuck_time += dt
     walker.jammed_time += dt
     over = walker.stuck_time - _STUCK_AFTER
-    if walker.stuck_time > _STUCK_AFTER and over > _STUCK_SPREAD * next_random(walker):
+    if walker.leader == NONE and walker.stuck_time > _STUCK_AFTER and over > _STUCK_SPREAD * next_random(walker):
         _turn_round(paths, walker, x, y)
 
 
@@ -336,6 +372,21 @@ def asked_to_go(fleet, first, n):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _group_pace(paths, pedestrians, i, shapes, near, first, dt):  # type: ignore[no-untyped-def]
+    """Have one of a group stay with the others; return the share of its pace at which it walks for that."""
+    walker = pedestrians[i]
+    note_distance(pedestrians, i, shapes, first)
+    if walker.leader == NONE:
+        return wait_for_companions(paths, walker, dt)
+    leader, b = pedestrians[walker.leader], first + i
+    if goes_wrong_way(paths, walker, leader):
+        _turn_round(paths, walker, shapes.x[b], shapes.y[b])
+    point = follow_point(paths, walker)
+    heading = point.left_y * walker.direction, -point.left_x * walker.direction
+    return keep_up(paths, walker, leader, shapes, (b, first + walker.leader), near, heading, dt)
+
+
+@compiled
 def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, pace, dt):  # type: ignore[no-untyped-def]
     """Advance all pedestrians by `dt` seconds; their bodies follow those of the vehicles in `shapes`, and in `grid`.
 
@@ -350,20 +401,24 @@ def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, pace
         b = first + i
         x, y = shapes.x[b], shapes.y[b]
         near = _nearby(shapes, grid, b, buffer)
-        is_waiting = advance_follow_point(paths, walker, junctions, asked[i], x, y, dt)
+        leader = pedestrians[i if walker.leader == NONE else walker.leader]
+        share = 1.0 if walker.group_size == 1 else _group_pace(paths, pedestrians, i, shapes, near, first, dt)
+        if asked[i]:
+            share = max(share, 1.0)
+        is_waiting = advance_follow_point(paths, walker, leader, junctions, asked[i], x, y, dt)
         left = walker.leaving_crossing
         if left >= 0 and walker.distance_walked - walker.leaving_since > _OFF_CROSSING:
             junctions.walkers_on[left] -= 1
             walker.leaving_crossing = NONE
         if asked[i] and walker.stuck_time > 2.5:
             _turn_round(paths, walker, x, y)  # it waits for us, and is in our way
-        step = _walk(paths, walker, shapes, b, near, is_waiting, pace, dt)
+        step = _walk(paths, walker, shapes, b, near, is_waiting, pace * share, dt)
         if step == 0.0:
             shapes.vx[b] = shapes.vy[b] = 0.0
         walker.speed = step / dt
         _note_gait(walker, step > 0.0, dt)
         walker.distance_walked += step
-        _note_progress(paths, walker, shapes.x[b], shapes.y[b], is_waiting, dt)
+        _note_progress(paths, walker, shapes.x[b], shapes.y[b], is_waiting or share < _WAITS_BELOW, dt)
 
 
 @compiled

@@ -17,6 +17,7 @@ from vico.sim.bodies import BUS, CAR, PEDESTRIAN, STEP_HEIGHT, Bodies, Drawn, jo
 from vico.sim.environment import Conditions
 from vico.sim.neighbours import neighbour_grid
 from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
+from vico.sim.traffic.companions import choose_companions, leave_group
 from vico.sim.traffic.crossings import mark_busy_crossings
 from vico.sim.traffic.hand_placing import HandPlaced, TrafficSetup
 from vico.sim.traffic.jams import STUCK_AFTER, Jam, JamLog, entity_before
@@ -223,18 +224,34 @@ class Traffic:
         if self.pedestrians and not len(usable):
             raise InputError("traffic: the world has no sidewalk; use --pedestrians 0")
         share = self.walks.length[usable] / self.walks.length[usable].sum() if len(usable) else None
+        choose_companions(self._walkers, first, seed)
         for i in range(first, self.pedestrians):
+            if self._walkers["leader"][i] != NONE and self._place_companion(i):
+                continue
             for _ in range(_TRIES):
                 walkway = int(random.choice(usable, p=share))
                 offset, way = random.uniform(0.0, self.walks.length[walkway]), 1 if random.random() < 0.5 else -1
-                if place_pedestrian(
-                    self._paths, self._walkers, i, walkway, offset, way, self.shapes, self.vehicles + i
-                ):
+                if self._place_pedestrian(i, walkway, offset, way):
                     break
             else:
                 raise InputError(
                     f"traffic: no room for pedestrian {i + 1} of {self.pedestrians}; use fewer, as in --pedestrians {i}"
                 )
+
+    def _place_pedestrian(self, i: int, walkway: int, offset: float, way: int) -> bool:
+        b = self.vehicles + i
+        return bool(place_pedestrian(self._paths, self._walkers, i, walkway, offset, way, self.shapes, b))
+
+    def _place_companion(self, i: int) -> bool:
+        """Put a pedestrian near who leads it; who finds no room there walks alone."""
+        leader = self._walkers[self._walkers["leader"][i]]
+        walkway, way, offset = (leader[name].item() for name in ("walkway", "direction", "offset"))
+        places = [offset + side * 1.05 * k for k in (1, 2, 3) for side in (-way, way)]
+        length = self.walks.length[walkway]
+        if any(0.0 <= place <= length and self._place_pedestrian(i, walkway, place, way) for place in places):
+            return True
+        leave_group(self._walkers, i)
+        return False
 
     # -- the subsystem contract --------------------------------------------------------------------------------------
 

@@ -133,7 +133,10 @@ PEDESTRIAN_RECORD = np.dtype(
         ("walkway", _I),  # walkway the followed point is on
         ("offset", _F),  # distance of that point along the walkway, m
         ("direction", _I),  # 1 along the walkway, -1 against it
-        ("lateral_share", _F),  # how far right of the middle of its room it walks: 0 in the middle, 1 at the edge
+        (
+            "lateral_share",
+            _F,
+        ),  # how far right of the middle of its room it walks: 0 in the middle, 1 at the edge, less than 0 left of it
         ("preferred_speed", _F),  # m/s
         ("speed", _F),  # measured over the last step, m/s
         ("distance_walked", _F),  # since the start, m
@@ -147,6 +150,12 @@ PEDESTRIAN_RECORD = np.dtype(
         ("goal_end", _I),  # the one after its last goal
         ("leaving_crossing", _I),  # crossing its body may still be on, NONE for none
         ("leaving_since", _F),  # `distance_walked` when its point left that crossing, m
+        ("leader", _I),  # pedestrian whom it walks with and who decides the way, NONE for who walks alone or leads
+        ("group_size", _I),  # how many walk together, 1 for who walks alone
+        ("group_place", _I),  # 0 who leads, then 1, 2 from right to left or from front to back
+        ("apart", _F),  # how far it is from who leads it, who leads from the farthest companion, m; 0 alone
+        ("parted_time", _F),  # who leads: how long somebody has been left behind, s
+        ("in_file", _F),  # how long it walks behind instead of beside for somebody who comes, s
         ("random", np.uint64),  # state of its stream of random numbers
     ],
     align=True,
@@ -357,7 +366,8 @@ def new_pedestrians(n: int, seed: int) -> Records:
     walkers["direction"] = 1
     walkers["lateral_share"] = random.uniform(0.1, 0.95, n)
     walkers["preferred_speed"] = random.uniform(1.0, 1.5, n)
-    walkers["leaving_crossing"] = walkers["goal"] = NONE
+    walkers["leaving_crossing"] = walkers["goal"] = walkers["leader"] = NONE
+    walkers["group_size"] = 1
     walkers["gait_time"] = -GAIT_TIME
     walkers["random"] = _random_streams(seed, "ways", n)
     return walkers

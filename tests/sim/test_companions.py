@@ -1,0 +1,48 @@
+"""Pedestrians who walk together, on the streets of central Helsinki."""
+
+import numpy as np
+
+from helsinki_traffic import traffic_by
+from vico.sim.bodies import Bodies
+from vico.sim.overlaps import overlapping
+from vico.sim.traffic import JunctionRule
+
+NOWHERE = Bodies.none()
+
+
+def test_a_third_walk_in_twos_and_threes_and_stay_together_and_touch_nobody() -> None:
+    traffic = traffic_by(JunctionRule.SIGNALS, 30, 120)
+    walkers = traffic.pedestrian_state
+    led = np.flatnonzero(walkers.leader >= 0)
+    assert 0.2 < (walkers.group_size > 1).mean() < 0.45
+    assert set(walkers.group_size.tolist()) == {1, 2, 3}
+    apart, beside, overlaps = [], [], 0
+    for step in range(1800):
+        if step % 10 == 0:
+            traffic.set_signals(step // 10, ())
+        traffic.advance(0.1, NOWHERE)
+        if step % 10 == 9:
+            body = traffic.walkers
+            to_leader = body.position[walkers.leader[led], :2] - body.position[led, :2]
+            forward = np.column_stack([np.cos(body.yaw[led]), np.sin(body.yaw[led])])
+            apart.append(np.hypot(*to_leader.T))
+            beside.append(np.abs((to_leader * forward).sum(axis=1)) < 0.4)
+            overlaps += len(overlapping(traffic.bodies(), 0.0))
+    assert overlaps == 0
+    assert (np.array(apart) < 4.0).mean() > 0.95
+    assert 0.2 < (np.array(beside) & (np.array(apart) < 2.5)).mean() < 0.9
+    # Nobody stands because of the others: they get as far as those who walk alone.
+    alone = walkers.distance_walked[walkers.group_size == 1].mean()
+    assert walkers.distance_walked[led].mean() > 0.8 * alone
+
+
+def test_groups_go_on_from_a_saved_state_as_if_nothing_had_been() -> None:
+    first, again = traffic_by(JunctionRule.ONE, 5, 40), traffic_by(JunctionRule.ONE, 5, 40)
+    assert (first.pedestrian_state.leader >= 0).any()
+    for _ in range(200):
+        first.advance(0.1, NOWHERE)
+    again.restore(first.arrays())
+    for _ in range(100):
+        first.advance(0.1, NOWHERE)
+        again.advance(0.1, NOWHERE)
+    assert all(np.array_equal(a, again.arrays()[name]) for name, a in first.arrays().items())
