@@ -15,6 +15,7 @@ from vico.render import Cameras, Lighting, Scene
 from vico.render.frames import PictureRequest, take_pictures
 from vico.render.gl.renderer import GlRenderer
 from vico.render.quality import FINE
+from vico.render.records import UPPER_WINDOWS
 from vico.render.sensors.batch import Viewers
 from vico.render.sensors.lens import Lens
 from vico.sim.config import SimConfig
@@ -50,6 +51,7 @@ def scene() -> Scene:
     made = Scene(
         joined(static), models, indoor=[s.of_entity(60) for s in room], rooms=[[100, 0, 0, 4, 4, 3, 0.0]], lighting=DAY
     )
+    made.arrays.textures.materials["windows"][made.material_names.index("brick")] = UPPER_WINDOWS
     places = [pose_matrix(*generator.uniform((-8, -18), (30, 18)), 0, k) for k in range(40)]
     made.place(["tree"] * 40, np.array(places), np.arange(100, 140))
     made.place(["cube"], np.array([pose_matrix(102, -1, 0, 0.4)]), [70], indoor=True)
@@ -106,6 +108,17 @@ def test_rooms_are_lit_alike(both: tuple[Scene, GlRenderer], lamp: float, daylig
     wanted, got = take_pictures(made, INSIDE, PictureRequest()), gl.take(INSIDE, PictureRequest())
     made.light_rooms(1.0, 1.0)
     assert np.abs(wanted.rgb.astype(int) - got.rgb).mean() < 1.0
+
+
+def test_windows_are_lit_alike(both: tuple[Scene, GlRenderer]) -> None:
+    made, gl = both
+    made.lighting = NIGHT
+    bright = take_pictures(made, OUTSIDE, PictureRequest()).rgb.astype(int)
+    made.light_windows(np.array([[1.0, 1.0]] * 10 + [[0.0, 1.0]] * 12 + [[1.0, 1.0]], np.float32))
+    wanted, got = take_pictures(made, OUTSIDE, PictureRequest()).rgb.astype(int), gl.take(OUTSIDE, PictureRequest())
+    made.light_windows(None)
+    assert wanted.mean() < 0.9 * bright.mean()
+    assert np.abs(wanted - got.rgb).mean() < 1.0
 
 
 def test_what_moves_is_moved_there_too(both: tuple[Scene, GlRenderer]) -> None:

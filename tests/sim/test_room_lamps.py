@@ -1,4 +1,4 @@
-"""Which rooms are lit: by the hour, by who is in, and by the power."""
+"""Which rooms and windows are lit: by the hour, by who is in, and by the power."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ import numpy as np
 import toy_city
 from vico.assets.interior import WINDOW
 from vico.assets.shapes import box
-from vico.render import Cameras, Scene, render
+from vico.render import Cameras, Lighting, Scene, render
+from vico.render.records import UPPER_WINDOWS
 from vico.sim.config import SimConfig
 from vico.sim.room_lamps import RoomLamps
 from vico.sim.simulation import Simulation
 from vico.sim.state import Posture
+from vico.sim.window_lights import WindowLights
 from vico.world.mesh import Material
+from vico.world.model import Category
 
 CAFE, BACK, SHOP = range(3)
 
@@ -76,3 +79,47 @@ def test_unlit_rooms_have_the_light_of_their_windows() -> None:
     made.rooms["windows"] = 0.0
     made.light_rooms(0.0, 1.0)
     assert render(made, camera).rgb[0, 48, 32].mean() == ground["night"]
+
+
+def city_with_homes() -> Simulation:
+    """The toy city with the café's rooms as the home of its residents, at three at night."""
+    world = toy_city.world()
+    home = {"category": Category.ACCOMMODATION, "kind": "apartments"}
+    world.places[0] = world.places[0].model_copy(update=home)
+    config = SimConfig(seed=3, observe=(), start=3 * 3600, date="2026-01-15", weather="clear")
+    return Simulation(world, toy_city.community(), config)
+
+
+def test_windows_of_a_home_shine_while_somebody_is_awake_in_it_and_shops_while_they_are_open() -> None:
+    sim = city_with_homes()
+    people, world = sim.state.people, sim.world
+    lights = WindowLights(world, sim.residents, RoomLamps(world, 3))
+    scene = Scene([], lighting=Lighting.at(3 * 3600.0))
+    seen = []
+    for place, posture in ((0, Posture.STANDING), (0, Posture.LYING), (-1, Posture.STANDING), (1, Posture.STANDING)):
+        people.place[:], people.posture[:] = place, posture
+        lights.set(scene, sim.state)
+        seen.append(scene.arrays.windows[world.buildings[0].entity].tolist())
+    home, asleep, away, shop = seen
+    assert home[0] == 1.0 > 0.1 > asleep[0] == away[0] == shop[0]
+    assert home[1] == asleep[1] == away[1] < 0.5 < shop[1]
+    nobody = np.zeros(len(world.places), bool)
+    assert lights.shares(11 * 3600.0, nobody)[0, 1] == 1.0
+    scene.lighting = Lighting.at(12 * 3600.0)
+    lights.set(scene, sim.state)
+    assert scene.arrays.windows.tolist() == [[1.0, 1.0]]
+
+
+def test_windows_of_one_building_go_out_and_those_of_another_stay() -> None:
+    glass = Material("wall", np.full((4, 4, 4), 255, np.uint8), emission=1.0)
+    houses = [box((1, 4, 4), (8, y, 2)).of_entity(entity) for y, entity in ((2.5, 10), (-2.5, 11))]
+    made = Scene(
+        [replace(house, material=glass, uv=house.positions[:, 1:]) for house in houses], lighting=Lighting.at(82_800.0)
+    )
+    made.arrays.textures.materials["windows"][made.material_names.index("wall")] = UPPER_WINDOWS
+    camera = Cameras(np.array([[0.0, 0, 2]]), np.array([[1.0, 0, 0]]), width=64, height=64)
+    before = render(made, camera).rgb[0].astype(int)
+    made.light_windows(np.array([[1.0, 1.0]] * 10 + [[0.0, 1.0], [1.0, 1.0]], np.float32))
+    after = render(made, camera).rgb[0].astype(int)
+    assert after[32, 22].mean() < 0.5 * before[32, 22].mean()
+    assert after[32, 42].tolist() == before[32, 42].tolist()

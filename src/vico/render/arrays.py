@@ -123,6 +123,9 @@ class SceneArrays(NamedTuple):
         OUTDOORS or INDOORS, uint8, shape ``(c,)``.
     counts
         A `COUNTS` record.
+    windows
+        Share of the light of buildings' windows that is on: upper floors, ground floor; by entity, float32, shape
+        ``(n, 2)``. The last row is for all entities beyond.
     """
 
     mesh: Mesh
@@ -133,6 +136,7 @@ class SceneArrays(NamedTuple):
     instances: Instances
     avatars: PosedAvatars
     counts: Any
+    windows: NDArray[np.float32]
 
 
 class Buffers(NamedTuple):

@@ -43,10 +43,12 @@ MATERIAL = np.dtype(
         ("levels", i4),  # number of mip levels; 0: no texture
         ("flags", i4),  # bits CUTOUT and DOUBLE_SIDED
         ("emission", f4),  # light of its own, 1 = a white wall in full light
+        ("windows", i4),  # whose light it is: NO_WINDOWS, or a column of `SceneArrays.windows` and one
     ],
     align=True,
 )
 CUTOUT, DOUBLE_SIDED = 1, 2
+NO_WINDOWS, UPPER_WINDOWS, GROUND_WINDOWS = 0, 1, 2
 
 # How many there are: instances in all, those of them that never move (they come first), and avatars.
 COUNTS = np.dtype([("instances", i8), ("static_instances", i8), ("avatars", i8)], align=True)

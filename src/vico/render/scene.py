@@ -41,6 +41,7 @@ from vico.world.mesh import Material, Surface
 _LEVEL_PIXELS = (1e9, 48.0, 20.0)
 _LEVEL_CELLS = (0.07, 0.16)
 _SHADOW_METRES, _RELIEF_METRES = 0.4, 1.5
+_ALL_ON = np.ones((1, 2), np.float32)
 
 
 class Scene:
@@ -62,6 +63,8 @@ class Scene:
 
     Attributes
     ----------
+    material_names
+        Of the rows of ``arrays.textures.materials``.
     moment
         Seconds; decides where drops and flakes are in pictures taken now.
 
@@ -90,6 +93,7 @@ class Scene:
         # Avatars have no texture: their colour is in the vertices.
         self._skin = materials.number(Material("vico skin"))
         textures = pack_textures(materials.entries)
+        self.material_names = [material.name for material in materials.entries]
         outside, outer = clustered(outside, textures.double_sided)
         inside, inner = clustered(inside, textures.double_sided)
         _shift(inner.span, len(outside.triangles), len(outside.position))
@@ -129,7 +133,7 @@ class Scene:
         # The mesh and the arrays whose triangles and colours it holds.
         self._clothed: tuple[Any, ...] | None = None
         self.arrays = SceneArrays(
-            mesh, textures, clusters, where, placeable, empty, _no_avatars(), np.zeros(1, COUNTS)[0]
+            mesh, textures, clusters, where, placeable, empty, _no_avatars(), np.zeros(1, COUNTS)[0], _ALL_ON
         )
 
     @property
@@ -291,17 +295,17 @@ class Scene:
         return self._light
 
     def light_rooms(self, lamp: ArrayLike, daylight: float) -> None:
-        """Switch the rooms' lamps.
-
-        Parameters
-        ----------
-        lamp
-            How far each room's lamps are on, 0..1, shape ``(r,)``, or one for all.
-        daylight
-            Light outdoors, as a share of that by day: it comes in where there are windows.
-        """
+        """Switch each room's lamps on, 0..1, shape ``(r,)``, and let a share of the daylight in by its windows."""
         self.rooms["lamp"] = lamp
         self.rooms["daylight"] = daylight * self.rooms["windows"]
+
+    def light_windows(self, shares: NDArray[np.float32] | None) -> None:
+        """Switch on shares of the light of buildings' windows, as ``SceneArrays.windows`` has them; None: all."""
+        windows = _ALL_ON if shares is None else np.ascontiguousarray(shares, np.float32)
+        if windows is not self.arrays.windows and not np.array_equal(windows, self.arrays.windows):
+            self._replace(windows=windows)
+            if self._light is not None:
+                self._light = self._light._replace()  # another one, for those who keep pictures taken by it
 
     def room_of(self, position: NDArray[np.float64]) -> Record | None:
         """Return the `ROOM` that holds a point, or None."""
@@ -356,7 +360,7 @@ class Scene:
         all_of.where[rows], all_of.sphere[rows] = moving.where, moving.sphere
         self.arrays.counts["instances"], self.arrays.counts["static_instances"] = fixed + count, fixed
 
-    def _replace(self, **changed: Mesh | Instances | PosedAvatars) -> None:
+    def _replace(self, **changed: Mesh | Instances | PosedAvatars | NDArray[np.float32]) -> None:
         self.arrays = self.arrays._replace(**changed)  # type: ignore[arg-type]
 
 

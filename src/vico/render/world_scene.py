@@ -8,6 +8,7 @@ import numpy as np
 
 from vico.assets.interior import WINDOW
 from vico.render.lighting import Lighting
+from vico.render.records import GROUND_WINDOWS, UPPER_WINDOWS
 from vico.render.scene import Scene
 from vico.world.mesh import Surface
 
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 
     from vico.world.folder import World
 
+# Beginnings of the names of materials with windows in them.
+_UPPER, _GROUND = ("wall_", "dormer"), ("ground_", "doors")
 OUTDOOR_LAYERS = ("ground", "buildings", "roofs")
 
 
@@ -42,6 +45,7 @@ def scene_of(
     ]
     models = {**world.prototypes(), **(prototypes or {})}
     scene = Scene(static, models, indoor=indoor, rooms=np.array(boxes).reshape(-1, 7), lighting=lighting)
+    _tell_windows(scene)
     if rooms:
         glazed = [np.unique(s.entity) for s in indoor if s.material.name == WINDOW]
         known = np.concatenate(glazed) if glazed else np.zeros(0, np.int32)
@@ -62,3 +66,11 @@ def scene_of(
         inside = np.array([bool(objects.room[k]) for k in taken])
         scene.place(names, transforms, objects.entity[index], indoor=inside)
     return scene
+
+
+def _tell_windows(scene: Scene) -> None:
+    """Mark the materials whose light is that of windows."""
+    records = scene.arrays.textures.materials
+    for k, name in enumerate(scene.material_names):
+        if records[k]["emission"] > 0.0:
+            records[k]["windows"] = UPPER_WINDOWS * name.startswith(_UPPER) + GROUND_WINDOWS * name.startswith(_GROUND)

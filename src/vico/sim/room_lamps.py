@@ -17,7 +17,8 @@ from vico.world.model import Category, Place
 _SHARED = ("stairs", "lift", "corridor")
 # Rooms of places that are open where nobody but who sleeps there switches it.
 _PRIVATE = ("hotel_room",)
-_HOME = "apartments"
+#: Kind of the places that people live in.
+HOME = "apartments"
 # From this on it is dark outdoors (0 by day, 1 at night); before, lamps are on everywhere, as by day.
 _DUSK = 0.5
 # Opening hours are looked up anew this often, seconds.
@@ -43,15 +44,10 @@ class RoomLamps:
         self._xy = np.array([room.centre[:2] for room in world.rooms], np.float64).reshape(-1, 2)
         self._place = np.array([number.get(room.place, -1) for room in world.rooms], np.int64)
         self._shared = np.array([room.kind in _SHARED for room in world.rooms], bool) | (self._place < 0)
-        self._hours = [
-            (k, _hours_of(place, weekday))
-            for k, place in enumerate(world.places)
-            if place.rooms and place.kind != _HOME
-        ]
+        self._hours = [(k, _hours_of(place, weekday)) for k, place in enumerate(world.places) if place.kind != HOME]
         self._private = np.array([room.kind in _PRIVATE for room in world.rooms], bool)
-        self._places = len(world.places)
         self._looked_up = -1.0
-        self._open = np.zeros(len(world.rooms), bool)
+        self._open = np.zeros(len(world.places), bool)
 
     def lit(self, state: SimulationState) -> NDArray[np.bool_]:
         """Return whether each room is lit now, shape ``(rooms,)``."""
@@ -59,21 +55,21 @@ class RoomLamps:
         powered = environment.has_power(self._xy)
         if environment.dark < _DUSK:
             return powered
-        lit = self._shared | self._is_open(state)
+        are_open = np.append(self.are_open(state.second), False)  # the last one is for no place
+        lit = self._shared | (are_open[self._place] & ~self._private)
         people = state.people
         lit[people.room[(people.room >= 0) & (people.posture != Posture.LYING)]] = True
         return lit & powered
 
-    def _is_open(self, state: SimulationState) -> NDArray[np.bool_]:
-        """Return whether each room belongs to a place that is open, shape ``(rooms,)``."""
-        moment = state.second // _LOOKED_UP_EVERY
+    def are_open(self, second: float) -> NDArray[np.bool_]:
+        """Return whether each place is open at a second, shape ``(places,)``; homes never are."""
+        moment = second // _LOOKED_UP_EVERY
         if moment != self._looked_up:
             self._looked_up = moment
-            are = np.zeros(self._places + 1, bool)  # the last one is for no place
             minute = moment * _LOOKED_UP_EVERY % DAY / 60.0
+            self._open[:] = False
             for k, spans in self._hours:
-                are[k] = is_within(spans, minute)
-            self._open = are[self._place] & ~self._private
+                self._open[k] = is_within(spans, minute)
         return self._open
 
 

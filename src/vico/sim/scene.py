@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from vico.assets.models.in_hand import in_hand_models
 from vico.assets.people import Appearance, body_of
+from vico.community.model import Resident
 from vico.errors import InputError
 from vico.render import Cameras, Lighting, Scene, render
 from vico.render.lighting import SHADOW_STEP
@@ -43,6 +44,7 @@ from vico.sim.passers_by import manner_of_pedestrian, pedestrian_motion
 from vico.sim.room_lamps import RoomLamps
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture, Vehicle
+from vico.sim.window_lights import WindowLights
 from vico.threads import in_order
 from vico.world.folder import World
 from vico.world.mesh import Surface
@@ -108,6 +110,10 @@ class RenderedSimulation(Protocol):
         """Everybody and everything, as it is now."""
 
     @property
+    def residents(self) -> Sequence[Resident]:
+        """Who takes part, the first of its people."""
+
+    @property
     def looks(self) -> Sequence[Appearance]:
         """How people look, in the order of their avatars, and after them the pedestrians."""
 
@@ -147,6 +153,7 @@ class SceneRenderer:
     def _attach(self, sim: RenderedSimulation) -> None:
         self._sim = sim
         self._room_lamps = RoomLamps(sim.world, date.fromisoformat(sim.config.date).weekday())
+        self._window_lights = WindowLights(sim.world, sim.residents, self._room_lamps)
         self._lit: tuple[float, ...] = ()
         self.wait()
         self._viewers = Viewers(
@@ -247,6 +254,7 @@ class SceneRenderer:
         if lit != self._lit:
             self._lit = lit
             self._scene.lighting = _lighting(state.environment, moment * _LIGHT_EVERY)
+        self._window_lights.set(self._scene, state)
 
     def _set_moving(self, state: SimulationState) -> None:
         """Put everything that moves where it is now."""

@@ -190,6 +190,9 @@ class GlRenderer:
                 mesh.triangle[first:last].tobytes(), offset=first * mesh.triangle.itemsize
             )
             self._buffers["entities"][1].write(mesh.entity[first:last].tobytes(), offset=first * 4)
+        if self._uploaded.get("windows") is not arrays.windows:
+            self._uploaded["windows"] = arrays.windows
+            self._buffer("windows", 11, arrays.windows)
         count = int(arrays.counts["instances"])
         self._buffer("matrices", 6, np.ascontiguousarray(instances.matrix[: max(count, 1)]))
         self._buffer("owners", 7, np.ascontiguousarray(instances.entity[: max(count, 1)]))

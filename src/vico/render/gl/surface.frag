@@ -1,8 +1,9 @@
 #version 450
 // What `vico.render.shading` does, pixel by pixel; see there for why.
-layout(std430, binding = 3) readonly buffer Materials { int materials[]; };  // MATERIAL: 4 whole numbers, 1 real
+layout(std430, binding = 3) readonly buffer Materials { int materials[]; };  // MATERIAL: 4 whole numbers, 1 real, 1 whole
 layout(std430, binding = 4) readonly buffer Starts { int starts[]; };
 layout(std430, binding = 5) readonly buffer Texels { uint texels[]; };
+layout(std430, binding = 11) readonly buffer Windows { float windows[]; };  // shares of upper and ground floors
 layout(std430, binding = 9) readonly buffer Tone { int tone[]; };
 
 uniform usampler2D closeness;
@@ -120,9 +121,11 @@ vec3 in_room(vec3 at, vec3 n, vec3 base, float glass_) {
 }
 
 void main() {
-    int log2_width = materials[5 * material], log2_height = materials[5 * material + 1];
-    int levels = materials[5 * material + 2], flags = materials[5 * material + 3];
-    float emission = intBitsToFloat(materials[5 * material + 4]);
+    int log2_width = materials[6 * material], log2_height = materials[6 * material + 1];
+    int levels = materials[6 * material + 2], flags = materials[6 * material + 3];
+    float emission = intBitsToFloat(materials[6 * material + 4]);
+    int column = materials[6 * material + 5];
+    if (column > 0) emission *= windows[2 * min(entity, windows.length() / 2 - 1) + column - 1];
     bool both = (flags & 2) != 0;
     vec2 dx = dFdx(uv), dy = dFdy(uv);
     if (depth >= far || (hidden != 0 && entity == hidden) || (!gl_FrontFacing && !both)) discard;

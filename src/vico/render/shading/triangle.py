@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from vico.render.compiled import inlined
-from vico.render.records import DOUBLE_SIDED, FLAT_NORMAL, MOVES, PLAIN_COLOUR, SHELTERED, TWO_SIDED
+from vico.render.records import DOUBLE_SIDED, FLAT_NORMAL, MOVES, NO_WINDOWS, PLAIN_COLOUR, SHELTERED, TWO_SIDED
 from vico.render.visibility.culling import set_instance_view, set_world_view
 from vico.render.visibility.draw import item_of
 
@@ -17,7 +17,8 @@ def set_up_triangle(scene: Any, camera: Any, buffers: Any, drawn: int, number: i
     """Write the `TRIANGLE_SETUP` of a triangle number."""
     item = item_of(buffers.base, drawn, number)
     code = buffers.drawn[item]
-    triangle = scene.mesh.triangle[buffers.first_triangle[item] + number - buffers.base[item]]
+    index = buffers.first_triangle[item] + number - buffers.base[item]
+    triangle = scene.mesh.triangle[index]
     vertex, ids = scene.mesh.vertex, triangle.vertices
     a, b, c = vertex[ids[0]], vertex[ids[1]], vertex[ids[2]]
     clusters = len(scene.cluster_where)
@@ -36,7 +37,7 @@ def set_up_triangle(scene: Any, camera: Any, buffers: Any, drawn: int, number: i
         _turn_normals(scene.instances.matrix[code - clusters], setup.normal)
     _finish_normals(setup.normal, flat)
     material = scene.textures.materials[triangle.material]
-    setup.emission = material.emission
+    setup.emission = material.emission * _windows_share(scene, material, scene.mesh.entity[index])
     setup.texture_width = 1 << material.log2_width
     setup.texture_height = 1 << material.log2_height
     setup.material = triangle.material
@@ -45,6 +46,14 @@ def set_up_triangle(scene: Any, camera: Any, buffers: Any, drawn: int, number: i
     setup.flags = (FLAT_NORMAL if flat else 0) | (PLAIN_COLOUR if plain else 0) | (TWO_SIDED if both else 0)
     setup.flags |= SHELTERED if is_person else 0
     setup.flags |= MOVES if code >= clusters + scene.counts.static_instances else 0
+
+
+@inlined
+def _windows_share(scene: Any, material: Any, entity: Any) -> Any:
+    """Return the share of a material's light that is on in a building."""
+    if material.windows == NO_WINDOWS:
+        return np.float32(1.0)
+    return scene.windows[min(entity, len(scene.windows) - 1), material.windows - 1]
 
 
 @inlined
