@@ -87,7 +87,7 @@ def guided_lanes(
             raise InputError(f"traffic: cars.{k}.route.0: no way for cars leads there")
         lead += ways
     edges = np.array([lanes.edge[goal] for route in routes for goal in route], np.int32)
-    return net._replace(goal_edge=edges, goal_next=np.array(lead, np.int32).reshape(-1, n))
+    return net._replace(goal_edge=edges, goal_next=np.array(lead, np.int32).reshape(len(edges), n))
 
 
 def guided_walks(walks: Walkways, paths: WalkwayNetwork, goals: Sequence[int]) -> WalkwayNetwork:
