@@ -74,6 +74,6 @@ def test_events_close_a_street_and_cut_the_power(helsinki_path: Path) -> None:
 @pytest.mark.slow
 def test_a_scene_of_the_film_is_filmed(helsinki_path: Path, tmp_path: Path) -> None:
     small = ("--residents", "20", "--size", "128x72", "--samples", "1", "--scenes", "street")
-    printed = run("09_film.py", "--world", str(helsinki_path), "--out", str(tmp_path / "film"), *small)
+    printed = run("10_film.py", "--world", str(helsinki_path), "--out", str(tmp_path / "film"), *small)
     assert "walks to work, from step" in printed
     assert printed.endswith("film.mp4: 17 s\n")

@@ -28,6 +28,7 @@ _FOR_PLEASURE = ("leisure", "visit", "exercise")
 #: Where one goes instead of a park in the rain.
 _SHELTERS = {"arts_centre", "bar", "books", "cafe", "cinema", "community_centre", "department_store", "fitness_centre"}
 _SHELTERS |= {"gallery", "library", "mall", "museum", "pub", "sports_centre"}
+_NOT_FOR_CHILDREN, _GROWN_UP = {"bar", "pub"}, 18
 # Which stays are spent at what is on, within so many metres of where one would be, by this share of people.
 _ATTRACTED = {"market": ("leisure", "shop"), "concert": ("leisure",)}
 _WORTH_IT, _CURIOUS = 600.0, 0.4
@@ -89,12 +90,15 @@ class ChangeOfPlans:
         Of the day.
     seed, name
         Of the run, and of the resident.
+    age
+        Years.
     """
 
-    def __init__(self, public_map: PublicMap, stays: Sequence[Stay], *, seed: int, name: str) -> None:
+    def __init__(self, public_map: PublicMap, stays: Sequence[Stay], *, seed: int, name: str, age: int = 30) -> None:
         self._map, self._stays = public_map, stays
         self._seed, self._name = seed, name
         self._tolerance = Tolerance.of(seed, name)
+        self._shelters = _SHELTERS if age >= _GROWN_UP else _SHELTERS - _NOT_FOR_CHILDREN
         # Where one goes for a stay instead of its place: the stay, and the places that were thought of.
         self._instead: tuple[Stay | None, list[str]] = None, []
         # What was heard of the weather last: how fast one walks, and whether it is too bad to cycle.
@@ -188,7 +192,7 @@ class ChangeOfPlans:
     def _shelter(self, wanted: PublicPlace, closed: Collection[str], stay: Stay) -> str:
         """Return where one spends a stay that was to be in the open: the nearest café or museum, say, or home."""
         near = self._map.places_near(wanted.position, _OTHER_NEAR)
-        roofs = (p.id for p in near if p.building is not None and p.kind in _SHELTERS and p.id not in closed)
+        roofs = (p.id for p in near if p.building is not None and p.kind in self._shelters and p.id not in closed)
         return next(roofs, self._home(stay))
 
     def _home(self, stay: Stay) -> str:

@@ -96,7 +96,7 @@ class ScheduleFollower:
         self._aside: list[Action] = []
         self._conversation = Conversation(resident, known, generator)
         self._posture = "standing"
-        self._changes = ChangeOfPlans(public_map, self._stays, seed=seed, name=resident.id)
+        self._changes = ChangeOfPlans(public_map, self._stays, seed=seed, name=resident.id, age=resident.age)
         # So that not everybody takes a sip at once.
         self._offset = int(generator.integers(_ROUND))
         self._tried: set[str] = set()

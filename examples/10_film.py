@@ -1,6 +1,6 @@
 """A day of a city in two minutes of film: seven scenes, each a recorded run of the same people with the same seed.
 
-python examples/09_film.py --world out/demo/world --out out/film [--residents 50] [--scenes school,bus]
+python examples/10_film.py --world out/demo/world --out out/film [--residents 50] [--scenes school,bus]
 
 The morning street, a child on the way to school, a bus ride seen from inside, a shop, robots at work, rain at dusk, the
 lit night. Each scene is simulated and recorded (`vico replay` opens the runs), then filmed from the recording with
