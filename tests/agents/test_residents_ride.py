@@ -25,7 +25,7 @@ Way = tuple[ScheduleItem, ScheduleItem, ScheduleItem]
 
 @pytest.fixture(scope="module")
 def people(helsinki_city: World) -> Community:
-    return build_community(helsinki_city, residents=40, seed=1)
+    return build_community(helsinki_city, residents=40, seed=2)
 
 
 def ways(resident: Resident) -> list[Way]:
