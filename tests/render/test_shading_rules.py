@@ -14,6 +14,7 @@ from vico.world.mesh import Material, Surface
 
 ZERO, ONE = np.float32(0.0), np.float32(1.0)
 UP = ZERO, ZERO, ONE
+SOFT = ONE  # of the edges of shadows
 
 
 def single(*values: float) -> tuple[np.float32, ...]:
@@ -57,14 +58,14 @@ def test_the_nearer_triangle_wins_whatever_the_order() -> None:
     ],
 )
 def test_a_ball_darkens_what_lies_behind_it(point: tuple[float, float, float], expected: float) -> None:
-    assert _ball_shadow(*single(*point), *UP) == pytest.approx(expected)
+    assert _ball_shadow(*single(*point), *UP, SOFT) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(
     ("point", "expected"), [((0.9, -0.9, -3.0), 1.0), ((0.9, -0.9, 1.5), 0.0), ((1.1, 0.0, -3.0), 0.0)]
 )
 def test_a_box_darkens_what_lies_behind_it(point: tuple[float, float, float], expected: float) -> None:
-    assert _box_shadow(*single(*point), *UP) == pytest.approx(expected)
+    assert _box_shadow(*single(*point), *UP, SOFT) == pytest.approx(expected)
 
 
 def test_the_shadow_at_the_foot_fades_sideways_and_upwards() -> None:

@@ -258,5 +258,8 @@ def test_bicycles_left_end_to_end_do_not_overlap(sim: Simulation) -> None:
 def test_bicycles_are_named_wherever_they_stand(sim: Simulation) -> None:
     transit = sim.state.transit
     assert transit is not None
-    for entity in transit.draw().entity.tolist():
+    drawn = transit.draw()
+    bicycles = drawn.entity[drawn.index == drawn.prototypes.index("bicycle")]
+    assert len(bicycles) > 0
+    for entity in bicycles.tolist():
         assert sim.entity(entity)["kind"] == "bicycle"

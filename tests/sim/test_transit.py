@@ -8,7 +8,7 @@ import pytest
 from road_city import HALF, road_city
 from vico.assets.vehicles import vehicle_prototypes
 from vico.errors import InputError
-from vico.sim.bodies import RESIDENT, Bodies
+from vico.sim.bodies import BICYCLE, RESIDENT, Bodies
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.traffic.population import PATIENCE
@@ -180,7 +180,8 @@ def test_a_bicycle_left_astray_stays_there_as_a_body() -> None:
     transit.bicycles.mount(bike, 0, float(transit.clock[0]))
     transit.bicycles.carry(bike, 3.0, 4.0, 0.5)
     assert transit.bicycles.dismount(bike, float(transit.clock[0])) > 20.0
-    assert transit.bodies().position[:, :2].tolist() == [[3.0, 4.0]]
+    bodies = transit.bodies()
+    assert bodies.position[bodies.kind == BICYCLE, :2].tolist() == [[3.0, 4.0]]
 
 
 def test_transit_goes_on_from_a_saved_state_as_if_never_stopped() -> None:

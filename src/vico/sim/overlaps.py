@@ -182,7 +182,9 @@ def _in_one_seat(riders: NDArray[np.void], state: SimulationState) -> list[tuple
 
 def overlapping(bodies: Bodies, tolerance: float = TOLERANCE) -> list[tuple[int, int, float]]:
     """Return the pairs of bodies outdoors that are deeper in each other than `tolerance`: indices and depth, metres."""
-    return [(int(i), int(j), float(depth)) for i, j, depth in pairs(records_of(bodies), tolerance)]
+    entity = bodies.entity.tolist()
+    found = pairs(records_of(bodies), tolerance)
+    return [(int(i), int(j), float(depth)) for i, j, depth in found if not _are_coupled(entity[i], entity[j])]
 
 
 def _overlap(one: Any, other: int, depth: float) -> Overlap:

@@ -78,6 +78,10 @@ class Rests(Mapping[str, "dict[str, Any] | None"]):
         """Return 2."""
         return 2
 
+    def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
+        """Be sent to another process as a dict of both: a way to find them cannot be sent."""
+        return dict, (dict(self),)
+
 
 @dataclass(frozen=True)
 class Seats:

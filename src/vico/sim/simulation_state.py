@@ -23,7 +23,7 @@ from vico.sim.openings import OpeningHours
 from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.seats import Seats
 from vico.sim.snapshot import arrays_of
-from vico.sim.state import FIRST_OBJECT, FIRST_UMBRELLA, RADIUS, REASON_LENGTH, MovableObjects, People, Vehicle
+from vico.sim.state import FIRST_THING, FIRST_UMBRELLA, RADIUS, REASON_LENGTH, MovableObjects, People, Vehicle
 from vico.sim.tills import Lines, Till
 from vico.sim.traffic.jams import Jam, JamLog
 from vico.sim.traffic.junction_rule import JunctionRule
@@ -394,7 +394,7 @@ class SimulationState:
 
     def entity(self, entity: int) -> dict[str, str]:
         """Return kind and name of an entity of the world or of this run."""
-        if FIRST_UMBRELLA <= entity < FIRST_OBJECT:
+        if FIRST_UMBRELLA <= entity < FIRST_THING:
             return {"kind": "umbrella", "name": "umbrella"}
         known = self.entities.get(entity) or self.world.entities.get(entity) or self.things.entity(entity)
         return known or {"kind": "unknown", "name": str(entity)}
