@@ -63,6 +63,7 @@ def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _A
         state.traffic.set_shut(effects.lanes, walkways)
     if state.robots is not None:
         state.robots.set_grip(state.environment.conditions.grip)
+        state.robots.set_closed_ground(state.environment.agenda.effects.ground)
         state.robots.set_wind(*state.environment.weather.wind_vector)
     _advance_subsystem(state.traffic, "traffic", bodies, watch)
     _advance_subsystem(state.transit, "transit", bodies, watch)

@@ -173,7 +173,9 @@ def drone(packs: bool = True) -> RobotModel:
             "velocity": flight_space(8.0, 3.0, 1.5),
         },
         control_period=0.01,
-        sensors=Sensors(joints=False, camera=_CAMERA, camera_pitch=float(_CAMERA_PITCH), rotors=True, battery=True),
+        sensors=Sensors(
+            contacts=("base",), camera=_CAMERA, camera_pitch=float(_CAMERA_PITCH), rotors=True, battery=True
+        ),
         stand=_STAND,
         half_length=HALF,
         half_width=HALF,

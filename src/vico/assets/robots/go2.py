@@ -17,6 +17,7 @@ from vico.assets.robots.model import (
     LIMB,
     TOUCH,
     ActionSpace,
+    BatteryModel,
     FourLegs,
     RobotModel,
     Sensors,
@@ -35,6 +36,8 @@ HALF_LENGTH, HALF_WIDTH, HEIGHT = 0.36, 0.19, 0.40
 # Gains the policy was trained with (Nm/rad, Nms/rad), and the stiffer ones our own gait needs.
 _POLICY_GAINS, _GAIT_GAINS = (20.0, 0.5), (120.0, 3.0)
 _LIMITS = {"hip": (-1.0472, 1.0472), "front": (-1.5708, 3.4907), "rear": (-0.5236, 4.5379), "calf": (-2.7227, -0.8378)}
+#: 28.8 V x 8 Ah (data sheet); what computer and motors take at rest is an estimate of ours.
+BATTERY = BatteryModel(capacity=28.8 * 8.0 * 3600.0, idle_power=45.0, holding=0.2)
 _SHELL, _BLACK, _DARK, _LIGHT = (172, 177, 186), (30, 31, 34), (62, 64, 69), (222, 226, 230)
 
 
@@ -198,7 +201,8 @@ def go2(packs: bool = True) -> RobotModel:
             "velocity": velocity_space(0.9, 0.4, 1.0),
         },
         control_period=0.02,
-        sensors=Sensors(contacts=tuple(f"{leg}_calf" for leg in LEGS), camera=(0.327, 0.0, 0.043)),
+        sensors=Sensors(contacts=tuple(f"{leg}_calf" for leg in LEGS), camera=(0.327, 0.0, 0.043), battery=True),
+        battery=BATTERY,
         stand=2 * THIGH * float(np.cos(0.75)) + FOOT,
         half_length=HALF_LENGTH,
         half_width=HALF_WIDTH,

@@ -22,6 +22,7 @@ from vico.assets.robots.model import (
     LIMB,
     TOUCH,
     ActionSpace,
+    BatteryModel,
     RobotModel,
     Sensors,
     TwoLegs,
@@ -37,6 +38,8 @@ THIGH, SHIN, SOLE = 0.4, 0.4, 0.07
 STAND = 0.1742 + (THIGH + SHIN) * float(np.cos(0.25)) + SOLE
 HALF_LENGTH, HALF_WIDTH, HEIGHT = 0.26, 0.32, 1.8
 MASS = 51.4
+#: 864 Wh (data sheet); what computer and motors take at rest is an estimate of ours.
+BATTERY = BatteryModel(capacity=864.0 * 3600.0, idle_power=120.0, holding=0.03)
 #: Seconds of two steps, as the network was trained.
 STRIDE = 0.76
 #: Site where it is pushed, and lifted after a fall.
@@ -161,7 +164,10 @@ def h1(packs: bool = True) -> RobotModel:
             "velocity": velocity_space(1.0, 0.1, 0.8),
         },
         control_period=0.02,
-        sensors=Sensors(contacts=tuple(f"{side}_ankle" for side in SIDES), camera=_EYE, camera_pitch=_EYE_PITCH),
+        sensors=Sensors(
+            contacts=tuple(f"{side}_ankle" for side in SIDES), camera=_EYE, camera_pitch=_EYE_PITCH, battery=True
+        ),
+        battery=BATTERY,
         stand=STAND,
         half_length=HALF_LENGTH,
         half_width=HALF_WIDTH,

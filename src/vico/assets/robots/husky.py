@@ -15,6 +15,7 @@ from vico.assets.robots.model import (
     BUMPER,
     TOUCH,
     ActionSpace,
+    BatteryModel,
     DeckModel,
     RobotModel,
     Sensors,
@@ -31,6 +32,8 @@ MASS, WHEEL_MASS = 50.0, 2.637
 # How much faster than by rolling alone the wheels have to turn for the base to turn, on pavement.
 _SLIP = 2.2
 WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
+#: 24 V x 20 Ah (data sheet); what computer and motors take at rest is an estimate of ours.
+BATTERY = BatteryModel(capacity=24.0 * 20.0 * 3600.0, idle_power=50.0, holding=0.05)
 _YELLOW, _BLACK, _DARK, _GREY = (238, 186, 24), (34, 35, 38), (58, 60, 64), (150, 153, 158)
 _STAND = RADIUS - HUB
 
@@ -158,7 +161,8 @@ def husky(packs: bool = True) -> RobotModel:
             "velocity": velocity_space(1.0, 0.0, 1.2),
         },
         control_period=0.02,
-        sensors=Sensors(camera=(0.29, 0.0, 0.335)),
+        sensors=Sensors(contacts=("base", *WHEELS), camera=(0.29, 0.0, 0.335), battery=True),
+        battery=BATTERY,
         # The rails' tops, behind the camera's mast.
         deck=DeckModel((-0.095, 0.0, 0.252), 0.63, 0.62),
         stand=_STAND,

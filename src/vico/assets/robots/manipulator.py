@@ -16,6 +16,7 @@ from vico.assets.robots.model import (
     LIMB,
     TOUCH,
     ActionSpace,
+    BatteryModel,
     MobileManipulator,
     RobotModel,
     Sensors,
@@ -26,6 +27,8 @@ from vico.world.mesh import Surface, joined
 
 ARM = ("torso", "shoulder", "bicep", "elbow", "forearm", "wrist", "gripper")
 FINGERS = ("right_finger", "left_finger")
+#: 24 V x 40 Ah, and what computer and motors take at rest: estimates of ours.
+BATTERY = BatteryModel(capacity=24.0 * 40.0 * 3600.0, idle_power=120.0, holding=0.02)
 BASE = ("forward", "yaw")
 #: Each joint's place in the frame of the one before it, metres, its axis and its bounds, rad.
 PLACES = np.array(
@@ -199,7 +202,10 @@ def manipulator(packs: bool = True) -> RobotModel:
             "velocity": velocity_space(0.8, 0.0, 1.2),
         },
         control_period=0.02,
-        sensors=Sensors(contacts=FINGERS, camera=(0.02, 0.05, 1.14), camera_pitch=float(np.radians(-35.0))),
+        sensors=Sensors(
+            contacts=FINGERS, camera=(0.02, 0.05, 1.14), camera_pitch=float(np.radians(-35.0)), battery=True
+        ),
+        battery=BATTERY,
         stand=WHEEL,
         half_length=RADIUS,
         half_width=RADIUS,

@@ -107,7 +107,7 @@ class Sensors:
     Attributes
     ----------
     joints
-        Whether it measures angles and speeds of its joints.
+        Whether it measures angles and speeds of its joints; of rotors where it flies.
     imu
         Whether it measures how its base turns, speeds up and stands to gravity.
     odometry
@@ -329,6 +329,29 @@ class NoController:
 
 
 @dataclass(frozen=True)
+class BatteryModel:
+    """Where a robot on the ground has its power from; those that fly have theirs in `RotorModel`.
+
+    Attributes
+    ----------
+    capacity
+        Joules.
+    idle_power
+        What everything but the motors takes, watts.
+    holding
+        Watts that the motor of a joint turns into heat for each (Nm)^2 of its torque (N^2 of its force), whether it
+        moves or not.
+    efficiency
+        Share of the remaining power of motors that becomes work.
+    """
+
+    capacity: float
+    idle_power: float
+    holding: float
+    efficiency: float = 0.75
+
+
+@dataclass(frozen=True)
 class RobotModel:
     """A kind of robot.
 
@@ -368,6 +391,8 @@ class RobotModel:
         Cosine of the tilt at which it counts as fallen; None: it can't fall.
     rotors
         What carries it in the air; None: it does not fly.
+    battery
+        Where it has its power from; None: nobody keeps account of that.
     shapes
         Surfaces by link, in the link's frame; links are bodies of `mjcf`.
 
@@ -399,6 +424,7 @@ class RobotModel:
     arrival: float = 0.3
     fallen_below: float | None = 0.7
     rotors: RotorModel | None = None
+    battery: BatteryModel | None = None
 
     def __post_init__(self) -> None:
         def need(good: bool, what: str) -> None:
@@ -423,6 +449,9 @@ class RobotModel:
             all((servo == "rotor") == flies for servo in self.servos),
             "what has rotors has no other motors, nor others it",
         )
+        has_battery = (self.battery or self.rotors) is not None
+        need(has_battery or not self.sensors.battery, "it can't know how full a battery is that it has not")
+        need(self.battery is None or not flies, "the battery of what flies belongs to its rotors")
         ticks = round(self.control_period / TICK)
         need(
             ticks >= 1 and abs(ticks * TICK - self.control_period) < 1e-9,
@@ -448,6 +477,12 @@ class RobotModel:
                 return space.low, space.high
         count = len(self.motors)
         return np.full(count, -np.inf), np.full(count, np.inf)
+
+    @cached_property
+    def motor_units(self) -> tuple[str, ...]:
+        """Units of the motors' targets; rad where no action space drives motors."""
+        found = [space.units for space in self.action_spaces.values() if space.drives == "motors"]
+        return found[0] if found else ("rad",) * len(self.motors)
 
     @property
     def driven(self) -> tuple[str, ...]:

@@ -9,11 +9,15 @@ from vico.assets.robots import ActionSpace
 from vico.rules import ReasonCode
 from vico.sim.actions.fields import Field, short
 from vico.sim.actions.model import ActionType, Actors, Refusal, Situation, Values
-from vico.sim.simulation_state import RobotSystem, SimulationState
+from vico.sim.robot_system import RobotSystem
+from vico.sim.simulation_state import SimulationState
 
 
 def check_control(values: Values, robot: int, state: SimulationState) -> Refusal | None:
     """Judge a vector: it has to be one of the robot's action space."""
+    refusal = _refuse_without_power("control", robot, state)
+    if refusal is not None:
+        return refusal
     spaces = _robots(state).action_spaces(robot)
     name = values.get("space") or next(iter(spaces))
     if name not in spaces:
@@ -64,6 +68,8 @@ def check_fly_to(values: Values, robot: int, state: SimulationState) -> Refusal 
     robots = _robots(state)
     if not robots.flies(robot):
         return Refusal(ReasonCode.NOT_ABLE, "fly_to: this robot does not fly; it takes go_to")
+    if robots.is_empty(robot):
+        return _refuse_without_power("fly_to", robot, state)
     reason = robots.flight_refusal(robot, np.array(values["target"], np.float64))
     return Refusal(ReasonCode.BLOCKED, f"fly_to: {reason}") if reason else None
 
@@ -94,9 +100,15 @@ def stop(values: Values, robot: int, state: SimulationState) -> None:
     _robots(state).stop(robot)
 
 
+def _refuse_without_power(action: str, robot: int, state: SimulationState) -> Refusal | None:
+    if not _robots(state).is_empty(robot):
+        return None
+    return Refusal(ReasonCode.NOT_ABLE, f"{action}: the battery is empty; wait until it is exchanged")
+
+
 def _refuse_without_arm(action: str, robot: int, state: SimulationState) -> Refusal | None:
     if _robots(state).has_arm(robot):
-        return None
+        return _refuse_without_power(action, robot, state)
     return Refusal(ReasonCode.NOT_ABLE, f"{action}: this robot has no arm")
 
 
@@ -188,7 +200,7 @@ def hand_over(values: Values, robot: int, state: SimulationState) -> None:
 def _refuse_without_velocities(action: str, robot: int, state: SimulationState) -> Refusal | None:
     spaces = _robots(state).action_spaces(robot)
     if any(space.drives == "velocity" for space in spaces.values()):
-        return None
+        return _refuse_without_power(action, robot, state)
     sentence = f"{action}: this robot follows no velocities; it takes control ({', '.join(spaces)})"
     return Refusal(ReasonCode.NOT_ABLE, sentence)
 

@@ -7,8 +7,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from vico.errors import InputError
 from vico.sim.robots import flying, tasks
-from vico.sim.robots.state import Mode, RobotRun
-from vico.sim.robots.ways import way_to
+from vico.sim.robots.path_follower import RobotStatus
+from vico.sim.robots.state import Circles, Mode, RobotRun
+from vico.sim.robots.ways import is_closed, way_to
 
 
 def command(run: RobotRun, robot: int, vector: ArrayLike, space: str = "") -> None:
@@ -113,6 +114,31 @@ def follow_body(run: RobotRun, robot: int, entity: int) -> None:
     run.followers[robot].end()
     run.set_mode(robot, Mode.FOLLOW)
     run.arrays.leader[robot] = entity
+
+
+def set_closed_ground(run: RobotRun, circles: Circles) -> None:
+    """Say which ground events close from now on: ways across it are planned anew, or given up where there is no other.
+
+    Parameters
+    ----------
+    circles
+        x, y and radius, ENU metres.
+    """
+    if circles == run.closed_ground:
+        return
+    run.closed_ground = circles
+    for robot, follower in enumerate(run.followers):
+        if not len(follower.path) or not circles or not is_closed(run, follower.ahead()):
+            continue
+        path = way_to(run, robot, follower.path[-1])
+        if path is not None:
+            follower.begin(path)
+        elif run.arrays.mode[robot] == Mode.FOLLOW:
+            follower.end()
+        else:
+            run.note(robot, "blocked")
+            stop(run, robot)
+            run.arrays.status[robot] = RobotStatus.BLOCKED
 
 
 def _need_velocities(run: RobotRun, robot: int, what: str) -> None:

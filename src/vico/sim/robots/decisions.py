@@ -47,7 +47,7 @@ def decide(run: RobotRun, dt: float, obstacles: Bodies, mine: Bodies, *, errands
         if robot in flying or arrays.status[robot] == _FALLEN or mode == _MOTORS:
             continue
         if mode == _IDLE:
-            if errands:
+            if errands and arrays.charge[robot] > 0.0:
                 _rest(run, robot, dt)
             continue
         around = around or NearbyBodies(obstacles, mine)

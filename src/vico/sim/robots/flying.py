@@ -32,7 +32,7 @@ _ABOVE, _ASIDE, _FORESIGHT = 1.5, 1.5, 1.5
 # Metres behind and above whom it follows, how far that one has to go for another way to be found.
 _BEHIND, _HIGHER, _DRIFT = 4.0, 5.0, 3.0
 # Seconds without getting nearer after which a way counts as blocked; share of its battery at which it lands.
-_PATIENCE, _LOW = 30.0, 0.1
+_PATIENCE, LOW_BATTERY = 30.0, 0.1
 _ERRAND_REST, _ERRAND_HEIGHT = 5.0, 15.0
 
 
@@ -159,7 +159,7 @@ def decide_flight(run: RobotRun, flight: Flight, dt: float, everybody: Bodies, *
 def _watch_battery(run: RobotRun, flight: Flight, row: int, robot: int) -> None:
     """Have it land near where it is when its battery is low."""
     a = flight.arrays
-    if a.warned[row] or a.charge[row] > _LOW or a.phase[row] != _FLYING:
+    if a.warned[row] or a.charge[row] > LOW_BATTERY or a.phase[row] != _FLYING:
         return
     a.warned[row] = True
     run.note(robot, "battery_low")

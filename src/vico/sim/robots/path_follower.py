@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from enum import IntEnum
 
@@ -33,6 +34,15 @@ class RobotStatus(IntEnum):
     IDLE, MOVING, WAITING, ARRIVED, BLOCKED, FALLEN = range(6)
 
 
+def _discs(one: np.void, room: float) -> list[tuple[float, float, float]]:
+    """Discs (x, y, radius) that cover somebody's footprint with some room around it: several along a vehicle."""
+    length, width = float(one["half_length"]), max(float(one["half_width"]), 0.1)
+    count = max(1, math.ceil(length / width))
+    c, s = math.cos(one["yaw"]), math.sin(one["yaw"])
+    shifts = [(2 * k + 1 - count) / count * length for k in range(count)]
+    return [(float(one["x"]) + c * shift, float(one["y"]) + s * shift, width + room) for shift in shifts]
+
+
 class PathFollower:
     """Follows a path. All that changes is in `path` and in the numbers of `numbers`."""
 
@@ -56,6 +66,13 @@ class PathFollower:
         """Forget the path."""
         self.begin(_NO_PATH)
         self.status = RobotStatus.IDLE
+
+    def ahead(self) -> NDArray[np.float64]:
+        """Points every half metre or so of what is left of the path, shape ``(k, 2)``."""
+        lengths = np.hypot(*np.diff(self.path, axis=0).T)
+        at = np.concatenate([[0.0], np.cumsum(lengths)])
+        steps = np.linspace(self.along, at[-1], max(2, int((at[-1] - self.along) / 0.5) + 2))
+        return np.column_stack([np.interp(steps, at, self.path[:, axis]) for axis in (0, 1)])
 
     def free(self, base: Base, others: NDArray[np.void], speed: float) -> tuple[float, int]:
         """Metres free ahead, and who is there."""
@@ -120,7 +137,7 @@ class PathFollower:
     def closed(self, base: Base, others: NDArray[np.void]) -> NDArray[np.float64]:
         """Discs (x, y, radius) a detour keeps out of: those who stand still near, and what is right ahead."""
         still = np.flatnonzero(np.hypot(others["vx"], others["vy"]) < 0.15)
-        discs = [(one["x"], one["y"], one["half_width"] + self._model.half_width + 0.35) for one in others[still]]
+        discs = [disc for one in others[still] for disc in _discs(one, self._model.half_width + 0.35)]
         ahead = base.position[:2] + base.rotation[:2, 0] * (self._model.half_length + GAP)
         if not len(still):
             discs.append((float(ahead[0]), float(ahead[1]), 0.5))

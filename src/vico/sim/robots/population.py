@@ -15,13 +15,14 @@ from vico.sim.carrying import DeckPose
 from vico.sim.physics.frames import FrameCount, FrameNeeds, frame_length
 from vico.sim.physics.loose import LooseObjects
 from vico.sim.robots import commands, drawing, flying, sensing, tasks
+from vico.sim.robots.batteries import charge_of, watch_batteries
 from vico.sim.robots.decisions import decide
 from vico.sim.robots.falls import watch_falls
 from vico.sim.robots.motors import command_motors, command_rotors, velocities
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.scene import RobotScene
 from vico.sim.robots.spawns import spawns
-from vico.sim.robots.state import NOTES, Mode, RobotArrays, RobotEvent, RobotRun
+from vico.sim.robots.state import NOTES, Circles, Mode, RobotArrays, RobotEvent, RobotRun
 from vico.sim.robots.ways import way_to
 from vico.sim.robots.work import Kind
 from vico.sim.state import MovableObjects
@@ -178,6 +179,10 @@ class RobotPopulation:
         """Land at a point, or where it is."""
         flying.land(self.run, robot, None if xy is None else np.asarray(xy, np.float64))
 
+    def is_empty(self, robot: int) -> bool:
+        """Return whether a robot's battery is empty: it stands still until that is exchanged."""
+        return charge_of(self.run, robot) == 0.0
+
     def has_arm(self, robot: int) -> bool:
         """Return whether a robot has an arm."""
         return tasks.work_of(self.run, robot) is not None
@@ -247,6 +252,7 @@ class RobotPopulation:
         self.run.known_bodies = None
         if since + dt > whole - 1e-9:
             watch_falls(self.run, whole)
+            watch_batteries(self.run, whole)
 
     def _step(self, ticks: int, left: int) -> None:
         """Let physics pass, with each kind of robots told what to do as often as its model asks.
@@ -311,6 +317,10 @@ class RobotPopulation:
     def set_grip(self, grip: float) -> None:
         """Have robots grip the ground with a share of what they do on dry ground, 0..1; told before every sub-step."""
         self.engine.set_friction(round(grip, _GRIP_DIGITS))
+
+    def set_closed_ground(self, circles: Circles) -> None:
+        """Have robots go round ground that events close, circles of x, y and radius; told like the grip."""
+        commands.set_closed_ground(self.run, circles)
 
     def set_wind(self, east: float, north: float) -> None:
         """Have the mean wind 10 m above ground blow with so many m/s towards east and north; told like the grip."""

@@ -22,6 +22,9 @@ from vico.sim.robots.wind import gusts_of
 from vico.sim.robots.work import Work
 from vico.sim.state import REASON_LENGTH, MovableObjects
 
+#: Circles on the ground: x, y and radius, ENU metres.
+Circles = tuple[tuple[float, float, float], ...]
+
 
 class Mode(IntEnum):
     """Who decides what a robot does."""
@@ -43,6 +46,8 @@ NOTES = (
     "placed",
     "handed_over",
     "failed",
+    "battery_empty",
+    "recharged",
 )
 
 
@@ -87,6 +92,10 @@ class RobotArrays:
         How many errands it was sent on, int64, shape ``(n,)``.
     rest
         Seconds it has had nothing to do, float64, shape ``(n,)``.
+    charge
+        How full its battery is, 0..1, float64, shape ``(n,)``; those that fly have theirs in `FlightArrays`.
+    uncharged
+        Seconds it has waited for a full battery, float64, shape ``(n,)``.
     tick
         Hundredths of a second of physics since the start, int64, shape ``(1,)``.
     owed
@@ -109,6 +118,8 @@ class RobotArrays:
     lying: NDArray[np.float64]
     errand: NDArray[np.int64]
     rest: NDArray[np.float64]
+    charge: NDArray[np.float64]
+    uncharged: NDArray[np.float64]
     tick: NDArray[np.int64]
     owed: NDArray[np.int64]
     frames: NDArray[np.int64]
@@ -131,6 +142,8 @@ class RobotArrays:
             lying=np.zeros(n),
             errand=np.zeros(n, np.int64),
             rest=np.zeros(n),
+            charge=np.ones(n),
+            uncharged=np.zeros(n),
             tick=np.zeros(1, np.int64),
             owed=np.zeros(1, np.int64),
             frames=np.zeros(2, np.int64),
@@ -164,6 +177,8 @@ class RobotRun:
         Tasks of each group's arms, None if it has none.
     objects
         Things that can be picked.
+    closed_ground
+        Ground that events close.
     pending
         Robot, and index into `NOTES`, of what happened since it was last asked.
     """
@@ -178,6 +193,7 @@ class RobotRun:
     flights: list[Flight | None] = field(init=False)
     work: list[Work | None] = field(init=False)
     objects: MovableObjects = field(default_factory=MovableObjects.none)
+    closed_ground: Circles = ()
     pending: list[tuple[int, int]] = field(default_factory=list)
     known_bodies: Bodies | None = None
 
@@ -239,6 +255,7 @@ class RobotRun:
                 found |= {f"work_{k}_{name}": value for name, value in work.saved().items()}
         numbers = [follower.numbers() for follower in self.followers]
         return found | {
+            "closed_ground": np.array(self.closed_ground, np.float64).reshape(-1, 3),
             "pending": np.array(self.pending, np.int64).reshape(-1, 2),
             "followers": np.array(numbers).reshape(len(self.followers), -1),
             "path_ends": np.cumsum([len(path) for path in paths], dtype=np.int64),
@@ -269,6 +286,7 @@ class RobotRun:
             if work is not None:
                 start = f"work_{k}_"
                 work.restore({key[len(start) :]: value for key, value in arrays.items() if key.startswith(start)})
+        self.closed_ground = tuple((x, y, radius) for x, y, radius in arrays["closed_ground"].tolist())
         self.pending = [(int(a), int(b)) for a, b in arrays["pending"]]
         starts = np.concatenate([[0], arrays["path_ends"]]).astype(int)
         for i, follower in enumerate(self.followers):

@@ -13,7 +13,9 @@ _NOBODY = np.zeros((0, 3))
 def way_to(
     run: RobotRun, robot: int, goal: NDArray[np.float64], closed: NDArray[np.float64] = _NOBODY
 ) -> NDArray[np.float64] | None:
-    """Return a way to a point that keeps clear of discs; None if there is none.
+    """Return a way to a point that keeps clear of discs and of ground that events close; None if there is none.
+
+    Whoever stands on ground that is closed may take any way out of it.
 
     Parameters
     ----------
@@ -29,6 +31,12 @@ def way_to(
     """
     scene, walkable = run.scene, run.scene.world.walkable
     blocked = scene.narrow(robot)
+    here = run.position(robot)[:2]
+    if run.closed_ground:
+        if is_closed(run, np.asarray(goal, np.float64)[None, :2]):
+            return None
+        if not is_closed(run, here[None]):
+            blocked = blocked | walkable.cells_within(run.closed_ground)
     if len(closed):
         blocked = blocked.copy()
         for x, y, radius in closed:
@@ -36,12 +44,17 @@ def way_to(
             yy, xx = np.mgrid[j0 : j1 + 1, i0 : i1 + 1]
             centres = walkable.centre_of(np.stack([xx, yy], axis=-1))
             blocked[j0 : j1 + 1, i0 : i1 + 1] |= np.hypot(centres[..., 0] - x, centres[..., 1] - y) < radius
-    here = run.position(robot)[:2]
     path = scene.router.path(here, np.asarray(goal, np.float64)[:2], blocked=blocked)
     if path is None:
         return None
     # The search may begin in a cell beside the robot's own.
     return path if len(path) > 1 and np.allclose(path[0], here) else np.vstack([here, path])
+
+
+def is_closed(run: RobotRun, points: NDArray[np.float64]) -> bool:
+    """Return whether events close the ground at any of some points, ENU metres, shape ``(k, 2)``."""
+    x, y, radius = np.array(run.closed_ground).reshape(-1, 3).T
+    return bool((np.hypot(points[:, :1] - x, points[:, 1:] - y) < radius).any())
 
 
 def next_errand(run: RobotRun, robot: int) -> NDArray[np.float64] | None:

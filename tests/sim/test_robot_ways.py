@@ -1,0 +1,82 @@
+"""Robots' ways lead round ground that events close, and round what is parked in them."""
+
+import numpy as np
+import pytest
+
+from robot_field import field
+from vico.sim.bodies import CAR, Bodies
+from vico.sim.robots import RobotPopulation, RobotStatus
+
+CLOSED = ((8.0, 0.0, 4.0),)
+
+
+@pytest.fixture
+def husky() -> RobotPopulation:
+    """One that stands at the origin."""
+    return RobotPopulation(field(), ["husky"], [[0, 0, 0]], packs=False)
+
+
+def run(robots: RobotPopulation, seconds: float, bodies: Bodies | None = None) -> tuple[list[str], np.ndarray]:
+    """Return what happened, and where it was ten times a second."""
+    events, places = [], []
+    for _ in range(round(seconds * 10)):
+        robots.advance(0.1, bodies if bodies is not None else Bodies.none())
+        events += [event.kind for event in robots.events()]
+        places.append(robots.run.position(0)[:2].copy())
+    return events, np.array(places)
+
+
+def test_a_way_leads_round_closed_ground_and_none_into_it(husky: RobotPopulation) -> None:
+    husky.set_closed_ground(CLOSED)
+    assert not husky.has_way(0, [8.0, 1.0])
+    assert husky.go_to(0, [15.0, 0.0])
+    events, places = run(husky, 30.0)
+    assert events == ["arrived"]
+    assert np.hypot(*(places - [8.0, 0.0]).T).min() > 3.5
+
+
+def test_ground_that_is_closed_on_the_way_changes_the_way_and_is_kept_in_a_snapshot(husky: RobotPopulation) -> None:
+    assert husky.go_to(0, [15.0, 0.0])
+    run(husky, 2.0)
+    husky.set_closed_ground(CLOSED)
+    saved = {name: array.copy() for name, array in husky.arrays().items()}
+    expected = run(husky, 2.0)[1]
+    husky.set_closed_ground(())
+    husky.restore(saved)
+    husky.set_closed_ground(CLOSED)  # as every sub-step says it again: no news
+    assert np.array_equal(run(husky, 2.0)[1], expected)
+    events, places = run(husky, 25.0)
+    assert events == ["arrived"]
+    assert np.hypot(*(places - [8.0, 0.0]).T).min() > 3.5
+
+
+def test_a_goal_that_is_closed_meanwhile_is_given_up(husky: RobotPopulation) -> None:
+    assert husky.go_to(0, [8.0, 1.0])
+    run(husky, 1.0)
+    husky.set_closed_ground(CLOSED)
+    assert run(husky, 0.1)[0] == ["blocked"]
+    husky.set_closed_ground(())
+    assert husky.go_to(0, [8.0, 1.0])
+    assert husky.status[0] == RobotStatus.MOVING
+
+
+def test_who_stands_on_closed_ground_may_leave_it(husky: RobotPopulation) -> None:
+    husky.set_closed_ground(((0.0, 0.0, 9.0),))
+    assert husky.go_to(0, [12.0, 0.0])
+    assert run(husky, 20.0)[0] == ["arrived"]
+
+
+def test_it_goes_round_a_car_parked_across_its_way(husky: RobotPopulation) -> None:
+    car = Bodies(
+        np.array([77], np.int32),
+        np.array([CAR], np.int8),
+        np.array([[6.0, 0.5, 0.0]]),
+        np.array([np.pi / 2]),
+        np.array([2.2]),
+        np.array([0.9]),
+        np.array([1.5]),
+        np.zeros((1, 2)),
+    )
+    assert husky.go_to(0, [12.0, 0.0])
+    events, _ = run(husky, 45.0, car)
+    assert events == ["arrived"]
