@@ -7,6 +7,8 @@ from vico.assets.packages import installed
 from vico.assets.robots.packs import GO2_PACKAGE
 from vico.assets.shapes import box
 from vico.sim.bodies import RESIDENT, Bodies
+from vico.sim.config import PHYSICS_ENGINES
+from vico.sim.physics import DEFAULT_ENGINE, engine_names
 from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.model import Manifest, Origin, Transit
@@ -14,6 +16,17 @@ from vico.world.objects import Objects
 from vico.world.walkable import BLOCKED, SIDEWALK, WalkableMap
 
 HALF = 40.0
+#: Physics engines: MuJoCo, which comes with the package, and those whose package is installed, which take minutes.
+ENGINES = [
+    pytest.param(
+        name,
+        marks=[
+            pytest.mark.skipif(name not in engine_names(), reason=f"the extra {name!r} is not installed"),
+            *([] if name == DEFAULT_ENGINE else [pytest.mark.slow]),
+        ],
+    )
+    for name in PHYSICS_ENGINES
+]
 #: With our own models, and with installed packages where there are.
 PACKS = [
     False,

@@ -1,11 +1,12 @@
 """The drone: it flies where it is sent, over and round houses and people, in gusts, and lands."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from robot_field import field, people
+from robot_field import ENGINES, field, people
 from vico.assets.robots import robot_model
 from vico.errors import InputError
 from vico.sim.bodies import Bodies
@@ -23,10 +24,10 @@ ROOF = 4.5
 MASS, GRAVITY, THRUST = 2.064, 9.81, 8.54858e-6
 
 
-@pytest.fixture(scope="module")
-def scenes() -> dict[int, RobotScene]:
+@pytest.fixture(scope="module", params=ENGINES)
+def scenes(request: Any) -> dict[int, RobotScene]:
     world = field(HOUSE)
-    return {count: RobotScene(world, ["drone"] * count, packs=False) for count in (1, 2)}
+    return {count: RobotScene(world, ["drone"] * count, packs=False, physics=request.param) for count in (1, 2)}
 
 
 @pytest.fixture

@@ -7,18 +7,22 @@ import sys
 import numpy as np
 import pytest
 
-from robot_field import HALF, field, people
+from robot_field import ENGINES, HALF, field, people
 from vico.assets.robots import robot_model
 from vico.errors import InputError
 from vico.sim.bodies import Bodies
-from vico.sim.robots import RobotPopulation, RobotStatus
+from vico.sim.robots import RobotPopulation, RobotScene, RobotStatus
 from vico.world.heights import HeightField, Steps
 
 
-def team(*commands: tuple[float, float, float], height: HeightField | None = None) -> RobotPopulation:
+def team(
+    *commands: tuple[float, float, float], height: HeightField | None = None, engine: str = "mujoco"
+) -> RobotPopulation:
     """Robots 3 m apart that follow a velocity each."""
     places = [[-5.0, 3.0 * k, 0.0] for k in range(len(commands))]
-    robots = RobotPopulation(field(height=height), ["h1"] * len(commands), places, packs=False)
+    world, kinds = field(height=height), ["h1"] * len(commands)
+    scene = RobotScene(world, kinds, packs=False, physics=engine)
+    robots = RobotPopulation(world, kinds, places, packs=False, scene=scene)
     for robot, command in enumerate(commands):
         robots.drive(robot, command)
     return robots
@@ -44,8 +48,9 @@ def yaws(robots: RobotPopulation) -> np.ndarray:
     return np.array([robots.engine.base(robot).yaw for robot in range(len(robots))])
 
 
-def test_it_walks_turns_and_stands_as_it_is_told() -> None:
-    robots = team((0.3, 0, 0), (0.6, 0, 0), (0, 0, 0.5), (0, 0, 0))
+@pytest.mark.parametrize("engine", ENGINES)
+def test_it_walks_turns_and_stands_as_it_is_told(engine: str) -> None:
+    robots = team((0.3, 0, 0), (0.6, 0, 0), (0, 0, 0.5), (0, 0, 0), engine=engine)
     assert run(robots, 3.0) == []
     before, heading = robots.bodies().position.copy(), yaws(robots)
     assert run(robots, 5.0) == []
@@ -62,8 +67,9 @@ def test_it_walks_turns_and_stands_as_it_is_told() -> None:
     assert np.linalg.norm(robots.bodies().position[1] - before[1]) < 0.01
 
 
-def test_it_stays_on_its_feet_when_it_is_pushed() -> None:
-    robots = team((0, 0, 0), (0, 0, 0), (0.5, 0, 0), (0.5, 0, 0))
+@pytest.mark.parametrize("engine", ENGINES)
+def test_it_stays_on_its_feet_when_it_is_pushed(engine: str) -> None:
+    robots = team((0, 0, 0), (0, 0, 0), (0.5, 0, 0), (0.5, 0, 0), engine=engine)
     run(robots, 2.0)
     for robot, angle in enumerate((0.0, np.pi, np.pi / 2, -np.pi / 2)):
         push(robots, robot, 15.0, angle)
@@ -83,8 +89,9 @@ def test_it_walks_up_a_kerb_and_down_again() -> None:
     assert robots.bodies().position[:, 0].min() > 2.0
 
 
-def test_one_that_fell_is_lifted_and_goes_on() -> None:
-    robots = team((0, 0, 0))
+@pytest.mark.parametrize("engine", ENGINES)
+def test_one_that_fell_is_lifted_and_goes_on(engine: str) -> None:
+    robots = team((0, 0, 0), engine=engine)
     push(robots, 0, 120.0, 0.7)
     robots.advance(0.1, Bodies.none())
     push(robots, 0, 0.0, 0.0)
@@ -95,8 +102,9 @@ def test_one_that_fell_is_lifted_and_goes_on() -> None:
     assert np.linalg.norm(robots.bodies().position[0] - before) > 1.2
 
 
-def test_it_waits_for_a_person_and_goes_round_who_stays() -> None:
-    robots = team((0, 0, 0))
+@pytest.mark.parametrize("engine", ENGINES)
+def test_it_waits_for_a_person_and_goes_round_who_stays(engine: str) -> None:
+    robots = team((0, 0, 0), engine=engine)
     assert robots.go_to(0, (7, 0))
     person = people((1, 0))
     least, waited = np.inf, False

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from robot_field import field, people
+from robot_field import ENGINES, field, people
 from vico.assets.shapes import box
 from vico.sim.bodies import Bodies
 from vico.sim.config import SimConfig
-from vico.sim.robots import RobotPopulation, RobotStatus
+from vico.sim.robots import RobotPopulation, RobotScene, RobotStatus
 from vico.sim.robots.arm import hand_pose, reach_pose
 from vico.sim.simulation import Simulation
 
@@ -15,17 +15,14 @@ SIZE = (0.12, 0.18, 0.2)
 TABLE = 0.55
 
 
-def make(*kinds: str, table: bool = False, assistants: int = 0) -> Simulation:
+def make(*kinds: str, table: bool = False, assistants: int = 0, engine: str = "mujoco") -> Simulation:
     """Robots in a row along y, at x = 0, that look along x."""
     world = field()
     if table:
         world.surfaces("collision").append(box((0.3, 0.8, TABLE), (3.0, 0.0, TABLE / 2)))
-    sim = Simulation(world, None, SimConfig(robots=kinds, assistants=assistants, observe=(), seed=2))
-    robots = sim.state.robots
-    positions, _ = robots.engine.coordinates
-    for robot, model in enumerate(robots.models):
-        root = robots.engine.compiled.robots[robot].root
-        positions[root : root + 7] = [0.0, -3.0 * robot, model.stand, 1.0, 0.0, 0.0, 0.0]
+    places = {f"robot_{robot}": (0.0, -3.0 * robot, 0.0) for robot in range(len(kinds))}
+    config = SimConfig(robots=kinds, assistants=assistants, observe=(), seed=2, physics=engine, robot_places=places)
+    sim = Simulation(world, None, config)
     sim.advance(1.0)
     return sim
 
@@ -89,8 +86,9 @@ def test_the_arms_kinematics_are_those_of_physics_and_are_inverted() -> None:
         assert np.abs(pose - goal).max() < 3e-3
 
 
-def test_a_thing_is_picked_from_the_ground_carried_by_friction_and_placed() -> None:
-    sim = make("manipulator")
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_thing_is_picked_from_the_ground_carried_by_friction_and_placed(engine: str) -> None:
+    sim = make("manipulator", engine=engine)
     thing = parcel(sim, 2.5, 0.8, yaw=0.7)
     told = sim.step({"robot_0": {"type": "pick", "object": thing}}).observations["robot_0"]["state"]
     assert told["action_status"] == "ok"
@@ -110,8 +108,9 @@ def test_a_thing_is_picked_from_the_ground_carried_by_friction_and_placed() -> N
     assert robots.in_hand(0) == 0
 
 
-def test_a_thing_from_a_table_is_put_on_a_deck_and_stays_there_while_that_drives() -> None:
-    sim = make("manipulator", "husky", table=True)
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_thing_from_a_table_is_put_on_a_deck_and_stays_there_while_that_drives(engine: str) -> None:
+    sim = make("manipulator", "husky", table=True, engine=engine)
     robots, objects = sim.state.robots, sim.state.objects
     thing = parcel(sim, 3.0, 0.0, TABLE)
     robots.pick(0, thing)
@@ -133,8 +132,9 @@ def test_a_thing_from_a_table_is_put_on_a_deck_and_stays_there_while_that_drives
     assert np.abs(after - on_deck).max() < 0.1
 
 
-def test_it_holds_a_thing_out_until_somebody_takes_it() -> None:
-    sim = make("manipulator", assistants=1)
+@pytest.mark.parametrize("engine", ENGINES)
+def test_it_holds_a_thing_out_until_somebody_takes_it(engine: str) -> None:
+    sim = make("manipulator", assistants=1, engine=engine)
     robots, objects = sim.state.robots, sim.state.objects
     thing = parcel(sim, 1.5, 0.0)
     sim.scenario.place_agent("assistant_0", (1.0, 3.0, 0.0))
@@ -167,8 +167,11 @@ def test_what_cannot_be_done_is_refused_with_a_reason() -> None:
     assert told["action_code"] == "not_able"
 
 
-def test_the_hand_reaches_a_point_and_the_base_waits_for_people_in_between() -> None:
-    robots = RobotPopulation(field(), ["manipulator"], [[0, 0, 0]], packs=False)
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_hand_reaches_a_point_and_the_base_waits_for_people_in_between(engine: str) -> None:
+    world = field()
+    scene = RobotScene(world, ["manipulator"], packs=False, physics=engine)
+    robots = RobotPopulation(world, ["manipulator"], [[0, 0, 0]], packs=False, scene=scene)
     robots.reach(0, [1.4, 0.0, 0.5])
     somebody = people((1.0, 0.0))
     for _ in range(60):

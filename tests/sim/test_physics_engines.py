@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from robot_field import ENGINES
 from vico.assets.robots import ActionSpace, NoController, RobotModel, Sensors, robot_model
 from vico.errors import InputError, SchemaError
 from vico.sim.bodies import CAR, OBJECT, RESIDENT, Bodies
-from vico.sim.physics import Capacity, PhysicsEngine, PhysicsScene, StaticScene, engine_names, make_scene
+from vico.sim.physics import Capacity, PhysicsEngine, PhysicsScene, StaticScene, make_scene
 from vico.sim.physics.frames import COARSE, FINE
 from vico.sim.physics.records import Party, RigidObject
 from vico.world.heights import HeightField
@@ -20,7 +21,7 @@ PILLAR = StaticScene(FLAT, pillars=np.array([[3.0, 1.0, 1.0, 0.3, 1.0]]))
 SMALL = Capacity(people=8, vehicles=4, objects=6)
 HILL = HeightField(np.add.outer(np.sin(np.arange(101.0)), np.cos(np.arange(101.0) / 2)).astype(np.float32) * 0.2, 50.0)
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
-pytestmark = pytest.mark.parametrize("name", engine_names())
+pytestmark = pytest.mark.parametrize("name", ENGINES)
 
 HUSKY, GO2 = (robot_model(kind, packs=False) for kind in ("husky", "go2"))
 ROTORS = [("front", 0.2, 0.0), ("left", 0.0, 0.2), ("back", -0.2, 0.0), ("right", 0.0, -0.2)]

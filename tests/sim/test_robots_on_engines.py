@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robot_field import field, people
+from robot_field import ENGINES, field, people
 from vico.errors import InputError
 from vico.sim.bodies import Bodies
 from vico.sim.config import PHYSICS_ENGINES, SimConfig
-from vico.sim.physics import engine_names, factory
+from vico.sim.physics import factory
 from vico.sim.robots import RobotPopulation, RobotScene, RobotStatus
 from vico.sim.simulation import Simulation
 
@@ -17,10 +17,6 @@ KINDS = ("husky", "go2", "drone", "manipulator")
 PLACES = [[0, 0, 0], [0, 6, 0], [0, 12, 0], [0, -6, 0]]
 HUSKY, GO2, DRONE, MANIPULATOR = range(4)
 WORLD = field()
-ENGINES = [
-    pytest.param(name, marks=pytest.mark.skipif(name not in engine_names(), reason=f"{name} is not installed"))
-    for name in PHYSICS_ENGINES
-]
 
 
 @pytest.fixture(scope="module", params=ENGINES)
@@ -66,6 +62,19 @@ def test_they_drive_walk_and_turn_as_fast_as_they_are_told(robots: RobotPopulati
     assert 1.2 < moved[GO2] < 2.1
     assert robots.bodies().yaw[MANIPULATOR] - yaw[MANIPULATOR] == pytest.approx(0.9, abs=0.15)
     assert robots.engine.base(GO2).rotation[2, 2] > 0.95
+
+
+def test_go2_turns_and_stops(robots: RobotPopulation) -> None:
+    robots.drive(GO2, (0.0, 0.0, 0.8))
+    run(robots, 1.0)
+    before = robots.engine.base(GO2).yaw
+    run(robots, 2.0)
+    assert robots.engine.base(GO2).yaw - before == pytest.approx(1.6, abs=0.3)
+    robots.stop(GO2)
+    assert run(robots, 1.5) == []
+    here = robots.run.position(GO2).copy()
+    run(robots, 1.0)
+    assert np.linalg.norm(robots.run.position(GO2) - here) < 0.03
 
 
 def test_they_stop_before_a_person_and_do_not_touch_them(robots: RobotPopulation) -> None:
