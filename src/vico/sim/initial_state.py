@@ -106,13 +106,12 @@ def _entities(state: SimulationState, residents: Sequence[Resident], config: Sim
         kind = "resident" if i < len(residents) else "assistant"
         shown = residents[i].name if i < len(residents) else name
         found[entity] = {"kind": kind, "name": shown, "agent": name}
-    for system, kind in ((state.robots, "robot"), (state.traffic, "")):
-        if system is None:
-            continue
-        bodies = system.bodies()
-        for k, entity in enumerate(bodies.entity.tolist()):
-            named = kind or KINDS[int(bodies.kind[k])]
-            found[entity] = {"kind": named, "name": f"{named} {k}"}
+    for k, entity in enumerate(state.robots.bodies().entity.tolist() if state.robots is not None else []):
+        found[entity] = {"kind": "robot", "name": f"robot {k}"}
+    if state.traffic is not None:
+        entities, kinds = state.traffic.entities()
+        for k, (entity, kind) in enumerate(zip(entities.tolist(), kinds.tolist(), strict=True)):
+            found[entity] = {"kind": KINDS[kind], "name": f"{KINDS[kind]} {k}"}
     # Bicycles in their stations are nobody's obstacle, but are seen.
     for k, entity in enumerate(state.transit.bicycles.entities().tolist() if state.transit is not None else []):
         found[entity] = {"kind": "bicycle", "name": f"bicycle {k}"}

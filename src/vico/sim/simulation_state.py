@@ -57,9 +57,12 @@ class TrafficSystem(Subsystem, Protocol):
     def walkers(self) -> Bodies:
         """The pedestrians alone."""
 
+    def entities(self) -> tuple[NDArray[np.int32], NDArray[np.int8]]:
+        """Return entity and kind of all, those that are not in the streets now among them."""
+
     @property
     def lights(self) -> NDArray[np.uint8]:
-        """Which lights each vehicle shows, bits as `vico.sim.traffic.lights` has them."""
+        """Which lights each vehicle among the bodies shows, bits as `vico.sim.traffic.lights` has them."""
 
     @property
     def gait(self) -> PedestrianGaits:

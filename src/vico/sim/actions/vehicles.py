@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from vico.clock import DAY, clock_of
 from vico.rules import ReasonCode
 from vico.sim import rides
 from vico.sim.actions.model import ActionType, Refusal, Situation, Values
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Vehicle
-from vico.sim.transit import BIKE_RATE, BIKE_REACH, DOOR_REACH, FARE
+from vico.sim.transit import BIKE_RATE, BIKE_REACH, DOOR_REACH, FARE, TransitSystem
 
+_NEAR_STOP = 6.0  # metres from the place to wait within which a stop is told of
 _NO_TRANSIT = "this run has no transit"
 
 
@@ -22,11 +24,23 @@ def check_enter_bus(values: Values, i: int, state: SimulationState) -> Refusal |
         return refusal
     bus = transit.bus_at(p.position[i])
     if bus is None:
-        return Refusal(ReasonCode.NO_VEHICLE, f"enter_bus: no bus stands with a door within {DOOR_REACH:g} m")
+        said = f"enter_bus: no bus stands with a door within {DOOR_REACH:g} m{_from_depot(i, state, transit)}"
+        return Refusal(ReasonCode.NO_VEHICLE, said)
+    if transit.ends(bus):
+        what, _, name = transit.service_of(bus)
+        return Refusal(ReasonCode.NO_VEHICLE, f"enter_bus: {what} {name} ends here{_from_depot(i, state, transit)}")
     if transit.aboard(bus) >= transit.capacity(bus):
         what, _, name = transit.service_of(bus)
         return Refusal(ReasonCode.FULL, f"enter_bus: {what} {name} is full with {transit.capacity(bus)} people")
     return _refuse_unless_paid("enter_bus", "the fare is", FARE, i, state)
+
+
+def _from_depot(i: int, state: SimulationState, transit: TransitSystem) -> str:
+    """Say which bus is awaited from the depot where somebody stands, if one is."""
+    expected = transit.expected_from_depot(state.people.position[i], _NEAR_STOP)
+    if expected is None:
+        return ""
+    return f"; bus {expected[0]} is in the depot until shortly before {clock_of(expected[1] % DAY)}"
 
 
 def check_exit_bus(values: Values, i: int, state: SimulationState) -> Refusal | None:

@@ -9,7 +9,7 @@ from vico.sim.traffic.leader import ANY_BODY, TOUCH, touched_at
 from vico.sim.traffic.letting_in import lane_to_change_to
 from vico.sim.traffic.path import PATH_POINT, changing_lane, lane_polyline, point_on_path, project_on_polyline
 from vico.sim.traffic.route import advance_on_route
-from vico.sim.traffic.state import NONE
+from vico.sim.traffic.state import NONE, PRESENT
 
 _REAR_GAP, _FRONT_GAP = 7.0, 8.0  # m that have to be free on the other lane behind the front's place and ahead of it
 _LET_IN_GAP, _CUT_IN_GAP = 2.0, 3.0  # m behind a bus that is let in, and ahead of it
@@ -40,7 +40,7 @@ def wants_lane_change(net, vehicle, gap, leading, wanted):  # type: ignore[no-un
 def _vehicles_on(fleet, lane):  # type: ignore[no-untyped-def]
     count = 0
     for vehicle in fleet:
-        count += vehicle.lane == lane
+        count += vehicle.lane == lane and vehicle.presence == PRESENT
     return count
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.sim.bodies import Bodies
+from vico.sim.traffic.shapes import Shapes
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.walkways import Walkways
@@ -166,3 +167,20 @@ def _height_on(graph: LaneGraph | Walkways, row: int, offset: float) -> float:
     """Return how high a lane or walkway is, metres along it."""
     own = slice(int(graph.first[row]), int(graph.first[row + 1]))
     return float(np.interp(offset, graph.along[own], graph.z[own]))
+
+
+def shapes_of(bodies: Bodies, levels: TrafficLevels) -> Shapes:
+    """Return bodies as the kernels take them, their extents in height as `levels` compares them."""
+    bottom, top = levels.extents_of(bodies)
+    return Shapes(
+        x=np.ascontiguousarray(bodies.position[:, 0]),
+        y=np.ascontiguousarray(bodies.position[:, 1]),
+        yaw=bodies.yaw,
+        half_length=bodies.half_length,
+        half_width=bodies.half_width,
+        rounding=bodies.rounding,
+        bottom=bottom,
+        top=top,
+        vx=np.ascontiguousarray(bodies.velocity[:, 0]),
+        vy=np.ascontiguousarray(bodies.velocity[:, 1]),
+    )

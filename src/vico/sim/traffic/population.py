@@ -16,12 +16,13 @@ from vico.seeds import rng
 from vico.sim.bodies import BUS, CAR, PEDESTRIAN, STEP_HEIGHT, Bodies, Drawn, joined_drawn
 from vico.sim.environment import Conditions
 from vico.sim.neighbours import neighbour_grid
+from vico.sim.traffic.axles import axle_transforms
 from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
 from vico.sim.traffic.companions import choose_companions, leave_group
 from vico.sim.traffic.crossings import mark_busy_crossings
 from vico.sim.traffic.hand_placing import HandPlaced, TrafficSetup
 from vico.sim.traffic.jams import STUCK_AFTER, Jam, JamLog, entity_before
-from vico.sim.traffic.levels import TrafficLevels
+from vico.sim.traffic.levels import TrafficLevels, shapes_of
 from vico.sim.traffic.lights import LampDrawing
 from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.traffic.pedestrians import RADIUS, advance_pedestrians, place_pedestrian
@@ -30,8 +31,11 @@ from vico.sim.traffic.shapes import Shapes
 from vico.sim.traffic.signal_heads import SignalHeads
 from vico.sim.traffic.signals import Circles, SignalClock, SignalsShown
 from vico.sim.traffic.state import (
+    AWAY,
+    COMING,
     NONE,
     PEDESTRIAN_RECORD,
+    PRESENT,
     TOP_SPEED,
     VEHICLE_STATE,
     BusRoutes,
@@ -40,13 +44,13 @@ from vico.sim.traffic.state import (
     new_junctions,
     new_pedestrians,
 )
-from vico.sim.traffic.vehicles import advance_vehicles, bring_back, place_vehicle
+from vico.sim.traffic.vehicles import advance_vehicles, bring_back, come_back, place_vehicle, take_away
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.world.walkways import SIDEWALK
 
 PERSON_HEIGHT = 1.72
-# A car that nothing has let move for so long (s) is taken out and comes back in at the map's edge, as SUMO does it.
+# A car that nothing has let move for so long (s) comes back in at the map's edge, as SUMO does it.
 PATIENCE = 150.0
 _ENTRY_SPEED = 6.0  # m/s
 _FAR = 1e7  # where bodies are before they have a place, m
@@ -255,6 +259,17 @@ class Traffic:
 
     # -- the subsystem contract --------------------------------------------------------------------------------------
 
+    def take_away(self, v: int) -> None:
+        """Take a vehicle on a route out of the world: it holds nothing, and is no body, until it is called back."""
+        take_away(self._net, self._vehicles, v, self.junctions)
+        self.shapes.x[v], self.shapes.y[v] = _FAR + v * 100.0, _FAR
+        self.shapes.vx[v] = self.shapes.vy[v] = 0.0
+        self._bodies = None
+
+    def call_back(self, v: int, wanted: bool = True) -> None:
+        """Have a vehicle that was taken away come back at its stop as soon as there is room, or stay away after all."""
+        self.fleet.presence[v] = COMING if wanted else AWAY
+
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Every number that decides the future, random streams among them."""
         return {name: array.copy() for name, array in self._state().items()}
@@ -275,14 +290,14 @@ class Traffic:
         return found | {f"jams.{name}": array for name, array in self.jams.arrays().items()}
 
     def bodies(self) -> Bodies:
-        """Vehicles, then pedestrians."""
+        """Vehicles, then pedestrians; without buses that are out of service."""
         if self._bodies is None:
             self._bodies = self._bodies_now()
         return self._bodies
 
     def _bodies_now(self) -> Bodies:
         xy = np.column_stack([self.shapes.x, self.shapes.y])
-        return Bodies(
+        everybody = Bodies(
             entity=self._own_entities,
             kind=self._kinds,
             position=np.column_stack([xy, self._levels.heights(xy)]),
@@ -292,6 +307,13 @@ class Traffic:
             height=self._heights,
             velocity=np.column_stack([self.shapes.vx, self.shapes.vy]),
         )
+        there = self._present()
+        walkers = np.arange(self.vehicles, len(xy))
+        return everybody.where(np.r_[there, walkers]) if len(there) < self.vehicles else everybody
+
+    def _present(self) -> NDArray[np.int64]:
+        """Return the vehicles that are not out of service."""
+        return np.flatnonzero(self._vehicles["presence"] == PRESENT)
 
     def set_conditions(self, conditions: Conditions) -> None:
         """Have everybody drive and walk as it is outdoors now: part of the environment's state, not of this one's."""
@@ -399,6 +421,10 @@ class Traffic:
         bring_back(self._net, self._vehicles, self.junctions, everybody, self._entries, _ENTRY_SPEED, PATIENCE)
         for k in np.flatnonzero(teleports[due] > before).tolist():
             self.jams.note_rescue(int(due[k]), where[k], float(stood[k]), blockers[k])
+        coming = np.flatnonzero(self._vehicles["presence"] == COMING)
+        self._levels.clear(coming, (everybody.bottom, everybody.top))
+        for v in coming.tolist():
+            come_back(self._net, self._vehicles, v, everybody)
 
     def _before(self, v: int) -> int:
         return entity_before(int(self.fleet.blocker[v]), self._entities)
@@ -425,28 +451,19 @@ class Traffic:
 
     def draw(self) -> Drawn:
         """Cars, buses and what signals show; pedestrians are drawn by whoever skins people."""
-        m = self.vehicles
-        c, s = np.cos(self.shapes.yaw[:m]), np.sin(self.shapes.yaw[:m])
-        xy = np.column_stack([self.shapes.x[:m], self.shapes.y[:m]])
-        half = self.fleet.wheelbase / 2
-        along = np.column_stack([c, s]) * half[:, None]
-        # On slopes a vehicle stands on its axles: pitch follows the ground between them.
-        front, back = (self._levels.at(xy + side, slice(0, m)) for side in (along, -along))
-        slope = (front - back) / (2 * half) if m else np.zeros(0)
-        size = np.sqrt(1.0 + slope**2)
-        transforms = np.zeros((m, 4, 4), np.float32)
-        forward = np.column_stack([c / size, s / size, slope / size])
-        left = np.column_stack([-s, c, np.zeros(m)])
-        transforms[:, :3, 0], transforms[:, :3, 1] = forward, left
-        transforms[:, :3, 2] = np.cross(forward, left)
-        transforms[:, :2, 3], transforms[:, 2, 3] = xy, (front + back) / 2
-        transforms[:, 3, 3] = 1.0
-        entity = np.arange(self.first_entity, self.first_entity + m, dtype=np.int32)
-        vehicles = Drawn(self._prototypes, self.prototype, transforms, entity)
-        parts = [vehicles, self._lamps.draw(self.fleet.lights, float(self.jams.elapsed[0]), vehicles)]
+        index, transforms, entity = self.prototype, self.vehicle_transforms(), self._own_entities
+        vehicles, there = Drawn(self._prototypes, index, transforms, entity[: self.vehicles]), self._present()
+        parts = [Drawn(self._prototypes, index[there], transforms[there], entity[there])]
+        parts.append(self._lamps.draw(self.fleet.lights, float(self.jams.elapsed[0]), vehicles))
         if self._heads is not None:
             parts.append(self._heads.draw(self._net.lanes["light"], self._paths.walkways["light"]))
         return joined_drawn(parts)
+
+    def vehicle_transforms(self) -> NDArray[np.float32]:
+        """Model to world of every vehicle, shape ``(vehicles, 4, 4)``; of those away it means nothing."""
+        m, half = self.vehicles, self.fleet.wheelbase / 2
+        xy = np.column_stack([self.shapes.x[:m], self.shapes.y[:m]])
+        return axle_transforms(xy, self.shapes.yaw[:m], half, lambda points: self._levels.at(points, slice(0, m)))
 
     def prototypes(self) -> dict[str, list[Surface]]:
         """Models of the vehicles and signals, by the names `draw` uses."""
@@ -462,13 +479,18 @@ class Traffic:
 
     @property
     def lights(self) -> NDArray[np.uint8]:
-        """Which lights each vehicle shows, bits as `vico.sim.traffic.lights` has them; cars, then buses."""
-        return np.asarray(self.fleet.lights, np.uint8)
+        """Which lights each vehicle shows, bits as `vico.sim.traffic.lights` has them; in the order of `bodies`."""
+        return np.asarray(self.fleet.lights[self._present()], np.uint8)
+
+    def entities(self) -> tuple[NDArray[np.int32], NDArray[np.int8]]:
+        """Return entity and kind of all, vehicles, then pedestrians; buses that are out of service are among them."""
+        return self._own_entities, self._kinds
 
     @property
     def walkers(self) -> Bodies:
         """The pedestrians alone."""
-        return self.bodies().where(np.arange(self.vehicles, len(self.shapes.x)))
+        bodies = self.bodies()
+        return bodies.where(np.arange(len(bodies) - self.pedestrians, len(bodies)))
 
     @property
     def gait(self) -> PedestrianGaits:
@@ -476,20 +498,3 @@ class Traffic:
         walkers = self.pedestrian_state
         walked = walkers.distance_walked - walkers.set_out
         return PedestrianGaits(walkers.preferred_speed.copy(), walked, walkers.gait_time.copy())
-
-
-def shapes_of(bodies: Bodies, levels: TrafficLevels) -> Shapes:
-    """Return bodies as the kernels take them, their extents in height as `levels` compares them."""
-    bottom, top = levels.extents_of(bodies)
-    return Shapes(
-        x=np.ascontiguousarray(bodies.position[:, 0]),
-        y=np.ascontiguousarray(bodies.position[:, 1]),
-        yaw=bodies.yaw,
-        half_length=bodies.half_length,
-        half_width=bodies.half_width,
-        rounding=bodies.rounding,
-        bottom=bottom,
-        top=top,
-        vx=np.ascontiguousarray(bodies.velocity[:, 0]),
-        vy=np.ascontiguousarray(bodies.velocity[:, 1]),
-    )

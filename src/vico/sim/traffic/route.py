@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from vico.io.compiled import compiled
 from vico.sim.traffic.random_stream import next_random
-from vico.sim.traffic.state import HELD_JUNCTIONS, NONE, PLANNED_LANES, PREVIOUS_LANES
+from vico.sim.traffic.state import HELD_JUNCTIONS, NONE, PLANNED_LANES, PRESENT, PREVIOUS_LANES
 
 NEVER = 1e9  # distance to a stop that there is not, m
 STANDING_ROOM = 1.5  # room kept behind a vehicle that has left a junction, m
@@ -18,7 +18,7 @@ def count_per_street(net, fleet, street_load):  # type: ignore[no-untyped-def]
     """Count the vehicles on each street (one direction) into `street_load`."""
     street_load[:] = 0
     for vehicle in fleet:
-        street_load[net.lanes[vehicle.lane].edge] += 1
+        street_load[net.lanes[vehicle.lane].edge] += vehicle.presence == PRESENT
 
 
 @compiled

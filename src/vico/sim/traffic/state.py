@@ -27,6 +27,8 @@ HELD_JUNCTIONS = 6  # junctions a vehicle can hold at once
 TOP_SPEED = 13.9  # m/s, whatever the street allows
 NONE = -1  # no lane, junction, route, body: wherever an index may be missing
 SEVERAL = -2  # more than one vehicle
+#: Where a vehicle is: on the streets, out of the world, or out of it and to come back as soon as there is room.
+PRESENT, AWAY, COMING = 0, 1, 2
 #: What a signal shows.
 DARK, GREEN, AMBER, RED = 0, 1, 2, 3
 
@@ -98,6 +100,7 @@ VEHICLE_STATE: list[tuple[Any, ...]] = [
     ("stop_route_index", _I),  # buses: position in its route of the lane with the next stop
     ("stop_offset", _F),  # buses: the stop's distance along that lane, m
     ("at_stop", _B),  # buses: whether it stands at its stop with its doors open
+    ("presence", np.uint8),  # buses: PRESENT, AWAY or COMING; its body is far off unless it is present
     ("goal", _I),  # cars: goal it drives to, an index into the network's; NONE for none
     ("goal_end", _I),  # cars: the one after its last goal
     ("lights", np.uint8),  # lights it shows: bits as `vico.sim.traffic.lights` has them

@@ -56,7 +56,7 @@ from vico.sim.traffic.path import (
 from vico.sim.traffic.random_stream import next_random
 from vico.sim.traffic.route import NEVER, advance_lane, can_step_back, plan_lanes, step_back_lane
 from vico.sim.traffic.signals import is_stopped_by_signal, loses_its_green
-from vico.sim.traffic.state import NONE
+from vico.sim.traffic.state import AWAY, NONE, PRESENT
 
 STANDING = 0.1  # slower is standing, m/s ...
 _STARTED = 0.95  # ... where a vehicle gains so much in a step: slower than this share of what it can gain
@@ -66,6 +66,7 @@ _BLOCKER_GAP = 3.0  # m within which a leader is what a standing vehicle stands 
 _CREEP = 1.0  # a vehicle that is refused a junction waits for it below this speed, m/s
 _OTHER_WAY_AFTER = 15.0  # s of waiting for a junction after which a car looks for another way, every 50 steps
 _BEFORE_JUNCTION = 1.0  # m before a lane's end at which a bus taken out of a jam goes on
+_COMING_BACK = 8.0  # m before and behind a bus that are free where it comes back
 _BEYOND_JUNCTION = 60.0  # m seen beyond a junction that is asked for
 
 
@@ -90,6 +91,8 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
     path_buffer = np.empty(PATH_POINTS, PATH_POINT)
     for v in range(len(fleet)):
         vehicle = fleet[v]
+        if vehicle.presence != PRESENT:
+            continue
         lane, speed, is_bus = vehicle.lane, vehicle.speed, vehicle.route >= 0
         look = look_ahead(vehicle)
         path_ends = plan_lanes(net, vehicle, street_load, look + vehicle.length + 12.0)
@@ -302,6 +305,28 @@ def _can_stand_on(net, vehicle, lane, following):  # type: ignore[no-untyped-def
     street = net.lanes[lane]
     fits = street.inside < 0 and street.junction < 0 and street.length > vehicle.length + _BEFORE_JUNCTION + 1.0
     return fits and following != street.left and following != street.right
+
+
+@compiled
+def take_away(net, fleet, v, junctions):  # type: ignore[no-untyped-def]
+    """Take a bus off the streets; it comes back at the stop that it drives to, or stands at."""
+    vehicle = fleet[v]
+    release_all_junctions(junctions, vehicle)
+    vehicle.route_index, vehicle.offset = vehicle.stop_route_index, vehicle.stop_offset
+    vehicle.lane = net.route[net.route_first[vehicle.route] + vehicle.route_index]
+    vehicle.planned_count = 0
+    vehicle.previous_lanes[:] = NONE
+    vehicle.speed = vehicle.stopped_time = vehicle.junction_wait = vehicle.lateral_offset = 0.0
+    vehicle.blocker = vehicle.gives_way_to = vehicle.queued_junction = vehicle.queued_exit = NONE
+    vehicle.at_stop, vehicle.lights, vehicle.presence = False, 0, AWAY
+
+
+@compiled
+def come_back(net, fleet, v, shapes):  # type: ignore[no-untyped-def]
+    """Put a bus that was taken away at its stop, where nobody is so near that they would have to brake for it."""
+    vehicle = fleet[v]
+    if place_vehicle(net, fleet, v, vehicle.lane, vehicle.offset, shapes, _COMING_BACK):
+        vehicle.at_stop, vehicle.presence = True, PRESENT
 
 
 @compiled

@@ -25,6 +25,7 @@ from vico.rules import TRAM_SECTIONS
 from vico.sim.bodies import Bodies, Drawn
 from vico.sim.state import FIRST_TRAM
 from vico.sim.traffic import Traffic
+from vico.sim.traffic.state import PRESENT
 from vico.sim.transit.bicycles import Bicycles
 from vico.sim.transit.bus_plan import BusPlan
 from vico.sim.transit.doors import DOOR_TIME, leaf_transforms, moved_doors
@@ -37,7 +38,9 @@ from vico.world.timetable import departure, next_departure
 # that had to drive faster than its time asks for would leave the next stop before it is due, without who comes on time.
 PACE = (2.5, 10.0)
 _START_STOP = 10.0
-_LAST_CALL = 3.0  # seconds before a tram goes out of the city at which everybody gets off
+_LAST_CALL = 3.0  # seconds before a tram goes out of the city, or a bus to the depot, at which everybody gets off
+#: A bus goes to the depot if its next departure is farther off, seconds, and comes back so long before it.
+DEPOT_FROM, DEPOT_UNTIL = 300.0, 120.0
 # Doors on a bus's right side, metres ahead of its centre.
 DOORS = (4.65, -0.05, -3.55)
 
@@ -102,7 +105,8 @@ class TransitSystem:
                 # It should be on its way to the second stop by now: the departure that is past is its own.
                 self.taken[line] -= 1
             self._send(bus, int(self.stop[bus]))
-            traffic.fleet.at_stop[self._vehicle[bus]] = True
+            self._begin_in_depot(bus, gone)
+            traffic.fleet.at_stop[self._vehicle[bus]] = not self.in_depot(bus)
 
         self._on_tracks = self.trams.walkways_on_tracks()
         self._shut: tuple[NDArray[np.bool_] | None, NDArray[np.bool_] | None] = None, None
@@ -134,6 +138,9 @@ class TransitSystem:
         fleet = self.traffic.fleet
         self.trams.advance(float(self.clock[0]), dt, obstacles)
         for bus, v in enumerate(self._vehicle.tolist()):
+            if fleet.presence[v] != PRESENT:
+                self._mind_depot(bus, v)
+                continue
             self.open[bus] = moved_doors(float(self.open[bus]), self._holds_doors(bus, v), dt)
             if not fleet.at_stop[v]:
                 self.dwell[bus] = DWELL
@@ -143,6 +150,8 @@ class TransitSystem:
             self.dwell[bus] = max(self.dwell[bus] - dt, 0.0)
             if self.may_leave_stop(bus):
                 self._leave_stop(bus)
+            elif self.dwell[bus] == 0.0 == self.open[bus] and self._ends_service(bus) and not self.aboard(bus):
+                self.traffic.take_away(v)
 
     def _holds_doors(self, bus: int, v: int) -> bool:
         """Whether a bus wants its doors open: at a stop, until shortly before it leaves."""
@@ -150,7 +159,62 @@ class TransitSystem:
             return False
         if self.dwell[bus] > DOOR_TIME:
             return True
+        if self._ends_service(bus):
+            return bool(self.aboard(bus))
         return bool(self.stop[bus] == 0 and self._next_departure(bus) - self.clock[0] > DOOR_TIME)
+
+    # -- the depot ---------------------------------------------------------------------------------------------------
+
+    def _ends_service(self, bus: int) -> bool:
+        """Return whether a bus at its line's first stop goes to the depot: its next departure is far off."""
+        return bool(self.stop[bus] == 0 and self._next_departure(bus) - self.clock[0] > DEPOT_FROM)
+
+    def _begin_in_depot(self, bus: int, gone: float) -> None:
+        """Have a bus begin the run in the depot: one whose round is over, or that has long to wait for its next."""
+        over = gone >= self.line_of(bus).travel[-1]
+        waits = self.stop[bus] == 0 and self.comes_from_depot(bus) - self.clock[0] > DEPOT_FROM
+        if over or waits:
+            self.stop[bus] = 0
+            self._send(bus, 0)
+            self.traffic.take_away(int(self._vehicle[bus]))
+
+    def _mind_depot(self, bus: int, v: int) -> None:
+        """Call a bus in the depot back shortly before the departure that it is to take."""
+        self.dwell[bus], self.open[bus] = DWELL / 2, 0.0  # a stop there is no arrival
+        soon = float(self.clock[0]) + DEPOT_UNTIL
+        self.traffic.call_back(v, self._next_departure(bus) <= soon and self.comes_from_depot(bus) <= soon)
+
+    def comes_from_depot(self, bus: int) -> int:
+        """Return the departure that a bus in the depot is to take, seconds; those that wait already go before it."""
+        line, fleet = self._plan.line_of_bus[bus], self.traffic.fleet
+        before = 0
+        for other, its_line in enumerate(self._plan.line_of_bus):
+            if its_line == line and self.stop[other] == 0:
+                v = self._vehicle[other]
+                before += bool(fleet.at_stop[v]) if fleet.presence[v] == PRESENT else other < bus
+        return departure(self.transit.lines[line], int(self.taken[line]) + before)
+
+    def in_depot(self, bus: int) -> bool:
+        """Return whether a bus is out of service, and nowhere in the world."""
+        return bus < self.traffic.buses and bool(self.traffic.fleet.presence[self._vehicle[bus]] != PRESENT)
+
+    def expected_from_depot(self, xy: ArrayLike, reach: float) -> tuple[str, int] | None:
+        """Return line and departure of the next bus that comes out of the depot to a stop near a point; None if none.
+
+        Parameters
+        ----------
+        xy
+            ENU metres, shape ``(2,)``.
+        reach
+            Of the place to wait there, metres.
+        """
+        waits = {stop.id: stop.wait for stop in self.transit.stops}
+        found: list[tuple[int, str]] = []
+        for bus in filter(self.in_depot, range(self.traffic.buses)):
+            line = self.line_of(bus)
+            if math.dist(waits[line.stops[0]][:2], np.asarray(xy, np.float64)[:2]) <= reach:
+                found.append((self.comes_from_depot(bus), line.name))
+        return (min(found)[1], min(found)[0]) if found else None
 
     def _note_arrival(self, bus: int) -> None:
         late = float(self.clock[0]) - self._due(bus, int(self.stop[bus]))
@@ -197,18 +261,17 @@ class TransitSystem:
 
     def draw(self) -> Drawn:
         """All bicycles, ridden ones too, trams, and doors; buses are drawn with the traffic."""
-        bikes, trams, buses = self.bicycles.draw(), self.trams.draw(), self.traffic.buses
+        bikes, trams = self.bicycles.draw(), self.trams.draw()
         leaves, width = bus_door_leaves()
         if self.traffic.lanes.lefthand:
             leaves = [(x, -y, way) for x, y, way in leaves]
-        # After the buses come signals.
-        cars = self.traffic.cars
-        bases = self.traffic.draw().transforms[cars : cars + buses].astype(np.float64)
+        there = np.flatnonzero(self.traffic.fleet.presence[self._vehicle] == PRESENT)
+        bases = self.traffic.vehicle_transforms()[self._vehicle[there]].astype(np.float64)
         doors = Drawn(
             ["bus_leaf"],
-            np.zeros(len(leaves) * buses, np.int32),
-            leaf_transforms(bases, leaves, self.open, width).astype(np.float32),
-            np.tile(self.traffic.first_entity + self._vehicle, len(leaves)).astype(np.int32),
+            np.zeros(len(leaves) * len(there), np.int32),
+            leaf_transforms(bases, leaves, self.open[there], width).astype(np.float32),
+            np.tile(self.traffic.first_entity + self._vehicle[there], len(leaves)).astype(np.int32),
         )
         names = [*bikes.prototypes, *doors.prototypes, *trams.prototypes]
         return Drawn(
@@ -366,8 +429,10 @@ class TransitSystem:
         return FARE
 
     def ends(self, bus: int) -> bool:
-        """Return whether a tram is about to leave its last stop: it takes nobody out of the city."""
+        """Return whether a tram or bus is about to leave for out of the city or the depot: it takes nobody there."""
         tram = bus - self.traffic.buses
+        if tram < 0:
+            return self.stopped_at(bus) is not None and bool(self.dwell[bus] <= _LAST_CALL) and self._ends_service(bus)
         return tram >= 0 and self.trams.ends(tram) and bool(self.trams.dwell[tram] <= _LAST_CALL)
 
     def alight(self, bus: int, rider: int) -> None:
