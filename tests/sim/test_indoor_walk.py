@@ -64,6 +64,14 @@ def act(sim: Simulation, **action: Any) -> dict[str, Any]:
     return state
 
 
+def go_through(sim: Simulation, room: str) -> dict[str, Any]:
+    """Enter a room, and wait until the lift is there if it is one."""
+    state = act(sim, type="enter", place=room)
+    while sim.state.people.lift_left[0] > 0.0:
+        state = act(sim, type="wait")
+    return state
+
+
 class Raster:
     """Cells of a room where a body fits, and the steps between them."""
 
@@ -177,13 +185,13 @@ def _visit_everything(sim: Simulation, world: World, *, containers: bool = True)
             if door.to and door.to not in seen:
                 walk(sim, room, door.inside)
                 assert abs(people.position[0, 2] - door.inside[2]) < 0.05, room.id
-                state = act(sim, type="enter", place=door.to)
+                state = go_through(sim, door.to)
                 assert (state["action_status"], state["room"]) == ("ok", door.to), state["action_reason"]
                 visit(door.to, name)
         if back is not None:
             way = next(door for door in room.doors if door.to == back)
             walk(sim, room, way.inside)
-            assert act(sim, type="enter", place=back)["room"] == back
+            assert go_through(sim, back)["room"] == back
 
     visit(place.rooms[0], None)
     assert seen == set(place.rooms)
@@ -226,7 +234,14 @@ def test_a_lift_takes_one_to_the_floor_whose_car_is_named_and_to_no_other_room(h
     refused = act(sim, type="enter", place=hotel.places[0].rooms[-1])
     assert "no door leads from here" in refused["action_reason"]
     state = act(sim, type="enter", place=cars[2].id)
-    assert (state["action_status"], state["room"]) == ("ok", cars[2].id)
+    assert (state["action_status"], state["room"]) == ("ok", cars[0].id)
+    refused = act(sim, type="enter", place=cars[1].id)
+    assert (refused["action_code"], refused["action_reason"][:29]) == ("moving", "enter: the lift is moving; it")
+    seconds = 2
+    while act(sim, type="enter", place=cars[2].id)["room"] != cars[2].id:
+        seconds += 1
+    # Doors, and two seconds for each of two floors.
+    assert seconds + 1 == 8
     assert people.position[0, 2] == pytest.approx(cars[2].centre[2])
 
 

@@ -135,6 +135,9 @@ class People(ArrayState):
         radians, float64, shape ``(n, 4)``.
     room, place
         Index of the room and place the avatar is in, -1 outdoors, int32, shape ``(n,)``.
+    lift_room, lift_left
+        Room that the lift one rides goes to, int32, and seconds until it is there, 0 for who rides none, float64; shape
+        ``(n,)``.
     vehicle, vehicle_entity
         A `Vehicle`, int8, and the entity number of the one ridden (0 for none), int32; shape ``(n,)``.
     vehicle_yaw
@@ -186,6 +189,8 @@ class People(ArrayState):
     moved: NDArray[np.float64]
     room: NDArray[np.int32]
     place: NDArray[np.int32]
+    lift_room: NDArray[np.int32]
+    lift_left: NDArray[np.float64]
     vehicle: NDArray[np.int8]
     vehicle_entity: NDArray[np.int32]
     vehicle_yaw: NDArray[np.float64]
@@ -231,6 +236,8 @@ class People(ArrayState):
             moved=np.zeros((n, 4)),
             room=np.full(n, -1, np.int32),
             place=np.full(n, -1, np.int32),
+            lift_room=np.full(n, -1, np.int32),
+            lift_left=np.zeros(n),
             vehicle=np.zeros(n, np.int8),
             vehicle_entity=np.zeros(n, np.int32),
             vehicle_yaw=np.zeros(n),

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.rules import ActionStatus, ReasonCode
-from vico.sim import holding, moves, rides
+from vico.sim import holding, lifts, moves, rides
 from vico.sim.bodies import ROBOT, Bodies, HasBodies, Subsystem
 from vico.sim.footprints import records_of
 from vico.sim.metrics import StopWatch
@@ -76,6 +76,7 @@ def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _A
         obstacles = np.concatenate([obstacles, in_rooms])
     state.avatars.advance(SUBSTEP, obstacles, share=share)
     rides.follow(state)
+    lifts.follow(state, SUBSTEP)
     holding.advance(state, SUBSTEP)
     bodies.refresh(state.avatars)
     stopped = _report_collisions(state)

@@ -7,10 +7,18 @@ import math
 from collections.abc import Iterable
 
 from vico.rules import WALK_SPEED
-from vico.world.model import LANDING, Doorway, Point3, Room
+from vico.world.model import LANDING, LIFT, Doorway, Point3, Room
 
-#: Seconds that going through a door takes, or from floor to floor in a lift: an agent acts once a second.
+#: Seconds that going through a door takes: an agent acts once a second.
 DOOR = 1.0
+#: Seconds for which a lift's doors close before a ride and open after it, and how fast it goes, metres a second: two
+#: seconds for a floor of 3.2 m.
+LIFT_DOORS, LIFT_SPEED = 4.0, 1.6
+
+
+def lift_seconds(up: float) -> float:
+    """Return how long a ride in a lift takes by metres up or down, seconds."""
+    return round(LIFT_DOORS + abs(up) / LIFT_SPEED, 1)
 
 
 class IndoorWays:
@@ -64,7 +72,10 @@ class IndoorWays:
             room = self._rooms[name]
             for door in self._doors(room):
                 if door.to in self._rooms:
-                    after = at + walk_within(room, here, door.inside) / WALK_SPEED + DOOR
+                    passage = DOOR
+                    if room.kind == self._rooms[door.to].kind == LIFT:
+                        passage = lift_seconds(self._rooms[door.to].centre[2] - room.centre[2])
+                    after = at + walk_within(room, here, door.inside) / WALK_SPEED + passage
                     heapq.heappush(queue, (round(after, 3), door.to, self._arrival(door.to, name)))
         return best
 

@@ -226,6 +226,8 @@ class Container(Record):
 
 #: Level stretch at either end of the flights of a stairs room, metres along its own x.
 LANDING = 1.1
+#: Kind of rooms that are cars of a lift, one a floor.
+LIFT = "lift"
 
 
 class Doorway(Record):

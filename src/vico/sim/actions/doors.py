@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vico.rules import DOOR_REACH, INNER_DOOR_REACH, ReasonCode
+from vico.sim import lifts
 from vico.sim.actions.fields import Field, short
 from vico.sim.actions.model import ActionType, Refusal, Values
 from vico.sim.holding import take_umbrella
@@ -19,6 +20,8 @@ _LEVEL = 0.5
 def check_enter(values: Values, i: int, state: SimulationState) -> Refusal | None:
     """Judge going in: through an entrance from the street, through a door from a room."""
     p, name = state.people, values["place"]
+    if p.lift_left[i] > 0.0:
+        return _refuse_in_lift(name, i, state)
     refusal = _refuse_inner_door(name, i, state) if p.room[i] >= 0 else _refuse_entrance(name, i, state)
     if refusal is not None:
         return refusal
@@ -27,6 +30,13 @@ def check_enter(values: Values, i: int, state: SimulationState) -> Refusal | Non
     if state.indoor.free_spot(room, anchor, state.taken_in(room)) is None:
         return Refusal(ReasonCode.FULL, "enter: it is full")
     return None
+
+
+def _refuse_in_lift(name: str, i: int, state: SimulationState) -> Refusal | None:
+    p = state.people
+    if state.indoor.index.get(name) == p.lift_room[i]:
+        return None  # on the way there
+    return Refusal(ReasonCode.MOVING, f"enter: the lift is moving; it is there in {p.lift_left[i]:.1f} s")
 
 
 def _refuse_inner_door(name: str, i: int, state: SimulationState) -> Refusal | None:
@@ -78,8 +88,13 @@ def _room_behind(name: str, i: int, state: SimulationState) -> int:
 def enter(values: Values, i: int, state: SimulationState) -> None:
     """Go through an entrance, or through the door to the next room."""
     p, indoor = state.people, state.indoor
+    if p.lift_left[i] > 0.0:
+        return
     outdoors = p.room[i] < 0
     room = _room_behind(values["place"], i, state)
+    if lifts.is_ride(int(p.room[i]), room, state):
+        lifts.ride(i, room, state)
+        return
     place_in_room(i, room, state, near=indoor.arrival(room, -1 if outdoors else int(p.room[i])))
     if outdoors:
         name = state.world.places[state.place_index[values["place"]]].name
@@ -116,7 +131,8 @@ def leave(values: Values, i: int, state: SimulationState) -> None:
 DOORS = (
     ActionType(
         "enter",
-        "Go into a place (its id) by an entrance within 2 m, or into the next room (its id) by a door within 1 m.",
+        "Go into a place (its id) by an entrance within 2 m, or into the next room (its id) by a door within 1 m; "
+        "a lift takes its time from car to car.",
         enter,
         check_enter,
         {"place": Field("name", slot="place")},
