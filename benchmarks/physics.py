@@ -4,7 +4,8 @@
 
 One robot of every kind stands on the widest square of the world. Each engine runs in a process of its own: it builds
 the city, the robots stand, drive, walk and fly as they are told, stop before people; then 50 people walk around them
-while they follow velocities, and a second of that is timed. Times are processor time of one core.
+while they follow velocities, and a second of that is timed. Then a new set of robots does what robots are for, task by
+task (`robot_tasks.py`). Times are processor time of one core.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from typing import Any
 
 import numpy as np
 from reporting import machine, publish
+from robot_tasks import Tasks, tables
 from scipy.ndimage import distance_transform_edt
 
 from vico.assets.robots import robot_names
@@ -157,7 +159,8 @@ def child(world: Path, engine: str, seconds: int) -> dict[str, Any]:
         "memory beside the world, MB, peak": f"{peak - before:.0f}",
         "snapshot / going back to it, CPU ms": f"{1e3 * saved:.1f} / {1e3 * again:.1f}",
     }
-    return {"kinds": trial.kinds, "rows": figures | behaviour}
+    tasks = Tasks(place, widest_square(place), engine).all()
+    return {"kinds": trial.kinds, "rows": figures | behaviour, "tasks": tasks}
 
 
 def main() -> None:
@@ -191,6 +194,11 @@ def main() -> None:
         f"| | {' | '.join(engines)} |",
         "|---|" + "---|" * len(engines),
         *(f"| {name} | {' | '.join(found[engine]['rows'][name] for engine in engines)} |" for name in first["rows"]),
+        "",
+        "Robots at their tasks, all five on the square while one works, nobody else about. Times real time: of all",
+        "five, by processor time of one core.",
+        "",
+        *tables({engine: found[engine]["tasks"] for engine in engines}),
     ]
     publish(lines, given.table)
 
