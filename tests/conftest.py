@@ -54,7 +54,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
     city = [item for item in items if needs(item, "helsinki_city")]
     people = [item for item in items if needs(item, "helsinki_people") and item not in city][:1]
-    long = [item for item in items if item.path.name in _LONG and item not in city]
+    long = [item for item in items if item.path.name in _LONG and item not in city + people]
     taken = set(map(id, city + people + long))
     rest = [item for item in items if id(item) not in taken]
     before_half = max(len(items) // 2 - len(city), 0)

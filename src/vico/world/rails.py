@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vico.io.compiled import compiled
 from vico.rules import TRAM_SECTION, TRAM_SECTIONS, TRAM_WIDTH
 from vico.world.model import Point2
 
@@ -95,10 +96,10 @@ class Track:
 
     def section(self, front: ArrayLike) -> NDArray[np.float64]:
         """x, y, yaw of the middle of a section whose front is at a distance along the track; shape ``(..., 3)``."""
-        middle = np.asarray(front, np.float64) - TRAM_SECTION / 2
-        a, b = self.at(middle - _PIVOT), self.at(middle + _PIVOT)
-        way = b - a
-        return np.concatenate([(a + b) / 2, np.arctan2(way[..., 1], way[..., 0])[..., None]], axis=-1)
+        front = np.asarray(front, np.float64)
+        found = np.empty((front.size, 3))
+        _stand(front.ravel() - TRAM_SECTION / 2, self._along, self._points, *self._ends, found)
+        return found.reshape(*front.shape, 3)
 
     def seconds(self, start: float, end: float, *, standing: bool = True) -> float:
         """How long a tram takes from one distance along the track to another, braking to a stand there if need be."""
@@ -108,6 +109,30 @@ class Track:
         if standing:
             speed = np.minimum(speed, np.sqrt(0.25 + 2 * TRAM_BRAKING * (end - s)))
         return float((STEP / np.maximum(speed, 0.5)).sum())
+
+
+@compiled
+def _point(s, along, points, first, last):  # type: ignore[no-untyped-def]
+    """Return the point at a distance along a track."""
+    if s <= 0.0:
+        return points[0, 0] + first[0] * s, points[0, 1] + first[1] * s
+    end = along[-1]
+    if s >= end:
+        return points[-1, 0] + last[0] * (s - end), points[-1, 1] + last[1] * (s - end)
+    k = np.searchsorted(along, s, side="right") - 1
+    share = (s - along[k]) / (along[k + 1] - along[k])
+    x = points[k, 0] + share * (points[k + 1, 0] - points[k, 0])
+    return x, points[k, 1] + share * (points[k + 1, 1] - points[k, 1])
+
+
+@compiled
+def _stand(middles, along, points, first, last, found):  # type: ignore[no-untyped-def]
+    """Write x, y, yaw of sections whose middles are at distances along a track, shape ``(n, 3)``."""
+    for i in range(len(middles)):
+        ax, ay = _point(middles[i] - _PIVOT, along, points, first, last)
+        bx, by = _point(middles[i] + _PIVOT, along, points, first, last)
+        found[i, 0], found[i, 1] = (ax + bx) / 2, (ay + by) / 2
+        found[i, 2] = np.arctan2(by - ay, bx - ax)
 
 
 def tram_door(track: Track, offset: float, door: int, side: float) -> tuple[Point2, Point2]:

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from vico.assets.tram import TRAM_BELLOWS, TRAM_CAPACITY, TRAM_HEIGHT, tram_door_leaves, tram_places, tram_prototypes
 from vico.clock import DAY
-from vico.io.compiled import compiled
 from vico.rules import BUS_DWELL, TRAM_SECTION, TRAM_SECTIONS, TRAM_WIDTH
 from vico.sim.bodies import TRAM, Bodies, Drawn
 from vico.sim.traffic import Traffic
 from vico.sim.transit.doors import DOOR_TIME, leaf_transforms, moved_doors
+from vico.sim.transit.tram_outlines import first_taken, inside_city, nobody, outlines, packed, stand
 from vico.sim.transit.tram_zones import zones_of
 from vico.world.mesh import Surface
 from vico.world.model import TramLine
@@ -49,6 +49,8 @@ _LOOK = TRAM_SPEED**2 / (2 * TRAM_BRAKING) + 6.0  # metres ahead that are watche
 _SOON = 1.2  # seconds: who will be in the way by then is in the way
 _SLOW = 3.0  # m/s at least that a timetable asks for
 _ALIKE = 40.0  # metres of track that have to be free to come in
+_HALF_SIZE = TRAM_SECTION / 2 - TRAM_BELLOWS, TRAM_WIDTH / 2  # metres, of a section
+_BEHIND = np.arange(TRAM_SECTIONS) * TRAM_SECTION  # metres from a tram's front to each section's
 _AT = 0.4  # metres from its stopping point at which a tram has arrived
 
 
@@ -103,6 +105,10 @@ class Trams:
         self.stops_served = np.zeros(n, np.int64)
         self.late_total, self.late_most = np.zeros(n), np.zeros(n)
         self.begun = np.array([_first_after(line, second) for line in lines], np.int64)
+        # Where they stand, which sections reach into the city, and their footprints, which begin those of everybody.
+        self._poses = np.zeros((n, TRAM_SECTIONS, 3))
+        self._inside = np.zeros((n, TRAM_SECTIONS), np.bool_)
+        self._everybody = nobody(n * TRAM_SECTIONS)
         self._bodies: Bodies | None = None
         self._entities = first_entity + np.arange(n * TRAM_SECTIONS, dtype=np.int32)
         self._set_out(second)
@@ -120,7 +126,8 @@ class Trams:
         """Go back to what `arrays` held."""
         for name in _STATE if len(self) else ():
             getattr(self, name)[...] = arrays[f"tram_{name}"]
-        self._bodies = None
+        for tram in range(len(self)):
+            self._stand_where_it_is(tram)
 
     # -- time --------------------------------------------------------------------------------------------------------
 
@@ -128,8 +135,7 @@ class Trams:
         """Move all trams on by `dt` seconds up to the second `now`; none comes nearer to anybody than it may."""
         if not len(self):
             return
-        self._packed_others = _packed(obstacles)
-        self._look_about()
+        self._look_about(obstacles)
         self._come_in(now)
         for tram in np.flatnonzero(self.front > AWAY).tolist():
             if self.dwell[tram] > 0.0:
@@ -151,7 +157,7 @@ class Trams:
                 continue
             self.front[tram], self.speed[tram], self.stop[tram], self.due[tram] = 0.0, _SLOW, 0, due
             self.begun[number] += 1
-            self._moved()
+            self._stand_where_it_is(tram)
 
     def _stand(self, tram: int, now: float, dt: float) -> None:
         # It does not leave before its time, nor its last stop before everybody is off.
@@ -183,12 +189,11 @@ class Trams:
             way = 0.0
         self.speed[tram] = way / dt
         self.front[tram] = front + way
-        if way > 0.0:
-            self._moved()
         self._leave_zones(tram, number)
         if ends:
             if front + way >= self._ends[number]:
-                self._go_out(tram)
+                self.front[tram], self.speed[tram] = AWAY, 0.0
+                self.holder[self.holder == tram] = -1
         elif target - front - way < _AT:
             self.dwell[tram] = BUS_DWELL
             self.speed[tram] = 0.0
@@ -196,47 +201,45 @@ class Trams:
             self.stops_served[tram] += 1
             self.late_total[tram] += late
             self.late_most[tram] = max(self.late_most[tram], late)
+        self._stand_where_it_is(tram)
 
-    def _moved(self) -> None:
-        """Have those who go next see where the trams are now."""
+    def _stand_where_it_is(self, tram: int) -> None:
+        """Have everybody see where a tram is now, and how fast it is."""
+        here, rows = self._poses[tram], slice(tram * TRAM_SECTIONS, (tram + 1) * TRAM_SECTIONS)
+        if self.front[tram] > AWAY:
+            here[:] = self._sections_at(tram, self.front[tram])
+            self._inside[tram] = inside_city(here, self._half)
+        else:
+            self._inside[tram] = False
+        stand(here, self._inside[tram], *_HALF_SIZE, self.speed[tram], self._everybody[rows])
         self._bodies = None
-        self._look_about()
 
-    def _go_out(self, tram: int) -> None:
-        self.front[tram], self.speed[tram] = AWAY, 0.0
-        self._moved()
-        self.holder[self.holder == tram] = -1
+    def _sections_at(self, tram: int, front: float) -> NDArray[np.float64]:
+        """x, y, yaw of a tram's sections with its front there, shape ``(TRAM_SECTIONS, 3)``."""
+        return self.tracks[self.line_of[tram]].section(front - _BEHIND)
 
     def _gap(self, tram: int, front: float, look: float) -> float:
         """Metres of track ahead of a front that nobody is on, or comes onto within a moment; `look` at most."""
         track = self.tracks[int(self.line_of[tram])]
         first = int(max(front, 0.0) / STEP) + 1
         points = track.across[first : first + int(look / STEP) + 2]
-        taken = int(_first_taken(points, *self._but(tram), ACROSS_REACH, _SOON))
+        taken = int(first_taken(points, *self._but(tram), ACROSS_REACH, _SOON))
         return look if taken == len(points) else max((first + taken) * STEP - front - _BEFORE, 0.0)
 
     def _fits(self, tram: int, front: float) -> bool:
         """Return whether no section touches anybody with the front there: in bends they swing to the sides."""
-        poses = self.tracks[self.line_of[tram]].section(front - np.arange(TRAM_SECTIONS) * TRAM_SECTION)
-        c, s = np.cos(poses[:, 2])[:, None], np.sin(poses[:, 2])[:, None]
-        u, v = _OUTLINE[:, 0], _OUTLINE[:, 1]
-        outline = np.stack([poses[:, 0, None] + c * u - s * v, poses[:, 1, None] + s * u + c * v], axis=-1)
-        outline = np.ascontiguousarray(outline[self._is_inside(poses)])
-        return bool(_first_taken(outline, *self._but(tram), _TOUCH, 0.0) == len(outline))
+        poses = self._sections_at(tram, front)
+        outline = outlines(poses, inside_city(poses, self._half))
+        return bool(first_taken(outline, *self._but(tram), _TOUCH, 0.0) == len(outline))
 
     def _but(self, tram: int) -> tuple[NDArray[np.float64], int, int]:
-        """Return everybody, packed, and which of them is the tram itself."""
-        own = self._around[tram]
-        return self._everybody, int(own[0]), int(own[1])
+        """Return the footprints of everybody, and which of them are the tram's own."""
+        return self._everybody, tram * TRAM_SECTIONS, TRAM_SECTIONS
 
-    def _look_about(self) -> None:
-        """Note where everybody is: the trams as they stand now, and all others."""
-        bodies = self.bodies()
-        trams = (bodies.entity - self.first_entity) // TRAM_SECTIONS
-        first = np.searchsorted(trams, np.arange(len(self)))
-        last = np.searchsorted(trams, np.arange(len(self)), side="right")
-        self._around = np.column_stack([first, last - first])
-        self._everybody = np.concatenate([_packed(bodies), self._packed_others])
+    def _look_about(self, others: Bodies) -> None:
+        """Note where all others are, behind the trams."""
+        own = self._everybody[: len(self) * TRAM_SECTIONS]
+        self._everybody = np.concatenate([own, packed(others)])
 
     def _zone_ahead(self, tram: int, number: int, front: float) -> float:
         """Metres to the next zone that another tram is in; those that are free are taken in passing."""
@@ -266,8 +269,7 @@ class Trams:
 
     def _set_out(self, second: float) -> None:
         """Put the trams that are under way at the start where they are by the timetable, as far as there is room."""
-        self._packed_others = _packed(self._traffic.bodies())
-        self._look_about()
+        self._look_about(self._traffic.bodies())
         for number, line in enumerate(self.lines):
             for back in (1, 2, 3):
                 due = _departure(line, int(self.begun[number]) - back)
@@ -290,15 +292,9 @@ class Trams:
         if self._gap(tram, front - TRAM_LENGTH, TRAM_LENGTH + 2.0) < TRAM_LENGTH + 2.0:
             return
         self.front[tram], self.stop[tram], self.due[tram] = front, k, due
-        self._moved()
+        self._stand_where_it_is(tram)
 
     # -- what others see ---------------------------------------------------------------------------------------------
-
-    def sections(self, trams: NDArray[np.int64]) -> NDArray[np.float64]:
-        """x, y, yaw of each section of some trams, the front one first; shape ``(n, TRAM_SECTIONS, 3)``."""
-        behind = np.arange(TRAM_SECTIONS) * TRAM_SECTION
-        found = [self.tracks[self.line_of[tram]].section(self.front[tram] - behind) for tram in trams.tolist()]
-        return np.array(found, np.float64).reshape(-1, TRAM_SECTIONS, 3)
 
     def bodies(self) -> Bodies:
         """Return the sections that are in the city."""
@@ -308,19 +304,8 @@ class Trams:
 
     def _shown(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
         """Tram, section and x, y, yaw of every section that reaches into the city."""
-        trams = np.flatnonzero(self.front > AWAY)
-        if not len(trams):
-            none = np.zeros(0, np.int64)
-            return none, none, np.zeros((0, 3))
-        poses = self.sections(trams)
-        which, section = np.nonzero(self._is_inside(poses))
-        return trams[which], section, poses[which, section]
-
-    def _is_inside(self, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return which sections reach into the city, by x, y, yaw of their middles, shape ``(..., 3)``."""
-        way = np.stack([np.cos(poses[..., 2]), np.sin(poses[..., 2])], axis=-1) * (TRAM_SECTION / 2)
-        ends = np.abs(np.stack([poses[..., :2] + way, poses[..., :2] - way])).max(axis=-1)
-        return np.asarray((ends < self._half).any(axis=0), np.bool_)
+        trams, section = np.nonzero(self._inside)
+        return trams, section, self._poses[trams, section]
 
     def _bodies_now(self) -> Bodies:
         trams, section, pose = self._shown()
@@ -333,8 +318,8 @@ class Trams:
             kind=np.full(n, TRAM, np.int8),
             position=np.column_stack([pose[:, :2], self._traffic.height(pose[:, :2])]),
             yaw=pose[:, 2],
-            half_length=np.full(n, TRAM_SECTION / 2 - TRAM_BELLOWS),
-            half_width=np.full(n, TRAM_WIDTH / 2),
+            half_length=np.full(n, _HALF_SIZE[0]),
+            half_width=np.full(n, _HALF_SIZE[1]),
             height=np.full(n, TRAM_HEIGHT),
             velocity=speed[:, None] * np.column_stack([np.cos(pose[:, 2]), np.sin(pose[:, 2])]),
         )
@@ -401,11 +386,10 @@ class Trams:
     def doors(self, tram: int, out: float = 0.0) -> NDArray[np.float64]:
         """Where a tram's doors are on the side of the kerb, `out` metres outside them, shape ``(k, 2)``."""
         side = (TRAM_WIDTH / 2 + out) * (-1.0 if self._traffic.lanes.lefthand else 1.0)
-        poses = self.sections(np.array([tram]))[0]
         return np.array(
             [
                 [x + a * math.cos(yaw) + side * math.sin(yaw), y + a * math.sin(yaw) - side * math.cos(yaw)]
-                for x, y, yaw in poses
+                for x, y, yaw in self._poses[tram].tolist()
                 for a in TRAM_DOORS
             ]
         )
@@ -413,7 +397,7 @@ class Trams:
     def seat(self, tram: int, place: int) -> NDArray[np.float64]:
         """x, y, yaw of a place in a tram."""
         section, ahead, left = tram_places()[0][place]
-        x, y, yaw = self.sections(np.array([tram]))[0, int(section)]
+        x, y, yaw = self._poses[tram, int(section)].tolist()
         c, s = math.cos(yaw), math.sin(yaw)
         return np.array([x + ahead * c - left * s, y + ahead * s + left * c, yaw])
 
@@ -438,65 +422,6 @@ def _departure(line: TramLine, number: int) -> int:
 def _first_after(line: TramLine, second: float) -> int:
     days, of_the_day = divmod(second, DAY)
     return int(np.searchsorted(line.departures, of_the_day)) + len(line.departures) * int(days)
-
-
-def _packed(bodies: Bodies) -> NDArray[np.float64]:
-    """Return footprints as `_first_taken` reads them: x, y, cos, sin, core half length and width, rounding, vx, vy."""
-    round_off = bodies.rounding
-    columns = (
-        bodies.position[:, 0], bodies.position[:, 1], np.cos(bodies.yaw), np.sin(bodies.yaw),
-        bodies.half_length - round_off, bodies.half_width - round_off, round_off,
-    )  # fmt: skip
-    return np.column_stack([*columns, bodies.velocity])
-
-
-@compiled
-def _first_taken(points, bodies, skip, skipped, within, soon):  # type: ignore[no-untyped-def]
-    """Return the first row of `points`, shape ``(n, k, 2)``, near a footprint now or in `soon` seconds; n for none.
-
-    Bodies from `skip` on, `skipped` of them, are left out.
-    """
-    found, n = len(points), len(points)
-    if n == 0:
-        return found
-    reach = 0.0
-    for i in (0, n - 1):
-        for k in range(points.shape[1]):
-            reach = max(reach, abs(points[i, k, 0] - points[0, 0, 0]) + abs(points[i, k, 1] - points[0, 0, 1]))
-    reach = 1.5 * reach + 16.0
-    for j in range(len(bodies)):
-        if skip <= j < skip + skipped:
-            continue
-        x, y, c, s, half, wide, rounding, vx, vy = bodies[j]
-        if abs(x - points[0, 0, 0]) > reach + half or abs(y - points[0, 0, 1]) > reach + half:
-            continue
-        for moment in range(2):
-            if moment == 1 and (soon == 0.0 or vx * vx + vy * vy < 0.09):
-                break
-            bx, by = x + moment * soon * vx, y + moment * soon * vy
-            for i in range(found):
-                for k in range(points.shape[1]):
-                    dx, dy = points[i, k, 0] - bx, points[i, k, 1] - by
-                    u = max(abs(dx * c + dy * s) - half, 0.0)
-                    v = max(abs(dy * c - dx * s) - wide, 0.0)
-                    if u * u + v * v < (within + rounding) ** 2:
-                        found = i
-                        break
-                if found == i:
-                    break
-    return found
-
-
-def _outline() -> NDArray[np.float64]:
-    """Points around a section, metres, so close that nobody fits between."""
-    half, wide = TRAM_SECTION / 2, TRAM_WIDTH / 2
-    along, across = np.linspace(-half, half, 24), np.linspace(-wide, wide, 8)
-    sides = [np.column_stack([along, np.full(24, y)]) for y in (-wide, wide)]
-    ends = [np.column_stack([np.full(8, x), across]) for x in (-half, half)]
-    return np.concatenate([*sides, *ends])
-
-
-_OUTLINE = _outline()
 
 
 def _transforms(pose: NDArray[np.float64], ground: NDArray[np.float64]) -> NDArray[np.float64]:
