@@ -15,12 +15,15 @@ SIZE = (0.12, 0.18, 0.2)
 TABLE = 0.55
 
 
-def make(*kinds: str, table: bool = False, assistants: int = 0, engine: str = "mujoco") -> Simulation:
-    """Robots in a row along y, at x = 0, that look along x."""
+def make(
+    *kinds: str, table: bool = False, assistants: int = 0, engine: str = "mujoco", **others: tuple[float, float, float]
+) -> Simulation:
+    """Robots in a row along y, at x = 0, that look along x, but for those that are told where they are."""
     world = field()
     if table:
         world.surfaces("collision").append(box((0.3, 0.8, TABLE), (3.0, 0.0, TABLE / 2)))
     places = {f"robot_{robot}": (0.0, -3.0 * robot, 0.0) for robot in range(len(kinds))}
+    places |= others
     config = SimConfig(robots=kinds, assistants=assistants, observe=(), seed=2, physics=engine, robot_places=places)
     sim = Simulation(world, None, config)
     sim.advance(1.0)
@@ -130,6 +133,20 @@ def test_a_thing_from_a_table_is_put_on_a_deck_and_stays_there_while_that_drives
     deck = robots.deck(carrier)
     after = deck.rotation.T @ (objects.position[0] - deck.position) - deck.centre
     assert np.abs(after - on_deck).max() < 0.1
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_from_before_a_carrier_it_goes_beside_it_to_reach_the_deck(engine: str) -> None:
+    sim = make("manipulator", "husky", engine=engine, robot_1=(3.0, 0.0, np.pi))
+    robots, objects = sim.state.robots, sim.state.objects
+    robots.pick(0, parcel(sim, 0.0, 1.2))
+    assert until_done(sim, 40)
+    robots.place(0, int(robots.entities[1]))
+    assert until_done(sim, 60)
+    assert [event.text for event in sim.state.events.log if event.kind == "robot"] == ["picked", "placed"]
+    deck = robots.deck(int(robots.entities[1]))
+    on_deck = deck.rotation.T @ (objects.position[0] - deck.position) - deck.centre
+    assert abs(on_deck[2]) < 0.02
 
 
 @pytest.mark.parametrize("engine", ENGINES)

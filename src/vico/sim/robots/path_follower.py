@@ -34,13 +34,20 @@ class RobotStatus(IntEnum):
     IDLE, MOVING, WAITING, ARRIVED, BLOCKED, FALLEN = range(6)
 
 
+def footprint_discs(
+    pose: tuple[float, float, float], half_length: float, half_width: float, room: float
+) -> list[tuple[float, float, float]]:
+    """Discs (x, y, radius) that cover a footprint at x, y, yaw with some room around it: several along a vehicle."""
+    (x, y, yaw), width = pose, max(half_width, 0.1)
+    count = max(1, math.ceil(half_length / width))
+    c, s = math.cos(yaw), math.sin(yaw)
+    shifts = [(2 * k + 1 - count) / count * half_length for k in range(count)]
+    return [(x + c * shift, y + s * shift, width + room) for shift in shifts]
+
+
 def _discs(one: np.void, room: float) -> list[tuple[float, float, float]]:
-    """Discs (x, y, radius) that cover somebody's footprint with some room around it: several along a vehicle."""
-    length, width = float(one["half_length"]), max(float(one["half_width"]), 0.1)
-    count = max(1, math.ceil(length / width))
-    c, s = math.cos(one["yaw"]), math.sin(one["yaw"])
-    shifts = [(2 * k + 1 - count) / count * length for k in range(count)]
-    return [(float(one["x"]) + c * shift, float(one["y"]) + s * shift, width + room) for shift in shifts]
+    pose = float(one["x"]), float(one["y"]), float(one["yaw"])
+    return footprint_discs(pose, float(one["half_length"]), float(one["half_width"]), room)
 
 
 class PathFollower:

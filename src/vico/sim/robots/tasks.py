@@ -17,7 +17,7 @@ from vico.sim.bodies import Bodies
 from vico.sim.physics.records import Base
 from vico.sim.quaternions import matrix_of
 from vico.sim.robots.arm import Chain, hand_pose, reach_pose, solve
-from vico.sim.robots.drawing import deck_of
+from vico.sim.robots.decks import deck_spot, way_beside_deck
 from vico.sim.robots.manipulator import ARM_GOAL, ARM_NOW
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.state import Mode, RobotRun
@@ -37,8 +37,6 @@ CARRY = np.array([0.46, -0.17, 0.78])
 _TILTS = (0.0, 0.25, -0.25, 0.5, -0.5)
 _NEAR, _NEAR_ENOUGH, _STRAIGHT, _TURN = 1.1, 2.2, 0.25, 0.9
 _DONE = {Kind.PICK: "picked", Kind.PLACE: "placed", Kind.OFFER: "handed_over"}
-# Metres from the edge of a deck that things are put at.
-_FROM_EDGE = 0.16
 # Metres before a person, and above the ground there, that things are held out to them.
 _ARM_LENGTH, _HELD_OUT = 0.45, 0.95
 _STEP = 0.012  # metres between two points of a straight way of the hand
@@ -78,11 +76,13 @@ def begin(run: RobotRun, robot: int, kind: Kind, target: Array, entity: int = 0)
     a.kind[row], a.stage[row], a.entity[row], a.target[row] = kind, Stage.GO, entity, target
     a.timer[row], a.tries[row] = 0.0, 0
     run.set_mode(robot, Mode.TASK)
-    here = run.position(robot)
-    if float(np.hypot(*(target - here)[:2])) > _NEAR:
+    path = None
+    if kind == Kind.PLACE and entity:
+        path = way_beside_deck(run, robot, entity)
+    elif float(np.hypot(*(target - run.position(robot))[:2])) > _NEAR:
         path = way_to(run, robot, target)
-        if path is not None:
-            run.followers[robot].begin(path)
+    if path is not None:
+        run.followers[robot].begin(path)
 
 
 def pick(run: RobotRun, robot: int, entity: int) -> None:
@@ -169,17 +169,6 @@ def handled(run: RobotRun, robot: int) -> int:
     return held or picking
 
 
-def deck_spot(run: RobotRun, robot: int, entity: int) -> Array | None:
-    """Where on the deck of the robot with an entity another one can put something, ENU metres; None without a deck."""
-    deck = deck_of(run, entity)
-    if deck is None:
-        return None
-    x, y, _ = apply_matrix(run.position(robot) - deck.position, deck.rotation.T) - deck.centre
-    half = np.array([deck.length, deck.width]) / 2 - _FROM_EDGE
-    spot = deck.centre + np.array([min(max(x, -half[0]), half[0]), min(max(y, -half[1]), half[1]), 0.0])
-    return np.asarray(deck.position + apply_matrix(spot, deck.rotation))
-
-
 # Decisions.
 
 
@@ -194,6 +183,9 @@ def decide_task(run: RobotRun, robot: int, everybody: Bodies, dt: float) -> bool
     if stage == Stage.GO:
         away = float(np.hypot(*(a.target[row] - run.position(robot))[:2]))
         waits = run.followers[robot].status == RobotStatus.WAITING and away < _NEAR_ENOUGH
+        # A way beside a deck is gone to its end.
+        if a.kind[row] == Kind.PLACE and a.entity[row]:
+            away, waits = math.inf, False
         if away > _NEAR and len(run.followers[robot].path) and not waits:
             return True
         run.followers[robot].end()
