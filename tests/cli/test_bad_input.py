@@ -171,6 +171,9 @@ def test_people_of_another_world_are_refused(
         (("--cars", -1), "cars is -1"),
         (("--pedestrians", -1), "pedestrians is -1"),
         (("--seed", -1), "seed is -1"),
+        (("--pedestrians", 100_000), "100,000 pedestrians are more than a run can have; ask for 5,000 at most"),
+        (("--cars", 100_000), "100,000 cars are more than a run can have; ask for 2,000 at most"),
+        (("--robots", "husky," * 999 + "husky"), "1,000 robots are more than a run can have; ask for 100 at most"),
     ],
 )
 def test_a_run_that_cannot_be_is_refused(
