@@ -13,7 +13,7 @@ from vico.sim.physics.frames import COARSE, FINE, FrameCount, FrameNeeds, frame_
 from vico.sim.physics.mujoco_engine import MujocoEngine
 from vico.sim.physics.mujoco_physics import MujocoScene
 from vico.sim.physics.records import PhysicsError
-from vico.sim.physics.solids import SolidCells
+from vico.sim.physics.solids import SolidCells, find_near
 from vico.sim.physics.surroundings import convex_parts
 from vico.world.heights import HeightField
 from vico.world.mesh import joined
@@ -45,7 +45,19 @@ def test_cells_near_a_solid_of_any_kind_are_marked_and_far_ones_are_not() -> Non
     corners = np.vstack([np.column_stack([hull, np.full(3, z)]) for z in (0.0, 3.0)])
     boxes = np.array([[-12.0, 3.0, 1.0, 0.5, 3.0, 0.2, 1.0]])
     pillars = np.array([[5.0, -15.0, 1.0, 0.25, 1.0]])
-    grid = SolidCells(StaticScene(HeightField.flat(40.0), (corners,), boxes, pillars), 0.8)
+    grid = SolidCells(StaticScene(HeightField.flat(40.0), (corners,), boxes, pillars), np.array([0.8, 0.3]))
+    near = np.zeros(2, np.bool_)
+
+    def are_near(xy: np.ndarray, z: float = 0.5) -> np.ndarray:
+        """Whether robots of either reach that stand still at points could touch something, shape ``(n, 2)``."""
+        found = np.empty((len(xy), 2), np.bool_)
+        first = np.array([[0, 0], [3, 3]])
+        for k, (x, y) in enumerate(xy.tolist()):
+            state = (np.array([x, y, z] * 2), np.zeros(6), first)
+            find_near((grid.away, grid.tops), grid.half, grid.reaches, 0.01, state, near)
+            found[k] = near
+        return found
+
     rng = np.random.default_rng(3)
     along = np.sort(rng.random((200, 2)), axis=1)
     inside = np.vstack(
@@ -56,13 +68,16 @@ def test_cells_near_a_solid_of_any_kind_are_marked_and_far_ones_are_not() -> Non
         ]
     )
     angle = rng.uniform(0.0, 2 * np.pi, len(inside))
-    near = inside + 0.8 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    column, row = ((near + grid.half) * len(grid.cells) / (2 * grid.half)).astype(int).T
-    assert grid.cells[row, column].all()
-    column, row = ((rng.uniform(-40.0, 40.0, (4000, 2)) + 40.0) * len(grid.cells) / 80.0).astype(int).T
-    middle = (np.stack([column, row], axis=1) + 0.5) * 80.0 / len(grid.cells) - 40.0
-    away = np.linalg.norm(middle[:, None] - inside[None], axis=2).min(axis=1)
-    assert not grid.cells[row, column][away > 3.5].any()
+    around = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    assert are_near(inside + 0.8 * around)[:, 0].all()
+    assert are_near(inside + 0.3 * around).all()
+    points = rng.uniform(-40.0, 40.0, (4000, 2))
+    away = np.linalg.norm(points[:, None] - inside[None], axis=2).min(axis=1)
+    assert not are_near(points[away > 3.5])[:, 0].any()
+    assert not are_near(points[away > 2.5])[:, 1].any()
+    # Who flies above the highest solid by more than it reaches can touch none.
+    assert not are_near(inside, 4.0).any()
+    assert are_near(inside[:200], 3.7)[:, 0].all()
 
 
 def test_looking_for_solids_only_where_they_are_near_changes_nothing() -> None:
@@ -74,7 +89,7 @@ def test_looking_for_solids_only_where_they_are_near_changes_nothing() -> None:
     motions = []
     for everywhere in (False, True):
         if everywhere:
-            scene.solids.cells[:] = True
+            scene.solids.mark_all()
         engine = scene.engine(places)
         engine.command(0, np.full(4, 6.0))
         path = []

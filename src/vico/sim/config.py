@@ -131,7 +131,9 @@ class SimConfig(SimSettings):
         for name, limit in LIMITS.items():
             asked = len(self.robots) if name == "robots" else getattr(self, name)
             if asked > limit:
-                raise InputError(f"simulation: {asked:,} {name} are more than a run can have; ask for {limit:,} at most")
+                raise InputError(
+                    f"simulation: {asked:,} {name} are more than a run can have; ask for {limit:,} at most"
+                )
         if self.junctions not in list(JunctionRule):
             raise InputError(f"simulation: junctions is {self.junctions!r}; take {', '.join(JunctionRule)}")
         if self.physics not in PHYSICS_ENGINES:

@@ -144,8 +144,10 @@ class PhysicsEngine(Protocol):
     def contacts(self) -> Contacts:
         """Who touched whom, where and how hard, in the last step of the solver."""
 
-    def step(self, frames: int = 1, *, frame: float = COARSE) -> None:
+    def step(self, frames: int = 1, *, frame: float = COARSE, holding: bool | None = None) -> None:
         """Move on by some frames of `FINE` or `COARSE` seconds (see `vico.sim.physics.frames`).
+
+        `holding`: whether friction has to hold things still, which costs more; None: in fine frames.
 
         Raises
         ------

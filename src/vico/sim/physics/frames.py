@@ -37,14 +37,18 @@ class FrameNeeds:
     manipulation: bool = False
     loose_objects: bool = False
 
+    @property
+    def forces_matter(self) -> bool:
+        """Whether anything asks for fine frames, with friction that holds things still."""
+        return self.motor_commands or self.fallen or self.manipulation or self.loose_objects
+
 
 def frame_length(needs: FrameNeeds, dt: float) -> float:
     """Return the seconds a frame lasts within the next `dt` seconds, a multiple of 0.01.
 
     Fine where anything needs it, and where coarse frames would not fit into `dt`.
     """
-    asked = needs.motor_commands or needs.fallen or needs.manipulation or needs.loose_objects
-    return FINE if asked or round(dt / FINE) % round(COARSE / FINE) else COARSE
+    return FINE if needs.forces_matter or round(dt / FINE) % round(COARSE / FINE) else COARSE
 
 
 @dataclass

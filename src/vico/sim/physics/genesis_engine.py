@@ -253,8 +253,8 @@ class GenesisEngine:
 
     # Time.
 
-    def step(self, frames: int = 1, *, frame: float = COARSE) -> None:
-        """Move on by some frames; people and vehicles move first, at every one."""
+    def step(self, frames: int = 1, *, frame: float = COARSE, holding: bool | None = None) -> None:
+        """Move on by some frames; people and vehicles move first, at every one. Friction is always the same."""
         scene = self._scene
         with scene.lock:
             self._hold()

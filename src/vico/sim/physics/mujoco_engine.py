@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError, SchemaError
 from vico.sim.bodies import Bodies
-from vico.sim.physics.frames import COARSE, SOLVER_STEPS
+from vico.sim.physics.frames import COARSE, FINE, SOLVER_STEPS
 from vico.sim.physics.movers import KinematicBodies
 from vico.sim.physics.mujoco_model import (
     FRICTION,
@@ -336,21 +336,22 @@ class MujocoEngine:
 
     # Time.
 
-    def step(self, frames: int = 1, *, frame: float = COARSE) -> None:
+    def step(self, frames: int = 1, *, frame: float = COARSE, holding: bool | None = None) -> None:
         """Move on by some frames; people and vehicles move first, at every one."""
-        self.step_in(self.compiled.shared, frames, frame)
+        self.step_in(self.compiled.shared, frames, frame, holding=holding)
         self.judge()
 
-    def step_in(self, shared: SharedModel, frames: int, frame: float) -> None:
+    def step_in(self, shared: SharedModel, frames: int, frame: float, *, holding: bool | None = None) -> None:
         """Step, with the equations of a model of the same scene: its own for each thread of a batch."""
         s, steps = self.compiled, SOLVER_STEPS[frame]
-        coordinates = (self._qpos, self._qvel, s.first)
+        coordinates, cells = (self._qpos, self._qvel, s.first), (s.solids.away, s.solids.tops)
         self._forget()
         with shared.lock:
             self._parameters.hold(shared)
-            shared.set_frame(frame / steps, FRICTION[frame])
+            firm = frame == FINE if holding is None else holding
+            shared.set_frame(frame / steps, FRICTION[firm])
             for _ in range(frames):
-                find_near(s.solids.cells, s.solids.half, s.solids.SLACK, frame, coordinates, self._near_solids)
+                find_near(cells, s.solids.half, s.solids.reaches, frame, coordinates, self._near_solids)
                 s.meet_solids(shared, self._near_solids)
                 if self._movers.moving:
                     self._movers.advance(frame)

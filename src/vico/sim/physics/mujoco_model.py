@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import BUMP, BUMPER, LIMB, TOUCH, RobotModel
 from vico.errors import InputError
-from vico.sim.physics.frames import COARSE, FINE, SOLVER_STEPS
+from vico.sim.physics.frames import COARSE, SOLVER_STEPS
 from vico.sim.physics.records import Capacity, StaticScene
 from vico.world.heights import HeightField
 
@@ -32,9 +32,10 @@ _OUTLINES = 4
 #: Extents and kilograms that objects are compiled with; every engine writes its own.
 OBJECT_HALF, OBJECT_MASS = 0.15, 1.0
 _FRICTION = [0.6, 0.005, 0.0001]
-#: How much harder friction is than contact, by the length of a frame. Held things creep out of a grasp where friction
-#: is soft, 4-7 mm a minute at 10, ten times that at 1; wheels and feet follow commands alike, at 60% of the cost.
-FRICTION = {FINE: 10.0, COARSE: 1.0}
+#: How much harder friction is than contact, by whether it has to hold things. Held things creep out of a grasp where
+#: friction is soft, 4-7 mm a minute at 10, ten times that at 1; wheels and feet follow commands alike, at 60% of the
+#: cost.
+FRICTION = {True: 10.0, False: 1.0}
 
 
 def standing_pose(
@@ -84,7 +85,7 @@ def _set_options(spec: Any) -> None:
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_WARMSTART)
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    spec.option.impratio = FRICTION[COARSE]
+    spec.option.impratio = FRICTION[False]
 
 
 def robot_spec(model: RobotModel) -> Any:

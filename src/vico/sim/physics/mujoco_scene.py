@@ -201,8 +201,8 @@ class CompiledScene:
         self._kinds: dict[bytes, KindIndex] = {}
         self._full: CompiledScene | None = None
         self._index_contacts()
-        reach = max((robot.reach for robot in self.robots), default=0.0)
-        self.solids: SolidCells = SolidCells(static, reach) if bare is None else bare.solids
+        reaches = np.array([robot.reach for robot in self.robots])
+        self.solids: SolidCells = SolidCells(static, reaches) if bare is None else bare.solids
         self._links = np.concatenate([np.zeros(0, np.int64), *(robot.link_bodies for robot in self.robots)])
         self._link_owner = np.repeat(np.arange(len(models)), [len(robot.link_bodies) for robot in self.robots])
         self._link_bits = np.array(m.body_contype[self._links])

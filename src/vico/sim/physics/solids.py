@@ -18,11 +18,23 @@ _CELL = 0.5
 _DIRECTIONS = np.stack([np.cos(np.arange(16) * np.pi / 8), np.sin(np.arange(16) * np.pi / 8)], axis=1)
 
 
+#: Metres a robot may move before it is asked again.
+_SLACK = 0.1
+_HALF_DIAGONAL = _CELL * math.sqrt(0.5)
+# What a distance kept with 4 bytes may be wrong by, metres.
+_ROUNDING = 1e-3
+
+
 @compiled
-def _mark(cells, half, outlines, directions, reach):  # type: ignore[no-untyped-def]
-    """Mark cells whose middle is within `reach` of an outline, given by how far it goes in each direction."""
-    count = len(cells)
-    for outline in outlines:
+def _measure(cells, half, outlines, directions, reach):  # type: ignore[no-untyped-def]
+    """Write how far each cell's middle is from the nearest outline, and how high the highest within `reach` goes.
+
+    Outlines are given by how far they go in each direction, and their tops.
+    """
+    away, tops = cells
+    count = len(away)
+    for k in range(len(outlines[0])):
+        outline, top = outlines[0][k], outlines[1][k]
         # The first, fifth, ninth and thirteenth direction are east, north, west and south.
         first_column = max(int((-outline[8] - reach + half) / _CELL), 0)
         last_column = min(int((outline[0] + reach + half) / _CELL), count - 1)
@@ -31,71 +43,91 @@ def _mark(cells, half, outlines, directions, reach):  # type: ignore[no-untyped-
         for row in range(first_row, last_row + 1):
             y = (row + 0.5) * _CELL - half
             for column in range(first_column, last_column + 1):
-                if cells[row, column]:
-                    continue
                 x = (column + 0.5) * _CELL - half
-                inside = True
+                outside = 0.0
                 for d in range(len(directions)):
-                    if directions[d, 0] * x + directions[d, 1] * y > outline[d] + reach:
-                        inside = False
+                    outside = max(outside, directions[d, 0] * x + directions[d, 1] * y - outline[d])
+                    if outside > reach:
                         break
-                cells[row, column] = inside
+                if outside <= reach:
+                    away[row, column] = min(away[row, column], outside)
+                    tops[row, column] = max(tops[row, column], top)
 
 
 @compiled
-def find_near(cells, half, slack, seconds, state, near):  # type: ignore[no-untyped-def]
+def find_near(cells, half, reach, seconds, state, near):  # type: ignore[no-untyped-def]
     """Say of each robot whether it could touch something solid within some seconds.
 
     Parameters
     ----------
-    slack
-        Metres a robot may move before it reaches further than `cells` say.
+    cells
+        As `SolidCells.away` and `SolidCells.tops`.
+    reach
+        Metres from a robot's base within which all of it is, shape ``(n,)``.
     state
         Positions and speeds as the engine orders them, and where in them each robot's base begins, shape ``(n, 2)``.
     near
         Written, bool, shape ``(n,)``.
     """
+    away, tops = cells
     positions, speeds, first = state
     for k in range(len(first)):
-        x, y = positions[first[k, 0]], positions[first[k, 0] + 1]
-        speed = math.hypot(speeds[first[k, 1]], speeds[first[k, 1] + 1])
-        column, row = math.floor((x + half) / _CELL), math.floor((y + half) / _CELL)
-        if 0 <= row < len(cells) and 0 <= column < len(cells) and 2.0 * speed * seconds < slack:
-            near[k] = cells[int(row), int(column)]
-        else:
-            near[k] = True
+        q, v = first[k, 0], first[k, 1]
+        speed = math.sqrt(speeds[v] ** 2 + speeds[v + 1] ** 2 + speeds[v + 2] ** 2)
+        column, row = math.floor((positions[q] + half) / _CELL), math.floor((positions[q + 1] + half) / _CELL)
+        near[k] = True
+        if 0 <= row < len(away) and 0 <= column < len(away) and 2.0 * speed * seconds < _SLACK:
+            whole = reach[k] + _SLACK
+            r, c = int(row), int(column)
+            near[k] = away[r, c] <= whole + _HALF_DIAGONAL + _ROUNDING and positions[q + 2] - whole <= tops[r, c]
 
 
 class SolidCells:
-    """A square grid of what is near solids.
+    """A square grid of how far solids are, and how high.
 
     Parameters
     ----------
     scene
         What never moves.
-    reach
-        Metres from its base within which all of a robot is.
+    reaches
+        Metres from its base within which all of each robot is, shape ``(robots,)``.
 
     Attributes
     ----------
-    cells
-        Whether a robot whose base is in a cell may touch a solid, bool, shape ``(n, n)``, row = y.
+    away
+        Metres from a cell's middle to the outline of the nearest solid, at least; inf where that is further than any
+        robot in the cell could reach; float32, shape ``(n, n)``, row = y.
+    tops
+        Height to which those solids go that a robot in the cell could reach, metres; -inf for none; like `away`.
     half
         Half the side of the grid, metres.
+    reaches
+        As given.
     """
 
-    #: Metres a robot may move before it is asked again.
-    SLACK = 0.1
-
-    def __init__(self, scene: StaticScene, reach: float) -> None:
+    def __init__(self, scene: StaticScene, reaches: NDArray[np.float64]) -> None:
         self.half = float(scene.height.half)
+        self.reaches = reaches
         count = math.ceil(2 * self.half / _CELL)
-        self.cells = np.zeros((count, count), np.bool_)
-        whole = reach + self.SLACK + _CELL * math.sqrt(0.5)
-        if math.isfinite(whole):
-            _mark(self.cells, self.half, _outlines(scene), _DIRECTIONS, whole)
-        else:
-            self.cells[:] = True
+        self.away = np.full((count, count), np.inf, np.float32)
+        self.tops = np.full((count, count), -np.inf, np.float32)
+        finite = reaches[np.isfinite(reaches)]
+        if len(finite):
+            whole = float(finite.max()) + _SLACK + _HALF_DIAGONAL
+            _measure((self.away, self.tops), self.half, (_outlines(scene), _tops(scene)), _DIRECTIONS, whole)
+        if len(finite) < len(reaches):  # something of it may be anywhere
+            self.mark_all()
+
+    def mark_all(self) -> None:
+        """Have something solid be near everywhere."""
+        self.away[:], self.tops[:] = 0.0, np.inf
+
+
+def _tops(scene: StaticScene) -> NDArray[np.float64]:
+    """Height of each solid's top, metres, in the order of `_outlines`."""
+    hulls = [float(points[:, 2].max()) for points in scene.hulls]
+    boxes, pillars = scene.boxes[:, 2] + scene.boxes[:, 6], scene.pillars[:, 2] + scene.pillars[:, 4]
+    return np.concatenate([np.array(hulls), boxes, pillars]) + _ROUNDING
 
 
 def _outlines(scene: StaticScene) -> NDArray[np.float64]:

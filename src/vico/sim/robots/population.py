@@ -263,6 +263,7 @@ class RobotPopulation:
         now, owed = int(arrays.tick[0]), int(arrays.owed[0]) + ticks
         left += owed - ticks
         needs = self._needs()  # decided between sub-steps, not within
+        holding = needs.forces_matter
         orders = [
             (group, memory, velocities(self.run, group) if flight is None else None, flight)
             for group, memory, flight in zip(groups, self.run.memory, self.run.flights, strict=True)
@@ -289,7 +290,7 @@ class RobotPopulation:
                     command_motors(self.run, group, memory, velocity)
             for flight in flights:
                 flight.push(self.engine, frame, now * TICK)
-            self.engine.step(frame=frame)
+            self.engine.step(frame=frame, holding=holding)
             now, owed, left = now + taken, owed - taken, left - taken
             arrays.frames[0 if taken == 1 else 1] += 1
             arrays.tick[0], arrays.owed[0] = now, owed
