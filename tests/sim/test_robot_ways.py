@@ -5,7 +5,10 @@ import pytest
 
 from robot_field import field
 from vico.sim.bodies import CAR, Bodies
+from vico.sim.config import SimConfig
+from vico.sim.environment.agenda import EventEffects
 from vico.sim.robots import RobotPopulation, RobotStatus
+from vico.sim.simulation import Simulation
 
 CLOSED = ((8.0, 0.0, 4.0),)
 
@@ -80,3 +83,17 @@ def test_it_goes_round_a_car_parked_across_its_way(husky: RobotPopulation) -> No
     assert husky.go_to(0, [12.0, 0.0])
     events, _ = run(husky, 45.0, car)
     assert events == ["arrived"]
+
+
+def test_a_run_tells_robots_what_its_events_close_and_refuses_ways_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    sim = Simulation(field((0, 10, 6, 6)), None, SimConfig(robots=("husky",), observe=(), seed=1))
+    monkeypatch.setattr(sim.state.environment.agenda, "_effects", EventEffects({}, ground=CLOSED))
+    sim.step({})
+    codes = []
+    for target in ([8.0, 1.0, 0.0], [-45.0, 60.0, 0.0], [14.0, 0.0, 0.0]):
+        told = sim.step({"robot_0": {"type": "go_to", "target": target}}).observations["robot_0"]["state"]
+        codes.append(told["action_code"])
+    assert codes == ["closed", "blocked", ""]
+    robots = sim.state.robots
+    assert isinstance(robots, RobotPopulation)
+    assert robots.run.closed_ground == CLOSED

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -122,7 +124,13 @@ def _refuse_unless_holding(action: str, robot: int, state: SimulationState) -> R
 def _refuse_without_way(action: str, point: NDArray[np.float64], robot: int, state: SimulationState) -> Refusal | None:
     if _robots(state).has_way(robot, point[:2]):
         return None
-    return Refusal(ReasonCode.BLOCKED, f"{action}: no way there that is wide enough for this robot")
+    closed = state.environment.agenda.effects.ground
+    if any(math.hypot(point[0] - x, point[1] - y) < radius for x, y, radius in closed):
+        return Refusal(ReasonCode.CLOSED, f"{action}: an event has closed the ground there")
+    return Refusal(
+        ReasonCode.BLOCKED,
+        f"{action}: no way there outdoors that is wide enough for this robot; robots do not go indoors",
+    )
 
 
 def check_reach(values: Values, robot: int, state: SimulationState) -> Refusal | None:
