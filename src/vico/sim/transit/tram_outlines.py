@@ -120,3 +120,23 @@ def first_taken(points, bodies, skip, skipped, within, soon):  # type: ignore[no
                 if found == i:
                     break
     return found
+
+
+@compiled
+def spots_near(line, points, reach):  # type: ignore[no-untyped-def]
+    """Return how many spots along a line, at every metre, are within reach of one of the points."""
+    found, begins = 0, 0.0
+    spot = 0.5
+    for k in range(len(line) - 1):
+        dx, dy = line[k + 1, 0] - line[k, 0], line[k + 1, 1] - line[k, 1]
+        length = np.sqrt(dx * dx + dy * dy)
+        while spot < begins + length:
+            x = line[k, 0] + dx * (spot - begins) / length
+            y = line[k, 1] + dy * (spot - begins) / length
+            for i in range(len(points)):
+                if (points[i, 0] - x) ** 2 + (points[i, 1] - y) ** 2 < reach[i] * reach[i]:
+                    found += 1
+                    break
+            spot += 1.0
+        begins += length
+    return found

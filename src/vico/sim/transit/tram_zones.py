@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.io.compiled import compiled
 from vico.world.rails import STEP, TRAM_LENGTH, Track
 
 #: Tracks nearer than this to one another, metres, are one where they lead the same way.
@@ -55,18 +56,34 @@ def _contested(tracks: Sequence[Track]) -> list[NDArray[np.bool_]]:
         for j, other in enumerate(tracks):
             if i == j:
                 continue
-            d2 = np.hypot(one.xy[:, None, 0] - other.xy[None, :, 0], one.xy[:, None, 1] - other.xy[None, :, 1])
-            reach = one.half_width[:, None] + other.half_width[None, :]
-            nearest = d2.argmin(axis=1)
+            nearest, away, meets = _look_across(one.xy, one.half_width, other.xy, other.half_width)
             turn = np.abs((heading - _heading(other)[nearest] + np.pi) % (2 * np.pi) - np.pi)
-            same = (d2.min(axis=1) < _SAME) & (turn < _ALIGNED)
-            marks[i] |= (d2 < reach).any(axis=1) & ~same
+            same = (away < _SAME) & (turn < _ALIGNED)
+            marks[i] |= meets & ~same
     return marks
 
 
 def _heading(track: Track) -> NDArray[np.float64]:
     way = np.gradient(track.xy, axis=0)
     return np.asarray(np.arctan2(way[:, 1], way[:, 0]), np.float64)
+
+
+@compiled
+def _look_across(one, one_half, other, other_half):  # type: ignore[no-untyped-def]
+    """Return the nearest point of another track to each one of a track, its distance, and whether trams could touch."""
+    n = len(one)
+    nearest, away, meets = np.zeros(n, np.int64), np.full(n, np.inf), np.zeros(n, np.bool_)
+    for i in range(n):
+        best = np.inf
+        for j in range(len(other)):
+            dx, dy = one[i, 0] - other[j, 0], one[i, 1] - other[j, 1]
+            square = dx * dx + dy * dy
+            if square < best:
+                best, nearest[i] = square, j
+            reach = one_half[i] + other_half[j]
+            meets[i] |= square < reach * reach
+        away[i] = np.sqrt(best)
+    return nearest, away, meets
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -88,10 +105,10 @@ def _joined(tracks: Sequence[Track], runs: Sequence[tuple[int, int, int]]) -> li
     for p, (i, a, b) in enumerate(runs):
         for q in range(p):
             j, c, d = runs[q]
-            one, other = tracks[i].xy[a : b + 1], tracks[j].xy[c : d + 1]
-            away = np.hypot(one[:, None, 0] - other[None, :, 0], one[:, None, 1] - other[None, :, 1])
-            reach = tracks[i].half_width[a : b + 1, None] + tracks[j].half_width[None, c : d + 1]
-            if bool((away < reach).any()) and name[p] != name[q]:
+            one, other = slice(a, b + 1), slice(c, d + 1)
+            here, there = tracks[i], tracks[j]
+            _, _, meets = _look_across(here.xy[one], here.half_width[one], there.xy[other], there.half_width[other])
+            if bool(meets.any()) and name[p] != name[q]:
                 old, new = max(name[p], name[q]), min(name[p], name[q])
                 name = [new if n == old else n for n in name]
     return name

@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from vico.assets.tram import TRAM_BELLOWS, TRAM_CAPACITY, TRAM_HEIGHT, tram_door_leaves, tram_places, tram_prototypes
@@ -21,7 +20,7 @@ from vico.rules import BUS_DWELL, TRAM_SECTION, TRAM_SECTIONS, TRAM_WIDTH
 from vico.sim.bodies import TRAM, Bodies, Drawn
 from vico.sim.traffic import Traffic
 from vico.sim.transit.doors import DOOR_TIME, leaf_transforms, moved_doors
-from vico.sim.transit.tram_outlines import first_taken, inside_city, nobody, outlines, packed, stand
+from vico.sim.transit.tram_outlines import first_taken, inside_city, nobody, outlines, packed, spots_near, stand
 from vico.sim.transit.tram_zones import zones_of
 from vico.world.mesh import Surface
 from vico.world.model import TramLine
@@ -357,13 +356,10 @@ class Trams:
         if not len(self):
             return found
         points = np.concatenate([track.xy for track in self.tracks])
-        reach = np.concatenate([track.half_width for track in self.tracks])
+        reach = np.concatenate([track.half_width for track in self.tracks]) + _WALKER
         for k in np.flatnonzero(walks.kind == SIDEWALK).tolist():
-            line = shapely.LineString(walks.line(k))
-            spots = shapely.get_coordinates(line.interpolate(np.arange(0.5, line.length, 1.0)))
-            if len(spots):
-                away = np.hypot(spots[:, None, 0] - points[None, :, 0], spots[:, None, 1] - points[None, :, 1])
-                found[k] = int((away < reach + _WALKER).any(axis=1).sum()) >= _ON_TRACK
+            line = np.ascontiguousarray(walks.line(k), np.float64)
+            found[k] = spots_near(line, points, reach) >= _ON_TRACK
         return found
 
     # -- riders ------------------------------------------------------------------------------------------------------
