@@ -8,6 +8,8 @@ from enum import IntEnum
 #: Metres a second.
 WALK_SPEED = 1.0
 RUN_SPEED = 2.5
+#: On stairs, up or down, seen from above.
+STAIRS_SPEED = 0.5
 BIKE_SPEED = 3.0
 
 # Children of five keep up with a stroll; the old slow down (Bohannon and Williams Andrews, Physiotherapy 97, 2011).

@@ -23,6 +23,7 @@ from vico.sim.animation import (
     style_of,
 )
 from vico.sim.animation.standing import TURN_CYCLE
+from vico.sim.animation.stride import pace_of_step
 
 LOOKS = [random_appearance(rng(5, "walker", k)) for k in range(6)]
 BODIES = [body_of(look, source="procedural") for look in LOOKS]
@@ -223,6 +224,32 @@ def test_soles_keep_to_slopes_and_kerbs_within_a_centimetre(clip: str) -> None:
                     lowest = min(lowest, float((sole[:, 2] - rises(sole)).min()))
             assert lowest > -0.01
             assert lowest < 0.012 or abs(x - 0.4) < 0.8
+
+
+def test_on_stairs_each_foot_stands_on_a_tread_and_the_body_rises_with_them() -> None:
+    tread, riser = 0.2875, 0.2
+
+    def stairs(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return riser * np.clip(np.floor(points[..., 0] / tread) + 1, 0, 8)
+
+    number, pace = np.full(N, clip_index("walk")), np.array([pace_of_step(tread, tall) for tall in STYLE["height"]])
+    stride = stride_length(number, pace, STYLE["height"])
+    pelvis = []
+    for x in np.arange(0.6, 1.5, 0.02):
+        places = np.column_stack([np.full(N, x), np.zeros(N), np.full(N, riser * x / tread)])
+        moves = number, x / stride % 1.0, pace, STYLE
+        ground = ground_under_feet(*moves, (places, np.zeros(N)), stairs)
+        rotations, offsets = pose(*moves, ground=ground)
+        pelvis.append(places[:, 2] + offsets[:, 2])
+        vertices = skin(CROWD, rotations, offsets, places, np.zeros(N))[0].astype(np.float64)
+        for person in range(N):
+            soles = [vertices[feet(person, side)] for side in ("left", "right")]
+            above = [float(np.min(sole[:, 2] - stairs(sole))) for sole in soles]
+            # One foot always stands, on a tread.
+            assert min(map(abs, above)) < 0.02
+    rises = np.diff(pelvis, axis=0)
+    assert rises.max() < 0.06
+    assert rises.min() > -0.03
 
 
 def changed(was: str, now: str, since: float, phase: float, speed: tuple[float, float] = (1.0, 1.0)) -> Any:

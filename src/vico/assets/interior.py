@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vico.assets.shapes import Colour
 from vico.seeds import rng
 from vico.world.mesh import Material, Surface, surface_of_quads
-from vico.world.model import LANDING
+from vico.world.model import FLIGHT_STEPS, LANDING
 
 #: Height from one floor of a place to the next, metres.
 RISE = 3.2
@@ -23,7 +23,6 @@ SILL, SHOP_SILL, HEAD = 0.85, 0.4, 2.35
 _TILE = {"planks": 2.0, "tiles": 1.2, "carpet": 2.0, "stone": 1.6, "concrete": 4.0, "parquet": 1.2, "chequer": 1.2}
 _WALL_TILE = 2.4
 _SKIRTING = 5  # rows of a wall's picture
-_STEPS = 8  # risers a flight
 FLOORS = tuple(_TILE)
 WALLS = ("plaster", "wallpaper", "tiled", "brick", "panels")
 #: Name of the windows' material.
@@ -388,8 +387,8 @@ def _stairs(quads: _Quads, room: Inside) -> None:
     level(west, west + LANDING, -half, 0.0, 0.0)
     level(west, west + LANDING, 0.0, half, room.rise)
     level(west + LANDING + run, length / 2, -half, half, rise)
-    tread, riser = run / _STEPS, rise / _STEPS
-    for k in range(_STEPS):
+    tread, riser = run / FLIGHT_STEPS, rise / FLIGHT_STEPS
+    for k in range(FLIGHT_STEPS):
         start = west + LANDING + k * tread
         level(start, start + tread, -half, 0.0, (k + 1) * riser)
         quads.add(

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
-from vico.rules import ActionStatus, ReasonCode
+from vico.rules import STAIRS_SPEED, ActionStatus, ReasonCode
 from vico.sim.animation import CLIPS, LONGEST_BLEND
 from vico.sim.animation.blending import is_gait
 from vico.sim.animation.gait import RUN_START, WALK_START
 from vico.sim.animation.standing import TURN_CYCLE, TURN_START
-from vico.sim.animation.stride import stride_of
+from vico.sim.animation.stride import pace_of_step, stride_of
 from vico.sim.bodies import Bodies
 from vico.sim.collisions import SolidMap, sweep
 from vico.sim.footprints import IN_BUS, Rectangle, gaps, records_of
@@ -54,6 +54,7 @@ class _Motion(NamedTuple):
     held: NDArray[np.int32]
     action_clip: NDArray[np.int16]
     height: NDArray[np.float64]
+    tread: NDArray[np.float64]  # of the stairs they are on, metres; 0 elsewhere
 
 
 class _Clips(NamedTuple):
@@ -147,10 +148,12 @@ class Avatars:
         moving = (p.move_left > 0.0) | (p.turn_left != 0.0)
         p.velocity[:] = 0.0
         turned = np.zeros(len(p))
+        tread = self._indoor.treads_under(p.room)
         if moving.any():
             # Turning comes first, within the first half of the second, so that a walk starts in the new direction.
             turn = p.turn_left * share
-            distance = np.minimum(p.move_left, p.move_speed * dt)
+            pace = np.where(tread > 0.0, np.minimum(STAIRS_SPEED, p.move_speed), p.move_speed)
+            distance = np.minimum(p.move_left, pace * dt)
             before = p.position[:, :2].copy()
             bodies = np.concatenate([records_of(p.bodies_of(slice(None)), self.space()), obstacles])
             moved, contact = sweep(distance, turn, p.yaw, bodies, self.solids)
@@ -165,7 +168,7 @@ class Avatars:
             p.contact[hit] = contact[hit]
             p.velocity[:] = (p.position[:, :2] - before) / dt
             self.settle(np.flatnonzero(moved > 0.0))
-        self._animate(turned, dt)
+        self._animate(turned, tread, dt)
 
     def settle(self, who: NDArray[np.int64]) -> None:
         """Put feet on the ground or the floor."""
@@ -175,9 +178,10 @@ class Avatars:
         indoors = who[p.room[who] >= 0]
         p.position[indoors, 2] = self._indoor.floors_at(p.room[indoors], p.position[indoors])
 
-    def _animate(self, turned: NDArray[np.float64], dt: float) -> None:
+    def _animate(self, turned: NDArray[np.float64], tread: NDArray[np.float64], dt: float) -> None:
         p = self.people
-        motion = _Motion(p.velocity, p.move_speed, turned, p.posture, p.vehicle, p.held, p.action_clip, p.height)
+        doing = p.posture, p.vehicle, p.held, p.action_clip
+        motion = _Motion(p.velocity, p.move_speed, turned, *doing, p.height, tread)
         before = p.clip_before, p.phase_before, p.pace_before, p.clip_time
         _advance_clips(motion, _Clips(p.clip, p.phase, p.pace, *before), dt)
 
@@ -188,7 +192,7 @@ def _clip_of(motion, k, speed):  # type: ignore[no-untyped-def]
     if motion.vehicle[k] == _ON_BIKE:
         return _RIDE_BIKE
     if speed > _STANDING:
-        if motion.move_speed[k] > _FASTEST_WALK:
+        if motion.move_speed[k] > _FASTEST_WALK and motion.tread[k] == 0.0:
             return _RUN
         left, right = motion.held[k, 0] > 0, motion.held[k, 1] > 0
         if left and right:
@@ -235,6 +239,8 @@ def _advance_clips(motion, clips, dt):  # type: ignore[no-untyped-def]
         now = _clip_of(motion, k, speed)
         # Whom something stops, or who arrives, takes a shorter way in this sub-step, not shorter strides.
         pace = max(motion.move_speed[k], speed)
+        if motion.tread[k] > 0.0:
+            pace = pace_of_step(motion.tread[k], motion.height[k])
         if now != clips.clip[k] or (is_gait(now) and abs(pace - clips.pace[k]) > _SAME_PACE):
             _begin_clip(clips, k, now, pace)
         clips.clip_time[k] = min(clips.clip_time[k] + dt, LONGEST_BLEND)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from vico.io.compiled import compiled
 from vico.sim.collisions import box_gap, gap_to, room_gap
 from vico.sim.state import RADIUS
-from vico.world.model import Entrance, Place, Room
+from vico.world.model import FLIGHT_STEPS, LANDING, Entrance, Place, Room
 from vico.world.objects import Objects
 
 #: Lists of free spots that are remembered, one a room and door.
@@ -103,10 +103,19 @@ class Indoor:
             heights[k] = self.floor_at(int(rooms[k]), xy[k])
         return heights
 
+    def treads_under(self, rooms: NDArray[np.int32]) -> NDArray[np.float64]:
+        """Depth of the treads of the stairs that several people are on, metres, shape ``(n,)``; 0 elsewhere."""
+        return self._treads[rooms]
+
     @cached_property
     def stairs(self) -> frozenset[int]:
         """Rooms whose floor climbs."""
         return frozenset(i for i, room in enumerate(self.rooms) if room.rise)
+
+    @cached_property
+    def _treads(self) -> NDArray[np.float64]:
+        """Of each room, and last 0 for those who are in none."""
+        return np.array([(r.size[0] - 2 * LANDING) / FLIGHT_STEPS if r.rise else 0.0 for r in self.rooms] + [0.0])
 
     @cached_property
     def _climbs(self) -> NDArray[np.bool_]:

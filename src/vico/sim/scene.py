@@ -75,6 +75,8 @@ class _Motion(NamedTuple):
         Radians, counter-clockwise from east, float64.
     on_ground
         Whether they stand in the street, not on a floor or a vehicle, bool.
+    room
+        Where they are, int32; -1 for outdoors and vehicles.
     rise, rise_before
         How far whoever sits is, or was before, above the height at which their feet would rest on the floor, metres,
         float64; 0 for others.
@@ -89,6 +91,7 @@ class _Motion(NamedTuple):
     position: NDArray[np.float64]
     yaw: NDArray[np.float64]
     on_ground: NDArray[np.bool_]
+    room: NDArray[np.int32]
     rise: NDArray[np.float64]
     rise_before: NDArray[np.float64]
     hands: Hands
@@ -328,8 +331,14 @@ class SceneRenderer:
         place = motion.position, motion.yaw
         ground = ground_under_feet(*course, self._style, place, self._sim.world.height.near)
         ground[~motion.on_ground] = 0.0
+        indoor = self._sim.state.indoor
+        for k in np.flatnonzero(indoor.treads_under(motion.room) > 0):
+            clip, phase, speed = (part[k : k + 1] for part in course)
+            here = motion.position[k : k + 1], motion.yaw[k : k + 1]
+            treads = indoor.rooms[int(motion.room[k])].treads_at
+            ground[k] = ground_under_feet(clip, phase, speed, self._style[k : k + 1], here, treads)[0]
         # From high seats feet hang; a step is there for them on stools.
-        ground[~motion.on_ground, :, :, 0] = -np.clip(rise[~motion.on_ground], -_FEET_RISE, _FEET_HANG)[:, None, None]
+        ground[~motion.on_ground, :, :, 0] -= np.clip(rise[~motion.on_ground], -_FEET_RISE, _FEET_HANG)[:, None, None]
         return ground
 
     def _motion_of_pedestrians(self, state: SimulationState) -> _Motion:
@@ -340,10 +349,12 @@ class SceneRenderer:
             state.traffic.gait, self._height[len(state.people) :], state.second
         )
         on_ground = np.ones(len(clip), np.bool_)
-        still = np.zeros(len(clip))
-        after = after._replace(moved=np.zeros((len(clip), 4)))
+        still, outdoors = np.zeros(len(clip)), np.full(len(clip), -1, np.int32)
+        after = after._replace(moved=np.zeros((len(clip), 4)), over_ground=pace)
         hands = hands_of_pedestrians(self._habit, state.environment.weather.rain)
-        return _Motion(clip, phase, pace, after, walkers.position, walkers.yaw, on_ground, still, still, hands)
+        return _Motion(
+            clip, phase, pace, after, walkers.position, walkers.yaw, on_ground, outdoors, still, still, hands
+        )
 
 
 def _lighting(environment: Environment, second: float) -> Lighting:
@@ -378,7 +389,9 @@ def _motion_of_agents(state: SimulationState) -> _Motion:
     in_seat = (p.vehicle == Vehicle.BUS) & (p.posture == Posture.SITTING)
     yaw = np.where(in_seat, p.vehicle_yaw, p.yaw)
     before = p.clip_before.astype(np.int64), p.phase_before.copy(), p.pace_before.copy(), p.clip_time.copy()
-    after = Transition(*before, moved=p.moved.copy())
+    on_stairs = state.indoor.treads_under(p.room) > 0
+    over_ground = np.where(on_stairs, np.hypot(*p.velocity.T), p.pace)
+    after = Transition(*before, moved=p.moved.copy(), over_ground=over_ground)
     on_ground = (p.room < 0) & (p.vehicle == Vehicle.NONE) & (p.seat < 0)
     rise = np.zeros(len(p))
     sitting = np.flatnonzero(p.seat >= 0)
@@ -388,7 +401,7 @@ def _motion_of_agents(state: SimulationState) -> _Motion:
         rise[sitting] = p.position[sitting, 2] - state.seats.floor[seat]
     # Who gets up comes down from the seat to the floor.
     rise_before = np.where(p.seat < 0, p.moved[:, 2], 0.0)
-    place = p.position.copy(), yaw, on_ground, rise, rise_before, hands_of_agents(state)
+    place = p.position.copy(), yaw, on_ground, p.room.copy(), rise, rise_before, hands_of_agents(state)
     return _Motion(p.clip.astype(np.int64), p.phase.copy(), p.pace.copy(), after, *place)
 
 

@@ -6,7 +6,7 @@ import heapq
 import math
 from collections.abc import Iterable
 
-from vico.rules import WALK_SPEED
+from vico.rules import STAIRS_SPEED, WALK_SPEED
 from vico.world.model import LANDING, LIFT, Doorway, Point3, Room
 
 #: Seconds that going through a door takes: an agent acts once a second.
@@ -75,7 +75,8 @@ class IndoorWays:
                     passage = DOOR
                     if room.kind == self._rooms[door.to].kind == LIFT:
                         passage = lift_seconds(self._rooms[door.to].centre[2] - room.centre[2])
-                    after = at + walk_within(room, here, door.inside) / WALK_SPEED + passage
+                    speed = STAIRS_SPEED if room.rise else WALK_SPEED
+                    after = at + walk_within(room, here, door.inside) / speed + passage
                     heapq.heappush(queue, (round(after, 3), door.to, self._arrival(door.to, name)))
         return best
 

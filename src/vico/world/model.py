@@ -11,6 +11,8 @@ import math
 from enum import StrEnum
 from typing import Annotated
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 SCHEMA = "vico.world"
@@ -228,6 +230,8 @@ class Container(Record):
 LANDING = 1.1
 #: Kind of rooms that are cars of a lift, one a floor.
 LIFT = "lift"
+#: Risers of each of its two flights.
+FLIGHT_STEPS = 8
 
 
 class Doorway(Record):
@@ -294,6 +298,22 @@ class Room(Record):
         share = min(1.0, max(0.0, (along + self.size[0] / 2 - LANDING) / run))
         climbed = share / 2 if across < 0 else 1.0 - share / 2
         return self.centre[2] + self.rise * climbed
+
+    def treads_at(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Heights of what feet stand on at points ``(..., 2)``, ENU metres: of the treads on stairs, else the floor."""
+        if not self.rise:
+            return np.full(xy.shape[:-1], self.centre[2])
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        dx, dy = xy[..., 0] - self.centre[0], xy[..., 1] - self.centre[1]
+        along, across = c * dx + s * dy, c * dy - s * dx
+        run = self.size[0] - 2 * LANDING
+        climbed = (along + self.size[0] / 2 - LANDING) / run * FLIGHT_STEPS
+        lower = np.clip(np.floor(climbed) + 1, 0, FLIGHT_STEPS)
+        upper = FLIGHT_STEPS + np.clip(np.floor(FLIGHT_STEPS - climbed) + 1, 0, FLIGHT_STEPS)
+        level: NDArray[np.float64] = self.centre[2] + self.rise / (2 * FLIGHT_STEPS) * np.where(
+            across < 0, lower, upper
+        )
+        return level
 
 
 class Stop(Record):

@@ -24,7 +24,7 @@ from vico.sim.animation.blending import (
 )
 from vico.sim.animation.gait import run, walk
 from vico.sim.animation.holds import hold_up
-from vico.sim.animation.limbs import BodyPose, curl_fingers
+from vico.sim.animation.limbs import AHEAD, HERE, BodyPose, curl_fingers
 from vico.sim.animation.names import (
     CARRY,
     CARRY_LEFT,
@@ -41,7 +41,7 @@ from vico.sim.animation.names import (
     TURN,
     WALK,
 )
-from vico.sim.animation.rotations import Array, Z, axis_angle, smoothstep
+from vico.sim.animation.rotations import Array, X, Z, axis_angle, smoothstep
 from vico.sim.animation.seated import ride_bike, sit, sleep, step_up
 from vico.sim.animation.standing import TURN_CYCLE, TURN_START, gesture_seated, stand
 
@@ -100,7 +100,7 @@ class Circumstances(NamedTuple):
     moved
         Where the body was then, in its frame of now: x, y, z, metres, and yaw, radians, float64, shape ``(n, 4)``.
     speed
-        Metres a second that the strides are those of, float64, shape ``(n,)``.
+        Metres a second over the ground, float64, shape ``(n,)``.
     second
         Of the clock.
     hands
@@ -176,7 +176,7 @@ def _set_out(body: Any, old: Any, i: int, course: Any, around: Any) -> None:
     first = course.phase[i] - gone  # where the gait began
     ankles, feet = np.empty((2, 2, 3)), np.empty((2, 2, 3, 3))
     start = BodyPose(
-        np.zeros_like(body.local), np.zeros(3), body.joints, body.style, body.second, np.zeros((2, 2, 2)), body.hand
+        np.zeros_like(body.local), np.zeros(3), body.joints, body.style, body.second, np.zeros((2, 2, 3)), body.hand
     )
     level = BodyPose(
         np.zeros_like(body.local), np.zeros(3), body.joints, body.style, body.second, start.ground, body.hand
@@ -191,6 +191,8 @@ def _set_out(body: Any, old: Any, i: int, course: Any, around: Any) -> None:
     for side in range(2):
         for k in range(2):
             ankles[k, side] -= roll_of(body, side, feet[k, side])
+        if not is_gait(was):
+            ankles[0, side, X] -= body.ground[side, HERE, AHEAD]
         at = (first + 0.5 * side) % 1.0
         steps[side] = step_taken(at, at + gone, duty_of(now))
         flew = is_gait(was) and (before.phase[i] + 0.5 * side) % 1.0 > duty_of(was)

@@ -11,17 +11,25 @@ from numpy.typing import NDArray
 from vico.io.compiled import compiled
 from vico.sim.animation.blending import is_gait, is_seated
 from vico.sim.animation.gait import foothold, gait_of_run, gait_of_walk
-from vico.sim.animation.limbs import ANKLE, stance
-from vico.sim.animation.names import RUN
+from vico.sim.animation.limbs import AHEAD, ANKLE, LEVEL, TILT, stance
+from vico.sim.animation.names import CARRY, CARRY_LEFT, CARRY_RIGHT, RUN, WALK
 from vico.sim.animation.rotations import Y
 from vico.sim.animation.seated import seated_foot
 from vico.sim.animation.stride import stride_length
 from vico.sim.animation.style import KERNEL_STYLE
 
+GAITS = (WALK, CARRY, CARRY_LEFT, CARRY_RIGHT, RUN)
 # Heel and ball of a foot, shares of its length behind the ankle and before it.
 _HEEL, _BALL = 1.0, 1.05
-# Steeper than this under one foot is an edge: the foot stands on it.
-_EDGE = 0.22
+_HALF_WIDTH = 0.035  # of the sole, metres
+# Steeper than this under one foot is an edge, and so is ground that bends by so many metres from heel to ball.
+_EDGE, _BENT = 0.22, 0.006
+# Where the ground is looked at around a foot on an edge, along it and across, and how far feet are moved, metres.
+_ALONG, _ACROSS = np.linspace(-0.48, 0.56, 53), np.array([-_HALF_WIDTH, 0.0, _HALF_WIDTH])
+_SHIFTS = np.linspace(-0.28, 0.28, 29)
+# Room to the edge, and heights that are one level, metres.
+_ROOM, _TOE_ROOM, _SAME = 0.03, 0.03, 0.006
+_ON_IT = 0.35  # what standing on an edge costs, as metres of a move
 
 
 def ground_under_feet(
@@ -47,32 +55,117 @@ def ground_under_feet(
     -------
     ndarray
         For each left and right foot, where it is or was last and where it comes down next: height above where the
-        person is, metres, and slope, radians, toes down; shape ``(n, 2, 2, 2)``.
+        person is, metres; slope, radians, toes down; how far ahead of its place in the gait it stands, so that all of
+        it is on one side of an edge, metres; shape ``(n, 2, 2, 3)``.
     """
     position, yaw = place
     people = style.astype(KERNEL_STYLE)
     numbers = np.ascontiguousarray(clip, np.int64)
     stride = stride_length(numbers, np.asarray(speed, np.float64), people["height"])
-    ends = np.empty((len(people), 2, 2, 2, 2))  # foot; here, next; heel, ball; x, y
-    _feet(numbers, np.ascontiguousarray(phase, np.float64), stride, people, ends)
+    spots = np.empty((len(people), 2, 2, 5, 2))  # foot; here, next; heel left and right, ball so, middle; x, y
+    _feet(numbers, np.ascontiguousarray(phase, np.float64), stride, people, spots)
     c, s = np.cos(yaw)[:, None, None, None], np.sin(yaw)[:, None, None, None]
-    points = np.empty((*ends.shape[:-1], 3))
-    points[..., 0] = c * ends[..., 0] - s * ends[..., 1] + position[:, 0, None, None, None]
-    points[..., 1] = s * ends[..., 0] + c * ends[..., 1] + position[:, 1, None, None, None]
+    points = np.empty((*spots.shape[:-1], 3))
+    points[..., 0] = c * spots[..., 0] - s * spots[..., 1] + position[:, 0, None, None, None]
+    points[..., 1] = s * spots[..., 0] + c * spots[..., 1] + position[:, 1, None, None, None]
     points[..., 2] = position[:, 2, None, None, None]
     found = height(points.reshape(-1, 3)).reshape(points.shape[:-1]) - position[:, 2, None, None, None]
-    rise, run = found[..., 1] - found[..., 0], ends[..., 1, 0] - ends[..., 0, 0]
-    edge = np.abs(rise) > _EDGE * run
-    behind = (_HEEL * people["heel_length"][:, None, None]) / run
-    ground = np.empty((len(people), 2, 2, 2))
-    ground[..., 0] = np.where(edge, found.max(axis=-1), found[..., 0] + rise * behind)
-    ground[..., 1] = np.where(edge, 0.0, -np.arctan2(rise, run))
+    heel, ball = 0.5 * (found[..., 0] + found[..., 1]), 0.5 * (found[..., 2] + found[..., 3])
+    rise, run = ball - heel, spots[..., 2, 0] - spots[..., 0, 0]
+    bent = np.abs(found[..., 4] - 0.5 * (heel + ball)) + np.abs(
+        found[..., 0] - found[..., 1] - found[..., 2] + found[..., 3]
+    )
+    edge = (
+        (np.abs(rise) > _EDGE * run)
+        | (bent > _BENT)
+        | (np.abs(found[..., 0] - found[..., 1]) > 2 * _EDGE * _HALF_WIDTH)
+    )
+    behind = _HEEL * people["heel_length"][:, None, None]
+    ground = np.zeros((len(people), 2, 2, 3))
+    ground[..., LEVEL] = np.where(edge, found.max(axis=-1), heel + rise * behind / run)
+    ground[..., TILT] = np.where(edge, 0.0, -np.arctan2(rise, run))
+    steps = edge & _walks(numbers)[:, None, None]
+    if steps.any():
+        who, side, when = np.nonzero(steps)
+        back, front = 0.5 * (points[..., 0, :] + points[..., 1, :]), 0.5 * (points[..., 2, :] + points[..., 3, :])
+        ankle = (back + (front - back) * (behind / run)[..., None])[who, side, when]
+        foot = people["heel_length"][who], people["toe_length"][who]
+        out = yaw[who] + np.where(side == 0, 1.0, -1.0) * people["toe_out"][who]
+        ahead, level = _off_the_edge(ankle, out, foot, height)
+        ground[who, side, when, AHEAD], ground[who, side, when, LEVEL] = ahead, level - position[who, 2]
     return ground
 
 
+def _walks(clip: NDArray[np.int64]) -> NDArray[np.bool_]:
+    return np.isin(clip, GAITS)
+
+
+def _off_the_edge(
+    ankle: NDArray[np.float64],
+    yaw: NDArray[np.float64],
+    foot: tuple[NDArray[np.float64], NDArray[np.float64]],
+    height: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return how far on or back feet stand that would stand across an edge, and how high, metres, each ``(k,)``.
+
+    As near as can be to where the gait has them, on one level; on treads that are shorter than the foot, with the heel
+    or the toes over the edge, never into the next riser.
+    """
+    c, s = np.cos(yaw)[:, None, None], np.sin(yaw)[:, None, None]
+    u, v = _ALONG[None, :, None], _ACROSS[None, None, :]
+    points = np.empty((len(ankle), len(_ALONG), len(_ACROSS), 3))
+    points[..., 0] = ankle[:, 0, None, None] + c * u - s * v
+    points[..., 1] = ankle[:, 1, None, None] + s * u + c * v
+    points[..., 2] = ankle[:, 2, None, None]
+    found = height(points.reshape(-1, 3)).reshape(points.shape[:-1])
+    ahead, level = np.empty(len(ankle)), np.empty(len(ankle))
+    _nearest_place(found, *foot, ahead, level)
+    return ahead, level
+
+
 @compiled
-def _feet(clip: Any, phase: Any, stride: Any, style: Any, ends: Any) -> None:
-    """Write heel and ball of every foot where it stands and where it comes down, body frame, metres."""
+def _nearest_place(found: Any, heel: Any, toe: Any, ahead: Any, level: Any) -> None:
+    """Write how far feet move and how high they stand there, from heights along them and across."""
+    for i in range(len(found)):
+        # Along an edge there is no room for a foot on either side: it stands on it.
+        best, ahead[i], level[i] = _ON_IT, 0.0, -np.inf
+        for j in range(len(_ALONG)):
+            if -0.5 * heel[i] <= _ALONG[j] <= 0.7 * toe[i]:
+                level[i] = max(level[i], found[i, j].max())
+            elif -0.9 * heel[i] <= _ALONG[j] <= 0.9 * toe[i]:
+                level[i] = max(level[i], found[i, j, 1])
+        for shift in _SHIFTS:
+            # Of two places as good the one ahead, however the numbers are rounded.
+            cost = abs(shift) - 1e-4 * shift
+            if cost < best:
+                stands, more = _discomfort(found[i], shift, heel[i], toe[i])
+                if cost + more < best - 1e-9:
+                    best, ahead[i], level[i] = cost + more, shift, stands
+
+
+@compiled
+def _discomfort(found: Any, shift: float, heel: float, toe: float) -> tuple[float, float]:
+    """Return how high a foot so moved stands, and how bad it is there, as metres of a move."""
+    stands, lowest, top = -np.inf, np.inf, -np.inf
+    for j in range(len(_ALONG)):
+        place = _ALONG[j] - shift
+        if -heel - _ROOM <= place <= toe + _TOE_ROOM:
+            high = found[j].max()
+            top = max(top, high)
+            if -0.5 * heel <= place <= 0.6 * toe:
+                stands, lowest = max(stands, high), min(lowest, found[j].min())
+    under, over = 0, 0
+    for j in range(len(_ALONG)):
+        if -heel - _ROOM <= _ALONG[j] - shift <= toe + _TOE_ROOM:
+            under += 1
+            over += found[j].min() < stands - _SAME
+    into = max(top - stands - _SAME, 0.0) + 2.0 * max(stands - lowest - _SAME, 0.0)
+    return stands, 0.3 * over / under + 20.0 * into
+
+
+@compiled
+def _feet(clip: Any, phase: Any, stride: Any, style: Any, spots: Any) -> None:
+    """Write corners and middle of every foot where it stands and where it comes down, body frame, metres."""
     for i in range(len(clip)):
         one = style[i]
         for side in range(2):
@@ -89,5 +182,8 @@ def _feet(clip: Any, phase: Any, stride: Any, style: Any, ends: Any) -> None:
                 here, y = stance(one, side)
                 after = here
             for k, x in enumerate((here, after)):
-                ends[i, side, k, 0, 0], ends[i, side, k, 1, 0] = x - _HEEL * one.heel_length, x + _BALL * one.toe_length
-                ends[i, side, k, 0, 1] = ends[i, side, k, 1, 1] = y
+                heel, ball = x - _HEEL * one.heel_length, x + _BALL * one.toe_length
+                for j in range(4):
+                    spots[i, side, k, j, 0] = heel if j < 2 else ball
+                    spots[i, side, k, j, 1] = y + (_HALF_WIDTH if j % 2 == 0 else -_HALF_WIDTH)
+                spots[i, side, k, 4, 0], spots[i, side, k, 4, 1] = 0.5 * (heel + ball), y

@@ -12,6 +12,7 @@ import numpy as np
 
 from vico.io.compiled import compiled
 from vico.sim.animation.limbs import (
+    AHEAD,
     ANKLE,
     FOOT,
     HERE,
@@ -31,6 +32,7 @@ from vico.sim.animation.limbs import (
 from vico.sim.animation.rotations import Array, X, Y, Z, compose, hermite, rotation_about, smoothstep
 
 _TAU = 2 * np.pi
+_UNEVEN = 0.06  # metres between the feet that legs take up without the body riding lower
 
 
 class Gait(NamedTuple):
@@ -91,7 +93,11 @@ def _rolled(body: Any, side: int, flat: float, pitch: float, out: float, ground:
     c, s = np.cos(tilt), np.sin(tilt)
     ahead = c * x + s * z
     return FootPose(
-        flat + np.cos(out) * ahead, np.sin(out) * ahead, level - s * x + c * z, pitch + tilt, max(pitch, 0.0)
+        flat + ground[AHEAD] + np.cos(out) * ahead,
+        np.sin(out) * ahead,
+        level - s * x + c * z,
+        pitch + tilt,
+        max(pitch, 0.0),
     )
 
 
@@ -144,15 +150,16 @@ def _swing(body: Any, side: int, t: float, gait: Any) -> Any:
     down = _rolled(body, side, first, -gait.strike, gait.out, ground[NEXT])
     # The body goes on over a foot that has not left yet or has come down: over the ground both ends are at rest.
     slope = -gait.stride * (1 - gait.duty)
-    x = hermite(off.x, down.x, slope, slope, t)
+    # Up a kerb the foot rises first and goes ahead then; down it goes ahead first.
+    step = ground[NEXT, LEVEL] - ground[HERE, LEVEL]
+    kerb = min(abs(step) / 0.1, 1.0)
+    later = (0.15 if step > 0 else 0.2) * kerb * np.sin(np.pi * t) ** 2
+    x = hermite(off.x, down.x, slope, slope, t - later if step > 0 else t + later)
     y = off.y + (down.y - off.y) * smoothstep(t)
     pitch = hermite(off.pitch, down.pitch, 1.6 * push, 0.0, t)
     toes = push * (1 - smoothstep(2.2 * t))
     rise = np.sin(np.pi * t)
-    # Up a kerb the foot rises first and goes ahead then; down it goes ahead first.
-    step = ground[NEXT, LEVEL] - ground[HERE, LEVEL]
-    kerb = min(abs(step) / 0.1, 1.0)
-    early = smoothstep((1 + 1.6 * kerb) * t - (0.0 if step > 0 else 1.6 * kerb))
+    early = smoothstep((1 + 2.2 * kerb) * t - (0.0 if step > 0 else 2.2 * kerb))
     z = off.z + (down.z - off.z) * early + gait.lift * rise * (0.25 + 0.75 * rise) + 0.3 * abs(step) * rise * rise
     # Neither toes nor heel touch the ground while the foot swings.
     floor = ground[HERE, LEVEL] + step * early
@@ -167,13 +174,17 @@ def _swing(body: Any, side: int, t: float, gait: Any) -> Any:
 
 @compiled
 def ground_between(body: Any, p: float, gait: Any) -> float:
-    """Return the height that the body rides over: between the feet, and smooth where the ground is not."""
-    total = 0.0
+    """Return the height that the body rides over: between the feet, and smooth where the ground is not.
+
+    Where one foot is much higher than the other, as on stairs, the body waits with the lower one.
+    """
+    total, level = 0.0, np.empty(2)
     for side in range(2):
         t = smoothstep((((p + 0.5 * side) % 1.0) - gait.duty) / (1 - gait.duty))
         here, after = body.ground[side, HERE, LEVEL], body.ground[side, NEXT, LEVEL]
-        total += here + (after - here) * t
-    return 0.5 * total
+        level[side] = here + (after - here) * t
+        total += level[side]
+    return 0.5 * total - 0.5 * max(abs(level[0] - level[1]) - _UNEVEN, 0.0)
 
 
 @compiled

@@ -33,6 +33,9 @@ class Transition(NamedTuple):
     moved
         Where bodies were before they sat down, lay down or got up, in their frames of now: x, y, z, metres, and yaw,
         radians, shape ``(n, 4)``; None: where they are.
+    over_ground
+        Metres a second that they cover now, where that is not what their strides are those of, as on stairs; shape
+        ``(n,)``; None: it is.
     """
 
     clip: NDArray[Any]
@@ -41,6 +44,7 @@ class Transition(NamedTuple):
     since: NDArray[Any]
     ground: NDArray[np.float64] | None = None
     moved: NDArray[np.float64] | None = None
+    over_ground: NDArray[np.float64] | None = None
 
 
 def pose(
@@ -85,9 +89,10 @@ def pose(
     people = style.astype(KERNEL_STYLE)
     now = _course(clip, phase, speed, people, ground)
     before, since = now, np.full(len(people), LONGEST_BLEND)
-    moved = np.zeros((len(people), 4))
+    moved, over_ground = np.zeros((len(people), 4)), speed
     if after is not None:
         moved = moved if after.moved is None else np.ascontiguousarray(after.moved, np.float64)
+        over_ground = speed if after.over_ground is None else after.over_ground
         before = _course(after.clip, after.phase, after.speed, people, after.ground)
         since = np.ascontiguousarray(after.since, np.float64)
     rotations = np.zeros((len(people), len(JOINTS), 3), np.float32)
@@ -98,7 +103,7 @@ def pose(
             before,
             since,
             moved,
-            np.ascontiguousarray(speed, np.float64),
+            np.ascontiguousarray(over_ground, np.float64),
             float(second),
             hands or free_hands(len(people)),
         ),
@@ -125,7 +130,7 @@ def _course(
     """Return motions as kernels take them."""
     numbers = np.ascontiguousarray(clip, np.int64)
     stride = stride_length(numbers, np.asarray(speed, np.float64), people["height"])
-    under = np.zeros((len(people), 2, 2, 2)) if ground is None else np.ascontiguousarray(ground, np.float64)
+    under = np.zeros((len(people), 2, 2, 3)) if ground is None else np.ascontiguousarray(ground, np.float64)
     return Course(numbers, np.ascontiguousarray(phase, np.float64), stride, under)
 
 

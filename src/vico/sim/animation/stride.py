@@ -11,6 +11,7 @@ from vico.io.compiled import compiled
 from vico.sim.animation.names import CARRY, CARRY_LEFT, CARRY_RIGHT, RIDE_BIKE, RUN, WALK
 
 _TURN_OF_CRANKS = 4.0  # metres
+_STRIDE, _POWER = 0.727, 0.45  # of a walk at 1 m/s, in statures; how strides grow with speed
 _SLOWEST = 0.15  # shorter strides than at this speed nobody takes, m/s
 
 
@@ -18,10 +19,16 @@ _SLOWEST = 0.15  # shorter strides than at this speed nobody takes, m/s
 def stride_of(clip, speed, height):  # type: ignore[no-untyped-def]
     """Return the metres one cycle of one motion covers; see `stride_length`."""
     if clip in (WALK, CARRY, CARRY_LEFT, CARRY_RIGHT):
-        return 0.727 * height * max(speed, _SLOWEST) ** 0.45
+        return _STRIDE * height * max(speed, _SLOWEST) ** _POWER
     if clip == RUN:
         return height * (0.62 + 0.20 * speed)
     return _TURN_OF_CRANKS if clip == RIDE_BIKE else np.inf
+
+
+@compiled
+def pace_of_step(step, height):  # type: ignore[no-untyped-def]
+    """Return the speed at which somebody's steps are so long on level ground, m/s."""
+    return max((2.0 * step / (_STRIDE * height)) ** (1.0 / _POWER), _SLOWEST)
 
 
 def stride_length(
