@@ -8,7 +8,8 @@
     .stages/              what the stages made, to run one again; no part of the world, may be deleted
     terrain.npz           height field
     buildings.json places.json entrances.json rooms.json roads.json transit.json
-    objects.parquet       things that stand around, one row each
+    objects.parquet       things that stand around, one row each; parked cars among them
+    parking.json          parking spots, those with a car and free ones; older worlds have none
     roads.net.xml roads.xodr
     walkable.npz
     meshes/{ground,buildings,roofs,rooms,collision,prototypes}.glb
@@ -37,7 +38,7 @@ from vico.version import __version__
 from vico.world import model
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface, read_glb
-from vico.world.model import Building, Entrance, Manifest, Place, Record, Roads, Room, Transit
+from vico.world.model import Building, Entrance, Manifest, ParkingSpot, Place, Record, Roads, Room, Transit
 from vico.world.objects import Objects, read_objects
 from vico.world.routing import Router
 from vico.world.trips import Trips
@@ -65,8 +66,8 @@ class World:
         Its folder; None for a world that lives in memory only.
     parts
         Parts by attribute name, instead of the folder's (for worlds in memory): ``height``, ``buildings``, ``places``,
-        ``entrances``, ``rooms``, ``objects``, ``roads``, ``transit``, ``walkable``, ``lanes``, ``layers`` (surfaces by
-        layer) and ``models`` (surfaces by prototype).
+        ``entrances``, ``rooms``, ``objects``, ``roads``, ``transit``, ``walkable``, ``lanes``, ``parking``, ``layers``
+        (surfaces by layer) and ``models`` (surfaces by prototype).
 
     Attributes
     ----------
@@ -84,7 +85,7 @@ class World:
         self.derived: dict[object, object] = {}
         self._layers: dict[str, list[Surface]] = dict(parts.pop("layers", {}))
         known = {"height", "buildings", "places", "entrances", "rooms", "objects", "roads", "transit", "walkable"}
-        if unknown := set(parts) - known - {"lanes", "models"}:
+        if unknown := set(parts) - known - {"lanes", "models", "parking"}:
             raise TypeError(f"World: unknown parts {sorted(unknown)}")
         for name, value in parts.items():
             self.__dict__["_models" if name == "models" else name] = value
@@ -141,6 +142,13 @@ class World:
     def transit(self) -> Transit:
         """Stops, lines, bicycle stations."""
         return read_record(self.file("transit.json"), Transit)
+
+    @cached_property
+    def parking(self) -> list[ParkingSpot]:
+        """Parking spots; none in worlds that were built before there were any."""
+        if self.path is None or not (self.path / "parking.json").exists():
+            return []
+        return read_records(self.path / "parking.json", ParkingSpot)
 
     @cached_property
     def walkable(self) -> WalkableMap:

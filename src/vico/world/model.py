@@ -463,3 +463,34 @@ class Roads(Record):
     roads: list[Road]
     junctions: list[Junction]
     crossings: list[Point2]
+
+
+class ParkingSpot(Record):
+    """Room for one parked car.
+
+    Attributes
+    ----------
+    position
+        Its middle on the ground; `yaw` is where a car in it faces.
+    length, width
+        Metres.
+    kind
+        ``kerb``: along the kerb, in the direction of traffic; ``across``: at the kerb, across the street; ``lot``: in
+        a car park.
+    lane, offset, side
+        Of spots along kerbs: the lane they are entered from, the metres along it at which the spot's middle lies, and
+        how far that is to the left of the lane's middle (negative: to the right). None, 0 and 0 for the others.
+    car
+        Entity of the car that stands there for good; None where the spot is free.
+    """
+
+    id: str
+    position: Point3
+    yaw: float
+    length: float
+    width: float
+    kind: str
+    lane: str | None = None
+    offset: float = 0.0
+    side: float = 0.0
+    car: int | None = None

@@ -19,6 +19,7 @@ from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.world.model import Building, Dropped, Entrance, Place
+from vico.world.objects import Objects
 from vico.worldgen.buildings.fitting.nudging import plans_on_tiles, settled
 from vico.worldgen.buildings.stage import BuildingsResult, buildings_from_plans
 from vico.worldgen.evidence import Evidence
@@ -34,6 +35,7 @@ from vico.worldgen.ground.walkable import walkable_from_site
 from vico.worldgen.indoor.layout_llm import furnish_drawn
 from vico.worldgen.indoor.stage import Indoors, furnish
 from vico.worldgen.objects.models import models_of
+from vico.worldgen.objects.parking import parking_from_osm
 from vico.worldgen.objects.stage import objects_from_osm
 from vico.worldgen.photos.streetview.renders import photographer_of
 from vico.worldgen.photos.texturing import (
@@ -50,6 +52,7 @@ from vico.worldgen.stages import Stages
 from vico.worldgen.streets.netconvert import road_network
 from vico.worldgen.streets.polygons import road_polygons
 from vico.worldgen.streets.roads import roads_from_osm, streets_from_osm
+from vico.worldgen.streets.walk_lines import Kerbs
 from vico.worldgen.tables import read_tables
 from vico.worldgen.transit.stage import transit_from_osm
 from vico.worldgen.transit.waiting import waiting_places
@@ -87,7 +90,8 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
 
     ways = run("ways", streets_from_osm, site, solids, bridges.usable)
     roads = run("roads", roads_from_osm, site, ways)
-    lanes = write.streets(roads, run("network", road_network, site, ways, levels))
+    kerbs = Kerbs(streets.carriageway, solids)
+    lanes = write.streets(roads, run("network", road_network, site, ways, levels, kerbs))
     feeds = list(evidence.feeds)
     mapped = run("transit", transit_from_osm, site, lanes, levels, solids=solids, seed=seed, feeds=feeds)
     with stages.timed("waiting"):
@@ -106,6 +110,20 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
         lanes=lanes,
         seed=seed,
     )
+    parking = run(
+        "parking",
+        parking_from_osm,
+        site,
+        streets=streets,
+        lanes=lanes,
+        objects=outdoors,
+        solids=solids,
+        height=height,
+        transit=transit,
+        seed=seed,
+    )
+    write.parking(parking)
+    outdoors = stages.digested(Objects.joined([outdoors, parking.cars]))
     write.outdoors(outdoors, dropped)
     walkable = run("walkable", walkable_from_site, site, streets, [*solids, *bridges.low], outdoors)
     write.walkable(walkable)
@@ -145,6 +163,7 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
         transit=transit,
         walkable=walkable,
         lanes=lanes,
+        parking=parking.spots,
         models=models,
     )
     layers = Layers(ground, built.walls, fronts.surfaces, built.roofs, indoors.surfaces, built.collision)

@@ -21,6 +21,7 @@ from vico.world.model import (
     Entrance,
     Manifest,
     Origin,
+    ParkingSpot,
     Place,
     Road,
     Roads,
@@ -33,6 +34,7 @@ from vico.world.walkable import WalkableMap, write_walkable
 from vico.worldgen.buildings.stage import BuildingsResult
 from vico.worldgen.evidence import Evidence
 from vico.worldgen.indoor.stage import Indoors
+from vico.worldgen.objects.parking import CAR, Parking
 from vico.worldgen.request import WorldRequest
 from vico.worldgen.stages import Stages
 from vico.worldgen.streets.netconvert import RoadNetwork
@@ -87,6 +89,7 @@ class WorldParts:
     transit: Transit
     walkable: WalkableMap
     lanes: LaneGraph
+    parking: list[ParkingSpot]
     models: dict[str, Sequence[Surface]]
 
     def world(self, manifest: Manifest, folder: Path, layers: Layers) -> World:
@@ -147,11 +150,17 @@ class WorldWriter:
             transit.left_out,
         )
 
+    def parking(self, parking: Parking) -> None:
+        """Write the parking spots; the cars in them are written with what else stands around."""
+        write_records(self.folder / "parking.json", parking.spots)
+        self._stages.report("parking", {"parking_spots": len(parking.spots), "parked_cars": len(parking.cars)})
+
     def outdoors(self, objects: Objects, dropped: Iterable[Dropped]) -> None:
         """Report what stands outdoors; it is written together with what stands indoors."""
         barrier = np.isin(objects.kind, _BARRIER_KINDS)
+        amenity = (objects.group == "amenity") & ~barrier & (objects.kind != CAR)
         counts = {
-            "amenity_objects": int(((objects.group == "amenity") & ~barrier).sum()),
+            "amenity_objects": int(amenity.sum()),
             "natural_objects": int(((objects.group == "natural") & ~barrier).sum()),
             "barrier_pieces": int(barrier.sum()),
             "kinds": len(np.unique(objects.kind)),

@@ -13,7 +13,8 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import polygons_of
-from vico.worldgen.facts.expendable import NamedShape, expendable, united
+from vico.worldgen.facts.bays import bay_borders, free_pieces, junction_zones, lot_rows
+from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.streets import LANE_WIDTH, Crossing, Street, StreetPolygons
 
 _STRIPE, _STRIPE_PERIOD = 0.5, 1.0  # of a zebra, metres along the walk
@@ -79,7 +80,7 @@ def road_markings(
                 zebra += _crossing(crossing)
     zebra += _stop_lines(streets, left_driving)
     shapely.prepare(streets.carriageway)
-    breaks = _junction_zones(streets)
+    breaks = junction_zones(streets)
     dashes: list[NDArray[np.float64]] = []
     middles: list[NDArray[np.float64]] = []
     for street in streets.streets:
@@ -247,55 +248,26 @@ def _kerbside_of(
         if not parking and not cycle:
             continue
         outer = street.width / 2 - parking
-        for piece in _free_pieces(street, side * outer, breaks):
+        for piece in free_pieces(street, side * outer, breaks):
             path = _divided(np.asarray(piece.coords), longest)
             if parking:
                 edges += _ribbon(path, 0.0, 0.1)
-                pitch = 2.6 if street.slanted else 5.8
-                for place in np.arange(1.0, piece.length - 1.0, pitch):
+                for place in bay_borders(piece, slanted=street.slanted):
                     a, b = (np.asarray(piece.interpolate(v).coords[0]) for v in (place, place + 0.1))
                     u = (b - a) / max(float(np.hypot(*(b - a))), 1e-9)
                     out = side * np.array([-u[1], u[0]])
                     edges += _ribbon(np.array([a, a + out * (parking - 0.2)]), 0.0, 0.1)
         if cycle:
-            for piece in _free_pieces(street, side * (outer - _CYCLE_WIDTH / 2 - 0.1), breaks):
+            for piece in free_pieces(street, side * (outer - _CYCLE_WIDTH / 2 - 0.1), breaks):
                 path = _divided(np.asarray(piece.coords), longest)
                 lanes += _ribbon(path, 0.0, _CYCLE_WIDTH)
                 edges += _ribbon(path, -side * (_CYCLE_WIDTH / 2), _LINE)
     return lanes, edges
 
 
-def _free_pieces(street: Street, offset: float, breaks: BaseGeometry) -> list[LineString]:
-    line = overlay.offset_curve(LineString(street.line), offset)
-    free = shapely.get_parts(overlay.difference(line, breaks))
-    return [piece for piece in free if isinstance(piece, LineString) and piece.length > _DASH]
-
-
 def _car_park(shape: Polygon) -> list[NDArray[np.float64]]:
-    """Bays along the two long sides of a car park, and in pairs of rows between where there is room."""
-    box = shapely.minimum_rotated_rectangle(shape)
-    if not isinstance(box, Polygon) or shape.area < 80.0:
-        return []
-    corner = np.asarray(box.exterior.coords)
-    u, v = corner[1] - corner[0], corner[3] - corner[0]
-    if np.hypot(*u) < np.hypot(*v):
-        u, v = v, u
-    length, depth = float(np.hypot(*u)), float(np.hypot(*v))
-    u, v = u / length, v / depth
-    rows = [(0.2, 5.0), (depth - 0.2, -5.0)] if depth > 15.0 else [(0.2, 5.0)] if depth > 8.0 else []
-    if depth > 31.0:
-        for middle in np.arange(16.5, depth - 16.0, 16.0):
-            rows += [(float(middle), 5.0), (float(middle), -5.0)]
-    inner = overlay.buffer(shape, -0.3)
-    shapely.prepare(inner)
-    found: list[NDArray[np.float64]] = []
-    for start, reach in rows:
-        for place in np.arange(0.4, length - 0.3, 2.5):
-            a = corner[0] + u * place + v * start
-            b = a + v * reach
-            if inner.contains(LineString([a, b])):
-                found += _ribbon(np.array([a, b]), 0.0, 0.1)
-    return found
+    """Lines between the bays of a car park."""
+    return [quad for row in lot_rows(shape) for line in row for quad in _ribbon(line, 0.0, 0.1)]
 
 
 def pitch_lines(shape: Polygon, sport: str) -> list[NDArray[np.float64]]:
@@ -366,26 +338,6 @@ def _lane_lines(street: Street) -> list[tuple[float, bool]]:
         opposite = not street.oneway and k == (street.lanes + 1) // 2
         lines.append((offset if abs(offset) > 1e-6 else 0.0, opposite))
     return lines
-
-
-def _junction_zones(streets: StreetPolygons) -> BaseGeometry:
-    """Where lines stop: around nodes that three or more street ends share, and at crossings."""
-    ends: dict[tuple[float, float], list[float]] = {}
-    for street in streets.streets:
-        for k, point in enumerate(street.line):
-            key = (round(float(point[0]), 2), round(float(point[1]), 2))
-            share = [street.width] if k in (0, len(street.line) - 1) else [street.width, street.width]
-            ends.setdefault(key, []).extend(share)
-    zones: list[NamedShape] = []
-    for point, widths in ends.items():
-        if len(widths) >= 3:
-            with expendable(name := f"junction at {point[0]:.1f}, {point[1]:.1f}"):
-                zone = overlay.buffer(shapely.Point(point), max(widths) / 2 + 3.0, quad_segs=3)
-                zones.append(NamedShape(name, zone))
-    for crossing in streets.crossings:
-        with expendable(crossing.id):
-            zones.append(NamedShape(crossing.id, overlay.buffer(crossing.polygon, 1.2, join_style="mitre")))
-    return united(zones)
 
 
 def _divided(line: NDArray[np.float64], longest: float | None) -> NDArray[np.float64]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from vico.assets.things.pack import credits_of, our_models, read_things
+from vico.assets.vehicles import vehicle_prototypes
 from vico.world.mesh import Surface
 from vico.world.model import Source
 from vico.world.objects import Objects
@@ -18,6 +19,7 @@ def models_of(objects: Objects, *, installed: bool) -> tuple[dict[str, Sequence[
     models: dict[str, Sequence[Surface]] = {
         name: list(stand_ins.get(name, model.surfaces)) for name, model in our_models().items() if name in used
     }
+    models |= {name: surfaces for name, surfaces in vehicle_prototypes().items() if name in used}
     foreign = [name for name in models if name in stand_ins]
     if pack is None or not foreign:
         return models, []

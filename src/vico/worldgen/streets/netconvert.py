@@ -31,6 +31,7 @@ from vico.worldgen.streets.roads import (
     is_traffic_street,
 )
 from vico.worldgen.streets.smoothing import without_kinks
+from vico.worldgen.streets.walk_lines import Kerbs, sidewalks_beside
 
 _NO_RAIL = (
     "rail rail_urban rail_electric rail_fast tram drone aircraft scooter container wheelchair subway cable_car ship"
@@ -103,7 +104,12 @@ def netconvert_binary() -> Path:
     )
 
 
-def road_network(site: SiteFacts, streets: Sequence[NetworkStreet], height: HeightField | None = None) -> RoadNetwork:
+def road_network(
+    site: SiteFacts,
+    streets: Sequence[NetworkStreet],
+    height: HeightField | None = None,
+    kerbs: Kerbs | None = None,
+) -> RoadNetwork:
     """Build the lane-level network of a window: lanes, junctions, sidewalks, crossings, signals.
 
     Parameters
@@ -114,6 +120,8 @@ def road_network(site: SiteFacts, streets: Sequence[NetworkStreet], height: Heig
         `streets_from_osm` of the same site.
     height
         The ground and the decks above it: lanes and walkways lie on them; without it all is flat.
+    kerbs
+        Where carriageways end: sidewalks lie beyond; without it they lie beside the outermost lanes.
 
     Returns
     -------
@@ -135,12 +143,12 @@ def road_network(site: SiteFacts, streets: Sequence[NetworkStreet], height: Heig
     binary = netconvert_binary()
     for _ in range(_MOST_REFUSED):
         try:
-            return _converted(binary, site, used, height)
+            return _converted(binary, site, used, height, kerbs)
         except NetconvertError as error:
             culprit = _culprit(binary, site, used, height)
             leave_out(f"w{culprit}", f"{FAILED}: {error}")
             used = [street for street in used if street.way != culprit]
-    return _converted(binary, site, used, height) if used else empty_network(osm.frame, osm.half)
+    return _converted(binary, site, used, height, kerbs) if used else empty_network(osm.frame, osm.half)
 
 
 def _culprit(binary: Path, site: SiteFacts, streets: Sequence[NetworkStreet], height: HeightField | None) -> int:
@@ -157,7 +165,11 @@ def _culprit(binary: Path, site: SiteFacts, streets: Sequence[NetworkStreet], he
 
 
 def _converted(
-    binary: Path, site: SiteFacts, streets: Sequence[NetworkStreet], height: HeightField | None = None
+    binary: Path,
+    site: SiteFacts,
+    streets: Sequence[NetworkStreet],
+    height: HeightField | None = None,
+    kerbs: Kerbs | None = None,
 ) -> RoadNetwork:
     """Run netconvert.
 
@@ -192,6 +204,8 @@ def _converted(
                 f"road network: netconvert gave no network ({said[0]}); exit status {done.returncode}"
             )
         plain = without_kinks(_plain_net(net.read_bytes()))
+        if kerbs is not None:
+            plain = sidewalks_beside(plain, kerbs, left_driving=site.left_driving)
         return RoadNetwork(plain if height is None else _laid(plain, height), _plain_xodr(xodr.read_bytes()))
 
 
