@@ -175,10 +175,12 @@ def test_a_street_that_netconvert_refuses_costs_itself_alone(monkeypatch: pytest
     used = [street for street in streets if is_traffic_street(street)]
     bad, converted = used[len(used) // 2].way, netconvert._converted
 
-    def refusing(binary: Path, site: SiteFacts, some: Sequence[NetworkStreet], height: None) -> RoadNetwork:
+    def refusing(
+        binary: Path, site: SiteFacts, some: Sequence[NetworkStreet], height: None, kerbs: None = None
+    ) -> RoadNetwork:
         if any(street.way == bad for street in some):
             raise netconvert.NetconvertError("road network: netconvert gave no network")
-        return converted(binary, site, some, height)
+        return converted(binary, site, some, height, kerbs)
 
     monkeypatch.setattr(netconvert, "_converted", refusing)
     with listening() as losses:

@@ -23,6 +23,7 @@ LOT_PITCH, LOT_DEPTH = 2.5, 5.0
 LEAST_PIECE = 3.0
 """Metres of a kerb or a line between two junctions that are worth painting."""
 
+_AISLE = 5.4  # metres between the rows of a car park, at least
 _INWARD = 0.1  # metres that a car along a kerb stands nearer to the street than the middle of its bay: for its mirrors
 
 
@@ -130,12 +131,13 @@ def lot_rows(shape: Polygon) -> list[list[NDArray[np.float64]]]:
             rows += [(float(middle), reach), (float(middle), -reach)]
     inner = overlay.buffer(shape, -0.1)
     shapely.prepare(inner)
+    spare = min(max((depth - 2 * reach - _AISLE) / 2, 0.0), 3.0) if depth <= 31.0 else 0.5
     across = np.arange(0.4, length - 0.3, LOT_PITCH)
     found: list[list[NDArray[np.float64]]] = []
     for start, deep in rows:
         # The outline seldom runs along the box: the row begins where most bays have room.
         best: list[NDArray[np.float64]] = []
-        for back in (0.0, 0.5, 1.0, 1.5, 2.0, 3.0):
+        for back in np.arange(0.0, spare + 0.01, 0.5).tolist():
             a = corner[0] + u * across[:, None] + v * (start + math.copysign(back, deep))
             lines = np.stack([a, a + v * deep], axis=1)
             row = list(lines[shapely.contains(inner, shapely.linestrings(lines))])
