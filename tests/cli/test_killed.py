@@ -142,6 +142,7 @@ def test_a_killed_demo_needs_no_force(
             demo.demo(tmp_path / "demo")
     monkeypatch.setattr(demo.run_verb, "run", lambda *_, **__: 0)
     monkeypatch.setattr(demo.replay_verb, "replay", lambda *_, **__: 0)
+    monkeypatch.setattr(demo.film_verb, "film", lambda *_, **__: 0)
     assert demo.demo(tmp_path / "demo") == 0
     assert not (tmp_path / "demo" / ".unfinished").exists()
     assert json.dumps(str(tmp_path))[1:-1] in capsys.readouterr().out

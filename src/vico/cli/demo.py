@@ -9,41 +9,71 @@ from pathlib import Path
 from rich.console import Console
 
 from vico.cli import community as community_verb
+from vico.cli import film as film_verb
 from vico.cli import replay as replay_verb
 from vico.cli import run as run_verb
 from vico.cli import world as world_verb
-from vico.cli.options import RunOptions
+from vico.cli.options import FilmOptions, RunOptions
 from vico.cli.output import check_output
 from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.sources import Sources
 
 
 def demo(out: Path, *, seed: int = 0, force: bool = False) -> int:
-    """Build central Helsinki, people it, simulate half an hour from 08:00, and make the page and the film."""
+    """Build central Helsinki, people it, simulate half an hour from 08:00 and a rainy evening, show both."""
     unfinished = out / ".unfinished"
     check_output(out, force=force or unfinished.is_file())
     if out.exists() and not out.is_dir():
         out.unlink()
-    world, people, run = out / "world", out / "community", out / "run"
+    world, people, run, evening = (out / name for name in ("world", "community", "run", "evening"))
     console = Console(stderr=True)
     began = time.perf_counter()
     extract = packaged_extract()
     out.mkdir(parents=True, exist_ok=True)
     unfinished.touch()  # a demo that was killed begins again without --force
-    for folder in (world, people, run):
+    for folder in (world, people, run, evening):
         shutil.rmtree(folder, ignore_errors=True)
-    console.rule("1 of 4: the world")
+    console.rule("1 of 5: the world")
     world_verb.build(Sources(extract.path), out=world, centre=(extract.lat, extract.lon), half=extract.half, seed=seed)
-    console.rule("2 of 4: its people")
+    console.rule("2 of 5: its people")
     community_verb.build(world, out=people, residents=15, seed=seed, force=False, json=False)
-    console.rule("3 of 4: half an hour of their morning")
+    console.rule("3 of 5: half an hour of their morning")
     run_verb.run(RunOptions(world, people, out=run, seed=seed))
-    console.rule("4 of 4: something to look at")
+    console.rule("4 of 5: something to look at")
     replay_verb.replay(run, film=True)
+    console.rule("5 of 5: an evening in the rain, with robots")
+    _evening(world, people, evening, seed)
     unfinished.unlink()
     console.rule(f"done in {time.perf_counter() - began:.0f} s")
     print(f"world       {world}    map.png, previews/, meshes/*.glb, roads.xodr, roads.net.xml")
     print(f"community   {people}")
     print(f"run         {run}    replay.html, demo.mp4, metrics.json")
+    print(f"evening     {evening}    film.mp4")
     print(f"to look at it:  python3 -m webbrowser {run / 'replay.html'}")
     return 0
+
+
+def _evening(world: Path, people: Path, out: Path, seed: int) -> None:
+    """Simulate and film a moment of an evening in October, when lamps and windows are lit."""
+    run_verb.run(
+        RunOptions(
+            world,
+            people,
+            out,
+            start="17:45",
+            date="2026-10-20",
+            utc_offset=3.0,
+            weather="rain",
+            robots="husky,go2,h1,drone",
+            cars=40,
+            pedestrians=80,
+            junctions="signals",
+            observe="none",
+            steps=36,
+            seed=seed,
+        )
+    )
+    around_the_h1 = FilmOptions(
+        out, follow="robot_2", out=out / "film.mp4", size="640x360", start="24", fps=15, view="orbit", samples=1
+    )
+    film_verb.film(around_the_h1)
