@@ -32,7 +32,7 @@ class _Watched:
 
 
 def in_the_street() -> set[str]:
-    """Walk, run, turn, carry, talk, wave, sit, lie."""
+    """Walk, run, turn, carry, talk, wave, sit, go through a door, lie."""
     sim = Simulation(toy_city.world(), None, SimConfig(assistants=2, observe=()))
     watched = _Watched(sim)
     sim.scenario.place_agent("assistant_0", (-20.0, -15.0))
@@ -68,6 +68,9 @@ def in_the_street() -> set[str]:
     watched.act(type="communicate", text="Hello from my chair!")
     sim.scenario.place_agent("assistant_1", (-15.0, -20.0))
     watched.act(type="communicate", text="Hello over there!")
+    sim.state.people.posture[0] = Posture.STANDING
+    sim.scenario.place_agent("assistant_0", (-5.0, 3.6))
+    assert watched.act(type="enter", place=toy_city.CAFE) == "ok"
     sim.state.people.posture[0] = Posture.LYING
     watched.act(type="sleep")
     return watched.seen

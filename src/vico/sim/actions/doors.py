@@ -10,8 +10,9 @@ from vico.sim.actions.fields import Field, short
 from vico.sim.actions.model import ActionType, Refusal, Values
 from vico.sim.holding import take_umbrella
 from vico.sim.indoor import near_door
-from vico.sim.moves import place_in_room, put_outdoors, spot_outside
+from vico.sim.moves import gesture, place_in_room, put_outdoors, spot_outside
 from vico.sim.simulation_state import SimulationState
+from vico.world.model import LIFT
 
 #: A door that lies further up or down than this is on another level, metres.
 _LEVEL = 0.5
@@ -96,9 +97,20 @@ def enter(values: Values, i: int, state: SimulationState) -> None:
         lifts.ride(i, room, state)
         return
     place_in_room(i, room, state, near=indoor.arrival(room, -1 if outdoors else int(p.room[i])))
+    _hold_door(i, state)
     if outdoors:
         name = state.world.places[state.place_index[values["place"]]].name
         state.events.add("enter", p.names[i], f"enters {name}", p.position[i], place=values["place"])
+
+
+def _hold_door(i: int, state: SimulationState) -> None:
+    """Show a hand at the door that somebody has come through, if one is free; cars of lifts open by themselves."""
+    p = state.people
+    if p.room[i] >= 0 and state.indoor.rooms[int(p.room[i])].kind == LIFT:
+        return
+    hand = next((hand for hand in (1, 0) if not p.held[i, hand]), None)
+    if hand is not None:
+        gesture("open_door", i, state, hand=hand)
 
 
 def check_exit(values: Values, i: int, state: SimulationState) -> Refusal | None:
@@ -125,6 +137,7 @@ def leave(values: Values, i: int, state: SimulationState) -> None:
     assert place.entrance is not None
     take_umbrella(i, state)
     put_outdoors(i, spot, state.entrances[place.entrance].facing, state)
+    _hold_door(i, state)
     state.events.add("exit", p.names[i], f"leaves {place.name}", p.position[i], place=place.id)
 
 

@@ -23,6 +23,7 @@ from vico.sim.animation.names import (
     DRINK,
     EAT,
     IDLE,
+    OPEN_DOOR,
     PICK,
     PUT,
     REACH,
@@ -55,6 +56,8 @@ def stand(body: Any, p: float, clip: int) -> None:
         _reach_out(body, p, clip)
     elif clip in (DRINK, EAT):
         _consume(body, p, clip, 0.0)
+    elif clip == OPEN_DOOR:
+        _let_go_of_door(body, p)
     elif clip == STAND:
         _hold_on(body)
 
@@ -77,6 +80,17 @@ def _hold_on(body: Any) -> None:
     tall = body.style.height
     reach(body, RIGHT, np.array([0.10 * tall, -0.12 * tall, 1.02 * tall]), np.array([0.2, -1.0, -0.3]))
     grip(body, RIGHT, 1.0)
+
+
+@compiled
+def _let_go_of_door(body: Any, p: float) -> None:
+    """Have a hand at the handle of the door one has come through, and bring it back to the side."""
+    tall, hand = body.style.height, body.hand
+    sign, out = SIGN[hand], np.zeros(3)
+    out[X], out[Y], out[Z] = -0.10 * tall, sign * 0.26 * tall, 0.57 * tall
+    share = smoothstep(2.4 * (0.45 - p)) if p < 0.5 else smoothstep(2.4 * (p - 0.55))
+    reach_by(body, hand, out, np.array([-0.6, sign * 0.4, 0.2]), share)
+    grip(body, hand, 0.35 + 0.4 * share)
 
 
 @compiled
@@ -105,6 +119,8 @@ def _stand_upright(body: Any, p: float, clip: int) -> None:
         yaw, nod = 0.06 * np.sin(_TAU * p + style.asymmetry), 0.06 * np.sin(2 * _TAU * p)
     elif clip in (EAT, DRINK):
         nod = (0.10 if clip == EAT else -0.22) * strength
+    elif clip == OPEN_DOOR:
+        yaw = 0.22 * SIGN[body.hand] * np.cos(np.pi * p) ** 2
     elif clip == TURN:
         for side in range(2):
             lifts[side], pivots[side] = _pivot((p + 0.5 * side) % 1.0)
