@@ -1,11 +1,13 @@
-"""Many people, many pictures: milliseconds of processor time a step, and memory.
+"""Many people, many pictures, all robots: times real time, processor time and memory, of four workloads in one table.
 
-    python benchmarks/crowd.py WORLD COMMUNITY_50 COMMUNITY_1000 [--before SOURCE] [--table benchmarks/results/crowd.md]
+    python benchmarks/crowd.py WORLD COMMUNITY_50 COMMUNITY_1000 [--rounds 3] [--steps 120] [--before SOURCE]
+        [--cases robots,observing] [--table benchmarks/results/crowd.md]
 
-With `--before`, the folder ``src`` of another state of the sources, every case is measured there too, each in a
-process of its own, turn about. Cases: everybody of the small community observing (256 x 256 RGB, depth and
-segmentation) among 100 cars, 100 pedestrians and 2 robots; the large community without pictures among 200 cars and
-200 pedestrians; one agent observing alone, 15 people walking before it; and peak memory of 1 and of all observing.
+Every measurement has a process of its own, and the workloads take turns, round by round. Residents follow their
+schedules from 08:00, robots go on errands, compiled code is loaded. Where agents observe (256 x 256 RGB, depth and
+segmentation), all pictures are asked for after each step, before the next one begins; nothing is left out that somebody
+who looks at them would wait for. With `--before`, the folder ``src`` of another state of the sources, every workload is
+measured there too, turn about.
 """
 
 from __future__ import annotations
@@ -18,13 +20,63 @@ import subprocess
 import sys
 import time
 from contextlib import nullcontext, suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 _WARM = 5
-_PEOPLE = 15
+_ROBOTS = ("husky", "go2", "h1", "drone", "manipulator")
+
+
+@dataclass(frozen=True)
+class Workload:
+    """What is measured: its line in the table, the goal, and the simulation's options.
+
+    Attributes
+    ----------
+    title
+        In words.
+    goal
+        Times real time, at least.
+    people
+        How many residents take part.
+    options
+        Of `SimConfig`.
+    memory
+        MB, at most; None: no goal.
+    """
+
+    title: str
+    goal: float
+    people: int
+    options: dict[str, Any] = field(default_factory=dict)
+    memory: int | None = None
+
+
+_WORKLOADS = {
+    "robots": Workload("five kinds of robots, 50 residents, no pictures", 20.0, 50, {"robots": _ROBOTS, "observe": ()}),
+    "observing": Workload(
+        "50 residents and five robots observe, 100 cars, 100 pedestrians",
+        5.0,
+        50,
+        {"robots": _ROBOTS, "cars": 100, "pedestrians": 100},
+    ),
+    "many observing": Workload(
+        "200 residents observe, 100 cars, 100 pedestrians, no robots",
+        1.0,
+        200,
+        {"cars": 100, "pedestrians": 100},
+        4096,
+    ),
+    "crowd": Workload(
+        "1,000 residents, 400 cars, 400 pedestrians, no pictures",
+        10.0,
+        1000,
+        {"cars": 400, "pedestrians": 400, "observe": ()},
+    ),
+}
 
 
 def asked_together(followers: dict[str, Any]) -> tuple[list[Any], list[str]]:
@@ -46,13 +98,8 @@ def ask(followers: dict[str, Any], together: tuple[list[Any], list[str]], told: 
     return actions | {name: followers[name].act(observations[name], infos[name]) for name in alone}
 
 
-def steps(
-    world_folder: Path, community_folder: Path, options: dict[str, Any], count: int, *, look: bool = False
-) -> dict[str, Any]:
-    """Measure steps of a simulation whose residents follow their schedules from 08:00.
-
-    With `look`, all pictures and what is in them are asked for after each step, before the next one begins.
-    """
+def measure(workload: Workload, world_folder: Path, community_folder: Path, count: int) -> dict[str, Any]:
+    """Measure steps of a workload in this process."""
     from vico.agents.schedule import followers_of
     from vico.community import read_community
     from vico.sim.config import SimConfig
@@ -62,9 +109,10 @@ def steps(
 
     world = read_world(world_folder)
     community = read_community(community_folder, world)
-    config = SimConfig(errands=True, **options)
+    config = SimConfig(errands=True, residents=workload.people, **workload.options)
     sim = Simulation(world, community, config)
-    followers = followers_of(community, PublicMap.from_world(world), seed=config.seed)
+    known = followers_of(community, PublicMap.from_world(world), seed=config.seed)
+    followers = {name: agent for name, agent in known.items() if name in sim.agents}
     observations, infos = sim.observe()
     together = asked_together(followers)
     cpu, wall = [], []
@@ -79,72 +127,24 @@ def steps(
             began, spent = time.perf_counter(), time.process_time()
             result = sim.step(ask(followers, together, (observations, infos)))
             observations, infos = result.observations, result.infos
-            if look:
+            if config.observe is None:
                 _ = [(observations[name], infos[name]) for name in sim.agents]
             if step >= _WARM:
                 cpu.append(1000 * (time.process_time() - spent))
                 wall.append(1000 * (time.perf_counter() - began))
     phases = {name: 1000 * seconds / count for name, seconds in sim.metrics.seconds.items()}
-    phases["agents and the rest"] = float(np.mean(wall)) - sum(phases.values())
-    return {"cpu": cpu, "wall": wall, "phases": phases}
-
-
-def one_view(world_folder: Path, count: int) -> dict[str, Any]:
-    """Measure observations of one agent before whom people walk, posed and skinned anew each time; nothing is kept."""
-    from vico.sim.config import SimConfig
-    from vico.sim.simulation import Simulation
-    from vico.world.folder import read_world
-
-    world = read_world(world_folder)
-    config = SimConfig(observe=("assistant_0",), assistants=_PEOPLE + 1, cars=15, pedestrians=0)
-    sim = Simulation(world, None, config)
-    generator = np.random.default_rng(3)
-    people = sim.state.people
-    sim.observe()
-    cpu = []
-    for _ in range(count):
-        while True:
-            spot, yaw = world.walkable.random_point(generator), float(generator.uniform(-np.pi, np.pi))
-            before = spot + 6.0 * np.array([np.cos(yaw), np.sin(yaw)])
-            if world.walkable.class_at(before):
-                break
-        scattered = before + generator.uniform(-3.0, 3.0, (_PEOPLE, 2))
-        people.position[:, :2] = np.vstack([spot[None], scattered])
-        people.position[:, 2] = world.height(people.position[:, :2])
-        people.yaw[:] = np.concatenate([[yaw], generator.uniform(-np.pi, np.pi, _PEOPLE)])
-        people.room[:] = people.place[:] = -1
-        people.phase[:] = generator.uniform(0.0, 1.0, len(people))
-        spent = time.process_time()
-        observations, infos = sim.observe()
-        _ = observations["assistant_0"]["rgb"], infos["assistant_0"]["entities"]
-        cpu.append(1000 * (time.process_time() - spent))
-    return {"cpu": cpu[_WARM:]}
-
-
-def case(name: str, world: Path, small: Path, large: Path, count: int) -> dict[str, Any]:
-    """Measure one case in this process."""
-    busy = {"cars": 100, "pedestrians": 100, "robots": ("husky", "go2")}
-    if name == "observing":
-        found = steps(world, small, busy, count)
-    elif name == "looking":
-        found = steps(world, small, busy, count, look=True)
-    elif name == "one observing":
-        found = steps(world, small, {**busy, "observe": ("resident_0",)}, count)
-    elif name == "crowd":
-        found = steps(world, large, {"cars": 200, "pedestrians": 200, "observe": ()}, count)
-    else:
-        found = one_view(world, count)
-    found["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    return found
+    phases["agents, waiting for pictures, and the rest"] = float(np.mean(wall)) - sum(phases.values())
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1024 if sys.platform != "darwin" else 1024 * 1024)
+    percentiles = {"cpu": np.percentile(cpu, [50, 90]).tolist(), "wall": np.percentile(wall, [50, 90, 99]).tolist()}
+    return {**percentiles, "phases": phases, "peak_mb": peak}
 
 
 def measured(name: str, source: Path, given: argparse.Namespace) -> dict[str, Any]:
-    """Measure one case in a process of its own, with the given sources."""
-    count = given.steps if name != "view" else 4 * given.steps
+    """Measure one workload in a process of its own, with the given sources."""
     command = [sys.executable, __file__, str(given.world), str(given.small), str(given.large), "--case", name]
     environment = {**os.environ, "PYTHONPATH": str(source)}
     done = subprocess.run(
-        [*command, "--steps", str(count)], env=environment, capture_output=True, text=True, check=False
+        [*command, "--steps", str(given.steps)], env=environment, capture_output=True, text=True, check=False
     )
     if done.returncode:
         sys.exit(f"{name}: exit status {done.returncode}\n{done.stderr}")
@@ -152,69 +152,75 @@ def measured(name: str, source: Path, given: argparse.Namespace) -> dict[str, An
     return result
 
 
-_TITLES = {
-    "observing": "everybody of the small community observes, 100 + 100 traffic, 2 robots: a step",
-    "looking": "the same, and all pictures are asked for before the next step: a step",
-    "crowd": "large community, no pictures, 200 + 200 traffic: a step",
-    "view": "one agent observes, 15 people about: an observation",
-    "one observing": "as the first, one observes: a step",
-}
-
-
-def table(results: dict[tuple[str, str], dict[str, Any]]) -> list[str]:
+def table(results: dict[tuple[str, str], list[dict[str, Any]]]) -> list[str]:
     """Return the lines of the report."""
     lines = [
-        "| case | sources | CPU ms median | p90 | p99 | wall ms median | p99 | peak MB |",
-        "|---|---|---|---|---|---|---|---|",
+        "| workload | sources | times real time | slowest..fastest round | goal | CPU ms a step | wall ms a step | "
+        "90 % | 99 % | peak MB |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]
-    for (name, which), found in results.items():
-        cpu = np.percentile(found["cpu"], [50, 90, 99])
-        wall = np.percentile(found["wall"], [50, 99]) if "wall" in found else None
-        walls = " | ".join(f"{value:.1f}" for value in wall) if wall is not None else " | "
-        values = " | ".join(f"{value:.1f}" for value in cpu)
-        lines.append(f"| {_TITLES[name]} | {which} | {values} | {walls} | {found['peak_mb']:.0f} |")
-    lines += ["", "Wall milliseconds a step by phase, mean:", ""]
-    for (name, which), found in results.items():
-        if "phases" in found:
-            phases = ", ".join(f"{phase} {value:.1f}" for phase, value in found["phases"].items())
-            lines.append(f"- {_TITLES[name]} ({which}): {phases}")
+    for (name, which), rounds in results.items():
+        workload = _WORKLOADS[name]
+        speeds = [1000 / one["wall"][0] for one in rounds]
+        cpu = np.median([one["cpu"][0] for one in rounds])
+        wall = np.median([one["wall"] for one in rounds], axis=0)
+        peak = max(one["peak_mb"] for one in rounds)
+        goal = f">= {workload.goal:g}" + (f", < {workload.memory} MB" if workload.memory else "")
+        lines.append(
+            f"| {workload.title} | {which} | **{np.median(speeds):.1f}** | {min(speeds):.1f}..{max(speeds):.1f} "
+            f"| {goal} | {cpu:.1f} | {wall[0]:.1f} | {wall[1]:.1f} | {wall[2]:.1f} | {peak:.0f} |"
+        )
+    lines += ["", "Wall milliseconds a step by phase, mean, of the median round:", ""]
+    for (name, which), rounds in results.items():
+        middle = sorted(rounds, key=lambda one: one["wall"][0])[len(rounds) // 2]
+        phases = ", ".join(f"{phase} {value:.1f}" for phase, value in middle["phases"].items())
+        lines.append(f"- {_WORKLOADS[name].title} ({which}): {phases}")
     return lines
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("world", type=Path)
-    parser.add_argument("small", type=Path)
-    parser.add_argument("large", type=Path)
+    parser.add_argument("small", type=Path, help="community of 50 residents or more")
+    parser.add_argument("large", type=Path, help="community of 1,000 residents or more")
     parser.add_argument("--before", type=Path, help="src of another state of the sources, measured turn about")
-    parser.add_argument("--steps", type=int, default=200)
+    parser.add_argument("--steps", type=int, default=120)
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--cases", default=",".join(_WORKLOADS), help="which workloads")
     parser.add_argument("--table", type=Path)
-    parser.add_argument("--case", choices=list(_TITLES), help="measure this one here, and print it as JSON")
+    parser.add_argument("--case", choices=list(_WORKLOADS), help="measure this one here, and print it as JSON")
     given = parser.parse_args()
     if given.case:
-        print(json.dumps(case(given.case, given.world, given.small, given.large, given.steps)))
+        workload = _WORKLOADS[given.case]
+        community = given.small if workload.people <= 50 else given.large
+        print(json.dumps(measure(workload, given.world, community, given.steps)))
         return
     from reporting import machine, publish
 
     sources = {"now": Path(__file__).parents[1] / "src"}
     if given.before:
         sources = {"before": given.before, **sources}
+    before = " --before ../before/src" if given.before else ""
     lines = [
-        "# Crowds and pictures: milliseconds a step of one second",
+        "# Crowds, pictures and robots: how much faster than real time",
         "",
         machine(),
-        "Made by `python benchmarks/crowd.py WORLD COMMUNITY_50 COMMUNITY_1000 --before ../before/src "
-        "--table benchmarks/results/crowd.md`.",
+        f"Made by `python benchmarks/crowd.py WORLD COMMUNITY_50 COMMUNITY_1000 --rounds {given.rounds} "
+        f"--steps {given.steps}{before} --table benchmarks/results/crowd.md`.",
         "",
-        f"{given.steps} steps each from 08:00, residents on their schedules; each case in a process of its own, "
-        "compiled code loaded. Percentiles are over steps. Residents look at no pictures; they are taken: "
-        "while the next step goes on, or, by older sources, before it begins.",
+        f"World: {json.loads((given.world / 'world.json').read_text())['name']}. A step is a second of simulated time. "
+        f"{given.steps} steps from 08:00 a round, {given.rounds} rounds, each workload in a process of its own: "
+        "medians over steps, then over rounds; percentiles are over steps. Residents follow their schedules, "
+        "robots are on errands. Where anybody observes (256 x 256 RGB, depth, segmentation), all pictures are "
+        "asked for before the next step begins.",
         "",
     ]
-    results = {}
-    for name in _TITLES:
-        for which, source in sources.items():
-            results[name, which] = measured(name, source, given)
+    results: dict[tuple[str, str], list[dict[str, Any]]] = {
+        (name, which): [] for name in given.cases.split(",") for which in sources
+    }
+    for _ in range(given.rounds):
+        for name, which in results:
+            results[name, which].append(measured(name, sources[which], given))
     publish([*lines, *table(results)], given.table)
 
 
