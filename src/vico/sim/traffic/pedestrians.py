@@ -41,6 +41,7 @@ _GAP, _GAP_WHEN_JAMMED = 0.1, 0.04  # kept from others, m
 _ANGLES = np.array([0.0, -0.35, 0.35, -0.7, 0.7, -1.1, 1.1, -1.6, 1.6, -2.3, 2.3, 3.1])
 _FORWARD = 9
 _CARS_FIRST_AFTER, _CARS_FIRST_UNTIL = 10.0, 12.0  # s waited by a car that goes first then, and by the pedestrian
+_LET_GO_AFTER = 5.0  # s after which companions of who gets nowhere go their own ways: they may be in the way
 _LEFT_BEHIND = 15.0  # s after which a companion whose leader has crossed crosses, too
 _GIVE_UP_CROSSING = 20.0, 10.0  # s waited for a crossing before turning round, and more by `lateral_share`
 _OFF_CROSSING = 1.3  # m walked after which the body is off the crossing
@@ -401,8 +402,11 @@ def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, pace
         b = first + i
         x, y = shapes.x[b], shapes.y[b]
         near = _nearby(shapes, grid, b, buffer)
-        leader = pedestrians[i if walker.leader == NONE else walker.leader]
-        share = 1.0 if walker.group_size == 1 else _group_pace(paths, pedestrians, i, shapes, near, first, dt)
+        led_by = walker.leader
+        leader = pedestrians[i if led_by == NONE else led_by]
+        if leader.jammed_time > _LET_GO_AFTER:
+            walker.leader = NONE  # in this step it goes its own way
+        share = 1.0 if walker.group_size == 1 or leader.jammed_time > _LET_GO_AFTER else _group_pace(paths, pedestrians, i, shapes, near, first, dt)
         if asked[i]:
             share = max(share, 1.0)
         is_waiting = advance_follow_point(paths, walker, leader, junctions, asked[i], x, y, dt)
@@ -419,6 +423,7 @@ def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, pace
         _note_gait(walker, step > 0.0, dt)
         walker.distance_walked += step
         _note_progress(paths, walker, shapes.x[b], shapes.y[b], is_waiting or share < _WAITS_BELOW, dt)
+        walker.leader = led_by
 
 
 @compiled

@@ -114,7 +114,10 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
             and not at_signal
             and not request_junctions(net, fleet, junctions, vehicle, request, view)
         )
-        vehicle.junction_wait = vehicle.junction_wait + dt if is_refused and speed < _CREEP else 0.0
+        if speed >= _CREEP or not (is_refused or at_signal):
+            vehicle.junction_wait = 0.0
+        elif is_refused:
+            vehicle.junction_wait += dt  # and at red it keeps what it has waited: its green was too short for it
 
         wanted = desired_speed(net, vehicle)
         stop, limit = stop_and_speed_limit(net, vehicle, look, stop_distance, let_in_distance, wanted)
