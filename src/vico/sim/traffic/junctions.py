@@ -117,19 +117,26 @@ def _exit_is_long_enough(vehicle, request, leave):  # type: ignore[no-untyped-de
 
 
 @compiled
-def _exit_is_free(vehicle, leave, view, vehicles):  # type: ignore[no-untyped-def]
-    """Return whether no vehicle is where this one would stand: whoever stands there may stay."""
+def _who_is_at_exit(vehicle, leave, view, vehicles):  # type: ignore[no-untyped-def]
+    """Return the first vehicle that is where this one would stand, or `NONE`: whoever stands there may stay."""
     if leave.start < 0.0:
-        return True
+        return NONE
     room = min(leave.to_come + vehicle.length + STANDING_ROOM, max(leave.clear, 0.0))
     x, y, _, _ = point_on_path(view.path, leave.start + (room - vehicle.length) / 2)
     nearby = bodies_around(vehicle.index, x, y, (room + vehicle.length) / 2 + _AROUND, view.beyond)
     places = 5 + int(leave.to_come / _APART)
     for i in range(1, places + 1):
         there = leave.start + room * i / places
-        if touched_at(view.path, view.outline, there, nearby, _GAP, _GAP, vehicles) >= 0:
-            return False
-    return True
+        hit = touched_at(view.path, view.outline, there, nearby, _GAP, _GAP, vehicles)
+        if hit >= 0:
+            return nearby[hit].body
+    return NONE
+
+
+@compiled
+def _waits_outside(net, vehicle):  # type: ignore[no-untyped-def]
+    """Return whether a vehicle waits for a junction before it: for ever, if who has waited longer cannot pass it."""
+    return vehicle.junction_wait > 0.0 and vehicle.granted_count == 0 and net.lanes[vehicle.lane].junction < 0
 
 
 @compiled
@@ -172,7 +179,11 @@ def may_enter_junction(net, fleet, junctions, vehicle, request, leave, view):  #
     lane = vehicle.planned_lanes[leave.last] if leave.start >= 0.0 else NONE
     if lane >= 0 and is_overtaken(junctions.longest_exit_wait[lane], counted_wait(junctions, vehicle)):
         return False
-    if not _exit_is_free(vehicle, leave, view, len(fleet)):
+    other = _who_is_at_exit(vehicle, leave, view, len(fleet))
+    if other >= 0 and _waits_outside(net, fleet[other]):
+        vehicle.kept_out_from = fleet[other].lane  # that one goes first, and who comes behind it stays back
+        return False
+    if other >= 0:
         vehicle.queued_exit = lane
         return False
     return not lets_out or _way_is_free(vehicle, leave, view, len(fleet))

@@ -14,6 +14,7 @@ from vico.sim.traffic.state import NONE, PRESENT
 _REAR_GAP, _FRONT_GAP = 7.0, 8.0  # m that have to be free on the other lane behind the front's place and ahead of it
 _LET_IN_GAP, _CUT_IN_GAP = 2.0, 3.0  # m behind a bus that is let in, and ahead of it
 _VEHICLE_GAP, _PERSON_GAP = 0.1, 0.3  # m kept sideways on the other lane
+_SWING_OUT, _PLACES = 6.0, 5  # m that a car has to have free to swing out, and places where that is looked at
 _LANE_POINTS = 64
 _QUEUE_GAP, _QUEUE_SPEED = 15.0, 0.5  # m, share of the desired speed: nearer and slower leaders are a queue
 _LEAST_TIME = 6.0  # s between two lane changes of a car
@@ -65,6 +66,16 @@ def change_as_route_does(net, vehicle, view):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _can_swing_out(path, swerving, offset, places, view):  # type: ignore[no-untyped-def]
+    """Return whether a vehicle touches nobody at the first so many places of its lane change."""
+    for i in range(places):
+        there = offset + _SWING_OUT * i / _PLACES
+        if touched_at(path, swerving, there, view.nearby, TOUCH, TOUCH, ANY_BODY) >= 0:
+            return False
+    return True
+
+
+@compiled
 def is_gap_accepted(net, target, offset, lateral_offset, is_let_in, view):  # type: ignore[no-untyped-def]
     """Return whether nobody is in the way on lane `target`, from a gap behind to the end of the lane change.
 
@@ -86,7 +97,8 @@ def is_gap_accepted(net, target, offset, lateral_offset, is_let_in, view):  # ty
         if touched_at(path, straight, there, view.nearby, _VEHICLE_GAP, _PERSON_GAP) >= 0:
             return False
     swerving = changing_lane(view.outline, lateral_offset, -offset)
-    return touched_at(path, swerving, offset, view.nearby, TOUCH, TOUCH, ANY_BODY) < 0
+    # A car swings out only if it gets across now: halfway, behind who stands there, it would be in the way of both.
+    return _can_swing_out(path, swerving, offset, 1 if is_let_in else _PLACES, view)
 
 
 @compiled

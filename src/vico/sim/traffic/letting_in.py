@@ -7,8 +7,11 @@ import numpy as np
 from vico.io.compiled import compiled
 from vico.sim.traffic.path import LANE_CHANGE, project_on_polyline
 from vico.sim.traffic.route import NEVER, route_lane
+from vico.sim.traffic.state import NONE
 
 _REAR_GAP = 4.0  # m behind a bus that are left for it
+_SET_BACK = 5.0  # m before a lane's end at which vehicles stay out of the way of who does not get past there ...
+_KEPT_OUT = 10.0  # ... and has waited for so long, s
 _CLOSER = 1.5  # m nearer to a bus than that, a vehicle still stays behind it
 _AFTER_ANOTHER = 2.0  # m driven straight between two lane changes
 
@@ -39,9 +42,15 @@ def room_to_change(net, vehicle):  # type: ignore[no-untyped-def]
 
 @compiled
 def places_to_let_in(net, fleet, shapes):  # type: ignore[no-untyped-def]
-    """Return for each lane where vehicles stop to let a bus in that waits beside it: metres along it, else `NEVER`."""
+    """Return for each lane where vehicles stop to let others in: metres along it, else `NEVER`.
+
+    That is a bus that waits beside it, or who does not get past those who wait at its end.
+    """
     places = np.full(len(net.lanes), NEVER)
     for vehicle in fleet:
+        kept, room = vehicle.kept_out_from, vehicle.length + _SET_BACK
+        if kept != NONE and vehicle.junction_wait > _KEPT_OUT and net.lanes[kept].length > room:
+            places[kept] = min(places[kept], net.lanes[kept].length - _SET_BACK)
         if vehicle.route < 0 or vehicle.at_stop or vehicle.planned_count > 0 or vehicle.lateral_offset != 0.0:
             continue
         is_stop_ahead = vehicle.stop_route_index == vehicle.route_index and vehicle.stop_offset > vehicle.offset - 1.0

@@ -406,7 +406,11 @@ def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, pace
         leader = pedestrians[i if led_by == NONE else led_by]
         if leader.jammed_time > _LET_GO_AFTER:
             walker.leader = NONE  # in this step it goes its own way
-        share = 1.0 if walker.group_size == 1 or leader.jammed_time > _LET_GO_AFTER else _group_pace(paths, pedestrians, i, shapes, near, first, dt)
+        share = (
+            1.0
+            if walker.group_size == 1 or leader.jammed_time > _LET_GO_AFTER
+            else _group_pace(paths, pedestrians, i, shapes, near, first, dt)
+        )
         if asked[i]:
             share = max(share, 1.0)
         is_waiting = advance_follow_point(paths, walker, leader, junctions, asked[i], x, y, dt)

@@ -95,6 +95,7 @@ VEHICLE_STATE: list[tuple[Any, ...]] = [
     ("junction_wait", _F),  # how long it has stood before a junction it asked for and did not get, s
     ("queued_junction", _I),  # junction cluster that somebody else has, or has waited longer for; else NONE
     ("queued_exit", _I),  # lane beyond the junction on which there is no room for it to stand; else NONE
+    ("kept_out_from", _I),  # lane at whose end somebody waits who stands in its way to that room; else NONE
     ("time_since_lane_change", _F),  # s
     ("route_index", _I),  # buses: position of its lane in its route
     ("stop_route_index", _I),  # buses: position in its route of the lane with the next stop
@@ -353,6 +354,7 @@ def new_fleet(n: int, seed: int) -> Records:
         "gives_way_to",
         "queued_junction",
         "queued_exit",
+        "kept_out_from",
         "stop_route_index",
         "goal",
     ):

@@ -106,7 +106,7 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         gap, leader = find_leader(view, vehicle.offset, look, buffers[1])
         # Who is behind another vehicle does not ask: it would hold the junction that the other one needs.
         is_behind = (0 <= leader < len(fleet) and gap < request.distance) or let_in_distance < request.distance
-        vehicle.queued_junction = vehicle.queued_exit = NONE
+        vehicle.queued_junction = vehicle.queued_exit = vehicle.kept_out_from = NONE
         at_signal = request.planned_index >= 0 and is_stopped_by_signal(net, vehicle, request.planned_index)
         is_refused = (
             request.planned_index >= 0
@@ -114,10 +114,7 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
             and not at_signal
             and not request_junctions(net, fleet, junctions, vehicle, request, view)
         )
-        if speed >= _CREEP or not (is_refused or at_signal):
-            vehicle.junction_wait = 0.0
-        elif is_refused:
-            vehicle.junction_wait += dt  # and at red it keeps what it has waited: its green was too short for it
+        vehicle.junction_wait = _junction_wait(vehicle, is_refused, at_signal, dt)
 
         wanted = desired_speed(net, vehicle)
         stop, limit = stop_and_speed_limit(net, vehicle, look, stop_distance, let_in_distance, wanted)
@@ -161,6 +158,17 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
                 change_as_route_does(net, vehicle, view)
         elif 0 <= leader < len(fleet) and wants_lane_change(net, vehicle, gap, leading, wanted):
             change_to_emptier_lane(net, fleet, vehicle, view)
+
+
+@compiled
+def _junction_wait(vehicle, is_refused, at_signal, dt):  # type: ignore[no-untyped-def]
+    """Return how long a vehicle has waited for a junction, s.
+
+    At red it keeps what it has waited: its green was too short for it, and it would else begin anew with each.
+    """
+    if vehicle.speed >= _CREEP or not (is_refused or at_signal):
+        return 0.0
+    return vehicle.junction_wait + (dt if is_refused else 0.0)
 
 
 @compiled
@@ -320,7 +328,8 @@ def take_away(net, fleet, v, junctions):  # type: ignore[no-untyped-def]
     vehicle.planned_count = 0
     vehicle.previous_lanes[:] = NONE
     vehicle.speed = vehicle.stopped_time = vehicle.junction_wait = vehicle.lateral_offset = 0.0
-    vehicle.blocker = vehicle.gives_way_to = vehicle.queued_junction = vehicle.queued_exit = NONE
+    vehicle.blocker = vehicle.gives_way_to = NONE
+    vehicle.queued_junction = vehicle.queued_exit = vehicle.kept_out_from = NONE
     vehicle.at_stop, vehicle.lights, vehicle.presence = False, 0, AWAY
 
 
