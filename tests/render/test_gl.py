@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from vico.assets.shapes import ball, box, pose_matrix
 from vico.errors import InputError, MissingExtraError
@@ -15,7 +16,7 @@ from vico.render import Cameras, Lighting, Scene
 from vico.render.frames import PictureRequest, take_pictures
 from vico.render.gl.renderer import GlRenderer
 from vico.render.quality import FINE
-from vico.render.records import UPPER_WINDOWS
+from vico.render.records import GROUND_WINDOWS, ROOM_FRONT, UPPER_WINDOWS
 from vico.render.sensors.batch import Viewers
 from vico.render.sensors.lens import Lens
 from vico.sim.config import SimConfig
@@ -40,6 +41,8 @@ def scene() -> Scene:
         x, y, z = generator.uniform((-10, -20, 1), (30, 20, 6))
         block = box((3, 2, 2 * z), (x, y, z)).of_entity(10 + k)
         static.append(replace(block, material=brick, uv=(block.positions[:, [0, 2]] + block.positions[:, 1:2]) / 3))
+    slab = box((0.02, 3, 3), (-7.99, 1.5, 1.5)).of_entity(30)
+    static.append(replace(slab, material=replace(brick, name="shop"), uv=slab.positions[:, 1:] / 8))
     room = [box((8, 0.2, 3), (100, -3, 1.5)), box((8, 8, 0.2), (100, 0, -0.1)), box((0.2, 8, 3), (104, 0, 1.5))]
     pane = box((0.05, 2, 1), (103.85, -1.5, 1.5))
     room.append(replace(pane, material=replace(ground, name="pane", emission=1.0), uv=pane.positions[:, 1:]))
@@ -51,7 +54,9 @@ def scene() -> Scene:
     made = Scene(
         joined(static), models, indoor=[s.of_entity(60) for s in room], rooms=[[100, 0, 0, 4, 4, 3, 0.0]], lighting=DAY
     )
-    made.arrays.textures.materials["windows"][made.material_names.index("brick")] = UPPER_WINDOWS
+    brick = made.arrays.textures.materials[made.material_names.index("brick")]
+    brick["windows"], brick["storeys"] = UPPER_WINDOWS, 4
+    made.arrays.textures.materials["windows"][made.material_names.index("shop")] = GROUND_WINDOWS
     places = [pose_matrix(*generator.uniform((-8, -18), (30, 18)), 0, k) for k in range(40)]
     made.place(["tree"] * 40, np.array(places), np.arange(100, 140))
     made.place(["cube"], np.array([pose_matrix(102, -1, 0, 0.4)]), [70], indoor=True)
@@ -60,6 +65,17 @@ def scene() -> Scene:
     figure = ball((0.3, 0.3, 0.9), (-7, -5, 0.9), colour=(90, 120, 200)).of_entity(9)
     made.set_skinned(figure.positions, figure.normals, figure.triangles, figure.colour, figure.entity)
     return made
+
+
+def front() -> NDArray[np.void]:
+    """The room lies behind the shop's pane."""
+    record = np.zeros(1, ROOM_FRONT)
+    for name, value in {
+        "x": -8, "inward_x": 1, "room_x": 96, "room_inward_x": 1, "left": -9, "right": 9, "height": 3, "depth": 8,
+        "half_width": 4,
+    }.items():  # fmt: skip
+        record[name] = value
+    return record
 
 
 @pytest.fixture(scope="module")
@@ -99,6 +115,18 @@ def test_both_renderers_take_the_same_pictures(
     assert np.percentile(np.abs(wanted.normals - got.normals)[same], 99) < 1e-2
     # What moves throws no shadow there.
     assert np.abs(wanted.rgb.astype(int) - got.rgb).mean() < 1.0
+
+
+def test_rooms_behind_glass_are_the_same_ones(both: tuple[Scene, GlRenderer]) -> None:
+    made, gl = both
+    made.lighting, made.fronts = DAY, front()
+    look = Cameras(np.array([[-14.0, 0.0, 1.6]]), np.array([[1.0, 0.0, 0.0]]), width=160, height=120)
+    request = PictureRequest(quality=FINE)
+    wanted, got = take_pictures(made, look, request).rgb.astype(int), gl.take(look, request).rgb.astype(int)
+    made.fronts = made.fronts[:0]
+    without = gl.take(look, request).rgb.astype(int)
+    assert np.abs(wanted - got).mean() < 1.0
+    assert (np.abs(without - got).max(axis=-1) > 10).mean() > 0.004
 
 
 @pytest.mark.parametrize(("lamp", "daylight"), [(0.0, 1.0), (1.0, 0.0), (0.0, 0.0)])

@@ -26,7 +26,7 @@ VIEW_X, VIEW_Y, VIEW_Z, SCREEN_X, SCREEN_Y, INVERSE_DEPTH = range(6)
 # end, too. See `vico.render.shading.pixels` for the fields.
 QUEUE, RUN = 256, 8
 STRIDE = QUEUE + 2 * RUN
-REAL_FIELDS, WHOLE_FIELDS = 23, 14
+REAL_FIELDS, WHOLE_FIELDS = 23, 15
 
 
 class Prototypes(NamedTuple):
@@ -166,6 +166,9 @@ class Buffers(NamedTuple):
         Where in `drawn` an item is, -1: nowhere, int32.
     sun, contact
         What moving things leave of the sun and of the light at the ground, 0..1, float32, shape ``(h * w + PAD,)``.
+    glass
+        Share of what lies behind a pane on the ground floor that is seen through it, of 255, uint8, ``(h * w + PAD,)``;
+        written where `interiors` of the light are on.
     changed
         Whether a pixel differs from what is known of the picture, bool, shape ``(h * w + PAD,)``.
     real, whole
@@ -192,6 +195,7 @@ class Buffers(NamedTuple):
     slot: NDArray[np.int32]
     sun: NDArray[np.float32]
     contact: NDArray[np.float32]
+    glass: NDArray[np.uint8]
     changed: NDArray[np.bool_]
     real: NDArray[np.float32]
     whole: NDArray[np.uint32]
@@ -205,6 +209,20 @@ class Buffers(NamedTuple):
         if len(self.strip) != width or len(self.keys) != width * height + PAD:
             return False
         return len(self.candidate) >= _item_count(scene) and self.vertex.shape[1] >= _most_vertices(scene)
+
+    def hold(self, scene: SceneArrays, width: int, height: int) -> bool:
+        """Return whether they are large enough for a picture of this size."""
+        across, down = -(-width // TILE), -(-height // TILE)
+        enough = len(self.strip) >= width and len(self.keys) >= width * height + PAD
+        enough &= len(self.tiles) >= across * down
+        enough &= len(self.blocks) >= -(-across // BLOCK) * -(-down // BLOCK)
+        return enough and len(self.candidate) >= _item_count(scene) and self.vertex.shape[1] >= _most_vertices(scene)
+
+    def cut(self, height: int, width: int) -> Buffers:
+        """Return them as those of a smaller picture."""
+        pixels = height * width + PAD
+        parts = {name: getattr(self, name)[:pixels] for name in ("keys", "sun", "contact", "glass", "changed")}
+        return self._replace(strip=self.strip[:width], **parts)
 
 
 def buffers_for(scene: SceneArrays, width: int, height: int) -> Buffers:
@@ -230,6 +248,7 @@ def buffers_for(scene: SceneArrays, width: int, height: int) -> Buffers:
         slot=np.full(items, -1, np.int32),
         sun=np.ones(pixels + PAD, np.float32),
         contact=np.ones(pixels + PAD, np.float32),
+        glass=np.zeros(pixels + PAD, np.uint8),
         changed=np.zeros(pixels + PAD, np.bool_),
         real=np.zeros(REAL_FIELDS * STRIDE, np.float32),
         whole=np.zeros(WHOLE_FIELDS * STRIDE, np.uint32),

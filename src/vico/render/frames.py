@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.errors import InputError
-from vico.render.arrays import Buffers
+from vico.render.arrays import Buffers, buffers_for
+from vico.render.behind.panes import show_rooms
 from vico.render.cameras import Cameras
 from vico.render.lighting import Lighting
 from vico.render.quality import PLAIN, RenderQuality
@@ -416,10 +417,15 @@ def _camera(scene: Scene, cameras: Cameras, k: int, samples: int) -> Record:
 def _take(scene: Scene, camera: Record, light: Light | None, out: Pictures, how: _How = _USUAL) -> int:
     """Take pictures of one camera; return how many items were drawn."""
     buffers = _buffers(scene, int(camera["width"]), int(camera["height"]))
+    if how.quality.interiors:
+        buffers.glass[:] = 0
     drawn = take(
         scene.arrays, camera, NO_LIGHT if light is None else light, buffers, NOTHING_KEPT, how.moving, new_caster(), out
     )
     if light is not None and out.rgb.size:
+        if how.quality.interiors:
+            draw = partial(_picture_of_room, scene, light, how.moving)
+            show_rooms(scene, camera, light.uniforms, buffers.keys, buffers.glass, draw, out.rgb)
         if how.quality.ambient_occlusion:
             occlude(camera, buffers.keys, out.rgb)
         if how.quality.smooth_edges:
@@ -430,16 +436,32 @@ def _take(scene: Scene, camera: Record, light: Light | None, out: Pictures, how:
 
 def light_of(light: Light, quality: RenderQuality) -> Light:
     """Return the light with what the shader reads of switches."""
-    if not quality.soft_shadows and not quality.reflections:
+    if not (quality.soft_shadows or quality.reflections or quality.interiors):
         return light
     uniforms = light.uniforms.copy()
     if quality.soft_shadows:
         uniforms["shadow_softness"] = _SOFT_TEXELS
+    uniforms["interiors"] = float(quality.interiors)
     if quality.reflections:
         uniforms["glass"] = 1.0
         # Glass is told by what may shine, be it ever so little by day.
         uniforms["lamp_exposure"] = max(float(uniforms["lamp_exposure"]), _LEAST_SHINE)
     return light._replace(uniforms=uniforms)
+
+
+def _picture_of_room(scene: Scene, light: Light, moving: bool, camera: Record) -> NDArray[np.uint8]:
+    """Take the picture of a room that is seen from outdoors."""
+    shape = int(camera["height"]), int(camera["width"])
+    spare = getattr(_local, "room_buffers", None)
+    if spare is None or not spare.hold(scene.arrays, shape[1], shape[0]):
+        # Of any size below: rooms are seen through panes of all sizes.
+        side = 64 * -(-max(shape) // 64)
+        spare = buffers_for(scene.arrays, side, side)
+        _local.room_buffers = spare
+    rgb = np.empty((*shape, 3), np.uint8)
+    pictures = Pictures(rgb, _EMPTY_F32, _EMPTY_I32)
+    take(scene.arrays, camera, light, spare.cut(*shape), NOTHING_KEPT, moving, new_caster(), pictures)
+    return rgb
 
 
 def _buffers(scene: Scene, width: int, height: int) -> Buffers:

@@ -23,12 +23,15 @@ class RenderQuality:
         Edges of what stands before something else are smoothed.
     reflections
         Windows and other glass mirror the sky and the street.
+    interiors
+        Rooms are seen behind windows: the shop's own behind its front, behind others one that might be there.
     """
 
     soft_shadows: bool = False
     ambient_occlusion: bool = False
     smooth_edges: bool = False
     reflections: bool = False
+    interiors: bool = False
 
     @property
     def is_plain(self) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-f4, f8, i4, i8 = np.float32, np.float64, np.int32, np.int64
+f4, f8, i4, i8, u4 = np.float32, np.float64, np.int32, np.int64, np.uint32
 
 VERTEX = np.dtype(
     [
@@ -44,11 +44,13 @@ MATERIAL = np.dtype(
         ("flags", i4),  # bits CUTOUT and DOUBLE_SIDED
         ("emission", f4),  # light of its own, 1 = a white wall in full light
         ("windows", i4),  # whose light it is: NO_WINDOWS, or a column of `SceneArrays.windows` and one
+        ("storeys", i4),  # a facade's picture shows `BAYS` bays by so many storeys; 0: it is none
     ],
     align=True,
 )
 CUTOUT, DOUBLE_SIDED = 1, 2
 NO_WINDOWS, UPPER_WINDOWS, GROUND_WINDOWS = 0, 1, 2
+BAYS = 8
 
 # How many there are: instances in all, those of them that never move (they come first), and avatars.
 COUNTS = np.dtype([("instances", i8), ("static_instances", i8), ("avatars", i8)], align=True)
@@ -146,6 +148,7 @@ LIGHT_UNIFORMS = np.dtype(
         ("snowfall", f4),
         ("shadow_softness", f4),  # radius of the blur of static shadows' rims, texels of their map; 0: none
         ("glass", f4),  # share of what glass mirrors that is shown, 0..1
+        ("interiors", f4),  # 1: windows show what is behind them
         ("unlit_x", f4),  # circle on which all that is fixed and shines is out, metres
         ("unlit_y", f4),
         ("unlit_radius", f4),  # 0 for none
@@ -184,11 +187,39 @@ TRIANGLE_SETUP = np.dtype(
         ("texture_width", f4),  # of the finest level, texels
         ("texture_height", f4),
         ("material", i4),
+        ("window", u4),  # 0, or whose window it is: see `WINDOW_STOREYS`
         ("flags", i4),  # bits FLAT_NORMAL, PLAIN_COLOUR, TWO_SIDED, SHELTERED (nothing lies on it), MOVES
     ],
     align=True,
 )
 FLAT_NORMAL, PLAIN_COLOUR, TWO_SIDED, SHELTERED, MOVES = 1, 2, 4, 8, 16
+
+# A window's number: storeys of the picture in the low bits, whether it is on the ground floor, the building above.
+WINDOW_STOREYS, WINDOW_GROUND, WINDOW_SHIFT = 7, 8, 4
+
+# Glass on a street, and the room behind it: two frames that are laid over each other (right as seen from the street,
+# inwards, up), with their origins at the foot of the door and of the middle of the wall that has it.
+ROOM_FRONT = np.dtype(
+    [
+        ("x", f8),
+        ("y", f8),
+        ("z", f8),
+        ("inward_x", f8),
+        ("inward_y", f8),
+        ("room_x", f8),
+        ("room_y", f8),
+        ("room_z", f8),
+        ("room_inward_x", f8),
+        ("room_inward_y", f8),
+        ("left", f8),  # what belongs to it, metres to the right of the door
+        ("right", f8),
+        ("height", f8),  # of the room, metres
+        ("depth", f8),
+        ("half_width", f8),
+        ("room", i8),  # row of `Scene.rooms`
+    ],
+    align=True,
+)
 
 # Something that moves, as it casts a shadow.
 CASTER = np.dtype(

@@ -29,7 +29,7 @@ from vico.render.instances import (
     with_spare,
 )
 from vico.render.lighting import Lighting, cloud_map, linear_table, sky_table, tone_table, unit
-from vico.render.records import COUNTS, ROOM, SPAN, SPHERE
+from vico.render.records import COUNTS, ROOM, ROOM_FRONT, SPAN, SPHERE
 from vico.render.shading.light import Light, ReliefMap, ShadowMap
 from vico.render.shading.sky import SKY_SIZE, paint_sky
 from vico.render.shadows.maps import relief_map, shadow_map
@@ -65,6 +65,8 @@ class Scene:
     ----------
     material_names
         Of the rows of ``arrays.textures.materials``.
+    fronts
+        Glass on streets with rooms behind it, `ROOM_FRONT`; none unless assigned.
     moment
         Seconds; decides where drops and flakes are in pictures taken now.
 
@@ -116,6 +118,7 @@ class Scene:
         self._lighting = lighting or Lighting()
         self._light: Light | None = None
         self.moment = 0.0
+        self.fronts = np.zeros(0, ROOM_FRONT)
         self._shadow_key: tuple[float, ...] | None = None
         self._shadow: ShadowMap | None = None
         self._relief: ReliefMap | None = None

@@ -41,15 +41,20 @@ def camera_uniforms(cameras: Cameras, k: int, samples: int, room: Record | None)
     camera["hidden_entity"] = np.asarray(cameras.hidden_entity)[k]
     camera["most_taps"] = _QUICK_TAPS if samples == 1 else _FINE_TAPS
     if room is not None:
-        camera["indoors"] = 1
-        for name in ("x", "y", "z", "half_length", "half_width", "height"):
-            camera[f"room_{name}"] = room[name]
-        camera["room_cos"], camera["room_sin"] = np.cos(room["yaw"]), np.sin(room["yaw"])
-        lamp, daylight = float(room["lamp"]), float(room["daylight"])
-        camera["room_lamp"] = lamp
-        camera["room_around"] = lamp + (1.0 - lamp) * (_UNLIT + (_DAYLIT - _UNLIT) * daylight)
-        camera["room_window"] = _NIGHT_WINDOW + (1.0 - _NIGHT_WINDOW) * daylight
+        set_room(camera, room)
     return camera
+
+
+def set_room(camera: Record, room: Record) -> None:
+    """Write into `CAMERA_UNIFORMS` that a room is what is seen."""
+    camera["indoors"] = 1
+    for name in ("x", "y", "z", "half_length", "half_width", "height"):
+        camera[f"room_{name}"] = room[name]
+    camera["room_cos"], camera["room_sin"] = np.cos(room["yaw"]), np.sin(room["yaw"])
+    lamp, daylight = float(room["lamp"]), float(room["daylight"])
+    camera["room_lamp"] = lamp
+    camera["room_around"] = lamp + (1.0 - lamp) * (_UNLIT + (_DAYLIT - _UNLIT) * daylight)
+    camera["room_window"] = _NIGHT_WINDOW + (1.0 - _NIGHT_WINDOW) * daylight
 
 
 def light_uniforms(light: Lighting) -> Record:

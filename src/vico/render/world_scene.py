@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vico.assets.interior import WINDOW
+from vico.render.behind.fronts import room_fronts
 from vico.render.lighting import Lighting
 from vico.render.records import GROUND_WINDOWS, UPPER_WINDOWS
 from vico.render.scene import Scene
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
 
 # Beginnings of the names of materials with windows in them.
 _UPPER, _GROUND = ("wall_", "dormer"), ("ground_", "doors")
+# Storeys in the pictures of those that show bays, the same width everywhere.
+_STOREYS = {"wall_": 4, "ground_": 1}
+# Their panes have pictures of their own of what stands in them.
+_SHOP_WINDOWS = ("ground_shops", "ground_cafes", "ground_loft", "ground_lobby")
 OUTDOOR_LAYERS = ("ground", "buildings", "roofs")
 
 
@@ -47,6 +52,7 @@ def scene_of(
     scene = Scene(static, models, indoor=indoor, rooms=np.array(boxes).reshape(-1, 7), lighting=lighting)
     _tell_windows(scene)
     if rooms:
+        scene.fronts = room_fronts(world)
         glazed = [np.unique(s.entity) for s in indoor if s.material.name == WINDOW]
         known = np.concatenate(glazed) if glazed else np.zeros(0, np.int32)
         scene.rooms["windows"] = np.isin([room.entity for room in world.rooms], known)
@@ -73,4 +79,6 @@ def _tell_windows(scene: Scene) -> None:
     records = scene.arrays.textures.materials
     for k, name in enumerate(scene.material_names):
         if records[k]["emission"] > 0.0:
+            bays = name.startswith(tuple(_STOREYS)) and name not in _SHOP_WINDOWS
+            records[k]["storeys"] = next(n for start, n in _STOREYS.items() if name.startswith(start)) if bays else 0
             records[k]["windows"] = UPPER_WINDOWS * name.startswith(_UPPER) + GROUND_WINDOWS * name.startswith(_GROUND)

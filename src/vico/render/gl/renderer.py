@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError, MissingExtraError
 from vico.render.arrays import ANYWHERE, INDOORS, OUTDOORS, SceneArrays
+from vico.render.behind.panes import show_rooms
 from vico.render.cameras import Cameras
 from vico.render.frames import Frames, PictureRequest, light_of
 from vico.render.lighting import TONE_RANGE, TONE_STEPS
@@ -91,9 +92,11 @@ class GlRenderer:
         camera["most_taps"] = 2 if samples == 1 else 4
         if samples > 1 and request.rgb:
             fine = camera_uniforms(cameras, k, samples, room)
-            wide = self._draw(fine, light, moving=request.moving).colours()
+            wide = self._colours(fine, light, request)
             blocks = wide.reshape(cameras.height, samples, cameras.width, samples, 3).astype(np.float32)
             rgb = np.round(blocks.mean(axis=(1, 3))).astype(np.uint8)
+        elif request.rgb:
+            rgb = self._colours(camera, light, request)
         target = self._draw(camera, light, moving=request.moving)
         if len(frames.depth):
             frames.depth[k] = target.depth()
@@ -102,8 +105,6 @@ class GlRenderer:
         if len(frames.normals):
             frames.normals[k] = target.normals()
         if request.rgb:
-            if samples == 1:
-                rgb = target.colours()
             keys = _keys(target.depth(), target.entities())
             if request.quality.ambient_occlusion:
                 occlude(camera, keys, rgb)
@@ -111,6 +112,19 @@ class GlRenderer:
                 smooth_edges(camera, keys, rgb)
             draw_weather(camera, light, keys, self.scene.moment, rgb)
             frames.rgb[k] = rgb
+
+    def _colours(self, camera: Record, light: Light, request: PictureRequest) -> NDArray[np.uint8]:
+        """Return what a camera sees, with rooms behind glass."""
+        target = self._draw(camera, light, moving=request.moving)
+        rgb = target.colours()
+        if request.quality.interiors:
+            keys, glass = _keys(target.depth(), target.entities()), target.glass()
+
+            def draw(inside: Record) -> NDArray[np.uint8]:
+                return self._draw(inside, light, moving=request.moving).colours()
+
+            show_rooms(self.scene, camera, light.uniforms, keys, glass, draw, rgb)
+        return rgb
 
     def _draw(self, camera: Record, light: Light, *, moving: bool) -> _Target:
         """Draw what a camera sees."""
@@ -245,6 +259,10 @@ class _Target:
         self._buffer.use()
         self._buffer.clear(depth=1.0)
 
+    def glass(self) -> NDArray[np.uint8]:
+        """Return how much of what is behind is seen through each pixel, of 255, in one dimension."""
+        return np.ascontiguousarray(self._read(0, np.uint8, 4)[..., 3]).reshape(-1)
+
     def colours(self) -> NDArray[np.uint8]:
         return np.ascontiguousarray(self._read(0, np.uint8, 4)[..., :3])
 
@@ -315,6 +333,10 @@ def _view_uniforms(camera: Record) -> dict[str, Any]:
         "down": _vector(camera, "down"),
         "forward": _vector(camera, "forward"),
         "scale": (2.0 * focal / float(camera["width"]), 2.0 * focal / float(camera["height"])),
+        "centre": (
+            2.0 * float(camera["centre_x"]) / float(camera["width"]) - 1.0,
+            2.0 * float(camera["centre_y"]) / float(camera["height"]) - 1.0,
+        ),
         "near": float(camera["near"]),
         "far": float(camera["far"]),
         "indoors": int(camera["indoors"]),
@@ -348,6 +370,7 @@ def _light_uniforms(light: Light) -> dict[str, Any]:
         "snow_cover": float(u["snow_cover"]),
         "softness": float(u["shadow_softness"]),
         "glass": float(u["glass"]),
+        "interiors": float(u["interiors"]),
         "tone_scale": (TONE_STEPS - 1) / TONE_RANGE,
         "shadow_frame": tuple(float(v) for v in light.shadow.matrix.T.reshape(-1)),
         "relief_frame": (float(relief.x), float(relief.y), float(relief.texels_per_metre)),
@@ -364,7 +387,8 @@ def _are_in_view(centre: NDArray[Any], radius: NDArray[Any], camera: Record) -> 
     """Return which spheres a camera may see."""
     place, axes = _axes(camera)
     across, down, ahead = ((centre - place) @ axes.T).T
-    tangents = (0.5 * float(camera[side]) / float(camera["focal"]) for side in ("width", "height"))
+    sides = (float(camera["width"]), float(camera["centre_x"])), (float(camera["height"]), float(camera["centre_y"]))
+    tangents = (max(centre, size - centre) / float(camera["focal"]) for size, centre in sides)
     seen = (ahead + radius > camera["near"]) & (ahead - radius < camera["far"])
     for aside, tangent in zip((np.abs(across), np.abs(down)), tangents, strict=True):
         seen &= aside - ahead * tangent <= radius * np.sqrt(1.0 + tangent * tangent)

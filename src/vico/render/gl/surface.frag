@@ -1,6 +1,6 @@
 #version 450
 // What `vico.render.shading` does, pixel by pixel; see there for why.
-layout(std430, binding = 3) readonly buffer Materials { int materials[]; };  // MATERIAL: 4 whole numbers, 1 real, 1 whole
+layout(std430, binding = 3) readonly buffer Materials { int materials[]; };  // MATERIAL: 4 whole numbers, 1 real, 2 whole
 layout(std430, binding = 4) readonly buffer Starts { int starts[]; };
 layout(std430, binding = 5) readonly buffer Texels { uint texels[]; };
 layout(std430, binding = 11) readonly buffer Windows { float windows[]; };  // shares of upper and ground floors
@@ -12,7 +12,7 @@ uniform mat4x3 shadow_frame;
 uniform vec3 relief_frame;  // corner, texels a metre
 uniform vec3 eye, sun, sun_colour, ambient, tilt, haze, unlit;
 uniform vec2 side;
-uniform float near, far, haze_per_metre, lamp_exposure, wet, snow_cover, softness, glass, tone_scale;
+uniform float near, far, haze_per_metre, lamp_exposure, wet, snow_cover, softness, glass, interiors, tone_scale;
 uniform vec4 room_place, room_size;  // centre and cosine of the yaw; half length, half width, height, sine
 uniform vec3 room_light;  // shares of lamps, of light all around, and of what windows show by day
 uniform int indoors, hidden, most_taps, levels_each, is_person;
@@ -120,11 +120,50 @@ vec3 in_room(vec3 at, vec3 n, vec3 base, float glass_) {
     return base * ((0.36 + 0.05 * n.z + 0.03 * n.x) * light.y + lamp * light.x) * corner * tint;
 }
 
+float share_of(uint number, int low) {
+    return float((number >> low) & 255u) / 255.0;
+}
+
+// What is behind a pane of an upper floor or a plain ground floor: `look_into_windows`.
+vec3 room_behind(vec3 way_to, vec3 n, float storeys, float shine) {  // `shine` is 0 where no lamp is on
+    vec3 to = way_to / max(length(way_to), 1e-12);
+    float ahead = max(-dot(to.xy, n.xy), 0.02), aside = to.y * n.x - to.x * n.y, up = to.z;
+    vec2 cell = uv * vec2(8.0, storeys), corner = floor(cell), at = (cell - corner) * vec2(3.2, 2.9);
+    uint bay = uint(int(corner.x) & 7), storey = uint(int(corner.y) & 3);
+    uint number = uint(entity) * 0x9E3779B1u;
+    number ^= (bay * 4u + storey + 1u) * 0x85EBCA6Bu;
+    number = (number ^ (number >> 15)) * 0x2C1B3C6Du;
+    number ^= number >> 13;
+    float first = share_of(number, 0), second = share_of(number, 8), third = share_of(number, 16);
+    float deep = 2.6 + 2.4 * first;
+    float to_side = (aside > 0.0 ? 3.2 - at.x : at.x) / max(abs(aside), 1e-4);
+    float to_level = (up > 0.0 ? 2.9 - at.y : at.y) / max(abs(up), 1e-4);
+    float to_back = deep / ahead, to_thing = 0.62 * deep / ahead;
+    float way = min(to_side, min(to_level, to_back));
+    bool is_level = to_level <= to_side && to_level <= to_back, is_back = to_back < to_side && to_back < to_level;
+    vec2 t = at + vec2(aside, up) * to_thing;
+    float left = 0.3 + 1.4 * second;
+    bool is_thing = to_thing < way && t.x > left && t.x < left + 1.1 && t.y < 0.7 + 1.2 * third;
+    way = is_thing ? to_thing : way;
+    vec3 hit = vec3(at.x + aside * way, ahead * way, at.y + up * way);
+    bool is_frame = is_back && abs(hit.x - 0.7 - 1.6 * third) < 0.36 && abs(hit.z - 1.65) < 0.28;
+    float warm = 0.50 + 0.34 * second, dark = 0.12 + 0.22 * first;
+    vec3 base = vec3(warm, warm * (0.90 + 0.08 * third), warm * (0.70 + 0.25 * first));
+    if (is_level) base = up > 0.0 ? vec3(0.82, 0.80, 0.76) : vec3(0.30, 0.20, 0.12);
+    if (is_frame) base = vec3(0.22, 0.26, 0.30);
+    if (is_thing) base = dark * vec3(1.0, 0.8, 0.62);
+    vec3 away = hit - vec3(1.6, 0.5 * deep, 2.5);
+    float glow = is_level && up > 0.0 && dot(away.xy, away.xy) < 0.05 ? 2.2 : 0.0;
+    float lamp = (1.7 / (1.0 + 1.6 * dot(away, away)) + 0.06 + glow) * shine * 1.25;
+    float daylight = 0.26 / (1.0 + 0.30 * hit.y) * (1.0 - 0.8 * min(lamp_exposure / 1.6, 1.0));
+    return base * (daylight * ambient + lamp * vec3(1.0, 0.84, 0.58));
+}
+
 void main() {
-    int log2_width = materials[6 * material], log2_height = materials[6 * material + 1];
-    int levels = materials[6 * material + 2], flags = materials[6 * material + 3];
-    float emission = intBitsToFloat(materials[6 * material + 4]);
-    int column = materials[6 * material + 5];
+    int log2_width = materials[7 * material], log2_height = materials[7 * material + 1];
+    int levels = materials[7 * material + 2], flags = materials[7 * material + 3];
+    float emission = intBitsToFloat(materials[7 * material + 4]);
+    int column = materials[7 * material + 5];
     if (column > 0) emission *= windows[2 * min(entity, windows.length() / 2 - 1) + column - 1];
     bool both = (flags & 2) != 0;
     vec2 dx = dFdx(uv), dy = dFdy(uv);
@@ -138,6 +177,7 @@ void main() {
         base = vec4(base.rgb * found.rgb, found.a);
     }
     vec3 light;
+    float seen = 0.0;
     if (indoors != 0) {
         light = in_room(at, n, base.rgb, levels > 0 ? emission * base.a : 0.0);
     } else {
@@ -167,6 +207,14 @@ void main() {
         vec3 around = (ambient + n.z * tilt + dot(n.xy, side)) * sky_share(at, n);
         light = base.rgb * (facing * sun_colour + around + shine * vec3(1.0, 0.86, 0.62));
         light = (1.0 - clear) * (haze + glow * sun_colour) + clear * light;
+        if (interiors > 0.0 && column > 0 && levels > 0) {
+            float ahead = max(-dot(place.xy, n.xy) / max(length_, 1e-12), 0.02);
+            float pane = min(base.a * 50.0, 1.0) * clamp(1.0 - 3.0 * abs(n.z), 0.0, 1.0);
+            pane *= 0.90 * (1.0 - pow(1.0 - min(ahead, 1.0), 5.0)) * clamp((70.0 - length_) / 25.0, 0.0, 1.0);
+            seen = column == 2 ? pane : 0.0;
+            int storeys = materials[7 * material + 6];
+            if (storeys > 0 && pane > 0.0) light = mix(light, room_behind(place, n, float(storeys), base.a > 0.1 ? shine : 0.0), 0.66 * pane);
+        }
         if (glass > 0.0) {
             float front = clamp(-dot(place, n) / max(length_, 1e-12), 0.0, 1.0);
             float fresnel = 0.10 + 0.9 * pow(1.0 - front, 5.0);
@@ -177,7 +225,7 @@ void main() {
         }
     }
     ivec3 row = ivec3(clamp(light * tone_scale, vec3(0.0), vec3(4095.0)));
-    out_colour = vec4(tone[row.r], tone[row.g], tone[row.b], 255.0) / 255.0;
+    out_colour = vec4(tone[row.r], tone[row.g], tone[row.b], floor(255.0 * seen)) / 255.0;
     out_depth = depth;
     out_entity = entity;
     out_normal = vec4(n, 0.0);

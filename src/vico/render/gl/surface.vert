@@ -10,6 +10,7 @@ layout(std430, binding = 8) readonly buffer Chosen { int chosen[]; };
 uniform int base, first, is_instance, is_person, first_moving;
 uniform vec3 eye, right, down, forward;
 uniform vec2 scale;  // 2 * focal / size of the picture
+uniform vec2 centre;  // of the picture, beside its optical axis, halves of its size
 uniform float near;
 
 out vec3 place;  // from the eye, world's axes
@@ -45,5 +46,5 @@ void main() {
     }
     depth = dot(place, forward);
     // Rows of the picture go down: its first one is the lowest of the frame buffer.
-    gl_Position = vec4(dot(place, right) * scale.x, dot(place, down) * scale.y, depth - 2.0 * near, depth);
+    gl_Position = vec4(dot(place, right) * scale.x + centre.x * depth, dot(place, down) * scale.y + centre.y * depth, depth - 2.0 * near, depth);
 }

@@ -12,17 +12,50 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.render.arrays import QUEUE, STRIDE
+from vico.render.arrays import QUEUE
 from vico.render.compiled import inlined, kernel
 from vico.render.lighting import TONE_RANGE, TONE_STEPS
-
-# Fields, float32: texture coordinates in texels and their step between samples; colour; normal; position; share of the
-# sky that is seen; light of its own; shares of the sun and the sky that moving things leave.
-U, V, SU, SV, RED, GREEN, BLUE, NX, NY, NZ, X, Y, Z, SKY, SHINE, SUN, AROUND = (k * STRIDE for k in range(17))
-_F, _G, _A, _B, _LEVEL, _LIT = (k * STRIDE for k in range(17, 23))
-# Fields, uint32: first texel, columns and rows of the texture's level, and the pixel.
-START, COLUMNS, ROWS, PIXEL = (k * STRIDE for k in range(4))
-_I0, _I1, _I2, _I3, _T0, _T1, _T2, _T3, _PAIR, _MIDDLE = (k * STRIDE for k in range(4, 14))
+from vico.render.shading.fields import (
+    AROUND,
+    BLUE,
+    COLUMNS,
+    GREEN,
+    I0,
+    I1,
+    I2,
+    I3,
+    LEVEL,
+    LIT,
+    MIDDLE,
+    NX,
+    NY,
+    NZ,
+    PAIR,
+    PIXEL,
+    RED,
+    ROWS,
+    SEEN,
+    SHINE,
+    SKY,
+    START,
+    SU,
+    SUN,
+    SV,
+    T0,
+    T1,
+    T2,
+    T3,
+    A,
+    B,
+    F,
+    G,
+    U,
+    V,
+    X,
+    Y,
+    Z,
+)
+from vico.render.shading.interiors import look_into_windows
 
 
 class PixelQueue(NamedTuple):
@@ -32,10 +65,13 @@ class PixelQueue(NamedTuple):
     ----------
     real, whole
         float32 and uint32, shape ``(fields * STRIDE,)``.
+    glass
+        As in `Buffers`.
     """
 
     real: NDArray[np.float32]
     whole: NDArray[np.uint32]
+    glass: NDArray[np.uint8]
 
 
 class MovingShadows(NamedTuple):
@@ -72,32 +108,32 @@ def look_up(texels: Any, real: Any, whole: Any, along: Any) -> None:
     for i in range(QUEUE):
         x, y = real[U + i] + along * real[SU + i], real[V + i] + along * real[SV + i]
         floor_x, floor_y = np.floor(x), np.floor(y)
-        real[_F + i], real[_G + i] = x - floor_x, y - floor_y
-        whole[_I0 + i], whole[_I1 + i] = np.int32(floor_x), np.int32(floor_y)
+        real[F + i], real[G + i] = x - floor_x, y - floor_y
+        whole[I0 + i], whole[I1 + i] = np.int32(floor_x), np.int32(floor_y)
     # Every sum is cut to 32 bits at once: else the compiler calculates with 64, in twice as many steps.
     for i in range(QUEUE):
         last_column, last_row = np.uint32(whole[COLUMNS + i] - _UNIT), np.uint32(whole[ROWS + i] - _UNIT)
-        left = np.uint32(whole[_I0 + i] & last_column)
-        right = np.uint32(np.uint32(whole[_I0 + i] + _UNIT) & last_column)
-        row, next_row = whole[_I1 + i] & last_row, np.uint32(whole[_I1 + i] + _UNIT) & last_row
+        left = np.uint32(whole[I0 + i] & last_column)
+        right = np.uint32(np.uint32(whole[I0 + i] + _UNIT) & last_column)
+        row, next_row = whole[I1 + i] & last_row, np.uint32(whole[I1 + i] + _UNIT) & last_row
         upper = np.uint32(whole[START + i] + np.uint32(row * whole[COLUMNS + i]))
         lower = np.uint32(whole[START + i] + np.uint32(next_row * whole[COLUMNS + i]))
-        whole[_I0 + i], whole[_I1 + i] = np.uint32(upper + left), np.uint32(upper + right)
-        whole[_I2 + i], whole[_I3 + i] = np.uint32(lower + left), np.uint32(lower + right)
+        whole[I0 + i], whole[I1 + i] = np.uint32(upper + left), np.uint32(upper + right)
+        whole[I2 + i], whole[I3 + i] = np.uint32(lower + left), np.uint32(lower + right)
     for i in range(QUEUE):
-        whole[_T0 + i] = texels[whole[_I0 + i]]
-        whole[_T1 + i] = texels[whole[_I1 + i]]
-        whole[_T2 + i] = texels[whole[_I2 + i]]
-        whole[_T3 + i] = texels[whole[_I3 + i]]
+        whole[T0 + i] = texels[whole[I0 + i]]
+        whole[T1 + i] = texels[whole[I1 + i]]
+        whole[T2 + i] = texels[whole[I2 + i]]
+        whole[T3 + i] = texels[whole[I3 + i]]
     for i in range(QUEUE):
-        f, g = np.int32(real[_F + i] * np.float32(256.0)), np.int32(real[_G + i] * np.float32(256.0))
+        f, g = np.int32(real[F + i] * np.float32(256.0)), np.int32(real[G + i] * np.float32(256.0))
         wd = np.int32(np.int32(f * g) >> np.int32(8))
         wb, wc = np.int32(f - wd), np.int32(g - wd)
         wa = np.int32(np.int32(np.int32(256) - f) - wc)
-        a, b, c, d = whole[_T0 + i], whole[_T1 + i], whole[_T2 + i], whole[_T3 + i]
-        whole[_PAIR + i] = _weighed(a, b, c, d, np.uint32(wa), np.uint32(wb), np.uint32(wc), np.uint32(wd))
+        a, b, c, d = whole[T0 + i], whole[T1 + i], whole[T2 + i], whole[T3 + i]
+        whole[PAIR + i] = _weighed(a, b, c, d, np.uint32(wa), np.uint32(wb), np.uint32(wc), np.uint32(wd))
         a, b, c, d = a >> _EIGHT, b >> _EIGHT, c >> _EIGHT, d >> _EIGHT
-        whole[_MIDDLE + i] = _weighed(a, b, c, d, np.uint32(wa), np.uint32(wb), np.uint32(wc), np.uint32(wd))
+        whole[MIDDLE + i] = _weighed(a, b, c, d, np.uint32(wa), np.uint32(wb), np.uint32(wc), np.uint32(wd))
 
 
 @inlined
@@ -119,26 +155,28 @@ def sample_albedo(texels: Any, real: Any, whole: Any, taps: int) -> None:
     share = np.float32(1.0 / taps)
     factor = np.float32(1.0 / (256.0 * 255.0)) * share
     for i in range(QUEUE):
-        real[_A + i], real[_B + i], real[_LEVEL + i], real[_LIT + i] = _ZERO, _ZERO, _ZERO, _ZERO
+        real[A + i], real[B + i], real[LEVEL + i], real[LIT + i] = _ZERO, _ZERO, _ZERO, _ZERO
     for tap in range(taps):
         look_up(texels, real, whole, (np.float32(tap) + _HALF) * share - _HALF)
         for i in range(QUEUE):
-            pair, middle = whole[_PAIR + i], whole[_MIDDLE + i]
-            real[_A + i] += np.float32(np.int32(pair & 0xFFFF))
-            real[_B + i] += np.float32(np.int32(middle & 0xFFFF))
-            real[_LIT + i] += np.float32(np.int32(middle >> 16))
-            real[_LEVEL + i] += np.float32(np.int32(pair >> 16))
+            pair, middle = whole[PAIR + i], whole[MIDDLE + i]
+            real[A + i] += np.float32(np.int32(pair & 0xFFFF))
+            real[B + i] += np.float32(np.int32(middle & 0xFFFF))
+            real[LIT + i] += np.float32(np.int32(middle >> 16))
+            real[LEVEL + i] += np.float32(np.int32(pair >> 16))
     for i in range(QUEUE):
-        r, g, b = real[_A + i] * factor, real[_B + i] * factor, real[_LEVEL + i] * factor
+        r, g, b = real[A + i] * factor, real[B + i] * factor, real[LEVEL + i] * factor
         real[RED + i] *= r * (_P1 + r * (_P2 + r * _P3))
         real[GREEN + i] *= g * (_P1 + g * (_P2 + g * _P3))
         real[BLUE + i] *= b * (_P1 + b * (_P2 + b * _P3))
-        real[SHINE + i] *= real[_LIT + i] * factor
+        lit = real[LIT + i] * factor
+        real[LIT + i] = lit
+        real[SHINE + i] *= lit
 
 
 @kernel
 def sun_visibility(light: Any, shadow: Any, real: Any, whole: Any) -> None:
-    """Leave in `real[_F:]` how much of the sun every place gets: its slope, and shadows.
+    """Leave in `real[F:]` how much of the sun every place gets: its slope, and shadows.
 
     Static shadows are four comparisons around a position of the shadow map, blended.
     """
@@ -148,17 +186,17 @@ def sun_visibility(light: Any, shadow: Any, real: Any, whole: Any) -> None:
     size = shadow.closeness.shape[0]
     flat = shadow.closeness.reshape(-1)
     for i in range(QUEUE):
-        at = whole[_I0 + i]
+        at = whole[I0 + i]
         below = at + np.uint32(size)
-        whole[_T0 + i], whole[_T1 + i] = flat[at], flat[at + np.uint32(1)]
-        whole[_T2 + i], whole[_T3 + i] = flat[below], flat[below + np.uint32(1)]
+        whole[T0 + i], whole[T1 + i] = flat[at], flat[at + np.uint32(1)]
+        whole[T2 + i], whole[T3 + i] = flat[below], flat[below + np.uint32(1)]
     for i in range(QUEUE):
-        a, b, level = real[_A + i], real[_B + i], real[_LEVEL + i]
-        t0, t1 = np.float32(np.int32(whole[_T0 + i])), np.float32(np.int32(whole[_T1 + i]))
-        t2, t3 = np.float32(np.int32(whole[_T2 + i])), np.float32(np.int32(whole[_T3 + i]))
+        a, b, level = real[A + i], real[B + i], real[LEVEL + i]
+        t0, t1 = np.float32(np.int32(whole[T0 + i])), np.float32(np.int32(whole[T1 + i]))
+        t2, t3 = np.float32(np.int32(whole[T2 + i])), np.float32(np.int32(whole[T3 + i]))
         low = (_ONE - a if t0 <= level else _ZERO) + (a if t1 <= level else _ZERO)
         high = (_ONE - a if t2 <= level else _ZERO) + (a if t3 <= level else _ZERO)
-        real[_F + i] *= (low + b * (high - low)) * real[SUN + i]
+        real[F + i] *= (low + b * (high - low)) * real[SUN + i]
 
 
 @kernel
@@ -170,24 +208,24 @@ def soft_sun_visibility(light: Any, shadow: Any, real: Any, whole: Any) -> None:
     flat = shadow.closeness.reshape(-1)
     r = light.shadow_softness
     for i in range(QUEUE):
-        real[_G + i] = _ZERO
+        real[G + i] = _ZERO
     for tap in range(_SOFT_TAPS):
         du, dv = r * _SOFT_U[tap], r * _SOFT_V[tap]
         _project_aside(shadow.matrix, size, du, dv, real, whole)
         for i in range(QUEUE):
-            at = whole[_I0 + i]
+            at = whole[I0 + i]
             below = at + np.uint32(size)
-            whole[_T0 + i], whole[_T1 + i] = flat[at], flat[at + np.uint32(1)]
-            whole[_T2 + i], whole[_T3 + i] = flat[below], flat[below + np.uint32(1)]
+            whole[T0 + i], whole[T1 + i] = flat[at], flat[at + np.uint32(1)]
+            whole[T2 + i], whole[T3 + i] = flat[below], flat[below + np.uint32(1)]
         for i in range(QUEUE):
-            a, b, level = real[_A + i], real[_B + i], real[_LEVEL + i]
-            t0, t1 = np.float32(np.int32(whole[_T0 + i])), np.float32(np.int32(whole[_T1 + i]))
-            t2, t3 = np.float32(np.int32(whole[_T2 + i])), np.float32(np.int32(whole[_T3 + i]))
+            a, b, level = real[A + i], real[B + i], real[LEVEL + i]
+            t0, t1 = np.float32(np.int32(whole[T0 + i])), np.float32(np.int32(whole[T1 + i]))
+            t2, t3 = np.float32(np.int32(whole[T2 + i])), np.float32(np.int32(whole[T3 + i]))
             low = (_ONE - a if t0 <= level else _ZERO) + (a if t1 <= level else _ZERO)
             high = (_ONE - a if t2 <= level else _ZERO) + (a if t3 <= level else _ZERO)
-            real[_G + i] += low + b * (high - low)
+            real[G + i] += low + b * (high - low)
     for i in range(QUEUE):
-        real[_F + i] *= np.float32(1.0 / _SOFT_TAPS) * real[_G + i] * real[SUN + i]
+        real[F + i] *= np.float32(1.0 / _SOFT_TAPS) * real[G + i] * real[SUN + i]
 
 
 # Where a soft shadow is looked up around a point, in its radius.
@@ -225,30 +263,30 @@ def mirror_surroundings(light: Any, camera: Any, real: Any, whole: Any) -> None:
         green = wall_green + sky * (haze_green + high * (zenith_green - haze_green) - wall_green)
         blue = wall_blue + sky * (haze_blue + high * (zenith_blue - haze_blue) - wall_blue)
         a, b, c = (
-            np.float32(np.int32(whole[_I0 + i])),
-            np.float32(np.int32(whole[_I1 + i])),
-            np.float32(np.int32(whole[_I2 + i])),
+            np.float32(np.int32(whole[I0 + i])),
+            np.float32(np.int32(whole[I1 + i])),
+            np.float32(np.int32(whole[I2 + i])),
         )
-        whole[_I0 + i] = np.int32(min(max(_ZERO, a + share * (red * _TONE_SCALE - a)), _TONE_LAST))
-        whole[_I1 + i] = np.int32(min(max(_ZERO, b + share * (green * _TONE_SCALE - b)), _TONE_LAST))
-        whole[_I2 + i] = np.int32(min(max(_ZERO, c + share * (blue * _TONE_SCALE - c)), _TONE_LAST))
+        whole[I0 + i] = np.int32(min(max(_ZERO, a + share * (red * _TONE_SCALE - a)), _TONE_LAST))
+        whole[I1 + i] = np.int32(min(max(_ZERO, b + share * (green * _TONE_SCALE - b)), _TONE_LAST))
+        whole[I2 + i] = np.int32(min(max(_ZERO, c + share * (blue * _TONE_SCALE - c)), _TONE_LAST))
 
 
 @inlined
 def face_sun(light: Any, real: Any) -> Any:
-    """Leave in `real[_F:]` the cosine of the sun's slope on every place, 0 where it is behind; return the largest."""
+    """Leave in `real[F:]` the cosine of the sun's slope on every place, 0 where it is behind; return the largest."""
     sun_x, sun_y, sun_z = light.sun_x, light.sun_y, light.sun_z
     most = _ZERO
     for i in range(QUEUE):
         facing = max(real[NX + i] * sun_x + real[NY + i] * sun_y + real[NZ + i] * sun_z, _ZERO)
-        real[_F + i] = facing
+        real[F + i] = facing
         most = max(most, facing)
     return most
 
 
 @inlined
 def _project_on_shadow_map(frame: Any, size: Any, real: Any, whole: Any) -> None:
-    """Leave every place's texel in `whole[_I0:]`, its share of the next ones and its closeness to the sun in `real`."""
+    """Leave every place's texel in `whole[I0:]`, its share of the next ones and its closeness to the sun in `real`."""
     _project_aside(frame, size, _ZERO, _ZERO, real, whole)
 
 
@@ -270,12 +308,12 @@ def _project_aside(frame: Any, size: Any, du: Any, dv: Any, real: Any, whole: An
         u = f00 * px + f01 * py + f02 * pz + f03
         v = f10 * px + f11 * py + f12 * pz + f13
         level = f20 * px + f21 * py + f22 * pz + f23
-        ok = (u >= _ZERO) & (v >= _ZERO) & (u < rim) & (v < rim) & (real[_F + i] > _ZERO)
+        ok = (u >= _ZERO) & (v >= _ZERO) & (u < rim) & (v < rim) & (real[F + i] > _ZERO)
         u, v = u if ok else _ZERO, v if ok else _ZERO
         floor_u, floor_v = np.floor(u), np.floor(v)
-        real[_A + i], real[_B + i] = u - floor_u, v - floor_v
-        real[_LEVEL + i] = level if ok else np.float32(1e9)
-        whole[_I0 + i] = np.int32(floor_v) * size + np.int32(floor_u)
+        real[A + i], real[B + i] = u - floor_u, v - floor_v
+        real[LEVEL + i] = level if ok else np.float32(1e9)
+        whole[I0 + i] = np.int32(floor_v) * size + np.int32(floor_u)
 
 
 @kernel
@@ -299,7 +337,7 @@ def light_outdoors(light: Any, camera: Any, real: Any, whole: Any) -> None:
         glow = np.float32(0.10) * toward * toward * toward
         nz, share = real[NZ + i], real[SKY + i] * real[AROUND + i]
         side = real[NX + i] * side_x + real[NY + i] * side_y
-        facing, shine = real[_F + i], real[SHINE + i]
+        facing, shine = real[F + i], real[SHINE + i]
         red = real[RED + i] * (facing * sun_red + (ambient_red + nz * tilt_red + side) * share + shine)
         green = real[GREEN + i] * (
             facing * sun_green + (ambient_green + nz * tilt_green + side) * share + shine * green_shine
@@ -311,9 +349,9 @@ def light_outdoors(light: Any, camera: Any, real: Any, whole: Any) -> None:
         red = (haze * (haze_red + glow * sun_red) + clear * red) * _TONE_SCALE
         green = (haze * (haze_green + glow * sun_green) + clear * green) * _TONE_SCALE
         blue = (haze * (haze_blue + glow * sun_blue) + clear * blue) * _TONE_SCALE
-        whole[_I0 + i] = np.int32(min(max(_ZERO, red), _TONE_LAST))
-        whole[_I1 + i] = np.int32(min(max(_ZERO, green), _TONE_LAST))
-        whole[_I2 + i] = np.int32(min(max(_ZERO, blue), _TONE_LAST))
+        whole[I0 + i] = np.int32(min(max(_ZERO, red), _TONE_LAST))
+        whole[I1 + i] = np.int32(min(max(_ZERO, green), _TONE_LAST))
+        whole[I2 + i] = np.int32(min(max(_ZERO, blue), _TONE_LAST))
 
 
 @kernel
@@ -348,9 +386,9 @@ def light_room(camera: Any, real: Any, whole: Any) -> None:
         lamp *= all_lamp + glass * (window - all_lamp)
         bright = ((np.float32(0.36) + np.float32(0.05) * nz + np.float32(0.03) * nx) * around + lamp) * corner
         bright *= (np.float32(0.4) + np.float32(0.6) * real[AROUND + i]) * _TONE_SCALE
-        whole[_I0 + i] = np.int32(min(max(_ZERO, real[RED + i] * bright * red), _TONE_LAST))
-        whole[_I1 + i] = np.int32(min(max(_ZERO, real[GREEN + i] * bright), _TONE_LAST))
-        whole[_I2 + i] = np.int32(min(max(_ZERO, real[BLUE + i] * bright * blue), _TONE_LAST))
+        whole[I0 + i] = np.int32(min(max(_ZERO, real[RED + i] * bright * red), _TONE_LAST))
+        whole[I1 + i] = np.int32(min(max(_ZERO, real[GREEN + i] * bright), _TONE_LAST))
+        whole[I2 + i] = np.int32(min(max(_ZERO, real[BLUE + i] * bright * blue), _TONE_LAST))
 
 
 @kernel
@@ -393,13 +431,18 @@ def finish(light: Any, camera: Any, texels: Any, queue: Any, moving: Any, count:
         else:
             sun_visibility(light.uniforms, light.shadow, real, whole)
         light_outdoors(light.uniforms, camera, real, whole)
+        if light.uniforms.interiors > _ZERO:
+            glass = queue.glass
+            look_into_windows(light.uniforms, camera, taps > 0, real, whole)
+            for i in range(count):
+                glass[whole[PIXEL + i]] = np.uint8(real[SEEN + i] * np.float32(255.0))
         if light.uniforms.glass > _ZERO:
             mirror_surroundings(light.uniforms, camera, real, whole)
     for i in range(count):
         pixel = whole[PIXEL + i] * np.uint32(3)
-        out[pixel] = tone[whole[_I0 + i]]
-        out[pixel + np.uint32(1)] = tone[whole[_I1 + i]]
-        out[pixel + np.uint32(2)] = tone[whole[_I2 + i]]
+        out[pixel] = tone[whole[I0 + i]]
+        out[pixel + np.uint32(1)] = tone[whole[I1 + i]]
+        out[pixel + np.uint32(2)] = tone[whole[I2 + i]]
 
 
 @kernel
@@ -409,7 +452,7 @@ def finish_sky(sky: Any, queue: Any, count: int, out: Any) -> None:
     look_up(sky, real, whole, _ZERO)
     for i in range(count):
         pixel = whole[PIXEL + i] * np.uint32(3)
-        pair = whole[_PAIR + i]
+        pair = whole[PAIR + i]
         out[pixel] = np.uint8((pair >> 8) & 0xFF)
-        out[pixel + np.uint32(1)] = np.uint8((whole[_MIDDLE + i] >> 8) & 0xFF)
+        out[pixel + np.uint32(1)] = np.uint8((whole[MIDDLE + i] >> 8) & 0xFF)
         out[pixel + np.uint32(2)] = np.uint8(pair >> 24)

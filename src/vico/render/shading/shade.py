@@ -13,7 +13,7 @@ import numpy as np
 from vico.render.arrays import QUEUE, RUN, SETUPS, STRIDE
 from vico.render.compiled import inlined, kernel
 from vico.render.records import FLAT_NORMAL, MOVES, PLAIN_COLOUR, SHELTERED, TWO_SIDED
-from vico.render.shading.pixels import (
+from vico.render.shading.fields import (
     AROUND,
     BLUE,
     COLUMNS,
@@ -30,16 +30,14 @@ from vico.render.shading.pixels import (
     SU,
     SUN,
     SV,
-    MovingShadows,
-    PixelQueue,
+    WINDOW,
     U,
     V,
     X,
     Y,
     Z,
-    finish,
-    finish_sky,
 )
+from vico.render.shading.pixels import MovingShadows, PixelQueue, finish, finish_sky
 from vico.render.shading.sky import SKY_SIZE
 from vico.render.shading.triangle import set_up_triangle
 from vico.render.visibility.fill import triangle_number
@@ -142,7 +140,7 @@ def shade(
     # Everything is looked up once, out here: taking an array out of a tuple costs as much as shading a pixel.
     keys, setups, known, changed = buffers.keys, buffers.setup, buffers.setup_number, buffers.changed
     real, whole, sky_real, sky_whole = buffers.real, buffers.whole, buffers.sky_real, buffers.sky_whole
-    queue, sky_queue = PixelQueue(real, whole), PixelQueue(sky_real, sky_whole)
+    queue, sky_queue = PixelQueue(real, whole, buffers.glass), PixelQueue(sky_real, sky_whole, buffers.glass)
     moving = MovingShadows(buffers.sun, buffers.contact, any_moving)
     texels, texel_start, materials = scene.textures.texels, scene.textures.start, scene.textures.materials
     sky, relief, relief_height = light.sky, light.relief, light.relief.height
@@ -204,7 +202,7 @@ def shade(
                 _queue_colours(real, at, setup)
                 _queue_normals(real, at, setup, eye)
                 _queue_constants(real, at, window.du, window.dv, open_sky, own)
-                _queue_addresses(whole, at, window, offset + column)
+                _queue_addresses(whole, at, window, offset + column, setup.window)
                 queued += count
                 column += count
                 if queued > QUEUE - RUN:
@@ -508,7 +506,8 @@ def _queue_constants(real: Any, at: int, du: Any, dv: Any, open_sky: Any, shine:
 
 
 @inlined
-def _queue_addresses(whole: Any, at: int, window: Any, pixel: int) -> None:
+def _queue_addresses(whole: Any, at: int, window: Any, pixel: int, number: Any) -> None:
     for i in range(RUN):
         whole[START + at + i], whole[COLUMNS + at + i] = window.start, window.columns
         whole[ROWS + at + i], whole[PIXEL + at + i] = window.rows, pixel + i
+        whole[WINDOW + at + i] = number

@@ -7,7 +7,18 @@ from typing import Any
 import numpy as np
 
 from vico.render.compiled import inlined
-from vico.render.records import DOUBLE_SIDED, FLAT_NORMAL, MOVES, NO_WINDOWS, PLAIN_COLOUR, SHELTERED, TWO_SIDED
+from vico.render.records import (
+    DOUBLE_SIDED,
+    FLAT_NORMAL,
+    GROUND_WINDOWS,
+    MOVES,
+    NO_WINDOWS,
+    PLAIN_COLOUR,
+    SHELTERED,
+    TWO_SIDED,
+    WINDOW_GROUND,
+    WINDOW_SHIFT,
+)
 from vico.render.visibility.culling import set_instance_view, set_world_view
 from vico.render.visibility.draw import item_of
 
@@ -38,6 +49,7 @@ def set_up_triangle(scene: Any, camera: Any, buffers: Any, drawn: int, number: i
     _finish_normals(setup.normal, flat)
     material = scene.textures.materials[triangle.material]
     setup.emission = material.emission * _windows_share(scene, material, scene.mesh.entity[index])
+    setup.window = _window_number(material, scene.mesh.entity[index])
     setup.texture_width = 1 << material.log2_width
     setup.texture_height = 1 << material.log2_height
     setup.material = triangle.material
@@ -54,6 +66,15 @@ def _windows_share(scene: Any, material: Any, entity: Any) -> Any:
     if material.windows == NO_WINDOWS:
         return np.float32(1.0)
     return scene.windows[min(entity, len(scene.windows) - 1), material.windows - 1]
+
+
+@inlined
+def _window_number(material: Any, entity: Any) -> Any:
+    """Return whose window a triangle may show, 0 for none."""
+    if material.windows == NO_WINDOWS:
+        return np.uint32(0)
+    ground = WINDOW_GROUND if material.windows == GROUND_WINDOWS else 0
+    return np.uint32((int(entity) << WINDOW_SHIFT) | ground | material.storeys)
 
 
 @inlined

@@ -126,8 +126,8 @@ def in_view(box: Any, camera: Any) -> bool:
     if depth + reach <= camera.near or depth - reach >= camera.far:
         return False
     for axis in range(2):
-        size = camera.width if axis == 0 else camera.height
-        tangent = 0.5 * size / camera.focal
+        size, centre = (camera.width, camera.centre_x) if axis == 0 else (camera.height, camera.centre_y)
+        tangent = max(centre, size - centre) / camera.focal
         for sign in (-1.0, 1.0):
             distance = depth * tangent + sign * box.centre[axis]
             radius = (
@@ -252,7 +252,8 @@ def is_instance_in_view(sphere: Any, owner: int, where: int, camera: Any) -> boo
     ahead = dx * camera.forward_x + dy * camera.forward_y + dz * camera.forward_z
     if ahead + radius <= camera.near or ahead - radius >= camera.far or is_tiny(radius, ahead, camera):
         return False
-    tangent_x, tangent_y = 0.5 * camera.width / camera.focal, 0.5 * camera.height / camera.focal
+    tangent_x = max(camera.centre_x, camera.width - camera.centre_x) / camera.focal
+    tangent_y = max(camera.centre_y, camera.height - camera.centre_y) / camera.focal
     aside = abs(dx * camera.right_x + dy * camera.right_y + dz * camera.right_z)
     if (aside - ahead * tangent_x) > radius * np.sqrt(1.0 + tangent_x * tangent_x):
         return False

@@ -32,6 +32,8 @@ def _styles() -> dict[str, WindowStyle]:
     return {window.name: window for file in files for window in file.window}
 
 
+# Light of a pane with no lamp on behind it, of 255: too little to be seen; it tells glass from wall.
+_PANE = 5.0
 _LOW, _HIGH = np.array([34, 40, 46], np.float32), np.array([116, 136, 154], np.float32)
 
 
@@ -60,7 +62,7 @@ def glass(canvas: Canvas, x0: float, y0: float, x1: float, y1: float, *, lively:
     choice = float(random.random())
     kind = float(random.random())
     power = float(random.uniform(0.45, 1.0)) * 255
-    canvas.glow[b:d, a:c] = 0.0
+    canvas.glow[b:d, a:c] = _PANE
     if on:
         # A room seen through the pane: brightest below its lamp, with something standing before the far wall.
         hue = np.array([196, 162, 112] if kind < 0.66 else [202, 188, 158] if kind < 0.94 else [120, 140, 172])

@@ -1,0 +1,1 @@
+"""What lies behind glass: rooms seen from the street."""
