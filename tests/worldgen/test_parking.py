@@ -13,9 +13,9 @@ from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.model import Transit
 from vico.world.objects import Objects
-from vico.worldgen.facts.bays import lot_bays
+from vico.worldgen.facts.bays import kerb_bays, lot_bays
 from vico.worldgen.facts.site import SiteFacts, site_facts
-from vico.worldgen.facts.streets import StreetPolygons
+from vico.worldgen.facts.streets import Street, StreetPolygons
 from vico.worldgen.objects.parking import Parking, parking_from_osm
 from vico.worldgen.streets.netconvert import road_network
 from vico.worldgen.streets.polygons import road_polygons
@@ -105,6 +105,23 @@ def test_nobody_parks_at_a_hydrant() -> None:
 )
 def test_where_people_park_by_habit(tags: dict[str, str], some: bool) -> None:
     assert bool(parked(tags)[0].spots) == some
+
+
+def test_cars_stand_across_the_street_where_the_map_says_so() -> None:
+    found, _, _ = parked({"highway": "residential", "parking:lane:both": "perpendicular"})
+    assert len(found.spots) > 30
+    assert {(spot.kind, spot.length) for spot in found.spots} == {("across", 4.8)}
+    assert 0.6 < len(found.cars) / len(found.spots) < 0.95
+
+
+def test_a_side_for_cars_along_the_street_has_long_bays_though_they_stand_across_it_on_the_other() -> None:
+    line = np.array([(0.0, 0.0), (40.0, 0.0)])
+    street = Street(1, "residential", line, 13.0, 2, False, parking_left=4.8, parking_right=2.0, slanted=True)
+    (left,), (right,) = (
+        {round(bay.length, 2) for bay in kerb_bays(street, side, depth, shapely.Polygon())}
+        for side, depth in ((1.0, 4.8), (-1.0, 2.0))
+    )
+    assert (left, right) == (4.8, 5.8)
 
 
 def test_a_car_park_has_two_rows_and_an_aisle() -> None:

@@ -23,6 +23,7 @@ LOT_PITCH, LOT_DEPTH = 2.5, 5.0
 LEAST_PIECE = 3.0
 """Metres of a kerb or a line between two junctions that are worth painting."""
 
+_WIDEST_PARALLEL = 3.0  # metres of a parking lane in which cars stand along the street
 _AISLE = 5.4  # metres between the rows of a car park, at least
 _INWARD = 0.1  # metres that a car along a kerb stands nearer to the street than the middle of its bay: for its mirrors
 
@@ -73,6 +74,11 @@ def free_pieces(street: Street, offset: float, breaks: BaseGeometry) -> list[Lin
     return [piece for piece in free if isinstance(piece, LineString) and piece.length > LEAST_PIECE]
 
 
+def stands_across(street: Street, depth: float) -> bool:
+    """Whether cars stand across the street in a parking lane of this width; the other side may be another."""
+    return street.slanted and depth > _WIDEST_PARALLEL
+
+
 def bay_borders(piece: LineString, *, slanted: bool) -> NDArray[np.float64]:
     """Metres along a piece of a parking lane's edge at which its bays begin, the end of the last with them."""
     return np.arange(1.0, piece.length - 1.0, ACROSS_PITCH if slanted else PARALLEL_PITCH)
@@ -93,8 +99,9 @@ def kerb_bays(street: Street, side: float, depth: float, breaks: BaseGeometry) -
         Where nobody parks.
     """
     found: list[Bay] = []
+    across = stands_across(street, depth)
     for piece in free_pieces(street, side * (street.width / 2 - depth), breaks):
-        borders = bay_borders(piece, slanted=street.slanted)
+        borders = bay_borders(piece, slanted=across)
         for low, high in pairwise(borders.tolist()):
             a, b = shapely.get_coordinates(shapely.line_interpolate_point(piece, [low, high]))
             run = float(np.hypot(*(b - a)))
@@ -102,9 +109,9 @@ def kerb_bays(street: Street, side: float, depth: float, breaks: BaseGeometry) -
                 continue  # round a bend
             u = (b - a) / run
             out = side * np.array([-u[1], u[0]])
-            x, y = (a + b) / 2 + out * (depth / 2 - (0.0 if street.slanted else _INWARD))
-            towards = out if street.slanted else u
-            size = (depth, run) if street.slanted else (run, depth)
+            x, y = (a + b) / 2 + out * (depth / 2 - (0.0 if across else _INWARD))
+            towards = out if across else u
+            size = (depth, run) if across else (run, depth)
             found.append(Bay((float(x), float(y)), float(np.arctan2(towards[1], towards[0])), *size))
     return found
 

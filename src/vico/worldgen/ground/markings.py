@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from vico.geo import overlay
 from vico.geo.osm import polygons_of
-from vico.worldgen.facts.bays import bay_borders, free_pieces, junction_zones, lot_rows
+from vico.worldgen.facts.bays import bay_borders, free_pieces, junction_zones, lot_rows, stands_across
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.streets import LANE_WIDTH, Crossing, Street, StreetPolygons
 
@@ -252,7 +252,7 @@ def _kerbside_of(
             path = _divided(np.asarray(piece.coords), longest)
             if parking:
                 edges += _ribbon(path, 0.0, 0.1)
-                for place in bay_borders(piece, slanted=street.slanted):
+                for place in bay_borders(piece, slanted=stands_across(street, parking)):
                     a, b = (np.asarray(piece.interpolate(v).coords[0]) for v in (place, place + 0.1))
                     u = (b - a) / max(float(np.hypot(*(b - a))), 1e-9)
                     out = side * np.array([-u[1], u[0]])

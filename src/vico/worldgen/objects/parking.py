@@ -25,7 +25,7 @@ from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.model import FIRST_OBJECT, ParkingSpot, Transit
 from vico.world.objects import Objects
-from vico.worldgen.facts.bays import Bay, junction_zones, kerb_bays, lot_bays
+from vico.worldgen.facts.bays import Bay, junction_zones, kerb_bays, lot_bays, stands_across
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import Street, StreetPolygons
@@ -38,7 +38,7 @@ _SHARES = {"hatchback": 0.40, "sedan": 0.29, "suv": 0.22, "van": 0.08, "taxi": 0
 _HABIT = ("residential", "unclassified", "tertiary")  # where people park though the map says nothing
 _HABIT_DEPTH = 2.1  # metres
 _HABIT_ROOM = 3.0  # metres of carriageway for a lane beside parked cars
-_BUMPER = 0.15  # metres that a car leaves to the ends of its bay
+_BUMPER = 0.09  # metres that a car leaves to the ends of its bay
 _WALL, _THING, _WALKER = 0.3, 0.15, 0.45  # metres to walls, things and the lines that walkers follow
 _JUNCTION = 2.0  # beyond where lines are painted: 5 m from the corner in all
 _CROSSING, _HYDRANT = 4.0, 5.0
@@ -161,7 +161,7 @@ def _along_street(street: Street, tags: Tags, breaks: BaseGeometry, left_driving
         elif _for_loading(tags, mapped):
             continue
         against = not street.oneway and (side == "right" if left_driving else side == "left")
-        kind = "across" if street.slanted else "kerb"
+        kind = "across" if stands_across(street, depth) else "kerb"
         for k, bay in enumerate(kerb_bays(street, sign, depth, breaks)):
             turn = math.pi if against and kind == "kerb" else 0.0
             bay = bay._replace(yaw=math.remainder(bay.yaw + turn, 2 * math.pi))
@@ -199,12 +199,10 @@ def _rectangle(bay: Bay, length: float, width: float) -> NDArray[np.float64]:
 
 def _feet(found: Sequence[_Candidate]) -> NDArray[np.object_]:
     """Ground that a car in each bay may take."""
-    wider = {"kerb": 0.1}  # mirrors
+    less = {"kerb": (0.3, -0.1), "across": (0.1, 0.1), "lot": (0.3, 0.1)}  # along the kerb mirrors stick out
+    sizes = [(one.bay.length - less[one.kind][0], one.bay.width - less[one.kind][1]) for one in found]
     return np.asarray(
-        shapely.polygons(
-            [_rectangle(one.bay, one.bay.length - 0.3, one.bay.width + wider.get(one.kind, -0.1)) for one in found]
-        ),
-        object,
+        shapely.polygons([_rectangle(one.bay, *size) for one, size in zip(found, sizes, strict=True)]), object
     )
 
 
