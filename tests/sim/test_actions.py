@@ -179,6 +179,20 @@ def test_a_thing_is_put_on_a_table_within_reach(sim: Simulation) -> None:
     assert sim.ground_truth.object_position("parcel")[2] == pytest.approx(toy_city.FLOOR + 0.75)
 
 
+def test_a_thing_put_at_the_edge_of_a_table_rests_on_it_whole(sim: Simulation) -> None:
+    thing = parcel(sim, -6.0, 9.0, "r_cafe")
+    act(sim, "resident_0", type="pick", hand=0, object=thing)
+    table = sim.world.rooms[0].containers[0]
+    edge = table.centre[1] - table.size[1] / 2
+    sim.state.people.position[0, :2] = (table.centre[0], edge - 0.5)
+    point = (table.centre[0], edge + 0.01, table.centre[2])
+    assert act(sim, "resident_0", type="put", hand=0, target=point)["action_status"] == "ok"
+    x, y, z = sim.ground_truth.object_position("parcel")
+    assert (x, z) == pytest.approx((table.centre[0], table.centre[2]))
+    long, wide, _ = sim.state.objects.size[sim.state.objects.index(thing)]
+    assert y - edge == pytest.approx(np.hypot(long, wide) / 2)
+
+
 def test_two_things_on_a_table_do_not_lie_in_each_other(sim: Simulation) -> None:
     table = sim.world.rooms[0].containers[0]
     for k in range(2):

@@ -195,15 +195,29 @@ class Indoor:
 
     def support(self, room: int, xy: Sequence[float]) -> float:
         """Height of what a thing put down at a point of a room comes to lie on: the highest surface there."""
-        best = self.floor_at(room, xy)
+        return float(self.resting_point(room, xy, 0.0)[2])
+
+    def resting_point(self, room: int, xy: Sequence[float], radius: float) -> NDArray[np.float64]:
+        """Where a thing comes to rest that is put down at a point of a room, ENU metres, shape ``(3,)``.
+
+        On the highest surface there, drawn in from its edges by `radius`, so that it hangs over none; in the middle of
+        a surface that is smaller.
+        """
+        spot = np.array([float(xy[0]), float(xy[1]), self.floor_at(room, xy)])
         for container in self.rooms[room].containers:
             x, y, z = container.centre
             inside = box_gap(
                 float(xy[0]), float(xy[1]), x, y, container.yaw, container.size[0] / 2, container.size[1] / 2
             )
-            if inside <= 0.0 and z > best:
-                best = z
-        return best
+            if inside <= 0.0 and z > spot[2]:
+                c, s = math.cos(container.yaw), math.sin(container.yaw)
+                dx, dy = float(xy[0]) - x, float(xy[1]) - y
+                u, v = (
+                    min(max(way, radius - half), half - radius) if radius < half else 0.0
+                    for way, half in zip((c * dx + s * dy, c * dy - s * dx), np.array(container.size) / 2, strict=True)
+                )
+                spot = np.array([x + c * u - s * v, y + s * u + c * v, z])
+        return spot
 
 
 def _doors(rooms: Sequence[Room], places: Sequence[Place], index: dict[str, int]) -> list[list[Door]]:

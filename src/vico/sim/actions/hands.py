@@ -219,7 +219,7 @@ def _at_point(point: tuple[float, ...], i: int, thing: Thing, state: SimulationS
     if room >= 0:
         if not state.indoor.holds(room, (x, y, state.indoor.floor_at(room, (x, y)))):
             return Refusal(ReasonCode.ELSEWHERE, "put: the point is outside this room")
-        height = state.indoor.support(room, (x, y))
+        x, y, height = state.indoor.resting_point(room, (x, y), math.hypot(thing.size[0], thing.size[1]) / 2).tolist()
     else:
         if state.world.walkable.class_at((x, y)) == 0:
             return Refusal(ReasonCode.BLOCKED, "put: something solid is at that point")
