@@ -135,7 +135,7 @@ def _kerb_candidates(osm: OsmData, streets: StreetPolygons, left_driving: bool) 
     """Bays along kerbs: in the parking lanes of the map, else where a street by its kind and width has them."""
     tags_of = {way.id: way.tags for way in osm.ways}
     breaks = junction_zones(streets)
-    breaks = overlay.buffer(breaks, _JUNCTION, quad_segs=2)
+    shapely.prepare(breaks)
     window = shapely.box(-osm.half, -osm.half, osm.half, osm.half)
     for street in streets.streets:
         tags = tags_of.get(street.way, {})
@@ -163,6 +163,8 @@ def _along_street(street: Street, tags: Tags, breaks: BaseGeometry, left_driving
         against = not street.oneway and (side == "right" if left_driving else side == "left")
         kind = "across" if stands_across(street, depth) else "kerb"
         for k, bay in enumerate(kerb_bays(street, sign, depth, breaks)):
+            if shapely.dwithin(breaks, shapely.Polygon(_rectangle(bay, bay.length, bay.width)), _JUNCTION):
+                continue
             turn = math.pi if against and kind == "kerb" else 0.0
             bay = bay._replace(yaw=math.remainder(bay.yaw + turn, 2 * math.pi))
             yield _Candidate(f"w{street.way}.{side}.{k}", f"w{street.way}.{side}", kind, bay)
