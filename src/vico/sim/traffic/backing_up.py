@@ -15,6 +15,7 @@ _ALIKE = 0.85  # cosine of the angle between two headings that count as the same
 _QUEUE = 6  # vehicles behind one another that make room
 _ROOM = 6.0  # m that are left behind a vehicle that lets another one pass: it may have to back up farther
 _AWAY = 3.0  # m between two vehicles' outer circles from which on they have passed each other
+_BACK_UP_FOR_PERSON, _LOOKS_FOR_WAY = 8.0, 0.2  # s that it has stood, and m/s at which the person walks to and fro
 _GIVES_WAY_FOR = 25.0  # s after which a vehicle that lets another one pass does no longer
 
 
@@ -74,6 +75,13 @@ def _have_passed(shapes, vehicle, other):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _leaves_no_way(net, vehicle, shapes, b):  # type: ignore[no-untyped-def]
+    """Return whether a vehicle in a junction stands in the way of a person who looks for one round it, body b."""
+    moves = shapes.vx[b] ** 2 + shapes.vy[b] ** 2 > _LOOKS_FOR_WAY**2
+    return net.lanes[vehicle.lane].junction >= 0 and vehicle.stopped_time > _BACK_UP_FOR_PERSON and moves
+
+
+@compiled
 def vehicles_backing_up(net, fleet, shapes, dt):  # type: ignore[no-untyped-def]
     """Return for each vehicle whether it backs up in this step, bool, shape ``(vehicles,)``; note whom it lets pass."""
     for vehicle in fleet:
@@ -86,6 +94,8 @@ def vehicles_backing_up(net, fleet, shapes, dt):  # type: ignore[no-untyped-def]
     backs_up = np.zeros(len(fleet), np.bool_)
     for v in range(len(fleet)):
         vehicle, b = fleet[v], fleet[v].blocker
+        if b >= len(fleet):
+            backs_up[v] = _leaves_no_way(net, vehicle, shapes, b)
         if not 0 <= b < len(fleet) or not _keep_each_other(vehicle, fleet[b]):
             continue
         if fleet[b].blocker == v or fleet[b].gives_way_to == v:
