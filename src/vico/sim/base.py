@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING
@@ -25,6 +26,7 @@ from vico.sim.robots.scene import RobotScene
 from vico.sim.seats import Seats
 from vico.sim.tills import Till, tills_of
 from vico.sim.traffic.network import TrafficNetwork
+from vico.sim.traffic.standing_spots import with_spots
 from vico.sim.transit import BusPlan, plan_buses
 from vico.world.folder import World
 from vico.world.model import Entrance
@@ -113,7 +115,8 @@ class SimulationBase:
     @cached_property
     def streets(self) -> TrafficNetwork:
         """What traffic moves on."""
-        return TrafficNetwork.of(self.world.lanes, self.solids, self._signal_poles)
+        network = TrafficNetwork.of(self.world.lanes, self.solids, self._signal_poles)
+        return replace(network, walked=with_spots(network.walked, network.walks, self.world, self.solids))
 
     @cached_property
     def router(self) -> Router:

@@ -35,6 +35,9 @@ def follow_city_events(state: SimulationState) -> None:
             walkways = state.transit.shut_walkways(walkways)
         state.traffic.set_shut(agenda.effects.lanes, walkways)
         state.traffic.drop_shut_plans()
+    if state.traffic is not None:
+        state.traffic.gatherings.follow(agenda.gatherings)
+        state.traffic.gatherings.advance(state.second)
     state.things.follow(state)
     for one, what in news:
         told = {name: value for name, value in one.event.record().items() if name != "kind" and value}

@@ -15,7 +15,10 @@ from vico.seeds import rng
 from vico.sim.animation import Transition, clip_index, stride_length
 from vico.sim.animation.gait import WALK_START
 from vico.sim.environment.weather import Weather
-from vico.sim.traffic.state import PedestrianGaits
+from vico.sim.traffic.state import TALK, PedestrianGaits
+
+# Who talks goes on for so long, then the other does, s.
+_TURN_TO_TALK = 6.0
 
 
 def looks_of_strangers(seed: int, count: int) -> list[Appearance]:
@@ -49,7 +52,7 @@ class PedestrianMotion(NamedTuple):
 
 
 def pedestrian_motion(gaits: PedestrianGaits, height: NDArray[np.float64], second: float) -> PedestrianMotion:
-    """Return motion and place in its cycle of each pedestrian: they walk, or stand and breathe.
+    """Return motion and place in its cycle of each pedestrian: they walk, stand and breathe, talk, or sit in a bus.
 
     Parameters
     ----------
@@ -62,11 +65,16 @@ def pedestrian_motion(gaits: PedestrianGaits, height: NDArray[np.float64], secon
     """
     walk, idle = clip_index("walk"), clip_index("idle")
     walking = gaits.time > 0.0
+    n = np.arange(len(walking))
     stride = stride_length(walk, gaits.pace, height)
     in_stride = (WALK_START + gaits.walked / stride) % 1.0
     # People at rest breathe by the clock, each at their own time.
-    at_rest = (second * 0.5 + np.arange(len(walking)) * 0.37) % 1.0
+    at_rest = (second * 0.5 + n * 0.37) % 1.0
+    # Of two who talk one does and the other listens, by turns; one comes right after the other.
+    talks = (gaits.standing == TALK) & ((second // _TURN_TO_TALK + n) % 2 == 0)
+    still = np.where(gaits.seated, clip_index("ride_bus"), np.where(talks, clip_index("talk"), idle))
+    at_rest = np.where(talks, (second / _TURN_TO_TALK * 2.0) % 1.0, at_rest)
     after = Transition(
         np.where(walking, idle, walk), np.where(walking, at_rest, in_stride), gaits.pace, np.abs(gaits.time)
     )
-    return PedestrianMotion(np.where(walking, walk, idle), np.where(walking, in_stride, at_rest), gaits.pace, after)
+    return PedestrianMotion(np.where(walking, walk, still), np.where(walking, in_stride, at_rest), gaits.pace, after)

@@ -348,10 +348,11 @@ class SceneRenderer:
         clip, phase, pace, after = pedestrian_motion(
             state.traffic.gait, self._height[len(state.people) :], state.second
         )
-        on_ground = np.ones(len(clip), np.bool_)
+        on_ground = ~state.traffic.riding
         still, outdoors = np.zeros(len(clip)), np.full(len(clip), -1, np.int32)
         after = after._replace(moved=np.zeros((len(clip), 4)), over_ground=pace)
         hands = hands_of_pedestrians(self._habit, state.environment.weather.rain)
+        hands.share[~on_ground] = 0.0
         return _Motion(
             clip, phase, pace, after, walkers.position, walkers.yaw, on_ground, outdoors, still, still, hands
         )

@@ -25,6 +25,7 @@ from vico.sim.seats import Seats
 from vico.sim.snapshot import arrays_of
 from vico.sim.state import FIRST_THING, FIRST_UMBRELLA, RADIUS, REASON_LENGTH, MovableObjects, People, Vehicle
 from vico.sim.tills import Lines, Till
+from vico.sim.traffic.gatherings import Gatherings
 from vico.sim.traffic.jams import Jam, JamLog
 from vico.sim.traffic.junction_rule import JunctionRule
 from vico.sim.traffic.signals import SignalsShown
@@ -59,6 +60,18 @@ class TrafficSystem(Subsystem, Protocol):
 
     def entities(self) -> tuple[NDArray[np.int32], NDArray[np.int8]]:
         """Return entity and kind of all, those that are not in the streets now among them."""
+
+    @property
+    def gatherings(self) -> Gatherings:
+        """Leads pedestrians to events."""
+
+    @property
+    def riding(self) -> NDArray[np.bool_]:
+        """Which pedestrians ride in buses."""
+
+    @property
+    def passengers(self) -> Bodies:
+        """The pedestrians who ride in buses, where they sit or stand."""
 
     @property
     def lights(self) -> NDArray[np.uint8]:
@@ -325,6 +338,11 @@ class SimulationState:
         self.tick = int(arrays["tick"][0])
         for name, part in self._parts().items():
             part.restore(arrays_of(arrays, name))
+        if self.traffic is not None:
+            effects = self.environment.agenda.effects
+            shut = effects.walkways if self.transit is None else self.transit.shut_walkways(effects.walkways)
+            self.traffic.set_shut(effects.lanes, shut)
+            self.traffic.gatherings.follow(self.environment.agenda.gatherings)
         self.show_signals()
 
     def show_signals(self) -> None:

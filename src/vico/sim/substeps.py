@@ -67,6 +67,8 @@ def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _A
         state.robots.set_wind(*state.environment.weather.wind_vector)
     _advance_subsystem(state.traffic, "traffic", bodies, watch)
     _advance_subsystem(state.transit, "transit", bodies, watch)
+    if state.traffic is not None and state.transit is not None:
+        bodies.refresh(state.traffic)  # people have got into buses and off
     gone = periods.since_begun(state.tick)[: len(state.people)]
     share = SUBSTEP_TICKS / np.maximum(ACTION_TICKS - gone, SUBSTEP_TICKS)
     obstacles = _held_off(bodies.but(state.avatars))

@@ -52,6 +52,7 @@ def traffic_and_transit_of(base: SimulationBase, config: SimConfig) -> tuple[Tra
         return traffic, None
     second = float(config.start)
     transit = TransitSystem(world.transit, traffic, plan, second=second, first_bike=FIRST_BIKE, first_tram=FIRST_TRAM)
+    transit.take_passengers(world.walkable, config.seed)
     return traffic, transit
 
 

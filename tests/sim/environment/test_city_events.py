@@ -184,7 +184,7 @@ def works(helsinki: World) -> dict[str, Any]:
             assert sim.state.traffic is not None
             assert sim.overlap_check is not None
             now = closed[sim.state.traffic.fleet.lane]
-            entered += int((now & ~before).sum()) if step > 45 else 0
+            entered += int((now & ~before).sum()) if step > 60 else 0
             before = now
             on_foot.append(int(walks[sim.state.traffic.pedestrian_state.walkway].sum()))
         found[name] = {

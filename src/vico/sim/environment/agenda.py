@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,40 +13,16 @@ from numpy.typing import NDArray
 from vico.clock import DAY
 from vico.errors import InputError
 from vico.sim.environment.city_event import CityEvent, planned_events
-from vico.sim.environment.event_kinds import EventKind, kind_of_event
+from vico.sim.environment.event_crowds import Gathering, gathering_of
+from vico.sim.environment.event_kinds import kind_of_event
 from vico.sim.environment.event_schedule import events_of_day
 from vico.sim.environment.event_sites import EventSites
+from vico.sim.environment.occurrence import Occurrence
 
 #: The names of no events at all, and of events that come by themselves.
 NO_EVENTS, CHANGING_EVENTS = "none", "changing"
 
 _WAITS, _GOES_ON, _IS_OVER = range(3)
-
-
-@dataclass(frozen=True)
-class Occurrence:
-    """An event of a run.
-
-    Attributes
-    ----------
-    id
-        Counts from 1; an event keeps it.
-    middle
-        The point it is at, ENU metres.
-    circles
-        Ground that it closes to people: x, y and radius, ENU metres.
-    """
-
-    id: int
-    event: CityEvent
-    kind: EventKind
-    middle: NDArray[np.float64]
-    circles: tuple[tuple[float, float, float], ...]
-
-    @property
-    def noise(self) -> float:
-        """How loud it is 10 m from its middle, dB; 0 for not at all."""
-        return self.kind.noise if self.event.noise is None else self.event.noise
 
 
 class EventEffects(NamedTuple):
@@ -111,6 +87,8 @@ class Agenda:
         self._now: tuple[int, ...] = ()
         self._going_on: list[Occurrence] = []
         self._effects = _NOTHING
+        self._gatherings: tuple[Gathering, ...] | None = None
+        self._crowds: dict[int, Gathering | None] = {}
         self._day = int(second // DAY)
         if isinstance(wanted, str):
             if wanted not in (NO_EVENTS, CHANGING_EVENTS):
@@ -149,6 +127,7 @@ class Agenda:
         self._told = [event.pop("told") for event in listed]
         self._events = [CityEvent.of(event) for event in listed]
         self._known, self._now, self._going_on, self._effects = {}, (), [], _NOTHING
+        self._gatherings, self._crowds = None, {}
         self._refresh(second)
 
     def advance(self, second: float) -> None:
@@ -212,6 +191,17 @@ class Agenda:
         """What the events that go on do."""
         return self._effects
 
+    @property
+    def gatherings(self) -> tuple[Gathering, ...]:
+        """Crowds of the events that go on, by id; the same tuple as long as they are the same."""
+        if self._gatherings is None:
+            for one in self._going_on:
+                if one.id not in self._crowds:
+                    self._crowds[one.id] = gathering_of(one, self.sites)
+            found = (self._crowds[one.id] for one in self._going_on)
+            self._gatherings = tuple(one for one in found if one is not None)
+        return self._gatherings
+
     def start(self, event: CityEvent, second: float) -> int:
         """Let an event take place; return its id.
 
@@ -248,7 +238,7 @@ class Agenda:
         self._second = second
         now = tuple(k for k, event in enumerate(self._events) if event.goes_on(second))
         if now != self._now:
-            self._now = now
+            self._now, self._gatherings = now, None
             self._going_on = [self._occurrence(k) for k in now]
             self._effects = effects_of(self._going_on, self.sites) if now else _NOTHING
 

@@ -32,6 +32,8 @@ class EventKind(DataRecord):
         Between which hours of the day it begins, and for how many minutes it lasts, when nobody says so.
     radius
         Of its region when nobody says so, metres.
+    crowd, crowd_manner
+        How many pedestrians come, and whether they watch, stroll between its things, or march along its street.
     often
         How many there are on a day of changing events, on average.
     """
@@ -47,6 +49,8 @@ class EventKind(DataRecord):
     hours: tuple[_Hour, _Hour] = (8.0, 18.0)
     lasts: tuple[NotNegative, NotNegative] = (60.0, 240.0)
     radius: Annotated[float, Field(gt=0)] = 30.0
+    crowd: Annotated[int, Field(ge=0, le=200)] = 0
+    crowd_manner: Literal["watch", "stroll", "march"] = "watch"
     often: NotNegative = 0.0
 
 

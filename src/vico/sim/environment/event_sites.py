@@ -158,6 +158,11 @@ class EventSites:
         return np.array([*point, float(self._world.height(point))])
 
     @property
+    def walks(self) -> Walkways:
+        """The walkways that traffic has."""
+        return self._walks()
+
+    @property
     def world(self) -> World:
         """Where it is."""
         return self._world

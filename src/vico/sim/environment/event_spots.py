@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vico.sim.environment.agenda import Occurrence
 from vico.sim.environment.event_sites import EventSites
+from vico.sim.environment.occurrence import Occurrence
 from vico.world.walkable import CROSSING, ROADWAY
 
 # A barrier stands so far within its lane, metres, or in its middle if that is nearer.

@@ -106,6 +106,8 @@ def everybody(sim: Simulation) -> Bodies:
     state = sim.state
     people = state.people.bodies_of(np.arange(len(state.people)))
     owners = [s.bodies() for s in (state.robots, state.traffic, state.transit) if s is not None]
+    if state.traffic is not None:
+        owners.append(state.traffic.passengers)
     owners.append(state.things.bodies())
     return Bodies.joined([people, *owners, _objects_as_bodies(state.objects)])
 

@@ -90,12 +90,16 @@ def guided_lanes(
     return net._replace(goal_edge=edges, goal_next=np.array(lead, np.int32).reshape(len(edges), n))
 
 
-def guided_walks(walks: Walkways, paths: WalkwayNetwork, goals: Sequence[int]) -> WalkwayNetwork:
-    """Return the network with how far it is from each meeting point to some walkways."""
+def guided_walks(
+    walks: Walkways, paths: WalkwayNetwork, goals: Sequence[int], *, shut: NDArray[np.bool_] | None = None
+) -> WalkwayNetwork:
+    """Return the network with how far it is from each meeting point to some walkways, without those that are shut."""
     nodes = len(walks.meeting_first) - 1
     away = np.full((len(goals), max(nodes, 1)), np.inf)
     if goals:
-        graph = csr_matrix((walks.length + 0.01, (walks.ends[:, 0], walks.ends[:, 1])), shape=(nodes, nodes))
+        open_ = np.ones(len(walks), np.bool_) if shut is None else ~shut
+        ends = walks.ends[open_]
+        graph = csr_matrix((walks.length[open_] + 0.01, (ends[:, 0], ends[:, 1])), shape=(nodes, nodes))
         for k, goal in enumerate(goals):
             away[k] = dijkstra(graph, directed=False, indices=walks.ends[goal], min_only=True)
     return paths._replace(goal_walkway=np.asarray(goals, np.int32), goal_away=away)

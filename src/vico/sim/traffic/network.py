@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from vico.sim.traffic.state import LANE, WALKWAY, LaneNetwork, WalkwayNetwork
+from vico.sim.traffic.state import LANE, SPOT, WALKWAY, LaneNetwork, WalkwayNetwork
 from vico.world.lanes import LaneGraph
 from vico.world.objects import Objects
 from vico.world.walkways import CROSSING, Walkways
@@ -168,6 +168,8 @@ def walkway_network(walks: Walkways) -> WalkwayNetwork:
         meeting=walks.meeting,
         goal_walkway=np.zeros(0, np.int32),
         goal_away=np.zeros((0, nodes)),
+        spots=np.zeros(0, SPOT),
+        spot_first=np.zeros(len(walks) + 1, np.int32),
     )
 
 

@@ -23,7 +23,8 @@ from vico.sim.traffic.companions import (
 from vico.sim.traffic.path import project_on_polyline
 from vico.sim.traffic.random_stream import next_random
 from vico.sim.traffic.shapes import disc_touches, distance_to, is_disc, share_level
-from vico.sim.traffic.state import AMBER, GAIT_TIME, NONE
+from vico.sim.traffic.standing import note_standing, stop_at_spot, turn_towards
+from vico.sim.traffic.state import AMBER, CROWD, GAIT_TIME, NONE
 from vico.world.lanes import lane_pose
 from vico.world.walkways import CORNER as _CORNER_KIND
 from vico.world.walkways import CROSSING as _CROSSING_KIND
@@ -50,6 +51,8 @@ _STRIDE_AHEAD = 0.4  # m ahead where a heading is tested against the walkway's s
 _PROGRESS = 1.0  # who is farther from where it was has got on, m
 _STUCK_AFTER, _STUCK_SPREAD = 3.5, 3.0  # s without progress before turning round, and how much that varies
 _WAITS_BELOW = 0.3  # who walks at less than this share of its pace waits for somebody
+_SLOWS_WITHIN = 1.2  # m from its place
+_STANDS_WITHIN = 0.2  # m from where it is to stand
 _CORNER, _CROSSING = int(_CORNER_KIND), int(_CROSSING_KIND)
 
 
@@ -315,10 +318,13 @@ def may_step_to(tx, ty, x, y, shapes, near):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _walk(paths, walker, shapes, b, near, is_waiting, pace, dt):  # type: ignore[no-untyped-def]
-    """Take a pedestrian, body b, a step towards its point; return the metres walked."""
+def _walk(paths, walker, point, shapes, b, near, is_waiting, time):  # type: ignore[no-untyped-def]
+    """Take a pedestrian, body b, a step towards a point; return the metres walked.
+
+    `time` is the share of its pace at which it walks, and the seconds that pass.
+    """
+    pace, dt = time
     x, y = shapes.x[b], shapes.y[b]
-    point = follow_point(paths, walker)
     dx, dy = point.x - x, point.y - y
     away = np.sqrt(dx * dx + dy * dy)
     if (is_waiting and away < 0.2) or away <= 1e-6:
@@ -388,6 +394,65 @@ def _group_pace(paths, pedestrians, i, shapes, near, first, dt):  # type: ignore
 
 
 @compiled
+def _leave_crossing(walker, junctions):  # type: ignore[no-untyped-def]
+    """Note who is off the crossing it was on."""
+    left = walker.leaving_crossing
+    if left >= 0 and walker.distance_walked - walker.leaving_since > _OFF_CROSSING:
+        junctions.walkers_on[left] -= 1
+        walker.leaving_crossing = NONE
+
+
+@compiled
+def _go_to_spot(paths, pedestrians, i, shapes, b, near, time):  # type: ignore[no-untyped-def]
+    """Take who is to stand a step to where it stands, or turn it there; return the metres walked."""
+    walker, dt = pedestrians[i], time[1]
+    x, y = walker.stand_xy
+    is_there = (x - shapes.x[b]) ** 2 + (y - shapes.y[b]) ** 2 < _STANDS_WITHIN**2
+    if walker.group_size > 1:
+        note_distance(pedestrians, i, shapes, b - i)
+    step = 0.0
+    if is_there:
+        turn_towards(shapes, b, walker.stand_yaw, dt)
+    else:
+        # Sides of walkways do not count. In a crowd one slows down towards one's place, or goes on with a march.
+        if walker.stand_kind == CROWD:
+            away = np.sqrt((x - shapes.x[b]) ** 2 + (y - shapes.y[b]) ** 2)
+            time = (time[0] * min(1.0, away / _SLOWS_WITHIN), dt)
+        step = _walk(paths, walker, FollowPoint(x, y, x, y, 0.0, 0.0), shapes, b, near, True, time)
+    _note_progress(paths, walker, shapes.x[b], shapes.y[b], is_there, dt)
+    note_standing(pedestrians, walker, is_there, dt)
+    return step
+
+
+@compiled
+def _go_along(paths, pedestrians, junctions, shapes, who, near, is_asked, time):  # type: ignore[no-untyped-def]
+    """Take a pedestrian, by its row and its body in `who`, a step along its walkway; return the metres walked."""
+    (i, b), (pace, dt) = who, time
+    walker = pedestrians[i]
+    x, y = shapes.x[b], shapes.y[b]
+    led_by = walker.leader
+    leader = pedestrians[i if led_by == NONE else led_by]
+    is_let_go = leader.jammed_time > _LET_GO_AFTER
+    if is_let_go:
+        walker.leader = NONE  # in this step it goes its own way
+    is_alone = walker.group_size == 1 or is_let_go
+    share = 1.0 if is_alone else _group_pace(paths, pedestrians, i, shapes, near, b - i, dt)
+    if is_asked:
+        share = max(share, 1.0)
+    walkway, offset = walker.walkway, walker.offset
+    is_waiting = advance_follow_point(paths, walker, leader, junctions, is_asked, x, y, dt)
+    _leave_crossing(walker, junctions)
+    if is_asked and walker.stuck_time > 2.5:
+        _turn_round(paths, walker, x, y)  # it waits for us, and is in our way
+    elif led_by == NONE and walker.walkway == walkway and walker.offset != offset:
+        stop_at_spot(paths, pedestrians, i, shapes, b - i, offset)
+    step = _walk(paths, walker, follow_point(paths, walker), shapes, b, near, is_waiting, (pace * share, dt))
+    _note_progress(paths, walker, shapes.x[b], shapes.y[b], is_waiting or share < _WAITS_BELOW, dt)
+    walker.leader = led_by
+    return step
+
+
+@compiled
 def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, pace, dt):  # type: ignore[no-untyped-def]
     """Advance all pedestrians by `dt` seconds; their bodies follow those of the vehicles in `shapes`, and in `grid`.
 
@@ -399,35 +464,19 @@ def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, pace
     junctions.walker_wait[:] = 0.0
     for i in range(len(pedestrians)):
         walker = pedestrians[i]
+        if walker.aboard != NONE:
+            continue
         b = first + i
-        x, y = shapes.x[b], shapes.y[b]
         near = _nearby(shapes, grid, b, buffer)
-        led_by = walker.leader
-        leader = pedestrians[i if led_by == NONE else led_by]
-        if leader.jammed_time > _LET_GO_AFTER:
-            walker.leader = NONE  # in this step it goes its own way
-        share = (
-            1.0
-            if walker.group_size == 1 or leader.jammed_time > _LET_GO_AFTER
-            else _group_pace(paths, pedestrians, i, shapes, near, first, dt)
-        )
-        if asked[i]:
-            share = max(share, 1.0)
-        is_waiting = advance_follow_point(paths, walker, leader, junctions, asked[i], x, y, dt)
-        left = walker.leaving_crossing
-        if left >= 0 and walker.distance_walked - walker.leaving_since > _OFF_CROSSING:
-            junctions.walkers_on[left] -= 1
-            walker.leaving_crossing = NONE
-        if asked[i] and walker.stuck_time > 2.5:
-            _turn_round(paths, walker, x, y)  # it waits for us, and is in our way
-        step = _walk(paths, walker, shapes, b, near, is_waiting, pace * share, dt)
+        if walker.stand_kind != 0:
+            step = _go_to_spot(paths, pedestrians, i, shapes, b, near, (pace, dt))
+        else:
+            step = _go_along(paths, pedestrians, junctions, shapes, (i, b), near, asked[i], (pace, dt))
         if step == 0.0:
             shapes.vx[b] = shapes.vy[b] = 0.0
         walker.speed = step / dt
         _note_gait(walker, step > 0.0, dt)
         walker.distance_walked += step
-        _note_progress(paths, walker, shapes.x[b], shapes.y[b], is_waiting or share < _WAITS_BELOW, dt)
-        walker.leader = led_by
 
 
 @compiled

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from vico.sim.traffic.axles import axle_transforms
 from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
 from vico.sim.traffic.companions import choose_companions, leave_group
 from vico.sim.traffic.crossings import mark_busy_crossings
+from vico.sim.traffic.gatherings import Gatherings
 from vico.sim.traffic.hand_placing import HandPlaced, TrafficSetup
 from vico.sim.traffic.jams import STUCK_AFTER, Jam, JamLog, entity_before
 from vico.sim.traffic.levels import TrafficLevels, shapes_of
@@ -30,6 +31,7 @@ from vico.sim.traffic.route import count_per_street, drop_shut_plans, is_taken, 
 from vico.sim.traffic.shapes import Shapes
 from vico.sim.traffic.signal_heads import SignalHeads
 from vico.sim.traffic.signals import Circles, SignalClock, SignalsShown
+from vico.sim.traffic.standing import stand_at_start
 from vico.sim.traffic.state import (
     AWAY,
     COMING,
@@ -48,6 +50,9 @@ from vico.sim.traffic.vehicles import advance_vehicles, bring_back, come_back, p
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.world.walkways import SIDEWALK
+
+#: Positions, shape ``(n, 3)``, yaws, and whether people sit.
+Seating = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]
 
 PERSON_HEIGHT = 1.72
 # A car that nothing has let move for so long (s) comes back in at the map's edge, as SUMO does it.
@@ -121,7 +126,7 @@ class Traffic:
         # Copies of one's own: how fast lanes are driven follows the weather of the run, and what is shut its events.
         walked = network.walked._replace(walkways=network.walked.walkways.copy())
         hand = HandPlaced.of(placed, lanes, network.walks, net._replace(lanes=net.lanes.copy()), walked)
-        self._net, self._paths = hand.net, hand.paths
+        self._net, self.paths = hand.net, hand.paths
         self._shut: tuple[NDArray[np.bool_] | None, NDArray[np.bool_] | None] = None, None
         self._speed_limits = net.lanes["speed"].copy()
         self._conditions: Conditions | None = None
@@ -140,6 +145,8 @@ class Traffic:
         self.signals = SignalClock(lanes, network.walks, seed) if junction_rule.has_signals else None
         self._heads = SignalHeads(lanes, network.walks, network.poles, height) if self.signals else None
         self._levels = TrafficLevels(height, lanes, network.walks, self._heights, self.shapes.bottom.copy())
+        #: Tells where pedestrians are who ride in buses, by their numbers.
+        self.seats: Callable[[NDArray[np.int64]], Seating] | None = None
         self._lamps = LampDrawing([self._prototypes[k].split("_")[0] for k in self.prototype])
         self._street_load = np.zeros(len(lanes.edges), np.int32)
         self._entries = self._all_entries = network.entries
@@ -150,6 +157,9 @@ class Traffic:
             self.pedestrian_state.preferred_speed[i] = one.speed or self.pedestrian_state.preferred_speed[i]
         self._place_cars(seed, network.starts, len(placed.cars))
         self._place_pedestrians(seed, len(placed.pedestrians))
+        stand_at_start(self.paths, self._walkers, self.shapes, self.vehicles, seed)
+        #: Leads pedestrians to events.
+        self.gatherings = Gatherings(self)
         far = np.full(len(self.shapes.x), _FAR)
         self._follow_levels(far, far)
 
@@ -244,7 +254,7 @@ class Traffic:
 
     def _place_pedestrian(self, i: int, walkway: int, offset: float, way: int) -> bool:
         b = self.vehicles + i
-        return bool(place_pedestrian(self._paths, self._walkers, i, walkway, offset, way, self.shapes, b))
+        return bool(place_pedestrian(self.paths, self._walkers, i, walkway, offset, way, self.shapes, b))
 
     def _place_companion(self, i: int) -> bool:
         """Put a pedestrian near who leads it; who finds no room there walks alone."""
@@ -290,12 +300,16 @@ class Traffic:
         return found | {f"jams.{name}": array for name, array in self.jams.arrays().items()}
 
     def bodies(self) -> Bodies:
-        """Vehicles, then pedestrians; without buses that are out of service."""
+        """Vehicles but those out of service, then the pedestrians in the street."""
         if self._bodies is None:
-            self._bodies = self._bodies_now()
+            found = self._everybody()
+            riding = self.riding
+            out = np.concatenate([np.ones(len(found) - self.pedestrians, np.bool_), ~riding])
+            self._bodies = found.where(out) if riding.any() else found
         return self._bodies
 
-    def _bodies_now(self) -> Bodies:
+    def _everybody(self) -> Bodies:
+        """Return vehicles and all pedestrians, who ride in buses far away."""
         xy = np.column_stack([self.shapes.x, self.shapes.y])
         everybody = Bodies(
             entity=self._own_entities,
@@ -346,7 +360,7 @@ class Traffic:
         if lanes is not None:
             widen_shut(self._net, shut)
         self._net.lanes["shut"] = shut
-        self._paths.walkways["shut"] = False if walkways is None else walkways
+        self.paths.walkways["shut"] = False if walkways is None else walkways
         left = self._all_entries[~shut[self._all_entries]]
         self._entries = left if len(left) else self._all_entries
 
@@ -364,7 +378,7 @@ class Traffic:
         """
         if self.signals is None:
             return
-        clusters = self.signals.show(second, dark, self._net, self._paths)
+        clusters = self.signals.show(second, dark, self._net, self.paths)
         if clusters is not None and self.junction_rule.is_shared:
             exclusive = self.junctions.claims.exclusive
             exclusive[:] = False
@@ -372,7 +386,7 @@ class Traffic:
 
     def signals_shown(self) -> SignalsShown | None:
         """Return what all signals show now; None where they are not obeyed."""
-        return None if self.signals is None else self.signals.shown(self._net, self._paths)
+        return None if self.signals is None else self.signals.shown(self._net, self.paths)
 
     def drop_shut_plans(self) -> None:
         """Have cars plan anew that were about to drive where it is shut since."""
@@ -382,6 +396,15 @@ class Traffic:
         """Return whether a car is on some lanes (a mask), or on its way there."""
         return bool(is_taken(self._net, self._vehicles, lanes))
 
+    @property
+    def shut_walkways(self) -> NDArray[np.bool_] | None:
+        """Which walkways nobody is to walk on; None for none."""
+        return self._shut[1]
+
+    def is_shut_street_taken(self) -> bool:
+        """Return whether a car is where an event keeps cars off."""
+        return self._shut[0] is not None and self.is_taken(self._shut[0])
+
     def advance(self, dt: float, obstacles: Bodies) -> None:
         """Advance everybody by `dt` seconds; nobody touches anybody, `obstacles` (all other bodies) among them."""
         mine, others = self.shapes, shapes_of(obstacles, self._levels)
@@ -390,7 +413,7 @@ class Traffic:
         mark_busy_crossings(net, fleet, junctions)
         widest = float(np.max(everybody.half_length + everybody.half_width, initial=0.0))
         grid = neighbour_grid(everybody.x, everybody.y, _CELL, widest + _DRIFT * dt)
-        advance_pedestrians(self._paths, self._walkers, junctions, fleet, everybody, grid, self._walking_pace, dt)
+        advance_pedestrians(self.paths, self._walkers, junctions, fleet, everybody, grid, self._walking_pace, dt)
         junctions.vehicle_wait[:] = 0.0
         count_per_street(net, fleet, self._street_load)
         advance_vehicles(net, fleet, junctions, everybody, grid, self._street_load, dt)
@@ -456,7 +479,7 @@ class Traffic:
         parts = [Drawn(self._prototypes, index[there], transforms[there], entity[there])]
         parts.append(self._lamps.draw(self.fleet.lights, float(self.jams.elapsed[0]), vehicles))
         if self._heads is not None:
-            parts.append(self._heads.draw(self._net.lanes["light"], self._paths.walkways["light"]))
+            parts.append(self._heads.draw(self._net.lanes["light"], self.paths.walkways["light"]))
         return joined_drawn(parts)
 
     def vehicle_transforms(self) -> NDArray[np.float32]:
@@ -488,13 +511,57 @@ class Traffic:
 
     @property
     def walkers(self) -> Bodies:
-        """The pedestrians alone."""
-        bodies = self.bodies()
-        return bodies.where(np.arange(len(bodies) - self.pedestrians, len(bodies)))
+        """The pedestrians alone, in buses, too."""
+        everybody = self._everybody()
+        found = everybody.where(np.arange(len(everybody) - self.pedestrians, len(everybody)))
+        riding = np.flatnonzero(self._walkers["aboard"] != NONE)
+        if len(riding) and self.seats is not None:
+            position, yaw, _ = self.seats(riding)
+            found.position[riding], found.yaw[riding] = position, yaw
+        return found
+
+    @property
+    def spots(self) -> NDArray[np.void]:
+        """Where people stand beside walkways, dtype `SPOT`."""
+        return self.paths.spots
+
+    @property
+    def riding(self) -> NDArray[np.bool_]:
+        """Which pedestrians ride in buses, shape ``(pedestrians,)``."""
+        return np.asarray(self._walkers["aboard"] != NONE)
+
+    @property
+    def passengers(self) -> Bodies:
+        """The pedestrians who ride in buses, where they sit or stand."""
+        return self.walkers.where(self.riding)
+
+    def take_off(self, i: int) -> None:
+        """Take a pedestrian out of the street: it rides in a bus from now on."""
+        b = self.vehicles + i
+        self.shapes.x[b], self.shapes.y[b] = _FAR + b * 100.0, _FAR
+        self.shapes.vx[b] = self.shapes.vy[b] = 0.0
+        self._walkers["speed"][i] = 0.0
+        self._bodies = None
+
+    def set_down(self, i: int, xy: NDArray[np.float64], walkway: int, offset: float) -> None:
+        """Put a pedestrian back into the street, to walk on along a walkway."""
+        b, walker = self.vehicles + i, self._walkers[i]
+        before = self.shapes.x.copy(), self.shapes.y.copy()
+        self.shapes.x[b], self.shapes.y[b] = xy
+        walker["walkway"], walker["offset"], walker["progress_xy"] = walkway, offset, xy
+        walker["stuck_time"] = walker["jammed_time"] = walker["crossing_wait"] = 0.0
+        self._follow_levels(*before)
+        self._bodies = None
 
     @property
     def gait(self) -> PedestrianGaits:
         """How each pedestrian walks: what sets a walking clip's rate and phase."""
         walkers = self.pedestrian_state
         walked = walkers.distance_walked - walkers.set_out
-        return PedestrianGaits(walkers.preferred_speed.copy(), walked, walkers.gait_time.copy())
+        seated = np.zeros(len(walked), np.bool_)
+        riding = np.flatnonzero(walkers.aboard != NONE)
+        if len(riding) and self.seats is not None:
+            seated[riding] = self.seats(riding)[2]
+        return PedestrianGaits(
+            walkers.preferred_speed.copy(), walked, walkers.gait_time.copy(), walkers.stand_kind.copy(), seated
+        )

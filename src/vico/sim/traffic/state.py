@@ -129,6 +129,26 @@ WALKWAY = np.dtype(
     align=True,
 )
 
+#: Why a pedestrian stands, or follows a point of its own: it looks into a window, talks, waits at a stop; from `LED` on
+#: others say where and how long: it boards a bus, or belongs to an event's crowd.
+WINDOW, TALK, STOP = 1, 2, 3
+LED = BOARD = 4
+CROWD = 5
+#: A spot beside a walkway at which people stand.
+SPOT = np.dtype(
+    [
+        ("x", _F),  # ENU metres
+        ("y", _F),
+        ("yaw", _F),  # where one looks, rad
+        ("walkway", _I),
+        ("offset", _F),  # metres along it
+        ("kind", np.uint8),  # WINDOW, TALK or STOP
+        ("partner", _I),  # TALK: spot of the other one, NONE for none
+        ("stop", _I),  # STOP: number of the bus stop, NONE for none
+    ],
+    align=True,
+)
+
 #: Longest time that `gait_time` counts, s.
 GAIT_TIME = 2.0
 #: A pedestrian; it follows a point that runs a little ahead of it along its walkway.
@@ -160,6 +180,16 @@ PEDESTRIAN_RECORD = np.dtype(
         ("apart", _F),  # how far it is from who leads it, who leads from the farthest companion, m; 0 alone
         ("parted_time", _F),  # who leads: how long somebody has been left behind, s
         ("in_file", _F),  # how long it walks behind instead of beside for somebody who comes, s
+        ("stand_kind", np.uint8),  # why it stands, or follows a point of its own; 0 for who walks along walkways
+        ("spot", _I),  # spot at which it stands or to which it goes, NONE for none
+        ("stand_time", _F),  # how long it goes on standing, s
+        ("stand_xy", _F, (2,)),  # where it stands or goes, ENU metres
+        ("stand_yaw", _F),  # where it looks then, rad
+        ("event", _I),  # event of the city that it goes to or is at, 0 for none
+        ("place", _I),  # its number there
+        ("boards", _I),  # bus to whose door it goes, NONE for none
+        ("aboard", _I),  # bus it rides in, NONE for none
+        ("stops_left", _I),  # how many stops it still rides
         ("random", np.uint64),  # state of its stream of random numbers
     ],
     align=True,
@@ -177,11 +207,17 @@ class PedestrianGaits(NamedTuple):
         Metres since it last set out.
     time
         Seconds since then, or since it stopped if negative; counted up to `GAIT_TIME`.
+    standing
+        Why it stands, or goes to stand: `WINDOW`, `TALK` and so on, 0 for who walks along.
+    seated
+        Whether it sits in a bus.
     """
 
     pace: NDArray[np.float64]
     walked: NDArray[np.float64]
     time: NDArray[np.float64]
+    standing: NDArray[np.uint8]
+    seated: NDArray[np.bool_]
 
 
 class LaneNetwork(NamedTuple):
@@ -242,6 +278,8 @@ class WalkwayNetwork(NamedTuple):
     goal_walkway, goal_away
         Walkway of each goal of pedestrians whose route is given, int32, shape ``(goals,)``, and how far it is from each
         meeting point, metres, shape ``(goals, meeting points)``.
+    spots, spot_first
+        Where people stand beside walkway ``i``: ``spots[spot_first[i]:spot_first[i + 1]]``, dtype `SPOT`.
     """
 
     walkways: Records
@@ -252,6 +290,8 @@ class WalkwayNetwork(NamedTuple):
     meeting: Ints
     goal_walkway: Ints
     goal_away: Floats
+    spots: Records
+    spot_first: Ints
 
 
 class Claims(NamedTuple):
@@ -372,6 +412,7 @@ def new_pedestrians(n: int, seed: int) -> Records:
     walkers["lateral_share"] = random.uniform(0.1, 0.95, n)
     walkers["preferred_speed"] = random.uniform(1.0, 1.5, n)
     walkers["leaving_crossing"] = walkers["goal"] = walkers["leader"] = NONE
+    walkers["spot"] = walkers["boards"] = walkers["aboard"] = NONE
     walkers["group_size"] = 1
     walkers["gait_time"] = -GAIT_TIME
     walkers["random"] = _random_streams(seed, "ways", n)

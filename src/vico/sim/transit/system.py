@@ -29,10 +29,12 @@ from vico.sim.traffic.state import PRESENT
 from vico.sim.transit.bicycles import Bicycles
 from vico.sim.transit.bus_plan import BusPlan
 from vico.sim.transit.doors import DOOR_TIME, leaf_transforms, moved_doors
+from vico.sim.transit.passengers import Passengers
 from vico.sim.transit.trams import Trams
 from vico.world.mesh import Surface
 from vico.world.model import Line, Transit
 from vico.world.timetable import departure, next_departure
+from vico.world.walkable import WalkableMap
 
 # Buses drive so fast as the timetable asks for, within these, m/s; starting and braking cost the seconds beside. One
 # that had to drive faster than its time asks for would leave the next stop before it is due, without who comes on time.
@@ -41,6 +43,7 @@ _START_STOP = 10.0
 _LAST_CALL = 3.0  # seconds before a tram goes out of the city, or a bus to the depot, at which everybody gets off
 #: A bus goes to the depot if its next departure is farther off, seconds, and comes back so long before it.
 DEPOT_FROM, DEPOT_UNTIL = 300.0, 120.0
+_TINY = 1e-6  # seconds by which clocks err
 # Doors on a bus's right side, metres ahead of its centre.
 DOORS = (4.65, -0.05, -3.55)
 
@@ -108,8 +111,14 @@ class TransitSystem:
             self._begin_in_depot(bus, gone)
             traffic.fleet.at_stop[self._vehicle[bus]] = not self.in_depot(bus)
 
+        #: Pedestrians who ride; None where nobody said where they can get off.
+        self.passengers: Passengers | None = None
         self._on_tracks = self.trams.walkways_on_tracks()
         self._shut: tuple[NDArray[np.bool_] | None, NDArray[np.bool_] | None] = None, None
+
+    def take_passengers(self, walkable: WalkableMap, seed: int) -> None:
+        """Have pedestrians ride in buses, who get off where one can walk; `seed` decides who does at the start."""
+        self.passengers = Passengers(self, walkable, seed)
 
     def shut_walkways(self, shut: NDArray[np.bool_] | None) -> NDArray[np.bool_] | None:
         """Return a mask of walkways nobody is to walk on with those added that lie on tracks; the same for the same."""
@@ -147,11 +156,16 @@ class TransitSystem:
                 continue
             if self.dwell[bus] == DWELL:
                 self._note_arrival(bus)
+                if self.passengers is not None:
+                    self.passengers.arrive(bus)
             self.dwell[bus] = max(self.dwell[bus] - dt, 0.0)
             if self.may_leave_stop(bus):
                 self._leave_stop(bus)
-            elif self.dwell[bus] == 0.0 == self.open[bus] and self._ends_service(bus) and not self.aboard(bus):
+            elif self.dwell[bus] == 0.0 == self.open[bus] and self.ends_service(bus) and not self.aboard(bus):
                 self.traffic.take_away(v)
+        # Once a second.
+        if self.passengers is not None and math.floor(self.clock[0] + _TINY) > math.floor(self.clock[0] - dt + _TINY):
+            self.passengers.advance(obstacles)
 
     def _holds_doors(self, bus: int, v: int) -> bool:
         """Whether a bus wants its doors open: at a stop, until shortly before it leaves."""
@@ -159,13 +173,13 @@ class TransitSystem:
             return False
         if self.dwell[bus] > DOOR_TIME:
             return True
-        if self._ends_service(bus):
+        if self.ends_service(bus):
             return bool(self.aboard(bus))
         return bool(self.stop[bus] == 0 and self._next_departure(bus) - self.clock[0] > DOOR_TIME)
 
     # -- the depot ---------------------------------------------------------------------------------------------------
 
-    def _ends_service(self, bus: int) -> bool:
+    def ends_service(self, bus: int) -> bool:
         """Return whether a bus at its line's first stop goes to the depot: its next departure is far off."""
         return bool(self.stop[bus] == 0 and self._next_departure(bus) - self.clock[0] > DEPOT_FROM)
 
@@ -432,7 +446,7 @@ class TransitSystem:
         """Return whether a tram or bus is about to leave for out of the city or the depot: it takes nobody there."""
         tram = bus - self.traffic.buses
         if tram < 0:
-            return self.stopped_at(bus) is not None and bool(self.dwell[bus] <= _LAST_CALL) and self._ends_service(bus)
+            return self.stopped_at(bus) is not None and bool(self.dwell[bus] <= _LAST_CALL) and self.ends_service(bus)
         return tram >= 0 and self.trams.ends(tram) and bool(self.trams.dwell[tram] <= _LAST_CALL)
 
     def alight(self, bus: int, rider: int) -> None:

@@ -1,0 +1,220 @@
+"""Where pedestrians stand a while: before shop windows, in twos on wide sidewalks, and at bus stops.
+
+Each spot leaves a lane of its walkway free, and is clear of doors, other walkways and whatever is solid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from vico.sim.traffic.state import NONE, SPOT, STOP, TALK, WINDOW, Records, WalkwayNetwork
+from vico.world.folder import World
+from vico.world.model import Category, Point2
+from vico.world.walkable import CROSSING, ROADWAY
+from vico.world.walkways import SIDEWALK, Walkways
+
+_BODY = 0.3  # m: a body's radius and a little air
+_LANE_LEFT = 0.65  # m that the middles of others can be apart who pass beside somebody who stands
+_FROM_WALL = 0.65  # m from a window to who looks in
+_BESIDE_DOOR = (1.7, 2.6)  # m along the wall from a door to a window
+_WALL_WITHIN = (0.35, 0.9)  # m to the wall of who looks in
+_DOOR_FREE, _STOP_FREE = 1.0, 1.1  # m around doors and around where passengers wait that stay free
+_REACH = 6.0  # m from a walkway to a spot beside it
+_OTHER_WALKWAYS = 0.9  # m to them
+_PAIR_EVERY, _PAIR_APART = 30.0, 0.72  # m along a sidewalk between pairs, and between the two of a pair
+_BEND = 0.05  # m by which that may differ
+_AT_STOP, _STOP_GRID, _PER_STOP = 5.0, 0.5, 6  # m around where passengers wait, m between places tried, and people
+_STOP_ROOM, _FROM_LANE = 0.35, 1.9  # m around who waits, and from there to the middle of the bus's lane
+_STOP_REACH = 9.0  # m from a walkway to who waits
+_LEAST_LENGTH = 8.0  # m of sidewalk on which people stop
+_RAISED = 0.5  # m above the ground: on decks nobody stops
+_END = 1.5  # m at a walkway's ends that stay free
+
+
+@dataclass
+class _Site:
+    """What spots have to keep clear of."""
+
+    walks: Walkways
+    solids: shapely.STRtree
+    kept_free: NDArray[np.float64]
+    usable: NDArray[np.bool_]
+    rows: list[tuple[object, ...]] = field(default_factory=list)
+    taken: list[tuple[float, float]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.lines = [shapely.LineString(self.walks.line(k)) for k in range(len(self.walks))]
+        self.tree = shapely.STRtree(self.lines)
+
+    def nearest(self, point: Point2, reach: float = _REACH) -> tuple[int, float] | None:
+        """Return the sidewalk nearest to a point on which people stop, and metres along it."""
+        near = self.tree.query(shapely.Point(point), predicate="dwithin", distance=reach)
+        near = [int(k) for k in sorted(near) if self.usable[k]]
+        if not near:
+            return None
+        away = [float(shapely.distance(self.lines[k], shapely.Point(point))) for k in near]
+        best = near[int(np.argmin(away))]
+        return best, float(shapely.line_locate_point(self.lines[best], shapely.Point(point)))
+
+    def at(self, walkway: int, offset: float, aside: float) -> tuple[float, float, float]:
+        """Return the point so far left of a walkway's middle, and the walkway's direction there."""
+        here = np.array(self.lines[walkway].interpolate(offset).coords[0])
+        ahead = np.array(self.lines[walkway].interpolate(offset + 0.3).coords[0])
+        behind = np.array(self.lines[walkway].interpolate(max(offset - 0.3, 0.0)).coords[0])
+        yaw = float(np.arctan2(*(ahead - behind)[::-1]))
+        return float(here[0] - np.sin(yaw) * aside), float(here[1] + np.cos(yaw) * aside), yaw
+
+    def aside(self, walkway: int, offset: float, point: Point2) -> float:
+        """Return how far left of a walkway's middle a point is, metres."""
+        x, y, yaw = self.at(walkway, offset, 0.0)
+        return float(-np.sin(yaw) * (point[0] - x) + np.cos(yaw) * (point[1] - y))
+
+    def fits(self, walkway: int, offset: float, point: Point2) -> bool:
+        """Return whether somebody may stand at a point beside a walkway, and can get there."""
+        if not _END <= offset <= float(self.walks.length[walkway]) - _END:
+            return False
+        aside = self.aside(walkway, offset, point)
+        room = self.walks.room[walkway]
+        side, other = (room[0], room[1]) if aside > 0 else (room[1], room[0])
+        blocks = abs(aside) < side + 2 * _BODY
+        if blocks and min(side, abs(aside) - 2 * _BODY) + other < _LANE_LEFT:
+            return False
+        here = shapely.Point(point)
+        near = self.tree.query(here, predicate="dwithin", distance=_OTHER_WALKWAYS)
+        if any(k != walkway for k in near):
+            return False
+        x, y, _ = self.at(walkway, offset, 0.0)
+        way = shapely.LineString([(x, y), point])
+        if len(self.solids.query(way, predicate="dwithin", distance=_BODY)):
+            return False
+        kept = self.kept_free
+        if len(kept) and (np.hypot(kept[:, 0] - point[0], kept[:, 1] - point[1]) < kept[:, 2]).any():
+            return False
+        return all(np.hypot(a - point[0], b - point[1]) > 2 * _BODY + 0.1 for a, b in self.taken)
+
+    def add(self, spots: Sequence[tuple[Point2, float, int, float]], kind: int, stop: int = NONE) -> None:
+        """Add spots: point, yaw, walkway and metres along it; two of them are partners."""
+        first = len(self.rows)
+        for k, ((x, y), yaw, walkway, offset) in enumerate(spots):
+            partner = first + 1 - k if kind == TALK else NONE
+            self.rows.append((x, y, yaw, walkway, offset, kind, partner, stop))
+            self.taken.append((x, y))
+
+
+def with_spots(
+    network: WalkwayNetwork, walks: Walkways, world: World, solids: Iterable[shapely.Polygon]
+) -> WalkwayNetwork:
+    """Return the walkways with the spots of a world at which people stand.
+
+    Parameters
+    ----------
+    walks
+        The walkways as the world has them, in the network's order.
+    solids
+        Footprints nobody walks through.
+    """
+    if not len(walks):
+        return network
+    kept = [(*entrance.approach, _DOOR_FREE) for entrance in world.entrances]
+    waits = [stop.wait for stop in world.transit.stops] + [stop.wait for stop in world.transit.tram_stops]
+    kept += [(*wait[:2], _STOP_FREE) for wait in waits]
+    kept += [(*station.position[:2], 2.5) for station in world.transit.bike_stations]
+    on_ground = np.abs(walks.z - world.height(walks.points)) < _RAISED
+    rows = np.repeat(np.arange(len(walks)), np.diff(walks.first))
+    usable = np.bincount(rows, weights=~on_ground, minlength=len(walks)) == 0
+    usable &= (walks.kind == SIDEWALK) & (walks.length >= _LEAST_LENGTH)
+    site = _Site(walks, shapely.STRtree(list(solids)), np.array(kept, np.float64).reshape(-1, 3), usable)
+    _add_stops(site, world)
+    _add_windows(site, world)
+    _add_pairs(site)
+    spots = np.array(site.rows, SPOT) if site.rows else np.zeros(0, SPOT)
+    return network._replace(spots=_sorted(spots), spot_first=_first(spots, len(walks)))
+
+
+def _sorted(spots: Records) -> Records:
+    """Return spots by walkway, with their partners' new numbers."""
+    order = np.argsort(spots["walkway"], kind="stable")
+    place = np.empty(len(order), np.int32)
+    place[order] = np.arange(len(order))
+    found = spots[order]
+    paired = found["partner"] != NONE
+    found["partner"][paired] = place[found["partner"][paired]]
+    return found
+
+
+def _first(spots: Records, walkways: int) -> NDArray[np.int32]:
+    first = np.zeros(walkways + 1, np.int32)
+    first[1:] = np.cumsum(np.bincount(spots["walkway"], minlength=walkways))
+    return first
+
+
+def _add_stops(site: _Site, world: World) -> None:
+    """Add spots on free ground around where passengers wait, the nearest first, facing the street."""
+    lanes, served = world.lanes, {stop for line in world.transit.lines for stop in line.stops}
+    steps = np.arange(-_AT_STOP, _AT_STOP + 0.01, _STOP_GRID)
+    grid = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    grid = grid[np.lexsort((grid[:, 1], grid[:, 0], np.round(np.hypot(*grid.T), 3)))]
+    for number, stop in enumerate(world.transit.stops):
+        if stop.id not in served or stop.lane not in lanes.index:
+            continue
+        bus = lanes.at(lanes.index[stop.lane], stop.offset)
+        points = grid + np.array(stop.wait[:2])
+        free = (world.walkable.clearance_at(points) >= _STOP_ROOM) & world.walkable.is_connected(points)
+        free &= ~np.isin(world.walkable.class_at(points), (ROADWAY, CROSSING))
+        beside = -np.sin(bus[2]) * (points[:, 0] - bus[0]) + np.cos(bus[2]) * (points[:, 1] - bus[1])
+        free &= np.abs(beside) > _FROM_LANE
+        count = 0
+        for (x, y), away in zip(points[free].tolist(), beside[free].tolist(), strict=True):
+            found = site.nearest((x, y), _STOP_REACH)
+            if found is None or not site.fits(*found, (x, y)):
+                continue
+            site.add([((x, y), float(bus[2]) - np.sign(away) * np.pi / 2, *found)], STOP, number)
+            count += 1
+            if count == _PER_STOP:
+                break
+
+
+def _add_windows(site: _Site, world: World) -> None:
+    """Add spots beside the doors of shops, cafés and restaurants, facing the wall."""
+    trade = {place.entrance for place in world.places if place.category in (Category.FOOD, Category.STORE)}
+    doors = [entrance for entrance in world.entrances if entrance.id in trade]
+    for door in doors:
+        normal = np.array([np.cos(door.facing), np.sin(door.facing)])
+        tangent = np.array([-normal[1], normal[0]])
+        for along in (side * metres for side in (1, -1) for metres in _BESIDE_DOOR):
+            x, y = (np.array(door.position[:2]) + along * tangent + _FROM_WALL * normal).tolist()
+            solid = site.solids.query_nearest(shapely.Point(x, y))
+            near = float(shapely.distance(site.solids.geometries[solid[0]], shapely.Point(x, y))) if len(solid) else 9.0
+            found = site.nearest((x, y))
+            if found is None or not _WALL_WITHIN[0] <= near <= _WALL_WITHIN[1]:
+                continue
+            if site.fits(*found, (x, y)):
+                site.add([((x, y), door.facing + np.pi, *found)], WINDOW)
+                break
+
+
+def _add_pairs(site: _Site) -> None:
+    """Add spots for two who talk, at the side of sidewalks, facing each other."""
+    for walkway in np.flatnonzero(site.usable).tolist():
+        length = float(site.walks.length[walkway])
+        for number, offset in enumerate(np.arange(length / 2 % _PAIR_EVERY, length, _PAIR_EVERY)):
+            left = (walkway + number) % 2 == 0
+            for side in (1, -1) if left else (-1, 1):
+                aside = side * float(site.walks.room[walkway, 0 if side > 0 else 1])
+                ends = [offset - _PAIR_APART / 2, offset + _PAIR_APART / 2]
+                places = [site.at(walkway, end, aside) for end in ends]
+                between = np.hypot(places[0][0] - places[1][0], places[0][1] - places[1][1])
+                # On the inside of a bend they would be too near.
+                is_straight = abs(between - _PAIR_APART) < _BEND
+                if is_straight and all(
+                    site.fits(walkway, end, place[:2]) for end, place in zip(ends, places, strict=True)
+                ):
+                    yaws = [places[0][2], places[1][2] + np.pi]
+                    both = [(p[:2], yaw, walkway, end) for p, yaw, end in zip(places, yaws, ends, strict=True)]
+                    site.add(both, TALK)
+                    break

@@ -1,0 +1,199 @@
+"""People nobody plays who ride in buses: they wait at stops, get in by a door, sit, and get off some stops later."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from vico.assets.bus import BUS_FLOOR
+from vico.seeds import rng
+from vico.sim.avatars import free_ground
+from vico.sim.bodies import Bodies
+from vico.sim.traffic.population import Seating, Traffic
+from vico.sim.traffic.state import BOARD, NONE, STOP
+from vico.world.model import Transit
+from vico.world.walkable import WalkableMap
+from vico.world.walkways import SIDEWALK
+
+#: Among a bus's riders pedestrians are numbered from here.
+FIRST_PASSENGER = 1_000_000
+# Riders of a bus at which no more pedestrians get in: there is room for those who are played.
+_FULL = 24
+_AT_START, _MOST_AT_START = 0.1, 8  # share of those who walk alone that ride at the start, and most in one bus
+_RIDE = 4  # stops they ride at the most
+_LEAST_DWELL = 9.0  # s a bus has to stand on for somebody to set out to its door
+_AT_DOOR = 0.5  # m from the door's front where one gets in
+_BESIDE = 1.5  # m from the door where one gets off if there is no room before it
+_STOP_REACH = 8.0  # m from where passengers wait to a sidewalk
+
+
+class HasBuses(Protocol):
+    """Transit, as far as its riders are concerned; `vico.sim.transit.TransitSystem` tells each."""
+
+    transit: Transit
+    traffic: Traffic
+    open: NDArray[np.float64]
+    dwell: NDArray[np.float64]
+
+    def ends_service(self, bus: int) -> bool:
+        """Whether a bus goes to the depot from the stop it is at."""
+
+    def stopped_at(self, bus: int) -> str | None:
+        """Id of the stop at which a bus stands."""
+
+    def bus_pose(self, bus: int) -> NDArray[np.float64]:
+        """x, y, yaw of a bus."""
+
+    def exit_spots(self, bus: int) -> NDArray[np.float64]:
+        """Points outside each door."""
+
+    def seat(self, bus: int, rider: int) -> NDArray[np.float64]:
+        """x, y, yaw of where a rider is."""
+
+    def is_seated(self, bus: int, rider: int) -> bool:
+        """Whether a rider has a seat."""
+
+    def aboard(self, bus: int) -> int:
+        """How many ride in a bus."""
+
+    def capacity(self, bus: int) -> int:
+        """How many a bus takes."""
+
+    def board(self, bus: int, rider: int) -> float:
+        """Take a rider in."""
+
+    def alight(self, bus: int, rider: int) -> None:
+        """Let a rider off."""
+
+
+class Passengers:
+    """Moves pedestrians into buses and out again; what it knows is in their records and among the buses' riders.
+
+    Parameters
+    ----------
+    transit
+        Whose buses they ride.
+    walkable
+        Where one can get off.
+    seed
+        Decides who rides at the start.
+    """
+
+    def __init__(self, transit: HasBuses, walkable: WalkableMap, seed: int) -> None:
+        self._transit, self._traffic, self._walkable = transit, transit.traffic, walkable
+        self._walkers = transit.traffic.pedestrian_state
+        self._traffic.seats = self.seats
+        self._number = {stop.id: k for k, stop in enumerate(transit.transit.stops)}
+        self._sidewalks = _sidewalks_at(transit)
+        if self._traffic.pedestrians and self._traffic.buses:
+            self._start(rng(seed, "traffic", "passengers"))
+
+    def _start(self, random: np.random.Generator) -> None:
+        """Have some ride at the start."""
+        walkers, buses = self._walkers, self._traffic.buses
+        draws, chosen = random.random(len(walkers)), random.integers(0, buses, len(walkers))
+        alone = (walkers.group_size == 1) & (walkers.goal == NONE) & (draws < _AT_START)
+        for i in np.flatnonzero(alone).tolist():
+            bus = int(chosen[i])
+            if self._transit.stopped_at(bus) is not None and self._transit.aboard(bus) < _MOST_AT_START:
+                self._get_in(i, int(chosen[i]))
+
+    def seats(self, who: NDArray[np.int64]) -> Seating:
+        """Return where some who ride are: positions, yaws, and whether they sit."""
+        transit, aboard = self._transit, self._walkers.aboard
+        poses = np.array([transit.seat(int(aboard[i]), FIRST_PASSENGER + int(i)) for i in who]).reshape(-1, 3)
+        sits = [transit.is_seated(int(aboard[i]), FIRST_PASSENGER + int(i)) for i in who]
+        floor = self._traffic.height(poses[:, :2]) + BUS_FLOOR
+        return np.column_stack([poses[:, :2], floor]), poses[:, 2], np.array(sits, np.bool_)
+
+    def arrive(self, bus: int) -> None:
+        """Note that a bus has come to a stop."""
+        self._walkers.stops_left[self._walkers.aboard == bus] -= 1
+
+    def advance(self, obstacles: Bodies) -> None:
+        """Let people in and out of buses that stand with open doors; once a second.
+
+        Parameters
+        ----------
+        obstacles
+            Everybody's bodies.
+        """
+        walkers = self._walkers
+        if not len(walkers):
+            return
+        boarding = np.flatnonzero(walkers.stand_kind == BOARD)
+        for i in boarding.tolist():
+            self._board(i, int(walkers.boards[i]))
+        for bus in range(self._traffic.buses):
+            stop = self._transit.stopped_at(bus)
+            if stop is None or self._transit.open[bus] < 1.0:
+                continue
+            ends = self._transit.ends_service(bus)
+            due = np.flatnonzero((walkers.aboard == bus) & ((walkers.stops_left <= 0) | ends))
+            if len(due):
+                self._get_off(int(due[0]), bus, stop, obstacles)
+            elif not ends and self._transit.dwell[bus] >= _LEAST_DWELL:
+                self._call(bus, stop)
+
+    def _call(self, bus: int, stop: str) -> None:
+        """Have those who wait at a stop go to the nearest door of a bus, as long as there is room."""
+        walkers, doors = self._walkers, self._transit.exit_spots(bus)
+        waiting = np.flatnonzero((walkers.stand_kind == STOP) & (walkers.spot != NONE))
+        stops = self._traffic.spots["stop"][walkers.spot[waiting]]
+        room = _FULL - self._transit.aboard(bus) - int(((walkers.stand_kind == BOARD) & (walkers.boards == bus)).sum())
+        for i in waiting[stops == self._number[stop]][: max(room, 0)].tolist():
+            here = self._position(i)
+            door = doors[int(np.argmin(np.hypot(*(doors - here).T)))]
+            walkers.stand_kind[i], walkers.boards[i], walkers.spot[i] = BOARD, bus, NONE
+            walkers.stand_xy[i], walkers.stand_yaw[i] = door, self._transit.bus_pose(bus)[2] + np.pi / 2
+
+    def _board(self, i: int, bus: int) -> None:
+        """Let somebody in who stands before a door; who comes too late walks on."""
+        walkers = self._walkers
+        if self._transit.stopped_at(bus) is None or self._transit.open[bus] < 1.0:
+            walkers.stand_kind[i], walkers.boards[i] = 0, NONE
+        elif np.hypot(*(walkers.stand_xy[i] - self._position(i))) < _AT_DOOR:
+            self._get_in(i, bus)
+
+    def _get_in(self, i: int, bus: int) -> None:
+        walkers = self._walkers
+        if self._transit.aboard(bus) >= self._transit.capacity(bus):
+            return
+        self._transit.board(bus, FIRST_PASSENGER + i)
+        walkers.aboard[i], walkers.boards[i], walkers.stand_kind[i] = bus, NONE, 0
+        walkers.stops_left[i] = 1 + int(walkers.random[i] % np.uint64(_RIDE))
+        self._traffic.take_off(i)
+
+    def _get_off(self, i: int, bus: int, stop: str, obstacles: Bodies) -> None:
+        """Let somebody off beside a door, if there is room."""
+        way = self._sidewalks.get(stop)
+        everybody = Bodies.joined([self._traffic.bodies(), obstacles])
+        for door in self._transit.exit_spots(bus) if way is not None else ():
+            spot = free_ground(self._walkable, door, everybody, within=_BESIDE)
+            if spot is not None and way is not None:
+                self._transit.alight(bus, FIRST_PASSENGER + i)
+                self._walkers.aboard[i] = NONE
+                self._traffic.set_down(i, spot, *way)
+                return
+
+    def _position(self, i: int) -> NDArray[np.float64]:
+        shapes, b = self._traffic.shapes, self._traffic.vehicles + i
+        return np.array([shapes.x[b], shapes.y[b]])
+
+
+def _sidewalks_at(transit: HasBuses) -> dict[str, tuple[int, float]]:
+    """Return the sidewalk by each stop, and metres along it."""
+    walks = transit.traffic.walks
+    ways = np.flatnonzero(walks.kind == SIDEWALK)
+    lines: list[Any] = [shapely.LineString(walks.line(int(way))) for way in ways]
+    found: dict[str, tuple[int, float]] = {}
+    for stop in transit.transit.stops if lines else ():
+        point = shapely.Point(stop.wait[:2])
+        away = shapely.distance(lines, point)
+        best = int(np.argmin(away))
+        if away[best] <= _STOP_REACH:
+            found[stop.id] = int(ways[best]), float(shapely.line_locate_point(lines[best], point))
+    return found
