@@ -28,7 +28,7 @@ def _shown(traffic: Traffic) -> tuple[np.ndarray, np.ndarray]:
     for second in range(2 * CYCLE):
         traffic.set_signals(second, ())
         lanes.append(traffic._net.lanes["light"][clock.lane])
-        walks.append(traffic._paths.walkways["light"][clock.walkway])
+        walks.append(traffic.paths.walkways["light"][clock.walkway])
     return np.array(lanes), np.array(walks)
 
 
@@ -60,7 +60,7 @@ def test_nobody_gets_green_within_two_seconds_of_another_ones_amber() -> None:
 
 def test_nobody_drives_into_a_junction_or_steps_on_a_crossing_at_red() -> None:
     traffic = traffic_by(JunctionRule.SIGNALS, 60, 60)
-    net, paths = traffic._net, traffic._paths
+    net, paths = traffic._net, traffic.paths
     entered = crossed = waited = 0
     red_since = np.zeros(len(net.lanes))
     for step in range(2400):
@@ -118,7 +118,7 @@ def test_everybody_is_told_what_signals_near_them_show_and_residents_wait_at_red
         assert shown is not None
         info = {"signals": shown.near(*middle.tolist(), 60.0)}
         assert {one["for"] for one in info["signals"]} == {"vehicles", "pedestrians"}
-        light = traffic._paths.walkways["light"][way]
+        light = traffic.paths.walkways["light"][way]
         assert shows_red(tuple(middle.tolist()), info) == (light == RED)
         assert not shows_red((1e4, 0.0), info)
 

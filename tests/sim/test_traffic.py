@@ -121,7 +121,7 @@ def test_two_people_who_meet_between_walls_do_not_stand_there() -> None:
     stretch = int(np.argmin(np.where(narrow, traffic.walks.room.sum(axis=1), np.inf)))
     for i, (share, way) in enumerate([(0.4, 1), (0.6, -1)]):
         offset = share * traffic.walks.length[stretch]
-        assert place_pedestrian(traffic._paths, traffic._walkers, i, stretch, offset, way, traffic.shapes, i)
+        assert place_pedestrian(traffic.paths, traffic._walkers, i, stretch, offset, way, traffic.shapes, i)
     assert _watched(traffic, 120).longest.max() < 30.0
 
 
