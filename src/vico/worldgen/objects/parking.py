@@ -43,7 +43,7 @@ _WALL, _THING, _WALKER = 0.3, 0.15, 0.45  # metres to walls, things and the line
 _JUNCTION = 2.0  # beyond where lines are painted: 5 m from the corner in all
 _CROSSING, _HYDRANT = 4.0, 5.0
 _STOP_BEFORE, _STOP_AFTER, _STOP_WIDE = 18.0, 6.0, 4.5  # metres of the lane about a bus stop
-_RAIL = 2.0  # metres from a tram track's middle
+_RAIL = 1.8  # metres from a tram track's middle
 _STEEP = 0.06  # slope along a car on which it still stands level
 _LANE_REACH, _LANE_TURN = 6.5, 0.35
 
