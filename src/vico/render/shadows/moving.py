@@ -34,6 +34,8 @@ _OUTDOOR_REACH = 70.0
 _ROUND_EDGE, _BOX_EDGE, _ROUND_GAIN, _BOX_GAIN, _DARKEST = 2.0, 1.25, 1.5, 4.0, 0.75
 # Half the height of the layer at the ground in which they lie, metres.
 _CONTACT_HEIGHT = 0.5
+# Half the height of things that stand on the ground at least, metres.
+_SMALL = 0.45
 # Nothing is darkened further below a caster's foot than this, metres.
 _DEEPEST = np.float32(6.0)
 # ... nor further above it than this, in half heights.
@@ -163,7 +165,9 @@ def _set_reach(caster: Any, camera: Any, light: Any) -> None:
     centre, axes, reach = caster.centre, caster.half_axes, caster.reach
     sx, sy, sz = float(light.shadow_x), float(light.shadow_y), float(light.shadow_z)
     indoors, up = camera.indoors != 0, caster.half_height
-    throw = 0.0 if indoors else min(2.0 * up / max(sz, _LOWEST_SUN), _LONGEST_SHADOW)
+    # Small things are held, worn, fly, or are parts of robots: the ground may lie well below them.
+    drop = 2.0 * up if up > _SMALL else _DEEPEST + 2.0 * up
+    throw = 0.0 if indoors else min(drop / max(sz, _LOWEST_SUN), _LONGEST_SHADOW)
     rim, middle, tall = 1.3, 0.0, 1.1
     if indoors and caster.is_round:
         rim, middle, tall = 2.0, -1.0, 0.5 / up
