@@ -11,9 +11,9 @@ from vico.assets.robots import robot_model
 from vico.errors import InputError
 from vico.sim.bodies import Bodies
 from vico.sim.config import SimConfig
-from vico.sim.robots import Mode, RobotPopulation, RobotScene, RobotStatus
+from vico.sim.robots import RobotMode, RobotPopulation, RobotScene, RobotStatus
 from vico.sim.robots.airspace import CEILING, OVER
-from vico.sim.robots.rotors import Phase
+from vico.sim.robots.rotors import FlightPhase
 from vico.sim.robots.wind import air_at, gusts_of
 from vico.sim.simulation import Simulation
 
@@ -107,7 +107,7 @@ def test_points_nobody_can_fly_to_are_refused(robots: RobotPopulation, target: l
     assert reason in robots.flight_refusal(0, target)
     with pytest.raises(InputError, match="fly_to: "):
         robots.fly_to(0, target)
-    assert robots.mode[0] == Mode.IDLE
+    assert robots.mode[0] == RobotMode.IDLE
 
 
 def test_it_lands_on_a_flat_roof_and_not_on_its_edge(robots: RobotPopulation) -> None:
@@ -213,7 +213,7 @@ def test_with_a_low_battery_it_lands(robots: RobotPopulation) -> None:
     assert flight is not None
     flight.arrays.charge[:] = 0.1
     assert run(robots, 14.0) == ["battery_low", "landed"]
-    assert flight.arrays.phase[0] == Phase.LANDED
+    assert flight.arrays.phase[0] == FlightPhase.LANDED
 
 
 def test_two_drones_fly_as_each_would_alone_and_are_restored_bit_for_bit(scenes: dict[int, RobotScene]) -> None:

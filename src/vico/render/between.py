@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.render.scene import Scene
-from vico.render.sensors.past import Placement, matched, placement_of
+from vico.render.sensors.past import PlacedInstances, matched, placement_of
 
 #: What is farther from where it was than this has not moved, but come or gone through a door; metres.
 LEAP = 4.0
 
 
-class Moment(NamedTuple):
+class SceneMoment(NamedTuple):
     """Where everything that moves is.
 
     Attributes
@@ -31,19 +31,19 @@ class Moment(NamedTuple):
 
     scene: Scene
     second: float
-    placement: Placement
+    placement: PlacedInstances
     normals: NDArray[np.float32]
 
 
-def moment_of(scene: Scene, second: float) -> Moment:
+def moment_of(scene: Scene, second: float) -> SceneMoment:
     """Return a copy of where everything is now."""
     spans = scene.arrays.avatars.span
     first = int(spans["first_vertex"].min()) if len(spans) else 0
     vertices = slice(first, int(spans["end_vertex"].max(initial=0)))
-    return Moment(scene, second, placement_of(scene), scene.arrays.mesh.vertex["normal"][vertices].copy())
+    return SceneMoment(scene, second, placement_of(scene), scene.arrays.mesh.vertex["normal"][vertices].copy())
 
 
-def show_between(before: Moment, after: Moment, share: float) -> Scene:
+def show_between(before: SceneMoment, after: SceneMoment, share: float) -> Scene:
     """Put everything `share` (0..1) of the way from one moment to a later one; return the scene.
 
     What came, went, or leapt in between is where it was until the later moment has come.
@@ -97,14 +97,14 @@ def between(a: NDArray[np.float32], b: NDArray[np.float32], share: float) -> NDA
     return np.asarray(out, np.float32)
 
 
-def _show(moment: Moment) -> None:
+def _show(moment: SceneMoment) -> None:
     now = moment.placement
     _set_rigid(moment.scene, now, now.matrix)
     if len(now.x):
         moment.scene.repose(np.stack([now.x, now.y, now.z], axis=1), moment.normals)
 
 
-def _set_rigid(scene: Scene, placement: Placement, matrix: NDArray[np.float32]) -> None:
+def _set_rigid(scene: Scene, placement: PlacedInstances, matrix: NDArray[np.float32]) -> None:
     transforms = np.zeros((len(matrix), 4, 4), np.float32)
     transforms[:, :3], transforms[:, 3, 3] = matrix, 1.0
     scene.set_rigid(placement.prototype, transforms, placement.entity)

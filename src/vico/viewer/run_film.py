@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from vico.errors import InputError
-from vico.render.between import Moment, moment_of, show_between
+from vico.render.between import SceneMoment, moment_of, show_between
 from vico.render.film import FilmWriter
 from vico.render.frames import PictureRequest, take_pictures
 from vico.render.quality import FINE, RenderQuality
@@ -58,7 +58,7 @@ class FilmSettings:
 
 
 class _Seen(NamedTuple):
-    moment: Moment
+    moment: SceneMoment
     target: Target
 
 

@@ -14,11 +14,11 @@ from vico.errors import InputError, SchemaError
 from vico.sim.environment import Agenda, Environment, EventSites, Sky, Weather, weather_kinds
 from vico.sim.environment.climate import usual_temperature
 from vico.sim.environment.effects import CLEAR_SIGHT
-from vico.sim.environment.forecast import Changing, Site, forecast_of
+from vico.sim.environment.forecast import Changing, WeatherSite, forecast_of
 from vico.sim.environment.ground import Ground, aged, cover, iciness, wetness
 
-HELSINKI = Site(60.17, 24.94, 172)
-JANUARY = Site(60.17, 24.94, 15)
+HELSINKI = WeatherSite(60.17, 24.94, 172)
+JANUARY = WeatherSite(60.17, 24.94, 15)
 
 
 def environment(wanted: Any = "fair", *, hour: float = 12.0, date: str = "2026-06-21") -> Environment:

@@ -27,7 +27,7 @@ from vico.world.public import PublicMap
 SEARCH_ROUNDS = 3
 
 
-class Phase(IntEnum):
+class AutomatonState(IntEnum):
     """States of the automaton, numbered as in the figure."""
 
     GOTO_SOURCE = 0
@@ -56,7 +56,7 @@ class HeuristicDelivery:
     ) -> None:
         self.errands = instructions[number::of]
         self.skills = AssistantSkills(public_map, rng(seed, "heuristic", number))
-        self.phase = Phase.GOTO_SOURCE if self.errands else Phase.FINISHED
+        self.phase = AutomatonState.GOTO_SOURCE if self.errands else AutomatonState.FINISHED
         self._current = 0
         self._search: LookAround | None = None
         self._rounds = 0
@@ -86,7 +86,7 @@ class HeuristicDelivery:
     def restore(self, state: AgentState) -> None:
         """Go on with the errands as `state` returned them."""
         self.skills.restore(state["skills"])
-        self.phase, self._current = Phase(state["phase"]), state["current"]
+        self.phase, self._current = AutomatonState(state["phase"]), state["current"]
         self._search = None
         if state["search"] is not None:
             self._search = self._new_search()
@@ -123,7 +123,7 @@ class HeuristicDelivery:
         action = self.skills.go_to(view, self.errand["source"])
         if action is None:
             self._search = self._new_search()
-            self.phase = Phase.SEARCH
+            self.phase = AutomatonState.SEARCH
         return action
 
     def _look(self, view: ObservationView) -> Action | None:
@@ -133,11 +133,11 @@ class HeuristicDelivery:
             return action
         if self._search.found is not None:
             self._target, self._near = self._search.found, GRASP
-            self.phase = Phase.NAVIGATE
+            self.phase = AutomatonState.NAVIGATE
             return None
         self._rounds += 1
         if any(view.held):
-            self.phase = Phase.GOTO_DESTINATION
+            self.phase = AutomatonState.GOTO_DESTINATION
         elif self._rounds >= SEARCH_ROUNDS:
             self._next_errand()
         else:
@@ -152,7 +152,7 @@ class HeuristicDelivery:
         action = self.skills.approach(view, self._target.position, near=self._near)
         if action is not None and self._steps_here < 60:
             return action
-        self.phase = Phase.PICK
+        self.phase = AutomatonState.PICK
         return None
 
     def _pick(self, view: ObservationView) -> Action | None:
@@ -163,15 +163,15 @@ class HeuristicDelivery:
                 self._picked.add(name)
             elif self._near > 0.5:
                 self._near -= 0.3
-                self.phase = Phase.NAVIGATE
+                self.phase = AutomatonState.NAVIGATE
                 return None
             else:
-                self.phase = Phase.SEARCH
+                self.phase = AutomatonState.SEARCH
                 self._search = self._new_search()
                 return {"type": "wait"}
         left = [name for name in self.errand["objects"] if name not in self._picked]
         if not left or all(view.held):
-            self.phase = Phase.GOTO_DESTINATION
+            self.phase = AutomatonState.GOTO_DESTINATION
             return None
         if self._target.name in left:
             self._picking = self._target.name
@@ -179,17 +179,17 @@ class HeuristicDelivery:
         seen = next((thing for thing in view.things if self._wanted(thing)), None)
         if seen is not None:
             self._target, self._near = seen, GRASP
-            self.phase = Phase.NAVIGATE
+            self.phase = AutomatonState.NAVIGATE
             return None
         # More is wanted from here: one look around before carrying off what is in hand.
         self._search = self._new_search()
-        self.phase = Phase.SEARCH
+        self.phase = AutomatonState.SEARCH
         return None
 
     def _goto_destination(self, view: ObservationView) -> Action | None:
         action = self.skills.go_to(view, self.errand["destination"])
         if action is None:
-            self.phase = Phase.DROP
+            self.phase = AutomatonState.DROP
         return action
 
     def _drop(self, view: ObservationView) -> Action | None:
@@ -197,13 +197,13 @@ class HeuristicDelivery:
         if full:
             if view.refused and self._steps_here > 0:
                 if self._steps_here > 12:
-                    self.phase = Phase.GOTO_DESTINATION
+                    self.phase = AutomatonState.GOTO_DESTINATION
                 if self._steps_here % 2:
                     return {"type": "turn_left", "degrees": 70.0}
             return {"type": "put", "hand": full[0]}
         left = [name for name in self.errand["objects"] if name not in self._picked]
         if left and self._rounds < SEARCH_ROUNDS:
-            self.phase = Phase.GOTO_SOURCE
+            self.phase = AutomatonState.GOTO_SOURCE
             return None
         self._next_errand()
         return None
@@ -213,26 +213,26 @@ class HeuristicDelivery:
         self._rounds = 0
         self._search = None
         self._target = None
-        self.phase = Phase.GOTO_SOURCE if self._current < len(self.errands) else Phase.COMPLETE
+        self.phase = AutomatonState.GOTO_SOURCE if self._current < len(self.errands) else AutomatonState.COMPLETE
 
     def _complete(self, view: ObservationView) -> Action | None:
         if self._reported < len(self.errands):
             index = int(self.errands[self._reported]["index"])
             self._reported += 1
             return {"type": "task_complete", "index": index}
-        self.phase = Phase.FINISHED
+        self.phase = AutomatonState.FINISHED
         return None
 
     def _finished(self, view: ObservationView) -> Action | None:
         return {"type": "wait"}
 
-    _STEPS: ClassVar[dict[Phase, Callable[[HeuristicDelivery, ObservationView], Action | None]]] = {
-        Phase.GOTO_SOURCE: _goto_source,
-        Phase.SEARCH: _look,
-        Phase.NAVIGATE: _navigate,
-        Phase.PICK: _pick,
-        Phase.GOTO_DESTINATION: _goto_destination,
-        Phase.DROP: _drop,
-        Phase.COMPLETE: _complete,
-        Phase.FINISHED: _finished,
+    _STEPS: ClassVar[dict[AutomatonState, Callable[[HeuristicDelivery, ObservationView], Action | None]]] = {
+        AutomatonState.GOTO_SOURCE: _goto_source,
+        AutomatonState.SEARCH: _look,
+        AutomatonState.NAVIGATE: _navigate,
+        AutomatonState.PICK: _pick,
+        AutomatonState.GOTO_DESTINATION: _goto_destination,
+        AutomatonState.DROP: _drop,
+        AutomatonState.COMPLETE: _complete,
+        AutomatonState.FINISHED: _finished,
     }

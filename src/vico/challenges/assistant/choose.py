@@ -29,7 +29,7 @@ def seeded_chooser(rng: np.random.Generator) -> Chooser:
     return lambda question, candidates: int(rng.integers(len(candidates)))
 
 
-class Surroundings:
+class NearbyRegions:
     """What lies within a walk of a starting point: the regions a task can speak of.
 
     Parameters

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from vico.assets.models.movable import movable_colours, movable_kinds
-from vico.challenges.assistant.choose import CANDIDATES, Chooser, Surroundings, seeded_chooser
+from vico.challenges.assistant.choose import CANDIDATES, Chooser, NearbyRegions, seeded_chooser
 from vico.challenges.assistant.model import Region, Start, StateView, Subtask, Task, TaskObject
 from vico.errors import EmptyInputError
 from vico.seeds import rng
@@ -119,19 +119,19 @@ def _inside(region: Region, name: str, state: StateView, world: World) -> bool:
     return room is None and float(np.hypot(*(position[:2] - np.asarray(region.centre[:2])))) <= region.radius
 
 
-def _start(world: World, router: Router, chance: np.random.Generator) -> tuple[np.ndarray, Surroundings]:
+def _start(world: World, router: Router, chance: np.random.Generator) -> tuple[np.ndarray, NearbyRegions]:
     """Return a free spot with enough places around it, away from the map's edge."""
     for _ in range(20):
         start = world.walkable.random_point(chance, near=(0.0, 0.0), radius=0.75 * world.half, clearance=0.75)
         try:
-            return start, Surroundings(world, router, start, reach=REACH)
+            return start, NearbyRegions(world, router, start, reach=REACH)
         except EmptyInputError:
             continue
     raise EmptyInputError("delivery: no start has two places that can be entered within a walk; use a larger world")
 
 
 def _candidates(
-    surroundings: Surroundings, chance: np.random.Generator, *, indoors: bool, radius: float
+    surroundings: NearbyRegions, chance: np.random.Generator, *, indoors: bool, radius: float
 ) -> list[Region]:
     """Nine regions, or as many as there are, of the wanted kind; of the other kind if there is none."""
     outdoors = surroundings.outdoor_candidates(chance, CANDIDATES, radius=radius)
@@ -150,7 +150,7 @@ def _at(region: Region) -> str:
 
 
 def _thing(
-    surroundings: Surroundings,
+    surroundings: NearbyRegions,
     chance: np.random.Generator,
     kind: str,
     source: Region,
@@ -179,7 +179,7 @@ def _thing(
 
 
 def _spot_indoors(
-    surroundings: Surroundings, chance: np.random.Generator, kind: str, source: Region
+    surroundings: NearbyRegions, chance: np.random.Generator, kind: str, source: Region
 ) -> tuple[Point3, str]:
     """Return a spot on one of a place's surfaces, and the id of its room."""
     rooms = [surroundings.rooms[i] for i in surroundings.world.place_by_id[str(source.place)].rooms]

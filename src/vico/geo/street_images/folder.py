@@ -96,7 +96,7 @@ class Photos(BaseModel):
     photos: list[Photo]
 
 
-class Lens(BaseModel):
+class ReconstructedCamera(BaseModel):
     """A camera of an OpenSfM reconstruction."""
 
     model_config = ConfigDict(extra="ignore")
@@ -128,7 +128,7 @@ class Reconstruction(BaseModel):
     """A part of an OpenSfM ``reconstruction.json``."""
 
     model_config = ConfigDict(extra="ignore")
-    cameras: dict[str, Lens]
+    cameras: dict[str, ReconstructedCamera]
     shots: dict[str, OpenSfmShot]
     reference_lla: Reference
 

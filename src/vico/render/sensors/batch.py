@@ -16,7 +16,7 @@ from vico.render.frames import Frames, PictureRequest, take_pictures
 from vico.render.quality import PLAIN, RenderQuality
 from vico.render.scene import Scene
 from vico.render.sensors.lens import CubeMap, Lens, cube_map
-from vico.render.sensors.past import PastPlaces, Placement, past_places, placement_of
+from vico.render.sensors.past import PastPlaces, PlacedInstances, past_places, placement_of
 from vico.render.view_cache import ViewCache
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class _Glance:
     """Where a viewer was when it looked last, and where everything was then."""
 
     second: float
-    placement: Placement
+    placement: PlacedInstances
     position: NDArray[np.float64]
     rotation: NDArray[np.float64]
     room: int

@@ -38,7 +38,7 @@ _NONE = np.zeros(0, np.float32)
 NO_PAST = PastPlaces(np.zeros((0, 3, 4), np.float32), np.zeros(0, np.bool_), _NONE, _NONE, _NONE, np.zeros(3))
 
 
-class Placement(NamedTuple):
+class PlacedInstances(NamedTuple):
     """Where everything that moves is at one moment.
 
     Attributes
@@ -62,7 +62,7 @@ class Placement(NamedTuple):
     owner: NDArray[np.int64]
 
 
-def placement_of(scene: Scene) -> Placement:
+def placement_of(scene: Scene) -> PlacedInstances:
     """Return a copy of where everything that moves is in a scene."""
     arrays = scene.arrays
     moving = slice(int(arrays.counts["static_instances"]), int(arrays.counts["instances"]))
@@ -70,7 +70,7 @@ def placement_of(scene: Scene) -> Placement:
     first = int(spans["first_vertex"].min()) if len(spans) else 0
     vertices = slice(first, int(spans["end_vertex"].max(initial=0)))
     owner = np.column_stack([mesh.entity[spans["first_triangle"]], spans["first_vertex"]]).astype(np.int64)
-    return Placement(
+    return PlacedInstances(
         instances.entity[moving].copy(),
         instances.prototype[moving].copy(),
         instances.matrix[moving].copy(),
@@ -81,7 +81,7 @@ def placement_of(scene: Scene) -> Placement:
     )
 
 
-def past_places(before: Placement, now: Placement, eye: NDArray[np.float64]) -> PastPlaces:
+def past_places(before: PlacedInstances, now: PlacedInstances, eye: NDArray[np.float64]) -> PastPlaces:
     """Return where what is there `now` was `before`, seen from an eye that was at `eye` then.
 
     Things are told by entity and prototype, several of one kind by their order.
@@ -93,7 +93,7 @@ def past_places(before: Placement, now: Placement, eye: NDArray[np.float64]) -> 
     return PastPlaces(np.ascontiguousarray(matrix), known, x, y, z, eye)
 
 
-def matched(before: Placement, now: Placement) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def matched(before: PlacedInstances, now: PlacedInstances) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Return the row of `before` for each moving instance of `now`, and whether there is one (else it is 0)."""
     old, new = _keys(before), _keys(now)
     order = np.lexsort(old.T[::-1])
@@ -102,7 +102,7 @@ def matched(before: Placement, now: Placement) -> tuple[NDArray[np.int64], NDArr
     return np.maximum(place, 0), place >= 0
 
 
-def _keys(placement: Placement) -> NDArray[np.int64]:
+def _keys(placement: PlacedInstances) -> NDArray[np.int64]:
     """Return entity, prototype and how many such came before, of each moving instance; shape ``(n, 3)``."""
     pair = placement.entity.astype(np.int64) << 32 | placement.prototype.astype(np.int64)
     order = np.argsort(pair, kind="stable")

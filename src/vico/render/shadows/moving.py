@@ -35,7 +35,7 @@ _ROUND_EDGE, _BOX_EDGE, _ROUND_GAIN, _BOX_GAIN, _DARKEST = 2.0, 1.25, 1.5, 4.0, 
 # Half the height of the layer at the ground in which they lie, metres.
 _CONTACT_HEIGHT = 0.5
 # Half the height of things that stand on the ground at least, metres.
-_SMALL = 0.45
+_SMALL = 0.65
 # Nothing is darkened further below a caster's foot than this, metres.
 _DEEPEST = np.float32(6.0)
 # ... nor further above it than this, in half heights.

@@ -14,7 +14,7 @@ from vico.errors import InputError
 from vico.sim.environment.agenda import Agenda
 from vico.sim.environment.city_event import CityEvent, Region
 from vico.sim.environment.effects import Conditions, conditions, sight_in_unlit_room
-from vico.sim.environment.forecast import Forecast, Site, forecast_of
+from vico.sim.environment.forecast import Forecast, WeatherSite, forecast_of
 from vico.sim.environment.ground import Ground, aged, cover, iciness, settled, wetness
 from vico.sim.environment.sky import Sky
 from vico.sim.environment.weather import NAMES, Weather, blended, kind_of_weather
@@ -47,7 +47,7 @@ class Environment:
 
     def __init__(self, sky: Sky, wanted: str | Mapping[str, Any], *, seed: int, second: float, agenda: Agenda) -> None:
         self.sky, self.agenda = sky, agenda
-        self._forecast: Forecast = forecast_of(wanted, Site(sky.lat, sky.lon, sky.day_of_year), seed)
+        self._forecast: Forecast = forecast_of(wanted, WeatherSite(sky.lat, sky.lon, sky.day_of_year), seed)
         # When a change that was called for begins and ends, and the weather before and after it; none: never.
         self._change = np.full(2, np.inf)
         self._before_after = np.zeros((2, len(NAMES)))

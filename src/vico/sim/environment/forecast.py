@@ -30,7 +30,7 @@ _PASSING = 1200.0
 
 
 @dataclass(frozen=True)
-class Site:
+class WeatherSite:
     """Where and when a run is, as weather and sun need it.
 
     Attributes
@@ -60,7 +60,7 @@ class Forecast(Protocol):
 class Steady:
     """One kind of weather all the time; its temperature goes with the hour."""
 
-    def __init__(self, kind: WeatherKind, site: Site) -> None:
+    def __init__(self, kind: WeatherKind, site: WeatherSite) -> None:
         self._kind, self._site = kind, site
 
     def at(self, seconds: float) -> NDArray[np.float64]:
@@ -71,7 +71,7 @@ class Steady:
 class Changing:
     """Weather that changes every few hours: kinds by how often they are, among those the season is warm enough for."""
 
-    def __init__(self, site: Site, seed: int) -> None:
+    def __init__(self, site: WeatherSite, seed: int) -> None:
         self._site, self._seed = site, seed
         self._of_day = lru_cache(maxsize=8)(self._drawn)
 
@@ -156,7 +156,7 @@ class Planned:
         return blended(self._after[k - 1], self._after[k], gone / self._over[k])
 
 
-def planned(record: Mapping[str, Any], site: Site, *, source: str = "weather") -> Planned:
+def planned(record: Mapping[str, Any], site: WeatherSite, *, source: str = "weather") -> Planned:
     """Return the weather that a weather file's content asks for; docs/weather.md describes it.
 
     Raises
@@ -183,7 +183,7 @@ def planned(record: Mapping[str, Any], site: Site, *, source: str = "weather") -
     return Planned(changes)
 
 
-def forecast_of(wanted: str | Mapping[str, Any], site: Site, seed: int) -> Forecast:
+def forecast_of(wanted: str | Mapping[str, Any], site: WeatherSite, seed: int) -> Forecast:
     """Return the weather that a configuration asks for.
 
     Parameters

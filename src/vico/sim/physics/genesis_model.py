@@ -2,7 +2,7 @@
 
 Genesis reads the same MJCF as MuJoCo, through MuJoCo. It cannot add bodies to what it has built, nor resize them, and
 keeps tables of 0.8 MB for every shape that differs from all others; so boxes and cylinders are built alike, of unit
-extents, and get their own by writing them where Genesis looks them up (`Shapes`).
+extents, and get their own by writing them where Genesis looks them up (`GenesisShapes`).
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Built:
     movers: NDArray[np.int64]
     objects: NDArray[np.int64]
     specs: list[Any]
-    shapes: Shapes
+    shapes: GenesisShapes
 
 
 def build_scene(gs: Any, static: StaticScene, models: Sequence[RobotModel], capacity: Capacity, step: float) -> Built:
@@ -90,7 +90,7 @@ def build_scene(gs: Any, static: StaticScene, models: Sequence[RobotModel], capa
     objects = [_add_object(gs, scene, k) for k in range(capacity.objects)]
     scene.build()
     solver = scene.sim.rigid_solver
-    shapes = Shapes(solver)
+    shapes = GenesisShapes(solver)
     if city is not None:
         geoms = [geom.idx for link in city.links for geom in link.geoms]
         shapes.resize(np.array(geoms), np.array(solids.in_order([link.name for link in city.links])))
@@ -225,7 +225,7 @@ def _add_object(gs: Any, scene: Any, index: int) -> Any:
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 
 
-class Shapes:
+class GenesisShapes:
     """Extents of boxes and cylinders where Genesis looks them up.
 
     Parameters

@@ -22,7 +22,7 @@ _REACH, _FLAT = 2.0, 0.12
 _STEMS = {"tree": 0.25, "palm": 0.25, "street_lamp": 0.1, "lamp": 0.1, "traffic_signals": 0.1, "flagpole": 0.1}
 
 
-class Ground(Protocol):
+class PhysicsGround(Protocol):
     """What `static_scene_of` asks of a world."""
 
     @property
@@ -73,7 +73,7 @@ def _is_convex(surface: Surface) -> bool:
     return bool((ahead <= 0.002 * size + 1e-9).all())
 
 
-def static_scene_of(world: Ground, *, flying: bool = False) -> StaticScene:
+def static_scene_of(world: PhysicsGround, *, flying: bool = False) -> StaticScene:
     """Everything of a world that robots can touch.
 
     Convex solids of the layer ``collision`` that reach down to where robots are, and solid objects outdoors: stems as

@@ -5,6 +5,6 @@ from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.population import RobotPopulation
 from vico.sim.robots.scene import RobotScene
 from vico.sim.robots.sensing import Reading
-from vico.sim.robots.state import Mode, RobotEvent
+from vico.sim.robots.state import RobotEvent, RobotMode
 
-__all__ = ["ActionSpace", "Mode", "Reading", "RobotEvent", "RobotPopulation", "RobotScene", "RobotStatus"]
+__all__ = ["ActionSpace", "Reading", "RobotEvent", "RobotMode", "RobotPopulation", "RobotScene", "RobotStatus"]

@@ -5,12 +5,12 @@ from __future__ import annotations
 from vico.assets.robots import BatteryModel, RobotModel
 from vico.sim.robots import commands
 from vico.sim.robots.flying import LOW_BATTERY, flight_of
-from vico.sim.robots.rotors import Phase
-from vico.sim.robots.state import Mode, RobotRun
+from vico.sim.robots.rotors import FlightPhase
+from vico.sim.robots.state import RobotMode, RobotRun
 
 #: Seconds that a robot stands with an empty battery until somebody, who is not shown, has put in a full one.
 EXCHANGE = 600.0
-_IDLE, _LANDED = int(Mode.IDLE), int(Phase.LANDED)
+_IDLE, _LANDED = int(RobotMode.IDLE), int(FlightPhase.LANDED)
 
 
 def charge_of(run: RobotRun, robot: int) -> float:

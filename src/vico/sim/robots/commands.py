@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from vico.errors import InputError
 from vico.sim.robots import flying, tasks
 from vico.sim.robots.path_follower import RobotStatus
-from vico.sim.robots.state import Circles, Mode, RobotRun
+from vico.sim.robots.state import Circles, RobotMode, RobotRun
 from vico.sim.robots.ways import is_closed, way_to
 
 
@@ -39,7 +39,7 @@ def command(run: RobotRun, robot: int, vector: ArrayLike, space: str = "") -> No
     tasks.abandon(run, robot)
     run.arrays.command[robot] = 0.0
     run.arrays.command[robot, : len(values)] = np.clip(values, chosen.low, chosen.high)
-    run.set_mode(robot, Mode.MOTORS if chosen.drives == "motors" else Mode.VELOCITY)
+    run.set_mode(robot, RobotMode.MOTORS if chosen.drives == "motors" else RobotMode.VELOCITY)
 
 
 def drive(run: RobotRun, robot: int, velocity: ArrayLike) -> None:
@@ -63,7 +63,7 @@ def stop(run: RobotRun, robot: int) -> None:
     """Stand still, or hover."""
     flying.settle(run, robot)
     tasks.abandon(run, robot)
-    run.set_mode(robot, Mode.IDLE)
+    run.set_mode(robot, RobotMode.IDLE)
 
 
 def go_to(run: RobotRun, robot: int, goal: NDArray[np.float64]) -> bool:
@@ -97,7 +97,7 @@ def take(run: RobotRun, robot: int, path: ArrayLike) -> None:
         raise InputError(f"follow: {run.scene.models[robot].title} flies: send it to points")
     tasks.abandon(run, robot)
     run.followers[robot].begin(points)
-    run.set_mode(robot, Mode.ROUTE)
+    run.set_mode(robot, RobotMode.ROUTE)
 
 
 def follow_body(run: RobotRun, robot: int, entity: int) -> None:
@@ -112,7 +112,7 @@ def follow_body(run: RobotRun, robot: int, entity: int) -> None:
     flying.settle(run, robot)
     tasks.abandon(run, robot)
     run.followers[robot].end()
-    run.set_mode(robot, Mode.FOLLOW)
+    run.set_mode(robot, RobotMode.FOLLOW)
     run.arrays.leader[robot] = entity
 
 
@@ -133,7 +133,7 @@ def set_closed_ground(run: RobotRun, circles: Circles) -> None:
         path = way_to(run, robot, follower.path[-1])
         if path is not None:
             follower.begin(path)
-        elif run.arrays.mode[robot] == Mode.FOLLOW:
+        elif run.arrays.mode[robot] == RobotMode.FOLLOW:
             follower.end()
         else:
             run.note(robot, "blocked")

@@ -10,7 +10,7 @@ from vico.sim.robots.controller import DirectMotors, MotorController
 from vico.sim.robots.legs import Legs
 from vico.sim.robots.manipulator import ArmOnWheels
 from vico.sim.robots.quadrotor import FourRotors
-from vico.sim.robots.walker import Walker
+from vico.sim.robots.walker import TwoLegWalker
 from vico.sim.robots.wheels import SkidSteer
 
 #: Makers of controllers by name.
@@ -20,7 +20,7 @@ CONTROLLERS: dict[str, Callable[[RobotModel], MotorController]] = {
     "four_legs": Legs,
     "mobile_manipulator": ArmOnWheels,
     "quadrotor": FourRotors,
-    "two_legs": Walker,
+    "two_legs": TwoLegWalker,
 }
 
 

@@ -10,12 +10,12 @@ from vico.sim.robots import commands
 from vico.sim.robots.flying import decide_flight
 from vico.sim.robots.navigation import GAP, SIGHT, NearbyBodies
 from vico.sim.robots.path_follower import RobotStatus
-from vico.sim.robots.state import Mode, RobotRun
+from vico.sim.robots.state import RobotMode, RobotRun
 from vico.sim.robots.tasks import decide_task, handled
 from vico.sim.robots.ways import next_errand, way_to
 
 # What the states' arrays hold: members of an enumeration are slow to look up in the control loop.
-_IDLE, _VELOCITY, _MOTORS, _ROUTE, _FOLLOW, _TASK = (int(mode) for mode in Mode)
+_IDLE, _VELOCITY, _MOTORS, _ROUTE, _FOLLOW, _TASK = (int(mode) for mode in RobotMode)
 _FALLEN = int(RobotStatus.FALLEN)
 #: Seconds a robot on errands rests between two.
 _REST = 5.0
@@ -95,7 +95,7 @@ def _keep_to_way(run: RobotRun, robot: int, others: NDArray[np.void], dt: float)
     run.arrays.status[robot] = status
     if status in (RobotStatus.ARRIVED, RobotStatus.BLOCKED):
         run.note(robot, "arrived" if status == RobotStatus.ARRIVED else "blocked")
-        run.arrays.mode[robot] = Mode.IDLE
+        run.arrays.mode[robot] = RobotMode.IDLE
         run.followers[robot].end()
         run.arrays.rest[robot] = 0.0
 

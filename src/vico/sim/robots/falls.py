@@ -6,7 +6,7 @@ import numpy as np
 
 from vico.sim.robots.controller import MotorController
 from vico.sim.robots.path_follower import RobotStatus
-from vico.sim.robots.state import Mode, RobotRun
+from vico.sim.robots.state import RobotMode, RobotRun
 
 #: Seconds a robot has to be tilted to count as fallen; cosine of the tilt at which it may be up again.
 _FALL_TIME, _UPRIGHT = 0.3, 0.95
@@ -45,7 +45,7 @@ def _watch_lying(run: RobotRun, robot: int, controller: MotorController, dt: flo
     above = run.above_ground(robot)
     upright = float(base.rotation[2, 2]) > _UPRIGHT
     if upright and controller.stands(lying, base, run.engine.joints(robot)[0], above):
-        arrays.status[robot] = RobotStatus.MOVING if arrays.mode[robot] != Mode.IDLE else RobotStatus.IDLE
+        arrays.status[robot] = RobotStatus.MOVING if arrays.mode[robot] != RobotMode.IDLE else RobotStatus.IDLE
         lift = controller.lift(0.0, base, above)
         if lift is not None:  # let go
             run.engine.thrust(robot, lift[:1], np.zeros((1, 3)))

@@ -11,13 +11,13 @@ from vico.errors import InputError
 from vico.sim.bodies import Bodies
 from vico.sim.robots.airspace import BESIDE, CEILING, HOVER
 from vico.sim.robots.path_follower import RobotStatus
-from vico.sim.robots.rotors import HEADING, POSITION, TURNING, VELOCITY, Flight, Phase
-from vico.sim.robots.state import Mode, RobotRun
+from vico.sim.robots.rotors import HEADING, POSITION, TURNING, VELOCITY, Flight, FlightPhase
+from vico.sim.robots.state import RobotMode, RobotRun
 
 Array = NDArray[np.float64]
 
-_LANDED, _FLYING, _LANDING = (int(phase) for phase in Phase)
-_IDLE, _VELOCITY, _MOTORS, _ROUTE, _FOLLOW, _ = (int(mode) for mode in Mode)
+_LANDED, _FLYING, _LANDING = (int(phase) for phase in FlightPhase)
+_IDLE, _VELOCITY, _MOTORS, _ROUTE, _FOLLOW, _ = (int(mode) for mode in RobotMode)
 _FALLEN = int(RobotStatus.FALLEN)
 #: Metres above what is there at which `go_to` ends, and that a landing begins above.
 CRUISE, APPROACH = 10.0, 4.0
@@ -72,7 +72,7 @@ def fly_to(run: RobotRun, robot: int, target: Array, *, lands: bool = False) -> 
     if refusal:
         raise InputError(f"fly_to: {refusal}")
     settle(run, robot)
-    run.set_mode(robot, Mode.ROUTE)
+    run.set_mode(robot, RobotMode.ROUTE)
     _begin(run, robot, flight, row, target)
     flight.arrays.lands[row] = lands
 
@@ -94,7 +94,7 @@ def land(run: RobotRun, robot: int, xy: Array | None = None) -> None:
     if not space.is_flat(spot):
         raise InputError("land: what is there is not even enough to land on")
     if float(np.hypot(*(spot - here[:2]))) < 1.0:
-        run.set_mode(robot, Mode.ROUTE)
+        run.set_mode(robot, RobotMode.ROUTE)
         flight.arrays.phase[row] = _LANDING
         flight.arrays.calm[row] = 0.0
         flight.ways[row] = np.array([[*spot, space.top(spot)]])
@@ -214,7 +214,7 @@ def _keep_to_way(run: RobotRun, flight: Flight, row: int, robot: int, dt: float)
         settle(run, robot)
         if status == RobotStatus.ARRIVED:
             a.setpoint[row, POSITION] = target
-        run.arrays.mode[robot] = Mode.IDLE
+        run.arrays.mode[robot] = RobotMode.IDLE
         run.arrays.rest[robot] = 0.0
 
 
@@ -293,7 +293,7 @@ def _come_down(run: RobotRun, flight: Flight, row: int, robot: int, others: Bodi
     if a.calm[row] > _CALM:
         settle(run, robot)
         a.phase[row] = _LANDED
-        run.arrays.mode[robot] = Mode.IDLE
+        run.arrays.mode[robot] = RobotMode.IDLE
         run.arrays.status[robot] = RobotStatus.ARRIVED
         run.arrays.rest[robot] = 0.0
         run.note(robot, "landed")

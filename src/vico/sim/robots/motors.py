@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from vico.sim.robots.path_follower import RobotStatus
-from vico.sim.robots.rotors import Flight, Phase
+from vico.sim.robots.rotors import Flight, FlightPhase
 from vico.sim.robots.scene import RobotGroup
-from vico.sim.robots.state import Mode, RobotRun
+from vico.sim.robots.state import RobotMode, RobotRun
 
-_MOTORS, _FALLEN = int(Mode.MOTORS), int(RobotStatus.FALLEN)
-_LANDED = int(Phase.LANDED)
+_MOTORS, _FALLEN = int(RobotMode.MOTORS), int(RobotStatus.FALLEN)
+_LANDED = int(FlightPhase.LANDED)
 
 
 def velocities(run: RobotRun, group: RobotGroup) -> np.ndarray | None:

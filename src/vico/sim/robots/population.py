@@ -22,7 +22,7 @@ from vico.sim.robots.motors import command_motors, command_rotors, velocities
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.scene import RobotScene
 from vico.sim.robots.spawns import spawns
-from vico.sim.robots.state import NOTES, Circles, Mode, RobotArrays, RobotEvent, RobotRun
+from vico.sim.robots.state import NOTES, Circles, RobotArrays, RobotEvent, RobotMode, RobotRun
 from vico.sim.robots.ways import way_to
 from vico.sim.robots.work import Kind
 from vico.sim.state import MovableObjects
@@ -31,7 +31,7 @@ from vico.world.mesh import Surface
 from vico.world.model import FIRST_BODY
 
 # What the arrays hold: members of an enumeration are slow to look up at every frame.
-_MOTORS, _FALLEN = int(Mode.MOTORS), int(RobotStatus.FALLEN)
+_MOTORS, _FALLEN = int(RobotMode.MOTORS), int(RobotStatus.FALLEN)
 # Digits of the grip that robots are told: weather that changes writes it into physics seldom.
 _GRIP_DIGITS = 2
 # Metres above ground below which robots that fly come near things that lie there.
@@ -98,7 +98,7 @@ class RobotPopulation:
 
     @property
     def mode(self) -> NDArray[np.int8]:
-        """Who decides what each does, a `Mode`, shape ``(n,)``."""
+        """Who decides what each does, a `RobotMode`, shape ``(n,)``."""
         return self.run.arrays.mode
 
     @property

@@ -21,7 +21,7 @@ _STILL = 1e-3  # rad/s below which a rotor stands
 POSITION, VELOCITY, HEADING, TURNING, SETPOINT = slice(0, 3), slice(3, 6), 6, 7, 8
 
 
-class Phase(IntEnum):
+class FlightPhase(IntEnum):
     """What a robot that flies is about."""
 
     LANDED, FLYING, LANDING = range(3)
@@ -42,7 +42,7 @@ class FlightArrays:
     setpoint
         What the controller follows, as `POSITION`, `VELOCITY`, `HEADING` and `TURNING` say; float64, shape ``(k, 8)``.
     phase
-        A `Phase`, int8, shape ``(k,)``.
+        A `FlightPhase`, int8, shape ``(k,)``.
     leg
         Which corner of its way it flies to, int64, shape ``(k,)``.
     lands
@@ -130,7 +130,7 @@ class Flight(OnTheirWays):
     @property
     def in_the_air(self) -> bool:
         """Whether any of them flies."""
-        return bool((self.arrays.phase != Phase.LANDED).any())
+        return bool((self.arrays.phase != FlightPhase.LANDED).any())
 
     def push(self, engine: PhysicsEngine, frame: float, seconds: float) -> None:
         """Let rotors and air push for a frame that begins so many seconds after the start of the run."""

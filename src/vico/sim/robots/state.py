@@ -26,7 +26,7 @@ from vico.sim.state import REASON_LENGTH, MovableObjects
 Circles = tuple[tuple[float, float, float], ...]
 
 
-class Mode(IntEnum):
+class RobotMode(IntEnum):
     """Who decides what a robot does."""
 
     IDLE, VELOCITY, MOTORS, ROUTE, FOLLOW, TASK = range(6)
@@ -73,7 +73,7 @@ class RobotArrays:
     Attributes
     ----------
     mode
-        A `Mode`, int8, shape ``(n,)``.
+        A `RobotMode`, int8, shape ``(n,)``.
     status
         A `RobotStatus`, int8, shape ``(n,)``.
     action_status, reason, reason_code
@@ -224,15 +224,15 @@ class RobotRun:
         """Keep that something happened to a robot."""
         self.pending.append((robot, NOTES.index(kind)))
 
-    def set_mode(self, robot: int, mode: Mode) -> None:
+    def set_mode(self, robot: int, mode: RobotMode) -> None:
         """Have somebody else decide what a robot does; a fallen one stays fallen."""
         a = self.arrays
         a.mode[robot] = mode
         if a.status[robot] != RobotStatus.FALLEN:
-            a.status[robot] = RobotStatus.IDLE if mode == Mode.IDLE else RobotStatus.MOVING
-        if mode != Mode.FOLLOW:
+            a.status[robot] = RobotStatus.IDLE if mode == RobotMode.IDLE else RobotStatus.MOVING
+        if mode != RobotMode.FOLLOW:
             a.leader[robot] = 0
-        if mode not in (Mode.ROUTE, Mode.FOLLOW, Mode.TASK):
+        if mode not in (RobotMode.ROUTE, RobotMode.FOLLOW, RobotMode.TASK):
             self.followers[robot].end()
 
     def errand_stream(self, robot: int) -> np.random.Generator:

@@ -20,7 +20,7 @@ from vico.sim.robots.arm import Chain, hand_pose, reach_pose, solve
 from vico.sim.robots.decks import deck_spot, way_beside_deck
 from vico.sim.robots.manipulator import ARM_GOAL, ARM_NOW
 from vico.sim.robots.path_follower import RobotStatus
-from vico.sim.robots.state import Mode, RobotRun
+from vico.sim.robots.state import RobotMode, RobotRun
 from vico.sim.robots.ways import way_to
 from vico.sim.robots.work import Kind, Stage, Work
 from vico.sim.state import MovableObjects
@@ -75,7 +75,7 @@ def begin(run: RobotRun, robot: int, kind: Kind, target: Array, entity: int = 0)
     a = work.arrays
     a.kind[row], a.stage[row], a.entity[row], a.target[row] = kind, Stage.GO, entity, target
     a.timer[row], a.tries[row] = 0.0, 0
-    run.set_mode(robot, Mode.TASK)
+    run.set_mode(robot, RobotMode.TASK)
     path = None
     if kind == Kind.PLACE and entity:
         path = way_beside_deck(run, robot, entity)
@@ -215,7 +215,7 @@ def _next(work: Work, row: int, stage: Stage) -> None:
 def _finish(run: RobotRun, robot: int, work: Work, row: int, what: str) -> None:
     run.note(robot, what)
     abandon(run, robot)
-    run.arrays.mode[robot] = Mode.IDLE
+    run.arrays.mode[robot] = RobotMode.IDLE
     run.arrays.status[robot] = RobotStatus.ARRIVED if what != "failed" else RobotStatus.BLOCKED
 
 

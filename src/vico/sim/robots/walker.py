@@ -56,7 +56,7 @@ def _walk(layers, settings, motion, command, memory):  # type: ignore[no-untyped
     return out
 
 
-class Walker(MotorController):
+class TwoLegWalker(MotorController):
     """Walks on two legs, stands, and steps to catch itself when it is pushed. Who fell is set on its feet."""
 
     memory = MEMORY

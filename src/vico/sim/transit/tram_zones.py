@@ -19,7 +19,7 @@ _ROOM = 6.0
 
 
 @dataclass(frozen=True)
-class Zone:
+class TramZone:
     """A stretch of a track, metres along it, that is part of the zone with a number."""
 
     number: int
@@ -27,7 +27,7 @@ class Zone:
     end: float
 
 
-def zones_of(tracks: Sequence[Track]) -> tuple[list[list[Zone]], int]:
+def zones_of(tracks: Sequence[Track]) -> tuple[list[list[TramZone]], int]:
     """Find the zones of several tracks.
 
     Returns
@@ -42,9 +42,9 @@ def zones_of(tracks: Sequence[Track]) -> tuple[list[list[Zone]], int]:
     joined = _joined(tracks, runs)
     names = sorted(set(joined))
     number = {name: k for k, name in enumerate(names)}
-    found: list[list[Zone]] = [[] for _ in tracks]
+    found: list[list[TramZone]] = [[] for _ in tracks]
     for (k, a, b), name in zip(runs, joined, strict=True):
-        found[k].append(Zone(number[name], a * STEP, b * STEP))
+        found[k].append(TramZone(number[name], a * STEP, b * STEP))
     return found, len(names)
 
 

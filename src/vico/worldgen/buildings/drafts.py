@@ -13,7 +13,7 @@ from vico.geo.overlay import OverlayError
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.world.model import Building, Dropped
-from vico.worldgen.buildings.solids import Mesh, Seat, collision_bodies, part_mesh, seat_of
+from vico.worldgen.buildings.solids import Footing, Mesh, collision_bodies, part_mesh, seat_of
 from vico.worldgen.facades.looks import FacadeStyle
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
@@ -57,7 +57,7 @@ class Draft:
     """
 
     plan: BuildingPlan
-    seat: Seat
+    seat: Footing
     look: FacadeStyle
     footprint: Polygon
     meshes: list[Mesh]

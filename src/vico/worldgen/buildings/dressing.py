@@ -13,7 +13,7 @@ from vico.seeds import rng
 from vico.threads import in_order
 from vico.world.mesh import Material, Surface
 from vico.world.model import FIRST_BUILDING
-from vico.worldgen.buildings.solids import Seat, SolidMesh
+from vico.worldgen.buildings.solids import Footing, SolidMesh
 from vico.worldgen.buildings.storeys import storeys_of
 from vico.worldgen.buildings.wall_lines import WallLines, WallSide, lines_of_faces
 from vico.worldgen.facades import sheets
@@ -124,7 +124,12 @@ class _Faces:
 
 
 def dressed(
-    mesh: SolidMesh, edges: WallLines, plans: list[BuildingPlan], seats: list[Seat], looks: list[FacadeStyle], seed: int
+    mesh: SolidMesh,
+    edges: WallLines,
+    plans: list[BuildingPlan],
+    seats: list[Footing],
+    looks: list[FacadeStyle],
+    seed: int,
 ) -> tuple[list[Surface], list[Surface]]:
     """Give every triangle its material and texture coordinates; cut walls where the material changes.
 
@@ -185,7 +190,7 @@ def dressed(
 
 
 def _levels(
-    mesh: SolidMesh, parts: list[PartPlan], plans: list[BuildingPlan], seats: list[Seat], looks: list[FacadeStyle]
+    mesh: SolidMesh, parts: list[PartPlan], plans: list[BuildingPlan], seats: list[Footing], looks: list[FacadeStyle]
 ) -> _Levels:
     of = mesh.plan_of_part
     base = np.array([seats[p].base for p in of])

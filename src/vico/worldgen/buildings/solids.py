@@ -26,14 +26,14 @@ _BESIDE = 0.5  # metres by which a part may reach over its building's outline an
 
 
 @dataclass(frozen=True)
-class Seat:
+class Footing:
     """Where a building stands: `bottom` of its walls and `base` (ground floor), metres."""
 
     bottom: float
     base: float
 
 
-def seat_of(plan: BuildingPlan, terrain: HeightField) -> Seat:
+def seat_of(plan: BuildingPlan, terrain: HeightField) -> Footing:
     """Seat a building: walls down to the lowest ground under it, ground floor a little above that on a slope."""
     lowest, highest = _ground_along(plan.outline, terrain)
     base = lowest + min(0.4 * (highest - lowest), 1.5)
@@ -41,7 +41,7 @@ def seat_of(plan: BuildingPlan, terrain: HeightField) -> Seat:
         corners = shapely.points(np.asarray(part.polygon.exterior.coords)[:, :2])
         if shapely.distance(plan.outline, corners).max() > _BESIDE:
             lowest = min(lowest, _ground_along(part.polygon, terrain)[0])
-    return Seat(lowest - _SKIRT, base)
+    return Footing(lowest - _SKIRT, base)
 
 
 def _ground_along(polygon: Polygon, terrain: HeightField) -> tuple[float, float]:
@@ -50,7 +50,7 @@ def _ground_along(polygon: Polygon, terrain: HeightField) -> tuple[float, float]
     return float(ground.min()), float(ground.max())
 
 
-def heights_of(part: PartPlan, seat: Seat) -> tuple[float, float]:
+def heights_of(part: PartPlan, seat: Footing) -> tuple[float, float]:
     """Underside and eaves of a part above sea level."""
     return (seat.bottom if part.low <= 0 else seat.base + part.low), seat.base + part.eaves
 
@@ -70,7 +70,7 @@ class SolidMesh:
     broken: list[int] = field(default_factory=list)
 
 
-def part_mesh(part: PartPlan, seat: Seat) -> Mesh:
+def part_mesh(part: PartPlan, seat: Footing) -> Mesh:
     """Return the solid of a part on its seat; without faces where nothing comes of it."""
     if part.mesh is not None:
         return part.mesh[0] + (0.0, 0.0, seat.base), part.mesh[1]
@@ -87,7 +87,7 @@ def part_mesh(part: PartPlan, seat: Seat) -> Mesh:
     return vertices + np.array([x, y, eaves]), triangles
 
 
-def solid_meshes(plans: Sequence[BuildingPlan], seats: Sequence[Seat]) -> SolidMesh:
+def solid_meshes(plans: Sequence[BuildingPlan], seats: Sequence[Footing]) -> SolidMesh:
     """Mesh every solid of every plan, on its seat; one that can't be made has no faces."""
     meshes: list[list[Mesh]] = []
     for plan, seat in zip(plans, seats, strict=True):
@@ -135,7 +135,7 @@ def leaky(mesh: SolidMesh) -> set[int]:
     return set(mesh.broken) | set(mesh.plan_of_part[mesh.part[open_edges(mesh.faces)]].tolist())
 
 
-def collision_bodies(part: PartPlan, seat: Seat) -> list[Surface]:
+def collision_bodies(part: PartPlan, seat: Footing) -> list[Surface]:
     """Convex prisms that fill a part's walls, up to half the height of a pitched roof; of entity 0."""
     low, eaves = heights_of(part, seat)
     top = eaves + (part.roof.height if part.roof.shape == "flat" else 0.5 * part.roof.height)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vico.exact import apply_matrix
 from vico.geo.osm import OsmData, OsmWay
-from vico.worldgen.buildings.solids import Seat
+from vico.worldgen.buildings.solids import Footing
 from vico.worldgen.facades.catalogue import styles
 from vico.worldgen.facts.outlines.plans import BuildingPlan, PartPlan
 from vico.worldgen.facts.outlines.roof_shapes import rings_of
@@ -49,7 +49,7 @@ class WallLines:
     first: NDArray[np.int64]
 
 
-def wall_lines(plans: list[BuildingPlan], seats: list[Seat], osm: OsmData) -> WallLines:
+def wall_lines(plans: list[BuildingPlan], seats: list[Footing], osm: OsmData) -> WallLines:
     """Return every wall's line, and what it shows: nothing towards a neighbour, a front towards a street."""
     starts: list[NDArray[np.float64]] = []
     ends: list[NDArray[np.float64]] = []
@@ -107,7 +107,7 @@ def wall_lines(plans: list[BuildingPlan], seats: list[Seat], osm: OsmData) -> Wa
     return WallLines(start, end, style, np.array(first))
 
 
-def fronts_of(plans: list[BuildingPlan], seats: list[Seat], osm: OsmData) -> list[list[NDArray[np.bool_]]]:
+def fronts_of(plans: list[BuildingPlan], seats: list[Footing], osm: OsmData) -> list[list[NDArray[np.bool_]]]:
     """Return, of each plan's parts, which edges of the outline are fronts."""
     edges = wall_lines(plans, seats, osm)
     shown = (edges.style == WallSide.FRONT) | (edges.style == WallSide.SHOPFRONT)
