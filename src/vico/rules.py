@@ -25,6 +25,9 @@ _REACH_OF_STATURE = 1.35
 DOOR_REACH = 2.0
 INNER_DOOR_REACH = 1.0
 
+#: Beds have a place to lie for every so many metres of their width.
+BED_WIDTH = 0.7
+
 #: Buses: seconds one stands at a stop, what boarding costs, how near to one of its doors one boards, metres, and how
 #: many ride in it.
 BUS_DWELL = 30.0

@@ -17,6 +17,7 @@ from vico.clock import seconds_of_day
 from vico.community import Community, build_community, check_community, digest_of, procedural_author
 from vico.community.catalogue import names as known_names
 from vico.community.model import ItemType
+from vico.community.place_index import PlaceIndex
 from vico.errors import EmptyInputError, InputError
 from vico.world.folder import World
 from vico.world.model import Category
@@ -215,6 +216,12 @@ def test_homes_are_dwellings_for_all_but_guests(town: World, community: Communit
     }
     assert kinds == {"apartments"}
     assert {town.place_by_id[r.home].category for r in community.residents} == {Category.ACCOMMODATION}
+
+
+def test_everybody_has_a_bed_at_home(helsinki: World) -> None:
+    index, people = PlaceIndex(helsinki, 0), procedural_author(helsinki, residents=25, seed=2).residents
+    crowded = [h for h, n in Counter(r.home for r in people).items() if n > index.beds(index.place_by_id[h])]
+    assert crowded == []
 
 
 def test_nobody_is_called_a_night_owl_who_rises_early_nor_an_early_riser_who_sleeps_in(town: World) -> None:

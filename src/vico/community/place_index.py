@@ -14,7 +14,7 @@ from vico.community.ride_times import RideTimes
 from vico.community.usual_hours import usual_spans
 from vico.community.walks import Walks
 from vico.errors import EmptyInputError
-from vico.rules import WALK_SPEED
+from vico.rules import BED_WIDTH, WALK_SPEED
 from vico.world.folder import World
 from vico.world.indoor_ways import IndoorWays
 from vico.world.model import Category, Place, Point2
@@ -47,11 +47,13 @@ class PlaceIndex:
         self.router = world.router
         self.walks = Walks.of(world)
         self.place_by_id = {p.id: p for p in world.places}
+        rooms = world.rooms if any(p.rooms for p in world.places) else ()
+        self._rooms = {r.id: r for r in rooms}
         self.buildings = {b.id: b for b in world.buildings}
         self.spot = {p.id: k for k, p in enumerate(world.places)}
         self._positions = np.array([p.position[:2] for p in world.places], float).reshape(-1, 2)
         self._names = np.array([p.id for p in world.places])
-        ways = IndoorWays(world.rooms if any(p.rooms for p in world.places) else ())
+        ways = IndoorWays(rooms)
         # From the street to the farthest room: whoever has come that far is there, whatever the room.
         self._inside = np.array([ways.seconds(p.rooms) for p in world.places], np.float64)
         self._estimates: dict[str, NDArray[np.int64]] = {}
@@ -92,6 +94,11 @@ class PlaceIndex:
             [p for p in found if kind_of(p) not in GUEST_KINDS],
             [p for p in found if kind_of(p) in GUEST_KINDS],
         )
+
+    def beds(self, place: Place) -> int:
+        """How many people can lie in the beds of a place: wide beds are for two."""
+        tops = (top for name in place.rooms for top in self._rooms[name].containers if top.kind == "bed")
+        return sum(max(1, int(top.size[1] / BED_WIDTH + 1e-9)) for top in tops)
 
     def same_building(self, a: str, b: str) -> bool:
         """Whether two places are under one roof, or the same."""

@@ -27,13 +27,18 @@ _TRIES, _PART_TIME = 8, 4 * 60
 
 
 def assign_homes(rng: np.random.Generator, index: PlaceIndex, households: Sequence[Household]) -> None:
-    """Give each household a home: guests a room, all others a dwelling; the emptiest first, at times a neighbour's."""
+    """Give each household a home: guests a room, all others a dwelling, with a bed for each while there are any.
+
+    Large households choose first. They take the emptiest homes, at times a neighbour's.
+    """
     dwellings, rooms = index.homes()
+    beds = Counter({p.id: index.beds(p) for p in (*dwellings, *rooms)})
     taken: Counter[str] = Counter()
-    for household in households:
+    for household in sorted(households, key=lambda one: -len(one.members)):
         options = (rooms or dwellings) if household.kind == "guest" else (dwellings or rooms)
         if household.kind == "flatmates" and household.members[0].status == "student":
             options = [p for p in options if kind_of(p) == "dormitory"] or options
+        options = _roomy(options, Counter({p.id: beds[p.id] - taken[p.id] for p in options}), len(household.members))
         fewest = min(taken[p.id] for p in options)
         neighbours = [p for p in options if 0 < taken[p.id] < 4]
         if neighbours and rng.random() < 0.15:
@@ -45,6 +50,12 @@ def assign_homes(rng: np.random.Generator, index: PlaceIndex, households: Sequen
         taken[home.id] += len(household.members)
         for member in household.members:
             member.home = home.id
+
+
+def _roomy(homes: list[Place], free: Counter[str], people: int) -> list[Place]:
+    """Return the homes with a free bed for each of some people; where none has so many, those that lack the fewest."""
+    most = max(free[p.id] for p in homes)
+    return [p for p in homes if free[p.id] >= min(people, most)]
 
 
 def employers(index: PlaceIndex) -> list[Place]:

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.rules import BED_WIDTH
 from vico.world.mesh import Surface, joined
 
 
@@ -58,7 +59,7 @@ class Seat:
     @property
     def places(self) -> list[tuple[float, float]]:
         """Where people's hips are, one a place, from the model's origin, metres."""
-        count = max(1, int(self.size[1] / (_LYING_WIDTH if self.lies else _SITTING_WIDTH) + 1e-9))
+        count = max(1, int(self.size[1] / (BED_WIDTH if self.lies else _SITTING_WIDTH) + 1e-9))
         pitch = self.size[1] / count
         first = self.centre[1] - 0.5 * (count - 1) * pitch
         return [(self.centre[0], first + k * pitch) for k in range(count)]
@@ -67,7 +68,7 @@ class Seat:
 # Kinds of tops that are seats.
 _SEATS = ("chair", "sofa")
 # Width of a place, metres.
-_SITTING_WIDTH, _LYING_WIDTH = 0.48, 0.7
+_SITTING_WIDTH = 0.48
 
 
 @dataclass(frozen=True)
