@@ -20,7 +20,7 @@ from vico.worldgen.objects.parking import Parking, parking_from_osm
 from vico.worldgen.streets.netconvert import road_network
 from vico.worldgen.streets.polygons import road_polygons
 from vico.worldgen.streets.roads import streets_from_osm
-from vico.worldgen.streets.walk_lines import Kerbs
+from vico.worldgen.streets.walk_lines import CarriagewayEdges
 
 NO_TRANSIT = Transit(stops=[], lines=[], bike_stations=[], origin={})
 PARKING = {"highway": "residential", "parking:lane:both": "parallel"}
@@ -36,7 +36,7 @@ def town(tags: tuple[tuple[str, str], ...], lot: bool = False) -> tuple[SiteFact
     areas = [OsmArea("w7", shapely.box(-60, 30, 0, 50), {"amenity": "parking"})] if lot else []
     site = site_facts(OsmData(LocalFrame(60.0, 25.0), 80.0, 20.0, [hydrant], [street, back], areas, []))
     streets = road_polygons(site)
-    kerbs = Kerbs(streets.carriageway, [])
+    kerbs = CarriagewayEdges(streets.carriageway, [])
     lanes = lanes_of(road_network(site, streets_from_osm(site, ()), HeightField.flat(100.0), kerbs))
     return site, streets, lanes
 

@@ -52,7 +52,7 @@ from vico.worldgen.stages import Stages
 from vico.worldgen.streets.netconvert import road_network
 from vico.worldgen.streets.polygons import road_polygons
 from vico.worldgen.streets.roads import roads_from_osm, streets_from_osm
-from vico.worldgen.streets.walk_lines import Kerbs
+from vico.worldgen.streets.walk_lines import CarriagewayEdges
 from vico.worldgen.tables import read_tables
 from vico.worldgen.transit.stage import transit_from_osm
 from vico.worldgen.transit.waiting import waiting_places
@@ -90,7 +90,7 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
 
     ways = run("ways", streets_from_osm, site, solids, bridges.usable)
     roads = run("roads", roads_from_osm, site, ways)
-    kerbs = Kerbs(streets.carriageway, solids)
+    kerbs = CarriagewayEdges(streets.carriageway, solids)
     lanes = write.streets(roads, run("network", road_network, site, ways, levels, kerbs))
     feeds = list(evidence.feeds)
     mapped = run("transit", transit_from_osm, site, lanes, levels, solids=solids, seed=seed, feeds=feeds)

@@ -31,7 +31,7 @@ _FINER = 1.4
 _DAY, _SLACK = 0.62, 0.03
 
 
-class Seen(NamedTuple):
+class SeenGlass(NamedTuple):
     """The part of a front that a picture shows: along it and up, metres; least depth before the camera, and pixels."""
 
     left: float
@@ -75,7 +75,7 @@ def show_rooms(
         area = _area(front, camera)
         if area is None:
             continue
-        seen = Seen(*_look_for_glass(front, camera, keys, glass, area))
+        seen = SeenGlass(*_look_for_glass(front, camera, keys, glass, area))
         if seen.pixels < _LEAST_SHARE * len(keys) or seen.right <= seen.left or seen.high <= seen.low:
             continue
         inside = _camera_into(scene, front, camera, seen)
@@ -133,7 +133,7 @@ def _area(front: Record, camera: Record) -> tuple[int, int, int, int] | None:
     return area if area[0] < area[1] and area[2] < area[3] else None
 
 
-def _camera_into(scene: Scene, front: Record, camera: Record, seen: Seen) -> Record:
+def _camera_into(scene: Scene, front: Record, camera: Record, seen: SeenGlass) -> Record:
     """Return the camera that looks into the room by the part of its front that is seen."""
     a, b, z = _place(front, camera)
     ix, iy = float(front["room_inward_x"]), float(front["room_inward_y"])
@@ -174,7 +174,7 @@ def _is_pane(front: Any, a: float, b: float, z: float) -> bool:
 
 @kernel
 def _look_for_glass(front: Any, camera: Any, keys: Any, glass: Any, area: Any) -> Any:
-    """Return the part of a front that is seen through glass: the fields of `Seen`."""
+    """Return the part of a front that is seen through glass: the fields of `SeenGlass`."""
     left, right, low, high, least, count = 1e30, -1e30, 1e30, -1e30, 1e30, 0
     for row in range(area[0], area[1]):
         for column in range(area[2], area[3]):

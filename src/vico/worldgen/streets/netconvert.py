@@ -31,7 +31,7 @@ from vico.worldgen.streets.roads import (
     is_traffic_street,
 )
 from vico.worldgen.streets.smoothing import without_kinks
-from vico.worldgen.streets.walk_lines import Kerbs, sidewalks_beside
+from vico.worldgen.streets.walk_lines import CarriagewayEdges, sidewalks_beside
 
 _NO_RAIL = (
     "rail rail_urban rail_electric rail_fast tram drone aircraft scooter container wheelchair subway cable_car ship"
@@ -108,7 +108,7 @@ def road_network(
     site: SiteFacts,
     streets: Sequence[NetworkStreet],
     height: HeightField | None = None,
-    kerbs: Kerbs | None = None,
+    kerbs: CarriagewayEdges | None = None,
 ) -> RoadNetwork:
     """Build the lane-level network of a window: lanes, junctions, sidewalks, crossings, signals.
 
@@ -169,7 +169,7 @@ def _converted(
     site: SiteFacts,
     streets: Sequence[NetworkStreet],
     height: HeightField | None = None,
-    kerbs: Kerbs | None = None,
+    kerbs: CarriagewayEdges | None = None,
 ) -> RoadNetwork:
     """Run netconvert.
 

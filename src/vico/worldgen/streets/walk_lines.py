@@ -23,7 +23,7 @@ _LANE = re.compile(rb'(<lane id="([^"]*)"[^>]*? shape=")([^"]*)(")')
 
 
 @dataclass(frozen=True)
-class Kerbs:
+class CarriagewayEdges:
     """What says where sidewalks can be.
 
     Attributes
@@ -38,7 +38,7 @@ class Kerbs:
     solids: Sequence[BaseGeometry]
 
 
-def sidewalks_beside(net: bytes, kerbs: Kerbs, *, left_driving: bool) -> bytes:
+def sidewalks_beside(net: bytes, kerbs: CarriagewayEdges, *, left_driving: bool) -> bytes:
     """Return a SUMO network whose sidewalks lie beside the carriageway as it is painted.
 
     netconvert puts them beside the outermost lanes. Where cars park there, people would walk in the parking lane.
