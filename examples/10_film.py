@@ -109,7 +109,7 @@ class Passenger:
         line = max(public_map.lines, key=lambda line: line.travel[-1])
         self.here, goal = (stops[line.stops[k]] for k in (1, 1 + len(line.stops) // 2))
         self.goal = float(goal[0]), float(goal[1])
-        self.traveller = Traveller(public_map, rng(seed, "passenger", number), modes=("walk", "bus"))
+        self.traveller = Traveller(public_map, rng(seed, "passenger", number), modes=("bus",))
 
     def act(self, observation: dict, info: dict) -> dict:
         """Go on with the trip."""

@@ -15,7 +15,7 @@ from vico.world.check.solids import coplanar_overlaps, open_edges
 from vico.worldgen.buildings.projections import projections, water_tank
 from vico.worldgen.buildings.roofs.dormers import dormers
 from vico.worldgen.buildings.roofs.eaves import eaves, edges_of, slopes_of
-from vico.worldgen.buildings.solids import Mesh, Seat, part_mesh
+from vico.worldgen.buildings.solids import Footing, Mesh, part_mesh
 from vico.worldgen.buildings.storeys import storeys_of
 from vico.worldgen.facades.catalogue import styles
 from vico.worldgen.facades.cuts import cut_at_heights, without_needless
@@ -39,12 +39,12 @@ def plan_of(
 def fringes(
     plans: list[BuildingPlan], *, reach: float = 0.5, streets: shapely.STRtree = NO_STREETS
 ) -> list[list[PartPlan]]:
-    meshes = [[part_mesh(part, Seat(-0.3, 0.0)) for part in plan.parts] for plan in plans]
+    meshes = [[part_mesh(part, Footing(-0.3, 0.0)) for part in plan.parts] for plan in plans]
     return eaves(plans, meshes, [0.0] * len(plans), [reach] * len(plans), ["eaves"] * len(plans), streets, dropped=[])
 
 
 def mesh_of(part: PartPlan) -> Mesh:
-    return part_mesh(part, Seat(-0.3, 0.0))
+    return part_mesh(part, Footing(-0.3, 0.0))
 
 
 def volume(mesh: Mesh) -> float:

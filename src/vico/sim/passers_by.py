@@ -69,7 +69,7 @@ def pedestrian_motion(gaits: PedestrianGaits, height: NDArray[np.float64], secon
     stride = stride_length(walk, gaits.pace, height)
     in_stride = (WALK_START + gaits.walked / stride) % 1.0
     # People at rest breathe by the clock, each at their own time.
-    at_rest = (second * 0.5 + n * 0.37) % 1.0
+    at_rest = (second * 0.5 + n * 0.37 + 0.1) % 1.0
     # Of two who talk one does and the other listens, by turns; one comes right after the other.
     talks = (gaits.standing == TALK) & ((second // _TURN_TO_TALK + n) % 2 == 0)
     still = np.where(gaits.seated, clip_index("ride_bus"), np.where(talks, clip_index("talk"), idle))
