@@ -134,6 +134,37 @@ def test_the_younger_the_larger_the_head(source: str) -> None:
     assert eyes[0] < 0.922 < 0.93 < eyes[-1]
 
 
+@pytest.mark.parametrize("source", SOURCES)
+def test_glasses_stand_before_eyes_and_cheeks_all_around(source: str) -> None:
+    for look in (Appearance(1.0, 60, glasses=True, build=0.9), Appearance(0.0, 9, 1.3, glasses=True)):
+        body = body_of(look, source=source, detail="full")  # type: ignore[arg-type]
+        frame = (body.colour == (30, 28, 30)).all(1) & (body.vertices[:, 2] > 0.8 * look.height)
+        eyes = body.rest_joints[[J["left_eye"], J["right_eye"]]]
+        rims = body.vertices[frame & (body.vertices[:, 0] > eyes[:, 0].min())]
+        assert np.ptp(rims[:, 2]) > 0.12 * (look.height - eyes[0, 2]) / 0.475
+        own = body.vertices[~frame & (body.weight_joints[:, 0] == J["head"])]
+        near = np.linalg.norm(own[:, None, 1:] - rims[None, :, 1:], axis=2) < 0.004
+        # The nose passes between the lenses.
+        near &= (np.abs(own[:, 1]) > 0.02)[:, None]
+        ahead = np.where(near, own[:, None, 0] - rims[None, :, 0], -1.0)
+        assert ahead.max() < 0.003
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_cut_hair_stays_on_the_neck(source: str) -> None:
+    colour = (90, 200, 90)
+    for age, height in ((8, 1.28), (40, 1.75)):
+        look = Appearance(1.0, age, height, hair="short", hair_colour=colour)
+        body = body_of(look, source=source, detail="full")  # type: ignore[arg-type]
+        green = body.colour[:, 1] > 1.5 * body.colour[:, 0].astype(float)
+        eye = body.rest_joints[J["left_eye"], 2]
+        low = body.vertices[green & (body.vertices[:, 2] < eye - 0.02)]
+        skin = body.vertices[~green & (np.abs(body.vertices[:, 2] - eye) < 0.2)]
+        assert len(low) > 0
+        away = np.linalg.norm(low[:, None] - skin[None], axis=2).min(1)
+        assert away.max() < 0.035
+
+
 def test_people_dress_for_the_weather() -> None:
     summer = Appearance(top="t-shirt", bottom="shorts", shoes="sandals")
     snow = dressed(summer, -5.0, snow=1.0)

