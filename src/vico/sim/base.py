@@ -27,6 +27,7 @@ from vico.sim.seats import Seats
 from vico.sim.tills import Till, tills_of
 from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.traffic.standing_spots import with_spots
+from vico.sim.traffic.stopping_places import with_stopping_places
 from vico.sim.transit import BusPlan, plan_buses
 from vico.world.folder import World
 from vico.world.model import Entrance
@@ -116,7 +117,9 @@ class SimulationBase:
     def streets(self) -> TrafficNetwork:
         """What traffic moves on."""
         network = TrafficNetwork.of(self.world.lanes, self.solids, self._signal_poles)
-        return replace(network, walked=with_spots(network.walked, network.walks, self.world, self.solids))
+        driven = with_stopping_places(network.driven, network.lanes, network.walks, self.world, self.solids)
+        walked = with_spots(network.walked, network.walks, self.world, self.solids)
+        return replace(network, driven=driven, walked=walked)
 
     @cached_property
     def router(self) -> Router:

@@ -13,6 +13,7 @@ from vico.sim.traffic.letting_in import room_to_change
 from vico.sim.traffic.path import footprint
 from vico.sim.traffic.route import NEVER, is_lane_of_stop
 from vico.sim.traffic.state import NONE
+from vico.sim.traffic.stopping import distance_to_place, speed_into_place
 
 COMFORTABLE_BRAKING = 2.0  # m/s^2 on dry ground; what vehicles do now is `vehicle.braking`
 TIME_GAP = 1.2  # s on dry ground; now: `vehicle.time_gap`
@@ -39,17 +40,17 @@ def braking_distance(vehicle):  # type: ignore[no-untyped-def]
 
 @compiled
 def distance_to_stop(vehicle):  # type: ignore[no-untyped-def]
-    """Return the metres to a bus's stop if that is on its lane; `NEVER` otherwise."""
+    """Return the metres to a bus's stop if that is on its lane, or to a car's place; `NEVER` otherwise."""
     is_here = vehicle.stop_route_index >= 0 and vehicle.route_index == vehicle.stop_route_index
     if vehicle.route >= 0 and is_here and vehicle.stop_offset > vehicle.offset - 1.0:
         return max(vehicle.stop_offset - vehicle.offset, 0.0)
-    return NEVER
+    return distance_to_place(vehicle)
 
 
 @compiled
 def desired_speed(net, vehicle):  # type: ignore[no-untyped-def]
     """Return the speed a vehicle drives at on an empty lane, m/s."""
-    return min(net.lanes[vehicle.lane].speed * vehicle.speed_factor, vehicle.target_speed)
+    return speed_into_place(vehicle, min(net.lanes[vehicle.lane].speed * vehicle.speed_factor, vehicle.target_speed))
 
 
 @compiled

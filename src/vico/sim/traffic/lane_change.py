@@ -7,9 +7,16 @@ import numpy as np
 from vico.io.compiled import compiled
 from vico.sim.traffic.leader import ANY_BODY, TOUCH, touched_at
 from vico.sim.traffic.letting_in import lane_to_change_to
-from vico.sim.traffic.path import PATH_POINT, changing_lane, lane_polyline, point_on_path, project_on_polyline
+from vico.sim.traffic.path import (
+    LANE_CHANGE,
+    PATH_POINT,
+    changing_lane,
+    lane_polyline,
+    point_on_path,
+    project_on_polyline,
+)
 from vico.sim.traffic.route import advance_on_route
-from vico.sim.traffic.state import NONE, PRESENT
+from vico.sim.traffic.state import APPROACHING, DRIVING, NONE, PRESENT
 
 _REAR_GAP, _FRONT_GAP = 7.0, 8.0  # m that have to be free on the other lane behind the front's place and ahead of it
 _LET_IN_GAP, _CUT_IN_GAP = 2.0, 3.0  # m behind a bus that is let in, and ahead of it
@@ -38,10 +45,11 @@ def wants_lane_change(net, vehicle, gap, leading, wanted):  # type: ignore[no-un
 
 
 @compiled
-def _vehicles_on(fleet, lane):  # type: ignore[no-untyped-def]
+def _vehicles_on(net, fleet, lane):  # type: ignore[no-untyped-def]
     count = 0
     for vehicle in fleet:
-        count += vehicle.lane == lane and vehicle.presence == PRESENT
+        is_parked = vehicle.stopping > APPROACHING and not net.places[vehicle.place].delivery
+        count += vehicle.lane == lane and vehicle.presence == PRESENT and not is_parked
     return count
 
 
@@ -49,11 +57,21 @@ def _vehicles_on(fleet, lane):  # type: ignore[no-untyped-def]
 def change_to_emptier_lane(net, fleet, vehicle, view):  # type: ignore[no-untyped-def]
     """Move a car to a neighbour lane with fewer vehicles if there is a gap."""
     lane = vehicle.lane
-    here = _vehicles_on(fleet, lane)
+    here = _vehicles_on(net, fleet, lane)
     for beside in (net.lanes[lane].left, net.lanes[lane].right):
         is_open = beside >= 0 and not net.lanes[beside].closed and not net.lanes[beside].shut
-        is_better = is_open and _vehicles_on(fleet, beside) < here
+        is_better = is_open and _vehicles_on(net, fleet, beside) < here
         if is_better and change_lane(net, vehicle, beside, view):
+            break
+
+
+@compiled
+def change_to_lane_beside(net, vehicle, view):  # type: ignore[no-untyped-def]
+    """Move a car to a neighbour lane if there is a gap, however many drive there."""
+    lane = vehicle.lane
+    for beside in (net.lanes[lane].left, net.lanes[lane].right):
+        is_open = beside >= 0 and not net.lanes[beside].closed and not net.lanes[beside].shut
+        if is_open and change_lane(net, vehicle, beside, view):
             break
 
 
@@ -108,7 +126,7 @@ def change_lane(net, vehicle, target, view):  # type: ignore[no-untyped-def]
     Its place on the ground changes gradually.
     """
     length = vehicle.length
-    is_changing = vehicle.lateral_offset != 0.0
+    is_changing = vehicle.lateral_offset != 0.0 or vehicle.stopping != DRIVING
     if vehicle.granted_count > 0 or is_changing or vehicle.offset < length + 3.0:
         return False
     lane = net.lanes[target]
@@ -120,6 +138,7 @@ def change_lane(net, vehicle, target, view):  # type: ignore[no-untyped-def]
         return False
     vehicle.lane, vehicle.offset, vehicle.planned_count = target, offset, 0
     vehicle.lateral_offset, vehicle.lane_change_distance = lateral_offset, 0.0
+    vehicle.lane_change_length = LANE_CHANGE + length
     vehicle.time_since_lane_change = 0.0
     vehicle.previous_lanes[:] = NONE
     return True

@@ -7,12 +7,13 @@ import numpy as np
 from vico.io.compiled import compiled
 from vico.sim.traffic.path import LANE_CHANGE, project_on_polyline
 from vico.sim.traffic.route import NEVER, route_lane
-from vico.sim.traffic.state import NONE
+from vico.sim.traffic.state import DRIVING, LEAVING, NONE, STANDING
 
 _REAR_GAP = 4.0  # m behind a bus that are left for it
 _SET_BACK = 5.0  # m before a lane's end at which vehicles stay out of the way of who does not get past there ...
 _KEPT_OUT = 10.0  # ... and has waited for so long, s
 _CLOSER = 1.5  # m nearer to a bus than that, a vehicle still stays behind it
+_SWING_OUT, _WAITS_TO_LEAVE = 12.0, 20.0  # m behind a delivery from where one changes lanes; s
 _AFTER_ANOTHER = 2.0  # m driven straight between two lane changes
 
 
@@ -41,6 +42,18 @@ def room_to_change(net, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _behind_place(net, vehicle):  # type: ignore[no-untyped-def]
+    """Return where others stop behind a car that backs into a place, has long waited to leave one, or delivers, m."""
+    place = net.places[vehicle.place]
+    if place.delivery:
+        return vehicle.stop_offset - vehicle.length - _SWING_OUT
+    is_let_out = vehicle.stopping == LEAVING and vehicle.stay_left < -_WAITS_TO_LEAVE
+    if is_let_out or (place.reverse and vehicle.stopping < STANDING):
+        return place.middle - vehicle.length / 2 - _REAR_GAP
+    return NEVER
+
+
+@compiled
 def places_to_let_in(net, fleet, shapes):  # type: ignore[no-untyped-def]
     """Return for each lane where vehicles stop to let others in: metres along it, else `NEVER`.
 
@@ -51,6 +64,8 @@ def places_to_let_in(net, fleet, shapes):  # type: ignore[no-untyped-def]
         kept, room = vehicle.kept_out_from, vehicle.length + _SET_BACK
         if kept != NONE and vehicle.junction_wait > _KEPT_OUT and net.lanes[kept].length > room:
             places[kept] = min(places[kept], net.lanes[kept].length - _SET_BACK)
+        if vehicle.place != NONE:
+            places[vehicle.lane] = min(places[vehicle.lane], _behind_place(net, vehicle))
         if vehicle.route < 0 or vehicle.at_stop or vehicle.planned_count > 0 or vehicle.lateral_offset != 0.0:
             continue
         is_stop_ahead = vehicle.stop_route_index == vehicle.route_index and vehicle.stop_offset > vehicle.offset - 1.0
@@ -70,6 +85,8 @@ def distance_to_let_in(vehicle, places):  # type: ignore[no-untyped-def]
 
     Who has a junction ahead drives on: it would keep the bus and others from it.
     """
+    if vehicle.stopping != DRIVING:
+        return NEVER
     distance = places[vehicle.lane] - vehicle.offset
     is_too_late = distance + _CLOSER < vehicle.speed * vehicle.speed / (2 * vehicle.braking)
     return NEVER if is_too_late or vehicle.granted_count > 0 else max(distance, 0.0)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from vico.assets.vehicle_lights import lit_lamps
 from vico.io.compiled import compiled
 from vico.sim.bodies import Drawn
-from vico.sim.traffic.state import NONE
+from vico.sim.traffic.state import APPROACHING, NONE
 
 #: Bits of what a vehicle shows.
 BRAKE, LEFT, RIGHT = 1, 2, 4
@@ -23,6 +23,8 @@ _BLINKS = 3.0  # times a second that indicators go on or off
 def shown_lights(net, vehicle, speed_before, dt):  # type: ignore[no-untyped-def]
     """Return the lights that a vehicle shows: whether it brakes or stands, and where it turns or changes lanes to."""
     shown = BRAKE if vehicle.speed == 0.0 or speed_before - vehicle.speed > _BRAKES * dt else 0
+    if vehicle.stopping == APPROACHING:
+        return shown
     if vehicle.lateral_offset > _CHANGES and vehicle.lane_change_distance < vehicle.length:
         return shown | RIGHT  # it comes from the left
     if vehicle.lateral_offset < -_CHANGES and vehicle.lane_change_distance < vehicle.length:

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from vico.sim.traffic.state import LANE, SPOT, WALKWAY, LaneNetwork, WalkwayNetwork
+from vico.sim.traffic.state import LANE, SPOT, STOPPING_PLACE, WALKWAY, LaneNetwork, WalkwayNetwork
 from vico.world.lanes import LaneGraph
 from vico.world.objects import Objects
 from vico.world.walkways import CROSSING, Walkways
@@ -141,6 +141,7 @@ def _lane_network(lanes: LaneGraph, walks: Walkways) -> LaneNetwork:
         route=np.zeros(0, np.int32),
         goal_edge=np.zeros(0, np.int32),
         goal_next=np.zeros((0, len(lanes)), np.int32),
+        places=np.zeros(0, STOPPING_PLACE),
     )
 
 

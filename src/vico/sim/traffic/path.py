@@ -33,6 +33,8 @@ class Outline(NamedTuple):
         Where a lane change under way began, to the left of the path; 0 without one.
     change_done
         Metres of that lane change that were done at s = 0 of the path.
+    change_length
+        Metres it takes; less than 0: the lane is left for a place beside it, and `change_done` is less so many metres.
     person_gap
         Distance kept sideways from people.
     """
@@ -43,6 +45,7 @@ class Outline(NamedTuple):
     wheelbase: float
     lateral_offset: float
     change_done: float
+    change_length: float
     person_gap: float
 
 
@@ -56,6 +59,7 @@ def vehicle_outline(vehicle):  # type: ignore[no-untyped-def]
         vehicle.wheelbase,
         vehicle.lateral_offset,
         vehicle.lane_change_distance - vehicle.offset,
+        vehicle.lane_change_length,
         _PERSON_GAP if vehicle.stopped_time < _SQUEEZE_AFTER else _SQUEEZE_GAP,
     )
 
@@ -65,7 +69,7 @@ def changing_lane(outline, lateral_offset, change_done):  # type: ignore[no-unty
     """Return the outline of the same vehicle with another lane change (none: 0, 0)."""
     return Outline(
         outline.length, outline.half_width, outline.overhang, outline.wheelbase,
-        lateral_offset, change_done, outline.person_gap,
+        lateral_offset, change_done, LANE_CHANGE + outline.length, outline.person_gap,
     )  # fmt: skip
 
 
@@ -136,7 +140,7 @@ def point_on_path(path, s):  # type: ignore[no-untyped-def]
 @compiled
 def _lateral_offset(outline, s):  # type: ignore[no-untyped-def]
     """Return the metres to the left of its path that a vehicle's point at `s` is, during a lane change."""
-    share = min(max((outline.change_done + s) / (LANE_CHANGE + outline.length), 0.0), 1.0)
+    share = min(max((outline.change_done + s) / outline.change_length, 0.0), 1.0)
     return outline.lateral_offset * (1.0 - share * share * (3.0 - 2.0 * share))
 
 

@@ -46,6 +46,7 @@ from vico.sim.traffic.state import (
     new_junctions,
     new_pedestrians,
 )
+from vico.sim.traffic.stopping_places import without_deliveries
 from vico.sim.traffic.vehicles import advance_vehicles, bring_back, come_back, place_vehicle, take_away
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
@@ -123,6 +124,7 @@ class Traffic:
         self.first_entity = first_entity
         self.junction_rule = junction_rule
         net = network.with_routes(buses.routes, shared=junction_rule.is_shared)
+        net = without_deliveries(net, net.route)
         # Copies of one's own: how fast lanes are driven follows the weather of the run, and what is shut its events.
         walked = network.walked._replace(walkways=network.walked.walkways.copy())
         hand = HandPlaced.of(placed, lanes, network.walks, net._replace(lanes=net.lanes.copy()), walked)
@@ -185,6 +187,7 @@ class Traffic:
         fleet.speed_factor[car] = random.uniform(*_CAR_SPEED_FACTORS, self.cars)
         fleet.speed_factor[bus] = _BUS_SPEED_FACTOR
         fleet.route[car], fleet.route[bus] = NONE, buses.buses
+        fleet.delivers = np.array([name.startswith("van_") for name in self._prototypes])[self.prototype]
 
     def _new_shapes(self) -> Shapes:
         n = self.vehicles + self.pedestrians

@@ -29,6 +29,9 @@ NONE = -1  # no lane, junction, route, body: wherever an index may be missing
 SEVERAL = -2  # more than one vehicle
 #: Where a vehicle is: on the streets, out of the world, or out of it and to come back as soon as there is room.
 PRESENT, AWAY, COMING = 0, 1, 2
+#: Whether a car stops at a place beside the road: it drives, comes to the place, backs into it, stands there, or waits
+#: for a gap to leave it.
+DRIVING, APPROACHING, BACKING_IN, STANDING, LEAVING = 0, 1, 2, 3, 4
 #: What a signal shows.
 DARK, GREEN, AMBER, RED = 0, 1, 2, 3
 
@@ -56,6 +59,22 @@ LANE = np.dtype(
         ("turn", np.int8),  # in junctions: 1 where it turns left, -1 right, 0 straight on
         ("leaves", _B),  # whether it ends where the map cuts the street off
         ("light", np.uint8),  # what its signal shows who wants onto it: DARK, GREEN, AMBER or RED
+        ("first_place", _I),  # places beside it where cars stop: `places` from here ...
+        ("end_place", _I),  # ... to before here
+    ],
+    align=True,
+)
+
+#: A place where cars stop: a parking spot at the kerb, or the edge of a lane for deliveries.
+STOPPING_PLACE = np.dtype(
+    [
+        ("lane", _I),
+        ("middle", _F),  # metres along the lane
+        ("side", _F),  # metres to the left of the lane's middle
+        ("longest", _F),  # vehicle that fits, m
+        ("taper", _F),  # metres along the lane that it takes to get there, or away
+        ("reverse", _B),  # whether one backs into it: who drives in forwards would touch what stands behind it
+        ("delivery", _B),  # whether it is for deliveries
     ],
     align=True,
 )
@@ -73,6 +92,7 @@ VEHICLE_PARAMETERS: list[tuple[Any, ...]] = [
     ("time_gap", _F),  # that its driver keeps behind another vehicle, s
     ("speed_factor", _F),  # share of the speed limit it drives at
     ("route", _I),  # bus route it follows, NONE for cars
+    ("delivers", _B),  # whether it is a van that makes deliveries
 ]
 
 #: What changes about a vehicle: its state, that is hashed and saved.
@@ -87,6 +107,7 @@ VEHICLE_STATE: list[tuple[Any, ...]] = [
     ("held_junctions", _I, (HELD_JUNCTIONS,)),  # junction clusters it holds, NONE in free slots
     ("lateral_offset", _F),  # where a lane change under way began, m to the left of the new lane; 0 without one
     ("lane_change_distance", _F),  # driven since that lane change began, m
+    ("lane_change_length", _F),  # metres it takes; less than 0: the lane is left, and so many metres are left of it
     ("blocker", _I),  # body it stands behind, an index into the step's `Shapes`; NONE while it drives
     ("target_speed", _F),  # most it drives, m/s: what a bus's timetable asks for
     ("gives_way_to", _I),  # vehicle it backed up for and lets pass now, NONE for nobody
@@ -99,8 +120,11 @@ VEHICLE_STATE: list[tuple[Any, ...]] = [
     ("time_since_lane_change", _F),  # s
     ("route_index", _I),  # buses: position of its lane in its route
     ("stop_route_index", _I),  # buses: position in its route of the lane with the next stop
-    ("stop_offset", _F),  # buses: the stop's distance along that lane, m
-    ("at_stop", _B),  # buses: whether it stands at its stop with its doors open
+    ("stop_offset", _F),  # the stop's distance along that lane, m; cars: where one that comes to a place stops first
+    ("at_stop", _B),  # whether it stands at its stop with its doors open, or at a place where cars stop
+    ("stopping", np.uint8),  # cars: DRIVING, APPROACHING, BACKING_IN, STANDING or LEAVING
+    ("place", _I),  # cars: place where it stops, an index into the network's; NONE for none
+    ("stay_left", _F),  # cars: how long it goes on standing there, or tries to get there, s
     ("presence", np.uint8),  # buses: PRESENT, AWAY or COMING; its body is far off unless it is present
     ("goal", _I),  # cars: goal it drives to, an index into the network's; NONE for none
     ("goal_end", _I),  # cars: the one after its last goal
@@ -246,6 +270,8 @@ class LaneNetwork(NamedTuple):
     goal_edge, goal_next
         Street of each goal of cars whose route is given, and the lane that leads to it from each lane, `NONE` for none,
         int32, shapes ``(goals,)`` and ``(goals, lanes)``.
+    places
+        Places where cars stop, lane by lane, dtype `STOPPING_PLACE`.
     """
 
     lanes: Records
@@ -260,6 +286,7 @@ class LaneNetwork(NamedTuple):
     route: Ints
     goal_edge: Ints
     goal_next: Ints
+    places: Records
 
 
 class WalkwayNetwork(NamedTuple):
@@ -397,6 +424,7 @@ def new_fleet(n: int, seed: int) -> Records:
         "kept_out_from",
         "stop_route_index",
         "goal",
+        "place",
     ):
         fleet[name] = NONE
     fleet["target_speed"] = TOP_SPEED

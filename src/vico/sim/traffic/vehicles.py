@@ -29,6 +29,7 @@ from vico.sim.traffic.junctions import hesitates, next_junction_request, request
 from vico.sim.traffic.lane_change import (
     change_as_route_does,
     change_to_emptier_lane,
+    change_to_lane_beside,
     wants_lane_change,
 )
 from vico.sim.traffic.leader import (
@@ -43,8 +44,8 @@ from vico.sim.traffic.leader import (
 )
 from vico.sim.traffic.letting_in import distance_to_let_in, places_to_let_in
 from vico.sim.traffic.lights import shown_lights
+from vico.sim.traffic.moving import move_vehicle
 from vico.sim.traffic.path import (
-    LANE_CHANGE,
     PATH_POINT,
     PATH_POINTS,
     changing_lane,
@@ -56,7 +57,8 @@ from vico.sim.traffic.path import (
 from vico.sim.traffic.random_stream import next_random
 from vico.sim.traffic.route import NEVER, advance_lane, can_step_back, plan_lanes, step_back_lane
 from vico.sim.traffic.signals import is_stopped_by_signal, loses_its_green
-from vico.sim.traffic.state import AWAY, NONE, PRESENT
+from vico.sim.traffic.state import APPROACHING, AWAY, DRIVING, NONE, PRESENT
+from vico.sim.traffic.stopping import choose_place, come_to_place, is_behind_delivery, stay_at_place
 
 STANDING = 0.1  # slower is standing, m/s ...
 _STARTED = 0.95  # ... where a vehicle gains so much in a step: slower than this share of what it can gain
@@ -92,6 +94,9 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
     for v in range(len(fleet)):
         vehicle = fleet[v]
         if vehicle.presence != PRESENT:
+            continue
+        if vehicle.stopping > APPROACHING:
+            stay_at_place(net, fleet, vehicle, (path_buffer, buffers[0]), beyond, dt)
             continue
         lane, speed, is_bus = vehicle.lane, vehicle.speed, vehicle.route >= 0
         look = look_ahead(vehicle)
@@ -131,7 +136,7 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         if backs_up[v] and move == 0.0:
             move = _move_back(net, vehicle, view, dt)
         if move != 0.0:
-            _move_vehicle(vehicle, shapes, view, move, dt)
+            move_vehicle(vehicle, shapes, view, move, dt)
             advance_lane(net, vehicle)
             if vehicle.offset < 0.0:
                 step_back_lane(net, vehicle)
@@ -144,6 +149,7 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         vehicle.lights = shown_lights(net, vehicle, speed, dt)
         vehicle.time_since_lane_change += dt
         vehicle.stopped_time = vehicle.stopped_time + dt if is_standing else 0.0
+        come_to_place(net, vehicle)
         if is_bus:
             _arrive_at_stop(vehicle, stop_distance, is_standing)
         elif is_refused and _gives_up_waiting(vehicle, dt):
@@ -151,13 +157,31 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
 
         # Only on the lane the path was laid for: who has just reached another one can change a step later.
         if vehicle.lane != lane:
+            choose_place(net, fleet, vehicle)
             continue
-        if is_bus:
-            # Not before its stop, where its route goes on in the lane beside after that: it would drive past it.
-            if not vehicle.at_stop and vehicle.planned_count == 0 and stop_distance >= NEVER:
-                change_as_route_does(net, vehicle, view)
-        elif 0 <= leader < len(fleet) and wants_lane_change(net, vehicle, gap, leading, wanted):
-            change_to_emptier_lane(net, fleet, vehicle, view)
+        _change_lane(net, fleet, vehicle, view, stop_distance, (leader, gap, leading, wanted))
+
+
+@compiled
+def _change_lane(net, fleet, vehicle, view, stop_distance, ahead):  # type: ignore[no-untyped-def]
+    """Change lanes as the route does, past a delivery, or out of a queue.
+
+    Parameters
+    ----------
+    stop_distance
+        Metres to its stop, `NEVER` for none.
+    ahead
+        Its leader, the gap to it (metres) and its speed; the speed the vehicle would like (m/s).
+    """
+    leader, gap, leading, wanted = ahead
+    if vehicle.route >= 0:
+        # Not before its stop, where its route goes on in the lane beside after that: it would drive past it.
+        if not vehicle.at_stop and vehicle.planned_count == 0 and stop_distance >= NEVER:
+            change_as_route_does(net, vehicle, view)
+    elif is_behind_delivery(net, fleet, vehicle):
+        change_to_lane_beside(net, vehicle, view)
+    elif 0 <= leader < len(fleet) and wants_lane_change(net, vehicle, gap, leading, wanted):
+        change_to_emptier_lane(net, fleet, vehicle, view)
 
 
 @compiled
@@ -218,26 +242,15 @@ def _move_without_contact(net, vehicle, view, move, gap, leader):  # type: ignor
 def _move_back(net, vehicle, view, dt):  # type: ignore[no-untyped-def]
     """Return the move of a vehicle that backs up, metres; 0 where it would touch a body."""
     move = -_REVERSE * dt
-    if vehicle.granted_count > 0 or (vehicle.offset + move < 0.0 and not can_step_back(net, vehicle)):
+    if (
+        vehicle.stopping != DRIVING
+        or vehicle.granted_count > 0
+        or (vehicle.offset + move < 0.0 and not can_step_back(net, vehicle))
+    ):
         return 0.0
     # Whoever backs up stands as near as may be to what it backs away from.
     is_blocked = touched_at(view.path, view.outline, vehicle.offset + move, view.nearby, TOUCH / 4, TOUCH / 4) >= 0
     return 0.0 if is_blocked else move
-
-
-@compiled
-def _move_vehicle(vehicle, shapes, view, move, dt):  # type: ignore[no-untyped-def]
-    """Move a vehicle along its path and put its body there."""
-    x, y, c, s = footprint(view.path, view.outline, vehicle.offset + move)
-    vehicle.offset += move
-    if vehicle.lateral_offset != 0.0 and move > 0.0:
-        # The front's own metres: `outline` keeps what a point of the path had done when the change began.
-        vehicle.lane_change_distance += move
-    v = vehicle.index
-    shapes.vx[v], shapes.vy[v] = (x - shapes.x[v]) / dt, (y - shapes.y[v]) / dt
-    shapes.x[v], shapes.y[v], shapes.yaw[v] = x, y, np.arctan2(s, c)
-    if vehicle.lane_change_distance > LANE_CHANGE + 2.0 + 2 * view.outline.length:
-        vehicle.lateral_offset = 0.0
 
 
 @compiled
@@ -272,6 +285,7 @@ def place_vehicle(net, fleet, v, lane, offset, shapes, air):  # type: ignore[no-
             shapes.x[v], shapes.y[v] = before
             return False
     vehicle.lane, vehicle.offset, vehicle.planned_count, vehicle.lateral_offset = lane, offset, 0, 0.0
+    vehicle.stopping, vehicle.place = DRIVING, NONE
     vehicle.gives_way_to = NONE
     vehicle.previous_lanes[:] = NONE
     vehicle.speed = vehicle.stopped_time = vehicle.junction_wait = 0.0
