@@ -1,5 +1,7 @@
 """Cars and pedestrians placed by hand, on the streets of central Helsinki."""
 
+import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -79,6 +81,19 @@ def test_a_car_drives_its_route_in_order_and_then_as_others_do() -> None:
     places = [seen.index(int(lanes.edge[goal])) for goal in goals]
     assert places == sorted(places)
     assert fleet.teleports[0] == 0
+
+
+def test_the_example_file_of_traffic_is_driven_and_walked_in_central_helsinki() -> None:
+    content = json.loads((Path(__file__).parents[2] / "examples" / "traffic.json").read_text())
+    traffic = _traffic(content)
+    assert (traffic.cars, traffic.pedestrians) == (3, 2)
+    assert (traffic.fleet.goal[:2] >= 0).all()
+    assert (traffic.pedestrian_state.goal >= 0).all()
+    before = traffic.fleet.lane.copy()
+    for _ in range(300):
+        traffic.advance(0.1, NOWHERE)
+    assert (traffic.fleet.lane != before).all()
+    assert (traffic.pedestrian_state.distance_walked > 20.0).all()
 
 
 def test_a_pedestrian_walks_its_route_and_goes_on_from_a_snapshot_as_if_nothing_had_been() -> None:

@@ -309,6 +309,22 @@ def test_a_car_ahead_in_the_queue_does_not_back_up() -> None:
     assert fleet["gives_way_to"].tolist() == [-1, -1]
 
 
+def test_in_a_bend_the_car_ahead_on_the_same_lane_does_not_back_up() -> None:
+    net, fleet, shapes = _bus_in_a_junction_beside_a_car(7.0, 3.5, 0.8)
+    fleet["lane"][1], fleet["offset"] = fleet["lane"][0], (3.0, 9.0)
+    assert not vehicles_backing_up(net, fleet, shapes, 0.1).any()
+    fleet["offset"] = 9.0, 3.0
+    assert vehicles_backing_up(net, fleet, shapes, 0.1).tolist() == [False, True]
+
+
+def test_who_waits_on_another_street_backs_up_for_who_cannot_leave_the_junction() -> None:
+    net, fleet, shapes = _bus_in_a_junction_beside_a_car(9.0, 0.0, 0.3)
+    fleet["junction_wait"][1] = 5.0
+    assert vehicles_backing_up(net, fleet, shapes, 0.1).tolist() == [False, True]
+    fleet["gives_way_to"], fleet["planned_lanes"][0, 0], fleet["planned_count"][0] = -1, fleet["lane"][1], 1
+    assert not vehicles_backing_up(net, fleet, shapes, 0.1).any()
+
+
 def test_nobody_lets_another_one_pass_for_ever() -> None:
     net, fleet, shapes = _bus_in_a_junction_beside_a_car(-4.0, 2.3, 0.25)
     vehicles_backing_up(net, fleet, shapes, 0.1)

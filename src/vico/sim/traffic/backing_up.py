@@ -57,9 +57,18 @@ def _gives_way_head_on(net, vehicle, other):  # type: ignore[no-untyped-def]
 def _drives_before(shapes, other, vehicle):  # type: ignore[no-untyped-def]
     """Return whether `other` is ahead of a vehicle and headed as it is, as in a queue; beside it, it is in its way."""
     v, o = vehicle.index, other.index
+    if other.lane == vehicle.lane and other.lateral_offset == 0.0:
+        return other.offset > vehicle.offset  # in bends they are headed otherwise
     c, s = np.cos(shapes.yaw[v]), np.sin(shapes.yaw[v])
     ahead = (shapes.x[o] - shapes.x[v]) * c + (shapes.y[o] - shapes.y[v]) * s
     return np.cos(shapes.yaw[v] - shapes.yaw[o]) >= _ALIKE and ahead > vehicle.length / 2
+
+
+@compiled
+def _waits_beside_way(net, vehicle, other):  # type: ignore[no-untyped-def]
+    """Return whether `other` waits for a junction on another street than those that a vehicle takes: no queue."""
+    waits = other.junction_wait > 0.0 and other.granted_count == 0 and net.lanes[other.lane].junction < 0
+    return waits and other.lane != vehicle.lane and not _plans_over(vehicle, other.lane)
 
 
 @compiled
@@ -100,8 +109,9 @@ def vehicles_backing_up(net, fleet, shapes, dt):  # type: ignore[no-untyped-def]
             continue
         if fleet[b].blocker == v or fleet[b].gives_way_to == v:
             backs_up[b] = _gives_way_head_on(net, vehicle, fleet[b])
-        elif net.lanes[vehicle.lane].junction >= 0 and not _drives_before(shapes, fleet[b], vehicle):
-            backs_up[b] = True
+        elif net.lanes[vehicle.lane].junction >= 0:
+            is_aside = _waits_beside_way(net, vehicle, fleet[b])
+            backs_up[b] = backs_up[b] or is_aside or not _drives_before(shapes, fleet[b], vehicle)
         if backs_up[b] and fleet[b].gives_way_to == NONE:
             fleet[b].gives_way_to, fleet[b].gave_way_for = v, 0.0
     # Who stands close behind one that backs up backs up, too.

@@ -149,7 +149,11 @@ def keep_up(paths, walker, leader, shapes, bodies, near, heading, dt):  # type: 
     lag = 0.0 if is_beside else _BEHIND * walker.group_place
     dx, dy = shapes.x[first] - shapes.x[b], shapes.y[first] - shapes.y[b]
     if walker.walkway == leader.walkway:
-        behind = dx * hx + dy * hy - lag
+        behind = dx * hx + dy * hy
+        if walker.apart > _TOGETHER:
+            # Round a corner who leads may be ahead on the way and yet not the way one looks.
+            behind = max(behind, (leader.offset - walker.offset) * walker.direction)
+        behind -= lag
     else:
         behind = walker.apart - max(lag, _BESIDE)
     return min(max(leader.speed / walker.preferred_speed + _CATCH_UP * behind, 0.0), _FASTEST)

@@ -24,6 +24,7 @@ _VEHICLE_GAP, _PERSON_GAP = 0.1, 0.3  # m kept sideways on the other lane
 _SWING_OUT, _PLACES = 6.0, 5  # m that a car has to have free to swing out, and places where that is looked at
 _LANE_POINTS = 64
 _QUEUE_GAP, _QUEUE_SPEED = 15.0, 0.5  # m, share of the desired speed: nearer and slower leaders are a queue
+_BEHIND_HEADWAY, _BESIDE = 2.0, 2.0  # s until who comes up on the other lane is there; m from its middle
 _LEAST_TIME = 6.0  # s between two lane changes of a car
 _LEAST_LANE = 18.0  # m of lane that have to be left for a car to change
 
@@ -84,6 +85,24 @@ def change_as_route_does(net, vehicle, view):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _somebody_comes_up(vehicle, lateral_offset, view):  # type: ignore[no-untyped-def]
+    """Return whether somebody on the other lane would have to brake for a vehicle that changes onto it.
+
+    That lane is `lateral_offset` metres to the right.
+    """
+    shapes, v = view.beyond.shapes, vehicle.index
+    c, s = np.cos(shapes.yaw[v]), np.sin(shapes.yaw[v])
+    for one in view.nearby:
+        dx, dy = one.x - shapes.x[v], one.y - shapes.y[v]
+        ahead, aside = dx * c + dy * s, dy * c - dx * s
+        closing = shapes.vx[one.body] * c + shapes.vy[one.body] * s - vehicle.speed
+        gap = -ahead - vehicle.length / 2 - one.half_length
+        if ahead < 0.0 and abs(aside + lateral_offset) < _BESIDE and gap < closing * _BEHIND_HEADWAY:
+            return True
+    return False
+
+
+@compiled
 def _can_swing_out(path, swerving, offset, places, view):  # type: ignore[no-untyped-def]
     """Return whether a vehicle touches nobody at the first so many places of its lane change."""
     for i in range(places):
@@ -134,7 +153,10 @@ def change_lane(net, vehicle, target, view):  # type: ignore[no-untyped-def]
     offset, lateral_offset = project_on_polyline(net.points, net.along, lane.first_point, lane.end_point, x, y)
     if offset < length + 2.0 or offset > lane.length - 1.0:
         return False
-    if not is_gap_accepted(net, target, offset, lateral_offset, vehicle.route >= 0, view):
+    is_let_in = vehicle.route >= 0
+    if not is_gap_accepted(net, target, offset, lateral_offset, is_let_in, view):
+        return False
+    if not is_let_in and _somebody_comes_up(vehicle, lateral_offset, view):
         return False
     vehicle.lane, vehicle.offset, vehicle.planned_count = target, offset, 0
     vehicle.lateral_offset, vehicle.lane_change_distance = lateral_offset, 0.0

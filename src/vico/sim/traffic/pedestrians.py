@@ -43,9 +43,11 @@ _ANGLES = np.array([0.0, -0.35, 0.35, -0.7, 0.7, -1.1, 1.1, -1.6, 1.6, -2.3, 2.3
 _FORWARD = 9
 _CARS_FIRST_AFTER, _CARS_FIRST_UNTIL = 10.0, 12.0  # s waited by a car that goes first then, and by the pedestrian
 _LET_GO_AFTER = 5.0  # s after which companions of who gets nowhere go their own ways: they may be in the way
+_MAKES_ROOM_AFTER = 10.0  # s after which who is led goes its own way, away from a vehicle that it is in the way of
 _LEFT_BEHIND = 15.0  # s after which a companion whose leader has crossed crosses, too
 _GIVE_UP_CROSSING = 20.0, 10.0  # s waited for a crossing before turning round, and more by `lateral_share`
 _OFF_CROSSING = 1.3  # m walked after which the body is off the crossing
+_AT_END = 0.3  # m from the end of a crossing from which on one stands at the kerb
 _TURN_RATE = 4.0  # rad/s
 _STRIDE_AHEAD = 0.4  # m ahead where a heading is tested against the walkway's sides
 _PROGRESS = 1.0  # who is farther from where it was has got on, m
@@ -168,8 +170,8 @@ def must_wait_at_crossing(walker, junctions, crossing, is_asked):  # type: ignor
 def _enter_walkway(paths, walker, junctions, following, node):  # type: ignore[no-untyped-def]
     """Put the followed point at the start of the next walkway, from meeting point `node`."""
     walkway = walker.walkway
+    walker.crossing_wait = 0.0
     if paths.walkways[following].kind == _CROSSING:
-        walker.crossing_wait = 0.0
         junctions.walkers_on[following] += 1
     if paths.walkways[walkway].kind == _CROSSING:
         if walker.leaving_crossing >= 0:
@@ -187,13 +189,13 @@ def _enter_walkway(paths, walker, junctions, following, node):  # type: ignore[n
 @compiled
 def _may_go_onto(paths, walker, junctions, is_asked, following, dt):  # type: ignore[no-untyped-def]
     """Return whether a walker may go onto a walkway now; who may not counts the time, and gives up after a while."""
-    if paths.walkways[following].kind != _CROSSING:
-        return True
+    if paths.walkways[following].kind != _CROSSING or following == walker.leaving_crossing:
+        return True  # Who turns round before it is off a crossing goes back: vehicles wait for it as it is.
     if (paths.walkways[following].light >= AMBER or waits_for_companions(walker)) and not is_asked:
         return False
     if not must_wait_at_crossing(walker, junctions, following, is_asked):
         return True
-    walker.crossing_wait += dt
+    walker.crossing_wait = max(walker.crossing_wait, dt)
     junctions.walker_wait[following] = max(junctions.walker_wait[following], walker.crossing_wait)
     return False
 
@@ -211,6 +213,8 @@ def advance_follow_point(paths, walker, leader, junctions, is_asked, x, y, dt): 
 
     That is a crossing, or where the way forks who leads the walker (`leader`; the walker itself where nobody does).
     """
+    if walker.crossing_wait > 0.0:
+        walker.crossing_wait += dt  # also while others push it to and fro before the crossing
     lead = _LEAD_WHEN_HINDERED if walker.jammed_time > _HINDERED_AFTER else _LEAD
     for _ in range(12):
         point = follow_point(paths, walker)
@@ -394,10 +398,20 @@ def _group_pace(paths, pedestrians, i, shapes, near, first, dt):  # type: ignore
 
 
 @compiled
-def _leave_crossing(walker, junctions):  # type: ignore[no-untyped-def]
-    """Note who is off the crossing it was on."""
+def _is_off_crossing(paths, crossing, x, y):  # type: ignore[no-untyped-def]
+    """Return whether (x, y) is at an end of a crossing, or beside it."""
+    along, aside = _project_on_walkway(paths, crossing, x, y)
+    way = paths.walkways[crossing]
+    is_at_end = min(along, way.length - along) < _AT_END
+    return is_at_end or not -way.reach_right - RADIUS < aside < way.reach_left + RADIUS
+
+
+@compiled
+def _leave_crossing(paths, walker, junctions, x, y):  # type: ignore[no-untyped-def]
+    """Note who is off the crossing it was on: the metres alone do not tell, as one may walk to and fro there."""
     left = walker.leaving_crossing
-    if left >= 0 and walker.distance_walked - walker.leaving_since > _OFF_CROSSING:
+    has_walked = walker.distance_walked - walker.leaving_since > _OFF_CROSSING
+    if left >= 0 and has_walked and _is_off_crossing(paths, left, x, y):
         junctions.walkers_on[left] -= 1
         walker.leaving_crossing = NONE
 
@@ -432,7 +446,9 @@ def _go_along(paths, pedestrians, junctions, shapes, who, near, is_asked, time):
     x, y = shapes.x[b], shapes.y[b]
     led_by = walker.leader
     leader = pedestrians[i if led_by == NONE else led_by]
-    is_let_go = leader.jammed_time > _LET_GO_AFTER
+    # A vehicle may stand between it and who leads it, and wait for it to go: then it makes room for that one first.
+    is_in_way = is_asked and walker.jammed_time > _MAKES_ROOM_AFTER
+    is_let_go = leader.jammed_time > _LET_GO_AFTER or is_in_way
     if is_let_go:
         walker.leader = NONE  # in this step it goes its own way
     is_alone = walker.group_size == 1 or is_let_go
@@ -441,7 +457,7 @@ def _go_along(paths, pedestrians, junctions, shapes, who, near, is_asked, time):
         share = max(share, 1.0)
     walkway, offset = walker.walkway, walker.offset
     is_waiting = advance_follow_point(paths, walker, leader, junctions, is_asked, x, y, dt)
-    _leave_crossing(walker, junctions)
+    _leave_crossing(paths, walker, junctions, x, y)
     if is_asked and walker.stuck_time > 2.5:
         _turn_round(paths, walker, x, y)  # it waits for us, and is in our way
     elif led_by == NONE and walker.walkway == walkway and walker.offset != offset:

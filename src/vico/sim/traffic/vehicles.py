@@ -111,6 +111,8 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         gap, leader = find_leader(view, vehicle.offset, look, buffers[1])
         # Who is behind another vehicle does not ask: it would hold the junction that the other one needs.
         is_behind = (0 <= leader < len(fleet) and gap < request.distance) or let_in_distance < request.distance
+        # Nor does who makes room for another one: it stands, and who holds a junction does not back up.
+        is_behind = is_behind or vehicle.gives_way_to != NONE
         vehicle.queued_junction = vehicle.queued_exit = vehicle.kept_out_from = NONE
         at_signal = request.planned_index >= 0 and is_stopped_by_signal(net, vehicle, request.planned_index)
         is_refused = (
@@ -119,7 +121,8 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
             and not at_signal
             and not request_junctions(net, fleet, junctions, vehicle, request, view)
         )
-        vehicle.junction_wait = _junction_wait(vehicle, is_refused, at_signal, dt)
+        keeps_wait = at_signal or vehicle.gives_way_to != NONE
+        vehicle.junction_wait = _junction_wait(vehicle, is_refused, keeps_wait, dt)
 
         wanted = desired_speed(net, vehicle)
         stop, limit = stop_and_speed_limit(net, vehicle, look, stop_distance, let_in_distance, wanted)
@@ -185,12 +188,13 @@ def _change_lane(net, fleet, vehicle, view, stop_distance, ahead):  # type: igno
 
 
 @compiled
-def _junction_wait(vehicle, is_refused, at_signal, dt):  # type: ignore[no-untyped-def]
+def _junction_wait(vehicle, is_refused, keeps_wait, dt):  # type: ignore[no-untyped-def]
     """Return how long a vehicle has waited for a junction, s.
 
-    At red it keeps what it has waited: its green was too short for it, and it would else begin anew with each.
+    At red it keeps what it has waited: its green was too short for it, and it would else begin anew with each. So does
+    who makes room for another one.
     """
-    if vehicle.speed >= _CREEP or not (is_refused or at_signal):
+    if vehicle.speed >= _CREEP or not (is_refused or keeps_wait):
         return 0.0
     return vehicle.junction_wait + (dt if is_refused else 0.0)
 
