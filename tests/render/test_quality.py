@@ -60,6 +60,20 @@ def test_corners_get_darker_and_open_ground_does_not(scene: Scene) -> None:
     assert (change[-12:] == 0).all()
 
 
+def test_what_stands_off_a_wall_has_no_halo_and_what_touches_it_has() -> None:
+    change = []
+    for off in (0.4, 0.0):
+        parts = [box((0.2, 8, 8), (0, 0, 0)).of_entity(2), box((0.2, 0.3, 0.3), (-0.2 - off, 0, 0)).of_entity(3)]
+        one = Scene(joined(parts), lighting=Lighting())
+        before = Cameras(np.array([[-2.5, 0.0, 0.0]]), np.array([[1.0, 0.0, 0.0]]))
+        dark = take_pictures(one, before, PictureRequest(quality=RenderQuality(ambient_occlusion=True)))
+        plain = render(one, before)
+        wall = plain.segmentation[0] == 2
+        change.append(int((dark.rgb[0, ..., 1].astype(int) - plain.rgb[0, ..., 1])[wall].min()))
+    assert change[0] >= -2
+    assert change[1] < -8
+
+
 def test_edges_are_smoothed_and_faces_are_not(scene: Scene) -> None:
     change, entity = changed(scene, smooth_edges=True)
     edge = np.zeros_like(entity, bool)

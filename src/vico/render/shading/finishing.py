@@ -13,9 +13,10 @@ from vico.render.visibility.fill import inverse_depth, triangle_number
 
 # Ambient occlusion looks this far around a point, metres, at no more pixels than that.
 _REACH, _MOST_PIXELS = 0.55, 28.0
+_OFF = 0.30  # what is farther off a surface than this takes no light from it, metres
 _LOOKS = 3
 _LEAST_PIXELS = np.float32(1.7)  # what is farther away is left alone
-_STRENGTH, _BIAS = 1.15, 0.12
+_STRENGTH, _BIAS = 1.25, 0.12
 # Sharper steps of brightness than this (of 255, and of the brighter one) are smoothed.
 _STEP, _SHARE = 8.0, 0.09
 # Neighbours begin to look in other directions.
@@ -107,8 +108,11 @@ def _look_around(camera: Any, near: Any, turns: Any, out: Any) -> None:
                 d = one / v
                 dx, dy, dz = (np.float32(i) - cx) / focal * d - x, (np.float32(j) - cy) / focal * d - y, d - z
                 squared = dx * dx + dy * dy + dz * dz
-                above = (nx * dx + ny * dy + nz * dz) / np.sqrt(squared + np.float32(1e-6))
-                fade = max(one - squared / (np.float32(2.0) * reach * reach), zero)
+                height = nx * dx + ny * dy + nz * dz
+                above = height / np.sqrt(squared + np.float32(1e-6))
+                # What stands off in the air, like a head before a wall, lets light in behind it.
+                off = height * height * np.float32(1.0 / _OFF**2)
+                fade = max(one - off - squared / (np.float32(2.0) * reach * reach), zero)
                 hidden += max(above - np.float32(_BIAS), zero) * fade
             out[row, column] = max(one - np.float32(_STRENGTH / _LOOKS) * hidden, np.float32(0.35))
 
