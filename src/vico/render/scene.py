@@ -135,6 +135,7 @@ class Scene:
         self._placed = self._spacious = empty
         # The mesh and the arrays whose triangles and colours it holds.
         self._clothed: tuple[Any, ...] | None = None
+        self._bodies = _no_avatars().span
         self.arrays = SceneArrays(
             mesh, textures, clusters, where, placeable, empty, _no_avatars(), np.zeros(1, COUNTS)[0], _ALL_ON
         )
@@ -204,6 +205,8 @@ class Scene:
         triangles: NDArray[np.int32],
         colour: NDArray[np.uint8],
         entity: NDArray[np.int32],
+        *,
+        drawn: NDArray[np.int64] | None = None,
     ) -> None:
         """Replace the posed avatars: all bodies in one mesh, each body's triangles and vertices in a row.
 
@@ -218,6 +221,8 @@ class Scene:
             sRGB, uint8, shape ``(V, 3)``.
         entity
             int32, shape ``(V,)``; a change of value starts the next body.
+        drawn
+            Which bodies are there at all, ascending; the vertices of the others are not read. None: every one.
         """
         vertex_count, triangle_count = len(vertices), len(triangles)
         if not vertex_count or not triangle_count:
@@ -233,10 +238,9 @@ class Scene:
         known = self._clothed
         if known is None or any(a is not b for a, b in zip(known, (mesh, triangles, colour, entity), strict=True)):
             self._clothed = None
-            span = self._clothe(mesh, triangles, colour, entity)
+            self._bodies = self._clothe(mesh, triangles, colour, entity)
             self._clothed = (mesh, triangles, colour, entity)
-        else:
-            span = self.arrays.avatars.span
+        span = self._bodies if drawn is None else self._bodies[drawn]
         low, high = np.zeros((len(span), 3), np.float32), np.zeros((len(span), 3), np.float32)
         posed = np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(normals, np.float32)
         if not _pose_avatars(mesh, *posed, first_vertex, span, low, high):
@@ -473,17 +477,17 @@ def _pose_avatars(
     """Write positions, normals and bounds; return False if a position is not finite."""
     xs, ys, zs, records = mesh.x, mesh.y, mesh.z, mesh.vertex
     total = np.float32(0.0)
-    for i in range(len(vertices)):
-        k = first_vertex + i
-        x, y, z = vertices[i, 0], vertices[i, 1], vertices[i, 2]
-        xs[k], ys[k], zs[k] = x, y, z
-        # Zero for finite numbers, else none.
-        total += (x - x) + (y - y) + (z - z)
-        position, normal = records[k].position, records[k].normal
-        position[0], position[1], position[2] = x, y, z
-        normal[0], normal[1], normal[2] = normals[i, 0], normals[i, 1], normals[i, 2]
     for body in range(len(span)):
         first, end = span[body].first_vertex, span[body].end_vertex
+        for k in range(first, end):
+            i = k - first_vertex
+            x, y, z = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+            xs[k], ys[k], zs[k] = x, y, z
+            # Zero for finite numbers, else none.
+            total += (x - x) + (y - y) + (z - z)
+            position, normal = records[k].position, records[k].normal
+            position[0], position[1], position[2] = x, y, z
+            normal[0], normal[1], normal[2] = normals[i, 0], normals[i, 1], normals[i, 2]
         for axis in range(3):
             line = xs if axis == 0 else (ys if axis == 1 else zs)
             smallest = largest = line[first]

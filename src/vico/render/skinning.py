@@ -87,13 +87,15 @@ def skin(
     offsets: NDArray[np.float32],
     positions: NDArray[np.float64],
     yaws: NDArray[np.float64],
+    *,
+    drawn: NDArray[np.int64] | None = None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Pose every avatar and place it in the world.
 
     Parameters
     ----------
     batch
-        The bodies.
+        The bodies; of n people, or after these the bodies of the same n people once more, in another shape.
     rotations
         Axis-angle of each joint relative to its parent, T-pose = 0, radians, float32, shape ``(n, 55, 3)``.
     offsets
@@ -102,6 +104,8 @@ def skin(
         Points on the ground, world metres, float64, shape ``(n, 3)``.
     yaws
         Headings, radians, float64, shape ``(n,)``.
+    drawn
+        Which bodies of the batch; the vertices of the others are left undefined. None: every one.
 
     Returns
     -------
@@ -127,9 +131,11 @@ def skin(
         np.ascontiguousarray(yaws, np.float64),
     )
     # Each thread some of the bodies, which is the same as one thread all of them.
-    bounds = np.linspace(0, len(batch), min(_PARTS, max(len(batch), 1)) + 1).astype(np.int64)
+    rows = np.arange(len(batch)) if drawn is None else np.asarray(drawn, np.int64)
+    bounds = np.linspace(0, len(rows), min(_PARTS, max(len(rows), 1)) + 1).astype(np.int64)
     for_each(
-        lambda k: _skin(bodies, poses, PARENTS, (bounds[k], bounds[k + 1]), (vertices, normals)), range(len(bounds) - 1)
+        lambda k: _skin(bodies, poses, PARENTS, rows[bounds[k] : bounds[k + 1]], (vertices, normals)),
+        range(len(bounds) - 1),
     )
     return vertices, normals
 
@@ -210,20 +216,21 @@ _fast_inlined: Any = compiled(nogil=True, fastmath=True, error_model="numpy", fo
 
 @_fast
 def _skin(bodies: Any, poses: Any, parents: Any, which: Any, out: Any) -> None:
-    """Write vertices and normals of the bodies from the first to before the second of `which`."""
+    """Write vertices and normals of the bodies `which`."""
     count, starts = len(parents), bodies.starts
     out_vertices, out_normals = out
-    for i in range(which[0], which[1]):
+    for body in which:
+        i = body % len(poses.rotations)
         turned = np.empty((count, 3, 3), np.float64)
         placed = np.empty((count, 3), np.float64)
-        forward_kinematics(poses.rotations[i], bodies.joints[i], parents, poses.offsets[i], turned, placed)
+        forward_kinematics(poses.rotations[i], bodies.joints[body], parents, poses.offsets[i], turned, placed)
         bones = np.empty((count, 3, 4), np.float32)
-        rest_joints, frames, position = bodies.rest_joints[i], bodies.frames[i], poses.positions[i]
+        rest_joints, frames, position = bodies.rest_joints[body], bodies.frames[body], poses.positions[i]
         cosine, sine = np.cos(poses.yaws[i]), np.sin(poses.yaws[i])
         for j in range(count):
             _set_bone(turned[j], frames[j], cosine, sine, bones[j])
             _set_origin(bones[j], placed[j], rest_joints[j], position, cosine, sine)
-        _blend_vertices(bodies, bones, starts[i], starts[i + 1], out_vertices, out_normals)
+        _blend_vertices(bodies, bones, starts[body], starts[body + 1], out_vertices, out_normals)
 
 
 @_fast_inlined

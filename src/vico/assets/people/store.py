@@ -31,7 +31,7 @@ def stored_body(look: Appearance, source: str, data: Path | None) -> Path:
     look
         Whose body.
     source
-        Which maker: "procedural" or "anny".
+        Which maker: "procedural" or "anny", and what for if not the usual light body.
     data
         File that the maker reads, if it does.
     """

@@ -39,6 +39,8 @@ def ground_under_feet(
     style: NDArray[Any],
     place: tuple[NDArray[np.float64], NDArray[np.float64]],
     height: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    *,
+    roughly: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.float64]:
     """Return the ground where people's feet stand and where they come down next.
 
@@ -50,6 +52,8 @@ def ground_under_feet(
         Feet, ENU metres, shape ``(n, 3)``, and headings, radians, shape ``(n,)``.
     height
         Heights of the ground, or of the deck that is nearest, at points of shape ``(m, 3)``.
+    roughly
+        Whose feet are left across edges, such as those of people far away, shape ``(n,)``; None: nobody's.
 
     Returns
     -------
@@ -85,6 +89,8 @@ def ground_under_feet(
     ground[..., LEVEL] = np.where(edge, found.max(axis=-1), heel + rise * behind / run)
     ground[..., TILT] = np.where(edge, 0.0, -np.arctan2(rise, run))
     steps = edge & _walks(numbers)[:, None, None]
+    if roughly is not None:
+        steps &= ~roughly[:, None, None]
     if steps.any():
         who, side, when = np.nonzero(steps)
         back, front = 0.5 * (points[..., 0, :] + points[..., 1, :]), 0.5 * (points[..., 2, :] + points[..., 3, :])
