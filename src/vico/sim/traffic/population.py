@@ -8,23 +8,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.vehicle_lights import lit_lamps, night_lamps
-from vico.assets.vehicle_parts import mirrored
-from vico.assets.vehicles import CAR_KINDS, vehicle_prototypes, vehicle_size
 from vico.errors import InputError
 from vico.seeds import rng
-from vico.sim.bodies import BUS, CAR, PEDESTRIAN, STEP_HEIGHT, Bodies, Drawn, joined_drawn
+from vico.sim.bodies import BUS, CAR, PEDESTRIAN, STEP_HEIGHT, Bodies, Drawn
 from vico.sim.environment import Conditions
 from vico.sim.neighbours import neighbour_grid
 from vico.sim.traffic.axles import axle_transforms
 from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
 from vico.sim.traffic.companions import choose_companions, leave_group
 from vico.sim.traffic.crossings import mark_busy_crossings
+from vico.sim.traffic.drawing import TrafficDrawing
 from vico.sim.traffic.gatherings import Gatherings
 from vico.sim.traffic.hand_placing import HandPlaced, TrafficSetup
 from vico.sim.traffic.jams import STUCK_AFTER, Jam, JamLog, entity_before
 from vico.sim.traffic.levels import TrafficLevels, shapes_of
-from vico.sim.traffic.lights import LampDrawing
+from vico.sim.traffic.makes import choose_models
 from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.traffic.pedestrians import RADIUS, advance_pedestrians, place_pedestrian
 from vico.sim.traffic.route import count_per_street, drop_shut_plans, is_taken, widen_shut
@@ -63,10 +61,6 @@ _FAR = 1e7  # where bodies are before they have a place, m
 _CELL = 25.0  # of the grid of neighbours, m
 _DRIFT = 2.0 * TOP_SPEED  # nobody moves faster, m/s
 _TRIES = 400  # places tried for a car or pedestrian
-#: Share of each kind of car.
-_SHARE = {"hatchback": 0.3, "sedan": 0.27, "suv": 0.23, "van": 0.12, "taxi": 0.08}
-_CAR_ACCELERATION, _BUS_ACCELERATION, _HARD_BRAKING = 1.6, 1.1, 8.0  # m/s^2, on dry ground
-_CAR_SPEED_FACTORS, _BUS_SPEED_FACTOR = (0.85, 1.05), 0.95
 
 
 class Traffic:
@@ -133,10 +127,11 @@ class Traffic:
         self._speed_limits = net.lanes["speed"].copy()
         self._conditions: Conditions | None = None
         self._walking_pace = 1.0
-        self._prototypes = [f"{kind}_{colour}" for kind, colours in CAR_KINDS.items() for colour in colours] + ["bus"]
         self._vehicles = new_fleet(self.vehicles, seed)
         self.fleet = self._vehicles.view(np.recarray)
-        self._choose_vehicles(buses, [car.model for car in placed.cars], seed)
+        models = [car.model for car in placed.cars]
+        self.prototype, self._vehicle_height = choose_models(self.fleet, buses.buses, models, seed)
+        self._dry_acceleration = self.fleet.acceleration.copy()
         self._bodies: Bodies | None = None  # as they stand since they last moved; asked for by everybody
         self._walkers = new_pedestrians(pedestrians, seed)
         self.pedestrian_state = self._walkers.view(np.recarray)
@@ -145,11 +140,11 @@ class Traffic:
         self._entities = np.zeros(0, np.int32)  # of all bodies of the last step, in the order of its shapes
         self.shapes = self._new_shapes()
         self.signals = SignalClock(lanes, network.walks, seed) if junction_rule.has_signals else None
-        self._heads = SignalHeads(lanes, network.walks, network.poles, height) if self.signals else None
+        heads = SignalHeads(lanes, network.walks, network.poles, height) if self.signals else None
         self._levels = TrafficLevels(height, lanes, network.walks, self._heights, self.shapes.bottom.copy())
         #: Tells where pedestrians are who ride in buses, by their numbers.
         self.seats: Callable[[NDArray[np.int64]], Seating] | None = None
-        self._lamps = LampDrawing([self._prototypes[k].split("_")[0] for k in self.prototype])
+        self._drawing = TrafficDrawing(self.prototype, self._own_entities[: self.vehicles], heads)
         self._street_load = np.zeros(len(lanes.edges), np.int32)
         self._entries = self._all_entries = network.entries
         self._place_buses(buses.starts)
@@ -166,28 +161,6 @@ class Traffic:
         self._follow_levels(far, far)
 
     # -- start -------------------------------------------------------------------------------------------------------
-
-    def _choose_vehicles(self, buses: BusRoutes, models: Sequence[str], seed: int) -> None:
-        """Give every vehicle a model (the first ones those that are asked for) and its parameters."""
-        random = rng(seed, "traffic", "makes")
-        shares = np.array(
-            [share for kind, colours in CAR_KINDS.items() for share in [_SHARE[kind] / len(colours)] * len(colours)]
-        )
-        cars, bus_model = random.choice(len(shares), self.cars, p=shares / shares.sum()), len(shares)
-        for v, model in enumerate(models):
-            cars[v] = self._prototypes.index(model) if model else cars[v]
-        self.prototype = np.concatenate([cars, np.full(self.buses, bus_model)]).astype(np.int32)
-        sizes = np.array([vehicle_size(name) for name in self._prototypes])[self.prototype].reshape(-1, 5)
-        length, width, self._vehicle_height, overhang, wheelbase = sizes.T.copy()
-        fleet, car, bus = self.fleet, slice(0, self.cars), slice(self.cars, None)
-        fleet.length, fleet.half_width, fleet.overhang, fleet.wheelbase = length, width / 2, overhang, wheelbase
-        fleet.acceleration[car], fleet.acceleration[bus] = _CAR_ACCELERATION, _BUS_ACCELERATION
-        self._dry_acceleration = fleet.acceleration.copy()
-        fleet.braking, fleet.hard_braking, fleet.time_gap = COMFORTABLE_BRAKING, _HARD_BRAKING, TIME_GAP
-        fleet.speed_factor[car] = random.uniform(*_CAR_SPEED_FACTORS, self.cars)
-        fleet.speed_factor[bus] = _BUS_SPEED_FACTOR
-        fleet.route[car], fleet.route[bus] = NONE, buses.buses
-        fleet.delivers = np.array([name.startswith("van_") for name in self._prototypes])[self.prototype]
 
     def _new_shapes(self) -> Shapes:
         n = self.vehicles + self.pedestrians
@@ -477,13 +450,9 @@ class Traffic:
 
     def draw(self) -> Drawn:
         """Cars, buses and what signals show; pedestrians are drawn by whoever skins people."""
-        index, transforms, entity = self.prototype, self.vehicle_transforms(), self._own_entities
-        vehicles, there = Drawn(self._prototypes, index, transforms, entity[: self.vehicles]), self._present()
-        parts = [Drawn(self._prototypes, index[there], transforms[there], entity[there])]
-        parts.append(self._lamps.draw(self.fleet.lights, float(self.jams.elapsed[0]), vehicles))
-        if self._heads is not None:
-            parts.append(self._heads.draw(self._net.lanes["light"], self.paths.walkways["light"]))
-        return joined_drawn(parts)
+        transforms, lights, elapsed = self.vehicle_transforms(), self.fleet.lights, float(self.jams.elapsed[0])
+        shown = self._net.lanes["light"], self.paths.walkways["light"]
+        return self._drawing.draw(transforms, self._present(), lights, elapsed, shown)
 
     def vehicle_transforms(self) -> NDArray[np.float32]:
         """Model to world of every vehicle, shape ``(vehicles, 4, 4)``; of those away it means nothing."""
@@ -493,13 +462,7 @@ class Traffic:
 
     def prototypes(self) -> dict[str, list[Surface]]:
         """Models of the vehicles and signals, by the names `draw` uses."""
-        models = vehicle_prototypes()
-        models = models | {name: [*models[name], night_lamps(name.split("_")[0])] for name in self._prototypes}
-        models = models | lit_lamps()
-        if self._heads is not None:
-            models = models | self._heads.prototypes()
-        # Doors open to the kerb.
-        return models | {"bus": [mirrored(part) for part in models["bus"]]} if self.lanes.lefthand else models
+        return self._drawing.prototypes(lefthand=self.lanes.lefthand)
 
     # -- what others ask ---------------------------------------------------------------------------------------------
 
