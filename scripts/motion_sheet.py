@@ -25,7 +25,7 @@ from vico.render.skinning import batch_bodies, skin
 from vico.seeds import rng
 from vico.sim.animation import CLIPS, Hands, Hold, Transition, clip_index, free_hands, ground_under_feet, pose, style_of
 from vico.sim.animation.blending import is_seated
-from vico.sim.hands_scene import Holders, draw_umbrellas
+from vico.sim.hands_scene import Holders, draw_phones, draw_umbrellas
 from vico.world.mesh import Material, Surface
 
 MOMENTS = 8
@@ -114,7 +114,7 @@ def row(name: str, look: Appearance, height: int) -> NDArray[np.uint8]:
     return pictures(scene, spots, height)
 
 
-_MEALS = {"drink": "paper_cup", "eat": "sandwich", "sit_drink": "mug", "sit_eat": "sandwich"}
+_MEALS = {"drink": "paper_cup", "eat": "sandwich", "sit_drink": "mug", "sit_eat": "sandwich", "phone": "phone"}
 
 
 def _prototypes() -> dict[str, list[Surface]]:
@@ -127,9 +127,10 @@ def in_hand(scene: Scene, who: Holders, what: str) -> None:
     if not what:
         return
     rows = np.arange(MOMENTS)
-    if what == "umbrella":
-        drawn = draw_umbrellas(who, MOMENTS)
+    if what in ("umbrella", "phone"):
+        drawn = draw_umbrellas(who, MOMENTS) if what == "umbrella" else draw_phones(who)
         assert drawn is not None
+        rows = rows[: len(drawn.index)]
         frames, names = drawn.transforms, [drawn.prototypes[k] for k in drawn.index]
     else:
         palms = who.palms(rows)
@@ -139,7 +140,7 @@ def in_hand(scene: Scene, who: Holders, what: str) -> None:
             frames[:, :2, :2] *= -1.0
         frames[:, :3, 3] = who.world(rows, points)
     index = np.array([scene.names[name] for name in names], np.int32)
-    scene.set_rigid(index, np.asarray(frames, np.float64), np.full(MOMENTS, 7))
+    scene.set_rigid(index, np.asarray(frames, np.float64), np.full(len(rows), 7))
 
 
 def pictures(scene: Scene, spots: NDArray[np.float64], height: int) -> NDArray[np.uint8]:

@@ -18,9 +18,12 @@ from vico.sim.state import FIRST_PEDESTRIAN_UMBRELLA, FIRST_UMBRELLA
 from vico.world.model import Category
 
 _DRINKS = (clip_index("drink"), clip_index("sit_drink"))
+_PHONE = clip_index("phone")
 _EATS = (clip_index("eat"), clip_index("sit_eat"))
 # Cups and glasses tip so far at the mouth, radians.
 _TIP = 0.8
+# Screens lean back so far from lying flat, radians.
+_TILT = 0.75
 # Umbrellas are made for people so tall, metres; the fist is so far below the canopy.
 _MADE_FOR, _SHAFT = 1.75, 0.8
 # Pedestrians have their umbrellas up when it rains so much more than they bear, mm/h.
@@ -81,12 +84,13 @@ def hands_of_pedestrians(habit: NDArray[np.float64], rain: float) -> Hands:
     """Return what pedestrians do with their hands, by how little each minds rain, 0..1, and the rain, mm/h."""
     n = len(habit)
     share = np.clip((rain - bearable_rain(habit)) / _RAIN_MORE, 0.0, 1.0) * carries_umbrella(habit)
-    return Hands(np.ones(n, np.int64), np.full(n, int(Hold.UMBRELLA_RIGHT)), share, np.zeros(n))
+    # The hand that holds no umbrella makes gestures.
+    return Hands((share <= 0.0).astype(np.int64), np.full(n, int(Hold.UMBRELLA_RIGHT)), share, np.zeros(n))
 
 
 def draw_in_hands(state: SimulationState, who: Holders) -> list[Drawn]:
     """Return what is drawn in everybody's hands, and the movable objects that lie about."""
-    drawn = [draw_umbrellas(who, len(state.people)), _meals(state, who)]
+    drawn = [draw_umbrellas(who, len(state.people)), _meals(state, who), draw_phones(who)]
     if len(state.objects):
         drawn.append(_objects(state, who))
     return [lot for lot in drawn if lot is not None]
@@ -140,6 +144,18 @@ def _meals(state: SimulationState, who: Holders) -> Drawn | None:
         axes[k] = np.array([[way * c, 0.0, s], [0.0, way, 0.0], [-way * s, 0.0, c]])
     entity = np.asarray(who.entity[rows], np.int32)
     return Drawn(names, np.array(index, np.int32), _transforms(who, rows, axes, fist), entity)
+
+
+def draw_phones(who: Holders) -> Drawn | None:
+    """Return the phones that people look at, None without any; they come out of a pocket with the hand."""
+    rows = np.flatnonzero((who.clip == _PHONE) & (np.abs(who.phase % 1.0 - 0.5) < 0.45))
+    if not len(rows):
+        return None
+    fist = who.palms(rows)[np.arange(len(rows)), who.hands.gesture[rows]]
+    c, s = np.cos(_TILT), np.sin(_TILT)
+    axes = np.tile(np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]), (len(rows), 1, 1))
+    index, entity = np.zeros(len(rows), np.int32), np.asarray(who.entity[rows], np.int32)
+    return Drawn(["hand_phone"], index, _transforms(who, rows, axes, fist + np.array([0.02, 0.0, 0.03])), entity)
 
 
 def drink_of(i: int, state: SimulationState) -> str:

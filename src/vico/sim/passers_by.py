@@ -15,10 +15,12 @@ from vico.seeds import rng
 from vico.sim.animation import Transition, clip_index, stride_length
 from vico.sim.animation.gait import WALK_START
 from vico.sim.environment.weather import Weather
-from vico.sim.traffic.state import TALK, PedestrianGaits
+from vico.sim.traffic.state import STOP, TALK, PedestrianGaits
 
 # Who talks goes on for so long, then the other does, s.
 _TURN_TO_TALK = 6.0
+# Who waits at a stop looks at a phone for the first of these times out of every second one, s.
+_AT_PHONE, _EVERY = 28.0, 47.0
 
 
 def looks_of_strangers(seed: int, count: int) -> list[Appearance]:
@@ -52,7 +54,9 @@ class PedestrianMotion(NamedTuple):
 
 
 def pedestrian_motion(gaits: PedestrianGaits, height: NDArray[np.float64], second: float) -> PedestrianMotion:
-    """Return motion and place in its cycle of each pedestrian: they walk, stand and breathe, talk, or sit in a bus.
+    """Return motion and place in its cycle of each pedestrian: they walk, stand and breathe, talk, sit in a bus.
+
+    Who waits at a stop looks at a phone now and then.
 
     Parameters
     ----------
@@ -74,6 +78,11 @@ def pedestrian_motion(gaits: PedestrianGaits, height: NDArray[np.float64], secon
     talks = (gaits.standing == TALK) & ((second // _TURN_TO_TALK + n) % 2 == 0)
     still = np.where(gaits.seated, clip_index("ride_bus"), np.where(talks, clip_index("talk"), idle))
     at_rest = np.where(talks, (second / _TURN_TO_TALK * 2.0) % 1.0, at_rest)
+    # The phone comes up and goes down within the motion.
+    waited = (second + 13.0 * n) % _EVERY
+    phones = (gaits.standing == STOP) & ~gaits.seated & ~walking & (waited < _AT_PHONE) & (n % 4 != 0)
+    still = np.where(phones, clip_index("phone"), still)
+    at_rest = np.where(phones, waited / _AT_PHONE, at_rest)
     after = Transition(
         np.where(walking, idle, walk), np.where(walking, at_rest, in_stride), gaits.pace, np.abs(gaits.time)
     )

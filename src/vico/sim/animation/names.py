@@ -32,6 +32,7 @@ CLIPS = (
     "sit_drink",
     "sit_eat",
     "open_door",
+    "phone",
 )
 _INDEX = {name: index for index, name in enumerate(CLIPS)}
 
@@ -53,4 +54,4 @@ def clip_index(name: str) -> int:
 IDLE, WALK, RUN, TURN, SIT, SLEEP, TALK, WAVE, PICK, PUT, REACH, DRINK, EAT, CARRY = range(14)
 RIDE_BIKE, RIDE_BUS, STAND, ENTER_VEHICLE, EXIT_VEHICLE, CARRY_LEFT, CARRY_RIGHT = range(14, 21)
 SIT_TALK, SIT_WAVE, SIT_DRINK, SIT_EAT = range(21, 25)
-OPEN_DOOR = 25
+OPEN_DOOR, PHONE = 25, 26

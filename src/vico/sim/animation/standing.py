@@ -24,6 +24,7 @@ from vico.sim.animation.names import (
     EAT,
     IDLE,
     OPEN_DOOR,
+    PHONE,
     PICK,
     PUT,
     REACH,
@@ -58,6 +59,8 @@ def stand(body: Any, p: float, clip: int) -> None:
         _consume(body, p, clip, 0.0)
     elif clip == OPEN_DOOR:
         _let_go_of_door(body, p)
+    elif clip == PHONE:
+        _look_at_phone(body, p)
     elif clip == STAND:
         _hold_on(body)
 
@@ -94,6 +97,23 @@ def _let_go_of_door(body: Any, p: float) -> None:
 
 
 @compiled
+def _raised(p: float) -> float:
+    """Return how far a phone is raised, 0..1: it comes up in the first of the cycle and goes down in the last."""
+    return smoothstep(12.0 * p) * smoothstep(12.0 * (1.0 - p))
+
+
+@compiled
+def _look_at_phone(body: Any, p: float) -> None:
+    """Hold a phone before the chest, the thumb on it."""
+    tall, hand, up = body.style.height, body.hand, _raised(p)
+    sign, out = SIGN[hand], np.zeros(3)
+    out[X], out[Y], out[Z] = 0.17 * tall, sign * 0.045 * tall, 0.68 * tall
+    reach_by(body, hand, out, np.array([-0.4, sign * 0.5, -0.9]), up)
+    body.local[WRIST[hand]] = rotation_about(Y, -0.25 * up)
+    grip(body, hand, 0.38 + 0.3 * up)
+
+
+@compiled
 def _strength(p: float) -> float:
     """Return how far a gesture has gone, 0..1: most at half the cycle."""
     return np.sin(np.pi * p) ** 2
@@ -125,8 +145,11 @@ def _stand_upright(body: Any, p: float, clip: int) -> None:
         for side in range(2):
             lifts[side], pivots[side] = _pivot((p + 0.5 * side) % 1.0)
         shift[Y] = 0.025 * np.sin(_TAU * p)
-    elif clip in (IDLE, STAND):
+    elif clip in (IDLE, STAND, PHONE):
         weight, yaw, glance = _restless(body)
+        if clip == PHONE:
+            up = _raised(p)
+            yaw, glance = yaw * (1.0 - up), glance * (1.0 - up) + 0.5 * up
         shift[Y], roll = shift[Y] + 0.028 * weight, roll + np.radians(2.5) * weight
         nod = glance
     local[PELVIS] = compose(rotation_about(X, -roll), rotation_about(Y, 0.35 * (lean - 0.35 * style.trunk_lean)))
