@@ -1,6 +1,7 @@
 """Cars that park at the kerb and vans that make deliveries: on a smooth way, seen by others, exact, nothing touches."""
 
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -20,6 +21,7 @@ from vico.world.heights import HeightField
 SIDE, TAPER = -2.9, 10.2
 
 
+@cache
 def _network(*, delivery: bool = False) -> TrafficNetwork:
     """Helsinki with a place halfway along each street lane that has room for one, backed into on every other one."""
     city = road_city()
@@ -51,12 +53,12 @@ def test_cars_park_and_leave_again_and_repeat_exactly() -> None:
     seen: dict[tuple[int, int], int] = {}
     saved: dict[str, Any] = {}
     forwards = backwards = 0
-    for step in range(900):
+    for step in range(600):
         before, yaw = fleet.stopping.copy(), traffic.shapes.yaw.copy()
         _advance(traffic, 1)
-        assert step % 3 or len(overlapping(traffic.bodies(), 0.0)) == 0
+        assert step % 8 or len(overlapping(traffic.bodies(), 0.0)) == 0
         turned = np.abs((traffic.shapes.yaw - yaw + np.pi) % (2 * np.pi) - np.pi)[before != DRIVING]
-        assert turned.max(initial=0.0) < 0.15
+        assert turned.max(initial=0.0) < 0.13
         for v in np.flatnonzero(before != fleet.stopping).tolist():
             change = int(before[v]), int(fleet.stopping[v])
             seen[change] = seen.get(change, 0) + 1
@@ -71,7 +73,7 @@ def test_cars_park_and_leave_again_and_repeat_exactly() -> None:
         assert (fleet.stopped_time[standing | leaving] == 0.0).all()
         assert ((traffic.lights & LEFT > 0) & (traffic.lights & RIGHT == 0))[leaving & (before == LEAVING)].all()
         assert (traffic.lights & RIGHT > 0)[fleet.stopping == BACKING_IN].all()
-        if step == 450:
+        if step == 300:
             saved = traffic.arrays()
     assert forwards > 0
     assert backwards > 0
@@ -88,7 +90,7 @@ def test_cars_park_and_leave_again_and_repeat_exactly() -> None:
     others = [_traffic(network, 24) for _ in range(2)]
     for other in others:
         other.restore(saved)
-        _advance(other, 60)
+        _advance(other, 40)
     for name, array in others[0].arrays().items():
         np.testing.assert_array_equal(array, others[1].arrays()[name], err_msg=name)
 
@@ -146,6 +148,5 @@ def test_a_place_is_where_nothing_stands_in_the_way(ahead: int, behind: int, exp
     for there in [5.8] * ahead + [-5.8] * behind:
         x, y, yaw = network.lanes.at(lane, middle + there)
         solids.append(shapely.Point(x - np.sin(yaw) * SIDE, y + np.cos(yaw) * SIDE).buffer(0.9))
-    plain = TrafficNetwork.of(network.lanes).driven
-    places = with_stopping_places(plain, network.lanes, network.walks, world, solids).places
+    places = with_stopping_places(network.driven, network.lanes, network.walks, world, solids).places
     assert places["reverse"][~places["delivery"]].tolist() == expected
