@@ -16,9 +16,12 @@ from vico.sim.transit import DWELL, FARE, TransitSystem, plan_buses, ride_price
 from vico.world.heights import HeightField
 
 
-def _systems(cars: int = 20, pedestrians: int = 20, *, second: float = 8 * 3600.0) -> tuple[Traffic, TransitSystem]:
+def _systems(
+    cars: int = 20, pedestrians: int = 20, *, second: float = 8 * 3600.0, trams: bool = False
+) -> tuple[Traffic, TransitSystem]:
     city = road_city()
-    plan = plan_buses(city.transit, city.lanes, second)
+    lines = city.transit if trams else city.transit.model_copy(update={"tram_lines": []})
+    plan = plan_buses(lines, city.lanes, second)
     traffic = Traffic(
         TrafficNetwork.of(city.lanes, city.solids),
         HeightField.flat(HALF),
@@ -28,7 +31,7 @@ def _systems(cars: int = 20, pedestrians: int = 20, *, second: float = 8 * 3600.
         first_entity=1_000_000,
         buses=plan.bus_routes,
     )
-    return traffic, TransitSystem(city.transit, traffic, plan, second=second, first_bike=1_100_000)
+    return traffic, TransitSystem(lines, traffic, plan, second=second, first_bike=1_100_000)
 
 
 def _advance(traffic: Traffic, transit: TransitSystem) -> None:
@@ -185,11 +188,11 @@ def test_a_bicycle_left_astray_stays_there_as_a_body() -> None:
 
 
 def test_transit_goes_on_from_a_saved_state_as_if_never_stopped() -> None:
-    traffic, transit = _systems()
+    traffic, transit = _systems(trams=True)
     for _ in range(400):
         _advance(traffic, transit)
     saved = traffic.arrays(), transit.arrays()
-    other_traffic, other = _systems()
+    other_traffic, other = _systems(trams=True)
     other_traffic.restore(saved[0])
     other.restore(saved[1])
     for _ in range(400):
@@ -233,8 +236,8 @@ def test_a_bus_that_somebody_stops_for_good_goes_on_from_its_next_stop_and_is_co
     assert transit.aboard(0) == 1
 
 
-def test_buses_and_bicycles_overlap_nobody() -> None:
-    traffic, transit = _systems()
+def test_buses_trams_and_bicycles_overlap_nobody() -> None:
+    traffic, transit = _systems(trams=True)
     overlaps = 0
     for _ in range(3000):
         _advance(traffic, transit)

@@ -129,11 +129,12 @@ def test_a_car_that_sets_off_stands_no_more_however_slippery_it_is(kind: str) ->
 
 def _bus_lateness(kind: str) -> dict[str, float]:
     city = road_city()
-    plan = plan_buses(city.transit, city.lanes, 8 * 3600.0)
+    lines = city.transit.model_copy(update={"tram_lines": []})
+    plan = plan_buses(lines, city.lanes, 8 * 3600.0)
     traffic = Traffic(
         network(), HeightField.flat(HALF), cars=0, pedestrians=0, seed=3, first_entity=1_000_000, buses=plan.bus_routes
     )
-    transit = TransitSystem(city.transit, traffic, plan, second=8 * 3600.0, first_bike=1_100_000)
+    transit = TransitSystem(lines, traffic, plan, second=8 * 3600.0, first_bike=1_100_000)
     traffic.set_conditions(conditions(kind))
     for _ in range(5_000):
         traffic.advance(0.1, transit.bodies())
