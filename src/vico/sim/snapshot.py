@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from vico.errors import MissingFileError, SchemaError
 from vico.io.files import write_bytes
+from vico.io.npz import read_npz
 from vico.version import __version__
 
 SCHEMA = "vico.snapshot"
@@ -100,8 +101,7 @@ def read_snapshot(path: Path, *, owner: str) -> dict[str, NDArray[Any]]:
         If it is damaged, no snapshot, or belongs to another simulation.
     """
     try:
-        with np.load(path, allow_pickle=False) as data:
-            arrays = {name: data[name] for name in data.files}
+        arrays = read_npz(path.read_bytes())
     except FileNotFoundError:
         raise MissingFileError(f"{path}: no such snapshot") from None
     except (ValueError, OSError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:

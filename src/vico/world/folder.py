@@ -34,6 +34,7 @@ from pydantic import TypeAdapter, ValidationError
 from vico.errors import MissingFileError, SchemaError
 from vico.geo.frame import LocalFrame
 from vico.io.files import read_json, sha256_of, write_bytes, write_json
+from vico.io.npz import read_npz
 from vico.version import __version__
 from vico.world import model
 from vico.world.heights import HeightField
@@ -335,8 +336,7 @@ def write_terrain(path: Path, height: HeightField) -> None:
 def read_terrain(path: Path) -> HeightField:
     """Read what `write_terrain` wrote."""
     try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as data:
-            return HeightField.from_arrays(data)
+        return HeightField.from_arrays(read_npz(path.read_bytes()))
     except FileNotFoundError:
         raise MissingFileError(f"{path}: no such file; build the world anew") from None
     except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile) as error:

@@ -21,6 +21,7 @@ from scipy import ndimage
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.io.compiled import compiled
 from vico.io.files import write_bytes
+from vico.io.npz import read_npz
 
 BLOCKED, OPEN, SIDEWALK, CROSSING, ROADWAY = range(5)
 CLASS_NAMES = ("blocked", "open", "sidewalk", "crossing", "roadway")
@@ -247,8 +248,8 @@ def read_walkable(path: Path) -> WalkableMap:
         If the file is not there, or damaged.
     """
     try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as data:
-            return WalkableMap(data["cls"].astype(np.uint8), float(data["half"]), float(data["cell"]))
+        data = read_npz(path.read_bytes(), ("cls", "half", "cell"))
+        return WalkableMap(data["cls"].astype(np.uint8), float(data["half"]), float(data["cell"]))
     except FileNotFoundError:
         raise MissingFileError(f"{path}: no such file; build the world anew") from None
     except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile) as error:

@@ -18,10 +18,13 @@ from vico.assets.motions.clip import HIP_HEIGHT, MotionClip
 from vico.assets.motions.rotations import matrices_of, vectors_of
 from vico.assets.people import JOINTS, J
 from vico.errors import InputError, MissingFileError, SchemaError
+from vico.io.npz import read_npz
 
 #: Pelvis height of the mean SMPL-X body in the T-pose, metres; its translations are for a body of that size.
 _SMPLX_HIP_HEIGHT = 0.95
 _MOST_BYTES = 1 << 30
+#: Names under which archives keep their frame rate.
+_RATES = ("mocap_frame_rate", "mocap_framerate")
 
 # Rows: our axes (forward, left, up) in those of an SMPL-X body (left, up, forward).
 _AXES = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
@@ -112,12 +115,12 @@ def read_amass(path: Path) -> MotionClip:
     try:
         if path.stat().st_size > _MOST_BYTES:
             raise SchemaError(f"{path}: larger than {_MOST_BYTES >> 20} MiB; cut it into pieces")
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-            rate = next((float(data[key]) for key in ("mocap_frame_rate", "mocap_framerate") if key in data), None)
-            if rate is None or "poses" not in data or "trans" not in data:
-                held = ", ".join(data.files[:12]) or "nothing"
-                raise SchemaError(f"{path}: no motion of AMASS (poses, trans, mocap_frame_rate); it holds {held}")
-            return motion_from_smplx(data["poses"], data["trans"], rate, name=path.stem)
+        data = read_npz(path.read_bytes(), ("poses", "trans", *_RATES))
+        rate = next((float(data[key]) for key in _RATES if key in data), None)
+        if rate is None or "poses" not in data or "trans" not in data:
+            held = ", ".join(data) or "none of them"
+            raise SchemaError(f"{path}: no motion of AMASS (poses, trans, mocap_frame_rate); it holds {held}")
+        return motion_from_smplx(data["poses"], data["trans"], rate, name=path.stem)
     except FileNotFoundError:
         raise MissingFileError(f"{path}: no such file") from None
     except (ValueError, OSError, EOFError, TypeError, zipfile.BadZipFile, zlib.error) as error:

@@ -21,6 +21,7 @@ from vico.assets.people.model import JOINTS, Appearance, Colour, J, SkinnedBody
 from vico.assets.people.skulls import ScannedSkull
 from vico.errors import MissingExtraError
 from vico.io.cache import cache_folder
+from vico.io.npz import read_npz
 
 # Metres that a garment lies off the body: near the skin, and how much more at its far end.
 _TOPS: dict[str, tuple[float, float]] = {
@@ -72,8 +73,7 @@ def installed_file() -> Path:
 
 @lru_cache(maxsize=2)
 def _wardrobe(path: Path) -> dict[str, NDArray[Any]]:
-    with np.load(path, allow_pickle=False) as file:
-        record = {name: file[name] for name in file.files}
+    record = read_npz(path.read_bytes())
     record["basis"] = record["basis"].astype(np.float32)
     return record
 

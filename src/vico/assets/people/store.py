@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vico.assets.people.model import JOINTS, Appearance, SkinnedBody
 from vico.io.cache import cache_folder
 from vico.io.compiled import source_digest
 from vico.io.files import sha256_of, write_bytes
+from vico.io.npz import read_npz
 
 _ARRAYS = tuple(field.name for field in fields(SkinnedBody) if field.name != "height")
 
@@ -54,9 +54,10 @@ def _hash_of(data: Path, changed: int) -> str:
 def read_body(path: Path) -> SkinnedBody | None:
     """Read a kept body; None if it is absent or damaged, so that it is made anew."""
     try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as file:
-            arrays: dict[str, NDArray[Any]] = {name: file[name] for name in (*_ARRAYS, "height")}
+        arrays = read_npz(path.read_bytes(), (*_ARRAYS, "height"))
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+    if len(arrays) < len(_ARRAYS) + 1:
         return None
     count = len(arrays["vertices"])
     sound = arrays["weights"].shape == (count, 4) and arrays["joints"].shape == (len(JOINTS), 3)

@@ -29,6 +29,7 @@ from vico.assets.robots.model import (
     velocity_space,
 )
 from vico.assets.robots.packs import h1_shapes
+from vico.io.npz import read_npz
 
 PARTS = ("hip_yaw", "hip_roll", "hip_pitch", "knee", "ankle")
 JOINTS = tuple(f"{side}_{part}" for side in SIDES for part in PARTS)
@@ -138,9 +139,9 @@ def h1_mjcf() -> str:
 @cache
 def _network() -> tuple[tuple[NDArray[np.float32], ...], tuple[NDArray[np.float32], ...]]:
     """Weights, shape ``(inputs, outputs)``, and biases of the layers that `scripts/train_h1.py` made."""
-    with (files("vico") / "data" / "h1_policy.npz").open("rb") as file, np.load(file) as arrays:
-        count = sum(name.startswith("weights") for name in arrays.files)
-        return tuple(arrays[f"weights_{k}"] for k in range(count)), tuple(arrays[f"biases_{k}"] for k in range(count))
+    arrays = read_npz((files("vico") / "data" / "h1_policy.npz").read_bytes())
+    count = sum(name.startswith("weights") for name in arrays)
+    return tuple(arrays[f"weights_{k}"] for k in range(count)), tuple(arrays[f"biases_{k}"] for k in range(count))
 
 
 @cache
