@@ -114,6 +114,7 @@ class Avatars:
     def begin(self, who: NDArray[np.bool_]) -> None:
         """Start the step of some avatars: they want nothing yet, and nothing has gone wrong."""
         p = self.people
+        through = p.at_door()  # these go on
         p.move_left[who] = 0.0
         p.turn_left[who] = 0.0
         p.move_speed[who] = 0.0
@@ -125,7 +126,7 @@ class Avatars:
         # Who has a cup at the mouth puts it down again, and who has turned to somebody talks, unless they do otherwise.
         begun = (p.clip == _TURN) | ((p.phase > 1.0 - _DONE) & (p.phase < _DONE))
         goes_on = np.isin(p.action_clip, _FINISHED) & begun
-        p.action_clip[who & ~goes_on] = -1
+        p.action_clip[who & ~goes_on & ~through] = -1
 
     def space(self) -> NDArray[np.int32]:
         """Return the room each avatar is in, `OUTDOORS` or `IN_BUS`: only those of one space can touch."""

@@ -34,6 +34,8 @@ _NARROWER_BELOW = 1.5
 # People look a little down while they walk, radians.
 LEVEL_GAZE = -0.1
 REASON_LENGTH = 240
+#: From the hand on a door until one is through, seconds.
+DOOR_OPENING = 1.0
 
 
 class Vehicle(IntEnum):
@@ -138,6 +140,9 @@ class People(ArrayState):
     lift_room, lift_left
         Room that the lift one rides goes to, int32, and seconds until it is there, 0 for who rides none, float64; shape
         ``(n,)``.
+    door, door_time
+        Index of the place whose door one goes through, -1 for none, int32, and the seconds since one laid a hand on it,
+        negative on the way there, float64; shape ``(n,)``. See `vico.sim.doorways`.
     vehicle, vehicle_entity
         A `Vehicle`, int8, and the entity number of the one ridden (0 for none), int32; shape ``(n,)``.
     vehicle_yaw
@@ -191,6 +196,8 @@ class People(ArrayState):
     place: NDArray[np.int32]
     lift_room: NDArray[np.int32]
     lift_left: NDArray[np.float64]
+    door: NDArray[np.int32]
+    door_time: NDArray[np.float64]
     vehicle: NDArray[np.int8]
     vehicle_entity: NDArray[np.int32]
     vehicle_yaw: NDArray[np.float64]
@@ -238,6 +245,8 @@ class People(ArrayState):
             place=np.full(n, -1, np.int32),
             lift_room=np.full(n, -1, np.int32),
             lift_left=np.zeros(n),
+            door=np.full(n, -1, np.int32),
+            door_time=np.zeros(n),
             vehicle=np.zeros(n, np.int8),
             vehicle_entity=np.zeros(n, np.int32),
             vehicle_yaw=np.zeros(n),
@@ -257,6 +266,10 @@ class People(ArrayState):
 
     def __len__(self) -> int:
         return len(self.names)
+
+    def at_door(self) -> NDArray[np.bool_]:
+        """Who is on the way through a door of a house, and not through it yet."""
+        return np.asarray((self.door >= 0) & (self.door_time < DOOR_OPENING))
 
     def outdoors(self) -> NDArray[np.bool_]:
         """Who stands or rides in the street on their own feet or bicycle (not in a room, not in a bus)."""

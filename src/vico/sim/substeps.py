@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.rules import ActionStatus, ReasonCode
-from vico.sim import holding, lifts, moves, rides
+from vico.sim import doorways, holding, lifts, moves, rides
 from vico.sim.bodies import ROBOT, Bodies, HasBodies, Subsystem
 from vico.sim.footprints import records_of
 from vico.sim.metrics import StopWatch
@@ -71,6 +71,7 @@ def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _A
         bodies.refresh(state.traffic)  # people have got into buses and off
     gone = periods.since_begun(state.tick)[: len(state.people)]
     share = SUBSTEP_TICKS / np.maximum(ACTION_TICKS - gone, SUBSTEP_TICKS)
+    doorways.walk_up(state, share, SUBSTEP)
     obstacles = _held_off(bodies.but(state.avatars))
     lying = state.objects.in_rooms()
     if len(lying):
@@ -78,6 +79,7 @@ def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _A
         obstacles = np.concatenate([obstacles, in_rooms])
     state.avatars.advance(SUBSTEP, obstacles, share=share)
     rides.follow(state)
+    doorways.follow(state, SUBSTEP)
     lifts.follow(state, SUBSTEP)
     holding.advance(state, SUBSTEP)
     bodies.refresh(state.avatars)

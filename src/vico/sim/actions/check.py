@@ -10,7 +10,7 @@ from vico.sim.actions.fields import FORMS, short
 from vico.sim.actions.model import ActionType, Command, Refusal, Situation
 from vico.sim.actions.table import ACTIONS, PEOPLE_ACTIONS, ROBOT_ACTIONS, form_of
 from vico.sim.simulation_state import SimulationState
-from vico.sim.state import Posture, Vehicle
+from vico.sim.state import DOOR_OPENING, Posture, Vehicle
 
 _OF_PEOPLE, _OF_ROBOTS = frozenset(PEOPLE_ACTIONS), frozenset(ROBOT_ACTIONS)
 
@@ -38,7 +38,7 @@ def check(action: object, agent: int, state: SimulationState) -> Command | Refus
     kind = form_of(command.kind, robot=is_robot)
     refusal = (
         _refuse_actor(kind, is_robot=is_robot)
-        or (None if is_robot else _refuse_situation(kind, agent, state))
+        or (None if is_robot else _refuse_situation(kind, agent, state) or _refuse_at_door(kind, agent, state))
         or _refuse_range(kind, command)
         or kind.check(command.values, agent - people if is_robot else agent, state)
     )
@@ -101,6 +101,8 @@ _ON_BIKE = _Bar(Situation.ON_BIKE, ReasonCode.ON_BIKE, "on a bicycle; exit_bike 
 # By number: every action of everybody is looked up here.
 _BUS = int(Vehicle.BUS)
 _POSTURE_BARS = {int(Posture.LYING): _ASLEEP, int(Posture.SITTING): _SEATED}
+# What can be done on the way through the door of a house; the last two ask for what is going on.
+_AT_DOORS = frozenset({"wait", "communicate", "enter", "exit"})
 _VEHICLE_BARS = {int(Vehicle.BUS): _IN_BUS, int(Vehicle.BIKE): _ON_BIKE}
 
 
@@ -114,6 +116,14 @@ def _refuse_situation(kind: ActionType, i: int, state: SimulationState) -> Refus
         if bar is not None and bar.situation not in kind.when:
             return Refusal(bar.code, f"{kind.name}: {bar.sentence}")
     return None
+
+
+def _refuse_at_door(kind: ActionType, i: int, state: SimulationState) -> Refusal | None:
+    """Refuse what nobody does on the way through the door of a house."""
+    p = state.people
+    if kind.name in _AT_DOORS or p.door.item(i) < 0 or p.door_time.item(i) >= DOOR_OPENING:
+        return None
+    return Refusal(ReasonCode.MOVING, f"{kind.name}: on the way through a door; wait until you are through")
 
 
 def _refuse_range(kind: ActionType, command: Command) -> Refusal | None:

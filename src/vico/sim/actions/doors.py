@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from vico.rules import DOOR_REACH, INNER_DOOR_REACH, ReasonCode
-from vico.sim import lifts
+from vico.sim import doorways, lifts
 from vico.sim.actions.fields import Field, short
 from vico.sim.actions.model import ActionType, Refusal, Values
-from vico.sim.holding import take_umbrella
 from vico.sim.indoor import near_door
-from vico.sim.moves import gesture, place_in_room, put_outdoors, spot_outside
+from vico.sim.moves import place_in_room, spot_outside
 from vico.sim.simulation_state import SimulationState
 from vico.world.model import LIFT
 
@@ -21,6 +20,8 @@ _LEVEL = 0.5
 def check_enter(values: Values, i: int, state: SimulationState) -> Refusal | None:
     """Judge going in: through an entrance from the street, through a door from a room."""
     p, name = state.people, values["place"]
+    if p.at_door().item(i):
+        return _refuse_at_door(name, i, state)
     if p.lift_left[i] > 0.0:
         return _refuse_in_lift(name, i, state)
     refusal = _refuse_inner_door(name, i, state) if p.room[i] >= 0 else _refuse_entrance(name, i, state)
@@ -31,6 +32,13 @@ def check_enter(values: Values, i: int, state: SimulationState) -> Refusal | Non
     if state.indoor.free_spot(room, anchor, state.taken_in(room)) is None:
         return Refusal(ReasonCode.FULL, "enter: it is full")
     return None
+
+
+def _refuse_at_door(name: str, i: int, state: SimulationState) -> Refusal | None:
+    p = state.people
+    if p.room[i] < 0 and state.place_index.get(name) == p.door[i]:
+        return None  # on the way in
+    return Refusal(ReasonCode.MOVING, "enter: on the way through a door; wait until you are through")
 
 
 def _refuse_in_lift(name: str, i: int, state: SimulationState) -> Refusal | None:
@@ -89,28 +97,18 @@ def _room_behind(name: str, i: int, state: SimulationState) -> int:
 def enter(values: Values, i: int, state: SimulationState) -> None:
     """Go through an entrance, or through the door to the next room."""
     p, indoor = state.people, state.indoor
-    if p.lift_left[i] > 0.0:
+    if p.lift_left[i] > 0.0 or p.at_door().item(i):
         return
-    outdoors = p.room[i] < 0
+    if p.room[i] < 0:
+        doorways.begin(i, state.place_index[values["place"]], state)
+        return
     room = _room_behind(values["place"], i, state)
     if lifts.is_ride(int(p.room[i]), room, state):
         lifts.ride(i, room, state)
         return
-    place_in_room(i, room, state, near=indoor.arrival(room, -1 if outdoors else int(p.room[i])))
-    _hold_door(i, state)
-    if outdoors:
-        name = state.world.places[state.place_index[values["place"]]].name
-        state.events.add("enter", p.names[i], f"enters {name}", p.position[i], place=values["place"])
-
-
-def _hold_door(i: int, state: SimulationState) -> None:
-    """Show a hand at the door that somebody has come through, if one is free; cars of lifts open by themselves."""
-    p = state.people
-    if p.room[i] >= 0 and state.indoor.rooms[int(p.room[i])].kind == LIFT:
-        return
-    hand = next((hand for hand in (1, 0) if not p.held[i, hand]), None)
-    if hand is not None:
-        gesture("open_door", i, state, hand=hand)
+    place_in_room(i, room, state, near=indoor.arrival(room, int(p.room[i])))
+    if indoor.rooms[room].kind != LIFT:  # whose doors open by themselves
+        doorways.let_go(i, state)
 
 
 def check_exit(values: Values, i: int, state: SimulationState) -> Refusal | None:
@@ -118,6 +116,8 @@ def check_exit(values: Values, i: int, state: SimulationState) -> Refusal | None
     p = state.people
     if p.room[i] < 0:
         return Refusal(ReasonCode.OUTDOORS, "exit: already outdoors")
+    if p.at_door().item(i):
+        return None  # on the way out
     door = next((d for d in state.indoor.doors[p.room[i]] if d.to < 0), None)
     if door is None:
         return Refusal(ReasonCode.NO_DOOR, "exit: no door of this room leads outdoors")
@@ -129,26 +129,20 @@ def check_exit(values: Values, i: int, state: SimulationState) -> Refusal | None
 
 
 def leave(values: Values, i: int, state: SimulationState) -> None:
-    """Go out of the building, and look away from it."""
+    """Go to the door and out of the building, to look away from it there."""
     p = state.people
-    place = state.world.places[int(p.place[i])]
-    spot = spot_outside(i, state)
-    assert spot is not None
-    assert place.entrance is not None
-    take_umbrella(i, state)
-    put_outdoors(i, spot, state.entrances[place.entrance].facing, state)
-    _hold_door(i, state)
-    state.events.add("exit", p.names[i], f"leaves {place.name}", p.position[i], place=place.id)
+    if not p.at_door().item(i):
+        doorways.begin(i, int(p.place[i]), state)
 
 
 DOORS = (
     ActionType(
         "enter",
-        "Go into a place (its id) by an entrance within 2 m, or into the next room (its id) by a door within 1 m; "
-        "a lift takes its time from car to car.",
+        "Go into a place (its id) by an entrance within 2 m, which takes 1 to 2 s, or into the next room (its id) by a "
+        "door within 1 m; a lift takes its time from car to car.",
         enter,
         check_enter,
         {"place": Field("name", slot="place")},
     ),
-    ActionType("exit", "Go out of the building by a door within 2 m.", leave, check_exit),
+    ActionType("exit", "Go out of the building by a door within 2 m, which takes 1 to 2 s.", leave, check_exit),
 )

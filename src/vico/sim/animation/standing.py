@@ -58,7 +58,7 @@ def stand(body: Any, p: float, clip: int) -> None:
     elif clip in (DRINK, EAT):
         _consume(body, p, clip, 0.0)
     elif clip == OPEN_DOOR:
-        _let_go_of_door(body, p)
+        _open_door(body, p)
     elif clip == PHONE:
         _look_at_phone(body, p)
     elif clip == STAND:
@@ -86,13 +86,15 @@ def _hold_on(body: Any) -> None:
 
 
 @compiled
-def _let_go_of_door(body: Any, p: float) -> None:
-    """Have a hand at the handle of the door one has come through, and bring it back to the side."""
+def _open_door(body: Any, p: float) -> None:
+    """Lay a hand on a door and push it open; from half the cycle on one is through, and the hand lets go behind."""
     tall, hand = body.style.height, body.hand
     sign, out = SIGN[hand], np.zeros(3)
-    out[X], out[Y], out[Z] = -0.10 * tall, sign * 0.26 * tall, 0.57 * tall
-    share = smoothstep(2.4 * (0.45 - p)) if p < 0.5 else smoothstep(2.4 * (p - 0.55))
-    reach_by(body, hand, out, np.array([-0.6, sign * 0.4, 0.2]), share)
+    pushed, behind = smoothstep(5.0 * (p - 0.28)), smoothstep(6.0 * (p - 0.5))
+    share = smoothstep(4.5 * p) * smoothstep(4.0 * (0.95 - p))
+    out[X] = ((0.235 + 0.045 * pushed) * (1.0 - behind) - 0.10 * behind) * tall
+    out[Y], out[Z] = sign * (0.07 + 0.19 * behind) * tall, 0.59 * tall
+    reach_by(body, hand, out, np.array([-0.6, sign * 0.4, 0.2 * behind - 0.7 * (1.0 - behind)]), share)
     grip(body, hand, 0.35 + 0.4 * share)
 
 
@@ -140,7 +142,9 @@ def _stand_upright(body: Any, p: float, clip: int) -> None:
     elif clip in (EAT, DRINK):
         nod = (0.10 if clip == EAT else -0.22) * strength
     elif clip == OPEN_DOOR:
-        yaw = 0.22 * SIGN[body.hand] * np.cos(np.pi * p) ** 2
+        through = smoothstep(6.0 * (p - 0.5)) * smoothstep(4.0 * (0.95 - p))
+        yaw = 0.22 * SIGN[body.hand] * through
+        lean = lean + 0.06 * smoothstep(5.0 * (p - 0.28)) * (1.0 - smoothstep(6.0 * (p - 0.5)))
     elif clip == TURN:
         for side in range(2):
             lifts[side], pivots[side] = _pivot((p + 0.5 * side) % 1.0)
