@@ -7,6 +7,7 @@ import pytest
 
 from vico.assets.shapes import ball, box, pose_matrix
 from vico.render import Cameras, Lighting, Scene, render, render_top_down
+from vico.render.limbs import LIMBS
 from vico.world.mesh import Material, Surface, joined
 
 AHEAD = np.array([[1.0, 0, 0]])
@@ -135,6 +136,32 @@ def test_a_car_darkens_the_ground_beside_it(square: Scene) -> None:
     )
     assert darker.sum() > 300
     square.lighting = Lighting()
+
+
+def test_two_legs_throw_two_shadows() -> None:
+    legs = joined([box((0.2, 0.2, 1.0), (0, y, 0.5)) for y in (-0.4, 0.4)])[0].of_entity(9)
+    scene = Scene([box((40, 40, 1), (0, 0, -0.5)).of_entity(2)], lighting=Lighting(sun_direction=(-1.0, 0.0, 0.5)))
+    limbs = np.array([[[0, y, 0.1, 0, y, 0.9, 0.1] for y in (-0.4, 0.4)]], np.float32)
+    limbs = np.concatenate([limbs, np.tile(limbs[:, :1], (1, len(LIMBS) - 2, 1))], axis=1)
+    eye = Cameras(np.array([[1.0, 0, 4.0]]), np.array([[0.0, 0, -1]]), up=(1, 0, 0))
+
+    def ground(x: float) -> list[float]:
+        """How bright it is behind one leg, between them, behind the other one, and far to the side."""
+        row = 128 - round((x - 1.0) * 32)
+        return [float(render(scene, eye).rgb[0, row, 128 - round(y * 32)].mean()) for y in (-0.4, 0.0, 0.4, 2.0)]
+
+    shape = legs.positions, legs.normals, legs.triangles, legs.colour, legs.entity
+    scene.set_skinned(*shape, limbs=limbs)
+    one, between, other, lit = ground(1.2)
+    assert max(one, other) < 0.8 * lit
+    assert between > 0.95 * lit
+    scene.set_skinned(*shape)  # an ellipsoid around both
+    assert ground(1.2)[1] < 0.8 * lit
+    scene.set_skinned(*shape, limbs=limbs)
+    scene.repose(legs.positions, legs.normals, limbs + np.array([0, 0.8, 0, 0, 0.8, 0, 0], np.float32))
+    one, between, other, lit = ground(1.2)
+    assert other < 0.8 * lit
+    assert one > 0.95 * lit
 
 
 def test_the_shadow_of_a_car_behind_a_house_is_seen_beside_it(square: Scene) -> None:

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from vico.assets.people import JOINTS, PARENTS, J, body_of, random_appearance
+from vico.render.limbs import LIMBS
 from vico.render.skinning import batch_bodies, rotation_matrix, skin
 from vico.seeds import rng
 
@@ -42,6 +43,21 @@ def test_skinning_equals_the_textbook_formula() -> None:
     for k in range(N):
         own = slice(CROWD.starts[k], CROWD.starts[k + 1])
         np.testing.assert_allclose(vertices[own], reference(k, rotations[k], offsets[k]), atol=2e-5)
+
+
+def test_limbs_are_where_the_body_is() -> None:
+    rotations = np.random.default_rng(3).normal(0, 0.4, (N, 55, 3)).astype(np.float32)
+    limbs = np.empty((N, len(LIMBS), 7), np.float32)
+    spots, yaw = np.array([[5.0, 2.0, 1.0]] * N), np.full(N, 0.7)
+    vertices, _ = skin(CROWD, rotations, np.zeros((N, 3), np.float32), spots, yaw, limbs=limbs)
+    start, along, radius = limbs[:, :, None, :3], limbs[:, :, None, 3:6] - limbs[:, :, None, :3], limbs[:, :, 6]
+    assert (radius > 0.02).all()
+    assert (radius < 0.22).all()
+    for k in range(N):
+        off = vertices[None, CROWD.starts[k] : CROWD.starts[k + 1]] - start[k]
+        way = np.clip((off * along[k]).sum(-1) / (along[k] ** 2).sum(-1), 0.0, 1.0)
+        outside = np.linalg.norm(off - way[..., None] * along[k], axis=-1) - radius[k, :, None]
+        assert np.percentile(outside.min(axis=0), 95) < 0.05
 
 
 def test_no_rotation_gives_the_t_pose() -> None:

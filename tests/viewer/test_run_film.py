@@ -16,6 +16,7 @@ from vico.errors import InputError, SchemaError
 from vico.render import Scene
 from vico.render.between import between, moment_of, show_between
 from vico.render.film import read_film
+from vico.render.limbs import LIMBS
 from vico.sim.config import SimConfig
 from vico.sim.recorder import Recorder
 from vico.sim.recording import Run, read_run
@@ -114,11 +115,13 @@ def test_things_and_bodies_go_half_way_and_what_leaps_waits() -> None:
     for x, leap in ((0.0, 0.0), (1.0, 50.0)):
         scene.set_rigid([0, 0], np.array([pose_matrix(x, 0, 0, 0), pose_matrix(leap, 5, 0, 0)]), [1, 2])
         vertices = (figure.positions + np.array([x, 0, 0])).astype(np.float32)
-        scene.set_skinned(vertices, figure.normals, figure.triangles, figure.colour, figure.entity)
+        limbs = np.full((1, len(LIMBS), 7), x, np.float32)
+        scene.set_skinned(vertices, figure.normals, figure.triangles, figure.colour, figure.entity, limbs=limbs)
         moments.append(moment_of(scene, x))
     show_between(*moments, 0.25)
     assert scene.arrays.instances.matrix[:2, 0, 3].tolist() == [0.25, 0.0]
     assert scene.arrays.avatars.low[0].tolist() == pytest.approx([0.0, -0.25, 0.0], abs=1e-6)
+    assert np.unique(scene.arrays.avatars.limbs).tolist() == [0.25]
     assert scene.moment == 0.25
 
 

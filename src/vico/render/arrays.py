@@ -103,11 +103,15 @@ class PosedAvatars(NamedTuple):
         Bounds, world metres, float32, shape ``(a, 3)``.
     span
         Triangles and vertices of each, `SPAN`, shape ``(a,)``.
+    limbs
+        Capsules that throw each one's shadow, both ends and radius, world metres, float32, shape ``(a, limbs, 7)``;
+        none where they are not known.
     """
 
     low: NDArray[np.float32]
     high: NDArray[np.float32]
     span: NDArray[np.void]
+    limbs: NDArray[np.float32]
 
 
 class SceneArrays(NamedTuple):

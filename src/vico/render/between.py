@@ -27,12 +27,15 @@ class SceneMoment(NamedTuple):
         Where everything is.
     normals
         Of the avatars' vertices, float32, shape ``(V, 3)``.
+    limbs
+        Of the avatars, as `PosedAvatars` has them.
     """
 
     scene: Scene
     second: float
     placement: PlacedInstances
     normals: NDArray[np.float32]
+    limbs: NDArray[np.float32]
 
 
 def moment_of(scene: Scene, second: float) -> SceneMoment:
@@ -40,7 +43,8 @@ def moment_of(scene: Scene, second: float) -> SceneMoment:
     spans = scene.arrays.avatars.span
     first = int(spans["first_vertex"].min()) if len(spans) else 0
     vertices = slice(first, int(spans["end_vertex"].max(initial=0)))
-    return SceneMoment(scene, second, placement_of(scene), scene.arrays.mesh.vertex["normal"][vertices].copy())
+    normals = scene.arrays.mesh.vertex["normal"][vertices].copy()
+    return SceneMoment(scene, second, placement_of(scene), normals, scene.arrays.avatars.limbs)
 
 
 def show_between(before: SceneMoment, after: SceneMoment, share: float) -> Scene:
@@ -70,9 +74,12 @@ def show_between(before: SceneMoment, after: SceneMoment, share: float) -> Scene
         leap = np.abs(new[starts] - old[starts]).max(axis=1) > LEAP
         part = np.repeat(np.where(leap, 0.0, share), counts)[:, None].astype(np.float32)
         normals = before.normals + part * (after.normals - before.normals)
-        scene.repose(old + part * (new - old), normals)
+        limbs = after.limbs
+        if len(before.limbs) == len(limbs) == len(leap):
+            limbs = before.limbs + np.where(leap, 0.0, share)[:, None, None] * (limbs - before.limbs)
+        scene.repose(old + part * (new - old), normals, limbs)
     else:
-        scene.repose(np.stack([b.x, b.y, b.z], axis=1), after.normals)
+        scene.repose(np.stack([b.x, b.y, b.z], axis=1), after.normals, after.limbs)
     return scene
 
 
@@ -101,7 +108,7 @@ def _show(moment: SceneMoment) -> None:
     now = moment.placement
     _set_rigid(moment.scene, now, now.matrix)
     if len(now.x):
-        moment.scene.repose(np.stack([now.x, now.y, now.z], axis=1), moment.normals)
+        moment.scene.repose(np.stack([now.x, now.y, now.z], axis=1), moment.normals, moment.limbs)
 
 
 def _set_rigid(scene: Scene, placement: PlacedInstances, matrix: NDArray[np.float32]) -> None:

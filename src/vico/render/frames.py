@@ -27,7 +27,7 @@ from vico.render.sensors.surface import write_surface
 from vico.render.shading.finishing import occlude, smooth_edges
 from vico.render.shading.light import NO_LIGHT, Light
 from vico.render.shading.weather import draw_weather
-from vico.render.shadows.moving import new_caster
+from vico.render.shadows.casters import new_caster
 from vico.render.uniforms import Record, camera_uniforms
 from vico.render.view import NOTHING_KEPT, Pictures, take
 from vico.render.view_cache import ViewCache, fitting_buffers

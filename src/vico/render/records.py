@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from vico.render.limbs import LIMBS
+
 f4, f8, i4, i8, u4 = np.float32, np.float64, np.int32, np.int64, np.uint32
 
 VERTEX = np.dtype(
@@ -236,7 +238,13 @@ CASTER = np.dtype(
         ("end_column", i8),
         ("first_row", i8),
         ("end_row", i8),
-        ("is_round", i8),  # 1: an ellipsoid (an avatar), 0: a box
+        ("is_round", i8),  # 1: an avatar, 0: a box
+        ("limb_count", i8),  # 0: a whole box or ellipsoid throws the shadow
+        ("sun_frame", f8, (3, 4)),  # world to what limbs' shadows are told in: across the light twice, then along it
+        # Of each limb in that frame, metres: its start, the step to its end, 1 / length of that squared (all across the
+        # light), start and step along it, and its radius.
+        ("limbs", f4, (len(LIMBS), 8)),
+        ("area", f4, (4,)),  # least and most of both coordinates across that it may darken
     ],
     align=True,
 )

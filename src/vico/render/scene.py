@@ -18,6 +18,7 @@ from vico.render.arrays import (
     Prototypes,
     SceneArrays,
 )
+from vico.render.avatars import no_avatars, pose_avatars, with_room
 from vico.render.compiled import kernel
 from vico.render.geometry import Mesh, Soup, clustered, grouped, joined_meshes, mesh_of, simplified, soup_of, spans
 from vico.render.instances import (
@@ -29,6 +30,7 @@ from vico.render.instances import (
     with_spare,
 )
 from vico.render.lighting import Lighting, cloud_map, linear_table, sky_table, tone_table, unit
+from vico.render.limbs import LIMBS
 from vico.render.records import COUNTS, ROOM, ROOM_FRONT, SPAN, SPHERE
 from vico.render.shading.light import Light, ReliefMap, ShadowMap
 from vico.render.shading.sky import SKY_SIZE, paint_sky
@@ -135,9 +137,9 @@ class Scene:
         self._placed = self._spacious = empty
         # The mesh and the arrays whose triangles and colours it holds.
         self._clothed: tuple[Any, ...] | None = None
-        self._bodies = _no_avatars().span
+        self._bodies = no_avatars().span
         self.arrays = SceneArrays(
-            mesh, textures, clusters, where, placeable, empty, _no_avatars(), np.zeros(1, COUNTS)[0], _ALL_ON
+            mesh, textures, clusters, where, placeable, empty, no_avatars(), np.zeros(1, COUNTS)[0], _ALL_ON
         )
 
     @property
@@ -207,6 +209,7 @@ class Scene:
         entity: NDArray[np.int32],
         *,
         drawn: NDArray[np.int64] | None = None,
+        limbs: NDArray[np.float32] | None = None,
     ) -> None:
         """Replace the posed avatars: all bodies in one mesh, each body's triangles and vertices in a row.
 
@@ -223,17 +226,20 @@ class Scene:
             int32, shape ``(V,)``; a change of value starts the next body.
         drawn
             Which bodies are there at all, ascending; the vertices of the others are not read. None: every one.
+        limbs
+            Capsules of all bodies as from `vico.render.skinning.skin`: what throws their shadows. Without, ellipsoids
+            do.
         """
         vertex_count, triangle_count = len(vertices), len(triangles)
         if not vertex_count or not triangle_count:
-            self._replace(avatars=_no_avatars())
+            self._replace(avatars=no_avatars())
             self._clothed = None
             self.arrays.counts["avatars"] = 0
             return
         first_triangle, first_vertex = self._static_size
         mesh = self.arrays.mesh
         if len(mesh.x) < first_vertex + vertex_count or len(mesh.triangle) < first_triangle + triangle_count:
-            mesh = _with_room(mesh, self._static_size, vertex_count * 5 // 4, triangle_count * 5 // 4)
+            mesh = with_room(mesh, self._static_size, vertex_count * 5 // 4, triangle_count * 5 // 4)
             self._replace(mesh=mesh)
         known = self._clothed
         if known is None or any(a is not b for a, b in zip(known, (mesh, triangles, colour, entity), strict=True)):
@@ -241,21 +247,32 @@ class Scene:
             self._bodies = self._clothe(mesh, triangles, colour, entity)
             self._clothed = (mesh, triangles, colour, entity)
         span = self._bodies if drawn is None else self._bodies[drawn]
-        low, high = np.zeros((len(span), 3), np.float32), np.zeros((len(span), 3), np.float32)
-        posed = np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(normals, np.float32)
-        if not _pose_avatars(mesh, *posed, first_vertex, span, low, high):
-            raise InputError("scene: a vertex of an avatar is not finite")
-        self._replace(avatars=PosedAvatars(low, high, span))
+        self._pose(vertices, normals, span, limbs if drawn is None or limbs is None else limbs[drawn])
         self.arrays.counts["avatars"] = len(span)
 
-    def repose(self, vertices: NDArray[np.float32], normals: NDArray[np.float32]) -> None:
-        """Move the avatars that are there to other places: as many vertices as `set_skinned` was given."""
-        span = self.arrays.avatars.span
+    def repose(
+        self, vertices: NDArray[np.float32], normals: NDArray[np.float32], limbs: NDArray[np.float32] | None = None
+    ) -> None:
+        """Move the avatars that are there to other places: as many vertices as `set_skinned` was given.
+
+        `limbs` are those of the avatars that are there, as `PosedAvatars` has them.
+        """
+        self._pose(vertices, normals, self.arrays.avatars.span, limbs)
+
+    def _pose(
+        self,
+        vertices: NDArray[np.float32],
+        normals: NDArray[np.float32],
+        span: NDArray[np.void],
+        limbs: NDArray[np.float32] | None,
+    ) -> None:
         low, high = np.zeros((len(span), 3), np.float32), np.zeros((len(span), 3), np.float32)
         posed = np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(normals, np.float32)
-        if not _pose_avatars(self.arrays.mesh, *posed, self._static_size[1], span, low, high):
+        if not pose_avatars(self.arrays.mesh, *posed, self._static_size[1], span, low, high):
             raise InputError("scene: a vertex of an avatar is not finite")
-        self._replace(avatars=PosedAvatars(low, high, span))
+        if limbs is None or len(limbs) != len(span):
+            limbs = np.zeros((0, len(LIMBS), 7), np.float32)
+        self._replace(avatars=PosedAvatars(low, high, span, np.ascontiguousarray(limbs, np.float32)))
 
     def _clothe(
         self, mesh: Mesh, triangles: NDArray[np.int32], colour: NDArray[np.uint8], entity: NDArray[np.int32]
@@ -427,27 +444,6 @@ def _prototypes(soups: Sequence[Soup]) -> tuple[Prototypes, list[Mesh]]:
     return Prototypes(bounds[0], bounds[1], levels, pixels), meshes
 
 
-def _no_avatars() -> PosedAvatars:
-    return PosedAvatars(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), np.zeros(0, SPAN))
-
-
-def _with_room(mesh: Mesh, used: tuple[int, int], vertices: int, triangles: int) -> Mesh:
-    """Return a copy of the static part with space for avatars behind it."""
-    t, v = used
-
-    def grown(values: NDArray[Any], keep: int, extra: int) -> NDArray[Any]:
-        return np.concatenate([values[:keep], np.zeros((extra, *values.shape[1:]), values.dtype)])
-
-    return Mesh(
-        grown(mesh.x, v, vertices),
-        grown(mesh.y, v, vertices),
-        grown(mesh.z, v, vertices),
-        grown(mesh.vertex, v, vertices),
-        grown(mesh.triangle, t, triangles),
-        grown(mesh.entity, t, triangles),
-    )
-
-
 @kernel
 def _room_of(rooms: NDArray[np.void], x: float, y: float, z: float) -> int:
     """Return the number of the room that holds a point, or -1."""
@@ -462,36 +458,3 @@ def _room_of(rooms: NDArray[np.void], x: float, y: float, z: float) -> int:
         if abs(dx * c + dy * s) <= room.half_length and abs(dy * c - dx * s) <= room.half_width:
             return k
     return -1
-
-
-@kernel
-def _pose_avatars(
-    mesh: Mesh,
-    vertices: NDArray[np.float32],
-    normals: NDArray[np.float32],
-    first_vertex: int,
-    span: NDArray[np.void],
-    low: NDArray[np.float32],
-    high: NDArray[np.float32],
-) -> bool:
-    """Write positions, normals and bounds; return False if a position is not finite."""
-    xs, ys, zs, records = mesh.x, mesh.y, mesh.z, mesh.vertex
-    total = np.float32(0.0)
-    for body in range(len(span)):
-        first, end = span[body].first_vertex, span[body].end_vertex
-        for k in range(first, end):
-            i = k - first_vertex
-            x, y, z = vertices[i, 0], vertices[i, 1], vertices[i, 2]
-            xs[k], ys[k], zs[k] = x, y, z
-            # Zero for finite numbers, else none.
-            total += (x - x) + (y - y) + (z - z)
-            position, normal = records[k].position, records[k].normal
-            position[0], position[1], position[2] = x, y, z
-            normal[0], normal[1], normal[2] = normals[i, 0], normals[i, 1], normals[i, 2]
-        for axis in range(3):
-            line = xs if axis == 0 else (ys if axis == 1 else zs)
-            smallest = largest = line[first]
-            for v in range(first, end):
-                smallest, largest = min(smallest, line[v]), max(largest, line[v])
-            low[body, axis], high[body, axis] = smallest, largest
-    return bool(total == 0.0)

@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.people import PARENTS, SkinnedBody
+from vico.assets.people import PARENTS, J, SkinnedBody
 from vico.io.compiled import compiled
+from vico.render.limbs import HEAD, LIMB_JOINTS, LIMB_WAYS, LIMBS, LimbSizes, limb_sizes
 from vico.threads import for_each
 
 
@@ -32,6 +33,8 @@ class BodyBatch:
         Of each vertex, int32.
     rest_joints, joints, frames
         As in `SkinnedBody`, stacked, shape ``(n, 55, ...)``.
+    limbs
+        How large the capsules are that throw their shadows.
     """
 
     starts: NDArray[np.int32]
@@ -46,6 +49,7 @@ class BodyBatch:
     rest_joints: NDArray[np.float32]
     joints: NDArray[np.float32]
     frames: NDArray[np.float32]
+    limbs: LimbSizes
 
     def __len__(self) -> int:
         return len(self.starts) - 1
@@ -78,6 +82,7 @@ def batch_bodies(bodies: Sequence[SkinnedBody], entities: Sequence[int]) -> Body
         stacked("rest_joints", 3),
         stacked("joints", 3),
         stacked("frames", 3, 3),
+        limb_sizes(list(bodies)),
     )
 
 
@@ -89,6 +94,7 @@ def skin(
     yaws: NDArray[np.float64],
     *,
     drawn: NDArray[np.int64] | None = None,
+    limbs: NDArray[np.float32] | None = None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Pose every avatar and place it in the world.
 
@@ -106,6 +112,9 @@ def skin(
         Headings, radians, float64, shape ``(n,)``.
     drawn
         Which bodies of the batch; the vertices of the others are left undefined. None: every one.
+    limbs
+        Written, where given: the capsules of each body's limbs, both ends and radius, world metres, float32, shape
+        ``(len(batch), len(LIMBS), 7)``.
 
     Returns
     -------
@@ -123,6 +132,8 @@ def skin(
         batch.rest_joints,
         batch.joints,
         batch.frames,
+        batch.limbs.radius,
+        batch.limbs.head,
     )
     poses = _Poses(
         np.ascontiguousarray(rotations, np.float32),
@@ -133,8 +144,9 @@ def skin(
     # Each thread some of the bodies, which is the same as one thread all of them.
     rows = np.arange(len(batch)) if drawn is None else np.asarray(drawn, np.int64)
     bounds = np.linspace(0, len(rows), min(_PARTS, max(len(rows), 1)) + 1).astype(np.int64)
+    capsules = _NO_LIMBS if limbs is None else limbs
     for_each(
-        lambda k: _skin(bodies, poses, PARENTS, rows[bounds[k] : bounds[k + 1]], (vertices, normals)),
+        lambda k: _skin(bodies, poses, PARENTS, rows[bounds[k] : bounds[k + 1]], (vertices, normals, capsules)),
         range(len(bounds) - 1),
     )
     return vertices, normals
@@ -195,6 +207,8 @@ class _Bodies(NamedTuple):
     rest_joints: NDArray[np.float32]
     joints: NDArray[np.float32]
     frames: NDArray[np.float32]
+    limb_radius: NDArray[np.float32]
+    head: NDArray[np.float32]
 
 
 class _Poses(NamedTuple):
@@ -208,6 +222,9 @@ class _Poses(NamedTuple):
 
 # Bodies are shared out among threads in so many parts.
 _PARTS = 4
+_NO_LIMBS = np.zeros((0, len(LIMBS), 7), np.float32)
+
+_HEAD_JOINT = J["head"]
 
 # fastmath is safe here: pictures come of it, never state.
 _fast: Any = compiled(nogil=True, fastmath=True, error_model="numpy")
@@ -218,7 +235,7 @@ _fast_inlined: Any = compiled(nogil=True, fastmath=True, error_model="numpy", fo
 def _skin(bodies: Any, poses: Any, parents: Any, which: Any, out: Any) -> None:
     """Write vertices and normals of the bodies `which`."""
     count, starts = len(parents), bodies.starts
-    out_vertices, out_normals = out
+    out_vertices, out_normals, limbs = out
     for body in which:
         i = body % len(poses.rotations)
         turned = np.empty((count, 3, 3), np.float64)
@@ -231,6 +248,15 @@ def _skin(bodies: Any, poses: Any, parents: Any, which: Any, out: Any) -> None:
             _set_bone(turned[j], frames[j], cosine, sine, bones[j])
             _set_origin(bones[j], placed[j], rest_joints[j], position, cosine, sine)
         _blend_vertices(bodies, bones, starts[body], starts[body + 1], out_vertices, out_normals)
+        if len(limbs):
+            _set_limbs(placed, turned[_HEAD_JOINT], bodies.head[body], limbs[body])
+            for k in range(len(LIMB_WAYS)):
+                limbs[body, k, 6] = bodies.limb_radius[body, k]
+                for end in range(2):
+                    x, y = limbs[body, k, 3 * end], limbs[body, k, 3 * end + 1]
+                    limbs[body, k, 3 * end] = cosine * x - sine * y + position[0]
+                    limbs[body, k, 3 * end + 1] = sine * x + cosine * y + position[1]
+                    limbs[body, k, 3 * end + 2] += position[2]
 
 
 @_fast_inlined
@@ -256,6 +282,19 @@ def _set_origin(bone: Any, placed: Any, rest: Any, position: Any, cosine: float,
     bone[0, 3] = cosine * px - sine * py + position[0] - (bone[0, 0] * x0 + bone[0, 1] * y0 + bone[0, 2] * z0)
     bone[1, 3] = sine * px + cosine * py + position[1] - (bone[1, 0] * x0 + bone[1, 1] * y0 + bone[1, 2] * z0)
     bone[2, 3] = pz + position[2] - (bone[2, 0] * x0 + bone[2, 1] * y0 + bone[2, 2] * z0)
+
+
+@_fast_inlined
+def _set_limbs(placed: Any, head_turned: Any, head: Any, limbs: Any) -> None:
+    """Write both ends of a body's limbs, in its frame."""
+    for k in range(len(LIMB_WAYS)):
+        for end in range(2):
+            a, b, way = LIMB_JOINTS[k, end, 0], LIMB_JOINTS[k, end, 1], LIMB_WAYS[k, end]
+            for axis in range(3):
+                limbs[k, 3 * end + axis] = placed[a, axis] + way * (placed[b, axis] - placed[a, axis])
+    for axis in range(3):
+        m = head_turned[axis]
+        limbs[HEAD, 3 + axis] += m[0] * head[0] + m[1] * head[1] + m[2] * head[2]
 
 
 @_fast_inlined

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vico.render.arrays import Buffers, buffers_for
 from vico.render.scene import Scene
 from vico.render.shading.light import Light
-from vico.render.shadows.moving import CoarseDepth, is_disturbed, new_scratch
+from vico.render.shadows.notice import CoarseDepth, is_disturbed, new_scratch
 from vico.render.uniforms import Record
 from vico.render.view import NOTHING_KEPT, Kept, Pictures, take
 from vico.render.visibility.draw import write_depth

@@ -18,6 +18,7 @@ from vico.community.model import Resident
 from vico.errors import InputError
 from vico.render import Cameras, Lighting, Scene, render
 from vico.render.lighting import SHADOW_STEP
+from vico.render.limbs import LIMBS
 from vico.render.quality import RenderQuality
 from vico.render.sensors.batch import PictureSet, Viewers
 from vico.render.sensors.lens import Lens
@@ -287,8 +288,10 @@ class SceneRenderer:
             far = far_from_all(sights, motion.position, self._height)
         rotations, offsets = self._poses(motion, state.second, roughly=far)
         drawn = np.flatnonzero(np.concatenate([~far, far])[: len(bodies)])
-        vertices, normals = skin(bodies, rotations, offsets, motion.position, motion.yaw, drawn=drawn)
-        self._scene.set_skinned(vertices, normals, bodies.triangles, bodies.colour, bodies.entity, drawn=drawn)
+        limbs = np.empty((len(bodies), len(LIMBS), 7), np.float32)
+        vertices, normals = skin(bodies, rotations, offsets, motion.position, motion.yaw, drawn=drawn, limbs=limbs)
+        shape = bodies.triangles, bodies.colour, bodies.entity
+        self._scene.set_skinned(vertices, normals, *shape, drawn=drawn, limbs=limbs)
         moving = [s.draw() for s in (state.traffic, state.transit, state.robots) if s is not None]
         if len(state.things):
             moving.append(state.things.draw())

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from vico.assets.motions import MotionClip
 from vico.assets.people import Appearance, body_of
 from vico.render import Cameras, Lighting, Scene, render
+from vico.render.limbs import LIMBS
 from vico.render.skinning import batch_bodies, skin
 from vico.world.mesh import Material, Surface
 
@@ -40,9 +41,10 @@ def motion_sheet(clip: MotionClip, *, moments: int = 8, height: int = 360) -> ND
     spots = np.zeros((moments, 3))
     spots[:, 1] = _APART * np.arange(moments)
     rotations = np.stack([clip.rotations(frame) for frame in frames])
-    vertices, normals = skin(batch, rotations, offsets, spots, np.zeros(moments))
+    limbs = np.empty((moments, len(LIMBS), 7), np.float32)
+    vertices, normals = skin(batch, rotations, offsets, spots, np.zeros(moments), limbs=limbs)
     scene = Scene([_floor()], lighting=Lighting())
-    scene.set_skinned(vertices, normals, batch.triangles, batch.colour, batch.entity)
+    scene.set_skinned(vertices, normals, batch.triangles, batch.colour, batch.entity, limbs=limbs)
     middle, wide = float(spots[:, 1].mean()), _APART * (moments - 1) + _WIDE
     tall = 2.3
     # Cameras see 90 degrees from top to bottom: far enough away they would see mostly sky, so only the middle is kept.
