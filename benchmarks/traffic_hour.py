@@ -3,7 +3,8 @@
     python benchmarks/traffic_hour.py WORLD ... [--rules shared signals] [--cars 200] [--pedestrians 100]
         [--seconds 3600] [--start 08:00] [--seed 1] [--jams] [--table benchmarks/results/traffic_hour.md]
 
-Nobody but the traffic is in the world, and no buses. `--jams` tells who was taken out where, and behind whom.
+Nobody but the traffic is in the world, and no buses. `--jams` tells who was taken out where, and behind whom, and who
+is stuck at the end. Pedestrians are stuck who have not got on by 1 m for 60 s, and do not wait for anything.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ class Hour:
 
     speed: list[float] = field(default_factory=list)
     stood: list[int] = field(default_factory=list)
+    stuck: list[int] = field(default_factory=list)  # pedestrians
     overlaps: int = 0
     entries: int = 0
     at_red: int = 0
@@ -55,6 +57,7 @@ def drive(traffic: Traffic, start: int, seconds: int) -> Hour:
             found.at_red += int(np.isin(entered, red).sum())
         found.speed.append(float(traffic.fleet.speed.mean()))
         found.stood.append(int((traffic.fleet.stopped_time > _STANDS).sum()))
+        found.stuck.append(int((traffic.pedestrian_state.jammed_time > _STANDS).sum()))
         if k % _OVERLAPS_EVERY == 0:
             found.overlaps += len(overlapping(traffic.bodies(), 0.0))
     return found
@@ -77,6 +80,8 @@ def _row(world: Path, rule: str, given: argparse.Namespace) -> str:
         print(
             f"  {jam.at:5.0f} s  {jam.position[0]:5.0f} {jam.position[1]:5.0f}  entity {jam.entity} behind {jam.before}"
         )
+    for jam in traffic.stuck() if given.jams else ():
+        print(f"  at the end {jam.position[0]:5.0f} {jam.position[1]:5.0f}  entity {jam.entity} for {jam.stood:.0f} s")
     red = f"{hour.at_red} of {hour.entries:,}" if JunctionRule(rule).has_signals else ""
     figures = [
         f"{world.name} ({len(traffic.lanes.lights.programs)})",
@@ -85,6 +90,7 @@ def _row(world: Path, rule: str, given: argparse.Namespace) -> str:
         f"{traffic.reentered:,}",
         f"{np.mean(hour.speed):.1f}",
         f"{np.mean(hour.stood):.1f}",
+        f"{np.mean(hour.stuck):.1f}, {hour.stuck[-1]}",
         red,
         str(hour.overlaps),
     ]
@@ -110,8 +116,9 @@ def main() -> None:
         f"{given.cars} cars, {given.pedestrians} pedestrians, no buses, seed {given.seed}, {given.seconds:,} s from "
         f"{given.start}. {machine()}",
         "",
-        "| world (programs) | rule | rescued | through | mean speed, m/s | stood > 60 s, mean | at red | overlaps |",
-        "|---|---|---|---|---|---|---|---|",
+        "| world (programs) | rule | rescued | through | mean speed, m/s | stood > 60 s, mean | pedestrians stuck, "
+        "mean, at the end | at red | overlaps |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for world in given.worlds:
         for rule in given.rules:
