@@ -16,7 +16,7 @@ from vico.agents.strides import CORNER, DRIFT, NARROW, NARROW_DRIFT, ROAD
 from vico.rules import ReasonCode, code_name
 from vico.world.public import PublicMap
 
-VEHICLES = ("car", "bus", "bicycle", "tram")
+VEHICLES = ("car", "bus", "bicycle", "tram", "cyclist")
 # The last point of a path is walked to more closely than other corners, metres.
 _END = 0.2
 # At a kerb, people let vehicles pass that are nearer than this, metres, but not for ever, seconds.

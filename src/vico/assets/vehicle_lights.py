@@ -26,9 +26,10 @@ def _lamp(place: tuple[float, float, float], size: tuple[float, float], colour: 
 
 @cache
 def night_lamps(kind: str) -> Surface:
-    """Return the headlights and rear lights of a kind of car, or of the bus: they shine when it is dark."""
+    """Return the headlights and rear lights of a kind of car, of the bus or a bicycle: they shine when it is dark."""
     front, rear = lamp_places(kind)
-    return one_surface(both_sides([_lamp(front, (0.24, 0.11), _WHITE, 0.0), _lamp(rear, (0.18, 0.16), _DIM_RED, 0.0)]))
+    sizes = ((0.06, 0.06), (0.04, 0.05)) if kind == "bicycle" else ((0.24, 0.11), (0.18, 0.16))
+    return one_surface(both_sides([_lamp(front, sizes[0], _WHITE, 0.0), _lamp(rear, sizes[1], _DIM_RED, 0.0)]))
 
 
 @cache

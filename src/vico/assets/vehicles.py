@@ -114,6 +114,10 @@ _BUILDS: dict[str, _Build] = {
 _BUILDS["taxi"] = _BUILDS["sedan"]
 
 BICYCLE_SIZE = (1.75, 0.6, 1.05)
+#: Paints of the bicycles in traffic; those to rent are yellow.
+BICYCLE_PAINTS = ("black", "silver", "red", "blue", "green")
+#: Where a bicycle's cranks turn, and how long they are, metres.
+CRANK_AXLE, CRANK = (-0.08, 0.0, 0.29), 0.15
 
 
 def vehicle_size(name: str) -> tuple[float, float, float, float, float]:
@@ -135,9 +139,11 @@ class LampPlaces(NamedTuple):
 
 
 def lamp_places(kind: str) -> LampPlaces:
-    """Return where the lamps of a kind of car, or of the bus, are."""
+    """Return where the lamps of a kind of car, of the bus, or of a bicycle are."""
     if kind == "bus":
         return LampPlaces(*BUS_LAMPS)
+    if kind == "bicycle":
+        return LampPlaces((0.72, 0.03, 0.82), (-0.90, 0.02, 0.60))
     build = _BUILDS[kind]
     _, _, high, nose = build.lower[-1]
     _, _, rear_high, stern = build.lower[0]
@@ -152,6 +158,13 @@ def vehicle_prototypes() -> dict[str, list[Surface]]:
     models["bus"] = [bus()]
     models["bicycle"] = [bicycle()]
     return models
+
+
+@cache
+def ridden_prototypes() -> dict[str, list[Surface]]:
+    """Bicycles in traffic, ``bicycle_black`` and the like, without the ``cranks`` that turn beneath their riders."""
+    models = {f"bicycle_{paint}": [bicycle(PAINTS[paint], parked=False)] for paint in BICYCLE_PAINTS}
+    return models | {"cranks": [cranks()]}
 
 
 def car(kind: str, paint: Colour) -> Surface:
@@ -265,8 +278,18 @@ def _fittings(build: _Build, paint: Colour) -> list[Surface]:
     return parts + both_sides(sides)
 
 
-def bicycle(paint: Colour = (255, 200, 0)) -> Surface:
-    """Make a city bicycle with mudguards and a basket."""
+def cranks() -> Surface:
+    """Make a bicycle's cranks and pedals, turning about the y axis at the origin; the left pedal is ahead."""
+    parts = [tube((0.0, -0.09, 0.0), (0.0, 0.09, 0.0), 0.015, RIM)]
+    for side in (-1.0, 1.0):
+        at = side * CRANK, side * 0.09, 0.0
+        parts.append(tube((0.0, side * 0.08, 0.0), at, 0.012, RIM))
+        parts.append(tube(at, (side * CRANK, side * 0.18, 0.0), 0.018, TRIM))
+    return one_surface(parts)
+
+
+def bicycle(paint: Colour = (255, 200, 0), *, parked: bool = True) -> Surface:
+    """Make a city bicycle with mudguards and a basket; where it is not parked, without cranks and pedals."""
     radius, rear, front = 0.34, -0.54, 0.54
     parts: list[Surface] = []
     angles = np.linspace(0, 2 * np.pi, 17)
@@ -294,10 +317,13 @@ def bicycle(paint: Colour = (255, 200, 0)) -> Surface:
         box((0.02, 0.34, 0.2), (0.46, 0, 0.88), colour=TRIM),
         box((0.26, 0.02, 0.2), (0.58, 0.16, 0.88), colour=TRIM),
         box((0.26, 0.02, 0.2), (0.58, -0.16, 0.88), colour=TRIM),
-        tube((-0.08, -0.09, 0.29), (-0.08, 0.09, 0.29), 0.015, RIM),
-        box((0.1, 0.09, 0.025), (-0.08, 0.15, 0.14), colour=TRIM),
-        box((0.1, 0.09, 0.025), (-0.08, -0.15, 0.44), colour=TRIM),
     ]
+    if parked:
+        parts += [
+            tube((-0.08, -0.09, 0.29), (-0.08, 0.09, 0.29), 0.015, RIM),
+            box((0.1, 0.09, 0.025), (-0.08, 0.15, 0.14), colour=TRIM),
+            box((0.1, 0.09, 0.025), (-0.08, -0.15, 0.44), colour=TRIM),
+        ]
     for t0, t1 in zip(np.linspace(0.5, 2.9, 6)[:-1], np.linspace(0.5, 2.9, 6)[1:], strict=True):
         arc = [(rear + np.cos(t) * (radius + 0.04), 0.0, radius + np.sin(t) * (radius + 0.04)) for t in (t0, t1)]
         parts.append(tube(arc[0], arc[1], 0.018, paint, 4))

@@ -173,6 +173,8 @@ class RunOptions:
         Engine that moves robots: mujoco, or genesis (an extra).
     cars
         How many cars drive around.
+    cyclists
+        How many people nobody plays ride bicycles in the streets.
     pedestrians
         How many people nobody plays walk around.
     junctions
@@ -234,6 +236,7 @@ class RunOptions:
     robot_places: Path | None = None
     physics: Literal["mujoco", "genesis"] = "mujoco"
     cars: int = 30
+    cyclists: int = 0
     pedestrians: int = 30
     junctions: Literal["one", "shared", "signals", "both"] = "one"
     traffic: str = "none"

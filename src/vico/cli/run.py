@@ -128,6 +128,7 @@ class _Job:
             physics=options.physics,
             errands=True,
             cars=options.cars,
+            cyclists=options.cyclists,
             pedestrians=options.pedestrians,
             junctions=options.junctions,
             traffic=named_or_read(options.traffic),

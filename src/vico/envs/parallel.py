@@ -230,9 +230,9 @@ def make(
     setup
         Called with the fresh `Simulation` at each reset.
     options
-        `seed`, `start`, `residents`, `assistants`, `robots`, `robot_places`, `errands`, `cars`, `pedestrians`,
-        `junctions`, `traffic`, `transit`, `observe`, `image`, `periods` and `max_steps`, as `vico.envs.spec.EnvSpec`
-        has them.
+        `seed`, `start`, `residents`, `assistants`, `robots`, `robot_places`, `errands`, `cars`, `cyclists`,
+        `pedestrians`, `junctions`, `traffic`, `transit`, `observe`, `image`, `periods` and `max_steps`, as
+        `vico.envs.spec.EnvSpec` has them.
 
     Raises
     ------

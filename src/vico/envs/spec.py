@@ -28,6 +28,7 @@ class EnvOptions(TypedDict, total=False):
     robots: tuple[str, ...]
     errands: bool
     cars: int
+    cyclists: int
     pedestrians: int
     junctions: str
     traffic: str | Mapping[str, Any]

@@ -16,10 +16,22 @@ from numpy.typing import NDArray
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 
-KINDS = ("resident", "assistant", "robot", "car", "bus", "bicycle", "pedestrian", "object", "fixture", "tram")
-RESIDENT, ASSISTANT, ROBOT, CAR, BUS, BICYCLE, PEDESTRIAN, OBJECT, FIXTURE, TRAM = range(len(KINDS))
+KINDS = (
+    "resident",
+    "assistant",
+    "robot",
+    "car",
+    "bus",
+    "bicycle",
+    "pedestrian",
+    "object",
+    "fixture",
+    "tram",
+    "cyclist",
+)
+RESIDENT, ASSISTANT, ROBOT, CAR, BUS, BICYCLE, PEDESTRIAN, OBJECT, FIXTURE, TRAM, CYCLIST = range(len(KINDS))
 #: By kind: whether it is a person.
-IS_PERSON = np.isin(np.arange(len(KINDS)), (RESIDENT, ASSISTANT, PEDESTRIAN))
+IS_PERSON = np.isin(np.arange(len(KINDS)), (RESIDENT, ASSISTANT, PEDESTRIAN, CYCLIST))
 #: By kind: whether its footprint is round at the ends. A bicycle left standing takes the room its rider took with it.
 IS_ROUND = IS_PERSON | (np.arange(len(KINDS)) == BICYCLE)
 #: People step over what is no higher than this, metres: the lowest part of a person's extent is in nobody's way.

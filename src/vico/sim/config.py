@@ -19,7 +19,7 @@ PHYSICS_ENGINES = ("mujoco", "genesis")
 
 #: How many of whom one run may have: placing them takes seconds at most then, and a second of them takes less than
 #: about a second to compute (100 robots 0.6 s, 5,000 pedestrians 0.25 s). Residents are as many as a community has.
-LIMITS = {"robots": 100, "assistants": 1_000, "cars": 2_000, "pedestrians": 5_000}
+LIMITS = {"robots": 100, "assistants": 1_000, "cars": 2_000, "cyclists": 1_000, "pedestrians": 5_000}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +42,7 @@ class SimSettings:
         Where robots start, by name: x, y (ENU metres) and yaw (radians); the others start where the seed says.
     errands
         Robots that nobody controls go from place to place.
-    cars, pedestrians
+    cars, cyclists, pedestrians
         Vehicles and people nobody plays.
     junctions
         Who may be in a junction: ``"one"``, ``"shared"``, ``"signals"`` or ``"both"``
@@ -90,6 +90,7 @@ class SimSettings:
     robot_places: Mapping[str, Sequence[float]] = field(default_factory=dict)
     errands: bool = False
     cars: int = 0
+    cyclists: int = 0
     pedestrians: int = 0
     junctions: str = "one"
     traffic: str | Mapping[str, Any] = "none"
@@ -124,7 +125,7 @@ class SimConfig(SimSettings):
     observe: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
-        for name in ("seed", "assistants", "cars", "pedestrians", "residents"):
+        for name in ("seed", "assistants", "cars", "cyclists", "pedestrians", "residents"):
             value = getattr(self, name)
             if value is not None and value < 0:
                 raise InputError(f"simulation: {name} is {value}; it has to be 0 or more")

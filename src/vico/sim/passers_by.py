@@ -54,7 +54,7 @@ class PedestrianMotion(NamedTuple):
 
 
 def pedestrian_motion(gaits: PedestrianGaits, height: NDArray[np.float64], second: float) -> PedestrianMotion:
-    """Return motion and place in its cycle of each pedestrian: they walk, stand and breathe, talk, sit in a bus.
+    """Return motion and place in its cycle of each pedestrian: they walk, stand and breathe, talk, sit, ride.
 
     Who waits at a stop looks at a phone now and then.
 
@@ -67,11 +67,12 @@ def pedestrian_motion(gaits: PedestrianGaits, height: NDArray[np.float64], secon
     second
         Seconds since midnight of the first day.
     """
-    walk, idle = clip_index("walk"), clip_index("idle")
+    idle = clip_index("idle")
+    walk = np.where(gaits.cycling, clip_index("ride_bike"), clip_index("walk"))
     walking = gaits.time > 0.0
     n = np.arange(len(walking))
     stride = stride_length(walk, gaits.pace, height)
-    in_stride = (WALK_START + gaits.walked / stride) % 1.0
+    in_stride = (np.where(gaits.cycling, 0.0, WALK_START) + gaits.walked / stride) % 1.0
     # People at rest breathe by the clock, each at their own time.
     at_rest = (second * 0.5 + n * 0.37 + 0.1) % 1.0
     # Of two who talk one does and the other listens, by turns; one comes right after the other.
@@ -84,6 +85,9 @@ def pedestrian_motion(gaits: PedestrianGaits, height: NDArray[np.float64], secon
     still = np.where(phones, clip_index("phone"), still)
     at_rest = np.where(phones, waited / _AT_PHONE, at_rest)
     after = Transition(
-        np.where(walking, idle, walk), np.where(walking, at_rest, in_stride), gaits.pace, np.abs(gaits.time)
+        np.where(walking & ~gaits.cycling, idle, walk),
+        np.where(walking & ~gaits.cycling, at_rest, in_stride),
+        gaits.pace,
+        np.abs(gaits.time),
     )
     return PedestrianMotion(np.where(walking, walk, still), np.where(walking, in_stride, at_rest), gaits.pace, after)

@@ -21,6 +21,7 @@ def reports(state: SimulationState, check: OverlapCheck | None) -> dict[str, Any
         ``rescued``: how many vehicles were taken out of jams, and the first of them by name, place, time, how long
         they had stood and why; ``stuck``: the same of who gets nowhere now; ``reentered``: how often cars that had
         left the map came back in; ``junctions``: by which rule vehicles enter them;
+        ``cyclists`` where some ride: how many, and how far all of them have;
         ``buses`` where there are buses or bicycles: how late, see `vico.sim.transit.TransitSystem.lateness`;
         ``physics`` where there are robots: engine and frames; ``overlaps``
         where they were checked, see `vico.sim.overlaps.OverlapCheck`.
@@ -38,6 +39,8 @@ def reports(state: SimulationState, check: OverlapCheck | None) -> dict[str, Any
     }
     if traffic is not None:
         found["junctions"] = str(traffic.junction_rule)
+        if traffic.cyclists:
+            found["cyclists"] = {"count": traffic.cyclists, "kilometres": round(float(traffic.ridden.sum()) / 1e3, 3)}
     if state.transit is not None:
         found["buses"] = state.transit.lateness()
         if len(state.transit.trams):

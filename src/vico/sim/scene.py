@@ -371,10 +371,9 @@ class SceneRenderer:
         """Return how the pedestrians of the traffic move."""
         assert state.traffic is not None
         walkers = state.traffic.walkers
-        clip, phase, pace, after = pedestrian_motion(
-            state.traffic.gait, self._height[len(state.people) :], state.second
-        )
-        on_ground = ~state.traffic.riding
+        gait = state.traffic.gait
+        clip, phase, pace, after = pedestrian_motion(gait, self._height[len(state.people) :], state.second)
+        on_ground = gait.afoot
         still, outdoors = np.zeros(len(clip)), np.full(len(clip), -1, np.int32)
         after = after._replace(moved=np.zeros((len(clip), 4)), over_ground=pace)
         hands = hands_of_pedestrians(self._habit, state.environment.weather.rain)

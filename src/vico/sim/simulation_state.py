@@ -56,7 +56,15 @@ class TrafficSystem(Subsystem, Protocol):
 
     @property
     def walkers(self) -> Bodies:
-        """The pedestrians alone."""
+        """The pedestrians alone, then the cyclists."""
+
+    @property
+    def cyclists(self) -> int:
+        """How many cyclists there are."""
+
+    @property
+    def ridden(self) -> NDArray[np.float64]:
+        """Metres that each cyclist has ridden."""
 
     def entities(self) -> tuple[NDArray[np.int32], NDArray[np.int8]]:
         """Return entity and kind of all, those that are not in the streets now among them."""
@@ -79,7 +87,7 @@ class TrafficSystem(Subsystem, Protocol):
 
     @property
     def gait(self) -> PedestrianGaits:
-        """How each pedestrian walks."""
+        """How each pedestrian walks, and each cyclist rides."""
 
     @property
     def junction_rule(self) -> JunctionRule:

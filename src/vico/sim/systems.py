@@ -28,14 +28,14 @@ _ROBOT_RADIUS = 0.6
 
 
 def traffic_and_transit_of(base: SimulationBase, config: SimConfig) -> tuple[Traffic | None, TransitSystem | None]:
-    """Cars and pedestrians, buses and bicycles; None for what nobody asked for, or the world has not."""
+    """Cars, cyclists and pedestrians, buses and bicycles; None for what nobody asked for, or the world has not."""
     world = base.world
     has_transit = config.transit and bool(
         world.transit.lines or world.transit.bike_stations or world.transit.tram_lines
     )
-    setup = TrafficSetup(JunctionRule(config.junctions), placed_traffic(config.traffic))
+    setup = TrafficSetup(JunctionRule(config.junctions), placed_traffic(config.traffic), config.cyclists)
     by_hand = setup.placed.cars or setup.placed.pedestrians
-    if not has_transit and not config.cars and not config.pedestrians and not by_hand:
+    if not (has_transit or config.cars or config.cyclists or config.pedestrians or by_hand):
         return None, None
     plan = base.bus_plan(config.start) if has_transit else BusPlan()
     traffic = Traffic(

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from vico.io.compiled import compiled
 from vico.sim.animation.names import CARRY, CARRY_LEFT, CARRY_RIGHT, RIDE_BIKE, RUN, WALK
 
-_TURN_OF_CRANKS = 4.0  # metres
+#: Metres that a turn of a bicycle's cranks covers.
+TURN_OF_CRANKS = 4.0
 _STRIDE, _POWER = 0.727, 0.45  # of a walk at 1 m/s, in statures; how strides grow with speed
 _SLOWEST = 0.15  # shorter strides than at this speed nobody takes, m/s
 
@@ -22,7 +23,7 @@ def stride_of(clip, speed, height):  # type: ignore[no-untyped-def]
         return _STRIDE * height * max(speed, _SLOWEST) ** _POWER
     if clip == RUN:
         return height * (0.62 + 0.20 * speed)
-    return _TURN_OF_CRANKS if clip == RIDE_BIKE else np.inf
+    return TURN_OF_CRANKS if clip == RIDE_BIKE else np.inf
 
 
 @compiled

@@ -103,7 +103,7 @@ def _command(path: Path, manifest: Mapping[str, Any]) -> str:
     world, community, config = (_mapping(manifest.get(name)) for name in ("world", "community", "config"))
     words = ["vico", "run", world.get("path") or "WORLD", community.get("path") or "COMMUNITY"]
     options = {"seed": manifest.get("seed"), "steps": manifest.get("wanted_steps"), "out": path}
-    options |= {name: config.get(name) for name in ("cars", "pedestrians")}
+    options |= {name: config.get(name) for name in ("cars", "cyclists", "pedestrians")}
     options |= {name: ",".join(config[name]) or "none" for name in ("robots", "observe") if _is_names(config.get(name))}
     words += [word for name, value in options.items() if value is not None for word in (f"--{name}", value)]
     return shlex.join(map(str, [*words, "--force"]))

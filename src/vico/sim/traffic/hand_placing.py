@@ -30,10 +30,13 @@ class TrafficSetup:
         Who may be in a junction.
     placed
         Who is placed by hand: the first cars and the first pedestrians, beside the others.
+    cyclists
+        How many people nobody plays ride bicycles.
     """
 
     junction_rule: JunctionRule = JunctionRule.ONE
     placed: PlacedTraffic = field(default_factory=PlacedTraffic)
+    cyclists: int = 0
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from vico.sim.traffic.path import (
     PATH_POINT,
     changing_lane,
     lane_polyline,
+    line_points,
     point_on_path,
     project_on_polyline,
 )
@@ -24,6 +25,7 @@ _VEHICLE_GAP, _PERSON_GAP = 0.1, 0.3  # m kept sideways on the other lane
 _SWING_OUT, _PLACES = 6.0, 5  # m that a car has to have free to swing out, and places where that is looked at
 _LANE_POINTS = 64
 _QUEUE_GAP, _QUEUE_SPEED = 15.0, 0.5  # m, share of the desired speed: nearer and slower leaders are a queue
+_CYCLIST_GAP, _CYCLIST_SPEED = 25.0, 0.9  # the same of cyclists who are overtaken
 _BEHIND_HEADWAY, _BESIDE = 2.0, 2.0  # s until who comes up on the other lane is there; m from its middle
 _LEAST_TIME = 6.0  # s between two lane changes of a car
 _LEAST_LANE = 18.0  # m of lane that have to be left for a car to change
@@ -77,6 +79,47 @@ def change_to_lane_beside(net, vehicle, view):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _is_open(net, lane):  # type: ignore[no-untyped-def]
+    return lane >= 0 and not net.lanes[lane].closed and not net.lanes[lane].shut
+
+
+@compiled
+def keep_to_kerb(net, vehicle, view):  # type: ignore[no-untyped-def]
+    """Move a cyclist to the neighbour lane towards the kerb if there is one and a gap."""
+    beside = net.lanes[vehicle.lane].right
+    if _is_open(net, beside) and vehicle.time_since_lane_change > _LEAST_TIME:
+        change_lane(net, vehicle, beside, view)
+
+
+@compiled
+def wants_to_overtake_cyclist(net, vehicle, view, ahead, wanted):  # type: ignore[no-untyped-def]
+    """Return whether the one ahead rides a bicycle, resident or not, too slowly for a car that has not changed lately.
+
+    Parameters
+    ----------
+    ahead
+        The leader, metres to it, and its speed, m/s.
+    wanted
+        Speed the car would like to drive at, m/s.
+    """
+    leader, gap, leading = ahead
+    shapes = view.beyond.shapes
+    # Who is round but no disc.
+    rides = shapes.rounding[leader] > 0.0 and shapes.half_length[leader] > shapes.rounding[leader]
+    is_held_up = rides and gap < _CYCLIST_GAP and leading < _CYCLIST_SPEED * wanted
+    left = net.lanes[vehicle.lane].length - vehicle.offset
+    return is_held_up and vehicle.time_since_lane_change > _LEAST_TIME and left > _LEAST_LANE
+
+
+@compiled
+def overtake_cyclist(net, vehicle, view):  # type: ignore[no-untyped-def]
+    """Move a car to the neighbour lane towards the middle of the street if there is one and a gap."""
+    beside = net.lanes[vehicle.lane].left
+    if _is_open(net, beside):
+        change_lane(net, vehicle, beside, view)
+
+
+@compiled
 def change_as_route_does(net, vehicle, view):  # type: ignore[no-untyped-def]
     """Move a bus to the neighbour lane where its route goes on, if it does and there is a gap."""
     beside = lane_to_change_to(net, vehicle)
@@ -113,17 +156,16 @@ def _can_swing_out(path, swerving, offset, places, view):  # type: ignore[no-unt
 
 
 @compiled
-def is_gap_accepted(net, target, offset, lateral_offset, is_let_in, view):  # type: ignore[no-untyped-def]
+def is_gap_accepted(net, vehicle, target, offset, lateral_offset, view):  # type: ignore[no-untyped-def]
     """Return whether nobody is in the way on lane `target`, from a gap behind to the end of the lane change.
 
     Parameters
     ----------
     offset, lateral_offset
         Where the vehicle is now, seen from that lane: metres along it and to the left of it.
-    is_let_in
-        Whether others make room for it.
     """
-    path = lane_polyline(net, target, np.empty(_LANE_POINTS, PATH_POINT))
+    is_let_in = vehicle.route >= 0
+    path = lane_polyline(net, line_points(net, vehicle), target, np.empty(_LANE_POINTS, PATH_POINT))
     straight = changing_lane(view.outline, 0.0, 0.0)
     # A bus is let in: who is behind it waits for it, and it may wait for who is ahead of it.
     behind, ahead = (_REAR_GAP, _FRONT_GAP + view.outline.length) if not is_let_in else (_LET_IN_GAP, _CUT_IN_GAP)
@@ -150,13 +192,13 @@ def change_lane(net, vehicle, target, view):  # type: ignore[no-untyped-def]
         return False
     lane = net.lanes[target]
     x, y, _, _ = point_on_path(view.path, vehicle.offset)
-    offset, lateral_offset = project_on_polyline(net.points, net.along, lane.first_point, lane.end_point, x, y)
+    points = line_points(net, vehicle)
+    offset, lateral_offset = project_on_polyline(points, net.along, lane.first_point, lane.end_point, x, y)
     if offset < length + 2.0 or offset > lane.length - 1.0:
         return False
-    is_let_in = vehicle.route >= 0
-    if not is_gap_accepted(net, target, offset, lateral_offset, is_let_in, view):
+    if not is_gap_accepted(net, vehicle, target, offset, lateral_offset, view):
         return False
-    if not is_let_in and _somebody_comes_up(vehicle, lateral_offset, view):
+    if vehicle.route < 0 and _somebody_comes_up(vehicle, lateral_offset, view):
         return False
     vehicle.lane, vehicle.offset, vehicle.planned_count = target, offset, 0
     vehicle.lateral_offset, vehicle.lane_change_distance = lateral_offset, 0.0

@@ -22,6 +22,8 @@ _BLINKS = 3.0  # times a second that indicators go on or off
 @compiled
 def shown_lights(net, vehicle, speed_before, dt):  # type: ignore[no-untyped-def]
     """Return the lights that a vehicle shows: whether it brakes or stands, and where it turns or changes lanes to."""
+    if vehicle.is_bicycle:
+        return 0
     shown = BRAKE if vehicle.speed == 0.0 or speed_before - vehicle.speed > _BRAKES * dt else 0
     if vehicle.stopping == APPROACHING:
         return shown
@@ -47,13 +49,15 @@ class LampDrawing:
     Parameters
     ----------
     kinds
-        Of each vehicle: a kind of car, or ``bus``.
+        Of each vehicle: a kind of car, ``bus``, or ``bicycle``, which has none.
     """
 
     def __init__(self, kinds: list[str]) -> None:
         self._names = list(lit_lamps())
         number = {name: k for k, name in enumerate(self._names)}
-        self._lamps = np.array([[number[f"{kind}:{lamp}"] for kind in kinds] for lamp in ("brake", "left", "right")])
+        self._lamps = np.array(
+            [[number.get(f"{kind}:{lamp}", 0) for kind in kinds] for lamp in ("brake", "left", "right")]
+        )
         self._lamps = self._lamps.reshape(3, len(kinds)).astype(np.int32)
 
     def draw(self, lights: NDArray[np.uint8], elapsed: float, vehicles: Drawn) -> Drawn:

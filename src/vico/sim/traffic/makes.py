@@ -7,13 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.vehicles import CAR_KINDS, vehicle_size
+from vico.assets.vehicles import BICYCLE_PAINTS, CAR_KINDS, vehicle_size
 from vico.seeds import rng
 from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
 from vico.sim.traffic.state import NONE
 
 #: Models that vehicles can be, by name.
 VEHICLE_MODELS = [f"{kind}_{colour}" for kind, colours in CAR_KINDS.items() for colour in colours] + ["bus"]
+VEHICLE_MODELS += [f"bicycle_{colour}" for colour in BICYCLE_PAINTS]
 
 #: Share of each kind of car.
 _SHARE = {"hatchback": 0.3, "sedan": 0.27, "suv": 0.23, "van": 0.12, "taxi": 0.08}
@@ -46,7 +47,7 @@ def choose_models(
     shares = np.array(
         [share for kind, colours in CAR_KINDS.items() for share in [_SHARE[kind] / len(colours)] * len(colours)]
     )
-    chosen, bus_model = random.choice(len(shares), cars, p=shares / shares.sum()), len(shares)
+    chosen, bus_model = random.choice(len(shares), cars, p=shares / shares.sum()), VEHICLE_MODELS.index("bus")
     for v, model in enumerate(models):
         chosen[v] = VEHICLE_MODELS.index(model) if model else chosen[v]
     prototype = np.concatenate([chosen, np.full(len(buses), bus_model)]).astype(np.int32)

@@ -132,6 +132,7 @@ def _lane_network(lanes: LaneGraph, walks: Walkways) -> LaneNetwork:
         lanes=records,
         points=lanes.points,
         along=lanes.along,
+        kerb_points=lanes.points,
         next=lanes.next,
         conflict_first=np.zeros(len(lanes) + 1, np.int32),
         conflict=np.zeros(0, np.int32),

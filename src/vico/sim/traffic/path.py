@@ -74,22 +74,28 @@ def changing_lane(outline, lateral_offset, change_done):  # type: ignore[no-unty
 
 
 @compiled
-def _append_lane(net, lane, base, path, count):  # type: ignore[no-untyped-def]
+def line_points(net, vehicle):  # type: ignore[no-untyped-def]
+    """Return the points of the lines that a vehicle follows, shape ``(p, 2)``: the lanes' middles, or at the kerb."""
+    return net.kerb_points if vehicle.is_bicycle else net.points
+
+
+@compiled
+def _append_lane(net, points, lane, base, path, count):  # type: ignore[no-untyped-def]
     """Add a lane that starts at s = `base` to the first `count` points of a path; return their number then."""
     last = path[count - 1].s if count > 0 else -1e18
     for p in range(net.lanes[lane].first_point, net.lanes[lane].end_point):
         s = base + net.along[p]
         if s > last + 1e-6 and count < len(path):
-            path[count].x, path[count].y, path[count].s = net.points[p, 0], net.points[p, 1], s
+            path[count].x, path[count].y, path[count].s = points[p, 0], points[p, 1], s
             count += 1
             last = s
     return count
 
 
 @compiled
-def lane_polyline(net, lane, buffer):  # type: ignore[no-untyped-def]
-    """Lay the path along one lane into `buffer` and return the part of it that is used."""
-    return buffer[: _append_lane(net, lane, 0.0, buffer, 0)]
+def lane_polyline(net, points, lane, buffer):  # type: ignore[no-untyped-def]
+    """Lay the path along one lane's `line_points` into `buffer` and return the part of it that is used."""
+    return buffer[: _append_lane(net, points, lane, 0.0, buffer, 0)]
 
 
 @compiled
@@ -101,6 +107,7 @@ def path_polyline(net, vehicle, behind, ahead, buffer):  # type: ignore[no-untyp
     ndarray
         The part of `buffer` that is used, dtype `PATH_POINT`.
     """
+    points = line_points(net, vehicle)
     k = 0
     base = 0.0
     while k < PREVIOUS_LANES and vehicle.previous_lanes[k] != NONE and -base < behind:
@@ -109,15 +116,15 @@ def path_polyline(net, vehicle, behind, ahead, buffer):  # type: ignore[no-untyp
     count = 0
     for back in range(k - 1, -1, -1):
         lane = vehicle.previous_lanes[back]
-        count = _append_lane(net, lane, base, buffer, count)
+        count = _append_lane(net, points, lane, base, buffer, count)
         base += net.lanes[lane].length
-    count = _append_lane(net, vehicle.lane, 0.0, buffer, count)
+    count = _append_lane(net, points, vehicle.lane, 0.0, buffer, count)
     base = net.lanes[vehicle.lane].length
     for k in range(vehicle.planned_count):
         if base > ahead:
             break
         lane = vehicle.planned_lanes[k]
-        count = _append_lane(net, lane, base, buffer, count)
+        count = _append_lane(net, points, lane, base, buffer, count)
         base += net.lanes[lane].length
     return buffer[:count]
 

@@ -1,4 +1,4 @@
-"""Cars, buses and pedestrians nobody plays: one population on the lane graph, moved by compiled kernels."""
+"""Cars, buses, cyclists and pedestrians nobody plays: one population on the lane graph, moved by compiled kernels."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError
 from vico.seeds import rng
-from vico.sim.bodies import BUS, CAR, PEDESTRIAN, STEP_HEIGHT, Bodies, Drawn
+from vico.sim.animation.stride import TURN_OF_CRANKS
+from vico.sim.bodies import BUS, CAR, CYCLIST, PEDESTRIAN, STEP_HEIGHT, Bodies, Drawn
 from vico.sim.environment import Conditions
 from vico.sim.neighbours import neighbour_grid
 from vico.sim.traffic.axles import axle_transforms
 from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
 from vico.sim.traffic.companions import choose_companions, leave_group
 from vico.sim.traffic.crossings import mark_busy_crossings
+from vico.sim.traffic.cyclists import HALF_WIDTH, HEIGHT, equip_cyclists, kerb_points, starts_of_cyclists
 from vico.sim.traffic.drawing import TrafficDrawing
 from vico.sim.traffic.gatherings import Gatherings
 from vico.sim.traffic.hand_placing import HandPlaced, TrafficSetup
@@ -33,6 +35,7 @@ from vico.sim.traffic.standing import stand_at_start
 from vico.sim.traffic.state import (
     AWAY,
     COMING,
+    GAIT_TIME,
     NONE,
     PEDESTRIAN_RECORD,
     PRESENT,
@@ -77,11 +80,11 @@ class Traffic:
     seed
         Decides who starts where, paces, makes and turns.
     first_entity
-        Entities are numbered from here: cars, then buses, then pedestrians.
+        Entities are numbered from here: cars, then buses, then cyclists, then pedestrians.
     buses
         Their routes and where they start.
     setup
-        Who may be in a junction, and who is placed by hand.
+        How many cyclists there are, who may be in a junction, and who is placed by hand.
 
     Attributes
     ----------
@@ -109,16 +112,19 @@ class Traffic:
         setup: TrafficSetup | None = None,
     ) -> None:
         buses, setup = buses or BusRoutes(), setup or TrafficSetup()
-        junction_rule, placed = setup.junction_rule, setup.placed
+        junction_rule, placed, cyclists = setup.junction_rule, setup.placed, setup.cyclists
         cars, pedestrians = cars + len(placed.cars), pedestrians + len(placed.pedestrians)
         lanes = network.lanes
         self.lanes, self.height, self.walks = lanes, height, network.walks
         self.cars, self.buses, self.pedestrians = cars, len(buses.buses), pedestrians
-        self.vehicles = self.cars + self.buses
+        self.cyclists = cyclists
+        self.vehicles = self.cars + self.buses + cyclists
         self.first_entity = first_entity
         self.junction_rule = junction_rule
         net = network.with_routes(buses.routes, shared=junction_rule.is_shared)
         net = without_deliveries(net, net.route)
+        if cyclists:
+            net = net._replace(kerb_points=kerb_points(lanes))
         # Copies of one's own: how fast lanes are driven follows the weather of the run, and what is shut its events.
         walked = network.walked._replace(walkways=network.walked.walkways.copy())
         hand = HandPlaced.of(placed, lanes, network.walks, net._replace(lanes=net.lanes.copy()), walked)
@@ -130,8 +136,15 @@ class Traffic:
         self._vehicles = new_fleet(self.vehicles, seed)
         self.fleet = self._vehicles.view(np.recarray)
         models = [car.model for car in placed.cars]
-        self.prototype, self._vehicle_height = choose_models(self.fleet, buses.buses, models, seed)
-        self._dry_acceleration = self.fleet.acceleration.copy()
+        ridden = slice(self.vehicles - cyclists, self.vehicles)
+        motor, height_of_motor = choose_models(
+            self._vehicles[: ridden.start].view(np.recarray), buses.buses, models, seed
+        )
+        self.prototype = np.concatenate([motor, equip_cyclists(self._vehicles[ridden].view(np.recarray), seed)])
+        self._vehicle_height = np.concatenate([height_of_motor, np.full(cyclists, HEIGHT)])
+        #: Metres that each cyclist has ridden.
+        self.ridden = np.zeros(cyclists)
+        self._dry_acceleration, self._dry_braking = self.fleet.acceleration.copy(), self.fleet.hard_braking.copy()
         self._bodies: Bodies | None = None  # as they stand since they last moved; asked for by everybody
         self._walkers = new_pedestrians(pedestrians, seed)
         self.pedestrian_state = self._walkers.view(np.recarray)
@@ -153,6 +166,7 @@ class Traffic:
         for i, one in enumerate(placed.pedestrians):
             self.pedestrian_state.preferred_speed[i] = one.speed or self.pedestrian_state.preferred_speed[i]
         self._place_cars(seed, network.starts, len(placed.cars))
+        self._place_cyclists(seed, network.starts)
         self._place_pedestrians(seed, len(placed.pedestrians))
         stand_at_start(self.paths, self._walkers, self.shapes, self.vehicles, seed)
         #: Leads pedestrians to events.
@@ -166,18 +180,19 @@ class Traffic:
         n = self.vehicles + self.pedestrians
         # What never changes of the bodies.
         self._own_entities = np.arange(self.first_entity, self.first_entity + n, dtype=np.int32)
-        kinds = np.array([CAR, BUS, PEDESTRIAN], np.int8)
-        self._kinds = np.repeat(kinds, [self.cars, self.buses, self.pedestrians])
+        kinds = np.array([CAR, BUS, CYCLIST, PEDESTRIAN], np.int8)
+        self._kinds = np.repeat(kinds, [self.cars, self.buses, self.cyclists, self.pedestrians])
         self._heights = np.concatenate([self._vehicle_height, np.full(self.pedestrians, PERSON_HEIGHT)])
         walks = np.arange(n) >= self.vehicles
+        is_person = (self._kinds == CYCLIST) | walks
         return Shapes(
             x=np.full(n, _FAR) + np.arange(n) * 100.0,
             y=np.full(n, _FAR),
             yaw=np.zeros(n),
             half_length=np.concatenate([self.fleet.length / 2, np.full(self.pedestrians, RADIUS)]),
             half_width=np.concatenate([self.fleet.half_width, np.full(self.pedestrians, RADIUS)]),
-            rounding=np.where(walks, RADIUS, 0.0),
-            bottom=np.where(walks, STEP_HEIGHT, 0.0),
+            rounding=np.where(walks, RADIUS, np.where(is_person, HALF_WIDTH, 0.0)),
+            bottom=np.where(is_person, STEP_HEIGHT, 0.0),
             top=self._heights.copy(),
             vx=np.zeros(n),
             vy=np.zeros(n),
@@ -207,6 +222,20 @@ class Traffic:
                     break
             else:
                 raise InputError(f"traffic: no room for car {v + 1} of {self.cars}; use fewer, as in --cars {v}")
+
+    def _place_cyclists(self, seed: int, usable: NDArray[np.int64]) -> None:
+        random = rng(seed, "traffic", "cyclists at the start")
+        kerb, share = starts_of_cyclists(self.lanes, usable, self.cyclists)
+        for k, v in enumerate(range(self.vehicles - self.cyclists, self.vehicles)):
+            for _ in range(_TRIES):
+                lane = int(random.choice(kerb, p=share))
+                low, high = self.fleet.length[v] + 1.0, self.lanes.length[lane] - 1.5
+                if high > low and self._place_vehicle(v, lane, random.uniform(low, high), 1.0):
+                    break
+            else:
+                raise InputError(
+                    f"traffic: no room for cyclist {k + 1} of {self.cyclists}; use fewer, as in --cyclists {k}"
+                )
 
     def _place_pedestrians(self, seed: int, first: int) -> None:
         random = rng(seed, "traffic", "pedestrians")
@@ -272,7 +301,7 @@ class Traffic:
         found |= {f"pedestrians.{field}": self._walkers[field] for field in PEDESTRIAN_RECORD.fields or ()}
         for name, part in (("junctions", self.junctions.arrays()), ("shapes", self.shapes._asdict())):
             found |= {f"{name}.{field}": array for field, array in part.items()}
-        found |= self._levels.arrays()
+        found |= self._levels.arrays() | ({"cyclists.ridden": self.ridden} if self.cyclists else {})
         return found | {f"jams.{name}": array for name, array in self.jams.arrays().items()}
 
     def bodies(self) -> Bodies:
@@ -314,7 +343,7 @@ class Traffic:
         np.minimum(self._speed_limits * conditions.driving, conditions.safe_speed, out=net.lanes["speed"])
         np.minimum(self._dry_acceleration, conditions.traction, out=fleet.acceleration)
         fleet.braking = COMFORTABLE_BRAKING * conditions.braking
-        fleet.hard_braking = conditions.hard_braking
+        np.minimum(self._dry_braking, conditions.hard_braking, out=fleet.hard_braking)
         fleet.time_gap = TIME_GAP * conditions.time_gap
         self._walking_pace = conditions.walking
 
@@ -393,6 +422,7 @@ class Traffic:
         junctions.vehicle_wait[:] = 0.0
         count_per_street(net, fleet, self._street_load)
         advance_vehicles(net, fleet, junctions, everybody, grid, self._street_load, dt)
+        self.ridden += fleet["speed"][self.vehicles - self.cyclists :] * dt
         self._entities = np.concatenate([self._own_entities, obstacles.entity])
         self.jams.elapsed += dt
         self._bring_back(everybody)
@@ -452,7 +482,8 @@ class Traffic:
         """Cars, buses and what signals show; pedestrians are drawn by whoever skins people."""
         transforms, lights, elapsed = self.vehicle_transforms(), self.fleet.lights, float(self.jams.elapsed[0])
         shown = self._net.lanes["light"], self.paths.walkways["light"]
-        return self._drawing.draw(transforms, self._present(), lights, elapsed, shown)
+        pedals = self.ridden / TURN_OF_CRANKS
+        return self._drawing.draw(transforms, self._present(), lights, elapsed, shown, pedals)
 
     def vehicle_transforms(self) -> NDArray[np.float32]:
         """Model to world of every vehicle, shape ``(vehicles, 4, 4)``; of those away it means nothing."""
@@ -477,9 +508,10 @@ class Traffic:
 
     @property
     def walkers(self) -> Bodies:
-        """The pedestrians alone, in buses, too."""
+        """The pedestrians alone, in buses, too, then the cyclists."""
         everybody = self._everybody()
-        found = everybody.where(np.arange(len(everybody) - self.pedestrians, len(everybody)))
+        people, n = self.pedestrians, len(everybody)
+        found = everybody.where(np.r_[n - people : n, n - people - self.cyclists : n - people])
         riding = np.flatnonzero(self._walkers["aboard"] != NONE)
         if len(riding) and self.seats is not None:
             position, yaw, _ = self.seats(riding)
@@ -499,7 +531,7 @@ class Traffic:
     @property
     def passengers(self) -> Bodies:
         """The pedestrians who ride in buses, where they sit or stand."""
-        return self.walkers.where(self.riding)
+        return self.walkers.where(np.flatnonzero(self.riding))
 
     def take_off(self, i: int) -> None:
         """Take a pedestrian out of the street: it rides in a bus from now on."""
@@ -521,13 +553,22 @@ class Traffic:
 
     @property
     def gait(self) -> PedestrianGaits:
-        """How each pedestrian walks: what sets a walking clip's rate and phase."""
-        walkers = self.pedestrian_state
+        """How each pedestrian walks, then how each cyclist rides: what sets a clip's rate and phase."""
+        walkers, n = self.pedestrian_state, self.cyclists
         walked = walkers.distance_walked - walkers.set_out
-        seated = np.zeros(len(walked), np.bool_)
+        seated = np.zeros(len(walked) + n, np.bool_)
         riding = np.flatnonzero(walkers.aboard != NONE)
         if len(riding) and self.seats is not None:
             seated[riding] = self.seats(riding)[2]
+        cycling = np.arange(len(seated)) >= len(walked)
+        afoot = ~cycling
+        afoot[riding] = False
         return PedestrianGaits(
-            walkers.preferred_speed.copy(), walked, walkers.gait_time.copy(), walkers.stand_kind.copy(), seated
+            np.concatenate([walkers.preferred_speed, self.fleet.target_speed[self.vehicles - n :]]),
+            np.concatenate([walked, self.ridden]),
+            np.concatenate([walkers.gait_time, np.full(n, GAIT_TIME)]),
+            np.concatenate([walkers.stand_kind, np.zeros(n, np.uint8)]),
+            seated,
+            cycling,
+            afoot,
         )

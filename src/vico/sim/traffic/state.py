@@ -93,6 +93,7 @@ VEHICLE_PARAMETERS: list[tuple[Any, ...]] = [
     ("speed_factor", _F),  # share of the speed limit it drives at
     ("route", _I),  # bus route it follows, NONE for cars
     ("delivers", _B),  # whether it is a van that makes deliveries
+    ("is_bicycle", _B),  # whether it is a bicycle, that keeps to the kerb
 ]
 
 #: What changes about a vehicle: its state, that is hashed and saved.
@@ -235,6 +236,10 @@ class PedestrianGaits(NamedTuple):
         Why it stands, or goes to stand: `WINDOW`, `TALK` and so on, 0 for who walks along.
     seated
         Whether it sits in a bus.
+    cycling
+        Whether it is a cyclist: it never stands for anything, and `walked` is what it has ridden.
+    afoot
+        Whether its feet are on the ground: it rides neither in a bus nor on a bicycle.
     """
 
     pace: NDArray[np.float64]
@@ -242,6 +247,8 @@ class PedestrianGaits(NamedTuple):
     time: NDArray[np.float64]
     standing: NDArray[np.uint8]
     seated: NDArray[np.bool_]
+    cycling: NDArray[np.bool_]
+    afoot: NDArray[np.bool_]
 
 
 class LaneNetwork(NamedTuple):
@@ -256,6 +263,8 @@ class LaneNetwork(NamedTuple):
         Dtype `LANE`.
     points, along
         Points of the lanes' centre lines, metres, shape ``(p, 2)``, and their distances along their lanes.
+    kerb_points
+        The same points where cyclists ride, shape ``(p, 2)``: towards the kerb.
     next
         Lanes that follow another one, lane by lane.
     conflict_first, conflict
@@ -277,6 +286,7 @@ class LaneNetwork(NamedTuple):
     lanes: Records
     points: Floats
     along: Floats
+    kerb_points: Floats
     next: Ints
     conflict_first: Ints
     conflict: Ints

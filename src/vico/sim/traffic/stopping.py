@@ -63,7 +63,13 @@ def _place_to_stop_at(net, fleet, vehicle):  # type: ignore[no-untyped-def]
     """Return the place beside its lane where a car that has just come onto it is going to stop, `NONE` for none."""
     lane = net.lanes[vehicle.lane]
     count = lane.end_place - lane.first_place
-    is_busy = vehicle.route >= 0 or vehicle.goal != NONE or vehicle.lateral_offset != 0.0 or vehicle.granted_count > 0
+    is_busy = (
+        vehicle.route >= 0
+        or vehicle.is_bicycle
+        or vehicle.goal != NONE
+        or vehicle.lateral_offset != 0.0
+        or vehicle.granted_count > 0
+    )
     if count == 0 or is_busy or lane.shut:
         return NONE
     share = _DELIVERY_SHARE if vehicle.delivers else _PARKING_SHARE

@@ -30,7 +30,10 @@ from vico.sim.traffic.lane_change import (
     change_as_route_does,
     change_to_emptier_lane,
     change_to_lane_beside,
+    keep_to_kerb,
+    overtake_cyclist,
     wants_lane_change,
+    wants_to_overtake_cyclist,
 )
 from vico.sim.traffic.leader import (
     NEARBY_BODY,
@@ -51,6 +54,7 @@ from vico.sim.traffic.path import (
     changing_lane,
     footprint,
     lane_polyline,
+    line_points,
     path_polyline,
     vehicle_outline,
 )
@@ -183,6 +187,10 @@ def _change_lane(net, fleet, vehicle, view, stop_distance, ahead):  # type: igno
             change_as_route_does(net, vehicle, view)
     elif is_behind_delivery(net, fleet, vehicle):
         change_to_lane_beside(net, vehicle, view)
+    elif vehicle.is_bicycle:
+        keep_to_kerb(net, vehicle, view)
+    elif leader >= 0 and wants_to_overtake_cyclist(net, vehicle, view, (leader, gap, leading), wanted):
+        overtake_cyclist(net, vehicle, view)
     elif 0 <= leader < len(fleet) and wants_lane_change(net, vehicle, gap, leading, wanted):
         change_to_emptier_lane(net, fleet, vehicle, view)
 
@@ -276,7 +284,7 @@ def _gives_up_waiting(vehicle, dt):  # type: ignore[no-untyped-def]
 def place_vehicle(net, fleet, v, lane, offset, shapes, air):  # type: ignore[no-untyped-def]
     """Put vehicle v on a lane if no other body would be nearer than `air` metres; True if it now stands there."""
     vehicle = fleet[v]
-    path = lane_polyline(net, lane, np.empty(256, PATH_POINT))
+    path = lane_polyline(net, line_points(net, vehicle), lane, np.empty(256, PATH_POINT))
     outline = changing_lane(vehicle_outline(vehicle), 0.0, 0.0)
     cx, cy, c, s = footprint(path, outline, offset)
     before = shapes.x[v], shapes.y[v]
@@ -390,7 +398,7 @@ def bring_back(net, fleet, junctions, shapes, entries, entry_speed, patience):  
             start = vehicle.length + 0.2
             if net.lanes[entry].length > start + 1.0 and place_vehicle(net, fleet, v, entry, start, shapes, 4.0):
                 release_all_junctions(junctions, vehicle)
-                vehicle.speed = entry_speed if left else 0.0
+                vehicle.speed = min(entry_speed, vehicle.target_speed) if left else 0.0
                 if left:
                     vehicle.laps += 1
                 else:
