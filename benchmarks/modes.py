@@ -53,13 +53,13 @@ def main() -> None:
 
 def table_of_modes(ways: list[tuple[Resident, str, ScheduleItem, str]]) -> None:
     """Print the share of each mode, by the walker's age and by how long the way is."""
-    print("| who | ways | walk | bus | bike |")
-    print("|---|---|---|---|---|")
+    print("| who | ways | on foot | bus | tram | bicycle |")
+    print("|---|---|---|---|---|---|")
     groups = (("all", 0, 200), ("below 18", 0, 18), ("18 to 59", 18, 60), ("60 on", 60, 200))
     for name, low, high in groups:
         modes = Counter(item.mode.value if item.mode else "walk" for one, _, item, _ in ways if low <= one.age < high)
         total = sum(modes.values())
-        shares = " | ".join(f"{100 * modes[mode] / max(total, 1):.1f} %" for mode in ("walk", "bus", "bike"))
+        shares = " | ".join(f"{100 * modes[mode] / max(total, 1):.1f} %" for mode in MODES)
         print(f"| {name} | {total} | {shares} |")
 
 

@@ -12,7 +12,7 @@ from vico.community.ride_times import RideTimes
 from vico.community.walks import Walk, Walks
 from vico.rules import BUS_DWELL, BUS_FARE
 from vico.world.folder import World
-from vico.world.model import BikeStation, Line, Point2, Stop, Transit
+from vico.world.model import BikeStation, Line, Point2, Stop, TramLine, TramStop, Transit
 from vico.world.routing import Router
 from vico.world.trips import Trips
 from vico.world.trips.ways import find_way
@@ -45,7 +45,7 @@ class SameWalks(Walks):
 
 
 def town(seed: int) -> Transit:
-    """One line of five stops, and four stations, anywhere."""
+    """A line of buses and one of trams with five stops each, and four bicycle stations, anywhere."""
     rng = np.random.default_rng(seed)
     spots = (2.0 * rng.integers(-95, 95, (9, 2)) + 1.0).tolist()
     travel, clock = [0.0], 0.0
@@ -68,7 +68,15 @@ def town(seed: int) -> Transit:
         )
         for k in range(4)
     ]  # fmt: skip
-    return Transit(stops=stops, lines=[line], bike_stations=racks, origin={})
+    posts = (2.0 * rng.integers(-95, 95, (5, 2)) + 1.0).tolist()
+    tram_stops = [
+        TramStop(id=f"tram_stop_{k}", entity=k + 20, name=str(k), wait=(*post, 0.0)) for k, post in enumerate(posts)
+    ]
+    tram = TramLine(
+        id="tram", name="4", kind="tram", colour="#000000", track=[], stops=[stop.id for stop in tram_stops],
+        offsets=[], travel=[40.0 + second for second in travel], departures=line.departures,
+    )  # fmt: skip
+    return Transit(stops=stops, lines=[line], bike_stations=racks, origin={}, tram_stops=tram_stops, tram_lines=[tram])
 
 
 class Town:
@@ -76,7 +84,7 @@ class Town:
         self.transit, self.router = transit, ROUTER
 
 
-@pytest.mark.parametrize("mode", [Mode.BUS, Mode.BIKE])
+@pytest.mark.parametrize("mode", [Mode.BUS, Mode.TRAM, Mode.BIKE])
 @pytest.mark.parametrize("seed", range(12))
 def test_the_first_and_the_last_ride_are_those_of_the_router_of_trips(seed: int, mode: Mode) -> None:
     rides, trips = RideTimes(town(seed), SameWalks()), Trips(Town(town(seed)))

@@ -9,7 +9,9 @@ import pytest
 
 import toy_city
 from road_city import lanes_of
+from vico.agents.schedule import followers_of
 from vico.agents.travel import Traveller
+from vico.community.model import Mode
 from vico.geo.frame import LocalFrame
 from vico.rules import BUS_DWELL
 from vico.seeds import rng
@@ -21,6 +23,7 @@ from vico.sim.transit.system import TransitSystem
 from vico.sim.transit.tram_zones import zones_of
 from vico.world.folder import World
 from vico.world.model import TramLine, TramStop
+from vico.world.public import PublicMap
 from vico.world.rails import TRAM_LENGTH, Track
 from vico.worldgen.streets.netconvert import empty_network
 
@@ -153,8 +156,6 @@ def test_trips_take_the_tram_where_that_is_faster_and_travellers_follow_them(sim
     assert (leg.origin, leg.destination, leg.line, leg.price) == ("tram_stop_0", "tram_stop_1", "tram_0", 2.0)
     assert leg.depart == EIGHT + 20 + 30 + BUS_DWELL
     assert world.trips.plan((-22.0, Y), (14.0, Y), EIGHT, modes=("tram",), closed=["tram_0"]) is None
-    from vico.world.public import PublicMap
-
     traveller = Traveller(PublicMap.from_world(world), rng(0, "traveller"), modes=("tram",))
     observations, infos = sim.observe()
     ridden = False
@@ -168,6 +169,31 @@ def test_trips_take_the_tram_where_that_is_faster_and_travellers_follow_them(sim
         ridden |= bool(sim.state.people.vehicle[0] == Vehicle.BUS)
     assert ridden
     assert np.linalg.norm(sim.state.people.position[0, :2] - (14.0, Y - 4.0)) < 2.0
+
+
+def test_a_resident_takes_the_tram_as_the_schedule_says_and_the_counts_say_so() -> None:
+    world, nobody = tram_world(), toy_city.community()
+    way = toy_city.item("commute", "07:59:30", "08:03:30", None).model_copy(update={"mode": Mode.TRAM})
+    day = [
+        toy_city.item("sleep", "00:00:00", "07:59:30", toy_city.CAFE),
+        way,
+        toy_city.item("main", "08:03:30", "23:59:59", toy_city.PARK),
+    ]
+    people = nobody.model_copy(update={"residents": [toy_city.resident(0, "Ada Berg", day)], "relations": []})
+    sim = Simulation(world, people, SimConfig(cars=0, pedestrians=0, start=EIGHT - 60, observe=()))
+    ada = followers_of(people, PublicMap.from_world(world))["resident_0"]
+    observations, infos = sim.observe()
+    seen = ("boarding", "alighting", "arrival")
+    told: list[tuple[str, Any]] = []
+    for _ in range(230):
+        result = sim.step({"resident_0": ada.act(observations["resident_0"], infos["resident_0"])})
+        observations, infos = result.observations, result.infos
+        told += [(event.kind, event.data) for event in result.events if event.kind in seen]
+    assert tuple(kind for kind, _ in told) == seen
+    assert told[-1][1]["mode"] == "tram"
+    assert told[-1][1]["seconds_late"] <= 0.0
+    counts = sim.punctuality.by_mode()
+    assert [(counts[mode]["meant"], counts[mode]["made"]) for mode in ("tram", "bus")] == [(1, 1), (0, 0)]
 
 
 def test_where_tracks_cross_one_tram_at_a_time_is_let_in() -> None:

@@ -387,7 +387,7 @@ class ScheduleFollower:
         return pace_in_time(metres, seconds, self._ease, self._haste)
 
     def _travel(self, observation: Observation, info: Info, stay: Stay, place: PublicPlace) -> Action:
-        """Go by bus or bicycle, as the schedule says; where that fails, as one gets there first."""
+        """Go by bus, tram or bicycle, as the schedule says; where that fails, as one gets there first."""
         state = observation["state"]
         goal = (float(place.position[0]), float(place.position[1]))
         left, time_left = self._traveller.remaining(observation["pose"]), stay.due - state["time"] % DAY

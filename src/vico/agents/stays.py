@@ -53,7 +53,7 @@ class Item(Protocol):
 class Stay:
     """To be at a place by `due`, and to set out at `leave`, seconds of the day; `tag` says what for.
 
-    `mode` is how one means to get there: walk, bus or bike.
+    `mode` is how one means to get there: walk, bus, tram or bike.
     """
 
     leave: float

@@ -68,6 +68,7 @@ class Mode(StrEnum):
 
     WALK = "walk"
     BUS = "bus"
+    TRAM = "tram"
     BIKE = "bike"
 
 

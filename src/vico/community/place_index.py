@@ -61,7 +61,7 @@ class PlaceIndex:
 
     @cached_property
     def rides(self) -> RideTimes:
-        """Trips by bus and bicycle."""
+        """Trips by bus, tram and bicycle."""
         return RideTimes(self.world.transit, self.walks)
 
     def reachable(self, place: Place) -> bool:

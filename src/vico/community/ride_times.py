@@ -1,4 +1,4 @@
-"""Trips of one ride each, by bus or bicycle: the last that is there in time, and the first that is there at all.
+"""Trips of one ride each, by bus, tram or bicycle: the last that is there in time, and the first that is there at all.
 
 Who changes is stranded too easily, so one ride is all that is looked for: all of them at once, as arrays. Walks to and
 from stops and stations are bounds at first; those of the ride that looks best are measured, until its are known.
@@ -7,6 +7,7 @@ from stops and stations are bounds at first; those of the ride that looks best a
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,14 +17,17 @@ from vico.clock import DAY
 from vico.community.model import Mode
 from vico.community.walks import Walk, Walks
 from vico.rules import BIKE_RATE, BIKE_SPEED, BUS_FARE, WALK_SPEED
-from vico.world.model import Point2, Transit
-from vico.world.timetable import LineTimes
+from vico.world.model import Point2, Stop, TramStop, Transit
+from vico.world.timetable import LineTimes, TramTimes
 from vico.world.trips import AHEAD
 from vico.world.trips.network import ALIGHT, BOARD, DISMOUNT, MOUNT
 from vico.world.trips.ways import TURN
 
 # Metres that a walk may be shorter than the bee line: its ends may lie off what is walked on.
 _SNAP = 12.0
+
+#: A ride by timetable: by when one has to be there, from which stop, to which, and when one is off.
+_Row = tuple[float, str, str, float]
 
 
 @dataclass(frozen=True)
@@ -124,7 +128,7 @@ class _Rides:
 
 
 class RideTimes:
-    """Trips of one ride from door to door: buses keep their timetable, bicycles go at any time.
+    """Trips of one ride from door to door: buses and trams keep their timetable, bicycles go at any time.
 
     Parameters
     ----------
@@ -136,7 +140,11 @@ class RideTimes:
 
     def __init__(self, transit: Transit, walks: Walks) -> None:
         self._walks = walks
-        self._rides = {Mode.BUS: _buses(transit, walks), Mode.BIKE: _bicycles(transit, walks)}
+        self._rides = {
+            Mode.BUS: _buses(transit, walks),
+            Mode.TRAM: _trams(transit, walks),
+            Mode.BIKE: _bicycles(transit, walks),
+        }
 
     @property
     def any(self) -> bool:
@@ -179,7 +187,7 @@ class RideTimes:
     def first(self, doors: tuple[Point2, Point2], mode: Mode, depart: float, cash: float = math.inf) -> RideTrip | None:
         """Return the trip that is there first of those that set out at a second of the day; None if there is none.
 
-        Parameters are those of `last`; buses of the next day are not waited for.
+        Parameters are those of `last`; buses and trams of the next day are not waited for.
         """
         rides = self._rides[mode].within(depart, math.inf)
         while True:
@@ -231,12 +239,10 @@ def _trip(rides: _Rides, k: int, doors: tuple[Point2, Point2], times: tuple[floa
 
 def _buses(transit: Transit, walks: Walks) -> _Rides:
     """Return the rides of a day with the buses of all lines, from every stop to every other of the line."""
-    lines = [line for line in transit.lines if len(line.stops) > 1 and line.departures]
-    served = {name for line in lines for name in line.stops}
-    stops = [stop for stop in transit.stops if stop.id in served]
-    number = {stop.id: k for k, stop in enumerate(stops)}
-    rows: list[tuple[float, int, int, float]] = []
-    for line in lines:
+    rows: list[_Row] = []
+    for line in transit.lines:
+        if len(line.stops) < 2 or not line.departures:
+            continue
         times, n = LineTimes.of(line), len(line.stops)
         for k, name in enumerate(line.stops):
             for turn in range(times.next_round(k, 0.0), times.next_round(k, DAY)):
@@ -245,12 +251,35 @@ def _buses(transit: Transit, walks: Walks) -> _Rides:
                 for call in range(k + 1, k + n):
                     # At the end of its round the bus stands at the first stop until its next departure.
                     arrives = times.arrives(turn, call) if call <= n else onward + line.travel[call - n]
-                    rows.append((ready, number[name], number[line.stops[call % n]], arrives + ALIGHT))
-    rows = sorted(row for row in rows if row[1] != row[2])
-    table = np.array(rows, np.float64).reshape(-1, 4)
+                    rows.append((ready, name, line.stops[call % n], arrives + ALIGHT))
+    return _by_timetable(rows, transit.stops, walks)
+
+
+def _trams(transit: Transit, walks: Walks) -> _Rides:
+    """Return the rides of a day with the trams of all lines, from every stop to those that come after it."""
+    rows: list[_Row] = []
+    for line in transit.tram_lines:
+        if len(line.stops) < 2 or not line.departures:
+            continue
+        times = TramTimes(line)
+        for k, name in enumerate(line.stops):
+            for turn in range(times.next_round(k, 0.0), times.next_round(k, DAY)):
+                ready = times.leaves(turn, k) - BOARD - AHEAD
+                for call in range(k + 1, len(line.stops)):
+                    rows.append((ready, name, line.stops[call], times.arrives(turn, call) + ALIGHT))
+    return _by_timetable(rows, transit.tram_stops, walks)
+
+
+def _by_timetable(rows: Sequence[_Row], every: Sequence[Stop | TramStop], walks: Walks) -> _Rides:
+    """Return the rides of a timetable between some of all stops."""
+    served = {name for row in rows for name in row[1:3]}
+    stops = [stop for stop in every if stop.id in served]
+    number = {stop.id: k for k, stop in enumerate(stops)}
+    found = sorted((ready, number[a], number[b], off) for ready, a, b, off in rows if a != b)
+    table = np.array(found, np.float64).reshape(-1, 4)
     first, last = table[:, 1].astype(np.int64), table[:, 2].astype(np.int64)
     ends = _Ends([stop.id for stop in stops], [(stop.wait[0], stop.wait[1]) for stop in stops], walks)
-    return _Rides(ends, first, last, table[:, 0].copy(), table[:, 3].copy(), np.ones(len(rows), np.bool_))
+    return _Rides(ends, first, last, table[:, 0].copy(), table[:, 3].copy(), np.ones(len(found), np.bool_))
 
 
 def _bicycles(transit: Transit, walks: Walks) -> _Rides:

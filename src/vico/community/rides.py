@@ -1,7 +1,7 @@
-"""Who takes the bus or a bicycle where: the way that costs somebody the least time, money and bother.
+"""Who takes the bus, the tram or a bicycle where: the way that costs somebody the least time, money and bother.
 
 Days are planned on foot. Where a ride is worth it, one sets out later instead and stays longer where one is; so
-nobody's day hangs on it, and who misses the bus is late by some minutes at most.
+nobody's day hangs on it, and who misses the bus or tram is late by some minutes at most.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from vico.world.model import Place
 SETTING_OUT = 20.0
 #: Seconds that one sets out sooner besides, which nobody minds: who stands somewhere on a square has farther to go, and
 #: who comes to the stop seconds late waits for the next bus.
-SOONER = {Mode.BUS: 60.0, Mode.BIKE: 0.0}
-#: Seconds kept in hand at the end: buses are up to two minutes late, bicycles are ridden around others.
-RESERVE = {Mode.BUS: 120.0, Mode.BIKE: 60.0}
+SOONER = {Mode.BUS: 60.0, Mode.TRAM: 60.0, Mode.BIKE: 0.0}
+#: Seconds kept in hand at the end: buses and trams are up to two minutes late, bicycles are ridden around others.
+RESERVE = {Mode.BUS: 120.0, Mode.TRAM: 120.0, Mode.BIKE: 60.0}
 # Shorter ways are walked, seconds.
 _SHORT = 6 * 60
-_LEAST_PRICE = {Mode.BUS: BUS_FARE, Mode.BIKE: BIKE_RATE}
+_LEAST_PRICE = {Mode.BUS: BUS_FARE, Mode.TRAM: BUS_FARE, Mode.BIKE: BIKE_RATE}
 # Who carries a hundred would spend two minutes to save one; who carries more, less.
 _SECONDS_OF_MONEY = 12_000.0
 # At these ages people cycle.
 _CYCLISTS = (12, 74)
 # Each year beyond so many makes a walk so much longer.
 _TIRED_FROM, _TIRED = 60, 0.015
-_BOTHER = {Mode.BUS: 0.0, Mode.BIKE: 270.0}
+_BOTHER = {Mode.BUS: 0.0, Mode.TRAM: 0.0, Mode.BIKE: 270.0}
 # A second on foot counts like so many spent sitting, as people choose.
 _ON_FOOT = 1.5
 
@@ -66,7 +66,8 @@ class Habits:
         """Draw somebody's habits from their age, money and character."""
         character = resident.personality
         off_bus, off_bike = chance.normal(0.0, 60.0), chance.normal(0.0, 120.0)
-        bother = {Mode.BUS: _BOTHER[Mode.BUS] + float(off_bus)}
+        # Who minds others in a bus minds them in a tram.
+        bother = {mode: _BOTHER[mode] + float(off_bus) for mode in (Mode.BUS, Mode.TRAM)}
         if _CYCLISTS[0] <= resident.age <= _CYCLISTS[1]:
             # Among cars the anxious would rather walk; the open-minded cycle.
             mind = 150.0 * (character.neuroticism - character.openness)
@@ -84,7 +85,7 @@ class Habits:
 
 
 def first_ride(index: PlaceIndex, ends: tuple[str, str], mode: Mode, times: tuple[float, float], cash: float) -> float:
-    """Return the second of the day at which somebody is at a place who sets out by bus or bicycle at one.
+    """Return the second of the day at which somebody is at a place who sets out by bus, tram or bicycle at one.
 
     From the farthest room of the one place to the farthest room of the other; infinite if there is no such ride.
 
@@ -131,7 +132,7 @@ def with_rides(
     index: PlaceIndex,
     stream: Callable[[str], np.random.Generator],
 ) -> list[Resident]:
-    """Let residents take the bus or a bicycle on the ways of their day where that costs them less than to walk.
+    """Let residents take buses, trams or bicycles on the ways of their day where that costs them less than to walk.
 
     Parameters
     ----------
@@ -251,7 +252,7 @@ class _Means:
 
     def _is_to_be_had(self, ride: _Ride) -> bool:
         """Take the bicycle for a ride; False where others have planned with it."""
-        return ride.mode is Mode.BUS or self.racks.serve(ride.trip)
+        return ride.mode is not Mode.BIKE or self.racks.serve(ride.trip)
 
     def _may_stay(self, resident: Resident, item: ScheduleItem, until: int) -> bool:
         """Return whether somebody may be where they are until a second of the day."""
@@ -272,5 +273,5 @@ class _Means:
 
 
 def _words(mode: Mode, goal: Place, *, home: bool) -> str:
-    how = "Take the bus" if mode is Mode.BUS else "Cycle"
+    how = "Cycle" if mode is Mode.BIKE else f"Take the {mode}"
     return f"{how} home" if home else f"{how} to {goal.name}"

@@ -12,15 +12,22 @@ from vico.clock import DAY
 from vico.community.model import Mode
 from vico.sim.appointments import Appointment
 from vico.sim.simulation_state import SimulationState
-from vico.sim.state import ArrayState, Vehicle
+from vico.sim.state import FIRST_TRAM, ArrayState, Vehicle
 
 # Somebody who comes up to a minute after the hour is not called late.
 GRACE = 60
 # An open place is reached when its position is this near, metres.
 OPEN_REACH = 5.0
-#: Ways to get about, by number. Who was in a bus at all came by bus.
+#: Ways to get about, by number.
 MODES = tuple(Mode)
-_MADE = (MODES.index(Mode.WALK), MODES.index(Mode.BUS), MODES.index(Mode.BIKE), MODES.index(Mode.BUS))
+# Who was in a bus at all came by bus, of the others who was in a tram by tram: a way's mode by the bits of `rode`.
+_IN_BUS, _ON_BIKE, _IN_TRAM = 1, 2, 4
+_MADE = tuple(
+    MODES.index(
+        Mode.BUS if bits & _IN_BUS else Mode.TRAM if bits & _IN_TRAM else Mode.BIKE if bits & _ON_BIKE else Mode.WALK
+    )
+    for bits in range(8)
+)
 #: Seconds late that are told apart begin here (who is earlier counts as this early), and end there.
 EARLIEST, _LATEST = -300, 1800
 
@@ -40,7 +47,7 @@ class Punctuality(ArrayState):
     told
         Whether it has been noted that the next stay began without the resident.
     rode
-        In what each resident was since the last stay was reached: 1 a bus, 2 a bicycle, 3 both.
+        In what each resident was since the last stay was reached, the sum of: 1 a bus, 2 a bicycle, 4 a tram.
     meant
         By what the way to each stay is to be made, a number of `MODES`.
     trips
@@ -97,8 +104,11 @@ class Punctuality(ArrayState):
 
     def watch(self, state: SimulationState) -> None:
         """Note arrivals and failures to arrive, as events and in the counts."""
-        vehicles = state.people.vehicle[: len(self.rode)]
-        self.rode |= (vehicles == Vehicle.BUS).astype(np.int8) | 2 * (vehicles == Vehicle.BIKE).astype(np.int8)
+        n = len(self.rode)
+        vehicles, trams = state.people.vehicle[:n], state.people.vehicle_entity[:n] >= FIRST_TRAM
+        self.rode[vehicles == Vehicle.BIKE] |= _ON_BIKE
+        self.rode[(vehicles == Vehicle.BUS) & ~trams] |= _IN_BUS
+        self.rode[(vehicles == Vehicle.BUS) & trams] |= _IN_TRAM
         some = np.flatnonzero(self.start[1:] > self.start[:-1])
         rows, shift = self.following[some], DAY * self.day[some]
         places = self.place[rows]

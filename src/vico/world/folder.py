@@ -163,7 +163,7 @@ class World:
 
     @cached_property
     def trips(self) -> Trips:
-        """Plans trips on foot, by bus and by bicycle."""
+        """Plans trips on foot, by bus, by tram and by bicycle."""
         return Trips(self)
 
     @cached_property

@@ -115,7 +115,7 @@ class PublicMap:
 
     @cached_property
     def trips(self) -> Trips:
-        """Plans trips on foot, by bus and by bicycle."""
+        """Plans trips on foot, by bus, by tram and by bicycle."""
         return Trips(self)
 
     @cached_property

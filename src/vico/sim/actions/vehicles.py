@@ -24,7 +24,7 @@ def check_enter_bus(values: Values, i: int, state: SimulationState) -> Refusal |
         return refusal
     bus = transit.bus_at(p.position[i])
     if bus is None:
-        said = f"enter_bus: no bus stands with a door within {DOOR_REACH:g} m{_from_depot(i, state, transit)}"
+        said = f"enter_bus: no bus or tram stands with a door within {DOOR_REACH:g} m{_from_depot(i, state, transit)}"
         return Refusal(ReasonCode.NO_VEHICLE, said)
     if transit.ends(bus):
         what, _, name = transit.service_of(bus)
@@ -49,10 +49,10 @@ def check_exit_bus(values: Values, i: int, state: SimulationState) -> Refusal | 
     if transit is None:
         return Refusal(ReasonCode.NO_TRANSIT, f"exit_bus: {_NO_TRANSIT}")
     if state.people.vehicle[i] != Vehicle.BUS:
-        return Refusal(ReasonCode.NOT_RIDING, "exit_bus: not in a bus")
+        return Refusal(ReasonCode.NOT_RIDING, "exit_bus: not in a bus or tram")
     bus = rides.bus_of(i, state, transit)
     if transit.stopped_at(bus) is None:
-        return Refusal(ReasonCode.MOVING, "exit_bus: the bus is moving")
+        return Refusal(ReasonCode.MOVING, f"exit_bus: the {transit.service_of(bus)[0]} is moving")
     if rides.spot_beside(bus, state, transit) is None:
         return Refusal(ReasonCode.NO_FREE_SPOT, "exit_bus: no free ground at the doors")
     return None

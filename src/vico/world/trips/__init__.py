@@ -1,4 +1,4 @@
-"""Ways from door to door on foot, by bus and by bicycle, by the clock: one router for all who plan."""
+"""Ways from door to door on foot, by bus, by tram and by bicycle, by the clock: one router for all who plan."""
 
 from vico.world.trips.model import MODES, Closure, Leg, Trip
 from vico.world.trips.network import AHEAD
