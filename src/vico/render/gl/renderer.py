@@ -8,13 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.errors import InputError, MissingExtraError
-from vico.render.arrays import ANYWHERE, INDOORS, OUTDOORS, SceneArrays
+from vico.errors import MissingExtraError
+from vico.render.arrays import SceneArrays
 from vico.render.behind.panes import show_rooms
 from vico.render.cameras import Cameras
 from vico.render.frames import Frames, PictureRequest, light_of
+from vico.render.gl.culling import cluster_ranges, instances_in_view, joined_ranges
+from vico.render.gl.moving import CASTER_ROWS, packed_casters, packed_past
 from vico.render.lighting import TONE_RANGE, TONE_STEPS
 from vico.render.scene import Scene
+from vico.render.sensors.past import PastPlaces
 from vico.render.shading.finishing import occlude, smooth_edges
 from vico.render.shading.light import Light
 from vico.render.shading.sky import SKY_SIZE
@@ -24,14 +27,12 @@ from vico.render.uniforms import Record, camera_uniforms
 
 _HERE = Path(__file__).parent
 _NOBODY = 1
-# Smaller than this across is not drawn, pixels; as the other renderer has it.
-_LEAST_PIXELS = 0.8
+# The sky is this far away, metres: only turning moves it.
+_SKY = 1e7
 
 
 class GlRenderer:
     """Takes pictures of one scene by OpenGL 4.5, through EGL: no window is needed.
-
-    What moves throws no shadows, and flow is not measured.
 
     Parameters
     ----------
@@ -55,7 +56,7 @@ class GlRenderer:
         # The arrays themselves: a number of theirs may be another array's one day.
         self._uploaded: dict[str, NDArray[Any]] = {}
         self._kept: dict[str, Any] = {}
-        self._targets: dict[tuple[int, int], Any] = {}
+        self._targets: dict[tuple[int, int, bool], Any] = {}
 
     @property
     def device(self) -> str:
@@ -63,21 +64,14 @@ class GlRenderer:
         return str(self._gl.info["GL_RENDERER"])
 
     def take(self, cameras: Cameras, request: PictureRequest) -> Frames:
-        """Take pictures with every camera; see `vico.render.frames.take_pictures`.
-
-        Raises
-        ------
-        InputError
-            If past places are asked for: that is left to the other renderer.
-        """
-        if request.past:
-            raise InputError("render: OpenGL measures no flow; take the renderer cpu, or leave flow out")
+        """Take pictures with every camera; see `vico.render.frames.take_pictures`."""
         shape = len(cameras), cameras.height, cameras.width
         frames = Frames(
             np.empty((*shape, 3) if request.rgb else (0, 0, 0, 3), np.uint8),
             np.empty(shape if request.depth else (0, 0, 0), np.float32),
             np.empty(shape if request.segmentation else (0, 0, 0), np.int32),
             np.empty((*shape, 3) if request.normals else (0, 0, 0, 3), np.float32),
+            np.empty((*shape, 3) if request.past else (0, 0, 0, 3), np.float64),
         )
         light = light_of(self.scene.light(), request.quality)
         self._upload(self.scene.arrays, light)
@@ -97,7 +91,9 @@ class GlRenderer:
             rgb = np.round(blocks.mean(axis=(1, 3))).astype(np.uint8)
         elif request.rgb:
             rgb = self._colours(camera, light, request)
-        target = self._draw(camera, light, moving=request.moving)
+        target = self._draw(camera, light, moving=request.moving, past=request.past[k] if request.past else None)
+        if len(frames.places):
+            frames.places[k] = _with_sky(target.places(), target.depth(), camera)
         if len(frames.depth):
             frames.depth[k] = target.depth()
         if len(frames.segmentation):
@@ -126,13 +122,15 @@ class GlRenderer:
             show_rooms(self.scene, camera, light.uniforms, keys, glass, draw, rgb)
         return rgb
 
-    def _draw(self, camera: Record, light: Light, *, moving: bool) -> _Target:
-        """Draw what a camera sees."""
+    def _draw(self, camera: Record, light: Light, *, moving: bool, past: PastPlaces | None = None) -> _Target:
+        """Draw what a camera sees, with where it was if the past is known."""
         width, height = int(camera["width"]), int(camera["height"])
-        target = self._targets.get((width, height))
+        size = width, height, past is not None
+        target = self._targets.get(size)
         if target is None:
-            target = self._targets[width, height] = _Target(self._gl, width, height)
+            target = self._targets[size] = _Target(self._gl, *size)
         target.clear()
+        shadows = self._set_moving(camera, light, past, moving=moving)
         for binding, buffer in self._buffers.values():
             buffer.bind_to_storage_buffer(binding)
         view = _view_uniforms(camera)
@@ -144,23 +142,45 @@ class GlRenderer:
         self._gl.depth_func, self._gl.front_face = "<", "cw"
         self._kept["closeness"].use(0)
         self._kept["relief"].use(1)
-        _set(self._program, view | _light_uniforms(light) | {"closeness": 0, "relief": 1, "levels_each": LEVELS})
+        _set(
+            self._program,
+            view | shadows | _light_uniforms(light) | {"closeness": 0, "relief": 1, "levels_each": LEVELS},
+        )
         counts = self.scene.arrays.counts
         _set(self._program, {"first_moving": int(counts["static_instances"]), "is_person": 0, "is_instance": 0})
-        for start, end in _cluster_ranges(self.scene.arrays, camera):
+        for start, end in cluster_ranges(self.scene.arrays, camera):
             self._render(start, end - start)
         _set(self._program, {"is_instance": 1})
         self._draw_instances(camera, moving=moving)
         if moving and int(counts["avatars"]):
             spans = self.scene.arrays.avatars.span
             _set(self._program, {"is_instance": 0, "is_person": 1})
-            self._render(
-                int(spans["first_triangle"][0]), int(spans["end_triangle"][-1]) - int(spans["first_triangle"][0])
-            )
+            for start, end in joined_ranges(spans["first_triangle"], spans["end_triangle"]):
+                self._render(start, end - start)
         return target
 
+    def _set_moving(self, camera: Record, light: Light, past: PastPlaces | None, *, moving: bool) -> dict[str, Any]:
+        """Bring what throws shadows and where things were onto the card; return the uniforms about that."""
+        arrays = self.scene.arrays
+        casters = packed_casters(arrays, camera, light) if moving else np.zeros((0, 1), np.float32)
+        self._buffer("casters", 12, casters)
+        uniforms: dict[str, Any] = {"caster_count": len(casters), "with_past": int(past is not None)}
+        if past is None:
+            return uniforms
+        bodies, things = packed_past(past)
+        self._buffer("past_bodies", 13, bodies)
+        self._buffer("past_things", 14, things)
+        spans = arrays.avatars.span
+        first = int(spans["first_vertex"].min()) if len(spans) else 0
+        shift = np.array([camera["x"], camera["y"], camera["z"]]) - past.eye
+        return uniforms | {
+            "eye_moved": tuple(float(v) for v in shift),
+            "first_vertex": first,
+            "bodies_known": int(len(bodies) > 0),
+        }
+
     def _draw_instances(self, camera: Record, *, moving: bool) -> None:
-        code, number = _instances_in_view(self.scene.arrays, camera, moving=moving)
+        code, number = instances_in_view(self.scene.arrays, camera, moving=moving)
         if not len(number):
             return
         order = np.argsort(code, kind="stable")
@@ -242,7 +262,7 @@ class GlRenderer:
 class _Target:
     """A frame buffer with all outputs; its first row is the picture's upper one."""
 
-    def __init__(self, gl: Any, width: int, height: int) -> None:
+    def __init__(self, gl: Any, width: int, height: int, with_past: bool) -> None:
         size = width, height
         self._shape = height, width
         self._planes = [
@@ -251,6 +271,8 @@ class _Target:
             gl.texture(size, 1, dtype="i4"),
             gl.texture(size, 4, dtype="f4"),
         ]
+        if with_past:
+            self._planes.append(gl.texture(size, 4, dtype="f4"))
         for plane in self._planes:
             plane.filter = gl.NEAREST, gl.NEAREST
         self._buffer = gl.framebuffer(self._planes, gl.depth_texture(size))
@@ -275,6 +297,11 @@ class _Target:
     def normals(self) -> NDArray[np.float32]:
         return self._read(3, np.float32, 4)[..., :3]
 
+    def places(self) -> NDArray[np.float64]:
+        """Return where points were, from where the eye was, as far as that is known."""
+        found = self._read(4, np.float32, 4).astype(np.float64)
+        return np.where(found[..., 3:] > 0.5, found[..., :3], np.nan)
+
     def _read(self, plane: int, kind: Any, channels: int) -> NDArray[Any]:
         return np.frombuffer(self._planes[plane].read(), kind).reshape(*self._shape, channels).copy()
 
@@ -298,7 +325,8 @@ def _context() -> Any:
 
 def _sources(name: str) -> tuple[str, str]:
     """Return the sources of a program's vertex and fragment shader."""
-    return (_HERE / f"{name}.vert").read_text(), (_HERE / f"{name}.frag").read_text()
+    fragment = (_HERE / f"{name}.frag").read_text().replace("%CASTER_ROWS%", str(CASTER_ROWS))
+    return (_HERE / f"{name}.vert").read_text(), fragment
 
 
 def _keys(depth: NDArray[np.float32], entity: NDArray[np.int32]) -> NDArray[np.uint64]:
@@ -308,6 +336,16 @@ def _keys(depth: NDArray[np.float32], entity: NDArray[np.int32]) -> NDArray[np.u
     number = np.where(seen, np.maximum(entity, _NOBODY), 0).astype(np.uint64)
     keys = (inverse.view(np.uint32).astype(np.uint64) << np.uint64(32)) | number
     return np.concatenate([keys.reshape(-1), np.zeros(64, np.uint64)])
+
+
+def _with_sky(places: NDArray[np.float64], depth: NDArray[np.float32], camera: Record) -> NDArray[np.float64]:
+    """Return places with those of the sky, far away along each pixel's ray."""
+    height, width = depth.shape
+    right, down, forward = (np.array(_vector(camera, name)) for name in ("right", "down", "forward"))
+    u = (np.arange(width) + 0.5 - float(camera["centre_x"])) / float(camera["focal"])
+    v = (np.arange(height) + 0.5 - float(camera["centre_y"])) / float(camera["focal"])
+    ray = forward + u[None, :, None] * right + v[:, None, None] * down
+    return np.where(depth[..., None] > 0.0, places, _SKY * ray)
 
 
 def _set(program: Any, values: dict[str, Any]) -> None:
@@ -375,63 +413,3 @@ def _light_uniforms(light: Light) -> dict[str, Any]:
         "shadow_frame": tuple(float(v) for v in light.shadow.matrix.T.reshape(-1)),
         "relief_frame": (float(relief.x), float(relief.y), float(relief.texels_per_metre)),
     }
-
-
-def _axes(camera: Record) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return where a camera is, and its axes as rows."""
-    place = np.array([camera["x"], camera["y"], camera["z"]], np.float64)
-    return place, np.array([_vector(camera, name) for name in ("right", "down", "forward")])
-
-
-def _are_in_view(centre: NDArray[Any], radius: NDArray[Any], camera: Record) -> NDArray[np.bool_]:
-    """Return which spheres a camera may see."""
-    place, axes = _axes(camera)
-    across, down, ahead = ((centre - place) @ axes.T).T
-    sides = (float(camera["width"]), float(camera["centre_x"])), (float(camera["height"]), float(camera["centre_y"]))
-    tangents = (max(centre, size - centre) / float(camera["focal"]) for size, centre in sides)
-    seen = (ahead + radius > camera["near"]) & (ahead - radius < camera["far"])
-    for aside, tangent in zip((np.abs(across), np.abs(down)), tangents, strict=True):
-        seen &= aside - ahead * tangent <= radius * np.sqrt(1.0 + tangent * tangent)
-    return np.asarray(seen)
-
-
-def _cluster_ranges(arrays: SceneArrays, camera: Record) -> list[tuple[int, int]]:
-    """Return ranges of triangles of the clusters in view, neighbours joined."""
-    clusters = arrays.clusters
-    if not len(clusters.low):
-        return []
-    low, high = clusters.low.astype(np.float64), clusters.high.astype(np.float64)
-    radius = np.linalg.norm(high - low, axis=1) / 2
-    seen = _are_in_view((low + high) / 2, radius, camera)
-    seen &= arrays.cluster_where == (INDOORS if camera["indoors"] else OUTDOORS)
-    first, end = clusters.span["first_triangle"][seen], clusters.span["end_triangle"][seen]
-    if not len(first):
-        return []
-    breaks = np.flatnonzero(first[1:] != end[:-1]) + 1
-    starts, ends = np.concatenate([[0], breaks]), np.append(breaks, len(first)) - 1
-    return list(zip(first[starts].tolist(), end[ends].tolist(), strict=True))
-
-
-def _instances_in_view(
-    arrays: SceneArrays, camera: Record, *, moving: bool
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return three times the prototype plus the level of detail, and the number, of each instance in view."""
-    count = int(arrays.counts["instances" if moving else "static_instances"])
-    instances, prototypes = arrays.instances, arrays.prototypes
-    sphere = instances.sphere[:count]
-    centre = np.stack([sphere["x"], sphere["y"], sphere["z"]], axis=1).astype(np.float64)
-    radius = sphere["radius"].astype(np.float64)
-    seen = _are_in_view(centre, radius, camera)
-    where = instances.where[:count]
-    seen &= (where == ANYWHERE) | (where == (INDOORS if camera["indoors"] else OUTDOORS))
-    place, axes = _axes(camera)
-    ahead = (centre - place) @ axes[2]
-    seen &= ~(2.0 * radius * float(camera["focal"]) < _LEAST_PIXELS * ahead)
-    number = np.flatnonzero(seen)
-    model = instances.prototype[number].astype(np.int64)
-    extent = (prototypes.high[model] - prototypes.low[model]).astype(np.float64)
-    scale = np.linalg.norm(instances.matrix[number][:, :, 0], axis=1)
-    pixels = np.linalg.norm(extent, axis=1) * scale * float(camera["focal"]) / np.maximum(ahead[number], camera["near"])
-    limits = prototypes.pixels[model]
-    level = np.where(pixels < limits[:, 1], np.where(pixels < limits[:, 2], 2, 1), 0)
-    return 3 * model + level, number

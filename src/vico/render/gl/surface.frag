@@ -6,6 +6,8 @@ layout(std430, binding = 5) readonly buffer Texels { uint texels[]; };
 layout(std430, binding = 11) readonly buffer Windows { float windows[]; };  // shares of upper and ground floors
 layout(std430, binding = 9) readonly buffer Tone { int tone[]; };
 
+layout(std430, binding = 12) readonly buffer Casters { vec4 casters[]; };  // see `packed_casters`
+
 uniform usampler2D closeness;
 uniform sampler2D relief;
 uniform mat4x3 shadow_frame;
@@ -15,19 +17,21 @@ uniform vec2 side;
 uniform float near, far, haze_per_metre, lamp_exposure, wet, snow_cover, softness, glass, interiors, tone_scale;
 uniform vec4 room_place, room_size;  // centre and cosine of the yaw; half length, half width, height, sine
 uniform vec3 room_light;  // shares of lamps, of light all around, and of what windows show by day
-uniform int indoors, hidden, most_taps, levels_each, is_person;
+uniform int indoors, hidden, most_taps, levels_each, is_person, caster_count;
 
 in vec3 place;
 in vec3 normal;
 in vec3 colour;
 in vec2 uv;
 in float depth;
-flat in int material, entity, moves;
+in vec3 before;
+flat in int material, entity, moves, item, is_known;
 
 layout(location = 0) out vec4 out_colour;
 layout(location = 1) out float out_depth;
 layout(location = 2) out int out_entity;
 layout(location = 3) out vec4 out_normal;
+layout(location = 4) out vec4 out_before;
 
 vec4 texel(int start, int columns, int rows, int i, int j) {
     uint t = texels[start + (j & (rows - 1)) * columns + (i & (columns - 1))];
@@ -104,6 +108,75 @@ float sun_share(vec3 at, vec3 n, vec2 aside) {
                mix(lit_at(i + ivec2(0, 1), p.z), lit_at(i + ivec2(1, 1), p.z), f.x), f.y);
 }
 
+// Shadows of what moves: `vico.render.shadows`.
+const int CASTER_ROWS = %CASTER_ROWS%;
+
+float of_way(float from, float to, float soft) {
+    float dark = clamp((to - max(from, 0.0)) * soft, 0.0, 1.0);
+    return dark * dark * (3.0 - 2.0 * dark);
+}
+
+float ball_shadow(vec3 p, vec3 to, float soft) {
+    float qa = dot(to, to), qb = dot(p, to), qc = dot(p, p) - 1.0;
+    float root = sqrt(max(qb * qb - qa * qc, 0.0));
+    return of_way((-qb - root) / qa, (-qb + root) / qa, soft);
+}
+
+float box_shadow(vec3 p, vec3 to, float soft) {
+    vec3 t0 = vec3(0.0), t1 = vec3(0.0);
+    for (int k = 0; k < 3; k++) {
+        float inverse = 1.0 / (abs(to[k]) > 1e-9 ? to[k] : 1e-9);
+        t0[k] = min((-1.0 - p[k]) * inverse, (1.0 - p[k]) * inverse);
+        t1[k] = max((-1.0 - p[k]) * inverse, (1.0 - p[k]) * inverse);
+    }
+    return of_way(max(t0.x, max(t0.y, t0.z)), min(t1.x, min(t1.y, t1.z)), soft);
+}
+
+float limbs_shadow(int at, int count, vec3 p) {
+    float darkest = 0.0;
+    for (int k = 0; k < count; k++) {
+        vec4 start = casters[at + 2 * k], rest = casters[at + 2 * k + 1];
+        vec2 off = p.xy - start.xy;
+        float way = clamp(dot(off, start.zw) * rest.x, 0.0, 1.0), ahead = rest.y + way * rest.z - p.z;
+        float rim = min(0.03 + 0.012 * max(ahead, 0.0), 2.5 * rest.w);
+        float dark = clamp((rest.w - length(off - way * start.zw)) / rim + 0.5, 0.0, 1.0);
+        darkest = max(darkest, dark * clamp(ahead * 25.0, 0.0, 1.0));
+    }
+    return darkest * darkest * (3.0 - 2.0 * darkest);
+}
+
+// What moving things leave of the sun, and of the light at the ground.
+vec2 left_by_moving() {
+    vec2 left = vec2(1.0);
+    vec2 pixel = floor(gl_FragCoord.xy);
+    vec4 here = vec4(place, 1.0);
+    for (int k = 0; k < caster_count; k++) {
+        int row = CASTER_ROWS * k;
+        vec4 part = casters[row + 4], kind = casters[row + 5];
+        if (pixel.x < part.x || pixel.x >= part.y || pixel.y < part.z || pixel.y >= part.w) continue;
+        ivec2 owner = floatBitsToInt(casters[row + 10].xy);
+        if (owner.x >= 0 ? item == owner.x : (is_person != 0 && entity == owner.y)) continue;
+        float above = place.z - kind.x;
+        if (above > kind.y || above < -6.0) continue;
+        vec3 unit = vec3(dot(casters[row], here), dot(casters[row + 1], here), dot(casters[row + 2], here));
+        bool is_round = kind.z > 0.5;
+        if (indoors == 0) {
+            vec4 sun_ = casters[row + 3];
+            float dark;
+            if (kind.w > 0.5) {
+                vec3 across = vec3(dot(casters[row + 6], here), dot(casters[row + 7], here), dot(casters[row + 8], here));
+                dark = limbs_shadow(row + 11, int(kind.w), across);
+            } else {
+                dark = is_round ? ball_shadow(unit, sun_.xyz, sun_.w) : box_shadow(unit, sun_.xyz, sun_.w);
+            }
+            left.x *= 1.0 - dark;
+        }
+        float foot = is_round ? (1.0 - length(unit.xy) / 2.0) * 1.5 : (1.0 - max(abs(unit.x), abs(unit.y)) / 1.25) * 4.0;
+        left.y *= 1.0 - min(max(foot, 0.0) * max(1.0 - abs(above) / 0.5, 0.0), 0.75);
+    }
+    return left;
+}
+
 vec3 in_room(vec3 at, vec3 n, vec3 base, float glass_) {
     vec3 p = at - room_place.xyz;
     float c = room_place.w, s = room_size.w, height = room_size.z;
@@ -178,8 +251,9 @@ void main() {
     }
     vec3 light;
     float seen = 0.0;
+    vec2 left = left_by_moving();
     if (indoors != 0) {
-        light = in_room(at, n, base.rgb, levels > 0 ? emission * base.a : 0.0);
+        light = in_room(at, n, base.rgb, levels > 0 ? emission * base.a : 0.0) * (0.4 + 0.6 * left.y);
     } else {
         bool dark = unlit.z > 0.0 && moves == 0 && distance(at.xy, unlit.xy) <= unlit.z;
         float shine = dark ? 0.0 : emission * lamp_exposure * base.a;
@@ -192,6 +266,7 @@ void main() {
             shine *= 1.0 - share;
         }
         float facing = max(dot(n, sun), 0.0);
+        facing *= left.x;
         if (facing > 0.0) {
             if (softness > 0.0) {
                 facing *= 0.25 * (sun_share(at, n, softness * vec2(0.8, 0.35)) + sun_share(at, n, softness * vec2(-0.35, 0.8))
@@ -204,7 +279,7 @@ void main() {
         float clear = 1.0 / (1.0 + thick * (1.0 + thick * (0.5 + thick * 0.1666)));
         float toward = max(dot(place, sun) / max(length_, 1e-12), 0.0);
         float glow = 0.10 * toward * toward * toward;
-        vec3 around = (ambient + n.z * tilt + dot(n.xy, side)) * sky_share(at, n);
+        vec3 around = (ambient + n.z * tilt + dot(n.xy, side)) * sky_share(at, n) * left.y;
         light = base.rgb * (facing * sun_colour + around + shine * vec3(1.0, 0.86, 0.62));
         light = (1.0 - clear) * (haze + glow * sun_colour) + clear * light;
         if (interiors > 0.0 && column > 0 && levels > 0) {
@@ -229,5 +304,6 @@ void main() {
     out_depth = depth;
     out_entity = entity;
     out_normal = vec4(n, 0.0);
+    out_before = vec4(before, float(is_known));
     gl_FragDepth = log2(depth / near) / log2(far / near);
 }

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from vico.render.compiled import inlined
+from vico.render.compiled import inlined, kernel
 from vico.render.records import CASTER
 from vico.render.shadows.people import set_limbs
 from vico.render.uniforms import Record
@@ -26,6 +26,8 @@ _OUTDOOR_REACH = 70.0
 _SMALL = 0.65
 # Nothing is darkened further below a caster's foot than this, metres.
 DEEPEST = np.float32(6.0)
+# Nothing is darkened further above a caster's foot than this, in half heights.
+TALLEST = np.float32(2.2)
 # What rounding may move a caster's centre by, and far more, metres.
 _SLACK = 0.1
 
@@ -162,6 +164,20 @@ def _set_screen_bounds(caster: Any, camera: Any) -> bool:
     caster.first_row = int(min(max(top, 0.0), 1e9))
     caster.end_row = int(max(min(bottom + 1.0, float(height)), -1.0))
     return caster.first_column < caster.end_column and caster.first_row < caster.end_row
+
+
+@kernel
+def list_casters(scene: Any, camera: Any, light: Any, casters: Any, numbers: Any) -> int:
+    """Write the `CASTER` of everything that may darken a picture, and its number among instances and then avatars.
+
+    Return how many there are.
+    """
+    reach, instances, count = shadow_reach(camera), scene.counts.instances, 0
+    for k in range(scene.counts.static_instances, instances + scene.counts.avatars):
+        if set_caster(scene, k, camera, light, reach, casters[count]):
+            numbers[count] = k
+            count += 1
+    return count
 
 
 @inlined

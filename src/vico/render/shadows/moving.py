@@ -8,7 +8,7 @@ import numpy as np
 
 from vico.render.arrays import PAD, STRIDE
 from vico.render.compiled import inlined, kernel
-from vico.render.shadows.casters import DEEPEST, is_box_far, is_sphere_far, set_caster, shadow_reach
+from vico.render.shadows.casters import DEEPEST, TALLEST, is_box_far, is_sphere_far, set_caster, shadow_reach
 from vico.render.shadows.people import limb_shadow
 from vico.render.visibility.fill import inverse_depth, triangle_number
 
@@ -16,8 +16,6 @@ from vico.render.visibility.fill import inverse_depth, triangle_number
 _ROUND_EDGE, _BOX_EDGE, _ROUND_GAIN, _BOX_GAIN, _DARKEST = 2.0, 1.25, 1.5, 4.0, 0.75
 # Half the height of the layer at the ground in which they lie, metres.
 _CONTACT_HEIGHT = 0.5
-# Nothing is darkened further above a caster's foot than this, in half heights.
-_TALLEST = np.float32(2.2)
 _ZERO, _ONE, _TWO, _THREE, _TINY = (np.float32(value) for value in (0.0, 1.0, 2.0, 3.0, 1e-9))
 # Pixels that are looked at together, and the fields of the scratch memory of a block.
 _BLOCK = PAD
@@ -80,7 +78,7 @@ def _darken(camera: Any, buffers: Any, caster: Any, own: int, own_end: int) -> N
     )
     line_a, line_b, line_c = _unit_line(camera, caster, 0), _unit_line(camera, caster, 1), _unit_line(camera, caster, 2)
     height = _line(camera, 0.0, 0.0, 1.0, -caster.foot)
-    tallest = np.float32(_TALLEST * caster.half_height)
+    tallest = np.float32(TALLEST * caster.half_height)
     for row in range(first_row, end_row):
         for column in range(first_column, end_column, _BLOCK):
             pixel = (row * width + column) & _INDEX
@@ -106,7 +104,7 @@ def _darken_by_limbs(camera: Any, buffers: Any, caster: Any, own: int, own_end: 
     across, upward, along = _sun_line(camera, caster, 0), _sun_line(camera, caster, 1), _sun_line(camera, caster, 2)
     line_a, line_b = _unit_line(camera, caster, 0), _unit_line(camera, caster, 1)
     height = _line(camera, 0.0, 0.0, 1.0, -caster.foot)
-    tallest = np.float32(_TALLEST * caster.half_height)
+    tallest = np.float32(TALLEST * caster.half_height)
     for row in range(caster.first_row, caster.end_row):
         for column in range(first_column, end_column, _BLOCK):
             pixel = (row * width + column) & _INDEX
