@@ -344,7 +344,7 @@ def test_joint_poses_are_those_that_were_drawn(path: Path) -> None:
         p, posed = sim.state.people, people.at(step)
         assert posed.entity.tolist() == p.entity.tolist()
         after = Transition(p.clip_before, p.phase_before, p.pace_before, p.clip_time)
-        style = renderer._style  # type: ignore[attr-defined]
+        style = renderer._people.style  # type: ignore[attr-defined]
         rotations, offsets = pose(p.clip, p.phase, p.pace, style, second=sim.state.second, after=after)
         assert posed.rotations.shape == (len(p), 55, 3)
         assert np.abs(posed.rotations - rotations).max() < 0.01

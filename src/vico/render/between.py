@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.render.scene import Scene
-from vico.render.sensors.past import PlacedInstances, matched, placement_of
+from vico.render.sensors.past import PlacedInstances, as_before, matched, placement_of, vertices_before
 
 #: What is farther from where it was than this has not moved, but come or gone through a door; metres.
 LEAP = 4.0
@@ -67,19 +67,18 @@ def show_between(before: SceneMoment, after: SceneMoment, share: float) -> Scene
         moves = known & ~leaps
         matrix[moves] = between(start[moves], b.matrix[moves], share)
     _set_rigid(scene, b, matrix)
-    if len(a.x) == len(b.x) and np.array_equal(a.owner, b.owner) and len(b.x):
-        old, new = np.stack([a.x, a.y, a.z], axis=1), np.stack([b.x, b.y, b.z], axis=1)
+    if len(b.x):
+        was, new = vertices_before(a, b), np.stack([b.x, b.y, b.z], axis=1)
+        old = as_before(np.stack([a.x, a.y, a.z], axis=1), new, was)
         starts = b.owner[:, 1] - b.owner[0, 1]
         counts = np.diff([*starts.tolist(), len(new)])
         leap = np.abs(new[starts] - old[starts]).max(axis=1) > LEAP
         part = np.repeat(np.where(leap, 0.0, share), counts)[:, None].astype(np.float32)
-        normals = before.normals + part * (after.normals - before.normals)
+        normals = as_before(before.normals, after.normals, was)
         limbs = after.limbs
-        if len(before.limbs) == len(limbs) == len(leap):
+        if len(before.limbs) == len(limbs) == len(leap) and np.array_equal(a.owner[:, 0], b.owner[:, 0]):
             limbs = before.limbs + np.where(leap, 0.0, share)[:, None, None] * (limbs - before.limbs)
-        scene.repose(old + part * (new - old), normals, limbs)
-    else:
-        scene.repose(np.stack([b.x, b.y, b.z], axis=1), after.normals, after.limbs)
+        scene.repose(old + part * (new - old), normals + part * (after.normals - normals), limbs)
     return scene
 
 

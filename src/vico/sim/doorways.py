@@ -133,6 +133,8 @@ def _go_out(i: int, number: int, state: SimulationState) -> None:
         return
     assert place.entrance is not None
     take_umbrella(i, state)
+    if number == state.homes[i]:
+        p.clothes[i] = state.weather_to_dress_for()
     put_outdoors(i, spot, state.entrances[place.entrance].facing, state)
     p.door[i] = number
     state.events.add("exit", p.names[i], f"leaves {place.name}", p.position[i], place=place.id)

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from datetime import date
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from vico.rules import TRAM_SECTIONS
 from vico.seeds import rng
 from vico.sim import spawn, systems
@@ -75,6 +77,10 @@ def initial_state(
     for i in range(len(residents), len(people)):
         spawn.place_anywhere(i, state, rng(config.seed, "spawn", people.names[i]))
     take_umbrella(slice(None), state)
+    state.homes = np.full(len(people), -1, np.int32)
+    state.homes[: len(residents)] = [base.place_index.get(resident.home, -1) for resident in residents]
+    state.clothes_at_start = state.weather_to_dress_for()
+    people.clothes[:] = state.clothes_at_start
     return state
 
 

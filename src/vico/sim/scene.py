@@ -5,49 +5,42 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import date
-from functools import partial
-from pathlib import Path
 from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.models.in_hand import in_hand_models
-from vico.assets.people import Appearance, SkinnedBody, body_of
+from vico.assets.people import Appearance
 from vico.community.model import Resident
-from vico.errors import InputError
 from vico.render import Cameras, Lighting, Scene, render
 from vico.render.lighting import SHADOW_STEP
 from vico.render.limbs import LIMBS
 from vico.render.quality import RenderQuality
 from vico.render.sensors.batch import PictureSet, Viewers
 from vico.render.sensors.lens import Lens
-from vico.render.skinning import BodyBatch, batch_bodies, skin
+from vico.render.skinning import skin
 from vico.render.world_scene import scene_of
-from vico.seeds import rng
 from vico.sim.animation import (
     LONGEST_BLEND,
-    STYLE,
     Hands,
     Transition,
     ground_under_feet,
     joint_places,
     pose,
-    style_of,
 )
 from vico.sim.config import SimConfig
-from vico.sim.detail import CROWD, Sights, far_from_all
+from vico.sim.detail import Sights, far_from_all
+from vico.sim.drawn_people import DrawnPeople
 from vico.sim.environment import Environment
 from vico.sim.eyes import SemanticClasses, lenses_by_entity
 from vico.sim.hands_scene import Holders, draw_in_hands, hands_of_agents, hands_of_pedestrians
-from vico.sim.holding import habit_of
 from vico.sim.observations import Views
-from vico.sim.passers_by import manner_of_pedestrian, pedestrian_motion
+from vico.sim.passers_by import pedestrian_motion
 from vico.sim.room_lamps import RoomLamps
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture, Vehicle
 from vico.sim.window_lights import WindowLights
-from vico.threads import in_order
 from vico.world.folder import World
 from vico.world.mesh import Surface
 
@@ -170,51 +163,9 @@ class SceneRenderer:
         )
         self._lenses = lenses_by_entity(sim.state, sim.config)
         self._usual_lens = Lens.of({}, side=sim.config.image)
-        self._load_bodies(sim)
-
-    def _load_bodies(self, sim: RenderedSimulation) -> None:
-        """Make everybody's body and what tells their movements apart."""
-        state = sim.state
-        looks = list(sim.looks)
-        entities = state.people.entity.tolist()
-        walkers = state.traffic.walkers.entity.tolist() if state.traffic is not None else []
-        made = dict(
-            zip(
-                dict.fromkeys(looks), in_order(partial(body_of, detail=self._detail), dict.fromkeys(looks)), strict=True
-            )
-        )
-        bodies = [made[look] for look in looks]
-        for name, path in sim.config.worn.items():
-            from vico.assets.people.worn import worn  # few wear anything of their own
-
-            if name not in state.people.names:
-                people = ", ".join(state.people.names) or "none"
-                raise InputError(f"worn: nobody is called {name!r}; there are {people}")
-            k = state.people.names.index(name)
-            bodies[k] = worn(bodies[k], Path(path))
-        far = self._far_bodies(looks, bodies, set(sim.config.worn), state.people.names)
-        self._bodies: BodyBatch = batch_bodies([*bodies, *far], [*entities, *walkers] * (2 if far else 1))
-        names = [*state.people.names, *(manner_of_pedestrian(k) for k in range(len(walkers)))]
-        style = [
-            style_of(body, rng(sim.config.seed, "manner", name), age=look.age)
-            for body, name, look in zip(bodies, names, looks, strict=True)
-        ]
-        self._style = np.stack(style) if style else np.zeros(0, STYLE)
-        self._height = np.array([body.height for body in bodies], np.float64)
-        self._entities = np.array([*entities, *walkers], np.int32)
-        self._habit = np.array([habit_of(sim.config.seed, name) for name in names[len(entities) :]], np.float64)
-
-    def _far_bodies(
-        self, looks: Sequence[Appearance], near: Sequence[SkinnedBody], worn: set[str], names: Sequence[str]
-    ) -> list[SkinnedBody]:
-        """Make the bodies of a crowd as seen from far away; none for a few people, or where every detail is wanted."""
         # Flow tells where each vertex has been: bodies keep their shape there.
-        if self._detail == "full" or len(looks) < CROWD or "flow" in self._viewers.outputs:
-            return []
-        kinds = list(dict.fromkeys(looks))
-        made = dict(zip(kinds, in_order(partial(body_of, detail="far"), kinds), strict=True))
-        own = {k for k, name in enumerate(names) if name in worn}
-        return [near[k] if k in own else made[look] for k, look in enumerate(looks)]
+        far = self._detail == "light" and "flow" not in self._viewers.outputs
+        self._people = DrawnPeople(sim, detail=self._detail, far=far)
 
     def render(self, state: SimulationState, poses: NDArray[np.float64], own: NDArray[np.int32]) -> Views:
         """Begin to render one view for each pose in one call; see `ObservationRenderer.render`."""
@@ -281,11 +232,12 @@ class SceneRenderer:
             self._scene, self._lit = scene_of(self._sim.world, prototypes=_shapes(self._sim)), ()
             self._viewers.scene = self._scene
             self._set_light(state)
-        motion, bodies = self._motion(state), self._bodies
+        self._people.follow(state)
+        motion, bodies = self._motion(state), self._people.batch
         people = len(motion.clip)
         far = np.zeros(people, np.bool_)
         if sights is not None and len(bodies) > people:
-            far = far_from_all(sights, motion.position, self._height)
+            far = far_from_all(sights, motion.position, self._people.height)
         rotations, offsets = self._poses(motion, state.second, roughly=far)
         drawn = np.flatnonzero(np.concatenate([~far, far])[: len(bodies)])
         limbs = np.empty((len(bodies), len(LIMBS), 7), np.float32)
@@ -311,7 +263,12 @@ class SceneRenderer:
     def _holders(self, motion: _Motion, rotations: NDArray[np.float32], offsets: NDArray[np.float32]) -> Holders:
         place = motion.position, motion.yaw, motion.clip, motion.phase, motion.hands
         return Holders(
-            self._bodies.joints[: len(motion.clip)], rotations, offsets, *place, self._height, self._entities
+            self._people.batch.joints[: len(motion.clip)],
+            rotations,
+            offsets,
+            *place,
+            self._people.height,
+            self._people.entities,
         )
 
     @property
@@ -328,7 +285,7 @@ class SceneRenderer:
         """Return how everybody moves, and where their joints are, body frame, metres, shape ``(n, 55, 3)``."""
         motion = self._motion(state)
         rotations, offsets = self._poses(motion, state.second)
-        return motion, joint_places(self._bodies.joints[: len(motion.clip)], rotations, offsets)
+        return motion, joint_places(self._people.batch.joints[: len(motion.clip)], rotations, offsets)
 
     def _poses(
         self, motion: _Motion, second: float, *, roughly: NDArray[np.bool_] | None = None
@@ -343,7 +300,7 @@ class SceneRenderer:
             )
         )
         after = after._replace(ground=now if before is None else before)
-        moves = motion.clip, motion.phase, motion.speed, self._style
+        moves = motion.clip, motion.phase, motion.speed, self._people.style
         return pose(*moves, second=second, after=after, ground=now, hands=motion.hands)
 
     def _ground(
@@ -355,14 +312,14 @@ class SceneRenderer:
     ) -> NDArray[np.float64]:
         """Return the ground under everybody's feet in a motion: clip, phase and speed."""
         place = motion.position, motion.yaw
-        ground = ground_under_feet(*course, self._style, place, self._sim.world.height.near, roughly=roughly)
+        ground = ground_under_feet(*course, self._people.style, place, self._sim.world.height.near, roughly=roughly)
         ground[~motion.on_ground] = 0.0
         indoor = self._sim.state.indoor
         for k in np.flatnonzero(indoor.treads_under(motion.room) > 0):
             clip, phase, speed = (part[k : k + 1] for part in course)
             here = motion.position[k : k + 1], motion.yaw[k : k + 1]
             treads = indoor.rooms[int(motion.room[k])].treads_at
-            ground[k] = ground_under_feet(clip, phase, speed, self._style[k : k + 1], here, treads)[0]
+            ground[k] = ground_under_feet(clip, phase, speed, self._people.style[k : k + 1], here, treads)[0]
         # From high seats feet hang; a step is there for them on stools.
         ground[~motion.on_ground, :, :, 0] -= np.clip(rise[~motion.on_ground], -_FEET_RISE, _FEET_HANG)[:, None, None]
         return ground
@@ -372,11 +329,11 @@ class SceneRenderer:
         assert state.traffic is not None
         walkers = state.traffic.walkers
         gait = state.traffic.gait
-        clip, phase, pace, after = pedestrian_motion(gait, self._height[len(state.people) :], state.second)
+        clip, phase, pace, after = pedestrian_motion(gait, self._people.height[len(state.people) :], state.second)
         on_ground = gait.afoot
         still, outdoors = np.zeros(len(clip)), np.full(len(clip), -1, np.int32)
         after = after._replace(moved=np.zeros((len(clip), 4)), over_ground=pace)
-        hands = hands_of_pedestrians(self._habit, state.environment.weather.rain)
+        hands = hands_of_pedestrians(self._people.habit, state.environment.weather.rain)
         hands.share[~on_ground] = 0.0
         return _Motion(
             clip, phase, pace, after, walkers.position, walkers.yaw, on_ground, outdoors, still, still, hands

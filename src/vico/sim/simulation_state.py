@@ -147,6 +147,10 @@ class SimulationState:
         Who stands in line at tills.
     openings
         When places are open; None in a run that does not ask.
+    homes
+        Index of the place that each person lives in, -1 for none, int32, shape ``(n,)``. Not part of the state.
+    clothes_at_start
+        Weather that everybody has dressed for at the start, as `People.clothes`, shape ``(3,)``. Not part of the state.
     entities
         Kind and name of every body of the run by entity number, and the agent's name of those that have one.
     shapes
@@ -168,6 +172,8 @@ class SimulationState:
     transit: TransitSystem | None = None
     robots: RobotSystem | None = None
     openings: OpeningHours | None = None
+    homes: NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, np.int32))
+    clothes_at_start: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     lines: Lines = field(default_factory=lambda: Lines.of(0))
     tick: int = 0
     entities: dict[int, dict[str, str]] = field(default_factory=dict)
@@ -296,6 +302,11 @@ class SimulationState:
             {"to": "outside" if d.to < 0 else rooms[d.to].id, "position": list(d.position)}
             for d in self.indoor.doors[room]
         ]
+
+    def weather_to_dress_for(self) -> NDArray[np.float64]:
+        """Return what it is like outdoors now, as `People.clothes`, shape ``(3,)``."""
+        weather = self.environment.weather
+        return np.array([weather.temperature, weather.rain, weather.snow])
 
     def is_locked_out(self, i: int, place: str) -> bool:
         """Return whether a place is shut now to person `i`, by its hours."""

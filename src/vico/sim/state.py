@@ -154,6 +154,8 @@ class People(ArrayState):
         0..1, float64; shape ``(n,)``.
     umbrella, umbrella_habit
         Whether one has an umbrella along, bool, and how little one minds rain, 0..1, float64; shape ``(n,)``.
+    clothes
+        Weather that one has dressed for: degrees Celsius, rain and snow in mm/h, float64, shape ``(n, 3)``.
     held
         Entities in the left and right hand, 0 for none, int32, shape ``(n, 2)``.
     cash
@@ -206,6 +208,7 @@ class People(ArrayState):
     hold_share: NDArray[np.float64]
     umbrella: NDArray[np.bool_]
     umbrella_habit: NDArray[np.float64]
+    clothes: NDArray[np.float64]
     held: NDArray[np.int32]
     cash: NDArray[np.float64]
     owed: NDArray[np.float64]
@@ -255,6 +258,7 @@ class People(ArrayState):
             hold_share=np.zeros(n),
             umbrella=np.zeros(n, np.bool_),
             umbrella_habit=np.ones(n),
+            clothes=np.zeros((n, 3)),
             held=np.zeros((n, 2), np.int32),
             cash=np.zeros(n),
             owed=np.zeros(n),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ class PastPlaces(NamedTuple):
     known
         Whether each of them was there, bool, shape ``(n,)``.
     x, y, z
-        Vertices of the avatars, world metres, float32; none where they were others.
+        Vertices of the avatars, world metres, float32; of who was not there in the same shape, where they are now.
     eye
         Where the camera was, world metres, float64, shape ``(3,)``.
     """
@@ -88,9 +88,41 @@ def past_places(before: PlacedInstances, now: PlacedInstances, eye: NDArray[np.f
     """
     place, known = matched(before, now)
     matrix = before.matrix[place] if len(before.matrix) else now.matrix
-    same = len(before.x) == len(now.x) and np.array_equal(before.owner, now.owner)
-    x, y, z = (before.x, before.y, before.z) if same else (_NONE, _NONE, _NONE)
+    was = vertices_before(before, now)
+    x, y, z = (as_before(old, new, was) for old, new in zip(before[3:6], now[3:6], strict=True))
     return PastPlaces(np.ascontiguousarray(matrix), known, x, y, z, eye)
+
+
+def vertices_before(before: PlacedInstances, now: PlacedInstances) -> NDArray[np.int64] | None:
+    """Return which vertex of `before` each avatar's vertex of `now` was, -1 for other shapes'; None: all the same."""
+    if len(before.x) == len(now.x) and np.array_equal(before.owner, now.owner):
+        return None
+    spans = {entity: (start, count) for entity, start, count in _spans(before)}
+    was = np.full(len(now.x), -1, np.int64)
+    for entity, start, count in _spans(now):
+        then, as_many = spans.get(entity, (0, -1))
+        if as_many == count:
+            was[start : start + count] = np.arange(then, then + count)
+    return was
+
+
+def as_before(old: NDArray[Any], new: NDArray[Any], was: NDArray[np.int64] | None) -> NDArray[Any]:
+    """Return values of vertices as they were before, and as they are now where these were not there."""
+    if was is None:
+        return old
+    out = new.copy()
+    out[was >= 0] = old[was[was >= 0]]
+    return out
+
+
+def _spans(placement: PlacedInstances) -> list[tuple[int, int, int]]:
+    """Return entity, first vertex from the first avatar's on, and number of vertices of each avatar."""
+    if not len(placement.owner):
+        return []
+    entity, start = placement.owner[:, 0], placement.owner[:, 1] - placement.owner[:, 1].min()
+    order = np.argsort(start, kind="stable")
+    count = np.diff([*start[order].tolist(), len(placement.x)])
+    return list(zip(entity[order].tolist(), start[order].tolist(), count.tolist(), strict=True))
 
 
 def matched(before: PlacedInstances, now: PlacedInstances) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
