@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +23,7 @@ from vico.agents.travel import Traveller
 from vico.assets.shapes import box
 from vico.clock import DAY, clock_of
 from vico.community import Community, build_community
-from vico.render.film import FilmWriter
+from vico.render.film import FilmWriter, read_film, write_film
 from vico.runner.faults import FaultLog
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Hook, Runner, Step
@@ -42,6 +42,8 @@ from vico.world.walkable import CROSSING, ROADWAY
 RATE = 25
 ROBOTS = ("manipulator", "husky", "go2", "h1", "drone")
 PASSENGERS, ROAD = 6, (CROSSING, ROADWAY)
+SEARCH = 180  # seconds of a walk of which the best part is shown
+CAMERA = 4.2  # metres that a camera may be away
 PARCEL = (0.12, 0.18, 0.2)
 AUTUMN = {"date": "2026-10-20", "utc_offset": 3.0}
 
@@ -60,12 +62,14 @@ class Scene:
         What is written below it.
     start
         Second of the day at which its run begins.
-    follow, view
-        Who is seen, and from where (`vico.viewer.follow.VIEWS`).
+    follow, views
+        Who is seen, and from where (`vico.viewer.follow.VIEWS`): one shot each, equally long.
     seconds
         How long it is.
     begins
-        Whether it begins, asked in every second of the run.
+        Whether it may begin, asked in every second of the run.
+    search, worth
+        For how many seconds after that the best part is sought, and what makes a second worth seeing.
     config
         What its run has of its own.
     setup
@@ -77,28 +81,40 @@ class Scene:
     caption: str
     start: float
     follow: str
-    view: str = "behind"
+    views: tuple[str, ...] = ("behind",)
     seconds: int = 17
     begins: Callable[[Simulation], bool] = lambda sim: sim.metrics.steps >= 10
+    search: int = 0
+    worth: Callable[[Simulation], float] = lambda sim: 0.0
     config: dict = field(default_factory=dict)
     setup: Callable[[Simulation], None] = lambda sim: None
     players: dict = field(default_factory=dict)
 
 
 class UntilPlayed(Hook):
-    """Notes when a scene begins, and ends its run once it has been played; after an hour it gives up."""
+    """Notes what the seconds of a scene are worth, and ends its run once it has been played, or an hour has passed."""
 
     def __init__(self, scene: Scene, sim: Simulation) -> None:
-        self.scene, self.sim, self.first = scene, sim, -1
+        self.scene, self.sim, self.begun = scene, sim, -1
+        self.worth: list[float] = []
 
     def stepped(self, step: Step) -> None:
         """Look whether it begins or is over."""
-        if self.first < 0 and self.scene.begins(self.sim):
-            self.first = step.number
-        if self.first >= 0 and step.number >= self.first + self.scene.seconds:
+        if self.begun < 0 and self.scene.begins(self.sim):
+            self.begun = step.number
+        if self.begun < 0:
+            return
+        self.worth.append(self.scene.worth(self.sim))
+        if step.number >= self.begun + self.scene.search + self.scene.seconds:
             raise Enough
-        if step.number >= 3600:
-            raise SystemExit(f"the scene {self.scene.caption!r} did not come about within an hour")
+
+    @property
+    def first(self) -> int:
+        """Step at which the best part begins; -1 where the scene did not come about."""
+        if len(self.worth) <= self.scene.seconds:
+            return -1
+        sums = np.convolve(self.worth, np.ones(self.scene.seconds + 1), "valid")
+        return self.begun + int(np.argmax(sums))
 
 
 class Passenger:
@@ -144,9 +160,13 @@ class Crew:
         """Return a robot that is told what `order` says, once for each order."""
         return Robot(self, name, order)
 
-    def begins(self, sim: Simulation) -> bool:
+    def has_come(self) -> bool:
         """Whether the Husky has come."""
         return self.near(1, 1.5)
+
+    def begins(self, sim: Simulation) -> bool:
+        """Whether the parcel has been picked up."""
+        return self.holds()
 
     def near(self, robot: int, metres: float) -> bool:
         """Whether a robot is near the spot."""
@@ -168,7 +188,7 @@ class Crew:
 
     def manipulator(self) -> dict | None:
         """Wait for the Husky; pick the parcel up, and put it on the deck."""
-        if not self.begins(self.sim):
+        if not self.has_come():
             return None
         if not self.holds() and "place" not in self.sent.get("manipulator", ""):
             return {"type": "pick", "object": self.parcel}
@@ -236,7 +256,7 @@ def anybody(resident, stay: Stay) -> bool:
 
 
 def on_the_way(community: Community, world: World, early: str, late: str, wanted: Callable) -> tuple[str, Stay]:
-    """Return who has the longest walk that begins between two hours, and to which stay."""
+    """Return who has the longest walk that begins between two hours, and to which stay; best to where others are."""
     first, last = (int(hour[:2]) * 3600 + int(hour[3:]) * 60 for hour in (early, late))
     found = []
     for resident in community.residents:
@@ -248,6 +268,30 @@ def on_the_way(community: Community, world: World, early: str, late: str, wanted
         raise SystemExit(f"nobody of the community is on such a way between {early} and {late}; take more residents")
     _, name, stay = max(found, key=lambda one: (one[0], one[1]))
     return name, stay
+
+
+def liveliness(name: str) -> Callable[[Simulation], float]:
+    """Return how much goes on around somebody outdoors: who moves near by, with room for a camera before and behind."""
+
+    def worth(sim: Simulation) -> float:
+        people, bodies = sim.state.people, sim.state.obstacles()
+        i = people.names.index(name)
+        if people.room[i] >= 0 or people.vehicle[i] != 0:
+            return -20.0
+        offset = (bodies.position[:, :2] - people.position[i, :2])[bodies.entity != people.entity[i]]
+        moves = np.hypot(*bodies.velocity.T)[bodies.entity != people.entity[i]] > 0.3
+        away = np.hypot(*offset.T)
+        lively = float((moves / (1.0 + away / 8.0))[away < 40.0].sum())
+        heading = np.array([math.cos(people.yaw[i]), math.sin(people.yaw[i])])
+        # Nobody is to walk through the camera, or to stand between it and whom it follows.
+        for side in (-1.0, 1.0):
+            along = np.clip(side * (offset @ heading), 0.8, CAMERA)
+            near = np.hypot(*(offset - side * along[:, None] * heading).T)
+            lively -= 1.5 * float(np.clip(1.2 - near, 0.0, 0.6).sum())
+        walks = float(np.hypot(*people.velocity[i])) > 0.5
+        return lively if walks else lively - 2.0
+
+    return worth
 
 
 def outdoors(name: str, seconds: int) -> Callable[[Simulation], bool]:
@@ -297,12 +341,17 @@ class Casting:
     community: Community
     seed: int
 
-    def walk(self, early: str, late: str, caption: str, wanted=anybody, *, view="behind", after=6, **config) -> Scene:
+    def walk(
+        self, early: str, late: str, caption: str, wanted=anybody, *, views=("front", "behind"), after=6, **config
+    ) -> Scene:
         """Return a scene of somebody on the way."""
         name, stay = on_the_way(self.community, self.world, early, late, wanted)
         called = next(one.name for one in self.community.residents if one.id == name)
         start = stay.leave - 20
-        return Scene(caption.format(called), start, name, view, begins=outdoors(name, after), config=config)
+        begins, worth = outdoors(name, after), liveliness(name)
+        return Scene(
+            caption.format(called), start, name, views, begins=begins, search=SEARCH, worth=worth, config=config
+        )
 
     def street(self) -> Scene:
         """Return the morning."""
@@ -323,13 +372,15 @@ class Casting:
             sim.state.people.cash[-PASSENGERS:] = 20.0
 
         config, last = {"assistants": PASSENGERS}, f"assistant_{PASSENGERS - 1}"
-        return Scene("In the bus", 9 * 3600, last, "eyes", 17, in_a_moving_bus, config, setup, riders)
+        return Scene(
+            "In the bus", 9 * 3600, last, ("eyes",), begins=in_a_moving_bus, config=config, setup=setup, players=riders
+        )
 
     def shop(self) -> Scene:
         """Return somebody who shops."""
         scene = self.walk("08:00", "20:00", "{} shops", shops)
         _, stay = on_the_way(self.community, self.world, "08:00", "20:00", shops)
-        return replace(scene, begins=arrived(scene.follow, stay.place), seconds=16)
+        return replace(scene, views=("behind",), begins=arrived(scene.follow, stay.place), search=0)
 
     def robots(self) -> Scene:
         """Return the crew at work, on the square of the world with the most room."""
@@ -344,7 +395,15 @@ class Casting:
         places = {name: (middle[0] + x, middle[1] + y, yaw) for name, (x, y, yaw) in around.items()}
         config = {"robots": ROBOTS, "robot_places": places}
         return Scene(
-            "Robots at work", 11 * 3600, "robot_0", "orbit", 22, config=config, setup=crew.setup, players=crew.players()
+            "Robots at work",
+            11 * 3600,
+            "robot_0",
+            ("orbit",),
+            20,
+            crew.begins,
+            config=config,
+            setup=crew.setup,
+            players=crew.players(),
         )
 
     def rain(self) -> Scene:
@@ -361,7 +420,7 @@ SCENES = ("street", "school", "bus", "shop", "robots", "rain", "night")
 
 def play(scene: Scene, out: Path, world: World, community: Community, seed: int) -> tuple[RepeatedRun, int]:
     """Simulate and record a scene; return it, and the step at which it begins."""
-    options = {"cars": 40, "pedestrians": 80, "junctions": "signals", **scene.config}
+    options = {"cars": 80, "pedestrians": 200, "junctions": "signals", **scene.config}
     config = SimConfig(seed=seed, start=int(scene.start) % DAY, observe=(), **options)
     sim = Simulation(world, community, config)
     scene.setup(sim)
@@ -372,15 +431,28 @@ def play(scene: Scene, out: Path, world: World, community: Community, seed: int)
         with suppress(Enough):
             Runner(sim, agents, hooks=[RecordedRun(recorder, faults), played], faults=faults).run(3600)
         recorder.close()
+    if played.first < 0:
+        raise SystemExit(f"{scene.caption!r} did not come about within an hour; take another seed, or more residents")
     return RepeatedRun(read_run(out), world, community, setup=scene.setup), played.first
 
 
-def captioned(frames: Iterator[np.ndarray], scene: Scene, second: float) -> Iterator[np.ndarray]:
+def shots(repeated: RepeatedRun, scene: Scene, first: int, options: argparse.Namespace) -> Iterator[np.ndarray]:
+    """Yield the frames of a scene, one shot after the other."""
+    width, height = (int(side) for side in options.size.split("x"))
+    cuts = np.linspace(first, first + scene.seconds, len(scene.views) + 1).round().astype(int).tolist()
+    for view, (begin, end) in zip(scene.views, pairwise(cuts), strict=True):
+        settings = FilmSettings(
+            follow=scene.follow, view=view, width=width, height=height, rate=options.rate, samples=options.samples
+        )
+        yield from film_frames(repeated, settings, first=begin, last=end)
+
+
+def captioned(frames: Iterator[np.ndarray], scene: Scene, second: float, rate: int) -> Iterator[np.ndarray]:
     """Write what is seen, and when, into the lower left corner."""
     for number, frame in enumerate(frames):
         picture = Image.fromarray(frame)
         draw, height = ImageDraw.Draw(picture), frame.shape[0]
-        text = f"{clock_of(int(second + number / RATE) % DAY)[:5]}   {scene.caption}"
+        text = f"{clock_of(int(second + number / rate) % DAY)[:5]}   {scene.caption}"
         draw.text(
             (height // 24, height - height // 12), text, (255, 255, 255), ImageFont.load_default(height // 26),
             stroke_width=max(height // 360, 1), stroke_fill=(0, 0, 0),
@@ -395,6 +467,7 @@ def main() -> None:
     parser.add_argument("--residents", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--size", default="1280x720")
+    parser.add_argument("--rate", type=int, default=RATE, help="frames a second")
     parser.add_argument("--samples", type=int, default=2, help="rays a pixel, along each side")
     parser.add_argument("--scenes", default=",".join(SCENES), help="which, separated by commas")
     arguments = parser.parse_args()
@@ -402,20 +475,25 @@ def main() -> None:
     world = read_world(arguments.world)
     community = build_community(world, residents=arguments.residents, seed=arguments.seed)
     casting = Casting(world, community, arguments.seed)
-    width, height = (int(side) for side in arguments.size.split("x"))
     arguments.out.mkdir(parents=True, exist_ok=True)
-    with FilmWriter(arguments.out / "film.mp4", rate=RATE, crf=20, threads=2) as film:
-        for name in arguments.scenes.split(","):
-            scene = getattr(casting, name)()
-            repeated, first = play(scene, arguments.out / name, world, community, arguments.seed)
-            settings = FilmSettings(
-                follow=scene.follow, view=scene.view, width=width, height=height, rate=RATE, samples=arguments.samples
-            )
-            frames = film_frames(repeated, settings, first=first, last=repeated.run.last)
-            for frame in captioned(frames, scene, float(repeated.run.times[first])):
+    names = arguments.scenes.split(",")
+    for name in names:
+        if (arguments.out / f"{name}.mp4").exists():
+            print(f"{name}: is there already, and kept", flush=True)
+            continue
+        scene = getattr(casting, name)()
+        repeated, first = play(scene, arguments.out / name, world, community, arguments.seed)
+        with FilmWriter(arguments.out / f"{name}.mp4", rate=arguments.rate, crf=18, threads=2) as film:
+            for frame in captioned(
+                shots(repeated, scene, first, arguments), scene, float(repeated.run.times[first]), arguments.rate
+            ):
                 film.add(frame)
-            print(f"{name}: {scene.caption}, from step {first} of {arguments.out / name}", flush=True)
-    print(f"{arguments.out / 'film.mp4'}: {film.frames / RATE:.0f} s")
+        print(f"{name}: {scene.caption}, from step {first} of {arguments.out / name}", flush=True)
+    parts = [arguments.out / f"{name}.mp4" for name in names]
+    count = write_film(
+        arguments.out / "film.mp4", chain.from_iterable(map(read_film, parts)), rate=arguments.rate, crf=20
+    )
+    print(f"{arguments.out / 'film.mp4'}: {count / arguments.rate:.0f} s")
 
 
 if __name__ == "__main__":

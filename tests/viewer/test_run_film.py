@@ -125,7 +125,7 @@ def test_things_and_bodies_go_half_way_and_what_leaps_waits() -> None:
     assert scene.moment == 0.25
 
 
-@pytest.mark.parametrize("view", ["behind", "side", "above", "orbit"])
+@pytest.mark.parametrize("view", ["behind", "front", "side", "above", "orbit"])
 def test_the_camera_follows_smoothly_and_stays_before_walls(view: str) -> None:
     """Along a street 5 m wide whose walls are nearer than the camera would like to be, round a corner."""
     scene = Scene(joined([box((80, 1, 8), (0, 3, 4)), box((80, 1, 8), (0, -3, 4)), box((80, 80, 1), (0, 0, -0.5))]))

@@ -298,7 +298,7 @@ class FilmOptions:
     start: str = ""
     stop: str = ""
     fps: int = 25
-    view: Literal["behind", "eyes", "above", "side", "orbit"] = "behind"
+    view: Literal["behind", "front", "eyes", "above", "side", "orbit"] = "behind"
     samples: int = 2
     quality: Literal["plain", "fine"] = "fine"
     world: Path | None = None
@@ -338,7 +338,7 @@ class StillOptions:
     at: str = ""
     out: Path = Path("still.png")
     size: str = "1920x1080"
-    view: Literal["behind", "eyes", "above", "side", "orbit"] = "behind"
+    view: Literal["behind", "front", "eyes", "above", "side", "orbit"] = "behind"
     samples: int = 3
     quality: Literal["plain", "fine"] = "fine"
     world: Path | None = None

@@ -311,9 +311,10 @@ def _render_cached(
 
 def _mean_of_blocks(wide: NDArray[np.uint8], samples: int) -> NDArray[np.uint8]:
     """Return the mean of each square of `samples` pixels a side."""
-    height, width = wide.shape[0] // samples, wide.shape[1] // samples
-    blocks = wide.reshape(height, samples, width, samples, 3).astype(np.float32)
-    return np.round(blocks.mean(axis=(1, 3))).astype(np.uint8)
+    total = np.zeros((wide.shape[0] // samples, wide.shape[1] // samples, 3), np.uint32)
+    for k in range(samples * samples):
+        total += wide[k // samples :: samples, k % samples :: samples]
+    return np.round(total / np.float32(samples * samples)).astype(np.uint8)
 
 
 def render_top_down(scene: Scene, half: float, pixels: int, *, samples: int = 2) -> NDArray[np.uint8]:

@@ -18,10 +18,16 @@ from vico.sim.moves import eye_height
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Vehicle
 
-VIEWS = ("behind", "eyes", "above", "side", "orbit")
+VIEWS = ("behind", "front", "eyes", "above", "side", "orbit")
 
 # Where the camera is from what it looks at: metres back along the heading, degrees round it (0 is behind), degrees up.
-_PLACES = {"behind": (3.6, 0.0, 16.0), "side": (3.6, 80.0, 8.0), "above": (15.0, 0.0, 62.0), "orbit": (4.5, 0.0, 15.0)}
+_PLACES = {
+    "behind": (3.6, 0.0, 16.0),
+    "front": (3.4, 165.0, 4.0),
+    "side": (3.6, 80.0, 8.0),
+    "above": (15.0, 0.0, 62.0),
+    "orbit": (4.5, 0.0, 15.0),
+}
 _ORBIT = math.radians(14.0)  # a second
 # How far back for those who ride, as a multiple.
 _RIDING = {Vehicle.NONE: 1.0, Vehicle.BIKE: 1.3, Vehicle.BUS: 3.6}
