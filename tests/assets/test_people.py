@@ -165,6 +165,22 @@ def test_cut_hair_stays_on_the_neck(source: str) -> None:
         assert away.max() < 0.035
 
 
+@pytest.mark.skipif(not anny.available(), reason="no baked bodies: vico assets install people")
+@pytest.mark.parametrize("fine", [True, False])
+def test_skin_lies_deep_under_a_top(fine: bool) -> None:
+    """Where shoulders bend, the cloth and the skin under it part ways by up to a centimetre."""
+    look = Appearance(top="jumper", top_colour=(0, 255, 0), skin=(220, 150, 110))
+    body = anny.body(look, fine=fine)
+    cloth = (body.colour == look.top_colour).all(axis=1)
+    low = body.vertices[:, 2] < body.joints[J["neck"], 2] - 0.1
+    skin = low & (body.colour == look.skin).all(axis=1) & (np.abs(body.vertices[:, 1]) < 0.2)
+    apart = body.vertices[skin][:, None] - body.vertices[cloth][None]
+    nearest = np.argmin((apart**2).sum(axis=2), axis=1)
+    depth = -(apart[np.arange(len(nearest)), nearest] * body.normals[cloth][nearest]).sum(axis=1)
+    assert len(depth) > 10
+    assert depth.min() > 0.012
+
+
 def test_people_dress_for_the_weather() -> None:
     summer = Appearance(top="t-shirt", bottom="shorts", shoes="sandals")
     snow = dressed(summer, -5.0, snow=1.0)

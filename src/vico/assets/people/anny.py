@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from vico.assets.people.accessories import worn_parts
 from vico.assets.people.bake import AGES, ANCESTRIES, GENDERS, LEVELS, TARGETS, VERSION
@@ -34,6 +35,8 @@ _TOPS: dict[str, tuple[float, float]] = {
     "suit": (0.012, 0.005),
     "coat": (0.019, 0.006),
 }
+# Metres that skin under a top is pulled in.
+_TUCKED = 0.015
 _BOTTOMS: dict[str, tuple[float, float]] = {
     "trousers": (0.006, 0.020),
     "jeans": (0.004, 0.010),
@@ -203,6 +206,7 @@ def _upper(fit: _Fitting) -> list[BodyPart]:
     name = "tee" if look.top in ("t-shirt", "dress") else "top"
     if name == "tee":
         parts.append(fit.piece("arms", look.skin))
+        _tuck_in(parts[-1], fit)
     rows = fit.wardrobe[f"rows.{name}"]
     hem = 1 - np.clip((fit.points[rows, 2] - fit.joints[J["pelvis"], 2] + 0.1) / 0.25, 0, 1)
     top = fit.cloth(name, look.top_colour, near + far * hem, soft=2 if near > 0.008 else 1)
@@ -212,6 +216,17 @@ def _upper(fit: _Fitting) -> list[BodyPart]:
     front = merged([top, *parts[2:]]) if len(parts) > 2 else top
     collar = float(top.vertices[(top.vertices[:, 0] > 0) & (np.abs(top.vertices[:, 1]) < 0.03), 2].max())
     return parts + front_of(look, front, lambda share: share * look.height, collar / look.height)
+
+
+def _tuck_in(skin: BodyPart, fit: _Fitting) -> None:
+    """Pull skin that lies under the top, off its open edges, further in: else it comes through where joints bend."""
+    name = "tee" if fit.look.top in ("t-shirt", "dress") else "top"
+    place = fit.points[fit.wardrobe[f"rows.{name}"]]
+    from_edge = cKDTree(place[np.unique(_edges(fit.path, name))]).query(skin.vertices)[0]
+    from_top = cKDTree(place).query(skin.vertices)[0]
+    covered = (from_top < 0.6 * from_edge) & (from_top < 0.04)
+    depth = np.where(covered, _TUCKED * np.clip((from_edge - 0.02) / 0.03, 0.0, 1.0), 0.0)
+    skin.vertices = skin.vertices - depth[:, None] * skin.normals
 
 
 def _feet(fit: _Fitting) -> list[BodyPart]:
@@ -229,6 +244,7 @@ def _feet(fit: _Fitting) -> list[BodyPart]:
 def _head(fit: _Fitting) -> list[BodyPart]:
     look, fine = fit.look, fit.fine
     head = fit.piece("head", look.skin)
+    _tuck_in(head, fit)
     rows = fit.wardrobe[f"rows.{fit.name('head')}"]
     from_mouth = fit.wardrobe["typical"][rows].astype(np.float64) - fit.wardrobe["mouth"]
     eyes = fit.piece("eyes", (232, 228, 224))
