@@ -144,6 +144,7 @@ class Traffic:
         self._vehicle_height = np.concatenate([height_of_motor, np.full(cyclists, HEIGHT)])
         #: Metres that each cyclist has ridden.
         self.ridden = np.zeros(cyclists)
+        self._riding_speed = self.fleet.target_speed[ridden].copy()
         self._dry_acceleration, self._dry_braking = self.fleet.acceleration.copy(), self.fleet.hard_braking.copy()
         self._bodies: Bodies | None = None  # as they stand since they last moved; asked for by everybody
         self._walkers = new_pedestrians(pedestrians, seed)
@@ -346,6 +347,7 @@ class Traffic:
         np.minimum(self._dry_braking, conditions.hard_braking, out=fleet.hard_braking)
         fleet.time_gap = TIME_GAP * conditions.time_gap
         self._walking_pace = conditions.walking
+        fleet.target_speed[self.vehicles - self.cyclists :] = self._riding_speed * conditions.cycling
 
     def set_shut(self, lanes: NDArray[np.bool_] | None, walkways: NDArray[np.bool_] | None) -> None:
         """Have cars keep off some lanes and pedestrians off some walkways: part of the environment's state.
@@ -392,6 +394,11 @@ class Traffic:
     def signals_shown(self) -> SignalsShown | None:
         """Return what all signals show now; None where they are not obeyed."""
         return None if self.signals is None else self.signals.shown(self._net, self.paths)
+
+    @property
+    def lane_lights(self) -> NDArray[np.uint8]:
+        """What the signal of each lane shows now: DARK, GREEN, AMBER or RED, shape ``(lanes,)``."""
+        return np.asarray(self._net.lanes["light"], np.uint8)
 
     def drop_shut_plans(self) -> None:
         """Have cars plan anew that were about to drive where it is shut since."""
@@ -564,7 +571,7 @@ class Traffic:
         afoot = ~cycling
         afoot[riding] = False
         return PedestrianGaits(
-            np.concatenate([walkers.preferred_speed, self.fleet.target_speed[self.vehicles - n :]]),
+            np.concatenate([walkers.preferred_speed, self._riding_speed]),
             np.concatenate([walked, self.ridden]),
             np.concatenate([walkers.gait_time, np.full(n, GAIT_TIME)]),
             np.concatenate([walkers.stand_kind, np.zeros(n, np.uint8)]),

@@ -2,7 +2,8 @@
 
 A tram is where its front is along its track; its sections stand on the track behind it. It never moves into anybody:
 what is in its way ahead, or is about to be, it brakes for, and stands before it. Where tracks cross or meet one tram at
-a time is let in (`vico.sim.transit.tram_zones`).
+a time is let in (`vico.sim.transit.tram_zones`); where signals are obeyed, trams obey those of the lanes beside them
+(`vico.sim.transit.tram_signals`).
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from vico.sim.bodies import TRAM, Bodies, Drawn
 from vico.sim.traffic import Traffic
 from vico.sim.transit.doors import DOOR_TIME, leaf_transforms, moved_doors
 from vico.sim.transit.tram_outlines import first_taken, inside_city, nobody, outlines, packed, spots_near, stand
+from vico.sim.transit.tram_signals import TramSignal, metres_to_signal, signals_of
 from vico.sim.transit.tram_zones import zones_of
 from vico.world.mesh import Surface
 from vico.world.model import TramLine
@@ -93,6 +95,8 @@ class Trams:
         ]
         zones, count = zones_of(self.tracks)
         self._zones = zones
+        obeys = traffic.signals is not None
+        self._signals: list[list[TramSignal]] = signals_of(self.tracks, traffic.lanes) if obeys else [[] for _ in lines]
         slots = [min(math.ceil((line.travel[-1] + 240.0) / _headway(line)) + 1, 8) for line in lines]
         self.line_of = np.repeat(np.arange(len(lines)), slots).astype(np.int32)
         n = len(self.line_of)
@@ -179,6 +183,9 @@ class Trams:
         wanted = max(min(target, track.length) - front, 0.0) / max(left - 6.0, 1.0)
         limit = min(limit, max(wanted * 1.1, _SLOW))
         free = min(self._gap(tram, front, _LOOK), self._zone_ahead(tram, number, front))
+        if self._signals[number]:
+            speed_now, light = float(self.speed[tram]), self._traffic.lane_lights
+            free = min(free, metres_to_signal(self._signals[number], front, speed_now, light))
         if not ends:
             limit = min(limit, math.sqrt(2 * TRAM_BRAKING * max(target - front, 0.0)) + 0.15)
         limit = min(limit, math.sqrt(2 * TRAM_BRAKING * max(free, 0.0)))
