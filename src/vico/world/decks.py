@@ -1,7 +1,8 @@
 """Surfaces above and below the ground that people and vehicles use: decks of bridges over streets, tunnels.
 
 The ground has one height at a point. Where a bridge passes over a street, or a tunnel under a hill, there is a second
-surface, and a body is on whichever is nearest to it in height: so it stays on the one it came by.
+surface, and a body is on whichever is nearest to it in height: so it stays on the one it came by. Where a tunnel begins
+the ground is cut open down to its floor.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from numpy.typing import NDArray
 from vico.io.compiled import compiled
 
 HEADROOM = 2.0
-"""Metres between the ground and a deck above it under which nobody can be: there the deck is all there is."""
+"""Metres between the ground and a deck above it, or the floor of a cut below it, where that is all there is: nobody can
+be under such a deck, or above such a floor."""
 
 _ENDS = 0.5  # metres that a deck goes on beyond its ends, so that no gap is left in bends and at joints
 
@@ -114,8 +116,10 @@ def _nearest_surface(strips, places, ground):  # type: ignore[no-untyped-def]
                 height = points[m, 2] + t * (points[m + 1, 2] - points[m, 2])
                 if across > pavement[s]:
                     height += rise[s]
-                # Nobody is between the ground and a deck that lies low above it.
+                # Nobody is between the ground and a deck that lies low above it, nor above the floor of an open cut.
                 away = 0.0 if 0.0 <= height - low < HEADROOM and pz < height else abs(pz - height)
+                if 0.0 < low - height < HEADROOM and pz < low + HEADROOM:
+                    away = -1.0
                 if away < found or (away == found and height > best):
                     best, found = height, away
         ground[k] = best

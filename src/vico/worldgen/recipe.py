@@ -88,7 +88,7 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     built = run("buildings", buildings_from_plans, plans, site.osm, height, seed=seed)
     solids = stages.digested([*built.standing(height), *bridges.feet])
 
-    ways = run("ways", streets_from_osm, site, solids, bridges.usable)
+    ways = run("ways", streets_from_osm, site, solids, bridges.open_ways)
     roads = run("roads", roads_from_osm, site, ways)
     kerbs = CarriagewayEdges(streets.carriageway, solids)
     lanes = write.streets(roads, run("network", road_network, site, ways, levels, kerbs))
@@ -102,7 +102,7 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
         "objects",
         objects_from_osm,
         site.osm,
-        solids=solids,
+        solids=[*solids, *bridges.cuts],
         carriageway=streets.carriageway,
         openings=streets.footways(),
         height=height,
@@ -125,7 +125,7 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     write.parking(parking)
     outdoors = stages.digested(Objects.joined([outdoors, parking.cars]))
     write.outdoors(outdoors, dropped)
-    walkable = run("walkable", walkable_from_site, site, streets, [*solids, *bridges.low], outdoors)
+    walkable = run("walkable", walkable_from_site, site, streets, [*solids, *bridges.low, *bridges.cuts], outdoors)
     write.walkable(walkable)
 
     places, entrances, dropped = run(

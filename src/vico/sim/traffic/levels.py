@@ -1,14 +1,15 @@
-"""Where traffic is on two levels: how high everybody is, and who is in whose way above and below decks.
+"""Where traffic is on two levels: how high everybody is, and who is in whose way above and below decks, in tunnels.
 
-A body stays on the surface it came by, so its height is part of the state where a world has decks. Kernels compare
-extents in height that tell levels apart, but not the ups and downs of one street: whoever is on the ground has the
-extent above it; whoever is high on a deck is above all that passes below; and whoever is where the ground goes over
-into a deck, or on a street that leads onto one, is on both.
+A body stays on the surface it came by, so its height is part of the state where a world has decks or tunnels. Kernels
+compare extents in height that tell levels apart, but not the ups and downs of one street: whoever is on the ground has
+the extent above it; whoever is high on a deck is above all that passes below, and whoever is deep in a tunnel below all
+that passes above; and whoever is where the ground goes over into a deck or a tunnel, or on a street that leads to one,
+is on both.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +23,18 @@ from vico.world.walkways import Walkways
 _ABOVE_ALL = 1e5  # metres
 _OFF = 0.05  # metres from the ground at which somebody is on another surface
 _APART = 3.3  # metres above the ground from which on a deck lets pass whatever drives below it
-_REACH = 12.0  # metres: as high as extents on a deck reach
-_APPROACH = 60.0  # metres before a deck, and after it, where lanes and walkways count as part of both levels
+_REACH = 12.0  # metres: as high as extents on a deck reach, and as low as those in a tunnel
+_APPROACH = 60.0  # metres before a deck or tunnel, and after it, where lanes and walkways count as part of both levels
 _JUMP = 5.0  # metres: who is so far away after a step was put there
 
 Floats = NDArray[np.float64]
+
+
+class _Leads(NamedTuple):
+    """Which lanes, walkways or bodies lie on a deck or near one, and which in a tunnel or near one."""
+
+    up: NDArray[np.bool_]
+    down: NDArray[np.bool_]
 
 
 class TrafficLevels:
@@ -50,14 +58,12 @@ class TrafficLevels:
         self._height, self._lanes, self._walks = height, lanes, walks
         self._heights, self._bottoms = heights, bottoms
         self.any = height.decks is not None
+        self._has_tunnels = self.any and bool((lanes.z < height(lanes.points) - 1.0).any())
         self.z = np.zeros(len(heights) if self.any else 0)
         if self.any:
-            self._lane_leads = _leads(
-                _raised(height, lanes), lanes.length, np.repeat(np.arange(len(lanes)), np.diff(lanes.next_first)),
-                lanes.next,
-            )  # fmt: skip
-            pairs = _meetings(walks)
-            self._walk_leads = _leads(_raised(height, walks), walks.length, pairs[:, 0], pairs[:, 1])
+            starts, pairs = np.repeat(np.arange(len(lanes)), np.diff(lanes.next_first)), _meetings(walks)
+            self._lane_leads = _leads_of(height, lanes, starts, lanes.next)
+            self._walk_leads = _leads_of(height, walks, pairs[:, 0], pairs[:, 1])
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return how high everybody is, where a world has decks: part of the state."""
@@ -100,7 +106,11 @@ class TrafficLevels:
             graph, (row, offset), i = (self._lanes, lane, k) if k < vehicles else (self._walks, walkway, k - vehicles)
             self.z[k] = _height_on(graph, int(row[i]), float(offset[i]))
         self.z[:] = self._height.near(np.c_[xy, self.z])
-        leads = np.concatenate([self._lane_leads[lane[0]], self._walk_leads[walkway[0]]])
+        on_lanes, on_walks = self._lane_leads, self._walk_leads
+        leads = _Leads(
+            np.concatenate([on_lanes.up[lane[0]], on_walks.up[walkway[0]]]),
+            np.concatenate([on_lanes.down[lane[0]], on_walks.down[walkway[0]]]),
+        )
         extents[0][:], extents[1][:] = self._extents(xy, self.z, self._bottoms, self._heights, leads)
 
     def extents_of(self, bodies: Bodies) -> tuple[Floats, Floats]:
@@ -108,8 +118,8 @@ class TrafficLevels:
         bottom, top = bodies.levels(self._height)
         if not self.any or not len(bodies):
             return bottom, top
-        # Who stands is seen from both levels wherever it is not below a deck.
-        leads = bottom < _APART
+        # Who stands is seen from both levels wherever it is not below a deck, or above a tunnel.
+        leads = _Leads(bottom < _APART, np.full(len(bodies), self._has_tunnels))
         position = bodies.position
         surface = self._height.near(position)
         return self._extents(position[:, :2], surface, bottom, top, leads)
@@ -117,23 +127,34 @@ class TrafficLevels:
     def clear(self, who: NDArray[np.int64], extents: tuple[Floats, Floats]) -> None:
         """Have some count as on every level: those that are put elsewhere in a step."""
         if self.any:
-            extents[0][who], extents[1][who] = 0.0, _REACH
+            extents[0][who], extents[1][who] = -_REACH if self._has_tunnels else 0.0, _REACH
 
-    def _extents(
-        self, xy: Floats, z: Floats, bottom: Floats, top: Floats, leads: NDArray[np.bool_]
-    ) -> tuple[Floats, Floats]:
+    def _extents(self, xy: Floats, z: Floats, bottom: Floats, top: Floats, leads: _Leads) -> tuple[Floats, Floats]:
         ground = self._height(xy)
         above = self._height.near(np.c_[xy, np.full(len(xy), _ABOVE_ALL)]) > ground + _OFF
         rise = z - ground
         on_deck = rise > _OFF
         high = on_deck & (rise >= _APART)
-        both = (on_deck & ~high) | (~on_deck & leads & ~above)
-        return np.where(high, _APART, bottom), np.where(high | both, np.maximum(_REACH, top), top)
+        both = (on_deck & ~high) | (~on_deck & leads.up & ~above)
+        low, upper = np.where(high, _APART, bottom), np.where(high | both, np.maximum(_REACH, top), top)
+        if not self._has_tunnels:
+            return low, upper
+        below = self._height.near(np.c_[xy, np.full(len(xy), -_ABOVE_ALL)]) < ground - _OFF
+        in_tunnel = rise < -_OFF
+        deep = in_tunnel & (rise <= -_APART)
+        down = (in_tunnel & ~deep) | (~in_tunnel & ~on_deck & leads.down & ~below)
+        return np.where(deep | down, -_REACH, low), np.where(deep, -_OFF, upper)
 
 
-def _raised(height: HeightField, graph: LaneGraph | Walkways) -> NDArray[np.bool_]:
-    """Return which lanes or walkways leave the ground somewhere."""
-    off = np.abs(graph.z - height(graph.points)) > 1.0
+def _leads_of(height: HeightField, graph: LaneGraph | Walkways, start: NDArray[Any], end: NDArray[Any]) -> _Leads:
+    """Return which lanes or walkways count as part of a second level; `start` and `end`: which meet."""
+    up, down = (_leads(_off(height, graph, side), graph.length, start, end) for side in (1, -1))
+    return _Leads(up, down)
+
+
+def _off(height: HeightField, graph: LaneGraph | Walkways, side: int) -> NDArray[np.bool_]:
+    """Return which lanes or walkways leave the ground somewhere: upwards, or with `side` -1 downwards."""
+    off = side * (graph.z - height(graph.points)) > 1.0
     rows = np.repeat(np.arange(len(graph)), np.diff(graph.first))
     return np.bincount(rows, weights=off, minlength=len(graph)) > 0
 

@@ -88,7 +88,9 @@ def ground_from_osm(
     osm = site.osm
     reach = osm.half + apron
     window = shapely.box(-reach, -reach, reach, reach)
-    pieces = ground_partition(site, streets, window)
+    pieces, holes = ground_partition(site, streets, window), overlay.union_all(bridges.cuts)
+    if bridges.cuts:
+        pieces = {name: _without(shapes, holes) for name, shapes in pieces.items()}
     level = is_level(terrain)
     waters = open_water(terrain, pieces.get("water", []), piped_waters(osm)) if terrain.steps is not None else []
     flights = flights_of(site, terrain, streets.steps)
@@ -113,6 +115,7 @@ def ground_from_osm(
     ]
     under = _under_bridges(site, wet, window) if waters else []
     dry = overlay.difference(window, overlay.buffer(overlay.union_all([wet, *under]), 0.6, quad_segs=1))
+    dry = overlay.difference(dry, holes) if bridges.cuts else dry
     surfaces += _underlay(dry, terrain, reach)
     if terrain.steps is not None:
         surfaces += _kerbs(plan, laid, streets, terrain, reach)

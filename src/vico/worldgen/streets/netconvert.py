@@ -313,12 +313,12 @@ def _way_tags(street: NetworkStreet) -> dict[str, str]:
     return tags
 
 
-def _levels(points: np.ndarray, on_deck: np.ndarray, height: HeightField | None) -> np.ndarray:
-    """Return how high nodes lie, metres: those of decks on the highest surface there is, the others on the ground."""
+def _levels(points: np.ndarray, level: np.ndarray, height: HeightField | None) -> np.ndarray:
+    """Return how high nodes lie, metres: on the ground, on the highest surface (`level` 1) or on the lowest (-1)."""
     if height is None:
         return np.zeros(len(points))
     ground = height(points)
-    return np.where(on_deck, height.near(np.c_[points, np.where(on_deck, _ABOVE_ALL, ground)]), ground)
+    return np.where(level != 0, height.near(np.c_[points, np.where(level != 0, level * _ABOVE_ALL, ground)]), ground)
 
 
 def _with_profile(street: NetworkStreet, number: int) -> NetworkStreet:
@@ -347,17 +347,17 @@ def _osm_xml(osm: OsmData, streets: Sequence[NetworkStreet], height: HeightField
 
     streets = [_with_profile(street, k) if street.deck else street for k, street in enumerate(streets)]
     points: dict[int, np.ndarray] = {}
-    decks: set[int] = set()
+    level: dict[int, int] = {}
     for street in streets:
         for node, xy in zip(street.nodes, street.line, strict=True):
             points.setdefault(node_id(node), xy)
         if street.deck:
-            decks.update(node_id(node) for node in street.nodes)
+            level.update(dict.fromkeys(map(node_id, street.nodes), -1 if street.below else 1))
     signals = {n.id for n in osm.nodes if n.tags.get("highway") == "traffic_signals"}
     ids = sorted(points)
     lat, lon = osm.frame.to_geodetic(np.array([points[i] for i in ids]))
     rows = ['<?xml version="1.0" encoding="UTF-8"?>', '<osm version="0.6">']
-    levels = _levels(np.array([points[i] for i in ids]), np.array([i in decks for i in ids]), height)
+    levels = _levels(np.array([points[i] for i in ids]), np.array([level.get(i, 0) for i in ids]), height)
     for i, y, x, z in zip(ids, lat, lon, levels, strict=True):
         tag = '<tag k="highway" v="traffic_signals"/>' if i in signals else ""
         tag += "" if height is None else f'<tag k="ele" v="{z:.2f}"/>'

@@ -22,7 +22,7 @@ from vico.worldgen.facts.levels import OVER_A_STREET
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.tags import on_the_ground
 
-UNDERGROUND = "under the ground: tunnels have mouths, and nobody drives or walks in them"
+UNDERGROUND = "under the ground: no way in leads down gently and in the open, or it is not for everybody"
 THROUGH_A_BUILDING = "leads through a building that stands across it"
 """Why a road is closed, beside `levels.OVER_A_STREET`."""
 
@@ -71,7 +71,7 @@ class NetworkStreet:
         Why neither traffic nor walkers use it; None for the rest. A way under a roof or through a house
         (`covered`, `tunnel=building_passage`) lies on the ground and is open, unless the house as built stands across.
     deck
-        Whether it lies on a deck above another street.
+        Whether it lies on a deck above another street, or in a tunnel.
     """
 
     way: int
@@ -90,6 +90,11 @@ class NetworkStreet:
     tags: dict[str, str]
     closed: str | None = None
     deck: bool = False
+
+    @property
+    def below(self) -> bool:
+        """Whether it lies in a tunnel that can be used."""
+        return self.deck and not on_the_ground(self.tags)
 
     @property
     def drivable(self) -> bool:
@@ -239,7 +244,7 @@ def streets_from_osm(
     solids
         What stands on the ground, metres.
     usable
-        Ids of the ways above others whose decks can be used: those are open.
+        Ids of the ways above others and in tunnels that can be used: those are open.
 
     Returns
     -------
@@ -255,8 +260,14 @@ def streets_from_osm(
         pieces, new_id = _cut(way, site.osm.half, new_id)
         with expendable(f"w{way.id}"):
             found = _parts(way, pieces, site, standing)
-            streets += [replace(s, deck=True, closed=None) if way.id in usable else s for s in found]
+            streets += [_opened(street) if way.id in usable else street for street in found]
     return _medians_cleared(streets, lefthand=site.left_driving)
+
+
+def _opened(street: NetworkStreet) -> NetworkStreet:
+    """Return a street on a deck or in a tunnel that can be used; tunnels that are not for walkers have no sidewalks."""
+    street = replace(street, deck=True, closed=None)
+    return replace(street, sidewalk="none") if street.below and street.tags.get("foot") == "no" else street
 
 
 def _parts(

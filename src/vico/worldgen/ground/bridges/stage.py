@@ -12,28 +12,34 @@ from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import StreetPolygons
+from vico.worldgen.ground.bridges.bores import bore_surfaces
 from vico.worldgen.ground.bridges.decks import Deck, decks_of, kept_clear, pier_feet
 from vico.worldgen.ground.bridges.portals import Portal, portal_feet, portal_surfaces, portals_of
 from vico.worldgen.ground.bridges.surfaces import bridge_surfaces
+from vico.worldgen.ground.bridges.tunnels import Bore, bores_of, cuts_of
 from vico.worldgen.ground.bridges.usable import deck_surfaces, low_parts, usable_decks
 
 
 @dataclass(frozen=True)
 class Bridges:
-    """Decks above streets, and the mouths of tunnels.
+    """Decks above streets, tunnels, and the mouths of those that nobody can use.
 
     Attributes
     ----------
     decks
         Pieces of decks with their heights.
     portals
-        Mouths of tunnels.
+        Mouths of tunnels that are closed.
     feet
         Where piers and mouths stand, for those who must not walk through them, metres.
     usable
         Ids of the ways whose decks can be driven or walked on.
     low
         Where decks lie too low for people to pass under them, metres.
+    bores
+        Pieces of the tunnels that can be used.
+    cuts
+        Where those are open to the sky, metres: the ground has holes there.
     """
 
     decks: list[Deck]
@@ -41,10 +47,17 @@ class Bridges:
     feet: list[Polygon]
     usable: frozenset[int] = frozenset()
     low: Sequence[Polygon] = ()
+    bores: Sequence[Bore] = ()
+    cuts: Sequence[Polygon] = ()
+
+    @property
+    def open_ways(self) -> frozenset[int]:
+        """Ids of the ways on decks and in tunnels that can be used."""
+        return self.usable.union(bore.way.id for bore in self.bores)
 
     def levels(self) -> Decks | None:
-        """Return the decks that can be used as surfaces of the world; None if there are none."""
-        return deck_surfaces(self.decks, self.usable)
+        """Return the decks and tunnels that can be used as surfaces of the world; None if there are none."""
+        return deck_surfaces([deck for deck in self.decks if deck.way.id in self.usable], self.bores)
 
     def surfaces(
         self, site: SiteFacts, terrain: HeightField, streets: StreetPolygons, window: Polygon
@@ -53,12 +66,16 @@ class Bridges:
         return [
             *bridge_surfaces(self.decks, site, terrain, streets, window),
             *portal_surfaces(self.portals, terrain, window),
+            *bore_surfaces(self.bores, terrain),
         ]
 
 
 def bridges_of(site: SiteFacts, terrain: HeightField, streets: StreetPolygons) -> Bridges:
-    """Decide the bridges above streets and the mouths of tunnels; `terrain` is graded to `streets`."""
+    """Decide the bridges above streets and the tunnels; `terrain` is graded to `streets`."""
     decks = decks_of(site, terrain)
-    portals = portals_of(site.osm, streets)
+    bores = bores_of(site, terrain, streets)
+    used = {bore.way.id for bore in bores}
+    portals = [portal for portal in portals_of(site.osm, streets) if portal.way not in used]
     feet = [*pier_feet(decks, terrain, kept_clear(site.osm, streets)), *portal_feet(portals)]
-    return Bridges(decks, portals, feet, usable_decks(site, decks, terrain), low_parts(decks, terrain))
+    usable = usable_decks(site, decks, terrain)
+    return Bridges(decks, portals, feet, usable, low_parts(decks, terrain), bores, cuts_of(bores))

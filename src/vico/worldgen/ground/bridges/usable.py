@@ -1,9 +1,9 @@
-"""Which decks above streets can be driven and walked on, and what those are as surfaces of the world."""
+"""Which decks above streets can be driven and walked on, and what they and tunnels are as surfaces of the world."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.levels import ON_FOOT
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.ground.bridges.decks import Deck, deck_walk, left_normals
+from vico.worldgen.ground.bridges.tunnels import Bore
 from vico.worldgen.ground.kerbs import KERB
 
 _LANDED = 0.35  # metres from the ground at which the end of a deck counts as down
@@ -53,15 +54,18 @@ def usable_decks(site: SiteFacts, decks: Sequence[Deck], terrain: HeightField) -
     return frozenset(found)
 
 
-def deck_surfaces(decks: Sequence[Deck], usable: Collection[int]) -> Decks | None:
-    """Return the usable decks as surfaces of the world; None if there are none."""
+def deck_surfaces(decks: Sequence[Deck], bores: Sequence[Bore]) -> Decks | None:
+    """Return usable decks and tunnels as surfaces of the world; None if there are none."""
     strips: list[tuple[NDArray[np.float64], float, float, float]] = []
     for deck in decks:
-        if deck.way.id in usable:
+        if "highway" in deck.way.tags:
             kind, half = deck.way.tags["highway"], deck.width / 2
             pavement = 0.0 if kind in ON_FOOT else half - deck_walk(deck.way.tags)
             rise = 0.0 if kind == "steps" else KERB
             strips.append((np.c_[deck.line, deck.z], half, pavement if kind != "steps" else half, rise))
+    for bore in bores:
+        pavement = 0.0 if bore.on_foot else bore.width / 2 - bore.walk
+        strips.append((np.c_[bore.line, bore.z], bore.width / 2, pavement, KERB))
     return Decks.of(strips) if strips else None
 
 

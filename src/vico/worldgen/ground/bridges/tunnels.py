@@ -1,0 +1,334 @@
+"""Tunnels that can be driven and walked through: which, how deep, and where they are open cuts.
+
+From its mouths, at the ground, the floor of a tunnel leads straight on where a hill rises over it; where none does, it
+dives on a slope that can be driven. Where too little ground lies above it for a roof it is an open cut between walls;
+from there on it is covered. A tunnel is used if all its cuts begin at mouths, are short, and keep clear of houses and
+of other streets.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from vico.geo import overlay
+from vico.geo.osm import OsmWay
+from vico.world.heights import HeightField
+from vico.worldgen.facts.levels import ON_FOOT
+from vico.worldgen.facts.site import SiteFacts
+from vico.worldgen.facts.streets import StreetPolygons, carriageway_width
+from vico.worldgen.facts.tags import on_the_ground
+from vico.worldgen.ground.bridges.decks import deck_walk, deck_width, left_normals
+from vico.worldgen.ground.kerbs import KERB
+from vico.worldgen.ground.profiles import Network
+
+Floats = NDArray[np.float64]
+
+HEADROOM, HEADROOM_ON_FOOT = 4.5, 2.6
+"""Clear height of tunnels for vehicles and of those for walkers, metres."""
+
+WALL = 0.35
+"""Thickness of the walls of cuts, metres."""
+
+_ROOF = 0.4  # metres of ground above the clear height where a tunnel is covered
+_STEEPEST, _STEEPEST_ON_FOOT = 0.11, 0.12
+_LONGEST_CUT, _SHORT_CUT = 62.0, 30.0  # metres; a straight tunnel is preferred to a dive up to cuts of the second
+_LEAST, _SPACING = 12.0, 3.0
+_SAME_FLOOR = 0.4  # metres by which floors that meet may differ where they overlap
+_LEDGE = 0.6  # metres, where nobody walks
+_JOINT = 5.0  # metres at a mouth where a cut meets the street that leads in
+_MOST_PAVED = 6.0  # m2 that a cut may take of other streets: corners that overlap
+_TAPER = 8.0  # metres in which the floor comes down by a kerb where the street at the mouth has none
+_DRIVEN = {"motorway", "trunk", "primary", "secondary", "tertiary", "unclassified", "residential", "living_street"}
+_PRIVATE = {"no", "private", "permit", "delivery", "agricultural", "forestry", "military", "customers"}
+
+
+@dataclass(frozen=True)
+class Bore:
+    """A piece of a tunnel.
+
+    Attributes
+    ----------
+    way
+        Of the map.
+    line, z
+        Points along its middle every few metres, shape ``(n, 2)``, and heights of its floor there, metres.
+    width, walk, headroom
+        Between its walls, and of each of its pavements, or ledges, and clear height, metres; no pavements where
+        nothing drives.
+    covered
+        Which points lie under a roof; at the others it is an open cut.
+    """
+
+    way: OsmWay
+    line: Floats
+    z: Floats
+    width: float
+    walk: float
+    headroom: float
+    covered: NDArray[np.bool_]
+
+    @property
+    def on_foot(self) -> bool:
+        """Whether nothing drives in it."""
+        return self.way.tags["highway"] in ON_FOOT
+
+    def cut(self) -> BaseGeometry:
+        """Return where it is open to the sky, between the outsides of its walls, metres."""
+        return _strip(self.line, ~self.covered, self.width / 2 + WALL)
+
+    def plan(self) -> BaseGeometry:
+        """Return where it lies, between its walls, metres."""
+        return _strip(self.line, np.ones(len(self.line), bool), self.width / 2)
+
+    def roofed(self) -> BaseGeometry:
+        """Return where it lies under a roof, metres."""
+        return _strip(self.line, self.covered, self.width / 2, both=True)
+
+    def driven(self) -> BaseGeometry:
+        """Return where its carriageway lies, metres; nowhere if nothing drives in it."""
+        inner = 0.0 if self.on_foot else self.width / 2 - self.walk
+        return _strip(self.line, np.full(len(self.line), inner > 0.0), inner)
+
+    def end_lines(self) -> Floats:
+        """Return the lines across its two ends, wall to wall, metres, shape ``(2, 2, 2)``."""
+        side = left_normals(self.line)[[0, -1]] * (self.width / 2 + WALL)
+        return np.stack([self.line[[0, -1]] - side, self.line[[0, -1]] + side], axis=1)
+
+
+def bores_of(site: SiteFacts, terrain: HeightField, streets: StreetPolygons) -> list[Bore]:
+    """Return the tunnels that can be used; `terrain` is graded to `streets`."""
+    ways = [way for way in site.osm.ways if _is_bore(way, terrain.half - 1.0)]
+    if not ways:
+        return []
+    built = shapely.STRtree(
+        [area.polygon for area in site.osm.areas if area.tags.get("building", "no") not in ("no", "roof")]
+    )
+    paved = overlay.union_all(
+        [streets.carriageway, streets.sidewalk, streets.pedestrian, streets.cycleway, streets.parking], grid=None
+    )
+    shapely.prepare(paved)
+    open_nodes = {
+        node
+        for way in site.osm.ways
+        if "highway" in way.tags and on_the_ground(way.tags) and way.id not in site.levels.above
+        for node in way.nodes
+    }
+    # Of the floors that were laid together some may be refused; the others stay as they lie.
+    bores, mouths = _bores(ways, terrain, open_nodes)
+    bores = [bore for bore in bores if _is_usable(bore, mouths, built, paved, terrain)]
+    while refused := _crossing(bores) | _blind(bores, mouths, terrain.half - 1.0):
+        bores = [bore for bore in bores if bore.way.id not in refused]
+    return bores
+
+
+def cuts_of(bores: Sequence[Bore]) -> list[Polygon]:
+    """Return where tunnels are open to the sky, metres: nobody walks over there."""
+    whole = overlay.union_all([bore.cut() for bore in bores])
+    return [part for part in shapely.get_parts(whole) if part.geom_type == "Polygon" and part.area > 0.05]
+
+
+def _strip(line: Floats, chosen: NDArray[np.bool_], half: float, *, both: bool = False) -> BaseGeometry:
+    """Return the strip along the pieces of a line that have a chosen end, or with `both` two."""
+    side = left_normals(line) * half
+    pieces = [
+        Polygon(np.concatenate([(line + side)[k : k + 2], (line - side)[k : k + 2][::-1]]))
+        for k in range(len(line) - 1)
+        if int(chosen[k]) + int(chosen[k + 1]) > both
+    ]
+    return overlay.union_all([overlay.mended(piece) for piece in pieces])
+
+
+def _is_bore(way: OsmWay, reach: float) -> bool:
+    """Whether a way is a tunnel outdoors for everybody, long enough for two mouths, within the window."""
+    tags = way.tags
+    kind = tags.get("highway", "").removesuffix("_link")
+    if tags.get("tunnel", "no") in ("no", "building_passage", "culvert") or tags.get("indoor", "no") != "no":
+        return False
+    if kind not in _DRIVEN and (kind not in ON_FOOT or kind in ("steps", "corridor", "elevator")):
+        return False
+    allowing = ("foot", "access") if kind in ON_FOOT else ("motorcar", "motor_vehicle", "vehicle", "access")
+    if next((tags[key] for key in allowing if key in tags), "yes") in _PRIVATE or way.closed:
+        return False
+    inside = np.abs(way.line).max() < 4 * reach and bool((np.abs(way.line) < reach).all(axis=1).any())
+    return inside and bool(shapely.LineString(way.line).length >= _LEAST)
+
+
+def _bores(ways: Sequence[OsmWay], terrain: HeightField, open_nodes: Collection[int]) -> tuple[list[Bore], Floats]:
+    """Lay the floors of tunnels; returns them, and their mouths, metres, shape ``(m, 2)``."""
+    network = Network.of([way.line for way in ways], spacing=_SPACING)
+    reach = terrain.half - 1.0
+    is_mouth = np.zeros(len(network.points), bool)
+    for way, row in zip(ways, network.rows, strict=True):
+        for node, k in ((way.nodes[0], int(row[0])), (way.nodes[-1], int(row[-1]))):
+            is_mouth[k] |= node in open_nodes
+    ground = terrain.smooth(network.points)
+    # Beyond the window the ground is not known: tunnels go on level.
+    is_known = np.abs(network.points).max(axis=1) <= reach
+    roof = np.zeros(len(ground))
+    for way, row in zip(ways, network.rows, strict=True):
+        headroom = HEADROOM_ON_FOOT if way.tags["highway"] in ON_FOOT else HEADROOM
+        roof[row] = np.maximum(roof[row], headroom + _ROOF)
+    z = _floor(network, [_steepest(way) for way in ways], ground, is_mouth, is_known, roof)
+    # A floor that dives lies a roof below the ground to within rounding.
+    is_covered = (ground - z >= roof - _ROOF / 2) | ~is_known
+    mouths = network.points[is_mouth & is_known]
+    bores = []
+    for way, row in zip(ways, network.rows, strict=True):
+        if len(row) > 1:
+            line = network.points[row]
+            if way.tags["highway"] in ON_FOOT:
+                bores.append(Bore(way, line, z[row], max(deck_width(way), 2.2), 0.0, HEADROOM_ON_FOOT, is_covered[row]))
+                continue
+            walk = deck_walk(way.tags) if way.tags.get("foot") != "no" else _LEDGE
+            width = carriageway_width(way.tags) + 2 * walk
+            lowered = _kerbed(line, z[row], is_mouth[row[[0, -1]]], terrain)
+            bores.append(Bore(way, line, lowered, width, walk, HEADROOM, is_covered[row]))
+    return bores, mouths
+
+
+def _steepest(way: OsmWay) -> float:
+    return _STEEPEST_ON_FOOT if way.tags["highway"] in ON_FOOT else _STEEPEST
+
+
+def _floor(
+    network: Network,
+    slopes: Sequence[float],
+    ground: Floats,
+    is_mouth: NDArray[np.bool_],
+    is_known: NDArray[np.bool_],
+    roof: Floats,
+) -> Floats:
+    """Return how high the floors lie, metres: straight from mouth to mouth where hills cover them soon, else dived."""
+    weight = np.where(is_mouth & is_known, 30.0, 0.0)
+    if not weight.any():
+        return np.asarray(ground - roof)
+    straight = network.levelled(ground, weight, length=25.0, spacing=_SPACING)
+    straight[is_mouth & is_known] = ground[is_mouth & is_known]
+    # How low the floor can be at each point, coming down from the mouths, and how low it has to be for what is ahead.
+    everywhere, unbounded = np.arange(len(ground)), np.full(len(ground), -np.inf)
+    mouths = np.flatnonzero(is_mouth & is_known)
+    lowest = network.ramps(mouths, ground[mouths], slopes, unbounded)
+    wanted = np.where(is_known, np.minimum(straight, ground - roof), straight)
+    dived = np.maximum(lowest, -network.ramps(everywhere, -wanted, slopes, unbounded))
+    found = straight.copy()
+    for rows in _systems(network):
+        if _open_length(network, rows, ground - straight < roof, is_known) > _SHORT_CUT:
+            every = np.unique(np.concatenate([network.rows[k] for k in rows]))
+            found[every] = dived[every]
+    return found
+
+
+def _systems(network: Network) -> list[list[int]]:
+    """Return the lines (numbers of rows) that hang together."""
+    owner: dict[int, int] = {}
+    group = list(range(len(network.rows)))
+
+    def root(k: int) -> int:
+        while group[k] != k:
+            group[k] = group[group[k]]
+            k = group[k]
+        return k
+
+    for k, row in enumerate(network.rows):
+        for point in (int(row[0]), int(row[-1])):
+            other = root(owner.setdefault(point, k))
+            group[max(root(k), other)] = min(root(k), other)
+    found: dict[int, list[int]] = defaultdict(list)
+    for k in range(len(network.rows)):
+        found[root(k)].append(k)
+    return list(found.values())
+
+
+def _open_length(network: Network, rows: Sequence[int], is_open: NDArray[np.bool_], known: NDArray[np.bool_]) -> float:
+    """Return the length of the longest stretch without a roof, metres."""
+    longest = 0.0
+    for k in rows:
+        row, run = network.rows[k], 0.0
+        for a, b in pairwise(row.tolist()):
+            both = is_open[a] and is_open[b] and known[a] and known[b]
+            run = run + float(np.hypot(*(network.points[b] - network.points[a]))) if both else 0.0
+            longest = max(longest, run)
+    return longest
+
+
+def _kerbed(line: Floats, z: Floats, is_mouth: NDArray[np.bool_], terrain: HeightField) -> Floats:
+    """Lower a floor by a kerb, as the street's is that leads in; where that has none, little by little."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    drop = np.full(len(line), KERB)
+    for mouth, away, k in ((is_mouth[0], along, 0), (is_mouth[1], along[-1] - along, -1)):
+        if mouth and float(terrain.smooth(line[k]) - terrain(line[k])) < KERB / 2:
+            drop = np.minimum(drop, KERB * away / _TAPER)
+    return z - drop
+
+
+def _is_usable(bore: Bore, mouths: Floats, built: shapely.STRtree, paved: BaseGeometry, terrain: HeightField) -> bool:
+    """Whether nothing of a tunnel is too steep, and its cuts begin at mouths, are short and in the open."""
+    run = np.maximum(np.hypot(*np.diff(bore.line, axis=0).T), 0.3)
+    if float((np.abs(np.diff(bore.z)) / run).max()) > 1.35 * _steepest(bore.way):
+        return False
+    along = np.concatenate([[0.0], np.cumsum(run)])
+    inside = np.abs(bore.line).max(axis=1) < terrain.half - 1.0
+    is_open = ~bore.covered & inside
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_open, [False]]).astype(np.int8)))
+    for first, last in edges.reshape(-1, 2).tolist():
+        ends = bore.line[first], bore.line[last - 1]
+        begins = [len(mouths) > 0 and float(np.hypot(*(mouths - end).T).min()) < 0.1 for end in ends]
+        at_end = first == 0, last == len(bore.line)
+        if not any(begin and end for begin, end in zip(begins, at_end, strict=True)):
+            return False
+        if all(begins) or along[last - 1] - along[first] > _LONGEST_CUT:
+            return False
+    cut = bore.cut()
+    near_mouths = overlay.union_all([overlay.buffer(shapely.Point(p), bore.width / 2 + _JOINT) for p in mouths])
+    if len(built.query(cut, predicate="intersects")):
+        return False
+    return overlay.common_area(overlay.difference(cut, near_mouths), paved) <= _MOST_PAVED
+
+
+def _crossing(bores: Sequence[Bore]) -> set[int]:
+    """Return ways that cross another tunnel without meeting it, or lie partly above one: of each two the shorter."""
+    found: set[int] = set()
+    lines = [shapely.LineString(bore.line) for bore in bores]
+    tree = shapely.STRtree([bore.plan() for bore in bores])
+    for k, own in enumerate(bores):
+        for other in np.sort(tree.query(tree.geometries[k], predicate="intersects")).tolist():
+            if other <= k or {own.way.id, bores[other].way.id} & found:
+                continue
+            meet = bool(set(own.way.nodes).intersection(bores[other].way.nodes))
+            if (not meet and lines[k].intersects(lines[other])) or _one_above(own, bores[other], lines[other]):
+                found.add((own if lines[k].length < lines[other].length else bores[other]).way.id)
+    return found
+
+
+def _one_above(first: Bore, second: Bore, line: shapely.LineString) -> bool:
+    """Whether two tunnels overlap at heights that differ; `line`: the second's."""
+    places = shapely.points(first.line)
+    near = np.flatnonzero(shapely.distance(line, places) < (first.width + second.width) / 2)
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(second.line, axis=0).T))])
+    z = np.interp(shapely.line_locate_point(line, places[near]), along, second.z)
+    return bool((np.abs(first.z[near] - z) > _SAME_FLOOR).any())
+
+
+def _blind(bores: Sequence[Bore], mouths: Floats, reach: float) -> set[int]:
+    """Return ways of which one end is neither a mouth, nor in another tunnel, nor outside the window."""
+    at: dict[int, int] = defaultdict(int)
+    for bore in bores:
+        for node in {bore.way.nodes[0], bore.way.nodes[-1]}:
+            at[node] += 1
+    inner = {node for bore in bores for node in bore.way.nodes[1:-1]}
+    found: set[int] = set()
+    for bore in bores:
+        for node, point in ((bore.way.nodes[0], bore.line[0]), (bore.way.nodes[-1], bore.line[-1])):
+            is_mouth = len(mouths) > 0 and float(np.hypot(*(mouths - point).T).min()) < 0.1
+            if at[node] < 2 and node not in inner and not is_mouth and np.abs(point).max() < reach:
+                found.add(bore.way.id)
+    return found
