@@ -56,6 +56,17 @@ def test_wet_ground_is_darker_and_mirrors_what_stands_behind_it(scene: Scene) ->
     assert (dry[wall] >= wet[wall]).all()
 
 
+def test_wet_ground_mirrors_no_sky_where_an_umbrella_hides_the_wall_it_mirrors() -> None:
+    ground = quad([(-40, -40, 0), (40, -40, 0), (40, 40, 0), (-40, 40, 0)], GROUND, (120, 120, 120))
+    wall = quad([(39, 40, 0), (39, -40, 0), (39, -40, 20), (39, 40, 20)], WALL, (200, 40, 30))
+    hung = quad([(4, 1, 1.5), (4, -1, 1.5), (4, -1, 2.3), (4, 1, 2.3)], PERSON, (30, 60, 160))
+    open_view, entity = seen(Scene([ground, wall]), replace(OVERCAST, wet=1.0))
+    hidden, _ = seen(Scene([ground, wall, hung]), replace(OVERCAST, wet=1.0))
+    far = (entity == GROUND) & (np.arange(SIDE) < SIDE // 2 + 9)[:, None]
+    assert np.abs(hidden - open_view)[far].max() < 30.0
+    assert hidden[far].mean(axis=0) == pytest.approx(open_view[far].mean(axis=0), abs=6.0)
+
+
 def test_snow_lies_on_the_ground_and_neither_on_walls_nor_on_people(scene: Scene) -> None:
     bare, entity = seen(scene, OVERCAST)
     snowy, _ = seen(scene, replace(OVERCAST, snow_cover=1.0))

@@ -23,7 +23,7 @@ VIEWS = ("behind", "front", "eyes", "above", "side", "orbit")
 # Where the camera is from what it looks at: metres back along the heading, degrees round it (0 is behind), degrees up.
 _PLACES = {
     "behind": (3.6, 0.0, 16.0),
-    "front": (3.4, 165.0, 4.0),
+    "front": (4.0, 165.0, 5.0),
     "side": (3.6, 80.0, 8.0),
     "above": (15.0, 0.0, 62.0),
     "orbit": (4.5, 0.0, 15.0),

@@ -134,19 +134,24 @@ def _puddles(x: float, y: float) -> float:
 
 @inlined
 def _mirrored_row(camera: Any, keys: Any, row: int, column: int, drop: float, ahead: float, level: float) -> int:
-    """Return the row that a level place `ahead` metres before the eye and `drop` below it mirrors; below 0: the sky."""
+    """Return the row that a level place `ahead` metres before the eye and `drop` below it mirrors; below 0: the sky.
+
+    Where something nearer hides what is mirrored, it is the last that is seen behind the place on the way up.
+    """
     width, slope = camera.width, drop / ahead
-    other = row - 1
+    other, behind = row - 1, -1
     while other >= 0:
         along, up = _ray_along(camera, level, other)
         steepness = up / along
-        if steepness >= slope - 1e-3:
-            return -1 - other
         key = keys[other * width + column]
-        if triangle_number(key) != 0:
-            there = along / inverse_depth(key)
-            if ahead * 1.02 < there <= 2.0 * drop / (slope - steepness):
+        is_open = triangle_number(key) == 0
+        if steepness >= slope - 1e-3:
+            return -1 - other if is_open or behind < 0 else behind
+        there = 0.0 if is_open else along / inverse_depth(key)
+        if there > ahead * 1.02:
+            if there <= 2.0 * drop / (slope - steepness):
                 return other
+            behind = other
         other -= 2 + (row - other) // 8
     return -1
 
