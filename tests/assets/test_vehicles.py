@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from vico.assets.bus import BUS_DOORS, bus_door_leaves
+from vico.assets.tram import tram_prototypes
+from vico.assets.vehicle_lights import night_lamps
 from vico.assets.vehicles import vehicle_prototypes, vehicle_size
 
 NAMES = sorted(vehicle_prototypes())
@@ -55,3 +57,11 @@ def test_cars_come_in_many_kinds_and_colours() -> None:
     kinds = {name.split("_")[0] for name in NAMES}
     assert kinds >= {"hatchback", "sedan", "suv", "van", "taxi", "bus", "bicycle"}
     assert len(NAMES) >= 15
+
+
+def test_buses_and_trams_are_lit_inside_at_night() -> None:
+    lights = [night_lamps("bus"), tram_prototypes()["tram_middle"][1]]
+    for surface, top in zip(lights, (2.6, 2.7), strict=True):
+        assert surface.material.emission == 1.0
+        down = surface.normals[:, 2] < -0.99
+        assert surface.positions[down, 2].max() == pytest.approx(top, abs=0.01)

@@ -20,6 +20,7 @@ from vico.assets.vehicle_parts import (
     arch,
     both_sides,
     front,
+    inside_lights,
     loft,
     mirrored,
     one_surface,
@@ -248,6 +249,12 @@ def bus_leaf() -> Surface:
         panel(-half + 0.05, half - 0.05, y, _LOW + 0.16, _BELT - 0.06, GLASS),
     ]
     return one_surface(both_sides(strips))
+
+
+def bus_inside_lights() -> Surface:
+    """Return what shines in the bus when it is dark."""
+    y = _HALF - _LINING - 0.01
+    return inside_lights((_REAR + 0.06, -y, BUS_FLOOR + 0.003), (_NOSE - 0.9, y, _CEILING - 0.004))
 
 
 def bus(paint: Colour = (0, 114, 178), sign: Colour = (246, 170, 30)) -> Surface:

@@ -18,6 +18,7 @@ from vico.assets.vehicle_parts import (
     TRIM,
     both_sides,
     front,
+    inside_lights,
     loft,
     one_surface,
     panel,
@@ -181,9 +182,11 @@ def _leaf() -> Surface:
 def tram_prototypes() -> dict[str, list[Surface]]:
     """Return the shapes of a tram: front, middle and rear section, and a door leaf."""
     turned = pose_matrix(yaw=np.pi)
+    y = _HALF - _LINING - 0.01
+    lit = inside_lights((-_END, -y, TRAM_FLOOR + 0.003), (_END, y, _CEILING - 0.004))
     return {
-        "tram_front": [one_surface([*_shell(nose=True), *_furniture()])],
-        "tram_middle": [one_surface([*_shell(nose=False), *_furniture()])],
-        "tram_rear": [one_surface([*(part.moved(turned) for part in _shell(nose=True)), *_furniture()])],
+        "tram_front": [one_surface([*_shell(nose=True), *_furniture()]), lit],
+        "tram_middle": [one_surface([*_shell(nose=False), *_furniture()]), lit],
+        "tram_rear": [one_surface([*(part.moved(turned) for part in _shell(nose=True)), *_furniture()]), lit],
         "tram_leaf": [_leaf()],
     }

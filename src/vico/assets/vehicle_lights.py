@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from functools import cache
 
+from vico.assets.bus import bus_inside_lights
 from vico.assets.shapes import Colour, box
-from vico.assets.vehicle_parts import both_sides, one_surface
+from vico.assets.vehicle_parts import SHINING, both_sides, one_surface
 from vico.assets.vehicles import CAR_KINDS, lamp_places
-from vico.world.mesh import Material, Surface
+from vico.world.mesh import Surface
 
 _WHITE: Colour = (255, 250, 228)
 _DIM_RED: Colour = (150, 16, 14)
 _RED: Colour = (255, 36, 22)
 _AMBER: Colour = (255, 160, 20)
-_SHINING = Material("vehicle lamp", emission=1.0)
 _PROUD = 0.006  # m that a lit lamp stands out of its face
 _THICK = 0.012  # m
 
@@ -21,15 +21,19 @@ _THICK = 0.012  # m
 def _lamp(place: tuple[float, float, float], size: tuple[float, float], colour: Colour, out: float) -> Surface:
     """Make a lit rectangle (width, height) on a face of a lamp, `out` metres forward of it."""
     x, y, z = place
-    return box((_THICK, *size), (x + out, y, z), colour=colour, material=_SHINING)
+    return box((_THICK, *size), (x + out, y, z), colour=colour, material=SHINING)
 
 
 @cache
 def night_lamps(kind: str) -> Surface:
-    """Return the headlights and rear lights of a kind of car, of the bus or a bicycle: they shine when it is dark."""
+    """Return the headlights and rear lights of a kind of car, of the bus or a bicycle: they shine when it is dark.
+
+    With the bus comes the light in it.
+    """
     front, rear = lamp_places(kind)
     sizes = ((0.06, 0.06), (0.04, 0.05)) if kind == "bicycle" else ((0.24, 0.11), (0.18, 0.16))
-    return one_surface(both_sides([_lamp(front, sizes[0], _WHITE, 0.0), _lamp(rear, sizes[1], _DIM_RED, 0.0)]))
+    lamps = both_sides([_lamp(front, sizes[0], _WHITE, 0.0), _lamp(rear, sizes[1], _DIM_RED, 0.0)])
+    return one_surface([*lamps, bus_inside_lights()] if kind == "bus" else lamps)
 
 
 @cache

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.shapes import Colour
-from vico.world.mesh import Surface, joined, quad_triangles
+from vico.world.mesh import Material, Surface, joined, quad_triangles
 
 GLASS: Colour = (44, 54, 64)
 TYRE: Colour = (26, 26, 28)
@@ -19,6 +19,10 @@ HEADLIGHT: Colour = (240, 240, 228)
 TAILLIGHT: Colour = (170, 20, 20)
 INDICATOR: Colour = (230, 130, 20)
 PLATE: Colour = (235, 235, 230)
+#: What shines when it is dark.
+SHINING = Material("vehicle lamp", emission=1.0)
+_LIT_CEILING: Colour = (206, 204, 194)
+_LIT_FLOOR: Colour = (88, 90, 90)
 
 
 def one_surface(parts: Sequence[Surface]) -> Surface:
@@ -30,6 +34,17 @@ def quads(corners: NDArray[np.float64] | Sequence[Sequence[Sequence[float]]], co
     """Flat quadrilaterals, shape (n, 4, 3), counter-clockwise from outside."""
     points = np.asarray(corners, np.float64).reshape(-1, 3)
     return Surface.from_triangles(points, quad_triangles(np.arange(0, len(points), 4), by_halves=True), colour=colour)
+
+
+def inside_lights(low: tuple[float, float, float], high: tuple[float, float, float]) -> Surface:
+    """Make the lit ceiling and, fainter, the floor under it, of a vehicle with passengers: they shine when it is dark.
+
+    `low` and `high` are opposite corners of what is between them, metres.
+    """
+    (x0, y0, z0), (x1, y1, z1) = low, high
+    ceiling = quads([[(x0, y1, z1), (x1, y1, z1), (x1, y0, z1), (x0, y0, z1)]], _LIT_CEILING)
+    floor = quads([[(x0, y0, z0), (x1, y0, z0), (x1, y1, z0), (x0, y1, z0)]], _LIT_FLOOR)
+    return replace(one_surface([ceiling, floor]), material=SHINING)
 
 
 def mirrored(surface: Surface) -> Surface:
