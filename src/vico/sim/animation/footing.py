@@ -21,7 +21,7 @@ from vico.sim.animation.style import KERNEL_STYLE
 GAITS = (WALK, CARRY, CARRY_LEFT, CARRY_RIGHT, RUN)
 # Heel and ball of a foot, shares of its length behind the ankle and before it.
 _HEEL, _BALL = 1.0, 1.05
-_HALF_WIDTH = 0.035  # of the sole, metres
+_HALF_WIDTH, _LONG = 0.035, 0.25  # of the sole, metres, on feet so long from heel to toes
 # Steeper than this under one foot is an edge, and so is ground that bends by so many metres from heel to ball.
 _EDGE, _BENT = 0.22, 0.006
 # Where the ground is looked at around a foot on an edge, along it and across, and how far feet are moved, metres.
@@ -118,7 +118,8 @@ def _off_the_edge(
     or the toes over the edge, never into the next riser.
     """
     c, s = np.cos(yaw)[:, None, None], np.sin(yaw)[:, None, None]
-    u, v = _ALONG[None, :, None], _ACROSS[None, None, :]
+    wide = np.minimum((foot[0] + foot[1]) / _LONG, 1.0)  # feet of children are narrower
+    u, v = _ALONG[None, :, None], _ACROSS[None, None, :] * wide[:, None, None]
     points = np.empty((len(ankle), len(_ALONG), len(_ACROSS), 3))
     points[..., 0] = ankle[:, 0, None, None] + c * u - s * v
     points[..., 1] = ankle[:, 1, None, None] + s * u + c * v
@@ -166,7 +167,7 @@ def _discomfort(found: Any, shift: float, heel: float, toe: float) -> tuple[floa
             under += 1
             over += found[j].min() < stands - _SAME
     into = max(top - stands - _SAME, 0.0) + 2.0 * max(stands - lowest - _SAME, 0.0)
-    return stands, 0.3 * over / under + 20.0 * into
+    return stands, 0.6 * over / under + 20.0 * into
 
 
 @compiled

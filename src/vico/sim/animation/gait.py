@@ -153,13 +153,13 @@ def _swing(body: Any, side: int, t: float, gait: Any) -> Any:
     # Up a kerb the foot rises first and goes ahead then; down it goes ahead first.
     step = ground[NEXT, LEVEL] - ground[HERE, LEVEL]
     kerb = min(abs(step) / 0.1, 1.0)
-    later = (0.15 if step > 0 else 0.2) * kerb * np.sin(np.pi * t) ** 2
-    x = hermite(off.x, down.x, slope, slope, t - later if step > 0 else t + later)
+    later = (0.24 if step > 0 else -0.2) * kerb * np.sin(np.pi * t) ** 2
+    x = off.x + slope * t + (down.x - slope - off.x) * smoothstep(t - later)
     y = off.y + (down.y - off.y) * smoothstep(t)
     pitch = hermite(off.pitch, down.pitch, 1.6 * push, 0.0, t)
     toes = push * (1 - smoothstep(2.2 * t))
     rise = np.sin(np.pi * t)
-    early = smoothstep((1 + 2.2 * kerb) * t - (0.0 if step > 0 else 2.2 * kerb))
+    early = smoothstep((1 + 2.8 * kerb) * t if step > 0 else (1 + 2.2 * kerb) * t - 2.2 * kerb)
     z = off.z + (down.z - off.z) * early + gait.lift * rise * (0.25 + 0.75 * rise) + 0.3 * abs(step) * rise * rise
     # Neither toes nor heel touch the ground while the foot swings.
     floor = ground[HERE, LEVEL] + step * early
