@@ -70,18 +70,21 @@ def test_spots_leave_room_for_who_walks_past() -> None:
         assert nearest > 0.05 or room.sum() > 1.0
 
 
-def test_people_wait_for_buses_and_ride_and_talk_in_twos_and_touch_nobody() -> None:
+def test_people_wait_for_buses_and_trams_and_ride_and_talk_in_twos_and_touch_nobody() -> None:
     traffic, transit = _systems()
     walkers = traffic.pedestrian_state
     rode, waited, apart, overlaps = traffic.riding, walkers.stand_kind == STOP, [], 0
     before: dict[str, Any] = {}
-    boarded, alighted = 0, 0
+    # Of buses, and of trams.
+    boarded, alighted = [0, 0], [0, 0]
     walkers.stops_left[rode] = 1
     for second in range(150):
-        riding = traffic.riding
+        riding, aboard = traffic.riding, walkers.aboard.copy()
         _advance(traffic, transit, 1)
-        boarded += int((traffic.riding & ~riding).sum())
-        alighted += int((riding & ~traffic.riding).sum())
+        for i in np.flatnonzero(traffic.riding & ~riding).tolist():
+            boarded[int(walkers.aboard[i] >= traffic.buses)] += 1
+        for i in np.flatnonzero(riding & ~traffic.riding).tolist():
+            alighted[int(aboard[i] >= traffic.buses)] += 1
         waited |= walkers.stand_kind == STOP
         overlaps += len(overlapping(traffic.bodies(), 0.0))
         talk = np.flatnonzero((walkers.stand_kind == TALK) & (walkers.leader >= 0) & (walkers.gait_time <= -1.0))
@@ -91,16 +94,16 @@ def test_people_wait_for_buses_and_ride_and_talk_in_twos_and_touch_nobody() -> N
             before = traffic.arrays() | transit.arrays()
     assert rode.any()
     assert waited.any()
-    assert boarded > 0
-    assert alighted > 0
+    assert min(boarded) > 0
+    assert min(alighted) > 0
     assert overlaps == 0
     assert apart
     assert np.median(apart) < 1.2
-    # Who rides is where a place of the bus is, and in nobody's way.
+    # Who rides is where a place of the bus or tram is, and in nobody's way.
     assert len(traffic.bodies()) == traffic.vehicles + 60 - int(traffic.riding.sum())
-    buses = np.array([transit.bus_pose(bus)[:2] for bus in range(traffic.buses)])
-    inside = traffic.passengers.position[:, None, :2] - buses[None]
-    assert (np.hypot(inside[..., 0], inside[..., 1]).min(axis=1) < 6.5).all()
+    for i, place in zip(np.flatnonzero(traffic.riding), traffic.passengers.position, strict=True):
+        doors = transit.doors(int(walkers.aboard[i]))
+        assert np.hypot(*(doors - place[:2]).T).min() < 3.0
     # From a saved state all goes on as if nothing had been.
     again = _systems()
     again[0].restore(before)

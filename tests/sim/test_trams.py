@@ -19,6 +19,7 @@ from vico.sim.config import SimConfig
 from vico.sim.overlaps import overlaps_of
 from vico.sim.simulation import Simulation
 from vico.sim.state import Posture, Vehicle
+from vico.sim.transit.passengers import FIRST_PASSENGER
 from vico.sim.transit.system import TransitSystem
 from vico.sim.transit.tram_zones import zones_of
 from vico.world.folder import World
@@ -94,6 +95,9 @@ def test_a_tram_comes_on_time_takes_people_for_the_fare_and_everybody_off_at_its
     people = sim.state.people
     assert people.posture[0] == Posture.SITTING
     assert sim.state.entity(int(people.vehicle_entity[0]))["kind"] == "tram"
+    trams = system(sim).trams
+    tram = int(trams.standing[0])
+    trams.riders[tram, 5] = FIRST_PASSENGER
     # It leaves by the timetable and not before, with its doors shut, and the rider in it.
     leaves = EIGHT + 20 + 30 + BUS_DWELL
     run(sim, int(leaves - sim.state.second) - 3)
@@ -111,8 +115,9 @@ def test_a_tram_comes_on_time_takes_people_for_the_fare_and_everybody_off_at_its
     told = sim.reports()["trams"]
     assert told["arrivals"] == 2
     assert -25.0 < told["late_mean"] < 2.0
-    # It has left the city.
+    # It has left the city, and a passer-by with it who found no pavement at the last stop.
     assert len(system(sim).bodies()) == 0
+    assert trams.riders[tram, 5] == FIRST_PASSENGER
 
 
 def test_a_full_tram_says_so(sim: Simulation) -> None:

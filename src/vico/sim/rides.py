@@ -7,7 +7,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.bus import BUS_FLOOR
 from vico.sim.avatars import clearances, cyclist_fits, free_ground
 from vico.sim.bodies import Bodies
 from vico.sim.moves import follow_hands, gesture, wrapped
@@ -117,8 +116,9 @@ def follow(state: SimulationState) -> None:
 
 def _seat(i: int, state: SimulationState, transit: TransitSystem) -> None:
     p = state.people
-    x, y, yaw = transit.seat(bus_of(i, state, transit), i)
-    p.position[i] = x, y, float(state.world.height((x, y))) + BUS_FLOOR
+    bus = bus_of(i, state, transit)
+    x, y, yaw = transit.seat(bus, i)
+    p.position[i] = x, y, float(state.world.height((x, y))) + transit.floor(bus)
     # Whoever looks out of a window goes on doing so while the bus turns.
     p.yaw[i] = wrapped(float(p.yaw[i] + yaw - p.vehicle_yaw[i]))
     p.vehicle_yaw[i] = yaw

@@ -1,4 +1,4 @@
-"""Where pedestrians stand a while: before shop windows, in twos on wide sidewalks, and at bus stops.
+"""Where pedestrians stand a while: before shop windows, in twos on wide sidewalks, and at stops of buses and trams.
 
 Each spot leaves a lane of its walkway free, and is clear of doors, other walkways and whatever is solid.
 """
@@ -29,7 +29,7 @@ _OTHER_WALKWAYS = 0.9  # m to them
 _PAIR_EVERY, _PAIR_APART = 30.0, 0.72  # m along a sidewalk between pairs, and between the two of a pair
 _BEND = 0.05  # m by which that may differ
 _AT_STOP, _STOP_GRID, _PER_STOP = 5.0, 0.5, 6  # m around where passengers wait, m between places tried, and people
-_STOP_ROOM, _FROM_LANE = 0.35, 1.9  # m around who waits, and from there to the middle of the bus's lane
+_STOP_ROOM, _FROM_LANE = 0.35, 1.9  # m around who waits, and from there to the middle of the lane or track
 _STOP_REACH = 9.0  # m from a walkway to who waits
 _LEAST_LENGTH = 8.0  # m of sidewalk on which people stop
 _RAISED = 0.5  # m above the ground: on decks nobody stops
@@ -154,29 +154,58 @@ def _first(spots: Records, walkways: int) -> NDArray[np.int32]:
 
 
 def _add_stops(site: _Site, world: World) -> None:
-    """Add spots on free ground around where passengers wait, the nearest first, facing the street."""
-    lanes, served = world.lanes, {stop for line in world.transit.lines for stop in line.stops}
+    """Add spots on free ground around where passengers wait for buses and trams, the nearest first, facing them.
+
+    Stops are numbered as those of buses, then those of trams.
+    """
+    transit, lanes = world.transit, world.lanes
+    served = {stop for line in transit.lines for stop in line.stops}
+    tracks = [shapely.LineString(line.track) for line in transit.tram_lines]
+    for number, stop in enumerate(transit.stops):
+        if stop.id in served and stop.lane in lanes.index:
+            _add_stop(site, world, stop.wait[:2], lanes.at(lanes.index[stop.lane], stop.offset), number, tracks)
+    tram_stops = {stop.id: (k, stop) for k, stop in enumerate(transit.tram_stops, len(transit.stops))}
+    done: set[str] = set()
+    for line, track in zip(transit.tram_lines, tracks, strict=True):
+        for name, offset in zip(line.stops, line.offsets, strict=True):
+            if name in done:
+                continue
+            done.add(name)
+            number, tram_stop = tram_stops[name]
+            door = min(float(track.project(shapely.Point(tram_stop.wait[:2]))), offset)
+            ahead, here = (np.array(track.interpolate(along).coords[0]) for along in (door + 0.5, door - 0.5))
+            pose = np.array([*here, np.arctan2(*(ahead - here)[::-1])])
+            _add_stop(site, world, tram_stop.wait[:2], pose, number, tracks)
+
+
+def _add_stop(
+    site: _Site,
+    world: World,
+    wait: Point2,
+    pose: NDArray[np.float64],
+    number: int,
+    tracks: Sequence[shapely.LineString],
+) -> None:
+    """Add spots around a place to wait, beside the line of a bus or tram that has a pose there, off all tracks."""
     steps = np.arange(-_AT_STOP, _AT_STOP + 0.01, _STOP_GRID)
     grid = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-    grid = grid[np.lexsort((grid[:, 1], grid[:, 0], np.round(np.hypot(*grid.T), 3)))]
-    for number, stop in enumerate(world.transit.stops):
-        if stop.id not in served or stop.lane not in lanes.index:
+    points = grid[np.lexsort((grid[:, 1], grid[:, 0], np.round(np.hypot(*grid.T), 3)))] + np.array(wait)
+    free = (world.walkable.clearance_at(points) >= _STOP_ROOM) & world.walkable.is_connected(points)
+    free &= ~np.isin(world.walkable.class_at(points), (ROADWAY, CROSSING))
+    beside = -np.sin(pose[2]) * (points[:, 0] - pose[0]) + np.cos(pose[2]) * (points[:, 1] - pose[1])
+    free &= np.abs(beside) > _FROM_LANE
+    spots = shapely.points(points)
+    for track in tracks:
+        free &= shapely.distance(track, spots) > _FROM_LANE
+    count = 0
+    for (x, y), away in zip(points[free].tolist(), beside[free].tolist(), strict=True):
+        found = site.nearest((x, y), _STOP_REACH)
+        if found is None or not site.fits(*found, (x, y)):
             continue
-        bus = lanes.at(lanes.index[stop.lane], stop.offset)
-        points = grid + np.array(stop.wait[:2])
-        free = (world.walkable.clearance_at(points) >= _STOP_ROOM) & world.walkable.is_connected(points)
-        free &= ~np.isin(world.walkable.class_at(points), (ROADWAY, CROSSING))
-        beside = -np.sin(bus[2]) * (points[:, 0] - bus[0]) + np.cos(bus[2]) * (points[:, 1] - bus[1])
-        free &= np.abs(beside) > _FROM_LANE
-        count = 0
-        for (x, y), away in zip(points[free].tolist(), beside[free].tolist(), strict=True):
-            found = site.nearest((x, y), _STOP_REACH)
-            if found is None or not site.fits(*found, (x, y)):
-                continue
-            site.add([((x, y), float(bus[2]) - np.sign(away) * np.pi / 2, *found)], STOP, number)
-            count += 1
-            if count == _PER_STOP:
-                break
+        site.add([((x, y), float(pose[2]) - np.sign(away) * np.pi / 2, *found)], STOP, number)
+        count += 1
+        if count == _PER_STOP:
+            break
 
 
 def _add_windows(site: _Site, world: World) -> None:

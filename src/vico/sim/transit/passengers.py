@@ -1,4 +1,7 @@
-"""People nobody plays who ride in buses: they wait at stops, get in by a door, sit, and get off some stops later."""
+"""People nobody plays who ride in buses and trams: they wait at stops, get in by a door, sit, and get off later.
+
+Where a bus is asked for, numbers from the number of buses on are trams, as with `vico.sim.transit.TransitSystem`.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +11,12 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from vico.assets.bus import BUS_FLOOR
 from vico.seeds import rng
 from vico.sim.avatars import free_ground
 from vico.sim.bodies import Bodies
 from vico.sim.traffic.population import Seating, Traffic
 from vico.sim.traffic.state import BOARD, NONE, STOP
-from vico.world.model import Transit
+from vico.world.model import Stop, TramStop, Transit
 from vico.world.walkable import WalkableMap
 from vico.world.walkways import SIDEWALK
 
@@ -35,17 +37,25 @@ class HasBuses(Protocol):
 
     transit: Transit
     traffic: Traffic
-    open: NDArray[np.float64]
-    dwell: NDArray[np.float64]
+
+    @property
+    def services(self) -> int:
+        """How many buses and trams there are, those out of service too."""
 
     def ends_service(self, bus: int) -> bool:
-        """Whether a bus goes to the depot from the stop it is at."""
+        """Whether a bus goes to the depot from the stop it is at, or a tram out of the city."""
+
+    def boards_for(self, bus: int) -> float:
+        """Seconds for which a bus keeps its doors open at the least; 0 while they are not wholly open."""
+
+    def will_stop(self, bus: int) -> bool:
+        """Whether a bus is in service and has yet to come to a stop, or stands at one."""
 
     def stopped_at(self, bus: int) -> str | None:
         """Id of the stop at which a bus stands."""
 
-    def bus_pose(self, bus: int) -> NDArray[np.float64]:
-        """x, y, yaw of a bus."""
+    def doors(self, bus: int) -> NDArray[np.float64]:
+        """Where the doors are."""
 
     def exit_spots(self, bus: int) -> NDArray[np.float64]:
         """Points outside each door."""
@@ -62,8 +72,11 @@ class HasBuses(Protocol):
     def capacity(self, bus: int) -> int:
         """How many a bus takes."""
 
-    def board(self, bus: int, rider: int) -> float:
-        """Take a rider in."""
+    def floor(self, bus: int) -> float:
+        """Height of the floor riders are on above the ground, metres."""
+
+    def take_in(self, bus: int, rider: int) -> None:
+        """Give a rider a place."""
 
     def alight(self, bus: int, rider: int) -> None:
         """Let a rider off."""
@@ -75,7 +88,7 @@ class Passengers:
     Parameters
     ----------
     transit
-        Whose buses they ride.
+        Whose buses and trams they ride.
     walkable
         Where one can get off.
     seed
@@ -86,27 +99,28 @@ class Passengers:
         self._transit, self._traffic, self._walkable = transit, transit.traffic, walkable
         self._walkers = transit.traffic.pedestrian_state
         self._traffic.seats = self.seats
-        self._number = {stop.id: k for k, stop in enumerate(transit.transit.stops)}
+        every: list[Stop | TramStop] = [*transit.transit.stops, *transit.transit.tram_stops]
+        self._number = {stop.id: k for k, stop in enumerate(every)}
         self._sidewalks = _sidewalks_at(transit)
-        if self._traffic.pedestrians and self._traffic.buses:
+        if self._traffic.pedestrians and transit.services:
             self._start(rng(seed, "traffic", "passengers"))
 
     def _start(self, random: np.random.Generator) -> None:
         """Have some ride at the start."""
-        walkers, buses = self._walkers, self._traffic.buses
+        walkers, buses = self._walkers, self._transit.services
         draws, chosen = random.random(len(walkers)), random.integers(0, buses, len(walkers))
         alone = (walkers.group_size == 1) & (walkers.goal == NONE) & (draws < _AT_START)
         for i in np.flatnonzero(alone).tolist():
             bus = int(chosen[i])
-            if self._transit.stopped_at(bus) is not None and self._transit.aboard(bus) < _MOST_AT_START:
-                self._get_in(i, int(chosen[i]))
+            if self._transit.will_stop(bus) and self._transit.aboard(bus) < _MOST_AT_START:
+                self._get_in(i, bus)
 
     def seats(self, who: NDArray[np.int64]) -> Seating:
         """Return where some who ride are: positions, yaws, and whether they sit."""
         transit, aboard = self._transit, self._walkers.aboard
         poses = np.array([transit.seat(int(aboard[i]), FIRST_PASSENGER + int(i)) for i in who]).reshape(-1, 3)
         sits = [transit.is_seated(int(aboard[i]), FIRST_PASSENGER + int(i)) for i in who]
-        floor = self._traffic.height(poses[:, :2]) + BUS_FLOOR
+        floor = self._traffic.height(poses[:, :2]) + [transit.floor(int(aboard[i])) for i in who]
         return np.column_stack([poses[:, :2], floor]), poses[:, 2], np.array(sits, np.bool_)
 
     def arrive(self, bus: int) -> None:
@@ -127,33 +141,34 @@ class Passengers:
         boarding = np.flatnonzero(walkers.stand_kind == BOARD)
         for i in boarding.tolist():
             self._board(i, int(walkers.boards[i]))
-        for bus in range(self._traffic.buses):
-            stop = self._transit.stopped_at(bus)
-            if stop is None or self._transit.open[bus] < 1.0:
+        for bus in range(self._transit.services):
+            stop, left = self._transit.stopped_at(bus), self._transit.boards_for(bus)
+            if stop is None or left == 0.0:
                 continue
             ends = self._transit.ends_service(bus)
             due = np.flatnonzero((walkers.aboard == bus) & ((walkers.stops_left <= 0) | ends))
             if len(due):
                 self._get_off(int(due[0]), bus, stop, obstacles)
-            elif not ends and self._transit.dwell[bus] >= _LEAST_DWELL:
+            elif not ends and left >= _LEAST_DWELL:
                 self._call(bus, stop)
 
     def _call(self, bus: int, stop: str) -> None:
         """Have those who wait at a stop go to the nearest door of a bus, as long as there is room."""
-        walkers, doors = self._walkers, self._transit.exit_spots(bus)
+        walkers, doors, fronts = self._walkers, self._transit.doors(bus), self._transit.exit_spots(bus)
         waiting = np.flatnonzero((walkers.stand_kind == STOP) & (walkers.spot != NONE))
         stops = self._traffic.spots["stop"][walkers.spot[waiting]]
         room = _FULL - self._transit.aboard(bus) - int(((walkers.stand_kind == BOARD) & (walkers.boards == bus)).sum())
         for i in waiting[stops == self._number[stop]][: max(room, 0)].tolist():
             here = self._position(i)
-            door = doors[int(np.argmin(np.hypot(*(doors - here).T)))]
+            door = int(np.argmin(np.hypot(*(fronts - here).T)))
             walkers.stand_kind[i], walkers.boards[i], walkers.spot[i] = BOARD, bus, NONE
-            walkers.stand_xy[i], walkers.stand_yaw[i] = door, self._transit.bus_pose(bus)[2] + np.pi / 2
+            walkers.stand_xy[i] = fronts[door]
+            walkers.stand_yaw[i] = np.arctan2(*(doors[door] - fronts[door])[::-1])
 
     def _board(self, i: int, bus: int) -> None:
         """Let somebody in who stands before a door; who comes too late walks on."""
         walkers = self._walkers
-        if self._transit.stopped_at(bus) is None or self._transit.open[bus] < 1.0:
+        if self._transit.boards_for(bus) == 0.0:
             walkers.stand_kind[i], walkers.boards[i] = 0, NONE
         elif np.hypot(*(walkers.stand_xy[i] - self._position(i))) < _AT_DOOR:
             self._get_in(i, bus)
@@ -162,7 +177,7 @@ class Passengers:
         walkers = self._walkers
         if self._transit.aboard(bus) >= self._transit.capacity(bus):
             return
-        self._transit.board(bus, FIRST_PASSENGER + i)
+        self._transit.take_in(bus, FIRST_PASSENGER + i)
         walkers.aboard[i], walkers.boards[i], walkers.stand_kind[i] = bus, NONE, 0
         walkers.stops_left[i] = 1 + int(walkers.random[i] % np.uint64(_RIDE))
         self._traffic.take_off(i)
@@ -190,7 +205,8 @@ def _sidewalks_at(transit: HasBuses) -> dict[str, tuple[int, float]]:
     ways = np.flatnonzero(walks.kind == SIDEWALK)
     lines: list[Any] = [shapely.LineString(walks.line(int(way))) for way in ways]
     found: dict[str, tuple[int, float]] = {}
-    for stop in transit.transit.stops if lines else ():
+    every: list[Stop | TramStop] = [*transit.transit.stops, *transit.transit.tram_stops]
+    for stop in every if lines else ():
         point = shapely.Point(stop.wait[:2])
         away = shapely.distance(lines, point)
         best = int(np.argmin(away))

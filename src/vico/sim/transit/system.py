@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.assets.bus import BUS_SIZE, bus_door_leaves, bus_leaf, bus_places
-from vico.assets.tram import tram_places, tram_prototypes
+from vico.assets.bus import BUS_FLOOR, BUS_SIZE, bus_door_leaves, bus_leaf, bus_places
+from vico.assets.tram import TRAM_FLOOR, tram_places, tram_prototypes
 from vico.assets.vehicles import vehicle_prototypes
 from vico.errors import InputError
 from vico.rules import BUS_CAPACITY as CAPACITY
@@ -30,7 +30,7 @@ from vico.sim.transit.bicycles import Bicycles
 from vico.sim.transit.bus_plan import BusPlan
 from vico.sim.transit.doors import DOOR_TIME, leaf_transforms, moved_doors
 from vico.sim.transit.passengers import Passengers
-from vico.sim.transit.trams import Trams
+from vico.sim.transit.trams import AWAY, Trams
 from vico.world.mesh import Surface
 from vico.world.model import Line, Transit
 from vico.world.timetable import departure, next_departure
@@ -43,6 +43,7 @@ _START_STOP = 10.0
 _LAST_CALL = 3.0  # seconds before a tram goes out of the city, or a bus to the depot, at which everybody gets off
 #: A bus goes to the depot if its next departure is farther off, seconds, and comes back so long before it.
 DEPOT_FROM, DEPOT_UNTIL = 300.0, 120.0
+_OUT_OF_SIGHT = -40.0  # metres above the ground
 _TINY = 1e-6  # seconds by which clocks err
 # Doors on a bus's right side, metres ahead of its centre.
 DOORS = (4.65, -0.05, -3.55)
@@ -145,7 +146,9 @@ class TransitSystem:
         """Advance the timetable by `dt` seconds; the buses themselves move with the traffic."""
         self.clock += dt
         fleet = self.traffic.fleet
-        self.trams.advance(float(self.clock[0]), dt, obstacles)
+        for tram in self.trams.advance(float(self.clock[0]), dt, obstacles):
+            if self.passengers is not None:
+                self.passengers.arrive(self.traffic.buses + tram)
         for bus, v in enumerate(self._vehicle.tolist()):
             if fleet.presence[v] != PRESENT:
                 self._mind_depot(bus, v)
@@ -180,7 +183,12 @@ class TransitSystem:
     # -- the depot ---------------------------------------------------------------------------------------------------
 
     def ends_service(self, bus: int) -> bool:
-        """Return whether a bus at its line's first stop goes to the depot: its next departure is far off."""
+        """Return whether a bus at its line's first stop goes to the depot, as its next departure is far off.
+
+        Of a tram whether it stands at its last stop in the city.
+        """
+        if bus >= self.traffic.buses:
+            return self.trams.ends(bus - self.traffic.buses)
         return bool(self.stop[bus] == 0 and self._next_departure(bus) - self.clock[0] > DEPOT_FROM)
 
     def _begin_in_depot(self, bus: int, gone: float) -> None:
@@ -406,6 +414,32 @@ class TransitSystem:
         """Return how many a bus takes."""
         return len(self._riders_of(bus))
 
+    @property
+    def services(self) -> int:
+        """How many buses and trams there are, those in the depot or out of the city too."""
+        return self.traffic.buses + len(self.trams)
+
+    def boards_for(self, bus: int) -> float:
+        """Return for how many seconds a bus keeps its doors open at the least; 0 while they are not wholly open."""
+        tram = bus - self.traffic.buses
+        share, left = (
+            (self.trams.open[tram], self.trams.dwell[tram]) if tram >= 0 else (self.open[bus], self.dwell[bus])
+        )
+        # At its first stop a bus stands with open doors until its departure, its time to dwell long over.
+        return max(float(left), _TINY) if share == 1.0 and self.stopped_at(bus) is not None else 0.0
+
+    def will_stop(self, bus: int) -> bool:
+        """Return whether a bus stands at a stop, or a tram is in the city and has yet to come to one."""
+        tram = bus - self.traffic.buses
+        return self.trams.will_stop(tram) if tram >= 0 else self.stopped_at(bus) is not None
+
+    def floor(self, bus: int) -> float:
+        """Return how high the floor that riders are on is above the ground, metres; far below it out of the city."""
+        tram = bus - self.traffic.buses
+        if tram < 0:
+            return BUS_FLOOR
+        return TRAM_FLOOR if self.trams.front[tram] > AWAY else _OUT_OF_SIGHT
+
     def _riders_of(self, bus: int) -> NDArray[np.int32]:
         tram = bus - self.traffic.buses
         return self.riders[bus] if tram < 0 else self.trams.riders[tram]
@@ -435,12 +469,15 @@ class TransitSystem:
         """
         if self.stopped_at(bus) is None:
             raise InputError("enter_bus: the bus is not at a stop")
-        riders = self._riders_of(bus)
-        free = np.flatnonzero(riders < 0)
-        if not len(free):
+        if self.aboard(bus) >= self.capacity(bus):
             raise InputError("enter_bus: the bus is full")
-        riders[free[0]] = rider
+        self.take_in(bus, rider)
         return FARE
+
+    def take_in(self, bus: int, rider: int) -> None:
+        """Give a rider the first free place; there has to be one."""
+        riders = self._riders_of(bus)
+        riders[np.flatnonzero(riders < 0)[0]] = rider
 
     def ends(self, bus: int) -> bool:
         """Return whether a tram or bus is about to leave for out of the city or the depot: it takes nobody there."""

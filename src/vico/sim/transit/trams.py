@@ -21,6 +21,7 @@ from vico.rules import BUS_DWELL, TRAM_SECTION, TRAM_SECTIONS, TRAM_WIDTH
 from vico.sim.bodies import TRAM, Bodies, Drawn
 from vico.sim.traffic import Traffic
 from vico.sim.transit.doors import DOOR_TIME, leaf_transforms, moved_doors
+from vico.sim.transit.passengers import FIRST_PASSENGER
 from vico.sim.transit.tram_outlines import first_taken, inside_city, nobody, outlines, packed, spots_near, stand
 from vico.sim.transit.tram_signals import TramSignal, metres_to_signal, signals_of
 from vico.sim.transit.tram_zones import zones_of
@@ -134,17 +135,27 @@ class Trams:
 
     # -- time --------------------------------------------------------------------------------------------------------
 
-    def advance(self, now: float, dt: float, obstacles: Bodies) -> None:
-        """Move all trams on by `dt` seconds up to the second `now`; none comes nearer to anybody than it may."""
+    def advance(self, now: float, dt: float, obstacles: Bodies) -> list[int]:
+        """Move all trams on by `dt` seconds up to the second `now`; none comes nearer to anybody than it may.
+
+        Returns
+        -------
+        list
+            Trams that have come to a stop.
+        """
+        arrived: list[int] = []
         if not len(self):
-            return
+            return arrived
         self._look_about(obstacles)
         self._come_in(now)
         for tram in np.flatnonzero(self.front > AWAY).tolist():
             if self.dwell[tram] > 0.0:
                 self._stand(tram, now, dt)
-            else:
-                self._drive(tram, now, dt)
+                continue
+            self._drive(tram, now, dt)
+            if self.dwell[tram] > 0.0:
+                arrived.append(tram)
+        return arrived
 
     def _come_in(self, now: float) -> None:
         """Have the trams that are due come in, where the track begins."""
@@ -163,9 +174,11 @@ class Trams:
             self._stand_where_it_is(tram)
 
     def _stand(self, tram: int, now: float, dt: float) -> None:
-        # It does not leave before its time, nor its last stop before everybody is off.
+        # It does not leave before its time, nor its last stop before everybody is off who is played: the others may
+        # ride out of the city, and come in again with the same tram.
         time = self.due[tram] + self.lines[self.line_of[tram]].travel[self.stop[tram]] + BUS_DWELL
-        least = _WAITS if self.ends(tram) and (self.riders[tram] >= 0).any() else 0.0
+        played = (self.riders[tram] >= 0) & (self.riders[tram] < FIRST_PASSENGER)
+        least = _WAITS if self.ends(tram) and played.any() else 0.0
         self.dwell[tram] = max(self.dwell[tram] - dt, least, time - now)
         self.open[tram] = moved_doors(float(self.open[tram]), self.dwell[tram] > DOOR_TIME, dt)
         if self.dwell[tram] == 0.0:
@@ -382,6 +395,10 @@ class Trams:
             return None
         return self.lines[self.line_of[tram]].stops[int(self.stop[tram])]
 
+    def will_stop(self, tram: int) -> bool:
+        """Return whether a tram is in the city and stands at a stop, or has yet to come to one."""
+        return bool(self.front[tram] > AWAY and self.stop[tram] < len(self.lines[self.line_of[tram]].stops))
+
     def ends(self, tram: int) -> bool:
         """Return whether a tram stands at its last stop in the city."""
         return bool(self.dwell[tram] > 0.0 and self.stop[tram] == len(self.lines[self.line_of[tram]].stops) - 1)
@@ -398,9 +415,10 @@ class Trams:
         )
 
     def seat(self, tram: int, place: int) -> NDArray[np.float64]:
-        """x, y, yaw of a place in a tram."""
+        """x, y, yaw of a place in a tram; of one out of the city where it will come in."""
         section, ahead, left = tram_places()[0][place]
-        x, y, yaw = self._poses[tram, int(section)].tolist()
+        poses = self._poses[tram] if self.front[tram] > AWAY else self._sections_at(tram, 0.0)
+        x, y, yaw = poses[int(section)].tolist()
         c, s = math.cos(yaw), math.sin(yaw)
         return np.array([x + ahead * c - left * s, y + ahead * s + left * c, yaw])
 
