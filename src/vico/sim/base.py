@@ -200,7 +200,9 @@ class SimulationBase:
         if key not in self._robot_scenes:
             if len(self._robot_scenes) >= _SCENES:
                 self._robot_scenes.clear()
-            self._robot_scenes[key] = RobotScene(self.world, kinds, router=self.router, physics=physics)
+            self._robot_scenes[key] = RobotScene(
+                self.world, kinds, router=self.router, physics=physics, indoor=self.indoor
+            )
         return self._robot_scenes[key]
 
     def way(self, origin: int, goal: int) -> NDArray[np.float64] | None:

@@ -64,9 +64,10 @@ def hearers_of(state: SimulationState, i: int, reach: float) -> Heard:
     away = np.linalg.norm(p.position - p.position[i], axis=1)
     near = [(p.names[j], j) for j in np.flatnonzero(away <= reach).tolist() if j != i and state.same_space(i, j)]
     places = [(name, p.position[j], eyes[j]) for name, j in near]
-    if state.robots is not None and outdoors:
+    if state.robots is not None and (outdoors or p.room[i] >= 0):
         positions, heights = state.robots.bodies().position, state.robots.camera_heights()
         close = np.linalg.norm(positions - p.position[i], axis=1) <= reach
+        close &= state.robots.rooms == p.room[i]
         places += [(state.robots.names[k], positions[k], float(heights[k])) for k in np.flatnonzero(close).tolist()]
     mouth = p.position[i] + _up(eyes[i])
     found = Heard([], {})

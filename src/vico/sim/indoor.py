@@ -129,8 +129,13 @@ class Indoor:
 
     def gap(self, room: int, xy: NDArray[np.float64] | tuple[float, float]) -> float:
         """Free room around a point of a room, metres: to the nearest wall or piece of furniture; negative in one."""
+        return float(self.gaps(room, np.array([[float(xy[0]), float(xy[1])]]))[0])
+
+    def gaps(self, room: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Free room around points of a room, ENU metres, shape ``(k, 2)``: as `gap` has it, shape ``(k,)``."""
         furniture = self.furniture[self.furniture_start[room] : self.furniture_start[room + 1]]
-        return float(_free_room(np.array([[float(xy[0]), float(xy[1])]]), self.boxes[room], furniture)[0])
+        found: NDArray[np.float64] = _free_room(np.ascontiguousarray(points), self.boxes[room], furniture)
+        return found
 
     def free_spot(self, room: int, near: ArrayLike, taken: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Spot of a room nearest to `near` where someone can stand; None if the room is full.
@@ -175,8 +180,7 @@ class Indoor:
         c, s = np.cos(yaw), np.sin(yaw)
         spots = np.column_stack([x + c * grid[:, 0] - s * grid[:, 1], y + s * grid[:, 0] + c * grid[:, 1]])
         spots = np.vstack([near[None], spots])
-        furniture = self.furniture[self.furniture_start[room] : self.furniture_start[room + 1]]
-        gap = _free_room(spots, self.boxes[room], furniture)
+        gap = self.gaps(room, spots)
         gap[0] += 0.02  # the point itself may be as narrow as can be
         spots = spots[gap >= RADIUS + 0.02]
         spots = spots[np.argsort(np.hypot(*(spots - near).T), kind="stable")]

@@ -69,6 +69,7 @@ def initial_state(
     robots = systems.robots_of(base, config, state.obstacles(), errands=config.errands)
     if robots is not None:
         robots.attach_objects(state.objects)
+        robots.attach_people(people)
     state.robots = robots
     state.entities = _entities(state, residents, config)
     events.names = state.names

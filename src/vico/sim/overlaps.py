@@ -17,7 +17,7 @@ from vico.io.compiled import compiled
 from vico.rules import TRAM_SECTIONS
 from vico.sim.bodies import Bodies
 from vico.sim.collisions import WALL, SolidMap, gap_to, map_gap, room_gap
-from vico.sim.footprints import IN_BUS, OUTDOORS, body_gap, can_touch, records_of
+from vico.sim.footprints import BODY, IN_BUS, OUTDOORS, body_gap, can_touch, records_of
 from vico.sim.neighbours import neighbour_grid, search
 from vico.sim.state import FIRST_TRAM, FIRST_UMBRELLA, RADIUS
 from vico.world.heights import HeightField
@@ -139,13 +139,25 @@ class OverlapCheck:
 def overlaps_of(state: SimulationState) -> list[Overlap]:
     """Return all overlaps of a state, in a fixed order."""
     people, objects = state.people, state.objects
-    others = Bodies.joined([owner.bodies() for owner in state.owners() if owner is not state.avatars])
+    others = Bodies.joined(
+        [owner.bodies() for owner in state.owners() if owner is not state.avatars and owner is not state.robots]
+    )
+    robots = np.zeros(0, BODY)
+    if state.robots is not None:
+        others = Bodies.joined([others, state.robots.outdoor_bodies()])
+        inside = np.flatnonzero(state.robots.rooms >= 0)
+        robots = records_of(state.robots.bodies().where(inside), state.robots.rooms[inside])
     lying = objects.in_rooms()
     everybody = people.bodies_of(np.arange(len(people)))
     avatars = records_of(everybody, state.avatars.space())
     avatars = avatars[avatars["space"] < len(state.indoor.rooms)]  # the rest is nowhere yet
     records = np.concatenate(
-        [avatars, _on_slopes(others, state.world.height), records_of(objects.bodies_of(lying), objects.room[lying])]
+        [
+            avatars,
+            _on_slopes(others, state.world.height),
+            robots,
+            records_of(objects.bodies_of(lying), objects.room[lying]),
+        ]
     )
     # Who sits or lies is in furniture, and shoulder to shoulder with others; each place has one person by rule.
     seated = set(people.entity[people.seat >= 0].tolist())

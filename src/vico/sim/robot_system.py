@@ -96,8 +96,39 @@ class RobotSystem(Subsystem, Protocol):
     def has_way(self, robot: int, xy: NDArray[np.float64]) -> bool:
         """Return whether there is a way to a point that is wide enough for the robot."""
 
-    def go_to(self, robot: int, xy: NDArray[np.float64]) -> bool:
-        """Have the robot go to a point; False if there is no way."""
+    def go_to(self, robot: int, xy: NDArray[np.float64], room: int = -1) -> bool:
+        """Have the robot go to a point of a room (-1: outdoors); False if there is no way."""
+
+    @property
+    def rooms(self) -> NDArray[np.int32]:
+        """The room each robot is in, -1 outdoors, int32, shape ``(n,)``."""
+
+    def outdoor_bodies(self) -> Bodies:
+        """Bodies of the robots that are outdoors."""
+
+    def room_at(self, point: NDArray[np.float64]) -> int:
+        """Return the room that a point lies in, ENU metres, -1 for none."""
+
+    def trip_refusal(self, robot: int, room: int, point: NDArray[np.float64]) -> str:
+        """Why a robot can't go to a point of a room (-1: outdoors), in words; "" if it can."""
+
+    def trip_room(self, robot: int) -> int:
+        """Return the room that a robot is going to, -1 outdoors, -2 for no trip."""
+
+    def at_doors(self) -> list[tuple[int, int]]:
+        """Return the robots that wait at doors, and the rooms behind those (-1: outdoors)."""
+
+    def ride(self, robot: int, dt: float) -> float:
+        """Have a robot ride on in a lift; return the seconds that it has."""
+
+    def room_needed(self, robot: int) -> float:
+        """Return how much room a robot needs around its middle, metres."""
+
+    def pass_door(self, robot: int, room: int, taken: NDArray[np.float64]) -> bool:
+        """Have a robot come through a door into a room (-1: outdoors); False if no spot there is clear of discs."""
+
+    def give_up(self, robot: int) -> None:
+        """Have a robot end its way before it is there."""
 
     def is_empty(self, robot: int) -> bool:
         """Return whether a robot's battery is empty."""
@@ -139,7 +170,7 @@ class RobotSystem(Subsystem, Protocol):
         """Have the robot hold out what it holds to a person at a point, until it is taken."""
 
     def follow_body(self, robot: int, entity: int) -> None:
-        """Have the robot keep near a body, wherever that goes outdoors."""
+        """Have the robot keep near a body, wherever that goes."""
 
     def stop(self, robot: int) -> None:
         """Have the robot stand still."""

@@ -227,7 +227,10 @@ class SimulationState:
 
     def obstacles(self) -> Bodies:
         """Every body outdoors that somebody on the ground could touch."""
-        everything = Bodies.joined([owner.bodies() for owner in self.owners()])
+        robots = self.robots
+        everything = Bodies.joined(
+            [owner.bodies() if owner is not robots else robots.outdoor_bodies() for owner in self.owners()]
+        )
         bottom, _ = everything.levels(self.world.height)
         return everything.where(bottom < TALLEST)
 
@@ -294,7 +297,10 @@ class SimulationState:
 
     def doors_of(self, i: int) -> list[dict[str, Any]]:
         """Ways out of the room that person `i` is in: where each leads, and where it is."""
-        room = self.people.room.item(i)
+        return self.doors_in(self.people.room.item(i))
+
+    def doors_in(self, room: int) -> list[dict[str, Any]]:
+        """Ways out of a room (-1: none): where each leads, and where it is."""
         if room < 0:
             return []
         rooms = self.indoor.rooms
@@ -327,6 +333,8 @@ class SimulationState:
         lying = objects.in_rooms()
         things = objects.bodies_of(lying[objects.room[lying] == room])
         things = things.where(things.height > STEP_HEIGHT)
+        if self.robots is not None and (self.robots.rooms == room).any():
+            things = Bodies.joined([things, self.robots.bodies().where(self.robots.rooms == room)])
         return np.vstack([self.people.position[inside], *(_points_of(things, k) for k in range(len(things)))])
 
     def seats_taken(self) -> NDArray[np.bool_]:

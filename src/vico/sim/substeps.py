@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.rules import ActionStatus, ReasonCode
-from vico.sim import doorways, holding, lifts, moves, rides
+from vico.sim import doorways, holding, lifts, moves, rides, robot_doors
 from vico.sim.bodies import ROBOT, Bodies, HasBodies, Subsystem
 from vico.sim.footprints import records_of
 from vico.sim.metrics import StopWatch
@@ -77,10 +77,15 @@ def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _A
     if len(lying):
         in_rooms = records_of(state.objects.bodies_of(lying), state.objects.room[lying])
         obstacles = np.concatenate([obstacles, in_rooms])
+    if state.robots is not None and (state.robots.rooms >= 0).any():
+        inside = np.flatnonzero(state.robots.rooms >= 0)
+        at = records_of(state.robots.bodies().where(inside), state.robots.rooms[inside])
+        obstacles = np.concatenate([obstacles, at])
     state.avatars.advance(SUBSTEP, obstacles, share=share)
     rides.follow(state)
     doorways.follow(state, SUBSTEP)
     lifts.follow(state, SUBSTEP)
+    robot_doors.follow(state, SUBSTEP)
     holding.advance(state, SUBSTEP)
     bodies.refresh(state.avatars)
     stopped = _report_collisions(state)
@@ -122,10 +127,14 @@ class _AllBodies:
     """Everybody's bodies; an owner's are asked for again only when they have moved."""
 
     def __init__(self, state: SimulationState) -> None:
-        self._bodies = {id(owner): owner.bodies() for owner in state.owners()}
+        self._robots = state.robots
+        self._bodies = {id(owner): self._outdoors(owner) for owner in state.owners()}
 
     def refresh(self, owner: HasBodies) -> None:
-        self._bodies[id(owner)] = owner.bodies()
+        self._bodies[id(owner)] = self._outdoors(owner)
+
+    def _outdoors(self, owner: HasBodies) -> Bodies:
+        return owner.bodies() if self._robots is None or owner is not self._robots else self._robots.outdoor_bodies()
 
     def but(self, owner: HasBodies) -> Bodies:
         return Bodies.joined([bodies for key, bodies in self._bodies.items() if key != id(owner)])

@@ -193,6 +193,17 @@ def _spaces(state: SimulationState) -> NDArray[np.int64]:
     return spaces
 
 
+def _where_robot_is(robot: int, state: SimulationState) -> dict[str, Any]:
+    """Return building, room, place and doors around a robot; empty outdoors."""
+    assert state.robots is not None
+    inside = int(state.robots.rooms[robot])
+    if inside < 0:
+        return {"building": "", "room": "", "place": "", "doors": []}
+    room, at = state.indoor.rooms[inside], int(state.indoor.place[inside])
+    place = state.world.places[at].id if at >= 0 else ""
+    return {"building": room.building, "room": room.id, "place": place, "doors": state.doors_in(inside)}
+
+
 def state_of(i: int, state: SimulationState) -> dict[str, Any]:
     """Return the state part of an agent's observation; empty strings and 0 stand for "none".
 
@@ -208,11 +219,8 @@ def state_of(i: int, state: SimulationState) -> dict[str, Any]:
             "cash": 0.0,
             "held": [0, 0],
             "vehicle": "",
-            "building": "",
-            "room": "",
-            "place": "",
+            **_where_robot_is(k, state),
             "accessible_places": [],
-            "doors": [],
             "posture": "standing",
             "action_status": _STATUSES[int(robots.action_status[k])],
             "action_code": code_name(int(robots.reason_code[k])),

@@ -11,6 +11,7 @@ from vico.assets.robots import ActionSpace
 from vico.rules import ReasonCode
 from vico.sim.actions.fields import Field, short
 from vico.sim.actions.model import ActionType, Actors, Refusal, Situation, Values
+from vico.sim.robot_doors import place_of_room, shut_words
 from vico.sim.robot_system import RobotSystem
 from vico.sim.simulation_state import SimulationState
 
@@ -38,14 +39,28 @@ def control(values: Values, robot: int, state: SimulationState) -> None:
 
 
 def check_go_to(values: Values, robot: int, state: SimulationState) -> Refusal | None:
-    """Judge going to a point: the robot drives or walks, and there is a way."""
-    target = np.array(values["target"], np.float64)
-    return _refuse_without_velocities("go_to", robot, state) or _refuse_without_way("go_to", target, robot, state)
+    """Judge going to a point: the robot drives or walks, and there is a way, through open doors where it is indoors."""
+    target, robots = np.array(values["target"], np.float64), _robots(state)
+    refusal = _refuse_without_velocities("go_to", robot, state)
+    room = robots.room_at(target)
+    if refusal is not None or (room < 0 and robots.rooms[robot] < 0):
+        return refusal or _refuse_without_way("go_to", target, robot, state)
+    if robots.flies(robot):
+        return Refusal(ReasonCode.BLOCKED, "go_to: robots that fly do not go indoors")
+    if robots.in_hand(robot) and room != robots.rooms[robot]:
+        return Refusal(ReasonCode.HAND_FULL, "go_to: doors are for empty hands; put down what is held, or on a deck")
+    place = place_of_room(room, state) if robots.rooms[robot] < 0 else None
+    if place is not None and (shut := shut_words(place, state)):
+        return Refusal(ReasonCode.CLOSED, f"go_to: {shut}")
+    reason = robots.trip_refusal(robot, room, target)
+    return Refusal(ReasonCode.BLOCKED, f"go_to: {reason}") if reason else None
 
 
 def go_to(values: Values, robot: int, state: SimulationState) -> None:
     """Send a robot to a point."""
-    _robots(state).go_to(robot, np.array(values["target"][:2]))
+    target = np.array(values["target"], np.float64)
+    room = _robots(state).room_at(target)
+    _robots(state).go_to(robot, target[:2] if room < 0 else target, room)
 
 
 def check_follow(values: Values, robot: int, state: SimulationState) -> Refusal | None:
@@ -109,6 +124,8 @@ def _refuse_without_power(action: str, robot: int, state: SimulationState) -> Re
 
 
 def _refuse_without_arm(action: str, robot: int, state: SimulationState) -> Refusal | None:
+    if _robots(state).rooms[robot] >= 0:
+        return Refusal(ReasonCode.INDOORS, f"{action}: arms work outdoors; go out first")
     if _robots(state).has_arm(robot):
         return _refuse_without_power(action, robot, state)
     return Refusal(ReasonCode.NOT_ABLE, f"{action}: this robot has no arm")
@@ -129,7 +146,7 @@ def _refuse_without_way(action: str, point: NDArray[np.float64], robot: int, sta
         return Refusal(ReasonCode.CLOSED, f"{action}: an event has closed the ground there")
     return Refusal(
         ReasonCode.BLOCKED,
-        f"{action}: no way there outdoors that is wide enough for this robot; robots do not go indoors",
+        f"{action}: no way there outdoors that is wide enough for this robot",
     )
 
 
@@ -236,7 +253,7 @@ ROBOTS = (
     ),
     ActionType(
         "go_to",
-        "Send a robot to a point outdoors, round whoever stands in the way.",
+        "Send a robot to a point, outdoors or in a room, through doors and by lifts, round whoever stands in the way.",
         go_to,
         check_go_to,
         {"target": Field("point")},
@@ -245,7 +262,7 @@ ROBOTS = (
     ),
     ActionType(
         "follow",
-        "Have a robot keep near an agent, wherever that goes outdoors.",
+        "Have a robot keep near an agent, wherever that goes.",
         follow,
         check_follow,
         {"agent": Field("name")},

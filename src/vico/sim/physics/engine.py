@@ -97,6 +97,12 @@ class PhysicsEngine(Protocol):
             Force and torque in the frame of each site, N and Nm, shape ``(k, 6)``.
         """
 
+    def park(self, robot: int) -> None:
+        """Take a robot out of the scene until it is stood there again: it hangs where nobody comes."""
+
+    def stand(self, robot: int, place: NDArray[np.float64]) -> None:
+        """Stand a robot on the ground at rest: x, y (ENU metres) and yaw, shape ``(3,)``."""
+
     # Everybody else.
 
     def set_dynamic_obstacles(self, obstacles: Bodies, dt: float) -> None:

@@ -21,7 +21,7 @@ from vico.sim.physics.genesis_objects import ObjectSlots
 from vico.sim.physics.genesis_rays import RayTwin
 from vico.sim.physics.genesis_scene import BuiltScene
 from vico.sim.physics.movers import KinematicBodies
-from vico.sim.physics.mujoco_model import standing_pose
+from vico.sim.physics.mujoco_model import parked_robot, standing_pose
 from vico.sim.physics.mujoco_views import base_motion, motion_of
 from vico.sim.physics.records import Base, Contacts, Imu, Motion, ObjectMotion, PhysicsError, RigidObject
 
@@ -56,14 +56,12 @@ class GenesisEngine:
         self._contacts: NDArray[np.float64] | None = np.zeros((0, 9))
         self._twin: RayTwin | None = None
         self._hold()
-        for index, model, place in zip(scene.robots, scene.models, places, strict=True):
-            position, quaternion = standing_pose(scene.height, model, place)
-            scene.positions[index.root : index.root + 7] = [*position, *quaternion]
-            scene.positions[index.angle] = model.rest
-            self._gain[index.driven], self._bias[index.driven] = index.gain, index.bias
+        self._parked = np.zeros(len(scene.models), np.bool_)
+        for robot, place in enumerate(places):
+            index = scene.robots[robot]
             self._limit[index.driven] = index.limit
             scene.state["dyn_state.dofs.ctrl_mode"][index.driven, 0] = index.mode
-            self._follow(index, model.stance if model.driven else np.zeros(0))
+            self._stand(robot, place)
         self._put_parameters()
         self._note()
 
@@ -195,6 +193,40 @@ class GenesisEngine:
         for robot, values in zip(robots.tolist(), wrenches, strict=True):
             self._wrench[robot][self._scene.robots[robot].sites[site]] = values
 
+    def park(self, robot: int) -> None:
+        """Take a robot out of the scene."""
+        with self._scene.lock:
+            self._hold()
+            self._parked[robot] = True
+            self._rest(robot, parked_robot(robot))
+            self._note()
+
+    def stand(self, robot: int, place: NDArray[np.float64]) -> None:
+        """Stand a robot on the ground at rest."""
+        with self._scene.lock:
+            self._hold()
+            self._parked[robot] = False
+            self._stand(robot, place)
+            self._put_parameters()
+            self._note()
+
+    def _stand(self, robot: int, place: NDArray[np.float64]) -> None:
+        index, model = self._scene.robots[robot], self._scene.models[robot]
+        position, quaternion = standing_pose(self._scene.height, model, place)
+        self._rest(robot, [*position, *quaternion])
+        self._gain[index.driven], self._bias[index.driven] = index.gain, index.bias
+        self._velocity_before[robot] = 0.0
+
+    def _rest(self, robot: int, pose: list[float]) -> None:
+        """Put a robot to a pose, at rest, pushed by nothing."""
+        scene, index, model = self._scene, self._scene.robots[robot], self._scene.models[robot]
+        scene.positions[index.positions] = scene.pristine["rigid_info.qpos"][index.positions, 0]
+        scene.positions[index.root : index.root + 7] = pose
+        scene.positions[index.angle] = model.rest
+        scene.speeds[index.speeds] = 0.0
+        self._wrench[robot][:] = 0.0
+        self._follow(index, model.stance if model.driven else np.zeros(0))
+
     # Everybody else.
 
     def set_dynamic_obstacles(self, obstacles: Bodies, dt: float) -> None:
@@ -202,7 +234,8 @@ class GenesisEngine:
         before = self._movers.half.copy()
         with self._scene.lock:
             self._hold()
-            self._movers.set(obstacles, dt, self._qpos[self._scene.first[:, :1] + np.arange(2)])
+            centres = self._qpos[self._scene.first[:, :1] + np.arange(2)]
+            self._movers.set(obstacles, dt, centres[~self._parked])
             changed = np.flatnonzero((before != self._movers.half).any(axis=1))
             if len(changed):
                 self._scene.built.shapes.resize(self._scene.mover_geom[changed], 2.0 * self._movers.half[changed])
@@ -255,13 +288,15 @@ class GenesisEngine:
 
     def step(self, frames: int = 1, *, frame: float = COARSE, holding: bool | None = None) -> None:
         """Move on by some frames; people and vehicles move first, at every one. Friction is always the same."""
-        scene = self._scene
+        scene, parked = self._scene, np.flatnonzero(self._parked).tolist()
         with scene.lock:
             self._hold()
             for _ in range(frames):
                 if self._movers.moving:
                     self._movers.advance(frame)
                     self._move_movers()
+                for robot in parked:
+                    self._rest(robot, parked_robot(robot))
                 self._velocity_before[:] = scene.speeds[scene.first[:, 1:] + np.arange(3)]
                 said = scene.step(frame, self._wrench)
                 self._contacts = None
@@ -300,6 +335,7 @@ class GenesisEngine:
             "grip": self._grip.copy(),
             "velocity_before": self._velocity_before.copy(),
             "frame": self._frame.copy(),
+            "parked": self._parked.copy(),
             "forces": self._forces.copy(),
             "contacts": contacts,
             **self._slots.arrays(),
@@ -334,6 +370,7 @@ class GenesisEngine:
                 wrench[:] = arrays["wrench"][first : first + len(wrench)]
                 first += len(wrench)
             self._velocity_before[:], self._frame[:] = arrays["velocity_before"], arrays["frame"]
+            self._parked[:] = arrays["parked"]
             self._forces[:], self._contacts = arrays["forces"], np.array(arrays["contacts"])
             if scene.holder is not None and scene.holder is not self:
                 scene.holder.leave()

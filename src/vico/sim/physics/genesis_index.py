@@ -35,6 +35,8 @@ class GenesisIndex:
     ----------
     root, root_speed
         First of its base's position and speed.
+    positions, speeds
+        All its positions and speeds.
     angle, rate
         Positions and speeds of its joints, in the order of the model's `joints`, int64.
     driven
@@ -63,6 +65,8 @@ class GenesisIndex:
     def __init__(self, model: RobotModel, spec: Any, entity: Any) -> None:
         self._offset = int(entity.dof_start), int(entity.q_start)
         self.root, self.root_speed = int(entity.q_start), int(entity.dof_start)
+        self.positions = slice(self.root, self.root + int(entity.n_qs))
+        self.speeds = slice(self.root_speed, self.root_speed + int(entity.n_dofs))
         names = [link.name for link in entity.links]
         self.links = tuple(names)
         self.link = np.array([link.idx for link in entity.links], np.int64)

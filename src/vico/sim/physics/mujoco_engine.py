@@ -23,6 +23,7 @@ from vico.sim.physics.mujoco_model import (
     FRICTION,
     SOLID_GROUPS,
     parked_object,
+    parked_robot,
     standing_pose,
 )
 from vico.sim.physics.mujoco_parameters import Parameters
@@ -83,13 +84,10 @@ class MujocoEngine:
         self._contacts: NDArray[np.float64] | None = np.zeros((0, 9))
         self._gains_of: list[tuple[float, float] | None] = [None] * len(scene.models)
         self._near_solids = np.ones(len(scene.models), np.bool_)
-        for robot, (model, place) in enumerate(zip(scene.models, places, strict=True)):
-            index = scene.robots[robot]
-            position, quaternion = standing_pose(scene.height, model, place)
-            self._qpos[index.root : index.root + 7] = [*position, *quaternion]
-            self._qpos[index.angle] = model.rest
-            if model.driven:
-                self._data.ctrl[index.motor] = model.stance
+        self._parked = np.zeros(len(scene.models), np.bool_)
+        for robot, place in enumerate(places):
+            position, quaternion = standing_pose(scene.height, scene.models[robot], place)
+            self._rest(robot, [*position, *quaternion])
         self._forget()
         self._move_movers()
 
@@ -236,11 +234,44 @@ class MujocoEngine:
         """Push several robots of one kind at the site of one name from now on."""
         self._ctrl[self.compiled.kind(robots).thrusters[site]] = wrenches
 
+    def park(self, robot: int) -> None:
+        """Take a robot out of the scene."""
+        self._parked[robot] = True
+        self._rest(robot, parked_robot(robot))
+        self._forget()
+
+    def stand(self, robot: int, place: NDArray[np.float64]) -> None:
+        """Stand a robot on the ground at rest."""
+        self._parked[robot] = False
+        position, quaternion = standing_pose(self.compiled.height, self.compiled.models[robot], place)
+        self._rest(robot, [*position, *quaternion])
+        self._velocity_before[robot] = 0.0
+        self._contacts = self._last_contacts()
+        # As stiff as at the beginning, until its controller says otherwise.
+        mine = np.isin(self.compiled.servos, self.compiled.robots[robot].servo)
+        self._parameters.stiffness[mine] = self.compiled.stiffness[mine]
+        self._parameters.damping[mine] = self.compiled.damping[mine]
+        self._parameters.changed()
+        self._gains_of[robot] = None
+        self._forget()
+
+    def _rest(self, robot: int, pose: list[float]) -> None:
+        """Put a robot to a pose, at rest, pushed by nothing."""
+        index, model = self.compiled.robots[robot], self.compiled.models[robot]
+        self._qpos[index.positions] = self._model.qpos0[index.positions]
+        self._qpos[index.root : index.root + 7] = pose
+        self._qpos[index.angle] = model.rest
+        self._qvel[index.speeds] = 0.0
+        self._data.qacc_warmstart[index.speeds] = 0.0
+        self._ctrl[index.actuators] = 0.0
+        if model.driven:
+            self._ctrl[index.motor] = model.stance
+
     # Everybody else.
 
     def set_dynamic_obstacles(self, obstacles: Bodies, dt: float) -> None:
         """Take people and vehicles near robots; they arrive `dt` seconds from now."""
-        self._movers.set(obstacles, dt, self._qpos[self.compiled.base_position])
+        self._movers.set(obstacles, dt, self._qpos[self.compiled.base_position][~self._parked])
         if not np.array_equal(self._parameters.mover_half, self._movers.half):
             self._parameters.mover_half[:] = self._movers.half
             self._parameters.changed()
@@ -344,6 +375,7 @@ class MujocoEngine:
     def step_in(self, shared: SharedModel, frames: int, frame: float, *, holding: bool | None = None) -> None:
         """Step, with the equations of a model of the same scene: its own for each thread of a batch."""
         s, steps = self.compiled, SOLVER_STEPS[frame]
+        parked = np.flatnonzero(self._parked).tolist()
         coordinates, cells = (self._qpos, self._qvel, s.first), (s.solids.away, s.solids.tops)
         self._forget()
         with shared.lock:
@@ -353,6 +385,8 @@ class MujocoEngine:
             for _ in range(frames):
                 find_near(cells, s.solids.half, s.solids.reaches, frame, coordinates, self._near_solids)
                 s.meet_solids(shared, self._near_solids)
+                for robot in parked:
+                    self._rest(robot, parked_robot(robot))
                 if self._movers.moving:
                     self._movers.advance(frame)
                     self._move_movers()
@@ -405,6 +439,7 @@ class MujocoEngine:
             "state": self._state(),
             "present": self._present.copy(),
             "calm": self._calm.copy(),
+            "parked": self._parked.copy(),
             "velocity_before": self._velocity_before.copy(),
             "frame": self._frame.copy(),
             "forces": np.array(self._data.actuator_force),
@@ -452,7 +487,7 @@ class MujocoEngine:
         anew = not other and not np.array_equal(self._present, present)
         self._set_state(state, arrays["forces"], arrays["contacts"], anew=anew)
         self._present[:] = present
-        self._calm[:] = arrays["calm"]
+        self._calm[:], self._parked[:] = arrays["calm"], arrays["parked"]
         self._velocity_before[:] = arrays["velocity_before"]
         self._frame[:] = arrays["frame"]
         self._gains_of = [None] * len(self.compiled.models)

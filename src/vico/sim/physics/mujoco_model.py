@@ -19,6 +19,8 @@ SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 PARKED = -500.0
 #: Metres between parked bodies.
 PARKED_APART = 20.0
+#: Height at which robots hang that are not in the scene, metres: they have weight, and the ground is solid from below.
+PARKED_ROBOTS = 3000.0
 #: Finest grid of the ground, metres: finer ones cost time and give robots nothing.
 _CELL = 2.0
 #: ... and where it has kerbs, which are ramps half a metre wide then.
@@ -207,6 +209,11 @@ def _add_objects(spec: Any, capacity: Capacity) -> None:
             contype=TOUCH | SOLID,
             conaffinity=TOUCH | LIMB,
         )
+
+
+def parked_robot(robot: int) -> list[float]:
+    """Position and quaternion of a robot that is not in the scene."""
+    return [PARKED_APART * robot, 0.0, PARKED_ROBOTS, 1.0, 0.0, 0.0, 0.0]
 
 
 def parked_object(slot: int) -> list[float]:

@@ -35,6 +35,8 @@ class RobotIndex:
         Names of all its bodies, base first.
     link_bodies
         Those bodies, int64, shape ``(links,)``.
+    positions, speeds, actuators
+        All its positions, speeds and actuators, in MuJoCo's order.
     reach
         Metres from its base within which all of it is, however its joints turn.
     thrusters
@@ -55,6 +57,12 @@ class RobotIndex:
         mine = [k for k in range(model.nbody) if model.body(k).name.startswith(prefix)]
         self.links = tuple(model.body(k).name.removeprefix(prefix) for k in mine)
         self.link_bodies = np.array(mine, np.int64)
+        mine_too = np.flatnonzero(np.isin(model.jnt_bodyid, self.link_bodies))
+        last = int(mine_too[-1])
+        self.speeds = slice(self.root_speed, self.root_speed + int(np.isin(model.dof_bodyid, self.link_bodies).sum()))
+        self.positions = slice(self.root, int(model.jnt_qposadr[last]) + (7 if len(mine_too) == 1 else 1))
+        names = [model.actuator(k).name for k in range(model.nu)]
+        self.actuators = np.array([k for k, name in enumerate(names) if name.startswith(prefix)], np.int64)
         sites = [model.site(k).name for k in range(model.nsite)]
         self.reach = _reach(model, self.link_bodies)
         self.thrusters = {

@@ -180,9 +180,9 @@ def _agents(step: int, sim: Simulation, actions: Mapping[str, Any]) -> Rows:
             "reason": robots.reason,
         }
         n = len(robots.names)
-        # A robot has no posture, pocket or hand, and is never indoors.
+        # A robot has no posture, pocket or hand.
         rest = {key: np.zeros(n) for key in rows} | {"step": np.full(n, step)}
-        rest |= {key: np.full(n, -1) for key in ("room", "place")}
+        rest |= {"room": robots.rooms, "place": np.append(state.indoor.place, -1)[robots.rooms]}
         rows = {key: np.concatenate([values, own.get(key, rest[key])]) for key, values in rows.items()}
     rows["reason"] = rows["reason"].tolist()
     return rows | {"action": [action_text(actions[name]) if name in actions else None for name in names]}

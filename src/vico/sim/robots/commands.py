@@ -9,6 +9,7 @@ from vico.errors import InputError
 from vico.sim.robots import flying, tasks
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.state import Circles, RobotMode, RobotRun
+from vico.sim.robots.trips import begin_leg
 from vico.sim.robots.ways import is_closed, way_to
 
 
@@ -66,13 +67,19 @@ def stop(run: RobotRun, robot: int) -> None:
     run.set_mode(robot, RobotMode.IDLE)
 
 
-def go_to(run: RobotRun, robot: int, goal: NDArray[np.float64]) -> bool:
-    """Take a way to a point, ENU metres; return False, and change nothing, if there is none."""
+def go_to(run: RobotRun, robot: int, goal: NDArray[np.float64], room: int = -1) -> bool:
+    """Take a way to a point of a room (-1: outdoors); return False, and change nothing, without one."""
     if run.scene.models[robot].rotors is not None:
         target = flying.cruise_point(run, goal)
-        if run.scene.airspace.refusal(target):
+        if room >= 0 or run.scene.airspace.refusal(target):
             return False
         flying.fly_to(run, robot, target)
+        return True
+    if room >= 0 or run.trips.room[robot] >= 0:
+        if not begin_leg(run, robot, room, goal):
+            return False
+        tasks.abandon(run, robot)
+        run.set_mode(robot, RobotMode.ROUTE)
         return True
     path = way_to(run, robot, goal)
     if path is None:
@@ -96,12 +103,13 @@ def take(run: RobotRun, robot: int, path: ArrayLike) -> None:
     if run.scene.models[robot].rotors is not None:
         raise InputError(f"follow: {run.scene.models[robot].title} flies: send it to points")
     tasks.abandon(run, robot)
+    run.trips.end(robot)
     run.followers[robot].begin(points)
     run.set_mode(robot, RobotMode.ROUTE)
 
 
 def follow_body(run: RobotRun, robot: int, entity: int) -> None:
-    """Keep near a body, wherever it goes outdoors.
+    """Keep near a body, wherever it goes.
 
     Raises
     ------
@@ -112,6 +120,7 @@ def follow_body(run: RobotRun, robot: int, entity: int) -> None:
     flying.settle(run, robot)
     tasks.abandon(run, robot)
     run.followers[robot].end()
+    run.trips.end(robot)
     run.set_mode(robot, RobotMode.FOLLOW)
     run.arrays.leader[robot] = entity
 
@@ -128,7 +137,7 @@ def set_closed_ground(run: RobotRun, circles: Circles) -> None:
         return
     run.closed_ground = circles
     for robot, follower in enumerate(run.followers):
-        if not len(follower.path) or not circles or not is_closed(run, follower.ahead()):
+        if run.trips.room[robot] >= 0 or not len(follower.path) or not circles or not is_closed(run, follower.ahead()):
             continue
         path = way_to(run, robot, follower.path[-1])
         if path is not None:

@@ -10,9 +10,12 @@ from vico.sim.robots import commands
 from vico.sim.robots.flying import decide_flight
 from vico.sim.robots.navigation import GAP, SIGHT, NearbyBodies
 from vico.sim.robots.path_follower import RobotStatus
+from vico.sim.robots.rooms import OUTDOORS
 from vico.sim.robots.state import RobotMode, RobotRun
 from vico.sim.robots.tasks import decide_task, handled
-from vico.sim.robots.ways import next_errand, way_to
+from vico.sim.robots.trip_state import NONE
+from vico.sim.robots.trips import begin_leg, others_in_room, way_on, whereabouts
+from vico.sim.robots.ways import next_errand
 
 # What the states' arrays hold: members of an enumeration are slow to look up in the control loop.
 _IDLE, _VELOCITY, _MOTORS, _ROUTE, _FOLLOW, _TASK = (int(mode) for mode in RobotMode)
@@ -47,12 +50,15 @@ def decide(run: RobotRun, dt: float, obstacles: Bodies, mine: Bodies, *, errands
         if robot in flying or arrays.status[robot] == _FALLEN or mode == _MOTORS:
             continue
         if mode == _IDLE:
-            if errands and arrays.charge[robot] > 0.0:
+            if errands and arrays.charge[robot] > 0.0 and run.trips.room[robot] == OUTDOORS:
                 _rest(run, robot, dt)
             continue
         around = around or NearbyBodies(obstacles, mine)
         in_hand = handled(run, robot)
-        if in_hand:
+        if run.trips.room[robot] >= 0:
+            inside = NearbyBodies(others_in_room(run, robot), mine.where(np.array([robot])))
+            others = inside.near(0, SIGHT + 4)
+        elif in_hand:
             others = NearbyBodies(obstacles.where(obstacles.entity != in_hand), mine).near(robot, SIGHT + 4)
         else:
             others = around.near(robot, SIGHT + 4)
@@ -91,13 +97,30 @@ def _hold_velocity(run: RobotRun, robot: int, others: NDArray[np.void]) -> None:
 
 def _keep_to_way(run: RobotRun, robot: int, others: NDArray[np.void], dt: float) -> None:
     """Follow the way, and say when it ends or can't be gone."""
-    status = _steer(run, robot, others, dt)
+    status = _go_on(run, robot, others, dt)
     run.arrays.status[robot] = status
     if status in (RobotStatus.ARRIVED, RobotStatus.BLOCKED):
         run.note(robot, "arrived" if status == RobotStatus.ARRIVED else "blocked")
         run.arrays.mode[robot] = RobotMode.IDLE
         run.followers[robot].end()
+        run.trips.end(robot)
         run.arrays.rest[robot] = 0.0
+
+
+def _go_on(run: RobotRun, robot: int, others: NDArray[np.void], dt: float) -> RobotStatus:
+    """Steer along the way, from door to door; return how that goes."""
+    trips = run.trips
+    if trips.door[robot] != NONE:
+        return RobotStatus.WAITING
+    if not len(run.followers[robot].path):  # it has come through a door
+        goes_on = begin_leg(run, robot, int(trips.goal_room[robot]), trips.goal[robot])
+        return RobotStatus.MOVING if goes_on else RobotStatus.BLOCKED
+    status = _steer(run, robot, others, dt)
+    if status == RobotStatus.ARRIVED and trips.leg[robot] != NONE:
+        trips.door[robot] = trips.leg[robot]
+        run.followers[robot].end()
+        return RobotStatus.WAITING
+    return status
 
 
 def _steer(run: RobotRun, robot: int, others: NDArray[np.void], dt: float) -> RobotStatus:
@@ -105,7 +128,7 @@ def _steer(run: RobotRun, robot: int, others: NDArray[np.void], dt: float) -> Ro
     follower, base = run.followers[robot], run.engine.base(robot)
     run.arrays.velocity[robot] = follower.steer(base, others, dt)
     if follower.wants_detour:
-        follower.detoured(way_to(run, robot, follower.path[-1], follower.closed(base, others)))
+        follower.detoured(way_on(run, robot, follower.path[-1], follower.closed(base, others)))
     return follower.status
 
 
@@ -118,26 +141,35 @@ def _drive_to_work(run: RobotRun, robot: int, others: NDArray[np.void], dt: floa
 
 
 def _keep_near(run: RobotRun, robot: int, others: NDArray[np.void], dt: float, everyone: Bodies) -> None:
-    """Go where the leader is; wait near it, and where it can't be found."""
-    follower, arrays = run.followers[robot], run.arrays
-    found = np.flatnonzero(everyone.entity == arrays.leader[robot])
+    """Go where the leader is, through doors if need be; wait near it, and where it can't be found."""
+    follower, arrays, trips = run.followers[robot], run.arrays, run.trips
     arrays.status[robot] = RobotStatus.WAITING
-    if not len(found):
-        follower.end()
+    found = whereabouts(run, int(arrays.leader[robot]), everyone)
+    if found is None:
+        _stay(run, robot)
         return
-    leader = everyone.position[found[0], :2]
+    space, at = found
+    here = space == trips.room[robot]
     near = run.scene.models[robot].half_length + _FOLLOW_GAP
-    if np.hypot(*(leader - run.position(robot)[:2])) < near:
-        follower.end()
+    if here and np.hypot(*(at - run.position(robot))[:2]) < near:
+        _stay(run, robot)
         return
-    if not len(follower.path) or np.hypot(*(follower.path[-1] - leader)) > _FOLLOW_DRIFT:
-        path = way_to(run, robot, leader)
-        if path is None:
-            follower.end()
-            return
-        follower.begin(path)
-    status = _steer(run, robot, others, dt)
-    arrays.status[robot] = status
-    if status in (RobotStatus.ARRIVED, RobotStatus.BLOCKED):
-        follower.end()
+    if trips.door[robot] != NONE and trips.goal_room[robot] == space:
+        return
+    on_the_way = len(follower.path) > 0 and trips.goal_room[robot] == space
+    if on_the_way and here:
+        end = follower.path[-1] if space == OUTDOORS else trips.goal[robot, :2]
+        on_the_way = bool(np.hypot(*(end - at[:2])) <= _FOLLOW_DRIFT)
+    if not on_the_way and not begin_leg(run, robot, space, at):
+        _stay(run, robot)
+        return
+    arrays.status[robot] = _go_on(run, robot, others, dt)
+    if arrays.status[robot] in (RobotStatus.ARRIVED, RobotStatus.BLOCKED):
+        _stay(run, robot)
         arrays.status[robot] = RobotStatus.WAITING
+
+
+def _stay(run: RobotRun, robot: int) -> None:
+    """Be on no way any more."""
+    run.followers[robot].end()
+    run.trips.end(robot)

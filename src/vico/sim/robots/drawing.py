@@ -9,35 +9,11 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.exact import apply_matrix
-from vico.sim.bodies import Bodies, Drawn
+from vico.sim.bodies import Drawn
 from vico.sim.carrying import DeckPose
 from vico.sim.robots.flying import flight_of
 from vico.sim.robots.state import RobotRun
 from vico.world.mesh import Surface
-
-#: Metres a robot has to be above where it stands on the ground to count as being in the air.
-_AIRBORNE = 0.5
-
-
-def bodies_of(run: RobotRun) -> Bodies:
-    """Return upright boxes around the robots: on the ground, or where they fly."""
-    outlines = run.scene.outlines
-    bases = [run.engine.base(i) for i in range(len(run.entities))]
-    position = np.array([base.position for base in bases]).reshape(-1, 3)
-    ground = run.scene.world.height(position)
-    bottom = position[:, 2] - outlines.stand
-    in_the_air = (bottom > ground + _AIRBORNE) | run.scene.outlines.flies
-    position[:, 2] = np.where(in_the_air, bottom, ground)
-    return Bodies(
-        run.entities,
-        outlines.kind,
-        position,
-        np.array([base.yaw for base in bases]),
-        outlines.half_length,
-        outlines.half_width,
-        outlines.height,
-        np.array([base.velocity for base in bases]).reshape(-1, 3)[:, :2].copy(),
-    )
 
 
 def prototypes_of(models: Sequence[RobotModel]) -> dict[str, list[Surface]]:
@@ -94,7 +70,7 @@ def cameras(run: RobotRun) -> NDArray[np.float64]:
 
 def camera_heights(run: RobotRun) -> NDArray[np.float64]:
     """Height of each robot's camera above its body's bottom, metres; of the base's where there is no camera."""
-    return np.asarray(cameras(run)[:, 2] - bodies_of(run).position[:, 2])
+    return np.asarray(cameras(run)[:, 2] - run.bodies().position[:, 2])
 
 
 def _eye(run: RobotRun, robot: int) -> NDArray[np.float64]:

@@ -12,20 +12,23 @@ from vico.assets.robots import TICK, ActionSpace
 from vico.errors import InputError
 from vico.sim.bodies import Bodies, Drawn
 from vico.sim.carrying import DeckPose
+from vico.sim.physics import PhysicsEngine
 from vico.sim.physics.frames import FrameCount, FrameNeeds, frame_length
 from vico.sim.physics.loose import LooseObjects
-from vico.sim.robots import commands, drawing, flying, sensing, tasks
+from vico.sim.robots import commands, drawing, flying, sensing, tasks, trips
 from vico.sim.robots.batteries import charge_of, watch_batteries
 from vico.sim.robots.decisions import decide
 from vico.sim.robots.falls import watch_falls
 from vico.sim.robots.motors import command_motors, command_rotors, velocities
 from vico.sim.robots.path_follower import RobotStatus
+from vico.sim.robots.rooms import turning_radius
 from vico.sim.robots.scene import RobotScene
 from vico.sim.robots.spawns import spawns
 from vico.sim.robots.state import NOTES, Circles, RobotArrays, RobotEvent, RobotMode, RobotRun
+from vico.sim.robots.trip_state import NONE
 from vico.sim.robots.ways import way_to
 from vico.sim.robots.work import Kind
-from vico.sim.state import MovableObjects
+from vico.sim.state import MovableObjects, People
 from vico.world.folder import World
 from vico.world.mesh import Surface
 from vico.world.model import FIRST_BODY
@@ -89,9 +92,15 @@ class RobotPopulation:
         where = spawns(world, len(kinds), seed) if places is None else np.asarray(places, np.float64)
         if where.shape != (len(kinds), 3):
             raise InputError(f"robots: {len(kinds)} robots need as many places of x, y, yaw, not {where.shape}")
-        self.engine = self.scene.engine(where)
-        self.run = RobotRun(self.scene, self.engine, self.entities, seed, RobotArrays.idle(self.scene))
-        self._loose = LooseObjects(self.engine, MovableObjects.none())
+        engine = self.scene.engine(where)
+        self.run = RobotRun(self.scene, engine, self.entities, seed, RobotArrays.idle(self.scene))
+        self._outdoors = engine
+        self._loose = LooseObjects(engine, MovableObjects.none())
+
+    @property
+    def engine(self) -> PhysicsEngine:
+        """Physics of all robots, outdoors and in rooms."""
+        return self.run.engine
 
     def __len__(self) -> int:
         return len(self.models)
@@ -153,11 +162,13 @@ class RobotPopulation:
         """Return whether there is a way to a point that is wide enough for a robot."""
         if self.flies(robot):
             return not self.scene.airspace.refusal(flying.cruise_point(self.run, np.asarray(xy, np.float64)))
+        if self.run.trips.room[robot] >= 0:
+            return not self.trip_refusal(robot, -1, xy)
         return way_to(self.run, robot, np.asarray(xy, np.float64)) is not None
 
-    def go_to(self, robot: int, xy: ArrayLike) -> bool:
-        """Find a way to a point and take it; False, and nothing changes, if there is none."""
-        return commands.go_to(self.run, robot, np.asarray(xy, np.float64))
+    def go_to(self, robot: int, xy: ArrayLike, room: int = -1) -> bool:
+        """Find a way to a point of a room (-1: outdoors) and take it; False, and nothing changes, if there is none."""
+        return commands.go_to(self.run, robot, np.asarray(xy, np.float64), room)
 
     def flies(self, robot: int) -> bool:
         """Return whether a robot flies."""
@@ -243,6 +254,7 @@ class RobotPopulation:
         whole = dt if substep is None else substep
         if since == 0.0:
             self.engine.set_dynamic_obstacles(obstacles, whole)
+            trips.surround(self.run, whole)
             decide(self.run, whole, obstacles, self.bodies(), errands=self.errands)
             self._loose.update(self._near_ground())
             arrays = self.run.arrays
@@ -298,12 +310,13 @@ class RobotPopulation:
     def _near_ground(self) -> NDArray[np.float64]:
         """Where the robots are that things can be near to: those high up in the air are not."""
         positions = np.array([self.run.position(i) for i in range(len(self))])
+        outdoors = self.run.trips.room < 0
         flights = [flight.robots for flight in self.run.flights if flight is not None]
         if not flights:
-            return positions
+            return positions[outdoors]
         flying = np.zeros(len(self), np.bool_)
         flying[np.concatenate(flights)] = True
-        return positions[~flying | (positions[:, 2] < self.world.height(positions) + _LOW_FLIGHT)]
+        return positions[outdoors & (~flying | (positions[:, 2] < self.world.height(positions) + _LOW_FLIGHT))]
 
     def _needs(self) -> FrameNeeds:
         """Return what decides how long a frame is."""
@@ -331,8 +344,12 @@ class RobotPopulation:
 
     def attach_objects(self, objects: MovableObjects) -> None:
         """Have physics move things that lie near robots, or fall; before the first step."""
-        self._loose = LooseObjects(self.engine, objects)
+        self._loose = LooseObjects(self._outdoors, objects)
         self.run.objects = objects
+
+    def attach_people(self, people: People) -> None:
+        """Have robots know of people indoors; before the first step."""
+        self.run.people = people
 
     def physics_record(self) -> dict[str, Any]:
         """Return what a run reports of its physics: frames, and how many were near robots and found no room in it."""
@@ -360,9 +377,60 @@ class RobotPopulation:
 
     def bodies(self) -> Bodies:
         """Oriented rectangles of the robots' outlines."""
-        if self.run.known_bodies is None:
-            self.run.known_bodies = drawing.bodies_of(self.run)
-        return self.run.known_bodies
+        return self.run.bodies()
+
+    # Doors and rooms.
+
+    @property
+    def rooms(self) -> NDArray[np.int32]:
+        """Return the room each is in, -1 outdoors, int32, shape ``(n,)``."""
+        return self.run.trips.room
+
+    def outdoor_bodies(self) -> Bodies:
+        """Oriented rectangles of the outlines of those that are outdoors."""
+        bodies, outdoors = self.run.bodies(), self.run.trips.room < 0
+        return bodies if outdoors.all() else bodies.where(outdoors)
+
+    def room_at(self, point: ArrayLike) -> int:
+        """Return the room that a point lies in, ENU metres, -1 for none."""
+        return self.scene.rooms.room_at(np.asarray(point, np.float64)) if self.world.rooms else -1
+
+    def trip_refusal(self, robot: int, room: int, point: ArrayLike) -> str:
+        """Why a robot can't go to a point of a room (-1: outdoors), in words; "" if it can."""
+        return trips.refusal(self.run, robot, room, np.asarray(point, np.float64))
+
+    def at_doors(self) -> list[tuple[int, int]]:
+        """Return the robots that wait at doors, and the rooms behind those (-1: outdoors)."""
+        doors = self.run.trips.door
+        return [(robot, int(doors[robot])) for robot in np.flatnonzero(doors != NONE).tolist()]
+
+    def trip_room(self, robot: int) -> int:
+        """Return the room that a robot is going to, -1 outdoors, -2 for no trip."""
+        return int(self.run.trips.goal_room[robot])
+
+    def ride(self, robot: int, dt: float) -> float:
+        """Have a robot ride on in a lift; return the seconds that it has."""
+        self.run.trips.ride[robot] += dt
+        return float(self.run.trips.ride[robot])
+
+    def room_needed(self, robot: int) -> float:
+        """Return how much room a robot needs around its middle, metres."""
+        return turning_radius(self.models[robot])
+
+    def pass_door(self, robot: int, room: int, taken: NDArray[np.float64]) -> bool:
+        """Have a robot come through a door into a room (-1: outdoors); False if no spot there is clear of discs."""
+        run = self.run
+        spot = trips.arrival(run, robot, room, int(run.trips.room[robot]), taken)
+        if spot is None:
+            return False
+        trips.pass_door(run, robot, room, spot)
+        return True
+
+    def give_up(self, robot: int) -> None:
+        """Have a robot end its way before it is there."""
+        self.run.note(robot, "blocked")
+        commands.stop(self.run, robot)
+        self.run.arrays.status[robot] = RobotStatus.BLOCKED
 
     def prototypes(self) -> dict[str, list[Surface]]:
         """Shapes of all links, by ``robot/<model>/<link>``."""

@@ -11,16 +11,22 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import TICK, RobotModel, robot_model
 from vico.sim.bodies import ROBOT
+from vico.sim.indoor import Indoor
 from vico.sim.physics import DEFAULT_ENGINE, PhysicsEngine, PhysicsScene, make_scene
+from vico.sim.physics.records import Capacity, StaticScene
 from vico.sim.physics.surroundings import static_scene_of
 from vico.sim.robots.airspace import Airspace
 from vico.sim.robots.controller import MotorController
 from vico.sim.robots.controllers import controller_for
+from vico.sim.robots.rooms import RobotRooms
 from vico.world.folder import World
+from vico.world.heights import HeightField
 from vico.world.routing import Router
 
 #: Metres a robot leaves to walls on its way.
 _WALL_GAP = 0.12
+#: Half the side of floors in physics, metres, and who can be near a robot in a room: people, and walls and furniture.
+_FLOOR, _IN_A_ROOM = 50.0, Capacity(people=12, vehicles=48, objects=0)
 
 
 @dataclass(frozen=True)
@@ -84,6 +90,8 @@ class RobotScene:
         Finds ways; made from the world's walkable map when it is first needed if it is not given.
     physics
         Name of the physics engine.
+    indoor
+        The world's rooms as arrays; made when they are first needed if they are not given.
 
     Attributes
     ----------
@@ -106,13 +114,15 @@ class RobotScene:
         packs: bool = True,
         router: Router | None = None,
         physics: str = DEFAULT_ENGINE,
+        indoor: Indoor | None = None,
     ) -> None:
         self.world = world
         self.kinds = tuple(kinds)
         self.models = tuple(robot_model(kind, packs=packs) for kind in kinds)
         self.groups = _groups(self.models)
         self._router = router
-        self._engine = physics
+        self._engine, self._indoor = physics, indoor
+        self._room_physics: dict[str, PhysicsScene] = {}
         self._narrow: dict[float, NDArray[np.bool_]] = {}
 
     def __len__(self) -> int:
@@ -136,6 +146,21 @@ class RobotScene:
         """Ground, solids and robots as physics has them, compiled when they are first needed."""
         flying = any(model.rotors is not None for model in self.models)
         return make_scene(self._engine, static_scene_of(self.world, flying=flying), self.models)
+
+    @cached_property
+    def rooms(self) -> RobotRooms:
+        """Rooms, and ways in them, made when they are first needed."""
+        world = self.world
+        indoor = self._indoor or Indoor.from_world(world.rooms, world.places, world.objects)
+        return RobotRooms(world, indoor)
+
+    def room_physics(self, robot: int) -> PhysicsScene:
+        """Return a level floor at height 0 and one robot of a kind, made when such a robot first goes indoors."""
+        model = self.models[robot]
+        if model.name not in self._room_physics:
+            floor = StaticScene(HeightField.flat(_FLOOR))
+            self._room_physics[model.name] = make_scene(self._engine, floor, (model,), _IN_A_ROOM)
+        return self._room_physics[model.name]
 
     @cached_property
     def airspace(self) -> Airspace:

@@ -15,12 +15,15 @@ from vico.errors import SchemaError
 from vico.seeds import rng
 from vico.sim.bodies import Bodies
 from vico.sim.physics import PhysicsEngine
+from vico.sim.physics.housed import HousedEngine
+from vico.sim.robots.outlines import bodies_of
 from vico.sim.robots.path_follower import PathFollower, RobotStatus
 from vico.sim.robots.rotors import Flight
 from vico.sim.robots.scene import RobotScene
+from vico.sim.robots.trip_state import Trips
 from vico.sim.robots.wind import gusts_of
 from vico.sim.robots.work import Work
-from vico.sim.state import REASON_LENGTH, MovableObjects
+from vico.sim.state import REASON_LENGTH, MovableObjects, People
 
 #: Circles on the ground: x, y and radius, ENU metres.
 Circles = tuple[tuple[float, float, float], ...]
@@ -177,6 +180,10 @@ class RobotRun:
         Tasks of each group's arms, None if it has none.
     objects
         Things that can be picked.
+    people
+        Avatars, some of whom are indoors.
+    trips
+        Where robots are indoors, and which doors they go through.
     closed_ground
         Ground that events close.
     pending
@@ -192,7 +199,9 @@ class RobotRun:
     followers: list[PathFollower] = field(init=False)
     flights: list[Flight | None] = field(init=False)
     work: list[Work | None] = field(init=False)
+    trips: Trips = field(init=False)
     objects: MovableObjects = field(default_factory=MovableObjects.none)
+    people: People | None = None
     closed_ground: Circles = ()
     pending: list[tuple[int, int]] = field(default_factory=list)
     known_bodies: Bodies | None = None
@@ -200,6 +209,7 @@ class RobotRun:
     def __post_init__(self) -> None:
         self.memory = [np.zeros((len(group.robots), group.controller.memory)) for group in self.scene.groups]
         self.followers = [PathFollower(model) for model in self.scene.models]
+        self.trips = Trips.none(len(self.scene))
         self.flights = [
             None
             if group.model.rotors is None
@@ -217,8 +227,35 @@ class RobotRun:
 
     def above_ground(self, robot: int) -> float:
         """Height of a robot's base above the ground, metres."""
-        position = self.engine.base(robot).position
-        return float(position[2]) - float(self.scene.world.height(position))
+        position, room = self.engine.base(robot).position, int(self.trips.room[robot])
+        ground = self.scene.world.height(position) if room < 0 else self.scene.rooms.indoor.floor[room]
+        return float(position[2]) - float(ground)
+
+    def bodies(self) -> Bodies:
+        """Oriented rectangles of the robots' outlines."""
+        if self.known_bodies is None:
+            self.known_bodies = bodies_of(self.scene, self.engine, self.entities, self.trips.room)
+        return self.known_bodies
+
+    # Robots in rooms have engines of their own.
+
+    def housed(self) -> HousedEngine:
+        """Return the engine as one in which robots can be indoors."""
+        if not isinstance(self.engine, HousedEngine):
+            self.engine = HousedEngine(self.engine)
+        return self.engine
+
+    def unhouse(self) -> None:
+        """Go back to the engine outdoors alone, which is quicker, where nobody is indoors."""
+        if isinstance(self.engine, HousedEngine) and not self.engine.inside:
+            self.engine = self.engine.outdoors
+
+    def forget(self, robot: int) -> None:
+        """Have a robot begin anew where it stands: its controller, and the way it was on."""
+        for group, memory in zip(self.scene.groups, self.memory, strict=True):
+            memory[group.robots == robot] = 0.0
+        self.followers[robot].end()
+        self.known_bodies = None
 
     def note(self, robot: int, kind: str) -> None:
         """Keep that something happened to a robot."""
@@ -234,6 +271,7 @@ class RobotRun:
             a.leader[robot] = 0
         if mode not in (RobotMode.ROUTE, RobotMode.FOLLOW, RobotMode.TASK):
             self.followers[robot].end()
+            self.trips.end(robot)
 
     def errand_stream(self, robot: int) -> np.random.Generator:
         """Random stream of a robot's errand under way."""
@@ -246,6 +284,7 @@ class RobotRun:
         paths = [follower.path for follower in self.followers]
         found = {f"engine_{key}": value for key, value in self.engine.arrays().items()}
         found |= {name: value.copy() for name, value in vars(self.arrays).items()}
+        found |= self.trips.saved()
         found |= {f"memory_{k}": memory.copy() for k, memory in enumerate(self.memory)}
         for k, flight in enumerate(self.flights):
             if flight is not None:
@@ -275,6 +314,8 @@ class RobotRun:
         for name, value in mine.items():
             if name not in arrays or arrays[name].shape != value.shape:
                 raise SchemaError("robots: the saved state belongs to other robots; start with the same ones")
+        self.trips.restore(arrays)
+        self._house_again()
         self.engine.restore({key[7:]: value for key, value in arrays.items() if key.startswith("engine_")})
         for name, value in mine.items():
             value[...] = arrays[name]
@@ -292,3 +333,13 @@ class RobotRun:
         for i, follower in enumerate(self.followers):
             follower.restore(arrays["paths"][starts[i] : starts[i + 1]], arrays["followers"][i])
         self.known_bodies = None
+
+    def _house_again(self) -> None:
+        """Have the robots be indoors that are so by their trips; their engines' states come after."""
+        inside = np.flatnonzero(self.trips.room >= 0).tolist()
+        if isinstance(self.engine, HousedEngine):
+            self.engine.inside.clear()
+        for robot in inside:
+            centre = np.array(self.scene.rooms.room(int(self.trips.room[robot])).centre)
+            self.housed().house(robot, self.scene.room_physics(robot), centre, np.array([*centre[:2], 0.0]))
+        self.unhouse()

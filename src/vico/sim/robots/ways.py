@@ -11,9 +11,14 @@ _NOBODY = np.zeros((0, 3))
 
 
 def way_to(
-    run: RobotRun, robot: int, goal: NDArray[np.float64], closed: NDArray[np.float64] = _NOBODY
+    run: RobotRun,
+    robot: int,
+    goal: NDArray[np.float64],
+    closed: NDArray[np.float64] = _NOBODY,
+    *,
+    start: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64] | None:
-    """Return a way to a point that keeps clear of discs and of ground that events close; None if there is none.
+    """Return a way outdoors to a point that keeps clear of discs and of closed ground; None if there is none.
 
     Whoever stands on ground that is closed may take any way out of it.
 
@@ -23,6 +28,8 @@ def way_to(
         ENU metres; its x and y count.
     closed
         Discs to keep out of: x, y, radius, metres, shape ``(m, 3)``.
+    start
+        Where it begins, ENU metres; None: where the robot is.
 
     Returns
     -------
@@ -31,7 +38,7 @@ def way_to(
     """
     scene, walkable = run.scene, run.scene.world.walkable
     blocked = scene.narrow(robot)
-    here = run.position(robot)[:2]
+    here = run.position(robot)[:2] if start is None else start[:2]
     if run.closed_ground:
         if is_closed(run, np.asarray(goal, np.float64)[None, :2]):
             return None

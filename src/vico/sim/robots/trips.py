@@ -1,0 +1,223 @@
+"""Robots' ways through doors: in which room each is, where it is going, and at which door it waits.
+
+A way to another room is gone leg by leg: to the next door, through it, on from behind it. Whether a door can be gone
+through is for the simulation to say (`vico.sim.robot_doors`), which knows who stands behind it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.assets.robots import MobileManipulator, SkidSteering
+from vico.sim.bodies import Bodies
+from vico.sim.physics.housed import HousedEngine
+from vico.sim.robots.rooms import DOORWAY, OUTDOORS, fits_doors, turning_radius
+from vico.sim.robots.state import RobotRun
+from vico.sim.robots.trip_state import NONE
+from vico.sim.robots.ways import way_to
+from vico.sim.state import People
+from vico.world.model import Entrance
+
+Array = NDArray[np.float64]
+
+#: Metres from a point in a room within which a way to it may end, and from the middle of a robot to a door it goes
+#: through, beside half its length: as near as people have to be.
+_NEAR_GOAL, _NEAR_DOOR = 0.75, 1.0
+#: Metres from an entrance within which a robot stands before it, and between points that are tried there.
+_BEFORE_ENTRANCE, _TRIED = 4.0, 0.25
+#: Slope from the ground before an entrance up to its door that wheels take.
+_RAMP = 0.2
+#: Metres from its door within which who comes into a room stands.
+_BEHIND_DOOR = 2.5
+_NOBODY = np.zeros((0, 3))
+
+# Whether a robot can get somewhere.
+
+
+def refusal(run: RobotRun, robot: int, space: int, goal: Array) -> str:
+    """Why a robot can't go from where it is to a point of a room, or outdoors; "" if it can."""
+    model, rooms = run.scene.models[robot], run.scene.rooms
+    here, at = int(run.trips.room[robot]), run.position(robot)
+    if space != here and not fits_doors(model):
+        return f"it is {2 * model.half_width:.2f} m wide, too wide for doors of {DOORWAY:g} m"
+    for _ in range(len(rooms.indoor.rooms) + 2):
+        if here == space:
+            return "" if _way(run, robot, here, at, goal, _NEAR_GOAL) is not None else _narrow(run, here)
+        to = rooms.next_room(here, space)
+        if to is None:
+            return "no way leads there but stairs, and there is no lift"
+        reason = _entrance_refusal(run, robot, max(here, to)) if OUTDOORS in (here, to) else ""
+        if reason:
+            return reason
+        if leg(run, robot, here, at, to) is None:
+            return _narrow(run, here)
+        spot = arrival(run, robot, to, here, _NOBODY)
+        if spot is None:
+            return _narrow(run, to)
+        here, at = to, spot
+    return "no way leads there"
+
+
+def _narrow(run: RobotRun, space: int) -> str:
+    where = "outdoors" if space == OUTDOORS else f"in room {run.scene.rooms.room(space).id}"
+    return f"no way {where} is wide enough for this robot"
+
+
+def _entrance_refusal(run: RobotRun, robot: int, room: int) -> str:
+    """Why a robot can't go through the entrance to a room."""
+    entrance, model = run.scene.rooms.entrances[room], run.scene.models[robot]
+    spot = outside(run, robot, entrance)
+    if spot is None:
+        return "there is no room for this robot before the entrance"
+    if isinstance(model.controller, SkidSteering | MobileManipulator):
+        up = abs(float(run.scene.world.height(spot)) - entrance.position[2])
+        away = float(np.hypot(*(spot - np.array(entrance.position[:2]))))
+        if up > _RAMP * away:
+            return f"the entrance is {up:.2f} m above or below the ground before it, and this robot has wheels"
+    return ""
+
+
+# Ways.
+
+
+def leg(run: RobotRun, robot: int, here: int, at: Array, to: int) -> Array | None:
+    """Return the way from a point of a space to the door to the next one; None if there is none."""
+    rooms, model = run.scene.rooms, run.scene.models[robot]
+    if here == OUTDOORS:
+        spot = outside(run, robot, rooms.entrances[to])
+        return None if spot is None else _way(run, robot, here, at, spot, _NEAR_GOAL)
+    return _way(run, robot, here, at, rooms.door(here, to), _NEAR_DOOR + model.half_length)
+
+
+def _way(run: RobotRun, robot: int, here: int, at: Array, goal: Array, within: float) -> Array | None:
+    if here != OUTDOORS:
+        radius = turning_radius(run.scene.models[robot])
+        return run.scene.rooms.path(here, at, goal, radius, within=within)
+    path = way_to(run, robot, goal, start=at[:2])
+    if path is None or float(np.hypot(*(path[-1] - goal[:2]))) > max(within, 1.0):
+        return None
+    return path
+
+
+def way_on(run: RobotRun, robot: int, goal: Array, closed: Array) -> Array | None:
+    """Return another way to a point of the space that a robot is in, clear of discs; None if there is none."""
+    trips, model = run.trips, run.scene.models[robot]
+    if trips.room[robot] == OUTDOORS:
+        return way_to(run, robot, goal, closed)
+    within = _NEAR_GOAL if trips.leg[robot] == NONE else _NEAR_DOOR + model.half_length
+    room, radius = int(trips.room[robot]), turning_radius(model)
+    return run.scene.rooms.path(room, run.position(robot), goal, radius, within=within, closed=closed)
+
+
+def begin_leg(run: RobotRun, robot: int, space: int, goal: Array) -> bool:
+    """Set out for a point of a space: on a way to it, or to the next door; return False if there is none."""
+    trips, here, at = run.trips, int(run.trips.room[robot]), run.position(robot)
+    to = NONE
+    if here == space:
+        path = way_to(run, robot, goal) if here == OUTDOORS else _way(run, robot, here, at, goal, _NEAR_GOAL)
+    else:
+        found = run.scene.rooms.next_room(here, space) if fits_doors(run.scene.models[robot]) else None
+        path = None if found is None else leg(run, robot, here, at, found)
+        if path is not None and OUTDOORS in (here, found) and _entrance_refusal(run, robot, max(here, found or 0)):
+            path = None
+        to = NONE if found is None else found
+    if path is None:
+        return False
+    run.followers[robot].begin(path)
+    trips.goal_room[robot], trips.goal[robot, : len(goal)] = space, goal
+    trips.leg[robot], trips.door[robot] = to, NONE
+    return True
+
+
+# Doors.
+
+
+def outside(run: RobotRun, robot: int, entrance: Entrance, closed: Array = _NOBODY) -> Array | None:
+    """Return where a robot stands before an entrance, clear of discs (x, y, radius), shape ``(2,)``; None for none."""
+    walkable, model = run.scene.world.walkable, run.scene.models[robot]
+    steps = np.arange(-_BEFORE_ENTRANCE, _BEFORE_ENTRANCE + _TRIED / 2, _TRIED)
+    grid = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2) + np.array(entrance.approach)
+    away = np.hypot(*(grid - np.array(entrance.position[:2])).T)
+    free = (walkable.clearance_at(grid) >= turning_radius(model)) & walkable.is_connected(grid)
+    free &= away <= _BEFORE_ENTRANCE
+    if len(closed):
+        apart = np.hypot(grid[:, :1] - closed[:, 0], grid[:, 1:] - closed[:, 1])
+        free &= (apart >= closed[:, 2]).all(axis=1)
+    if not free.any():
+        return None
+    away[~free] = np.inf
+    return np.asarray(grid[int(away.argmin())])
+
+
+def arrival(run: RobotRun, robot: int, space: int, origin: int, taken: Array) -> Array | None:
+    """Return where a robot stands that comes through a door, ENU metres, shape ``(2,)``; None if there is no room.
+
+    Parameters
+    ----------
+    space, origin
+        Where it comes to and from: rooms, or `OUTDOORS`.
+    taken
+        Discs (x, y, radius) that others stand in.
+    """
+    rooms, radius = run.scene.rooms, turning_radius(run.scene.models[robot])
+    if space == OUTDOORS:
+        return outside(run, robot, rooms.entrances[origin], taken)
+    near = rooms.indoor.arrival(space, origin)
+    return rooms.spot(space, near, radius, taken, _BEHIND_DOOR)
+
+
+def pass_door(run: RobotRun, robot: int, space: int, spot: Array) -> None:
+    """Have a robot come through a door and stand at a spot behind it; it goes on from there."""
+    trips, rooms = run.trips, run.scene.rooms
+    origin = int(trips.room[robot])
+    if space == OUTDOORS:
+        yaw = rooms.entrances[origin].facing
+    else:
+        ahead = spot - rooms.door(space, origin)[:2]
+        yaw = float(np.arctan2(ahead[1], ahead[0]))
+    place, housed = np.array([*spot, yaw]), run.housed()
+    if space == OUTDOORS:
+        housed.release(robot, place)
+        run.unhouse()
+    else:
+        centre = np.array(rooms.room(space).centre)
+        housed.house(robot, run.scene.room_physics(robot), centre, place)
+    trips.room[robot], trips.door[robot], trips.leg[robot], trips.ride[robot] = space, NONE, NONE, 0.0
+    run.forget(robot)
+
+
+def surround(run: RobotRun, dt: float) -> None:
+    """Tell physics in rooms who and what is around each robot there, and arrives in `dt` seconds."""
+    engine = run.engine
+    if isinstance(engine, HousedEngine):
+        for robot in engine.inside:
+            solids = run.scene.rooms.solids(int(run.trips.room[robot]))
+            engine.surround(robot, Bodies.joined([solids, others_in_room(run, robot)]), dt)
+
+
+def others_in_room(run: RobotRun, robot: int) -> Bodies:
+    """Bodies of people, things and other robots in the room that a robot is in."""
+    room = int(run.trips.room[robot])
+    robots = np.flatnonzero(run.trips.room == room)
+    parts = [run.bodies().where(robots[robots != robot])]
+    if run.people is not None:
+        parts.append(run.people.bodies_of(np.flatnonzero(run.people.room == room)))
+    lying = run.objects.in_rooms()
+    parts.append(run.objects.bodies_of(lying[run.objects.room[lying] == room]))
+    return Bodies.joined(parts)
+
+
+def whereabouts(run: RobotRun, entity: int, outdoors: Bodies) -> tuple[int, Array] | None:
+    """Return the space a body is in and where in it, ENU metres; None for one that is in none, or unknown."""
+    mine = np.flatnonzero(run.entities == entity)
+    if len(mine):
+        return int(run.trips.room[mine[0]]), run.position(int(mine[0]))
+    found = np.flatnonzero(outdoors.entity == entity)
+    if len(found):
+        return OUTDOORS, outdoors.position[found[0]]
+    people: People | None = run.people
+    if people is None:
+        return None
+    found = np.flatnonzero((people.entity == entity) & (people.room >= 0))
+    return (int(people.room[found[0]]), people.position[found[0]]) if len(found) else None
