@@ -41,8 +41,8 @@ _PUSHES = 40
 #: Modes in which one is taken along.
 _RIDDEN = ("bus", "tram")
 
-_NO_VEHICLE, _NO_FREE_SPOT, _NO_MONEY = (
-    code_name(code) for code in (ReasonCode.NO_VEHICLE, ReasonCode.NO_FREE_SPOT, ReasonCode.NO_MONEY)
+_NO_VEHICLE, _NO_FREE_SPOT, _NO_MONEY, _CLOSED = (
+    code_name(code) for code in (ReasonCode.NO_VEHICLE, ReasonCode.NO_FREE_SPOT, ReasonCode.NO_MONEY, ReasonCode.CLOSED)
 )
 
 
@@ -261,6 +261,8 @@ class Traveller:
         now = float(state["time"])
         if self._asked == "enter_bus" and state["action_code"] == _NO_MONEY:
             return self._plan_anew()
+        if self._asked == "enter_bus" and state["action_code"] == _CLOSED:
+            return self._close(leg)
         if now > leg.depart + _LATE:
             return self._plan_anew()
         # Which line a bus is of can't be seen: where several stop the time tells.

@@ -24,6 +24,10 @@ def check_enter_bus(values: Values, i: int, state: SimulationState) -> Refusal |
         return refusal
     bus = transit.bus_at(p.position[i])
     if bus is None:
+        line = transit.goes_round(p.position[i], _NEAR_STOP)
+        if line is not None:
+            said = f"enter_bus: bus {line} does not come by here: it goes round a street that is closed"
+            return Refusal(ReasonCode.CLOSED, said)
         said = f"enter_bus: no bus or tram stands with a door within {DOOR_REACH:g} m{_from_depot(i, state, transit)}"
         return Refusal(ReasonCode.NO_VEHICLE, said)
     if transit.ends(bus):

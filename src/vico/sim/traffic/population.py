@@ -352,8 +352,8 @@ class Traffic:
     def set_shut(self, lanes: NDArray[np.bool_] | None, walkways: NDArray[np.bool_] | None) -> None:
         """Have cars keep off some lanes and pedestrians off some walkways: part of the environment's state.
 
-        Buses keep to their routes. Cars that are there drive on until they are out; nobody enters any more. Where a
-        street leads nowhere else, it is shut, too.
+        Buses keep to the rounds they are given (`set_rounds`). Cars that are there drive on until they are out; nobody
+        enters any more. Where a street leads nowhere else, it is shut, too.
 
         Parameters
         ----------
@@ -407,6 +407,18 @@ class Traffic:
     def is_taken(self, lanes: NDArray[np.bool_]) -> bool:
         """Return whether a car is on some lanes (a mask), or on its way there."""
         return bool(is_taken(self._net, self._vehicles, lanes))
+
+    @property
+    def shut_lanes(self) -> NDArray[np.bool_] | None:
+        """Which lanes events keep cars off, without those that lead nowhere else; None for none."""
+        return self._shut[0]
+
+    def set_rounds(self, rounds: Sequence[Sequence[int]]) -> None:
+        """Have buses drive by other rounds: lane numbers of each; `fleet.route` are their numbers."""
+        first = np.zeros(len(rounds) + 1, np.int32)
+        first[1:] = np.cumsum([len(one) for one in rounds])
+        flat = np.array([lane for one in rounds for lane in one], np.int32)
+        self._net = self._net._replace(route_first=first, route=flat)
 
     @property
     def shut_walkways(self) -> NDArray[np.bool_] | None:

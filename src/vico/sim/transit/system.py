@@ -28,6 +28,7 @@ from vico.sim.traffic import Traffic
 from vico.sim.traffic.state import PRESENT
 from vico.sim.transit.bicycles import Bicycles
 from vico.sim.transit.bus_plan import BusPlan
+from vico.sim.transit.detours import Detours
 from vico.sim.transit.doors import DOOR_TIME, leaf_transforms, moved_doors
 from vico.sim.transit.passengers import Passengers
 from vico.sim.transit.trams import AWAY, Trams
@@ -72,6 +73,8 @@ class TransitSystem:
         less), and the most.
     open
         How far each bus's doors are open, 0..1.
+    detours
+        The ways of buses round streets that events have shut.
     bicycles
         The bicycles to rent, and who rides them.
     trams
@@ -101,6 +104,7 @@ class TransitSystem:
         self.stops_served = np.zeros(buses, np.int64)
         self.late_total, self.late_most = np.zeros(buses), np.zeros(buses)
         self.open = np.ones(buses)
+        self.detours = Detours(plan, traffic, self._vehicle)
         self.bicycles = Bicycles(transit.bike_stations, traffic, first_entity=first_bike)
         self.trams = Trams(transit.tram_lines, traffic, second=float(second), first_entity=first_tram)
         for bus in range(buses):
@@ -133,12 +137,14 @@ class TransitSystem:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Every number that decides the future; the buses' own motion is among the traffic's."""
-        return {name: getattr(self, name).copy() for name in _STATE} | self.bicycles.arrays() | self.trams.arrays()
+        found = {name: getattr(self, name).copy() for name in _STATE} | self.detours.arrays()
+        return found | self.bicycles.arrays() | self.trams.arrays()
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Go back to what `arrays` held."""
         for name in _STATE:
             getattr(self, name)[...] = arrays[name]
+        self.detours.restore(arrays)
         self.bicycles.restore(arrays)
         self.trams.restore(arrays)
 
@@ -146,6 +152,8 @@ class TransitSystem:
         """Advance the timetable by `dt` seconds; the buses themselves move with the traffic."""
         self.clock += dt
         fleet = self.traffic.fleet
+        for bus in self.detours.follow(self.stop) if self.detours.are_due() else ():
+            self._go_on(bus, int(self.stop[bus]))
         for tram in self.trams.advance(float(self.clock[0]), dt, obstacles):
             if self.passengers is not None:
                 self.passengers.arrive(self.traffic.buses + tram)
@@ -245,8 +253,34 @@ class TransitSystem:
         self.late_most[bus] = max(self.late_most[bus], late)
 
     def lateness(self) -> dict[str, float]:
-        """Return how often buses came to a stop, and the seconds they were late there: mean and most."""
-        return _lateness(self.stops_served, self.late_total, self.late_most)
+        """Return how often buses came to a stop, the seconds they were late there (mean and most), and stops skipped.
+
+        The latter are there only where buses went round what was shut, and could not come by.
+        """
+        skipped = int(self.detours.skipped.sum())
+        return _lateness(self.stops_served, self.late_total, self.late_most) | ({"skipped": skipped} if skipped else {})
+
+    def goes_round(self, xy: ArrayLike, reach: float) -> str | None:
+        """Return the name of a line whose buses do not come by a stop near a point, as all of them there do not.
+
+        Parameters
+        ----------
+        xy
+            ENU metres, shape ``(2,)``.
+        reach
+            Of the place to wait there, metres.
+        """
+        point = np.asarray(xy, np.float64)[:2]
+        near = [stop.id for stop in self.transit.stops if math.dist(stop.wait[:2], point) <= reach]
+        if not near or not self.detours.any:
+            return None
+        found = [
+            (line.name, self.detours.is_skipped(number, k))
+            for number, line in enumerate(self.transit.lines)
+            for k, stop in enumerate(line.stops)
+            if stop in near
+        ]
+        return found[0][0] if found and all(skipped for _, skipped in found) else None
 
     def tram_lateness(self) -> dict[str, float]:
         """Return the same of trams."""
@@ -273,8 +307,16 @@ class TransitSystem:
         if self.stop[bus] == 0:
             self.begun[bus] = self._next_departure(bus)
             self.taken[line] += 1
-        self.stop[bus] = (self.stop[bus] + 1) % len(self._plan.places[line])
-        self._send(bus, int(self.stop[bus]))
+        self._go_on(bus, (int(self.stop[bus]) + 1) % len(self._plan.places[line]))
+
+    def _go_on(self, bus: int, stop: int) -> None:
+        """Send a bus to a stop, or where it does not come by there, to the next one."""
+        count = len(self._plan.places[self._plan.line_of_bus[bus]])
+        while self.detours.place_of(bus, stop) < 0:
+            self.detours.skipped[bus] += 1
+            stop = (stop + 1) % count
+        self.stop[bus] = stop
+        self._send(bus, stop)
 
     def bodies(self) -> Bodies:
         """Return the bicycles left astray, and trams; buses are among the traffic's bodies."""
@@ -312,7 +354,7 @@ class TransitSystem:
 
     def _send(self, bus: int, stop: int) -> None:
         line, fleet, v = self._plan.line_of_bus[bus], self.traffic.fleet, self._vehicle[bus]
-        fleet.stop_route_index[v] = self._plan.places[line][stop]
+        fleet.stop_route_index[v] = self.detours.place_of(bus, stop)
         fleet.stop_offset[v] = self._plan.offsets[line][stop]
         fleet.at_stop[v] = False
         left = max(self._due(bus, stop) - self.clock[0] - _START_STOP, 1.0)
@@ -326,11 +368,11 @@ class TransitSystem:
     def _metres(self, bus: int, stop: int) -> float:
         """How far a bus has to drive to a stop, metres."""
         line, fleet, v, lanes = self._plan.line_of_bus[bus], self.traffic.fleet, self._vehicle[bus], self.traffic.lanes
-        route, place = self._plan.routes[line], int(fleet.route_index[v])
+        route, place = self.detours.round_of(bus), int(fleet.route_index[v])
         metres = self._plan.offsets[line][stop] - float(fleet.offset[v])
         # A stop that lies behind the bus on the lane it is on comes after a whole round.
         going = metres < 0.0
-        while going or place != self._plan.places[line][stop]:
+        while going or place != self.detours.place_of(bus, stop):
             going = False
             here, place = route[place], (place + 1) % len(route)
             if route[place] not in (lanes.left[here], lanes.right[here]):
