@@ -163,3 +163,20 @@ def test_however_time_is_cut_the_same_happens() -> None:
             sim.advance(seconds)
         hashes.append(sim.state_hash())
     assert len(set(hashes)) == 1
+
+
+def test_a_thing_on_another_stays_on_it_in_physics_even_if_it_alone_is_near_enough() -> None:
+    sim = simulation(assistants=1, errands=False)
+    point = ahead(sim, ENTER + 0.05)
+    crate = add(sim, point)
+    top = ahead(sim, ENTER - 0.04, height=CRATE[2] + 1e-4)
+    box_on_it = add(sim, top, (0.1, 0.1, 0.1), name="box")
+    sim.advance(1.0)
+    assert sim.state.robots.engine.objects().present.sum() == 2
+    assert np.abs(sim.state.objects.position[box_on_it] - top).max() < 0.005
+    assert np.abs(sim.state.objects.position[crate] - point).max() < 0.005
+    # Far from robots nothing of it is in physics, and nothing falls.
+    far = add(sim, ahead(sim, 9.0), name="far crate")
+    up = add(sim, ahead(sim, 9.0, height=CRATE[2] + 1e-4), (0.1, 0.1, 0.1), name="cup")
+    sim.advance(0.5)
+    assert sim.state.objects.position[up, 2] - sim.state.objects.position[far, 2] == CRATE[2] + 1e-4

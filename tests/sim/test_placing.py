@@ -65,6 +65,50 @@ def test_a_thing_put_onto_another_one_is_put_beside_it_and_that_is_told(sim: Sim
     assert sim.state.objects.hand[sim.state.objects.index(carried)] == -1
 
 
+def _carry(sim: Simulation, name: str, x: float, y: float, size: tuple[float, ...], room: str = "") -> int:
+    """Have assistant_0 carry a thing."""
+    entity = add(sim, name, x, y, size, room)
+    assert act(sim, type="pick", hand=0, object=entity)["action_status"] == "ok"
+    return entity
+
+
+@pytest.mark.parametrize("room", ["", "r_cafe"])
+def test_a_thing_put_onto_the_top_of_another_rests_there_and_comes_down_when_that_is_taken(
+    sim: Simulation, room: str
+) -> None:
+    x, y = (-6.0, 8.4) if room else (0.0, -15.0)
+    if room:
+        people = sim.state.people
+        people.room[0], people.place[0] = sim.state.indoor.index[room], 0
+        people.position[0] = (x, y, toy_city.FLOOR)
+    low = add(sim, "crate", x + 0.8, y, room=room)
+    box = _carry(sim, "box", x, y + 0.6, (0.2, 0.2, 0.2), room)
+    top = sim.ground_truth.object_position("crate")[2] + CRATE[2]
+    act(sim, type="put", hand=0, target=[x + 0.9, y + 0.05, top])
+    assert sim.ground_truth.object_position("box") == pytest.approx([x + 0.9, y + 0.05, top], abs=1e-3)
+    cup = _carry(sim, "cup", x, y + 0.6, (0.1, 0.1, 0.1), room)
+    act(sim, type="put", hand=0, target=[x + 0.9, y + 0.05, top + 0.2])
+    assert sim.ground_truth.object_position("cup")[2] == pytest.approx(top + 0.2, abs=1e-3)
+    assert overlaps_of(sim.state) == []
+    # What was below is taken away: all of it comes down.
+    assert act(sim, type="pick", hand=0, object=low)["action_status"] == "ok"
+    floor = top - CRATE[2]
+    assert sim.ground_truth.object_position("box")[2] == pytest.approx(floor, abs=0.02)
+    assert sim.ground_truth.object_position("cup")[2] == pytest.approx(floor + 0.2, abs=0.02)
+    assert overlaps_of(sim.state) == []
+    assert {sim.state.objects.holder[sim.state.objects.index(e)] for e in (box, cup)} == {0}
+
+
+def test_a_thing_whose_middle_is_over_no_top_falls_beside_it(sim: Simulation) -> None:
+    add(sim, "crate", 0.8, -15.0)
+    _carry(sim, "box", 0.0, -14.4, (0.3, 0.3, 0.3))
+    z = float(sim.world.height((0.8, -15.0)))
+    act(sim, type="put", hand=0, target=[0.8, -14.75, z + CRATE[2]])
+    x, y, bottom = sim.ground_truth.object_position("box")
+    assert bottom == pytest.approx(float(sim.world.height((x, y))), abs=1e-6)
+    assert overlaps_of(sim.state) == []
+
+
 def test_without_a_target_a_thing_is_put_clear_of_what_lies_ahead(sim: Simulation) -> None:
     add(sim, "crate", 0.6, -15.0, size=(0.2, 0.2, 0.2))
     carried = add(sim, "box", 0.0, -14.2, size=(0.2, 0.2, 0.2))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
 from vico.rules import TRAM_SECTIONS
-from vico.sim.bodies import Bodies
+from vico.sim.bodies import OBJECT, Bodies
 from vico.sim.collisions import WALL, SolidMap, gap_to, map_gap, room_gap
 from vico.sim.footprints import BODY, IN_BUS, OUTDOORS, body_gap, can_touch, records_of
 from vico.sim.neighbours import neighbour_grid, search
@@ -205,14 +205,18 @@ def _overlap(one: Any, other: int, depth: float) -> Overlap:
 
 
 def _on_slopes(bodies: Bodies, ground: HeightField) -> NDArray[np.void]:
-    """Return records whose extents follow the ground: on a slope a bus stands lower at one end than at its middle."""
+    """Return records whose extents follow the ground: on a slope a bus stands lower at one end than at its middle.
+
+    Those of loose things are their boxes, so that one may lie on another.
+    """
     records = records_of(bodies)
     c, s = records["cos"], records["sin"]
     here = ground.near(bodies.position)
     along = bodies.half_length[:, None] * np.column_stack([c, s, np.zeros(len(c))])
     ends = np.array([ground.near(bodies.position + u * along) for u in (-1.0, 1.0)])
-    records["bottom"] -= here - np.minimum(here, ends.min(axis=0))
-    records["top"] += np.maximum(here, ends.max(axis=0)) - here
+    slanted = bodies.kind != OBJECT
+    records["bottom"] -= slanted * (here - np.minimum(here, ends.min(axis=0)))
+    records["top"] += slanted * (np.maximum(here, ends.max(axis=0)) - here)
     return records
 
 

@@ -16,6 +16,9 @@ from vico.sim.simulation_state import SimulationState
 _TOLERANCE = 1e-3
 # A free spot beside a taken one is looked for in rings this far apart, metres, in so many directions.
 _RING, _DIRECTIONS = 0.1, 16
+# What is let go so far below a top comes to lie on it, and so far above it, metres: rounding errors.
+_LET_GO, _JUST_ABOVE = 0.03, 1e-4
+_FALLS = 1.5  # what falls comes to rest within so many metres
 # On one surface: floors and tops of furniture differ by more, metres.
 _SAME_HEIGHT = 0.02
 
@@ -87,6 +90,63 @@ def free_spot_near(
             if fits and in_the_way(thing, spot, room, state) == 0:
                 return spot
     return None
+
+
+def top_at(
+    thing: Thing, point: tuple[float, float, float], room: int, state: SimulationState
+) -> tuple[NDArray[np.float64], int] | None:
+    """Return where a thing comes to rest on another one that is below a point, and that one's entity.
+
+    Parameters
+    ----------
+    point
+        Where the thing is let go, ENU metres: on the top of the other one, or above it.
+
+    Returns
+    -------
+    tuple or None
+        The middle of its underside, ENU metres, shape ``(3,)``, and an entity; None if no level top is below, if the
+        thing would tip over its edge, or if something else is there.
+    """
+    x, y, z = point
+    for top, k in reversed(state.objects.tops_under((x, y), room)):
+        entity = int(state.objects.entity[k])
+        if entity != thing.entity and top <= z + _LET_GO:
+            spot = np.array([x, y, top + _JUST_ABOVE])
+            return (spot, entity) if in_the_way(thing, spot, room, state) == 0 else None
+    return None
+
+
+def lying_on(k: int, state: SimulationState) -> list[int]:
+    """Return the indices of all that lies on a thing, directly or on what lies there, the lowest first."""
+    objects = state.objects
+    on: list[int] = []
+    loose = np.flatnonzero((objects.holder == 0) & (objects.room == objects.room[k]))
+    for j in loose[np.argsort(objects.position[loose, 2], kind="stable")].tolist():
+        if j != k and objects.support_of(j) in (k, *on):
+            on.append(j)
+    return on
+
+
+def let_fall(fallen: list[int], state: SimulationState) -> None:
+    """Have things, the lowest first, come to rest on what is below them, or beside it where there is no room."""
+    objects = state.objects
+    for k in fallen:
+        x, y, z = objects.position[k].tolist()
+        room = int(objects.room[k])
+        thing = Thing(objects.size[k], float(objects.yaw[k]), int(objects.entity[k]))
+        rests = top_at(thing, (x, y, z), room, state)
+        if rests is not None:
+            objects.position[k] = rests[0]
+            continue
+        ground = float(state.world.height((x, y)))
+        if room >= 0:
+            # Not up onto a table that it lay below.
+            ground = state.indoor.support(room, (x, y))
+            ground = ground if ground <= z + _LET_GO else state.indoor.floor_at(room, (x, y))
+        spot = free_spot_near(thing, np.array([x, y, ground]), room, state, within=_FALLS)
+        if spot is not None:
+            objects.position[k] = spot
 
 
 def _lies_in_room(thing: Thing, spot: NDArray[np.float64], room: int, state: SimulationState) -> bool:

@@ -34,6 +34,10 @@ _NARROWER_BELOW = 1.5
 # People look a little down while they walk, radians.
 LEVEL_GAZE = -0.1
 REASON_LENGTH = 240
+#: Things stay on others with their middle so far inside the edge; heights that are one, metres.
+ON_TOP = 0.01
+#: Cosine of the tilt up to which the top of a thing is level.
+UPRIGHT = 0.999
 #: From the hand on a door until one is through, seconds.
 DOOR_OPENING = 1.0
 
@@ -405,6 +409,26 @@ class MovableObjects(ArrayState):
             2 * height,
             np.zeros((n, 2)),
         )
+
+    def tops_under(self, xy: tuple[float, float], room: int) -> list[tuple[float, int]]:
+        """Return heights of the tops of upright things below or above a point, and their indices, the lowest first."""
+        found = []
+        away = np.abs(self.position[:, :2] - xy).max(axis=1)
+        near = away < np.hypot(self.size[:, 0], self.size[:, 1])
+        for k in np.flatnonzero(near & (self.holder == 0) & (self.room == room)).tolist():
+            turn = self.rotation(k)
+            inside = np.abs(turn[:2, :2].T @ (xy - self.position[k, :2])) <= self.size[k, :2] / 2 - ON_TOP
+            if turn[2, 2] > UPRIGHT and inside.all():
+                found.append((float(self.position[k, 2] + self.size[k, 2]), k))
+        return sorted(found)
+
+    def support_of(self, k: int) -> int:
+        """Return the index of the thing that a thing lies on with its middle, -1 for none: ground, floor, furniture."""
+        x, y, z = self.position[k].tolist()
+        if not np.any(np.abs(self.position[:, 2] + self.size[:, 2] - z) < ON_TOP):
+            return -1
+        below = [j for top, j in self.tops_under((x, y), int(self.room[k])) if j != k and abs(top - z) < ON_TOP]
+        return below[-1] if below else -1
 
     def in_rooms(self) -> NDArray[np.int64]:
         """Return the indices of those that lie in rooms, on the floor or on furniture."""

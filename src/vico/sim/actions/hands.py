@@ -15,7 +15,7 @@ from vico.sim.actions.model import ActionType, Refusal, Situation, Values
 from vico.sim.carrying import DeckPose, free_place, lay_down
 from vico.sim.collisions import box_gap
 from vico.sim.moves import follow_hands, gesture
-from vico.sim.placing import Thing, free_spot_near, in_the_way
+from vico.sim.placing import Thing, free_spot_near, in_the_way, let_fall, lying_on, top_at
 from vico.sim.simulation_state import SimulationState
 from vico.world.model import Container
 
@@ -40,12 +40,15 @@ class PlacementPoint:
         Where it lies in the carrier's frame, metres, shape ``(3,)``; None without a carrier.
     beside
         Entity of whoever or whatever is at the point that was asked for, so that the thing lies beside it; 0: nobody.
+    on
+        Entity of the thing that it lies on; 0: none.
     """
 
     point: NDArray[np.float64]
     carrier: int = 0
     offset: NDArray[np.float64] | None = None
     beside: int = 0
+    on: int = 0
 
 
 def check_pick(values: Values, i: int, state: SimulationState) -> Refusal | None:
@@ -78,7 +81,9 @@ def pick(values: Values, i: int, state: SimulationState) -> None:
     """Take a thing into a hand."""
     p, objects = state.people, state.objects
     k = objects.index(values["object"])
+    above = lying_on(k, state) if objects.holder[k] == 0 else []
     _hold(k, i, values["hand"], state)
+    let_fall(above, state)
     gesture("pick", i, state, hand=values["hand"])
     state.events.add("pick", p.names[i], f"picks up {objects.names[k]}", p.position[i], object=int(objects.entity[k]))
 
@@ -107,8 +112,9 @@ def put(values: Values, i: int, state: SimulationState) -> None:
     if deck is not None and spot.offset is not None:
         lay_down(deck, spot.carrier, k, spot.offset, objects)
     gesture("put", i, state, hand=values["hand"])
-    beside = f" beside {state.entity(spot.beside)['name']}" if spot.beside else ""
-    said, entity = f"puts down {objects.names[k]}{beside}", int(objects.entity[k])
+    where = f" beside {state.entity(spot.beside)['name']}" if spot.beside else ""
+    where = f" on {state.entity(spot.on)['name']}" if spot.on else where
+    said, entity = f"puts down {objects.names[k]}{where}", int(objects.entity[k])
     state.events.add("put", p.names[i], said, objects.position[k], object=entity)
 
 
@@ -209,7 +215,9 @@ def _ahead(i: int, thing: Thing, state: SimulationState) -> PlacementPoint | Ref
     return Refusal(ReasonCode.NO_FREE_SPOT, "put: no free ground ahead; turn, or name a target")
 
 
-def _at_point(point: tuple[float, ...], i: int, thing: Thing, state: SimulationState) -> PlacementPoint | Refusal:
+def _at_point(
+    point: tuple[float, float, float], i: int, thing: Thing, state: SimulationState
+) -> PlacementPoint | Refusal:
     p = state.people
     x, y, z = point
     away = math.hypot(x - p.position[i, 0], y - p.position[i, 1])
@@ -219,14 +227,23 @@ def _at_point(point: tuple[float, ...], i: int, thing: Thing, state: SimulationS
     if room >= 0:
         if not state.indoor.holds(room, (x, y, state.indoor.floor_at(room, (x, y)))):
             return Refusal(ReasonCode.ELSEWHERE, "put: the point is outside this room")
-        x, y, height = state.indoor.resting_point(room, (x, y), math.hypot(thing.size[0], thing.size[1]) / 2).tolist()
+        surface = state.indoor.resting_point(room, (x, y), math.hypot(thing.size[0], thing.size[1]) / 2)
     else:
         if state.world.walkable.class_at((x, y)) == 0:
             return Refusal(ReasonCode.BLOCKED, "put: something solid is at that point")
-        height = float(state.world.height((x, y)))
+        surface = np.array([x, y, float(state.world.height((x, y)))])
+    height = float(surface[2])
     if not height - 0.5 <= z <= height + reach_up(float(p.height[i])):
         return Refusal(ReasonCode.TOO_HIGH_OR_LOW, f"put: the point is not above the surface there ({height:.2f} m)")
-    spot = np.array([x, y, height])
+    on_another = top_at(thing, point, room, state)
+    if on_another is not None and on_another[0][2] > height:
+        return PlacementPoint(on_another[0], on=on_another[1])
+    return _on_surface(surface, i, thing, state)
+
+
+def _on_surface(spot: NDArray[np.float64], i: int, thing: Thing, state: SimulationState) -> PlacementPoint | Refusal:
+    """Return a spot of a surface, or one beside it where something is there."""
+    p, room = state.people, int(state.people.room[i])
     other = in_the_way(thing, spot, room, state)
     if other == 0:
         return PlacementPoint(spot)

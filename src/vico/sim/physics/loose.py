@@ -83,13 +83,24 @@ class LooseObjects:
         away = np.full(len(objects), np.inf)
         for x, y in robots[:, :2]:
             away = np.minimum(away, np.hypot(objects.position[:, 0] - x, objects.position[:, 1] - y))
+        self._keep_stacks(loose, away)
         self._falling &= loose
         self._leave(loose, changed, away)
         inside = np.isin(objects.entity, self.entity)
         for k in np.flatnonzero(changed & ~inside):
-            self._falling[k] = self._clearances(int(k))[0] > _IN_THE_AIR
+            # What lies on another thing is held up, which physics does not know as long as that one is not in it.
+            held_up = objects.support_of(int(k)) >= 0
+            self._falling[k] = not held_up and self._clearances(int(k))[0] > _IN_THE_AIR
         self._enter(np.flatnonzero(loose & ~inside & (self._falling | (away < ENTER))), away)
         self._remember(loose)
+
+    def _keep_stacks(self, loose: NDArray[np.bool_], away: NDArray[np.float64]) -> None:
+        """Count what holds a thing up as near to robots as that is: else the thing would fall into it."""
+        for k in np.flatnonzero(loose & (away < LEAVE)).tolist():
+            below = self._objects.support_of(k)
+            while below >= 0 and away[below] > away[k]:
+                away[below] = away[k]
+                below = self._objects.support_of(below)
 
     def _know_all(self) -> None:
         """Make room for things that were added since."""
