@@ -121,7 +121,7 @@ def test_both_renderers_take_the_same_pictures(
 def test_rooms_behind_glass_are_the_same_ones(both: tuple[Scene, GlRenderer]) -> None:
     made, gl = both
     made.lighting, made.fronts = DAY, front()
-    look = Cameras(np.array([[-14.0, 0.0, 1.6]]), np.array([[1.0, 0.0, 0.0]]), width=160, height=120)
+    look = Cameras(np.array([[-14.0, 0.0, 1.6]]), np.array([[1.0, 0.0, 0.0]]), width=320, height=240)
     request = PictureRequest(quality=FINE)
     wanted, got = take_pictures(made, look, request).rgb.astype(int), gl.take(look, request).rgb.astype(int)
     made.fronts = made.fronts[:0]

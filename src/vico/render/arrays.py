@@ -269,5 +269,9 @@ def _item_count(scene: SceneArrays) -> int:
 
 def _most_vertices(scene: SceneArrays) -> int:
     """Return how many vertices the largest item has."""
-    spans = (scene.clusters.span, scene.prototypes.levels.reshape(-1), scene.avatars.span)
-    return max(int((s["end_vertex"] - s["first_vertex"]).max(initial=1)) for s in spans)
+    return max(int(scene.counts["fixed_vertices"]), widest(scene.avatars.span))
+
+
+def widest(spans: NDArray[np.void]) -> int:
+    """Return the most vertices of any range."""
+    return int((spans["end_vertex"] - spans["first_vertex"]).max(initial=1))

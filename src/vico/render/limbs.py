@@ -15,8 +15,8 @@ _End = tuple[str, str, float]
 _ENDS: dict[str, tuple[_End, _End]] = {
     "head": (("neck", "neck", 0.0), ("head", "head", 0.0)),  # its end goes to the middle of the head
     # Two beside each other: bodies are broader than deep.
-    "left_torso": (("left_hip", "right_hip", 0.12), ("left_shoulder", "right_shoulder", 0.22)),
-    "right_torso": (("right_hip", "left_hip", 0.12), ("right_shoulder", "left_shoulder", 0.22)),
+    "left_torso": (("left_hip", "right_hip", 0.25), ("left_shoulder", "right_shoulder", 0.3)),
+    "right_torso": (("right_hip", "left_hip", 0.25), ("right_shoulder", "left_shoulder", 0.3)),
 }
 for _side in ("left", "right"):
     for _name, _first, _second, _way in (

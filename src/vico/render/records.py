@@ -54,8 +54,9 @@ CUTOUT, DOUBLE_SIDED = 1, 2
 NO_WINDOWS, UPPER_WINDOWS, GROUND_WINDOWS = 0, 1, 2
 BAYS = 8
 
-# How many there are: instances in all, those of them that never move (they come first), and avatars.
-COUNTS = np.dtype([("instances", i8), ("static_instances", i8), ("avatars", i8)], align=True)
+# How many there are: instances in all, those of them that never move (they come first), and avatars; and vertices of
+# the largest item but avatars.
+COUNTS = np.dtype([("instances", i8), ("static_instances", i8), ("avatars", i8), ("fixed_vertices", i8)], align=True)
 
 ROOM = np.dtype(
     [

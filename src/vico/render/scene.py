@@ -17,6 +17,7 @@ from vico.render.arrays import (
     PosedAvatars,
     Prototypes,
     SceneArrays,
+    widest,
 )
 from vico.render.avatars import no_avatars, pose_avatars, with_room
 from vico.render.compiled import kernel
@@ -141,6 +142,7 @@ class Scene:
         self.arrays = SceneArrays(
             mesh, textures, clusters, where, placeable, empty, no_avatars(), np.zeros(1, COUNTS)[0], _ALL_ON
         )
+        self.arrays.counts["fixed_vertices"] = max(widest(clusters.span), widest(placeable.levels.reshape(-1)))
 
     @property
     def lighting(self) -> Lighting:

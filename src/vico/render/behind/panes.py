@@ -7,14 +7,14 @@ proportion.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vico.render.compiled import inlined, kernel
+from vico.render.records import CAMERA_UNIFORMS
 from vico.render.scene import Scene
 from vico.render.uniforms import Record, set_room
 from vico.render.visibility.fill import inverse_depth, triangle_number
@@ -23,23 +23,23 @@ from vico.render.visibility.fill import inverse_depth, triangle_number
 _MOST, _FARTHEST, _NEAREST = 3, 38.0, 0.25
 # The pane lies no farther than this off the wall, metres.
 _OFF_WALL = 0.12
-# Least height of a room, pixels of a picture of 256, and the least share of a picture that shows a room.
-_LEAST_PIXELS, _LEAST_SHARE = 10.0, 0.0015
+# Least height of a room, pixels of a picture of 256; and the least part of a picture that shows a room: so large a
+# share, and so many pixels that it can be told from a painted one.
+_LEAST_PIXELS, _LEAST_SHARE, _LEAST_SEEN = 10.0, 0.0015, 300
 # Pixels of a room's picture beside those in which it is seen.
-_FINER = 1.4
+_FINER = 1.0
 # Light indoors beside that on the street by day.
 _DAY, _SLACK = 0.62, 0.03
-
-
-class SeenGlass(NamedTuple):
-    """The part of a front that a picture shows: along it and up, metres; least depth before the camera, and pixels."""
-
-    left: float
-    right: float
-    low: float
-    high: float
-    depth: float
-    pixels: int
+_INDEX = 0x7FFFFFFF  # masked so, an index is not negative for all the compiler knows
+# A room that is shown: its front; the pixels that may show it; what of the front shows glass, along it and up, metres,
+# at what depth at least, and how many pixels of it; pixels a metre of its picture.
+_SHOWN = np.dtype(
+    [
+        *((name, np.int64) for name in ("front", "first_row", "end_row", "first_column", "end_column", "pixels")),
+        *((name, np.float64) for name in ("left", "right", "low", "high", "depth", "metre")),
+    ],
+    align=True,
+)
 
 
 Draw = Callable[[Record], NDArray[np.uint8]]
@@ -71,100 +71,124 @@ def show_rooms(
     if camera["indoors"] or not len(scene.fronts):
         return
     bright = _DAY + (1.0 - _DAY) * min(float(light["lamp_exposure"]) / 1.6, 1.0)
-    for front in _near_fronts(scene.fronts, camera):
-        area = _area(front, camera)
-        if area is None:
-            continue
-        seen = SeenGlass(*_look_for_glass(front, camera, keys, glass, area))
-        if seen.pixels < _LEAST_SHARE * len(keys) or seen.right <= seen.left or seen.high <= seen.low:
-            continue
-        inside = _camera_into(scene, front, camera, seen)
-        picture = draw(inside)
-        metre = float(inside["focal"]) / -_place(front, camera)[1]
-        _lay(front, camera, (keys, glass), area, picture, (seen.left, seen.high, metre), bright, rgb)
+    inside, found = np.zeros(_MOST, CAMERA_UNIFORMS), np.zeros(_MOST, _SHOWN)
+    inside[:] = camera
+    count = _find_rooms(scene.fronts, camera, keys, glass, inside, found)
+    for k in range(count):
+        front = scene.fronts[found["front"][k]]
+        set_room(inside[k], scene.rooms[int(front["room"])])
+        _lay(front, camera, (keys, glass), found[k], draw(inside[k]), bright, rgb)
 
 
-def _near_fronts(fronts: NDArray[np.void], camera: Record) -> NDArray[np.void]:
-    """Return the nearest fronts whose outside is seen, at most `_MOST`."""
-    dx, dy = camera["x"] - fronts["x"], camera["y"] - fronts["y"]
-    before = -(dx * fronts["inward_x"] + dy * fronts["inward_y"])
-    away = np.hypot(dx, dy)
-    ahead = -(dx * camera["forward_x"] + dy * camera["forward_y"])
-    reach = np.maximum(np.abs(fronts["left"]), np.abs(fronts["right"]))
-    chosen = np.flatnonzero((before > _NEAREST) & (away < _FARTHEST) & (ahead > -reach))
-    return fronts[chosen[np.argsort(away[chosen], kind="stable")][:_MOST]]
-
-
-def _place(front: Record, camera: Record) -> tuple[float, float, float]:
-    """Return where the eye is in a front's frame: right, inwards, up."""
-    dx, dy = float(camera["x"] - front["x"]), float(camera["y"] - front["y"])
-    ix, iy = float(front["inward_x"]), float(front["inward_y"])
-    return dx * iy - dy * ix, dx * ix + dy * iy, float(camera["z"] - front["z"])
-
-
-def _area(front: Record, camera: Record) -> tuple[int, int, int, int] | None:
-    """Return first and end row and column of the pixels that may show a front; None for none."""
-    ix, iy = float(front["inward_x"]), float(front["inward_y"])
-    along = np.array([front["left"], front["right"]])
-    points = np.array([(s, b, z) for s in along for b in (-_OFF_WALL, _OFF_WALL) for z in (0.0, front["height"])])
-    world = np.column_stack(
-        [
-            front["x"] + points[:, 0] * iy + points[:, 1] * ix - camera["x"],
-            front["y"] - points[:, 0] * ix + points[:, 1] * iy - camera["y"],
-            front["z"] + points[:, 2] - camera["z"],
-        ]
-    )
-    axes = np.array([[camera[f"{name}_{axis}"] for axis in "xyz"] for name in ("right", "down", "forward")])
-    x, y, depth = axes @ world.T
-    width, height = int(camera["width"]), int(camera["height"])
-    if depth.max() <= camera["near"]:
-        return None
-    if depth.min() <= camera["near"]:
-        return 0, height, 0, width
-    column, row = camera["centre_x"] + camera["focal"] * x / depth, camera["centre_y"] + camera["focal"] * y / depth
-    if row.max() - row.min() < _LEAST_PIXELS * height / 256.0:
-        return None
-    area = (
-        max(int(row.min()), 0),
-        min(int(row.max()) + 1, height),
-        max(int(column.min()), 0),
-        min(int(column.max()) + 1, width),
-    )
-    return area if area[0] < area[1] and area[2] < area[3] else None
-
-
-def _camera_into(scene: Scene, front: Record, camera: Record, seen: SeenGlass) -> Record:
-    """Return the camera that looks into the room by the part of its front that is seen."""
-    a, b, z = _place(front, camera)
-    ix, iy = float(front["room_inward_x"]), float(front["room_inward_y"])
-    inside = camera.copy()
-    inside["x"] = front["room_x"] + a * iy + b * ix
-    inside["y"] = front["room_y"] - a * ix + b * iy
-    inside["z"] = front["room_z"] + z
-    for name, axis in (("right", (iy, -ix, 0.0)), ("down", (0.0, 0.0, -1.0)), ("forward", (ix, iy, 0.0))):
-        for part, value in zip("xyz", axis, strict=True):
-            inside[f"{name}_{part}"] = value
-    wide, high = seen.right - seen.left, seen.high - seen.low
-    wanted = math.sqrt(_FINER * seen.pixels / (wide * high))
-    most = 2.0 * max(int(camera["width"]), int(camera["height"])) / max(wide, high)
-    metre = min(float(camera["focal"]) / max(seen.depth, 0.1), wanted, most)
-    inside["width"], inside["height"] = int(np.ceil(wide * metre)) + 1, int(np.ceil(high * metre)) + 1
-    inside["focal"] = -b * metre
-    inside["centre_x"], inside["centre_y"] = (a - seen.left) * metre, (seen.high - z) * metre
-    inside["near"], inside["far"] = -b + _SLACK, -b + float(front["depth"]) + 1.0
-    set_room(inside, scene.rooms[int(front["room"])])
-    return inside
+@kernel
+def _find_rooms(fronts: Any, camera: Any, keys: Any, glass: Any, inside: Any, found: Any) -> int:
+    """Write which rooms are seen and the cameras that look into them; return how many there are."""
+    nearest = np.full(_MOST, -1, np.int64)
+    for k in range(len(fronts)):
+        _keep_nearest(fronts, k, camera, nearest)
+    count = 0
+    for place in range(_MOST):
+        number = nearest[place]
+        if number < 0:
+            break
+        front, shown = fronts[number], found[count]
+        shown.front = number
+        if _set_area(front, camera, shown) and _look_for_glass(front, camera, keys, glass, shown):
+            _look_into(front, camera, inside[count], shown)
+            count += 1
+    return count
 
 
 @inlined
-def _step(front: Any, camera: Any, column: int, row: int, depth: Any) -> Any:
-    """Return a pixel's place in a front's frame: right, inwards, up, metres."""
-    u = (column + 0.5 - camera.centre_x) / camera.focal
-    v = (row + 0.5 - camera.centre_y) / camera.focal
-    dx = camera.x - front.x + depth * (camera.forward_x + u * camera.right_x + v * camera.down_x)
-    dy = camera.y - front.y + depth * (camera.forward_y + u * camera.right_y + v * camera.down_y)
-    dz = camera.z - front.z + depth * (camera.forward_z + u * camera.right_z + v * camera.down_z)
-    return dx * front.inward_y - dy * front.inward_x, dx * front.inward_x + dy * front.inward_y, dz
+def _keep_nearest(fronts: Any, k: int, camera: Any, nearest: Any) -> None:
+    """Put a front whose outside is seen among the nearest ones, in order."""
+    away = _distance(fronts[k], camera)
+    if away < 0.0:
+        return
+    for place in range(_MOST):
+        other = nearest[place]
+        if other < 0 or away < _distance(fronts[other], camera):
+            for later in range(_MOST - 1, place, -1):
+                nearest[later] = nearest[later - 1]
+            nearest[place] = k
+            return
+
+
+@inlined
+def _distance(front: Any, camera: Any) -> float:
+    """Return how far away a front is, metres; -1 if it can't be seen from outside or is too far away."""
+    dx, dy = camera.x - front.x, camera.y - front.y
+    away = np.sqrt(dx * dx + dy * dy)
+    before = -(dx * front.inward_x + dy * front.inward_y)
+    ahead = -(dx * camera.forward_x + dy * camera.forward_y)
+    seen = before > _NEAREST and away < _FARTHEST and ahead > -max(abs(front.left), abs(front.right))
+    return away if seen else -1.0
+
+
+@inlined
+def _set_area(front: Any, camera: Any, shown: Any) -> bool:
+    """Write first and end row and column of the pixels that may show a front; return whether there are any."""
+    left, right, top, bottom, nearest, farthest = 1e30, -1e30, 1e30, -1e30, 1e30, -1e30
+    for corner in range(8):
+        a = front.right if corner & 1 else front.left
+        b = _OFF_WALL if corner & 2 else -_OFF_WALL
+        dx = front.x + a * front.inward_y + b * front.inward_x - camera.x
+        dy = front.y - a * front.inward_x + b * front.inward_y - camera.y
+        dz = front.z + (front.height if corner & 4 else 0.0) - camera.z
+        depth = dx * camera.forward_x + dy * camera.forward_y + dz * camera.forward_z
+        nearest, farthest = min(nearest, depth), max(farthest, depth)
+        scale = camera.focal / max(depth, float(camera.near))
+        x = camera.centre_x + scale * (dx * camera.right_x + dy * camera.right_y + dz * camera.right_z)
+        y = camera.centre_y + scale * (dx * camera.down_x + dy * camera.down_y + dz * camera.down_z)
+        left, right, top, bottom = min(left, x), max(right, x), min(top, y), max(bottom, y)
+    if farthest <= camera.near:
+        return False
+    if nearest <= camera.near:
+        shown.first_row, shown.end_row, shown.first_column, shown.end_column = 0, camera.height, 0, camera.width
+        return True
+    if bottom - top < _LEAST_PIXELS * camera.height / 256.0:
+        return False
+    shown.first_row, shown.end_row = int(max(top, 0.0)), int(min(bottom + 1.0, float(camera.height)))
+    shown.first_column, shown.end_column = int(max(left, 0.0)), int(min(right + 1.0, float(camera.width)))
+    return shown.first_row < shown.end_row and shown.first_column < shown.end_column
+
+
+@inlined
+def _look_into(front: Any, camera: Any, inside: Any, shown: Any) -> None:
+    """Write the camera that looks into the room by the part of its front that is seen."""
+    ix, iy = front.room_inward_x, front.room_inward_y
+    dx, dy, z = camera.x - front.x, camera.y - front.y, camera.z - front.z
+    a, b = dx * front.inward_y - dy * front.inward_x, dx * front.inward_x + dy * front.inward_y
+    inside.x, inside.y, inside.z = front.room_x + a * iy + b * ix, front.room_y - a * ix + b * iy, front.room_z + z
+    inside.right_x, inside.right_y, inside.right_z = iy, -ix, 0.0
+    inside.down_x, inside.down_y, inside.down_z = 0.0, 0.0, -1.0
+    inside.forward_x, inside.forward_y, inside.forward_z = ix, iy, 0.0
+    wide, high = shown.right - shown.left, shown.high - shown.low
+    wanted = np.sqrt(_FINER * shown.pixels / (wide * high))
+    most = 2.0 * max(camera.width, camera.height) / max(wide, high)
+    metre = min(camera.focal / max(shown.depth, 0.1), wanted, most)
+    inside.width, inside.height = int(np.ceil(wide * metre)) + 1, int(np.ceil(high * metre)) + 1
+    inside.focal = -b * metre
+    inside.centre_x, inside.centre_y = (a - shown.left) * metre, (shown.high - z) * metre
+    inside.near, inside.far = -b + _SLACK, -b + front.depth + 1.0
+    shown.metre = metre
+
+
+@inlined
+def _coordinate(front: Any, camera: Any, axis: int) -> Any:
+    """Return a coordinate in a front's frame (right, inwards, up): where the eye is, and what each metre of depth adds.
+
+    That is a number at the picture's corner, and its steps from row to row and from column to column.
+    """
+    x = front.inward_y if axis == 0 else (front.inward_x if axis == 1 else 0.0)
+    y = -front.inward_x if axis == 0 else (front.inward_y if axis == 1 else 0.0)
+    z = 1.0 if axis == 2 else 0.0
+    eye = (camera.x - front.x) * x + (camera.y - front.y) * y + (camera.z - front.z) * z
+    across = (camera.right_x * x + camera.right_y * y + camera.right_z * z) / camera.focal
+    down = (camera.down_x * x + camera.down_y * y + camera.down_z * z) / camera.focal
+    start = camera.forward_x * x + camera.forward_y * y + camera.forward_z * z
+    start += (0.5 - camera.centre_x) * across + (0.5 - camera.centre_y) * down
+    return eye, start, down, across
 
 
 @inlined
@@ -172,48 +196,65 @@ def _is_pane(front: Any, a: float, b: float, z: float) -> bool:
     return abs(b) < _OFF_WALL and front.left < a < front.right and -0.5 < z < front.height + 0.5
 
 
-@kernel
-def _look_for_glass(front: Any, camera: Any, keys: Any, glass: Any, area: Any) -> Any:
-    """Return the part of a front that is seen through glass: the fields of `SeenGlass`."""
-    left, right, low, high, least, count = 1e30, -1e30, 1e30, -1e30, 1e30, 0
-    for row in range(area[0], area[1]):
-        for column in range(area[2], area[3]):
-            pixel = row * camera.width + column
+@inlined
+def _look_for_glass(front: Any, camera: Any, keys: Any, glass: Any, shown: Any) -> bool:
+    """Write the part of a front that is seen through glass; return whether it is worth showing.
+
+    Every second pixel of every second row is looked at.
+    """
+    a0, a1, a2, a3 = _coordinate(front, camera, 0)
+    b0, b1, b2, b3 = _coordinate(front, camera, 1)
+    z0, z1, z2, z3 = _coordinate(front, camera, 2)
+    left, right, low, high, least, count, width = 1e30, -1e30, 1e30, -1e30, 1e30, 0, camera.width
+    for row in range(shown.first_row, shown.end_row, 2):
+        a4, b4, z4 = a1 + row * a2, b1 + row * b2, z1 + row * z2
+        for column in range(shown.first_column, shown.end_column, 2):
+            pixel = (row * width + column) & _INDEX
             if glass[pixel] == 0 or triangle_number(keys[pixel]) == 0:
                 continue
             depth = 1.0 / float(inverse_depth(keys[pixel]))
-            a, b, z = _step(front, camera, column, row, depth)
+            a, b = a0 + depth * (a4 + column * a3), b0 + depth * (b4 + column * b3)
+            z = z0 + depth * (z4 + column * z3)
             if _is_pane(front, a, b, z):
                 a = min(max(a, -front.half_width), front.half_width)
                 left, right, low, high = min(left, a), max(right, a), min(low, z), max(high, z)
                 least = min(least, depth)
-                count += 1
-    return left, right, max(low, 0.0), min(high, front.height), least, count
+                count += 4
+    shown.left, shown.right, shown.low, shown.high = left, right, max(low, 0.0), min(high, front.height)
+    shown.depth, shown.pixels = least, count
+    enough = count >= max(_LEAST_SHARE * camera.width * camera.height, _LEAST_SEEN)
+    return enough and shown.right > shown.left and shown.high > shown.low
 
 
 @kernel
-def _lay(front: Any, camera: Any, pixels: Any, area: Any, picture: Any, frame: Any, bright: float, rgb: Any) -> None:
-    """Lay a room's picture behind the panes: `pixels` are keys and glass, `frame` left, upper end, pixels a metre."""
+def _lay(front: Any, camera: Any, pixels: Any, shown: Any, picture: Any, bright: float, rgb: Any) -> None:
+    """Lay a room's picture behind the panes: `pixels` are keys and glass."""
     keys, glass = pixels
-    left, high, metre = frame
-    rows, columns = picture.shape[0], picture.shape[1]
-    for row in range(area[0], area[1]):
-        for column in range(area[2], area[3]):
-            pixel = row * camera.width + column
+    left, high, metre, width = shown.left, shown.high, shown.metre, camera.width
+    a0, a1, a2, a3 = _coordinate(front, camera, 0)
+    b0, b1, b2, b3 = _coordinate(front, camera, 1)
+    z0, z1, z2, z3 = _coordinate(front, camera, 2)
+    last_x, last_y = picture.shape[1] - 1.001, picture.shape[0] - 1.001
+    for row in range(shown.first_row, shown.end_row):
+        a4, b4, z4 = a1 + row * a2, b1 + row * b2, z1 + row * z2
+        for column in range(shown.first_column, shown.end_column):
+            pixel = (row * width + column) & _INDEX
             if glass[pixel] == 0 or triangle_number(keys[pixel]) == 0:
                 continue
-            a, b, z = _step(front, camera, column, row, 1.0 / float(inverse_depth(keys[pixel])))
+            depth = 1.0 / float(inverse_depth(keys[pixel]))
+            a, b = a0 + depth * (a4 + column * a3), b0 + depth * (b4 + column * b3)
+            z = z0 + depth * (z4 + column * z3)
             if not _is_pane(front, a, b, z):
                 continue
-            x = min(max((a - left) * metre - 0.5, 0.0), columns - 1.001)
-            y = min(max((high - z) * metre - 0.5, 0.0), rows - 1.001)
+            x = min(max((a - left) * metre - 0.5, 0.0), last_x)
+            y = min(max((high - z) * metre - 0.5, 0.0), last_y)
             i, j = int(x), int(y)
-            s, t = x - i, y - j
-            i1, j1 = min(i + 1, columns - 1), min(j + 1, rows - 1)
-            share = float(glass[pixel]) / 255.0
+            s, t = np.float32(x - i), np.float32(y - j)
+            share = np.float32(glass[pixel]) * np.float32(1.0 / 255.0)
             for channel in range(3):
-                upper = (1.0 - s) * picture[j, i, channel] + s * picture[j, i1, channel]
-                lower = (1.0 - s) * picture[j1, i, channel] + s * picture[j1, i1, channel]
-                behind = bright * ((1.0 - t) * upper + t * lower)
-                here = float(rgb[row, column, channel])
-                rgb[row, column, channel] = np.uint8(here + share * (behind - here) + 0.5)
+                v0, v1 = np.float32(picture[j, i, channel]), np.float32(picture[j, i + 1, channel])
+                v2, v3 = np.float32(picture[j + 1, i, channel]), np.float32(picture[j + 1, i + 1, channel])
+                upper, lower = v0 + s * (v1 - v0), v2 + s * (v3 - v2)
+                behind = np.float32(bright) * (upper + t * (lower - upper))
+                here = np.float32(rgb[row, column, channel])
+                rgb[row, column, channel] = np.uint8(here + share * (behind - here) + np.float32(0.5))

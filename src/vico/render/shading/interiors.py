@@ -30,19 +30,20 @@ def _part_of(number: Any, low: Any) -> Any:
 
 
 @kernel
-def look_into_windows(light: Any, camera: Any, textured: bool, real: Any, whole: Any) -> None:
+def look_into_windows(light: Any, camera: Any, textured: bool, real: Any, whole: Any) -> bool:
     """Show a room behind each bay of a facade: change rows of the tone table in `whole`.
 
     The ray goes on into a box with a floor, a ceiling, walls and a piece of furniture, all decided by the number of
     the building and of the bay (interior mapping, J. van Dongen 2008). Leaves in `real[SEEN:]` how much of what is
-    behind is seen through panes of ground floors.
+    behind is seen through panes of ground floors; returns whether anything is.
     """
-    most = _ZERO
+    # Whole numbers: a greatest float of all would not become vector code.
+    codes = np.uint32(0)
     for i in range(QUEUE):
-        most = max(most, real[LIT + i] if whole[WINDOW + i] != 0 else _ZERO)
+        codes |= whole[WINDOW + i] if real[LIT + i] > _ZERO else np.uint32(0)
         real[SEEN + i] = _ZERO
-    if most <= _ZERO or not textured:
-        return
+    if codes == 0 or not textured:
+        return False
     vx, vy, vz = np.float32(camera.x), np.float32(camera.y), np.float32(camera.z)
     dusk = min(light.lamp_exposure * np.float32(1.0 / 1.6), _ONE)
     day_red, day_green, day_blue = light.ambient_red, light.ambient_green, light.ambient_blue
@@ -123,3 +124,4 @@ def look_into_windows(light: Any, camera: Any, textured: bool, real: Any, whole:
         whole[I0 + i] = np.int32(min(max(_ZERO, a + share * (red * _TONE_SCALE - a)), _TONE_LAST))
         whole[I1 + i] = np.int32(min(max(_ZERO, b + share * (green * _TONE_SCALE - b)), _TONE_LAST))
         whole[I2 + i] = np.int32(min(max(_ZERO, c + share * (blue * _TONE_SCALE - c)), _TONE_LAST))
+    return codes & np.uint32(WINDOW_GROUND) != 0

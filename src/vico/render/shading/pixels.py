@@ -433,9 +433,9 @@ def finish(light: Any, camera: Any, texels: Any, queue: Any, moving: Any, count:
         light_outdoors(light.uniforms, camera, real, whole)
         if light.uniforms.interiors > _ZERO:
             glass = queue.glass
-            look_into_windows(light.uniforms, camera, taps > 0, real, whole)
-            for i in range(count):
-                glass[whole[PIXEL + i]] = np.uint8(real[SEEN + i] * np.float32(255.0))
+            if look_into_windows(light.uniforms, camera, taps > 0, real, whole):
+                for i in range(count):
+                    glass[whole[PIXEL + i]] = np.uint8(real[SEEN + i] * np.float32(255.0))
         if light.uniforms.glass > _ZERO:
             mirror_surroundings(light.uniforms, camera, real, whole)
     for i in range(count):
