@@ -120,6 +120,21 @@ def test_a_tram_comes_on_time_takes_people_for_the_fare_and_everybody_off_at_its
     assert trams.riders[tram, 5] == FIRST_PASSENGER
 
 
+def test_a_railway_has_trains_that_are_called_so_and_drawn_as_such() -> None:
+    world = tram_world()
+    line = world.transit.tram_lines[0].model_copy(update={"kind": "rail"})
+    world.__dict__["transit"] = world.transit.model_copy(update={"tram_lines": [line]})
+    sim = Simulation(world, None, SimConfig(cars=0, pedestrians=0, start=EIGHT + 20))
+    sim.step({})
+    trams = system(sim).trams
+    assert {sim.state.entity(int(entity))["kind"] for entity in trams.bodies().entity} == {"train"}
+    drawn = trams.draw()
+    assert {drawn.prototypes[k] for k in drawn.index.tolist()} <= {
+        f"train_{part}" for part in ("front", "middle", "rear", "leaf")
+    }
+    assert len(drawn.index) > 0
+
+
 def test_a_full_tram_says_so(sim: Simulation) -> None:
     until(sim, "tram_stop_0")
     trams = system(sim).trams

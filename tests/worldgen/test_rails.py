@@ -66,6 +66,17 @@ def test_trams_leave_by_the_timetable_that_names_their_line() -> None:
     assert {b - a for a, b in pairwise(timed.departures)} == {900}
 
 
+def test_a_railway_through_the_window_is_driven_beside_as_many_trams() -> None:
+    osm = road_city().osm
+    tags = {"type": "route", "route": "train", "ref": "R"}
+    relations = [replace(r, tags=tags) if r.tags.get("ref") == "9" else r for r in osm.relations]
+    _, lines, left_out = trams_from_osm(site_facts(replace(osm, relations=relations)), FLAT, first_entity=1)
+    kinds = {line.name: line.kind for line in lines}
+    assert kinds.pop("R") == "rail"
+    assert list(kinds.values()) == ["tram"] * 3
+    assert all("4 other lines" in dropped.reason for dropped in left_out)
+
+
 def test_routes_on_bridges_over_streets_and_in_tunnels_are_no_lines() -> None:
     osm = road_city().osm
     under = [

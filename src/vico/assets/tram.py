@@ -45,11 +45,12 @@ _ROWS = (1.1, 0.25, -0.6, -1.35)
 _ACROSS = (0.93, 0.46)
 _SEAT_HEIGHT = 0.45
 
-_PAINT: Colour = (0, 124, 80)
-_CREAM: Colour = (238, 226, 168)
+#: Paint of the sides, of what is above it, and of seats.
+PAINT: Colour = (0, 124, 80)
+CREAM: Colour = (238, 226, 168)
 _INSIDE: Colour = (200, 204, 204)
 _FLOOR: Colour = (92, 96, 100)
-_SEAT: Colour = (44, 98, 76)
+SEAT: Colour = (44, 98, 76)
 _BELLOWS: Colour = (44, 46, 50)
 
 
@@ -98,11 +99,11 @@ def _sides() -> list[Surface]:
                              (a, y, min(high, _CEILING))]], _INSIDE))  # fmt: skip
 
     for a, b in _spans():
-        wall(a, b, _LOW, _BELT, _PAINT)
+        wall(a, b, _LOW, _BELT, PAINT)
         cuts = [a, *(x for pane in _PANES if a <= pane[0] and pane[1] <= b for x in pane), b]
         for c, d in zip(cuts[::2], cuts[1::2], strict=True):
-            wall(c, d, _BELT, _LINTEL, _CREAM)
-    wall(-_END, _END, _LINTEL, _EAVES, _CREAM)
+            wall(c, d, _BELT, _LINTEL, CREAM)
+    wall(-_END, _END, _LINTEL, _EAVES, CREAM)
     return both_sides(parts)
 
 
@@ -117,7 +118,7 @@ def _shell(nose: bool) -> list[Surface]:
     y, x0, x1 = _HALF - _LINING, -_END, _END
     parts = [
         skin(((0.1, 0.14), (0.0, _LOW), (0.0, TRAM_FLOOR - 0.01)), TRIM),
-        skin(((0.0, _EAVES), (0.12, TRAM_HEIGHT - 0.36), (0.3, TRAM_HEIGHT - 0.3)), _CREAM),
+        skin(((0.0, _EAVES), (0.12, TRAM_HEIGHT - 0.36), (0.3, TRAM_HEIGHT - 0.3)), CREAM),
         box((2.6, 1.5, 0.28), (0.4, 0.0, TRAM_HEIGHT - 0.16), colour=(206, 208, 206)),
         quads([[(x0, -y, TRAM_FLOOR), (x1, -y, TRAM_FLOOR), (x1, y, TRAM_FLOOR), (x0, y, TRAM_FLOOR)]], _FLOOR),
         quads([[(x0, y, _CEILING), (x1, y, _CEILING), (x1, -y, _CEILING), (x0, -y, _CEILING)]], _INSIDE),
@@ -137,8 +138,8 @@ def _shell(nose: bool) -> list[Surface]:
 def _nose() -> list[Surface]:
     x = _END
     parts = [
-        front(x + 0.002, _HALF, _LOW, _BELT, _PAINT),
-        front(x + 0.002, _HALF, _LINTEL + 0.05, _EAVES, _CREAM),
+        front(x + 0.002, _HALF, _LOW, _BELT, PAINT),
+        front(x + 0.002, _HALF, _LINTEL + 0.05, _EAVES, CREAM),
         front(x + 0.03, 0.75, _LINTEL + 0.1, _EAVES - 0.06, (246, 170, 30)),
         front(x - 0.06, -_HALF, TRAM_FLOOR, _BELT, _INSIDE),
         box((0.2, TRAM_WIDTH - 0.3, 0.34), (x + 0.08, 0.0, 0.42), colour=TRIM),
@@ -147,7 +148,7 @@ def _nose() -> list[Surface]:
     ]
     parts += both_sides(
         [
-            box((0.1, 0.12, 1.4), (x - 0.02, _HALF - 0.06, 1.75), colour=_CREAM),
+            box((0.1, 0.12, 1.4), (x - 0.02, _HALF - 0.06, 1.75), colour=CREAM),
             box((0.08, 0.3, 0.18), (x + 0.02, _HALF - 0.36, 0.82), colour=HEADLIGHT),
             box((0.06, 0.2, 0.12), (x + 0.02, _HALF - 0.16, 1.0), colour=TAILLIGHT),
         ]
@@ -160,8 +161,8 @@ def _furniture() -> list[Surface]:
     for x in _ROWS:
         for across in _ACROSS:
             for y in (across, -across):
-                parts.append(box((0.4, 0.4, 0.08), (x + 0.02, y, TRAM_FLOOR + _SEAT_HEIGHT - 0.04), colour=_SEAT))
-                parts.append(box((0.06, 0.4, 0.6), (x - 0.21, y, TRAM_FLOOR + _SEAT_HEIGHT + 0.26), colour=_SEAT))
+                parts.append(box((0.4, 0.4, 0.08), (x + 0.02, y, TRAM_FLOOR + _SEAT_HEIGHT - 0.04), colour=SEAT))
+                parts.append(box((0.06, 0.4, 0.6), (x - 0.21, y, TRAM_FLOOR + _SEAT_HEIGHT + 0.26), colour=SEAT))
     return parts
 
 
@@ -169,7 +170,7 @@ def _leaf() -> Surface:
     """Make a door leaf whose outer side faces both ways, its middle at the origin."""
     half, y = _LEAF / 2, 0.02
     strips = [
-        panel(-half, half, y, _LOW + 0.04, 0.5, _PAINT),
+        panel(-half, half, y, _LOW + 0.04, 0.5, PAINT),
         panel(-half, half, y, _LINTEL - 0.06, _EAVES - 0.12, TRIM),
         panel(-half, -half + 0.06, y, 0.5, _LINTEL - 0.06, TRIM),
         panel(half - 0.06, half, y, 0.5, _LINTEL - 0.06, TRIM),

@@ -123,7 +123,9 @@ def _entities(state: SimulationState, residents: Sequence[Resident], config: Sim
     for k, entity in enumerate(state.transit.bicycles.entities().tolist() if state.transit is not None else []):
         found[entity] = {"kind": "bicycle", "name": f"bicycle {k}"}
     for k, entity in enumerate(state.transit.trams.entities().tolist() if state.transit is not None else []):
-        found[entity] = {"kind": "tram", "name": f"tram {k // TRAM_SECTIONS}"}
+        tram = k // TRAM_SECTIONS
+        kind = state.transit.trams.kind(tram) if state.transit is not None else "tram"
+        found[entity] = {"kind": kind, "name": f"{kind} {tram}"}
     for k, name in enumerate(state.robots.names if state.robots is not None else []):
         found[FIRST_ROBOT + k] |= {"name": f"{config.robots[k].partition(':')[0]} {k}", "agent": name}
     return found

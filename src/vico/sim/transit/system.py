@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vico.assets.bus import BUS_FLOOR, BUS_SIZE, bus_door_leaves, bus_leaf, bus_places
-from vico.assets.tram import TRAM_FLOOR, tram_places, tram_prototypes
+from vico.assets.tram import TRAM_FLOOR, tram_places
 from vico.assets.vehicles import vehicle_prototypes
 from vico.errors import InputError
 from vico.rules import BUS_CAPACITY as CAPACITY
@@ -348,7 +348,7 @@ class TransitSystem:
     def prototypes(self) -> dict[str, list[Surface]]:
         """Return the shapes of bicycles, doors and trams."""
         shapes = {"bicycle": vehicle_prototypes()["bicycle"], "bus_leaf": [bus_leaf()]}
-        return shapes | tram_prototypes()
+        return shapes | self.trams.prototypes()
 
     # -- buses -------------------------------------------------------------------------------------------------------
 
@@ -393,10 +393,10 @@ class TransitSystem:
         return self.transit.lines[self._plan.line_of_bus[bus]]
 
     def service_of(self, bus: int) -> tuple[str, str, str]:
-        """Return what a vehicle is, bus or tram, and id and name of its line."""
+        """Return what a vehicle is, bus, tram or train, and id and name of its line."""
         tram = bus - self.traffic.buses
         line = self.trams.lines[self.trams.line_of[tram]] if tram >= 0 else self.line_of(bus)
-        return "tram" if tram >= 0 else "bus", line.id, line.name
+        return self.trams.kind(tram) if tram >= 0 else "bus", line.id, line.name
 
     def entity_of(self, bus: int) -> int:
         """Return a bus's entity; of a tram that of its first section."""

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.assets.train import SHAPES_OF, train_prototypes
 from vico.assets.tram import TRAM_BELLOWS, TRAM_CAPACITY, TRAM_HEIGHT, tram_door_leaves, tram_places, tram_prototypes
 from vico.clock import DAY
 from vico.rules import BUS_DWELL, TRAM_SECTION, TRAM_SECTIONS, TRAM_WIDTH
@@ -349,15 +350,22 @@ class Trams:
 
     def prototypes(self) -> dict[str, list[Surface]]:
         """Return the shapes `draw` refers to."""
-        return tram_prototypes() if len(self) else {}
+        made_of = {SHAPES_OF[line.kind] for line in self.lines}
+        every = tram_prototypes() | train_prototypes()
+        return {name: shape for name, shape in every.items() if name.rpartition("_")[0] in made_of}
 
     def draw(self) -> Drawn:
         """Return the sections and the leaves of their doors."""
         trams, section, pose = self._shown()
         n = len(trams)
-        names = sorted(tram_prototypes())
+        names = sorted(self.prototypes())
+        made_of = [SHAPES_OF[self.lines[line].kind] for line in self.line_of[trams].tolist()]
         bases = _transforms(pose, self._traffic.height(pose[:, :2]) if n else np.zeros(0))
-        index = [np.array([names.index(_PART[k]) for k in section.tolist()], np.int32)]
+        index = [
+            np.array(
+                [names.index(f"{what}_{_PART[k]}") for what, k in zip(made_of, section.tolist(), strict=True)], np.int32
+            )
+        ]
         leaves, width = tram_door_leaves()
         kerb = 1.0 if self._traffic.lanes.lefthand else -1.0
         parts = [bases]
@@ -365,7 +373,7 @@ class Trams:
             # Only the side of the kerb opens.
             share = self.open[trams] if side == kerb else np.zeros(n)
             parts.append(leaf_transforms(bases, [leaf for leaf in leaves if leaf[1] * side > 0], share, width))
-        index.append(np.full(len(leaves) * n, names.index("tram_leaf"), np.int32))
+        index.append(np.tile(np.array([names.index(f"{what}_leaf") for what in made_of], np.int32), len(leaves)))
         entity = np.tile(self._entities[trams * TRAM_SECTIONS + section], len(leaves) + 1)
         return Drawn(names, np.concatenate(index), np.concatenate(parts).astype(np.float32), entity)
 
@@ -388,6 +396,10 @@ class Trams:
     def standing(self) -> NDArray[np.int64]:
         """Trams that stand at a stop with their doors open."""
         return np.flatnonzero(self.dwell > 0.0)
+
+    def kind(self, tram: int) -> str:
+        """Return what a tram is called: tram, or train."""
+        return "train" if self.lines[self.line_of[tram]].kind == "rail" else "tram"
 
     def stopped_at(self, tram: int) -> str | None:
         """Id of the stop at which a tram stands with its doors open, None while it drives or is out of the city."""
@@ -427,7 +439,7 @@ _STATE = (
     "front", "speed", "stop", "dwell", "open", "due", "riders", "begun", "holder", "stops_served", "late_total",
     "late_most",
 )  # fmt: skip
-_PART = ("tram_front",) + ("tram_middle",) * (TRAM_SECTIONS - 2) + ("tram_rear",)
+_PART = ("front",) + ("middle",) * (TRAM_SECTIONS - 2) + ("rear",)
 
 
 def _headway(line: TramLine) -> float:

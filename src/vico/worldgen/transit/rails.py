@@ -32,6 +32,7 @@ _STOP_REACH = 6.0  # metres between a track and a pole or platform of its own
 _FEED_REACH = 30.0
 _STOPS_APART = 60.0
 _SAME_TRACK = 4.0
+_EDGE = 3.0  # metres from the window's edge within which tracks lead out of it
 _FIRST, _LAST, _HEADWAY = 5 * 3600, 23 * 3600 + 1800, 600
 _STAGGER = 130  # seconds between the first trams of two lines
 _RUN_SHARE, _RUN_MORE = 1.15, 4.0  # what streets cost, a share and seconds a stretch
@@ -86,7 +87,7 @@ def trams_from_osm(
     """
     left_out: list[Dropped] = []
     routes = _routes(site, left_out)
-    chosen = _chosen(routes, left_out)
+    chosen = _chosen(routes, site.osm.half, left_out)
     stops: dict[str, TramStop] = {}
     lines: list[TramLine] = []
     for number, route in enumerate(chosen):
@@ -212,8 +213,11 @@ def _length(line: NDArray[np.float64]) -> float:
     return float(np.hypot(*np.diff(line, axis=0).T).sum())
 
 
-def _chosen(routes: Sequence[_Route], left_out: list[Dropped]) -> list[_Route]:
-    """Choose lines that together run on the most track, each with its longest route of either direction."""
+def _chosen(routes: Sequence[_Route], half: float, left_out: list[Dropped]) -> list[_Route]:
+    """Choose lines that together run on the most track, each with its longest route of either direction.
+
+    Where none of them is a railway one more is chosen that is and leads through the window.
+    """
     named: dict[str, list[_Route]] = defaultdict(list)
     for route in routes:
         named[route.name].append(route)
@@ -232,11 +236,22 @@ def _chosen(routes: Sequence[_Route], left_out: list[Dropped]) -> list[_Route]:
         best = max(range(len(lines)), key=lambda k: (fresh[k], ways[k].length, -k))
         covered = covered.union(ways[best].buffer(_SAME_TRACK))
         chosen.append(lines.pop(best))
+    trains = [line for line in lines if line[0].kind == "rail" and all(_leads_through(r, half) for r in line)]
+    if trains and not any(line[0].kind == "rail" for line in chosen):
+        # A railway is in no street: one goes beside as many trams.
+        best_train = max(trains, key=lambda line: (sum(route.track.length for route in line), line[0].id))
+        lines.remove(best_train)
+        chosen.append(best_train)
     left_out += [
-        Dropped(id=line[0].id, reason=f"{line[0].kind} {line[0].name}: {_MOST_LINES} other lines on rails are driven")
+        Dropped(id=line[0].id, reason=f"{line[0].kind} {line[0].name}: {len(chosen)} other lines on rails are driven")
         for line in lines
     ]
     return [route for line in chosen for route in line]
+
+
+def _leads_through(route: _Route, half: float) -> bool:
+    """Return whether a route comes into the window at its edge and goes out there."""
+    return bool(np.abs(route.line[[0, -1]]).max(axis=1).min() > half - _EDGE)
 
 
 def _find_stops(route: _Route, osm: OsmData, feeds: Sequence[Feed]) -> None:
