@@ -60,6 +60,8 @@ class HousedEngine:
         self.outdoors.park(robot)
         engine = scene.engine(np.array([[place[0] - origin[0], place[1] - origin[1], place[2]]]))
         self.inside[robot] = HousedRobot(engine, np.array(origin, np.float64))
+        # In their order, whoever came first: that of a run that was saved and restored.
+        self.inside = dict(sorted(self.inside.items()))
 
     def release(self, robot: int, place: Array) -> None:
         """Stand a robot outdoors: x, y (ENU metres) and yaw."""
