@@ -2,7 +2,7 @@
 
 Who goes in walks up to the entrance and opens it from outside, who goes out does so from within; they are on the other
 side as soon as the door is open. `People.door_time` counts the seconds from the hand on the door on, and is negative
-before. The leaf falls shut behind them: its angle follows from the same time.
+before. Leaves are part of the walls' pictures, and do not move.
 """
 
 from __future__ import annotations
@@ -19,13 +19,12 @@ from vico.sim.moves import gesture, place_in_room, put_outdoors, spot_outside, w
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import DOOR_OPENING
 
-#: From when one is through until the door has fallen shut, seconds.
-CLOSING = 1.2
 # Up to the door one takes this long at most, seconds, to so far from it, metres, between these speeds, m/s.
 _WAY_UP, _ARM, _SLOWEST, _FASTEST = 1.0, 0.5, 0.6, 1.55
 # People turn to the door so fast, radians a second, and walk as soon as they nearly face it, radians.
 _TURN_RATE, _AHEAD, _FACING = 2.0 * math.pi, 0.6, 0.05
 _AT_IT = 0.03  # nearer to where one stands at the door nobody walks, metres
+_THROUGH = 0.66  # in the cycle of the motion: one is through, and the hand is at the door behind
 _EARLY = 1e-6  # sums of sub-steps are a little more or less than their time, seconds
 
 
@@ -77,14 +76,9 @@ def walk_up(state: SimulationState, share: NDArray[np.float64], dt: float) -> No
 
 
 def follow(state: SimulationState, dt: float) -> None:
-    """Let doors be opened, gone through, and fall shut for `dt` seconds."""
+    """Let doors be opened and gone through for `dt` seconds."""
     p = state.people
     for i in np.flatnonzero(p.door >= 0).tolist():
-        if p.door_time[i] >= DOOR_OPENING:
-            p.door_time[i] += dt
-            if p.door_time[i] >= DOOR_OPENING + CLOSING - _EARLY:
-                p.door[i], p.door_time[i] = -1, 0.0
-            continue
         # Whom something stops opens the door from there.
         stopped = p.status[i] == ActionStatus.COLLISION
         if stopped:
@@ -99,8 +93,8 @@ def follow(state: SimulationState, dt: float) -> None:
                 p.door_time[i] = 0.0
                 _touch(i, state)
         elif p.door_time[i] >= DOOR_OPENING - _EARLY:
-            p.door_time[i] = DOOR_OPENING
             _go_through(i, state)
+            p.door[i], p.door_time[i] = -1, 0.0
 
 
 def _go_through(i: int, state: SimulationState) -> None:
@@ -116,11 +110,10 @@ def _go_in(i: int, number: int, state: SimulationState) -> None:
     room = state.indoor.index[place.rooms[0]]
     near = state.indoor.arrival(room, -1)
     if state.indoor.free_spot(room, near, state.taken_in(room, without=i)) is None:
-        p.door[i] = -1
         state.set_outcome(i, ActionStatus.REFUSED, ReasonCode.FULL, "enter: it is full")
         return
     place_in_room(i, room, state, near=near)
-    p.door[i] = number
+    _leave_behind(i, state)
     state.events.add("enter", p.names[i], f"enters {place.name}", p.position[i], place=place.id)
 
 
@@ -128,7 +121,6 @@ def _go_out(i: int, number: int, state: SimulationState) -> None:
     p, place = state.people, state.world.places[number]
     spot = spot_outside(i, state)
     if spot is None:
-        p.door[i] = -1
         state.set_outcome(i, ActionStatus.REFUSED, ReasonCode.BLOCKED, "exit: somebody stands in front of the door")
         return
     assert place.entrance is not None
@@ -136,8 +128,15 @@ def _go_out(i: int, number: int, state: SimulationState) -> None:
     if number == state.homes[i]:
         p.clothes[i] = state.weather_to_dress_for()
     put_outdoors(i, spot, state.entrances[place.entrance].facing, state)
-    p.door[i] = number
+    _leave_behind(i, state)
     state.events.add("exit", p.names[i], f"leaves {place.name}", p.position[i], place=place.id)
+
+
+def _leave_behind(i: int, state: SimulationState) -> None:
+    """Have the hand that opened the door be at it behind."""
+    p = state.people
+    if p.clip[i] == CLIP["open_door"]:
+        p.phase[i] = _THROUGH
 
 
 def let_go(i: int, state: SimulationState) -> None:
@@ -148,4 +147,4 @@ def let_go(i: int, state: SimulationState) -> None:
     p = state.people
     gesture("open_door", i, state, hand=hand)
     p.clip_before[i], p.phase_before[i], p.pace_before[i] = p.clip[i], p.phase[i], p.pace[i]
-    p.clip[i], p.phase[i], p.clip_time[i] = CLIP["open_door"], 0.5, 0.0
+    p.clip[i], p.phase[i], p.clip_time[i] = CLIP["open_door"], _THROUGH, 0.0

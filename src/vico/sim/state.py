@@ -277,7 +277,7 @@ class People(ArrayState):
 
     def at_door(self) -> NDArray[np.bool_]:
         """Who is on the way through a door of a house, and not through it yet."""
-        return np.asarray((self.door >= 0) & (self.door_time < DOOR_OPENING))
+        return np.asarray(self.door >= 0)
 
     def outdoors(self) -> NDArray[np.bool_]:
         """Who stands or rides in the street on their own feet or bicycle (not in a room, not in a bus)."""

@@ -10,7 +10,7 @@ from vico.sim.actions.fields import FORMS, short
 from vico.sim.actions.model import ActionType, Command, Refusal, Situation
 from vico.sim.actions.table import ACTIONS, PEOPLE_ACTIONS, ROBOT_ACTIONS, form_of
 from vico.sim.simulation_state import SimulationState
-from vico.sim.state import DOOR_OPENING, Posture, Vehicle
+from vico.sim.state import Posture, Vehicle
 
 _OF_PEOPLE, _OF_ROBOTS = frozenset(PEOPLE_ACTIONS), frozenset(ROBOT_ACTIONS)
 
@@ -121,7 +121,7 @@ def _refuse_situation(kind: ActionType, i: int, state: SimulationState) -> Refus
 def _refuse_at_door(kind: ActionType, i: int, state: SimulationState) -> Refusal | None:
     """Refuse what nobody does on the way through the door of a house."""
     p = state.people
-    if kind.name in _AT_DOORS or p.door.item(i) < 0 or p.door_time.item(i) >= DOOR_OPENING:
+    if kind.name in _AT_DOORS or p.door.item(i) < 0:
         return None
     return Refusal(ReasonCode.MOVING, f"{kind.name}: on the way through a door; wait until you are through")
 
