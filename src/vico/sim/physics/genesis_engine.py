@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError, SchemaError
 from vico.sim.bodies import Bodies
-from vico.sim.physics.frames import COARSE
+from vico.sim.physics.frames import COARSE, FINE
 from vico.sim.physics.genesis_contacts import contacts_of, read_contacts
 from vico.sim.physics.genesis_objects import ObjectSlots
 from vico.sim.physics.genesis_rays import RayTwin
@@ -288,6 +288,7 @@ class GenesisEngine:
 
     def step(self, frames: int = 1, *, frame: float = COARSE, holding: bool | None = None) -> None:
         """Move on by some frames; people and vehicles move first, at every one. Friction is always the same."""
+        firm = frame == FINE if holding is None else holding
         scene, parked = self._scene, np.flatnonzero(self._parked).tolist()
         with scene.lock:
             self._hold()
@@ -298,7 +299,7 @@ class GenesisEngine:
                 for robot in parked:
                     self._rest(robot, parked_robot(robot))
                 self._velocity_before[:] = scene.speeds[scene.first[:, 1:] + np.arange(3)]
-                said = scene.step(frame, self._wrench)
+                said = scene.step(frame, self._wrench, holding=firm)
                 self._contacts = None
                 self._slots.watch(scene, frame)
                 if said or not math.isfinite(float(np.add.reduce(scene.speeds))):

@@ -25,7 +25,7 @@ from vico.sim.quaternions import matrix_of
 #: have more than the ground here; solids and people have none of their own.
 GROUND_FRICTION, SMOOTH, OBJECT_FRICTION = 0.6, 0.01, 0.6
 #: Side of the squares whose solids are one link, metres: boxes around links are compared first.
-_TILE = 40.0
+_TILE = 120.0
 #: Collisions that are looked at in a step at most.
 _PAIRS = 400
 _GRID = 16

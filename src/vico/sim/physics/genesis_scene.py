@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
+from vico.io.compiled import compiled
 from vico.sim.physics.frames import COARSE, FINE
 from vico.sim.physics.genesis_index import GenesisIndex
 from vico.sim.physics.genesis_model import build_scene
@@ -19,8 +20,58 @@ from vico.sim.physics.mujoco_views import place_bodies
 from vico.sim.physics.records import Capacity, Party, StaticScene
 from vico.sim.quaternions import matrix_of
 
-#: Steps in which Genesis solves a frame: 1/200 s each in fine frames, 1/100 s in coarse ones.
+#: Steps in which Genesis solves a frame: 1/200 s each in fine frames, 1/100 s in coarse ones. Fine ones in which
+#: nothing has to be held are solved in one.
 STEPS = {FINE: 2, COARSE: 2}
+
+
+@compiled
+def _rotated(q, v):  # type: ignore[no-untyped-def]
+    """Return a vector turned by a quaternion w, x, y, z."""
+    w, x, y, z = q
+    tx, ty, tz = 2.0 * (y * v[2] - z * v[1]), 2.0 * (z * v[0] - x * v[2]), 2.0 * (x * v[1] - y * v[0])
+    return np.array(
+        [
+            v[0] + w * tx + y * tz - z * ty,
+            v[1] + w * ty + z * tx - x * tz,
+            v[2] + w * tz + x * ty - y * tx,
+        ]
+    )
+
+
+@compiled
+def _add_wrench(link, arm, force, torque, pushed, turned):  # type: ignore[no-untyped-def]
+    """Add a force and a torque to what pushes a link; `arm`: from its robot's centre of mass to where they act."""
+    for axis in range(3):
+        a, b = (axis + 1) % 3, (axis + 2) % 3
+        pushed[link, axis] -= force[axis]
+        turned[link, axis] -= torque[axis] + arm[a] * force[b] - arm[b] * force[a]
+
+
+@compiled
+def _push_sites(sites, wrench, poses, pushed, turned):  # type: ignore[no-untyped-def]
+    """Push links with forces and torques in the frames of sites, shape ``(n, 6)``."""
+    links, place, turn = sites
+    position, quaternion, centre = poses
+    for k in range(len(links)):
+        if not wrench[k].any():
+            continue
+        link = links[k]
+        q = quaternion[link]
+        arm = position[link] + _rotated(q, place[k]) - centre[link]
+        local = np.zeros((2, 3))
+        for i in range(3):
+            for j in range(3):
+                local[0, i] += turn[k, i, j] * wrench[k, j]
+                local[1, i] += turn[k, i, j] * wrench[k, 3 + j]
+        _add_wrench(link, arm, _rotated(q, local[0]), _rotated(q, local[1]), pushed, turned)
+
+
+@compiled
+def _carry(links, lift, middle, pushed, turned):  # type: ignore[no-untyped-def]
+    """Carry the weight of links at their own centres of mass (`middle`: from their robot's)."""
+    for k in range(len(links)):
+        _add_wrench(links[k], middle[links[k]], lift[k], np.zeros(3), pushed, turned)
 
 
 class Holder(Protocol):
@@ -86,14 +137,23 @@ class BuiltScene:
         self.limit = view(solver.dyn_info.dofs.force_range)
         self.weightless = view(solver.dyn_info.entities.gravity_compensation)
         self._step = view(solver.rigid_info.substep_dt)
-        from genesis.engine.solvers.rigid.abd.forward_kinematics import kernel_forward_kinematics_links_geoms
+        from genesis.engine.solvers.rigid.abd.forward_kinematics import kernel_update_cartesian_space
 
-        self._kinematics = kernel_forward_kinematics_links_geoms
-        self._everywhere = self.built.scene._sanitize_envs_idx(None)
+        self._kinematics = kernel_update_cartesian_space
+        geoms = solver.dyn_state.geoms
+        self._geom_position, self._geom_quaternion = view(geoms.pos)[:, 0], view(geoms.quat)[:, 0]
+        self._placed = view(geoms.verts_updated)[:, 0]
+        self._failed = view(solver._errno)
         self.sparse = _SPARSE
         links = solver.dyn_state.links
         self._centre, self._middle = view(links.root_COM)[:, 0], view(links.i_pos)[:, 0]
         self._pushed, self._turned = view(links.cfrc_applied_vel)[:, 0], view(links.cfrc_applied_ang)[:, 0]
+        self._site_link = np.concatenate([np.zeros(0, np.int64), *(robot.site_link for robot in self.robots)])
+        self._site_place = np.concatenate([np.zeros((0, 3)), *(robot.site_place for robot in self.robots)])
+        self._site_turn = np.concatenate([np.zeros((0, 3, 3)), *(robot.site_turn for robot in self.robots)])
+        self._weightless = np.concatenate([np.zeros(0, np.int64), *(robot.weightless for robot in self.robots)])
+        self._lift = np.concatenate([np.zeros((0, 3)), *(robot.lift for robot in self.robots)])
+        self._nothing = np.zeros((0, 6))
         self._index_links()
         #: The state that Genesis is in when it has been built.
         self.pristine = self.save()
@@ -149,14 +209,22 @@ class BuiltScene:
         return np.flatnonzero((depth != 0.0) | direction.any(axis=1))
 
     def place_links(self) -> None:
-        """Compute poses of all links and shapes from the state as it is."""
-        solver = self.solver
-        self._kinematics(self._everywhere, solver.dyn_state, solver.dyn_info, solver.rigid_info, solver.rigid_config)
-        solver._is_forward_pos_updated = solver._is_forward_vel_updated = True
+        """Compute poses of all links and shapes that can move from the state as it is.
+
+        Those of solids stay, which are many: Genesis' own way computes them, too.
+        """
+        s = self.solver
+        self._kinematics(s.dyn_state, s.dyn_info, s.rigid_info, s.rigid_config, False, False)
+        s._is_forward_pos_updated, s._is_forward_vel_updated = True, False
 
     def place_movers(self, poses: NDArray[np.float64], entity: NDArray[np.int32]) -> None:
         """Put kinematic bodies at their poses (middle and yaw), and those that are nobody out of the way."""
-        place_bodies(poses, entity, self.built.movers, self.link_position, self.link_quaternion)
+        movers = self.built.movers
+        place_bodies(poses, entity, movers, self.link_position, self.link_quaternion)
+        # To Genesis they are fixed, and their shapes, which have the same frames, stay where they are.
+        self._geom_position[self.mover_geom] = self.link_position[movers]
+        self._geom_quaternion[self.mover_geom] = self.link_quaternion[movers]
+        self._placed[self.mover_geom] = False
 
     def poses(self, links: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the poses of links, shape ``(n, 4, 4)``."""
@@ -166,15 +234,17 @@ class BuiltScene:
         found[:, 3, 3] = 1.0
         return found
 
-    def step(self, frame: float, wrenches: list[NDArray[np.float64]]) -> str:
+    def step(self, frame: float, wrenches: list[NDArray[np.float64]], *, holding: bool = True) -> str:
         """Solve a frame; return what Genesis says if that fails, else "".
 
         Parameters
         ----------
+        holding
+            Whether things have to be held still in it.
         wrenches
             Force and torque in the frame of each robot's sites, N and Nm, shape ``(sites, 6)`` each.
         """
-        steps = STEPS[frame]
+        steps = STEPS[frame] if holding or frame == COARSE else 1
         self._step[...] = frame / steps
         # Poses computed at the end of a step and those computed from a restored state could differ in their last bits.
         self.place_links()
@@ -182,39 +252,21 @@ class BuiltScene:
             for _ in range(steps):
                 self._push(wrenches)
                 self.built.scene.step(update_visualizer=False)
-            self.solver.check_errno()
+            if self._failed.any():
+                self.solver.check_errno()
         except self._gs.GenesisException as error:
             return f" (Genesis says: {error})"
         return ""
 
     def _push(self, wrenches: list[NDArray[np.float64]]) -> None:
-        """Apply forces at sites, and carry what is weightless, in the next step."""
-        for robot, wrench in zip(self.robots, wrenches, strict=True):
-            if wrench.any():
-                body = matrix_of(self.link_quaternion[robot.site_link])
-                turn = body @ robot.site_turn
-                place = self.link_position[robot.site_link] + np.einsum("nij,nj->ni", body, robot.site_place)
-                force, torque = (np.einsum("nij,nj->ni", turn, wrench[:, part]) for part in _WRENCH)
-                self._apply(robot.site_link, place - self._centre[robot.site_link], force, torque)
-            if len(robot.weightless):
-                self._apply(robot.weightless, self._middle[robot.weightless], robot.lift, np.zeros_like(robot.lift))
+        """Apply forces at sites, and carry what is weightless, in the next step.
 
-    def _apply(
-        self,
-        links: NDArray[np.int64],
-        arm: NDArray[np.float64],
-        force: NDArray[np.float64],
-        torque: NDArray[np.float64],
-    ) -> None:
-        """Push links in the next step, as Genesis' `apply_links_external_wrench` does, which takes 0.2 ms a call.
-
-        Parameters
-        ----------
-        arm
-            From the centre of mass of all of a link's robot to where the force acts, ENU metres, shape ``(n, 3)``.
+        As Genesis' `apply_links_external_wrench` does, which takes 0.2 ms a call.
         """
-        np.subtract.at(self._pushed, links, force)
-        np.subtract.at(self._turned, links, torque + np.cross(arm, force))
+        wrench = np.concatenate([self._nothing, *wrenches])
+        poses = self.link_position, self.link_quaternion, self._centre
+        _push_sites((self._site_link, self._site_place, self._site_turn), wrench, poses, self._pushed, self._turned)
+        _carry(self._weightless, self._lift, self._middle, self._pushed, self._turned)
 
     def link_names(self, robot: int) -> tuple[str, ...]:
         """Names of a robot's links, base first."""
@@ -225,6 +277,5 @@ class BuiltScene:
         return tuple(self.robots[robot].sites)
 
 
-_WRENCH = (slice(0, 3), slice(3, 6))
 #: Kept for every pair of shapes that could ever touch: hundreds of thousands in a city, nearly all of them zero.
 _SPARSE = ("collider_state.contact_cache.normal", "collider_state.contact_cache.penetration")
