@@ -4,7 +4,8 @@
         [-- OPTIONS OF vico run]
 
 `vico run` without pictures, in pieces of equal length: each is killed (SIGKILL) when it has recorded its share, and the
-next goes on from the last checkpoint with `vico run --resume`. Of each piece, the resident set is read from the system
+next goes on from the last checkpoint with `vico run --resume`. So does this script: called again with the same `--out`
+it measures the pieces that are missing. Of each piece, the resident set is read from the system
 every few seconds, beside how far the recording has come. Growth is the median of the last tenth of a piece's readings
 less that of the second tenth (the first tenth fills caches).
 """
@@ -18,7 +19,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -157,10 +158,13 @@ def main() -> None:
     vico = [sys.executable, "-m", "vico.cli.main", "run"]
     fixed = ["--observe", "none", "--check", "overlaps", "--start", "00:00", "--steps", str(steps)]
     begin = [*vico, str(given.world), str(given.community), "--out", str(given.out), *fixed, *given_to_run]
-    pieces = []
-    for k in range(given.pieces):
+    kept = given.out.with_suffix(".pieces.json")
+    pieces = [Piece(**piece) for piece in json.loads(kept.read_text(encoding="utf-8"))] if kept.exists() else []
+    for k in range(len(pieces), given.pieces):
         until = None if k == given.pieces - 1 else round(steps * (k + 1) / given.pieces)
-        pieces.append(go_on(begin if k == 0 else [*vico, "--resume", str(given.out)], given.out, until))
+        begun = recorded_steps(given.out) > 0
+        pieces.append(go_on([*vico, "--resume", str(given.out)] if begun else begin, given.out, until))
+        kept.write_text(json.dumps([asdict(piece) for piece in pieces]), encoding="utf-8")
     run = read_run(given.out)
     lines = [
         f"# Soak: {given.hours:g} simulated hours in {given.pieces} pieces",
