@@ -36,7 +36,7 @@ def follow_city_events(state: SimulationState) -> None:
         state.traffic.set_shut(agenda.effects.lanes, walkways)
         state.traffic.drop_shut_plans()
     if state.traffic is not None:
-        state.traffic.gatherings.follow(agenda.gatherings)
+        state.traffic.gatherings.follow(agenda.gatherings(None if state.transit is None else state.transit.on_tracks))
         state.traffic.gatherings.advance(state.second)
     state.things.follow(state)
     for one, what in news:

@@ -1,4 +1,4 @@
-"""What is drawn in people's hands: what they carry, umbrellas, and what they eat and drink."""
+"""What is drawn in people's hands: what they carry, umbrellas, placards, and what they eat and drink."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.assets.models.in_hand import umbrellas
+from vico.assets.models.in_hand import placards, umbrellas
 from vico.assets.models.movable import movable_grip
 from vico.sim.animation import Hands, Hold, clip_index, hand_frames
 from vico.sim.bodies import Drawn
@@ -80,17 +80,28 @@ def hands_of_agents(state: SimulationState) -> Hands:
     return Hands(p.gesture_hand.astype(np.int64), p.hold.astype(np.int64), p.hold_share.copy(), width)
 
 
-def hands_of_pedestrians(habit: NDArray[np.float64], rain: float) -> Hands:
-    """Return what pedestrians do with their hands, by how little each minds rain, 0..1, and the rain, mm/h."""
-    n = len(habit)
+def hands_of_pedestrians(habit: NDArray[np.float64], rain: float, placard: NDArray[np.float64]) -> Hands:
+    """Return what pedestrians do with their hands.
+
+    Parameters
+    ----------
+    habit
+        How little each minds rain, 0..1, shape ``(n,)``.
+    rain
+        mm/h.
+    placard
+        How far each has a placard up, 0..1, shape ``(n,)``; who has one leaves the umbrella closed.
+    """
     share = np.clip((rain - bearable_rain(habit)) / _RAIN_MORE, 0.0, 1.0) * carries_umbrella(habit)
-    # The hand that holds no umbrella makes gestures.
-    return Hands((share <= 0.0).astype(np.int64), np.full(n, int(Hold.UMBRELLA_RIGHT)), share, np.zeros(n))
+    hold = np.where(placard > 0.0, int(Hold.PLACARD_RIGHT), int(Hold.UMBRELLA_RIGHT))
+    share = np.where(placard > 0.0, placard, share)
+    # The hand that holds nothing makes gestures.
+    return Hands((share <= 0.0).astype(np.int64), hold, share, np.zeros(len(habit)))
 
 
 def draw_in_hands(state: SimulationState, who: Holders) -> list[Drawn]:
     """Return what is drawn in everybody's hands, and the movable objects that lie about."""
-    drawn = [draw_umbrellas(who, len(state.people)), _meals(state, who), draw_phones(who)]
+    drawn = [draw_umbrellas(who, len(state.people)), draw_placards(who), _meals(state, who), draw_phones(who)]
     if len(state.objects):
         drawn.append(_objects(state, who))
     return [lot for lot in drawn if lot is not None]
@@ -122,6 +133,18 @@ def draw_umbrellas(who: Holders, agents: int) -> Drawn | None:
         _transforms(who, rows, axes, fist),
         number.astype(np.int32),
     )
+
+
+def draw_placards(who: Holders) -> Drawn | None:
+    """Return the placards that are held up, None without any; they face the way that their holders look."""
+    rows = np.flatnonzero((who.hands.hold == int(Hold.PLACARD_RIGHT)) & (who.hands.share > 0.25))
+    if not len(rows):
+        return None
+    fist = who.palms(rows)[:, 1]
+    size = np.clip(who.height[rows] / _MADE_FOR, 0.65, 1.1) * np.clip((who.hands.share[rows] - 0.25) / 0.75, 0.05, 1.0)
+    axes = np.eye(3) * size[:, None, None]
+    names, entity = placards(), np.asarray(who.entity[rows], np.int32)
+    return Drawn(names, (rows * 5 // 2 % len(names)).astype(np.int32), _transforms(who, rows, axes, fist), entity)
 
 
 def _meals(state: SimulationState, who: Holders) -> Drawn | None:

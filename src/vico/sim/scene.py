@@ -333,7 +333,8 @@ class SceneRenderer:
         on_ground = gait.afoot
         still, outdoors = np.zeros(len(clip)), np.full(len(clip), -1, np.int32)
         after = after._replace(moved=np.zeros((len(clip), 4)), over_ground=pace)
-        hands = hands_of_pedestrians(self._people.habit, state.environment.weather.rain)
+        placard = state.traffic.gatherings.placards(walkers.position)
+        hands = hands_of_pedestrians(self._people.habit, state.environment.weather.rain, placard)
         hands.share[~on_ground] = 0.0
         return _Motion(
             clip, phase, pace, after, walkers.position, walkers.yaw, on_ground, outdoors, still, still, hands

@@ -369,7 +369,8 @@ class SimulationState:
             effects = self.environment.agenda.effects
             shut = effects.walkways if self.transit is None else self.transit.shut_walkways(effects.walkways)
             self.traffic.set_shut(effects.lanes, shut)
-            self.traffic.gatherings.follow(self.environment.agenda.gatherings)
+            off = None if self.transit is None else self.transit.on_tracks
+            self.traffic.gatherings.follow(self.environment.agenda.gatherings(off))
         self.show_signals()
 
     def show_signals(self) -> None:

@@ -4,12 +4,17 @@ import numpy as np
 import shapely
 
 from helsinki_traffic import traffic_by
+from vico.sim.animation import Hold
 from vico.sim.bodies import Bodies
-from vico.sim.environment.event_crowds import MARCH_SPEED, Gathering, before_stage
+from vico.sim.environment.agenda import Agenda
+from vico.sim.environment.event_crowds import MARCH_SPEED, Gathering, before_stage, gathering_of
+from vico.sim.environment.event_sites import EventSites
 from vico.sim.environment.event_spots import Spot
+from vico.sim.hands_scene import hands_of_pedestrians
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import JunctionRule, Traffic
 from vico.sim.traffic.state import CROWD
+from vico.world.folder import World
 from vico.world.walkways import SIDEWALK
 
 NOWHERE = Bodies.none()
@@ -80,3 +85,31 @@ def test_a_march_goes_slowly_along_its_street_and_back() -> None:
     # Three rows of two.
     row = [one.place(k, 10.0)[:2] for k in range(6)]
     assert np.isclose(np.hypot(*(row[0] - row[1])), 0.95)
+
+
+def test_one_of_three_who_march_brings_a_placard() -> None:
+    traffic = traffic_by(JunctionRule.ONE, 0, 30)
+    walkers = traffic.pedestrian_state
+    one = _gathering(traffic, "march", 6)
+    traffic.gatherings.now = (one,)
+    walkers.event[:9] = one.id
+    walkers.stand_kind[:3] = CROWD
+    near, far = (np.tile(one.entry, (30, 1)) + np.array([away, 0.0]) for away in (10.0, 40.0))
+    assert np.flatnonzero(traffic.gatherings.placards(near)).tolist() == [0, 3, 6]
+    assert traffic.gatherings.placards(far).tolist() == [1.0] + [0.0] * 29
+    hands = hands_of_pedestrians(np.zeros(30), 20.0, traffic.gatherings.placards(near))
+    assert (hands.hold[[0, 3, 6]] == Hold.PLACARD_RIGHT).all()
+    assert hands.hold[1] == Hold.UMBRELLA_RIGHT
+
+
+def test_nobody_comes_along_a_walkway_that_nobody_walks_on(helsinki: World) -> None:
+    sites = EventSites(helsinki)
+    (occurrence,) = Agenda(
+        sites, {"events": [{"kind": "demonstration", "street": "Mikonkatu", "begin": "00:00"}]}
+    ).going_on
+    first = gathering_of(occurrence, sites)
+    assert first is not None
+    off = np.zeros(len(sites.walks), np.bool_)
+    off[first.walkway] = True
+    other = gathering_of(occurrence, sites, off)
+    assert other is None or other.walkway != first.walkway

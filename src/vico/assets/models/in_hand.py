@@ -1,4 +1,4 @@
-"""What people have in their hands while they eat, drink or keep dry: data in ``data/models/in_hand/*.toml``.
+"""What people have in their hands while they eat, drink, march or keep dry: data in ``data/models/in_hand/*.toml``.
 
 The origin of such a model is where the fist holds it, and not the middle of its foot.
 """
@@ -16,6 +16,12 @@ ROOM = "models/in_hand"
 def in_hand_models() -> dict[str, Model]:
     """Return the models by name: ours and the user's, which may replace ours."""
     return read_all(data_files(ROOM))
+
+
+@cached_data
+def placards() -> list[str]:
+    """Return the names of the placards there are."""
+    return [name for name, model in in_hand_models().items() if model.kind == "placard"]
 
 
 @cached_data

@@ -1,4 +1,4 @@
-"""Arms that hold something beside whatever the rest of the body does: an umbrella, a box before the chest. Compiled."""
+"""Arms that hold something beside what the rest of the body does: umbrella, placard, box before the chest. Compiled."""
 
 from __future__ import annotations
 
@@ -19,9 +19,11 @@ class Hold(IntEnum):
     UMBRELLA_LEFT = 1
     UMBRELLA_RIGHT = 2
     BEFORE_CHEST = 3
+    PLACARD_RIGHT = 4
 
 
 _UMBRELLA_LEFT, _UMBRELLA_RIGHT = int(Hold.UMBRELLA_LEFT), int(Hold.UMBRELLA_RIGHT)
+_PLACARD_RIGHT = int(Hold.PLACARD_RIGHT)
 
 
 @compiled
@@ -33,7 +35,7 @@ def hold_up(body: Any, hold: int, share: float, width: float) -> None:
     part = smoothstep(share)
     if hold == _UMBRELLA_LEFT:
         _hold_umbrella(body, LEFT, part)
-    elif hold == _UMBRELLA_RIGHT:
+    elif hold in (_UMBRELLA_RIGHT, _PLACARD_RIGHT):
         _hold_umbrella(body, RIGHT, part)
     else:
         _hold_before_chest(body, part, width)

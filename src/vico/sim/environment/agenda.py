@@ -191,13 +191,18 @@ class Agenda:
         """What the events that go on do."""
         return self._effects
 
-    @property
-    def gatherings(self) -> tuple[Gathering, ...]:
-        """Crowds of the events that go on, by id; the same tuple as long as they are the same."""
+    def gatherings(self, off: NDArray[np.bool_] | None) -> tuple[Gathering, ...]:
+        """Return the crowds of the events that go on, by id; the same tuple as long as they are the same.
+
+        Parameters
+        ----------
+        off
+            Walkways of the world that nobody ever walks on; None for none. The same at every call.
+        """
         if self._gatherings is None:
             for one in self._going_on:
                 if one.id not in self._crowds:
-                    self._crowds[one.id] = gathering_of(one, self.sites)
+                    self._crowds[one.id] = gathering_of(one, self.sites, off)
             found = (self._crowds[one.id] for one in self._going_on)
             self._gatherings = tuple(one for one in found if one is not None)
         return self._gatherings

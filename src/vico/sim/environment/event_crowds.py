@@ -88,8 +88,11 @@ class Gathering:
         return np.array([x - np.sin(yaw) * aside, y + np.cos(yaw) * aside, facing])
 
 
-def gathering_of(one: Occurrence, sites: EventSites) -> Gathering | None:
-    """Return the crowd of an event; None if none comes, or there is no sidewalk from where one gets there."""
+def gathering_of(one: Occurrence, sites: EventSites, off: NDArray[np.bool_] | None = None) -> Gathering | None:
+    """Return the crowd of an event; None if none comes, or there is no sidewalk from where one gets there.
+
+    Nobody comes along the walkways of the mask `off`.
+    """
     manner = one.kind.crowd_manner
     if not one.kind.crowd or not len(sites.walks):
         return None
@@ -107,7 +110,8 @@ def gathering_of(one: Occurrence, sites: EventSites) -> Gathering | None:
         towards = places[:, :2]
     if not len(towards):
         return None
-    entry = _entry(towards, sites, across_streets=manner == "march")
+    walked = sites.walks.kind == SIDEWALK if off is None else (sites.walks.kind == SIDEWALK) & ~off
+    entry = _entry(towards, sites, np.flatnonzero(walked), across_streets=manner == "march")
     if entry is None:
         return None
     walkway, offset, point, seen = entry
@@ -151,7 +155,7 @@ def _free(places: Floats, sites: EventSites) -> Floats:
 
 
 def _entry(
-    towards: Floats, sites: EventSites, *, across_streets: bool
+    towards: Floats, sites: EventSites, sidewalks: NDArray[np.int64], *, across_streets: bool
 ) -> tuple[int, float, Point2, NDArray[np.bool_]] | None:
     """Return the point of a sidewalk from which most of some points are reached straight on; of equals the nearest.
 
@@ -163,7 +167,7 @@ def _entry(
     walks, middle = sites.walks, towards.mean(axis=0)
     best: tuple[int, float] | None = None
     found: tuple[int, float, Point2, NDArray[np.bool_]] | None = None
-    for walkway in np.flatnonzero(walks.kind == SIDEWALK).tolist():
+    for walkway in sidewalks.tolist():
         line = shapely.LineString(walks.line(walkway))
         if line.distance(shapely.Point(middle)) > _ENTRY_WITHIN:
             continue

@@ -18,6 +18,8 @@ from vico.world.walkways import SIDEWALK, Walkways
 _MOST = 0.4  # share of all pedestrians that go to one event
 _COMES_FROM = 350.0  # m from where they come at the most
 _ARRIVED = 6.0  # m from where they leave the sidewalk
+_PLACARDS = 3  # of so many who march one has a placard
+_RAISED_FROM, _RAISING = 18.0, 4.0  # m from where a march is joined at which they go up, and in which
 _STROLL = (20, 61)  # s before a stall
 
 
@@ -97,6 +99,31 @@ class Gatherings:
                     self._place(i, one, second)
                 elif walkers.goal[i] == NONE and not waits:
                     self._come(i, one, k)
+
+    def placards(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return how far each of those who march has a placard up: one of three, from a little before they join in.
+
+        Parameters
+        ----------
+        position
+            Of pedestrians, and of others after them who hold none, metres, shape ``(n, 2)`` or ``(n, 3)``.
+
+        Returns
+        -------
+        ndarray
+            0..1, shape ``(n,)``.
+        """
+        up, walkers = np.zeros(len(position)), self._walkers
+        for one in self.now:
+            members = (
+                np.flatnonzero((walkers.event == one.id) & (walkers.aboard == NONE)) if one.manner == "march" else ()
+            )
+            for i in members:
+                if i % _PLACARDS == 0:
+                    away = float(np.hypot(*(position[i, :2] - one.entry)))
+                    joined = walkers.stand_kind[i] == CROWD
+                    up[i] = 1.0 if joined else min(max((_RAISED_FROM - away) / _RAISING, 0.0), 1.0)
+        return up
 
     def _call(self, one: Gathering, k: int, count: int) -> None:
         """Have the nearest of those who walk alone come to an event."""

@@ -118,7 +118,8 @@ class TransitSystem:
 
         #: Pedestrians who ride; None where nobody said where they can get off.
         self.passengers: Passengers | None = None
-        self._on_tracks = self.trams.walkways_on_tracks()
+        #: Walkways that lie on tracks, where nobody is to walk.
+        self.on_tracks = self.trams.walkways_on_tracks()
         self._shut: tuple[NDArray[np.bool_] | None, NDArray[np.bool_] | None] = None, None
 
     def take_passengers(self, walkable: WalkableMap, seed: int) -> None:
@@ -127,10 +128,10 @@ class TransitSystem:
 
     def shut_walkways(self, shut: NDArray[np.bool_] | None) -> NDArray[np.bool_] | None:
         """Return a mask of walkways nobody is to walk on with those added that lie on tracks; the same for the same."""
-        if not self._on_tracks.any():
+        if not self.on_tracks.any():
             return shut
         if self._shut[1] is None or shut is not self._shut[0]:
-            self._shut = shut, self._on_tracks if shut is None else shut | self._on_tracks
+            self._shut = shut, self.on_tracks if shut is None else shut | self.on_tracks
         return self._shut[1]
 
     # -- the subsystem contract --------------------------------------------------------------------------------------
