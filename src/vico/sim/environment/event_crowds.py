@@ -7,13 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components
 
 from vico.sim.environment.event_sites import EventSites
 from vico.sim.environment.event_spots import Spot, spots_of
 from vico.sim.environment.occurrence import Occurrence
 from vico.world.model import Point2
 from vico.world.walkable import CROSSING, ROADWAY
-from vico.world.walkways import SIDEWALK
+from vico.world.walkways import SIDEWALK, Walkways
 
 Floats = NDArray[np.float64]
 
@@ -26,6 +28,7 @@ _ENTRY_WITHIN, _ENTRY_EVERY = (
     70.0,
     3.0,
 )  # m from the middle to where people come from, and between points tried
+_NO_PLACES: Floats = np.zeros((0, 3))
 _ALONG = 0.5  # m between points of a way that are looked at
 
 
@@ -96,28 +99,42 @@ def gathering_of(one: Occurrence, sites: EventSites, off: NDArray[np.bool_] | No
     manner = one.kind.crowd_manner
     if not one.kind.crowd or not len(sites.walks):
         return None
-    places, route, abreast = np.zeros((0, 3)), np.zeros((0, 2)), 1
     if manner == "march":
         lines = shapely.get_parts(shapely.line_merge(sites.street(one.event)))
         longest = max(lines, key=lambda line: float(line.length))
-        route = shapely.get_coordinates(longest)
-        abreast = 4
-        towards = route[:1]
-    else:
-        spots = spots_of(one, sites)
-        places = before_stage(spots) if manner == "watch" else _before_stalls(spots)
-        places = _free(places, sites)
-        towards = places[:, :2]
-    if not len(towards):
-        return None
-    walked = sites.walks.kind == SIDEWALK if off is None else (sites.walks.kind == SIDEWALK) & ~off
-    entry = _entry(towards, sites, np.flatnonzero(walked), across_streets=manner == "march")
+        return _march(one, sites, shapely.get_coordinates(longest), _frequented(sites.walks, off))
+    spots = spots_of(one, sites)
+    places = _free(before_stage(spots) if manner == "watch" else _before_stalls(spots), sites)
+    entry = _entry(places[:, :2], sites, _frequented(sites.walks, off)) if len(places) else None
     if entry is None:
         return None
     walkway, offset, point, seen = entry
-    places = places[seen] if manner != "march" else places
-    count = min(one.kind.crowd, len(places)) if manner != "march" else one.kind.crowd
-    return Gathering(one.id, manner, count, one.event.begin, walkway, offset, point, places, route, abreast)
+    places, route = places[seen], np.zeros((0, 2))
+    count = min(one.kind.crowd, len(places))
+    return Gathering(one.id, manner, count, one.event.begin, walkway, offset, point, places, route)
+
+
+def _march(one: Occurrence, sites: EventSites, route: Floats, sidewalks: NDArray[np.int64]) -> Gathering | None:
+    """Return a march along a way: from the end to which people come the nearest; None if they come to neither."""
+    found: list[tuple[float, Gathering]] = []
+    for way in (route, route[::-1].copy()):
+        entry = _entry(way[:1], sites, sidewalks, across_streets=True)
+        if entry is not None:
+            walkway, offset, point, _ = entry
+            away = float(np.hypot(*(way[0] - np.asarray(point))))
+            begin, count = one.event.begin, one.kind.crowd
+            found.append((away, Gathering(one.id, "march", count, begin, walkway, offset, point, _NO_PLACES, way, 4)))
+    return min(found, key=lambda each: each[0])[1] if found else None
+
+
+def _frequented(walks: Walkways, off: NDArray[np.bool_] | None) -> NDArray[np.int64]:
+    """Return the sidewalks of the largest part of the network that hangs together: from there most people come."""
+    is_open = np.ones(len(walks), np.bool_) if off is None else ~off
+    nodes, ends = len(walks.meeting_first) - 1, walks.ends
+    graph = csr_matrix((is_open[is_open], (ends[is_open, 0], ends[is_open, 1])), shape=(nodes, nodes))
+    part = connected_components(graph, directed=False)[1][ends[:, 0]]
+    length = np.bincount(part[is_open], weights=walks.length[is_open])
+    return np.flatnonzero(is_open & (part == int(np.argmax(length))) & (walks.kind == SIDEWALK))
 
 
 def before_stage(spots: list[Spot]) -> Floats:
@@ -155,7 +172,7 @@ def _free(places: Floats, sites: EventSites) -> Floats:
 
 
 def _entry(
-    towards: Floats, sites: EventSites, sidewalks: NDArray[np.int64], *, across_streets: bool
+    towards: Floats, sites: EventSites, sidewalks: NDArray[np.int64], *, across_streets: bool = False
 ) -> tuple[int, float, Point2, NDArray[np.bool_]] | None:
     """Return the point of a sidewalk from which most of some points are reached straight on; of equals the nearest.
 
