@@ -64,7 +64,7 @@ def test_spots_leave_room_for_who_walks_past() -> None:
     across = spots[pairs["partner"]]
     assert np.allclose(np.hypot(across["x"] - pairs["x"], across["y"] - pairs["y"]), 0.72, atol=0.05)
     for spot in spots:
-        line, room = walks.line(spot["walkway"]), walks.room[spot["walkway"]]
+        line, room = walks.line(spot["walkway"]), walks.room_at(int(spot["walkway"]), float(spot["offset"]))
         nearest = np.hypot(line[:, 0] - spot["x"], line[:, 1] - spot["y"]).min()
         # Whoever stands in the middle of a narrow way leaves no room on either side.
         assert nearest > 0.05 or room.sum() > 1.0

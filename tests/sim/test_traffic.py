@@ -118,7 +118,11 @@ def test_everybody_gets_on_for_an_hour(seed: int) -> None:
 def test_two_people_who_meet_between_walls_do_not_stand_there() -> None:
     traffic = _traffic(0, 2)
     narrow = (traffic.walks.kind == SIDEWALK) & (traffic.walks.length > 30.0)
-    stretch = int(np.argmin(np.where(narrow, traffic.walks.room.sum(axis=1), np.inf)))
+    stretch = int(
+        np.argmin(
+            np.where(narrow, np.minimum.reduceat(traffic.walks.room.sum(axis=1), traffic.walks.first[:-1]), np.inf)
+        )
+    )
     for i, (share, way) in enumerate([(0.4, 1), (0.6, -1)]):
         offset = share * traffic.walks.length[stretch]
         assert place_pedestrian(traffic.paths, traffic._walkers, i, stretch, offset, way, traffic.shapes, i)

@@ -11,15 +11,14 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from vico.geo import overlay
+from vico.world.walk_clearance import BODY, Course, courses_past
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 SIDEWALK, CROSSING, CORNER = 0, 1, 2
 SHORTEST = 6.0  # metres of sidewalk left between two obstacles that are worth keeping
-_BODY = 0.3  # a walker's radius and a little air, metres
 _STEP_OFF = 1.2  # how far who is stuck steps off the kerb, metres
-_NEAR = 4.0  # buildings farther away leave all the room there is, metres
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +38,10 @@ class Walkways:
     length, width
         Metres, shape ``(n,)``.
     room
-        How far a walker's centre may be to the left and to the right of the centre line, metres, shape ``(n, 2)``.
+        How far a walker's centre may be to the left and to the right of the centre line from each point to the next,
+        metres, shape ``(p, 2)``.
     reach
-        The same for who has to get past somebody and steps off the kerb: as far as buildings allow, shape ``(n, 2)``.
+        The same for who has to get past somebody and steps off the kerb: as far as buildings allow, shape ``(p, 2)``.
     junction
         Junction a crossing or corner belongs to, -1 for sidewalks.
     ends
@@ -72,8 +72,14 @@ class Walkways:
         """Centre line of a stretch, metres, shape ``(k, 2)``."""
         return self.points[self.first[stretch] : self.first[stretch + 1]]
 
+    def room_at(self, stretch: int, offset: float) -> Floats:
+        """How far a walker may be to the left and to the right so many metres along a stretch, shape ``(2,)``."""
+        begin, end = int(self.first[stretch]), int(self.first[stretch + 1])
+        segment = int(np.searchsorted(self.along[begin:end], offset, side="right")) - 1
+        return self.room[begin + min(max(segment, 0), end - begin - 2)]
+
     def clear_of(self, solids: list[shapely.Polygon]) -> Walkways:
-        """Without the stretches that would lead through `solids` (buildings), and with less room where one is near.
+        """Led past `solids` (buildings, things), in pieces where no way leads past, and with less room beside them.
 
         Parameters
         ----------
@@ -82,66 +88,45 @@ class Walkways:
         """
         if not solids or not len(self):
             return self
-        tree = shapely.STRtree(solids)
-        lines = shapely.linestrings(self.points, indices=np.repeat(np.arange(len(self)), np.diff(self.first)))
-        which, solid = tree.query(lines, predicate="dwithin", distance=_NEAR)
-        sides = _distances(lines[which], tree.geometries[solid])
-        away = np.full((len(self), 2), np.inf)
-        np.minimum.at(away, which, sides)
-        nearest = away.min(axis=1)
-        rows: list[_Row] = []
+        rows = self._rows()
+        widest = np.array([row.room.max() for row in rows]), np.array([row.reach.max() for row in rows])
+        courses = courses_past([row.line for row in rows], *widest, solids)
+        kept: list[_Row] = []
         spare = int(self.ends.max()) + 1  # where a sidewalk is cut short, its end meets nothing
-        for i in range(len(self)):
-            row = _Row(
-                self.ids[i],
-                int(self.kind[i]),
-                self.line(i),
-                self.z[self.first[i] : self.first[i + 1]],
-                float(self.width[i]),
-                np.minimum(self.room[i], away[i] - _BODY),
-                np.minimum(self.reach[i], away[i] - _BODY),
-                int(self.junction[i]),
-                (int(self.ends[i, 0]), int(self.ends[i, 1])),
-            )
-            if nearest[i] >= _BODY + 0.05:
-                rows.append(row)
-            elif row.kind == SIDEWALK:
-                near = overlay.union_all(overlay.buffer(tree.geometries[solid[which == i]], _BODY + 0.06), grid=None)
-                for part in shapely.get_parts(overlay.difference(lines[i], near, grid=None)):
-                    if part.length < SHORTEST:
-                        continue
-                    line = np.asarray(part.coords)
-                    ends = (
-                        row.ends[0] if np.allclose(line[0], row.line[0]) else spare,
-                        row.ends[1] if np.allclose(line[-1], row.line[-1]) else spare + 1,
-                    )
-                    spare += 2
-                    kept = tree.geometries[solid[which == i]]
-                    beside = _distances(np.full(len(kept), part), kept).min(axis=0) - _BODY
-                    room = np.clip(beside, 0.05, self.room[i])
-                    z = _heights_along(row, lines[i], line)
-                    reach = np.clip(beside, 0.05, self.reach[i])
-                    rows.append(replace(row, line=line, z=z, room=room, reach=reach, ends=ends))
-        return _packed(rows)
+        for i, row in enumerate(rows):
+            if i not in courses:
+                kept.append(row)
+                continue
+            for course in courses[i]:
+                if not course.is_whole and row.kind != SIDEWALK:
+                    continue
+                piece = _piece(row, course, spare)
+                spare += 2
+                if course.is_whole or _along(piece.line)[-1] >= SHORTEST:
+                    kept.append(piece)
+        return _packed(kept)
 
     def without(self, dropped: NDArray[np.bool_]) -> Walkways:
         """Return a copy without some stretches."""
-        return _packed(
-            [
-                _Row(
-                    self.ids[i],
-                    int(self.kind[i]),
-                    self.line(i),
-                    self.z[self.first[i] : self.first[i + 1]],
-                    float(self.width[i]),
-                    self.room[i],
-                    self.reach[i],
-                    int(self.junction[i]),
-                    (int(self.ends[i, 0]), int(self.ends[i, 1])),
-                )
-                for i in np.flatnonzero(~dropped).tolist()
-            ]
-        )
+        return _packed([row for row, gone in zip(self._rows(), dropped.tolist(), strict=True) if not gone])
+
+    def _rows(self) -> list[_Row]:
+        """Return the stretches one by one."""
+        parts = [slice(a, b) for a, b in zip(self.first[:-1].tolist(), self.first[1:].tolist(), strict=True)]
+        return [
+            _Row(
+                self.ids[i],
+                int(self.kind[i]),
+                self.points[part],
+                self.z[part],
+                float(self.width[i]),
+                self.room[part],
+                self.reach[part],
+                int(self.junction[i]),
+                (int(self.ends[i, 0]), int(self.ends[i, 1])),
+            )
+            for i, part in enumerate(parts)
+        ]
 
 
 @dataclass(frozen=True)
@@ -174,8 +159,9 @@ def walkways_of(
     """
     number = {way[0]: i for i, way in enumerate(ways)}
 
-    def room(width: float) -> Floats:
-        return np.full(2, max(width / 2 - _BODY, 0.05))
+    def sides(line: Floats, width: float) -> tuple[Floats, Floats]:
+        room = np.full((len(line), 2), max(width / 2 - BODY, 0.05))
+        return room, room + _STEP_OFF
 
     # Every lane end is a meeting point of its own; a corner's stretches join them in pairs.
     rows = [
@@ -185,8 +171,7 @@ def walkways_of(
             line,
             z,
             width,
-            room(width),
-            room(width) + _STEP_OFF,
+            *sides(line, width),
             junction,
             (2 * i, 2 * i + 1),
         )
@@ -206,24 +191,8 @@ def walkways_of(
                 ends = (2 * i + side_a, 2 * j + side_b)
                 path = _path_within(area, start, end)
                 z = np.interp(_along(path), [0.0, _along(path)[-1]], [ways[i][3][-side_a], ways[j][3][-side_b]])
-                rows.append(_Row("", CORNER, path, z, width, room(width), room(width) + _STEP_OFF, place, ends))
+                rows.append(_Row("", CORNER, path, z, width, *sides(path, width), place, ends))
     return _packed(rows)
-
-
-def _distances(lines: NDArray[np.object_], solids: NDArray[np.object_]) -> Floats:
-    """Metres from each line to its solid on the left and on the right, shape ``(n, 2)``; inf where it is not there."""
-    out = np.full((len(lines), 2), np.inf)
-    for k, side in enumerate((_NEAR, -_NEAR)):
-        strips = overlay.buffer(lines, side, cap_style="flat", join_style="mitre", single_sided=True)
-        parts = overlay.crossing(overlay.mended(strips), solids, grid=None)
-        there = ~shapely.is_empty(parts)
-        out[there, k] = shapely.distance(lines[there], parts[there])
-    # Round the ends a solid is beside neither way of going on.
-    beyond = np.minimum(shapely.distance(shapely.get_point(lines, 0), solids), np.inf)
-    beyond = np.minimum(beyond, shapely.distance(shapely.get_point(lines, -1), solids))
-    neither = np.isinf(out).all(axis=1) | np.isnan(out).any(axis=1)
-    out[neither] = beyond[neither, None]
-    return out
 
 
 def _along(line: Floats) -> Floats:
@@ -231,9 +200,15 @@ def _along(line: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
 
 
-def _heights_along(row: _Row, whole: shapely.LineString, part: Floats) -> Floats:
-    """Heights of the points of a part of a stretch."""
-    return np.interp(shapely.line_locate_point(whole, shapely.points(part)), _along(row.line), row.z)
+def _piece(row: _Row, course: Course, spare: int) -> _Row:
+    """Return the part of a stretch that a course is; its new ends are `spare` and the next."""
+    along = _along(row.line)
+    z = np.interp(course.offsets, along, row.z)
+    ends = (
+        row.ends[0] if course.offsets[0] == 0.0 else spare,
+        row.ends[1] if course.offsets[-1] == along[-1] else spare + 1,
+    )
+    return replace(row, line=course.points, z=z, room=course.room, reach=course.reach, ends=ends)
 
 
 def _packed(rows: list[_Row]) -> Walkways:
@@ -258,8 +233,8 @@ def _packed(rows: list[_Row]) -> Walkways:
         z=np.concatenate([row.z for row in rows]) if n else np.zeros(0),
         length=np.array([s[-1] for s in steps]),
         width=np.array([row.width for row in rows]),
-        room=np.array([row.room for row in rows]).reshape(-1, 2),
-        reach=np.array([row.reach for row in rows]).reshape(-1, 2),
+        room=np.concatenate([np.zeros((0, 2)), *(row.room for row in rows)]),
+        reach=np.concatenate([np.zeros((0, 2)), *(row.reach for row in rows)]),
         junction=np.array([row.junction for row in rows], np.int32),
         ends=ends,
         meeting_first=meeting_first,
@@ -273,7 +248,7 @@ def _path_within(area: shapely.Geometry, start: Floats, end: Floats) -> Floats:
     grown = overlay.buffer(area, 0.15)
     if area.is_empty or grown.covers(shapely.LineString(straight)):
         return straight
-    inner = overlay.buffer(area, -_BODY)
+    inner = overlay.buffer(area, -BODY)
     rings = [np.asarray(p.exterior.coords)[:-1] for p in shapely.get_parts(inner) if isinstance(p, shapely.Polygon)]
     if not rings or not any(len(ring) for ring in rings):
         return straight

@@ -124,7 +124,7 @@ def _somebody_comes(shapes, b, near, group, hx, hy):  # type: ignore[no-untyped-
 
 
 @compiled
-def keep_up(paths, walker, leader, shapes, bodies, near, heading, dt):  # type: ignore[no-untyped-def]
+def keep_up(walker, leader, shapes, bodies, near, heading, half, dt):  # type: ignore[no-untyped-def]
     """Have a companion walk beside who leads it, or behind; return the share of its pace at which it stays with it.
 
     Parameters
@@ -133,14 +133,14 @@ def keep_up(paths, walker, leader, shapes, bodies, near, heading, dt):  # type: 
         Of the walker, and of who leads it.
     heading
         Unit vector along the walkway, the way they go.
+    half
+        Half the room there is across the walkway, metres.
     """
     b, first = bodies
     hx, hy = heading
     if _somebody_comes(shapes, b, near, (first, first + walker.group_size), hx, hy):
         walker.in_file = _LET_PASS
     walker.in_file = max(walker.in_file - dt, 0.0)
-    way = paths.walkways[walker.walkway]
-    half = max((way.room_left + way.room_right) / 2, 0.05)
     beside = leader.lateral_share - walker.group_place * _BESIDE / half
     is_beside = walker.in_file == 0.0 and beside >= -_LEFT_OF_MIDDLE
     change = (beside if is_beside else leader.lateral_share) - walker.lateral_share

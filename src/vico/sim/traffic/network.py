@@ -151,10 +151,6 @@ def walkway_network(walks: Walkways) -> WalkwayNetwork:
     records = np.zeros(len(walks), WALKWAY)
     for name, values in {
         "length": walks.length,
-        "room_left": walks.room[:, 0],
-        "room_right": walks.room[:, 1],
-        "reach_left": walks.reach[:, 0],
-        "reach_right": walks.reach[:, 1],
         "kind": walks.kind,
         "start": walks.ends[:, 0],
         "end": walks.ends[:, 1],
@@ -166,6 +162,7 @@ def walkway_network(walks: Walkways) -> WalkwayNetwork:
         first=walks.first,
         points=walks.points,
         along=walks.along,
+        room=np.ascontiguousarray(np.concatenate([walks.room, walks.reach], axis=1)),
         meeting_first=walks.meeting_first,
         meeting=walks.meeting,
         goal_walkway=np.zeros(0, np.int32),

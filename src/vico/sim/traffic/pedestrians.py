@@ -6,8 +6,6 @@ that point it takes the one that leads furthest, and makes no step that would to
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from vico.io.compiled import compiled
@@ -20,12 +18,12 @@ from vico.sim.traffic.companions import (
     waits_for_companions,
     walkway_to_leader,
 )
+from vico.sim.traffic.follow_point import FollowPoint, follow_point, room_at
 from vico.sim.traffic.path import project_on_polyline
 from vico.sim.traffic.random_stream import next_random
 from vico.sim.traffic.shapes import disc_touches, distance_to, is_disc, share_level
 from vico.sim.traffic.standing import note_standing, stop_at_spot, turn_towards
 from vico.sim.traffic.state import AMBER, CROWD, GAIT_TIME, NONE
-from vico.world.lanes import lane_pose
 from vico.world.walkways import CORNER as _CORNER_KIND
 from vico.world.walkways import CROSSING as _CROSSING_KIND
 
@@ -56,29 +54,6 @@ _WAITS_BELOW = 0.3  # who walks at less than this share of its pace waits for so
 _SLOWS_WITHIN = 1.2  # m from its place
 _STANDS_WITHIN = 0.2  # m from where it is to stand
 _CORNER, _CROSSING = int(_CORNER_KIND), int(_CROSSING_KIND)
-
-
-class FollowPoint(NamedTuple):
-    """The point a pedestrian follows, that beside it on the walkway's centre line, and the unit vector to the left."""
-
-    x: float
-    y: float
-    centre_x: float
-    centre_y: float
-    left_x: float
-    left_y: float
-
-
-@compiled
-def follow_point(paths, walker):  # type: ignore[no-untyped-def]
-    """Return the point a pedestrian follows."""
-    walkway = walker.walkway
-    offset = min(max(walker.offset, 0.0), paths.walkways[walkway].length)
-    x, y, yaw = lane_pose(paths.first, paths.points, paths.along, walkway, offset)
-    nx, ny = -np.sin(yaw), np.cos(yaw)
-    left, right = paths.walkways[walkway].room_left, paths.walkways[walkway].room_right
-    aside = (left - right) / 2 - walker.direction * walker.lateral_share * (left + right) / 2
-    return FollowPoint(x + nx * aside, y + ny * aside, x, y, nx, ny)
 
 
 @compiled
@@ -282,7 +257,7 @@ def _free_distance(x, y, c, s, shapes, near, gap):  # type: ignore[no-untyped-de
 
 
 @compiled
-def best_heading(x, y, point, walkway, shapes, near, is_jammed):  # type: ignore[no-untyped-def]
+def best_heading(x, y, point, shapes, near, is_jammed):  # type: ignore[no-untyped-def]
     """Return the heading (rad) that leads furthest towards the followed point, and the metres free along it.
 
     Headings that lead off the walkway count only on the way back onto it; who is jammed may step off the kerb.
@@ -290,8 +265,8 @@ def best_heading(x, y, point, walkway, shapes, near, is_jammed):  # type: ignore
     gap = _GAP_WHEN_JAMMED if is_jammed else _GAP
     straight = np.arctan2(point.y - y, point.x - x)
     aside = (x - point.centre_x) * point.left_x + (y - point.centre_y) * point.left_y
-    left = walkway.reach_left if is_jammed else walkway.room_left
-    right = walkway.reach_right if is_jammed else walkway.room_right
+    left = point.room[2] if is_jammed else point.room[0]
+    right = point.room[3] if is_jammed else point.room[1]
     best, best_score, best_free = 0.0, -1.0, 0.0
     ease = 1.2 if is_jammed else 0.35
     for k in range(len(_ANGLES) if is_jammed else _FORWARD):
@@ -322,7 +297,7 @@ def may_step_to(tx, ty, x, y, shapes, near):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _walk(paths, walker, point, shapes, b, near, is_waiting, time):  # type: ignore[no-untyped-def]
+def _walk(walker, point, shapes, b, near, is_waiting, time):  # type: ignore[no-untyped-def]
     """Take a pedestrian, body b, a step towards a point; return the metres walked.
 
     `time` is the share of its pace at which it walks, and the seconds that pass.
@@ -334,7 +309,7 @@ def _walk(paths, walker, point, shapes, b, near, is_waiting, time):  # type: ign
     if (is_waiting and away < 0.2) or away <= 1e-6:
         return 0.0
     is_jammed = walker.jammed_time > _JAMMED_AFTER
-    heading, free = best_heading(x, y, point, paths.walkways[walker.walkway], shapes, near, is_jammed)
+    heading, free = best_heading(x, y, point, shapes, near, is_jammed)
     speed = walker.preferred_speed * pace * min(1.0, free / 0.6)
     step = min(speed * dt, away if is_waiting else speed * dt)
     tx, ty = x + np.cos(heading) * step, y + np.sin(heading) * step
@@ -394,7 +369,8 @@ def _group_pace(paths, pedestrians, i, shapes, near, first, dt):  # type: ignore
         _turn_round(paths, walker, shapes.x[b], shapes.y[b])
     point = follow_point(paths, walker)
     heading = point.left_y * walker.direction, -point.left_x * walker.direction
-    return keep_up(paths, walker, leader, shapes, (b, first + walker.leader), near, heading, dt)
+    half = max((point.room[0] + point.room[1]) / 2, 0.05)
+    return keep_up(walker, leader, shapes, (b, first + walker.leader), near, heading, half, dt)
 
 
 @compiled
@@ -403,7 +379,8 @@ def _is_off_crossing(paths, crossing, x, y):  # type: ignore[no-untyped-def]
     along, aside = _project_on_walkway(paths, crossing, x, y)
     way = paths.walkways[crossing]
     is_at_end = min(along, way.length - along) < _AT_END
-    return is_at_end or not -way.reach_right - RADIUS < aside < way.reach_left + RADIUS
+    room = room_at(paths, crossing, along)
+    return is_at_end or not -room[3] - RADIUS < aside < room[2] + RADIUS
 
 
 @compiled
@@ -432,7 +409,7 @@ def _go_to_spot(paths, pedestrians, i, shapes, b, near, time):  # type: ignore[n
         if walker.stand_kind == CROWD:
             away = np.sqrt((x - shapes.x[b]) ** 2 + (y - shapes.y[b]) ** 2)
             time = (time[0] * min(1.0, away / _SLOWS_WITHIN), dt)
-        step = _walk(paths, walker, FollowPoint(x, y, x, y, 0.0, 0.0), shapes, b, near, True, time)
+        step = _walk(walker, FollowPoint(x, y, x, y, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0)), shapes, b, near, True, time)
     _note_progress(paths, walker, shapes.x[b], shapes.y[b], is_there, dt)
     note_standing(pedestrians, walker, is_there, dt)
     return step
@@ -462,7 +439,7 @@ def _go_along(paths, pedestrians, junctions, shapes, who, near, is_asked, time):
         _turn_round(paths, walker, x, y)  # it waits for us, and is in our way
     elif led_by == NONE and walker.walkway == walkway and walker.offset != offset:
         stop_at_spot(paths, pedestrians, i, shapes, b - i, offset)
-    step = _walk(paths, walker, follow_point(paths, walker), shapes, b, near, is_waiting, (pace * share, dt))
+    step = _walk(walker, follow_point(paths, walker), shapes, b, near, is_waiting, (pace * share, dt))
     _note_progress(paths, walker, shapes.x[b], shapes.y[b], is_waiting or share < _WAITS_BELOW, dt)
     walker.leader = led_by
     return step

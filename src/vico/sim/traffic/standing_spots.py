@@ -31,6 +31,7 @@ _BEND = 0.05  # m by which that may differ
 _AT_STOP, _STOP_GRID, _PER_STOP = 5.0, 0.5, 6  # m around where passengers wait, m between places tried, and people
 _STOP_ROOM, _FROM_LANE = 0.35, 1.9  # m around who waits, and from there to the middle of the lane or track
 _STOP_REACH = 9.0  # m from a walkway to who waits
+_WAY = 1.5  # m along the walkway that the way to a spot takes
 _LEAST_LENGTH = 8.0  # m of sidewalk on which people stop
 _RAISED = 0.5  # m above the ground: on decks nobody stops
 _END = 1.5  # m at a walkway's ends that stay free
@@ -79,7 +80,7 @@ class _Site:
         if not _END <= offset <= float(self.walks.length[walkway]) - _END:
             return False
         aside = self.aside(walkway, offset, point)
-        room = self.walks.room[walkway]
+        room = self.walks.room_at(walkway, offset)
         side, other = (room[0], room[1]) if aside > 0 else (room[1], room[0])
         blocks = abs(aside) < side + 2 * _BODY
         if blocks and min(side, abs(aside) - 2 * _BODY) + other < _LANE_LEFT:
@@ -88,8 +89,9 @@ class _Site:
         near = self.tree.query(here, predicate="dwithin", distance=_OTHER_WALKWAYS)
         if any(k != walkway for k in near):
             return False
-        x, y, _ = self.at(walkway, offset, 0.0)
-        way = shapely.LineString([(x, y), point])
+        # One leaves the walkway a little before, and comes back to it a little beyond.
+        ends = [self.at(walkway, offset + along, 0.0)[:2] for along in (-_WAY, _WAY)]
+        way = shapely.Polygon([*ends, point])
         if len(self.solids.query(way, predicate="dwithin", distance=_BODY)):
             return False
         kept = self.kept_free
@@ -234,7 +236,7 @@ def _add_pairs(site: _Site) -> None:
         for number, offset in enumerate(np.arange(length / 2 % _PAIR_EVERY, length, _PAIR_EVERY)):
             left = (walkway + number) % 2 == 0
             for side in (1, -1) if left else (-1, 1):
-                aside = side * float(site.walks.room[walkway, 0 if side > 0 else 1])
+                aside = side * float(site.walks.room_at(walkway, float(offset))[0 if side > 0 else 1])
                 ends = [offset - _PAIR_APART / 2, offset + _PAIR_APART / 2]
                 places = [site.at(walkway, end, aside) for end in ends]
                 between = np.hypot(places[0][0] - places[1][0], places[0][1] - places[1][1])

@@ -141,10 +141,6 @@ VEHICLE = np.dtype([*VEHICLE_PARAMETERS, *VEHICLE_STATE], align=True)
 WALKWAY = np.dtype(
     [
         ("length", _F),  # m
-        ("room_left", _F),  # how far a walker's centre may be to the left of the centre line, m
-        ("room_right", _F),  # and to the right
-        ("reach_left", _F),  # the same for who has to get past somebody
-        ("reach_right", _F),
         ("kind", np.uint8),  # SIDEWALK, CROSSING or CORNER
         ("shut", _B),  # whether an event keeps people off
         ("light", np.uint8),  # crossings: what its signal shows, as that of a lane
@@ -310,6 +306,9 @@ class WalkwayNetwork(NamedTuple):
         Dtype `WALKWAY`.
     first, points, along
         Walkway ``i``'s centre line is ``points[first[i]:first[i + 1]]``, metres; `along` the distances along it.
+    room
+        How far a walker's centre may be to the left and to the right of the centre line, and the same for who has to
+        get past somebody, from each point to the next, metres, shape ``(points, 4)``.
     meeting_first, meeting
         Walkways at meeting point ``k``: ``meeting[meeting_first[k]:meeting_first[k + 1]]``.
     goal_walkway, goal_away
@@ -323,6 +322,7 @@ class WalkwayNetwork(NamedTuple):
     first: Ints
     points: Floats
     along: Floats
+    room: Floats
     meeting_first: Ints
     meeting: Ints
     goal_walkway: Ints
