@@ -122,7 +122,8 @@ class EventSites:
     def walkways_of(self, event: CityEvent) -> NDArray[np.bool_]:
         """Return which walkways of traffic lie along the street of an event, crossings and corners left open."""
         walks = self._walks()
-        middles = np.array([walks.line(k)[len(walks.line(k)) // 2] for k in range(len(walks))]).reshape(-1, 2)
+        lines = [shapely.LineString(walks.line(k)) for k in range(len(walks))]
+        middles = shapely.get_coordinates(shapely.line_interpolate_point(lines, 0.5, normalized=True)).reshape(-1, 2)
         return np.asarray(shapely.contains_xy(self.ground(event), middles)) & (walks.kind == SIDEWALK)
 
     def circles(self, event: CityEvent) -> list[tuple[float, float, float]]:

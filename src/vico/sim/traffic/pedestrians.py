@@ -411,7 +411,7 @@ def _go_to_spot(paths, pedestrians, i, shapes, b, near, time):  # type: ignore[n
             time = (time[0] * min(1.0, away / _SLOWS_WITHIN), dt)
         step = _walk(walker, FollowPoint(x, y, x, y, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0)), shapes, b, near, True, time)
     _note_progress(paths, walker, shapes.x[b], shapes.y[b], is_there, dt)
-    note_standing(pedestrians, walker, is_there, dt)
+    note_standing(paths, pedestrians, walker, is_there, dt)
     return step
 
 

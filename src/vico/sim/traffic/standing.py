@@ -88,13 +88,14 @@ def stop_at_spot(paths, pedestrians, i, shapes, first, offset):  # type: ignore[
 
 
 @compiled
-def note_standing(pedestrians, walker, is_there, dt):  # type: ignore[no-untyped-def]
-    """Count the time somebody stands; who has stood long enough walks on, as does who can't get there."""
+def note_standing(paths, pedestrians, walker, is_there, dt):  # type: ignore[no-untyped-def]
+    """Count the time somebody stands; who has stood long enough walks on, or can't get there, or may not be there."""
     if walker.stand_kind >= LED:
         return
     walker.stand_time -= dt
     deserted = walker.stand_kind == TALK and walker.leader != NONE and pedestrians[walker.leader].stand_kind != TALK
-    if walker.stand_time <= 0.0 or deserted or (not is_there and walker.jammed_time > 6.0):
+    is_over = walker.stand_time <= 0.0 or paths.walkways[walker.walkway].shut
+    if is_over or deserted or (not is_there and walker.jammed_time > 6.0):
         leave_spot(walker)
 
 
