@@ -108,7 +108,8 @@ def in_vehicles(city: World) -> set[str]:
 
 def at_a_stop() -> set[str]:
     """Wait for a bus, as a pedestrian."""
-    waits = PedestrianGaits(np.ones(2), np.zeros(2), np.full(2, -9.0), np.full(2, STOP, np.uint8), np.zeros(2, bool))
+    no, yes = np.zeros(2, np.bool_), np.ones(2, np.bool_)
+    waits = PedestrianGaits(np.ones(2), np.zeros(2), np.full(2, -9.0), np.full(2, STOP, np.uint8), no, no, yes)
     shown = [pedestrian_motion(waits, np.full(2, 1.7), float(second)).clip[1] for second in range(60)]
     return {CLIPS[clip] for clip in shown}
 

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -30,6 +31,18 @@ def test_a_motion_that_diverges_is_an_error_and_leaves_no_log_file(
     with pytest.raises(PhysicsError, match=r"diverged at .* s .Nan, Inf or huge value in Q"):
         engine.step()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_running_out_of_memory_in_a_step_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = StaticScene(HeightField.flat(50.0))
+    engine = make_engine("mujoco", scene, [robot_model("husky", packs=False)], np.zeros((1, 3)))
+
+    def give_up(*_: object) -> None:
+        raise mujoco.FatalError("mj_stackAlloc: out of memory")
+
+    monkeypatch.setattr(mujoco, "mj_step", give_up)
+    with pytest.raises(PhysicsError, match=r"gave up at .* s .mj_stackAlloc"):
+        engine.step()
 
 
 def test_pieces_of_a_collision_surface_are_told_apart() -> None:

@@ -391,12 +391,20 @@ class MujocoEngine:
                     self._movers.advance(frame)
                     self._move_movers()
                 self._velocity_before[:] = self._qvel[s.base_velocity]
-                mujoco.mj_step(shared.model, self._data, steps)
+                self._step_data(shared, steps)
                 if s.slots:
                     motion = self._qvel[s.object_motion].reshape(-1, 6)
                     self._calm = np.where(np.abs(motion).max(axis=1) < _SLOW, self._calm + frame, 0.0)
         self._frame[0] = frame
         self._contacts = None
+
+    def _step_data(self, shared: SharedModel, steps: int) -> None:
+        try:
+            mujoco.mj_step(shared.model, self._data, steps)
+        except mujoco.FatalError as error:  # out of its working memory
+            raise PhysicsError(
+                f"physics: MuJoCo gave up at {self._data.time:.2f} s ({error}); report it with the snapshot"
+            ) from None
 
     def judge(self) -> None:
         """Raise or warn if MuJoCo said something."""

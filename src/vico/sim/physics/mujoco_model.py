@@ -60,9 +60,15 @@ def standing_pose(
     return [x, y, ground + model.stand / float(up[2]) + 0.01], quaternion.tolist()
 
 
+#: Bytes that MuJoCo may take for contacts and its solver: people in a heap on a robot that lies need more than it would
+#: choose. The system gives what is used.
+_WORKING_MEMORY = 128 << 20
+
+
 def compiled_model(scene: StaticScene, models: tuple[RobotModel, ...], capacity: Capacity) -> Any:
     """Compile a scene."""
     spec = mujoco.MjSpec()
+    spec.memory = _WORKING_MEMORY
     _set_options(spec)
     _add_scene(spec, scene)
     for index, model in enumerate(models):
