@@ -212,7 +212,7 @@ def test_more_cars_than_streets_hold_are_refused() -> None:
 def test_what_is_drawn_are_known_prototypes_at_the_bodies() -> None:
     traffic = _traffic()
     drawn = traffic.draw()
-    assert set(drawn.prototypes) <= set(traffic.prototypes())
+    assert {drawn.prototypes[k] for k in np.unique(drawn.index)} <= set(traffic.prototypes())
     assert np.allclose(drawn.transforms[:, :3, 3], traffic.bodies().position[: len(drawn.index)], atol=1e-3)
 
 
