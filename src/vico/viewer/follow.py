@@ -36,6 +36,7 @@ _FOV, _EYES_FOV = math.radians(42.0), math.radians(60.0)
 # Seconds in which the camera makes up for two thirds of a change.
 _TURNS, _SHIFTS, _WIDENS, _NARROWS = 0.55, 0.12, 0.9, 0.12
 _ASIDE = tuple(math.radians(k) for k in (0, 35, -35, 70, -70, 110, -110, 150, -150, 180))
+_SWING = 1.0  # radians a second at most
 _RIM = 0.25  # metres to whatever is behind the camera
 _NEAREST = 0.45
 
@@ -169,7 +170,9 @@ class FollowCamera:
             self._heading, self._pitch, self._focus = target.yaw, target.pitch, focus
         else:
             turn = math.remainder(target.yaw - self._heading, 2 * math.pi)
-            self._heading += _part(dt, 0.18 if self.view == "eyes" else _TURNS) * turn
+            swing = _part(dt, 0.18 if self.view == "eyes" else _TURNS) * turn
+            # From outside it swings round slowly: walls come near as fast as it turns towards them.
+            self._heading += swing if self.view == "eyes" else float(np.clip(swing, -_SWING * dt, _SWING * dt))
             self._pitch += _part(dt, _TURNS) * (target.pitch - self._pitch)
             # On foot the eye is steady; aboard it goes with the vehicle.
             self._focus = self._focus + _part(dt, _SHIFTS if target.riding == Vehicle.NONE else 1e-6) * (
