@@ -161,8 +161,9 @@ class Crew:
         return Robot(self, name, order)
 
     def has_come(self) -> bool:
-        """Whether the Husky has come."""
-        return self.near(1, 1.5)
+        """Whether the Husky has come and stands: it is not to drive into what the arm holds."""
+        speed = float(np.hypot(*self.sim.state.robots.bodies().velocity[1]))
+        return self.near(1, 1.5) and speed < 0.02
 
     def begins(self, sim: Simulation) -> bool:
         """Whether the parcel has been picked up."""
@@ -288,6 +289,10 @@ def liveliness(name: str) -> Callable[[Simulation], float]:
             along = np.clip(side * (offset @ heading), 0.8, CAMERA)
             near = np.hypot(*(offset - side * along[:, None] * heading).T)
             lively -= 1.5 * float(np.clip(1.2 - near, 0.0, 0.6).sum())
+        # Steps along the very edge of a kerb go up and down; and who stands is no walk.
+        aside = np.array([[heading[1], -heading[0]], [-heading[1], heading[0]]])
+        if np.ptp(sim.world.height(people.position[i, :2] + 0.3 * aside)) > 0.05:
+            lively -= 3.0
         walks = float(np.hypot(*people.velocity[i])) > 0.5
         return lively if walks else lively - 2.0
 
@@ -380,7 +385,7 @@ class Casting:
         """Return somebody who shops."""
         scene = self.walk("08:00", "20:00", "{} shops", shops)
         _, stay = on_the_way(self.community, self.world, "08:00", "20:00", shops)
-        return replace(scene, views=("behind",), begins=arrived(scene.follow, stay.place), search=0)
+        return replace(scene, views=("behind", "front"), begins=arrived(scene.follow, stay.place), search=0)
 
     def robots(self) -> Scene:
         """Return the crew at work, on the square of the world with the most room."""
