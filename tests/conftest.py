@@ -99,8 +99,8 @@ def corner(corner_path: Path) -> World:
 
 @pytest.fixture(scope="session")
 def helsinki_city(shared: Shared) -> World:
-    """800 m x 800 m of central Helsinki: large enough for bus lines and bicycle stations."""
-    return read_world(shared("city", lambda out: _world(out, 400.0)))
+    """700 m x 700 m of central Helsinki: large enough for bus lines and bicycle stations."""
+    return read_world(shared("city", lambda out: _world(out, 350.0)))
 
 
 @pytest.fixture(scope="session")
