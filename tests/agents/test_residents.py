@@ -68,7 +68,10 @@ def test_in_a_small_town_around_opening_time() -> None:
     assert {"move_forward", "enter", "wait", "communicate"} <= types
 
 
-@pytest.mark.parametrize(("start", "usual"), [(7.9, "move_forward"), (12.0, "eat"), (21.49, "sleep")])
+@pytest.mark.parametrize(
+    ("start", "usual"),
+    [(7.9, "move_forward"), pytest.param(12.0, "eat", marks=pytest.mark.slow), (21.49, "sleep")],
+)
 def test_a_hundred_residents_of_helsinki(helsinki: World, hundred: Community, start: float, usual: str) -> None:
     config = SimConfig(start=int(start * 3600), observe=(), cars=20, pedestrians=20)
     asked, types = together_and_alone(helsinki, hundred, config, 160)

@@ -90,7 +90,7 @@ def ends_of_a_ride(public: PublicMap, mode: str, number: int) -> tuple[Spot, Spo
     raise AssertionError(f"no {mode} ride in this city")
 
 
-@pytest.mark.parametrize(("mode", "number"), [("bus", 0), ("bike", 0), ("bike", 5)])
+@pytest.mark.parametrize(("mode", "number"), [("bus", 0), ("bike", 0), pytest.param("bike", 5, marks=pytest.mark.slow)])
 def test_a_traveller_arrives_about_when_planned(
     helsinki_city: World, public: PublicMap, mode: str, number: int
 ) -> None:

@@ -51,7 +51,9 @@ def test_the_heuristic_delivers_what_is_near_enough(helsinki: World, few: Commun
     assert result.steps == steps  # not everything was done
 
 
-@pytest.mark.parametrize(("method", "assistants"), [("random", 1), ("heuristic", 2)])
+@pytest.mark.parametrize(
+    ("method", "assistants"), [pytest.param("random", 1, marks=pytest.mark.slow), ("heuristic", 2)]
+)
 def test_an_episode_repeats_itself(helsinki: World, few: Community, method: str, assistants: int) -> None:
     first, again = (
         play(helsinki, few, method=method, steps=25, seed=2, assistants=assistants) for _ in range(2)

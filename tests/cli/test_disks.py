@@ -49,7 +49,7 @@ def when_there(path: Path, process: subprocess.Popen[str]) -> None:
         time.sleep(0.02)
 
 
-@pytest.mark.parametrize("most", [20_000, 300_000])
+@pytest.mark.parametrize("most", [20_000, pytest.param(300_000, marks=pytest.mark.slow)])
 def test_a_file_that_can_not_grow_ends_a_build_in_one_sentence(tmp_path: Path, most: int) -> None:
     said = sentence(started(*_BUILD, tmp_path / "w", most=most))
     assert said.startswith("vico: ")

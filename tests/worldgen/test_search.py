@@ -35,7 +35,7 @@ def _held(window: Window) -> None:
 
 
 _SHARE = st.floats(0, 1)
-_RADIUS = st.integers(60, 150 if _SEARCH else 70)
+_RADIUS = st.integers(60, 150 if _SEARCH else 62)
 
 
 @_windows
