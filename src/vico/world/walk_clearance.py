@@ -30,7 +30,7 @@ _SAME = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class ClearCourse:
     """A line that leads past all solids, or a piece of one.
 
     Attributes
@@ -54,7 +54,7 @@ class Course:
 
 def courses_past(
     lines: Sequence[Floats], room: Floats, reach: Floats, solids: Sequence[shapely.Polygon]
-) -> dict[int, list[Course]]:
+) -> dict[int, list[ClearCourse]]:
     """Lead lines past solids.
 
     Parameters
@@ -83,7 +83,7 @@ def courses_past(
     rows = [_places(lines[i], o) for i, o in zip(which, offsets, strict=True)]
     points, normals = np.concatenate([r[0] for r in rows]), np.concatenate([r[1] for r in rows])
     blocked = _blocked(points, normals, np.repeat(reach[which], counts), tree)
-    found: dict[int, list[Course]] = {}
+    found: dict[int, list[ClearCourse]] = {}
     first = 0
     for i, along, count in zip(which.tolist(), offsets, counts.tolist(), strict=True):
         here = slice(first, first + count)
@@ -103,7 +103,7 @@ def courses_past(
     return found
 
 
-def _touched(courses: Sequence[Course], grown: shapely.STRtree) -> Floats:
+def _touched(courses: Sequence[ClearCourse], grown: shapely.STRtree) -> Floats:
     """Metres along the line as it was at which courses are in grown solids for more than their air."""
     found: list[float] = []
     for course in courses:
@@ -169,9 +169,11 @@ def _free(blocked: list[Interval], reach: float) -> list[Interval]:
     return free
 
 
-def _courses(along: Floats, points: Floats, normals: Floats, free: list[list[Interval]], room: float) -> list[Course]:
+def _courses(
+    along: Floats, points: Floats, normals: Floats, free: list[list[Interval]], room: float
+) -> list[ClearCourse]:
     """Lead one line past its solids: in pieces, where there is no way."""
-    found: list[Course] = []
+    found: list[ClearCourse] = []
     for begin, aside in _ways_through(free, room):
         here = slice(begin, begin + len(aside))
         gaps = np.array([next(g for g in free[begin + j] if g[0] <= a <= g[1]) for j, a in enumerate(aside.tolist())])
@@ -183,7 +185,7 @@ def _courses(along: Floats, points: Floats, normals: Floats, free: list[list[Int
         moved = points[here] + aside[:, None] * normals[here]
         kept = _kept(aside, sides, normals[here])
         is_whole = len(aside) == len(along)
-        found.append(Course(along[here][kept], moved[kept], sides[kept, :2], sides[kept, 2:], is_whole))
+        found.append(ClearCourse(along[here][kept], moved[kept], sides[kept, :2], sides[kept, 2:], is_whole))
     return [course for course in found if len(course.points) > 1]
 
 

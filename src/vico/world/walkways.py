@@ -11,7 +11,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from vico.geo import overlay
-from vico.world.walk_clearance import BODY, Course, courses_past
+from vico.world.walk_clearance import BODY, ClearCourse, courses_past
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -200,7 +200,7 @@ def _along(line: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
 
 
-def _piece(row: _Row, course: Course, spare: int) -> _Row:
+def _piece(row: _Row, course: ClearCourse, spare: int) -> _Row:
     """Return the part of a stretch that a course is; its new ends are `spare` and the next."""
     along = _along(row.line)
     z = np.interp(course.offsets, along, row.z)

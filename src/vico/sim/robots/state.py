@@ -20,7 +20,7 @@ from vico.sim.robots.outlines import bodies_of
 from vico.sim.robots.path_follower import PathFollower, RobotStatus
 from vico.sim.robots.rotors import Flight
 from vico.sim.robots.scene import RobotScene
-from vico.sim.robots.trip_state import Trips
+from vico.sim.robots.trip_state import RobotTrips
 from vico.sim.robots.wind import gusts_of
 from vico.sim.robots.work import Work
 from vico.sim.state import REASON_LENGTH, MovableObjects, People
@@ -199,7 +199,7 @@ class RobotRun:
     followers: list[PathFollower] = field(init=False)
     flights: list[Flight | None] = field(init=False)
     work: list[Work | None] = field(init=False)
-    trips: Trips = field(init=False)
+    trips: RobotTrips = field(init=False)
     objects: MovableObjects = field(default_factory=MovableObjects.none)
     people: People | None = None
     closed_ground: Circles = ()
@@ -209,7 +209,7 @@ class RobotRun:
     def __post_init__(self) -> None:
         self.memory = [np.zeros((len(group.robots), group.controller.memory)) for group in self.scene.groups]
         self.followers = [PathFollower(model) for model in self.scene.models]
-        self.trips = Trips.none(len(self.scene))
+        self.trips = RobotTrips.none(len(self.scene))
         self.flights = [
             None
             if group.model.rotors is None

@@ -18,7 +18,7 @@ NONE = -2
 
 
 @dataclass
-class Trips:
+class RobotTrips:
     """Where robots are indoors, and where they go; row = robot.
 
     Attributes
@@ -43,7 +43,7 @@ class Trips:
     ride: Array
 
     @classmethod
-    def none(cls, robots: int) -> Trips:
+    def none(cls, robots: int) -> RobotTrips:
         """All robots are outdoors, and go nowhere."""
         nowhere = np.full(robots, NONE, np.int32)
         outdoors = np.full(robots, OUTDOORS, np.int32)
