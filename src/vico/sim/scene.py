@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.models.in_hand import in_hand_models
-from vico.assets.people import Appearance
-from vico.community.model import Resident
 from vico.render import Cameras, Lighting, Scene, render
 from vico.render.lighting import SHADOW_STEP
 from vico.render.limbs import LIMBS
@@ -29,9 +27,8 @@ from vico.sim.animation import (
     joint_places,
     pose,
 )
-from vico.sim.config import SimConfig
 from vico.sim.detail import Sights, far_from_all
-from vico.sim.drawn_people import DrawnPeople
+from vico.sim.drawn_people import Cast, DrawnPeople
 from vico.sim.environment import Environment
 from vico.sim.eyes import SemanticClasses, lenses_by_entity
 from vico.sim.hands_scene import Holders, draw_in_hands, hands_of_agents, hands_of_pedestrians
@@ -92,28 +89,12 @@ class _Motion(NamedTuple):
     hands: Hands
 
 
-class RenderedSimulation(Protocol):
+class RenderedSimulation(Cast, Protocol):
     """What the renderer asks of a simulation."""
 
     @property
     def world(self) -> World:
         """Where it happens."""
-
-    @property
-    def config(self) -> SimConfig:
-        """What the run is asked to be."""
-
-    @property
-    def state(self) -> SimulationState:
-        """Everybody and everything, as it is now."""
-
-    @property
-    def residents(self) -> Sequence[Resident]:
-        """Who takes part, the first of its people."""
-
-    @property
-    def looks(self) -> Sequence[Appearance]:
-        """How people look, in the order of their avatars, and after them the pedestrians."""
 
     @property
     def shapes(self) -> Mapping[str, Sequence[Surface]]:

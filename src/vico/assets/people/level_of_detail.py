@@ -16,8 +16,9 @@ from vico.assets.people.model import JOINTS, J, SkinnedBody
 from vico.assets.simplify import Worth, collapsed, is_sound
 from vico.io.compiled import compiled
 
-# Triangles of a light body, and of one that is seen from far away.
-LIGHT, FAR = 1900, 600
+# Triangles of a light body, and of one that is seen from far away; procedural ones are a tenth darker in pictures with
+# as few as the others (`tests/sim/test_detail.py`).
+LIGHT, FAR, FAR_PROCEDURAL = 1900, 600, 900
 # A place is hidden if something that moves with it lies within this many metres all around.
 _COVER = 0.05
 # What a change of colour by the whole range, and of all of a place's joints, is worth, in metres of displacement.
