@@ -28,7 +28,7 @@ from reporting import machine, publish
 from vico.sim.recording.run import Run, read_run
 
 _PERIOD = 2.0  # s between readings
-_USUAL = ("--robots", "husky,go2,go2,drone,manipulator", "--weather", "changing", "--cars", "60", "--pedestrians", "60")
+_USUAL = ("--robots", "husky,go2,h1,drone,manipulator", "--weather", "changing", "--cars", "60", "--pedestrians", "60")
 _DOWN = ("fallen", "recovered", "lost")
 
 
@@ -154,6 +154,7 @@ def main() -> None:
     parser.add_argument("--pieces", type=int, default=6)
     parser.add_argument("--table", type=Path)
     given = parser.parse_args(arguments)
+    given.out.parent.mkdir(parents=True, exist_ok=True)
     about, steps = machine(), round(3600 * given.hours)
     vico = [sys.executable, "-m", "vico.cli.main", "run"]
     fixed = ["--observe", "none", "--check", "overlaps", "--start", "00:00", "--steps", str(steps)]
