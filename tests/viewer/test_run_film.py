@@ -143,6 +143,21 @@ def test_the_camera_follows_smoothly_and_stays_before_walls(view: str) -> None:
         last = place
 
 
+def test_the_camera_rises_above_who_comes_near_it() -> None:
+    """Somebody walks from behind the camera towards whom it looks at, right through where it would be."""
+    scene = Scene([box((80, 80, 1), (0, 0, -0.5))])
+    camera, top, last = FollowCamera("front", 64, 36), 1.8, None
+    for k in range(200):
+        other = np.array([[12.0 - 0.06 * k, 0.6, top]])
+        eye = camera.look(scene, Target(np.zeros(3), 0.0, 0.0, 1.6, 1, others=other), 0.04)
+        place = eye.position[0]
+        if float(np.hypot(*(place[:2] - other[0, :2]))) < 0.5:
+            assert place[2] > top + 0.1
+        assert last is None or np.linalg.norm(place - last) < 0.12
+        last = place
+    assert place[2] < 1.8
+
+
 def test_through_a_door_the_camera_is_there_at_once() -> None:
     a = Target(np.zeros(3), 0.0, 0.0, 1.6, 1)
     b = a._replace(position=np.array([30.0, 0, 0]), room=3)

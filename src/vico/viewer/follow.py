@@ -38,6 +38,10 @@ _TURNS, _SHIFTS, _WIDENS, _NARROWS = 0.55, 0.12, 0.9, 0.12
 _ASIDE = tuple(math.radians(k) for k in (0, 35, -35, 70, -70, 110, -110, 150, -150, 180))
 _SWING = 1.0  # radians a second at most
 _RIM = 0.25  # metres to whatever is behind the camera
+# Who comes as near to the camera as the first makes it rise, metres; at the second it is so far above them.
+_RISES, _RISEN, _ABOVE = 2.6, 1.2, 0.4
+_LIFTS = 0.3  # seconds, as above
+_AROUND = 9.0
 _NEAREST = 0.45
 
 
@@ -60,6 +64,8 @@ class Target(NamedTuple):
         Index of the room it is in, -1 for none.
     riding
         A `Vehicle`.
+    others
+        The highest points of the others near by, ENU metres, shape ``(k, 3)``; None for nobody.
     """
 
     position: NDArray[np.float64]
@@ -70,6 +76,7 @@ class Target(NamedTuple):
     size: float = 1.75
     room: int = -1
     riding: int = Vehicle.NONE
+    others: NDArray[np.float64] | None = None
 
 
 def target_of(state: SimulationState, name: str) -> Target:
@@ -94,10 +101,19 @@ def target_of(state: SimulationState, name: str) -> Target:
             float(people.height[i]),
             int(people.room[i]),
             int(people.vehicle[i]),
+            _others(state, people.position[i], int(people.entity[i])) if people.vehicle[i] == Vehicle.NONE else None,
         )
     assert state.robots is not None
     k = i - len(people)
     return _target_of_body(state.robots.bodies(), k, float(state.robots.camera_heights()[k]))
+
+
+def _others(state: SimulationState, position: NDArray[np.float64], entity: int) -> NDArray[np.float64]:
+    """Return the highest points of the bodies within some metres of somebody, shape ``(k, 3)``."""
+    bodies = state.obstacles()
+    near = np.abs(bodies.position[:, :2] - position[:2]).max(axis=1) < _AROUND
+    near &= (bodies.entity != entity) & (np.abs(bodies.position[:, 2] - position[2]) < 3.0)
+    return bodies.position[near] + np.column_stack([np.zeros((int(near.sum()), 2)), bodies.height[near]])
 
 
 def _target_in_traffic(state: SimulationState, name: str) -> Target:
@@ -154,6 +170,8 @@ class FollowCamera:
     _distance: float = 0.0
     _angle: float = 0.0
     _aside: float = 0.0
+    _lift: float = 0.0
+    _place: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     _room: int = -2
 
     def __post_init__(self) -> None:
@@ -195,18 +213,30 @@ class FollowCamera:
         aside = self._roomiest(scene, turn, math.radians(up), wanted)
         self._aside = aside if cut else self._aside + _part(dt, _TURNS) * math.remainder(aside - self._aside, math.tau)
         back = _direction(turn + self._aside, math.radians(up))
+        lift = self._over(target.others, self._focus + wanted * back if cut else self._place, wanted) - math.radians(up)
+        self._lift = max(lift, 0.0) if cut else self._lift + _part(dt, _LIFTS) * (max(lift, 0.0) - self._lift)
+        back = _direction(turn + self._aside, math.radians(up) + self._lift)
         free = max(min(wanted, self._free(scene, back, wanted)), _NEAREST)
         if cut:
             self._distance = free
         else:
             self._distance += _part(dt, _NARROWS if free < self._distance else _WIDENS) * (free - self._distance)
             self._distance = min(self._distance, max(free, _NEAREST))
-        place = self._focus + self._distance * back
+        place = self._place = self._focus + self._distance * back
         # Near a wall, it looks over the shoulder.
         near = max(0.0, 1.0 - self._distance / 1.5)
         ahead = -back * (1.0 - near) + near * np.array([math.cos(self._heading), math.sin(self._heading), -0.1])
         hidden = target.entity if self._distance < 0.7 else 0
         return self._cameras(place, ahead, _FOV, hidden)
+
+    def _over(self, others: NDArray[np.float64] | None, place: NDArray[np.float64], wanted: float) -> float:
+        """Return how steeply the camera has to look down, radians, to be above those who come near it."""
+        if others is None or not len(others):
+            return 0.0
+        away = np.hypot(*(others[:, :2] - place[:2]).T)
+        share = np.clip((_RISES - away) / (_RISES - _RISEN), 0.0, 1.0)
+        height = float((share * (others[:, 2] + _ABOVE - self._focus[2])).max())
+        return math.asin(min(max(height / wanted, 0.0), 0.9))
 
     def _roomiest(self, scene: Scene, turn: float, rise: float, wanted: float) -> float:
         """Return how far to the side of where it would like to be the camera has some room: not at all, if it has."""
