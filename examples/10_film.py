@@ -293,6 +293,8 @@ def liveliness(name: str) -> Callable[[Simulation], float]:
         aside = np.array([[heading[1], -heading[0]], [-heading[1], heading[0]]])
         if np.ptp(sim.world.height(people.position[i, :2] + 0.3 * aside)) > 0.05:
             lively -= 3.0
+        # Beyond the edge of the world there is a bare plain.
+        lively -= 0.03 * max(150.0 - float(sim.world.half - np.abs(people.position[i, :2]).max()), 0.0)
         walks = float(np.hypot(*people.velocity[i])) > 0.5
         return lively if walks else lively - 2.0
 

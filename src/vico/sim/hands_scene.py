@@ -15,6 +15,7 @@ from vico.sim.holding import bearable_rain, carries_umbrella
 from vico.sim.quaternions import matrix_of
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import FIRST_PEDESTRIAN_UMBRELLA, FIRST_UMBRELLA
+from vico.sim.umbrellas import lean_apart
 from vico.world.model import Category
 
 _DRINKS = (clip_index("drink"), clip_index("sit_drink"))
@@ -26,6 +27,8 @@ _TIP = 0.8
 _TILT = 0.75
 # Umbrellas are made for people so tall, metres; the fist is so far below the canopy.
 _MADE_FOR, _SHAFT = 1.75, 0.8
+# Of their rims: how wide, and how high above the fist, metres.
+_RIM_RADIUS, _RIM_HEIGHT = 0.53, 0.64
 # Pedestrians have their umbrellas up when it rains so much more than they bear, mm/h.
 _RAIN_MORE = 0.15
 
@@ -69,6 +72,12 @@ class Holders(NamedTuple):
         c, s = np.cos(self.yaw[rows]), np.sin(self.yaw[rows])
         x, y = c * points[:, 0] - s * points[:, 1], s * points[:, 0] + c * points[:, 1]
         return self.position[rows] + np.column_stack([x, y, points[:, 2]])
+
+    def turned_back(self, rows: NDArray[np.int64], directions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return horizontal directions of the world, shape ``(k, 2)``, in body frames."""
+        c, s = np.cos(self.yaw[rows]), np.sin(self.yaw[rows])
+        x, y = directions.T
+        return np.column_stack([c * x + s * y, c * y - s * x])
 
 
 def hands_of_agents(state: SimulationState) -> Hands:
@@ -120,10 +129,14 @@ def draw_umbrellas(who: Holders, agents: int) -> Drawn | None:
     # The canopy is above the head, and opens when the arm is half up.
     above = np.column_stack([0.02 - 0.75 * fist[:, 0], -0.75 * fist[:, 1], _SHAFT * size])
     up = above / np.linalg.norm(above, axis=1)[:, None]
-    ahead = np.column_stack([up[:, 2], np.zeros(len(rows)), -up[:, 0]])
-    ahead /= np.linalg.norm(ahead, axis=1)[:, None]
     opened = np.clip((who.hands.share[rows] - 0.25) / 0.75, 0.0, 1.0)
     wide = size * (0.1 + 0.9 * opened)
+    rim = _RIM_HEIGHT * size
+    lean = lean_apart(who.world(rows, fist + rim[:, None] * up), _RIM_RADIUS * wide, rim)
+    up[:, :2] += np.tan(np.hypot(*lean.T))[:, None] * who.turned_back(rows, _unit(lean))
+    up /= np.linalg.norm(up, axis=1)[:, None]
+    ahead = np.column_stack([up[:, 2], np.zeros(len(rows)), -up[:, 0]])
+    ahead /= np.linalg.norm(ahead, axis=1)[:, None]
     axes = np.stack([ahead * wide[:, None], np.cross(up, ahead) * wide[:, None], up * size[:, None]], axis=2)
     names = umbrellas()
     number = np.where(rows < agents, FIRST_UMBRELLA + rows, FIRST_PEDESTRIAN_UMBRELLA + rows - agents)
@@ -145,6 +158,10 @@ def draw_placards(who: Holders) -> Drawn | None:
     axes = np.eye(3) * size[:, None, None]
     names, entity = placards(), np.asarray(who.entity[rows], np.int32)
     return Drawn(names, (rows * 5 // 2 % len(names)).astype(np.int32), _transforms(who, rows, axes, fist), entity)
+
+
+def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-9)[:, None]
 
 
 def _meals(state: SimulationState, who: Holders) -> Drawn | None:
