@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from vico.assets.bus import bus, bus_cabin, bus_inside_lights
 from vico.assets.shapes import ball, box, pose_matrix
 from vico.errors import InputError, MissingExtraError
 from vico.render import Cameras, Lighting, Scene
@@ -52,9 +53,15 @@ def scene() -> Scene:
     models = {
         "tree": [replace(crown, material=leaf, uv=crown.positions[:, :2])],
         "cube": [box((1, 1, 1), (0, 0, 0.5), colour=(200, 40, 40))],
+        "bus": [bus(), bus_inside_lights()],
     }
     made = Scene(
-        joined(static), models, indoor=[s.of_entity(60) for s in room], rooms=[[100, 0, 0, 4, 4, 3, 0.0]], lighting=DAY
+        joined(static),
+        models,
+        indoor=[s.of_entity(60) for s in room],
+        rooms=[[100, 0, 0, 4, 4, 3, 0.0]],
+        cabins={"bus": bus_cabin()},
+        lighting=DAY,
     )
     brick = made.arrays.textures.materials[made.material_names.index("brick")]
     brick["windows"], brick["storeys"] = UPPER_WINDOWS, 4
@@ -62,8 +69,9 @@ def scene() -> Scene:
     places = [pose_matrix(*generator.uniform((-8, -18), (30, 18)), 0, k) for k in range(40)]
     made.place(["tree"] * 40, np.array(places), np.arange(100, 140))
     made.place(["cube"], np.array([pose_matrix(102, -1, 0, 0.4)]), [70], indoor=True)
-    index = made.names["cube"]
-    made.set_rigid([index] * 2, np.array([pose_matrix(-8, -3, 0, 0.3), pose_matrix(-9, 0, 0, 1)]), [5, 8])
+    index = [made.names[name] for name in ("cube", "cube", "bus")]
+    places = [pose_matrix(-8, -3, 0, 0.3), pose_matrix(-9, 0, 0, 1), pose_matrix(4, 9, 0, 2.6)]
+    made.set_rigid(index, np.array(places), [5, 8, 6])
     figure = ball((0.3, 0.3, 0.9), (-7, -5, 0.9), colour=(90, 120, 200)).of_entity(9)
     made.set_skinned(figure.positions, figure.normals, figure.triangles, figure.colour, figure.entity)
     return made

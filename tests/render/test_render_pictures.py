@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from vico.assets.bus import bus, bus_cabin
 from vico.assets.shapes import ball, box, pose_matrix
+from vico.assets.vehicle_parts import Cabin
 from vico.render import Cameras, Lighting, Scene, render, render_top_down
 from vico.render.limbs import LIMBS
 from vico.world.mesh import Material, Surface, joined
@@ -162,6 +165,22 @@ def test_two_legs_throw_two_shadows() -> None:
     one, between, other, lit = ground(1.2)
     assert other < 0.8 * lit
     assert one > 0.95 * lit
+
+
+def test_the_roof_of_a_bus_shades_its_inside_and_lamps_light_it_at_night() -> None:
+    down = Cameras(np.array([[0.0, 0.0, 2.3]]), np.array([[0.05, 0.0, -1.0]]), width=96, height=96, fov_y=1.6)
+
+    def picture(light: Lighting, **cabins: Cabin) -> NDArray[np.float64]:
+        scene = Scene([box((40, 40, 1), (0, 0, -0.5))], {"bus": [bus()]}, cabins=cabins, lighting=light)
+        scene.set_rigid([0], np.eye(4)[None], [1])
+        return render(scene, down).rgb[0].mean(axis=2)
+
+    noon = Lighting(sun_direction=(0.2, 0.75, 0.63))
+    bare, shaded = picture(noon), picture(noon, bus=bus_cabin())
+    assert 0.2 < (shaded < 0.8 * bare).mean() < 0.95  # the rest lies in light from the windows, or faces away
+    assert (shaded > 0.9 * bare).mean() > 0.05
+    night = Lighting.at(23 * 3600)
+    assert picture(night, bus=bus_cabin()).mean() > 2.5 * picture(night).mean()
 
 
 def test_the_shadow_of_a_car_behind_a_house_is_seen_beside_it(square: Scene) -> None:

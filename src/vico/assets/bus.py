@@ -17,6 +17,7 @@ from vico.assets.vehicle_parts import (
     INDICATOR,
     TAILLIGHT,
     TRIM,
+    Cabin,
     arch,
     both_sides,
     front,
@@ -255,6 +256,21 @@ def bus_inside_lights() -> Surface:
     """Return what shines in the bus when it is dark."""
     y = _HALF - _LINING - 0.01
     return inside_lights((_REAR + 0.06, -y, BUS_FLOOR + 0.003), (_NOSE - 0.9, y, _CEILING - 0.004))
+
+
+def bus_cabin() -> Cabin:
+    """Return the inside of the bus."""
+    y = _HALF - _LINING / 2
+    return Cabin(
+        low=(_REAR + 0.03, -y, BUS_FLOOR - 0.02),
+        high=(_NOSE - 0.03, y, _CEILING + 0.01),
+        windows=(_BELT, _LINTEL),
+        left=tuple(_panes("left")),
+        right=tuple(_panes("right")),
+        front=(_BELT, _LINTEL),
+        rear=(1.5, 2.4),
+        end_half=_HALF - 0.3,
+    )
 
 
 def bus(paint: Colour = (0, 114, 178), sign: Colour = (246, 170, 30)) -> Surface:

@@ -16,6 +16,7 @@ from vico.assets.vehicle_parts import (
     HEADLIGHT,
     TAILLIGHT,
     TRIM,
+    Cabin,
     both_sides,
     front,
     inside_lights,
@@ -81,6 +82,13 @@ def tram_door_leaves() -> tuple[list[tuple[float, float, float]], float]:
         for way in (-1.0, 1.0):
             leaves += [(middle + way * _LEAF / 2, y, way) for y in (-_HALF, _HALF)]
     return leaves, _LEAF
+
+
+def tram_cabin() -> Cabin:
+    """Return the inside of a section, up to the middle of the bellows."""
+    y, end = _HALF - _LINING / 2, TRAM_SECTION / 2
+    panes = tuple(sorted([*_PANES, *((middle - _LEAF, middle + _LEAF) for middle in TRAM_DOORS)]))
+    return Cabin((-end, -y, TRAM_FLOOR - 0.02), (end, y, _CEILING + 0.01), (_BELT, _LINTEL), panes, panes)
 
 
 def _spans() -> list[tuple[float, float]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,34 @@ PLATE: Colour = (235, 235, 230)
 SHINING = Material("vehicle lamp", emission=1.0)
 _LIT_CEILING: Colour = (206, 204, 194)
 _LIT_FLOOR: Colour = (88, 90, 90)
+
+
+@dataclass(frozen=True)
+class Cabin:
+    """The inside of a vehicle, a box with windows, in the vehicle's frame, metres.
+
+    Attributes
+    ----------
+    low, high
+        Opposite corners of the room.
+    windows
+        Heights of the lower and upper rims of the side windows.
+    left, right
+        The windows of each side, from x to x.
+    front, rear
+        Heights of the lower and upper rims of the windows at the ends; equal where there is none.
+    end_half
+        Half the width of those.
+    """
+
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+    windows: tuple[float, float]
+    left: tuple[tuple[float, float], ...]
+    right: tuple[tuple[float, float], ...]
+    front: tuple[float, float] = (0.0, 0.0)
+    rear: tuple[float, float] = (0.0, 0.0)
+    end_half: float = 0.0
 
 
 def one_surface(parts: Sequence[Surface]) -> Surface:

@@ -40,12 +40,18 @@ class Prototypes(NamedTuple):
         Each level of detail, finest first, `SPAN`, shape ``(p, 3)``.
     pixels
         A level is used below this size on screen, pixels, float32, shape ``(p, 3)``.
+    cabin
+        Row of `cabins` of what can be looked into, else -1, int32, shape ``(p,)``.
+    cabins
+        `CABIN`, at least one.
     """
 
     low: NDArray[np.float32]
     high: NDArray[np.float32]
     levels: NDArray[np.void]
     pixels: NDArray[np.float32]
+    cabin: NDArray[np.int32]
+    cabins: NDArray[np.void]
 
 
 class InstanceGroups(NamedTuple):
@@ -170,6 +176,8 @@ class Buffers(NamedTuple):
         Where in `drawn` an item is, -1: nowhere, int32.
     sun, contact
         What moving things leave of the sun and of the light at the ground, 0..1, float32, shape ``(h * w + PAD,)``.
+    inside
+        1 where the inside of a vehicle is seen, else 0, float32, ``(h * w + PAD,)``; written where there is one.
     glass
         Share of what lies behind a pane on the ground floor that is seen through it, of 255, uint8, ``(h * w + PAD,)``;
         written where `interiors` of the light are on.
@@ -199,6 +207,7 @@ class Buffers(NamedTuple):
     slot: NDArray[np.int32]
     sun: NDArray[np.float32]
     contact: NDArray[np.float32]
+    inside: NDArray[np.float32]
     glass: NDArray[np.uint8]
     changed: NDArray[np.bool_]
     real: NDArray[np.float32]
@@ -225,7 +234,9 @@ class Buffers(NamedTuple):
     def cut(self, height: int, width: int) -> Buffers:
         """Return them as those of a smaller picture."""
         pixels = height * width + PAD
-        parts = {name: getattr(self, name)[:pixels] for name in ("keys", "sun", "contact", "glass", "changed")}
+        parts = {
+            name: getattr(self, name)[:pixels] for name in ("keys", "sun", "contact", "inside", "glass", "changed")
+        }
         return self._replace(strip=self.strip[:width], **parts)
 
 
@@ -252,6 +263,7 @@ def buffers_for(scene: SceneArrays, width: int, height: int) -> Buffers:
         slot=np.full(items, -1, np.int32),
         sun=np.ones(pixels + PAD, np.float32),
         contact=np.ones(pixels + PAD, np.float32),
+        inside=np.zeros(pixels + PAD, np.float32),
         glass=np.zeros(pixels + PAD, np.uint8),
         changed=np.zeros(pixels + PAD, np.bool_),
         real=np.zeros(REAL_FIELDS * STRIDE, np.float32),

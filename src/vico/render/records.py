@@ -224,6 +224,22 @@ ROOM_FRONT = np.dtype(
     align=True,
 )
 
+# The inside of a vehicle, in the frame in which its bounding box has corners at +-1 (x forward, y left, z up).
+CABIN_STEPS = 512
+CABIN = np.dtype(
+    [
+        ("low", f4, (3,)),
+        ("high", f4, (3,)),
+        ("windows", f4, (2,)),  # heights of the rims of side windows
+        ("front", f4, (2,)),  # and of those at the ends; equal: none
+        ("rear", f4, (2,)),
+        ("end_half", f4),  # half their width
+        ("sharp", f4, (3,)),  # steepness of rims along each axis: 1 / penumbra
+        ("open", f4, (2, CABIN_STEPS)),  # share of each side, right and left, that is window, from x = -1 to 1
+    ],
+    align=True,
+)
+
 # Something that moves, as it casts a shadow.
 CASTER = np.dtype(
     [
@@ -240,6 +256,7 @@ CASTER = np.dtype(
         ("first_row", i8),
         ("end_row", i8),
         ("is_round", i8),  # 1: an avatar, 0: a box
+        ("cabin", i8),  # row of `Prototypes.cabins`, -1: nobody sees its inside
         ("limb_count", i8),  # 0: a whole box or ellipsoid throws the shadow
         ("sun_frame", f8, (3, 4)),  # world to what limbs' shadows are told in: across the light twice, then along it
         # Of each limb in that frame, metres: its start, the step to its end, 1 / length of that squared (all across the

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vico.assets.vehicle_parts import Cabin
 from vico.errors import InputError
 from vico.render.arrays import (
     ANYWHERE,
@@ -35,6 +36,7 @@ from vico.render.limbs import LIMBS
 from vico.render.records import COUNTS, ROOM, ROOM_FRONT, SPAN, SPHERE
 from vico.render.shading.light import Light, ReliefMap, ShadowMap
 from vico.render.shading.sky import SKY_SIZE, paint_sky
+from vico.render.shadows.cabins import cabin_records
 from vico.render.shadows.maps import relief_map, shadow_map
 from vico.render.textures import pack_textures
 from vico.render.uniforms import Record, light_uniforms
@@ -61,6 +63,8 @@ class Scene:
     rooms
         Oriented boxes of the rooms, shape ``(r, 7)``: centre of the floor x, y, z, half length, half width, height,
         yaw.
+    cabins
+        Insides of vehicles that can be looked into, by the names of their models.
     lighting
         The light of the moment; assign `Scene.lighting` to change it.
 
@@ -85,6 +89,7 @@ class Scene:
         *,
         indoor: Sequence[Surface] = (),
         rooms: ArrayLike | None = None,
+        cabins: Mapping[str, Cabin] | None = None,
         lighting: Lighting | None = None,
     ) -> None:
         models = dict(prototypes or {})
@@ -111,7 +116,7 @@ class Scene:
         where = np.full(len(clusters.span), OUTDOORS, np.uint8)
         where[len(outer.span) :] = INDOORS
         surfaces = joined_meshes([mesh_of(outside), mesh_of(inside)])
-        placeable, model_meshes = _prototypes(model_soups)
+        placeable, model_meshes = _prototypes(model_soups, list(models), cabins or {})
         _shift(placeable.levels, len(surfaces.triangle), len(surfaces.x))
         mesh = joined_meshes([surfaces, *model_meshes])
         self.names = {name: k for k, name in enumerate(models)}
@@ -422,7 +427,9 @@ def _shift(span: NDArray[np.void], triangles: int, vertices: int) -> None:
     span["end_vertex"] += vertices
 
 
-def _prototypes(soups: Sequence[Soup]) -> tuple[Prototypes, list[Mesh]]:
+def _prototypes(
+    soups: Sequence[Soup], names: Sequence[str], cabins: Mapping[str, Cabin]
+) -> tuple[Prototypes, list[Mesh]]:
     """Return models with their levels of detail, and the meshes of these one behind the other."""
     levels = np.zeros((len(soups), len(_LEVEL_PIXELS)), SPAN)
     bounds = np.zeros((2, len(soups), 3), np.float32)
@@ -443,7 +450,7 @@ def _prototypes(soups: Sequence[Soup]) -> tuple[Prototypes, list[Mesh]]:
             levels[k, level] = triangles, end_triangle, vertices, end_vertex
             triangles, vertices = end_triangle, end_vertex
             meshes.append(mesh_of(coarse))
-    return Prototypes(bounds[0], bounds[1], levels, pixels), meshes
+    return Prototypes(bounds[0], bounds[1], levels, pixels, *cabin_records(names, cabins, *bounds)), meshes
 
 
 @kernel

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vico.render.compiled import inlined, kernel
 from vico.render.shading.shade import shade
-from vico.render.shadows.moving import cast_moving
+from vico.render.shadows.moving import NO_SHADOWS, cast_moving
 from vico.render.visibility.culling import renew_tiles
 from vico.render.visibility.draw import draw_moving, draw_static, mark_changed, write_depth, write_entities
 
@@ -83,7 +83,7 @@ def take(scene: Any, camera: Any, light: Any, buffers: Any, kept: Any, with_movi
     if out.segmentation.size:
         write_entities(scene, buffers, drawn, out.segmentation)
     if out.rgb.size:
-        darkened = False
+        darkened = NO_SHADOWS
         if with_moving:
             darkened = cast_moving(scene, camera, light.uniforms, buffers, caster)
         partly = with_moving and kept.rgb.size > 0

@@ -16,6 +16,7 @@ from vico.world.mesh import Surface
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from vico.assets.vehicle_parts import Cabin
     from vico.world.folder import World
 
 # Beginnings of the names of materials with windows in them.
@@ -33,6 +34,7 @@ def scene_of(
     rooms: bool = True,
     lighting: Lighting | None = None,
     prototypes: Mapping[str, Sequence[Surface]] | None = None,
+    cabins: Mapping[str, Cabin] | None = None,
 ) -> Scene:
     """Put a world's parts together.
 
@@ -42,6 +44,8 @@ def scene_of(
         Whether to take the rooms and the furniture in them.
     prototypes
         Further models that will move in the scene (vehicles, robots, goods), by name.
+    cabins
+        As in `Scene`.
     """
     static = [surface for layer in OUTDOOR_LAYERS for surface in world.surfaces(layer)]
     indoor = world.surfaces("rooms") if rooms else []
@@ -49,7 +53,7 @@ def scene_of(
         (*room.centre, room.size[0] / 2, room.size[1] / 2, room.size[2], room.yaw) for room in world.rooms if rooms
     ]
     models = {**world.prototypes(), **(prototypes or {})}
-    scene = Scene(static, models, indoor=indoor, rooms=np.array(boxes).reshape(-1, 7), lighting=lighting)
+    scene = Scene(static, models, indoor=indoor, rooms=np.array(boxes).reshape(-1, 7), cabins=cabins, lighting=lighting)
     _tell_windows(scene)
     if rooms:
         scene.fronts = room_fronts(world)

@@ -10,6 +10,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.assets.cabins import cabin_of
 from vico.assets.models.in_hand import in_hand_models
 from vico.render import Cameras, Lighting, Scene, render
 from vico.render.lighting import SHADOW_STEP
@@ -118,7 +119,7 @@ class SceneRenderer:
     def __init__(self, sim: RenderedSimulation, *, detail: Literal["light", "full"] = "light") -> None:
         self._detail = detail
         self._pictures: PictureSet | None = None
-        self._scene = scene_of(sim.world, prototypes=_shapes(sim))
+        self._scene = _scene_of(sim)
         self._attach(sim)
 
     def rebind(self, sim: RenderedSimulation) -> SceneRenderer:
@@ -210,7 +211,7 @@ class SceneRenderer:
         """Put everything that moves where it is now; people in less detail who are far from all that look at them."""
         if not set(state.things.prototypes()) <= set(self._scene.names):
             # An event has begun whose things nobody had reckoned with.
-            self._scene, self._lit = scene_of(self._sim.world, prototypes=_shapes(self._sim)), ()
+            self._scene, self._lit = _scene_of(self._sim), ()
             self._viewers.scene = self._scene
             self._set_light(state)
         self._people.follow(state)
@@ -381,6 +382,14 @@ def _joined_motion(a: _Motion, b: _Motion) -> _Motion:
 
 def _nothing() -> None:
     pass
+
+
+def _scene_of(sim: RenderedSimulation) -> Scene:
+    """Return the scene of a run, with nothing that moves in its place yet."""
+    shapes = _shapes(sim)
+    mirrored = sim.state.traffic is not None and sim.state.traffic.lanes.lefthand
+    found = {name: cabin_of(name, mirrored=mirrored) for name in shapes}
+    return scene_of(sim.world, prototypes=shapes, cabins={k: cabin for k, cabin in found.items() if cabin is not None})
 
 
 def _shapes(sim: RenderedSimulation) -> dict[str, Sequence[Surface]]:

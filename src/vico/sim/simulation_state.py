@@ -32,6 +32,7 @@ from vico.sim.traffic.signals import SignalsShown
 from vico.sim.traffic.state import PedestrianGaits
 from vico.sim.transit import TransitSystem
 from vico.world.folder import World
+from vico.world.lanes import LaneGraph
 from vico.world.mesh import Surface
 from vico.world.model import Entrance, Place
 
@@ -57,6 +58,10 @@ class TrafficSystem(Subsystem, Protocol):
     @property
     def walkers(self) -> Bodies:
         """The pedestrians alone, then the cyclists."""
+
+    @property
+    def lanes(self) -> LaneGraph:
+        """The lanes that vehicles drive on."""
 
     @property
     def cyclists(self) -> int:

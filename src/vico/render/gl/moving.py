@@ -24,8 +24,8 @@ def packed_casters(arrays: SceneArrays, camera: Record, light: Light) -> NDArray
 
     Of each caster, places being from the eye: three rows to its unit frame; the sun there and the inverse soft length;
     first and end column and row; foot, greatest height above it, whether it is round, and how many limbs it has; three
-    rows to the frame across the light; the area there; number of the instance or -1, and entity of the avatar, both as
-    bits of whole numbers; then two rows a limb.
+    rows to the frame across the light; the area there; number of the instance or -1, entity of the avatar, and row of
+    the cabin or -1, all as bits of whole numbers; then two rows a limb.
     """
     most = int(arrays.counts["instances"]) - int(arrays.counts["static_instances"]) + int(arrays.counts["avatars"])
     found, numbers = np.zeros(most, CASTER), np.zeros(most, np.int64)
@@ -43,13 +43,22 @@ def packed_casters(arrays: SceneArrays, camera: Record, light: Light) -> NDArray
     out[:, 5, 2], out[:, 5, 3] = found["is_round"], found["limb_count"]
     out[:, 9] = found["area"]
     avatar = numbers - int(arrays.counts["instances"])
-    owner = np.zeros((count, 2), np.int32)
+    owner = np.zeros((count, 3), np.int32)
     owner[:, 0] = np.where(avatar < 0, numbers, -1)
     if len(arrays.avatars.span):
         owner[:, 1] = arrays.mesh.entity[arrays.avatars.span["first_triangle"][np.maximum(avatar, 0)]]
-    out[:, 10, :2] = owner.view(np.float32)
+    owner[:, 2] = found["cabin"]
+    out[:, 10, :3] = owner.view(np.float32)
     out[:, 11:] = found["limbs"].reshape(count, 2 * len(LIMBS), 4)
     return out.reshape(count, 4 * CASTER_ROWS)
+
+
+def packed_cabins(arrays: SceneArrays) -> NDArray[np.float32]:
+    """Return the fields of all `CABIN`, 18 numbers and two sides each, float32."""
+    cabins = arrays.prototypes.cabins
+    parts = [cabins[name].reshape(len(cabins), -1) for name in ("low", "high", "windows", "front", "rear")]
+    parts += [cabins["end_half"][:, None], cabins["sharp"], np.zeros((len(cabins), 2), np.float32)]
+    return np.concatenate([*parts, cabins["open"].reshape(len(cabins), -1)], axis=1)
 
 
 def packed_past(past: PastPlaces) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

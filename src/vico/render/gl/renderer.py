@@ -14,19 +14,31 @@ from vico.render.behind.panes import show_rooms
 from vico.render.cameras import Cameras
 from vico.render.frames import Frames, PictureRequest, light_of
 from vico.render.gl.culling import cluster_ranges, instances_in_view, joined_ranges
-from vico.render.gl.moving import CASTER_ROWS, packed_casters, packed_past
+from vico.render.gl.moving import CASTER_ROWS, packed_cabins, packed_casters, packed_past
 from vico.render.lighting import TONE_RANGE, TONE_STEPS
+from vico.render.records import CABIN_STEPS
 from vico.render.scene import Scene
 from vico.render.sensors.past import PastPlaces
 from vico.render.shading.finishing import occlude, smooth_edges
 from vico.render.shading.light import Light
 from vico.render.shading.sky import SKY_SIZE
 from vico.render.shading.weather import draw_weather
+from vico.render.shadows import cabins
 from vico.render.textures import LEVELS
 from vico.render.uniforms import Record, camera_uniforms
 
 _HERE = Path(__file__).parent
 _NOBODY = 1
+# What shaders share with the processor's renderer.
+_CONSTANTS = {
+    "CASTER_ROWS": CASTER_ROWS,
+    "CABIN_STEPS": CABIN_STEPS,
+    "UNDER_ROOF": cabins.UNDER_ROOF,
+    "CABIN_LAMP": cabins.CABIN_LAMP,
+    "CABIN_TILT": cabins.CABIN_TILT,
+    "CABIN_GREEN": cabins.CABIN_GREEN,
+    "CABIN_BLUE": cabins.CABIN_BLUE,
+}
 # The sky is this far away, metres: only turning moves it.
 _SKY = 1e7
 
@@ -215,6 +227,7 @@ class GlRenderer:
             self._buffer("materials", 3, textures.materials)
             self._buffer("starts", 4, textures.start.astype(np.int32))
             self._buffer("texels", 5, textures.texels)
+            self._buffer("cabins", 15, packed_cabins(arrays))
         elif int(arrays.counts["avatars"]):
             spans = arrays.avatars.span
             first, last = int(spans["first_vertex"].min()), int(spans["end_vertex"].max())
@@ -325,7 +338,9 @@ def _context() -> Any:
 
 def _sources(name: str) -> tuple[str, str]:
     """Return the sources of a program's vertex and fragment shader."""
-    fragment = (_HERE / f"{name}.frag").read_text().replace("%CASTER_ROWS%", str(CASTER_ROWS))
+    fragment = (_HERE / f"{name}.frag").read_text()
+    for constant, value in _CONSTANTS.items():
+        fragment = fragment.replace(f"%{constant}%", str(value))
     return (_HERE / f"{name}.vert").read_text(), fragment
 
 

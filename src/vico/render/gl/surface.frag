@@ -7,6 +7,7 @@ layout(std430, binding = 11) readonly buffer Windows { float windows[]; };  // s
 layout(std430, binding = 9) readonly buffer Tone { int tone[]; };
 
 layout(std430, binding = 12) readonly buffer Casters { vec4 casters[]; };  // see `packed_casters`
+layout(std430, binding = 15) readonly buffer Cabins { float cabins[]; };  // see `packed_cabins`
 
 uniform usampler2D closeness;
 uniform sampler2D relief;
@@ -145,20 +146,56 @@ float limbs_shadow(int at, int count, vec3 p) {
     return darkest * darkest * (3.0 - 2.0 * darkest);
 }
 
-// What moving things leave of the sun, and of the light at the ground.
-vec2 left_by_moving() {
-    vec2 left = vec2(1.0);
+const int CABIN_STEPS = %CABIN_STEPS%;
+const int CABIN_SIZE = 18 + 2 * CABIN_STEPS;
+
+float within(float depth_) {
+    return clamp(depth_ + 0.5, 0.0, 1.0);
+}
+
+// What windows let in of the sun into a vehicle; below 0 outside of it. `vico.render.shadows.cabins`
+float sun_in_cabin(int cabin, vec3 p, vec3 to) {
+    int at = CABIN_SIZE * cabin;
+    vec3 low = vec3(cabins[at], cabins[at + 1], cabins[at + 2]), high = vec3(cabins[at + 3], cabins[at + 4], cabins[at + 5]);
+    if (any(lessThanEqual(p, low)) || any(greaterThanEqual(p, high))) return -1.0;
+    vec3 inverse;
+    for (int k = 0; k < 3; k++) inverse[k] = 1.0 / (abs(to[k]) > 1e-9 ? to[k] : 1e-9);
+    vec3 ways = (mix(low, high, greaterThan(inverse, vec3(0.0))) - p) * inverse;
+    vec3 hit = p + min(ways.x, min(ways.y, ways.z)) * to;
+    float sharp_b = cabins[at + 14], sharp_c = cabins[at + 15];
+    if (ways.y <= ways.x && ways.y <= ways.z) {
+        float along = clamp((hit.x + 1.0) * 0.5, 0.0, 1.0) * float(CABIN_STEPS - 1);
+        int k = min(int(along), CABIN_STEPS - 2), side = at + 18 + (inverse.y > 0.0 ? CABIN_STEPS : 0);
+        float open = mix(cabins[side + k], cabins[side + k + 1], along - float(k));
+        return open * within((hit.z - cabins[at + 6]) * sharp_c) * within((cabins[at + 7] - hit.z) * sharp_c);
+    }
+    if (ways.x < ways.y && ways.x <= ways.z) {
+        int end = at + (inverse.x > 0.0 ? 8 : 10);
+        return within((hit.z - cabins[end]) * sharp_c) * within((cabins[end + 1] - hit.z) * sharp_c)
+            * within((cabins[at + 12] - abs(hit.y)) * sharp_b);
+    }
+    return 0.0;
+}
+
+// What moving things leave of the sun, and of the light at the ground; and whether this is inside a vehicle.
+vec3 left_by_moving() {
+    vec3 left = vec3(1.0, 1.0, 0.0);
     vec2 pixel = floor(gl_FragCoord.xy);
     vec4 here = vec4(place, 1.0);
     for (int k = 0; k < caster_count; k++) {
         int row = CASTER_ROWS * k;
         vec4 part = casters[row + 4], kind = casters[row + 5];
         if (pixel.x < part.x || pixel.x >= part.y || pixel.y < part.z || pixel.y >= part.w) continue;
-        ivec2 owner = floatBitsToInt(casters[row + 10].xy);
-        if (owner.x >= 0 ? item == owner.x : (is_person != 0 && entity == owner.y)) continue;
+        ivec3 owner = floatBitsToInt(casters[row + 10].xyz);
+        bool own = owner.x >= 0 ? item == owner.x : (is_person != 0 && entity == owner.y);
         float above = place.z - kind.x;
-        if (above > kind.y || above < -6.0) continue;
+        if ((own && owner.z < 0) || above > kind.y || above < -6.0) continue;
         vec3 unit = vec3(dot(casters[row], here), dot(casters[row + 1], here), dot(casters[row + 2], here));
+        if (owner.z >= 0) {
+            float sunlit = sun_in_cabin(owner.z, unit, casters[row + 3].xyz);
+            if (sunlit >= 0.0) left *= vec3(sunlit, %UNDER_ROOF%, 1.0), left.z = 1.0;
+            if (own || sunlit >= 0.0) continue;
+        }
         bool is_round = kind.z > 0.5;
         if (indoors == 0) {
             vec4 sun_ = casters[row + 3];
@@ -251,13 +288,13 @@ void main() {
     }
     vec3 light;
     float seen = 0.0;
-    vec2 left = left_by_moving();
+    vec3 left = left_by_moving();
     if (indoors != 0) {
         light = in_room(at, n, base.rgb, levels > 0 ? emission * base.a : 0.0) * (0.4 + 0.6 * left.y);
     } else {
         bool dark = unlit.z > 0.0 && moves == 0 && distance(at.xy, unlit.xy) <= unlit.z;
         float shine = dark ? 0.0 : emission * lamp_exposure * base.a;
-        if (is_person == 0) {
+        if (is_person == 0 && left.z == 0.0) {
             float ground = clamp(n.z * 8.0 - 6.6, 0.0, 1.0);
             float share = clamp((n.z - 0.25) * 2.2, 0.0, 1.0);
             share = snow_cover * share * share * (3.0 - 2.0 * share);
@@ -282,6 +319,7 @@ void main() {
         vec3 around = (ambient + n.z * tilt + dot(n.xy, side)) * sky_share(at, n) * left.y;
         light = base.rgb * (facing * sun_colour + around + shine * vec3(1.0, 0.86, 0.62));
         light = (1.0 - clear) * (haze + glow * sun_colour) + clear * light;
+        light += left.z * lamp_exposure * (%CABIN_LAMP% + %CABIN_TILT% * n.z) * vec3(1.0, %CABIN_GREEN%, %CABIN_BLUE%) * base.rgb;
         if (interiors > 0.0 && column > 0 && levels > 0) {
             float ahead = max(-dot(place.xy, n.xy) / max(length_, 1e-12), 0.02);
             float pane = min(base.a * 50.0, 1.0) * clamp(1.0 - 3.0 * abs(n.z), 0.0, 1.0);

@@ -56,6 +56,8 @@ from vico.render.shading.fields import (
     Z,
 )
 from vico.render.shading.interiors import look_into_windows
+from vico.render.shadows.cabins import CABIN_BLUE, CABIN_GREEN, CABIN_LAMP, CABIN_TILT
+from vico.render.shadows.moving import CABINS, NO_SHADOWS
 
 
 class PixelQueue(NamedTuple):
@@ -81,13 +83,16 @@ class MovingShadows(NamedTuple):
     ----------
     sun, contact
         0..1, float32, shape ``(h * w,)``.
-    any
-        Whether there are any; else the arrays hold nothing.
+    inside
+        1 in vehicles with windows, float32, shape ``(h * w,)``.
+    found
+        What `cast_moving` returned: with NO_SHADOWS the arrays hold nothing, with SHADOWS `inside` does not.
     """
 
     sun: NDArray[np.float32]
     contact: NDArray[np.float32]
-    any: bool
+    inside: NDArray[np.float32]
+    found: int
 
 
 _ZERO, _HALF, _ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)
@@ -412,10 +417,30 @@ def cover_ground(light: Any, real: Any) -> None:
 
 
 @kernel
+def _take_under_roof(inside: Any, real: Any, whole: Any) -> None:
+    """Leave word in `SKY` that neither rain nor snow falls into vehicles."""
+    for i in range(QUEUE):
+        if inside[whole[PIXEL + i]] > _ZERO:
+            real[SKY + i] = -abs(real[SKY + i])
+
+
+@kernel
+def _light_cabins(lamps: Any, inside: Any, real: Any, whole: Any) -> None:
+    """Add the light of lamps under their ceilings to what is seen in vehicles: change rows of the tone table."""
+    for i in range(QUEUE):
+        lamp = lamps * inside[whole[PIXEL + i]] * (CABIN_LAMP + CABIN_TILT * real[NZ + i]) * _TONE_SCALE
+        a = np.float32(np.int32(whole[I0 + i])) + lamp * real[RED + i]
+        b = np.float32(np.int32(whole[I1 + i])) + lamp * real[GREEN + i] * CABIN_GREEN
+        c = np.float32(np.int32(whole[I2 + i])) + lamp * real[BLUE + i] * CABIN_BLUE
+        whole[I0 + i], whole[I1 + i] = np.int32(min(a, _TONE_LAST)), np.int32(min(b, _TONE_LAST))
+        whole[I2 + i] = np.int32(min(c, _TONE_LAST))
+
+
+@kernel
 def finish(light: Any, camera: Any, texels: Any, queue: Any, moving: Any, count: int, taps: int, out: Any) -> None:
     """Colour the first `count` places of the queue and write their pixels; `out` has one dimension."""
     real, whole, tone = queue.real, queue.whole, light.tone
-    if moving.any:
+    if moving.found != NO_SHADOWS:
         sun, contact = moving.sun, moving.contact
         for i in range(QUEUE):
             pixel = whole[PIXEL + i]
@@ -425,12 +450,16 @@ def finish(light: Any, camera: Any, texels: Any, queue: Any, moving: Any, count:
         light_room(camera, real, whole)
     else:
         if light.uniforms.snow_cover > _ZERO or light.uniforms.wet > _ZERO:
+            if moving.found == CABINS:
+                _take_under_roof(moving.inside, real, whole)
             cover_ground(light.uniforms, real)
         if light.uniforms.shadow_softness > _ZERO:
             soft_sun_visibility(light.uniforms, light.shadow, real, whole)
         else:
             sun_visibility(light.uniforms, light.shadow, real, whole)
         light_outdoors(light.uniforms, camera, real, whole)
+        if moving.found == CABINS and light.uniforms.lamp_exposure > _ZERO:
+            _light_cabins(light.uniforms.lamp_exposure, moving.inside, real, whole)
         if light.uniforms.interiors > _ZERO:
             glass = queue.glass
             if look_into_windows(light.uniforms, camera, taps > 0, real, whole):

@@ -130,18 +130,16 @@ class _TextureWindow(NamedTuple):
 
 
 @kernel
-def shade(
-    scene: Any, camera: Any, light: Any, buffers: Any, drawn: int, any_moving: bool, partly: bool, out: Any
-) -> None:
+def shade(scene: Any, camera: Any, light: Any, buffers: Any, drawn: int, shadows: int, partly: bool, out: Any) -> None:
     """Colour every pixel of one camera's picture, or `partly` the runs of pixels that `mark_changed` touched.
 
-    `drawn` is what `draw` returned, `any_moving` what `cast_moving` did.
+    `drawn` is what `draw` returned, `shadows` what `cast_moving` did.
     """
     # Everything is looked up once, out here: taking an array out of a tuple costs as much as shading a pixel.
     keys, setups, known, changed = buffers.keys, buffers.setup, buffers.setup_number, buffers.changed
     real, whole, sky_real, sky_whole = buffers.real, buffers.whole, buffers.sky_real, buffers.sky_whole
     queue, sky_queue = PixelQueue(real, whole, buffers.glass), PixelQueue(sky_real, sky_whole, buffers.glass)
-    moving = MovingShadows(buffers.sun, buffers.contact, any_moving)
+    moving = MovingShadows(buffers.sun, buffers.contact, buffers.inside, shadows)
     texels, texel_start, materials = scene.textures.texels, scene.textures.start, scene.textures.materials
     sky, relief, relief_height = light.sky, light.relief, light.relief.height
     relief_frame = _ReliefFrame(relief.x, relief.y, relief.texels_per_metre)

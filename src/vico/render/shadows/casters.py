@@ -8,6 +8,7 @@ import numpy as np
 
 from vico.render.compiled import inlined, kernel
 from vico.render.records import CASTER
+from vico.render.shadows.cabins import CABIN_REACH
 from vico.render.shadows.people import set_limbs
 from vico.render.uniforms import Record
 
@@ -85,6 +86,19 @@ def is_sphere_far(sphere: Any, camera: Any, reach: float) -> bool:
     # The sphere's centre is the caster's, but for rounding.
     x, y, z = float(sphere.x) - camera.x, float(sphere.y) - camera.y, float(sphere.z) - camera.z
     return x * x + y * y + z * z > (reach + _SLACK) * (reach + _SLACK)
+
+
+@inlined
+def instance_reach(sphere: Any, cabin: Any, camera: Any, reach: float) -> float:
+    """Return how near an instance must be to darken anything, metres: `reach`, or more of lit insides; 0 if it isn't.
+
+    `cabin` is below 0 of what has none. A quick first test, as `is_sphere_far`.
+    """
+    if not is_sphere_far(sphere, camera, reach):
+        return reach
+    if cabin < 0 or camera.indoors != 0 or is_sphere_far(sphere, camera, CABIN_REACH):
+        return 0.0
+    return CABIN_REACH
 
 
 @inlined
@@ -173,8 +187,10 @@ def list_casters(scene: Any, camera: Any, light: Any, casters: Any, numbers: Any
     Return how many there are.
     """
     reach, instances, count = shadow_reach(camera), scene.counts.instances, 0
+    spheres, models, cabin_of = scene.instances.sphere, scene.instances.prototype, scene.prototypes.cabin
     for k in range(scene.counts.static_instances, instances + scene.counts.avatars):
-        if set_caster(scene, k, camera, light, reach, casters[count]):
+        within = instance_reach(spheres[k], cabin_of[models[k]], camera, reach) if k < instances else reach
+        if within > 0.0 and set_caster(scene, k, camera, light, within, casters[count]):
             numbers[count] = k
             count += 1
     return count
@@ -200,7 +216,9 @@ def set_caster(scene: Any, k: int, camera: Any, light: Any, reach: float, caster
     caster.inverse_soft = 1.0 / (_SOFT_BALL if avatar >= 0 else _soft_length(axes))
     if not _set_unit_frame(caster, light):
         return False
-    caster.limb_count = 0
+    caster.limb_count, caster.cabin = 0, -1
+    if avatar < 0 and camera.indoors == 0:
+        caster.cabin = scene.prototypes.cabin[scene.instances.prototype[k]]
     if avatar >= 0 and camera.indoors == 0 and len(scene.avatars.limbs) > avatar and _is_large(caster, camera):
         set_limbs(scene.avatars.limbs[avatar], light, caster)
         _widen(scene.avatars.low[avatar], scene.avatars.high[avatar], axes)

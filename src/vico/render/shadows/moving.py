@@ -8,7 +8,8 @@ import numpy as np
 
 from vico.render.arrays import PAD, STRIDE
 from vico.render.compiled import inlined, kernel
-from vico.render.shadows.casters import DEEPEST, TALLEST, is_box_far, is_sphere_far, set_caster, shadow_reach
+from vico.render.shadows.cabins import INSIDE, UNDER_ROOF, sun_in_cabin
+from vico.render.shadows.casters import DEEPEST, TALLEST, instance_reach, is_box_far, set_caster, shadow_reach
 from vico.render.shadows.people import limb_shadow
 from vico.render.visibility.fill import inverse_depth, triangle_number
 
@@ -24,40 +25,53 @@ _INDEX = 0x7FFFFFFF
 _DEPTH, _REACHED, _ABOVE, _UNIT_A, _UNIT_B, _UNIT_C, _LEFT = (k * STRIDE for k in range(7))
 
 
+#: What `cast_moving` found: nothing, shadows, insides of vehicles as well.
+NO_SHADOWS, SHADOWS, CABINS = 0, 1, 2
+
+
 @kernel
-def cast_moving(scene: Any, camera: Any, light: Any, buffers: Any, caster: Any) -> bool:
+def cast_moving(scene: Any, camera: Any, light: Any, buffers: Any, caster: Any) -> int:
     """Darken `buffers.sun` and `buffers.contact` where moving things stand between a pixel and the sun or the ground.
 
     Rigid things cast the shadow of their bounding box; the longer the light's way through it, the darker, which
-    softens the rim. Avatars cast that of their limbs, far ones that of an ellipsoid. What is far is passed over. Return
-    whether there was anything.
+    softens the rim. Avatars cast that of their limbs, far ones that of an ellipsoid. What is far is passed over. What
+    is in a vehicle with windows gets the sun by these; `buffers.inside` tells where that is. Return NO_SHADOWS, SHADOWS
+    or CABINS.
     """
     reach = shadow_reach(camera)
     # Taken out of their tuples once: that costs as much as a caster that is far away.
     clusters, base, slots = len(scene.cluster_where), buffers.base, buffers.slot
-    spheres, lows, highs = scene.instances.sphere, scene.avatars.low, scene.avatars.high
+    spheres, models, cabin_of = scene.instances.sphere, scene.instances.prototype, scene.prototypes.cabin
+    lows, highs, cabins = scene.avatars.low, scene.avatars.high, scene.prototypes.cabins
     instances = scene.counts.instances
-    started = False
+    found = NO_SHADOWS
     for k in range(scene.counts.static_instances, instances + scene.counts.avatars):
+        within = reach
         if k < instances:
-            far = is_sphere_far(spheres[k], camera, reach)
+            within = instance_reach(spheres[k], cabin_of[models[k]], camera, reach)
+            far = within == 0.0
         else:
             far = is_box_far(lows[k - instances], highs[k - instances], camera, reach)
-        if far or not set_caster(scene, k, camera, light, reach, caster):
+        if far or not set_caster(scene, k, camera, light, within, caster):
             continue
-        if not started:
+        if found == NO_SHADOWS:
             buffers.sun[:] = np.float32(1.0)
             buffers.contact[:] = np.float32(1.0)
-            started = True
+            found = SHADOWS
         slot = slots[clusters + k]
         own, own_end = 0, 0
         if slot >= 0:
             own, own_end = base[slot], base[slot + 1]
         if caster.limb_count > 0:
             _darken_by_limbs(camera, buffers, caster, own, own_end)
+        elif caster.cabin >= 0:
+            if found != CABINS:
+                buffers.inside[:] = np.float32(0.0)
+                found = CABINS
+            _darken_with_cabin(camera, buffers, caster, cabins[caster.cabin], own, own_end)
         else:
             _darken(camera, buffers, caster, own, own_end)
-    return started
+    return found
 
 
 @kernel
@@ -93,6 +107,35 @@ def _darken(camera: Any, buffers: Any, caster: Any, own: int, own_end: int) -> N
                 _multiply(sun, pixel, end_column - column, real)
             _contact_of_block(is_round, real)
             _multiply(contact, pixel, end_column - column, real)
+
+
+@kernel
+def _darken_with_cabin(camera: Any, buffers: Any, caster: Any, cabin: Any, own: int, own_end: int) -> None:
+    """Darken the pixels that a vehicle with windows may reach, as `_darken` does, and its inside by its roof."""
+    keys, real, sun, contact, inside = buffers.keys, buffers.real, buffers.sun, buffers.contact, buffers.inside
+    soft = np.float32(caster.inverse_soft)
+    sun_way, width, first_column, end_column = caster.sun, camera.width, caster.first_column, caster.end_column
+    line_a, line_b, line_c = _unit_line(camera, caster, 0), _unit_line(camera, caster, 1), _unit_line(camera, caster, 2)
+    height = _line(camera, 0.0, 0.0, 1.0, -caster.foot)
+    tallest = np.float32(TALLEST * caster.half_height)
+    for row in range(caster.first_row, caster.end_row):
+        for column in range(first_column, end_column, _BLOCK):
+            pixel = (row * width + column) & _INDEX
+            _unpack_block(keys, pixel, np.uint32(own), np.uint32(own_end), real)
+            _lay_line(height, row, column, _ABOVE, real)
+            _take_out_unreached(tallest, real)
+            _lay_line(line_a, row, column, _UNIT_A, real)
+            _lay_line(line_b, row, column, _UNIT_B, real)
+            _lay_line(line_c, row, column, _UNIT_C, real)
+            _shadow_of_block(sun_way, soft, False, real)
+            sun_in_cabin(cabin, sun_way, real)
+            _multiply(sun, pixel, end_column - column, real)
+            _contact_of_block(False, real)
+            for i in range(_BLOCK):
+                real[_LEFT + i] = UNDER_ROOF if real[INSIDE + i] > _ZERO else real[_LEFT + i]
+            _multiply(contact, pixel, end_column - column, real)
+            for i in range(_BLOCK):
+                inside[pixel + i] = max(inside[pixel + i], real[INSIDE + i] if i < end_column - column else _ZERO)
 
 
 @kernel

@@ -322,16 +322,16 @@ def item_of(base: Any, drawn: int, number: int) -> int:
 
 
 @kernel
-def mark_changed(buffers: Any, kept: Any, any_moving: bool) -> None:
+def mark_changed(buffers: Any, kept: Any, moving: int) -> None:
     """Mark in `buffers.changed` what shows something else than the keys `kept`, or lies in a moving thing's shadow.
 
-    `any_moving` is what `cast_moving` returned.
+    `moving` is what `cast_moving` returned.
     """
     keys, sun, contact, changed = buffers.keys, buffers.sun, buffers.contact, buffers.changed
     one = np.float32(1.0)
     for i in range(len(changed)):
         changed[i] = keys[i] != kept[i]
-    if any_moving:
+    if moving:
         for i in range(len(changed)):
             changed[i] |= (sun[i] != one) | (contact[i] != one)
 

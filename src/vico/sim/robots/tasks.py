@@ -16,7 +16,8 @@ from vico.exact import apply_matrix
 from vico.sim.bodies import Bodies
 from vico.sim.physics.records import Base
 from vico.sim.quaternions import matrix_of
-from vico.sim.robots.arm import Chain, hand_pose, reach_pose, solve
+from vico.sim.robots.arm import hand_pose, reach_pose
+from vico.sim.robots.arm_ways import CARRY, downward, way_down, way_to_carry
 from vico.sim.robots.decks import deck_spot, way_beside_deck
 from vico.sim.robots.manipulator import ARM_GOAL, ARM_NOW
 from vico.sim.robots.path_follower import RobotStatus
@@ -30,16 +31,15 @@ Array = NDArray[np.float64]
 
 #: Metres from the base's middle to what the hand reaches for, tried one after the other; how exact that is.
 STANDOFFS, _EXACT = (0.60, 0.54, 0.66), 0.03
-#: Metres the hand comes from above, and lifts; room beside a thing for each finger.
-ABOVE, LIFT, ROOM = 0.14, 0.16, 0.02
-#: Where the hand carries what it holds, in the base's frame, and its tilts that are tried, rad.
-CARRY = np.array([0.46, -0.17, 0.78])
+#: Metres the hand lifts; room beside a thing for each finger.
+LIFT, ROOM = 0.16, 0.02
+# Tilts of the hand that are tried, rad.
 _TILTS = (0.0, 0.25, -0.25, 0.5, -0.5)
 _NEAR, _NEAR_ENOUGH, _STRAIGHT, _TURN = 1.1, 2.2, 0.25, 0.9
 _DONE = {Kind.PICK: "picked", Kind.PLACE: "placed", Kind.OFFER: "handed_over"}
 # Metres before a person, and above the ground there, that things are held out to them.
 _ARM_LENGTH, _HELD_OUT = 0.45, 0.95
-_STEP = 0.012  # metres between two points of a straight way of the hand
+_LOW = 0.05  # metres below where things are carried that make a hand low
 _GRIP_TIME, _STALE, _SETTLED = 1.2, 25.0, 0.02
 _PEOPLE = 0.9  # metres ahead of the base in which nobody may be
 
@@ -73,8 +73,10 @@ def begin(run: RobotRun, robot: int, kind: Kind, target: Array, entity: int = 0)
     """
     work, row, _ = _work(run, robot, kind.name.lower())
     a = work.arrays
-    a.kind[row], a.stage[row], a.entity[row], a.target[row] = kind, Stage.GO, entity, target
+    a.kind[row], a.entity[row], a.target[row] = kind, entity, target
+    a.stage[row] = Stage.RAISE if kind == Kind.PLACE and not _is_raised(run, robot, work) else Stage.GO
     a.timer[row], a.tries[row] = 0.0, 0
+    work.ways[row] = work.no_way()
     run.set_mode(robot, RobotMode.TASK)
     path = None
     if kind == Kind.PLACE and entity:
@@ -180,6 +182,9 @@ def decide_task(run: RobotRun, robot: int, everybody: Bodies, dt: float) -> bool
     a = work.arrays
     run.arrays.status[robot] = RobotStatus.MOVING
     stage = Stage(int(a.stage[row]))
+    if stage == Stage.RAISE and not len(work.ways[row]):
+        work.ways[row] = way_to_carry(work.chain, memory[ARM_NOW][:7] + work.model.rest[:7])
+        a.point[row] = 0
     if stage == Stage.GO:
         away = float(np.hypot(*(a.target[row] - run.position(robot))[:2]))
         waits = run.followers[robot].status == RobotStatus.WAITING and away < _NEAR_ENOUGH
@@ -206,6 +211,13 @@ def decide_task(run: RobotRun, robot: int, everybody: Bodies, dt: float) -> bool
     else:
         _move(run, robot, work, row, memory)
     return False
+
+
+def _is_raised(run: RobotRun, robot: int, work: Work) -> bool:
+    """Return whether the hand is as high as things are carried: somebody may want them put down before they are."""
+    poses = np.empty((7, 3)), np.empty((7, 3)), np.empty((3, 4))
+    hand_pose(work.chain, run.engine.joints(robot)[0][:7].copy(), *poses)
+    return float(poses[2][2, 3]) > CARRY[2] - _LOW
 
 
 def _next(work: Work, row: int, stage: Stage) -> None:
@@ -256,15 +268,6 @@ def _object(run: RobotRun, entity: int) -> tuple[MovableObjects, int] | None:
     return (objects, int(found[0])) if len(found) else None
 
 
-def _downward(x: Array, along: Array, tilt: float) -> Array:
-    """Pose of a hand at a point that points down and opens along a level direction, tilted about that."""
-    c, s = math.cos(tilt), math.sin(tilt)
-    side = np.array([along[1], -along[0], 0.0])
-    z = -c * np.array([0.0, 0.0, 1.0]) + s * side
-    y = np.array([along[0], along[1], 0.0])
-    return np.column_stack([np.cross(y, z), y, z, x])
-
-
 def _plan(run: RobotRun, robot: int, work: Work, row: int, memory: Array) -> None:
     """Plan the arm's way from where the base stands now, or try another standoff."""
     a, base = work.arrays, run.engine.base(robot)
@@ -277,7 +280,13 @@ def _plan(run: RobotRun, robot: int, work: Work, row: int, memory: Array) -> Non
     opening = work.opening
     if goals is not None and kind == Kind.PICK:
         goals, opening = goals[:-1], goals[-1][0, 3]
-    way = None if goals is None else _way(work, memory, goals, straight=kind in (Kind.PICK, Kind.PLACE))
+    now = work.model.rest[:7] + memory[ARM_NOW][:7]
+    way: tuple[Array, int] | None = None
+    if goals is not None and kind in (Kind.PICK, Kind.PLACE):
+        way = way_down(work.chain, now, goals, holds=kind == Kind.PLACE)
+    elif goals is not None:
+        reached = (reach_pose(work.chain, goal, now) for goal in goals)
+        way = next(((angles[None], 0) for angles in reached if angles is not None), None)
     if way is None:
         a.tries[row] += 1
         if a.tries[row] >= len(STANDOFFS):
@@ -304,7 +313,7 @@ def _goals(run: RobotRun, work: Work, row: int, base: Base, kind: Kind) -> list[
     at = _in_base(base, target)
     out = at[:2] / max(float(np.hypot(*at[:2])), 1e-6)
     aside = np.array([-out[1], out[0]])
-    return [_downward(at, aside * sign, tilt) for tilt in _TILTS for sign in (1.0, -1.0)]
+    return [downward(at, aside * sign, tilt) for tilt in _TILTS for sign in (1.0, -1.0)]
 
 
 def _grasps(work: Work, base: Base, objects: MovableObjects, k: int) -> list[Array] | None:
@@ -325,42 +334,11 @@ def _grasps(work: Work, base: Base, objects: MovableObjects, k: int) -> list[Arr
         along = apply_matrix(turn[:, axis], base.rotation.T)[:2]
         along = along / max(float(np.hypot(*along)), 1e-6)
         at = _in_base(base, grip)
-        found += [_downward(at, along * sign, tilt) for tilt in _TILTS for sign in (1.0, -1.0)]
+        found += [downward(at, along * sign, tilt) for tilt in _TILTS for sign in (1.0, -1.0)]
         last = np.zeros((3, 4))
         last[0, 3] = opening
         return [*found, last]
     return None
-
-
-def _way(work: Work, memory: Array, goals: list[Array], *, straight: bool) -> tuple[Array, int] | None:
-    """Angles from above a pose down to it and up again, of the first pose that can be reached; and where it is down."""
-    now = work.model.rest[:7] + memory[ARM_NOW][:7]
-    for goal in goals:
-        above = goal.copy()
-        above[2, 3] += ABOVE if straight else 0.0
-        first = reach_pose(work.chain, above, now)
-        if first is None:
-            continue
-        if not straight:
-            return np.stack([first]), 0
-        down = _line(work.chain, first, above, goal)
-        if down is None:
-            continue
-        return np.concatenate([first[None], down, down[::-1], first[None]]), len(down)
-    return None
-
-
-def _line(chain: Chain, angles: Array, start: Array, end: Array) -> Array | None:
-    """Angles along a straight way of the hand, shape ``(m, 7)``; None if it can't be gone."""
-    count = max(2, math.ceil(float(np.linalg.norm(end[:, 3] - start[:, 3])) / _STEP))
-    found, now = [], angles.copy()
-    for k in range(1, count + 1):
-        goal = start + (end - start) * (k / count)
-        before = now.copy()
-        if solve(chain, now, goal, 30) > 4e-3 or np.abs(now - before).max() > 0.35:
-            return None
-        found.append(now.copy())
-    return np.array(found)
 
 
 def _move(run: RobotRun, robot: int, work: Work, row: int, memory: Array) -> None:
@@ -380,7 +358,9 @@ def _move(run: RobotRun, robot: int, work: Work, row: int, memory: Array) -> Non
     if not there:
         return
     kind = Kind(int(a.kind[row]))
-    if stage == Stage.MOVE and kind == Kind.REACH:
+    if stage == Stage.RAISE:
+        _next(work, row, Stage.GO)
+    elif stage == Stage.MOVE and kind == Kind.REACH:
         _finish(run, robot, work, row, "reached")
     elif stage == Stage.MOVE:
         _next(work, row, Stage.GRIP)
@@ -429,25 +409,9 @@ def _after_lift(run: RobotRun, robot: int, work: Work, row: int, memory: Array, 
                 _next(work, row, Stage.ALIGN)
             return
         a.held[row] = float(a.entity[row]), depth
-        work.ways[row] = _way_to_carry(work.chain, memory[ARM_NOW][:7] + work.model.rest[:7])
+        work.ways[row] = way_to_carry(work.chain, memory[ARM_NOW][:7] + work.model.rest[:7])
     a.point[row] = 0
     _next(work, row, Stage.TUCK)
-
-
-def _way_to_carry(chain: Chain, now: Array) -> Array:
-    """Angles from where the arm is to where it carries: straight, or else however the hand points down there."""
-    poses = np.empty((7, 3)), np.empty((7, 3)), np.empty((3, 4))
-    hand_pose(chain, now, *poses)
-    goal = poses[2].copy()
-    goal[:, 3] = CARRY
-    goal[2, 3] = max(CARRY[2], float(poses[2][2, 3]))
-    way = _line(chain, now, poses[2], goal)
-    if way is not None:
-        return way
-    turns = np.arange(8) * np.pi / 4
-    poses_there = (_downward(goal[:, 3], np.array([math.cos(turn), math.sin(turn)]), 0.0) for turn in turns)
-    found = [angles for pose in poses_there if (angles := reach_pose(chain, pose, now)) is not None]
-    return min(found, key=lambda angles: float(np.abs(angles - now).max()))[None] if found else now[None]
 
 
 def _depth_below_hand(run: RobotRun, robot: int, work: Work, objects: MovableObjects, k: int) -> float | None:

@@ -22,9 +22,9 @@ class Kind(IntEnum):
 
 
 class Stage(IntEnum):
-    """How far a task has come."""
+    """How far a task has come; what is to be put down is raised before anything else."""
 
-    GO, ALIGN, PLAN, MOVE, GRIP, LIFT, TUCK = range(7)
+    GO, ALIGN, PLAN, MOVE, GRIP, LIFT, TUCK, RAISE = range(8)
 
 
 @dataclass
