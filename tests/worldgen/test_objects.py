@@ -87,6 +87,22 @@ def test_whatever_stands_on_a_pavement_leaves_a_way_past(tags: dict[str, str], n
         assert max(2.2 - foot[:, 1].max(), foot[:, 1].min()) > 0.89
 
 
+def test_lamps_stand_at_both_kerbs_of_a_street_in_town_but_where_some_are_mapped_or_none_are_lit() -> None:
+    def lamps(mapped: Sequence[OsmNode] = (), **tags: str) -> list[tuple[float, float]]:
+        street = OsmWay(1, [1, 2], np.array([[-50.0, 0.0], [50.0, 0.0]]), False, {"highway": "residential"} | tags)
+        objects, _ = placed(
+            list(mapped), ways=[street], carriageway=shapely.box(-50, -3, 50, 3), solids=[shapely.box(-30, 12, 30, 20)]
+        )
+        return [(float(x), float(y)) for x, y in zip(objects.x, objects.y, strict=True)]
+
+    everywhere = lamps()
+    assert len(everywhere) == 4
+    assert all(3.0 < abs(y) < 5.5 for _, y in everywhere)
+    assert len({y > 0 for _, y in everywhere}) == 2
+    assert lamps(lit="no") == []
+    assert len(lamps([node(k, -40.0 + 20.0 * k, 4.5, highway="street_lamp") for k in range(5)])) == 5
+
+
 def test_posts_across_a_path_leave_it_open() -> None:
     path, hedge = shapely.box(-20, -1.5, 20, 1.5), [shapely.box(-20, 1.5, 20, 3), shapely.box(-20, -3, 20, -1.5)]
     posts = [node(k, 0.0, y, barrier="bollard") for k, y in enumerate((-1.2, -0.7, 0.0, 0.7, 1.2), 1)]

@@ -1,7 +1,7 @@
 """Street objects and plants: every thing OpenStreetMap maps at its place, with a model, a facing and a size.
 
 What the tags mean is in the modules beside this one; here everything gets its room. Order is rank: stops first, then
-barriers, which can't be moved, then mapped things, then what fills mapped areas.
+barriers, which can't be moved, then mapped things, then what fills mapped areas, then lamps where none are mapped.
 """
 
 from __future__ import annotations
@@ -29,10 +29,12 @@ from vico.worldgen.objects.barriers import barrier_wishes, gate_yaws
 from vico.worldgen.objects.catalogue import standing
 from vico.worldgen.objects.groups import group_wishes
 from vico.worldgen.objects.kinds import region, thing_of
+from vico.worldgen.objects.lamps import lamp_wishes
 from vico.worldgen.objects.site import Site
 from vico.worldgen.objects.trees import climate, planted_wishes, row_wishes, tree_wish
 from vico.worldgen.objects.wishes import Wish, direction
 
+_LAMPS = ("street_lamp", "lamp")  # kinds
 _TWIN_GAP = 0.3  # metres between two that are one, mapped twice
 _KERB_REACH = 9.0  # signals and signs are mapped on the street's middle
 _SWEPT = 0.36  # metres at each side of a lane that no vehicle's body sweeps, a little less than `vico check` allows
@@ -74,18 +76,21 @@ def objects_from_osm(
     -------
     Objects, list of Dropped
         By rank, and in the map's order; what found no room within reach, with the reason. What was planted only to
-        fill an area, and found no room, is no loss and not listed.
+        fill an area, or put up to light a street without mapped lamps, and found no room, is no loss and not listed.
     """
     half = osm.half
     models = street_models()
     site = Site(solids=solids, carriageway=carriageway, lanes=_swept(lanes), openings=openings, half=half)
     zone, where = climate(osm.frame, height), region(osm.frame)
+    mapped = [*_point_wishes(osm, seed, zone, where), *row_wishes(osm, seed, zone)]
+    lamps = np.array([wish.xy for wish in mapped if models[wish.prototype].kind in _LAMPS]).reshape(-1, 2)
     lots: list[tuple[list[Wish], bool]] = [
         (_transit_wishes(transit, carriageway), True),
         (barrier_wishes(osm, carriageway, openings, half), True),
-        ([*_point_wishes(osm, seed, zone, where), *row_wishes(osm, seed, zone)], True),
+        (mapped, True),
         (group_wishes(osm, openings, half, seed, where=where), True),
         (planted_wishes(osm, carriageway, openings, half, seed, zone), False),
+        (lamp_wishes(osm, carriageway, solids, lamps), False),
     ]
     rows: list[dict[str, Any]] = []
     dropped: list[Dropped] = []
