@@ -18,7 +18,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from vico.agents.indoor_walk import IndoorWalker
 from vico.agents.schedule import Stay, followers_of, stays_of
+from vico.agents.serving import Clerk
 from vico.agents.travel import Traveller
 from vico.assets.shapes import box
 from vico.clock import DAY, clock_of
@@ -130,6 +132,27 @@ class Passenger:
     def act(self, observation: dict, info: dict) -> dict:
         """Go on with the trip."""
         return self.traveller.towards(self.goal, observation, info) or {"type": "wait"}
+
+
+class Shopkeeper:
+    """An assistant who goes into a shop and stands behind its till."""
+
+    def __init__(self, public_map: PublicMap, place: str, seed: int) -> None:
+        self.place, door = place, public_map.place_by_id[place].entrances[0].position
+        self.door = float(door[0]), float(door[1])
+        self.traveller, self.walker = Traveller(public_map, rng(seed, "shopkeeper")), IndoorWalker()
+        self.clerk = Clerk(self.walk)
+
+    def walk(self, point: tuple[float, float, float], near: float, observation: dict, info: dict) -> dict | None:
+        """Get on within the shop."""
+        self.walker.notice(observation, info)
+        return self.walker.towards(observation, point, near=near)
+
+    def act(self, observation: dict, info: dict) -> dict:
+        """Go in, and to the till."""
+        if observation["state"]["place"] != self.place:
+            return self.traveller.towards(self.door, observation, info) or {"type": "enter", "place": self.place}
+        return self.clerk.towards(self.place, observation, info) or {"type": "wait"}
 
 
 class Crew:
@@ -387,7 +410,16 @@ class Casting:
         """Return somebody who shops."""
         scene = self.walk("08:00", "20:00", "{} shops", shops)
         _, stay = on_the_way(self.community, self.world, "08:00", "20:00", shops)
-        return replace(scene, views=("behind", "front"), begins=arrived(scene.follow, stay.place), search=0)
+        keeper = Shopkeeper(PublicMap.from_world(self.world), stay.place, self.seed)
+        return replace(
+            scene,
+            views=("behind", "front"),
+            begins=arrived(scene.follow, stay.place),
+            search=0,
+            config=scene.config | {"assistants": 1},
+            setup=lambda sim: sim.scenario.place_agent("assistant_0", keeper.door),
+            players={"assistant_0": keeper},
+        )
 
     def robots(self) -> Scene:
         """Return the crew at work, on the square of the world with the most room."""

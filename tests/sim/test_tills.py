@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import toy_city
+from vico.agents.indoor_walk import IndoorWalker
+from vico.agents.serving import Clerk
 from vico.sim.config import SimConfig
 from vico.sim.moves import place_in_room
 from vico.sim.simulation import Simulation
@@ -16,13 +18,14 @@ from vico.world.folder import World
 
 
 def shop() -> World:
-    """The toy city with a counter instead of the shop's table, its front to the south."""
+    """The toy city with a counter instead of the shop's table, its front to the south, with room behind it."""
     world = toy_city.world()
     objects = world.objects
     here = objects.room == "r_shop"
     world.__dict__["objects"] = replace(
         objects,
         kind=np.where(here, "counter", objects.kind),
+        y=np.where(here, 12.4, objects.y),
         yaw=np.where(here, -np.pi / 2, objects.yaw),
         size_x=np.where(here, 0.8, objects.size_x),
         size_y=np.where(here, 1.6, objects.size_y),
@@ -85,3 +88,30 @@ def test_who_is_far_off_or_has_no_money_is_told_so_and_who_walks_away_is_out(sim
     assert texts == ["leaves the line"]
     sim.step({"assistant_1": {"type": "queue"}})
     assert state.people.reason[1] == "queue: there is no till in this room"
+
+
+def test_somebody_who_works_there_goes_behind_the_till_and_is_the_only_one(sim: Simulation) -> None:
+    state = sim.state
+    (room,) = state.tills
+    behind = np.array(state.tills[room].behind)
+    for i in (0, 1):
+        place_in_room(i, room, state, near=state.tills[room].spots[-1])
+    walker = IndoorWalker()
+
+    def walk(point: tuple[float, float, float], near: float, observation: dict, info: dict) -> dict | None:
+        walker.notice(observation, info)
+        return walker.towards(observation, point, near=near)
+
+    clerk = Clerk(walk)
+    for _ in range(60):
+        observations, infos = sim.observe()
+        action = clerk.towards("today", observations["assistant_0"], infos["assistant_0"])
+        if action == {"type": "wait"}:
+            break
+        sim.step({"assistant_0": action})
+    assert clerk.serves
+    assert np.hypot(*(state.people.position[0, :2] - behind[:2])) < 0.25
+    assert abs(state.people.yaw[0] - behind[2]) % (2 * np.pi) < 0.2
+    infos = sim.observe()[1]
+    assert "counter" in infos["assistant_0"]
+    assert "counter" not in infos["assistant_1"]

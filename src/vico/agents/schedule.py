@@ -14,6 +14,7 @@ from vico.agents.conversation import Acquaintance, Conversation, Speaker
 from vico.agents.indoor_walk import IndoorWalker
 from vico.agents.residents import Residents
 from vico.agents.resting import SeatSeeker
+from vico.agents.serving import Clerk
 from vico.agents.state import AgentState, generator_state, restore_generator
 from vico.agents.stays import Item, Stay, stays_of, with_ways
 from vico.agents.strides import Stride, pace_in_time, paces_of
@@ -38,6 +39,7 @@ _STROLLING = ("leisure", "visit")
 _RUNNING = ("exercise",)
 _EATING = ("meal_home", "meal_out")
 _BUYING = ("shop", "meal_out")
+_SERVING = ("work",)
 # One looks out of the window again after so many seconds, if nothing happens before: in snow one sets out earlier.
 _LOOK_OUT = 900.0
 # How often who is stopped indoors steps aside instead of trying again.
@@ -91,6 +93,7 @@ class ScheduleFollower:
         self._indoors = IndoorWalker()
         self._seeker = SeatSeeker(self._step_towards)
         self._buyer = Buyer(self._step_towards)
+        self._clerk = Clerk(self._step_towards)
         # Whether it is about to sit down.
         self._seeks = False
         self._aside: list[Action] = []
@@ -143,6 +146,7 @@ class ScheduleFollower:
             "indoors": self._indoors.state(),
             "seeker": self._seeker.state(),
             "buyer": self._buyer.state(),
+            "clerk": self._clerk.state(),
             "seeks": self._seeks,
             "conversation": self._conversation.state(),
             "aside": [dict(action) for action in self._aside],
@@ -168,6 +172,7 @@ class ScheduleFollower:
         self._indoors.restore(state["indoors"])
         self._seeker.restore(state["seeker"])
         self._buyer.restore(state["buyer"])
+        self._clerk.restore(state["clerk"])
         self._seeks = bool(state["seeks"])
         self._conversation.restore(state["conversation"])
         arrived, stroll = state["arrived"], state["stroll"]
@@ -258,12 +263,9 @@ class ScheduleFollower:
             return self._sleep(observation, info)
         if self._posture == "lying":
             return self._become("standing")
-        if stay.tag in _BUYING:
-            step = self._buyer.towards(f"{stay.due:.0f} {stay.place}", observation, info)
-            if step is not None and self._posture == "sitting":
-                return self._become("standing")
-            if step is not None:
-                return step
+        step = self._business(stay, observation, info)
+        if step is not None:
+            return step if self._posture != "sitting" else self._become("standing")
         eats = stay.type == "meal" or stay.tag in _EATING
         if self._posture == "sitting":
             self._seeks = False
@@ -282,6 +284,19 @@ class ScheduleFollower:
             return {"type": "wait"}
         rest = second + min(_MOVE_EVERY - tick % _MOVE_EVERY, _DRINK_EVERY - tick % _DRINK_EVERY)
         return self._rest(time, rest, "wait" if tick % _DRINK_EVERY else "drink")
+
+    def _business(self, stay: Stay, observation: Observation, info: Info) -> Action | None:
+        """Return the next action of buying or serving at a till; None where there is nothing to do at one."""
+        errand = f"{stay.due:.0f} {stay.place}"
+        if stay.tag in _BUYING:
+            return self._buyer.towards(errand, observation, info)
+        if stay.tag not in _SERVING:
+            return None
+        step = self._clerk.towards(errand, observation, info)
+        if step == {"type": "wait"}:
+            time: float = observation["state"]["time"]
+            return self._rest(time, time + _MOVE_EVERY)
+        return step
 
     def _sleep(self, observation: Observation, info: Info) -> Action:
         """Go to bed; who finds none sits down, and looks for one again later."""

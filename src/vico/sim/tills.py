@@ -23,6 +23,7 @@ SPACING, LOST = 0.75, 2.5
 AT_SPOT = 0.8
 _LONGEST = 6
 _BEFORE = 0.45  # metres between a counter and whoever is served
+_BEHIND = (0.45, 0.35, 0.6)  # metres between it and whoever serves, tried one after the other
 _AIR = 0.03
 _DOORWAY = 0.8  # metres from a door, and from who comes in by it, that a line keeps clear
 _KINDS = ("counter", "bar_counter", "pastry_case")
@@ -31,10 +32,21 @@ _TRADE = (Category.STORE, Category.FOOD)
 
 @dataclass(frozen=True)
 class Till:
-    """A till: its room, and where people stand in line before it, whoever is served first; shape ``(k, 2)``."""
+    """A till.
+
+    Attributes
+    ----------
+    room
+        Where it is.
+    spots
+        Where people stand in line before it, whoever is served first, ENU metres, shape ``(k, 2)``.
+    behind
+        Where whoever serves stands, ENU metres, and which way they look, radians; None where there is no room.
+    """
 
     room: int
     spots: NDArray[np.float64]
+    behind: tuple[float, float, float] | None = None
 
 
 def tills_of(places: Sequence[Place], indoor: Indoor, objects: Objects) -> dict[int, Till]:
@@ -48,8 +60,18 @@ def tills_of(places: Sequence[Place], indoor: Indoor, objects: Objects) -> dict[
         x, y, yaw = (float(values[k]) for values in (objects.x, objects.y, objects.yaw))
         spots = _line(room, (x, y, yaw, float(objects.size_x[k]) / 2), indoor)
         if len(spots) and (room not in found or len(spots) > len(found[room].spots)):
-            found[room] = Till(room, spots)
+            found[room] = Till(room, spots, _post(room, (x, y, yaw, float(objects.size_x[k]) / 2), indoor))
     return found
+
+
+def _post(room: int, counter: tuple[float, float, float, float], indoor: Indoor) -> tuple[float, float, float] | None:
+    """Return where somebody stands behind a counter and looks over it; None if nobody can."""
+    x, y, yaw, depth = counter
+    for away in _BEHIND:
+        spot = x - (depth + away) * math.cos(yaw), y - (depth + away) * math.sin(yaw)
+        if indoor.gap(room, spot) > RADIUS + _AIR:
+            return *spot, yaw
+    return None
 
 
 def _line(room: int, counter: tuple[float, float, float, float], indoor: Indoor) -> NDArray[np.float64]:

@@ -21,6 +21,8 @@ from vico.sim.state import Posture, Vehicle
 
 #: How far off signals are told of, metres.
 SIGNALS_REACH = 60.0
+# Somebody as near as this to where one serves is who serves, metres.
+_TAKEN = 0.6
 
 # By number. Looking an enumeration's members up costs more than all the rest.
 _VEHICLES = {int(Vehicle.NONE): "", int(Vehicle.BUS): "bus", int(Vehicle.BIKE): "bike"}
@@ -36,6 +38,18 @@ def _till_of(state: SimulationState, i: int) -> dict[str, Any] | None:
     x, y = place[1].tolist()
     waits = bool(state.lines.room[i] == room)
     return {"stand": (x, y, float(state.indoor.floor[room])), "before": place[0], "waits": waits}
+
+
+def _counter_of(state: SimulationState, i: int) -> tuple[float, float, float, float] | None:
+    """Return where somebody may serve in its room, ENU metres and yaw; None where nobody can, or somebody does."""
+    p = state.people
+    till = state.tills.get(p.room.item(i))
+    if till is None or till.behind is None:
+        return None
+    x, y, yaw = till.behind
+    near = (p.room == till.room) & (np.hypot(p.position[:, 0] - x, p.position[:, 1] - y) < _TAKEN)
+    near[i] = False
+    return None if near.any() else (x, y, float(state.indoor.floor[till.room]), yaw)
 
 
 def _closed_to(state: SimulationState, i: int) -> list[str]:
@@ -109,6 +123,8 @@ class Told:
             found["closed_now"] = self._closed[i]
         if i < len(p) and (till := _till_of(self._state, i)) is not None:
             found["till"] = till
+        if i < len(p) and p.room.item(i) >= 0 and (counter := _counter_of(self._state, i)) is not None:
+            found["counter"] = counter
         if i not in self._eyes_of:
             return found
         view = self._in_view.of(self._eyes_of[i])
