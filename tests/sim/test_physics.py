@@ -95,6 +95,8 @@ def test_cells_near_a_solid_of_any_kind_are_marked_and_far_ones_are_not() -> Non
 
 def test_looking_for_solids_only_where_they_are_near_changes_nothing() -> None:
     walls = np.array([[4.0, 0.0, 1.0, 0.2, 0.2, 5.0, 1.0], [-3.0, 4.0, 1.0, 0.0, 0.2, 0.2, 1.0]])
+    # What the second robot stumbles over: each of its links asks for itself.
+    walls = np.vstack([walls, [0.2, 20.0, 0.02, 0.3, 0.15, 0.5, 0.02]])
     models = (robot_model("husky", packs=False), robot_model("go2", packs=False))
     scene = make_scene("mujoco", StaticScene(HeightField.flat(50.0), boxes=walls), models)
     assert isinstance(scene, MujocoScene)

@@ -63,6 +63,9 @@ class LooseObjects:
         self._loose = np.zeros(0, np.bool_)
         self._falling = np.zeros(0, np.bool_)
 
+    def __len__(self) -> int:
+        return len(self._objects)
+
     def update(self, robots: NDArray[np.float64]) -> None:
         """Decide who enters and who leaves.
 

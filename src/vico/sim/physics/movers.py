@@ -41,8 +41,9 @@ def _gaps(position, half_length, half_width, centres):  # type: ignore[no-untype
 
 
 @compiled
-def _poses(start, end, share):  # type: ignore[no-untyped-def]
-    """Return middle and yaw of everybody after a share of the way, the shorter way round."""
+def moved_poses(start, end, time):  # type: ignore[no-untyped-def]
+    """Return middle and yaw of everybody on the way, the shorter way round; arguments as in `KinematicBodies`."""
+    share = 1.0 if time[1] <= 0.0 else min(1.0, time[0] / time[1])
     out = np.empty(start.shape)
     for k in range(len(start)):
         for i in range(YAW):
@@ -130,9 +131,7 @@ class KinematicBodies:
 
     def poses(self) -> NDArray[np.float64]:
         """Middle and yaw of everybody now, shape ``(n, 4)``."""
-        gone, whole = self.time.tolist()
-        share = 1.0 if whole <= 0.0 else min(1.0, gone / whole)
-        found: NDArray[np.float64] = _poses(self.start, self.end, share)
+        found: NDArray[np.float64] = moved_poses(self.start, self.end, self.time)
         return found
 
     def arrays(self) -> dict[str, NDArray[Any]]:

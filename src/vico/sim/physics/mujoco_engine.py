@@ -28,28 +28,15 @@ from vico.sim.physics.mujoco_model import (
 )
 from vico.sim.physics.mujoco_parameters import Parameters
 from vico.sim.physics.mujoco_scene import CompiledScene, SharedModel
-from vico.sim.physics.mujoco_views import base_motion, motion_of, place_bodies
+from vico.sim.physics.mujoco_views import base_motion, begin_frame, motion_of, place_bodies, solved_contacts
+from vico.sim.physics.mujoco_warnings import PhysicsWarning, heard, listen
 from vico.sim.physics.records import Base, Contacts, Imu, Motion, ObjectMotion, Party, PhysicsError, RigidObject
-from vico.sim.physics.solids import find_near
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 _DOWN = np.array([0.0, 0.0, -1.0])
 _GRAVITY = np.array([0.0, 0.0, 9.81])
 #: Slower than this, m/s and rad/s, for so many seconds an object rests.
 _SLOW, _CALM_TIME = 0.03, 0.2
-
-
-class PhysicsWarning(RuntimeWarning):
-    """MuJoCo says that something is about to go wrong."""
-
-
-# MuJoCo calls back from C, where an exception would end the process: what it says is kept until the step is over.
-_SAID: list[str] = []
-
-
-def _take_note(message: str) -> None:
-    if len(_SAID) < 10:
-        _SAID.append(message)
 
 
 class MujocoEngine:
@@ -64,9 +51,7 @@ class MujocoEngine:
     """
 
     def __init__(self, scene: CompiledScene, places: NDArray[np.float64]) -> None:
-        # By default MuJoCo appends its warnings to a file in the folder people happen to be in.
-        if mujoco.get_mju_user_warning() is None:
-            mujoco.set_mju_user_warning(_take_note)
+        listen()
         places = np.asarray(places, np.float64)
         if places.shape != (len(scene.models), 3):
             raise InputError(f"physics: {len(scene.models)} robots need as many places x, y, yaw, not {places.shape}")
@@ -84,6 +69,7 @@ class MujocoEngine:
         self._contacts: NDArray[np.float64] | None = np.zeros((0, 9))
         self._gains_of: list[tuple[float, float] | None] = [None] * len(scene.models)
         self._near_solids = np.ones(len(scene.models), np.bool_)
+        self._links_meet = np.ones(len(scene.link_parts[0]), np.bool_)
         self._parked = np.zeros(len(scene.models), np.bool_)
         for robot, place in enumerate(places):
             position, quaternion = standing_pose(scene.height, scene.models[robot], place)
@@ -105,8 +91,11 @@ class MujocoEngine:
         self._qpos, self._qvel = self._data.qpos, self._data.qvel
         self._mocap_pos, self._mocap_quat = self._data.mocap_pos, self._data.mocap_quat
         self._ctrl = self._data.ctrl
+        self._link_motion = self._data.xpos, self._data.cvel, self._data.subtree_com
         self._size = mujoco.mj_stateSize(self._model, STATE)
         self._parameters = Parameters(scene)
+        # Seconds since MuJoCo computed where links are and how they move; negative: that was of another state.
+        self._links_age = -1.0
         scene.reset(self._data)
 
     def _move_to(self, scene: CompiledScene) -> None:
@@ -137,6 +126,7 @@ class MujocoEngine:
     def _forget(self) -> None:
         """Drop what was computed from a state that is no more."""
         self._bases: list[Base] = []
+        self._motions: dict[bytes, Motion] = {}
         self._kinematics_of = -1.0
 
     # Robots.
@@ -157,8 +147,13 @@ class MujocoEngine:
 
     def motion(self, robots: NDArray[np.int64]) -> Motion:
         """Motion of several robots of one kind."""
-        index = self.compiled.kind(robots)
-        return Motion(*motion_of(self._qpos, self._qvel, index.first, index.angle, index.rate))
+        key = robots.tobytes()
+        found = self._motions.get(key)
+        if found is None:
+            index = self.compiled.kind(robots)
+            found = Motion(*motion_of(self._qpos, self._qvel, index.first, index.angle, index.rate))
+            self._motions[key] = found
+        return found
 
     def motor_forces(self, robot: int) -> NDArray[np.float64]:
         """Torques of the motors in the last step."""
@@ -237,12 +232,14 @@ class MujocoEngine:
     def park(self, robot: int) -> None:
         """Take a robot out of the scene."""
         self._parked[robot] = True
+        self._links_age = -1.0
         self._rest(robot, parked_robot(robot))
         self._forget()
 
     def stand(self, robot: int, place: NDArray[np.float64]) -> None:
         """Stand a robot on the ground at rest."""
         self._parked[robot] = False
+        self._links_age = -1.0
         position, quaternion = standing_pose(self.compiled.height, self.compiled.models[robot], place)
         self._rest(robot, [*position, *quaternion])
         self._velocity_before[robot] = 0.0
@@ -374,24 +371,28 @@ class MujocoEngine:
 
     def step_in(self, shared: SharedModel, frames: int, frame: float, *, holding: bool | None = None) -> None:
         """Step, with the equations of a model of the same scene: its own for each thread of a batch."""
-        s, steps = self.compiled, SOLVER_STEPS[frame]
-        parked = np.flatnonzero(self._parked).tolist()
-        coordinates, cells = (self._qpos, self._qvel, s.first), (s.solids.away, s.solids.tops)
+        s, steps, movers = self.compiled, SOLVER_STEPS[frame], self._movers
+        parked = [robot for robot, out in enumerate(self._parked.tolist()) if out]
+        somebody = movers.entity != 0
+        told = (
+            (self._qpos, self._qvel, s.first, self._velocity_before),
+            (s.solids.away, s.solids.tops, s.solids.half, s.solids.reaches, self._near_solids),
+            (*s.link_parts, *self._link_motion, self._links_meet),
+            (movers.entity, movers.start, movers.end, movers.time),
+            (s.mover_mocap, self._mocap_pos, self._mocap_quat),
+        )
         self._forget()
         with shared.lock:
             self._parameters.hold(shared)
             firm = frame == FINE if holding is None else holding
             shared.set_frame(frame / steps, FRICTION[firm])
             for _ in range(frames):
-                find_near(cells, s.solids.half, s.solids.reaches, frame, coordinates, self._near_solids)
-                s.meet_solids(shared, self._near_solids)
                 for robot in parked:
                     self._rest(robot, parked_robot(robot))
-                if self._movers.moving:
-                    self._movers.advance(frame)
-                    self._move_movers()
-                self._velocity_before[:] = self._qvel[s.base_velocity]
+                begin_frame(frame, self._links_age, *told)
+                s.choose_pairs(shared, self._links_meet, somebody)
                 self._step_data(shared, steps)
+                self._links_age = frame / steps
                 if s.slots:
                     motion = self._qvel[s.object_motion].reshape(-1, 6)
                     self._calm = np.where(np.abs(motion).max(axis=1) < _SLOW, self._calm + frame, 0.0)
@@ -408,7 +409,7 @@ class MujocoEngine:
 
     def judge(self) -> None:
         """Raise or warn if MuJoCo said something."""
-        said, _SAID[:] = _SAID[:], ()
+        said = heard()
         if not math.isfinite(float(np.add.reduce(self._qvel))):
             why = f" ({said[0]})" if said else ""
             raise PhysicsError(
@@ -420,14 +421,7 @@ class MujocoEngine:
     def _last_contacts(self) -> NDArray[np.float64]:
         """Shapes, position, normal and force of the last step's contacts: the state after it does not tell them."""
         if self._contacts is None:
-            contact, solved = self._data.contact, np.asarray(self._data.contact.efc_address) >= 0
-            kept = np.empty((int(solved.sum()), 9))
-            kept[:, :2] = np.asarray(contact.geom)[solved]
-            kept[:, 2:5] = np.asarray(contact.pos)[solved]
-            kept[:, 5:8] = np.asarray(contact.frame)[solved, :3]
-            # The first row of an elliptic or frictionless contact is its normal force.
-            kept[:, 8] = self._data.efc_force[np.asarray(contact.efc_address)[solved]]
-            self._contacts = kept
+            self._contacts = solved_contacts(self._data)
         return self._contacts
 
     def contacts(self) -> Contacts:
@@ -470,6 +464,7 @@ class MujocoEngine:
         mujoco.mj_setState(self._model, self._data, state, STATE)
         self._data.actuator_force[:] = forces
         self._contacts = np.array(contacts)
+        self._links_age = -1.0
         self._forget()
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:

@@ -117,8 +117,8 @@ class SharedModel:
         Whose parameters it has now, as `Parameters.numbers`; None before the first.
     holder
         Stands for the parameters it has, as `Parameters.token`.
-    near
-        Of which robots links meet solids now, as bytes of an array of bool.
+    met
+        Which links meet solids now, and which kinematic bodies are anybody, as bytes of arrays of bool.
     lock
         Held by whoever uses it.
     """
@@ -127,7 +127,7 @@ class SharedModel:
         self.model = model
         self.written: NDArray[np.float64] | None = None
         self.holder: object = None
-        self.near = b""
+        self.met = b""
         self.lock = threading.RLock()
         self._frame = (0.0, 0.0)
 
@@ -165,6 +165,9 @@ class CompiledScene:
         Itself, or the scene without objects.
     slots
         How many objects there is room for: none, or all.
+    link_parts
+        Of the links of all robots: index of the robot, body, metres from that within which its shapes are, and body of
+        the robot's base; shape ``(links,)`` each.
     """
 
     def __init__(
@@ -185,9 +188,6 @@ class CompiledScene:
             b = bare.model
             m.stat.meaninertia = b.stat.meaninertia * max(b.nv, 1) / m.nv
         self.robots = [RobotIndex(m, index, model) for index, model in enumerate(models)]
-        self.base_velocity = np.array([np.arange(3) + robot.root_speed for robot in self.robots], np.int64).reshape(
-            -1, 3
-        )
         self.base_position = np.array([np.arange(2) + robot.root for robot in self.robots], np.int64).reshape(-1, 2)
         self.first = np.array([(robot.root, robot.root_speed) for robot in self.robots], np.int64).reshape(-1, 2)
         self.servos = np.concatenate([np.zeros(0, np.int64), *(robot.servo for robot in self.robots)])
@@ -212,8 +212,10 @@ class CompiledScene:
         reaches = np.array([robot.reach for robot in self.robots])
         self.solids: SolidCells = SolidCells(static, reaches) if bare is None else bare.solids
         self._links = np.concatenate([np.zeros(0, np.int64), *(robot.link_bodies for robot in self.robots)])
-        self._link_owner = np.repeat(np.arange(len(models)), [len(robot.link_bodies) for robot in self.robots])
         self._link_bits = np.array(m.body_contype[self._links])
+        self._mover_bits = np.array(m.body_contype[self.mover_body]), np.array(m.body_conaffinity[self.mover_body])
+        owner = np.repeat(np.arange(len(models)), [len(robot.link_bodies) for robot in self.robots])
+        self.link_parts = owner, self._links, _radii(m, self._links), np.asarray(m.body_rootid[self._links], np.int64)
         pristine = mujoco.MjData(m)
         m.opt.enableflags &= ~SLEEP
         mujoco.mj_kinematics(m, pristine)
@@ -256,19 +258,23 @@ class CompiledScene:
         for name, poses in self._poses.items():
             getattr(data, name)[:] = poses
 
-    def meet_solids(self, shared: SharedModel, near: NDArray[np.bool_]) -> None:
-        """Have the links of some robots meet solids; what is far from all of them need not be looked for.
+    def choose_pairs(self, shared: SharedModel, near: NDArray[np.bool_], somebody: NDArray[np.bool_]) -> None:
+        """Have links meet solids that are near some, and kinematic bodies that are anybody; the rest touches nothing.
 
         Parameters
         ----------
         near
-            Of which robots, shape ``(robots,)``.
+            Which links solids are near to, shape ``(links,)``.
+        somebody
+            Which kinematic bodies stand for people and vehicles, shape ``(movers,)``.
         """
-        key = near.tobytes()
-        if key != shared.near:
-            bits = np.where(near[self._link_owner], self._link_bits, self._link_bits & ~SOLID)
-            shared.model.body_contype[self._links] = bits
-            shared.near = key
+        key = near.tobytes() + somebody.tobytes()
+        if key != shared.met:
+            kinds, affinities = shared.model.body_contype, shared.model.body_conaffinity
+            kinds[self._links] = np.where(near, self._link_bits, self._link_bits & ~SOLID)
+            kinds[self.mover_body] = np.where(somebody, self._mover_bits[0], 0)
+            affinities[self.mover_body] = np.where(somebody, self._mover_bits[1], 0)
+            shared.met = key
 
     def object_at(self, slot: int) -> tuple[int, int]:
         """First of an object's position and of its speed."""
@@ -307,6 +313,15 @@ def _reach(model: Any, bodies: NDArray[np.int64]) -> float:
             size = float(np.linalg.norm(model.geom_pos[geom])) + float(model.geom_rbound[geom])
             whole = max(whole, away[body] + size)
     return whole
+
+
+def _radii(model: Any, bodies: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Metres from each body's origin within which its shapes are."""
+    found = np.zeros(len(bodies))
+    sizes = np.linalg.norm(model.geom_pos, axis=1) + model.geom_rbound
+    for k, body in enumerate(bodies.tolist()):
+        found[k] = sizes[model.geom_bodyid == body].max(initial=0.0)
+    return found
 
 
 def _slide(model: Any, joint: int) -> float:

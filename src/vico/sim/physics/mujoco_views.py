@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
+from vico.sim.physics.movers import moved_poses
 from vico.sim.physics.mujoco_model import PARKED, PARKED_APART
+from vico.sim.physics.solids import SLACK, find_near, is_clear
 
 
 @compiled
@@ -71,3 +75,64 @@ def place_bodies(poses, entity, where, positions, quaternions):  # type: ignore[
         else:
             positions[body] = PARKED_APART * k, 0.0, PARKED
             quaternions[body] = 1.0, 0.0, 0.0, 0.0
+
+
+@compiled
+def begin_frame(frame, known, state, solids, links, movers, mocap):  # type: ignore[no-untyped-def]
+    """Say which links could touch something solid in a frame, and move people and vehicles on to its end.
+
+    Parameters
+    ----------
+    frame
+        Its length, seconds.
+    known
+        Seconds since the poses and velocities of `links` were computed; negative: they are of another state.
+    state
+        Positions and speeds, where in them each robot's base begins, and where to put the velocities of bases.
+    solids
+        Distances and tops of cells, half the side of their grid, reaches of the robots, and `near`, which is written:
+        of which robots links might meet solids, bool, shape ``(robots,)``.
+    links
+        As `CompiledScene.link_parts`; positions of bodies, their velocities about the centres of their robots'
+        masses and those centres, as MuJoCo has them; and what is written: which links might meet solids, bool.
+    movers
+        Entities, poses at the beginning and at the end of the motion, and seconds of it that have passed.
+    mocap
+        Which kinematic body each is, and where positions and quaternions of those are.
+    """
+    positions, speeds, first, before = state
+    away, tops, half, reach, near = solids
+    find_near((away, tops), half, reach, frame, (positions, speeds, first), near)
+    for k in range(len(first)):
+        for i in range(3):
+            before[k, i] = speeds[first[k, 1] + i]
+    owner, body, radius, root, places, motion, centre, meets = links
+    for k in range(len(owner)):
+        meets[k] = near[owner[k]]
+        if known < 0.0 or not meets[k]:
+            continue
+        b = body[k]
+        wx, wy, wz, vx, vy, vz = motion[b]
+        x, y, z = places[b]
+        ax, ay, az = x - centre[root[k], 0], y - centre[root[k], 1], z - centre[root[k], 2]
+        vx, vy, vz = vx + wy * az - wz * ay, vy + wz * ax - wx * az, vz + wx * ay - wy * ax
+        speed = math.sqrt(vx * vx + vy * vy + vz * vz) + math.sqrt(wx * wx + wy * wy + wz * wz) * radius[k]
+        if 2.0 * speed * (frame + known) < SLACK:
+            meets[k] = not is_clear(away, tops, half, (x, y, z), radius[k] + SLACK)
+    entity, start, end, time = movers
+    if time[0] < time[1] - 1e-9 and entity.any():
+        time[0] += frame
+        poses = moved_poses(start, end, time)
+        place_bodies(poses, entity, mocap[0], mocap[1], mocap[2])
+
+
+def solved_contacts(data: Any) -> NDArray[np.float64]:
+    """Shapes (2), position (3), normal (3) and force of the contacts that the last step solved, shape ``(n, 9)``."""
+    contact, solved = data.contact, np.asarray(data.contact.efc_address) >= 0
+    found = np.empty((int(solved.sum()), 9))
+    found[:, :2] = np.asarray(contact.geom)[solved]
+    found[:, 2:5] = np.asarray(contact.pos)[solved]
+    found[:, 5:8] = np.asarray(contact.frame)[solved, :3]
+    # The first row of an elliptic or frictionless contact is its normal force.
+    found[:, 8] = data.efc_force[np.asarray(contact.efc_address)[solved]]
+    return found

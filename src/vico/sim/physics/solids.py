@@ -18,8 +18,8 @@ _CELL = 0.5
 _DIRECTIONS = np.stack([np.cos(np.arange(16) * np.pi / 8), np.sin(np.arange(16) * np.pi / 8)], axis=1)
 
 
-#: Metres a robot may move before it is asked again.
-_SLACK = 0.1
+#: Metres a robot, or a link of one, may move before it is asked again.
+SLACK = 0.1
 _HALF_DIAGONAL = _CELL * math.sqrt(0.5)
 # What a distance kept with 4 bytes may be wrong by, metres.
 _ROUNDING = 1e-3
@@ -55,6 +55,16 @@ def _measure(cells, half, outlines, directions, reach):  # type: ignore[no-untyp
 
 
 @compiled
+def is_clear(away, tops, half, point, radius):  # type: ignore[no-untyped-def]
+    """Return whether nothing solid is within some metres of a point, `radius` no more than the cells are made for."""
+    column, row = math.floor((point[0] + half) / _CELL), math.floor((point[1] + half) / _CELL)
+    if not (0 <= row < len(away) and 0 <= column < len(away)):
+        return False
+    r, c = int(row), int(column)
+    return away[r, c] > radius + _HALF_DIAGONAL + _ROUNDING or point[2] - radius > tops[r, c]
+
+
+@compiled
 def find_near(cells, half, reach, seconds, state, near):  # type: ignore[no-untyped-def]
     """Say of each robot whether it could touch something solid within some seconds.
 
@@ -74,12 +84,10 @@ def find_near(cells, half, reach, seconds, state, near):  # type: ignore[no-unty
     for k in range(len(first)):
         q, v = first[k, 0], first[k, 1]
         speed = math.sqrt(speeds[v] ** 2 + speeds[v + 1] ** 2 + speeds[v + 2] ** 2)
-        column, row = math.floor((positions[q] + half) / _CELL), math.floor((positions[q + 1] + half) / _CELL)
         near[k] = True
-        if 0 <= row < len(away) and 0 <= column < len(away) and 2.0 * speed * seconds < _SLACK:
-            whole = reach[k] + _SLACK
-            r, c = int(row), int(column)
-            near[k] = away[r, c] <= whole + _HALF_DIAGONAL + _ROUNDING and positions[q + 2] - whole <= tops[r, c]
+        if 2.0 * speed * seconds < SLACK:
+            point = positions[q], positions[q + 1], positions[q + 2]
+            near[k] = not is_clear(away, tops, half, point, reach[k] + SLACK)
 
 
 class SolidCells:
@@ -113,7 +121,7 @@ class SolidCells:
         self.tops = np.full((count, count), -np.inf, np.float32)
         finite = reaches[np.isfinite(reaches)]
         if len(finite):
-            whole = float(finite.max()) + _SLACK + _HALF_DIAGONAL
+            whole = float(finite.max()) + SLACK + _HALF_DIAGONAL
             _measure((self.away, self.tops), self.half, (_outlines(scene), _tops(scene)), _DIRECTIONS, whole)
         if len(finite) < len(reaches):  # something of it may be anywhere
             self.mark_all()

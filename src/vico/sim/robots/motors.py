@@ -24,20 +24,34 @@ def velocities(run: RobotRun, group: RobotGroup) -> np.ndarray | None:
     return arrays.velocity[robots]
 
 
-def command_rotors(run: RobotRun, flight: Flight, group: RobotGroup, memory: np.ndarray) -> None:
+def follow_setpoints(run: RobotRun, flight: Flight, group: RobotGroup) -> bool:
+    """Return whether all of a kind that flies are in the air and follow setpoints.
+
+    It stays the same until the robots decide again, or somebody commands one.
+    """
+    arrays, robots = run.arrays, group.robots
+    told = (arrays.status[robots] == _FALLEN) | (arrays.mode[robots] == _MOTORS)
+    return not (told | (flight.arrays.phase == _LANDED)).any()
+
+
+def command_rotors(
+    run: RobotRun, flight: Flight, group: RobotGroup, memory: np.ndarray, *, all_follow: bool = False
+) -> None:
     """Tell the rotors of a kind of robots what speeds to have for its period; all that are in the air in one call.
 
     Parameters
     ----------
     memory
         What the group's controller remembers, shape ``(k, controller.memory)``; updated in place.
+    all_follow
+        As `follow_setpoints` has it.
     """
     arrays, robots, a = run.arrays, group.robots, flight.arrays
-    fallen, motors = arrays.status[robots] == _FALLEN, arrays.mode[robots] == _MOTORS
-    led = ~fallen & ~motors & (a.phase != _LANDED)
-    if led.all():
+    if all_follow:
         a.wanted[:] = group.controller.targets(run.engine.motion(robots), a.setpoint, memory)
         return
+    fallen, motors = arrays.status[robots] == _FALLEN, arrays.mode[robots] == _MOTORS
+    led = ~fallen & ~motors & (a.phase != _LANDED)
     rows = led.nonzero()[0]
     if len(rows):
         setpoint, mine = a.setpoint[rows], memory[rows]

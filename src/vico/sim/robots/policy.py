@@ -41,15 +41,19 @@ def dense(inputs, weights, bias, last):  # type: ignore[no-untyped-def]
     """
     out = np.empty((len(inputs), len(bias)), np.float32)
     for k in range(len(inputs)):
-        out[k] = bias
-    for j in range(inputs.shape[1]):
-        for k in range(len(inputs)):
-            x = inputs[k, j]
-            for i in range(len(bias)):
-                out[k, i] += weights[j, i] * x
-    if not last:
-        for k in range(len(inputs)):
-            _elu(out[k])
+        x, sums = inputs[k], out[k]
+        sums[:] = bias
+        # Four inputs at a time, so that sums are read and written a quarter as often.
+        whole = len(x) - len(x) % 4
+        for j in range(0, whole, 4):
+            for i in range(len(sums)):
+                first = sums[i] + weights[j, i] * x[j] + weights[j + 1, i] * x[j + 1]
+                sums[i] = first + weights[j + 2, i] * x[j + 2] + weights[j + 3, i] * x[j + 3]
+        for j in range(whole, len(x)):
+            for i in range(len(sums)):
+                sums[i] += weights[j, i] * x[j]
+        if not last:
+            _elu(sums)
     return out
 
 

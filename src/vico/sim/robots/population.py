@@ -19,7 +19,7 @@ from vico.sim.robots import commands, drawing, flying, sensing, tasks, trips
 from vico.sim.robots.batteries import charge_of, watch_batteries
 from vico.sim.robots.decisions import decide
 from vico.sim.robots.falls import watch_falls
-from vico.sim.robots.motors import command_motors, command_rotors, velocities
+from vico.sim.robots.motors import command_motors, command_rotors, follow_setpoints, velocities
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.rooms import turning_radius
 from vico.sim.robots.scene import RobotScene
@@ -256,7 +256,8 @@ class RobotPopulation:
             self.engine.set_dynamic_obstacles(obstacles, whole)
             trips.surround(self.run, whole)
             decide(self.run, whole, obstacles, self.bodies(), errands=self.errands)
-            self._loose.update(self._near_ground())
+            if len(self._loose):
+                self._loose.update(self._near_ground())
             arrays = self.run.arrays
             arrays.left_out[:] = np.maximum(arrays.left_out, (self.engine.left_out, self._loose.left_out))
         self._step(ticks, round((whole - since) / TICK))
@@ -276,13 +277,19 @@ class RobotPopulation:
         left += owed - ticks
         needs = self._needs()  # decided between sub-steps, not within
         holding = needs.forces_matter
-        orders = [
-            (group, memory, velocities(self.run, group) if flight is None else None, flight)
+        # Robots that walk and drive by velocities, or None; those that fly, and whether all of them follow setpoints.
+        driven = [
+            (group, memory, velocities(self.run, group))
             for group, memory, flight in zip(groups, self.run.memory, self.run.flights, strict=True)
+            if flight is None
         ]
-        flights = [flight for flight in self.run.flights if flight is not None]
+        flown = [
+            (group, memory, flight, follow_setpoints(self.run, flight, group))
+            for group, memory, flight in zip(groups, self.run.memory, self.run.flights, strict=True)
+            if flight is not None
+        ]
         # Rotors that stand need nothing told to them often.
-        busy = [group for group, _, _, flight in orders if flight is None or flight.in_the_air]
+        busy = [group for group, *_ in driven] + [group for group, _, flight, _ in flown if flight.in_the_air]
         lengths: dict[int, float] = {}  # of frames, by the ticks there are for one
         arrays.owed[0] = owed
         while owed:
@@ -293,14 +300,12 @@ class RobotPopulation:
             taken = round(frame / TICK)
             if taken > owed:
                 return
-            for group, memory, velocity, flight in orders:
-                if now % group.period != 0:
-                    continue
-                if flight is not None:
-                    command_rotors(self.run, flight, group, memory)
-                else:
+            for group, memory, velocity in driven:
+                if now % group.period == 0:
                     command_motors(self.run, group, memory, velocity)
-            for flight in flights:
+            for group, memory, flight, all_follow in flown:
+                if now % group.period == 0:
+                    command_rotors(self.run, flight, group, memory, all_follow=all_follow)
                 flight.push(self.engine, frame, now * TICK)
             self.engine.step(frame=frame, holding=holding)
             now, owed, left = now + taken, owed - taken, left - taken
