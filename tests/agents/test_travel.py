@@ -35,7 +35,8 @@ class Journey:
         self.sim = Simulation(city, None, SimConfig(assistants=1, observe=(), start=EIGHT, cars=20, pedestrians=20))
         self.sim.state.people.cash[0] = 50.0
         self.sim.scenario.place_agent(ME, self.start)
-        self.traveller = Traveller(public, rng(0, "travel"), modes=modes)
+        self.public, self.modes, self.chance = public, modes, rng(0, "travel")
+        self.traveller = Traveller(public, self.chance, modes=modes)
         self.observation, self.info = (part[ME] for part in self.sim.observe())
         self.vehicles: list[str] = []
 
@@ -52,14 +53,33 @@ class Journey:
         self.observation, self.info = result.observations[ME], result.infos[ME]
         self.vehicles.append(self.observation["state"]["vehicle"])
 
-    def go(self, limit: float) -> bool:
+    def go(self, limit: float, twin: Traveller | None = None) -> bool:
         """Travel until there, for so many seconds at most."""
         while self.second < EIGHT + limit:
             action = self.traveller.towards(self.goal, self.observation, self.info)
+            assert twin is None or twin.towards(self.goal, self.observation, self.info) == action
             if action is None:
                 return bool(np.hypot(*(self.observation["pose"][:2] - self.goal)) < 0.5)
             self.do(action)
         return False
+
+    def board(self) -> None:
+        """Travel until in a vehicle."""
+        while not self.vehicles or not self.vehicles[-1]:
+            action = self.traveller.towards(self.goal, self.observation, self.info)
+            assert action is not None
+            self.do(action)
+
+    def restored(self) -> Traveller:
+        """Another traveller in the state of this one."""
+        saved = self.traveller.state()
+        rest = {k: v for k, v in saved.items() if k not in ("walker", "legs")}
+        assert json.loads(json.dumps(rest)) == rest
+        chance = np.random.Generator(np.random.PCG64())
+        chance.bit_generator.state = self.chance.bit_generator.state
+        twin = Traveller(self.public, chance, modes=self.modes)
+        twin.restore(saved)
+        return twin
 
 
 def ends_of_a_ride(public: PublicMap, mode: str, number: int) -> tuple[Spot, Spot]:
@@ -91,31 +111,25 @@ def ends_of_a_ride(public: PublicMap, mode: str, number: int) -> tuple[Spot, Spo
 
 
 @pytest.mark.parametrize(("mode", "number"), [("bus", 0), ("bike", 0), pytest.param("bike", 5, marks=pytest.mark.slow)])
-def test_a_traveller_arrives_about_when_planned(
+def test_a_traveller_arrives_about_when_planned_and_a_restored_one_would(
     helsinki_city: World, public: PublicMap, mode: str, number: int
 ) -> None:
     ends = ends_of_a_ride(public, mode, number)
     trip = public.trips.plan(*ends, EIGHT, modes=(mode,))
     assert trip is not None
     journey = Journey(helsinki_city, public, ends, (mode,))
-    # Buses are up to two minutes late (see the timetable's tests), and others are in the way.
-    assert journey.go(trip.seconds * 1.2 + 120.0)
-    assert journey.traveller.plans == 1
-    assert {mode} < set(journey.vehicles)
-    assert journey.paid == (BUS_FARE if mode == "bus" else pytest.approx(trip.price, abs=0.2 * 3))
-
-
-def test_a_bicycle_is_brought_to_the_planned_station(helsinki_city: World, public: PublicMap) -> None:
-    ends = ends_of_a_ride(public, "bike", 1)
-    journey = Journey(helsinki_city, public, ends, ("bike",))
     transit = journey.sim.state.transit
     assert transit is not None
     before = transit.bicycles.free()
-    assert journey.go(1500.0)
-    trip = journey.traveller.trip
-    assert trip is not None
+    journey.board()
+    # Buses are up to two minutes late (see the timetable's tests), and others are in the way.
+    assert journey.go(trip.seconds * 1.2 + 120.0, journey.restored())
+    assert journey.traveller.plans == 1
+    assert {mode} < set(journey.vehicles)
+    assert journey.paid == (BUS_FARE if mode == "bus" else pytest.approx(trip.price, abs=0.2 * 3))
     change = dict(zip((s.id for s in public.bike_stations), (transit.bicycles.free() - before).tolist(), strict=True))
-    assert {name: k for name, k in change.items() if k} == {trip.legs[1].origin: -1, trip.legs[1].destination: 1}
+    brought = {trip.legs[1].origin: -1, trip.legs[1].destination: 1} if mode == "bike" else {}
+    assert {name: k for name, k in change.items() if k} == brought
 
 
 def test_who_finds_the_rack_empty_plans_anew(helsinki_city: World, public: PublicMap) -> None:
@@ -156,27 +170,3 @@ def test_who_has_no_money_walks(helsinki_city: World, public: PublicMap) -> None
     assert action is not None
     assert journey.traveller.trip is not None
     assert journey.traveller.trip.modes == ("walk",)
-
-
-@pytest.mark.parametrize("mode", ["bus", "bike"])
-def test_a_restored_traveller_goes_on_as_the_saved_one(helsinki_city: World, public: PublicMap, mode: str) -> None:
-    journey = Journey(helsinki_city, public, ends_of_a_ride(public, mode, 0), (mode,))
-    generator = rng(0, "travel")
-    journey.traveller = Traveller(public, generator, modes=(mode,))
-    while not journey.vehicles or journey.vehicles[-1] != mode:
-        action = journey.traveller.towards(journey.goal, journey.observation, journey.info)
-        assert action is not None
-        journey.do(action)
-    saved = journey.traveller.state()
-    rest = {k: v for k, v in saved.items() if k not in ("walker", "legs")}
-    assert json.loads(json.dumps(rest)) == rest
-    chance = np.random.Generator(np.random.PCG64())
-    chance.bit_generator.state = generator.bit_generator.state
-    twin = Traveller(public, chance, modes=(mode,))
-    twin.restore(saved)
-    for _ in range(60):
-        action = journey.traveller.towards(journey.goal, journey.observation, journey.info)
-        assert twin.towards(journey.goal, journey.observation, journey.info) == action
-        if action is None:
-            break
-        journey.do(action)

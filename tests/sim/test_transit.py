@@ -1,6 +1,6 @@
 """Buses and bicycles in central Helsinki: timetable, boarding, prices."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -39,54 +39,91 @@ def _advance(traffic: Traffic, transit: TransitSystem) -> None:
     transit.advance(0.1, traffic.bodies())
 
 
-def test_a_bus_serves_every_stop_of_its_line_in_order() -> None:
-    traffic, transit = _systems()
-    served: list[str] = []
+@dataclass
+class _Service:
+    """What buses did: stops in the order in which the first bus served them, and how late each came to its first."""
+
+    order: list[str]
+    served: list[str]
+    late: list[float]
+
+
+@pytest.fixture(scope="module")
+def busy() -> _Service:
+    """Buses among cars and pedestrians until each has been at its first stop twice."""
+    traffic, transit = _systems(30, 30)
+    seen = _Service(transit.line_of(0).stops, [], [])
+    was = [True] * traffic.buses
     for _ in range(15_000):
+        if len(seen.late) >= 2 * traffic.buses and len(seen.served) > len(seen.order):
+            break
         _advance(traffic, transit)
         stop = transit.stopped_at(0)
-        if stop and (not served or served[-1] != stop):
-            served.append(stop)
-        if len(served) > len(transit.line_of(0).stops):
-            break
-    order = transit.line_of(0).stops
+        if stop and (not seen.served or seen.served[-1] != stop):
+            seen.served.append(stop)
+        for bus in range(traffic.buses):
+            there = transit.stopped_at(bus) == transit.line_of(bus).stops[0]
+            if there and not was[bus]:
+                seen.late.append(float(transit.clock[0] - transit.begun[bus] - transit.line_of(bus).travel[-1]))
+            was[bus] = there
+    return seen
+
+
+def test_a_bus_serves_every_stop_of_its_line_in_order(busy: _Service) -> None:
+    order, served = busy.order, busy.served
     first = order.index(served[0])
     assert len(served) >= len(order)
     assert served == [order[(first + k) % len(order)] for k in range(len(served))]
 
 
-def test_buses_come_to_their_first_stop_by_the_timetable_but_for_a_jam() -> None:
-    traffic, transit = _systems(30, 30)
-    late, was = [], [True] * traffic.buses
-    for _ in range(15_000):
-        if len(late) >= 2 * traffic.buses:
-            break
-        _advance(traffic, transit)
-        for bus in range(traffic.buses):
-            there = transit.stopped_at(bus) == transit.line_of(bus).stops[0]
-            if there and not was[bus]:
-                late.append(transit.clock[0] - transit.begun[bus] - transit.line_of(bus).travel[-1])
-            was[bus] = there
-    assert np.median(np.abs(late)) < 15.0
+def test_buses_come_to_their_first_stop_by_the_timetable_but_for_a_jam(busy: _Service) -> None:
+    assert np.median(np.abs(busy.late)) < 15.0
     # A car that gets nowhere before a bus is taken out after so long.
-    assert max(map(abs, late)) < PATIENCE
+    assert max(map(abs, busy.late)) < PATIENCE
 
 
-def test_buses_on_empty_streets_leave_no_stop_before_its_time() -> None:
+@dataclass
+class _Stands:
+    """How long the first bus stood, sub-steps, with the sub-step at which it left, and how early buses left, s."""
+
+    stood: list[tuple[int, int]]
+    early: list[float]
+
+
+@pytest.fixture(scope="module")
+def empty() -> _Stands:
+    """Buses alone in the streets for 25 minutes."""
     traffic, transit = _systems(0, 0)
-    early = [0.0]
-    stood: dict[int, tuple[int, float]] = {}
-    for _ in range(15_000):
+    seen, last = _Stands([], [0.0]), 0
+    due: dict[int, tuple[int, float]] = {}
+    for step in range(15_000):
         _advance(traffic, transit)
+        at = transit.stopped_at(0)
+        if at and at != transit.line_of(0).stops[0]:
+            last += 1
+        elif last:
+            seen.stood.append((step, last))
+            last = 0
         for bus in range(traffic.buses):
             stop = int(transit.stop[bus])
             if transit.stopped_at(bus):
-                stood[bus] = stop, transit.begun[bus] + transit.line_of(bus).travel[stop] + DWELL
-            elif bus in stood:
-                at, due = stood.pop(bus)
-                early.append(due - transit.clock[0] if at else 0.0)
+                due[bus] = stop, transit.begun[bus] + transit.line_of(bus).travel[stop] + DWELL
+            elif bus in due:
+                left, when = due.pop(bus)
+                seen.early.append(when - transit.clock[0] if left else 0.0)
+    return seen
+
+
+def test_buses_on_empty_streets_leave_no_stop_before_its_time(empty: _Stands) -> None:
+    assert len(empty.early) > 10
     # Seconds that a bus brakes less than the timetable reckons with; more was 45 before buses drove so slowly.
-    assert max(early) < 10.0
+    assert max(empty.early) < 10.0
+
+
+def test_a_bus_stands_thirty_seconds_at_a_stop(empty: _Stands) -> None:
+    # The first one counted was under way when the run began.
+    assert empty.stood[1:]
+    assert all(abs(steps / 10 - DWELL) < 0.3 for _, steps in empty.stood[1:])
 
 
 def test_a_bus_that_has_just_left_when_a_run_begins_drives_its_round() -> None:
@@ -118,22 +155,6 @@ def test_a_stop_behind_the_bus_is_a_whole_round_away() -> None:
     second = next(s for s in transit.transit.stops if s.id == line.stops[1])
     assert first.lane == second.lane
     assert transit._metres(short, 0) == pytest.approx(around - (second.offset - first.offset), abs=1.0)
-
-
-def test_a_bus_stands_thirty_seconds_at_a_stop() -> None:
-    traffic, transit = _systems(0, 0)
-    stood, last = [], 0
-    for step in range(9_000):
-        _advance(traffic, transit)
-        at = transit.stopped_at(0)
-        if at and at != transit.line_of(0).stops[0]:
-            last += 1
-        elif last:
-            stood.append((step, last))
-            last = 0
-    # The first one counted was under way when the run began.
-    assert stood[1:]
-    assert all(abs(steps / 10 - DWELL) < 0.3 for _, steps in stood[1:])
 
 
 def test_a_stopped_bus_can_be_boarded_from_the_place_to_wait() -> None:
