@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import struct
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,13 @@ from vico.assets.people.worn import worn
 from vico.errors import MissingFileError, SchemaError
 from vico.render.skinning import batch_bodies, skin
 
-BODY = body_of(Appearance(height=1.75, hair="long"), source="procedural")
 _TO_GLTF = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+
+
+# Not while tests are collected: what makes a body would be compiled then.
+@cache
+def plain() -> SkinnedBody:
+    return body_of(Appearance(height=1.75, hair="long"), source="procedural")
 
 
 def write_glb(path: Path, arrays: dict[str, NDArray[Any]], document: dict[str, Any], picture: bytes = b"") -> Path:
@@ -127,11 +133,11 @@ def placed(body: SkinnedBody, rotations: NDArray[np.float32]) -> NDArray[np.floa
 
 
 def test_a_textured_head_is_worn_on_the_neck_and_turns_with_it(tmp_path: Path) -> None:
-    body = worn(BODY, head_file(tmp_path / "head.glb"))
-    new = slice(len(BODY.vertices), None)
+    body = worn(plain(), head_file(tmp_path / "head.glb"))
+    new = slice(len(plain().vertices), None)
     rest = np.zeros((55, 3), np.float32)
     head = placed(body, rest)[new]
-    top = placed(BODY, rest)[:, 2].max()
+    top = placed(plain(), rest)[:, 2].max()
     assert abs(head[:, 2].max() - top) < 0.02
     assert abs(head[:, 1].mean()) < 0.02
     # Both halves of the texture are there: red on the person's right.
@@ -144,24 +150,24 @@ def test_a_textured_head_is_worn_on_the_neck_and_turns_with_it(tmp_path: Path) -
     # Nothing of the own head is left: none of its triangles.
     used = np.zeros(len(body.vertices), bool)
     used[body.triangles] = True
-    own_hair = (BODY.weight_joints[:, 0] == J["head"]) & (BODY.vertices[:, 2] > BODY.height - 0.05)
-    assert not used[: len(BODY.vertices)][own_hair].any()
+    own_hair = (plain().weight_joints[:, 0] == J["head"]) & (plain().vertices[:, 2] > plain().height - 0.05)
+    assert not used[: len(plain().vertices)][own_hair].any()
 
 
 def test_a_skinned_body_moves_as_its_own_joints_would(tmp_path: Path) -> None:
-    body = worn(BODY, body_file(tmp_path / "body.glb", BODY))
-    assert body.height == BODY.height
+    body = worn(plain(), body_file(tmp_path / "body.glb", plain()))
+    assert body.height == plain().height
     bent = np.zeros((55, 3), np.float32)
     bent[J["left_elbow"]] = 0.0, 0.0, -1.0
     bent[J["right_hip"]] = 0.0, -0.8, 0.0
-    away = np.linalg.norm(placed(body, bent) - placed(BODY, bent), axis=1)
-    hands = np.isin(BODY.weight_joints[:, 0], [j for j in range(55) if j > 21])
+    away = np.linalg.norm(placed(body, bent) - placed(plain(), bent), axis=1)
+    hands = np.isin(plain().weight_joints[:, 0], [j for j in range(55) if j > 21])
     assert away[~hands].max() < 0.03
 
 
 def test_files_that_cannot_be_worn_are_refused_with_their_name(tmp_path: Path) -> None:
     with pytest.raises(MissingFileError, match=r"none\.glb"):
-        worn(BODY, tmp_path / "none.glb")
+        worn(plain(), tmp_path / "none.glb")
     whole = head_file(tmp_path / "head.glb").read_bytes()
     for k, data in enumerate(
         (b"", b"glTF", whole[:200], whole.replace(b'"POSITION": 0', b'"POSITION": 9'), whole[:-60])
@@ -169,4 +175,4 @@ def test_files_that_cannot_be_worn_are_refused_with_their_name(tmp_path: Path) -
         damaged = tmp_path / f"damaged{k}.glb"
         damaged.write_bytes(data)
         with pytest.raises(SchemaError, match=f"damaged{k}"):
-            worn(BODY, damaged)
+            worn(plain(), damaged)

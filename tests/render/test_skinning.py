@@ -1,16 +1,27 @@
+from functools import cache
+
 import numpy as np
 import pytest
 
-from vico.assets.people import JOINTS, PARENTS, J, body_of, random_appearance
+from vico.assets.people import JOINTS, PARENTS, J, SkinnedBody, body_of, random_appearance
 from vico.render.limbs import LIMBS
-from vico.render.skinning import batch_bodies, rotation_matrix, skin
+from vico.render.skinning import BodyBatch, batch_bodies, rotation_matrix, skin
 from vico.seeds import rng
 
-BODIES = [body_of(random_appearance(rng(2, "skinned", k)), source="procedural") for k in range(3)]
-CROWD = batch_bodies(BODIES, [11, 12, 13])
-N = len(BODIES)
+N = 3
 REST = np.zeros((N, len(JOINTS), 3), np.float32)
 NOWHERE, AHEAD = np.zeros((N, 3)), np.zeros(N)
+
+
+# Not while tests are collected: what makes bodies would be compiled then.
+@cache
+def bodies() -> list[SkinnedBody]:
+    return [body_of(random_appearance(rng(2, "skinned", k)), source="procedural") for k in range(N)]
+
+
+@cache
+def crowd() -> BodyBatch:
+    return batch_bodies(bodies(), [11, 12, 13])
 
 
 def matrix(axis_angle: np.ndarray) -> np.ndarray:
@@ -21,7 +32,7 @@ def matrix(axis_angle: np.ndarray) -> np.ndarray:
 
 def reference(body: int, rotations: np.ndarray, offset: np.ndarray) -> np.ndarray:
     """Plain linear blend skinning with homogeneous matrices, one joint at a time."""
-    b = BODIES[body]
+    b = bodies()[body]
     world = np.zeros((55, 4, 4))
     for j in range(55):
         local = np.eye(4)
@@ -39,9 +50,9 @@ def reference(body: int, rotations: np.ndarray, offset: np.ndarray) -> np.ndarra
 def test_skinning_equals_the_textbook_formula() -> None:
     rotations = np.random.default_rng(1).normal(0, 0.4, (N, 55, 3)).astype(np.float32)
     offsets = np.array([[0.1, 0.0, -0.05]] * N, np.float32)
-    vertices, _ = skin(CROWD, rotations, offsets, NOWHERE, AHEAD)
+    vertices, _ = skin(crowd(), rotations, offsets, NOWHERE, AHEAD)
     for k in range(N):
-        own = slice(CROWD.starts[k], CROWD.starts[k + 1])
+        own = slice(crowd().starts[k], crowd().starts[k + 1])
         np.testing.assert_allclose(vertices[own], reference(k, rotations[k], offsets[k]), atol=2e-5)
 
 
@@ -49,21 +60,21 @@ def test_limbs_are_where_the_body_is() -> None:
     rotations = np.random.default_rng(3).normal(0, 0.4, (N, 55, 3)).astype(np.float32)
     limbs = np.empty((N, len(LIMBS), 7), np.float32)
     spots, yaw = np.array([[5.0, 2.0, 1.0]] * N), np.full(N, 0.7)
-    vertices, _ = skin(CROWD, rotations, np.zeros((N, 3), np.float32), spots, yaw, limbs=limbs)
+    vertices, _ = skin(crowd(), rotations, np.zeros((N, 3), np.float32), spots, yaw, limbs=limbs)
     start, along, radius = limbs[:, :, None, :3], limbs[:, :, None, 3:6] - limbs[:, :, None, :3], limbs[:, :, 6]
     assert (radius > 0.02).all()
     assert (radius < 0.22).all()
     for k in range(N):
-        off = vertices[None, CROWD.starts[k] : CROWD.starts[k + 1]] - start[k]
+        off = vertices[None, crowd().starts[k] : crowd().starts[k + 1]] - start[k]
         way = np.clip((off * along[k]).sum(-1) / (along[k] ** 2).sum(-1), 0.0, 1.0)
         outside = np.linalg.norm(off - way[..., None] * along[k], axis=-1) - radius[k, :, None]
         assert np.percentile(outside.min(axis=0), 95) < 0.05
 
 
 def test_no_rotation_gives_the_t_pose() -> None:
-    vertices, _ = skin(CROWD, REST, np.zeros((N, 3), np.float32), NOWHERE, AHEAD)
-    for k, body in enumerate(BODIES):
-        own = vertices[CROWD.starts[k] : CROWD.starts[k + 1]]
+    vertices, _ = skin(crowd(), REST, np.zeros((N, 3), np.float32), NOWHERE, AHEAD)
+    for k, body in enumerate(bodies()):
+        own = vertices[crowd().starts[k] : crowd().starts[k + 1]]
         span = np.ptp(own[:, 1])
         # Arm span is about the stature.
         assert 0.85 < span / body.height < 1.1
@@ -71,9 +82,9 @@ def test_no_rotation_gives_the_t_pose() -> None:
 
 def test_yaw_and_position_move_the_whole_body_rigidly() -> None:
     offsets = np.zeros((N, 3), np.float32)
-    plain, normals = skin(CROWD, REST, offsets, NOWHERE, AHEAD)
+    plain, normals = skin(crowd(), REST, offsets, NOWHERE, AHEAD)
     yaw, place = 2.1, np.array([350.0, -120.0, 7.5])
-    moved, turned = skin(CROWD, REST, offsets, np.tile(place, (N, 1)), np.full(N, yaw))
+    moved, turned = skin(crowd(), REST, offsets, np.tile(place, (N, 1)), np.full(N, yaw))
     rotation = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
     np.testing.assert_allclose(moved, plain @ rotation.T + place, atol=2e-4)
     np.testing.assert_allclose(turned, normals @ rotation.T, atol=1e-5)
@@ -81,7 +92,7 @@ def test_yaw_and_position_move_the_whole_body_rigidly() -> None:
 
 def test_normals_have_unit_length_in_every_pose() -> None:
     rotations = np.random.default_rng(2).normal(0, 0.5, (N, 55, 3)).astype(np.float32)
-    _, normals = skin(CROWD, rotations, np.zeros((N, 3), np.float32), NOWHERE, AHEAD)
+    _, normals = skin(crowd(), rotations, np.zeros((N, 3), np.float32), NOWHERE, AHEAD)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-4)
 
 
@@ -90,17 +101,17 @@ def test_bending_an_elbow_moves_the_hand_and_not_the_head() -> None:
     bent[:, J["left_elbow"], 2] = -1.2
     offsets = np.zeros((N, 3), np.float32)
     moved = np.linalg.norm(
-        skin(CROWD, bent, offsets, NOWHERE, AHEAD)[0] - skin(CROWD, REST, offsets, NOWHERE, AHEAD)[0], axis=1
+        skin(crowd(), bent, offsets, NOWHERE, AHEAD)[0] - skin(crowd(), REST, offsets, NOWHERE, AHEAD)[0], axis=1
     )
-    hand = (CROWD.weight_joints[:, 0] >= J["left_index1"]) & (CROWD.weight_joints[:, 0] <= J["left_thumb3"])
-    head = CROWD.weight_joints[:, 0] == J["head"]
+    hand = (crowd().weight_joints[:, 0] >= J["left_index1"]) & (crowd().weight_joints[:, 0] <= J["left_thumb3"])
+    head = crowd().weight_joints[:, 0] == J["head"]
     assert moved[hand].min() > 0.1
     assert moved[head].max() < 1e-5
 
 
 def test_every_vertex_carries_its_owner_s_entity() -> None:
-    assert np.unique(CROWD.entity).tolist() == [11, 12, 13]
-    assert (CROWD.entity[CROWD.triangles[: CROWD.triangle_starts[1]]] == 11).all()
+    assert np.unique(crowd().entity).tolist() == [11, 12, 13]
+    assert (crowd().entity[crowd().triangles[: crowd().triangle_starts[1]]] == 11).all()
 
 
 def test_a_crowd_of_nobody_is_empty() -> None:

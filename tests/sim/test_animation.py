@@ -1,14 +1,15 @@
 import subprocess
 import sys
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vico.assets.people import J, body_of, random_appearance
+from vico.assets.people import J, SkinnedBody, body_of, random_appearance
 from vico.errors import InputError
-from vico.render.skinning import batch_bodies, skin
+from vico.render.skinning import BodyBatch, batch_bodies, skin
 from vico.seeds import rng
 from vico.sim.animation import (
     CLIPS,
@@ -26,32 +27,44 @@ from vico.sim.animation.standing import TURN_CYCLE
 from vico.sim.animation.stride import pace_of_step
 
 LOOKS = [random_appearance(rng(5, "walker", k)) for k in range(6)]
-BODIES = [body_of(look, source="procedural") for look in LOOKS]
-CROWD = batch_bodies(BODIES, range(1, len(BODIES) + 1))
-STYLE = np.stack(
-    [style_of(b, rng(5, "manner", k), age=look.age) for k, (b, look) in enumerate(zip(BODIES, LOOKS, strict=True))]
-)
-N = len(BODIES)
+N = len(LOOKS)
+
+
+# Not while tests are collected: what makes bodies would be compiled then.
+@cache
+def bodies() -> list[SkinnedBody]:
+    return [body_of(look, source="procedural") for look in LOOKS]
+
+
+@cache
+def crowd() -> BodyBatch:
+    return batch_bodies(bodies(), range(1, N + 1))
+
+
+@cache
+def styles() -> NDArray[np.void]:
+    each = enumerate(zip(bodies(), LOOKS, strict=True))
+    return np.stack([style_of(b, rng(5, "manner", k), age=look.age) for k, (b, look) in each])
 
 
 def posed(clip: str, phase: float, speed: float = 0.0, x: float | NDArray[np.float64] = 0.0) -> NDArray[np.float32]:
     """Everybody's vertices in one pose, at x."""
-    rotations, offsets = pose(np.full(N, clip_index(clip)), np.full(N, phase), np.full(N, speed), STYLE)
+    rotations, offsets = pose(np.full(N, clip_index(clip)), np.full(N, phase), np.full(N, speed), styles())
     positions = np.zeros((N, 3))
     positions[:, 0] = x
-    return skin(CROWD, rotations, offsets, positions, np.zeros(N))[0]
+    return skin(crowd(), rotations, offsets, positions, np.zeros(N))[0]
 
 
 def feet(person: int, side: str) -> NDArray[np.int64]:
     """Vertices of a shoe's sole."""
-    first, last = CROWD.starts[person], CROWD.starts[person + 1]
-    own = np.isin(CROWD.weight_joints[first:last, 0], [J[f"{side}_ankle"], J[f"{side}_foot"]])
-    return first + np.flatnonzero(own & (CROWD.vertices[first:last, 2] < 0.03))
+    first, last = crowd().starts[person], crowd().starts[person + 1]
+    own = np.isin(crowd().weight_joints[first:last, 0], [J[f"{side}_ankle"], J[f"{side}_foot"]])
+    return first + np.flatnonzero(own & (crowd().vertices[first:last, 2] < 0.03))
 
 
 @pytest.mark.parametrize(("clip", "speed"), [("walk", 0.3), ("walk", 1.0), ("walk", 1.8), ("carry", 1.0), ("run", 2.5)])
 def test_a_planted_foot_stays_within_half_a_centimetre_while_the_body_moves_on(clip: str, speed: float) -> None:
-    stride = stride_length(np.full(N, clip_index(clip)), np.full(N, speed), STYLE["height"])
+    stride = stride_length(np.full(N, clip_index(clip)), np.full(N, speed), styles()["height"])
     # The left foot is flat on the ground in this part of its stance.
     duty = 0.36 if clip == "run" else 0.62
     start, end = 0.2 * duty, 0.5 * duty
@@ -86,7 +99,7 @@ def test_nobody_sinks_more_than_a_centimetre_into_the_ground(clip: str, speed: f
 def test_somebody_standing_or_walking_always_touches_the_ground(clip: str) -> None:
     for phase in np.linspace(0, 1, 25):
         vertices = posed(clip, phase, 1.0 if clip in ("walk", "carry") else 0.0)
-        lows = [vertices[CROWD.starts[i] : CROWD.starts[i + 1], 2].min() for i in range(N)]
+        lows = [vertices[crowd().starts[i] : crowd().starts[i + 1], 2].min() for i in range(N)]
         assert max(lows) < 0.012
 
 
@@ -111,7 +124,7 @@ def test_motion_is_smooth(clip: str) -> None:
 
 @pytest.mark.parametrize("clip", CLIPS)
 def test_limbs_keep_their_length_and_nothing_is_nan(clip: str) -> None:
-    rotations, offsets = pose(np.full(N, clip_index(clip)), np.linspace(0, 0.9, N), np.full(N, 1.0), STYLE)
+    rotations, offsets = pose(np.full(N, clip_index(clip)), np.linspace(0, 0.9, N), np.full(N, 1.0), styles())
     assert np.isfinite(rotations).all()
     assert np.isfinite(offsets).all()
     assert np.linalg.norm(rotations, axis=2).max() <= np.pi + 1e-5
@@ -120,14 +133,14 @@ def test_limbs_keep_their_length_and_nothing_is_nan(clip: str) -> None:
 @pytest.mark.parametrize("clip", ["walk", "run", "sit", "idle", "pick", "ride_bike"])
 def test_knees_bend_backward_only(clip: str) -> None:
     for phase in np.linspace(0, 1, 20):
-        rotations, _ = pose(np.full(N, clip_index(clip)), np.full(N, phase), np.full(N, 1.5), STYLE)
+        rotations, _ = pose(np.full(N, clip_index(clip)), np.full(N, phase), np.full(N, 1.5), styles())
         knees = rotations[:, [J["left_knee"], J["right_knee"]], 1]
         assert knees.min() > -0.05
 
 
 def test_arms_swing_against_the_legs() -> None:
-    rotations, offsets = pose(np.full(N, clip_index("walk")), np.zeros(N), np.full(N, 1.2), STYLE)
-    palms = hand_frames(CROWD.joints, rotations, offsets)[:, :, :3, 3]
+    rotations, offsets = pose(np.full(N, clip_index("walk")), np.zeros(N), np.full(N, 1.2), styles())
+    palms = hand_frames(crowd().joints, rotations, offsets)[:, :, :3, 3]
     # At phase 0 the left heel strikes ahead, so the right hand is ahead.
     assert (palms[:, 1, 0] > palms[:, 0, 0]).all()
 
@@ -136,25 +149,25 @@ def test_a_hand_that_reaches_is_ahead_and_a_hand_that_picks_is_low() -> None:
     for clip, axis, low, high in (("reach", 0, 0.40, 0.9), ("pick", 2, 0.0, 0.45), ("drink", 2, 1.1, 2.0)):
         for person in range(N):
             rotations, offsets = pose(
-                np.array([clip_index(clip)]), np.array([0.5]), np.zeros(1), STYLE[person : person + 1]
+                np.array([clip_index(clip)]), np.array([0.5]), np.zeros(1), styles()[person : person + 1]
             )
-            place = hand_position(rotations[0], offsets[0], BODIES[person], 1)
-            scale = BODIES[person].height / 1.72
+            place = hand_position(rotations[0], offsets[0], bodies()[person], 1)
+            scale = bodies()[person].height / 1.72
             assert low * scale < place[axis] < high * scale
 
 
 def test_seats_are_at_the_height_of_chairs() -> None:
     vertices = posed("sit", 0.0)
     for person in range(N):
-        own = slice(CROWD.starts[person], CROWD.starts[person + 1])
-        hips = np.isin(CROWD.weight_joints[own, 0], [J["pelvis"]])
+        own = slice(crowd().starts[person], crowd().starts[person + 1])
+        hips = np.isin(crowd().weight_joints[own, 0], [J["pelvis"]])
         assert 0.28 < np.quantile(vertices[own][hips, 2], 0.02) < 0.50
 
 
 def test_the_pelvis_bobs_by_centimetres_at_a_walk() -> None:
     heights = np.array(
         [
-            pose(np.full(N, clip_index("walk")), np.full(N, p), np.full(N, 1.3), STYLE)[1][:, 2]
+            pose(np.full(N, clip_index("walk")), np.full(N, p), np.full(N, 1.3), styles())[1][:, 2]
             for p in np.linspace(0, 1, 50)
         ]
     )
@@ -171,7 +184,7 @@ def test_stride_grows_with_speed_and_stature() -> None:
 
 
 def test_people_move_in_manners_of_their_own() -> None:
-    same = np.stack([style_of(BODIES[0], rng(5, "manner", k)) for k in range(5)])
+    same = np.stack([style_of(bodies()[0], rng(5, "manner", k)) for k in range(5)])
     rotations, _ = pose(np.full(5, clip_index("walk")), np.full(5, 0.1), np.full(5, 1.2), same)
     assert len({row.tobytes() for row in rotations}) == 5
 
@@ -182,7 +195,7 @@ def test_an_unknown_motion_is_refused_with_the_known_ones() -> None:
 
 
 def test_nobody_is_posed_without_fuss() -> None:
-    rotations, offsets = pose(np.zeros(0, int), np.zeros(0), np.zeros(0), np.zeros(0, STYLE.dtype))
+    rotations, offsets = pose(np.zeros(0, int), np.zeros(0), np.zeros(0), np.zeros(0, styles().dtype))
     assert rotations.shape == (0, 55, 3)
     assert offsets.shape == (0, 3)
 
@@ -207,13 +220,13 @@ def rises(points: NDArray[np.float64]) -> NDArray[np.float64]:
 @pytest.mark.parametrize("clip", ["walk", "carry"])
 def test_soles_keep_to_slopes_and_kerbs_within_a_centimetre(clip: str) -> None:
     number, speed = np.full(N, clip_index(clip)), np.full(N, 1.2)
-    stride = stride_length(number, speed, STYLE["height"])
+    stride = stride_length(number, speed, styles()["height"])
     for x in np.linspace(-1.2, 1.2, 49):
         places = np.column_stack([np.full(N, x), np.zeros(N), rises(np.full((N, 2), x))])
-        moves = number, x / stride % 1.0, speed, STYLE
+        moves = number, x / stride % 1.0, speed, styles()
         ground = ground_under_feet(*moves, (places, np.zeros(N)), rises)
         rotations, offsets = pose(*moves, ground=ground)
-        vertices = skin(CROWD, rotations, offsets, places, np.zeros(N))[0].astype(np.float64)
+        vertices = skin(crowd(), rotations, offsets, places, np.zeros(N))[0].astype(np.float64)
         for person in range(N):
             lowest = np.inf
             for side in ("left", "right"):
@@ -232,16 +245,16 @@ def test_on_stairs_each_foot_stands_on_a_tread_and_the_body_rises_with_them() ->
     def stairs(points: NDArray[np.float64]) -> NDArray[np.float64]:
         return riser * np.clip(np.floor(points[..., 0] / tread) + 1, 0, 8)
 
-    number, pace = np.full(N, clip_index("walk")), np.array([pace_of_step(tread, tall) for tall in STYLE["height"]])
-    stride = stride_length(number, pace, STYLE["height"])
+    number, pace = np.full(N, clip_index("walk")), np.array([pace_of_step(tread, tall) for tall in styles()["height"]])
+    stride = stride_length(number, pace, styles()["height"])
     pelvis = []
     for x in np.arange(0.6, 1.5, 0.02):
         places = np.column_stack([np.full(N, x), np.zeros(N), np.full(N, riser * x / tread)])
-        moves = number, x / stride % 1.0, pace, STYLE
+        moves = number, x / stride % 1.0, pace, styles()
         ground = ground_under_feet(*moves, (places, np.zeros(N)), stairs)
         rotations, offsets = pose(*moves, ground=ground)
         pelvis.append(places[:, 2] + offsets[:, 2])
-        vertices = skin(CROWD, rotations, offsets, places, np.zeros(N))[0].astype(np.float64)
+        vertices = skin(crowd(), rotations, offsets, places, np.zeros(N))[0].astype(np.float64)
         for person in range(N):
             soles = [vertices[feet(person, side)] for side in ("left", "right")]
             above = [float(np.min(sole[:, 2] - stairs(sole))) for sole in soles]
@@ -255,7 +268,7 @@ def test_on_stairs_each_foot_stands_on_a_tread_and_the_body_rises_with_them() ->
 def changed(was: str, now: str, since: float, phase: float, speed: tuple[float, float] = (1.0, 1.0)) -> Any:
     """Everybody's rotations so long after one motion became another."""
     after = Transition(np.full(N, clip_index(was)), np.full(N, 0.2), np.full(N, speed[0]), np.full(N, since))
-    return pose(np.full(N, clip_index(now)), np.full(N, phase), np.full(N, speed[1]), STYLE, after=after)
+    return pose(np.full(N, clip_index(now)), np.full(N, phase), np.full(N, speed[1]), styles(), after=after)
 
 
 @pytest.mark.parametrize(
@@ -270,21 +283,23 @@ def changed(was: str, now: str, since: float, phase: float, speed: tuple[float, 
 )
 def test_a_motion_begins_as_the_one_before_ended(was: str, now: str, start: float) -> None:
     rotations, offsets = changed(was, now, 0.0, start)
-    before, shifts = pose(np.full(N, clip_index(was)), np.full(N, 0.2), np.full(N, 1.0), STYLE)
+    before, shifts = pose(np.full(N, clip_index(was)), np.full(N, 0.2), np.full(N, 1.0), styles())
     # Feet in the new motion may be turned a little otherwise.
     np.testing.assert_allclose(rotations, before, atol=0.03)
     np.testing.assert_allclose(offsets, shifts, atol=0.01)
     ended, _ = changed(was, now, LONGEST_BLEND, 0.4)
-    np.testing.assert_array_equal(ended, pose(np.full(N, clip_index(now)), np.full(N, 0.4), np.full(N, 1.0), STYLE)[0])
+    np.testing.assert_array_equal(
+        ended, pose(np.full(N, clip_index(now)), np.full(N, 0.4), np.full(N, 1.0), styles())[0]
+    )
 
 
 def test_feet_that_stand_do_not_turn_with_who_turns_on_the_spot() -> None:
     turn = np.full(N, clip_index("turn"))
     soles = []
     for phase in (0.05, 0.25, 0.45):
-        rotations, offsets = pose(turn, np.full(N, phase), np.zeros(N), STYLE)
+        rotations, offsets = pose(turn, np.full(N, phase), np.zeros(N), styles())
         yaw = np.full(N, (phase - 0.25) * TURN_CYCLE)
-        soles.append(skin(CROWD, rotations, offsets, np.zeros((N, 3)), yaw)[0])
+        soles.append(skin(crowd(), rotations, offsets, np.zeros((N, 3)), yaw)[0])
     for person in range(N):
         left = feet(person, "left")
         assert np.linalg.norm(soles[2][left] - soles[0][left], axis=1).max() < 0.01
@@ -292,7 +307,9 @@ def test_feet_that_stand_do_not_turn_with_who_turns_on_the_spot() -> None:
 
 def test_people_who_wait_do_not_move_in_unison() -> None:
     idle = np.full(N, clip_index("idle"))
-    course = np.array([pose(idle, np.zeros(N), np.zeros(N), STYLE, second=t)[0][:, J["head"]] for t in range(0, 60, 2)])
+    course = np.array(
+        [pose(idle, np.zeros(N), np.zeros(N), styles(), second=t)[0][:, J["head"]] for t in range(0, 60, 2)]
+    )
     moved = np.abs(np.diff(course, axis=0)).max(axis=2) > 0.03
     assert moved.any(axis=0).all()
     assert not (moved == moved[:, :1]).all()
