@@ -1,6 +1,7 @@
 """Buses and bicycles in central Helsinki: timetable, boarding, prices."""
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -16,6 +17,11 @@ from vico.sim.transit import DWELL, FARE, TransitSystem, plan_buses, ride_price
 from vico.world.heights import HeightField
 
 
+@cache
+def _network() -> TrafficNetwork:
+    return TrafficNetwork.of(road_city().lanes, road_city().solids)
+
+
 def _systems(
     cars: int = 20, pedestrians: int = 20, *, second: float = 8 * 3600.0, trams: bool = False
 ) -> tuple[Traffic, TransitSystem]:
@@ -23,7 +29,7 @@ def _systems(
     lines = city.transit if trams else city.transit.model_copy(update={"tram_lines": []})
     plan = plan_buses(lines, city.lanes, second)
     traffic = Traffic(
-        TrafficNetwork.of(city.lanes, city.solids),
+        _network(),
         HeightField.flat(HALF),
         cars=cars,
         pedestrians=pedestrians,
