@@ -124,7 +124,7 @@ def test_a_run_has_one_hash_whoever_looks_and_however_many_work(
 
 def test_a_killed_evaluation_comes_to_the_same_table(helsinki_path: Path, tmp_path: Path) -> None:
     def words(out: Path) -> list[object]:
-        steps = ["--seeds", 2, "--steps", 25, "--method", "random"]
+        steps = ["--seeds", 2, "--steps", 10, "--method", "random"]
         return ["eval", "assistant", "--worlds", helsinki_path, *steps, "--out", out]
 
     def table(out: Path) -> tuple[Any, Any]:
