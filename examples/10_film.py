@@ -14,6 +14,7 @@ from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from itertools import chain, pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -138,14 +139,24 @@ class Shopkeeper:
     """An assistant who goes into a shop and stands behind its till."""
 
     def __init__(self, public_map: PublicMap, place: str, seed: int) -> None:
-        self.place, door = place, public_map.place_by_id[place].entrances[0].position
+        self.place, door = place, public_map.place_by_id[place].entrance
         self.door = float(door[0]), float(door[1])
         self.traveller, self.walker = Traveller(public_map, rng(seed, "shopkeeper")), IndoorWalker()
         self.clerk = Clerk(self.walk)
+        self.sim: Simulation | None = None
+
+    def setup(self, sim: Simulation) -> None:
+        """Stand before the shop's door."""
+        self.sim = sim
+        sim.scenario.place_agent("assistant_0", self.door)
 
     def walk(self, point: tuple[float, float, float], near: float, observation: dict, info: dict) -> dict | None:
-        """Get on within the shop."""
-        self.walker.notice(observation, info)
+        """Get on within the shop, which whoever works there knows."""
+        indoor = self.sim.state.indoor
+        room = indoor.index[observation["state"]["room"]]
+        furniture = indoor.furniture[indoor.furniture_start[room] : indoor.furniture_start[room + 1]]
+        known = SimpleNamespace(room=indoor.boxes[room], furniture=furniture)
+        self.walker.notice(observation, info | {"in_view": known})
         return self.walker.towards(observation, point, near=near)
 
     def act(self, observation: dict, info: dict) -> dict:
@@ -417,7 +428,7 @@ class Casting:
             begins=arrived(scene.follow, stay.place),
             search=0,
             config=scene.config | {"assistants": 1},
-            setup=lambda sim: sim.scenario.place_agent("assistant_0", keeper.door),
+            setup=keeper.setup,
             players={"assistant_0": keeper},
         )
 
