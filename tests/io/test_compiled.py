@@ -131,6 +131,64 @@ def test_a_function_is_compiled_once_for_all_constants_of_a_type(town: Path) -> 
     assert _printed(town, program) == "10.0 0\n[1]\n"
 
 
+_GROUND = """
+from typing import NamedTuple
+import numpy as np
+from vico.io.compiled import compiled
+
+class Ground(NamedTuple):
+    heights: object
+    marks: object
+
+@compiled
+def highest(ground, first):
+    best, part = 0.0, ground.heights[first:]
+    for height in part:
+        best = max(best, height)
+    ground.marks[:] = best
+    return best
+
+@compiled
+def part(ground, first):
+    return ground.heights[first:]
+
+@compiled
+def copied(ground):
+    return Ground(ground.heights + 1.0, ground.marks.copy())
+
+@compiled
+def survey(ground):
+    mine = np.arange(3.0)
+    total = highest(Ground(mine, mine), 0)
+    for first in range(len(ground.heights)):
+        total += highest(ground, first) + part(ground, first)[0] + highest(copied(ground), first)
+    return total
+"""
+_SURVEY = """
+import os
+import sys
+os.environ["NUMBA_NRT_STATS"] = "1"
+import numpy as np
+from numba.core.runtime import rtsys
+from town.ground import Ground, highest, part, survey
+
+ground = Ground(np.array([1.0, 3.0, 2.0]), np.zeros(3))
+print(survey(ground), highest(ground, 2), part(ground, 1))
+before = [sys.getrefcount(array) for array in ground], rtsys.get_allocation_stats()
+for _ in range(100):
+    survey(ground), highest(ground, 0), part(ground, 0)
+made = rtsys.get_allocation_stats()
+print(before[0] == [sys.getrefcount(array) for array in ground])
+print(made.alloc - before[1].alloc >= 300, made.alloc - before[1].alloc == made.free - before[1].free)
+print(["call void @NRT_incref" in code for rule in (highest, part) for code in rule.inspect_llvm().values()])
+"""
+
+
+def test_a_function_that_only_borrows_arrays_counts_no_references_and_loses_none(town: Path) -> None:
+    (town / "ground.py").write_text(_GROUND)
+    assert _printed(town, _SURVEY) == "27.0 2.0 [3. 2.]\nTrue\nTrue True\n[False, True]\n"
+
+
 def test_what_does_not_fit_a_slice_is_refused(town: Path) -> None:
     change(town / "rules.py", "return speed - 1.0", "speed[:2] = speed[2:]\n    return speed[0]")
     program = (

@@ -12,6 +12,8 @@ lies below what Python calls. Most of our functions are called by compiled ones 
 six times. Here such a function is only linked, and what Python calls is optimised whole, as a compiler of C does with a
 file. Results are the same to the bit, but where `fastmath` leaves them open. Where loops come out slower for it, a
 callee is optimised alone, too, which saves the machine code only.
+
+Functions that only borrow arrays do not count references to them (`vico.io.references`).
 """
 
 from __future__ import annotations
@@ -48,6 +50,7 @@ from numba.extending import overload
 from numba.np import arrayobj
 
 from vico.io.cache import cache_folder
+from vico.io.references import only_borrows
 
 _log = logging.getLogger(__name__)
 
@@ -206,6 +209,14 @@ def _brief_refusals() -> Iterator[None]:
         arrayobj.raise_with_shape_context = numbas
 
 
+def _lower(run_pass: Any, state: Any) -> None:
+    """Turn typed code into LLVM's, as `run_pass` of numba does it."""
+    # Of its own: numba makes a context for each function.
+    state.targetctx.enable_nrt = not only_borrows(state)
+    with _brief_refusals():
+        run_pass(state)
+
+
 class _CalleeLibrary(JITCodeLibrary):  # type: ignore[misc]
     """Code of a function and all it calls, neither optimised nor loaded: callers link it."""
 
@@ -236,8 +247,7 @@ class _CalleeLowering(NativeLowering):  # type: ignore[misc]
     def run_pass(self, state: Any) -> bool:
         state.library = self._library(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
-        with _brief_refusals():
-            super().run_pass(state)
+        _lower(super().run_pass, state)
         lowered = state["cr"]
         key = object()  # under which numba finds it; an address in memory otherwise
         state.targetctx.insert_user_function(key, lowered.fndesc, [state.library])
@@ -257,8 +267,7 @@ class _KernelLowering(NativeLowering):  # type: ignore[misc]
     _name = "vico_kernel_lowering"
 
     def run_pass(self, state: Any) -> bool:
-        with _brief_refusals():
-            super().run_pass(state)
+        _lower(super().run_pass, state)
         # Those of callees, too: they were not in memory when numba would have set them.
         for variable in state.library._final_module.global_variables:
             if variable.name.startswith("_ZN08NumbaEnv") and (environment := lookup_environment(variable.name)):
