@@ -103,7 +103,8 @@ class ChangeOfPlans:
         self._instead: tuple[Stay | None, list[str]] = None, []
         # What was heard of the weather last: how fast one walks, and whether it is too bad to cycle.
         self._walking, self._keeps_off_bicycles = 1.0, False
-        self._planned = sorted(stay.leave for stay in stays)
+        # For how fast one walks: when one sets out for each stay, and that in ascending order.
+        self._departures: tuple[float, list[float], list[float]] = math.nan, [], []
         # Whether one goes to what is on, where one would stand, and what one would look at.
         self._events: dict[int, Attraction] = {}
 
@@ -137,15 +138,19 @@ class ChangeOfPlans:
         """Modes that one does not choose in such weather."""
         return ("bike",) if self._keeps_off_bicycles else ()
 
-    def lead(self, stay: Stay) -> float:
-        """Return how many seconds earlier one sets out for a stay than planned, as it is slow to walk."""
-        return (stay.due - stay.leave) * (1.0 / self._walking - 1.0)
+    @property
+    def departures(self) -> Sequence[float]:
+        """When one sets out for each stay, seconds of the day: earlier than planned where it is slow to walk."""
+        if self._departures[0] != self._walking:
+            slower = 1.0 / self._walking - 1.0
+            times = [stay.leave - (stay.due - stay.leave) * slower for stay in self._stays]
+            self._departures = self._walking, times, sorted(times)
+        return self._departures[1]
 
     def changes(self) -> Sequence[float]:
         """Return when one sets out for each stay, seconds of the day, in ascending order."""
-        if self._walking == 1.0:
-            return self._planned
-        return sorted(stay.leave - self.lead(stay) for stay in self._stays)
+        _ = self.departures
+        return self._departures[2]
 
     def watched(self, place: PublicPlace) -> Point3 | None:
         """Return the point that those look at who came to a place; None where there is none."""

@@ -207,11 +207,11 @@ class ScheduleFollower:
         return self._leave(observation, info) if state["room"] else self._walk(observation, info, stay, place)
 
     def _stay_at(self, second: float) -> Stay | None:
-        current = None
-        for stay in self._stays:
-            if second >= stay.leave - self._changes.lead(stay):
-                current = stay
-        return current or (self._stays[0] if self._stays else None)
+        departures = self._changes.departures
+        for k in range(len(departures) - 1, -1, -1):
+            if second >= departures[k]:
+                return self._stays[k]
+        return self._stays[0] if self._stays else None
 
     def _is_there(self, observation: Observation, place: PublicPlace) -> bool:
         state = observation["state"]

@@ -138,7 +138,8 @@ class Seats:
 
     def in_room(self, room: int) -> slice:
         """Return which seats are in a room, or outdoors (-1)."""
-        first, last = np.searchsorted(self.room, (room, room + 1))
+        # Of the same type: all rooms would be converted to that of the sought ones.
+        first, last = np.searchsorted(self.room, np.array((room, room + 1), self.room.dtype))
         return slice(int(first), int(last))
 
     def near(self, point: ArrayLike, room: int, *, lies: bool, reach: float = REACH) -> NDArray[np.int64]:

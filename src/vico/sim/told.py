@@ -26,6 +26,7 @@ _TAKEN = 0.6
 
 # By number. Looking an enumeration's members up costs more than all the rest.
 _VEHICLES = {int(Vehicle.NONE): "", int(Vehicle.BUS): "bus", int(Vehicle.BIKE): "bike"}
+_ON_FOOT, _LYING = int(Vehicle.NONE), int(Posture.LYING)
 _POSTURES = {int(posture): posture.name.lower() for posture in Posture}
 _STATUSES = {int(status): status.name.lower() for status in ActionStatus}
 
@@ -137,7 +138,7 @@ class Told:
     def _rest(self, i: int) -> Rests:
         """Return the nearest free seat and bed, or the way there; none while one rides or lies."""
         p, state = self._state.people, self._state
-        if p.vehicle.item(i) != Vehicle.NONE or p.posture.item(i) == Posture.LYING:
+        if p.vehicle.item(i) != _ON_FOOT or p.posture.item(i) == _LYING:
             return Rests(lambda lies: None)
         here = p.position[i], p.room.item(i)
         return Rests(lambda lies: find_rest(state.seats, state.indoor, here, self._taken(), lies=lies))

@@ -13,6 +13,8 @@ from vico.sim.state import LEVEL_GAZE, Vehicle
 
 # Eyes turn up and down this far, radians.
 _STEEPEST = math.radians(60.0)
+# A member of an enumeration costs more to look up than all the rest.
+_BIKE = int(Vehicle.BIKE)
 #: A learner's turn is at most half a turn, degrees.
 _HALF_TURN = 180.0
 
@@ -20,7 +22,7 @@ _HALF_TURN = 180.0
 def check_move_forward(values: Values, i: int, state: SimulationState) -> Refusal | None:
     """Judge a walk: on foot one is slower than on a bicycle."""
     distance = values["distance"]
-    if distance <= RUN_SPEED or state.people.vehicle[i] == Vehicle.BIKE:
+    if distance <= RUN_SPEED or state.people.vehicle.item(i) == _BIKE:
         return None
     return Refusal(
         ReasonCode.OUT_OF_RANGE, f"move_forward: {distance:g} m is out of range; 0 to {RUN_SPEED:g} m a step on foot"
@@ -31,10 +33,10 @@ def move_forward(values: Values, i: int, state: SimulationState) -> None:
     """Walk or ride straight ahead over the coming second; on snow and ice one gets less far."""
     p = state.people
     outdoors = state.environment.conditions
-    if p.room[i] >= 0:
+    if p.room.item(i) >= 0:
         gets_on = 1.0
     else:
-        gets_on = outdoors.cycling if p.vehicle[i] == Vehicle.BIKE else outdoors.walking
+        gets_on = outdoors.cycling if p.vehicle.item(i) == _BIKE else outdoors.walking
     p.move_left[i] = values["distance"] * gets_on
     p.move_speed[i] = values["distance"] * gets_on
     p.pitch[i] = LEVEL_GAZE
