@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.errors import InputError
-from vico.seeds import rng
-from vico.sim.animation.stride import TURN_OF_CRANKS
-from vico.sim.bodies import BUS, CAR, CYCLIST, PEDESTRIAN, STEP_HEIGHT, Bodies, Drawn
+from vico.sim.bodies import BUS, CAR, CYCLIST, PEDESTRIAN, STEP_HEIGHT, Bodies
 from vico.sim.environment import Conditions
 from vico.sim.neighbours import neighbour_grid
-from vico.sim.traffic.axles import axle_transforms
 from vico.sim.traffic.car_following import COMFORTABLE_BRAKING, TIME_GAP
-from vico.sim.traffic.companions import choose_companions, leave_group
 from vico.sim.traffic.crossings import mark_busy_crossings
-from vico.sim.traffic.cyclists import HALF_WIDTH, HEIGHT, equip_cyclists, kerb_points, starts_of_cyclists
+from vico.sim.traffic.cyclists import HALF_WIDTH, HEIGHT, equip_cyclists, kerb_points
 from vico.sim.traffic.drawing import TrafficDrawing
 from vico.sim.traffic.gatherings import Gatherings
 from vico.sim.traffic.hand_placing import HandPlaced, TrafficSetup
@@ -26,23 +21,21 @@ from vico.sim.traffic.jams import STUCK_AFTER, Jam, JamLog, entity_before
 from vico.sim.traffic.levels import TrafficLevels, shapes_of
 from vico.sim.traffic.makes import choose_models
 from vico.sim.traffic.network import TrafficNetwork
-from vico.sim.traffic.pedestrians import RADIUS, advance_pedestrians, place_pedestrian
+from vico.sim.traffic.pedestrians import RADIUS, advance_pedestrians
 from vico.sim.traffic.route import count_per_street, drop_shut_plans, is_taken, widen_shut
+from vico.sim.traffic.seen import SeenTraffic
 from vico.sim.traffic.shapes import Shapes
 from vico.sim.traffic.signal_heads import SignalHeads
 from vico.sim.traffic.signals import Circles, SignalClock, SignalsShown
 from vico.sim.traffic.standing import stand_at_start
+from vico.sim.traffic.starting import Starting
 from vico.sim.traffic.state import (
     AWAY,
     COMING,
-    GAIT_TIME,
-    NONE,
     PEDESTRIAN_RECORD,
-    PRESENT,
     TOP_SPEED,
     VEHICLE_STATE,
     BusRoutes,
-    PedestrianGaits,
     new_fleet,
     new_junctions,
     new_pedestrians,
@@ -50,11 +43,6 @@ from vico.sim.traffic.state import (
 from vico.sim.traffic.stopping_places import without_deliveries
 from vico.sim.traffic.vehicles import advance_vehicles, bring_back, come_back, place_vehicle, take_away
 from vico.world.heights import HeightField
-from vico.world.mesh import Surface
-from vico.world.walkways import SIDEWALK
-
-#: Positions, shape ``(n, 3)``, yaws, and whether people sit.
-Seating = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]
 
 PERSON_HEIGHT = 1.72
 # A car that nothing has let move for so long (s) comes back in at the map's edge, as SUMO does it.
@@ -63,10 +51,9 @@ _ENTRY_SPEED = 6.0  # m/s
 _FAR = 1e7  # where bodies are before they have a place, m
 _CELL = 25.0  # of the grid of neighbours, m
 _DRIFT = 2.0 * TOP_SPEED  # nobody moves faster, m/s
-_TRIES = 400  # places tried for a car or pedestrian
 
 
-class Traffic:
+class Traffic(SeenTraffic):
     """Vehicles and pedestrians, as arrays.
 
     Parameters
@@ -146,7 +133,7 @@ class Traffic:
         self.ridden = np.zeros(cyclists)
         self._riding_speed = self.fleet.target_speed[ridden].copy()
         self._dry_acceleration, self._dry_braking = self.fleet.acceleration.copy(), self.fleet.hard_braking.copy()
-        self._bodies: Bodies | None = None  # as they stand since they last moved; asked for by everybody
+        self._bodies = None
         self._walkers = new_pedestrians(pedestrians, seed)
         self.pedestrian_state = self._walkers.view(np.recarray)
         self.junctions = new_junctions(lanes.zones, len(self.walks), len(lanes), shared=junction_rule.is_shared)
@@ -156,19 +143,19 @@ class Traffic:
         self.signals = SignalClock(lanes, network.walks, seed) if junction_rule.has_signals else None
         heads = SignalHeads(lanes, network.walks, network.poles, height) if self.signals else None
         self._levels = TrafficLevels(height, lanes, network.walks, self._heights, self.shapes.bottom.copy())
-        #: Tells where pedestrians are who ride in buses, by their numbers.
-        self.seats: Callable[[NDArray[np.int64]], Seating] | None = None
+        self.seats = None
         self._drawing = TrafficDrawing(self.prototype, self._own_entities[: self.vehicles], heads)
         self._street_load = np.zeros(len(lanes.edges), np.int32)
         self._entries = self._all_entries = network.entries
-        self._place_buses(buses.starts)
+        start = Starting(lanes, self.walks, self._net, self.paths, self._vehicles, self._walkers, self.shapes)
+        start.place_buses(self.cars, buses.starts)
         hand.put_cars(self._vehicles, self.shapes)
         hand.put_walkers(self._walkers, self.shapes, self.vehicles)
         for i, one in enumerate(placed.pedestrians):
             self.pedestrian_state.preferred_speed[i] = one.speed or self.pedestrian_state.preferred_speed[i]
-        self._place_cars(seed, network.starts, len(placed.cars))
-        self._place_cyclists(seed, network.starts)
-        self._place_pedestrians(seed, len(placed.pedestrians))
+        start.place_cars(seed, network.starts, len(placed.cars), self.cars)
+        start.place_cyclists(seed, network.starts, cyclists)
+        start.place_pedestrians(seed, len(placed.pedestrians))
         stand_at_start(self.paths, self._walkers, self.shapes, self.vehicles, seed)
         #: Leads pedestrians to events.
         self.gatherings = Gatherings(self)
@@ -202,77 +189,6 @@ class Traffic:
     def _place_vehicle(self, v: int, lane: int, offset: float, air: float) -> bool:
         return bool(place_vehicle(self._net, self._vehicles, v, lane, offset, self.shapes, air))
 
-    def _place_buses(self, starts: Sequence[tuple[int, float]]) -> None:
-        for k, (place, offset) in enumerate(starts):
-            v = self.cars + k
-            self.fleet.route_index[v] = place
-            lane = self._net.route[self._net.route_first[self.fleet.route[v]] + place]
-            if not self._place_vehicle(v, lane, offset, 1.0):
-                raise InputError(f"traffic: no room for bus {k} at its stop; run fewer buses on the line")
-
-    def _place_cars(self, seed: int, usable: NDArray[np.int64], first: int) -> None:
-        random = rng(seed, "traffic", "cars")
-        if self.cars and not len(usable):
-            raise InputError("traffic: the world has no street for cars; use --cars 0")
-        share = self.lanes.length[usable] / self.lanes.length[usable].sum() if len(usable) else None
-        for v in range(first, self.cars):
-            for _ in range(_TRIES):
-                lane = int(random.choice(usable, p=share))
-                low, high = self.fleet.length[v] + 1.0, self.lanes.length[lane] - 1.5
-                if high > low and self._place_vehicle(v, lane, random.uniform(low, high), 2.0):
-                    break
-            else:
-                raise InputError(f"traffic: no room for car {v + 1} of {self.cars}; use fewer, as in --cars {v}")
-
-    def _place_cyclists(self, seed: int, usable: NDArray[np.int64]) -> None:
-        random = rng(seed, "traffic", "cyclists at the start")
-        kerb, share = starts_of_cyclists(self.lanes, usable, self.cyclists)
-        for k, v in enumerate(range(self.vehicles - self.cyclists, self.vehicles)):
-            for _ in range(_TRIES):
-                lane = int(random.choice(kerb, p=share))
-                low, high = self.fleet.length[v] + 1.0, self.lanes.length[lane] - 1.5
-                if high > low and self._place_vehicle(v, lane, random.uniform(low, high), 1.0):
-                    break
-            else:
-                raise InputError(
-                    f"traffic: no room for cyclist {k + 1} of {self.cyclists}; use fewer, as in --cyclists {k}"
-                )
-
-    def _place_pedestrians(self, seed: int, first: int) -> None:
-        random = rng(seed, "traffic", "pedestrians")
-        usable = np.flatnonzero((self.walks.kind == SIDEWALK) & (self.walks.length > 3.0))
-        if self.pedestrians and not len(usable):
-            raise InputError("traffic: the world has no sidewalk; use --pedestrians 0")
-        share = self.walks.length[usable] / self.walks.length[usable].sum() if len(usable) else None
-        choose_companions(self._walkers, first, seed)
-        for i in range(first, self.pedestrians):
-            if self._walkers["leader"][i] != NONE and self._place_companion(i):
-                continue
-            for _ in range(_TRIES):
-                walkway = int(random.choice(usable, p=share))
-                offset, way = random.uniform(0.0, self.walks.length[walkway]), 1 if random.random() < 0.5 else -1
-                if self._place_pedestrian(i, walkway, offset, way):
-                    break
-            else:
-                raise InputError(
-                    f"traffic: no room for pedestrian {i + 1} of {self.pedestrians}; use fewer, as in --pedestrians {i}"
-                )
-
-    def _place_pedestrian(self, i: int, walkway: int, offset: float, way: int) -> bool:
-        b = self.vehicles + i
-        return bool(place_pedestrian(self.paths, self._walkers, i, walkway, offset, way, self.shapes, b))
-
-    def _place_companion(self, i: int) -> bool:
-        """Put a pedestrian near who leads it; who finds no room there walks alone."""
-        leader = self._walkers[self._walkers["leader"][i]]
-        walkway, way, offset = (leader[name].item() for name in ("walkway", "direction", "offset"))
-        places = [offset + side * 1.05 * k for k in (1, 2, 3) for side in (-way, way)]
-        length = self.walks.length[walkway]
-        if any(0.0 <= place <= length and self._place_pedestrian(i, walkway, place, way) for place in places):
-            return True
-        leave_group(self._walkers, i)
-        return False
-
     # -- the subsystem contract --------------------------------------------------------------------------------------
 
     def take_away(self, v: int) -> None:
@@ -304,36 +220,6 @@ class Traffic:
             found |= {f"{name}.{field}": array for field, array in part.items()}
         found |= self._levels.arrays() | ({"cyclists.ridden": self.ridden} if self.cyclists else {})
         return found | {f"jams.{name}": array for name, array in self.jams.arrays().items()}
-
-    def bodies(self) -> Bodies:
-        """Vehicles but those out of service, then the pedestrians in the street."""
-        if self._bodies is None:
-            found = self._everybody()
-            riding = self.riding
-            out = np.concatenate([np.ones(len(found) - self.pedestrians, np.bool_), ~riding])
-            self._bodies = found.where(out) if riding.any() else found
-        return self._bodies
-
-    def _everybody(self) -> Bodies:
-        """Return vehicles and all pedestrians, who ride in buses far away."""
-        xy = np.column_stack([self.shapes.x, self.shapes.y])
-        everybody = Bodies(
-            entity=self._own_entities,
-            kind=self._kinds,
-            position=np.column_stack([xy, self._levels.heights(xy)]),
-            yaw=self.shapes.yaw.copy(),
-            half_length=self.shapes.half_length,
-            half_width=self.shapes.half_width,
-            height=self._heights,
-            velocity=np.column_stack([self.shapes.vx, self.shapes.vy]),
-        )
-        there = self._present()
-        walkers = np.arange(self.vehicles, len(xy))
-        return everybody.where(np.r_[there, walkers]) if len(there) < self.vehicles else everybody
-
-    def _present(self) -> NDArray[np.int64]:
-        """Return the vehicles that are not out of service."""
-        return np.flatnonzero(self._vehicles["presence"] == PRESENT)
 
     def set_conditions(self, conditions: Conditions) -> None:
         """Have everybody drive and walk as it is outdoors now: part of the environment's state, not of this one's."""
@@ -497,61 +383,6 @@ class Traffic:
             for k in np.flatnonzero(since >= STUCK_AFTER).tolist()
         ]
 
-    def draw(self) -> Drawn:
-        """Cars, buses and what signals show; pedestrians are drawn by whoever skins people."""
-        transforms, lights, elapsed = self.vehicle_transforms(), self.fleet.lights, float(self.jams.elapsed[0])
-        shown = self._net.lanes["light"], self.paths.walkways["light"]
-        pedals = self.ridden / TURN_OF_CRANKS
-        return self._drawing.draw(transforms, self._present(), lights, elapsed, shown, pedals)
-
-    def vehicle_transforms(self) -> NDArray[np.float32]:
-        """Model to world of every vehicle, shape ``(vehicles, 4, 4)``; of those away it means nothing."""
-        m, half = self.vehicles, self.fleet.wheelbase / 2
-        xy = np.column_stack([self.shapes.x[:m], self.shapes.y[:m]])
-        return axle_transforms(xy, self.shapes.yaw[:m], half, lambda points: self._levels.at(points, slice(0, m)))
-
-    def prototypes(self) -> dict[str, list[Surface]]:
-        """Models of the vehicles and signals, by the names `draw` uses."""
-        return self._drawing.prototypes(lefthand=self.lanes.lefthand)
-
-    # -- what others ask ---------------------------------------------------------------------------------------------
-
-    @property
-    def lights(self) -> NDArray[np.uint8]:
-        """Which lights each vehicle shows, bits as `vico.sim.traffic.lights` has them; in the order of `bodies`."""
-        return np.asarray(self.fleet.lights[self._present()], np.uint8)
-
-    def entities(self) -> tuple[NDArray[np.int32], NDArray[np.int8]]:
-        """Return entity and kind of all, vehicles, then pedestrians; buses that are out of service are among them."""
-        return self._own_entities, self._kinds
-
-    @property
-    def walkers(self) -> Bodies:
-        """The pedestrians alone, in buses, too, then the cyclists."""
-        everybody = self._everybody()
-        people, n = self.pedestrians, len(everybody)
-        found = everybody.where(np.r_[n - people : n, n - people - self.cyclists : n - people])
-        riding = np.flatnonzero(self._walkers["aboard"] != NONE)
-        if len(riding) and self.seats is not None:
-            position, yaw, _ = self.seats(riding)
-            found.position[riding], found.yaw[riding] = position, yaw
-        return found
-
-    @property
-    def spots(self) -> NDArray[np.void]:
-        """Where people stand beside walkways, dtype `SPOT`."""
-        return self.paths.spots
-
-    @property
-    def riding(self) -> NDArray[np.bool_]:
-        """Which pedestrians ride in buses, shape ``(pedestrians,)``."""
-        return np.asarray(self._walkers["aboard"] != NONE)
-
-    @property
-    def passengers(self) -> Bodies:
-        """The pedestrians who ride in buses, where they sit or stand."""
-        return self.walkers.where(np.flatnonzero(self.riding))
-
     def take_off(self, i: int) -> None:
         """Take a pedestrian out of the street: it rides in a bus from now on."""
         b = self.vehicles + i
@@ -571,23 +402,6 @@ class Traffic:
         self._bodies = None
 
     @property
-    def gait(self) -> PedestrianGaits:
-        """How each pedestrian walks, then how each cyclist rides: what sets a clip's rate and phase."""
-        walkers, n = self.pedestrian_state, self.cyclists
-        walked = walkers.distance_walked - walkers.set_out
-        seated = np.zeros(len(walked) + n, np.bool_)
-        riding = np.flatnonzero(walkers.aboard != NONE)
-        if len(riding) and self.seats is not None:
-            seated[riding] = self.seats(riding)[2]
-        cycling = np.arange(len(seated)) >= len(walked)
-        afoot = ~cycling
-        afoot[riding] = False
-        return PedestrianGaits(
-            np.concatenate([walkers.preferred_speed, self._riding_speed]),
-            np.concatenate([walked, self.ridden]),
-            np.concatenate([walkers.gait_time, np.full(n, GAIT_TIME)]),
-            np.concatenate([walkers.stand_kind, np.zeros(n, np.uint8)]),
-            seated,
-            cycling,
-            afoot,
-        )
+    def spots(self) -> NDArray[np.void]:
+        """Where people stand beside walkways, dtype `SPOT`."""
+        return self.paths.spots
