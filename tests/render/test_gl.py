@@ -18,7 +18,7 @@ from vico.render.frames import PictureRequest, take_pictures
 from vico.render.gl.renderer import GlRenderer
 from vico.render.limbs import LIMBS
 from vico.render.quality import FINE
-from vico.render.records import GROUND_WINDOWS, ROOM_FRONT, UPPER_WINDOWS
+from vico.render.records import GROUND_WINDOWS, OPENING, ROOM_FRONT, UPPER_WINDOWS
 from vico.render.sensors.batch import Viewers
 from vico.render.sensors.lens import Lens
 from vico.sim.config import SimConfig
@@ -136,6 +136,24 @@ def test_rooms_behind_glass_are_the_same_ones(both: tuple[Scene, GlRenderer]) ->
     without = gl.take(look, request).rgb.astype(int)
     assert np.abs(wanted - got).mean() < 1.0
     assert (np.abs(without - got).max(axis=-1) > 10).mean() > 0.004
+
+
+def test_open_doors_are_cut_out_of_the_same_pixels(both: tuple[Scene, GlRenderer]) -> None:
+    made, gl = both
+    opening = np.zeros(1, OPENING)
+    sizes = {"x": -8.0, "y": 1.5, "inward_x": 1.0, "half_width": 0.5, "height": 2.0, "before": 0.1, "behind": 0.3}
+    for name, value in sizes.items():
+        opening[name] = value
+    made.lighting = DAY
+    look = Cameras(np.array([[-14.0, 0.0, 1.6]]), np.array([[1.0, 0.0, 0.0]]), width=160, height=120)
+    closed = take_pictures(made, look, PictureRequest()).segmentation
+    made.set_openings(opening)
+    wanted, got = take_pictures(made, look, PictureRequest()), gl.take(look, PictureRequest())
+    made.set_openings(opening[:0])
+    assert ((closed == 30) & (wanted.segmentation != 30)).sum() > 200
+    assert ((closed != 30) & (wanted.segmentation != closed)).sum() == 0
+    # What stands behind is seen by one of them only: nothing ever stands there but a hall.
+    assert ((got.segmentation == 30) == (wanted.segmentation == 30)).mean() > 0.995
 
 
 @pytest.mark.parametrize(("lamp", "daylight"), [(0.0, 1.0), (1.0, 0.0), (0.0, 0.0)])

@@ -14,6 +14,7 @@ from vico.assets.shapes import ball, box, pose_matrix
 from vico.errors import InputError
 from vico.render import Cameras, Frames, Lighting, Scene, ViewCache, render
 from vico.render.frames import PendingView
+from vico.render.records import OPENING
 from vico.world.mesh import Material, Surface, joined
 
 
@@ -280,3 +281,34 @@ def test_bad_arguments_are_refused_with_a_reason() -> None:
         scene.place(["tree"], np.eye(4)[None], [1])
     with pytest.raises(InputError, match="finite"):
         Scene([Surface.from_triangles(np.full((3, 3), np.nan), np.array([[0, 1, 2]]))])
+
+
+def wall_with_door() -> Scene:
+    """A wall at x = 5 with an open door in it, a hall behind that, and a leaf before its back."""
+    wall = box((0.2, 8, 4), (5.1, 0, 2)).of_entity(3)
+    scene = Scene([wall], {"hall": [box((0.2, 3, 4), (2.0, 0, 2))], "leaf": [box((0.2, 0.1, 1))]})
+    scene.keep_detail(["hall"])
+    scene.set_rigid([0, 1], np.array([pose_matrix(5, 0), pose_matrix(6, 0, 1.5)]), [4, 5], shadowless=2)
+    opening = np.zeros(1, OPENING)
+    sizes = {"x": 5.0, "inward_x": 1.0, "half_width": 0.5, "height": 2.0, "before": 0.1, "behind": 0.3}
+    for name, value in sizes.items():
+        opening[name] = value
+    scene.set_openings(opening)
+    return scene
+
+
+def test_through_an_open_door_what_moves_behind_the_wall_is_seen_and_nothing_beside_it() -> None:
+    scene = wall_with_door()
+    view = Cameras(np.array([[0.0, 0, 1.0]]), np.array([[1.0, 0, 0]]), width=128, height=128)
+    frames = render(scene, view, rgb=False)
+    seen, middle = frames.segmentation[0], 64
+    assert seen[middle, middle] == 4 or seen[middle, middle] == 5
+    assert abs(frames.depth[0][middle, middle - 4] - 6.9) < 0.01
+    focal = 64 / np.tan(view.fov_y / 2)
+    row, column = np.nonzero((seen == 4) | (seen == 5))
+    # The opening is a metre wide and ends 1 m above the eye, 5 m away; what is behind it stands 1 m below, 6.9 m away.
+    assert np.ptp(column) + 1 == pytest.approx(focal / 5.0, abs=2)
+    assert np.ptp(row) + 1 == pytest.approx(focal / 5.0 + focal / 6.9, abs=2)
+    assert {3, 4, 5} <= set(np.unique(seen).tolist())
+    scene.set_openings(np.zeros(0, OPENING))
+    assert set(np.unique(render(scene, view, rgb=False).segmentation[0, 32:76, 48:80])) == {3}

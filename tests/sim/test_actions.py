@@ -106,8 +106,9 @@ def test_a_place_is_entered_from_two_metres_and_not_from_further(sim: Simulation
     assert act(sim, "assistant_0", type="enter", place=toy_city.CAFE)["action_status"] == "refused"
     act(sim, "assistant_0", type="turn_left", degrees=90)
     act(sim, "assistant_0", type="move_forward", distance=1.2)
-    act(sim, "assistant_0", type="enter", place=toy_city.CAFE)  # and goes up to the door
-    state = act(sim, "assistant_0", type="enter", place=toy_city.CAFE)
+    for _ in range(2):
+        act(sim, "assistant_0", type="enter", place=toy_city.CAFE)  # goes up to the door, and through
+    state = [act(sim, "assistant_0", type="wait") for _ in range(2)][-1]
     assert (state["action_status"], state["place"], state["building"]) == ("ok", toy_city.CAFE, "b1")
 
 
@@ -127,7 +128,7 @@ def test_linked_rooms_are_walked_into_from_within_a_metre_of_the_door(sim: Simul
 
 def test_leaving_a_building_ends_in_front_of_its_door_looking_away(sim: Simulation) -> None:
     act(sim, "resident_0", type="exit")
-    state = act(sim, "resident_0", type="wait")
+    state = [act(sim, "resident_0", type="wait") for _ in range(4)][-1]
     assert (state["room"], state["place"]) == ("", "")
     assert sim.state.people.position[0, :2] == pytest.approx([-5.0, 4.0], abs=0.6)
     assert sim.state.people.yaw[0] == pytest.approx(-np.pi / 2)
@@ -166,7 +167,7 @@ def test_what_is_held_goes_along_and_indoors(sim: Simulation) -> None:
     outdoors(sim, "assistant_0", -5.0, 3.6, yaw=np.pi / 2)
     thing = parcel(sim, -5.5, 3.6)
     act(sim, "assistant_0", type="pick", hand=0, object=thing)
-    for _ in range(2):
+    for _ in range(4):
         act(sim, "assistant_0", type="enter", place=toy_city.CAFE)
     assert sim.ground_truth.object_room("parcel") == "r_cafe"
     assert sim.ground_truth.object_position("parcel")[2] == pytest.approx(toy_city.FLOOR, abs=1.5)

@@ -76,7 +76,7 @@ def test_feet_stay_on_sloping_ground(sim: Simulation) -> None:
 
 def test_furniture_and_walls_of_a_room_stop_people(sim: Simulation) -> None:
     sim.scenario.place_agent("assistant_0", (-5.0, 3.9), yaw=np.pi / 2)
-    for _ in range(2):
+    for _ in range(4):
         sim.step({"assistant_0": {"type": "enter", "place": toy_city.CAFE}})
     run_at(sim, "assistant_0", 1.0, 8)
     room = int(sim.state.people.room[0])

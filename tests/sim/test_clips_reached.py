@@ -74,6 +74,8 @@ def in_the_street() -> set[str]:
     sim.scenario.place_agent("assistant_0", (-5.0, 3.6))
     for _ in range(2):
         assert watched.act(type="enter", place=toy_city.CAFE) == "ok"
+    for _ in range(2):
+        watched.act(type="wait")
     sim.state.people.posture[0] = Posture.LYING
     watched.act(type="sleep")
     return watched.seen

@@ -169,7 +169,7 @@ def test_a_guest_gets_to_every_room_of_a_hotel_of_three_floors(hotel: World) -> 
 def _visit_everything(sim: Simulation, world: World, *, containers: bool = True) -> set[float]:
     """Enter, then go through all rooms depth first and back; heights of the floors on which people stood."""
     place = world.places[0]
-    for _ in range(2):
+    for _ in range(4):
         act(sim, type="enter", place=place.id)
     assert sim.state.people.room[0] >= 0
     seen: set[str] = set()

@@ -136,7 +136,7 @@ def test_a_thing_on_the_floor_of_a_room_stops_people_and_nobody_enters_onto_it(s
     inside = sim.state.indoor.rooms[room].inside
     add(sim, "crate", inside[0], inside[1], room="r_cafe")
     sim.scenario.place_agent("assistant_0", (-5.0, 3.9), yaw=np.pi / 2)
-    for _ in range(2):
+    for _ in range(4):
         act(sim, type="enter", place=toy_city.CAFE)
     assert sim.state.people.room[0] == room
     assert overlaps_of(sim.state) == []

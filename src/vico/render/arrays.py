@@ -17,7 +17,8 @@ PAD = 32
 TILE, BLOCK = 8, 4
 # Triangles whose setup the shader keeps at hand; a power of two.
 SETUPS = 2048
-OUTDOORS, INDOORS, ANYWHERE = 0, 1, 2
+# Where a thing is; what is `SHADOWLESS` is outdoors and darkens nothing.
+OUTDOORS, INDOORS, ANYWHERE, SHADOWLESS = 0, 1, 2, 3
 # Static instances that are looked at together.
 INSTANCE_GROUP = 48
 # Rows of `Buffers.vertex`: camera frame, metres; picture, pixels; 1 / metres.
@@ -85,7 +86,7 @@ class Instances(NamedTuple):
     entity
         Id in segmentation images where the prototype's triangles have none, int32, shape ``(n,)``.
     where
-        OUTDOORS, INDOORS or ANYWHERE, uint8, shape ``(n,)``.
+        OUTDOORS, INDOORS, ANYWHERE or SHADOWLESS, uint8, shape ``(n,)``.
     sphere
         Bounding sphere in the world, `SPHERE`, shape ``(n,)``.
     groups
@@ -136,6 +137,8 @@ class SceneArrays(NamedTuple):
     windows
         Share of the light of buildings' windows that is on: upper floors, ground floor; by entity, float32, shape
         ``(n, 2)``. The last row is for all entities beyond.
+    openings
+        Doors that are not closed, `OPENING`.
     """
 
     mesh: Mesh
@@ -147,6 +150,7 @@ class SceneArrays(NamedTuple):
     avatars: PosedAvatars
     counts: Any
     windows: NDArray[np.float32]
+    openings: NDArray[np.void]
 
 
 class Buffers(NamedTuple):

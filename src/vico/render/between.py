@@ -29,6 +29,10 @@ class SceneMoment(NamedTuple):
         Of the avatars' vertices, float32, shape ``(V, 3)``.
     limbs
         Of the avatars, as `PosedAvatars` has them.
+    openings
+        Doors that are not closed, as `SceneArrays` has them.
+    shadowless
+        How many of the last moving instances throw no shadow.
     """
 
     scene: Scene
@@ -36,6 +40,8 @@ class SceneMoment(NamedTuple):
     placement: PlacedInstances
     normals: NDArray[np.float32]
     limbs: NDArray[np.float32]
+    openings: NDArray[np.void]
+    shadowless: int
 
 
 def moment_of(scene: Scene, second: float) -> SceneMoment:
@@ -44,7 +50,8 @@ def moment_of(scene: Scene, second: float) -> SceneMoment:
     first = int(spans["first_vertex"].min()) if len(spans) else 0
     vertices = slice(first, int(spans["end_vertex"].max(initial=0)))
     normals = scene.arrays.mesh.vertex["normal"][vertices].copy()
-    return SceneMoment(scene, second, placement_of(scene), normals, scene.arrays.avatars.limbs)
+    openings, shadowless = scene.arrays.openings, scene.shadowless
+    return SceneMoment(scene, second, placement_of(scene), normals, scene.arrays.avatars.limbs, openings, shadowless)
 
 
 def show_between(before: SceneMoment, after: SceneMoment, share: float) -> Scene:
@@ -66,7 +73,7 @@ def show_between(before: SceneMoment, after: SceneMoment, share: float) -> Scene
         matrix[known] = start[known]
         moves = known & ~leaps
         matrix[moves] = between(start[moves], b.matrix[moves], share)
-    _set_rigid(scene, b, matrix)
+    _set_rigid(after, matrix)
     if len(b.x):
         was, new = vertices_before(a, b), np.stack([b.x, b.y, b.z], axis=1)
         old = as_before(np.stack([a.x, a.y, a.z], axis=1), new, was)
@@ -105,12 +112,15 @@ def between(a: NDArray[np.float32], b: NDArray[np.float32], share: float) -> NDA
 
 def _show(moment: SceneMoment) -> None:
     now = moment.placement
-    _set_rigid(moment.scene, now, now.matrix)
+    _set_rigid(moment, now.matrix)
     if len(now.x):
         moment.scene.repose(np.stack([now.x, now.y, now.z], axis=1), moment.normals, moment.limbs)
 
 
-def _set_rigid(scene: Scene, placement: PlacedInstances, matrix: NDArray[np.float32]) -> None:
+def _set_rigid(moment: SceneMoment, matrix: NDArray[np.float32]) -> None:
+    placement = moment.placement
     transforms = np.zeros((len(matrix), 4, 4), np.float32)
     transforms[:, :3], transforms[:, 3, 3] = matrix, 1.0
-    scene.set_rigid(placement.prototype, transforms, placement.entity)
+    things = placement.prototype, transforms, placement.entity
+    moment.scene.set_rigid(*things, shadowless=moment.shadowless)
+    moment.scene.set_openings(moment.openings)

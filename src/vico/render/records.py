@@ -240,6 +240,22 @@ CABIN = np.dtype(
     align=True,
 )
 
+# A door that is not closed: what of the wall is not drawn there, a box from before its leaf to the back of the hall.
+OPENING = np.dtype(
+    [
+        ("x", f8),  # middle of the sill, in the plane of the closed leaf
+        ("y", f8),
+        ("z", f8),
+        ("inward_x", f8),  # unit vector into the building
+        ("inward_y", f8),
+        ("half_width", f8),  # metres
+        ("height", f8),
+        ("before", f8),  # how far before and behind the leaf's plane nothing of the wall is drawn
+        ("behind", f8),
+    ],
+    align=True,
+)
+
 # Something that moves, as it casts a shadow.
 CASTER = np.dtype(
     [

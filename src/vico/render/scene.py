@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from vico.render.arrays import (
     ANYWHERE,
     INDOORS,
     OUTDOORS,
+    SHADOWLESS,
     Instances,
     PosedAvatars,
     Prototypes,
@@ -33,7 +34,7 @@ from vico.render.instances import (
 )
 from vico.render.lighting import Lighting, cloud_map, linear_table, sky_table, tone_table, unit
 from vico.render.limbs import LIMBS
-from vico.render.records import COUNTS, ROOM, ROOM_FRONT, SPAN, SPHERE
+from vico.render.records import COUNTS, OPENING, ROOM, ROOM_FRONT, SPAN, SPHERE
 from vico.render.shading.light import Light, ReliefMap, ShadowMap
 from vico.render.shading.sky import SKY_SIZE, paint_sky
 from vico.render.shadows.cabins import cabin_records
@@ -47,6 +48,7 @@ _LEVEL_PIXELS = (1e9, 48.0, 20.0)
 _LEVEL_CELLS = (0.07, 0.16)
 _SHADOW_METRES, _RELIEF_METRES = 0.4, 1.5
 _ALL_ON = np.ones((1, 2), np.float32)
+NO_OPENINGS = np.zeros(0, OPENING)
 
 
 class Scene:
@@ -76,6 +78,8 @@ class Scene:
         Glass on streets with rooms behind it, `ROOM_FRONT`; none unless assigned.
     moment
         Seconds; decides where drops and flakes are in pictures taken now.
+    shadowless
+        How many of the last things that move throw no shadow.
 
     Notes
     -----
@@ -126,6 +130,7 @@ class Scene:
         self._lighting = lighting or Lighting()
         self._light: Light | None = None
         self.moment = 0.0
+        self.shadowless = 0
         self.fronts = np.zeros(0, ROOM_FRONT)
         self._shadow_key: tuple[float, ...] | None = None
         self._shadow: ShadowMap | None = None
@@ -145,7 +150,16 @@ class Scene:
         self._clothed: tuple[Any, ...] | None = None
         self._bodies = no_avatars().span
         self.arrays = SceneArrays(
-            mesh, textures, clusters, where, placeable, empty, no_avatars(), np.zeros(1, COUNTS)[0], _ALL_ON
+            mesh,
+            textures,
+            clusters,
+            where,
+            placeable,
+            empty,
+            no_avatars(),
+            np.zeros(1, COUNTS)[0],
+            _ALL_ON,
+            NO_OPENINGS,
         )
         self.arrays.counts["fixed_vertices"] = max(widest(clusters.span), widest(placeable.levels.reshape(-1)))
 
@@ -198,14 +212,30 @@ class Scene:
         self._light = self._shadow = self._relief = None
         self.version += 1
 
-    def set_rigid(self, prototype_index: ArrayLike, transforms: ArrayLike, entity: ArrayLike) -> None:
-        """Replace the things that move as a whole; `prototype_index` are values of `Scene.names`."""
+    def set_rigid(
+        self, prototype_index: ArrayLike, transforms: ArrayLike, entity: ArrayLike, *, shadowless: int = 0
+    ) -> None:
+        """Replace the things that move as a whole; `prototype_index` are values of `Scene.names`.
+
+        The last `shadowless` of them are outdoors and throw no shadow.
+        """
         number = np.atleast_1d(np.asarray(prototype_index, np.int32))
         if number.size and (number.min() < 0 or number.max() >= len(self.names)):
             raise InputError(f"scene: prototype index {int(number.max())} of {len(self.names)}")
         rows = matrix_rows(transforms, len(number))
+        self.shadowless = shadowless
         where = np.full(len(number), ANYWHERE, np.uint8)
+        where[len(number) - shadowless :] = SHADOWLESS
         self._set_instances(self._instances(rows, number, entities_of(entity, len(number)), where))
+
+    def keep_detail(self, names: Iterable[str]) -> None:
+        """Draw models in full from afar, too: those of few triangles between which nothing may be seen."""
+        self.arrays.prototypes.pixels[[self.names[name] for name in names]] = 0.0
+
+    def set_openings(self, openings: NDArray[np.void]) -> None:
+        """Say which doors are not closed, `OPENING`: of what never moves, nothing is drawn within them."""
+        if len(openings) or len(self.arrays.openings):
+            self._replace(openings=np.ascontiguousarray(openings))
 
     def set_skinned(
         self,
@@ -391,7 +421,7 @@ class Scene:
         all_of.where[rows], all_of.sphere[rows] = moving.where, moving.sphere
         self.arrays.counts["instances"], self.arrays.counts["static_instances"] = fixed + count, fixed
 
-    def _replace(self, **changed: Mesh | Instances | PosedAvatars | NDArray[np.float32]) -> None:
+    def _replace(self, **changed: Mesh | Instances | PosedAvatars | NDArray[np.float32] | NDArray[np.void]) -> None:
         self.arrays = self.arrays._replace(**changed)  # type: ignore[arg-type]
 
 

@@ -132,7 +132,14 @@ class Avatars:
         """Return the room each avatar is in, `OUTDOORS` or `IN_BUS`: only those of one space can touch."""
         return np.where(self.people.vehicle == Vehicle.BUS, IN_BUS, self.people.room).astype(np.int32)
 
-    def advance(self, dt: float, obstacles: NDArray[np.void], *, share: NDArray[np.float64]) -> None:
+    def advance(
+        self,
+        dt: float,
+        obstacles: NDArray[np.void],
+        *,
+        share: NDArray[np.float64],
+        carried: tuple[NDArray[np.int64], NDArray[np.float64]] | None = None,
+    ) -> None:
         """Turn and walk on by `dt` seconds.
 
         Parameters
@@ -142,6 +149,8 @@ class Avatars:
         share
             Which part of each avatar's remaining turn belongs to this sub-step (1 in the last one of its action),
             shape ``(n,)``.
+        carried
+            Who was already moved in this sub-step, and how fast, m/s, shapes ``(k,)`` and ``(k, 2)``.
         """
         p = self.people
         if not len(p):
@@ -169,6 +178,8 @@ class Avatars:
             p.contact[hit] = contact[hit]
             p.velocity[:] = (p.position[:, :2] - before) / dt
             self.settle(np.flatnonzero(moved > 0.0))
+        if carried is not None:
+            p.velocity[carried[0]] = carried[1]
         self._animate(turned, tread, dt)
 
     def settle(self, who: NDArray[np.int64]) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from vico.assets.house_doors import DOOR_MATERIAL, house_doors
 from vico.assets.models.furniture import furniture_models
 from vico.assets.models.street import street_models
 from vico.errors import InputError
@@ -145,6 +146,16 @@ class SimulationBase:
     def entrances(self) -> dict[str, Entrance]:
         """Entrances by id."""
         return {entrance.id: entrance for entrance in self.world.entrances}
+
+    @cached_property
+    def house_doors(self) -> NDArray[np.void]:
+        """Doors of ``world.entrances``, `vico.assets.house_doors.HOUSE_DOOR`, as facades have them."""
+        return house_doors(self.world.geometry("buildings", DOOR_MATERIAL), self.world.entrances)
+
+    @cached_property
+    def entrance_index(self) -> dict[str, int]:
+        """Row of each entrance in ``world.entrances`` by id."""
+        return {entrance.id: k for k, entrance in enumerate(self.world.entrances)}
 
     @cached_property
     def doors(self) -> NDArray[np.float64]:

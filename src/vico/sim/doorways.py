@@ -1,8 +1,10 @@
-"""Going through the doors of houses: up to the door, a hand on it, and then through.
+"""Going through the doors of houses: up to the door, a hand on it, and through it when it is open.
 
-Who goes in walks up to the entrance and opens it from outside, who goes out does so from within; they are on the other
-side as soon as the door is open. `People.door_time` counts the seconds from the hand on the door on, and is negative
-before. Leaves are part of the walls' pictures, and do not move.
+Who goes in walks up to the entrance and opens it from outside, who goes out does so from within. `People.door_time`
+counts the seconds from the hand on the door on, and is negative before. The leaf begins to move when the hand is on it
+(`vico.sim.door_leaves`). Through the open door one walks (`vico.sim.passing`, `People.passing`): in from where one
+stands to a step behind the wall, and is in the room then; out from such a step to free ground. That leads through the
+wall's opening, which the map knows nothing of; others are kept clear of all the same. One who can't get on goes back.
 """
 
 from __future__ import annotations
@@ -12,19 +14,22 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.rules import ActionStatus, ReasonCode
+from vico.rules import ActionStatus
 from vico.sim.avatars import CLIP
-from vico.sim.holding import free_hand, take_umbrella
-from vico.sim.moves import gesture, place_in_room, put_outdoors, spot_outside, wrapped
+from vico.sim.holding import free_hand
+from vico.sim.moves import gesture, wrapped
+from vico.sim.passing import LET_GO, TURN_RATE, begin_passing, entrance_of
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import DOOR_OPENING
 
 # Up to the door one takes this long at most, seconds, to so far from it, metres, between these speeds, m/s.
 _WAY_UP, _ARM, _SLOWEST, _FASTEST = 1.0, 0.5, 0.6, 1.55
-# People turn to the door so fast, radians a second, and walk as soon as they nearly face it, radians.
-_TURN_RATE, _AHEAD, _FACING = 2.0 * math.pi, 0.6, 0.05
+# People walk to the door as soon as they nearly face it, radians.
+_AHEAD, _FACING = 0.6, 0.05
 _AT_IT = 0.03  # nearer to where one stands at the door nobody walks, metres
-_THROUGH = 0.66  # in the cycle of the motion: one is through, and the hand is at the door behind
+_THROUGH = 0.66  # in the cycle of the motion of a hand at a door: it is at the door behind
+# The leaf moves from so long after the hand's way to it began, seconds.
+_PUSHED = 0.25
 _EARLY = 1e-6  # sums of sub-steps are a little more or less than their time, seconds
 
 
@@ -42,10 +47,10 @@ def begin(i: int, place: int, state: SimulationState) -> None:
 def _way(i: int, state: SimulationState) -> tuple[float, float]:
     """Return how far somebody has to turn to the door, radians, and to walk up to it, metres."""
     p = state.people
-    place, room = state.world.places[int(p.door[i])], int(p.room[i])
+    room = int(p.room[i])
     if room < 0:
-        assert place.entrance is not None
-        x, y, _ = state.entrances[place.entrance].position
+        door = state.base.house_doors[entrance_of(i, state)]
+        x, y = float(door["x"]), float(door["y"])
     else:
         x, y, _ = next(door.position for door in state.indoor.doors[room] if door.to < 0)
     dx, dy = x - float(p.position[i, 0]), y - float(p.position[i, 1])
@@ -64,8 +69,11 @@ def walk_up(state: SimulationState, share: NDArray[np.float64], dt: float) -> No
     """Turn and set going who is on the way to a door; `share`, as `Avatars.advance` takes it, is theirs after it."""
     p = state.people
     for i in np.flatnonzero(p.at_door()).tolist():
+        if p.passing[i]:
+            p.turn_left[i] = p.move_left[i] = 0.0
+            continue
         turn, way = _way(i, state)
-        step = _TURN_RATE * dt
+        step = TURN_RATE * dt
         p.turn_left[i] = min(max(turn, -step), step) if abs(turn) > _FACING else 0.0
         share[i] = 1.0
         p.move_left[i] = p.move_speed[i] = 0.0
@@ -78,7 +86,7 @@ def walk_up(state: SimulationState, share: NDArray[np.float64], dt: float) -> No
 def follow(state: SimulationState, dt: float) -> None:
     """Let doors be opened and gone through for `dt` seconds."""
     p = state.people
-    for i in np.flatnonzero(p.door >= 0).tolist():
+    for i in np.flatnonzero((p.door >= 0) & (p.passing == 0)).tolist():
         # Whom something stops opens the door from there.
         stopped = p.status[i] == ActionStatus.COLLISION
         if stopped:
@@ -92,51 +100,11 @@ def follow(state: SimulationState, dt: float) -> None:
             if arrived or p.door_time[i] >= -_EARLY:
                 p.door_time[i] = 0.0
                 _touch(i, state)
-        elif p.door_time[i] >= DOOR_OPENING - _EARLY:
-            _go_through(i, state)
-            p.door[i], p.door_time[i] = -1, 0.0
-
-
-def _go_through(i: int, state: SimulationState) -> None:
-    p = state.people
-    if p.room[i] < 0:
-        _go_in(i, int(p.door[i]), state)
-    else:
-        _go_out(i, int(p.door[i]), state)
-
-
-def _go_in(i: int, number: int, state: SimulationState) -> None:
-    p, place = state.people, state.world.places[number]
-    room = state.indoor.index[place.rooms[0]]
-    near = state.indoor.arrival(room, -1)
-    if state.indoor.free_spot(room, near, state.taken_in(room, without=i)) is None:
-        state.set_outcome(i, ActionStatus.REFUSED, ReasonCode.FULL, "enter: it is full")
-        return
-    place_in_room(i, room, state, near=near)
-    _leave_behind(i, state)
-    state.events.add("enter", p.names[i], f"enters {place.name}", p.position[i], place=place.id)
-
-
-def _go_out(i: int, number: int, state: SimulationState) -> None:
-    p, place = state.people, state.world.places[number]
-    spot = spot_outside(i, state)
-    if spot is None:
-        state.set_outcome(i, ActionStatus.REFUSED, ReasonCode.BLOCKED, "exit: somebody stands in front of the door")
-        return
-    assert place.entrance is not None
-    take_umbrella(i, state)
-    if number == state.homes[i]:
-        p.clothes[i] = state.weather_to_dress_for()
-    put_outdoors(i, spot, state.entrances[place.entrance].facing, state)
-    _leave_behind(i, state)
-    state.events.add("exit", p.names[i], f"leaves {place.name}", p.position[i], place=place.id)
-
-
-def _leave_behind(i: int, state: SimulationState) -> None:
-    """Have the hand that opened the door be at it behind."""
-    p = state.people
-    if p.clip[i] == CLIP["open_door"]:
-        p.phase[i] = _THROUGH
+            continue
+        if p.door_time[i] >= _PUSHED:
+            state.leaves.hold(entrance_of(i, state), LET_GO)
+        if p.door_time[i] >= DOOR_OPENING - _EARLY:
+            begin_passing(i, state)
 
 
 def let_go(i: int, state: SimulationState) -> None:

@@ -44,7 +44,7 @@ def place_in_room(i: int, room: int, state: SimulationState, *, near: NDArray[An
     spot = indoor.free_spot(room, anchor, state.taken_in(room, without=i))
     assert spot is not None
     p.position[i] = spot
-    p.door[i] = -1
+    p.door[i], p.passing[i] = -1, 0
     p.room[i] = room
     p.place[i] = indoor.place[room]
     # From the door into the room: that is where people look when they come in.
@@ -73,6 +73,7 @@ def put_outdoors(i: int, spot: NDArray[np.float64], yaw: float, state: Simulatio
     """Stand someone on the ground outdoors."""
     p = state.people
     p.room[i] = p.place[i] = p.seat[i] = p.door[i] = -1
+    p.passing[i] = 0
     p.posture[i] = Posture.STANDING
     p.moved[i] = 0.0
     p.position[i, :2] = spot

@@ -165,6 +165,8 @@ def overlaps_of(state: SimulationState) -> list[Overlap]:
     found = [it for it in found if int(it[0]["entity"]) not in seated or it[1] not in seated]
     avatars = avatars[~np.isin(avatars["entity"], people.entity[people.seat >= 0])]
     found = [row for row in found if not _are_coupled(int(row[0]["entity"]), row[1])]
+    # Who walks through an open door is in the wall's opening.
+    avatars = avatars[~np.isin(avatars["entity"], people.entity[people.passing != 0])]
     inside = persons_in_solids(avatars, state.avatars.solids, TOLERANCE)
     found += [(avatars[i], FURNITURE if furniture else WALL, depth) for i, furniture, depth in inside]
     found += _in_one_seat(avatars[avatars["space"] == IN_BUS], state)

@@ -13,6 +13,8 @@ from vico.world.model import Place
 
 #: Metres between a robot that has come through a door and others.
 _APART = 0.1
+# Seconds for which doors stay open after robots.
+_HELD = 0.8
 
 
 def follow(state: SimulationState, dt: float) -> None:
@@ -30,9 +32,21 @@ def follow(state: SimulationState, dt: float) -> None:
             rooms = state.indoor.rooms
             if robots.ride(robot, dt) < lift_seconds(rooms[room].centre[2] - rooms[origin].centre[2]) - 1e-6:
                 continue
+        if -1 in (origin, room) and not _is_open(room if origin < 0 else origin, state):
+            continue
         if robots.pass_door(robot, room, _taken(robot, room, state)):
             _tell(robot, origin, room, place, state)
     _keep_on_decks(state)
+
+
+def _is_open(room: int, state: SimulationState) -> bool:
+    """Open the entrance to a room; return whether it is open."""
+    entrance = state.world.places[int(state.indoor.place[room])].entrance
+    if entrance is None:
+        return True
+    number = state.base.entrance_index[entrance]
+    state.leaves.hold(number, _HELD)
+    return state.leaves.share_of(number) >= 1.0 - 1e-6
 
 
 def shut_words(place: Place, state: SimulationState) -> str:

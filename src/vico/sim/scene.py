@@ -16,6 +16,7 @@ from vico.render import Cameras, Lighting, Scene, render
 from vico.render.lighting import SHADOW_STEP
 from vico.render.limbs import LIMBS
 from vico.render.quality import RenderQuality
+from vico.render.scene import NO_OPENINGS
 from vico.render.sensors.batch import PictureSet, Viewers
 from vico.render.sensors.lens import Lens
 from vico.render.skinning import skin
@@ -29,6 +30,7 @@ from vico.sim.animation import (
     pose,
 )
 from vico.sim.detail import Sights, far_from_all
+from vico.sim.drawn_doors import DrawnDoors
 from vico.sim.drawn_people import Cast, DrawnPeople
 from vico.sim.environment import Environment
 from vico.sim.eyes import SemanticClasses, lenses_by_entity
@@ -134,6 +136,7 @@ class SceneRenderer:
         self._sim = sim
         self._room_lamps = RoomLamps(sim.world, date.fromisoformat(sim.config.date).weekday())
         self._window_lights = WindowLights(sim.world, sim.residents, self._room_lamps)
+        self._doors = DrawnDoors.of(sim.state.base)
         self._lit: tuple[float, ...] = ()
         self.wait()
         self._viewers = Viewers(
@@ -230,12 +233,16 @@ class SceneRenderer:
         if len(state.things):
             moving.append(state.things.draw())
         moving += draw_in_hands(state, self._holders(motion, rotations, offsets))
+        doors = self._doors.draw(state) if len(state.leaves) else None
+        moving += [] if doors is None else [doors.shapes]
         index = [np.array([self._scene.names[d.prototypes[i]] for i in d.index], np.int32) for d in moving]
         self._scene.set_rigid(
             _joined(index, (0,), np.int32),
             _joined([d.transforms for d in moving], (0, 4, 4), np.float32),
             _joined([d.entity for d in moving], (0,), np.int32),
+            shadowless=0 if doors is None else len(doors.shapes.index),
         )
+        self._scene.set_openings(NO_OPENINGS if doors is None else doors.openings)
 
     def _motion(self, state: SimulationState) -> _Motion:
         """Return how everybody on legs moves."""
@@ -358,7 +365,7 @@ def _motion_of_agents(state: SimulationState) -> _Motion:
     on_stairs = state.indoor.treads_under(p.room) > 0
     over_ground = np.where(on_stairs, np.hypot(*p.velocity.T), p.pace)
     after = Transition(*before, moved=p.moved.copy(), over_ground=over_ground)
-    on_ground = (p.room < 0) & (p.vehicle == Vehicle.NONE) & (p.seat < 0)
+    on_ground = (p.room < 0) & (p.vehicle == Vehicle.NONE) & (p.seat < 0) & (p.passing == 0)
     rise = np.zeros(len(p))
     sitting = np.flatnonzero(p.seat >= 0)
     if len(sitting):
@@ -389,7 +396,9 @@ def _scene_of(sim: RenderedSimulation) -> Scene:
     shapes = _shapes(sim)
     mirrored = sim.state.traffic is not None and sim.state.traffic.lanes.lefthand
     found = {name: cabin_of(name, mirrored=mirrored) for name in shapes}
-    return scene_of(sim.world, prototypes=shapes, cabins={k: cabin for k, cabin in found.items() if cabin is not None})
+    scene = scene_of(sim.world, prototypes=shapes, cabins={k: cabin for k, cabin in found.items() if cabin is not None})
+    scene.keep_detail(DrawnDoors.of(sim.state.base).prototypes)
+    return scene
 
 
 def _shapes(sim: RenderedSimulation) -> dict[str, Sequence[Surface]]:
@@ -399,6 +408,7 @@ def _shapes(sim: RenderedSimulation) -> dict[str, Sequence[Surface]]:
         if system is not None:
             shapes |= system.prototypes()
     in_hand = {name: model.surfaces for name, model in in_hand_models().items()}
+    shapes |= DrawnDoors.of(sim.state.base).prototypes
     return shapes | in_hand | sim.state.things.prototypes() | dict(sim.shapes)
 
 

@@ -14,6 +14,7 @@ from vico.sim.avatars import Avatars
 from vico.sim.base import SimulationBase
 from vico.sim.bodies import STEP_HEIGHT, TALLEST, Bodies, HasBodies, Subsystem
 from vico.sim.carrying import DeckPose, HasDecks
+from vico.sim.door_leaves import DoorLeaves
 from vico.sim.environment import Conditions, Environment
 from vico.sim.event_things import EventThings
 from vico.sim.events import Events
@@ -150,6 +151,8 @@ class SimulationState:
         Subsystems with a state of their own; None where a run has none.
     lines
         Who stands in line at tills.
+    leaves
+        Doors of houses that are not closed.
     openings
         When places are open; None in a run that does not ask.
     homes
@@ -180,6 +183,7 @@ class SimulationState:
     homes: NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, np.int32))
     clothes_at_start: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     lines: Lines = field(default_factory=lambda: Lines.of(0))
+    leaves: DoorLeaves = field(default_factory=DoorLeaves)
     tick: int = 0
     entities: dict[int, dict[str, str]] = field(default_factory=dict)
     shapes: dict[str, list[Surface]] = field(default_factory=dict)
@@ -393,6 +397,7 @@ class SimulationState:
             "traffic": self.traffic,
             "transit": self.transit,
             "lines": self.lines,
+            "leaves": self.leaves,
             "robots": self.robots,
         }
         return {name: part for name, part in parts.items() if part is not None}

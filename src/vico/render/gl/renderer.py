@@ -14,7 +14,7 @@ from vico.render.behind.panes import show_rooms
 from vico.render.cameras import Cameras
 from vico.render.frames import Frames, PictureRequest, light_of
 from vico.render.gl.culling import cluster_ranges, instances_in_view, joined_ranges
-from vico.render.gl.moving import CASTER_ROWS, packed_cabins, packed_casters, packed_past
+from vico.render.gl.moving import CASTER_ROWS, OPENINGS, packed_cabins, packed_casters, packed_openings, packed_past
 from vico.render.lighting import TONE_RANGE, TONE_STEPS
 from vico.render.records import CABIN_STEPS
 from vico.render.scene import Scene
@@ -176,7 +176,14 @@ class GlRenderer:
         arrays = self.scene.arrays
         casters = packed_casters(arrays, camera, light) if moving else np.zeros((0, 1), np.float32)
         self._buffer("casters", 12, casters)
-        uniforms: dict[str, Any] = {"caster_count": len(casters), "with_past": int(past is not None)}
+        shown = min(len(arrays.openings), OPENINGS) if moving and not camera["indoors"] else 0
+        uniforms: dict[str, Any] = {
+            "caster_count": len(casters),
+            "opening_count": shown,
+            "with_past": int(past is not None),
+        }
+        if shown:
+            uniforms["openings"] = [tuple(row) for row in packed_openings(arrays, camera).reshape(-1, 4).tolist()]
         if past is None:
             return uniforms
         bodies, things = packed_past(past)

@@ -18,7 +18,7 @@ uniform vec2 side;
 uniform float near, far, haze_per_metre, lamp_exposure, wet, snow_cover, softness, glass, interiors, tone_scale;
 uniform vec4 room_place, room_size;  // centre and cosine of the yaw; half length, half width, height, sine
 uniform vec3 room_light;  // shares of lamps, of light all around, and of what windows show by day
-uniform int indoors, hidden, most_taps, levels_each, is_person, caster_count;
+uniform int indoors, hidden, most_taps, levels_each, is_person, caster_count, opening_count;
 
 in vec3 place;
 in vec3 normal;
@@ -269,6 +269,19 @@ vec3 room_behind(vec3 way_to, vec3 n, float storeys, float shine) {  // `shine` 
     return base * (daylight * ambient + lamp * vec3(1.0, 0.84, 0.58));
 }
 
+// Within a door that is not closed, of what never moves nothing is drawn: `vico.render.visibility.openings`.
+uniform vec4 openings[48];  // three a door: see `packed_openings`
+
+bool is_cut() {
+    for (int k = 0; k < opening_count; k++) {
+        vec4 sill = openings[3 * k], ways = openings[3 * k + 1], reach = openings[3 * k + 2];
+        vec3 d = place - sill.xyz;
+        float a = d.x * ways.y - d.y * ways.x, b = d.x * ways.x + d.y * ways.y;
+        if (abs(a) < sill.w && b > -reach.x && b < reach.y && d.z > 0.0 && d.z < ways.z) return true;
+    }
+    return false;
+}
+
 void main() {
     int log2_width = materials[7 * material], log2_height = materials[7 * material + 1];
     int levels = materials[7 * material + 2], flags = materials[7 * material + 3];
@@ -278,6 +291,7 @@ void main() {
     bool both = (flags & 2) != 0;
     vec2 dx = dFdx(uv), dy = dFdy(uv);
     if (depth >= far || (hidden != 0 && entity == hidden) || (!gl_FrontFacing && !both)) discard;
+    if (moves == 0 && is_cut()) discard;
     if ((flags & 1) != 0 && (levels == 0 || is_hole(log2_width, log2_height, levels, dx, dy))) discard;
     vec3 n = normalize(normal), at = eye + place;
     if (both && dot(n, place) > 0.0) n = -n;

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from vico.render.arrays import SHADOWLESS
 from vico.render.compiled import inlined, kernel
 from vico.render.records import CASTER
 from vico.render.shadows.cabins import CABIN_REACH
@@ -201,6 +202,8 @@ def set_caster(scene: Any, k: int, camera: Any, light: Any, reach: float, caster
     """Write the `CASTER` of a moving thing (instances, then avatars); return whether it may darken what is seen."""
     avatar = k - scene.counts.instances
     caster.is_round = 1 if avatar >= 0 else 0
+    if avatar < 0 and scene.instances.where[k] == SHADOWLESS:
+        return False
     if avatar >= 0:
         if camera.indoors and is_avatar_hidden(scene, avatar, camera):
             # Nobody sees their own body: in a room, its shadow would be a stain around nothing.

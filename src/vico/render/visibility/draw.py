@@ -36,6 +36,7 @@ from vico.render.visibility.fill import (
     triangle_number,
     twice_area,
 )
+from vico.render.visibility.openings import cut_openings
 
 # The coarse depth buffer is renewed after this many triangles of a 256 x 256 picture ...
 _RENEW_TRIANGLES = 1200
@@ -64,6 +65,8 @@ def draw_static(scene: Any, camera: Any, buffers: Any) -> int:
 def draw_moving(scene: Any, camera: Any, buffers: Any, drawn: int) -> int:
     """Add what moves to a picture in which `drawn` items are that never do; see `draw`."""
     buffers.slot[len(scene.cluster_where) + scene.counts.static_instances :] = -1
+    if len(scene.openings) and not camera.indoors:
+        cut_openings(scene.openings, camera, buffers.keys)
     found = list_moving(scene, camera, buffers)
     if found:
         renew_tiles(buffers, camera)

@@ -138,11 +138,11 @@ def leave(values: Values, i: int, state: SimulationState) -> None:
 DOORS = (
     ActionType(
         "enter",
-        "Go into a place (its id) by an entrance within 2 m, which takes 1 to 2 s, or into the next room (its id) by a "
+        "Go into a place (its id) by an entrance within 2 m, which takes 2 to 3 s, or into the next room (its id) by a "
         "door within 1 m; a lift takes its time from car to car.",
         enter,
         check_enter,
         {"place": Field("name", slot="place")},
     ),
-    ActionType("exit", "Go out of the building by a door within 2 m, which takes 1 to 2 s.", leave, check_exit),
+    ActionType("exit", "Go out of the building by a door within 2 m, which takes 2 to 4 s.", leave, check_exit),
 )

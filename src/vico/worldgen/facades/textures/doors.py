@@ -2,48 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.assets.house_doors import DOOR_CELLS, SHEET, Cell
 from vico.worldgen.facades.textures.ground_floors import show_window
 from vico.worldgen.facades.textures.windows import glass
 from vico.worldgen.texture_canvas import Canvas
 
-_WIDTH, _HEIGHT = 2048, 512
-
-
-@dataclass(frozen=True)
-class Cell:
-    """A rectangle of the sheet, pixels from its lower left corner."""
-
-    x: int
-    y: int
-    width: int
-    height: int
-
-    def uv(self) -> tuple[float, float, float, float]:
-        """Left, bottom, right and top in texture coordinates, a texel and a half within the cell's border."""
-        e = 1.5
-        return (
-            (self.x + e) / _WIDTH,
-            (self.y + e) / _HEIGHT,
-            (self.x + self.width - e) / _WIDTH,
-            (self.y + self.height - e) / _HEIGHT,
-        )
-
+_WIDTH, _HEIGHT = SHEET
 
 # Leaves stand in the upper row, 256 pixels high; show windows and the rest in the lower one.
-CELLS = {
-    "double": Cell(0, 256, 128, 256),
-    "panelled": Cell(128, 256, 128, 256),
-    "single": Cell(256, 256, 128, 256),
-    "glass": Cell(384, 256, 128, 256),
-    "office": Cell(512, 256, 256, 256),
-    "hotel": Cell(768, 256, 256, 256),
-    "portal": Cell(1024, 256, 256, 256),
-    "gate": Cell(1280, 256, 256, 256),
+CELLS = DOOR_CELLS | {
     "vitrine_4": Cell(1536, 256, 256, 256),
     "vitrine_5": Cell(1792, 256, 256, 256),
     "vitrine_0": Cell(0, 0, 256, 256),
