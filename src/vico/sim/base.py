@@ -117,7 +117,7 @@ class SimulationBase:
     @cached_property
     def streets(self) -> TrafficNetwork:
         """What traffic moves on."""
-        network = TrafficNetwork.of(self.world.lanes, self.solids, self._signal_poles)
+        network = TrafficNetwork.of(self.world.lanes, self.solids, self._signal_poles, self.world.height)
         driven = with_stopping_places(network.driven, network.lanes, network.walks, self.world, self.solids)
         walked = with_spots(network.walked, network.walks, self.world, self.solids)
         return replace(network, driven=driven, walked=walked)

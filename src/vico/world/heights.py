@@ -121,6 +121,30 @@ class HeightField:
         """Heights of the upper side near an edge, wherever the points lie: of the sidewalk, of the quay."""
         return self._look_up(xy, 3)
 
+    def edge_distance(self, xy: ArrayLike) -> NDArray[np.float64]:
+        """Metres to the nearest edge of a kerb, a quay or their like, negative below it; at most `EDGE_RANGE`.
+
+        Parameters
+        ----------
+        xy
+            ENU metres, shape ``(..., 2)`` (further columns are ignored).
+
+        Returns
+        -------
+        ndarray
+            Metres, shape ``(...)``; `EDGE_RANGE` where there are no edges.
+        """
+        points = np.asarray(xy, np.float64)
+        if self.steps is None:
+            return np.full(points.shape[:-1], EDGE_RANGE)
+        edge, n = self.steps.edge, self.steps.edge.shape[0]
+        u, v = (np.clip((points[..., k] + self.half) * (n - 1) / (2.0 * self.half), 0.0, n - 1.0) for k in (0, 1))
+        i, j = np.minimum(u.astype(np.int64), n - 2), np.minimum(v.astype(np.int64), n - 2)
+        fu, fv = u - i, v - j
+        south = edge[j, i] * (1.0 - fu) + edge[j, i + 1] * fu
+        north = edge[j + 1, i] * (1.0 - fu) + edge[j + 1, i + 1] * fu
+        return np.asarray((south * (1.0 - fv) + north * fv) * (EDGE_RANGE / 127.0), np.float64)
+
     def _look_up(self, xy: ArrayLike, which: int) -> NDArray[np.float64]:
         points = np.asarray(xy, np.float64)
         x = np.ascontiguousarray(points[..., 0]).ravel()

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import ndimage
 
 from vico.world.grid_search import (
     CELL,
@@ -30,6 +31,8 @@ WEIGHTS = {SIDEWALK: 100, CROSSING: 110, OPEN: 120, ROADWAY: 400}
 
 # Walls are given a berth where there is room: cells closer than this cost a quarter more.
 _BERTH = 0.6
+# So are roadways, beside which a kerb's edge is: cells that touch them cost a quarter more, too.
+_NEIGHBOURS = np.ones((3, 3), np.bool_)
 _SNAP = 6.0  # metres a start or goal may lie off what can be walked on
 
 # Costs from landmarks are worth their making (a search of the whole map each) to who searches this often.
@@ -57,6 +60,9 @@ class Router:
         cost = table[walkable.cls]
         self._clearance = np.ascontiguousarray(walkable.clearance)
         cost[self._clearance < _BERTH] = cost[self._clearance < _BERTH] * 5 // 4
+        beside = ndimage.binary_dilation(walkable.cls == ROADWAY, _NEIGHBOURS)
+        beside &= np.isin(walkable.cls, (SIDEWALK, OPEN))
+        cost[beside] = cost[beside] * 5 // 4
         cost[~walkable.connected] = 0
         self._cost = np.ascontiguousarray(cost, np.int32)
         self._free = self._cost > 0
@@ -108,7 +114,7 @@ class Router:
         blocked: NDArray[np.bool_] | None = None,
         closed: Sequence[tuple[float, float, float]] = (),
     ) -> NDArray[np.float64] | None:
-        """Find a walk that prefers sidewalks and crossings and keeps 0.3 m from walls.
+        """Find a walk that prefers sidewalks and crossings and keeps 0.3 m from walls, and off kerbs' edges if it can.
 
         Parameters
         ----------

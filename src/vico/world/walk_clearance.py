@@ -1,7 +1,8 @@
-"""How much room a walkway has beside what stands on it and along it, and where its line bends to get past."""
+"""How much room a walkway has beside solids and above the edges of kerbs, and where its line bends to get past."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,6 +11,7 @@ import shapely
 from numpy.typing import NDArray
 
 from vico.geo import overlay
+from vico.world.heights import HeightField
 
 Floats = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -27,6 +29,15 @@ _EACH_WAY = 2.0  # metres before and after a narrow place that are as narrow: wa
 _AROUND, _TRIES = 0.6, 4  # metres left out of a line that leads through a solid, and how often that is tried
 _LEAST = 0.05
 _SAME = 0.02
+_OFF_EDGE = 0.3  # metres that walkers' middles stay from the edges of kerbs and quays, above them
+_WIDER = 0.4  # metres beyond its room that a line has on one side for what a kerb takes on the other
+_BELOW, _DEEPER, _DEEPEST = (
+    0.1,
+    0.4,
+    0.5,
+)  # what it costs at a place to be too near to an edge or below, by metre, and m
+_NEARER = 0.2  # metres that they come nearer to an edge where they have little room
+_ROUND = 0.05  # metres to which room is rounded that a kerb leaves
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +64,13 @@ class ClearCourse:
 
 
 def courses_past(
-    lines: Sequence[Floats], room: Floats, reach: Floats, solids: Sequence[shapely.Polygon]
+    lines: Sequence[Floats],
+    room: Floats,
+    reach: Floats,
+    solids: Sequence[shapely.Polygon],
+    ground: Sequence[HeightField | None] | None = None,
 ) -> dict[int, list[ClearCourse]]:
-    """Lead lines past solids.
+    """Lead lines past solids, and along kerbs above their edges.
 
     Parameters
     ----------
@@ -66,16 +81,20 @@ def courses_past(
         farther than `room`.
     solids
         Footprints nobody can walk through, metres.
+    ground
+        Of each line, the ground with the edges it keeps off; None for none.
 
     Returns
     -------
     dict
-        By index, the pieces that are left of each line that has a solid within `reach`.
+        By index, the pieces that are left of each line that has a solid within `reach`, or an edge to keep off.
     """
     grown = overlay.buffer(np.asarray(solids, object), BODY + _AIR, quad_segs=4)
     tree = shapely.STRtree(grown)
     paths = [shapely.LineString(line) for line in lines]
-    which = np.unique(tree.query(paths, predicate="dwithin", distance=float(reach.max()))[0])
+    near = tree.query(paths, predicate="dwithin", distance=float(reach.max()))[0]
+    kept_off = [i for i, field in enumerate(ground or ()) if field is not None and field.steps is not None]
+    which = np.union1d(near, np.array(kept_off, np.int64))
     offsets = [_offsets(lines[i]) for i in which]
     counts = np.array([len(o) for o in offsets], np.int64)
     if not len(counts):
@@ -91,15 +110,18 @@ def courses_past(
         solid = [blocked.get(k, []) for k in range(first, first + count)]
         solid = [[*b, *a, *c] for b, a, c in zip([[], *solid[:-1]], solid, [*solid[1:], []], strict=True)]
         free = [_free(gaps, float(reach[i])) for gaps in solid]
+        depth = _depth(points[here], normals[here], float(room[i]), None if ground is None else ground[i])
+        first += count
+        if depth is None and not any(solid):
+            continue
         for _ in range(_TRIES):
-            found[i] = _courses(along, points[here], normals[here], free, float(room[i]))
+            found[i] = _courses(along, points[here], normals[here], free, float(room[i]), depth)
             touched = _touched(found[i], tree)
             if not len(touched):
                 break
             # A kink may lead between two cross-sections, through a solid that is in neither.
             for k in np.flatnonzero((np.abs(along[:, None] - touched) < _AROUND).any(axis=1)).tolist():
                 free[k] = []
-        first += count
     return found
 
 
@@ -169,16 +191,56 @@ def _free(blocked: list[Interval], reach: float) -> list[Interval]:
     return free
 
 
+def _depth(points: Floats, normals: Floats, room: float, ground: HeightField | None) -> Floats | None:
+    """Return by how many metres each place across a line is too near to an edge, or below it; None: none is.
+
+    Shape ``(places, columns)``; the columns are those of `_columns`.
+    """
+    if ground is None or ground.steps is None:
+        return None
+    across = points[:, None, :] + _columns(room)[None, :, None] * normals[:, None, :]
+    depth = _OFF_EDGE - ground.edge_distance(across)
+    return depth if (depth > 0.0).any() else None
+
+
+def _columns(room: float) -> Floats:
+    """Return how far to the left of a line it is looked at, metres: a little beyond its room."""
+    steps = max(round((room + _WIDER) / _GRID), 1)
+    return np.asarray(np.arange(-steps, steps + 1) * _GRID, np.float64)
+
+
+def _above_edges(free: list[Interval], depth: Floats, columns: Floats, room: float) -> list[Interval]:
+    """Return the parts of free intervals that are above edges and far enough from them, within what a line may take."""
+    if not (depth > 0.0).any():
+        return free
+    good = np.concatenate([[False], depth <= 0.0, [False]])
+    begins, ends = np.flatnonzero(~good[:-1] & good[1:]), np.flatnonzero(good[:-1] & ~good[1:]) - 1
+    found = []
+    for a, b in zip(begins.tolist(), ends.tolist(), strict=True):
+        low = -np.inf if a == 0 else columns[a] - _GRID * depth[a] / (depth[a] - depth[a - 1])
+        high = np.inf if b == len(columns) - 1 else columns[b] + _GRID * depth[b] / (depth[b] - depth[b + 1])
+        # What a kerb takes on one side a walkway may have on the other.
+        least = -room - min(max(room - high, 0.0), _WIDER)
+        most = room + min(max(room + low, 0.0), _WIDER)
+        for begin, end in free:
+            part = max(low, begin, least), min(high, end, most)
+            if part[0] < part[1]:
+                found.append(part)
+    return found
+
+
 def _courses(
-    along: Floats, points: Floats, normals: Floats, free: list[list[Interval]], room: float
+    along: Floats, points: Floats, normals: Floats, free: list[list[Interval]], room: float, depth: Floats | None
 ) -> list[ClearCourse]:
     """Lead one line past its solids: in pieces, where there is no way."""
+    good = free
+    if depth is not None:
+        columns = _columns(room)
+        good = [_above_edges(gaps, row, columns, room) for gaps, row in zip(free, depth, strict=True)]
     found: list[ClearCourse] = []
-    for begin, aside in _ways_through(free, room):
+    for begin, aside in _ways_through(free, good, room, depth):
         here = slice(begin, begin + len(aside))
-        gaps = np.array([next(g for g in free[begin + j] if g[0] <= a <= g[1]) for j, a in enumerate(aside.tolist())])
-        low, high = np.maximum(gaps[:, 0], -room), np.minimum(gaps[:, 1], room)
-        sides = np.stack([high - aside, aside - low, gaps[:, 1] - aside, aside - gaps[:, 0]], axis=1)
+        sides = np.array([_sides(free[begin + j], good[begin + j], room, a) for j, a in enumerate(aside.tolist())])
         near = np.abs(along[here][:, None] - along[here][None, :]) <= _EACH_WAY
         sides = np.maximum(np.where(near[:, :, None], sides[None, :, :], np.inf).min(axis=1), _LEAST)
         sides[:-1] = np.minimum(sides[:-1], sides[1:])  # from each point to the next
@@ -189,16 +251,37 @@ def _courses(
     return [course for course in found if len(course.points) > 1]
 
 
-def _ways_through(free: list[list[Interval]], room: float) -> list[tuple[int, Floats]]:
+def _sides(free: list[Interval], good: list[Interval], room: float, aside: float) -> tuple[float, float, float, float]:
+    """Return the room to the left and to the right of a line that is so far aside, and the same in need."""
+    low, high = next(gap for gap in free if gap[0] <= aside <= gap[1])
+    above = next((gap for gap in good if gap[0] <= aside <= gap[1]), None) if good is not free else None
+    if above is None:
+        return min(high, room) - aside, aside - max(low, -room), high - aside, aside - low
+    # On a strip too narrow to pass on walkers come nearer to its edges.
+    more = _NEARER if above[1] - above[0] < _APART else 0.0
+    left, right = min(above[1] + more, high) - aside, aside - max(above[0] - more, low)
+    left, right = (math.floor((side + 1e-9) / _ROUND) * _ROUND for side in (left, right))
+    return left, right, high - aside, aside - low
+
+
+def _ways_through(
+    free: list[list[Interval]], good: list[list[Interval]], room: float, depth: Floats | None
+) -> list[tuple[int, Floats]]:
     """Choose how far to the left of a line to go at each place: for each piece, its first place and those metres.
 
-    The way with the least cost: to go aside, to move sideways, and to be where nobody can pass costs.
+    The way with the least cost: to go aside, to move sideways, to be where nobody can pass and below a kerb costs.
     """
-    if all(any(low <= 0.0 <= high and min(high, room) - max(low, -room) >= _APART for low, high in g) for g in free):
+    most = room if depth is None else room + _WIDER
+    if all(any(low <= 0.0 <= high and min(high, most) - max(low, -most) >= _APART for low, high in g) for g in good):
         return [(0, np.zeros(len(free)))]
     steps = max(round(room / _GRID), 1)
     aside = np.linspace(-room, room, 2 * steps + 1)
     costs = _costs(free, aside, room)
+    if depth is not None:
+        # Where there is room above an edge, what is not above it costs, and how narrow it is there is the room's.
+        deep = np.stack([np.interp(aside, _columns(room), row) for row in depth])
+        below = _BELOW + _DEEPER * np.clip(deep, 0.0, _DEEPEST)
+        costs = np.where(deep > 0.0, costs + below, np.minimum(_costs(good, aside, most), costs + below))
     moves = np.arange(-(len(_MOVES) - 1), len(_MOVES))
     prices = np.array(_MOVES)[np.abs(moves)][:, None]
     columns = np.arange(len(aside))
@@ -228,11 +311,13 @@ def _ways_through(free: list[list[Interval]], room: float) -> list[tuple[int, Fl
 
 def _costs(free: list[list[Interval]], aside: Floats, room: float) -> Floats:
     """Return what it costs to be so far aside at each place, inf in solids, shape ``(places, len(aside))``."""
+    costs = np.full((len(free), len(aside)), np.inf)
     place = np.repeat(np.arange(len(free)), [len(gaps) for gaps in free])
+    if not len(place):
+        return costs
     low, high = np.array([gap for gaps in free for gap in gaps]).reshape(-1, 2).T[:, :, None]
     narrow = np.maximum(0.0, _APART - (np.minimum(high, room) - np.maximum(low, -room)))
     each = np.where((aside >= low) & (aside <= high), _ASIDE * np.abs(aside) + _NARROW * narrow, np.inf)
-    costs = np.full((len(free), len(aside)), np.inf)
     np.minimum.at(costs, place, each)
     return costs
 

@@ -11,6 +11,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from vico.geo import overlay
+from vico.world.heights import HeightField
 from vico.world.walk_clearance import BODY, ClearCourse, courses_past
 
 Floats = NDArray[np.float64]
@@ -18,6 +19,7 @@ Ints = NDArray[np.int32]
 
 SIDEWALK, CROSSING, CORNER = 0, 1, 2
 SHORTEST = 6.0  # metres of sidewalk left between two obstacles that are worth keeping
+_ON_GROUND = 0.5  # metres from the ground's height to what lies on it
 _STEP_OFF = 1.2  # how far who is stuck steps off the kerb, metres
 
 
@@ -78,19 +80,25 @@ class Walkways:
         segment = int(np.searchsorted(self.along[begin:end], offset, side="right")) - 1
         return self.room[begin + min(max(segment, 0), end - begin - 2)]
 
-    def clear_of(self, solids: list[shapely.Polygon]) -> Walkways:
+    def clear_of(self, solids: list[shapely.Polygon], ground: HeightField | None = None) -> Walkways:
         """Led past `solids` (buildings, things), in pieces where no way leads past, and with less room beside them.
+
+        Sidewalks and corners stay above the edges of kerbs, too, where they can.
 
         Parameters
         ----------
         solids
             Footprints nobody can walk through, metres.
+        ground
+            The ground with its kerbs; None for none.
         """
-        if not solids or not len(self):
+        has_edges = ground is not None and ground.steps is not None
+        if not len(self) or not (solids or has_edges):
             return self
         rows = self._rows()
         widest = np.array([row.room.max() for row in rows]), np.array([row.reach.max() for row in rows])
-        courses = courses_past([row.line for row in rows], *widest, solids)
+        kept_off = [ground if has_edges and _is_beside_kerbs(row, ground) else None for row in rows]
+        courses = courses_past([row.line for row in rows], *widest, solids, kept_off)
         kept: list[_Row] = []
         spare = int(self.ends.max()) + 1  # where a sidewalk is cut short, its end meets nothing
         for i, row in enumerate(rows):
@@ -193,6 +201,11 @@ def walkways_of(
                 z = np.interp(_along(path), [0.0, _along(path)[-1]], [ways[i][3][-side_a], ways[j][3][-side_b]])
                 rows.append(_Row("", CORNER, path, z, width, *sides(path, width), place, ends))
     return _packed(rows)
+
+
+def _is_beside_kerbs(row: _Row, ground: HeightField | None) -> bool:
+    """Return whether a stretch runs on the ground and is no crossing."""
+    return ground is not None and row.kind != CROSSING and bool((np.abs(row.z - ground(row.line)) < _ON_GROUND).all())
 
 
 def _along(line: Floats) -> Floats:

@@ -20,6 +20,7 @@ _LEFT_OF_MIDDLE = 0.3  # companions walk side by side no farther left than this 
 _ROOM_CHANGE = 0.6  # m/s to the side, from beside to behind and back
 _COMES_WITHIN, _COMES_BESIDE = 3.2, 1.1  # m ahead and to the side where somebody who comes is let pass
 _LET_PASS = 2.0  # s that companions stay one behind the other for them
+_FOLLOWS_AT, _FOLLOWS_WITHIN, _FOLLOWS_BESIDE = 0.75, 1.3, 0.5  # m to one of the group ahead, kept and looked for
 _CATCH_UP, _FASTEST = 0.8, 1.4  # share of one's pace for each metre one is behind, and the most
 _TOGETHER, _PARTED = 2.0, 3.0  # m: who leads slows down from the first on and stands from the second on
 _PARTED_LONG = 120.0  # s after which it goes on
@@ -156,7 +157,25 @@ def keep_up(walker, leader, shapes, bodies, near, heading, half, dt):  # type: i
         behind -= lag
     else:
         behind = walker.apart - max(lag, _BESIDE)
-    return min(max(leader.speed / walker.preferred_speed + _CATCH_UP * behind, 0.0), _FASTEST)
+    share = leader.speed / walker.preferred_speed + _CATCH_UP * behind
+    return min(max(min(share, _share_behind(walker, shapes, b, first, heading)), 0.0), _FASTEST)
+
+
+@compiled
+def _share_behind(walker, shapes, b, first, heading):  # type: ignore[no-untyped-def]
+    """Return the share of its pace at which a companion comes no nearer to one of its group who walks before it.
+
+    Whatever their order: nobody pushes past the others.
+    """
+    hx, hy = heading
+    share = _FASTEST
+    for j in range(first, first + walker.group_size):
+        dx, dy = shapes.x[j] - shapes.x[b], shapes.y[j] - shapes.y[b]
+        ahead, aside = dx * hx + dy * hy, abs(dy * hx - dx * hy)
+        if j != b and 0.0 < ahead < _FOLLOWS_WITHIN and aside < _FOLLOWS_BESIDE:
+            along = shapes.vx[j] * hx + shapes.vy[j] * hy
+            share = min(share, along / walker.preferred_speed + _CATCH_UP * (ahead - _FOLLOWS_AT))
+    return share
 
 
 @compiled

@@ -11,6 +11,7 @@ import shapely
 from numpy.typing import NDArray
 
 from vico.sim.traffic.state import LANE, SPOT, STOPPING_PLACE, WALKWAY, LaneNetwork, WalkwayNetwork
+from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.objects import Objects
 from vico.world.walkways import CROSSING, Walkways
@@ -50,7 +51,11 @@ class TrafficNetwork:
 
     @classmethod
     def of(
-        cls, lanes: LaneGraph, solids: Sequence[shapely.Polygon] = (), poles: Objects | None = None
+        cls,
+        lanes: LaneGraph,
+        solids: Sequence[shapely.Polygon] = (),
+        poles: Objects | None = None,
+        ground: HeightField | None = None,
     ) -> TrafficNetwork:
         """Make the network of a world's lanes.
 
@@ -60,8 +65,10 @@ class TrafficNetwork:
             Footprints nobody walks through.
         poles
             Objects on which signals are seen.
+        ground
+            The ground with its kerbs, above whose edges people walk where they can; None for none.
         """
-        walks = connected_walkways(lanes.walks.clear_of(list(solids)))
+        walks = connected_walkways(lanes.walks.clear_of(list(solids), ground))
         driven = _lane_network(lanes, walks)
         return cls(
             lanes, walks, driven, walkway_network(walks), *lanes_to_start_on(lanes, driven), poles or Objects.none()

@@ -47,6 +47,14 @@ _GIVE_UP_CROSSING = 20.0, 10.0  # s waited for a crossing before turning round, 
 _OFF_CROSSING = 1.3  # m walked after which the body is off the crossing
 _AT_END = 0.3  # m from the end of a crossing from which on one stands at the kerb
 _TURN_RATE = 4.0  # rad/s
+_KEEPS_ON = 0.3  # how much the heading counts that one has already, as metres free: ways round somebody are kept to
+_TURNS_FIRST = (
+    0.5,
+    1.5,
+)  # rad from where one looks to where one goes: slower from the first on, on the spot from the second
+_LEAST_STEP = 0.004  # m
+_ACCELERATION = 4.0  # m/s2 with which one sets out
+_SETS_OUT = 0.2  # m that have to be free for who stands to set out
 _STRIDE_AHEAD = 0.4  # m ahead where a heading is tested against the walkway's sides
 _PROGRESS = 1.0  # who is farther from where it was has got on, m
 _STUCK_AFTER, _STUCK_SPREAD = 3.5, 3.0  # s without progress before turning round, and how much that varies
@@ -257,29 +265,32 @@ def _free_distance(x, y, c, s, shapes, near, gap):  # type: ignore[no-untyped-de
 
 
 @compiled
-def best_heading(x, y, point, shapes, near, is_jammed):  # type: ignore[no-untyped-def]
+def best_heading(x, y, point, shapes, near, is_jammed, facing):  # type: ignore[no-untyped-def]
     """Return the heading (rad) that leads furthest towards the followed point, and the metres free along it.
 
-    Headings that lead off the walkway count only on the way back onto it; who is jammed may step off the kerb.
+    Of headings that are about as good it is the one nearest to where the walker looks (`facing`, rad): who goes round
+    somebody keeps to one side. Headings that lead off the walkway count only on the way back onto it; who is jammed may
+    step off the kerb.
     """
     gap = _GAP_WHEN_JAMMED if is_jammed else _GAP
     straight = np.arctan2(point.y - y, point.x - x)
     aside = (x - point.centre_x) * point.left_x + (y - point.centre_y) * point.left_y
     left = point.room[2] if is_jammed else point.room[0]
     right = point.room[3] if is_jammed else point.room[1]
-    best, best_score, best_free = 0.0, -1.0, 0.0
+    best, best_score, best_free = 0.0, -np.inf, 0.0
     ease = 1.2 if is_jammed else 0.35
     for k in range(len(_ANGLES) if is_jammed else _FORWARD):
-        if _SIGHT * (ease + np.cos(_ANGLES[k])) - 0.01 * k <= best_score:
-            continue  # not even if all of it were free
         angle = straight + _ANGLES[k]
+        habit = _KEEPS_ON * np.cos(angle - facing) - 0.01 * k
+        if _SIGHT * (ease + np.cos(_ANGLES[k])) + habit <= best_score:
+            continue  # not even if all of it were free
         c, s = np.cos(angle), np.sin(angle)
         there = aside + _STRIDE_AHEAD * (c * point.left_x + s * point.left_y)
         most = left if there > 0.0 else right
         if k > 0 and abs(there) > most + 0.1 and abs(there) >= abs(aside):
             continue
         free = _free_distance(x, y, c, s, shapes, near, gap)
-        score = free * (ease + np.cos(_ANGLES[k])) - 0.01 * k
+        score = free * (ease + np.cos(_ANGLES[k])) + habit
         if score > best_score:
             best, best_score, best_free = angle, score, free
     return best, best_free
@@ -300,7 +311,8 @@ def may_step_to(tx, ty, x, y, shapes, near):  # type: ignore[no-untyped-def]
 def _walk(walker, point, shapes, b, near, is_waiting, time):  # type: ignore[no-untyped-def]
     """Take a pedestrian, body b, a step towards a point; return the metres walked.
 
-    `time` is the share of its pace at which it walks, and the seconds that pass.
+    `time` is the share of its pace at which it walks, and the seconds that pass. Who goes another way than it looks
+    turns first: feet would slide.
     """
     pace, dt = time
     x, y = shapes.x[b], shapes.y[b]
@@ -309,15 +321,21 @@ def _walk(walker, point, shapes, b, near, is_waiting, time):  # type: ignore[no-
     if (is_waiting and away < 0.2) or away <= 1e-6:
         return 0.0
     is_jammed = walker.jammed_time > _JAMMED_AFTER
-    heading, free = best_heading(x, y, point, shapes, near, is_jammed)
-    speed = walker.preferred_speed * pace * min(1.0, free / 0.6)
-    step = min(speed * dt, away if is_waiting else speed * dt)
-    tx, ty = x + np.cos(heading) * step, y + np.sin(heading) * step
-    if step <= 0.004 or not may_step_to(tx, ty, x, y, shapes, near):
+    heading, free = best_heading(x, y, point, shapes, near, is_jammed, shapes.yaw[b])
+    if walker.gait_time < 0.0 and free < _SETS_OUT and not is_jammed:
         return 0.0
-    shapes.x[b], shapes.y[b] = tx, ty
+    speed = min(walker.preferred_speed * pace * min(1.0, free / 0.6), walker.speed + _ACCELERATION * dt)
+    if speed * dt <= _LEAST_STEP:
+        return 0.0
     turn = (heading - shapes.yaw[b] + np.pi) % (2 * np.pi) - np.pi
     shapes.yaw[b] += min(max(turn, -_TURN_RATE * dt), _TURN_RATE * dt)
+    slow, still = _TURNS_FIRST
+    speed *= min(max((still - abs(turn)) / (still - slow), 0.0), 1.0)
+    step = min(speed * dt, away if is_waiting else speed * dt)
+    tx, ty = x + np.cos(heading) * step, y + np.sin(heading) * step
+    if step <= _LEAST_STEP or not may_step_to(tx, ty, x, y, shapes, near):
+        return 0.0
+    shapes.x[b], shapes.y[b] = tx, ty
     shapes.vx[b], shapes.vy[b] = (tx - x) / dt, (ty - y) / dt
     return step
 
