@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import toy_city
 import vico
 from vico.errors import InputError
 from vico.world.folder import World
@@ -49,6 +50,11 @@ def test_a_view_shows_the_street_from_where_it_is_asked(helsinki: World) -> None
 def test_a_view_from_no_point_is_refused(helsinki: World, at: tuple[float, ...]) -> None:
     with pytest.raises(InputError, match="is no point"):
         vico.view_world(helsinki, at=at)
+
+
+def test_a_view_of_a_world_without_streets_asks_from_where() -> None:
+    with pytest.raises(InputError, match="say from where with `at`"):
+        vico.view_world(toy_city.world())
 
 
 def test_half_a_centre_is_refused(tmp_path: Path) -> None:

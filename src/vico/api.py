@@ -188,7 +188,10 @@ def view_world(
     """
     place = _world(world)
     if at is None:
-        view = viewpoints(place, count=1)[0]
+        found = viewpoints(place, count=1)
+        if not found:
+            raise InputError("view_world: this world has no street with room to look along; say from where with `at`")
+        view = found[0]
         eye, forward = np.asarray(view.position, np.float64), np.asarray(view.forward, np.float64)
     else:
         eye = _point(place, at)

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
+import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from rich.console import Console
 
 from vico.cli import community as community_verb
-from vico.cli import film as film_verb
 from vico.cli import replay as replay_verb
 from vico.cli import run as run_verb
 from vico.cli import world as world_verb
-from vico.cli.options import FilmOptions, RunOptions
+from vico.cli.options import RunOptions
 from vico.cli.output import check_output
+from vico.errors import StageError
 from vico.worldgen.packaged import packaged_extract
 from vico.worldgen.sources import Sources
 
@@ -37,12 +40,14 @@ def demo(out: Path, *, seed: int = 0, force: bool = False) -> int:
     world_verb.build(Sources(extract.path), out=world, centre=(extract.lat, extract.lon), half=extract.half, seed=seed)
     console.rule("2 of 5: its people")
     community_verb.build(world, out=people, residents=15, seed=seed, force=False, json=False)
-    console.rule("3 of 5: half an hour of their morning")
-    run_verb.run(RunOptions(world, people, out=run, seed=seed))
-    console.rule("4 of 5: something to look at")
-    replay_verb.replay(run, film=True)
-    console.rule("5 of 5: an evening in the rain, with robots")
-    _evening(world, people, evening, seed)
+    with ThreadPoolExecutor(1) as beside:
+        console.rule("3 of 5: half an hour of their morning; beside it, an evening in the rain with robots")
+        filmed = beside.submit(_evening, world, people, evening, seed)
+        run_verb.run(RunOptions(world, people, out=run, seed=seed))
+        console.rule("4 of 5: something to look at")
+        replay_verb.replay(run, film=True)
+        console.rule("5 of 5: the evening")
+        print(filmed.result(), end="")
     unfinished.unlink()
     console.rule(f"done in {time.perf_counter() - began:.0f} s")
     print(f"world       {world}    map.png, previews/, meshes/*.glb, roads.xodr, roads.net.xml")
@@ -53,27 +58,31 @@ def demo(out: Path, *, seed: int = 0, force: bool = False) -> int:
     return 0
 
 
-def _evening(world: Path, people: Path, out: Path, seed: int) -> None:
-    """Simulate and film a moment of an evening in October, when lamps and windows are lit."""
-    run_verb.run(
-        RunOptions(
-            world,
-            people,
-            out,
-            start="17:45",
-            date="2026-10-20",
-            utc_offset=3.0,
-            weather="rain",
-            robots="husky,go2,h1,drone",
-            cars=40,
-            pedestrians=80,
-            junctions="signals",
-            observe="none",
-            steps=36,
-            seed=seed,
-        )
-    )
-    around_the_h1 = FilmOptions(
-        out, follow="robot_2", out=out / "film.mp4", size="640x360", start="24", fps=15, view="orbit", samples=1
-    )
-    film_verb.film(around_the_h1)
+def _evening(world: Path, people: Path, out: Path, seed: int) -> str:
+    """Simulate and film a moment of an evening in October, when lamps and windows are lit; return what was printed."""
+    vico = [sys.executable, "-m", "vico.cli.main"]
+    moment = ["--start", "17:45", "--date", "2026-10-20", "--utc-offset", "3", "--weather", "rain", "--steps", "36"]
+    cast = ["--robots", "husky,go2,h1,drone", "--cars", "40", "--pedestrians", "80", "--junctions", "signals"]
+    run = [
+        *vico,
+        "run",
+        str(world),
+        str(people),
+        "--out",
+        str(out),
+        *moment,
+        *cast,
+        "--observe",
+        "none",
+        "--seed",
+        str(seed),
+    ]
+    around_the_h1 = ["--follow", "robot_2", "--view", "orbit", "--start", "24"]
+    made = ["--out", str(out / "film.mp4"), "--size", "640x360", "--fps", "15", "--samples", "1"]
+    told = ""
+    for command in (run, [*vico, "film", str(out), *around_the_h1, *made]):
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        told += done.stdout
+        if done.returncode != 0:
+            raise StageError(f"demo: the evening ended with exit status {done.returncode}: {done.stderr[-2000:]}")
+    return told
