@@ -243,7 +243,10 @@ def test_what_the_geometry_engine_refuses_costs_those_objects_alone(
     }
     gone = everything(whole) - everything(world)
     mine = tuple(place.ids[one] for one in loses)
-    assert {key for key in gone if not key.startswith(mine)} == set() if mine else gone == set()
+    others = {key for key in gone if not key.startswith(mine)} if mine else set(gone)
+    # Streets are lit where houses stand beside them: without a house there may be one lamp less.
+    assert {key for key in others if ".lamp" not in key} == set()
+    assert len(others) <= 1
     assert check_world(world) == []
 
 

@@ -117,6 +117,8 @@ class ScheduleFollower:
         if self.group is not None:
             self.group.forget(self._name)
         self.rests_until, self.stride = -math.inf, None
+        if info.get("coming_out"):  # of a door: nobody does anything else meanwhile
+            return {"type": "wait"}
         action = self._decide(observation, info)
         self._went_in = action["type"] == "enter"
         return action

@@ -164,6 +164,8 @@ class Traveller:
         if goal != self._goal:
             self.stop()
             self._goal = goal
+        if info.get("coming_out"):  # of a door: nobody does anything else meanwhile
+            return {"type": "wait"}
         self._notice(observation)
         self._ride, self._without, self._ground = ride, tuple(without), closed_ground(info)
         action = self._act(goal, observation, info, speed)

@@ -122,6 +122,8 @@ class Told:
             found["signals"] = self._signals.near(x, y, SIGNALS_REACH)
         if i in self._closed:
             found["closed_now"] = self._closed[i]
+        if i < len(p) and p.passing.item(i) < 0:
+            found["coming_out"] = True
         if i < len(p) and (till := _till_of(self._state, i)) is not None:
             found["till"] = till
         if i < len(p) and p.room.item(i) >= 0 and (counter := _counter_of(self._state, i)) is not None:

@@ -103,6 +103,8 @@ class HeuristicDelivery:
 
     def act(self, observation: Mapping[str, Any], info: Mapping[str, Any]) -> Action:
         """Return one action for one observation."""
+        if info.get("coming_out"):  # of a door: nobody does anything else meanwhile
+            return {"type": "wait"}
         view = ObservationView(observation, info)
         self.skills.notice(view)
         for _ in range(12):  # a chain of states that are done at once, each at most once or twice

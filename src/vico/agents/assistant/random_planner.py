@@ -63,6 +63,8 @@ class RandomPlanner:
 
     def act(self, observation: Mapping[str, Any], info: Mapping[str, Any]) -> Action:
         """Return one action for one observation."""
+        if info.get("coming_out"):  # of a door: nobody does anything else meanwhile
+            return {"type": "wait"}
         view = ObservationView(observation, info)
         self.skills.notice(view)
         self._age += 1

@@ -45,7 +45,9 @@ def _over_ground(one: Occurrence, sites: EventSites) -> list[Spot]:
     """Return spots on a grid round the middle, the nearest first, as many as there is open ground for."""
     models = [model for model, count in one.kind.things.items() for _ in range(count)]
     reach = one.kind.radius if one.event.region is None else one.event.region[2]
-    steps = np.arange(-np.floor(reach / _APART), np.floor(reach / _APART) + 1) * _APART
+    # One thing alone may stand anywhere: lamps and trees leave few places with so much room.
+    apart = _APART if len(models) > 1 else _APART / 4
+    steps = np.arange(-np.floor(reach / apart), np.floor(reach / apart) + 1) * apart
     grid = np.array([(x, y) for x in steps for y in steps if x * x + y * y <= reach * reach]).reshape(-1, 2)
     grid = grid[np.lexsort((grid[:, 1], grid[:, 0], np.round(np.hypot(*grid.T), 3)))]
     points = grid + one.middle[:2]
