@@ -33,6 +33,7 @@ def _network(*, delivery: bool = False) -> TrafficNetwork:
     places = np.zeros(len(rows), STOPPING_PLACE)
     places["lane"], places["middle"], places["longest"] = rows, lanes["length"][rows] / 2, 6.0
     places["side"], places["taper"] = (-0.4, 8.0) if delivery else (SIDE, TAPER)
+    places["lot"] = NONE
     places["reverse"], places["delivery"] = ~delivery & (np.arange(len(rows)) % 2 == 1), delivery
     return replace(network, driven=with_places(network.driven, places))
 

@@ -465,6 +465,42 @@ class Roads(Record):
     crossings: list[Point2]
 
 
+class WayIntoSpot(Record):
+    """A way between a lane and a spot in a car park, which a car's axles follow.
+
+    Attributes
+    ----------
+    lane, offset
+        Where it begins or ends: metres along a lane.
+    line
+        ENU metres, in the direction one drives. Into a spot: from the lane to the spot's middle. Out of it: from where
+        one stands in the aisle, having backed out of the spot, to the lane.
+    """
+
+    lane: str
+    offset: float
+    line: list[Point2]
+
+
+class WaysOfSpot(Record):
+    """How one gets into a spot of a car park, and out of it again.
+
+    Attributes
+    ----------
+    into
+        Forwards.
+    back
+        Backwards out of the spot, as a line from where one stands in the aisle then to the spot's middle; it begins
+        with the same straight piece as `out`.
+    out
+        Forwards out of the car park.
+    """
+
+    into: WayIntoSpot
+    back: list[Point2]
+    out: WayIntoSpot
+
+
 class ParkingSpot(Record):
     """Room for one parked car.
 
@@ -482,6 +518,8 @@ class ParkingSpot(Record):
         how far that is to the left of the lane's middle (negative: to the right). None, 0 and 0 for the others.
     car
         Entity of the car that stands there for good; None where the spot is free.
+    ways
+        Of free spots in car parks that are reached from a lane: how.
     """
 
     id: str
@@ -494,3 +532,4 @@ class ParkingSpot(Record):
     offset: float = 0.0
     side: float = 0.0
     car: int | None = None
+    ways: WaysOfSpot | None = None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vico.io.compiled import compiled
-from vico.sim.traffic.state import NONE, PRESENT, PREVIOUS_LANES
+from vico.sim.traffic.state import APPROACHING, NONE, PRESENT, PREVIOUS_LANES
 
 _CAR_PATIENCE = 10.0  # s that cars let pedestrians go first at a crossing
 _CALLED_AFTER = 4.0  # s that a pedestrian has waited before cars let it go first
@@ -42,7 +42,7 @@ def mark_busy_crossings(net, fleet, junctions):  # type: ignore[no-untyped-def]
     """
     junctions.crossing_busy[:] = False
     for vehicle in fleet:
-        if vehicle.presence != PRESENT:
+        if vehicle.presence != PRESENT or (vehicle.stopping > APPROACHING and vehicle.way_offset >= 0.0):
             continue
         rear = vehicle.offset - vehicle.length
         _mark_crossings(net, junctions, vehicle.lane, rear)

@@ -7,7 +7,7 @@ import numpy as np
 from vico.io.compiled import compiled
 from vico.sim.traffic.path import LANE_CHANGE, project_on_polyline
 from vico.sim.traffic.route import NEVER, route_lane
-from vico.sim.traffic.state import DRIVING, LEAVING, NONE, STANDING
+from vico.sim.traffic.state import DRIVING, DRIVING_OUT, LEAVING, NONE, STANDING
 
 _REAR_GAP = 4.0  # m behind a bus that are left for it
 _SET_BACK = 5.0  # m before a lane's end at which vehicles stay out of the way of who does not get past there ...
@@ -43,8 +43,11 @@ def room_to_change(net, vehicle):  # type: ignore[no-untyped-def]
 
 @compiled
 def _behind_place(net, vehicle):  # type: ignore[no-untyped-def]
-    """Return where others stop behind a car that backs into a place, has long waited to leave one, or delivers, m."""
+    """Return where others stop behind a car that backs into a place, has waited long to leave one, or delivers, m."""
     place = net.places[vehicle.place]
+    if place.lot != NONE:
+        waits = vehicle.stopping == DRIVING_OUT and vehicle.stay_left < -_WAITS_TO_LEAVE
+        return place.out_offset - _REAR_GAP if waits else NEVER
     if place.delivery:
         return vehicle.stop_offset - vehicle.length - _SWING_OUT
     is_let_out = vehicle.stopping == LEAVING and vehicle.stay_left < -_WAITS_TO_LEAVE

@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from vico.sim.traffic.path import PATH_POINT
 from vico.sim.traffic.state import LANE, SPOT, STOPPING_PLACE, WALKWAY, LaneNetwork, WalkwayNetwork
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
@@ -150,6 +151,7 @@ def _lane_network(lanes: LaneGraph, walks: Walkways) -> LaneNetwork:
         goal_edge=np.zeros(0, np.int32),
         goal_next=np.zeros((0, len(lanes)), np.int32),
         places=np.zeros(0, STOPPING_PLACE),
+        way_points=np.zeros(0, PATH_POINT),
     )
 
 

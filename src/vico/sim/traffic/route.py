@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from vico.io.compiled import compiled
 from vico.sim.traffic.random_stream import next_random
-from vico.sim.traffic.state import HELD_JUNCTIONS, NONE, PLANNED_LANES, PRESENT, PREVIOUS_LANES
+from vico.sim.traffic.state import HELD_JUNCTIONS, LEAVING, NONE, PLANNED_LANES, PRESENT, PREVIOUS_LANES, STANDING
 
 NEVER = 1e9  # distance to a stop that there is not, m
 STANDING_ROOM = 1.5  # room kept behind a vehicle that has left a junction, m
@@ -227,7 +227,8 @@ def drop_shut_plans(net, fleet):  # type: ignore[no-untyped-def]
 def is_taken(net, fleet, lanes):  # type: ignore[no-untyped-def]
     """Return whether a car is on one of some lanes (a mask), may still be with its rear, or will drive there."""
     for vehicle in fleet:
-        if vehicle.route >= 0:
+        is_in_car_park = vehicle.way_offset > 0.0 and (vehicle.stopping == STANDING or vehicle.stopping == LEAVING)
+        if vehicle.route >= 0 or is_in_car_park:
             continue
         if lanes[vehicle.lane]:
             return True

@@ -32,6 +32,8 @@ PRESENT, AWAY, COMING = 0, 1, 2
 #: Whether a car stops at a place beside the road: it drives, comes to the place, backs into it, stands there, or waits
 #: for a gap to leave it.
 DRIVING, APPROACHING, BACKING_IN, STANDING, LEAVING = 0, 1, 2, 3, 4
+#: In car parks, besides: it is on the way in, backs into the aisle, or is on the way out.
+DRIVING_IN, BACKING_OUT, DRIVING_OUT = 5, 6, 7
 #: What a signal shows.
 DARK, GREEN, AMBER, RED = 0, 1, 2, 3
 
@@ -75,6 +77,20 @@ STOPPING_PLACE = np.dtype(
         ("taper", _F),  # metres along the lane that it takes to get there, or away
         ("reverse", _B),  # whether one backs into it: who drives in forwards would touch what stands behind it
         ("delivery", _B),  # whether it is for deliveries
+        ("lot", _I),  # car park it is in, NONE for none; the rest is of these alone
+        ("first_in", _I),  # the way in: `way_points` from this one ...
+        ("end_in", _I),  # ... to before this one
+        ("first_back", _I),  # the way on which one backs out, in the direction one faces
+        ("end_back", _I),
+        ("first_out", _I),  # the way out, which begins as that one does
+        ("end_out", _I),
+        ("in_rest", _F),  # metres along the way in of the spot's middle
+        ("back_rest", _F),  # the same along the way on which one backs out
+        ("out_lane", _I),  # lane that the way out comes to
+        ("out_offset", _F),  # metres along that lane where it does
+        ("out_joint", _F),  # metres along the way out of the same point
+        ("out_side", _F),  # 1 for a turn to the left there, -1 to the right
+        ("hold", _F),  # metres along the way out of the front of a car that waits for a gap
     ],
     align=True,
 )
@@ -123,7 +139,8 @@ VEHICLE_STATE: list[tuple[Any, ...]] = [
     ("stop_route_index", _I),  # buses: position in its route of the lane with the next stop
     ("stop_offset", _F),  # the stop's distance along that lane, m; cars: where one that comes to a place stops first
     ("at_stop", _B),  # whether it stands at its stop with its doors open, or at a place where cars stop
-    ("stopping", np.uint8),  # cars: DRIVING, APPROACHING, BACKING_IN, STANDING or LEAVING
+    ("stopping", np.uint8),  # cars: DRIVING, APPROACHING and so on
+    ("way_offset", _F),  # distance of its front along its way in a car park, m; less than 0 for who goes to none
     ("place", _I),  # cars: place where it stops, an index into the network's; NONE for none
     ("stay_left", _F),  # cars: how long it goes on standing there, or tries to get there, s
     ("presence", np.uint8),  # buses: PRESENT, AWAY or COMING; its body is far off unless it is present
@@ -277,6 +294,8 @@ class LaneNetwork(NamedTuple):
         int32, shapes ``(goals,)`` and ``(goals, lanes)``.
     places
         Places where cars stop, lane by lane, dtype `STOPPING_PLACE`.
+    way_points
+        Points of the ways in car parks, dtype `PATH_POINT`.
     """
 
     lanes: Records
@@ -293,6 +312,7 @@ class LaneNetwork(NamedTuple):
     goal_edge: Ints
     goal_next: Ints
     places: Records
+    way_points: Records
 
 
 class WalkwayNetwork(NamedTuple):
@@ -438,6 +458,7 @@ def new_fleet(n: int, seed: int) -> Records:
     ):
         fleet[name] = NONE
     fleet["target_speed"] = TOP_SPEED
+    fleet["way_offset"] = -1.0
     fleet["random"] = _random_streams(seed, "turns", n)
     return fleet
 

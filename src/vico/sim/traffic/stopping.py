@@ -16,10 +16,14 @@ from vico.sim.traffic.moving import move_vehicle
 from vico.sim.traffic.path import path_polyline, vehicle_outline
 from vico.sim.traffic.random_stream import next_random
 from vico.sim.traffic.route import NEVER
-from vico.sim.traffic.state import APPROACHING, BACKING_IN, DRIVING, LEAVING, NONE, STANDING
+from vico.sim.traffic.state import APPROACHING, BACKING_IN, DRIVING, DRIVING_IN, LEAVING, NONE, STANDING
 
+#: m of lane that belong to a way into a car park, before that leaves it.
+WAY_LEAD = 8.0
+#: s that cars stand where they park.
+STAY = (120.0, 600.0)
 _PARKING_SHARE, _DELIVERY_SHARE = 0.25, 0.25  # of the cars (vans) that come onto a street with places
-_STAY, _DELIVERY = (120.0, 600.0), (60.0, 180.0)  # s that they stand there
+_DELIVERY = (60.0, 180.0)  # s that vans stand
 _MANOEUVRE, _REVERSE = 3.0, 1.2  # m/s into a place, and backwards
 _LATE = 1.5  # m/s^2: a place for which one had to brake harder is too near
 _GIVES_UP_AFTER = 12.0  # s of standing after which one drives on that has not got to its place
@@ -30,6 +34,7 @@ _PERSON_GAP, _VEHICLE_GAP = 0.3, 0.1  # m kept sideways
 _SWING_OUT, _SEES_DELIVERY, _PATIENT = 10.5, 60.0, 3.0  # m behind a delivery, and s after a lane change
 _APART = 20.0  # m between places that are taken at a time: nobody is in the way of who leaves the one behind
 _STANDS = 0.1  # m/s
+_TOO_FAR = 0.8  # m beyond the beginning of a way, at which the front axle has passed it
 _SIDE = 1.0  # m: places nearer to the lane's middle are in the lane
 
 
@@ -39,12 +44,29 @@ def _front_in_place(net, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def is_car_park_busy(net, fleet, vehicle, lot, k=NONE):  # type: ignore[no-untyped-def]
+    """Return whether another car is on its way in a car park, into it or out of it; or has place k.
+
+    Nor does one come in (k given) while one waits to get out.
+    """
+    for other in fleet:
+        if other.index == vehicle.index or other.place == NONE or net.places[other.place].lot != lot:
+            continue
+        waits = other.stopping == LEAVING and k == NONE
+        if other.place == k or (other.stopping != STANDING and not waits):
+            return True
+    return False
+
+
+@compiled
 def _is_free(net, fleet, vehicle, k):  # type: ignore[no-untyped-def]
     """Return whether nobody has place k or one near it, its street has no delivery, and nobody is close behind."""
     place = net.places[k]
+    if place.lot != NONE:
+        return not is_car_park_busy(net, fleet, vehicle, place.lot, k)
     edge = net.lanes[place.lane].edge
     for other in fleet:
-        if other.index == vehicle.index:
+        if other.index == vehicle.index or (other.place != NONE and net.places[other.place].lot != NONE):
             continue
         if other.place != NONE and net.lanes[other.lane].edge == edge:
             is_near = other.lane == place.lane and abs(net.places[other.place].middle - place.middle) < _APART
@@ -97,7 +119,9 @@ def choose_place(net, fleet, vehicle):  # type: ignore[no-untyped-def]
     place = net.places[k]
     vehicle.place, vehicle.stopping = k, APPROACHING
     vehicle.stop_offset = _front_in_place(net, vehicle)
-    if place.reverse:
+    if place.lot != NONE:
+        vehicle.stop_offset, vehicle.way_offset = place.middle, 0.0
+    elif place.reverse:
         vehicle.stop_offset += place.taper + vehicle.wheelbase
     else:
         # It leaves the lane where its rear axle ends up.
@@ -109,23 +133,39 @@ def choose_place(net, fleet, vehicle):  # type: ignore[no-untyped-def]
 @compiled
 def _drive_on(vehicle):  # type: ignore[no-untyped-def]
     vehicle.stopping, vehicle.place, vehicle.at_stop = DRIVING, NONE, False
-    vehicle.time_since_lane_change = 0.0
+    vehicle.time_since_lane_change, vehicle.way_offset = 0.0, -1.0
 
 
 @compiled
 def distance_to_place(vehicle):  # type: ignore[no-untyped-def]
-    """Return the metres to where a car that comes to a place stops, `NEVER` for others."""
-    return max(vehicle.stop_offset - vehicle.offset, 0.0) if vehicle.stopping == APPROACHING else NEVER
+    """Return the metres to where a car that comes to a place stops, `NEVER` for others: into car parks one turns."""
+    stops = vehicle.stopping == APPROACHING and vehicle.way_offset < 0.0
+    return max(vehicle.stop_offset - vehicle.offset, 0.0) if stops else NEVER
 
 
 @compiled
 def speed_into_place(vehicle, wanted):  # type: ignore[no-untyped-def]
     """Return the desired speed of a car that comes to a place it drives into, m/s: slow where it leaves its lane."""
-    if vehicle.stopping != APPROACHING or vehicle.lane_change_length >= 0.0:
+    if vehicle.stopping != APPROACHING or (vehicle.lane_change_length >= 0.0 and vehicle.way_offset < 0.0):
         return wanted
-    begin = vehicle.stop_offset - vehicle.wheelbase + vehicle.lane_change_length
+    begin = vehicle.stop_offset
+    if vehicle.way_offset < 0.0:
+        begin += vehicle.lane_change_length - vehicle.wheelbase
     before = max(begin - vehicle.offset, 0.0)
     return min(wanted, np.sqrt(_MANOEUVRE * _MANOEUVRE + 2 * _LATE * before))
+
+
+@compiled
+def _turn_into_car_park(vehicle, beyond):  # type: ignore[no-untyped-def]
+    """Leave the lane, `beyond` metres after the way into a car park does; drive on if that is too far, or not yet."""
+    if beyond < 0.0 or beyond > _TOO_FAR:
+        _drive_on(vehicle)
+        return
+    vehicle.stopping, vehicle.way_offset = DRIVING_IN, WAY_LEAD + beyond
+    vehicle.planned_count = vehicle.granted_count = 0
+    vehicle.blocker = vehicle.gives_way_to = NONE
+    vehicle.queued_junction = vehicle.queued_exit = vehicle.kept_out_from = NONE
+    vehicle.junction_wait = 0.0
 
 
 @compiled
@@ -138,7 +178,10 @@ def come_to_place(net, vehicle):  # type: ignore[no-untyped-def]
     if left < _SIGNALS_FROM:
         vehicle.lights |= LEFT if place.side > 0.0 else RIGHT
     is_there = left < 0.5 and vehicle.speed < _STANDS
-    if not is_there:
+    if place.lot != NONE:
+        if left <= 0.0 or vehicle.stopped_time > _GIVES_UP_AFTER:
+            _turn_into_car_park(vehicle, -left)
+    elif not is_there:
         in_lane = place.reverse or vehicle.offset < vehicle.stop_offset - vehicle.wheelbase - place.taper
         if in_lane and vehicle.stopped_time > _GIVES_UP_AFTER:
             vehicle.lateral_offset = 0.0
@@ -147,7 +190,7 @@ def come_to_place(net, vehicle):  # type: ignore[no-untyped-def]
         vehicle.stopping, vehicle.stay_left = BACKING_IN, _GIVES_UP_AFTER
         _prepare_to_leave(net, vehicle)
     else:
-        _stand(vehicle, _DELIVERY if place.delivery else _STAY)
+        stand(vehicle, _DELIVERY if place.delivery else STAY)
 
 
 @compiled
@@ -159,7 +202,8 @@ def _prepare_to_leave(net, vehicle):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _stand(vehicle, stay):  # type: ignore[no-untyped-def]
+def stand(vehicle, stay):  # type: ignore[no-untyped-def]
+    """Have a car stand where it parks, for a time between two, s."""
     vehicle.stopping, vehicle.at_stop = STANDING, True
     vehicle.stay_left = stay[0] + (stay[1] - stay[0]) * next_random(vehicle)
     vehicle.blocker = vehicle.gives_way_to = NONE
@@ -245,7 +289,7 @@ def _back_in(net, vehicle, scratch, beyond, dt):  # type: ignore[no-untyped-def]
     if touched_at(view.path, view.outline, vehicle.offset + move, view.nearby, TOUCH, _PERSON_GAP) < 0:
         move_vehicle(vehicle, shapes, view, move, dt)
         if left <= _REVERSE * dt:
-            _stand(vehicle, _STAY)
+            stand(vehicle, STAY)
         return
     vehicle.stay_left -= dt
     if vehicle.stay_left <= 0.0:

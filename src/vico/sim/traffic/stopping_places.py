@@ -1,4 +1,4 @@
-"""Where cars stop beside the road: free parking spots that can be reached, and edges of lanes for deliveries."""
+"""Where cars stop: free parking spots that can be reached, at the kerb and in car parks, and edges of lanes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from vico.sim.traffic.state import STOPPING_PLACE, LaneNetwork, Records
+from vico.sim.traffic.car_park_ways import places_in_car_parks
+from vico.sim.traffic.state import NONE, STOPPING_PLACE, LaneNetwork, Records
 from vico.world.folder import World
 from vico.world.lanes import LaneGraph
 from vico.world.walkways import CROSSING, Walkways
@@ -54,7 +55,14 @@ def with_stopping_places(
         return network
     tree = shapely.STRtree(list(solids))
     found = [*_parking(world, network, lanes, tree), *_deliveries(world, network, lanes, walks, tree)]
-    return with_places(network, np.array(sorted(found), STOPPING_PLACE) if found else np.zeros(0, STOPPING_PLACE))
+    places = np.zeros(len(found), STOPPING_PLACE)
+    places["lot"] = NONE
+    for name, column in zip(_Place._fields, zip(*sorted(found), strict=True), strict=False):
+        places[name] = column
+    parks, points = places_in_car_parks(world.parking, network, lanes, walks, tree)
+    places = np.concatenate([places, parks])
+    places = places[np.argsort(places["lane"], kind="stable")]
+    return with_places(network, places)._replace(way_points=points)
 
 
 def with_places(network: LaneNetwork, places: Records) -> LaneNetwork:

@@ -24,6 +24,7 @@ from vico.sim.traffic.car_following import (
     next_speed,
     stop_and_speed_limit,
 )
+from vico.sim.traffic.car_parks import stay_in_car_park
 from vico.sim.traffic.claims import holds_junction, note_claims, release_all_junctions, release_junctions
 from vico.sim.traffic.junctions import hesitates, next_junction_request, request_junctions
 from vico.sim.traffic.lane_change import (
@@ -100,7 +101,10 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         if vehicle.presence != PRESENT:
             continue
         if vehicle.stopping > APPROACHING:
-            stay_at_place(net, fleet, vehicle, (path_buffer, buffers[0]), beyond, dt)
+            if net.places[vehicle.place].lot != NONE:
+                stay_in_car_park(net, fleet, vehicle, buffers, beyond, dt)
+            else:
+                stay_at_place(net, fleet, vehicle, (path_buffer, buffers[0]), beyond, dt)
             continue
         lane, speed, is_bus = vehicle.lane, vehicle.speed, vehicle.route >= 0
         look = look_ahead(vehicle)
@@ -297,7 +301,7 @@ def place_vehicle(net, fleet, v, lane, offset, shapes, air):  # type: ignore[no-
             shapes.x[v], shapes.y[v] = before
             return False
     vehicle.lane, vehicle.offset, vehicle.planned_count, vehicle.lateral_offset = lane, offset, 0, 0.0
-    vehicle.stopping, vehicle.place = DRIVING, NONE
+    vehicle.stopping, vehicle.place, vehicle.way_offset = DRIVING, NONE, -1.0
     vehicle.gives_way_to = NONE
     vehicle.previous_lanes[:] = NONE
     vehicle.speed = vehicle.stopped_time = vehicle.junction_wait = 0.0

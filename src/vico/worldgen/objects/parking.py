@@ -29,6 +29,7 @@ from vico.worldgen.facts.bays import Bay, junction_zones, kerb_bays, lot_bays, s
 from vico.worldgen.facts.expendable import expendable
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.streets import Street, StreetPolygons
+from vico.worldgen.objects.car_park_ways import with_ways
 
 CAR = "parked_car"
 """Kind of the objects that are parked cars."""
@@ -119,7 +120,10 @@ def parking_from_osm(
             rows.append(row | {"entity": entity})
         spots.append(_spot(one, lanes, height, entity if row is not None else None))
         entity += row is not None
-    return Parking(Objects.from_rows(rows), spots)
+    cars = Objects.from_rows(rows)
+    standing = Objects.joined([objects, cars])
+    found_ways = with_ways(spots, streets=streets, lanes=lanes, objects=standing, solids=solids, height=height)
+    return Parking(cars, found_ways)
 
 
 def _said(tags: Tags, side: str) -> str | None:
