@@ -91,7 +91,7 @@ def until(sim: Simulation, stop: str) -> None:
 def test_a_tram_comes_on_time_takes_people_for_the_fare_and_everybody_off_at_its_last_stop(sim: Simulation) -> None:
     until(sim, "tram_stop_0")
     state = run(sim, 1, type="enter_bus")
-    assert (state["action_status"], state["vehicle"], state["cash"]) == ("ok", "bus", 7.0)
+    assert (state["action_status"], state["vehicle"], state["cash"]) == ("ok", "tram", 7.0)
     people = sim.state.people
     assert people.posture[0] == Posture.SITTING
     assert sim.state.entity(int(people.vehicle_entity[0]))["kind"] == "tram"

@@ -180,7 +180,7 @@ class Traveller:
 
     def _act(self, goal: tuple[float, float], observation: Observation, info: Info, speed: float) -> Action | None:
         vehicle = observation["state"]["vehicle"]
-        if vehicle == "bus":
+        if vehicle in ("bus", "tram", "train"):
             return self._ride_bus(observation)
         if vehicle == "bike":
             return self._ride_bike(observation, info)

@@ -223,6 +223,14 @@ def _where_robot_is(robot: int, state: SimulationState) -> dict[str, Any]:
     return {"building": room.building, "room": room.id, "place": place, "doors": state.doors_in(inside)}
 
 
+def _vehicle_of(state: SimulationState, i: int) -> str:
+    """Return what somebody rides: bus, tram, train or bike; empty for nothing."""
+    vehicle = state.people.vehicle.item(i)
+    if vehicle == Vehicle.BUS and state.transit is not None:
+        return state.transit.service_of(state.transit.with_entity(state.people.vehicle_entity.item(i)))[0]
+    return _VEHICLES[vehicle]
+
+
 def state_of(i: int, state: SimulationState) -> dict[str, Any]:
     """Return the state part of an agent's observation; empty strings and 0 stand for "none".
 
@@ -252,7 +260,7 @@ def state_of(i: int, state: SimulationState) -> dict[str, Any]:
         **common,
         "cash": round(p.cash.item(i), 2),
         "held": held,
-        "vehicle": _VEHICLES[p.vehicle.item(i)],
+        "vehicle": _vehicle_of(state, i),
         "building": room.building if room else "",
         "room": room.id if room else "",
         "place": place.id if place else "",

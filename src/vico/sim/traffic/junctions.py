@@ -14,6 +14,7 @@ from vico.sim.traffic.leader import bodies_around, touched_at
 from vico.sim.traffic.path import point_on_path
 from vico.sim.traffic.route import NEVER, STANDING_ROOM, is_lane_of_stop
 from vico.sim.traffic.state import NONE
+from vico.sim.traffic.track_crossings import clear_of_tracks, crosses_called_track
 
 _HESITATION = 3.0  # s that a vehicle let in may stand before the junction goes back
 _APART = 3.0  # m between places where it is looked whether somebody stands there
@@ -95,9 +96,13 @@ def _find_exit(net, junctions, vehicle, request):  # type: ignore[no-untyped-def
             start = -1.0
             last = k + 1
         else:
+            begin = clear_of_tracks(net, lane, clear, vehicle.length + STANDING_ROOM)
+            if begin > 0.0:
+                clear = 0.0
+                start = -1.0
             if start < 0.0:
-                start = s
-            clear += net.lanes[lane].length
+                start = s + begin
+            clear += net.lanes[lane].length - begin
         s += net.lanes[lane].length
         k += 1
         if clear >= vehicle.length + STANDING_ROOM:
@@ -175,12 +180,15 @@ def may_enter_junction(net, fleet, junctions, vehicle, request, leave, view):  #
             yields = True
     if yields or not _exit_is_long_enough(vehicle, request, leave):
         return False
+    s = vehicle.offset + request.distance
+    if crosses_called_track(net, vehicle, request.planned_index, leave.last, leave.end, s, leave.start):
+        return False
     # Shorter vehicles, and those with a shorter way, would else take whatever room there is for ever.
     lane = vehicle.planned_lanes[leave.last] if leave.start >= 0.0 else NONE
     if lane >= 0 and is_overtaken(junctions.longest_exit_wait[lane], counted_wait(junctions, vehicle)):
         return False
     other = _who_is_at_exit(vehicle, leave, view, len(fleet))
-    if other >= 0 and _waits_outside(net, fleet[other]):
+    if 0 <= other < len(fleet) and _waits_outside(net, fleet[other]):
         vehicle.kept_out_from = fleet[other].lane  # that one goes first, and who comes behind it stays back
         return False
     if other >= 0:

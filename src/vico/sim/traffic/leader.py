@@ -35,6 +35,7 @@ NO_GAP = 1e9  # the gap to the leader where there is none
 ANY_BODY = 2**31  # every body's index lies below
 
 _VEHICLE_GAP = 0.1  # sideways distance kept from vehicles that are passed, m
+_LONG = 2.5  # half the length of a section of a tram at least, m
 _NOSE = 0.02  # a vehicle's outline is tested so much longer, m
 _NEAR_PATH = 1.5  # more than a bus's corners leave its path in a bend, m
 _FINE_STEP, _COARSE_STEP, _COARSE_FROM = 1.0, 2.0, 8.0  # steps of the sweep, and from where on it takes the larger, m
@@ -123,14 +124,15 @@ def touches(rectangle, one):  # type: ignore[no-untyped-def]
 def touched_at(path, outline, front, bodies, vehicle_gap, person_gap, below=ANY_BODY):  # type: ignore[no-untyped-def]
     """Return the row of the first of `bodies` that a vehicle with its front at s = `front` would touch, or `NONE`.
 
-    Sideways it keeps the given gaps from vehicles and people, metres. Bodies from index `below` on do not count.
+    Sideways it keeps the given gaps from vehicles and people, metres. Bodies from index `below` on do not count, but
+    those as long as a tram's section.
     """
     cx, cy, c, s = footprint(path, outline, front)
     length, width = outline.length / 2, outline.half_width
     reach = length + width + 0.5
     for k in range(len(bodies)):
         one = bodies[k]
-        if one.body >= below:
+        if one.body >= below and one.half_length < _LONG:
             continue
         dx, dy = one.x - cx, one.y - cy
         r = reach + one.radius

@@ -11,7 +11,7 @@ import shapely
 from numpy.typing import NDArray
 
 from vico.sim.traffic.path import PATH_POINT
-from vico.sim.traffic.state import LANE, SPOT, STOPPING_PLACE, WALKWAY, LaneNetwork, WalkwayNetwork
+from vico.sim.traffic.state import LANE, SPOT, STOPPING_PLACE, TRACK_CROSSING, WALKWAY, LaneNetwork, WalkwayNetwork
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.objects import Objects
@@ -152,6 +152,7 @@ def _lane_network(lanes: LaneGraph, walks: Walkways) -> LaneNetwork:
         goal_next=np.zeros((0, len(lanes)), np.int32),
         places=np.zeros(0, STOPPING_PLACE),
         way_points=np.zeros(0, PATH_POINT),
+        tracks=np.zeros(0, TRACK_CROSSING),
     )
 
 

@@ -41,6 +41,7 @@ from vico.sim.traffic.state import (
     new_pedestrians,
 )
 from vico.sim.traffic.stopping_places import without_deliveries
+from vico.sim.traffic.track_crossings import crossed_tracks
 from vico.sim.traffic.vehicles import advance_vehicles, bring_back, come_back, place_vehicle, take_away
 from vico.world.heights import HeightField
 
@@ -305,6 +306,30 @@ class Traffic(SeenTraffic):
         first[1:] = np.cumsum([len(one) for one in rounds])
         flat = np.array([lane for one in rounds for lane in one], np.int32)
         self._net = self._net._replace(route_first=first, route=flat)
+
+    def put_tracks(self, crossings: NDArray[np.void]) -> NDArray[np.bool_]:
+        """Have vehicles let trams go first where their tracks cross lanes.
+
+        Parameters
+        ----------
+        crossings
+            Lane by lane, dtype `vico.sim.traffic.state.TRACK_CROSSING`.
+
+        Returns
+        -------
+        ndarray
+            Where a tram is or comes, to be written to, bool, shape ``(crossings,)``.
+        """
+        tracks = crossings.copy()
+        lanes = self._net.lanes
+        lanes["first_track"] = np.searchsorted(tracks["lane"], np.arange(len(lanes)))
+        lanes["end_track"] = np.searchsorted(tracks["lane"], np.arange(len(lanes)), side="right")
+        self._net = self._net._replace(tracks=tracks)
+        return tracks["called"]
+
+    def crossed_tracks(self) -> NDArray[np.bool_]:
+        """Return on which of these crossings vehicles are or will not stop before, bool, shape ``(crossings,)``."""
+        return np.asarray(crossed_tracks(self._net, self._vehicles), np.bool_)
 
     @property
     def shut_walkways(self) -> NDArray[np.bool_] | None:

@@ -63,9 +63,14 @@ LANE = np.dtype(
         ("light", np.uint8),  # what its signal shows who wants onto it: DARK, GREEN, AMBER or RED
         ("first_place", _I),  # places beside it where cars stop: `places` from here ...
         ("end_place", _I),  # ... to before here
+        ("first_track", _I),  # places where tracks of trams cross it: `tracks` from here ...
+        ("end_track", _I),  # ... to before here
     ],
     align=True,
 )
+
+#: Where tracks of trams cross a lane at an angle: metres along it, and whether a tram is there or comes.
+TRACK_CROSSING = np.dtype([("lane", _I), ("start", _F), ("end", _F), ("called", _B)], align=True)
 
 #: A place where cars stop: a parking spot at the kerb, or the edge of a lane for deliveries.
 STOPPING_PLACE = np.dtype(
@@ -296,6 +301,8 @@ class LaneNetwork(NamedTuple):
         Places where cars stop, lane by lane, dtype `STOPPING_PLACE`.
     way_points
         Points of the ways in car parks, dtype `PATH_POINT`.
+    tracks
+        Where tracks of trams cross lanes, lane by lane, dtype `TRACK_CROSSING`; `called` is part of the trams' state.
     """
 
     lanes: Records
@@ -313,6 +320,7 @@ class LaneNetwork(NamedTuple):
     goal_next: Ints
     places: Records
     way_points: Records
+    tracks: Records
 
 
 class WalkwayNetwork(NamedTuple):

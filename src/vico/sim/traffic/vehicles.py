@@ -64,6 +64,7 @@ from vico.sim.traffic.route import NEVER, advance_lane, can_step_back, plan_lane
 from vico.sim.traffic.signals import is_stopped_by_signal, loses_its_green
 from vico.sim.traffic.state import APPROACHING, AWAY, DRIVING, NONE, PRESENT
 from vico.sim.traffic.stopping import choose_place, come_to_place, is_behind_delivery, stay_at_place
+from vico.sim.traffic.track_crossings import asks_with_track, distance_to_track, look_over, track_ahead, waits_for_tram
 
 STANDING = 0.1  # slower is standing, m/s ...
 _STARTED = 0.95  # ... where a vehicle gains so much in a step: slower than this share of what it can gain
@@ -109,18 +110,21 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         lane, speed, is_bus = vehicle.lane, vehicle.speed, vehicle.route >= 0
         look = look_ahead(vehicle)
         path_ends = plan_lanes(net, vehicle, street_load, look + vehicle.length + 12.0)
+        track = track_ahead(net, vehicle, look)
+        look = max(look, look_over(track))
         if hesitates(net, vehicle) or loses_its_green(net, vehicle):
             vehicle.granted_count = 0
             release_junctions(net, junctions, vehicle)
 
         stop_distance, let_in_distance = distance_to_stop(vehicle), distance_to_let_in(vehicle, places)
-        request = next_junction_request(net, vehicle, stop_distance, braking_distance(vehicle), path_ends)
-        view = _look_around(net, vehicle, request, (path_buffer, buffers[0]), beyond)
+        asks_from = asks_with_track(track, braking_distance(vehicle))
+        request = next_junction_request(net, vehicle, stop_distance, asks_from, path_ends)
+        view = _look_around(net, vehicle, look, request, (path_buffer, buffers[0]), beyond)
         gap, leader = find_leader(view, vehicle.offset, look, buffers[1])
         # Who is behind another vehicle does not ask: it would hold the junction that the other one needs.
         is_behind = (0 <= leader < len(fleet) and gap < request.distance) or let_in_distance < request.distance
         # Nor does who makes room for another one: it stands, and who holds a junction does not back up.
-        is_behind = is_behind or vehicle.gives_way_to != NONE
+        is_behind = is_behind or vehicle.gives_way_to != NONE or waits_for_tram(track, request.distance)
         vehicle.queued_junction = vehicle.queued_exit = vehicle.kept_out_from = NONE
         at_signal = request.planned_index >= 0 and is_stopped_by_signal(net, vehicle, request.planned_index)
         is_refused = (
@@ -136,6 +140,8 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         stop, limit = stop_and_speed_limit(net, vehicle, look, stop_distance, let_in_distance, wanted)
         gap, leader = mind_only_before(stop, gap, leader)
         leading = leader_speed(shapes, leader, view, vehicle.offset + gap)
+        to_track = distance_to_track(track, vehicle, stop_distance, gap, leading)
+        stop, limit = min(stop, to_track), min(limit, np.sqrt(2 * vehicle.braking * to_track))
         # Who is still in a junction closes up, so that it gets out of it.
         behind = gap + CLOSING_UP if holds_junction(vehicle) else gap
         rate = idm_acceleration(vehicle, wanted, behind, leading)
@@ -221,10 +227,16 @@ def _standing_speed(vehicle, dt):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _look_around(net, vehicle, request, scratch, beyond):  # type: ignore[no-untyped-def]
-    """Return what a vehicle sees: bodies near it, and its path, farther where it may have to see beyond a junction."""
+def _look_around(net, vehicle, look, request, scratch, beyond):  # type: ignore[no-untyped-def]
+    """Return what a vehicle sees: bodies near it, and its path, farther where it may have to see beyond a junction.
+
+    Parameters
+    ----------
+    look
+        Metres ahead that it minds.
+    """
     path_buffer, body_buffer = scratch
-    look, length = look_ahead(vehicle), vehicle.length
+    length = vehicle.length
     far, reach = look, look + length + 6.0
     if request.planned_index >= 0:
         # Who asks has to see the place beyond the junction where it will stand.

@@ -85,6 +85,14 @@ def outlines(poses, inside):  # type: ignore[no-untyped-def]
     return found
 
 
+def holds_somebody(poses: NDArray[np.float64], footprints: NDArray[np.float64]) -> bool:
+    """Return whether the middle of a footprint lies in a section, by x, y, yaw: who is wholly in it touches no edge."""
+    dx, dy = footprints[:, 0, None] - poses[:, 0], footprints[:, 1, None] - poses[:, 1]
+    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    within = (np.abs(dx * c + dy * s) < TRAM_SECTION / 2) & (np.abs(dy * c - dx * s) < TRAM_WIDTH / 2)
+    return bool(within.any())
+
+
 @compiled
 def first_taken(points, bodies, skip, skipped, within, soon):  # type: ignore[no-untyped-def]
     """Return the first row of `points`, shape ``(n, k, 2)``, near a footprint now or in `soon` seconds; n for none.

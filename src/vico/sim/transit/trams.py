@@ -23,7 +23,17 @@ from vico.sim.bodies import TRAM, Bodies, Drawn
 from vico.sim.traffic import Traffic
 from vico.sim.transit.doors import DOOR_TIME, leaf_transforms, moved_doors
 from vico.sim.transit.passengers import FIRST_PASSENGER
-from vico.sim.transit.tram_outlines import first_taken, inside_city, nobody, outlines, packed, spots_near, stand
+from vico.sim.transit.tram_crossings import TramCrossings
+from vico.sim.transit.tram_outlines import (
+    first_taken,
+    holds_somebody,
+    inside_city,
+    nobody,
+    outlines,
+    packed,
+    spots_near,
+    stand,
+)
 from vico.sim.transit.tram_signals import TramSignal, metres_to_signal, signals_of
 from vico.sim.transit.tram_zones import zones_of
 from vico.world.mesh import Surface
@@ -80,6 +90,8 @@ class Trams:
         Departures that each line has begun since the first one of the first day.
     holder
         Tram in each zone, -1 for nobody.
+    called
+        Where tracks cross lanes, whether a tram is there or comes, shape ``(crossings,)``.
     stops_served, late_total, late_most
         As those of `vico.sim.transit.system.TransitSystem`.
     """
@@ -97,6 +109,8 @@ class Trams:
         ]
         zones, count = zones_of(self.tracks)
         self._zones = zones
+        self._crossings = TramCrossings(self.tracks, traffic)
+        self.called = self._crossings.called
         obeys = traffic.signals is not None
         self._signals: list[list[TramSignal]] = signals_of(self.tracks, traffic.lanes) if obeys else [[] for _ in lines]
         slots = [min(math.ceil((line.travel[-1] + 240.0) / _headway(line)) + 1, 8) for line in lines]
@@ -149,9 +163,11 @@ class Trams:
             return arrived
         self._look_about(obstacles)
         self._come_in(now)
+        self._crossings.begin_step(self._everybody[len(self) * TRAM_SECTIONS :])
         for tram in np.flatnonzero(self.front > AWAY).tolist():
             if self.dwell[tram] > 0.0:
                 self._stand(tram, now, dt)
+                self._crossings.call_under(int(self.line_of[tram]), float(self.front[tram]))
                 continue
             self._drive(tram, now, dt)
             if self.dwell[tram] > 0.0:
@@ -169,6 +185,8 @@ class Trams:
                 continue
             tram = int(free[0])
             if self._gap(tram, 0.0, _ALIKE) < _ALIKE or not self._fits(tram, 0.0):
+                continue
+            if holds_somebody(self._sections_at(tram, 0.0), self._everybody):
                 continue
             self.front[tram], self.speed[tram], self.stop[tram], self.due[tram] = 0.0, _SLOW, 0, due
             self.begun[number] += 1
@@ -200,6 +218,7 @@ class Trams:
         if self._signals[number]:
             speed_now, light = float(self.speed[tram]), self._traffic.lane_lights
             free = min(free, metres_to_signal(self._signals[number], front, speed_now, light))
+        free = min(free, self._crossings.metres_to_wait(number, front, float(self.speed[tram]), free))
         if not ends:
             limit = min(limit, math.sqrt(2 * TRAM_BRAKING * max(target - front, 0.0)) + 0.15)
         limit = min(limit, math.sqrt(2 * TRAM_BRAKING * max(free, 0.0)))
@@ -437,7 +456,7 @@ class Trams:
 
 _STATE = (
     "front", "speed", "stop", "dwell", "open", "due", "riders", "begun", "holder", "stops_served", "late_total",
-    "late_most",
+    "late_most", "called",
 )  # fmt: skip
 _PART = ("front",) + ("middle",) * (TRAM_SECTIONS - 2) + ("rear",)
 

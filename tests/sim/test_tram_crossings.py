@@ -1,0 +1,63 @@
+"""Tracks across streets: vehicles stop before them while a tram comes, do not stand on them, and are waited for."""
+
+import numpy as np
+
+from helsinki_traffic import network
+from road_city import HALF
+from vico.sim.bodies import Bodies
+from vico.sim.traffic import JunctionRule, Traffic, TrafficSetup
+from vico.sim.traffic.placed import placed_traffic
+from vico.sim.transit.tram_crossings import TramCrossings
+from vico.world.heights import HeightField
+from vico.world.rails import Track
+
+_NOBODY = np.zeros((0, 9))
+
+
+def crossed() -> tuple[Traffic, TramCrossings, int, float]:
+    """A car 40 m before a track across the longest lane without others beside it, and where along it they meet."""
+    lanes = network().lanes
+    plain = (lanes.inside < 0) & (lanes.left < 0) & (lanes.right < 0) & (lanes.zone < 0)
+    lane = int(np.argmax(np.where(plain, lanes.length, 0.0)))
+    meets = float(lanes.length[lane]) / 2
+    x, y, yaw = lanes.at(lane, meets)
+    across = np.array([-np.sin(yaw), np.cos(yaw)]) * 20.0
+    track = Track([(x - across[0], y - across[1]), (x + across[0], y + across[1])])
+    placed = placed_traffic({"cars": [{"at": lanes.at(lane, meets - 40.0)[:2].tolist()}]})
+    traffic = Traffic(
+        network(),
+        HeightField.flat(HALF),
+        cars=0,
+        pedestrians=0,
+        seed=1,
+        first_entity=1_000_000,
+        setup=TrafficSetup(JunctionRule.ONE, placed),
+    )
+    assert traffic.fleet.lane[0] == lane
+    return traffic, TramCrossings([track], traffic), lane, meets
+
+
+def drive(traffic: Traffic, seconds: int) -> None:
+    for _ in range(seconds * 10):
+        traffic.advance(0.1, Bodies.none())
+
+
+def test_a_car_waits_before_tracks_until_the_tram_has_passed_and_a_tram_for_a_car_on_them() -> None:
+    traffic, crossings, lane, meets = crossed()
+    crossings.begin_step(_NOBODY)
+    # Far from the lane nobody has to wait; a tram that comes is let through, and the car stops before its way.
+    assert crossings.metres_to_wait(0, 0.0, 5.0, 40.0) == np.inf
+    assert crossings.called.all()
+    drive(traffic, 15)
+    assert traffic.fleet.speed[0] == 0.0
+    assert meets - 8.0 < traffic.fleet.offset[0] < meets - 2.0
+    # Nobody comes any more: it drives on, and is waited for while it is on the tracks.
+    crossings.begin_step(_NOBODY)
+    waited = []
+    for _ in range(12):
+        drive(traffic, 1)
+        waited.append(crossings.metres_to_wait(0, 10.0, 2.0, 40.0))
+        crossings.begin_step(_NOBODY)
+    assert traffic.fleet.lane[0] != lane or traffic.fleet.offset[0] > meets + 5.0
+    assert 0.0 < min(waited) < 10.0
+    assert waited[-1] == np.inf
