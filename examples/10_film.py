@@ -353,10 +353,11 @@ def arrived(name: str, place: str) -> Callable[[Simulation], bool]:
 
 
 def in_a_moving_bus(sim: Simulation) -> bool:
-    """Return whether all passengers are in the bus, and it is on its way."""
+    """Return whether the one who is followed is in a bus that is on its way, with others who wanted to ride."""
     transit, aboard = sim.state.transit, sim.state.people.vehicle[-PASSENGERS:] > 0
-    return bool(aboard.all()) and all(transit.stopped_at(bus) is None for bus in range(transit.traffic.buses)
-                                      if transit.aboard(bus))  # fmt: skip
+    in_company = bool(aboard[-1]) and int(aboard.sum()) >= PASSENGERS // 2
+    return in_company and all(transit.stopped_at(bus) is None for bus in range(transit.traffic.buses)
+                              if transit.aboard(bus))  # fmt: skip
 
 
 def works(who, stay: Stay) -> bool:

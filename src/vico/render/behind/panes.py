@@ -17,6 +17,7 @@ from vico.render.compiled import inlined, kernel
 from vico.render.records import CAMERA_UNIFORMS
 from vico.render.scene import Scene
 from vico.render.uniforms import Record, set_room
+from vico.render.visibility.boxes import box_in_picture
 from vico.render.visibility.fill import inverse_depth, triangle_number
 
 # No more rooms than this are shown in one picture, none farther away, nor from nearer to the wall, metres.
@@ -128,19 +129,8 @@ def _distance(front: Any, camera: Any) -> float:
 @inlined
 def _set_area(front: Any, camera: Any, shown: Any) -> bool:
     """Write first and end row and column of the pixels that may show a front; return whether there are any."""
-    left, right, top, bottom, nearest, farthest = 1e30, -1e30, 1e30, -1e30, 1e30, -1e30
-    for corner in range(8):
-        a = front.right if corner & 1 else front.left
-        b = _OFF_WALL if corner & 2 else -_OFF_WALL
-        dx = front.x + a * front.inward_y + b * front.inward_x - camera.x
-        dy = front.y - a * front.inward_x + b * front.inward_y - camera.y
-        dz = front.z + (front.height if corner & 4 else 0.0) - camera.z
-        depth = dx * camera.forward_x + dy * camera.forward_y + dz * camera.forward_z
-        nearest, farthest = min(nearest, depth), max(farthest, depth)
-        scale = camera.focal / max(depth, float(camera.near))
-        x = camera.centre_x + scale * (dx * camera.right_x + dy * camera.right_y + dz * camera.right_z)
-        y = camera.centre_y + scale * (dx * camera.down_x + dy * camera.down_y + dz * camera.down_z)
-        left, right, top, bottom = min(left, x), max(right, x), min(top, y), max(bottom, y)
+    across, inward = (front.left, front.right), (-_OFF_WALL, _OFF_WALL)
+    left, right, top, bottom, nearest, farthest = box_in_picture(front, across, inward, camera)
     if farthest <= camera.near:
         return False
     if nearest <= camera.near:

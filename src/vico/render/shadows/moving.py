@@ -90,15 +90,13 @@ def _darken(camera: Any, buffers: Any, caster: Any, own: int, own_end: int) -> N
         caster.first_column,
         caster.end_column,
     )
-    line_a, line_b, line_c = _unit_line(camera, caster, 0), _unit_line(camera, caster, 1), _unit_line(camera, caster, 2)
-    height = _line(camera, 0.0, 0.0, 1.0, -caster.foot)
-    tallest = np.float32(TALLEST * caster.half_height)
+    line_a, line_b, line_c = _unit_lines(camera, caster)
+    foot = _foot_of(camera, caster)
     for row in range(first_row, end_row):
         for column in range(first_column, end_column, _BLOCK):
             pixel = (row * width + column) & _INDEX
             _unpack_block(keys, pixel, np.uint32(own), np.uint32(own_end), real)
-            _lay_line(height, row, column, _ABOVE, real)
-            _take_out_unreached(tallest, real)
+            _keep_reached(foot, row, column, real)
             _lay_line(line_a, row, column, _UNIT_A, real)
             _lay_line(line_b, row, column, _UNIT_B, real)
             if not indoors:
@@ -115,15 +113,13 @@ def _darken_with_cabin(camera: Any, buffers: Any, caster: Any, cabin: Any, own: 
     keys, real, sun, contact, inside = buffers.keys, buffers.real, buffers.sun, buffers.contact, buffers.inside
     soft = np.float32(caster.inverse_soft)
     sun_way, width, first_column, end_column = caster.sun, camera.width, caster.first_column, caster.end_column
-    line_a, line_b, line_c = _unit_line(camera, caster, 0), _unit_line(camera, caster, 1), _unit_line(camera, caster, 2)
-    height = _line(camera, 0.0, 0.0, 1.0, -caster.foot)
-    tallest = np.float32(TALLEST * caster.half_height)
+    line_a, line_b, line_c = _unit_lines(camera, caster)
+    foot = _foot_of(camera, caster)
     for row in range(caster.first_row, caster.end_row):
         for column in range(first_column, end_column, _BLOCK):
             pixel = (row * width + column) & _INDEX
             _unpack_block(keys, pixel, np.uint32(own), np.uint32(own_end), real)
-            _lay_line(height, row, column, _ABOVE, real)
-            _take_out_unreached(tallest, real)
+            _keep_reached(foot, row, column, real)
             _lay_line(line_a, row, column, _UNIT_A, real)
             _lay_line(line_b, row, column, _UNIT_B, real)
             _lay_line(line_c, row, column, _UNIT_C, real)
@@ -146,14 +142,12 @@ def _darken_by_limbs(camera: Any, buffers: Any, caster: Any, own: int, own_end: 
     area, limbs, count = caster.area, caster.limbs, caster.limb_count
     across, upward, along = _sun_line(camera, caster, 0), _sun_line(camera, caster, 1), _sun_line(camera, caster, 2)
     line_a, line_b = _unit_line(camera, caster, 0), _unit_line(camera, caster, 1)
-    height = _line(camera, 0.0, 0.0, 1.0, -caster.foot)
-    tallest = np.float32(TALLEST * caster.half_height)
+    foot = _foot_of(camera, caster)
     for row in range(caster.first_row, caster.end_row):
         for column in range(first_column, end_column, _BLOCK):
             pixel = (row * width + column) & _INDEX
             _unpack_block(keys, pixel, np.uint32(own), np.uint32(own_end), real)
-            _lay_line(height, row, column, _ABOVE, real)
-            _take_out_unreached(tallest, real)
+            _keep_reached(foot, row, column, real)
             _lay_line(across, row, column, _UNIT_A, real)
             _lay_line(upward, row, column, _UNIT_B, real)
             # Most of a low sun's long shadow's rectangle is not in it.
@@ -193,6 +187,25 @@ def _unit_line(camera: Any, caster: Any, axis: int) -> Any:
     """Return a coordinate in the caster's unit frame."""
     row = caster.to_unit[axis]
     return _line(camera, row[0], row[1], row[2], row[3])
+
+
+@inlined
+def _unit_lines(camera: Any, caster: Any) -> Any:
+    """Return the three coordinates in the caster's unit frame."""
+    return _unit_line(camera, caster, 0), _unit_line(camera, caster, 1), _unit_line(camera, caster, 2)
+
+
+@inlined
+def _foot_of(camera: Any, caster: Any) -> Any:
+    """Return the coordinate of height above a caster's foot, and up to which height it darkens."""
+    return _line(camera, 0.0, 0.0, 1.0, -caster.foot), np.float32(TALLEST * caster.half_height)
+
+
+@inlined
+def _keep_reached(foot: Any, row: int, column: int, real: Any) -> None:
+    """Take out of a block what is higher than a caster darkens; `foot` is of `_foot_of`."""
+    _lay_line(foot[0], row, column, _ABOVE, real)
+    _take_out_unreached(foot[1], real)
 
 
 @inlined

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from vico.render.compiled import inlined, kernel
+from vico.render.visibility.boxes import box_in_picture
 from vico.render.visibility.fill import inverse_depth, triangle_number
 
 # Farther away than this a door looks closed, metres.
@@ -35,19 +36,8 @@ def cut_openings(openings: Any, camera: Any, keys: Any) -> None:
 @inlined
 def _bounds(opening: Any, camera: Any) -> Any:
     """Return first and end row and column of the pixels that may show what lies in an opening."""
-    left, right, top, bottom, nearest, farthest = 1e30, -1e30, 1e30, -1e30, 1e30, -1e30
-    for corner in range(8):
-        a = opening.half_width if corner & 1 else -opening.half_width
-        b = opening.behind if corner & 2 else -opening.before
-        dx = opening.x + a * opening.inward_y + b * opening.inward_x - camera.x
-        dy = opening.y - a * opening.inward_x + b * opening.inward_y - camera.y
-        dz = opening.z + (opening.height if corner & 4 else 0.0) - camera.z
-        depth = dx * camera.forward_x + dy * camera.forward_y + dz * camera.forward_z
-        nearest, farthest = min(nearest, depth), max(farthest, depth)
-        scale = camera.focal / max(depth, float(camera.near))
-        x = camera.centre_x + scale * (dx * camera.right_x + dy * camera.right_y + dz * camera.right_z)
-        y = camera.centre_y + scale * (dx * camera.down_x + dy * camera.down_y + dz * camera.down_z)
-        left, right, top, bottom = min(left, x), max(right, x), min(top, y), max(bottom, y)
+    across, inward = (-opening.half_width, opening.half_width), (-opening.before, opening.behind)
+    left, right, top, bottom, nearest, farthest = box_in_picture(opening, across, inward, camera)
     if farthest <= camera.near or nearest > _FARTHEST:
         return 0, 0, 0, 0
     if nearest <= camera.near:
