@@ -109,3 +109,25 @@ def test_indoors_one_walks_around_furniture_in_view_without_touching_it() -> Non
         body.do(action)
         assert not body.collided
     assert math.hypot(body.pose[0] - 1.5, body.pose[1]) <= 0.3
+
+
+def test_rooms_one_left_are_known_again_the_last_six_of_them_and_by_who_goes_on_from_a_state() -> None:
+    walker, pose = IndoorWalker(), np.array([0.0, 0, 0, 1, 0, 0])
+
+    def bump_in(room: str) -> None:
+        walker.notice({"pose": pose, "state": {"room": room, "action_status": "collision"}}, {})
+
+    def known(walker: IndoorWalker) -> dict[str, int]:
+        return {kept["room"]: int(np.unpackbits(kept["grid"]["bumps"]).sum()) for kept in walker.state().values()}
+
+    for room in ("hall", "kitchen", "bath", "loft", "cellar", "shop"):
+        bump_in(room)
+    pose[3:5] = 0.0, 1.0
+    bump_in("kitchen")
+    assert known(walker) == {"hall": 1, "bath": 1, "loft": 1, "cellar": 1, "shop": 1, "kitchen": 2}
+    bump_in("bank")
+    assert list(known(walker)) == ["bath", "loft", "cellar", "shop", "kitchen", "bank"]
+    other = IndoorWalker()
+    other.restore(walker.state())
+    assert known(other) == known(walker)
+    assert other.towards({"pose": pose, "state": {"room": "bank"}}, (2.0, 0.0), near=0.3) is not None

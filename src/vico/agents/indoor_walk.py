@@ -23,20 +23,25 @@ class IndoorWalker:
     """Remembers what stands in rooms, by what is in view where that is told, else from pictures, and from bumps."""
 
     def __init__(self) -> None:
-        # The last few rooms, the one that was entered last at the end.
-        self._grids: dict[str, DepthGrid] = {}
+        # The room one is in, and the last few before it, the one that was left last at the end: as plain data, for a
+        # grid takes some ten times as much memory, and a thousand residents remember six rooms each.
+        self._room: str | None = None
+        self._grid = DepthGrid((0.0, 0.0))
+        self._left: dict[str, AgentState] = {}
 
     def state(self) -> AgentState:
         """Return what it knows of which rooms, numbered from the one that was entered longest ago."""
-        return {str(k): {"room": room, "grid": grid.state()} for k, (room, grid) in enumerate(self._grids.items())}
+        rooms = list(self._left.items())
+        if self._room is not None:
+            rooms.append((self._room, self._grid.state()))
+        return {str(k): {"room": room, "grid": grid} for k, (room, grid) in enumerate(rooms)}
 
     def restore(self, state: AgentState) -> None:
         """Know what `state` returned."""
-        self._grids = {}
-        for k in range(len(state)):
-            grid = DepthGrid((0.0, 0.0))
-            grid.restore(state[str(k)]["grid"])
-            self._grids[state[str(k)]["room"]] = grid
+        self._room, self._left = None, {state[str(k)]["room"]: state[str(k)]["grid"] for k in range(len(state))}
+        if self._left:
+            self._room, grid = self._left.popitem()
+            self._grid.restore(grid)
 
     def notice(self, observation: Observation, info: Info, *, ignore: ArrayLike = ()) -> None:
         """Take in what a new observation shows of the room one is in.
@@ -48,8 +53,8 @@ class IndoorWalker:
         ignore
             Entities that are not in the way (what one carries or is going to pick up).
         """
-        new, in_view = observation["state"]["room"] not in self._grids, info.get("in_view")
-        grid, pose = self._grid(observation), np.asarray(observation["pose"], np.float64)
+        new, in_view = observation["state"]["room"] not in (self._room, *self._left), info.get("in_view")
+        grid, pose = self._grid_of(observation), np.asarray(observation["pose"], np.float64)
         if in_view is not None:
             if new:
                 grid.mark(in_view.room, in_view.furniture)
@@ -67,7 +72,7 @@ class IndoorWalker:
         goal = np.asarray(target, np.float64)[:2]
         if math.dist(position, goal) <= near:
             return None
-        route = self._grid(observation).route(position, goal, near=near * 0.9)
+        route = self._grid_of(observation).route(position, goal, near=near * 0.9)
         # Where no way is known, nothing known is in the way of trying.
         aim = _straight(position, route) if len(route) else goal
         turn = wrapped(math.atan2(aim[1] - position[1], aim[0] - position[0]) - heading(observation))
@@ -75,13 +80,19 @@ class IndoorWalker:
             return {"type": "turn_left" if turn > 0 else "turn_right", "degrees": abs(math.degrees(turn))}
         return {"type": "move_forward", "distance": max(0.1, min(_STRIDE, math.dist(position, aim)))}
 
-    def _grid(self, observation: Observation) -> DepthGrid:
+    def _grid_of(self, observation: Observation) -> DepthGrid:
+        """Return the grid of the room one is in; what it holds was known before where one was there before."""
         room = observation["state"]["room"]
-        grid = self._grids.pop(room, None)
-        self._grids[room] = grid or DepthGrid(np.asarray(observation["pose"], np.float64)[:2])
-        if len(self._grids) > _REMEMBERED:
-            del self._grids[next(iter(self._grids))]
-        return self._grids[room]
+        if room != self._room:
+            if self._room is not None:
+                self._left[self._room] = self._grid.state()
+            known = self._left.pop(room, None)
+            self._room, self._grid = room, DepthGrid(np.asarray(observation["pose"], np.float64)[:2])
+            if known is not None:
+                self._grid.restore(known)
+            if len(self._left) >= _REMEMBERED:
+                del self._left[next(iter(self._left))]
+        return self._grid
 
 
 def _straight(position: NDArray[np.float64], route: NDArray[np.float64]) -> NDArray[np.float64]:
