@@ -239,6 +239,25 @@ def test_soles_keep_to_slopes_and_kerbs_within_a_centimetre(clip: str) -> None:
             assert lowest < 0.012 or abs(x - 0.4) < 0.8
 
 
+@pytest.mark.parametrize("skew", [0.0, 1.1])  # of the kerb to the way, radians
+def test_wherever_feet_meet_a_kerb_hips_do_not_plunge(skew: float) -> None:
+    def drops(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.where(np.cos(skew) * points[..., 0] + np.sin(skew) * points[..., 1] > 0.0, 0.0, 0.12)
+
+    frames = np.arange(-1.5, 1.5, 1.2 * 0.025)  # forty a second
+    number, speed, away = np.full(N, clip_index("walk")), np.full(N, 1.2), np.zeros(N)
+    stride = stride_length(number, speed, styles()["height"])
+    for first in np.arange(0.0, 1.0, 0.125):
+        pelvis = []
+        for x in frames:
+            places = np.column_stack([np.full(N, x), away, drops(np.full((N, 2), (x, 0.0)))])
+            moves = number, (first + x / stride) % 1.0, speed, styles()
+            ground = ground_under_feet(*moves, (places, away), drops)
+            pelvis.append(places[:, 2] + pose(*moves, ground=ground)[1][:, 2])
+        fallen = np.array(pelvis)[:-8] - np.array(pelvis)[8:]  # within 0.2 s
+        assert (fallen < 0.14 * styles()["height"]).all()
+
+
 def test_on_stairs_each_foot_stands_on_a_tread_and_the_body_rises_with_them() -> None:
     tread, riser = 0.2875, 0.2
 

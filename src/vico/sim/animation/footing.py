@@ -32,6 +32,8 @@ _ROOM, _TOE_ROOM, _SAME = 0.03, 0.03, 0.006
 _ON_IT = 0.35  # what standing on an edge costs, as metres of a move
 # The same where a move back would end as high: along a kerb hips would come down for legs to reach.
 _ON_TOP = 0.15
+# How much worse a move ahead is that ends lower: hips come down a long way for such a step.
+_LUNGE = 2.0
 
 
 def ground_under_feet(
@@ -143,12 +145,14 @@ def _nearest_place(found: Any, heel: Any, toe: Any, ahead: Any, level: Any) -> N
                 level[i] = max(level[i], found[i, j].max())
             elif -0.9 * heel[i] <= _ALONG[j] <= 0.9 * toe[i]:
                 level[i] = max(level[i], found[i, j, 1])
-        on_it = level[i]
+        on_it, size = level[i], (heel[i] + toe[i]) / _LONG
         for shift in _SHIFTS:
-            # Of two places as good the one ahead, however the numbers are rounded.
-            cost = abs(shift) - 1e-4 * shift
+            # Of two places as good the one ahead, however the numbers are rounded. To short legs a move is longer.
+            cost = abs(shift) / size - 1e-4 * shift
             if cost < best:
                 stands, more = _discomfort(found[i], shift, heel[i], toe[i])
+                if shift > 0.0 and stands < on_it - _SAME:
+                    more += (_LUNGE - 1.0) * cost
                 is_level = shift < 0.0 and stands >= on_it - _SAME
                 if cost + more < (min(best, _ON_TOP) if is_level else best) - 1e-9:
                     best, ahead[i], level[i] = cost + more, shift, stands
