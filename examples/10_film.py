@@ -335,6 +335,20 @@ def liveliness(name: str) -> Callable[[Simulation], float]:
     return worth
 
 
+def business(name: str) -> Callable[[Simulation], float]:
+    """Return whether somebody indoors goes about something, and does not only stand there."""
+
+    def worth(sim: Simulation) -> float:
+        people = sim.state.people
+        i = people.names.index(name)
+        if people.room[i] < 0:
+            return -20.0
+        walks = float(np.hypot(*people.velocity[i])) > 0.3
+        return float(walks or people.action_clip[i] >= 0)
+
+    return worth
+
+
 def outdoors(name: str, seconds: int) -> Callable[[Simulation], bool]:
     """Return whether somebody has been outdoors for some seconds."""
     since = [0]
@@ -397,7 +411,7 @@ class Casting:
 
     def street(self) -> Scene:
         """Return the morning."""
-        return self.walk("07:40", "09:30", "Morning: {} walks to work", works, after=20)
+        return self.walk("07:40", "09:30", "Morning: {} walks to work", works, after=20, pedestrians=360)
 
     def school(self) -> Scene:
         """Return a child on the way to school."""
@@ -427,7 +441,7 @@ class Casting:
             scene,
             views=("behind", "front"),
             begins=arrived(scene.follow, stay.place),
-            search=0,
+            worth=business(scene.follow),
             config=scene.config | {"assistants": 1},
             setup=keeper.setup,
             players={"assistant_0": keeper},

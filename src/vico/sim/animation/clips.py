@@ -176,7 +176,7 @@ def _set_out(body: Any, old: Any, i: int, course: Any, around: Any) -> None:
     first = course.phase[i] - gone  # where the gait began
     ankles, feet = np.empty((2, 2, 3)), np.empty((2, 2, 3, 3))
     start = BodyPose(
-        np.zeros_like(body.local), np.zeros(3), body.joints, body.style, body.second, np.zeros((2, 2, 3)), body.hand
+        np.zeros_like(body.local), np.zeros(3), body.joints, body.style, body.second, np.zeros((2, 2, 4)), body.hand
     )
     level = BodyPose(
         np.zeros_like(body.local), np.zeros(3), body.joints, body.style, body.second, start.ground, body.hand

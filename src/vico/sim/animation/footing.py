@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vico.io.compiled import compiled
 from vico.sim.animation.blending import is_gait, is_seated
 from vico.sim.animation.gait import foothold, gait_of_run, gait_of_walk
-from vico.sim.animation.limbs import AHEAD, ANKLE, LEVEL, TILT, stance
+from vico.sim.animation.limbs import AHEAD, ANKLE, LEVEL, OVER, TILT, stance
 from vico.sim.animation.names import CARRY, CARRY_LEFT, CARRY_RIGHT, RUN, WALK
 from vico.sim.animation.rotations import Y
 from vico.sim.animation.seated import seated_foot
@@ -29,6 +29,7 @@ _ALONG, _ACROSS = np.linspace(-0.48, 0.56, 53), np.array([-_HALF_WIDTH, 0.0, _HA
 _SHIFTS = np.linspace(-0.28, 0.28, 29)
 # Room to the edge, and heights that are one level, metres.
 _ROOM, _TOE_ROOM, _SAME = 0.03, 0.03, 0.006
+_DROP = 0.03  # beyond an edge it is lower by more than this, metres: sloping ground is not
 _ON_IT = 0.35  # what standing on an edge costs, as metres of a move
 # The same where a move back would end as high: along a kerb hips would come down for legs to reach.
 _ON_TOP = 0.15
@@ -64,7 +65,8 @@ def ground_under_feet(
     ndarray
         For each left and right foot, where it is or was last and where it comes down next: height above where the
         person is, metres; slope, radians, toes down; how far ahead of its place in the gait it stands, so that all of
-        it is on one side of an edge, metres; shape ``(n, 2, 2, 3)``.
+        it is on one side of an edge, metres; how much of its toes' end is over the edge all the same, metres; shape
+        ``(n, 2, 2, 4)``.
     """
     position, yaw = place
     people = style.astype(KERNEL_STYLE)
@@ -89,7 +91,7 @@ def ground_under_feet(
         | (np.abs(found[..., 0] - found[..., 1]) > 2 * _EDGE * _HALF_WIDTH)
     )
     behind = _HEEL * people["heel_length"][:, None, None]
-    ground = np.zeros((len(people), 2, 2, 3))
+    ground = np.zeros((len(people), 2, 2, 4))
     ground[..., LEVEL] = np.where(edge, found.max(axis=-1), heel + rise * behind / run)
     ground[..., TILT] = np.where(edge, 0.0, -np.arctan2(rise, run))
     steps = edge & _walks(numbers)[:, None, None]
@@ -101,8 +103,9 @@ def ground_under_feet(
         ankle = (back + (front - back) * (behind / run)[..., None])[who, side, when]
         foot = people["heel_length"][who], people["toe_length"][who]
         out = yaw[who] + np.where(side == 0, 1.0, -1.0) * people["toe_out"][who]
-        ahead, level = _off_the_edge(ankle, out, foot, height)
+        ahead, level, over = _off_the_edge(ankle, out, foot, height)
         ground[who, side, when, AHEAD], ground[who, side, when, LEVEL] = ahead, level - position[who, 2]
+        ground[who, side, when, OVER] = over
     return ground
 
 
@@ -115,8 +118,10 @@ def _off_the_edge(
     yaw: NDArray[np.float64],
     foot: tuple[NDArray[np.float64], NDArray[np.float64]],
     height: Callable[[NDArray[np.float64]], NDArray[np.float64]],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return how far on or back feet stand that would stand across an edge, and how high, metres, each ``(k,)``.
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return how far on or back feet stand that would be across an edge, how high, and how much of the toes is over.
+
+    Metres, each of shape ``(k,)``.
 
     As near as can be to where the gait has them, on one level; on treads that are shorter than the foot, with the heel
     or the toes over the edge, never into the next riser.
@@ -129,9 +134,10 @@ def _off_the_edge(
     points[..., 1] = ankle[:, 1, None, None] + s * u + c * v
     points[..., 2] = ankle[:, 2, None, None]
     found = height(points.reshape(-1, 3)).reshape(points.shape[:-1])
-    ahead, level = np.empty(len(ankle)), np.empty(len(ankle))
+    ahead, level, over = np.empty(len(ankle)), np.empty(len(ankle)), np.empty(len(ankle))
     _nearest_place(found, *foot, ahead, level)
-    return ahead, level
+    _toes_over(found, *foot, ahead, level, over)
+    return ahead, level, over
 
 
 @compiled
@@ -156,6 +162,19 @@ def _nearest_place(found: Any, heel: Any, toe: Any, ahead: Any, level: Any) -> N
                 is_level = shift < 0.0 and stands >= on_it - _SAME
                 if cost + more < (min(best, _ON_TOP) if is_level else best) - 1e-9:
                     best, ahead[i], level[i] = cost + more, shift, stands
+
+
+@compiled
+def _toes_over(found: Any, heel: Any, toe: Any, ahead: Any, level: Any, over: Any) -> None:
+    """Write how much of each foot's end is over an edge, where it stands at a level."""
+    for i in range(len(found)):
+        borne = -heel[i]
+        for j in range(len(_ALONG)):
+            place = _ALONG[j] - ahead[i]
+            if borne < place <= toe[i] and found[i, j].max() > level[i] - _DROP:
+                borne = place
+        gap = toe[i] - borne
+        over[i] = gap if gap > _ALONG[1] - _ALONG[0] + 1e-9 else 0.0
 
 
 @compiled

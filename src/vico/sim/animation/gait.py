@@ -18,6 +18,7 @@ from vico.sim.animation.limbs import (
     HERE,
     LEVEL,
     NEXT,
+    OVER,
     PELVIS,
     SIGN,
     TILT,
@@ -90,6 +91,13 @@ def _planted(body: Any, side: int, flat: float, pitch: float, gait: Any) -> Any:
 @compiled
 def _rolled(body: Any, side: int, flat: float, pitch: float, out: float, ground: Array) -> Any:
     x, z = sole_roll(body.style, side, pitch), sole_depth(body.style, side, pitch)
+    ball = body.joints[FOOT[side], X] - body.joints[ANKLE[side], X]
+    borne = max(body.style.toe_length - ground[OVER], 0.0)
+    if pitch > 0.0 and borne < ball:
+        # Beyond an edge there is nothing to roll over: the foot turns about the edge, its ball comes down beside it.
+        flat_depth = sole_depth(body.style, side, 0.0)
+        x = borne * (1 - np.cos(pitch)) + flat_depth * np.sin(pitch)
+        z = flat_depth * np.cos(pitch) + borne * np.sin(pitch)
     level, tilt = ground[LEVEL], ground[TILT]
     c, s = np.cos(tilt), np.sin(tilt)
     ahead = c * x + s * z

@@ -64,8 +64,8 @@ class BodyPose(NamedTuple):
         Of the clock, for those who stand and wait.
     ground
         Under each foot (left, right), where it stands or stood last and where it comes down next: height above the
-        body's origin, metres; slope, radians, toes down; how far it stands ahead of its place in the gait, metres;
-        shape ``(2, 2, 3)``.
+        body's origin, metres; slope, radians, toes down; how far it stands ahead of its place in the gait, metres; how
+        much of its toes' end is over an edge and borne by nothing, metres; shape ``(2, 2, 4)``.
     hand
         That makes gestures: 0 left, 1 right.
     """
@@ -81,7 +81,7 @@ class BodyPose(NamedTuple):
 
 # Of `BodyPose.ground`.
 HERE, NEXT = 0, 1
-LEVEL, TILT, AHEAD = 0, 1, 2
+LEVEL, TILT, AHEAD, OVER = 0, 1, 2, 3
 _FIRST_PITCH, _PITCHES = SOLE_PITCHES[0], len(SOLE_PITCHES)
 _PITCH_STEP = SOLE_PITCHES[1] - SOLE_PITCHES[0]
 

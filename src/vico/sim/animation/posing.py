@@ -130,7 +130,7 @@ def _course(
     """Return motions as kernels take them."""
     numbers = np.ascontiguousarray(clip, np.int64)
     stride = stride_length(numbers, np.asarray(speed, np.float64), people["height"])
-    under = np.zeros((len(people), 2, 2, 3)) if ground is None else np.ascontiguousarray(ground, np.float64)
+    under = np.zeros((len(people), 2, 2, 4)) if ground is None else np.ascontiguousarray(ground, np.float64)
     return Course(numbers, np.ascontiguousarray(phase, np.float64), stride, under)
 
 
