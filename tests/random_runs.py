@@ -74,7 +74,8 @@ class Drawn:
             errands=True,
             cars=int(random.integers(0, 100)),
             pedestrians=int(random.integers(0, 100)),
-            weather=str(random.choice(sorted(weather_kinds()))),
+            weather=str(random.choice([*sorted(weather_kinds()), "changing"])),
+            cyclists=int(random.integers(0, 8)),
             observe=(),
         )
         return config, residents

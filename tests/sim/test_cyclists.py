@@ -6,6 +6,7 @@ import pytest
 from helsinki_traffic import network
 from road_city import HALF
 from vico.sim.bodies import CYCLIST, Bodies
+from vico.sim.environment.effects import conditions
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import JunctionRule, Traffic, TrafficSetup
 from vico.sim.traffic.path import project_on_polyline
@@ -59,6 +60,26 @@ def test_cyclists_ride_beside_the_kerb_touch_nobody_and_go_on_from_a_saved_state
     gait = traffic.gait
     assert len(traffic.walkers) == len(gait.walked) == 15 + 25
     assert (gait.cycling[15:] & ~gait.afoot[15:]).all()
+
+
+def test_who_goes_back_to_where_the_weather_was_another_one_goes_on_in_the_same_way() -> None:
+    same = {"visibility": 20_000.0, "snowfall": 0.0, "dark": 0.0, "lamps": 0.0, "ice": 0.0}
+    dry = conditions(rain=0.0, wet=0.0, cover=0.0, **same)
+    snowy = conditions(rain=0.0, wet=0.0, cover=1.0, **same)
+    traffic = _traffic(4, 0, 4)
+
+    def onwards() -> bytes:
+        traffic.set_conditions(snowy)
+        for _ in range(5):
+            traffic.advance(0.1, NOWHERE)
+        return traffic.shapes.x.tobytes()
+
+    traffic.set_conditions(dry)
+    traffic.advance(0.1, NOWHERE)
+    kept = traffic.arrays()
+    first = onwards()
+    traffic.restore(kept)
+    assert onwards() == first
 
 
 def _behind_cyclist(beside: bool) -> tuple[Traffic, float, float]:

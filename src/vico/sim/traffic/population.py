@@ -211,7 +211,8 @@ class Traffic(SeenTraffic):
         """Go back to what `arrays` held."""
         for name, array in self._state().items():
             array[...] = arrays[name]
-        self._bodies = None
+        # Cyclists' speeds are of the state and of the conditions outdoors: these are to be set again.
+        self._bodies = self._conditions = None
 
     def _state(self) -> dict[str, NDArray[Any]]:
         """Return the arrays of the state by name, not copied."""
