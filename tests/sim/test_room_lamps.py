@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 import toy_city
 from vico.assets.interior import WINDOW
@@ -13,6 +14,7 @@ from vico.render import Cameras, Lighting, Scene, render
 from vico.render.records import UPPER_WINDOWS
 from vico.sim.config import SimConfig
 from vico.sim.room_lamps import RoomLamps
+from vico.sim.scene import SceneRenderer
 from vico.sim.simulation import Simulation
 from vico.sim.state import Posture
 from vico.sim.window_lights import WindowLights
@@ -42,6 +44,17 @@ def test_rooms_are_lit_by_day_when_they_are_open_and_when_somebody_is_awake_in_t
 
 def test_a_power_cut_puts_the_lamps_of_its_district_out_and_no_others() -> None:
     assert lit(12, cut=True) == [False, True, True]
+
+
+def test_rooms_have_less_daylight_under_clouds_and_none_at_night(monkeypatch: pytest.MonkeyPatch) -> None:
+    let_in: list[float] = []
+    monkeypatch.setattr(Scene, "light_rooms", lambda self, lamp, daylight: let_in.append(daylight))
+    for hour, weather in ((1, "clear"), (12, "rain"), (12, "clear")):
+        config = SimConfig(seed=3, observe=(), start=hour * 3600, date="2026-06-15", weather=weather)
+        sim = Simulation(toy_city.world(), None, config)
+        SceneRenderer(sim).show(sim.state)
+    night, rain, day = let_in
+    assert night == 0.0 < rain < 0.7 * day
 
 
 def test_people_in_unlit_rooms_are_noticed_only_from_close_by() -> None:

@@ -49,6 +49,7 @@ _LIGHT_EVERY = 60.0
 # Feet of who sits reach so far below where they would be on a seat of one's own height, and above, metres.
 _FEET_HANG, _FEET_RISE = 0.1, 0.3
 _ICE_SHINES = 0.6  # as much as wet ground does
+_OVERCAST = 0.45  # share of the daylight in rooms that a sky full of clouds takes
 
 
 class _Motion(NamedTuple):
@@ -204,7 +205,8 @@ class SceneRenderer:
         )
         lit += tuple(value for circle in environment.agenda.effects.dark for value in circle)
         self._scene.moment = state.second
-        self._scene.light_rooms(self._room_lamps.lit(state), 1.0 - round(16.0 * environment.dark) / 16.0)
+        daylight = (1.0 - environment.dark) * (1.0 - _OVERCAST * weather.clouds**2)
+        self._scene.light_rooms(self._room_lamps.lit(state), round(16.0 * daylight) / 16.0)
         if lit != self._lit:
             self._lit = lit
             self._scene.lighting = _lighting(state.environment, moment * _LIGHT_EVERY)
