@@ -4,8 +4,9 @@
 
 Straight walks of 5 m across one kerb of at least 7 cm each, at places drawn with a seed, at fifty frames a second, by
 people of 6, 30 and 80 years. *Float* is how far the lower foot is above the ground at worst, *sunk* how far a sole is
-below it; both on the world's own ground, kerb edges included. Stairs: up and down one flight of the world's first
-stairs room, from half a metre before it to half a metre behind; half a metre a second, as the simulation has it.
+below it; both on the world's own ground, kerb edges included. A *drop* is how far hips come down within 0.2 s. Stairs:
+up and down one flight of the world's first stairs room, from half a metre before it to half a metre behind; half a
+metre a second, as the simulation has it.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from vico.world.folder import World
 from vico.world.model import FLIGHT_STEPS, LANDING
 
 _LENGTH, _SPEED, _RATE, _KERB = 5.0, 1.2, 50.0, 0.07
+_SOON = round(0.2 * _RATE)  # frames
 _WHO = ("6 years", "30 years", "80 years")
 _TRIES = 200_000
 
@@ -58,15 +60,15 @@ def report(world: World, count: int) -> list[str]:
     walks = crossings(world, count)
     lines = ["# Feet over kerbs", "", machine(), "", f"World: {world.manifest.name}, {len(walks)} kerbs.", ""]
     lines += [
-        "| who | step | kerbs | skate cm a step, worst | float cm, worst | sunk cm, worst |",
-        "|---|---|---|---|---|---|",
+        "| who | step | kerbs | skate cm a step, worst | float cm, worst | sunk cm, worst | drop cm, worst |",
+        "|---|---|---|---|---|---|---|",
     ]
     for who in _WHO:
         look = PEOPLE[who]
         body = body_of(look)
         one = style_of(body, rng(3, "manner"), age=look.age)
         for name, sign in (("up", 1.0), ("down", -1.0)):
-            figures = []
+            figures, drops = [], []
             for start, yaw, rise in walks:
                 if rise * sign < 0:  # the other way round
                     start, yaw = start + _LENGTH * np.array([np.cos(yaw), np.sin(yaw)]), yaw + np.pi
@@ -79,9 +81,12 @@ def report(world: World, count: int) -> list[str]:
                 course = clip, 0.3 + gone / stride, np.full(frames, _SPEED), style
                 under = ground_under_feet(*course, (position, np.full(frames, yaw)), world.height)
                 moved = pose(*course, ground=under)
+                hips = position[:, 2] + moved[1][:, 2]
+                drops.append(100.0 * float((hips[:-_SOON] - hips[_SOON:]).max()))
                 steps = 2 * gone[-1] / stride
                 figures.append(of_feet(body, *moved, position, world.height, steps=steps, yaw=np.full(frames, yaw)))
             worst = [max(getattr(f, name) for f in figures) for name in ("skate", "above", "sunk")]
+            worst.append(max(drops))
             lines.append(f"| {who} | {name} | {len(figures)} | " + " | ".join(f"{value:.2f}" for value in worst) + " |")
     return lines + on_stairs(world)
 
