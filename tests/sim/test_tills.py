@@ -115,3 +115,17 @@ def test_somebody_who_works_there_goes_behind_the_till_and_is_the_only_one(sim: 
     infos = sim.observe()[1]
     assert "counter" in infos["assistant_0"]
     assert "counter" not in infos["assistant_1"]
+
+
+def test_nobody_is_told_to_serve_behind_a_counter_that_there_is_no_way_around(sim: Simulation) -> None:
+    (till,) = sim.state.tills.values()
+    assert till.behind is not None
+    indoor, (x, y, yaw, depth) = sim.state.indoor, till.counter
+    across = np.array([[x, y, yaw, depth, 10.0]])  # from wall to wall
+    first = indoor.furniture_start[till.room]
+    shut = replace(
+        indoor,
+        furniture=np.insert(indoor.furniture, first, across, axis=0),
+        furniture_start=indoor.furniture_start + (np.arange(len(indoor.furniture_start)) > till.room),
+    )
+    assert replace(till, _indoor=shut).behind is None

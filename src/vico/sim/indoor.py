@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import ndimage
 
 from vico.io.compiled import compiled
 from vico.sim.collisions import box_gap, gap_to, room_gap
@@ -19,6 +20,7 @@ from vico.world.objects import Objects
 
 #: Lists of free spots that are remembered, one a room and door.
 _SPOTS_KEPT = 4096
+_WAY_CELL = 0.1  # metres between the points by which ways in a room are found
 _LEVEL = 0.5  # metres a door may lie above or below who goes through it
 
 
@@ -136,6 +138,22 @@ class Indoor:
         furniture = self.furniture[self.furniture_start[room] : self.furniture_start[room + 1]]
         found: NDArray[np.float64] = _free_room(np.ascontiguousarray(points), self.boxes[room], furniture)
         return found
+
+    def joined(self, room: int, spots: ArrayLike, *, within: float) -> bool:
+        """Return whether a person can walk between some spots of a room, shape ``(k, >= 2)``.
+
+        Only ways are looked for that leave the square around the spots by no more than `within` metres.
+        """
+        goals = np.asarray(spots, np.float64)[:, :2]
+        x, y = (
+            np.arange(low - within, high + within + _WAY_CELL, _WAY_CELL)
+            for low, high in zip(goals.min(axis=0), goals.max(axis=0), strict=True)
+        )
+        points = np.stack(np.meshgrid(x, y), axis=-1)
+        free = (self.gaps(room, points.reshape(-1, 2)) > RADIUS).reshape(points.shape[:2])
+        part = ndimage.label(free, np.ones((3, 3)))[0][free]
+        away = np.hypot(*(goals[:, None] - points[free]).transpose(2, 0, 1))
+        return away.shape[1] > 0 and len(set(part[away.argmin(axis=1)].tolist())) == 1
 
     def free_spot(self, room: int, near: ArrayLike, taken: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Spot of a room nearest to `near` where someone can stand; None if the room is full.

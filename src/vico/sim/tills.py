@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -25,6 +26,7 @@ _LONGEST = 6
 _BEFORE = 0.45  # metres between a counter and whoever is served
 _BEHIND = (0.45, 0.35, 0.6)  # metres between it and whoever serves, tried one after the other
 _AIR = 0.03
+_AROUND = 2.5  # metres around a counter within which a way behind it begins and ends
 _DOORWAY = 0.8  # metres from a door, and from who comes in by it, that a line keeps clear
 _KINDS = ("counter", "bar_counter", "pastry_case")
 _TRADE = (Category.STORE, Category.FOOD)
@@ -40,13 +42,26 @@ class Till:
         Where it is.
     spots
         Where people stand in line before it, whoever is served first, ENU metres, shape ``(k, 2)``.
-    behind
-        Where whoever serves stands, ENU metres, and which way they look, radians; None where there is no room.
+    counter
+        Middle of the counter, which way its front looks, and half its depth, metres and radians.
     """
 
     room: int
     spots: NDArray[np.float64]
-    behind: tuple[float, float, float] | None = None
+    counter: tuple[float, float, float, float]
+    _indoor: Indoor
+
+    @cached_property
+    def behind(self) -> tuple[float, float, float] | None:
+        """Where whoever serves stands, ENU metres, and which way they look, radians; None where nobody can get."""
+        x, y, yaw, depth = self.counter
+        for away in _BEHIND:
+            spot = x - (depth + away) * math.cos(yaw), y - (depth + away) * math.sin(yaw)
+            if self._indoor.gap(self.room, spot) <= RADIUS + _AIR:
+                continue
+            if self._indoor.joined(self.room, np.array([spot, self.spots[0]]), within=_AROUND):
+                return *spot, yaw
+        return None
 
 
 def tills_of(places: Sequence[Place], indoor: Indoor, objects: Objects) -> dict[int, Till]:
@@ -57,21 +72,12 @@ def tills_of(places: Sequence[Place], indoor: Indoor, objects: Objects) -> dict[
         room = indoor.index.get(str(objects.room[k]), -1)
         if room < 0 or int(indoor.place[room]) not in trade:
             continue
-        x, y, yaw = (float(values[k]) for values in (objects.x, objects.y, objects.yaw))
-        spots = _line(room, (x, y, yaw, float(objects.size_x[k]) / 2), indoor)
+        x, y, yaw, size = (float(values[k]) for values in (objects.x, objects.y, objects.yaw, objects.size_x))
+        counter = x, y, yaw, size / 2
+        spots = _line(room, counter, indoor)
         if len(spots) and (room not in found or len(spots) > len(found[room].spots)):
-            found[room] = Till(room, spots, _post(room, (x, y, yaw, float(objects.size_x[k]) / 2), indoor))
+            found[room] = Till(room, spots, counter, indoor)
     return found
-
-
-def _post(room: int, counter: tuple[float, float, float, float], indoor: Indoor) -> tuple[float, float, float] | None:
-    """Return where somebody stands behind a counter and looks over it; None if nobody can."""
-    x, y, yaw, depth = counter
-    for away in _BEHIND:
-        spot = x - (depth + away) * math.cos(yaw), y - (depth + away) * math.sin(yaw)
-        if indoor.gap(room, spot) > RADIUS + _AIR:
-            return *spot, yaw
-    return None
 
 
 def _line(room: int, counter: tuple[float, float, float, float], indoor: Indoor) -> NDArray[np.float64]:
