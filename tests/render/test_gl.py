@@ -16,6 +16,7 @@ from vico.errors import InputError, MissingExtraError
 from vico.render import Cameras, Lighting, Scene
 from vico.render.frames import PictureRequest, take_pictures
 from vico.render.gl.renderer import GlRenderer
+from vico.render.lamps.found import lamps_placed
 from vico.render.limbs import LIMBS
 from vico.render.quality import FINE
 from vico.render.records import GROUND_WINDOWS, OPENING, ROOM_FRONT, UPPER_WINDOWS
@@ -54,6 +55,7 @@ def scene() -> Scene:
         "tree": [replace(crown, material=leaf, uv=crown.positions[:, :2])],
         "cube": [box((1, 1, 1), (0, 0, 0.5), colour=(200, 40, 40))],
         "bus": [bus(), bus_inside_lights()],
+        "crown": [replace(crown, material=Material("glow", emission=1.0))],
     }
     made = Scene(
         joined(static),
@@ -74,6 +76,9 @@ def scene() -> Scene:
     made.set_rigid(index, np.array(places), [5, 8, 6])
     figure = ball((0.3, 0.3, 0.9), (-7, -5, 0.9), colour=(90, 120, 200)).of_entity(9)
     made.set_skinned(figure.positions, figure.normals, figure.triangles, figure.colour, figure.entity)
+    places = np.array([pose_matrix(x, -4.0, 3.0) for x in (-9, -2, 6)])
+    made.lamps = lamps_placed(models, ["crown"] * 3, places)
+    made.lamps["entity"][1] = 12
     return made
 
 

@@ -27,7 +27,7 @@ VIEW_X, VIEW_Y, VIEW_Z, SCREEN_X, SCREEN_Y, INVERSE_DEPTH = range(6)
 # end, too. See `vico.render.shading.pixels` for the fields.
 QUEUE, RUN = 256, 8
 STRIDE = QUEUE + 2 * RUN
-REAL_FIELDS, WHOLE_FIELDS = 23, 15
+REAL_FIELDS, WHOLE_FIELDS = 24, 15
 
 
 class Prototypes(NamedTuple):

@@ -151,6 +151,10 @@ class Lighting:
         ambient = _mix((0.040, 0.050, 0.085), _mix(ambient, _scaled((0.74, 0.77, 0.82), gloom), hidden), day_share)
         bounce = _mix((0.28, 0.24, 0.21), (0.44, 0.40, 0.34), high)
         bounce = _mix((0.022, 0.022, 0.026), _mix(bounce, _scaled((0.34, 0.33, 0.32), gloom), hidden), day_share)
+        # The lamps of a town light the air above it, and walls and ground by what they throw back.
+        town = lamps * (1 - day_share)
+        zenith, horizon = _added(zenith, (0.006, 0.005, 0.005), town), _added(horizon, (0.030, 0.023, 0.017), town)
+        ambient, bounce = _added(ambient, (0.024, 0.018, 0.012), town), _added(bounce, (0.024, 0.019, 0.013), town)
         light = (moon if moon[2] > 0.15 else (0.35, -0.30, 0.88)) if night else sun
         return cls(
             sun_direction=light,
@@ -185,6 +189,10 @@ def _ramp(value: float, low: float, high: float) -> float:
 
 def _mix(a: Colour, b: Colour, share: float) -> Colour:
     return (a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share, a[2] + (b[2] - a[2]) * share)
+
+
+def _added(a: Colour, b: Colour, share: float) -> Colour:
+    return (a[0] + b[0] * share, a[1] + b[1] * share, a[2] + b[2] * share)
 
 
 def _scaled(a: Colour, factor: float) -> Colour:

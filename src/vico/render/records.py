@@ -224,6 +224,31 @@ ROOM_FRONT = np.dtype(
     align=True,
 )
 
+# What shines on its surroundings. From a lamp, a way at an angle to its axis gets `spread` times the angle's cosine and
+# `share`, from 0 to 1, of its light.
+LAMP = np.dtype(
+    [
+        ("x", f4),  # metres; of the lamp of a vehicle's model, in the model's frame
+        ("y", f4),
+        ("z", f4),
+        ("axis_x", f4),  # unit vector
+        ("axis_y", f4),
+        ("axis_z", f4),
+        ("spread", f4),
+        ("share", f4),
+        (
+            "power",
+            f4,
+        ),  # times the light, over the squared distance and `size`: light on what faces it, 1 = a sunny wall's
+        ("size", f4),  # square metres
+        ("inverse_reach", f4),  # squared, 1 / square metres: beyond, nothing is lit
+        ("entity", i4),  # building whose ground floor's windows it is, 0: none
+    ],
+    align=True,
+)
+# A lamp that lights a cell of a grid, and how much of it comes to the cell's corners past what stands in between.
+LAMP_IN_CELL = np.dtype([("lamp", i4), ("low", f4, (2,)), ("high", f4, (2,))], align=True)
+
 # The inside of a vehicle, in the frame in which its bounding box has corners at +-1 (x forward, y left, z up).
 CABIN_STEPS = 512
 CABIN = np.dtype(

@@ -32,13 +32,14 @@ from vico.render.instances import (
     neighbours_together,
     with_spare,
 )
+from vico.render.lamps.grid import NO_LAMPS, LampGrid, lamp_grid, shining
 from vico.render.lighting import Lighting, cloud_map, linear_table, sky_table, tone_table, unit
 from vico.render.limbs import LIMBS
-from vico.render.records import COUNTS, OPENING, ROOM, ROOM_FRONT, SPAN, SPHERE
+from vico.render.records import COUNTS, LAMP, OPENING, ROOM, ROOM_FRONT, SPAN, SPHERE
 from vico.render.shading.light import Light, ReliefMap, ShadowMap
 from vico.render.shading.sky import SKY_SIZE, paint_sky
 from vico.render.shadows.cabins import cabin_records
-from vico.render.shadows.maps import relief_map, shadow_map
+from vico.render.shadows.maps import built_tops, relief_map, shadow_map
 from vico.render.textures import pack_textures
 from vico.render.uniforms import Record, light_uniforms
 from vico.world.mesh import Material, Surface
@@ -76,6 +77,8 @@ class Scene:
         Of the rows of ``arrays.textures.materials``.
     fronts
         Glass on streets with rooms behind it, `ROOM_FRONT`; none unless assigned.
+    lamps
+        What stays where it is and shines on its surroundings, `LAMP`; none unless assigned, before the first picture.
     moment
         Seconds; decides where drops and flakes are in pictures taken now.
     shadowless
@@ -132,6 +135,8 @@ class Scene:
         self.moment = 0.0
         self.shadowless = 0
         self.fronts = np.zeros(0, ROOM_FRONT)
+        self.lamps = np.zeros(0, LAMP)
+        self._grid: LampGrid | None = None
         self._shadow_key: tuple[float, ...] | None = None
         self._shadow: ShadowMap | None = None
         self._relief: ReliefMap | None = None
@@ -209,7 +214,7 @@ class Scene:
             # Shadows must reach what stands up from the static surfaces, too.
             self._low = np.minimum(self._low, rows[outdoors][:, :, 3].min(axis=0))
             self._high = np.maximum(self._high, rows[outdoors][:, :, 3].max(axis=0) + np.array([0, 0, 12.0]))
-        self._light = self._shadow = self._relief = None
+        self._light = self._shadow = self._relief = self._grid = None
         self.version += 1
 
     def set_rigid(
@@ -352,8 +357,16 @@ class Scene:
             uniforms, tone = light_uniforms(light), tone_table()
             sky = np.zeros(SKY_SIZE * SKY_SIZE, np.uint32)
             paint_sky(uniforms, sky_table(light), cloud_map(), tone, sky)
-            self._light = Light(uniforms, tone, sky, self._shadow, self._relief)
+            self._light = Light(uniforms, tone, sky, self._shadow, self._relief, self._shining())
         return self._light
+
+    def _shining(self) -> LampGrid:
+        """Return the lamps as they shine now."""
+        if self._lighting.lamps <= 0.0 or not len(self.lamps):
+            return NO_LAMPS
+        if self._grid is None:
+            self._grid = lamp_grid(self.lamps, built_tops(self.arrays, self._low, self._high))
+        return shining(self._grid, self._lighting, self.arrays.windows)
 
     def light_rooms(self, lamp: ArrayLike, daylight: float) -> None:
         """Switch each room's lamps on, 0..1, shape ``(r,)``, and let a share of the daylight in by its windows."""
@@ -366,7 +379,9 @@ class Scene:
         if windows is not self.arrays.windows and not np.array_equal(windows, self.arrays.windows):
             self._replace(windows=windows)
             if self._light is not None:
-                self._light = self._light._replace()  # another one, for those who keep pictures taken by it
+                self._light = self._light._replace(
+                    lamps=self._shining()
+                )  # another one, for those who keep pictures taken by it
 
     def room_of(self, position: NDArray[np.float64]) -> Record | None:
         """Return the `ROOM` that holds a point, or None."""

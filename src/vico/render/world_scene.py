@@ -8,6 +8,7 @@ import numpy as np
 
 from vico.assets.interior import WINDOW
 from vico.render.behind.fronts import room_fronts
+from vico.render.lamps.found import LAMP_KINDS, lamps_placed, shop_lamps, with_lit_heads
 from vico.render.lighting import Lighting
 from vico.render.records import GROUND_WINDOWS, UPPER_WINDOWS
 from vico.render.scene import Scene
@@ -53,6 +54,9 @@ def scene_of(
         (*room.centre, room.size[0] / 2, room.size[1] / 2, room.size[2], room.yaw) for room in world.rooms if rooms
     ]
     models = {**world.prototypes(), **(prototypes or {})}
+    is_lamp = np.isin(world.objects.kind, LAMP_KINDS) & (world.objects.room == "")
+    for name in np.unique(world.objects.prototype[is_lamp]).tolist():
+        models[name] = with_lit_heads(models[name])
     scene = Scene(static, models, indoor=indoor, rooms=np.array(boxes).reshape(-1, 7), cabins=cabins, lighting=lighting)
     _tell_windows(scene)
     if rooms:
@@ -75,6 +79,9 @@ def scene_of(
         names = [str(objects.prototype[k]) for k in taken]
         inside = np.array([bool(objects.room[k]) for k in taken])
         scene.place(names, transforms, objects.entity[index], indoor=inside)
+        shining = np.flatnonzero(is_lamp[index])
+        lamps = lamps_placed(models, [names[k] for k in shining], transforms[shining])
+        scene.lamps = np.concatenate([lamps, shop_lamps(static, _SHOP_WINDOWS)])
     return scene
 
 

@@ -14,12 +14,15 @@ from vico.render.behind.panes import show_rooms
 from vico.render.cameras import Cameras
 from vico.render.frames import Frames, PictureRequest, light_of
 from vico.render.gl.culling import cluster_ranges, instances_in_view, joined_ranges
+from vico.render.gl.lamps import LAMP_FLOATS, packed_lamps
 from vico.render.gl.moving import CASTER_ROWS, OPENINGS, packed_cabins, packed_casters, packed_openings, packed_past
+from vico.render.lamps.grid import CELL
 from vico.render.lighting import TONE_RANGE, TONE_STEPS
 from vico.render.records import CABIN_STEPS
 from vico.render.scene import Scene
 from vico.render.sensors.past import PastPlaces
 from vico.render.shading.finishing import occlude, smooth_edges
+from vico.render.shading.lamplight import AROUND_CORNER, BEFORE
 from vico.render.shading.light import Light
 from vico.render.shading.sky import SKY_SIZE
 from vico.render.shading.weather import draw_weather
@@ -38,6 +41,9 @@ _CONSTANTS = {
     "CABIN_TILT": cabins.CABIN_TILT,
     "CABIN_GREEN": cabins.CABIN_GREEN,
     "CABIN_BLUE": cabins.CABIN_BLUE,
+    "CELL": CELL,
+    "AROUND_CORNER": AROUND_CORNER,
+    "BEFORE": BEFORE,
 }
 # The sky is this far away, metres: only turning moves it.
 _SKY = 1e7
@@ -254,6 +260,9 @@ class GlRenderer:
             self._uploaded["light"] = light.sky
             self._buffer("tone", 9, light.tone.astype(np.int32))
             self._buffer("sky", 10, light.sky)
+        if self._uploaded.get("lamps") is not light.lamps.power:
+            self._uploaded["lamps"] = light.lamps.power
+            self._buffer("lamps", 16, packed_lamps(light.lamps))
         self._texture("closeness", light.shadow.closeness, "u2")
         self._texture("relief", light.relief.height, "f4")
 
@@ -415,8 +424,10 @@ def _view_uniforms(camera: Record) -> dict[str, Any]:
 
 def _light_uniforms(light: Light) -> dict[str, Any]:
     u = light.uniforms
-    relief = light.relief
+    relief, grid = light.relief, light.lamps
     return {
+        "lamp_grid": (float(grid.x), float(grid.y), float(grid.columns), float(grid.rows)),
+        "lamp_parts": (len(grid.start), len(grid.start) + LAMP_FLOATS * len(grid.lamps)),
         "sun": _vector(u, "sun"),
         "sun_colour": _colour(u, "sun"),
         "ambient": _colour(u, "ambient"),

@@ -8,6 +8,7 @@ layout(std430, binding = 9) readonly buffer Tone { int tone[]; };
 
 layout(std430, binding = 12) readonly buffer Casters { vec4 casters[]; };  // see `packed_casters`
 layout(std430, binding = 15) readonly buffer Cabins { float cabins[]; };  // see `packed_cabins`
+layout(std430, binding = 16) readonly buffer Lamps { float lamps[]; };  // see `packed_lamps`
 
 uniform usampler2D closeness;
 uniform sampler2D relief;
@@ -18,6 +19,8 @@ uniform vec2 side;
 uniform float near, far, haze_per_metre, lamp_exposure, wet, snow_cover, softness, glass, interiors, tone_scale;
 uniform vec4 room_place, room_size;  // centre and cosine of the yaw; half length, half width, height, sine
 uniform vec3 room_light;  // shares of lamps, of light all around, and of what windows show by day
+uniform vec4 lamp_grid;  // corner, columns and rows of the cells
+uniform ivec2 lamp_parts;  // where lamps and what cells name of them begin
 uniform int indoors, hidden, most_taps, levels_each, is_person, caster_count, opening_count;
 
 in vec3 place;
@@ -214,6 +217,28 @@ vec3 left_by_moving() {
     return left;
 }
 
+// Light of lamps that stay where they are: `vico.render.shading.lamplight`.
+float lamplight(vec3 at, vec3 n) {
+    if (lamp_grid.w == 0.0) return 0.0;
+    vec2 cell = (at.xy + 1.2 * n.xy - lamp_grid.xy) / %CELL%, low = floor(cell);
+    if (any(lessThan(low, vec2(0.0))) || any(greaterThanEqual(low, lamp_grid.zw))) return 0.0;
+    vec2 st = clamp((at.xy + %BEFORE% * n.xy - lamp_grid.xy) / %CELL% - low, 0.0, 1.0);
+    int k = int(low.y) * int(lamp_grid.z) + int(low.x);
+    float sum = 0.0;
+    for (int i = floatBitsToInt(lamps[k]); i < floatBitsToInt(lamps[k + 1]); i++) {
+        int one = lamp_parts.y + 5 * i, lamp = lamp_parts.x + 12 * floatBitsToInt(lamps[one]);
+        vec3 to = vec3(lamps[lamp], lamps[lamp + 1], lamps[lamp + 2]) - at;
+        vec3 axis = vec3(lamps[lamp + 3], lamps[lamp + 4], lamps[lamp + 5]);
+        float squared = dot(to, to) + 1e-4, inverse = inversesqrt(squared);
+        float facing = max(dot(to, n) * inverse + %AROUND_CORNER%, 0.0);
+        float thrown = clamp(lamps[lamp + 7] - lamps[lamp + 6] * dot(to, axis) * inverse, 0.0, 1.0);
+        float left = max(1.0 - squared * lamps[lamp + 10], 0.0);
+        float comes = mix(mix(lamps[one + 1], lamps[one + 2], st.x), mix(lamps[one + 3], lamps[one + 4], st.x), st.y);
+        sum += lamps[lamp + 8] * facing * thrown * left * left * comes / (squared + lamps[lamp + 9]);
+    }
+    return sum;
+}
+
 vec3 in_room(vec3 at, vec3 n, vec3 base, float glass_) {
     vec3 p = at - room_place.xyz;
     float c = room_place.w, s = room_size.w, height = room_size.z;
@@ -331,7 +356,8 @@ void main() {
         float toward = max(dot(place, sun) / max(length_, 1e-12), 0.0);
         float glow = 0.10 * toward * toward * toward;
         vec3 around = (ambient + n.z * tilt + dot(n.xy, side)) * sky_share(at, n) * left.y;
-        light = base.rgb * (facing * sun_colour + around + shine * vec3(1.0, 0.86, 0.62));
+        float lamp = lamplight(at, n) * left.y;
+        light = base.rgb * (facing * sun_colour + around + (shine + lamp) * vec3(1.0, 0.86, 0.62));
         light = (1.0 - clear) * (haze + glow * sun_colour) + clear * light;
         light += left.z * lamp_exposure * (%CABIN_LAMP% + %CABIN_TILT% * n.z) * vec3(1.0, %CABIN_GREEN%, %CABIN_BLUE%) * base.rgb;
         if (interiors > 0.0 && column > 0 && levels > 0) {

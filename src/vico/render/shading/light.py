@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.render.lamps.grid import NO_LAMPS, LampGrid
 from vico.render.records import LIGHT_UNIFORMS
 
 
@@ -57,6 +58,8 @@ class Light(NamedTuple):
         `paint_sky`: packed like a texture, uint32, shape ``(SKY_SIZE ** 2,)``.
     shadow, relief
         Of the static scene.
+    lamps
+        Those that stay where they are, as they shine now.
     """
 
     uniforms: Any
@@ -64,6 +67,7 @@ class Light(NamedTuple):
     sky: NDArray[np.uint32]
     shadow: ShadowMap
     relief: ReliefMap
+    lamps: LampGrid
 
 
 #: For pictures without colours.
@@ -73,4 +77,5 @@ NO_LIGHT = Light(
     np.zeros(1, np.uint32),
     ShadowMap(np.zeros((1, 1), np.uint16), np.zeros((3, 4), np.float32)),
     ReliefMap(np.zeros((1, 1), np.float32), 0.0, 0.0, 0.0),
+    NO_LAMPS,
 )

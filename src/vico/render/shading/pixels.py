@@ -24,6 +24,7 @@ from vico.render.shading.fields import (
     I1,
     I2,
     I3,
+    LAMPS,
     LEVEL,
     LIT,
     MIDDLE,
@@ -342,7 +343,7 @@ def light_outdoors(light: Any, camera: Any, real: Any, whole: Any) -> None:
         glow = np.float32(0.10) * toward * toward * toward
         nz, share = real[NZ + i], real[SKY + i] * real[AROUND + i]
         side = real[NX + i] * side_x + real[NY + i] * side_y
-        facing, shine = real[F + i], real[SHINE + i]
+        facing, shine = real[F + i], real[SHINE + i] + real[LAMPS + i] * real[AROUND + i]
         red = real[RED + i] * (facing * sun_red + (ambient_red + nz * tilt_red + side) * share + shine)
         green = real[GREEN + i] * (
             facing * sun_green + (ambient_green + nz * tilt_green + side) * share + shine * green_shine

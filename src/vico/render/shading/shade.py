@@ -37,6 +37,7 @@ from vico.render.shading.fields import (
     Y,
     Z,
 )
+from vico.render.shading.lamplight import queue_lamplight
 from vico.render.shading.pixels import MovingShadows, PixelQueue, finish, finish_sky
 from vico.render.shading.sky import SKY_SIZE
 from vico.render.shading.triangle import set_up_triangle
@@ -49,6 +50,8 @@ _RELIEF_OFFSET = 1.2
 # Sky light falls by half of this share where a point lies this deep (metres) below the blurred heights around it.
 _RELIEF_DEPTH, _RELIEF_SHARE = 5.0, 0.62
 _ZERO, _HALF, _ONE, _TINY = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(1e-12)
+# No lamp shines there.
+_NOWHERE = 1e9
 # A position in the queue, masked so that the compiler knows it is not negative.
 _POSITION = 511
 # The same for pixels.
@@ -188,7 +191,7 @@ def shade(scene: Any, camera: Any, light: Any, buffers: Any, drawn: int, shadows
                 ray = _ray_at(left, eye, column)
                 window = _texture_window(setup, planes, middle, materials, texel_start, camera.most_taps)
                 taps = max(taps, window.taps)
-                open_sky, own = _ONE, shine
+                open_sky, own, x, y = _ONE, shine, _NOWHERE, _NOWHERE
                 if not indoors:
                     x, y, z = _before_surface(setup, middle, _ray_at(left, eye, column + 0.5 * (count - 1)), camera)
                     open_sky = np.float32(sky_visibility(relief_height, relief_frame, x, y, z))
@@ -201,6 +204,7 @@ def shade(scene: Any, camera: Any, light: Any, buffers: Any, drawn: int, shadows
                 _queue_normals(real, at, setup, eye)
                 _queue_constants(real, at, window.du, window.dv, open_sky, own)
                 _queue_addresses(whole, at, window, offset + column, setup.window)
+                queue_lamplight(real, at, light.lamps, x, y)
                 queued += count
                 column += count
                 if queued > QUEUE - RUN:

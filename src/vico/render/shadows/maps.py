@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vico.render.arrays import INDOORS, PAD
 from vico.render.compiled import inlined, kernel
+from vico.render.lamps.grid import Tops
 from vico.render.records import CUTOUT, DOUBLE_SIDED
 from vico.render.shading.light import ReliefMap, ShadowMap
 from vico.render.visibility.draw import corner_uv
@@ -21,6 +22,9 @@ from vico.render.visibility.fill import (
     inverse_depth,
     twice_area,
 )
+
+# Texels of the heights that keep the light of lamps from places, metres.
+_TOP_METRES = 1.0
 
 
 @inlined
@@ -119,8 +123,31 @@ def shadow_map(
     return ShadowMap(closeness, frame.astype(np.float32))
 
 
+def built_tops(scene: Any, low: NDArray[np.float64], high: NDArray[np.float64]) -> Tops:
+    """Return the top heights of ground and buildings, without what is placed on them."""
+    counts = scene.counts.copy()
+    counts["static_instances"] = 0
+    side = float((high - low)[:2].max())
+    size = int(np.clip(side / _TOP_METRES, 16, 2048))
+    heights, scale = _top_heights(scene._replace(counts=counts), low, high, size)
+    return Tops(heights, float(low[0]), float(low[1]), scale)
+
+
 def relief_map(scene: Any, low: NDArray[np.float64], high: NDArray[np.float64], size: int, radius: float) -> ReliefMap:
     """Return the top heights of the static scene, blurred twice over `radius` metres, `size` texels a side."""
+    heights, scale = _top_heights(scene, low, high, size)
+    reach = max(round(radius * scale), 1)
+    for _ in range(2):
+        for axis in (0, 1):
+            heights = _box_blur(heights, reach, axis)
+    west, south, scale = (float(np.float32(value)) for value in (low[0], low[1], scale))
+    return ReliefMap(heights, west, south, scale)
+
+
+def _top_heights(
+    scene: Any, low: NDArray[np.float64], high: NDArray[np.float64], size: int
+) -> tuple[NDArray[np.float32], float]:
+    """Return the top heights of the static scene, metres, and texels a metre."""
     span = max(float((high - low)[:2].max()), 1e-3)
     frame = np.zeros((3, 4))
     frame[0, 0] = frame[1, 1] = size / span
@@ -131,12 +158,7 @@ def relief_map(scene: Any, low: NDArray[np.float64], high: NDArray[np.float64], 
     draw_flat(scene, frame, keys, size, True)
     heights = np.zeros((size, size), np.float32)
     _heights(keys, float(low[2]), heights)
-    reach = max(round(radius * size / span), 1)
-    for _ in range(2):
-        for axis in (0, 1):
-            heights = _box_blur(heights, reach, axis)
-    west, south, scale = (float(np.float32(value)) for value in (low[0], low[1], size / span))
-    return ReliefMap(heights, west, south, scale)
+    return heights, size / span
 
 
 def _box_blur(values: NDArray[np.float32], reach: int, axis: int) -> NDArray[np.float32]:

@@ -1,0 +1,1 @@
+"""Light of lamps, shop fronts and headlights on what is around them."""
