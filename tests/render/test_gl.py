@@ -146,11 +146,11 @@ def test_rooms_behind_glass_are_the_same_ones(both: tuple[Scene, GlRenderer]) ->
 def test_open_doors_are_cut_out_of_the_same_pixels(both: tuple[Scene, GlRenderer]) -> None:
     made, gl = both
     opening = np.zeros(1, OPENING)
-    sizes = {"x": -8.0, "y": 1.5, "inward_x": 1.0, "half_width": 0.5, "height": 2.0, "before": 0.1, "behind": 0.3}
+    sizes = {"x": -8.0, "y": 0.3, "inward_x": 1.0, "half_width": 0.25, "height": 2.0, "before": 0.1, "behind": 0.3}
     for name, value in sizes.items():
         opening[name] = value
     made.lighting = DAY
-    look = Cameras(np.array([[-14.0, 0.0, 1.6]]), np.array([[1.0, 0.0, 0.0]]), width=160, height=120)
+    look = replace(OUTSIDE, position=np.array([[-11.0, 0.3, 1.6]]), forward=np.array([[1.0, 0.0, 0.0]]))
     closed = take_pictures(made, look, PictureRequest()).segmentation
     made.set_openings(opening)
     wanted, got = take_pictures(made, look, PictureRequest()), gl.take(look, PictureRequest())
