@@ -123,11 +123,15 @@ def _cells_of(lamp: Any, reach: float, tops: Tops, corner: tuple[float, float]) 
     side = int(2 * reach / CELL) + 2
     x = corner[0] + CELL * np.arange(i0, i0 + side + 1)
     y = corner[1] + CELL * np.arange(j0, j0 + side + 1)
-    comes = _unhidden(lamp, np.meshgrid(x, y), tops)
+    # A front shines outwards and not far: what stands there is lit itself.
+    is_front = int(lamp["entity"]) > 0
+    comes = np.ones((side + 1, side + 1)) if is_front else _unhidden(lamp, np.meshgrid(x, y), tops)
     corners = np.stack([comes[:-1, :-1], comes[:-1, 1:], comes[1:, :-1], comes[1:, 1:]], axis=-1)
     mx, my = np.meshgrid(x[:-1] + CELL / 2, y[:-1] + CELL / 2)
     squared = (mx - lamp["x"]) ** 2 + (my - lamp["y"]) ** 2
     lit = (np.sqrt(squared) < reach + 0.75 * CELL) & (corners.max(axis=-1) > 0)
+    ahead = (mx - lamp["x"]) * lamp["axis_x"] + (my - lamp["y"]) * lamp["axis_y"]
+    lit &= (ahead > -CELL) | (not is_front)
     bright = lamp["power"] / (squared + lamp["size"] + 4.0) * np.maximum(1 - squared / reach**2, 0.01)
     j, i = np.nonzero(lit)
     return i + i0, j + j0, corners[j, i].astype(np.float32), bright[j, i]
