@@ -65,13 +65,13 @@ def test_it_stays_on_the_ground_until_it_is_sent_and_then_hovers_with_its_weight
     run(robots, 1.0)
     assert place(robots)[2] == pytest.approx(robots.models[0].stand, abs=0.01)
     assert not robots.observation(0)["rotor_speed"].any()
-    assert robots.frames.fine == 0  # which only flying takes
     robots.fly_to(0, [0, 0, 5])
     assert run(robots, 7.0) == ["arrived"]
     assert place(robots) == pytest.approx([0, 0, 5], abs=0.05)
     hover = np.sqrt(MASS * GRAVITY / 4 / THRUST)
     assert robots.observation(0)["rotor_speed"] == pytest.approx(hover, rel=0.01)
     assert 0.99 < robots.observation(0)["battery"][0] < 1.0
+    assert robots.frames.fine == 0
 
 
 def test_a_house_between_is_flown_over_or_round_and_never_touched(robots: RobotPopulation) -> None:

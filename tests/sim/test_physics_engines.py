@@ -247,6 +247,24 @@ def test_rotors_lift_hold_and_turn_a_robot(name: str) -> None:
     assert engine.base(0).angular_velocity_body[2] == pytest.approx(0.004 * 0.5 / (0.4**2 / 6), rel=0.03)
 
 
+@pytest.mark.parametrize("frame", [FINE, COARSE])
+def test_whoever_acts_within_a_frame_does_so_before_each_step_and_sees_motion_as_it_is(name: str, frame: float) -> None:
+    engine = engine_of(name, PLAIN, (DRONE,))
+    found: list[tuple[float, float, float]] = []
+
+    def actuate(since: float, step: float) -> None:
+        found.append((since, step, float(engine.motion(np.array([0])).velocity[0, 2])))
+        engine.thrust_all(np.array([0]), "front", np.array([[0.0, 0.0, 20.0 * (1 + len(found)), 0.0, 0.0, 0.0]]))
+
+    engine.step(3, frame=frame, actuate=actuate)
+    since, steps, climbing = np.array(found).T
+    assert steps.sum() == pytest.approx(3 * frame)
+    each = len(found) // 3
+    assert each >= 2
+    assert since == pytest.approx(np.tile(np.arange(each) * frame / each, 3))
+    assert np.all(np.diff(climbing) > 0.0)
+
+
 def test_robots_of_a_kind_are_pushed_in_one_call_as_each_alone(name: str) -> None:
     wrench = np.array([[0.0, 0.0, 12.0, 0.0, 0.0, 0.001], [0.1, 0.0, 11.0, 0.0, 0.0, 0.0]])
     engines = [engine_of(name, PLAIN, (DRONE, DRONE), (0, 0, 0), (5, 0, 0)) for _ in range(2)]

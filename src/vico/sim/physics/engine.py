@@ -10,7 +10,7 @@ here says how contacts are solved: results of two engines agree loosely, those o
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -30,6 +30,9 @@ from vico.sim.physics.records import (
     RigidObject,
     StaticScene,
 )
+
+#: Told the seconds that have passed since the frame began, and those that the solver's step takes.
+Actuate = Callable[[float, float], None]
 
 
 class PhysicsEngine(Protocol):
@@ -150,10 +153,23 @@ class PhysicsEngine(Protocol):
     def contacts(self) -> Contacts:
         """Who touched whom, where and how hard, in the last step of the solver."""
 
-    def step(self, frames: int = 1, *, frame: float = COARSE, holding: bool | None = None) -> None:
+    def step(
+        self,
+        frames: int = 1,
+        *,
+        frame: float = COARSE,
+        holding: bool | None = None,
+        actuate: Actuate | None = None,
+    ) -> None:
         """Move on by some frames of `FINE` or `COARSE` seconds (see `vico.sim.physics.frames`).
 
-        `holding`: whether friction has to hold things still, which costs more; None: in fine frames.
+        Parameters
+        ----------
+        holding
+            Whether friction has to hold things still, which costs more; None: in fine frames.
+        actuate
+            Called before each of the solver's steps, for what cannot wait for the next frame: it reads the motion of
+            robots as it is then, and commands or pushes them.
 
         Raises
         ------
@@ -240,6 +256,7 @@ class PhysicsScene(Protocol):
 
 
 __all__ = [
+    "Actuate",
     "Base",
     "Capacity",
     "Contacts",

@@ -2,7 +2,7 @@
 
 The specification asks for 100 frames a second. That is what robots get whose motors are commanded directly, that have
 fallen, that hold or move things, or near which things fall or are pushed. Gaits and wheels that follow velocities,
-among people and vehicles, need no more than 50, and cost half as much.
+among people and vehicles, need no more than 50, and cost half as much. Rotors act before each of a frame's steps.
 """
 
 from __future__ import annotations
@@ -76,5 +76,5 @@ class FrameCount:
         return {
             "fine": {"seconds": FINE, "frames": self.fine},
             "coarse": {"seconds": COARSE, "frames": self.coarse},
-            "rule": "fine where motors are commanded, robots fly, fell or hold things, or things fall or are pushed",
+            "rule": "fine where motors are commanded, robots fell or hold things, or things fall or are pushed",
         }

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError, SchemaError
 from vico.sim.bodies import Bodies
+from vico.sim.physics.engine import Actuate
 from vico.sim.physics.frames import COARSE, FINE
 from vico.sim.physics.genesis_contacts import contacts_of, read_contacts
 from vico.sim.physics.genesis_objects import ObjectSlots
@@ -286,8 +287,16 @@ class GenesisEngine:
 
     # Time.
 
-    def step(self, frames: int = 1, *, frame: float = COARSE, holding: bool | None = None) -> None:
+    def step(
+        self,
+        frames: int = 1,
+        *,
+        frame: float = COARSE,
+        holding: bool | None = None,
+        actuate: Actuate | None = None,
+    ) -> None:
         """Move on by some frames; people and vehicles move first, at every one. Friction is always the same."""
+        before = None if actuate is None else self._before_step(actuate)
         firm = frame == FINE if holding is None else holding
         scene, parked = self._scene, np.flatnonzero(self._parked).tolist()
         with scene.lock:
@@ -299,7 +308,7 @@ class GenesisEngine:
                 for robot in parked:
                     self._rest(robot, parked_robot(robot))
                 self._velocity_before[:] = scene.speeds[scene.first[:, 1:] + np.arange(3)]
-                said = scene.step(frame, self._wrench, holding=firm)
+                said = scene.step(frame, self._wrench, holding=firm, actuate=before)
                 self._contacts = None
                 self._slots.watch(scene, frame)
                 if said or not math.isfinite(float(np.add.reduce(scene.speeds))):
@@ -307,6 +316,15 @@ class GenesisEngine:
             self._frame[0] = frame
             self._forces[:] = scene.applied
             self._note()
+
+    def _before_step(self, actuate: Actuate) -> Actuate:
+        """Return `actuate` as it is called in a step: with motions as they are then."""
+
+        def before(since: float, seconds: float) -> None:
+            self._note()
+            actuate(since, seconds)
+
+        return before
 
     def _last_contacts(self) -> NDArray[np.float64]:
         """Links, position, normal and force of the last step's contacts."""

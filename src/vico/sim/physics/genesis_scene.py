@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.io.compiled import compiled
+from vico.sim.physics.engine import Actuate
 from vico.sim.physics.frames import COARSE, FINE
 from vico.sim.physics.genesis_index import GenesisIndex
 from vico.sim.physics.genesis_model import build_scene
@@ -234,7 +235,14 @@ class BuiltScene:
         found[:, 3, 3] = 1.0
         return found
 
-    def step(self, frame: float, wrenches: list[NDArray[np.float64]], *, holding: bool = True) -> str:
+    def step(
+        self,
+        frame: float,
+        wrenches: list[NDArray[np.float64]],
+        *,
+        holding: bool = True,
+        actuate: Actuate | None = None,
+    ) -> str:
         """Solve a frame; return what Genesis says if that fails, else "".
 
         Parameters
@@ -243,13 +251,17 @@ class BuiltScene:
             Whether things have to be held still in it.
         wrenches
             Force and torque in the frame of each robot's sites, N and Nm, shape ``(sites, 6)`` each.
+        actuate
+            Called before each step of the solver; may change `wrenches`.
         """
         steps = STEPS[frame] if holding or frame == COARSE else 1
         self._step[...] = frame / steps
         # Poses computed at the end of a step and those computed from a restored state could differ in their last bits.
         self.place_links()
         try:
-            for _ in range(steps):
+            for k in range(steps):
+                if actuate is not None:
+                    actuate(k * frame / steps, frame / steps)
                 self._push(wrenches)
                 self.built.scene.step(update_visualizer=False)
             if self._failed.any():

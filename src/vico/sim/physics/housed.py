@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.sim.bodies import Bodies
-from vico.sim.physics.engine import PhysicsEngine, PhysicsScene
+from vico.sim.physics.engine import Actuate, PhysicsEngine, PhysicsScene
 from vico.sim.physics.frames import COARSE
 from vico.sim.physics.records import Base, Contacts, Imu, Motion, ObjectMotion, Party, RigidObject
 
@@ -205,9 +205,16 @@ class HousedEngine:
             found.append(replace(one, owner=owner, position=one.position + housed.origin))
         return Contacts(*(np.concatenate([getattr(one, f.name) for one in found]) for f in fields(Contacts)))
 
-    def step(self, frames: int = 1, *, frame: float = COARSE, holding: bool | None = None) -> None:
-        """Move on by some frames."""
-        self.outdoors.step(frames, frame=frame, holding=holding)
+    def step(
+        self,
+        frames: int = 1,
+        *,
+        frame: float = COARSE,
+        holding: bool | None = None,
+        actuate: Actuate | None = None,
+    ) -> None:
+        """Move on by some frames; only outdoors anybody is actuated within them."""
+        self.outdoors.step(frames, frame=frame, holding=holding, actuate=actuate)
         for housed in self.inside.values():
             housed.engine.step(frames, frame=frame, holding=holding)
 

@@ -7,7 +7,6 @@ fixed number that is parked far below the ground. Free boxes that lie still slee
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError, SchemaError
 from vico.sim.bodies import Bodies
+from vico.sim.physics.engine import Actuate
 from vico.sim.physics.frames import COARSE, FINE, SOLVER_STEPS
 from vico.sim.physics.movers import KinematicBodies
 from vico.sim.physics.mujoco_model import (
@@ -29,8 +29,8 @@ from vico.sim.physics.mujoco_model import (
 from vico.sim.physics.mujoco_parameters import Parameters
 from vico.sim.physics.mujoco_scene import CompiledScene, SharedModel
 from vico.sim.physics.mujoco_views import base_motion, begin_frame, motion_of, place_bodies, solved_contacts
-from vico.sim.physics.mujoco_warnings import PhysicsWarning, heard, listen
-from vico.sim.physics.records import Base, Contacts, Imu, Motion, ObjectMotion, Party, PhysicsError, RigidObject
+from vico.sim.physics.mujoco_warnings import heard, listen, report, solve
+from vico.sim.physics.records import Base, Contacts, Imu, Motion, ObjectMotion, Party, RigidObject
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 _DOWN = np.array([0.0, 0.0, -1.0])
@@ -117,11 +117,6 @@ class MujocoEngine:
     def coordinates(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """All positions and all velocities, as MuJoCo orders them; views."""
         return self._qpos, self._qvel
-
-    @property
-    def geoms(self) -> int:
-        """How many collision shapes there are."""
-        return int(self._model.ngeom)
 
     def _forget(self) -> None:
         """Drop what was computed from a state that is no more."""
@@ -364,12 +359,27 @@ class MujocoEngine:
 
     # Time.
 
-    def step(self, frames: int = 1, *, frame: float = COARSE, holding: bool | None = None) -> None:
+    def step(
+        self,
+        frames: int = 1,
+        *,
+        frame: float = COARSE,
+        holding: bool | None = None,
+        actuate: Actuate | None = None,
+    ) -> None:
         """Move on by some frames; people and vehicles move first, at every one."""
-        self.step_in(self.compiled.shared, frames, frame, holding=holding)
+        self.step_in(self.compiled.shared, frames, frame, holding=holding, actuate=actuate)
         self.judge()
 
-    def step_in(self, shared: SharedModel, frames: int, frame: float, *, holding: bool | None = None) -> None:
+    def step_in(
+        self,
+        shared: SharedModel,
+        frames: int,
+        frame: float,
+        *,
+        holding: bool | None = None,
+        actuate: Actuate | None = None,
+    ) -> None:
         """Step, with the equations of a model of the same scene: its own for each thread of a batch."""
         s, steps, movers = self.compiled, SOLVER_STEPS[frame], self._movers
         parked = [robot for robot, out in enumerate(self._parked.tolist()) if out]
@@ -391,7 +401,13 @@ class MujocoEngine:
                     self._rest(robot, parked_robot(robot))
                 begin_frame(frame, self._links_age, *told)
                 s.choose_pairs(shared, self._links_meet, somebody)
-                self._step_data(shared, steps)
+                if actuate is None:
+                    solve(shared.model, self._data, steps)
+                else:
+                    for k in range(steps):
+                        actuate(k * frame / steps, frame / steps)
+                        solve(shared.model, self._data, 1)
+                        self._forget()
                 self._links_age = frame / steps
                 if s.slots:
                     motion = self._qvel[s.object_motion].reshape(-1, 6)
@@ -399,24 +415,11 @@ class MujocoEngine:
         self._frame[0] = frame
         self._contacts = None
 
-    def _step_data(self, shared: SharedModel, steps: int) -> None:
-        try:
-            mujoco.mj_step(shared.model, self._data, steps)
-        except mujoco.FatalError as error:  # out of its working memory
-            raise PhysicsError(
-                f"physics: MuJoCo gave up at {self._data.time:.2f} s ({error}); report it with the snapshot"
-            ) from None
-
     def judge(self) -> None:
         """Raise or warn if MuJoCo said something."""
-        said = heard()
-        if not math.isfinite(float(np.add.reduce(self._qvel))):
-            why = f" ({said[0]})" if said else ""
-            raise PhysicsError(
-                f"physics: the robots' motion diverged at {self._data.time:.2f} s{why}; report it with the snapshot"
-            )
-        for message in said:
-            warnings.warn(f"physics: MuJoCo says: {message}", PhysicsWarning, stacklevel=3)
+        said, finite = heard(), math.isfinite(float(np.add.reduce(self._qvel)))
+        if said or not finite:
+            report(said, self._data.time, finite=finite)
 
     def _last_contacts(self) -> NDArray[np.float64]:
         """Shapes, position, normal and force of the last step's contacts: the state after it does not tell them."""

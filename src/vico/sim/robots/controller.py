@@ -53,6 +53,16 @@ class MotorController:
         """
         return np.tile(self.model.stance, (len(motion), 1))
 
+    def rotor_speeds(self, motion: Motion, setpoints: Array, memory: Array, seconds: float) -> Array:
+        """Return what the rotors of robots that fly follow for some seconds, rad/s, shape ``(k, rotors)``.
+
+        Parameters
+        ----------
+        setpoints
+            As `vico.sim.robots.rotors.FlightArrays` has them, shape ``(k, 8)``: moved on in place.
+        """
+        return self.targets(motion, setpoints, memory)
+
     def gains(self, memory: Array) -> list[Gains | None]:
         """Return what gains the targets just given need, one a robot; None: they stay as they are."""
         return [None] * len(memory)

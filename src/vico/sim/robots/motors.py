@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vico.sim.physics.engine import Actuate
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.rotors import Flight, FlightPhase
 from vico.sim.robots.scene import RobotGroup
@@ -35,9 +36,15 @@ def follow_setpoints(run: RobotRun, flight: Flight, group: RobotGroup) -> bool:
 
 
 def command_rotors(
-    run: RobotRun, flight: Flight, group: RobotGroup, memory: np.ndarray, *, all_follow: bool = False
+    run: RobotRun,
+    flight: Flight,
+    group: RobotGroup,
+    memory: np.ndarray,
+    seconds: float,
+    *,
+    all_follow: bool = False,
 ) -> None:
-    """Tell the rotors of a kind of robots what speeds to have for its period; all that are in the air in one call.
+    """Tell the rotors of a kind of robots what speeds to have for some seconds; all that are in the air in one call.
 
     Parameters
     ----------
@@ -48,20 +55,61 @@ def command_rotors(
     """
     arrays, robots, a = run.arrays, group.robots, flight.arrays
     if all_follow:
-        a.wanted[:] = group.controller.targets(run.engine.motion(robots), a.setpoint, memory)
+        a.wanted[:] = group.controller.rotor_speeds(run.engine.motion(robots), a.setpoint, memory, seconds)
         return
     fallen, motors = arrays.status[robots] == _FALLEN, arrays.mode[robots] == _MOTORS
     led = ~fallen & ~motors & (a.phase != _LANDED)
     rows = led.nonzero()[0]
     if len(rows):
         setpoint, mine = a.setpoint[rows], memory[rows]
-        a.wanted[rows] = group.controller.targets(run.engine.motion(robots[rows]), setpoint, mine)
+        a.wanted[rows] = group.controller.rotor_speeds(run.engine.motion(robots[rows]), setpoint, mine, seconds)
         a.setpoint[rows], memory[rows] = setpoint, mine
     memory[~led] = 0.0
     a.wanted[~led] = 0.0
     told = motors & ~fallen
     a.wanted[told] = arrays.command[robots[told], : len(group.model.motors)]
-    arrays.lying[robots[fallen]] += group.model.control_period
+    arrays.lying[robots[fallen]] += seconds
+
+
+class AllRotors:
+    """The rotors of all robots that fly, within a sub-step: who follows setpoints is decided between sub-steps.
+
+    Rotors are told what to do, and push, before each of the solver's steps: a quadrotor cannot wait for the next frame.
+    Rotors that stand, or come to a stop on the ground, are told once a frame.
+    """
+
+    def __init__(self, run: RobotRun) -> None:
+        self._run, self._began = run, 0.0
+        self._flown = [
+            (flight, group, memory, follow_setpoints(run, flight, group))
+            for group, memory, flight in zip(run.scene.groups, run.memory, run.flights, strict=True)
+            if flight is not None
+        ]
+        self._in_the_air = any(flight.in_the_air for flight, *_ in self._flown)
+
+    def begin_frame(self, seconds: float, frame: float) -> Actuate | None:
+        """Return what the engine has to call within a frame; None: nobody is in the air.
+
+        Parameters
+        ----------
+        seconds
+            Since the start of the run.
+        frame
+            Its length, seconds.
+        """
+        for flight, *_ in self._flown:
+            flight.begin_frame(self._run.engine)
+        self._began = seconds
+        if self._in_the_air:
+            return self._actuate
+        self._actuate(0.0, frame)
+        return None
+
+    def _actuate(self, since: float, step: float) -> None:
+        """Let rotors follow their commands and push for a step that begins so many seconds into the frame."""
+        for flight, group, memory, all_follow in self._flown:
+            command_rotors(self._run, flight, group, memory, step, all_follow=all_follow)
+            flight.push(self._run.engine, step, self._began + since)
 
 
 def command_motors(run: RobotRun, group: RobotGroup, memory: np.ndarray, velocity: np.ndarray | None) -> None:

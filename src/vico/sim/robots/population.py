@@ -19,7 +19,7 @@ from vico.sim.robots import commands, drawing, flying, sensing, tasks, trips
 from vico.sim.robots.batteries import charge_of, watch_batteries
 from vico.sim.robots.decisions import decide
 from vico.sim.robots.falls import watch_falls
-from vico.sim.robots.motors import command_motors, command_rotors, follow_setpoints, velocities
+from vico.sim.robots.motors import AllRotors, command_motors, velocities
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.rooms import turning_radius
 from vico.sim.robots.scene import RobotScene
@@ -277,23 +277,17 @@ class RobotPopulation:
         left += owed - ticks
         needs = self._needs()  # decided between sub-steps, not within
         holding = needs.forces_matter
-        # Robots that walk and drive by velocities, or None; those that fly, and whether all of them follow setpoints.
+        # Robots that walk and drive, by velocities or None.
         driven = [
             (group, memory, velocities(self.run, group))
             for group, memory, flight in zip(groups, self.run.memory, self.run.flights, strict=True)
             if flight is None
         ]
-        flown = [
-            (group, memory, flight, follow_setpoints(self.run, flight, group))
-            for group, memory, flight in zip(groups, self.run.memory, self.run.flights, strict=True)
-            if flight is not None
-        ]
-        # Rotors that stand need nothing told to them often.
-        busy = [group for group, *_ in driven] + [group for group, _, flight, _ in flown if flight.in_the_air]
+        rotors = AllRotors(self.run)
         lengths: dict[int, float] = {}  # of frames, by the ticks there are for one
         arrays.owed[0] = owed
         while owed:
-            room = min([left, *[group.period - now % group.period for group in busy]])
+            room = min([left, *[group.period - now % group.period for group, *_ in driven]])
             if room not in lengths:
                 lengths[room] = frame_length(needs, room * TICK)
             frame = lengths[room]
@@ -303,11 +297,7 @@ class RobotPopulation:
             for group, memory, velocity in driven:
                 if now % group.period == 0:
                     command_motors(self.run, group, memory, velocity)
-            for group, memory, flight, all_follow in flown:
-                if now % group.period == 0:
-                    command_rotors(self.run, flight, group, memory, all_follow=all_follow)
-                flight.push(self.engine, frame, now * TICK)
-            self.engine.step(frame=frame, holding=holding)
+            self.engine.step(frame=frame, holding=holding, actuate=rotors.begin_frame(now * TICK, frame))
             now, owed, left = now + taken, owed - taken, left - taken
             arrays.frames[0 if taken == 1 else 1] += 1
             arrays.tick[0], arrays.owed[0] = now, owed

@@ -44,8 +44,6 @@ class Airframe(NamedTuple):
         Of the rotors, as `vico.assets.robots.RotorModel`.
     fastest
         Of the rotors, rad/s.
-    period
-        Seconds between two commands.
     """
 
     mass: float
@@ -57,23 +55,23 @@ class Airframe(NamedTuple):
     thrust: float
     moment: float
     fastest: float
-    period: float
 
 
 @compiled
-def _follow(frame, position, velocity, setpoint, integral, wanted):  # type: ignore[no-untyped-def]
-    """Move what is followed on by a period, and write the acceleration that follows it."""
+def _follow(frame, seconds, motion, setpoint, integral, wanted):  # type: ignore[no-untyped-def]
+    """Move what is followed on by some seconds, and write the acceleration that follows it."""
+    position, velocity = motion
     for k in range(3):
         axis = 0 if k < 2 else 1
         if setpoint[3 + k] != 0.0:
-            ahead = setpoint[k] + setpoint[3 + k] * frame.period - position[k]
+            ahead = setpoint[k] + setpoint[3 + k] * seconds - position[k]
             setpoint[k] = position[k] + min(max(ahead, -_LEASH), _LEASH)
         speed = setpoint[3 + k] + _POSITION[axis] * (setpoint[k] - position[k])
         limit = frame.reach[axis]
         missing = min(max(speed, -limit), limit) - velocity[k]
-        integral[k] = min(max(integral[k] + _INTEGRAL[axis] * missing * frame.period, -_MOST_INTEGRAL), _MOST_INTEGRAL)
+        integral[k] = min(max(integral[k] + _INTEGRAL[axis] * missing * seconds, -_MOST_INTEGRAL), _MOST_INTEGRAL)
         wanted[k] = _VELOCITY[axis] * missing + integral[k]
-    setpoint[HEADING] += setpoint[TURNING] * frame.period
+    setpoint[HEADING] += setpoint[TURNING] * seconds
 
 
 @compiled
@@ -156,14 +154,14 @@ def _mix(frame, thrust, torque, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _fly_all(frame, motion, setpoints, memory):  # type: ignore[no-untyped-def]
+def _fly_all(frame, seconds, motion, setpoints, memory):  # type: ignore[no-untyped-def]
     """Return rotor speeds of all robots, rad/s, shape ``(k, rotors)``."""
     position, velocity, rotation, rates = motion
     out = np.empty((len(setpoints), len(frame.turns)))
     acceleration, attitude, torque = np.empty(3), np.empty((3, 3)), np.empty(3)
     for k in range(len(setpoints)):
         setpoint = setpoints[k]
-        _follow(frame, position[k], velocity[k], setpoint, memory[k], acceleration)
+        _follow(frame, seconds, (position[k], velocity[k]), setpoint, memory[k], acceleration)
         thrust = _attitude(frame, acceleration, setpoint[HEADING], attitude)
         # Tilted more or less than it should be, it pushes up as much as it should.
         upright = 0.0
@@ -199,18 +197,11 @@ class FourRotors(MotorController):
             rotors.thrust,
             rotors.moment,
             float(model.motor_limits[1].min()),
-            model.control_period,
         )
 
-    def targets(self, motion: Motion, command: Array, memory: Array) -> Array:
-        """Rotor speeds, rad/s.
-
-        Parameters
-        ----------
-        command
-            Setpoints, shape ``(k, 8)``: moved on in place.
-        """
-        assert command.shape[1] == SETPOINT
+    def rotor_speeds(self, motion: Motion, setpoints: Array, memory: Array, seconds: float) -> Array:
+        """Rotor speeds that follow setpoints, which move on by so many seconds."""
+        assert setpoints.shape[1] == SETPOINT
         state = (motion.position, motion.velocity, motion.rotation, motion.angular_velocity_body)
-        found: Array = _fly_all(self._frame, state, command, memory)
+        found: Array = _fly_all(self._frame, seconds, state, setpoints, memory)
         return found

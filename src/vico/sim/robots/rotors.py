@@ -132,33 +132,37 @@ class Flight(OnTheirWays):
         """Whether any of them flies."""
         return bool((self.arrays.phase != FlightPhase.LANDED).any())
 
-    def push(self, engine: PhysicsEngine, frame: float, seconds: float) -> None:
-        """Let rotors and air push for a frame that begins so many seconds after the start of the run."""
+    def begin_frame(self, engine: PhysicsEngine) -> None:
+        """Look up the ground below: it does not change much within a frame."""
+        self._below = self.ground(engine.motion(self.robots).position)
+
+    def push(self, engine: PhysicsEngine, step: float, seconds: float) -> None:
+        """Let rotors and air push for a step that begins so many seconds after the start of the run."""
         a, motion = self.arrays, engine.motion(self.robots)
-        above = motion.position[:, 2] - self.ground(motion.position)
+        above = motion.position[:, 2] - self._below
         wrenches = _push_all(
             (self._lift, self._lags, self._power, self._places, self._turns, self.gusts),
             (motion.position, motion.velocity, motion.rotation, above),
             (a.speed, a.wanted, a.turned, a.charge),
             a.wind,
-            frame,
+            step,
             seconds,
         )
         engine.thrust_all(self.robots, self._site, wrenches)
 
 
 @compiled
-def _turn_rotors(row, rotors, lags, frame):  # type: ignore[no-untyped-def]
-    """Let the rotors of a robot follow their commands for a frame; return the mean square of each one's speed."""
+def _turn_rotors(row, rotors, lags, step):  # type: ignore[no-untyped-def]
+    """Let the rotors of a robot follow their commands for a step; return the mean square of each one's speed."""
     speed, wanted, turned, charge = rotors
     squares = np.empty(speed.shape[1])
     for k in range(speed.shape[1]):
         before = speed[row, k]
         goal = wanted[row, k] if charge[row] > 0.0 else 0.0
         lag = lags[0] if goal > before else lags[1]
-        after = goal + (before - goal) * math.exp(-frame / lag)
+        after = goal + (before - goal) * math.exp(-step / lag)
         speed[row, k] = after if after > _STILL else 0.0
-        turned[row, k] = (turned[row, k] + 0.5 * (before + after) * frame) % (2.0 * math.pi)
+        turned[row, k] = (turned[row, k] + 0.5 * (before + after) * step) % (2.0 * math.pi)
         squares[k] = (before * before + before * after + after * after) / 3.0
     return squares
 
@@ -191,19 +195,19 @@ def _push(body, squares, lift, places, turns, out):  # type: ignore[no-untyped-d
 
 
 @compiled
-def _push_all(settings, motion, rotors, wind, frame, seconds):  # type: ignore[no-untyped-def]
-    """Let rotors turn and batteries drain for a frame; return forces and torques on all robots, shape ``(k, 6)``."""
+def _push_all(settings, motion, rotors, wind, step, seconds):  # type: ignore[no-untyped-def]
+    """Let rotors turn and batteries drain for a step; return forces and torques on all robots, shape ``(k, 6)``."""
     lift, lags, power, places, turns, gusts = settings
     position, velocity, rotation, above = motion
     charge = rotors[3]
     out, air, body = np.empty((len(position), 6)), np.empty(3), np.empty(3)
     for row in range(len(position)):
-        squares = _turn_rotors(row, rotors, lags, frame)
+        squares = _turn_rotors(row, rotors, lags, step)
         air_at(gusts, wind, position[row], above[row], seconds, air)
         past = air - velocity[row]
         for k in range(3):
             body[k] = rotation[row, 0, k] * past[0] + rotation[row, 1, k] * past[1] + rotation[row, 2, k] * past[2]
         work = _push(body, squares, lift, places, turns, out[row])
         drawn = power[0] * work + (power[1] if work > 0.0 else 0.0)
-        charge[row] = max(0.0, charge[row] - drawn * frame / power[2])
+        charge[row] = max(0.0, charge[row] - drawn * step / power[2])
     return out
