@@ -193,8 +193,16 @@ class DepthGrid:
         x, y = np.meshgrid(self.corner[0] + axis, self.corner[1] + axis)
         self._bumps |= ~_within(room, x, y)
         for box in furniture:
-            self._bumps |= _within(box, x, y)
+            part = self._around(box)
+            self._bumps[part] |= _within(box, x[part], y[part])
         self._blocked.clear()
+
+    def _around(self, box: NDArray[np.float64]) -> tuple[slice, slice]:
+        """Return rows and columns of cells, all those among them whose middles lie in an oriented rectangle."""
+        reach = math.hypot(box[3], box[4]) + self.cell
+        first, last = ((box[:2] + away - self.corner) / self.cell for away in (-reach, reach))
+        rows, columns = (slice(max(0, math.floor(first[k])), max(0, math.ceil(last[k]))) for k in (1, 0))
+        return rows, columns
 
     def bump(self, xy: ArrayLike) -> None:
         """Remember that something stopped a step at a point."""
@@ -257,7 +265,7 @@ def _search(blocked, start_x, start_y, aim_x, aim_y, reach):  # type: ignore[no-
     """Run A* on a grid; ties are broken by position."""
     n = blocked.shape[0]
     cost = np.full((n, n), np.inf)
-    parent = np.full((n, n), -1, np.int64)
+    parent = np.empty((n, n), np.int64)
     closed = np.zeros((n, n), np.bool_)
     cost[start_y, start_x] = 0.0
     queue = [(0.0, start_x, start_y)]

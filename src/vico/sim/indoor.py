@@ -21,6 +21,8 @@ from vico.world.objects import Objects
 #: Lists of free spots that are remembered, one a room and door.
 _SPOTS_KEPT = 4096
 _WAY_CELL = 0.1  # metres between the points by which ways in a room are found
+# Where one wants to stand may be as narrow as can be; other spots of a room have so much more room, metres.
+_NARROWER = 0.02
 _LEVEL = 0.5  # metres a door may lie above or below who goes through it
 
 
@@ -168,7 +170,10 @@ class Indoor:
         ndarray or None
             On the floor, ENU metres, shape ``(3,)``.
         """
-        spots = self._spots(room, np.asarray(near, np.float64).reshape(-1)[:2])
+        point = np.asarray(near, np.float64).reshape(-1)[:2]
+        if not len(taken) and room not in self.stairs and self.gap(room, point) + _NARROWER >= RADIUS + 0.02:
+            return np.array([*point, self.floor[room]])
+        spots = self._spots(room, point)
         if not len(taken) or not len(spots):
             return spots[0].copy() if len(spots) else None
         # A little more than touching, so that nobody starts in a contact.
@@ -199,7 +204,7 @@ class Indoor:
         spots = np.column_stack([x + c * grid[:, 0] - s * grid[:, 1], y + s * grid[:, 0] + c * grid[:, 1]])
         spots = np.vstack([near[None], spots])
         gap = self.gaps(room, spots)
-        gap[0] += 0.02  # the point itself may be as narrow as can be
+        gap[0] += _NARROWER
         spots = spots[gap >= RADIUS + 0.02]
         spots = spots[np.argsort(np.hypot(*(spots - near).T), kind="stable")]
         if room not in self.stairs:
@@ -294,7 +299,14 @@ def entrance_of(place: Place, entrances: dict[str, Entrance]) -> Entrance | None
 
 def near_door(position: NDArray[Any], door: Door, reach: float) -> bool:
     """Whether someone stands within `reach` metres of a door, measured on the floor, and on the door's level."""
+    return bool(doors_near(position, (door,), reach))
+
+
+def doors_near(position: NDArray[Any], doors: Sequence[Door], reach: float) -> list[Door]:
+    """Return the doors that someone stands within `reach` metres of, measured on the floor, and on the doors' level."""
     x, y, z = position.tolist()
-    if abs(z - door.position[2]) > _LEVEL:
-        return False
-    return math.hypot(x - door.position[0], y - door.position[1]) <= reach
+    return [
+        door
+        for door in doors
+        if abs(z - door.position[2]) <= _LEVEL and math.hypot(x - door.position[0], y - door.position[1]) <= reach
+    ]

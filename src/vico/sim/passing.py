@@ -166,13 +166,14 @@ def _is_in_the_way(
 ) -> bool:
     """Whether a step would bring somebody nearer to another body outdoors than one keeps."""
     p = state.people
-    near = np.flatnonzero(p.outdoors() & (np.abs(p.position[:, :2] - there).max(axis=1) < _REACH))
-    bodies = np.concatenate(
-        [
-            records_of(p.bodies_of(near[near != i])),
-            others[(np.abs(others["x"] - there[0]) < _LONGEST) & (np.abs(others["y"] - there[1]) < _LONGEST)],
-        ]
-    )
+    away = np.abs(p.position[:, :2] - there)
+    near = np.flatnonzero(p.outdoors() & (away[:, 0] < _REACH) & (away[:, 1] < _REACH))
+    near = near[near != i]
+    beside = (np.abs(others["x"] - there[0]) < _LONGEST) & (np.abs(others["y"] - there[1]) < _LONGEST)
+    beside &= others["space"] == OUTDOORS
+    if not len(near) and not beside.any():
+        return False
+    bodies = np.concatenate([records_of(p.bodies_of(near)), others[beside]])
     bodies = bodies[bodies["space"] == OUTDOORS]
     if not len(bodies):
         return False

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -9,13 +11,19 @@ from vico.sim.simulation_state import SimulationState
 from vico.sim.tills import AT_SPOT, LOST, PRICE, SPACING
 
 
-def place_in_line(i: int, state: SimulationState) -> tuple[int, NDArray[np.float64]] | None:
-    """Return how many are before a person at the till of its room, and where it stands, or would; None if nowhere."""
+def place_in_line(
+    i: int, state: SimulationState, line: Sequence[int] | None = None
+) -> tuple[int, NDArray[np.float64]] | None:
+    """Return how many are before a person at the till of its room, and where it stands, or would; None if nowhere.
+
+    `line` is who waits there, if that is known already.
+    """
     room = int(state.people.room[i])
     till = state.tills.get(room)
     if till is None:
         return None
-    line = state.lines.waiting(room)
+    if line is None:
+        line = state.lines.waiting(room)
     before = line.index(i) if i in line else len(line)
     return (before, till.spots[before]) if before < len(till.spots) else None
 

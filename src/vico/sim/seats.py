@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -138,9 +139,38 @@ class Seats:
 
     def in_room(self, room: int) -> slice:
         """Return which seats are in a room, or outdoors (-1)."""
-        # Of the same type: all rooms would be converted to that of the sought ones.
-        first, last = np.searchsorted(self.room, np.array((room, room + 1), self.room.dtype))
-        return slice(int(first), int(last))
+        starts = self._starts
+        if room + 2 >= len(starts):
+            return slice(len(self), len(self))
+        return slice(starts.item(room + 1), starts.item(room + 2))
+
+    @cached_property
+    def _starts(self) -> NDArray[np.int64]:
+        """First seat outdoors, of room 0, and so on to one after the last room that has any."""
+        rooms = np.arange(-1, int(self.room.max(initial=-1)) + 2, dtype=self.room.dtype)
+        return np.searchsorted(self.room, rooms)
+
+    @cached_property
+    def _stands(self) -> tuple[NDArray[np.int8], NDArray[np.float64]]:
+        """Of each seat whether it is known where one stands to take it: 0 not yet, 1 nowhere, 2 there; and the spot."""
+        return np.zeros(len(self), np.int8), np.zeros((len(self), 3))
+
+    def stand_before(self, seat: int, indoor: Indoor) -> tuple[float, float, float] | None:
+        """Return where one stands, ENU metres, to take a seat of an empty room; None where it cannot be reached.
+
+        Neither seats nor furniture move: it is found once a seat.
+        """
+        known, spots = self._stands
+        if not known[seat]:
+            room = self.room.item(seat)
+            stand = indoor.free_spot(room, self.before(seat)[:2], np.zeros((0, 3)))
+            reached = stand is not None and seat in self.near(
+                stand, room, lies=self.lies.item(seat), reach=REACH - _SHORT
+            )
+            if stand is not None and reached:
+                spots[seat] = stand
+            known[seat] = 2 if reached else 1
+        return _triple(spots[seat].tolist()) if known[seat] == 2 else None
 
     def near(self, point: ArrayLike, room: int, *, lies: bool, reach: float = REACH) -> NDArray[np.int64]:
         """Return the seats, or the beds, of a room within reach of a point on its floor, the nearest first."""
@@ -221,14 +251,16 @@ def _free_in(
     """Return the free seat of a room that is nearest to a point and can be reached, and where one stands before it."""
     point, room = here
     inside = seats.in_room(room)
-    free = np.flatnonzero((seats.lies[inside] == lies) & ~taken[inside])
+    free = ((seats.lies[inside] == lies) & ~taken[inside]).nonzero()[0]
+    if not len(free):
+        return None
     x, y = np.asarray(point, np.float64)[:2]
     places = seats.position[inside][free]
     order = np.argsort((places[:, 0] - x) ** 2 + (places[:, 1] - y) ** 2, kind="stable")
     for seat in (inside.start + free[order[:_TRIED]]).tolist():
-        stand = indoor.free_spot(room, seats.before(seat)[:2], np.zeros((0, 3)))
-        if stand is not None and seat in seats.near(stand, room, lies=lies, reach=REACH - _SHORT):
-            return seat, _triple(stand)
+        stand = seats.stand_before(seat, indoor)
+        if stand is not None:
+            return seat, stand
     return None
 
 

@@ -18,7 +18,7 @@ from vico.sim.door_leaves import DoorLeaves
 from vico.sim.environment import Conditions, Environment
 from vico.sim.event_things import EventThings
 from vico.sim.events import Events
-from vico.sim.indoor import Indoor, near_door
+from vico.sim.indoor import Indoor, doors_near
 from vico.sim.openings import OpeningHours
 from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.robot_system import RobotSystem
@@ -298,9 +298,9 @@ class SimulationState:
         if p.vehicle.item(i) != _ON_FOOT:
             return []
         if (room := p.room.item(i)) >= 0:
-            doors = self.indoor.doors[room]
-            near = [d.to for d in doors if d.to >= 0 and near_door(p.position[i], d, INNER_DOOR_REACH)]
-            return [self.indoor.rooms[to].id for to in near]
+            indoor = self.indoor
+            near = doors_near(p.position[i], indoor.doors[room], INNER_DOOR_REACH)
+            return [indoor.rooms[door.to].id for door in near if door.to >= 0]
         x, y = p.position[i, :2].tolist()
         return [self.world.places[k].id for k in self.base.entrances_near(x, y)]
 

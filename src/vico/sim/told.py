@@ -31,26 +31,39 @@ _POSTURES = {int(posture): posture.name.lower() for posture in Posture}
 _STATUSES = {int(status): status.name.lower() for status in ActionStatus}
 
 
-def _till_of(state: SimulationState, i: int) -> dict[str, Any] | None:
-    """Return where somebody stands in line at the till of its room, or would join, and how many are before it there."""
-    room = state.people.room.item(i)
-    if room < 0 or room not in state.tills or (place := place_in_line(i, state)) is None:
-        return None
-    x, y = place[1].tolist()
-    waits = bool(state.lines.room[i] == room)
-    return {"stand": (x, y, float(state.indoor.floor[room])), "before": place[0], "waits": waits}
+class _Tills:
+    """Tills of a moment: who waits at each, and who serves there, is found when it is first asked for."""
 
+    def __init__(self, state: SimulationState) -> None:
+        self._state = state
+        self._lines: dict[int, list[int]] = {}
+        self._serving: dict[int, list[int]] = {}
 
-def _counter_of(state: SimulationState, i: int) -> tuple[float, float, float, float] | None:
-    """Return where somebody may serve in its room, ENU metres and yaw; None where nobody can, or somebody does."""
-    p = state.people
-    till = state.tills.get(p.room.item(i))
-    if till is None or till.behind is None:
-        return None
-    x, y, yaw = till.behind
-    near = (p.room == till.room) & (np.hypot(p.position[:, 0] - x, p.position[:, 1] - y) < _TAKEN)
-    near[i] = False
-    return None if near.any() else (x, y, float(state.indoor.floor[till.room]), yaw)
+    def place_of(self, i: int, room: int) -> dict[str, Any] | None:
+        """Return where somebody stands in line at the till of its room, or would, and how many are before it there."""
+        state = self._state
+        if room not in self._lines:
+            self._lines[room] = state.lines.waiting(room)
+        place = place_in_line(i, state, self._lines[room])
+        if place is None:
+            return None
+        x, y = place[1].tolist()
+        waits = bool(state.lines.room[i] == room)
+        return {"stand": (x, y, float(state.indoor.floor[room])), "before": place[0], "waits": waits}
+
+    def counter_of(self, i: int, room: int) -> tuple[float, float, float, float] | None:
+        """Return where somebody may serve in its room, ENU metres and yaw; None where nobody can, or somebody does."""
+        state = self._state
+        behind = state.tills[room].behind
+        if behind is None:
+            return None
+        x, y, yaw = behind
+        if room not in self._serving:
+            p = state.people
+            near = (p.room == room) & (np.hypot(p.position[:, 0] - x, p.position[:, 1] - y) < _TAKEN)
+            self._serving[room] = near.nonzero()[0].tolist()
+        others = [j for j in self._serving[room] if j != i]
+        return None if others else (x, y, float(state.indoor.floor[room]), yaw)
 
 
 def _closed_to(state: SimulationState, i: int) -> list[str]:
@@ -93,6 +106,7 @@ class Told:
         self._eyes_of = {i: k for k, i in enumerate(self._residents.tolist())}
         self._in_view = look_about(state, stances, self._residents)
         self._seats_taken: NDArray[np.bool_] | None = None
+        self._tills = _Tills(state)
         self._weather = state.environment.record()
         self._signals = state.traffic.signals_shown() if state.traffic is not None else None
         asks = range(people) if state.openings is not None else ()
@@ -124,10 +138,11 @@ class Told:
             found["closed_now"] = self._closed[i]
         if i < len(p) and p.passing.item(i) < 0:
             found["coming_out"] = True
-        if i < len(p) and (till := _till_of(self._state, i)) is not None:
-            found["till"] = till
-        if i < len(p) and p.room.item(i) >= 0 and (counter := _counter_of(self._state, i)) is not None:
-            found["counter"] = counter
+        if i < len(p) and (inside := p.room.item(i)) in self._state.tills:
+            if (till := self._tills.place_of(i, inside)) is not None:
+                found["till"] = till
+            if (counter := self._tills.counter_of(i, inside)) is not None:
+                found["counter"] = counter
         if i not in self._eyes_of:
             return found
         view = self._in_view.of(self._eyes_of[i])
