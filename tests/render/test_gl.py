@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vico.assets.bus import bus, bus_cabin, bus_inside_lights
+from vico.assets.bus import bus, bus_cabin
 from vico.assets.shapes import ball, box, pose_matrix
+from vico.assets.vehicle_lights import night_lamps
 from vico.errors import InputError, MissingExtraError
 from vico.render import Cameras, Lighting, Scene
 from vico.render.frames import PictureRequest, take_pictures
@@ -54,7 +55,7 @@ def scene() -> Scene:
     models = {
         "tree": [replace(crown, material=leaf, uv=crown.positions[:, :2])],
         "cube": [box((1, 1, 1), (0, 0, 0.5), colour=(200, 40, 40))],
-        "bus": [bus(), bus_inside_lights()],
+        "bus": [bus(), night_lamps("bus")],
         "crown": [replace(crown, material=Material("glow", emission=1.0))],
     }
     made = Scene(

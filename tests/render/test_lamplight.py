@@ -9,8 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from vico.assets.shapes import box, pose_matrix
+from vico.assets.vehicle_lights import night_lamps
 from vico.render import Cameras, Lighting, Scene, render
 from vico.render.lamps.found import HEAD, lamps_placed, shop_lamps, with_lit_heads
+from vico.render.view_cache import ViewCache
 from vico.world.mesh import Material, Surface
 
 NIGHT, DAY = Lighting.at(23 * 3600), Lighting.at(12 * 3600)
@@ -90,3 +92,16 @@ def test_bright_parts_high_up_are_what_shines_in_a_lamp() -> None:
     assert with_lit_heads(glass) == glass
     lamp = lamps_placed({"post": heads}, ["post"], pose_matrix(3.0, 1.0, 5.0, np.pi / 2)[None])[0]
     assert [float(lamp[name]) for name in "xyz"] == pytest.approx([3.0, 1.5, 11.0])
+
+
+def test_headlights_light_what_is_ahead_also_for_an_eye_that_stands_still() -> None:
+    ground = box((160, 160, 1), (0, 0, -0.5)).of_entity(GROUND)
+    made = Scene([ground], {"car": [night_lamps("sedan")]}, lighting=NIGHT)
+    eye, cache = Cameras(np.array([[0.0, -12.0, 3.0]]), np.array([[0.0, 1.0, -0.2]]), width=64, height=64), ViewCache()
+    for x in (-12.0, -8.0, -4.0):
+        made.set_rigid([0], pose_matrix(x, 0.0, 0.0, 0.0)[None], [30])
+        np.testing.assert_array_equal(render(made, eye, cache=cache).rgb, render(made, eye).rgb)
+    ahead, behind = bright(made, 6.0, 0.0), bright(made, -14.0, 0.0)
+    assert ahead > 1.2 * behind
+    made.lighting = DAY
+    assert bright(made, 6.0, 0.0) == pytest.approx(bright(made, -14.0, 0.0), abs=0.5)

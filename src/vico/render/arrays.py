@@ -139,6 +139,8 @@ class SceneArrays(NamedTuple):
         ``(n, 2)``. The last row is for all entities beyond.
     openings
         Doors that are not closed, `OPENING`.
+    beams
+        Headlights, `LAMP`, of what moves.
     """
 
     mesh: Mesh
@@ -151,6 +153,7 @@ class SceneArrays(NamedTuple):
     counts: Any
     windows: NDArray[np.float32]
     openings: NDArray[np.void]
+    beams: NDArray[np.void]
 
 
 class Buffers(NamedTuple):

@@ -19,6 +19,7 @@ from vico.errors import InputError
 from vico.render.arrays import Buffers, buffers_for
 from vico.render.behind.panes import show_rooms
 from vico.render.cameras import Cameras
+from vico.render.lamps.beams import LIT_FROM
 from vico.render.lighting import Lighting
 from vico.render.quality import PLAIN, RenderQuality
 from vico.render.scene import Scene
@@ -289,7 +290,9 @@ def _render_cached(
             return
         camera, pictures = _camera(scene, cameras, k, 1), batch.pictures(k)
         background = cache.background(k, scene, camera)
-        if background is None:
+        # Headlights of what moves light what stays.
+        lit = len(scene.arrays.beams) > 0 and light.uniforms["lamp_exposure"] >= LIT_FROM and not camera["indoors"]
+        if background is None or lit:
             _take(scene, camera, light, pictures)
             return
         buffers = _buffers(scene, cameras.width, cameras.height)

@@ -17,13 +17,12 @@ from vico.render.arrays import (
     SHADOWLESS,
     Instances,
     PosedAvatars,
-    Prototypes,
     SceneArrays,
     widest,
 )
 from vico.render.avatars import no_avatars, pose_avatars, with_room
 from vico.render.compiled import kernel
-from vico.render.geometry import Mesh, Soup, clustered, grouped, joined_meshes, mesh_of, simplified, soup_of, spans
+from vico.render.geometry import Mesh, clustered, grouped, joined_meshes, mesh_of, soup_of, spans
 from vico.render.instances import (
     NO_GROUPS,
     entities_of,
@@ -32,24 +31,23 @@ from vico.render.instances import (
     neighbours_together,
     with_spare,
 )
+from vico.render.lamps.beams import beams_of
 from vico.render.lamps.grid import NO_LAMPS, LampGrid, lamp_grid, shining
 from vico.render.lighting import Lighting, cloud_map, linear_table, sky_table, tone_table, unit
 from vico.render.limbs import LIMBS
-from vico.render.records import COUNTS, LAMP, OPENING, ROOM, ROOM_FRONT, SPAN, SPHERE
+from vico.render.prototypes import prototypes_of
+from vico.render.records import COUNTS, LAMP, OPENING, ROOM, ROOM_FRONT, SPHERE
 from vico.render.shading.light import Light, ReliefMap, ShadowMap
 from vico.render.shading.sky import SKY_SIZE, paint_sky
-from vico.render.shadows.cabins import cabin_records
 from vico.render.shadows.maps import built_tops, relief_map, shadow_map
 from vico.render.textures import pack_textures
 from vico.render.uniforms import Record, light_uniforms
 from vico.world.mesh import Material, Surface
 
-# A level of detail is left for the next coarser one below these sizes on screen, pixels.
-_LEVEL_PIXELS = (1e9, 48.0, 20.0)
-_LEVEL_CELLS = (0.07, 0.16)
 _SHADOW_METRES, _RELIEF_METRES = 0.4, 1.5
 _ALL_ON = np.ones((1, 2), np.float32)
 NO_OPENINGS = np.zeros(0, OPENING)
+_NO_BEAMS = np.zeros(0, LAMP)
 
 
 class Scene:
@@ -123,7 +121,7 @@ class Scene:
         where = np.full(len(clusters.span), OUTDOORS, np.uint8)
         where[len(outer.span) :] = INDOORS
         surfaces = joined_meshes([mesh_of(outside), mesh_of(inside)])
-        placeable, model_meshes = _prototypes(model_soups, list(models), cabins or {})
+        placeable, model_meshes = prototypes_of(model_soups, list(models), cabins or {})
         _shift(placeable.levels, len(surfaces.triangle), len(surfaces.x))
         mesh = joined_meshes([surfaces, *model_meshes])
         self.names = {name: k for k, name in enumerate(models)}
@@ -137,6 +135,7 @@ class Scene:
         self.fronts = np.zeros(0, ROOM_FRONT)
         self.lamps = np.zeros(0, LAMP)
         self._grid: LampGrid | None = None
+        self._beams = beams_of(models)
         self._shadow_key: tuple[float, ...] | None = None
         self._shadow: ShadowMap | None = None
         self._relief: ReliefMap | None = None
@@ -165,6 +164,7 @@ class Scene:
             np.zeros(1, COUNTS)[0],
             _ALL_ON,
             NO_OPENINGS,
+            _NO_BEAMS,
         )
         self.arrays.counts["fixed_vertices"] = max(widest(clusters.span), widest(placeable.levels.reshape(-1)))
 
@@ -231,6 +231,7 @@ class Scene:
         self.shadowless = shadowless
         where = np.full(len(number), ANYWHERE, np.uint8)
         where[len(number) - shadowless :] = SHADOWLESS
+        self._replace(beams=self._beams.placed(number, rows))
         self._set_instances(self._instances(rows, number, entities_of(entity, len(number)), where))
 
     def keep_detail(self, names: Iterable[str]) -> None:
@@ -470,32 +471,6 @@ def _shift(span: NDArray[np.void], triangles: int, vertices: int) -> None:
     span["end_triangle"] += triangles
     span["first_vertex"] += vertices
     span["end_vertex"] += vertices
-
-
-def _prototypes(
-    soups: Sequence[Soup], names: Sequence[str], cabins: Mapping[str, Cabin]
-) -> tuple[Prototypes, list[Mesh]]:
-    """Return models with their levels of detail, and the meshes of these one behind the other."""
-    levels = np.zeros((len(soups), len(_LEVEL_PIXELS)), SPAN)
-    bounds = np.zeros((2, len(soups), 3), np.float32)
-    pixels = np.tile(np.array(_LEVEL_PIXELS, np.float32), (len(soups), 1))
-    meshes: list[Mesh] = []
-    triangles, vertices = 0, 0
-    for k, soup in enumerate(soups):
-        if not len(soup.triangles):
-            continue
-        bounds[:, k] = soup.position.min(axis=0), soup.position.max(axis=0)
-        size = float(np.linalg.norm(bounds[1, k] - bounds[0, k]))
-        for level in range(len(_LEVEL_PIXELS)):
-            coarse = soup if level == 0 else simplified(soup, max(size * _LEVEL_CELLS[level - 1], 1e-6))
-            if coarse is None:
-                levels[k, level] = levels[k, level - 1]
-                continue
-            end_triangle, end_vertex = triangles + len(coarse.triangles), vertices + len(coarse.position)
-            levels[k, level] = triangles, end_triangle, vertices, end_vertex
-            triangles, vertices = end_triangle, end_vertex
-            meshes.append(mesh_of(coarse))
-    return Prototypes(bounds[0], bounds[1], levels, pixels, *cabin_records(names, cabins, *bounds)), meshes
 
 
 @kernel

@@ -5,10 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.render.lamps.beams import MOST_BEAMS, nearest_beams
 from vico.render.lamps.grid import LampGrid
+from vico.render.uniforms import Record
 
 #: Numbers of each lamp.
 LAMP_FLOATS = 12
+
+
+def packed_beams(beams: NDArray[np.void], camera: Record, light: Record) -> NDArray[np.float32]:
+    """Return the headlights that light a camera's picture, in a light's uniforms."""
+    chosen = np.zeros(MOST_BEAMS, np.int64)
+    return beams[chosen[: nearest_beams(beams, camera, light["lamp_exposure"], chosen)]].view(np.float32)
 
 
 def packed_lamps(grid: LampGrid) -> NDArray[np.float32]:

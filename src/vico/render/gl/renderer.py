@@ -14,7 +14,7 @@ from vico.render.behind.panes import show_rooms
 from vico.render.cameras import Cameras
 from vico.render.frames import Frames, PictureRequest, light_of
 from vico.render.gl.culling import cluster_ranges, instances_in_view, joined_ranges
-from vico.render.gl.lamps import LAMP_FLOATS, packed_lamps
+from vico.render.gl.lamps import LAMP_FLOATS, packed_beams, packed_lamps
 from vico.render.gl.moving import CASTER_ROWS, OPENINGS, packed_cabins, packed_casters, packed_openings, packed_past
 from vico.render.lamps.grid import CELL
 from vico.render.lighting import TONE_RANGE, TONE_STEPS
@@ -182,9 +182,12 @@ class GlRenderer:
         arrays = self.scene.arrays
         casters = packed_casters(arrays, camera, light) if moving else np.zeros((0, 1), np.float32)
         self._buffer("casters", 12, casters)
+        beams = packed_beams(arrays.beams, camera, light.uniforms) if moving else np.zeros(0, np.float32)
+        self._buffer("beams", 17, beams)
         shown = min(len(arrays.openings), OPENINGS) if moving and not camera["indoors"] else 0
         uniforms: dict[str, Any] = {
             "caster_count": len(casters),
+            "beam_count": len(beams) // LAMP_FLOATS,
             "opening_count": shown,
             "with_past": int(past is not None),
         }

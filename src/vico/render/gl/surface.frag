@@ -9,6 +9,7 @@ layout(std430, binding = 9) readonly buffer Tone { int tone[]; };
 layout(std430, binding = 12) readonly buffer Casters { vec4 casters[]; };  // see `packed_casters`
 layout(std430, binding = 15) readonly buffer Cabins { float cabins[]; };  // see `packed_cabins`
 layout(std430, binding = 16) readonly buffer Lamps { float lamps[]; };  // see `packed_lamps`
+layout(std430, binding = 17) readonly buffer Beams { float beams[]; };  // see `packed_beams`
 
 uniform usampler2D closeness;
 uniform sampler2D relief;
@@ -21,7 +22,7 @@ uniform vec4 room_place, room_size;  // centre and cosine of the yaw; half lengt
 uniform vec3 room_light;  // shares of lamps, of light all around, and of what windows show by day
 uniform vec4 lamp_grid;  // corner, columns and rows of the cells
 uniform ivec2 lamp_parts;  // where lamps and what cells name of them begin
-uniform int indoors, hidden, most_taps, levels_each, is_person, caster_count, opening_count;
+uniform int indoors, hidden, most_taps, levels_each, is_person, caster_count, opening_count, beam_count;
 
 in vec3 place;
 in vec3 normal;
@@ -217,7 +218,26 @@ vec3 left_by_moving() {
     return left;
 }
 
-// Light of lamps that stay where they are: `vico.render.shading.lamplight`.
+// Light of lamps: `vico.render.shading.lamplight`.
+float lamp_on(vec3 to, vec3 axis, vec2 cone, vec2 power, float inverse_reach, vec3 n) {
+    float squared = dot(to, to) + 1e-4, inverse = inversesqrt(squared);
+    float facing = max(dot(to, n) * inverse + %AROUND_CORNER%, 0.0);
+    float thrown = clamp(cone.y - cone.x * dot(to, axis) * inverse, 0.0, 1.0);
+    float left = max(1.0 - squared * inverse_reach, 0.0);
+    return power.x * facing * thrown * left * left / (squared + power.y);
+}
+
+float headlights(vec3 at, vec3 n) {
+    float sum = 0.0;
+    for (int k = 0; k < beam_count; k++) {
+        int b = 12 * k;
+        vec3 to = vec3(beams[b], beams[b + 1], beams[b + 2]) - at, axis = vec3(beams[b + 3], beams[b + 4], beams[b + 5]);
+        vec2 cone = vec2(beams[b + 6], beams[b + 7]), power = vec2(beams[b + 8] * lamp_exposure, beams[b + 9]);
+        sum += lamp_on(to, axis, cone, power, beams[b + 10], n);
+    }
+    return sum;
+}
+
 float lamplight(vec3 at, vec3 n) {
     if (lamp_grid.w == 0.0) return 0.0;
     vec2 cell = (at.xy + 1.2 * n.xy - lamp_grid.xy) / %CELL%, low = floor(cell);
@@ -229,12 +249,9 @@ float lamplight(vec3 at, vec3 n) {
         int one = lamp_parts.y + 5 * i, lamp = lamp_parts.x + 12 * floatBitsToInt(lamps[one]);
         vec3 to = vec3(lamps[lamp], lamps[lamp + 1], lamps[lamp + 2]) - at;
         vec3 axis = vec3(lamps[lamp + 3], lamps[lamp + 4], lamps[lamp + 5]);
-        float squared = dot(to, to) + 1e-4, inverse = inversesqrt(squared);
-        float facing = max(dot(to, n) * inverse + %AROUND_CORNER%, 0.0);
-        float thrown = clamp(lamps[lamp + 7] - lamps[lamp + 6] * dot(to, axis) * inverse, 0.0, 1.0);
-        float left = max(1.0 - squared * lamps[lamp + 10], 0.0);
+        vec2 cone = vec2(lamps[lamp + 6], lamps[lamp + 7]), power = vec2(lamps[lamp + 8], lamps[lamp + 9]);
         float comes = mix(mix(lamps[one + 1], lamps[one + 2], st.x), mix(lamps[one + 3], lamps[one + 4], st.x), st.y);
-        sum += lamps[lamp + 8] * facing * thrown * left * left * comes / (squared + lamps[lamp + 9]);
+        sum += comes * lamp_on(to, axis, cone, power, lamps[lamp + 10], n);
     }
     return sum;
 }
@@ -356,7 +373,7 @@ void main() {
         float toward = max(dot(place, sun) / max(length_, 1e-12), 0.0);
         float glow = 0.10 * toward * toward * toward;
         vec3 around = (ambient + n.z * tilt + dot(n.xy, side)) * sky_share(at, n) * left.y;
-        float lamp = lamplight(at, n) * left.y;
+        float lamp = (lamplight(at, n) + headlights(at, n)) * left.y;
         light = base.rgb * (facing * sun_colour + around + (shine + lamp) * vec3(1.0, 0.86, 0.62));
         light = (1.0 - clear) * (haze + glow * sun_colour) + clear * light;
         light += left.z * lamp_exposure * (%CABIN_LAMP% + %CABIN_TILT% * n.z) * vec3(1.0, %CABIN_GREEN%, %CABIN_BLUE%) * base.rgb;

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from vico.render.arrays import RUN
 from vico.render.compiled import inlined
+from vico.render.lamps.beams import BEAM_REACH, MOST_BEAMS, nearest_beams
 from vico.render.lamps.grid import CELL
 from vico.render.shading.fields import LAMPS, NX, NY, NZ, X, Y, Z
 
@@ -18,14 +19,48 @@ BEFORE = np.float32(1.0)
 _ZERO, _ONE, _TINY = np.float32(0.0), np.float32(1.0), np.float32(1e-4)
 _PER_METRE = 1.0 / CELL
 
+# Blocks are up to some metres wide.
+_REACH = (BEAM_REACH + 4.0) ** 2
+
+
+class _Comes(NamedTuple):
+    """What comes of a lamp's light to the corners of a cell."""
+
+    low: tuple[Any, Any]
+    high: tuple[Any, Any]
+
+
+# Nothing hides headlights.
+_OPEN = _Comes((_ONE, _ONE), (_ONE, _ONE))
+
+
+class ShownBeams(NamedTuple):
+    """Headlights of a picture: the first `number` of `chosen` are rows of `lamps`."""
+
+    lamps: Any
+    chosen: Any
+    number: int
+    exposure: Any
+
 
 @inlined
-def queue_lamplight(real: Any, at: int, grid: Any, x: float, y: float) -> None:
+def shown_beams(beams: Any, camera: Any, exposure: Any) -> Any:
+    """Return the headlights that light a camera's picture; `exposure` is that of lamps."""
+    chosen = np.zeros(MOST_BEAMS, np.int64)
+    return ShownBeams(beams, chosen, nearest_beams(beams, camera, exposure, chosen), exposure)
+
+
+@inlined
+def queue_lamplight(real: Any, at: int, grid: Any, beams: Any, x: float, y: float) -> None:
     """Lay the light of lamps on a block of pixels into the queue; `x`, `y` is a point before its middle."""
-    if grid.rows == 0:
+    if grid.rows == 0 and beams.number == 0:
         return
     for i in range(RUN):
         real[LAMPS + at + i] = _ZERO
+    for k in range(beams.number):
+        beam = beams.lamps[beams.chosen[k]]
+        if (x - beam.x) ** 2 + (y - beam.y) ** 2 < _REACH:
+            _add_lamp(real, at, beam, beam.power * beams.exposure, _OPEN, _ZERO, _ZERO)
     u, v = (x - grid.x) * _PER_METRE, (y - grid.y) * _PER_METRE
     if not (u >= 0.0 and v >= 0.0 and u < grid.columns and v < grid.rows):
         return

@@ -37,7 +37,7 @@ from vico.render.shading.fields import (
     Y,
     Z,
 )
-from vico.render.shading.lamplight import queue_lamplight
+from vico.render.shading.lamplight import queue_lamplight, shown_beams
 from vico.render.shading.pixels import MovingShadows, PixelQueue, finish, finish_sky
 from vico.render.shading.sky import SKY_SIZE
 from vico.render.shading.triangle import set_up_triangle
@@ -147,6 +147,7 @@ def shade(scene: Any, camera: Any, light: Any, buffers: Any, drawn: int, shadows
     sky, relief, relief_height = light.sky, light.relief, light.relief.height
     relief_frame = _ReliefFrame(relief.x, relief.y, relief.texels_per_metre)
     lamp_exposure = light.uniforms.lamp_exposure
+    beams = shown_beams(scene.beams, camera, lamp_exposure)
     indoors, width, eye = camera.indoors != 0, camera.width, _eye(camera)
     is_covered = light.uniforms.snow_cover > _ZERO or light.uniforms.wet > _ZERO
     flat_out = out.reshape(-1)
@@ -204,7 +205,7 @@ def shade(scene: Any, camera: Any, light: Any, buffers: Any, drawn: int, shadows
                 _queue_normals(real, at, setup, eye)
                 _queue_constants(real, at, window.du, window.dv, open_sky, own)
                 _queue_addresses(whole, at, window, offset + column, setup.window)
-                queue_lamplight(real, at, light.lamps, x, y)
+                queue_lamplight(real, at, light.lamps, beams, x, y)
                 queued += count
                 column += count
                 if queued > QUEUE - RUN:
