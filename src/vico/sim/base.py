@@ -102,11 +102,11 @@ class SimulationBase:
 
     @cached_property
     def solids(self) -> list[shapely.Polygon]:
-        """Footprints nobody walks through: buildings and solid things outdoors."""
+        """Footprints nobody walks through: buildings, and the feet of solid things outdoors."""
         world = self.world
         solids = [shapely.Polygon(b.footprint[0], b.footprint[1:]) for b in world.buildings]
         things = world.objects.where(np.asarray(world.objects.solid & world.objects.outdoors, bool))
-        solids += [shapely.Polygon(corners) for corners in things.corners()]
+        solids += [shapely.Polygon(corners) for corners in things.feet()]
         return [solid for solid in solids if solid.is_valid and not solid.is_empty]
 
     @property

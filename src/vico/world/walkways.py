@@ -18,6 +18,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 SIDEWALK, CROSSING, CORNER = 0, 1, 2
+_AT_END = 1e-6  # metres from an end of a line that are no way: lengths are sums of rounded numbers
 SHORTEST = 6.0  # metres of sidewalk left between two obstacles that are worth keeping
 _ON_GROUND = 0.5  # metres from the ground's height to what lies on it
 _STEP_OFF = 1.2  # how far who is stuck steps off the kerb, metres
@@ -218,8 +219,8 @@ def _piece(row: _Row, course: ClearCourse, spare: int) -> _Row:
     along = _along(row.line)
     z = np.interp(course.offsets, along, row.z)
     ends = (
-        row.ends[0] if course.offsets[0] == 0.0 else spare,
-        row.ends[1] if course.offsets[-1] == along[-1] else spare + 1,
+        row.ends[0] if course.offsets[0] < _AT_END else spare,
+        row.ends[1] if course.offsets[-1] > along[-1] - _AT_END else spare + 1,
     )
     return replace(row, line=course.points, z=z, room=course.room, reach=course.reach, ends=ends)
 
