@@ -55,6 +55,9 @@ class HasBuses(Protocol):
     def stopped_at(self, bus: int) -> str | None:
         """Id of the stop at which a bus stands."""
 
+    def bodies(self) -> Bodies:
+        """Bodies of trams and of bicycles that stand about."""
+
     def doors(self, bus: int) -> NDArray[np.float64]:
         """Where the doors are."""
 
@@ -186,7 +189,7 @@ class Passengers:
     def _get_off(self, i: int, bus: int, stop: str, obstacles: Bodies) -> None:
         """Let somebody off beside a door, if there is room."""
         way = self._sidewalks.get(stop)
-        everybody = Bodies.joined([self._traffic.bodies(), obstacles])
+        everybody = Bodies.joined([self._traffic.bodies(), self._transit.bodies(), obstacles])
         for door in self._transit.exit_spots(bus) if way is not None else ():
             spot = free_ground(self._walkable, door, everybody, within=_BESIDE)
             if spot is not None and way is not None:
