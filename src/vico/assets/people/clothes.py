@@ -125,7 +125,7 @@ def _foremost(part: BodyPart, y: NDArray[np.float64], z: NDArray[np.float64]) ->
     """Return the largest x of a part's surface at each (y, z)."""
     a, b, c = (part.vertices[part.triangles[:, k]] for k in range(3))
     area = (b[:, 1] - a[:, 1]) * (c[:, 2] - a[:, 2]) - (c[:, 1] - a[:, 1]) * (b[:, 2] - a[:, 2])
-    facing = np.abs(area) > 1e-12
+    facing = area > 1e-12  # towards +x: above its rim in front there is still the back of the collar
     a, b, c, area = a[facing], b[facing], c[facing], area[facing]
     py, pz = y[:, None], z[:, None]
     u = ((b[:, 1] - py) * (c[:, 2] - pz) - (c[:, 1] - py) * (b[:, 2] - pz)) / area
