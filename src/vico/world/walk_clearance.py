@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -110,18 +111,50 @@ def courses_past(
         solid = [blocked.get(k, []) for k in range(first, first + count)]
         solid = [[*b, *a, *c] for b, a, c in zip([[], *solid[:-1]], solid, [*solid[1:], []], strict=True)]
         free = [_free(gaps, float(reach[i])) for gaps in solid]
-        depth = _depth(points[here], normals[here], float(room[i]), None if ground is None else ground[i])
+        line = _Line(along, points[here], normals[here], float(room[i]), None if ground is None else ground[i])
         first += count
-        if depth is None and not any(solid):
+        if not line.has_edges and not any(solid):
             continue
-        for _ in range(_TRIES):
-            found[i] = _courses(along, points[here], normals[here], free, float(room[i]), depth)
-            touched = _touched(found[i], tree)
-            if not len(touched):
-                break
-            # A kink may lead between two cross-sections, through a solid that is in neither.
-            for k in np.flatnonzero((np.abs(along[:, None] - touched) < _AROUND).any(axis=1)).tolist():
-                free[k] = []
+        found[i] = _led_past(line, list(free), line.room, tree)
+        if not any(course.is_whole for course in found[i]):
+            # Rather than end at what stands in the way, it leads round it off its own room, where that is above edges.
+            beside = _led_past(line, free, float(reach[i]), tree)
+            found[i] = beside if any(course.is_whole for course in beside) else found[i]
+    return found
+
+
+@dataclass(frozen=True)
+class _Line:
+    """A line to lead past solids: places along it, directions to the left there, its room, and ground with edges."""
+
+    along: Floats
+    points: Floats
+    normals: Floats
+    room: float
+    ground: HeightField | None
+
+    @cached_property
+    def has_edges(self) -> bool:
+        """Whether an edge is to be kept off within its room."""
+        return self.depth(self.room) is not None
+
+    def depth(self, bend: float) -> Floats | None:
+        """Return by how many metres each place across it is too near to an edge, or below it; None: none is."""
+        return _depth(self.points, self.normals, bend, self.ground)
+
+
+def _led_past(line: _Line, free: list[list[Interval]], bend: float, tree: shapely.STRtree) -> list[ClearCourse]:
+    """Lead a line past solids, no more than `bend` metres aside; `free` is changed in place."""
+    depth = line.depth(bend)
+    found: list[ClearCourse] = []
+    for _ in range(_TRIES):
+        found = _courses(line, free, bend, depth)
+        touched = _touched(found, tree)
+        if not len(touched):
+            break
+        # A kink may lead between two cross-sections, through a solid that is in neither.
+        for k in np.flatnonzero((np.abs(line.along[:, None] - touched) < _AROUND).any(axis=1)).tolist():
+            free[k] = []
     return found
 
 
@@ -229,23 +262,27 @@ def _above_edges(free: list[Interval], depth: Floats, columns: Floats, room: flo
     return found
 
 
-def _courses(
-    along: Floats, points: Floats, normals: Floats, free: list[list[Interval]], room: float, depth: Floats | None
-) -> list[ClearCourse]:
-    """Lead one line past its solids: in pieces, where there is no way."""
-    good = free
+def _courses(line: _Line, free: list[list[Interval]], bend: float, depth: Floats | None) -> list[ClearCourse]:
+    """Lead one line past its solids, no more than `bend` metres aside: in pieces, where there is no way."""
+    along, room = line.along, line.room
+    good = sides_good = free
     if depth is not None:
-        columns = _columns(room)
-        good = [_above_edges(gaps, row, columns, room) for gaps, row in zip(free, depth, strict=True)]
+        good = [_above_edges(gaps, row, _columns(bend), bend) for gaps, row in zip(free, depth, strict=True)]
+        # Walkers keep to the line's own room, however far it bends.
+        own, more = _columns(room), (depth.shape[1] - len(_columns(room))) // 2
+        inner = depth[:, more : more + len(own)]
+        sides_good = [_above_edges(gaps, row, own, room) for gaps, row in zip(free, inner, strict=True)]
     found: list[ClearCourse] = []
-    for begin, aside in _ways_through(free, good, room, depth):
+    for begin, aside in _ways_through(free, good, room, bend, depth):
         here = slice(begin, begin + len(aside))
-        sides = np.array([_sides(free[begin + j], good[begin + j], room, a) for j, a in enumerate(aside.tolist())])
+        sides = np.array(
+            [_sides(free[begin + j], sides_good[begin + j], room, a) for j, a in enumerate(aside.tolist())]
+        )
         near = np.abs(along[here][:, None] - along[here][None, :]) <= _EACH_WAY
         sides = np.maximum(np.where(near[:, :, None], sides[None, :, :], np.inf).min(axis=1), _LEAST)
         sides[:-1] = np.minimum(sides[:-1], sides[1:])  # from each point to the next
-        moved = points[here] + aside[:, None] * normals[here]
-        kept = _kept(aside, sides, normals[here])
+        moved = line.points[here] + aside[:, None] * line.normals[here]
+        kept = _kept(aside, sides, line.normals[here])
         is_whole = len(aside) == len(along)
         found.append(ClearCourse(along[here][kept], moved[kept], sides[kept, :2], sides[kept, 2:], is_whole))
     return [course for course in found if len(course.points) > 1]
@@ -265,23 +302,25 @@ def _sides(free: list[Interval], good: list[Interval], room: float, aside: float
 
 
 def _ways_through(
-    free: list[list[Interval]], good: list[list[Interval]], room: float, depth: Floats | None
+    free: list[list[Interval]], good: list[list[Interval]], room: float, bend: float, depth: Floats | None
 ) -> list[tuple[int, Floats]]:
     """Choose how far to the left of a line to go at each place: for each piece, its first place and those metres.
 
-    The way with the least cost: to go aside, to move sideways, to be where nobody can pass and below a kerb costs.
+    The way with the least cost: to go aside, to move sideways, to be where nobody can pass and below a kerb costs. Off
+    its own room it leads above edges alone.
     """
-    most = room if depth is None else room + _WIDER
+    most = bend if depth is None else bend + _WIDER
     if all(any(low <= 0.0 <= high and min(high, most) - max(low, -most) >= _APART for low, high in g) for g in good):
         return [(0, np.zeros(len(free)))]
-    steps = max(round(room / _GRID), 1)
-    aside = np.linspace(-room, room, 2 * steps + 1)
-    costs = _costs(free, aside, room)
+    steps = max(round(bend / _GRID), 1)
+    aside = np.linspace(-bend, bend, 2 * steps + 1)
+    costs = _costs(free, aside, bend)
     if depth is not None:
         # Where there is room above an edge, what is not above it costs, and how narrow it is there is the room's.
-        deep = np.stack([np.interp(aside, _columns(room), row) for row in depth])
+        deep = np.stack([np.interp(aside, _columns(bend), row) for row in depth])
         below = _BELOW + _DEEPER * np.clip(deep, 0.0, _DEEPEST)
         costs = np.where(deep > 0.0, costs + below, np.minimum(_costs(good, aside, most), costs + below))
+        costs[(deep > 0.0) & (np.abs(aside) > room + 1e-9)] = np.inf
     moves = np.arange(-(len(_MOVES) - 1), len(_MOVES))
     prices = np.array(_MOVES)[np.abs(moves)][:, None]
     columns = np.arange(len(aside))
