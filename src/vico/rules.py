@@ -28,13 +28,15 @@ INNER_DOOR_REACH = 1.0
 #: Beds have a place to lie for every so many metres of their width.
 BED_WIDTH = 0.7
 
-#: Buses: seconds one stands at a stop, what boarding costs, how near to one of its doors one boards, metres, and how
-#: many ride in it.
+#: Buses: seconds one stands at a stop, and how many more at its line's first one by the timetable; what boarding costs,
+#: how near to one of its doors one boards, metres, and how many ride in it.
 BUS_DWELL = 30.0
+BUS_LAYOVER = 40.0
 BUS_FARE = 2.0
 BUS_DOOR_REACH = 3.0
-#: How wide a bus is, and how far behind its front the middle of its front door, metres.
+#: How wide a bus is, and how far behind its front the middle of its front door is and of each of them, metres.
 BUS_WIDTH, BUS_DOOR_BEHIND_FRONT = 2.55, 1.35
+BUS_DOORS_BEHIND_FRONT = (BUS_DOOR_BEHIND_FRONT, 6.05, 9.55)
 BUS_CAPACITY = 60
 #: Trams: sections coupled to one, their length, and their width, metres; doors and fares are as with buses.
 TRAM_SECTIONS = 3

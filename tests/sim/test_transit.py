@@ -83,7 +83,8 @@ def test_a_bus_serves_every_stop_of_its_line_in_order(busy: _Service) -> None:
 
 
 def test_buses_come_to_their_first_stop_by_the_timetable_but_for_a_jam(busy: _Service) -> None:
-    assert np.median(np.abs(busy.late)) < 15.0
+    # Who comes early waits.
+    assert np.median(np.maximum(busy.late, 0.0)) < 15.0
     # A car that gets nowhere before a bus is taken out after so long.
     assert max(map(abs, busy.late)) < PATIENCE
 
@@ -122,19 +123,18 @@ def empty() -> _Stands:
 
 def test_buses_on_empty_streets_leave_no_stop_before_its_time(empty: _Stands) -> None:
     assert len(empty.early) > 10
-    # Seconds that a bus brakes less than the timetable reckons with; more was 45 before buses drove so slowly.
-    assert max(empty.early) < 10.0
+    assert max(empty.early) < 0.2
 
 
-def test_a_bus_stands_thirty_seconds_at_a_stop(empty: _Stands) -> None:
+def test_a_bus_stands_at_a_stop_for_thirty_seconds_and_until_its_time(empty: _Stands) -> None:
     # The first one counted was under way when the run began.
     assert empty.stood[1:]
-    assert all(abs(steps / 10 - DWELL) < 0.3 for _, steps in empty.stood[1:])
+    # What was kept of a leg's time for traffic that is not there.
+    assert all(DWELL - 0.3 < steps / 10 < DWELL + 45.0 for _, steps in empty.stood[1:])
 
 
 def test_a_bus_that_has_just_left_when_a_run_begins_drives_its_round() -> None:
     travel = plan_buses(road_city().transit, road_city().lanes, 8 * 3600.0)
-    assert travel.first_stops[0] == 0
     second = travel.begun[0] + 10.0
     traffic, transit = _systems(0, 0, second=second)
     assert transit.stop[0] == 0

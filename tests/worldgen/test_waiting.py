@@ -46,8 +46,11 @@ def street(stop: Stop, lanes: LaneGraph, kerb: float) -> StreetPolygons:
     )  # fmt: skip
 
 
-def wait(stop: Stop, lanes: LaneGraph, kerb: float, solids: list[shapely.Polygon] | None = None) -> shapely.Point:
-    transit = Transit(stops=[stop], lines=[], bike_stations=[], origin={})
+def wait(
+    stop: Stop, lanes: LaneGraph, kerb: float, solids: list[shapely.Polygon] | None = None, *, served: bool = True
+) -> shapely.Point:
+    lines = road_city().transit.lines[:1] if served else []
+    transit = Transit(stops=[stop], lines=lines, bike_stations=[], origin={})
     made = waiting_places(transit, street(stop, lanes, kerb), lanes, HeightField.flat(600.0), solids or [])
     return shapely.Point(made.stops[0].wait[:2])
 
@@ -65,6 +68,13 @@ def test_the_bus_can_be_boarded_from_where_one_waits(stop: tuple[Stop, LaneGraph
     assert pavement.contains(found) == (kerb < BUS_WIDTH / 2 + 2.2)
     # Where it is too far off one goes as near to it as one can.
     assert found.distance(pavement) < max(kerb - BUS_WIDTH / 2 - 2.2, 0.01)
+
+
+def test_at_a_stop_that_no_line_serves_one_waits_on_the_pavement_however_far_it_is(
+    stop: tuple[Stop, LaneGraph],
+) -> None:
+    here, lanes = stop
+    assert street(here, lanes, 5.0).sidewalk.contains(wait(here, lanes, 5.0, served=False))
 
 
 def test_nobody_waits_in_a_wall(stop: tuple[Stop, LaneGraph]) -> None:

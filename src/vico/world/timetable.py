@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from vico.clock import DAY
-from vico.rules import BUS_DWELL
+from vico.rules import BUS_DWELL, BUS_LAYOVER
 from vico.world.model import Line, TramLine
 
 
@@ -24,12 +24,13 @@ def next_departure(line: Line, second: float) -> int:
 
 
 def buses_needed(line: Line) -> int:
-    """Buses under way when most are: departures within the time of one round, but no more than stops."""
+    """Buses under way when most are: departures within the time of a round and its layover, but no more than stops."""
     n = len(line.departures)
+    whole = line.travel[-1] + BUS_DWELL + BUS_LAYOVER
     ahead = 0
     most = 1
     for k in range(n):
-        while departure(line, ahead + 1) < line.departures[k] + line.travel[-1]:
+        while departure(line, ahead + 1) < line.departures[k] + whole:
             ahead += 1
         most = max(most, ahead - k + 1)
     return min(most, len(line.stops))

@@ -32,10 +32,10 @@ from vico.world.model import Transit
 from vico.world.timetable import departure, next_departure
 from vico.world.walkable import WalkableMap
 
-# Buses drive so fast as the timetable asks for, within these, m/s; starting and braking cost the seconds beside. One
-# that had to drive faster than its time asks for would leave the next stop before it is due, without who comes on time.
+# Buses drive so fast as the timetable asks for, within these, m/s; starting and braking cost the seconds beside, and a
+# share of the time is kept for what holds one up. It waits at the next stop if nothing does.
 PACE = (2.5, 10.0)
-_START_STOP = 10.0
+_START_STOP, _KEPT = 10.0, 0.15
 _LAST_CALL = 3.0  # seconds before a tram goes out of the city, or a bus to the depot, at which everybody gets off
 #: A bus goes to the depot if its next departure is farther off, seconds, and comes back so long before it.
 DEPOT_FROM, DEPOT_UNTIL = 300.0, 120.0
@@ -162,7 +162,7 @@ class TransitSystem(Services):
             return True
         if self.ends_service(bus):
             return bool(self.aboard(bus))
-        return bool(self.stop[bus] == 0 and self._next_departure(bus) - self.clock[0] > DOOR_TIME)
+        return bool(self._departs(bus) - self.clock[0] > DOOR_TIME)
 
     # -- the depot ---------------------------------------------------------------------------------------------------
 
@@ -265,12 +265,14 @@ class TransitSystem(Services):
     def may_leave_stop(self, bus: int) -> bool:
         """Return whether a bus that stands at a stop leaves it now.
 
-        It dwells for `DWELL` seconds. From its line's first stop it leaves at the next departure that no other bus has
-        taken, or at once if that is past.
+        It dwells for `DWELL` seconds, and until the time that the timetable has it leave at, if that is not past.
         """
-        if self.dwell[bus] > 0.0:
-            return False
-        return bool(self.stop[bus] != 0 or self.clock[0] >= self._next_departure(bus))
+        return bool(self.dwell[bus] <= 0.0 and self.clock[0] >= self._departs(bus))
+
+    def _departs(self, bus: int) -> float:
+        """Return when a bus is to leave its stop, seconds: the first at the next departure that no other has taken."""
+        stop = int(self.stop[bus])
+        return self._due(bus, stop) + DWELL if stop else self._next_departure(bus)
 
     def _next_departure(self, bus: int) -> int:
         """Return the departure a bus at its first stop is to take, seconds."""
@@ -333,7 +335,7 @@ class TransitSystem(Services):
         fleet.stop_route_index[v] = self.detours.place_of(bus, stop)
         fleet.stop_offset[v] = self._plan.offsets[line][stop]
         fleet.at_stop[v] = False
-        left = max(self._due(bus, stop) - self.clock[0] - _START_STOP, 1.0)
+        left = max((self._due(bus, stop) - self.clock[0]) * (1.0 - _KEPT) - _START_STOP, 1.0)
         fleet.target_speed[v] = min(max(self._metres(bus, stop) / left, PACE[0]), PACE[1])
 
     def _due(self, bus: int, stop: int) -> float:

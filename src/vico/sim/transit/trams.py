@@ -48,11 +48,12 @@ from vico.world.rails import (
     TRAM_SPEED,
     Track,
 )
-from vico.world.walkways import SIDEWALK
+from vico.world.walkways import CORNER, CROSSING
 
 #: Where the front of a tram is that is not in the city.
 AWAY = -1.0
-_WALKER, _ON_TRACK = 0.25, 6  # m beside a tram that walkers keep; metres on a track that make a walkway part of it
+_WALKER = 0.25  # m beside a tram that walkers keep
+_ON_TRACK, _CORNER_ON_TRACK = 6, 10  # metres on a track that make a sidewalk part of it; corners lead over two tracks
 _WAITS = 0.5  # seconds left of a stop that a tram keeps while somebody has yet to get off
 _EDGE = 3.0  # metres from the city's edge within which tracks lead out of it
 _TOUCH = 0.03  # metres that are too near
@@ -404,9 +405,10 @@ class Trams:
             return found
         points = np.concatenate([track.xy for track in self.tracks])
         reach = np.concatenate([track.half_width for track in self.tracks]) + _WALKER
-        for k in np.flatnonzero(walks.kind == SIDEWALK).tolist():
+        for k in np.flatnonzero(walks.kind != CROSSING).tolist():
             line = np.ascontiguousarray(walks.line(k), np.float64)
-            found[k] = spots_near(line, points, reach) >= _ON_TRACK
+            most = _CORNER_ON_TRACK if walks.kind[k] == CORNER else _ON_TRACK
+            found[k] = spots_near(line, points, reach) >= most
         return found
 
     # -- riders ------------------------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from vico.rules import BUS_DOOR_BEHIND_FRONT, BUS_DOOR_REACH, BUS_WIDTH, TRAM_SECTIONS
+from vico.rules import BUS_DOOR_REACH, BUS_DOORS_BEHIND_FRONT, BUS_WIDTH, TRAM_SECTIONS
 from vico.world.check.finding import WorldFinding
 from vico.world.folder import World
 from vico.world.model import Stop
@@ -38,11 +38,11 @@ def check_roads(world: World) -> Iterator[WorldFinding]:
 def _check_waiting(world: World, stop: Stop) -> Iterator[WorldFinding]:
     """Check that one can stand where one waits at a stop, and board the bus from there."""
     lanes = world.lanes
-    x, y, yaw = lanes.at(lanes.index[stop.lane], stop.offset - BUS_DOOR_BEHIND_FRONT)
+    x, y, yaw = lanes.at(lanes.index[stop.lane], stop.offset - np.array(BUS_DOORS_BEHIND_FRONT)).T
     aside = BUS_WIDTH / 2 * (-1.0 if lanes.lefthand else 1.0)
-    away = math.hypot(x + math.sin(yaw) * aside - stop.wait[0], y - math.cos(yaw) * aside - stop.wait[1])
+    away = np.hypot(x + np.sin(yaw) * aside - stop.wait[0], y - np.cos(yaw) * aside - stop.wait[1]).min()
     if away > BUS_DOOR_REACH:
-        yield WorldFinding("stop out of reach", stop.id, f"its bus's front door is {away:.1f} m from where one waits")
+        yield WorldFinding("stop out of reach", stop.id, f"its bus's doors are {away:.1f} m from where one waits")
     walkable, here = world.walkable, np.array(stop.wait[:2])
     low, high = walkable.cell_of([here - _BESIDE, here + _BESIDE])
     # A shelter may stand where one waits: a step beside it will do.

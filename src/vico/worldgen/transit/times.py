@@ -1,8 +1,9 @@
 """The record of a bus line: its drive over lanes and its timetable.
 
-A bus that stands at a stop until its time holds up everybody behind it. What a round leaves over until the next
-departure is therefore driven: first by a way about (in truth the bus would be beyond the window's edge), then by
-driving slower between stops; only what still remains is waited for at the first stop.
+A tenth of a round, `BUS_LAYOVER` seconds at the least, is waited for at the first stop: a bus that comes late leaves on
+time all the same. But one that stands at a stop until its time holds up everybody behind it. What a round leaves over
+beyond that is therefore driven: first by a way about (in truth the bus would be beyond the window's edge), then by
+driving slower between stops; only what still remains is waited for, too.
 """
 
 from __future__ import annotations
@@ -15,19 +16,24 @@ from itertools import pairwise
 import numpy as np
 
 from vico.geo.gtfs.feed import DAY
+from vico.rules import BUS_DWELL, BUS_LAYOVER
 from vico.world.model import Line, Stop
 from vico.worldgen.transit.drive import BUS_LENGTH, Berth, Drive
 
 BUS_SPEED = 10.0
-DWELL = 30.0
+DWELL = BUS_DWELL
 FIRST_DEPARTURE, LAST_DEPARTURE = 5 * 3600, 23 * 3600
 HEADWAY = (360.0, 600.0)
 
+# Share of a round kept at the first stop to make up for what was lost on the way, and the most seconds of it: longer
+# nobody is held up behind a bus that waits for its time.
+_LAYOVER_SHARE, _MOST_LAYOVER = 0.1, 60.0
+_BUSY = 1.17  # times as long a round takes with 60 cars in central Helsinki: so much time our own plans give it
 _JUNCTION_SECONDS = 6.0
+_SIGNAL_SECONDS = 12.0  # that a junction with signals costs
 _STOP_SECONDS = 10.0  # that braking for a stop and starting from it cost
-_SLOWEST = 5.5  # m/s between stops; buses that have time drive no slower than a little below it
+_SLOWEST = 4.8  # m/s between stops; buses that have time drive no slower than a little below it
 _SMALL = 25.0  # seconds over that are not worth a way about
-_RESERVE = 45.0  # seconds of a round kept to make up for traffic
 _LONGEST_WAY_ABOUT = 600.0  # seconds: none drives about for longer, however rare its buses are
 _MOST_BENDS = 4
 _TRIALS = 24
@@ -97,21 +103,21 @@ def timing(
         headway = float(gaps[len(gaps) // 2]) if gaps else clock
     else:
         first, last = hours or (FIRST_DEPARTURE, LAST_DEPARTURE)
-        headway = float(interval or max(clock / max(1, math.ceil(clock / HEADWAY[1])), HEADWAY[0]))
+        whole = clock * _BUSY + _layover(clock)
+        headway = float(interval or max(whole / max(1, math.ceil(whole / HEADWAY[1])), HEADWAY[0]))
         # Whole minutes, so that the timetable can be read.
         headway = math.ceil(headway / 60.0) * 60.0
         times = list(range(first + later % int(headway), last + 1, int(headway)))
-    rest = max(1, math.ceil(clock / headway)) * headway - clock
-    legs[-1] = _way_about(drive, loop[-1], legs[-1], loop[0], min(rest - _RESERVE, _LONGEST_WAY_ABOUT))
+    legs[-1] = _way_about(drive, loop[-1], legs[-1], loop[0], min(_spare(clock, headway), _LONGEST_WAY_ABOUT))
     travel = [0.0]
     clock = slowest = 0.0
     for start, leg, end in _rows(loop, legs):
         clock += _seconds(drive, start, leg, end)
-        slowest += _metres(drive, start, leg, end) / _SLOWEST + _STOP_SECONDS + DWELL
+        slowest += _metres(drive, start, leg, end) / _SLOWEST + _waits(drive, start, leg) + _STOP_SECONDS + DWELL
         travel.append(round(clock, 1))
         clock += DWELL
-    rest = max(1, math.ceil(clock / headway)) * headway - clock
-    spare = min(rest, max(slowest - clock, 0.0))
+    spare = min(_spare(clock, headway), max(slowest - clock, 0.0))
+    rest = _rounds(clock, headway) * headway - clock
     under_way = [t - DWELL * max(i - 1, 0) for i, t in enumerate(travel)]
     travel = [round(t + spare * share / max(under_way[-1], 1.0), 1) for t, share in zip(travel, under_way, strict=True)]
     return Timing(tuple(loop), tuple(tuple(leg) for leg in legs), tuple(times), tuple(travel), rest - spare)
@@ -141,6 +147,21 @@ def line_record(number: int, name: str, times: Timing, drive: Drive, stops: Mapp
     )
 
 
+def _layover(clock: float) -> float:
+    """Return how long a bus whose round takes `clock` seconds is to wait at the first stop."""
+    return min(max(_LAYOVER_SHARE * clock, BUS_LAYOVER), _MOST_LAYOVER)
+
+
+def _rounds(clock: float, headway: float) -> int:
+    """Return how many departures there are in the time of a round and its layover."""
+    return max(1, math.ceil((clock + _layover(clock)) / headway))
+
+
+def _spare(clock: float, headway: float) -> float:
+    """Return the seconds of a round that are neither driven nor waited for."""
+    return _rounds(clock, headway) * headway - clock - _layover(clock)
+
+
 def _rows(loop: Sequence[Berth], legs: Sequence[Sequence[int]]) -> list[tuple[Berth, Sequence[int], Berth]]:
     return list(zip(loop, legs, [*loop[1:], loop[0]], strict=True))
 
@@ -152,11 +173,19 @@ def _seconds(drive: Drive, start: Berth, leg: Sequence[int], end: Berth) -> floa
     seconds = sum(float(lanes.length[i] / min(lanes.speed[i], BUS_SPEED)) for i in driven)
     seconds -= start.offset / min(float(lanes.speed[start.lane]), BUS_SPEED)
     seconds -= float(lanes.length[end.lane] - end.offset) / min(float(lanes.speed[end.lane]), BUS_SPEED)
+    # Drives in traffic take a quarter longer than at the limit.
+    return max(seconds, 0.0) * 1.25 + _waits(drive, start, leg) + 4.0
+
+
+def _waits(drive: Drive, start: Berth, leg: Sequence[int]) -> float:
+    """How long the junctions of a leg are waited for."""
+    lanes = drive.lanes
+    driven = [start.lane, *leg]
     # Every passage of a junction counts, also of one that is passed again; its lanes follow one another.
     zones = [int(z) for z in lanes.zone[driven]]
-    junctions = sum(b >= 0 and a != b for a, b in pairwise([-1, *zones]))
-    # Drives in traffic take a quarter longer than at the limit, and every junction is waited for a little.
-    return max(seconds, 0.0) * 1.25 + _JUNCTION_SECONDS * junctions + 4.0
+    entered = [lane for lane, a, b in zip(driven, [-1, *zones], zones, strict=False) if b >= 0 and a != b]
+    signalled = [lane for lane in entered if lanes.inside[lane] >= 0 and lanes.signals[lanes.inside[lane]]]
+    return _JUNCTION_SECONDS * (len(entered) - len(signalled)) + _SIGNAL_SECONDS * len(signalled)
 
 
 def _metres(drive: Drive, start: Berth, leg: Sequence[int], end: Berth) -> float:

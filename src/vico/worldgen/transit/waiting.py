@@ -1,4 +1,4 @@
-"""Where people wait for buses: on the pavement if they can board from there, else at the kerb's side of the lane.
+"""Where people wait for buses and trams: on the pavement if they can board from there, else beside the vehicle.
 
 Streets may be wider than the lanes that are driven: then the pavement is out of reach of the doors.
 """
@@ -11,10 +11,18 @@ from collections.abc import Sequence
 import shapely
 
 from vico.geo import overlay
-from vico.rules import BUS_DOOR_BEHIND_FRONT, BUS_DOOR_REACH, BUS_WIDTH
+from vico.rules import (
+    BUS_DOOR_BEHIND_FRONT,
+    BUS_DOOR_REACH,
+    BUS_DOORS_BEHIND_FRONT,
+    BUS_WIDTH,
+    TRAM_SECTIONS,
+    TRAM_WIDTH,
+)
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
-from vico.world.model import Point2, Stop, Transit
+from vico.world.model import Point2, Point3, Stop, TramLine, TramStop, Transit
+from vico.world.rails import TRAM_DOORS, Track, tram_door
 from vico.worldgen.facts.streets import StreetPolygons
 
 # Metres between a waiting place and the pavement's edge: as much as there is room for.
@@ -23,13 +31,23 @@ _FROM_EDGE = (0.7, 0.35)
 _REACH = BUS_DOOR_REACH - 0.5
 # And so far from the bus's side and from walls.
 _FROM_BUS, _FROM_WALL = 0.8, 0.4
+# So far from the middle of a track.
+_FROM_TRACK = TRAM_WIDTH / 2 + 0.5
+# A stop that nothing serves is on the pavement if that is so near, metres.
+_NOT_SERVED = 8.0
 
 
 def front_door(lanes: LaneGraph, lane: str, offset: float) -> Point2:
     """Return where the front door is of a bus that stands at a stop, ENU metres."""
-    x, y, yaw = lanes.at(lanes.index[lane], offset - BUS_DOOR_BEHIND_FRONT)
-    aside = BUS_WIDTH / 2 * (-1.0 if lanes.lefthand else 1.0)
-    return float(x + math.sin(yaw) * aside), float(y - math.cos(yaw) * aside)
+    return _bus_door(lanes, lane, offset, BUS_DOOR_BEHIND_FRONT)[0]
+
+
+def _bus_door(lanes: LaneGraph, lane: str, offset: float, behind: float) -> tuple[Point2, Point2]:
+    """Return where a door is of a bus that stands at a stop, metres behind its front, and the way out of it."""
+    x, y, yaw = lanes.at(lanes.index[lane], offset - behind)
+    aside = -1.0 if lanes.lefthand else 1.0
+    outward = float(math.sin(yaw) * aside), float(-math.cos(yaw) * aside)
+    return (float(x + outward[0] * BUS_WIDTH / 2), float(y + outward[1] * BUS_WIDTH / 2)), outward
 
 
 def waiting_places(
@@ -57,48 +75,95 @@ def waiting_places(
     Transit
         With other waiting places; those that are good stay.
     """
-    finder = _Finder(streets, lanes, solids)
-    stops = []
-    for stop in transit.stops:
-        here = stop.wait[0], stop.wait[1]
-        x, y = finder.place(stop)
-        if (x, y) != here:
-            x, y = round(x, 3), round(y, 3)
-            stop = stop.model_copy(update={"wait": (x, y, round(float(height((x, y))), 3))})
-        stops.append(stop)
-    return transit.model_copy(update={"stops": stops})
+    finder = _Finder(streets, lanes, solids, [line.track for line in transit.tram_lines])
+    served = {stop for line in transit.lines for stop in line.stops}
+
+    def wait(stop: Stop | TramStop, spot: Point2) -> dict[str, Point3]:
+        if spot == (stop.wait[0], stop.wait[1]):
+            return {}
+        x, y = round(spot[0], 3), round(spot[1], 3)
+        return {"wait": (x, y, round(float(height((x, y))), 3))}
+
+    stops = [stop.model_copy(update=wait(stop, finder.place(stop, served=stop.id in served))) for stop in transit.stops]
+    lines = {stop: line for line in reversed(transit.tram_lines) for stop in line.stops}
+    tram_stops = [
+        stop.model_copy(update=wait(stop, finder.place_for_tram(stop, lines[stop.id]))) if stop.id in lines else stop
+        for stop in transit.tram_stops
+    ]
+    return transit.model_copy(update={"stops": stops, "tram_stops": tram_stops})
 
 
 class _Finder:
-    def __init__(self, streets: StreetPolygons, lanes: LaneGraph, solids: Sequence[shapely.Polygon]) -> None:
+    def __init__(
+        self,
+        streets: StreetPolygons,
+        lanes: LaneGraph,
+        solids: Sequence[shapely.Polygon],
+        tracks: Sequence[Sequence[Point2]],
+    ) -> None:
+        rails = overlay.union_all([shapely.LineString(track).buffer(_FROM_TRACK) for track in tracks], grid=None)
         pavement = overlay.union_all([streets.sidewalk, streets.pedestrian], grid=None)
-        self._pavements = [overlay.buffer(pavement, -inset) for inset in _FROM_EDGE]
+        inside = [overlay.buffer(pavement, -inset) for inset in _FROM_EDGE]
+        self._pavements = [overlay.difference(area, rails, grid=None) for area in inside]
         self._carriageway, self._lanes = streets.carriageway, lanes
         self._walls = shapely.STRtree(list(solids))
         shapely.prepare(self._carriageway)
 
-    def place(self, stop: Stop) -> Point2:
-        """Return where people wait for a bus that stands at a stop."""
-        door = front_door(self._lanes, stop.lane, stop.offset)
-        middle = self._lanes.at(self._lanes.index[stop.lane], stop.offset - BUS_DOOR_BEHIND_FRONT)
-        outward = ((door[0] - middle[0]) / (BUS_WIDTH / 2), (door[1] - middle[1]) / (BUS_WIDTH / 2))
-        # Within reach of the door, and beyond the side of the bus.
-        along = shapely.Point(door[0] + outward[0] * _FROM_BUS, door[1] + outward[1] * _FROM_BUS)
-        reach = overlay.buffer(shapely.Point(door), _REACH)
-        beside = overlay.intersection(reach, _half_plane(along, outward), grid=None)
-        room = overlay.difference(beside, self._near_walls(beside), grid=None)
+    def place(self, stop: Stop, *, served: bool) -> Point2:
+        """Return where people wait for a bus that stands at a stop: one that a line serves can be boarded there."""
         here = shapely.Point(stop.wait[:2])
-        if not self._carriageway.contains(here) and room.covers(here):
-            return stop.wait[0], stop.wait[1]
-        for pavement in self._pavements:
-            found = overlay.intersection(room, pavement, grid=None)
-            if not found.is_empty:
-                return _nearest(found, here)
-        if room.is_empty:
-            return along.x, along.y
-        # The pavement is out of reach: as near to it as one can board from.
+        rooms = []
+        for behind in BUS_DOORS_BEHIND_FRONT:
+            rooms.append(self._room(*_bus_door(self._lanes, stop.lane, stop.offset, behind)))
+        found = self._on_pavement(here, rooms)
+        if found is not None:
+            return found
         widest = self._pavements[-1]
+        if not served:
+            near = overlay.intersection(widest, overlay.buffer(here, _NOT_SERVED), grid=None)
+            near = overlay.difference(near, self._near_walls(near), grid=None)
+            if not near.is_empty:
+                return _nearest(near, here)
+        room = rooms[0]
+        if room.is_empty:
+            (x, y), (u, v) = _bus_door(self._lanes, stop.lane, stop.offset, BUS_DOOR_BEHIND_FRONT)
+            return x + u * _FROM_BUS, y + v * _FROM_BUS
+        # The pavement is out of reach: as near to it as one can board from.
         return _nearest(room, here if widest.is_empty else widest)
+
+    def place_for_tram(self, stop: TramStop, line: TramLine) -> Point2:
+        """Return where people wait for a tram of a line: beside a door on the side of the kerb, off the roadway."""
+        here = shapely.Point(stop.wait[:2])
+        track, offset = Track(line.track), line.offsets[line.stops.index(stop.id)]
+        side = -1.0 if self._lanes.lefthand else 1.0
+        rooms = []
+        for k in sorted(range(TRAM_SECTIONS * len(TRAM_DOORS)), key=lambda k: abs(k - 1)):
+            door, middle = tram_door(track, offset, k, side)
+            half = TRAM_WIDTH / 2
+            rooms.append(self._room(door, ((door[0] - middle[0]) / half, (door[1] - middle[1]) / half)))
+        if any(room.covers(here) for room in rooms) and not self._carriageway.contains(here):
+            return stop.wait[0], stop.wait[1]
+        found = self._on_pavement(here, rooms)
+        return (stop.wait[0], stop.wait[1]) if found is None else found
+
+    def _on_pavement(self, here: shapely.Point, rooms: Sequence[shapely.Geometry]) -> Point2 | None:
+        """Return the place off the roadway in the first of several areas that has one; None without any."""
+        if not self._carriageway.contains(here) and rooms[0].covers(here):
+            return here.x, here.y
+        for room in rooms:
+            for pavement in self._pavements:
+                found = overlay.intersection(room, pavement, grid=None)
+                if not found.is_empty:
+                    return _nearest(found, here)
+        return None
+
+    def _room(self, door: Point2, outward: Point2) -> shapely.Geometry:
+        """Return where one can stand within reach of a door, beyond the side of its vehicle and clear of walls."""
+        along = shapely.Point(door[0] + outward[0] * _FROM_BUS, door[1] + outward[1] * _FROM_BUS)
+        beside = overlay.intersection(
+            overlay.buffer(shapely.Point(door), _REACH), _half_plane(along, outward), grid=None
+        )
+        return overlay.difference(beside, self._near_walls(beside), grid=None)
 
     def _near_walls(self, area: shapely.Geometry) -> shapely.Geometry:
         near = self._walls.query(overlay.buffer(area, _FROM_WALL)).tolist()
