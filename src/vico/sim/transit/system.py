@@ -231,10 +231,10 @@ class TransitSystem(Services):
     def lateness(self) -> dict[str, float]:
         """Return how often buses came to a stop, the seconds they were late there (mean and most), and stops skipped.
 
-        The latter are there only where buses went round what was shut, and could not come by.
+        The latter, ``skipped``, are those that buses could not come by as they went round what was shut.
         """
-        skipped = int(self.detours.skipped.sum())
-        return _lateness(self.stops_served, self.late_total, self.late_most) | ({"skipped": skipped} if skipped else {})
+        found = _lateness(self.stops_served, self.late_total, self.late_most)
+        return found | {"skipped": int(self.detours.skipped.sum())}
 
     def goes_round(self, xy: ArrayLike, reach: float) -> str | None:
         """Return the name of a line whose buses do not come by a stop near a point, as all of them there do not.
