@@ -188,4 +188,4 @@ def test_a_run_goes_on_exactly_from_the_middle_of_a_change_of_weather(helsinki: 
 def test_runs_tell_how_late_buses_were(helsinki: World) -> None:
     sim = Simulation(helsinki, None, SimConfig(assistants=1, observe=()))
     sim.step({})
-    assert sim.reports()["buses"] == {"arrivals": 0, "late_mean": 0.0, "late_most": 0.0}
+    assert sim.reports()["buses"] == {"arrivals": 0, "late_mean": 0.0, "late_most": 0.0, "skipped": 0}
