@@ -58,16 +58,16 @@ def test_places_before_a_stage_look_at_it_and_are_apart() -> None:
 def test_a_crowd_comes_and_stands_and_goes_when_it_is_over() -> None:
     traffic, again = traffic_by(JunctionRule.ONE, 5, 60), traffic_by(JunctionRule.ONE, 5, 60)
     walkers, one = traffic.pedestrian_state, _gathering(traffic, "watch", 6)
-    assert _run(traffic, one, 0, 150) == 0
+    assert _run(traffic, one, 0, 165) == 0
     stands = np.flatnonzero(walkers.stand_kind == CROWD)
     assert len(stands) >= 2
     there = traffic.walkers.position[stands, :2] - one.places[walkers.place[stands], :2]
     assert (np.hypot(*there.T) < 0.25).sum() >= 2
     saved = traffic.arrays()
-    assert _run(traffic, one, 150, 10) == 0
+    assert _run(traffic, one, 165, 10) == 0
     again.gatherings.follow((one,))
     again.restore(saved)
-    _run(again, one, 150, 10)
+    _run(again, one, 165, 10)
     assert all(np.array_equal(values, again.arrays()[name]) for name, values in traffic.arrays().items())
     traffic.gatherings.follow(())
     assert not walkers.event.any()

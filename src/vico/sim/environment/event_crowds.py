@@ -24,10 +24,7 @@ MARCH_SPEED, ROW_APART, BESIDE_APART = 0.6, 1.4, 0.95
 _ROOM = 0.35  # m around who stands
 _NEAREST, _ROWS, _ROW, _APART, _WIDEST = 5.5, 7, 1.2, 1.1, 1.3  # m, rows, m, m and rad of a half circle
 _BEFORE_STALL = 2.0  # m from a stall's middle to who looks at it
-_ENTRY_WITHIN, _ENTRY_EVERY = (
-    70.0,
-    3.0,
-)  # m from the middle to where people come from, and between points tried
+_ENTRY_WITHIN, _ENTRY_EVERY = 70.0, 3.0  # m from the middle to where people come from, and between points tried
 _NO_PLACES: Floats = np.zeros((0, 3))
 _ALONG = 0.5  # m between points of a way that are looked at
 
