@@ -181,6 +181,23 @@ def test_skin_lies_deep_under_a_top(fine: bool) -> None:
     assert depth.min() > 0.012
 
 
+def test_an_apron_goes_with_the_thighs_below_it() -> None:
+    colour = (1, 200, 3)
+    body = body_of(Appearance(over="apron", over_colour=colour, bottom="trousers"))
+    apron = np.flatnonzero((np.round(body.colour) == colour).all(axis=1))
+    low = apron[body.vertices[apron, 2] < body.rest_joints[J["left_knee"], 2] + 0.25]
+    assert len(low) >= 16
+    left, right = (
+        np.where(body.weight_joints[low] == J[side], body.weights[low], 0.0).sum(axis=1)
+        for side in ("left_hip", "right_hip")
+    )
+    assert (left + right).min() > 0.8
+    # Each side with its own.
+    aside = body.vertices[low, 1]
+    assert left[aside > 0.06].min() > 0.8
+    assert right[aside < -0.06].min() > 0.8
+
+
 def test_people_dress_for_the_weather() -> None:
     summer = Appearance(top="t-shirt", bottom="shorts", shoes="sandals")
     snow = dressed(summer, -5.0, snow=1.0)

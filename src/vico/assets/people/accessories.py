@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from vico.assets.people.clothes import sewn
-from vico.assets.people.lofts import BodyPart, LoftRing, Weights, blend, blob, dense, loft, merged, with_normals
+from vico.assets.people.lofts import BodyPart, LoftRing, Weights, blend, blob, loft, merged, with_normals
 from vico.assets.people.model import Appearance, Colour, Hat, J
 
 # Outlines of hats from below: height on the head, size beside the band's.
@@ -184,14 +185,9 @@ def _apron(look: Appearance, joints: NDArray[np.float64], cloth: BodyPart) -> Bo
         for c in range(wide - 1):
             a = k * wide + c
             faces += [(a, a + 1, a + wide + 1), (a, a + wide + 1, a + wide)]
-    hips = np.clip((joints[J["left_hip"], 2] - outer[:, 2]) / (joints[J["left_hip"], 2] - hem), 0, 1)[:, None] * 0.6
-    left = np.clip(outer[:, 1] / (0.2 * h) + 0.5, 0, 1)[:, None]
-    up = np.clip((outer[:, 2] - waist) / (top - waist), 0, 1)[:, None]
-    trunk = (1 - up) * dense({J["pelvis"]: 1.0}) + up * dense({J["spine2"]: 0.5, J["spine3"]: 0.5})
-    legs = left * dense({J["left_hip"]: 1.0}) + (1 - left) * dense({J["right_hip"]: 1.0})
+    weights = _carried_by(outer, cloth)
     front_faces, count = np.array(faces), len(outer)
     inner = outer - np.array([0.006, 0.0, 0.0])
-    weights = (1 - hips) * trunk + hips * legs
     colours = np.tile(np.asarray(look.over_colour, np.float64), (2 * count, 1))
     return with_normals(
         BodyPart(
@@ -201,6 +197,14 @@ def _apron(look: Appearance, joints: NDArray[np.float64], cloth: BodyPart) -> Bo
             np.concatenate([weights, weights]),
         )
     )
+
+
+def _carried_by(points: NDArray[np.float64], cloth: BodyPart) -> NDArray[np.float64]:
+    """Return the weights of points over clothes: those of the cloth below them, so that no limb comes through."""
+    trunk = np.flatnonzero(cloth.weights[:, [*_TRUNK, *_THIGHS]].sum(axis=1) > 0.5)
+    distance, nearest = cKDTree(cloth.vertices[trunk]).query(points, k=3)
+    share = 1.0 / (distance + 0.01)
+    return np.einsum("nk,nkj->nj", share / share.sum(axis=1)[:, None], cloth.weights[trunk][nearest])
 
 
 def _backpack(look: Appearance, joints: NDArray[np.float64], cloth: BodyPart) -> list[BodyPart]:
