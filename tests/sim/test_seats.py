@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +15,7 @@ from vico.agents.schedule import ScheduleFollower
 from vico.assets.people import J
 from vico.seeds import rng
 from vico.sim.config import SimConfig
+from vico.sim.moves import place_in_room
 from vico.sim.scene import SceneRenderer
 from vico.sim.simulation import Simulation
 from vico.sim.state import Posture
@@ -45,12 +47,12 @@ def _piece(name: str, x: float, y: float, yaw: float, size: tuple[float, float, 
     }
 
 
-def furnished() -> World:
+def furnished(beds: Sequence[dict[str, Any]] | None = None) -> World:
     """The toy city with a sofa in the café, a double bed in the room behind it, and a bench in the street."""
     world = toy_city.world()
     pieces = [
         _piece("sofa", -8.4, 11.0, 0.0, (0.8, 1.9, 0.84), "r_cafe"),
-        _piece("bed_double", 1.0, 10.0, np.pi / 2, (2.04, 1.64, 0.95), "r_back"),
+        *([_piece("bed_double", 1.0, 10.0, np.pi / 2, (2.04, 1.64, 0.95), "r_back")] if beds is None else beds),
         _piece("bench", -20.0, -15.0, 0.0, (0.6, 1.7, 0.9), ""),
     ]
     from vico.assets.models.furniture import furniture_models
@@ -161,6 +163,56 @@ def test_residents_go_to_bed_and_sit_where_there_are_seats() -> None:
         observations, infos = result.observations, result.infos
     assert sim.state.people.posture.tolist() == [Posture.LYING, Posture.LYING, Posture.SITTING]
     assert len(set(sim.state.people.seat.tolist())) == 3
+
+
+def _bed(x: float, y: float, yaw: float) -> dict[str, Any]:
+    return _piece("bed_single", x, y, yaw, (2.1, 0.94, 0.95), "r_back")
+
+
+def _asleep(beds: Sequence[dict[str, Any]], people: int = 1) -> Simulation:
+    """Return the café at night with these things in the room behind it, and residents who sleep there."""
+    community = toy_city.community()
+    night = [toy_city.item("sleep", "00:00:00", "23:59:59", toy_city.CAFE)]
+    residents = [r.model_copy(update={"schedule": night}) for r in community.residents[:people]]
+    community = community.model_copy(update={"residents": residents})
+    return Simulation(furnished(beds), community, SimConfig(start=3600, observe=()))
+
+
+def test_one_gets_out_of_a_bed_on_the_side_that_has_room() -> None:
+    # The bed's left side is at the south wall; there is room on the right alone.
+    sim = _asleep([_bed(0.0, 8.5, np.pi)])
+    assert sim.state.people.posture[0] == Posture.LYING
+    assert act(sim, "resident_0", type="wake")["action_status"] == "ok"
+    x, y, _ = sim.state.people.position[0]
+    assert y > 8.5 + 0.47 + 0.25
+    assert np.hypot(x, y - 8.5) < 1.0
+    assert act(sim, "resident_0", type="sleep")["action_status"] == "ok"
+
+
+def test_nobody_lies_down_in_a_bed_that_furniture_cuts_off_from_the_door() -> None:
+    fence = [_piece("wardrobe", 0.4, 9.5, 0.0, (0.5, 3.0, 2.0), "r_back")]
+    fence += [_piece("bookcase", 1.5, 11.0, 0.0, (3.0, 0.3, 2.0), "r_back")]
+    sim = _asleep([_bed(1.9, 8.5, 0.0), *fence])
+    # There is room beside it, but no way from there to the door.
+    assert sim.state.people.posture.tolist() == [Posture.STANDING]
+    place_in_room(0, sim.state.indoor.index["r_back"], sim.state, near=np.array([1.9, 9.6]))
+    told = act(sim, "resident_0", type="sleep")
+    assert told["action_code"] == "no_seat"
+    assert "got out of" in told["action_reason"]
+    sim = _asleep([_bed(1.9, 8.5, 0.0), *fence, _bed(-1.5, 8.5, 0.0)], people=2)
+    bed = sim.state.seats.position[sim.state.people.seat[0]]
+    assert sim.state.people.posture.tolist() == [Posture.LYING, Posture.STANDING]
+    assert bed[0] < 0.0
+
+
+def test_who_cannot_get_up_is_told_what_is_in_the_way() -> None:
+    sim = _asleep([_bed(0.0, 8.5, np.pi)])
+    state, bed = sim.state, int(sim.state.people.seat[0])
+    crowd = np.stack(np.meshgrid(np.arange(-3.0, 3.1, 0.5), np.arange(8.0, 12.1, 0.5)), axis=-1).reshape(-1, 2)
+    state.taken_in = lambda room, *, without=-1: crowd  # type: ignore[method-assign]
+    assert "somebody is in the way" in act(sim, "resident_0", type="wake")["action_reason"]
+    state.seats._stands[0][bed] = 1
+    assert "walls and furniture" in act(sim, "resident_0", type="wake")["action_reason"]
 
 
 def test_random_people_never_sit_in_the_air() -> None:

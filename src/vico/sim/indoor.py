@@ -23,6 +23,8 @@ _SPOTS_KEPT = 4096
 _WAY_CELL = 0.1  # metres between the points by which ways in a room are found
 # Where one wants to stand may be as narrow as can be; other spots of a room have so much more room, metres.
 _NARROWER = 0.02
+# Points at which a line beside a bed is looked at for furniture.
+_SAMPLES = 16
 _LEVEL = 0.5  # metres a door may lie above or below who goes through it
 
 
@@ -157,13 +159,51 @@ class Indoor:
         away = np.hypot(*(goals[:, None] - points[free]).transpose(2, 0, 1))
         return away.shape[1] > 0 and len(set(part[away.argmin(axis=1)].tolist())) == 1
 
-    def free_spot(self, room: int, near: ArrayLike, taken: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    def walked_from_doors(self, room: int, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return which points of a room, shape ``(k, >= 2)``, one can walk to from a door of it, shape ``(k,)``."""
+        x, y, yaw, half_length, half_width = self.boxes[room]
+        c, s = np.cos(yaw), np.sin(yaw)
+        dx, dy = points[:, 0] - x, points[:, 1] - y
+        cells = np.column_stack([c * dx + s * dy + half_length, c * dy - s * dx + half_width]) / _WAY_CELL
+        area = self._areas.get(room)
+        if area is None:
+            area = self._areas[room] = self._area_of_doors(room)
+        u, v = np.clip(np.rint(cells).astype(np.int64), 0, np.array(area.shape) - 1).T
+        return area[u, v]
+
+    @cached_property
+    def _areas(self) -> dict[int, NDArray[np.bool_]]:
+        """Of the rooms that were asked for: `_area_of_doors`."""
+        return {}
+
+    def _area_of_doors(self, room: int) -> NDArray[np.bool_]:
+        """Return the cells of a room's floor, along its length and width, that are by where one walks from a door."""
+        x, y, yaw, half_length, half_width = self.boxes[room]
+        u = np.arange(0.0, 2 * half_length + _WAY_CELL, _WAY_CELL) - half_length
+        v = np.arange(0.0, 2 * half_width + _WAY_CELL, _WAY_CELL) - half_width
+        c, s = np.cos(yaw), np.sin(yaw)
+        points = np.stack([x + c * u[:, None] - s * v, y + s * u[:, None] + c * v], axis=-1)
+        free = (self.gaps(room, points.reshape(-1, 2)) > RADIUS + _NARROWER).reshape(len(u), len(v))
+        parts = ndimage.label(free)[0]
+        inside = [door.inside or self.rooms[room].inside for door in self.doors[room]] or [self.rooms[room].inside]
+        doors = np.array(inside)[:, None, None, :2]
+        nearest = np.where(free, np.hypot(*np.moveaxis(points - doors, -1, 0)), np.inf).reshape(len(inside), -1)
+        homes = np.unique(parts.reshape(-1)[nearest.argmin(axis=1)])
+        # A spot beside a wall lies between cells: the one nearest to it may be a little too near to the wall.
+        return ndimage.binary_dilation(np.isin(parts, homes[homes > 0]), np.ones((3, 3)))
+
+    def free_spot(
+        self, room: int, near: ArrayLike, taken: NDArray[np.float64], *, beside: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64] | None:
         """Spot of a room nearest to `near` where someone can stand; None if the room is full.
 
         Parameters
         ----------
         taken
             Where others stand in that room, shape ``(k, >= 2)``.
+        beside
+            A point of furniture, shape ``(2,)``: only spots that one can walk to from a door, and with nothing else
+            between them and it.
 
         Returns
         -------
@@ -171,15 +211,27 @@ class Indoor:
             On the floor, ENU metres, shape ``(3,)``.
         """
         point = np.asarray(near, np.float64).reshape(-1)[:2]
-        if not len(taken) and room not in self.stairs and self.gap(room, point) + _NARROWER >= RADIUS + 0.02:
+        quick = not len(taken) and beside is None and room not in self.stairs
+        if quick and self.gap(room, point) + _NARROWER >= RADIUS + 0.02:
             return np.array([*point, self.floor[room]])
         spots = self._spots(room, point)
+        if beside is not None and len(spots):
+            spots = spots[self.walked_from_doors(room, spots)]
+            spots = spots[self._nothing_between(room, spots, beside)]
         if not len(taken) or not len(spots):
             return spots[0].copy() if len(spots) else None
         # A little more than touching, so that nobody starts in a contact.
         away = np.hypot(*(spots[:, None, :2] - taken[None, :, :2]).transpose(2, 0, 1)).min(axis=1)
         free = np.flatnonzero(away >= 2 * RADIUS + 0.05)
         return spots[free[0]].copy() if len(free) else None
+
+    def _nothing_between(self, room: int, spots: NDArray[np.float64], point: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return from which spots no furniture is in the way to a point, but what is at that point; shape ``(k,)``."""
+        furniture = self.furniture[self.furniture_start[room] : self.furniture_start[room + 1]]
+        here = np.array([gap_to(point[0], point[1], row) for row in furniture])
+        lines = spots[:, None, :2] + np.linspace(0.0, 1.0, _SAMPLES)[:, None] * (point - spots[:, None, :2])
+        gaps = _free_room(lines.reshape(-1, 2), self.boxes[room], furniture[here > 0.0])
+        return np.asarray((gaps.reshape(-1, _SAMPLES) > 0.0).all(axis=1))
 
     def _spots(self, room: int, near: NDArray[np.float64]) -> NDArray[np.float64]:
         """Where someone can stand in an empty room, ENU metres, shape ``(k, 3)``, the nearest to a point first."""

@@ -14,7 +14,7 @@ from vico.sim.carrying import carry_along
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import LEVEL_GAZE, Posture
 
-# Who gets up finds a place to stand within so many metres of the seat's front.
+# Who gets up outdoors finds a place to stand within so many metres of the bench's front.
 _STEP_ASIDE = 1.5
 
 
@@ -103,13 +103,11 @@ def spot_beside_seat(i: int, state: SimulationState) -> NDArray[np.float64] | No
     seat, room = int(p.seat[i]), int(p.room[i])
     if seat < 0:
         return p.position[i].copy()
-    before = seats.before(seat)
-    if room >= 0:
-        spot = state.indoor.free_spot(room, before[:2], state.taken_in(room, without=i))
-    else:
-        free = free_ground(state.world.walkable, before, state.obstacles_to(i), within=_STEP_ASIDE)
-        spot = None if free is None else np.array([*free, float(state.world.height(free))])
-    if spot is None or math.hypot(spot[0] - before[0], spot[1] - before[1]) > _STEP_ASIDE:
+    if room < 0:
+        free = free_ground(state.world.walkable, seats.before(seat), state.obstacles_to(i), within=_STEP_ASIDE)
+        return None if free is None else np.array([*free, float(state.world.height(free))])
+    spot = seats.spot_beside(seat, state.indoor, state.taken_in(room, without=i))
+    if spot is None or math.hypot(*(spot - seats.position[seat])[:2]) > seats.farthest(seat):
         return None
     return spot
 

@@ -162,15 +162,37 @@ class Seats:
         """
         known, spots = self._stands
         if not known[seat]:
-            room = self.room.item(seat)
-            stand = indoor.free_spot(room, self.before(seat)[:2], np.zeros((0, 3)))
+            stand = self.spot_beside(seat, indoor, np.zeros((0, 3)))
             reached = stand is not None and seat in self.near(
-                stand, room, lies=self.lies.item(seat), reach=REACH - _SHORT
+                stand, self.room.item(seat), lies=self.lies.item(seat), reach=REACH - _SHORT
             )
             if stand is not None and reached:
                 spots[seat] = stand
             known[seat] = 2 if reached else 1
         return _triple(spots[seat].tolist()) if known[seat] == 2 else None
+
+    def spot_beside(self, seat: int, indoor: Indoor, taken: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Return where one stands who leaves a seat of a room, ENU metres, shape ``(3,)``; None if there is no room.
+
+        A seat is left forwards, a bed on the side that has room and leads to a door.
+
+        Parameters
+        ----------
+        taken
+            Where others stand in that room, shape ``(k, >= 2)``.
+        """
+        room, lies = self.room.item(seat), self.lies.item(seat)
+        if not lies:
+            return indoor.free_spot(room, self.before(seat)[:2], taken)
+        hips = self.position[seat, :2]
+        left = self.before(seat)[:2]
+        spots = [indoor.free_spot(room, side, taken, beside=hips) for side in (left, 2.0 * hips - left)]
+        free = [spot for spot in spots if spot is not None]
+        return min(free, key=lambda spot: math.hypot(*(spot[:2] - hips)), default=None)
+
+    def farthest(self, seat: int) -> float:
+        """Return how far from the hips one may come to stand who leaves a seat or a bed, metres."""
+        return REACH + (_HALF_BED if self.lies.item(seat) else STEP_OFF)
 
     def near(self, point: ArrayLike, room: int, *, lies: bool, reach: float = REACH) -> NDArray[np.int64]:
         """Return the seats, or the beds, of a room within reach of a point on its floor, the nearest first."""
@@ -183,7 +205,7 @@ class Seats:
         return here.start + found[np.argsort(away[found], kind="stable")]
 
     def before(self, seat: int) -> NDArray[np.float64]:
-        """Return the point before a seat, or beside a bed, where one would best stand, ENU metres, shape ``(3,)``."""
+        """Return the point before a seat, or to the left of who lies there, where one would best stand, ENU metres."""
         x, y, _ = self.position[seat]
         yaw = self.yaw[seat] + (0.5 * math.pi if self.lies[seat] else 0.0)
         away = STEP_OFF + (0.3 if self.lies[seat] else 0.0)

@@ -64,7 +64,7 @@ def place_at(i: int, index: int, state: SimulationState) -> None:
 
 
 def put_to_bed(i: int, state: SimulationState) -> None:
-    """Lay someone into the first free bed of the place they are in, if it has one."""
+    """Lay someone into the first free bed of the place they are in, if it has one that they can get out of."""
     p, seats, indoor = state.people, state.seats, state.indoor
     if p.place[i] < 0:
         return
@@ -72,10 +72,11 @@ def put_to_bed(i: int, state: SimulationState) -> None:
     for name in state.world.places[int(p.place[i])].rooms:
         room = indoor.index[name]
         inside = seats.in_room(room)
-        free = np.flatnonzero(seats.lies[inside] & ~taken[inside])
-        if len(free):
+        free = inside.start + np.flatnonzero(seats.lies[inside] & ~taken[inside])
+        bed = next((k for k in free.tolist() if seats.stand_before(k, indoor) is not None), None)
+        if bed is not None:
             p.room[i] = room
-            take_seat(i, inside.start + int(free[0]), state)
+            take_seat(i, bed, state)
             p.moved[i] = 0.0
             return
 

@@ -40,10 +40,14 @@ def _seat_for(posture: Posture, values: Values, i: int, state: SimulationState) 
         what = f"{what} with the number {asked}"
     if not len(near):
         return Refusal(ReasonCode.NO_SEAT, f"{verb}: no {what} within {REACH} m")
-    free = near[~state.seats_taken()[near]]
-    if not len(free):
+    free = near[~state.seats_taken()[near]].tolist()
+    if not free:
         return Refusal(ReasonCode.NO_SEAT, f"{verb}: no {what} within {REACH} m is free")
-    return int(free[0])
+    if lies and p.room[i] >= 0:
+        free = [bed for bed in free if seats.stand_before(bed, state.indoor) is not None]
+    if not free:
+        return Refusal(ReasonCode.NO_SEAT, f"{verb}: no {what} within {REACH} m can be got out of")
+    return free[0]
 
 
 def _feet(i: int, state: SimulationState) -> NDArray[np.float64]:
@@ -54,9 +58,13 @@ def _feet(i: int, state: SimulationState) -> NDArray[np.float64]:
 
 
 def _check_getting_up(verb: str, i: int, state: SimulationState) -> Refusal | None:
-    if spot_beside_seat(i, state) is None:
-        return Refusal(ReasonCode.NO_FREE_SPOT, f"{verb}: no room to stand; somebody is in the way")
-    return None
+    if spot_beside_seat(i, state) is not None:
+        return None
+    p, seats = state.people, state.seats
+    if p.room[i] >= 0 and seats.stand_before(int(p.seat[i]), state.indoor) is None:
+        what = "bed" if p.posture[i] == Posture.LYING else "seat"
+        return Refusal(ReasonCode.NO_FREE_SPOT, f"{verb}: walls and furniture leave no room to stand by this {what}")
+    return Refusal(ReasonCode.NO_FREE_SPOT, f"{verb}: no room to stand; somebody is in the way")
 
 
 def check_stand(values: Values, i: int, state: SimulationState) -> Refusal | None:
