@@ -131,3 +131,35 @@ def test_rooms_one_left_are_known_again_the_last_six_of_them_and_by_who_goes_on_
     other.restore(walker.state())
     assert known(other) == known(walker)
     assert other.towards({"pose": pose, "state": {"room": "bank"}}, (2.0, 0.0), near=0.3) is not None
+
+
+def test_who_is_stopped_again_and_again_beside_a_wall_steps_back_and_goes_another_way() -> None:
+    cells = np.full((160, 160), OPEN, np.uint8)
+    cells[:80, :] = BLOCKED
+    public = PublicMap(HALF, WalkableMap(cells, HALF), HeightField.flat(HALF), [], [], [], [])
+    body = Point(-15.0, 0.25)
+    # So near to the wall that there is no room on the right, and so wide that a step to the left does not pass it.
+    body.discs = [(-7.6, 0.25, 1.5)]
+    walk(Walker(public, rng(0, "walk")), body, (30.0, 0.25), 200)
+    assert math.hypot(body.pose[0] - 30.0, body.pose[1] - 0.25) <= 0.5
+
+
+def test_who_needs_room_to_turn_has_it_at_each_corner() -> None:
+    cells = np.full((160, 160), OPEN, np.uint8)
+    # Two ways through a wall: one is a metre wide, the other one, farther off, four.
+    cells[:, 78:82] = BLOCKED
+    cells[60:62, 78:82] = cells[20:28, 78:82] = OPEN
+    public = PublicMap(HALF, WalkableMap(cells, HALF), HeightField.flat(HALF), [], [], [], [])
+    narrow = public.router.path((-20.0, -15.0), (20.0, -5.0))
+    wide = public.router.path((-20.0, -15.0), (20.0, -5.0), room=1.0)
+    assert narrow is not None
+    assert wide is not None
+    assert public.walkable.clearance_at(narrow).min() < 0.9 <= public.walkable.clearance_at(wide).min()
+    body = Point(-20.0, -15.0)
+    walker = Walker(public, rng(0, "walk"))
+    status = {"action_status": "ok", "action_code": ""}
+    while abs(body.pose[0]) > 1.0:
+        action = walker.towards((20.0, -5.0), 1.0, {"pose": body.pose, "state": status}, {"entities": {}}, room=1.0)
+        assert action is not None
+        body.do(action)
+    assert -30.0 < body.pose[1] < -26.0

@@ -18,17 +18,24 @@ from vico.world.public import PublicMap
 from vico.world.trips import AHEAD, MODES, Closure, Leg, Trip
 from vico.world.walkable import ROADWAY
 
-# This near to where one waits for a bus, or to a rack, is there, metres. At a stop others may stand in the spot: then a
-# little beside it will do, but not on the road, where one would keep the bus from coming up.
-_AT_STOP, _BY_STOP, _AT_RACK = 0.3, 1.5, 1.0
+# This near to where one waits for a bus, or to a rack, is there, metres. At a stop something or others may stand in the
+# spot: then beside it will do, but not on the road, where one would keep the bus from coming up.
+_AT_STOP, _BY_STOP, _BY_OTHERS, _AT_RACK = 0.3, 1.5, 4.0, 1.0
+# A bicycle is turned where there is so much room to walls, metres; straight on narrower ways will do.
+_TURNING = 1.0
 # A bicycle is left this near to the middle of its rack, metres.
 _TO_RACK = STATION_REACH - 1.0
 # Riders sit this near to the place to wait when their bus stands at a stop, metres.
 _BUS_AT_STOP = 12.0
-# A bus that is this late is not waited for, and one that is this late aboard is left; seconds.
+# A bus that is this late is not waited for, nor any other of its line on this way, and one that is this late aboard is
+# left; seconds.
 _LATE, _LOST = 240.0, 300.0
+# Who comes so late by the way that is meant, seconds, is not late.
+_GRACE = 60.0
 # After so many seconds of trying when the bus should be there one steps back from the road for as long, so many metres.
 _IN_THE_WAY, _BACK = 15, 2.5
+# From so long before a bus is to leave who waits beside the place for it tries to come up to it, seconds.
+_COMES_UP = 10.0
 # So long before a bus is to leave one tries to board: it stands for half a minute, and may be early.
 _EARLY = 2 * BUS_DWELL
 # Stands who has moved less than this in a second, metres; a bus stands that has for so many seconds.
@@ -41,8 +48,15 @@ _PUSHES = 40
 #: Modes in which one is taken along.
 _RIDDEN = ("bus", "tram")
 
-_NO_VEHICLE, _NO_FREE_SPOT, _NO_MONEY, _CLOSED = (
-    code_name(code) for code in (ReasonCode.NO_VEHICLE, ReasonCode.NO_FREE_SPOT, ReasonCode.NO_MONEY, ReasonCode.CLOSED)
+_NO_VEHICLE, _NO_FREE_SPOT, _NO_MONEY, _CLOSED, _HIT_BODY = map(
+    code_name,
+    (
+        ReasonCode.NO_VEHICLE,
+        ReasonCode.NO_FREE_SPOT,
+        ReasonCode.NO_MONEY,
+        ReasonCode.CLOSED,
+        ReasonCode.HIT_BODY,
+    ),
 )
 
 
@@ -80,7 +94,8 @@ class Traveller:
         self.trip: Trip | None = None
         self.plans = 0
         self._leg = 0
-        # Stations that had no bicycle, or none one could get on; lines one has no money for need no note: it is seen.
+        # Stations that had no bicycle, or none one could get on, and lines waited for in vain. Lines there is no
+        # money for need no note: it is seen.
         self._closed: list[str] = []
         # Whether no trip to the goal was begun yet; and how one means to make it.
         self._fresh = True
@@ -157,7 +172,8 @@ class Traveller:
             Metres a second on foot, up to 2.5; to a bus that would be missed it goes faster.
         ride
             Mode that is meant, and the second of the day by which one wants to be there: if a trip by it is there in
-            time, that is made. Where it fails (a bus gone or full, a rack empty) the trip that arrives first is.
+            time, or a minute later, that is made. Where it fails (a bus gone or full, a rack empty) the trip that
+            arrives first is.
         without
             Modes that one does not choose now; what was begun is gone on with.
         """
@@ -231,7 +247,7 @@ class Traveller:
         if meant is not None and meant[0] not in self._without:
             mode, due = meant
             trip = self._map.trips.plan(here, goal, now, modes=(mode,), cash=cash, closed=self._ground)
-            if trip is not None and trip.arrive <= due:
+            if trip is not None and trip.arrive <= due + _GRACE:
                 return trip
         closed: list[Closure] = [*self._closed, *self._ground]
         modes = tuple(mode for mode in self._modes if mode not in self._without)
@@ -251,9 +267,11 @@ class Traveller:
         away = _away(observation, ride.start)
         if ride.mode == "bike":
             return away <= _AT_RACK
-        stopped = observation["state"]["action_status"] == "collision"
-        beside = stopped and int(self._map.walkable.class_at(observation["pose"][:2])) != ROADWAY
-        return away <= (_BY_STOP if beside else _AT_STOP)
+        state = observation["state"]
+        if away > _BY_OTHERS or state["action_status"] != "collision":
+            return away <= _AT_STOP
+        near = _BY_OTHERS if state["action_code"] == _HIT_BODY else _BY_STOP
+        return away <= near and int(self._map.walkable.class_at(observation["pose"][:2])) != ROADWAY
 
     # -- buses -------------------------------------------------------------------------------------------------------
 
@@ -266,6 +284,8 @@ class Traveller:
         if self._asked == "enter_bus" and state["action_code"] == _CLOSED:
             return self._close(leg)
         if now > leg.depart + _LATE:
+            assert leg.line is not None
+            self._closed.append(leg.line)
             return self._plan_anew()
         # Which line a bus is of can't be seen: where several stop the time tells.
         lines: list[Line | TramLine] = [*self._map.lines, *self._map.tram_lines]
@@ -274,6 +294,11 @@ class Traveller:
             return {"type": "wait"}
         if self._asked == "enter_bus" and state["action_code"] == _NO_VEHICLE and now > leg.depart - BUS_DWELL:
             self._tries += 1
+            if now > leg.depart - _COMES_UP and _away(observation, leg.start) > _BY_STOP:
+                # Others who stand there go when their bus comes.
+                step = self._walker.towards(leg.start, WALK_SPEED, observation, info)
+                if step is not None:
+                    return step
         # A bus that leaves or comes round a bend may stop short of who waits at the kerb: now and then room is made.
         back = self._tries // _IN_THE_WAY % 2 == 1
         spot = self._back_from_road(leg.start) if back else leg.start
@@ -353,7 +378,7 @@ class Traveller:
         freed = self._freed(observation)
         if freed is not None:
             return freed
-        action = self._walker.towards(end, BIKE_SPEED, observation, info)
+        action = self._walker.towards(end, BIKE_SPEED, observation, info, room=_TURNING)
         return {"type": "exit_bike"} if action is None else action
 
     def _freed(self, observation: Observation) -> Action | None:

@@ -27,6 +27,8 @@ _SIGNAL_PATIENCE, _BESIDE = 150, 0.5
 _BLOCK, _GROW = 0.5, 0.4
 # Who stepped aside joins its way again this far on, metres, unless that is longer than straight on by so much.
 _REJOIN, _DETOUR = 8.0, 6.0
+# Degrees one turns for a step aside, and for one back; who is stopped so often steps back, for aside it is no wider.
+_ASIDE, _BACK, _BACK_FROM = (50.0, 90.0, 130.0), (130.0, 170.0, 90.0), 9
 _HIT_SOLID = code_name(ReasonCode.HIT_SOLID)
 
 Point = tuple[float, float]
@@ -59,6 +61,8 @@ class Walker:
         # Ground that events close, as far as the agent knows: circles, and the cells within.
         self._avoided: list[tuple[float, float, float]] = []
         self._shut: NDArray[np.bool_] | None = None
+        # Metres to walls that are wanted at corners, as told in every step.
+        self._turns_in = 0.0
 
     def state(self) -> AgentState:
         """Return the way under way and what is known to be in it; the generator is its owner's to save."""
@@ -109,7 +113,9 @@ class Walker:
             return None
         return (*self._path[self._next], self._left[self._next])
 
-    def towards(self, goal: tuple[float, float], speed: float, observation: Observation, info: Info) -> Action | None:
+    def towards(
+        self, goal: tuple[float, float], speed: float, observation: Observation, info: Info, *, room: float = 0.0
+    ) -> Action | None:
         """Return the next action on the way to a point; None if there is no way or it is reached.
 
         Parameters
@@ -118,7 +124,10 @@ class Walker:
             ENU metres.
         speed
             Metres a second to walk at, up to 2.5.
+        room
+            Metres to walls at the corners of the way, where there is such a way.
         """
+        self._turns_in = room
         x, y = observation["pose"][:2].tolist()
         position = (x, y)
         avoided = closed_ground(info)
@@ -151,6 +160,8 @@ class Walker:
 
     def _plan(self, position: Point) -> None:
         assert self._goal is not None
+        if self._turns_in and self._take_wide_way(position):
+            return
         path = self._map.router.path(position, self._goal, blocked=self._shut, closed=self._closed)
         if path is None and self._closed:
             # What stood in the way may have moved on by now.
@@ -162,9 +173,22 @@ class Walker:
         self._take([] if path is None else path.tolist())
         self._next = 1 if len(self._path) > 1 else 0
 
+    def _take_wide_way(self, position: Point) -> bool:
+        """Take a way with room at its corners, if there is one."""
+        assert self._goal is not None
+        router, shut, room = self._map.router, self._shut, self._turns_in
+        path = router.path(position, self._goal, blocked=shut, closed=self._closed, room=room)
+        if path is None:
+            return False
+        self._take(path.tolist())
+        # From where it is narrow the way there is a part of it.
+        self._next = int(len(self._path) > 1 and math.dist(self._path[0], position) < CORNER)
+        return True
+
     def _rejoin(self, position: Point) -> None:
         """Go back to the way a little further on, which is found sooner than all of it anew; else find a new one."""
-        ahead = next((k for k in range(self._next, len(self._path)) if self._along(k) >= _REJOIN), None)
+        corners = range(self._next, len(self._path)) if self._turns_in == 0.0 else ()
+        ahead = next((k for k in corners if self._along(k) >= _REJOIN), None)
         if ahead is not None:
             path = self._map.router.path(position, self._path[ahead], blocked=self._shut, closed=self._closed)
             points = [] if path is None else path.tolist()
@@ -242,7 +266,7 @@ class Walker:
         # Everybody passes on the right, mostly: so two who meet don't mirror each other.
         first = -1.0 if self._rng.random() < 0.8 else 1.0
         for side in (first, -first):
-            for degrees in (50.0, 90.0, 130.0):
+            for degrees in _ASIDE if self._blocked < _BACK_FROM else _BACK:
                 angle = yaw + side * math.radians(degrees)
                 reach = 0.8 + 0.2 * min(self._blocked, 4)
                 if self._room(_ahead(position, angle, reach)) >= 0.3 and (

@@ -75,6 +75,7 @@ class Router:
         self._lock = Lock()
         self._nothing = np.zeros((0, 0), np.bool_)
         self._shut = np.zeros(cost.shape, np.bool_)
+        self._narrow: dict[float, NDArray[np.bool_]] = {}
 
     def learn_landmarks(self) -> None:
         """Learn the costs from landmarks now, where many searches are to come, and not at one of the first of them."""
@@ -113,6 +114,7 @@ class Router:
         *,
         blocked: NDArray[np.bool_] | None = None,
         closed: Sequence[tuple[float, float, float]] = (),
+        room: float = 0.0,
     ) -> NDArray[np.float64] | None:
         """Find a walk that prefers sidewalks and crossings and keeps 0.3 m from walls, and off kerbs' edges if it can.
 
@@ -125,6 +127,9 @@ class Router:
         closed
             Squares that are closed besides, as x, y and half their side, metres: quicker than `blocked` where they are
             few and small.
+        room
+            Metres to walls at corners and ends of the walk, for what needs them to turn; straight on it leads through
+            narrower places, too.
 
         Returns
         -------
@@ -135,10 +140,17 @@ class Router:
         with self._lock:
             self._count_search()
             with self._closed(closed):
-                if blocked is None:
+                if blocked is None and room == 0.0:
                     return self._path(a, b, self._cost, self._shut if closed else None)
-                shut = blocked | self._shut
-                return self._path(a, b, np.where(shut, np.int32(0), self._cost), shut)
+                shut = self._shut if blocked is None else blocked | self._shut
+                not_searched = shut | self._narrower(room) if room else shut
+                return self._path(a, b, np.where(not_searched, np.int32(0), self._cost), shut)
+
+    def _narrower(self, room: float) -> NDArray[np.bool_]:
+        """Return the cells with less room to walls than so many metres."""
+        if room not in self._narrow:
+            self._narrow[room] = self._clearance < room
+        return self._narrow[room]
 
     def _path(
         self, a: NDArray[np.float64], b: NDArray[np.float64], cost: NDArray[np.int32], shut: NDArray[np.bool_] | None
