@@ -10,6 +10,8 @@ from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.traffic.letting_in import distance_to_let_in, places_to_let_in, room_to_change
 from vico.sim.traffic.population import PATIENCE
 from vico.sim.traffic.state import BusRoutes
+from vico.sim.traffic.stop_lines import BEFORE_JUNCTION, _passages, _set_back, _swept, stop_lines
+from vico.sim.transit import plan_buses
 from vico.world.heights import HeightField
 
 KERB, BESIDE = "30259989_1", "30259989_2"  # lanes of 101 m before a junction, the second on the left of the first
@@ -121,3 +123,20 @@ def test_a_bus_in_a_jam_whose_stop_is_taken_goes_on_from_before_it() -> None:
     assert [jam.entity for jam in traffic.jams.rescued()] == [1_000_000]
     assert 1 < traffic.fleet.route_index[bus] <= stop
     assert not len(overlapping(Bodies.joined([traffic.bodies(), others]), 0.0))
+
+
+def test_vehicles_stop_where_no_turning_bus_sweeps_over_them() -> None:
+    city = road_city()
+    lanes, routes = city.lanes, plan_buses(city.transit, city.lanes, 8 * 3600.0).bus_routes.routes
+    found = stop_lines(lanes, routes)
+    assert (stop_lines(lanes, []) == BEFORE_JUNCTION).all()
+    assert 0 < (found > BEFORE_JUNCTION).sum() < 20
+    assert found.max() < 6.6
+    swept = [
+        (int(lanes.zone[way[1]]), _swept(lanes, way), way[0]) for route in routes for way in _passages(lanes, route)
+    ]
+    for lane in np.flatnonzero(found > BEFORE_JUNCTION).tolist():
+        zones = {int(lanes.zone[k]) for k in lanes.following(lane)}
+        mine = [area for zone, area, own in swept if zone in zones and own != lane]
+        backs = [_set_back(lanes, lane, area) for area in mine]
+        assert max(backs) == found[lane]

@@ -61,3 +61,21 @@ def test_a_car_waits_before_tracks_until_the_tram_has_passed_and_a_tram_for_a_ca
     assert traffic.fleet.lane[0] != lane or traffic.fleet.offset[0] > meets + 5.0
     assert 0.0 < min(waited) < 10.0
     assert waited[-1] == np.inf
+
+
+def test_a_tram_behind_somebody_who_stands_before_the_crossing_does_not_keep_that_one_from_it() -> None:
+    traffic, crossings, _, _ = crossed()
+    track = crossings._tracks[0]
+    begin = crossings._stretches[0][0].start
+    x, y, yaw = track.section(np.array([begin - 1.0]))[0]
+    car = np.array([[x, y, np.cos(yaw), np.sin(yaw), 1.9, 0.9, 0.0, 0.0, 0.0]])
+    crossings.begin_step(car)
+    assert crossings.metres_to_wait(0, begin - 6.0, 0.0, 3.0) == np.inf  # what is ahead is told by `free`
+    front = begin - 4.0
+    assert crossings.metres_to_wait(0, front, 0.0, 5.0) < 4.0
+    assert not crossings.called.any()
+    car[0, 7:] = 2.0 * np.cos(yaw), 2.0 * np.sin(yaw)  # once it drives on the tram comes next
+    crossings.begin_step(car)
+    crossings.metres_to_wait(0, front, 0.0, 5.0)
+    assert crossings.called.all()
+    assert traffic.crossed_tracks().sum() == 0

@@ -21,7 +21,7 @@ CLOSING_UP = 1.2  # m nearer to its leader than usual stands who would else stan
 
 _JAM_GAP = 1.8  # m kept behind a leader that stands
 _LEAST_GAP = 0.3  # no step leaves less to the leader, m
-_BEFORE_JUNCTION, _BEFORE_LANE_END = 0.6, 1.0  # m kept before a junction that is not granted, and a path's end
+_BEFORE_LANE_END = 1.0  # m kept before a path's end
 _BEYOND_STOP = 3.0  # m beyond the place where a vehicle stops, others do not count
 _LEAST_SPEED = 0.02  # slower is standing, m/s
 
@@ -85,7 +85,7 @@ def stop_and_speed_limit(net, vehicle, look, stop_distance, let_in_distance, wan
             break
         lane = vehicle.planned_lanes[k]
         if net.lanes[lane].junction >= 0 and k >= vehicle.granted_count:
-            stop = max(ahead - _BEFORE_JUNCTION, 0.0)
+            stop = max(ahead - net.lanes[vehicle.lane if k == 0 else vehicle.planned_lanes[k - 1]].stop_line, 0.0)
             break
         limit = min(net.lanes[lane].speed * vehicle.speed_factor, vehicle.target_speed if is_bus else wanted)
         limit_now = min(limit_now, np.sqrt(limit * limit + 2 * vehicle.braking * max(ahead, 0.0)))

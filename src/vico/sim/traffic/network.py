@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from vico.sim.traffic.path import PATH_POINT
 from vico.sim.traffic.state import LANE, SPOT, STOPPING_PLACE, TRACK_CROSSING, WALKWAY, LaneNetwork, WalkwayNetwork
+from vico.sim.traffic.stop_lines import BEFORE_JUNCTION, stop_lines
 from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.objects import Objects
@@ -99,7 +100,10 @@ class TrafficNetwork:
         conflicts = self.conflicts if shared else (self.driven.conflict_first, self.driven.conflict)
         first = np.zeros(len(routes) + 1, np.int32)
         first[1:] = np.cumsum([len(route) for route in routes])
+        driven = self.driven.lanes.copy()
+        driven["stop_line"] = stop_lines(self.lanes, routes)
         return self.driven._replace(
+            lanes=driven,
             conflict_first=conflicts[0],
             conflict=conflicts[1],
             route_first=first,
@@ -134,6 +138,7 @@ def _lane_network(lanes: LaneGraph, walks: Walkways) -> LaneNetwork:
         "u_turn": u_turn,
         "turn": np.where((lanes.inside >= 0) & (np.abs(turn) > _TURN), np.sign(turn), 0),
         "leaves": leaves,
+        "stop_line": BEFORE_JUNCTION,
     }.items():
         records[name] = values
     return LaneNetwork(

@@ -65,6 +65,7 @@ LANE = np.dtype(
         ("end_place", _I),  # ... to before here
         ("first_track", _I),  # places where tracks of trams cross it: `tracks` from here ...
         ("end_track", _I),  # ... to before here
+        ("stop_line", _F),  # m before its end at which vehicles stop that may not enter the junction
     ],
     align=True,
 )

@@ -73,6 +73,7 @@ _REVERSE = 0.6  # m/s
 _BLOCKER_GAP = 3.0  # m within which a leader is what a standing vehicle stands before
 _CREEP = 1.0  # a vehicle that is refused a junction waits for it below this speed, m/s
 _OTHER_WAY_AFTER = 15.0  # s of waiting for a junction after which a car looks for another way, every 50 steps
+_KEEPS_OUT_FOR = 60.0  # s of waiting for which others stay back on the lane whose vehicles are in its way
 _BEFORE_JUNCTION = 1.0  # m before a lane's end at which a bus taken out of a jam goes on
 _COMING_BACK = 8.0  # m before and behind a bus that are free where it comes back
 _BEYOND_JUNCTION = 60.0  # m seen beyond a junction that is asked for
@@ -125,7 +126,9 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         is_behind = (0 <= leader < len(fleet) and gap < request.distance) or let_in_distance < request.distance
         # Nor does who makes room for another one: it stands, and who holds a junction does not back up.
         is_behind = is_behind or vehicle.gives_way_to != NONE or waits_for_tram(track, request.distance)
-        vehicle.queued_junction = vehicle.queued_exit = vehicle.kept_out_from = NONE
+        vehicle.queued_junction = vehicle.queued_exit = NONE
+        if not _keeps_others_out(vehicle, junctions):
+            vehicle.kept_out_from = NONE
         at_signal = request.planned_index >= 0 and is_stopped_by_signal(net, vehicle, request.planned_index)
         is_refused = (
             request.planned_index >= 0
@@ -203,6 +206,17 @@ def _change_lane(net, fleet, vehicle, view, stop_distance, ahead):  # type: igno
         overtake_cyclist(net, vehicle, view)
     elif 0 <= leader < len(fleet) and wants_lane_change(net, vehicle, gap, leading, wanted):
         change_to_emptier_lane(net, fleet, vehicle, view)
+
+
+@compiled
+def _keeps_others_out(vehicle, junctions):  # type: ignore[no-untyped-def]
+    """Return whether those stay back, until a vehicle has gone, who would stand in its way at the end of their lane.
+
+    Else whoever comes next would go before it again. Where junctions are shared they cannot wait for ever: on lanes of
+    a few metres they keep those behind them inside junctions.
+    """
+    is_patient = not junctions.claims.any_shared or vehicle.junction_wait < _KEEPS_OUT_FOR
+    return vehicle.junction_wait > 0.0 and is_patient
 
 
 @compiled

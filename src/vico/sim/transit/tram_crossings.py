@@ -18,6 +18,7 @@ _HALF_WIDTH = 1.3  # m to each side of a lane that vehicles take
 _FARTHEST = 4.5  # m from a track beyond which no lane is in its way
 _ALONG = 0.35  # rad: vehicles on lanes that lead the track's way drive before trams or behind them
 _BEFORE, _PASSED = 1.2, 0.05  # m kept before a stretch where a tram waits; beyond that place it is on its way
+_AT_BEGIN = 1.0  # m of a stretch on which somebody stands before it
 _CALLS_FOR, _CALLS_FROM = 2.0, 8.0  # s, and m, beyond its braking distance from which on vehicles let a tram go first
 _CREEPS, _VEHICLE = 1.0, 1.2  # m/s below which a vehicle may come to stand; half length of one at least, m
 _SAMPLE = 0.5  # m between places of a lane that are looked at
@@ -81,7 +82,7 @@ class TramCrossings:
         free
             Metres that nobody else is on.
         """
-        self.call_under(line, front, _BEFORE)
+        self.call_under(line, front, _BEFORE - _PASSED)
         reach = min(speed * speed / (2 * TRAM_BRAKING) + _CALLS_FOR * speed + _CALLS_FROM, free)
         for stretch in self._stretches[line]:
             ahead = stretch.start - _BEFORE - front
@@ -89,21 +90,30 @@ class TramCrossings:
                 continue
             if ahead > reach:
                 break
-            if not self._has_room(line, stretch):
+            if self._stands(line, front, stretch.start + _AT_BEGIN) or not self._has_room(line, stretch):
                 return max(ahead, 0.0)
-            self.called[stretch.rows] = True
             if self._taken is None:
                 self._taken = self._traffic.crossed_tracks()
-            if self._taken[stretch.rows].any():
+            is_taken = bool(self._taken[stretch.rows].any())
+            # Who stands on one of its crossings may have to drive over the next one to leave it.
+            self.called[stretch.rows] |= not (is_taken and self._stands(line, stretch.start, stretch.end))
+            if is_taken:
                 return max(ahead, 0.0)
         return np.inf
 
     def _has_room(self, line: int, stretch: CrossedStretch) -> bool:
         """Return whether no vehicle stands where a tram would stand clear of a stretch, behind it."""
-        points = self._tracks[line].across[int(stretch.end / STEP) : int((stretch.end + TRAM_LENGTH) / STEP) + 2]
+        return not self._stands(line, stretch.end, stretch.end + TRAM_LENGTH + STEP)
+
+    def _stands(self, line: int, start: float, end: float) -> bool:
+        """Return whether a vehicle stands in the way of trams between two distances along a track, metres.
+
+        Whoever stands between a tram and a stretch, and waits for that tram to go over it first, would wait for ever.
+        """
+        points = self._tracks[line].across[int(start / STEP) : int(end / STEP) + 1]
         stands = np.hypot(self._others[:, 7], self._others[:, 8]) < _CREEPS
         standing = self._others[stands & (self._others[:, 4] > _VEHICLE)]
-        return int(first_taken(points, standing, 0, 0, ACROSS_REACH, 0.0)) == len(points)
+        return int(first_taken(points, standing, 0, 0, ACROSS_REACH, 0.0)) < len(points)
 
 
 def crossed_stretches(tracks: Sequence[Track], lanes: LaneGraph) -> tuple[NDArray[np.void], list[list[CrossedStretch]]]:
