@@ -28,7 +28,10 @@ from reporting import machine, publish
 from vico.sim.recording.run import Run, read_run
 
 _PERIOD = 2.0  # s between readings
-_USUAL = ("--robots", "husky,go2,h1,drone,manipulator", "--weather", "changing", "--cars", "60", "--pedestrians", "60")
+_USUAL = (
+    "--robots", "husky,go2,h1,drone,manipulator", "--weather", "changing", "--cars", "60", "--pedestrians", "60",
+    "--junctions", "signals",
+)  # fmt: skip
 _DOWN = ("fallen", "recovered", "lost")
 
 
