@@ -66,7 +66,8 @@ class Scene:
     start
         Second of the day at which its run begins.
     follow, views
-        Who is seen, and from where (`vico.viewer.follow.VIEWS`): one shot each, equally long.
+        Who is seen, and from where (`vico.viewer.follow.VIEWS`): one shot each, equally long. `follow` may be told by
+        how things are as the scene begins.
     seconds
         How long it is.
     begins
@@ -83,7 +84,7 @@ class Scene:
 
     caption: str
     start: float
-    follow: str
+    follow: str | Callable[[Simulation], str]
     views: tuple[str, ...] = ("behind",)
     seconds: int = 17
     begins: Callable[[Simulation], bool] = lambda sim: sim.metrics.steps >= 10
@@ -98,13 +99,14 @@ class UntilPlayed(Hook):
     """Notes what the seconds of a scene are worth, and ends its run once it has been played, or an hour has passed."""
 
     def __init__(self, scene: Scene, sim: Simulation) -> None:
-        self.scene, self.sim, self.begun = scene, sim, -1
+        self.scene, self.sim, self.begun, self.follow = scene, sim, -1, scene.follow
         self.worth: list[float] = []
 
     def stepped(self, step: Step) -> None:
         """Look whether it begins or is over."""
         if self.begun < 0 and self.scene.begins(self.sim):
             self.begun = step.number
+            self.follow = self.follow if isinstance(self.follow, str) else self.follow(self.sim)
         if self.begun < 0:
             return
         self.worth.append(self.scene.worth(self.sim))
@@ -366,12 +368,19 @@ def arrived(name: str, place: str) -> Callable[[Simulation], bool]:
     return lambda sim: sim.state.people.place[sim.state.people.names.index(name)] == sim.state.place_index[place]
 
 
+def rearmost(sim: Simulation) -> str:
+    """Return which of the passengers sees most of the others: who sits farthest back."""
+    people = sim.state.people
+    aboard = [k for k in range(len(people) - PASSENGERS, len(people)) if people.vehicle[k] > 0]
+    ahead = np.array([np.cos(people.yaw[aboard[0]]), np.sin(people.yaw[aboard[0]])])
+    return people.names[min(aboard, key=lambda k: float(people.position[k, :2] @ ahead))]
+
+
 def in_a_moving_bus(sim: Simulation) -> bool:
-    """Return whether the one who is followed is in a bus that is on its way, with others who wanted to ride."""
+    """Return whether a bus is on its way with most of those who wanted to ride."""
     transit, aboard = sim.state.transit, sim.state.people.vehicle[-PASSENGERS:] > 0
-    in_company = bool(aboard[-1]) and int(aboard.sum()) >= PASSENGERS // 2
-    return in_company and all(transit.stopped_at(bus) is None for bus in range(transit.traffic.buses)
-                              if transit.aboard(bus))  # fmt: skip
+    buses = [bus for bus in range(transit.traffic.buses) if transit.aboard(bus)]
+    return int(aboard.sum()) > PASSENGERS // 2 and all(transit.stopped_at(bus) is None for bus in buses)
 
 
 def works(who, stay: Stay) -> bool:
@@ -418,7 +427,7 @@ class Casting:
         return self.walk("06:30", "09:00", "{} goes to school", learns)
 
     def bus(self) -> Scene:
-        """Return a ride, seen by the last who got on."""
+        """Return a ride, seen by who sits farthest back."""
         public_map = PublicMap.from_world(self.world)
         riders = {f"assistant_{k}": Passenger(public_map, self.seed, k) for k in range(PASSENGERS)}
 
@@ -427,10 +436,11 @@ class Casting:
                 sim.scenario.place_agent(name, rider.here)
             sim.state.people.cash[-PASSENGERS:] = 20.0
 
-        config, last = {"assistants": PASSENGERS}, f"assistant_{PASSENGERS - 1}"
+        config = {"assistants": PASSENGERS}
         return Scene(
-            "In the bus", 9 * 3600, last, ("eyes",), begins=in_a_moving_bus, config=config, setup=setup, players=riders
-        )
+            "In the bus", 9 * 3600, rearmost, ("eyes",), begins=in_a_moving_bus, config=config, setup=setup,
+            players=riders,
+        )  # fmt: skip
 
     def shop(self) -> Scene:
         """Return somebody who shops."""
@@ -483,8 +493,8 @@ class Casting:
 SCENES = ("street", "school", "bus", "shop", "robots", "rain", "night")
 
 
-def play(scene: Scene, out: Path, world: World, community: Community, seed: int) -> tuple[RepeatedRun, int]:
-    """Simulate and record a scene; return it, and the step at which it begins."""
+def play(scene: Scene, out: Path, world: World, community: Community, seed: int) -> tuple[RepeatedRun, int, str]:
+    """Simulate and record a scene; return it, the step at which it begins, and who is followed."""
     options = {"cars": 80, "pedestrians": 200, "junctions": "signals", **scene.config}
     config = SimConfig(seed=seed, start=int(scene.start) % DAY, observe=(), **options)
     sim = Simulation(world, community, config)
@@ -498,7 +508,7 @@ def play(scene: Scene, out: Path, world: World, community: Community, seed: int)
         recorder.close()
     if played.first < 0:
         raise SystemExit(f"{scene.caption!r} did not come about within an hour; take another seed, or more residents")
-    return RepeatedRun(read_run(out), world, community, setup=scene.setup), played.first
+    return RepeatedRun(read_run(out), world, community, setup=scene.setup), played.first, played.follow
 
 
 def shots(repeated: RepeatedRun, scene: Scene, first: int, options: argparse.Namespace) -> Iterator[np.ndarray]:
@@ -547,7 +557,8 @@ def main() -> None:
             print(f"{name}: is there already, and kept", flush=True)
             continue
         scene = getattr(casting, name)()
-        repeated, first = play(scene, arguments.out / name, world, community, arguments.seed)
+        repeated, first, follow = play(scene, arguments.out / name, world, community, arguments.seed)
+        scene = replace(scene, follow=follow)
         with FilmWriter(arguments.out / f"{name}.mp4", rate=arguments.rate, crf=18, threads=2) as film:
             for frame in captioned(
                 shots(repeated, scene, first, arguments), scene, float(repeated.run.times[first]), arguments.rate
