@@ -33,6 +33,7 @@ from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedRun
 from vico.seeds import rng
 from vico.sim.config import SimConfig
+from vico.sim.holding import carries_umbrella, habit_of
 from vico.sim.recorder import Recorder
 from vico.sim.recording import read_run
 from vico.sim.simulation import Simulation
@@ -482,8 +483,12 @@ class Casting:
         )
 
     def rain(self) -> Scene:
-        """Return an evening in the rain."""
-        return self.walk("17:20", "18:10", "Rain at dusk", after=20, weather="rain", **AUTUMN)
+        """Return an evening in the rain, of somebody who has an umbrella along."""
+
+        def is_careful(who, stay: Stay) -> bool:
+            return bool(carries_umbrella(np.array(habit_of(self.seed, who.id))))
+
+        return self.walk("17:20", "18:10", "Rain at dusk", is_careful, after=20, weather="rain", **AUTUMN)
 
     def night(self) -> Scene:
         """Return somebody on the way home at night."""
