@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from vico.world.folder import World
 from vico.world.model import TramLine, TramStop
 from vico.world.public import PublicMap
 from vico.world.rails import TRAM_LENGTH, Track
+from vico.world.walkways import CORNER, CROSSING, SIDEWALK
 from vico.worldgen.streets.netconvert import empty_network
 
 EIGHT = 8 * 3600
@@ -247,3 +249,33 @@ def test_trams_keep_clear_of_all_that_stands_beside_the_track() -> None:
     assert track.speed[80] < track.speed[0]
     middle = track.section(np.arange(TRAM_LENGTH, track.length, 1.0))
     assert np.abs(np.diff(np.unwrap(middle[:, 2]))).max() < 0.25
+
+
+class _Walks:
+    """Walkways as far as tracks are concerned: what each is, and where."""
+
+    def __init__(self, rows: list[tuple[int, list[tuple[float, float]]]]) -> None:
+        self.kind = np.array([kind for kind, _ in rows])
+        self._lines = [np.array(line) for _, line in rows]
+
+    def __len__(self) -> int:
+        return len(self._lines)
+
+    def line(self, k: int) -> np.ndarray:
+        return self._lines[k]
+
+
+def test_nobody_walks_along_tracks_on_sidewalks_or_over_corners_but_across_them(
+    sim: Simulation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trams = system(sim).trams
+    beside = Y - 3.2
+    monkeypatch.setattr(trams, "tracks", [Track([(-40.0, y), (40.0, y)]) for y in (Y, beside)])
+    along, across = [(-10.0, Y + 0.5), (2.0, Y + 0.5)], [(5.0, Y + 9.0), (5.0, beside - 9.0)]
+    rows = [
+        (SIDEWALK, along), (CORNER, along), (CROSSING, along), (SIDEWALK, [(-10.0, Y + 3.0), (2.0, Y + 3.0)]),
+        # Over both tracks at right angles; at the corner round a bend one walks along the nearer one.
+        (CORNER, across), (CORNER, [(5.0, Y + 3.0), (5.0, Y), (18.0, Y)]),
+    ]  # fmt: skip
+    monkeypatch.setattr(trams, "_traffic", SimpleNamespace(walks=_Walks(rows)))
+    assert trams.walkways_on_tracks().tolist() == [True, True, False, False, False, True]
