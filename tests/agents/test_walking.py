@@ -155,6 +155,9 @@ def test_who_needs_room_to_turn_has_it_at_each_corner() -> None:
     assert narrow is not None
     assert wide is not None
     assert public.walkable.clearance_at(narrow).min() < 0.9 <= public.walkable.clearance_at(wide).min()
+    along_the_edge = public.router.path((-39.8, -30.0), (-39.8, 30.0), room=1.0)
+    assert along_the_edge is not None
+    assert along_the_edge[:, 0].min() >= 1.0 - HALF
     body = Point(-20.0, -15.0)
     walker = Walker(public, rng(0, "walk"))
     status = {"action_status": "ok", "action_code": ""}

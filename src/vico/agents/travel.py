@@ -7,20 +7,24 @@ from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
+import shapely
+from numpy.typing import NDArray
 
 from vico.agents.base import Action, Info, Observation
 from vico.agents.state import AgentState
 from vico.agents.stays import RUN
 from vico.agents.wayfinding import Walker, closed_ground
-from vico.rules import BIKE_SPEED, BUS_DWELL, STATION_REACH, WALK_SPEED, ReasonCode, code_name
+from vico.rules import BIKE_SPEED, BUS_DWELL, STATION_REACH, TRAM_WIDTH, WALK_SPEED, ReasonCode, code_name
 from vico.world.model import Line, Stop, TramLine, TramStop
 from vico.world.public import PublicMap
 from vico.world.trips import AHEAD, MODES, Closure, Leg, Trip
 from vico.world.walkable import ROADWAY
 
 # This near to where one waits for a bus, or to a rack, is there, metres. At a stop something or others may stand in the
-# spot: then beside it will do, but not on the road, where one would keep the bus from coming up.
+# spot: then beside it will do, but not on the road or so near to the middle of a track, where one would keep the bus or
+# tram from coming up; the farther off only for who has got nowhere for some seconds.
 _AT_STOP, _BY_STOP, _BY_OTHERS, _AT_RACK = 0.3, 1.5, 4.0, 1.0
+_FROM_TRACK, _GETS_NOWHERE = TRAM_WIDTH / 2 + 0.8, 3
 # A bicycle is turned where there is so much room to walls, metres; straight on narrower ways will do.
 _TURNING = 1.0
 # A bicycle is left this near to the middle of its rack, metres.
@@ -212,8 +216,17 @@ class Traveller:
         action = self._walker.towards(goal if last else leg.end, pace, observation, info)
         if action is not None or last:
             return action
-        # There is no way to where the ride begins.
-        self._close(leg)
+        return self._at_the_ways_end(leg, observation)
+
+    def _at_the_ways_end(self, leg: Leg, observation: Observation) -> Action:
+        """Begin the ride from as near as one gets, as others stand in the place for it; do without it from farther."""
+        assert self.trip is not None
+        away = _away(observation, self.trip.legs[self._leg + 1].start)
+        if away > _BY_OTHERS:
+            self._close(leg)
+        elif not self._is_in_the_way(observation["pose"][:2]):
+            self._leg += 1
+        self._walker.stop()
         return {"type": "wait"}
 
     def _leg_on_foot(self, goal: tuple[float, float], observation: Observation) -> Leg | None:
@@ -270,8 +283,15 @@ class Traveller:
         state = observation["state"]
         if away > _BY_OTHERS or state["action_status"] != "collision":
             return away <= _AT_STOP
-        near = _BY_OTHERS if state["action_code"] == _HIT_BODY else _BY_STOP
-        return away <= near and int(self._map.walkable.class_at(observation["pose"][:2])) != ROADWAY
+        among_others = state["action_code"] == _HIT_BODY and self._still >= _GETS_NOWHERE
+        return away <= (_BY_OTHERS if among_others else _BY_STOP) and not self._is_in_the_way(observation["pose"][:2])
+
+    def _is_in_the_way(self, position: NDArray[np.float64]) -> bool:
+        """Return whether buses or trams come by a place."""
+        if int(self._map.walkable.class_at(position)) == ROADWAY:
+            return True
+        here = shapely.Point(position)
+        return any(shapely.LineString(line.track).distance(here) < _FROM_TRACK for line in self._map.tram_lines)
 
     # -- buses -------------------------------------------------------------------------------------------------------
 

@@ -128,8 +128,8 @@ class Router:
             Squares that are closed besides, as x, y and half their side, metres: quicker than `blocked` where they are
             few and small.
         room
-            Metres to walls at corners and ends of the walk, for what needs them to turn; straight on it leads through
-            narrower places, too.
+            Metres to walls and to the map's edge at corners and ends of the walk, for what needs them to turn; straight
+            on it leads through narrower places, too.
 
         Returns
         -------
@@ -147,9 +147,11 @@ class Router:
                 return self._path(a, b, np.where(not_searched, np.int32(0), self._cost), shut)
 
     def _narrower(self, room: float) -> NDArray[np.bool_]:
-        """Return the cells with less room to walls than so many metres."""
+        """Return the cells with less room to walls and to the map's edge than so many metres."""
         if room not in self._narrow:
-            self._narrow[room] = self._clearance < room
+            narrow, edge = self._clearance < room, math.ceil(room / self.walkable.cell)
+            narrow[:edge] = narrow[-edge:] = narrow[:, :edge] = narrow[:, -edge:] = True
+            self._narrow[room] = narrow
         return self._narrow[room]
 
     def _path(
