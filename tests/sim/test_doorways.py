@@ -121,3 +121,25 @@ def test_a_room_that_fills_up_while_the_door_opens_is_refused_then(sim: Simulati
     while sim.state.people.at_door()[0]:
         state = sim.step({"assistant_0": {"type": "wait"}}).observations["assistant_0"]["state"]
     assert (state["action_code"], state["room"]) == ("full", "")
+
+
+def test_one_comes_out_to_a_spot_beside_the_door_close_to_the_wall(
+    sim: Simulation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spot = np.array([-4.2, 4.72])
+    monkeypatch.setattr("vico.sim.passing.spot_outside", lambda i, state: spot)
+    place_in_room(0, 0, sim.state)
+    for _ in range(5):
+        sim.step({"assistant_0": {"type": "exit"}})
+    p = sim.state.people
+    assert (p.room[0], p.passing[0]) == (-1, 0)
+    assert p.position[0, :2].tolist() == spot.tolist()
+
+
+def test_who_waits_long_for_others_in_a_door_is_told_so(sim: Simulation, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vico.sim.passing._is_free", lambda i, way, state: False)
+    reasons = [
+        sim.step({"assistant_0": _ENTER}).observations["assistant_0"]["state"]["action_reason"] for _ in range(26)
+    ]
+    assert "enter: somebody is in the door" in reasons
+    assert sim.state.people.room[0] < 0

@@ -16,6 +16,7 @@ from vico.assets.people import J
 from vico.seeds import rng
 from vico.sim.config import SimConfig
 from vico.sim.moves import place_in_room
+from vico.sim.overlaps import overlaps_of
 from vico.sim.scene import SceneRenderer
 from vico.sim.simulation import Simulation
 from vico.sim.state import Posture
@@ -213,6 +214,22 @@ def test_who_cannot_get_up_is_told_what_is_in_the_way() -> None:
     assert "somebody is in the way" in act(sim, "resident_0", type="wake")["action_reason"]
     state.seats._stands[0][bed] = 1
     assert "walls and furniture" in act(sim, "resident_0", type="wake")["action_reason"]
+
+
+def test_nobody_sits_down_into_whoever_stands_beside_the_seat() -> None:
+    sim = _asleep([_piece("chair", 1.0, 9.0, 0.0, (0.44, 0.42, 0.9), "r_back")], people=2)
+    room = sim.state.indoor.index["r_back"]
+    place_in_room(1, room, sim.state, near=np.array([1.0, 9.47]))
+    place_in_room(0, room, sim.state, near=np.array([1.9, 9.0]))
+    # The next free seat is in the other room.
+    assert sim.observe()[1]["resident_0"]["rest"]["sit"]["door"] == "r_cafe"
+    told = act(sim, "resident_0", type="sit")
+    assert told["action_code"] == "no_seat"
+    assert "stands at" in told["action_reason"]
+    place_in_room(1, room, sim.state, near=np.array([1.0, 10.5]))
+    assert sim.observe()[1]["resident_0"]["rest"]["sit"]["door"] == ""
+    assert act(sim, "resident_0", type="sit")["posture"] == "sitting"
+    assert overlaps_of(sim.state) == []
 
 
 def test_random_people_never_sit_in_the_air() -> None:

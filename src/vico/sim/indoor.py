@@ -193,7 +193,13 @@ class Indoor:
         return ndimage.binary_dilation(np.isin(parts, homes[homes > 0]), np.ones((3, 3)))
 
     def free_spot(
-        self, room: int, near: ArrayLike, taken: NDArray[np.float64], *, beside: NDArray[np.float64] | None = None
+        self,
+        room: int,
+        near: ArrayLike,
+        taken: NDArray[np.float64],
+        *,
+        from_door: bool = False,
+        beside: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float64] | None:
         """Spot of a room nearest to `near` where someone can stand; None if the room is full.
 
@@ -201,9 +207,10 @@ class Indoor:
         ----------
         taken
             Where others stand in that room, shape ``(k, >= 2)``.
+        from_door
+            Only spots that one can walk to from a door.
         beside
-            A point of furniture, shape ``(2,)``: only spots that one can walk to from a door, and with nothing else
-            between them and it.
+            A point of furniture, shape ``(2,)``: only spots with no other furniture between them and it.
 
         Returns
         -------
@@ -213,10 +220,13 @@ class Indoor:
         point = np.asarray(near, np.float64).reshape(-1)[:2]
         quick = not len(taken) and beside is None and room not in self.stairs
         if quick and self.gap(room, point) + _NARROWER >= RADIUS + 0.02:
-            return np.array([*point, self.floor[room]])
+            quick = not from_door or bool(self.walked_from_doors(room, point[None])[0])
+            if quick:
+                return np.array([*point, self.floor[room]])
         spots = self._spots(room, point)
-        if beside is not None and len(spots):
+        if from_door and len(spots):
             spots = spots[self.walked_from_doors(room, spots)]
+        if beside is not None and len(spots):
             spots = spots[self._nothing_between(room, spots, beside)]
         if not len(taken) or not len(spots):
             return spots[0].copy() if len(spots) else None

@@ -13,7 +13,7 @@ from vico.sim.footprints import OUTDOORS, Rectangle, gaps, records_of
 from vico.sim.holding import take_umbrella
 from vico.sim.moves import place_in_room, put_outdoors, spot_outside, wrapped
 from vico.sim.simulation_state import SimulationState
-from vico.sim.state import LEVEL_GAZE, body_radius
+from vico.sim.state import DOOR_OPENING, LEVEL_GAZE, body_radius
 
 #: People turn at doors so fast, radians a second.
 TURN_RATE = 2.0 * math.pi
@@ -25,6 +25,7 @@ _AT_IT = 0.03  # metres within which nobody turns to where they go
 _INSIDE, _FROM, _CLEAR, _STEP = 0.75, 0.8, 0.35, 0.45
 _PACE = 1.25  # m/s at which people walk through doors
 _PATIENCE = 2.0  # s for which one waits in a door for others
+_IN_LINE = 20.0  # s for which one waits at an open door until nobody is in it
 _BESIDE, _APART = 0.03, 0.75  # metres that one keeps from others, and two who go the same way through one door
 # Bodies are looked at whose middle is nearer than this, metres: people, and vehicles as well.
 _REACH, _LONGEST = 1.5, 12.0
@@ -48,6 +49,8 @@ def begin_passing(i: int, state: SimulationState) -> None:
         _give_up(i, ReasonCode.BLOCKED, "exit: somebody stands in front of the door", state)
     elif not outwards and _room_for(i, number, state) is None:
         _give_up(i, ReasonCode.FULL, "enter: it is full", state)
+    elif p.door_time[i] >= DOOR_OPENING + _IN_LINE:
+        _give_up(i, ReasonCode.BLOCKED, f"{'exit' if outwards else 'enter'}: somebody is in the door", state)
     elif _is_free(i, -1 if outwards else 1, state):
         p.passing[i], p.door_time[i], p.action_clip[i] = (-1 if outwards else 1), 0.0, -1
         if outwards:
@@ -137,7 +140,10 @@ def _pass_on(i: int, state: SimulationState, others: NDArray[np.void], dt: float
     if p.passing[i] > 0:
         goal = _point(door, 0.0 if inside < -_BESIDE else _INSIDE)
     else:
-        goal = _point(door, -_CLEAR) if inside > _BESIDE - _CLEAR else (p.door_spot[i, 0], p.door_spot[i, 1])
+        # A spot beside the door may be nearer to the wall than where one turns to others.
+        clear = min(_CLEAR, -_inside(door, p.door_spot[i]))
+        to_spot = clear <= 0.0 or inside <= _BESIDE - clear
+        goal = (p.door_spot[i, 0], p.door_spot[i, 1]) if to_spot else _point(door, -clear)
     dx, dy = float(goal[0] - here[0]), float(goal[1] - here[1])
     left = math.hypot(dx, dy)
     step = min(_PACE * dt, left)

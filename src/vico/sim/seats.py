@@ -162,9 +162,11 @@ class Seats:
         """
         known, spots = self._stands
         if not known[seat]:
-            stand = self.spot_beside(seat, indoor, np.zeros((0, 3)))
-            reached = stand is not None and seat in self.near(
-                stand, self.room.item(seat), lies=self.lies.item(seat), reach=REACH - _SHORT
+            room, stand = self.room.item(seat), self.spot_beside(seat, indoor, np.zeros((0, 3)))
+            reached = (
+                stand is not None
+                and seat in self.near(stand, room, lies=self.lies.item(seat), reach=REACH - _SHORT)
+                and bool(indoor.walked_from_doors(room, stand[None])[0])
             )
             if stand is not None and reached:
                 spots[seat] = stand
@@ -174,19 +176,23 @@ class Seats:
     def spot_beside(self, seat: int, indoor: Indoor, taken: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Return where one stands who leaves a seat of a room, ENU metres, shape ``(3,)``; None if there is no room.
 
-        A seat is left forwards, a bed on the side that has room and leads to a door.
+        A seat is left forwards, a bed on the side that has room; where a door can be walked to from there, if there is
+        such a spot by a seat, and nowhere else by a bed.
 
         Parameters
         ----------
         taken
             Where others stand in that room, shape ``(k, >= 2)``.
         """
-        room, lies = self.room.item(seat), self.lies.item(seat)
-        if not lies:
-            return indoor.free_spot(room, self.before(seat)[:2], taken)
-        hips = self.position[seat, :2]
-        left = self.before(seat)[:2]
-        spots = [indoor.free_spot(room, side, taken, beside=hips) for side in (left, 2.0 * hips - left)]
+        room, hips = self.room.item(seat), self.position[seat, :2]
+        before = self.before(seat)[:2]
+        if not self.lies.item(seat):
+            spot = indoor.free_spot(room, before, taken, from_door=True)
+            if spot is not None and math.hypot(*(spot[:2] - hips)) <= self.farthest(seat):
+                return spot
+            return indoor.free_spot(room, before, taken)
+        sides = (before, 2.0 * hips - before)
+        spots = [indoor.free_spot(room, side, taken, from_door=True, beside=hips) for side in sides]
         free = [spot for spot in spots if spot is not None]
         return min(free, key=lambda spot: math.hypot(*(spot[:2] - hips)), default=None)
 
@@ -230,7 +236,13 @@ def _places_of(objects: Objects, name: str, model: Model) -> NDArray[np.float64]
 
 
 def find_rest(
-    seats: Seats, indoor: Indoor, here: tuple[ArrayLike, int], taken: NDArray[np.bool_], *, lies: bool
+    seats: Seats,
+    indoor: Indoor,
+    here: tuple[ArrayLike, int],
+    taken: NDArray[np.bool_],
+    *,
+    lies: bool,
+    has_room: Callable[[int], bool],
 ) -> Rest | None:
     """Return the nearest free seat of one's room, else the way to the nearest room of the same place that has one.
 
@@ -240,12 +252,15 @@ def find_rest(
         Where one is, ENU metres, and in which room (-1 outdoors: only benches near by are found).
     taken
         Which seats are no longer free, shape ``(m,)``.
+    has_room
+        Whether others leave room to sit on a seat.
     """
     point, room = here
     if room < 0:
         near = [k for k in seats.near(point, -1, lies=lies, reach=_BENCH).tolist() if not taken[k]]
-        return Rest(int(seats.entity[near[0]]), "", _triple(seats.before(near[0]))) if near else None
-    found = _free_in(seats, indoor, here, taken, lies=lies)
+        seat = next((k for k in near if has_room(k)), None)
+        return None if seat is None else Rest(int(seats.entity[seat]), "", _triple(seats.before(seat)))
+    found = _free_in(seats, indoor, here, taken, lies=lies, has_room=has_room)
     if found is not None:
         seat, stand = found
         return Rest(int(seats.entity[seat]), "", stand)
@@ -258,7 +273,7 @@ def find_rest(
                 continue
             first_door[door.to] = k if now == room else first_door[now]
             queue.append(door.to)
-            found = _free_in(seats, indoor, (door.position, door.to), taken, lies=lies)
+            found = _free_in(seats, indoor, (door.position, door.to), taken, lies=lies, has_room=has_room)
             if found is not None:
                 way = indoor.doors[room][first_door[door.to]]
                 return Rest(int(seats.entity[found[0]]), indoor.rooms[way.to].id, way.position)
@@ -268,7 +283,13 @@ def find_rest(
 
 
 def _free_in(
-    seats: Seats, indoor: Indoor, here: tuple[ArrayLike, int], taken: NDArray[np.bool_], *, lies: bool
+    seats: Seats,
+    indoor: Indoor,
+    here: tuple[ArrayLike, int],
+    taken: NDArray[np.bool_],
+    *,
+    lies: bool,
+    has_room: Callable[[int], bool],
 ) -> tuple[int, tuple[float, float, float]] | None:
     """Return the free seat of a room that is nearest to a point and can be reached, and where one stands before it."""
     point, room = here
@@ -281,7 +302,7 @@ def _free_in(
     order = np.argsort((places[:, 0] - x) ** 2 + (places[:, 1] - y) ** 2, kind="stable")
     for seat in (inside.start + free[order[:_TRIED]]).tolist():
         stand = seats.stand_before(seat, indoor)
-        if stand is not None:
+        if stand is not None and has_room(seat):
             return seat, stand
     return None
 

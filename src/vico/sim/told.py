@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from vico.sim.city import ANNOUNCED, has_news, known_events
 from vico.sim.moves import eye_height
 from vico.sim.perception import OUTDOORS, AllInView, Eyes, in_view, opaque_grid
 from vico.sim.queues import place_in_line
+from vico.sim.room_to_sit import has_room
 from vico.sim.seats import Rests, find_rest
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture, Vehicle
@@ -158,7 +160,8 @@ class Told:
         if p.vehicle.item(i) != _ON_FOOT or p.posture.item(i) == _LYING:
             return Rests(lambda lies: None)
         here = p.position[i], p.room.item(i)
-        return Rests(lambda lies: find_rest(state.seats, state.indoor, here, self._taken(), lies=lies))
+        clear = partial(has_room, i=i, state=state)
+        return Rests(lambda lies: find_rest(state.seats, state.indoor, here, self._taken(), lies=lies, has_room=clear))
 
     def _taken(self) -> NDArray[np.bool_]:
         if self._seats_taken is None:

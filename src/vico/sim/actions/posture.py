@@ -10,6 +10,7 @@ from vico.sim.actions.fields import Field
 from vico.sim.actions.model import ActionType, Actors, Check, Perform, Refusal, Situation, Values
 from vico.sim.holding import free_hand
 from vico.sim.moves import gesture, get_up, spot_beside_seat, take_seat
+from vico.sim.room_to_sit import has_room
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture
 
@@ -47,7 +48,10 @@ def _seat_for(posture: Posture, values: Values, i: int, state: SimulationState) 
         free = [bed for bed in free if seats.stand_before(bed, state.indoor) is not None]
     if not free:
         return Refusal(ReasonCode.NO_SEAT, f"{verb}: no {what} within {REACH} m can be got out of")
-    return free[0]
+    seat = next((seat for seat in free if has_room(seat, i, state)), None)
+    if seat is None:
+        return Refusal(ReasonCode.NO_SEAT, f"{verb}: somebody stands at every free {what} within {REACH} m")
+    return seat
 
 
 def _feet(i: int, state: SimulationState) -> NDArray[np.float64]:
