@@ -6,6 +6,8 @@ from helsinki_traffic import traffic_by
 from vico.sim.bodies import Bodies
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import JunctionRule
+from vico.sim.traffic.leaving import leave_crossing
+from vico.world.walkways import CROSSING
 
 NOWHERE = Bodies.none()
 
@@ -47,3 +49,17 @@ def test_groups_go_on_from_a_saved_state_as_if_nothing_had_been() -> None:
         first.advance(0.1, NOWHERE)
         again.advance(0.1, NOWHERE)
     assert all(np.array_equal(a, again.arrays()[name]) for name, a in first.arrays().items())
+
+
+def test_who_stands_beyond_the_end_of_a_crossing_is_off_it_however_little_it_walked() -> None:
+    traffic = traffic_by(JunctionRule.ONE, 0, 1)
+    walks, walkers, paths = traffic.walks, traffic._walkers, traffic.paths
+    crossing = int(np.flatnonzero(walks.kind == CROSSING)[0])
+    line = walks.line(crossing)
+    out = (line[-1] - line[-2]) / np.linalg.norm(line[-1] - line[-2])
+    traffic.junctions.walkers_on[crossing] = 1
+    walkers["leaving_crossing"], walkers["leaving_since"] = crossing, walkers["distance_walked"]
+    for beyond, is_off in ((-1.0, False), (0.1, False), (0.4, True)):
+        leave_crossing(paths, walkers[0], traffic.junctions, *(line[-1] + beyond * out))
+        assert (walkers["leaving_crossing"][0] < 0) == is_off
+        assert traffic.junctions.walkers_on[crossing] == (0 if is_off else 1)

@@ -18,16 +18,14 @@ from vico.sim.traffic.companions import (
     waits_for_companions,
     walkway_to_leader,
 )
-from vico.sim.traffic.follow_point import FollowPoint, follow_point, room_at
-from vico.sim.traffic.path import project_on_polyline
+from vico.sim.traffic.follow_point import FollowPoint, follow_point
+from vico.sim.traffic.leaving import RADIUS, leave_crossing, project_on_walkway
 from vico.sim.traffic.random_stream import next_random
 from vico.sim.traffic.shapes import disc_touches, distance_to, is_disc, share_level
 from vico.sim.traffic.standing import note_standing, stop_at_spot, turn_towards
 from vico.sim.traffic.state import AMBER, CROWD, GAIT_TIME, NONE
 from vico.world.walkways import CORNER as _CORNER_KIND
 from vico.world.walkways import CROSSING as _CROSSING_KIND
-
-RADIUS = 0.25
 
 _LEAD, _LEAD_WHEN_HINDERED = 0.7, 2.0  # how far ahead the point runs, m: past a vehicle that stands on it
 _HINDERED_AFTER = 3.0  # who has got nowhere for so long looks that far ahead, s
@@ -44,8 +42,6 @@ _LET_GO_AFTER = 5.0  # s after which companions of who gets nowhere go their own
 _MAKES_ROOM_AFTER = 10.0  # s after which who is led goes its own way, away from a vehicle that it is in the way of
 _LEFT_BEHIND = 15.0  # s after which a companion whose leader has crossed crosses, too
 _GIVE_UP_CROSSING = 20.0, 10.0  # s waited for a crossing before turning round, and more by `lateral_share`
-_OFF_CROSSING = 1.3  # m walked after which the body is off the crossing
-_AT_END = 0.3  # m from the end of a crossing from which on one stands at the kerb
 _TURN_RATE = 4.0  # rad/s
 _KEEPS_ON = 0.3  # how much the heading counts that one has already, as metres free: ways round somebody are kept to
 _TURNS_FIRST = (
@@ -65,17 +61,10 @@ _CORNER, _CROSSING = int(_CORNER_KIND), int(_CROSSING_KIND)
 
 
 @compiled
-def _project_on_walkway(paths, walkway, x, y):  # type: ignore[no-untyped-def]
-    """Return the metres along a walkway of its point nearest to (x, y), and how far left of it that is."""
-    begin, end = paths.first[walkway], paths.first[walkway + 1]
-    return project_on_polyline(paths.points, paths.along, begin, end, x, y)
-
-
-@compiled
 def _turn_round(paths, walker, x, y):  # type: ignore[no-untyped-def]
     """Go the other way from here on: the followed point comes back to where the walker is, or it would lead on."""
     walker.direction = -walker.direction
-    walker.offset, _ = _project_on_walkway(paths, walker.walkway, x, y)
+    walker.offset, _ = project_on_walkway(paths, walker.walkway, x, y)
     walker.crossing_wait = walker.stuck_time = 0.0
 
 
@@ -392,26 +381,6 @@ def _group_pace(paths, pedestrians, i, shapes, near, first, dt):  # type: ignore
 
 
 @compiled
-def _is_off_crossing(paths, crossing, x, y):  # type: ignore[no-untyped-def]
-    """Return whether (x, y) is at an end of a crossing, or beside it."""
-    along, aside = _project_on_walkway(paths, crossing, x, y)
-    way = paths.walkways[crossing]
-    is_at_end = min(along, way.length - along) < _AT_END
-    room = room_at(paths, crossing, along)
-    return is_at_end or not -room[3] - RADIUS < aside < room[2] + RADIUS
-
-
-@compiled
-def _leave_crossing(paths, walker, junctions, x, y):  # type: ignore[no-untyped-def]
-    """Note who is off the crossing it was on: the metres alone do not tell, as one may walk to and fro there."""
-    left = walker.leaving_crossing
-    has_walked = walker.distance_walked - walker.leaving_since > _OFF_CROSSING
-    if left >= 0 and has_walked and _is_off_crossing(paths, left, x, y):
-        junctions.walkers_on[left] -= 1
-        walker.leaving_crossing = NONE
-
-
-@compiled
 def _go_to_spot(paths, pedestrians, i, shapes, b, near, time):  # type: ignore[no-untyped-def]
     """Take who is to stand a step to where it stands, or turn it there; return the metres walked."""
     walker, dt = pedestrians[i], time[1]
@@ -452,7 +421,7 @@ def _go_along(paths, pedestrians, junctions, shapes, who, near, is_asked, time):
         share = max(share, 1.0)
     walkway, offset = walker.walkway, walker.offset
     is_waiting = advance_follow_point(paths, walker, leader, junctions, is_asked, x, y, dt)
-    _leave_crossing(paths, walker, junctions, x, y)
+    leave_crossing(paths, walker, junctions, x, y)
     if is_asked and walker.stuck_time > 2.5:
         _turn_round(paths, walker, x, y)  # it waits for us, and is in our way
     elif led_by == NONE and walker.walkway == walkway and walker.offset != offset:

@@ -18,10 +18,11 @@ from vico.sim.traffic.drawing import TrafficDrawing
 from vico.sim.traffic.gatherings import Gatherings
 from vico.sim.traffic.hand_placing import HandPlaced, TrafficSetup
 from vico.sim.traffic.jams import STUCK_AFTER, Jam, JamLog, entity_before
+from vico.sim.traffic.leaving import RADIUS
 from vico.sim.traffic.levels import TrafficLevels, shapes_of
 from vico.sim.traffic.makes import choose_models
 from vico.sim.traffic.network import TrafficNetwork
-from vico.sim.traffic.pedestrians import RADIUS, advance_pedestrians
+from vico.sim.traffic.pedestrians import advance_pedestrians
 from vico.sim.traffic.route import count_per_street, drop_shut_plans, is_taken, widen_shut
 from vico.sim.traffic.seen import SeenTraffic
 from vico.sim.traffic.shapes import Shapes
