@@ -218,11 +218,10 @@ class Indoor:
             On the floor, ENU metres, shape ``(3,)``.
         """
         point = np.asarray(near, np.float64).reshape(-1)[:2]
-        quick = not len(taken) and beside is None and room not in self.stairs
-        if quick and self.gap(room, point) + _NARROWER >= RADIUS + 0.02:
-            quick = not from_door or bool(self.walked_from_doors(room, point[None])[0])
-            if quick:
-                return np.array([*point, self.floor[room]])
+        is_open = not len(taken) and beside is None and room not in self.stairs
+        is_free = is_open and self.gap(room, point) + _NARROWER >= RADIUS + 0.02
+        if is_free and (not from_door or bool(self.walked_from_doors(room, point[None])[0])):
+            return np.array([*point, self.floor[room]])
         spots = self._spots(room, point)
         if from_door and len(spots):
             spots = spots[self.walked_from_doors(room, spots)]

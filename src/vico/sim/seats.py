@@ -260,7 +260,8 @@ def find_rest(
         near = [k for k in seats.near(point, -1, lies=lies, reach=_BENCH).tolist() if not taken[k]]
         seat = next((k for k in near if has_room(k)), None)
         return None if seat is None else Rest(int(seats.entity[seat]), "", _triple(seats.before(seat)))
-    found = _free_in(seats, indoor, here, taken, lies=lies, has_room=has_room)
+    wanted = (seats.lies == lies) & ~taken
+    found = _nearest_in(here, wanted, seats, indoor, has_room)
     if found is not None:
         seat, stand = found
         return Rest(int(seats.entity[seat]), "", stand)
@@ -273,7 +274,7 @@ def find_rest(
                 continue
             first_door[door.to] = k if now == room else first_door[now]
             queue.append(door.to)
-            found = _free_in(seats, indoor, (door.position, door.to), taken, lies=lies, has_room=has_room)
+            found = _nearest_in((door.position, door.to), wanted, seats, indoor, has_room)
             if found is not None:
                 way = indoor.doors[room][first_door[door.to]]
                 return Rest(int(seats.entity[found[0]]), indoor.rooms[way.to].id, way.position)
@@ -282,19 +283,17 @@ def find_rest(
     return None
 
 
-def _free_in(
+def _nearest_in(
+    here: tuple[ArrayLike, int],
+    wanted: NDArray[np.bool_],
     seats: Seats,
     indoor: Indoor,
-    here: tuple[ArrayLike, int],
-    taken: NDArray[np.bool_],
-    *,
-    lies: bool,
     has_room: Callable[[int], bool],
 ) -> tuple[int, tuple[float, float, float]] | None:
-    """Return the free seat of a room that is nearest to a point and can be reached, and where one stands before it."""
+    """Return the wanted seat of a room nearest to a point that can be reached, and where one stands before it."""
     point, room = here
     inside = seats.in_room(room)
-    free = ((seats.lies[inside] == lies) & ~taken[inside]).nonzero()[0]
+    free = wanted[inside].nonzero()[0]
     if not len(free):
         return None
     x, y = np.asarray(point, np.float64)[:2]

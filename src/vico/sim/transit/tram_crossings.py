@@ -90,6 +90,7 @@ class TramCrossings:
                 continue
             if ahead > reach:
                 break
+            # Who stands before the tram, and would wait for it to go over the stretch first, would wait for ever.
             if self._stands(line, front, stretch.start + _AT_BEGIN) or not self._has_room(line, stretch):
                 return max(ahead, 0.0)
             if self._taken is None:
@@ -106,10 +107,7 @@ class TramCrossings:
         return not self._stands(line, stretch.end, stretch.end + TRAM_LENGTH + STEP)
 
     def _stands(self, line: int, start: float, end: float) -> bool:
-        """Return whether a vehicle stands in the way of trams between two distances along a track, metres.
-
-        Whoever stands between a tram and a stretch, and waits for that tram to go over it first, would wait for ever.
-        """
+        """Return whether a vehicle stands in the way of trams between two distances along a track, metres."""
         points = self._tracks[line].across[int(start / STEP) : int(end / STEP) + 1]
         stands = np.hypot(self._others[:, 7], self._others[:, 8]) < _CREEPS
         standing = self._others[stands & (self._others[:, 4] > _VEHICLE)]
