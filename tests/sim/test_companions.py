@@ -63,3 +63,19 @@ def test_who_stands_beyond_the_end_of_a_crossing_is_off_it_however_little_it_wal
         leave_crossing(paths, walkers[0], traffic.junctions, *(line[-1] + beyond * out))
         assert (walkers["leaving_crossing"][0] < 0) == is_off
         assert traffic.junctions.walkers_on[crossing] == (0 if is_off else 1)
+
+
+def test_who_waits_for_a_crossing_on_rails_before_a_tram_turns_round_at_once() -> None:
+    traffic = traffic_by(JunctionRule.ONE, 60, 60)
+    walkers = traffic.pedestrian_state
+    for _ in range(1200):
+        traffic.advance(0.1, NOWHERE)
+        waits = np.flatnonzero((walkers.crossing_wait > 1.0) & (walkers.crossing_wait < 5.0) & (walkers.leader < 0))
+        if len(waits) > 1:
+            break
+    one, other = waits[:2].tolist()
+    ways = walkers.direction[[one, other]].tolist()
+    walkers.before_tram[one] = True
+    traffic.advance(0.1, NOWHERE)
+    assert walkers.direction[[one, other]].tolist() == [-ways[0], ways[1]]
+    assert walkers.crossing_wait[one] == 0.0

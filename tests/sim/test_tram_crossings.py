@@ -7,6 +7,8 @@ from road_city import HALF
 from vico.sim.bodies import Bodies
 from vico.sim.traffic import JunctionRule, Traffic, TrafficSetup
 from vico.sim.traffic.placed import placed_traffic
+from vico.sim.traffic.route import STANDING_ROOM
+from vico.sim.traffic.state import TRACK_CROSSING
 from vico.sim.transit.tram_crossings import TramCrossings
 from vico.world.heights import HeightField
 from vico.world.rails import Track
@@ -79,3 +81,30 @@ def test_a_tram_behind_somebody_who_stands_before_the_crossing_does_not_keep_tha
     crossings.metres_to_wait(0, front, 0.0, 5.0)
     assert crossings.called.all()
     assert traffic.crossed_tracks().sum() == 0
+
+
+def short_street() -> tuple[int, int]:
+    """A lane that leads through a junction onto one street alone, of 25 to 60 m, that goes on; and that street."""
+    lanes, driven = network().lanes, network().driven.lanes
+    for before in np.flatnonzero((lanes.inside < 0) & (lanes.length > 25.0) & ~driven["closed"]).tolist():
+        inside = lanes.following(before)
+        is_asked_for = len(inside) == 1 and driven["junction"][inside[0]] >= 0
+        street = lanes.following(int(inside[0])) if is_asked_for else []
+        if len(street) == 1 and 25.0 < lanes.length[street[0]] < 60.0 and len(lanes.following(int(street[0]))):
+            return before, int(street[0])
+    raise AssertionError("no such street in central Helsinki")
+
+
+def test_a_car_drives_through_a_junction_though_tracks_leave_no_room_to_stand_on_the_street_behind_it() -> None:
+    lanes = network().lanes
+    before, street = short_street()
+    at = lanes.at(before, float(lanes.length[before]) - 4.0)[:2]
+    setup = TrafficSetup(JunctionRule.ONE, placed_traffic({"cars": [{"at": at.tolist()}]}))
+    traffic = Traffic(
+        network(), HeightField.flat(HALF), cars=0, pedestrians=0, seed=1, first_entity=1_000_000, setup=setup
+    )
+    assert traffic.fleet.lane[0] == before
+    behind = float(traffic.fleet.length[0]) + STANDING_ROOM - 0.2  # m
+    traffic.put_tracks(np.array([(street, 0.0, float(lanes.length[street]) - behind, False)], TRACK_CROSSING))
+    drive(traffic, 30)
+    assert traffic.fleet.lane[0] not in (before, street)

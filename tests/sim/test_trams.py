@@ -279,3 +279,22 @@ def test_nobody_walks_along_tracks_on_sidewalks_or_over_corners_but_across_them(
     ]  # fmt: skip
     monkeypatch.setattr(trams, "_traffic", SimpleNamespace(walks=_Walks(rows)))
     assert trams.walkways_on_tracks().tolist() == [True, True, False, False, False, True]
+
+
+def test_a_tram_asks_those_to_go_who_stand_on_its_track_before_it(
+    sim: Simulation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sim.scenario.place_agent("assistant_0", (10.0, Y))
+    run(sim, 120)
+    trams = system(sim).trams
+    front = float((trams.bodies().position[:, 0] + trams.bodies().half_length).max())
+    xy = np.array([[0.0, 0.0], [front + 1.0, Y], [front + 1.0, Y + 1.0], [front + 1.0, Y + 3.0], [front + 9.0, Y]])
+    shapes = SimpleNamespace(x=xy[:, 0], y=xy[:, 1])
+    walkers = SimpleNamespace(before_tram=np.ones(4, np.bool_))  # the first body is a vehicle
+    traffic = SimpleNamespace(shapes=shapes, vehicles=1, pedestrian_state=walkers)
+    monkeypatch.setattr(trams, "_traffic", traffic)
+    trams._ask_to_go()
+    assert walkers.before_tram.tolist() == [True, True, False, False]
+    trams.speed[trams.front > -1.0] = 1.0
+    trams._ask_to_go()
+    assert not walkers.before_tram.any()

@@ -174,9 +174,13 @@ def _may_go_onto(paths, walker, junctions, is_asked, following, dt):  # type: ig
 
 @compiled
 def _gives_up_crossing(walker):  # type: ignore[no-untyped-def]
-    """Return whether a walker has waited so long for a crossing that it turns round; who is led does not."""
+    """Return whether a walker that waits for a crossing turns round; who is led does not.
+
+    That is who has waited for long, or waits on rails and holds up a tram.
+    """
     longest, spread = _GIVE_UP_CROSSING
-    return walker.leader == NONE and walker.crossing_wait > longest + spread * walker.lateral_share
+    is_patient = walker.crossing_wait <= longest + spread * walker.lateral_share
+    return walker.leader == NONE and (walker.before_tram or not is_patient)
 
 
 @compiled
@@ -422,7 +426,7 @@ def _go_along(paths, pedestrians, junctions, shapes, who, near, is_asked, time):
     walkway, offset = walker.walkway, walker.offset
     is_waiting = advance_follow_point(paths, walker, leader, junctions, is_asked, x, y, dt)
     leave_crossing(paths, walker, junctions, x, y)
-    if is_asked and walker.stuck_time > 2.5:
+    if (is_asked or walker.before_tram) and walker.stuck_time > 2.5:
         _turn_round(paths, walker, x, y)  # it waits for us, and is in our way
     elif led_by == NONE and walker.walkway == walkway and walker.offset != offset:
         stop_at_spot(paths, pedestrians, i, shapes, b - i, offset)

@@ -123,8 +123,31 @@ def is_lane_of_stop(net, vehicle, further):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def clear_of_tracks(net, lane, clear, room):  # type: ignore[no-untyped-def]
+    """Return from which metre of a street lane on a vehicle can stand that needs so much room and has `clear` before.
+
+    It is 0 where no tracks are in the way.
+    """
+    begin = 0.0
+    for c in range(net.lanes[lane].first_track, net.lanes[lane].end_track):
+        before = net.tracks[c].start - begin + (clear if begin == 0.0 else 0.0)
+        if before < room:
+            begin = net.tracks[c].end
+    return begin
+
+
+@compiled
+def _clear_with(net, lane, clear, room):  # type: ignore[no-untyped-def]
+    """Return the metres without a junction or tracks at the end of a path that a planned lane makes longer."""
+    if net.lanes[lane].junction >= 0:
+        return 0.0
+    begin = clear_of_tracks(net, lane, clear, room)
+    return net.lanes[lane].length - begin + (clear if begin == 0.0 else 0.0)
+
+
+@compiled
 def plan_lanes(net, vehicle, street_load, reach):  # type: ignore[no-untyped-def]
-    """Plan lanes until the path is `reach` metres long and ends where it can stand clear of junctions.
+    """Plan lanes until the path is `reach` metres long and ends where it can stand clear of junctions and tracks.
 
     Returns
     -------
@@ -134,12 +157,12 @@ def plan_lanes(net, vehicle, street_load, reach):  # type: ignore[no-untyped-def
     count = vehicle.planned_count
     lane = vehicle.lane if count == 0 else vehicle.planned_lanes[count - 1]
     ahead = net.lanes[vehicle.lane].length - vehicle.offset
-    clear = 1e9
+    clear, room = 1e9, vehicle.length + STANDING_ROOM
     for k in range(count):
         planned = vehicle.planned_lanes[k]
         ahead += net.lanes[planned].length
-        clear = 0.0 if net.lanes[planned].junction >= 0 else clear + net.lanes[planned].length
-    while vehicle.planned_count < PLANNED_LANES and (ahead < reach or clear < vehicle.length + STANDING_ROOM):
+        clear = _clear_with(net, planned, clear, room)
+    while vehicle.planned_count < PLANNED_LANES and (ahead < reach or clear < room):
         if vehicle.route >= 0:
             following = route_lane(net, vehicle, vehicle.planned_count + 1)
             if following == net.lanes[lane].left or following == net.lanes[lane].right:
@@ -151,7 +174,7 @@ def plan_lanes(net, vehicle, street_load, reach):  # type: ignore[no-untyped-def
         vehicle.planned_lanes[vehicle.planned_count] = following
         vehicle.planned_count += 1
         ahead += net.lanes[following].length
-        clear = 0.0 if net.lanes[following].junction >= 0 else clear + net.lanes[following].length
+        clear = _clear_with(net, following, clear, room)
         lane = following
     return False
 

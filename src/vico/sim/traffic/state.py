@@ -214,6 +214,7 @@ PEDESTRIAN_RECORD = np.dtype(
         ("jammed_time", _F),  # within a metre of `progress_xy`, s
         ("progress_xy", _F, (2,)),  # where it last got on, m
         ("crossing_wait", _F),  # how long it has waited for a crossing, s
+        ("before_tram", _B),  # whether a tram stands and waits for it to go
         ("goal", _I),  # goal it walks to, an index into the network's; NONE for none
         ("goal_end", _I),  # the one after its last goal
         ("leaving_crossing", _I),  # crossing its body may still be on, NONE for none

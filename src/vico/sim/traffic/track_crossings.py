@@ -126,20 +126,6 @@ def crosses_called_track(net, vehicle, first, last, end, s, start):  # type: ign
 
 
 @compiled
-def clear_of_tracks(net, lane, clear, room):  # type: ignore[no-untyped-def]
-    """Return from which metre of a street lane on a vehicle can stand that needs so much room and has `clear` before.
-
-    It is 0 where no tracks are in the way.
-    """
-    begin = 0.0
-    for c in range(net.lanes[lane].first_track, net.lanes[lane].end_track):
-        before = net.tracks[c].start - begin + (clear if begin == 0.0 else 0.0)
-        if before < room:
-            begin = net.tracks[c].end
-    return begin
-
-
-@compiled
 def _note_behind(net, vehicle, taken):  # type: ignore[no-untyped-def]
     """Note the tracks that a vehicle's body is on behind the lane that its front is on."""
     rear, k = vehicle.offset - vehicle.length, 0

@@ -148,3 +148,10 @@ def spots_near(line, points, reach):  # type: ignore[no-untyped-def]
             spot += 1.0
         begins += length
     return found
+
+
+def in_way(points: NDArray[np.float64], people: NDArray[np.float64], within: float) -> NDArray[np.bool_]:
+    """Return who of people, by x and y of each, is near one of `points`, shape ``(n, k, 2)``."""
+    near = points.reshape(-1, 2)
+    away = np.hypot(people[:, 0, None] - near[:, 0], people[:, 1, None] - near[:, 1])
+    return np.asarray((away < within).any(axis=1), np.bool_)

@@ -21,12 +21,14 @@ from vico.clock import DAY
 from vico.rules import BUS_DWELL, TRAM_SECTION, TRAM_SECTIONS, TRAM_WIDTH
 from vico.sim.bodies import TRAM, Bodies, Drawn
 from vico.sim.traffic import Traffic
+from vico.sim.traffic.leaving import RADIUS
 from vico.sim.transit.doors import DOOR_TIME, leaf_transforms, moved_doors
 from vico.sim.transit.passengers import FIRST_PASSENGER
 from vico.sim.transit.tram_crossings import TramCrossings
 from vico.sim.transit.tram_outlines import (
     first_taken,
     holds_somebody,
+    in_way,
     inside_city,
     nobody,
     outlines,
@@ -65,6 +67,9 @@ _SLOW = 3.0  # m/s at least that a timetable asks for
 _ALIKE = 40.0  # metres of track that have to be free to come in
 _HALF_SIZE = TRAM_SECTION / 2 - TRAM_BELLOWS, TRAM_WIDTH / 2  # metres, of a section
 _BEHIND = np.arange(TRAM_SECTIONS) * TRAM_SECTION  # metres from a tram's front to each section's
+_STANDS = 0.1  # slower is standing, m/s
+_ASKS = 4.0  # metres before a tram that stands from which it asks people to go
+_NEAR = TRAM_SECTION / 2 + _ASKS + TRAM_WIDTH  # metres from a first section's middle to whom it may ask
 _AT = 0.4  # metres from its stopping point at which a tram has arrived
 
 
@@ -173,7 +178,20 @@ class Trams:
             self._drive(tram, now, dt)
             if self.dwell[tram] > 0.0:
                 arrived.append(tram)
+        self._ask_to_go()
         return arrived
+
+    def _ask_to_go(self) -> None:
+        """Tell the pedestrians before whom a tram stands on its way that it waits for them to go."""
+        walkers, shapes, first = self._traffic.pedestrian_state, self._traffic.shapes, self._traffic.vehicles
+        walkers.before_tram[:] = False
+        for tram in np.flatnonzero((self.front > AWAY) & (self.speed < _STANDS) & (self.dwell == 0.0)).tolist():
+            ahead = int(max(self.front[tram], 0.0) / STEP) + 1
+            points = self.tracks[int(self.line_of[tram])].across[ahead : ahead + int(_ASKS / STEP)]
+            near = np.flatnonzero(np.hypot(*(self._poses[tram, 0, :2, None] - [shapes.x, shapes.y])) < _NEAR)
+            near = near[near >= first]
+            found = in_way(points, np.column_stack([shapes.x[near], shapes.y[near]]), ACROSS_REACH + RADIUS)
+            walkers.before_tram[near[found] - first] = True
 
     def _come_in(self, now: float) -> None:
         """Have the trams that are due come in, where the track begins."""
