@@ -7,9 +7,10 @@ from robot_field import field
 from vico.assets.robots import robot_names
 from vico.sim.bodies import Bodies
 from vico.sim.config import SimConfig
-from vico.sim.robots import RobotPopulation
+from vico.sim.robots import RobotPopulation, decisions
 from vico.sim.robots.batteries import EXCHANGE, watch_batteries
 from vico.sim.simulation import Simulation
+from vico.world.walkable import CROSSING, ROADWAY, SIDEWALK
 
 KINDS = tuple(robot_names())
 JOINTS = {"husky": 4, "go2": 12, "drone": 4, "manipulator": 9, "h1": 10}
@@ -98,3 +99,29 @@ def test_an_empty_battery_stops_a_robot_until_it_is_exchanged() -> None:
         watch_batteries(robots.run, 1.0)
     assert robots.observation(0)["battery"] == pytest.approx([1.0], abs=1e-3)
     assert robots.events()[-1].kind == "recharged"
+
+
+def test_who_stands_idle_with_a_low_battery_gets_a_full_one_and_who_goes_on_does_not() -> None:
+    made = RobotPopulation(field(), ("husky", "husky"), [[0, 0, 0], [0, 4, 0]], packs=False)
+    arrays = made.run.arrays
+    arrays.charge[:] = 0.05
+    made.drive(1, (0.5, 0, 0))
+    for _ in range(round(EXCHANGE)):
+        watch_batteries(made.run, 1.0)
+    assert arrays.charge[0] == 1.0
+    assert arrays.charge[1] < 0.05
+    assert [(event.robot, event.kind) for event in made.events()] == [(0, "recharged")]
+
+
+def test_errands_end_with_a_low_battery_but_not_where_vehicles_drive(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = RobotPopulation(field(), ("husky",), [[0, 0, 0]], packs=False)
+    made.run.arrays.errand[0] = 1
+    asked = []
+    monkeypatch.setattr(decisions, "next_errand", lambda run, robot: asked.append(robot))
+    ground = made.run.scene.world.walkable
+    for charge, below, goes in ((0.5, SIDEWALK, 1), (0.05, SIDEWALK, 0), (0.05, ROADWAY, 1), (0.05, CROSSING, 1)):
+        monkeypatch.setattr(type(ground), "class_of", lambda self, x, y, below=below: below)
+        made.run.arrays.charge[0] = charge
+        asked.clear()
+        decisions._rest(made.run, 0, 6.0)
+        assert len(asked) == goes

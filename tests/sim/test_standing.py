@@ -9,6 +9,7 @@ import numpy as np
 
 from helsinki_traffic import network
 from road_city import HALF, road_city
+from vico.sim.bodies import Bodies
 from vico.sim.overlaps import overlapping
 from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.traffic.standing_spots import with_spots
@@ -116,3 +117,15 @@ def test_people_wait_for_buses_and_trams_and_ride_and_talk_in_twos_and_touch_nob
         _advance(*again, 1)
     after, same = traffic.arrays() | transit.arrays(), again[0].arrays() | again[1].arrays()
     assert all(np.array_equal(values, same[name]) for name, values in after.items())
+
+
+def test_who_stands_where_a_bus_swings_out_goes_on_when_the_bus_waits_for_it() -> None:
+    traffic, _ = _systems()
+    walkers, fleet = traffic.pedestrian_state, traffic.fleet
+    waiting = np.flatnonzero(walkers.stand_kind == STOP)
+    asked, other = waiting[:2].tolist()
+    assert walkers.stand_time[[asked, other]].min() > 60.0
+    for _ in range(50):
+        fleet.blocker[0], fleet.stopped_time[0] = traffic.vehicles + asked, 5.0
+        traffic.advance(0.1, Bodies.none())
+    assert walkers.stand_kind[[asked, other]].tolist() == [0, STOP]

@@ -1,4 +1,4 @@
-"""What is left in robots' batteries: they drain by what motors do, and are exchanged when they are empty."""
+"""What is left in robots' batteries: they drain by what motors do, and are exchanged when they are low or empty."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from vico.sim.robots.flying import LOW_BATTERY, flight_of
 from vico.sim.robots.rotors import FlightPhase
 from vico.sim.robots.state import RobotMode, RobotRun
 
-#: Seconds that a robot stands with an empty battery until somebody, who is not shown, has put in a full one.
+#: Seconds that a robot stands with a low or empty battery until somebody, who is not shown, has put in a full one.
 EXCHANGE = 600.0
 _IDLE, _LANDED = int(RobotMode.IDLE), int(FlightPhase.LANDED)
 
@@ -38,6 +38,10 @@ def watch_batteries(run: RobotRun, dt: float) -> None:
         if after == 0.0:
             run.note(robot, "battery_empty")
             commands.stop(run, robot)
+        if after <= LOW_BATTERY and arrays.mode[robot] == _IDLE:
+            _exchange(run, robot, dt)
+        else:
+            arrays.uncharged[robot] = 0.0
     for flight in run.flights:
         if flight is not None:
             a = flight.arrays

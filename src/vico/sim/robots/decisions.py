@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from vico.sim.bodies import Bodies
 from vico.sim.robots import commands
-from vico.sim.robots.flying import decide_flight
+from vico.sim.robots.flying import LOW_BATTERY, decide_flight
 from vico.sim.robots.navigation import GAP, SIGHT, NearbyBodies
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.rooms import OUTDOORS
@@ -16,6 +16,7 @@ from vico.sim.robots.tasks import decide_task, handled
 from vico.sim.robots.trip_state import NONE
 from vico.sim.robots.trips import begin_leg, others_in_room, way_on, whereabouts
 from vico.sim.robots.ways import next_errand
+from vico.world.walkable import CROSSING, ROADWAY
 
 # What the states' arrays hold: members of an enumeration are slow to look up in the control loop.
 _IDLE, _VELOCITY, _MOTORS, _ROUTE, _FOLLOW, _TASK = (int(mode) for mode in RobotMode)
@@ -73,9 +74,10 @@ def decide(run: RobotRun, dt: float, obstacles: Bodies, mine: Bodies, *, errands
 
 
 def _rest(run: RobotRun, robot: int, dt: float) -> None:
-    """Let time pass until the next errand."""
+    """Let time pass until the next errand; with a low battery there is none, but away from where vehicles are."""
     arrays = run.arrays
-    if run.scene.models[robot].velocity_limit is None:
+    is_low = run.scene.models[robot].battery is not None and arrays.charge[robot] <= LOW_BATTERY
+    if run.scene.models[robot].velocity_limit is None or (is_low and not _stands_on_roadway(run, robot)):
         return
     arrays.rest[robot] += dt
     if arrays.rest[robot] > _REST or arrays.errand[robot] == 0:
@@ -83,6 +85,12 @@ def _rest(run: RobotRun, robot: int, dt: float) -> None:
         path = next_errand(run, robot)
         if path is not None:
             commands.take(run, robot, path)
+
+
+def _stands_on_roadway(run: RobotRun, robot: int) -> bool:
+    """Return whether a robot stands where vehicles drive."""
+    x, y = run.position(robot)[:2].tolist()
+    return run.scene.world.walkable.class_of(x, y) in (ROADWAY, CROSSING)
 
 
 def _hold_velocity(run: RobotRun, robot: int, others: NDArray[np.void]) -> None:

@@ -35,6 +35,8 @@ GAP, SIDE_GAP = 0.6, 0.15
 _HEIGHT_GAP = 0.5
 #: Metres a second squared it brakes with; metres it looks ahead at most; seconds others' motion is foreseen.
 BRAKE, SIGHT, FORESIGHT = 0.8, 5.0, 3.0
+#: Metres by which who goes away from somebody is farther from them, for each metre.
+_LEAVES = 0.4
 #: Seconds the rest of a robot takes to follow its nose.
 FOLLOW = 1.5
 
@@ -184,7 +186,11 @@ def free_ahead(x, y, yaw, speed, outline, path, along, others):  # type: ignore[
             cx, cy = x + (nose + s) * math.cos(yaw), y + (nose + s) * math.sin(yaw)
         for k in range(len(others)):
             # The place has to be free from now until the rest of the robot has followed.
-            if _least_gap(cx, cy, others[k], t + FOLLOW) < reach:
+            gap = _least_gap(cx, cy, others[k], t + FOLLOW)
+            if gap < reach:
+                now = _gap(x + nose * math.cos(yaw), y + nose * math.sin(yaw), others[k].x, others[k].y, others[k])
+                if s > 0.0 and gap > now + _LEAVES * s:
+                    continue  # who is too near already may go away from the other
                 # Whoever is abreast or behind already is nobody to stop for.
                 front = (others[k].x - x) * math.cos(yaw) + (others[k].y - y) * math.sin(yaw)
                 if s > 0.0 or front > half_length * 0.5:

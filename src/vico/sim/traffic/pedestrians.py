@@ -385,7 +385,7 @@ def _group_pace(paths, pedestrians, i, shapes, near, first, dt):  # type: ignore
 
 
 @compiled
-def _go_to_spot(paths, pedestrians, i, shapes, b, near, time):  # type: ignore[no-untyped-def]
+def _go_to_spot(paths, pedestrians, i, shapes, b, near, is_asked, time):  # type: ignore[no-untyped-def]
     """Take who is to stand a step to where it stands, or turn it there; return the metres walked."""
     walker, dt = pedestrians[i], time[1]
     x, y = walker.stand_xy
@@ -402,7 +402,7 @@ def _go_to_spot(paths, pedestrians, i, shapes, b, near, time):  # type: ignore[n
             time = (time[0] * min(1.0, away / _SLOWS_WITHIN), dt)
         step = _walk(walker, FollowPoint(x, y, x, y, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0)), shapes, b, near, True, time)
     _note_progress(paths, walker, shapes.x[b], shapes.y[b], is_there, dt)
-    note_standing(paths, pedestrians, walker, is_there, dt)
+    note_standing(paths, pedestrians, walker, is_there, is_asked, dt)
     return step
 
 
@@ -453,7 +453,7 @@ def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, pace
         b = first + i
         near = _nearby(shapes, grid, b, buffer)
         if walker.stand_kind != 0:
-            step = _go_to_spot(paths, pedestrians, i, shapes, b, near, (pace, dt))
+            step = _go_to_spot(paths, pedestrians, i, shapes, b, near, asked[i], (pace, dt))
         else:
             step = _go_along(paths, pedestrians, junctions, shapes, (i, b), near, asked[i], (pace, dt))
         if step == 0.0:

@@ -22,6 +22,7 @@ _LONGEST = np.array([0.0, 45.0, 180.0, 900.0])
 _WAITING_AT_START, _MOST_AT_START = 0.5, 0.08
 _ROOM = 0.3  # m: a body's radius and a little air
 _TURN_RATE = 2.5  # rad/s
+_MAKES_WAY = 3.0  # s that somebody goes on standing at most whom a vehicle waits for to go
 _TOGETHER = 2.0  # m within which two stop together
 
 
@@ -88,11 +89,16 @@ def stop_at_spot(paths, pedestrians, i, shapes, first, offset):  # type: ignore[
 
 
 @compiled
-def note_standing(paths, pedestrians, walker, is_there, dt):  # type: ignore[no-untyped-def]
-    """Count the time somebody stands; who has stood long enough walks on, or can't get there, or may not be there."""
+def note_standing(paths, pedestrians, walker, is_there, is_asked, dt):  # type: ignore[no-untyped-def]
+    """Count the time somebody stands; who has stood long enough walks on, or can't get there, or may not be there.
+
+    So does, before long, who is asked to go: a bus that leaves its stop swings out over the kerb.
+    """
     if walker.stand_kind >= LED:
         return
     walker.stand_time -= dt
+    if is_asked:
+        walker.stand_time = min(walker.stand_time, _MAKES_WAY)
     deserted = walker.stand_kind == TALK and walker.leader != NONE and pedestrians[walker.leader].stand_kind != TALK
     is_over = walker.stand_time <= 0.0 or paths.walkways[walker.walkway].shut
     if is_over or deserted or (not is_there and walker.jammed_time > 6.0):
