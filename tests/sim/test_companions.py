@@ -5,8 +5,10 @@ import numpy as np
 from helsinki_traffic import traffic_by
 from vico.sim.bodies import Bodies
 from vico.sim.overlaps import overlapping
-from vico.sim.traffic import JunctionRule
+from vico.sim.traffic import JunctionRule, Traffic
+from vico.sim.traffic.companions import note_distance
 from vico.sim.traffic.leaving import leave_crossing
+from vico.sim.traffic.pedestrians import asked_to_go
 from vico.world.walkways import CROSSING
 
 NOWHERE = Bodies.none()
@@ -79,3 +81,34 @@ def test_who_waits_for_a_crossing_on_rails_before_a_tram_turns_round_at_once() -
     traffic.advance(0.1, NOWHERE)
     assert walkers.direction[[one, other]].tolist() == [-ways[0], ways[1]]
     assert walkers.crossing_wait[one] == 0.0
+
+
+def pair() -> tuple[Traffic, int]:
+    """Traffic by one occupant at a time, and who leads the first two who walk together."""
+    traffic = traffic_by(JunctionRule.ONE, 5, 60)
+    walkers = traffic.pedestrian_state
+    return traffic, int(np.flatnonzero((walkers.group_size == 2) & (walkers.leader < 0))[0])
+
+
+def test_who_leads_does_not_wait_for_a_companion_who_is_ahead() -> None:
+    traffic, leader = pair()
+    walkers, shapes, first = traffic._walkers, traffic.shapes, traffic.vehicles
+    other = leader + 1
+    for name in ("walkway", "direction"):
+        walkers[name][other] = walkers[name][leader]
+    shapes.x[first + other] = shapes.x[first + leader] + 5.0
+    shapes.y[first + other] = shapes.y[first + leader]
+    for ahead, apart in ((-5.0, 5.0), (5.0, 0.0)):
+        walkers["offset"][other] = walkers["offset"][leader] + ahead * walkers["direction"][leader]
+        note_distance(walkers, leader, shapes, first)
+        note_distance(walkers, other, shapes, first)
+        assert (walkers["apart"][leader], walkers["apart"][other]) == (apart, 5.0)
+
+
+def test_a_vehicle_that_waits_for_a_companion_asks_who_leads_it_to_go_too() -> None:
+    traffic, leader = pair()
+    fleet, first = traffic._vehicles, traffic.vehicles
+    fleet["blocker"] = -1
+    fleet["blocker"][0], fleet["stopped_time"][0] = first + leader + 1, 5.0
+    asked = asked_to_go(fleet, first, traffic._walkers)
+    assert np.flatnonzero(asked).tolist() == [leader, leader + 1]

@@ -195,11 +195,24 @@ def waits_for_companions(walker):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _is_ahead(walker, other):  # type: ignore[no-untyped-def]
+    """Return whether `other` is farther along the walkway on which a pedestrian walks the same way."""
+    goes_along = other.walkway == walker.walkway and other.direction == walker.direction
+    return goes_along and (other.offset - walker.offset) * walker.direction > 0.0
+
+
+@compiled
 def note_distance(pedestrians, i, shapes, first):  # type: ignore[no-untyped-def]
-    """Note how far a pedestrian is from who leads it, or from the farthest of those whom it leads."""
+    """Note how far a pedestrian is from who leads it, or from the farthest of those whom it leads.
+
+    Who is ahead of who leads does not count: both would wait for the other one.
+    """
     walker = pedestrians[i]
-    begin, end = (i + 1, i + walker.group_size) if walker.leader == NONE else (walker.leader, walker.leader + 1)
+    leads = walker.leader == NONE
+    begin, end = (i + 1, i + walker.group_size) if leads else (walker.leader, walker.leader + 1)
     walker.apart = 0.0
     for k in range(first + begin, first + end):
+        if leads and _is_ahead(walker, pedestrians[k - first]):
+            continue
         dx, dy = shapes.x[k] - shapes.x[first + i], shapes.y[k] - shapes.y[first + i]
         walker.apart = max(walker.apart, np.sqrt(dx * dx + dy * dy))

@@ -359,12 +359,19 @@ def _note_gait(walker, is_walking, dt):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def asked_to_go(fleet, first, n):  # type: ignore[no-untyped-def]
-    """Return which of the `n` walkers from body `first` on a vehicle stands before, waiting for them to go."""
+def asked_to_go(fleet, first, pedestrians):  # type: ignore[no-untyped-def]
+    """Return which walkers, bodies from `first` on, a vehicle stands before, waiting for them to go.
+
+    Those who lead them are among them: companions go where they do.
+    """
+    n = len(pedestrians)
     asked = np.zeros(n, np.bool_)
     for vehicle in fleet:
         if first <= vehicle.blocker < first + n and vehicle.stopped_time > _ASKED_AFTER:
-            asked[vehicle.blocker - first] = True
+            i = vehicle.blocker - first
+            asked[i] = True
+            if pedestrians[i].leader != NONE:
+                asked[pedestrians[i].leader] = True
     return asked
 
 
@@ -443,7 +450,7 @@ def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, pace
     They walk at `pace` times the speed each prefers.
     """
     first = len(fleet)
-    asked = asked_to_go(fleet, first, len(pedestrians))
+    asked = asked_to_go(fleet, first, pedestrians)
     buffer = np.empty(len(shapes.x), np.int64)
     junctions.walker_wait[:] = 0.0
     for i in range(len(pedestrians)):
