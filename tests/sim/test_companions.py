@@ -9,7 +9,7 @@ from vico.sim.traffic import JunctionRule, Traffic
 from vico.sim.traffic.companions import note_distance
 from vico.sim.traffic.leaving import leave_crossing
 from vico.sim.traffic.pedestrians import asked_to_go
-from vico.world.walkways import CROSSING
+from vico.world.walkways import CORNER, CROSSING
 
 NOWHERE = Bodies.none()
 
@@ -67,7 +67,7 @@ def test_who_stands_beyond_the_end_of_a_crossing_is_off_it_however_little_it_wal
         assert traffic.junctions.walkers_on[crossing] == (0 if is_off else 1)
 
 
-def test_who_waits_for_a_crossing_on_rails_before_a_tram_turns_round_at_once() -> None:
+def test_who_waits_for_a_crossing_on_rails_before_a_tram_goes_at_once() -> None:
     traffic = traffic_by(JunctionRule.ONE, 60, 60)
     walkers = traffic.pedestrian_state
     for _ in range(1200):
@@ -76,11 +76,10 @@ def test_who_waits_for_a_crossing_on_rails_before_a_tram_turns_round_at_once() -
         if len(waits) > 1:
             break
     one, other = waits[:2].tolist()
-    ways = walkers.direction[[one, other]].tolist()
     walkers.before_tram[one] = True
     traffic.advance(0.1, NOWHERE)
-    assert walkers.direction[[one, other]].tolist() == [-ways[0], ways[1]]
-    assert walkers.crossing_wait[one] == 0.0
+    assert (walkers.crossing_wait[[one, other]] > 0.0).tolist() == [False, True]
+    assert traffic.walks.kind[walkers.walkway[[one, other]]].tolist() == [CROSSING, CORNER]
 
 
 def pair() -> tuple[Traffic, int]:
@@ -110,5 +109,7 @@ def test_a_vehicle_that_waits_for_a_companion_asks_who_leads_it_to_go_too() -> N
     fleet, first = traffic._vehicles, traffic.vehicles
     fleet["blocker"] = -1
     fleet["blocker"][0], fleet["stopped_time"][0] = first + leader + 1, 5.0
-    asked = asked_to_go(fleet, first, traffic._walkers)
-    assert np.flatnonzero(asked).tolist() == [leader, leader + 1]
+    assert np.flatnonzero(asked_to_go(fleet, first, traffic._walkers)).tolist() == [leader, leader + 1]
+    fleet["blocker"] = -1
+    traffic._walkers["before_tram"][leader + 1] = True
+    assert np.flatnonzero(asked_to_go(fleet, first, traffic._walkers)).tolist() == [leader, leader + 1]

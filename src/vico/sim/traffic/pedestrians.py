@@ -174,13 +174,9 @@ def _may_go_onto(paths, walker, junctions, is_asked, following, dt):  # type: ig
 
 @compiled
 def _gives_up_crossing(walker):  # type: ignore[no-untyped-def]
-    """Return whether a walker that waits for a crossing turns round; who is led does not.
-
-    That is who has waited for long, or waits on rails and holds up a tram.
-    """
+    """Return whether a walker has waited so long for a crossing that it turns round; who is led does not."""
     longest, spread = _GIVE_UP_CROSSING
-    is_patient = walker.crossing_wait <= longest + spread * walker.lateral_share
-    return walker.leader == NONE and (walker.before_tram or not is_patient)
+    return walker.leader == NONE and walker.crossing_wait > longest + spread * walker.lateral_share
 
 
 @compiled
@@ -360,18 +356,17 @@ def _note_gait(walker, is_walking, dt):  # type: ignore[no-untyped-def]
 
 @compiled
 def asked_to_go(fleet, first, pedestrians):  # type: ignore[no-untyped-def]
-    """Return which walkers, bodies from `first` on, a vehicle stands before, waiting for them to go.
+    """Return which walkers, bodies from `first` on, a vehicle or a tram stands before, waiting for them to go.
 
     Those who lead them are among them: companions go where they do.
     """
-    n = len(pedestrians)
-    asked = np.zeros(n, np.bool_)
+    asked = pedestrians["before_tram"].copy()
     for vehicle in fleet:
-        if first <= vehicle.blocker < first + n and vehicle.stopped_time > _ASKED_AFTER:
-            i = vehicle.blocker - first
-            asked[i] = True
-            if pedestrians[i].leader != NONE:
-                asked[pedestrians[i].leader] = True
+        if first <= vehicle.blocker < first + len(pedestrians) and vehicle.stopped_time > _ASKED_AFTER:
+            asked[vehicle.blocker - first] = True
+    for i in range(len(pedestrians)):
+        if asked[i] and pedestrians[i].leader != NONE:
+            asked[pedestrians[i].leader] = True
     return asked
 
 
@@ -433,7 +428,7 @@ def _go_along(paths, pedestrians, junctions, shapes, who, near, is_asked, time):
     walkway, offset = walker.walkway, walker.offset
     is_waiting = advance_follow_point(paths, walker, leader, junctions, is_asked, x, y, dt)
     leave_crossing(paths, walker, junctions, x, y)
-    if (is_asked or walker.before_tram) and walker.stuck_time > 2.5:
+    if is_asked and walker.stuck_time > 2.5:
         _turn_round(paths, walker, x, y)  # it waits for us, and is in our way
     elif led_by == NONE and walker.walkway == walkway and walker.offset != offset:
         stop_at_spot(paths, pedestrians, i, shapes, b - i, offset)
