@@ -177,6 +177,21 @@ def test_a_robot_goes_round_a_person_who_stays_and_never_touches_them(kind: str)
     assert robots.bodies().position[0, 0] == pytest.approx(14, abs=0.5)
 
 
+@pytest.mark.parametrize("kind", ["husky", "go2", "h1"])
+def test_who_waits_makes_room_for_somebody_who_stands_close_ahead_if_there_is_room_behind(kind: str) -> None:
+    robots = RobotPopulation(field(), [kind] * 2, [[0, 0, 0], [0, 12, 0]], packs=False)
+    half = robots.models[0].half_length
+    near = half + 0.25 + 0.08
+    standing = people((near, 0), (near, 12), (-near - 0.3, 12))
+    for robot, y in enumerate((0, 12)):
+        robots.follow(robot, [(0, y), (12, y)])
+    run(robots, 3.5, standing)
+    assert (robots.status == RobotStatus.WAITING).all()
+    back = -robots.bodies().position[:, 0]
+    assert 0.12 < back[0] < 0.45
+    assert abs(back[1]) < 0.05
+
+
 def test_a_robot_lets_a_person_cross() -> None:
     robots = RobotPopulation(field(), ["husky"], [[0, 0, 0]], packs=False)
     assert robots.go_to(0, (14, 0))

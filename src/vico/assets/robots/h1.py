@@ -159,7 +159,9 @@ def h1(packs: bool = True) -> RobotModel:
         servos=("position",) * 10,
         joints=JOINTS,
         rest=np.tile(REST, 2),
-        controller=TwoLegs(weights, biases, STRIDE, MASS, CHEST),
+        controller=TwoLegs(
+            weights, biases, STRIDE, MASS, CHEST, np.array([*(link.place for link in LEG), (0.055, 0.0, -SOLE)])
+        ),
         action_spaces={
             "joints": ActionSpace("motors", JOINTS, ("rad",) * len(JOINTS), low, high),
             "velocity": velocity_space(1.0, 0.1, 0.8),

@@ -218,6 +218,9 @@ class TwoLegs:
         Of the robot, kg.
     hoist
         Site of `RobotModel.mjcf` by which it is lifted when it has fallen, along the axes of its base.
+    places
+        Where the joints of the left leg are, each in the frame of the one before, and the middle of its sole in that of
+        the ankle; metres, shape ``(6, 3)``.
     """
 
     weights: tuple[NDArray[np.float32], ...] = field(repr=False)
@@ -225,6 +228,7 @@ class TwoLegs:
     stride: float
     mass: float
     hoist: str
+    places: NDArray[np.float64] = field(repr=False)
     name: str = "two_legs"
 
 

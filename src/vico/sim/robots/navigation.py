@@ -37,6 +37,8 @@ _HEIGHT_GAP = 0.5
 BRAKE, SIGHT, FORESIGHT = 0.8, 5.0, 3.0
 #: Metres by which who goes away from somebody is farther from them, for each metre.
 _LEAVES = 0.4
+#: Metres a second below which somebody stands still.
+STILL = 0.15
 #: Seconds the rest of a robot takes to follow its nose.
 FOLLOW = 1.5
 
@@ -197,6 +199,19 @@ def free_ahead(x, y, yaw, speed, outline, path, along, others):  # type: ignore[
                     return s, k
         s += 0.1
     return SIGHT, -1
+
+
+@compiled
+def who_gets_nearer(x, y, yaw, others):  # type: ignore[no-untyped-def]
+    """Return which of those who stand still are nearer to a point a step from x, y towards `yaw`, and who moves."""
+    found = np.empty(len(others), np.bool_)
+    ahead_x, ahead_y = x + 0.3 * math.cos(yaw), y + 0.3 * math.sin(yaw)
+    for k in range(len(others)):
+        one = others[k]
+        found[k] = math.hypot(one.vx, one.vy) >= STILL or (
+            _gap(ahead_x, ahead_y, one.x, one.y, one) < _gap(x, y, one.x, one.y, one)
+        )
+    return found
 
 
 @compiled

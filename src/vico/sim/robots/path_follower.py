@@ -13,16 +13,20 @@ from vico.assets.robots import RobotModel
 from vico.sim.physics.records import Base
 from vico.sim.robots.navigation import (
     GAP,
+    STILL,
     free_ahead,
     path_length,
     progress,
     room_to_turn,
     towards,
+    who_gets_nearer,
 )
 
 #: Seconds a robot waits for somebody who stands still before it goes round, and tries to move before it backs off.
 _PATIENCE, _STUCK = 4.0, 2.5
 _BACK_TIME, _BACK_SPEED = 1.5, 0.25
+#: Metres free ahead of who waits below which it makes room for who stands there.
+_CLOSE = 0.25
 #: Detours without getting 5 m further after which it gives up.
 _DETOURS = 6
 _NO_PATH = np.zeros((0, 2))
@@ -48,6 +52,11 @@ def footprint_discs(
 def _discs(one: np.void, room: float) -> list[tuple[float, float, float]]:
     pose = float(one["x"]), float(one["y"]), float(one["yaw"])
     return footprint_discs(pose, float(one["half_length"]), float(one["half_width"]), room)
+
+
+def _stand_still(others: NDArray[np.void]) -> NDArray[np.bool_]:
+    still: NDArray[np.bool_] = np.hypot(others["vx"], others["vy"]) < STILL
+    return still
 
 
 class PathFollower:
@@ -108,7 +117,7 @@ class PathFollower:
             wanted = np.zeros(3)
         if not wanted.any():
             self._wait(who, others, dt)
-            return wanted
+            return self._make_room(base, others)
         self.status, self.waiting = RobotStatus.MOVING, 0.0
         held = (wanted[0] > 0.15 and speed < 0.04) or (
             wanted[0] == 0.0 and abs(float(base.angular_velocity_body[2])) < 0.03
@@ -124,7 +133,7 @@ class PathFollower:
 
     def _wait(self, who: int, others: NDArray[np.void], dt: float) -> None:
         self.status = RobotStatus.WAITING
-        still = who < 0 or float(np.hypot(others["vx"][who], others["vy"][who])) < 0.15
+        still = who < 0 or bool(_stand_still(others)[who])
         self.waiting = self.waiting + dt if still else 0.0
         if self.waiting > _PATIENCE:
             self.waiting = 0.0
@@ -135,15 +144,29 @@ class PathFollower:
         self.backing -= dt
         if self.backing <= 0.0:
             self.wants_detour = True
+        return self._backwards(base, others)
+
+    def _make_room(self, base: Base, others: NDArray[np.void]) -> NDArray[np.float64]:
+        """Velocity of who waits: back, slowly, from somebody who stands right ahead."""
+        free, _ = self._straight(base, others[_stand_still(others)])
+        return self._backwards(base, others) if free < _CLOSE else np.zeros(3)
+
+    def _backwards(self, base: Base, others: NDArray[np.void]) -> NDArray[np.float64]:
+        """Velocity back, if there is room; who stands ahead and is left behind does not count."""
         behind = replace(base, rotation=-base.rotation)
-        path, self.path = self.path, _NO_PATH
-        free, _ = self.free(behind, others, _BACK_SPEED)
-        self.path = path
+        x, y = base.position[:2]
+        free, _ = self._straight(behind, others[who_gets_nearer(x, y, behind.yaw, others)])
         return np.array([-_BACK_SPEED, 0.0, 0.0]) if free > 0.5 else np.zeros(3)
+
+    def _straight(self, base: Base, others: NDArray[np.void]) -> tuple[float, int]:
+        """Metres free straight ahead of a base, whatever the path, and who is there."""
+        m = self._model
+        x, y = base.position[:2]
+        return free_ahead(x, y, base.yaw, _BACK_SPEED, (m.half_length, m.half_width), _NO_PATH, 0.0, others)
 
     def closed(self, base: Base, others: NDArray[np.void]) -> NDArray[np.float64]:
         """Discs (x, y, radius) a detour keeps out of: those who stand still near, and what is right ahead."""
-        still = np.flatnonzero(np.hypot(others["vx"], others["vy"]) < 0.15)
+        still = np.flatnonzero(_stand_still(others))
         discs = [disc for one in others[still] for disc in _discs(one, self._model.half_width + 0.35)]
         ahead = base.position[:2] + base.rotation[:2, 0] * (self._model.half_length + GAP)
         if not len(still):

@@ -17,8 +17,9 @@ from vico.io.compiled import compiled
 #: Joints of a leg and of both, and what the network sees.
 LEG, LEGS, OBSERVED = 5, 10, 44
 #: Entries of a robot's memory: where in its stride it is (0..1), whether it steps, seconds it has been calm, the
-#: command as far as it was let through, the last action.
-PHASE, STEPPING, CALM, COMMAND, ACTION, MEMORY = 0, 1, 2, 3, 6, 16
+#: velocity it follows, the last action, how far ankles and knees are fitted to the ground (left, right), seconds since
+#: it stopped without a command, the place held since then (x, y, yaw, ENU).
+PHASE, STEPPING, CALM, COMMAND, ACTION, GROUND, IDLE, PLACE, MEMORY = 0, 1, 2, 3, 6, 16, 20, 21, 24
 #: Metres a second and radians of tilt beyond which a standing robot steps to catch itself, and a stepping one goes on:
 #: steps sway.
 _PUSHED, _TILTED = (0.22, 0.60), (0.09, 0.20)
@@ -78,7 +79,9 @@ def advance_clock(settings, planar, tilt, memory):  # type: ignore[no-untyped-de
     tilt
         Of its base, rad.
     """
-    asked = memory[COMMAND] != 0.0 or memory[COMMAND + 1] != 0.0 or memory[COMMAND + 2] != 0.0
+    # Without a command it steps no longer for being steered back to its place.
+    follows = memory[COMMAND] != 0.0 or memory[COMMAND + 1] != 0.0 or memory[COMMAND + 2] != 0.0
+    asked = follows and memory[IDLE] == 0.0
     steps = 1 if memory[STEPPING] > 0.0 else 0
     if asked or math.hypot(planar[0], planar[1]) > _PUSHED[steps] or tilt > _TILTED[steps]:
         memory[CALM] = 0.0

@@ -12,6 +12,7 @@ from vico.io.compiled import compiled
 from vico.sim.physics.records import Base, Motion
 from vico.sim.robots.controller import Array, Gains, MotorController
 from vico.sim.robots.policy import dense
+from vico.sim.robots.standing import StanceSettings, feel_ground, fit_to_ground, wanted_velocity
 from vico.sim.robots.tracking import approach, planar_motion
 from vico.sim.robots.two_legs import (
     COMMAND,
@@ -25,6 +26,8 @@ from vico.sim.robots.two_legs import (
     observe,
 )
 
+#: Where the knee is among a leg's joints.
+_KNEE = 3
 #: What a command may change by in a second: m/s ahead and aside, rad/s.
 _SLEW = (1.5, 1.0, 3.0)
 #: Seconds a fallen one lies before it is lifted, and m/s that it is.
@@ -36,24 +39,28 @@ _PULL, _HOLD, _UPRIGHT, _UPRIGHT_HOLD = 1500.0, 400.0, 200.0, 60.0
 @compiled
 def _walk(layers, settings, motion, command, memory):  # type: ignore[no-untyped-def]
     """Return the joints' targets of all robots, shape ``(k, 10)``."""
-    steps, slew = settings
-    rotation, velocity, spin, angles, speeds = motion
+    steps, stance, slew = settings
+    position, rotation, velocity, spin, angles, speeds = motion
     count = len(command)
-    seen = np.empty((count, OBSERVED))
+    seen, wanted = np.empty((count, OBSERVED)), np.empty(3)
     for k in range(count):
         mine = memory[k]
-        now = mine[COMMAND : COMMAND + 3]
-        approach(now, command[k], slew)
+        wanted_velocity(steps.period, command[k], position[k], rotation[k], mine, wanted)
+        approach(mine[COMMAND : COMMAND + 3], wanted, slew)
         planar = planar_motion(rotation[k], velocity[k], spin[k])
         advance_clock(steps, planar, math.acos(min(max(rotation[k, 2, 2], -1.0), 1.0)), mine)
-        observe(steps, (rotation[k], velocity[k], spin[k]), (angles[k], speeds[k]), mine, seen[k])
+        feel_ground(stance, rotation[k], angles[k], mine)
+        level = angles[k].copy()
+        fit_to_ground(mine, level, -1.0)
+        observe(steps, (rotation[k], velocity[k], spin[k]), (level, speeds[k]), mine, seen[k])
     x = seen.astype(np.float32)
     for index in range(len(layers)):
         x = dense(x, layers[index][0], layers[index][1], index == len(layers) - 1)
     out = np.empty((count, LEGS))
     for k in range(count):
         leg_targets(steps, x[k].astype(np.float64), memory[k], out[k])
-    return out
+        fit_to_ground(memory[k], out[k], 1.0)
+    return np.minimum(np.maximum(out, steps.low), steps.high)
 
 
 class TwoLegWalker(MotorController):
@@ -67,12 +74,14 @@ class TwoLegWalker(MotorController):
         assert isinstance(c, TwoLegs)
         low, high = model.motor_limits
         steps = StepSettings(period, c.stride, np.array(model.rest[:LEG]), low, high)
-        self._settings = (steps, np.array(_SLEW) * period)
+        stance = StanceSettings(period, c.places, float(model.rest[_KNEE]))
+        self._settings = (steps, stance, np.array(_SLEW) * period)
         self._layers = tuple((np.ascontiguousarray(w), np.array(b)) for w, b in zip(c.weights, c.biases, strict=True))
 
     def targets(self, motion: Motion, command: Array, memory: Array) -> Array:
         """Joint angles, rad."""
-        moving = (motion.rotation, motion.velocity, motion.angular_velocity_body, motion.angles, motion.speeds)
+        m = motion
+        moving = (m.position, m.rotation, m.velocity, m.angular_velocity_body, m.angles, m.speeds)
         found: Array = _walk(self._layers, self._settings, moving, command, memory)
         return found
 
