@@ -202,19 +202,6 @@ def free_ahead(x, y, yaw, speed, outline, path, along, others):  # type: ignore[
 
 
 @compiled
-def who_gets_nearer(x, y, yaw, others):  # type: ignore[no-untyped-def]
-    """Return which of those who stand still are nearer to a point a step from x, y towards `yaw`, and who moves."""
-    found = np.empty(len(others), np.bool_)
-    ahead_x, ahead_y = x + 0.3 * math.cos(yaw), y + 0.3 * math.sin(yaw)
-    for k in range(len(others)):
-        one = others[k]
-        found[k] = math.hypot(one.vx, one.vy) >= STILL or (
-            _gap(ahead_x, ahead_y, one.x, one.y, one) < _gap(x, y, one.x, one.y, one)
-        )
-    return found
-
-
-@compiled
 def room_to_turn(x, y, radius, others):  # type: ignore[no-untyped-def]
     """Return whether nobody stands within `radius` of x, y."""
     is_free = True

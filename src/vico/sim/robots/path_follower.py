@@ -19,7 +19,6 @@ from vico.sim.robots.navigation import (
     progress,
     room_to_turn,
     towards,
-    who_gets_nearer,
 )
 
 #: Seconds a robot waits for somebody who stands still before it goes round, and tries to move before it backs off.
@@ -152,10 +151,8 @@ class PathFollower:
         return self._backwards(base, others) if free < _CLOSE else np.zeros(3)
 
     def _backwards(self, base: Base, others: NDArray[np.void]) -> NDArray[np.float64]:
-        """Velocity back, if there is room; who stands ahead and is left behind does not count."""
-        behind = replace(base, rotation=-base.rotation)
-        x, y = base.position[:2]
-        free, _ = self._straight(behind, others[who_gets_nearer(x, y, behind.yaw, others)])
+        """Velocity back, if there is room."""
+        free, _ = self._straight(replace(base, rotation=-base.rotation), others)
         return np.array([-_BACK_SPEED, 0.0, 0.0]) if free > 0.5 else np.zeros(3)
 
     def _straight(self, base: Base, others: NDArray[np.void]) -> tuple[float, int]:

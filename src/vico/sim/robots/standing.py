@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from vico.io.compiled import compiled
 from vico.sim.robots.two_legs import CALM, COMMAND, GROUND, IDLE, LEG, PLACE, STEPPING
 
-_HIP, _KNEE, _ANKLE = 2, 3, 4
+#: Where the joints that fit a leg to the ground are among its own.
+_HIP, KNEE, _ANKLE = 2, 3, 4
 #: From which axis to which each joint of a leg turns: yaw, roll, and three times pitch.
 _TURNS = ((0, 1), (1, 2), (2, 0), (2, 0), (2, 0))
 #: Radians and metres of a slope and between two soles beyond which it stands as if there were no more.
@@ -108,7 +109,7 @@ def fit_to_ground(memory, angles, sign):  # type: ignore[no-untyped-def]
         ankle, knee = sign * memory[GROUND + leg], sign * memory[GROUND + 2 + leg]
         first = LEG * leg
         angles[first + _HIP] -= 0.5 * knee
-        angles[first + _KNEE] += knee
+        angles[first + KNEE] += knee
         angles[first + _ANKLE] += ankle - 0.5 * knee
 
 

@@ -12,7 +12,7 @@ from vico.io.compiled import compiled
 from vico.sim.physics.records import Base, Motion
 from vico.sim.robots.controller import Array, Gains, MotorController
 from vico.sim.robots.policy import dense
-from vico.sim.robots.standing import StanceSettings, feel_ground, fit_to_ground, wanted_velocity
+from vico.sim.robots.standing import KNEE, StanceSettings, feel_ground, fit_to_ground, wanted_velocity
 from vico.sim.robots.tracking import approach, planar_motion
 from vico.sim.robots.two_legs import (
     COMMAND,
@@ -26,8 +26,6 @@ from vico.sim.robots.two_legs import (
     observe,
 )
 
-#: Where the knee is among a leg's joints.
-_KNEE = 3
 #: What a command may change by in a second: m/s ahead and aside, rad/s.
 _SLEW = (1.5, 1.0, 3.0)
 #: Seconds a fallen one lies before it is lifted, and m/s that it is.
@@ -74,7 +72,7 @@ class TwoLegWalker(MotorController):
         assert isinstance(c, TwoLegs)
         low, high = model.motor_limits
         steps = StepSettings(period, c.stride, np.array(model.rest[:LEG]), low, high)
-        stance = StanceSettings(period, c.places, float(model.rest[_KNEE]))
+        stance = StanceSettings(period, c.places, float(model.rest[KNEE]))
         self._settings = (steps, stance, np.array(_SLEW) * period)
         self._layers = tuple((np.ascontiguousarray(w), np.array(b)) for w, b in zip(c.weights, c.biases, strict=True))
 
