@@ -6,32 +6,36 @@ Straight walks of 5 m across one kerb of at least 7 cm each, at places drawn wit
 people of 6, 30 and 80 years. *Float* is how far the lower foot is above the ground at worst, *sunk* how far a sole is
 below it; both on the world's own ground, kerb edges included. A *drop* is how far hips come down within 0.2 s. Stairs:
 up and down one flight of the world's first stairs room, from half a metre before it to half a metre behind; half a
-metre a second, as the simulation has it.
+metre a second, as the simulation has it. Flights outdoors are taken likewise, where their treads are not so deep that
+one walks on them as on the ground.
 """
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from motion import PEOPLE, of_feet
+from motion import PEOPLE, Footwork, of_feet
 from numpy.typing import NDArray
 from reporting import machine, publish
 
 from vico.api import read_world
-from vico.assets.people import body_of
+from vico.assets.people import SkinnedBody, body_of
 from vico.rules import STAIRS_SPEED
 from vico.seeds import rng
 from vico.sim.animation import clip_index, ground_under_feet, pose, stride_length, style_of
 from vico.sim.animation.stride import pace_of_step
 from vico.world.folder import World
 from vico.world.model import FLIGHT_STEPS, LANDING
+from vico.world.stairs import DEEPEST
 
 _LENGTH, _SPEED, _RATE, _KERB = 5.0, 1.2, 50.0, 0.07
 _SOON = round(0.2 * _RATE)  # frames
 _WHO = ("6 years", "30 years", "80 years")
 _TRIES = 200_000
+_LEAST_TREADS = 8
 
 
 def crossings(world: World, count: int) -> list[tuple[NDArray[np.float64], float, float]]:
@@ -88,7 +92,7 @@ def report(world: World, count: int) -> list[str]:
             worst = [max(getattr(f, name) for f in figures) for name in ("skate", "above", "sunk")]
             worst.append(max(drops))
             lines.append(f"| {who} | {name} | {len(figures)} | " + " | ".join(f"{value:.2f}" for value in worst) + " |")
-    return lines + on_stairs(world)
+    return lines + on_stairs(world) + on_flights(world, count)
 
 
 def on_stairs(world: World) -> list[str]:
@@ -119,6 +123,61 @@ def on_stairs(world: World) -> list[str]:
             found = of_feet(body, *moved, position, room.treads_at, steps=2 * gone[-1] / stride, yaw=yaw)
             lines.append(f"| {who} | {name} | {found.skate:.2f} | {found.above:.2f} | {max(found.sunk, 0.0):.2f} |")
     return lines
+
+
+def flights(world: World) -> list[tuple[NDArray[np.float64], float]]:
+    """Return the middles of the treads' edges of each flight outdoors, upwards, and the depth of its treads, metres."""
+    stairs = world.height.stairs
+    if stairs is None:
+        return []
+    front = 0.5 * (stairs.corners[:, 0] + stairs.corners[:, 3])
+    back = 0.5 * (stairs.corners[:, 1] + stairs.corners[:, 2])
+    cuts = np.flatnonzero(np.hypot(*(back[:-1] - front[1:]).T) > 0.01) + 1
+    parts = np.split(np.arange(len(front)), cuts)
+    return [(np.vstack([front[part], back[part[-1:]]]), float(stairs.going[part[0]])) for part in parts]
+
+
+def on_flights(world: World, count: int) -> list[str]:
+    """Return the table of flights outdoors."""
+    chosen = [flight for flight in flights(world) if len(flight[0]) > _LEAST_TREADS and flight[1] < DEEPEST][:count]
+    if not chosen:
+        return []
+    lines = ["", f"Flights outdoors: {len(chosen)} of {_LEAST_TREADS} treads or more.", ""]
+    lines += ["| who | goes | skate cm a step, worst | float cm, worst | sunk cm, worst |", "|---|---|---|---|---|"]
+    for who in _WHO:
+        look = PEOPLE[who]
+        body = body_of(look)
+        one = style_of(body, rng(3, "manner"), age=look.age)
+        for name, sign in (("up", 1), ("down", -1)):
+            figures = [_climbed(world, body, one, look.height, line[::sign], going) for line, going in chosen]
+            worst = [max(0.0, *(getattr(f, kind) for f in figures)) for kind in ("skate", "above", "sunk")]
+            lines.append(f"| {who} | {name} | " + " | ".join(f"{value:.2f}" for value in worst) + " |")
+    return lines
+
+
+def _climbed(
+    world: World, body: SkinnedBody, one: Any, height: float, line: NDArray[np.float64], going: float
+) -> Footwork:
+    """Return what somebody's feet do along a flight, a tread a step."""
+    pace = pace_of_step(going, height)
+    stride = float(stride_length(clip_index("walk"), pace, height))
+    gone = np.arange(0.0, _along(line)[-1], STAIRS_SPEED / _RATE)
+    spots = np.column_stack([np.interp(gone, _along(line), line[:, k]) for k in (0, 1)])
+    yaw = np.arctan2(*np.gradient(spots, axis=0).T[::-1])
+    position = np.column_stack([spots, world.height(spots)])
+    course = np.full(len(gone), clip_index("walk")), 0.3 + gone / stride, np.full(len(gone), pace)
+    style = np.repeat(one[None], len(gone))
+
+    def footing(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        level = world.height(points[..., :2])
+        return world.height.footing(np.concatenate([points[..., :2], level[..., None]], axis=-1))
+
+    moved = pose(*course, style, ground=ground_under_feet(*course, style, (position, yaw), world.height.footing))
+    return of_feet(body, *moved, position, footing, steps=2 * gone[-1] / stride, yaw=yaw)
+
+
+def _along(line: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
 
 
 if __name__ == "__main__":

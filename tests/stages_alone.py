@@ -11,6 +11,7 @@ from vico.worldgen.facts.site import site_facts
 from vico.worldgen.facts.streets import StreetPolygons
 from vico.worldgen.ground.bridges.stage import bridges_of
 from vico.worldgen.ground.stage import ground_from_osm
+from vico.worldgen.ground.stairs import flights_of
 
 
 def buildings_of(osm: OsmData, terrain: HeightField, *, seed: int) -> BuildingsResult:
@@ -21,4 +22,5 @@ def buildings_of(osm: OsmData, terrain: HeightField, *, seed: int) -> BuildingsR
 def ground_of(osm: OsmData, terrain: HeightField, streets: StreetPolygons) -> list[Surface]:
     """The ground of a map, its bridges with it."""
     site = site_facts(osm)
-    return ground_from_osm(site, terrain, streets, bridges_of(site, terrain, streets))
+    flights = flights_of(site, terrain, streets.steps)
+    return ground_from_osm(site, terrain, streets, bridges_of(site, terrain, streets), flights)

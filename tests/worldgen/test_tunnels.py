@@ -21,6 +21,7 @@ from vico.worldgen.ground.bridges.stage import Bridges, bridges_of
 from vico.worldgen.ground.bridges.tunnels import HEADROOM
 from vico.worldgen.ground.grading import graded
 from vico.worldgen.ground.stage import ground_from_osm
+from vico.worldgen.ground.stairs import flights_of
 from vico.worldgen.ground.terrain import flat_terrain
 from vico.worldgen.streets.netconvert import road_network
 from vico.worldgen.streets.polygons import road_polygons
@@ -111,7 +112,8 @@ def test_the_ground_is_open_over_the_ways_in_and_nowhere_else() -> None:
     bridges, height = _bridges(_town())
     cuts = shapely.union_all(bridges.cuts)
     site = site_facts(_town())
-    surfaces = ground_from_osm(site, replace(height, decks=None), road_polygons(site), bridges)
+    bare, streets = replace(height, decks=None), road_polygons(site)
+    surfaces = ground_from_osm(site, bare, streets, bridges, flights_of(site, bare, streets.steps))
     x = np.arange(-66.0, 66.0, 1.5)
     corners = np.concatenate([s.positions[s.triangles] for s in surfaces]).astype(np.float64)
     level = np.abs(corners[..., 2]).max(axis=1) < 0.4

@@ -158,7 +158,7 @@ class Avatars:
         moving = (p.move_left > 0.0) | (p.turn_left != 0.0)
         p.velocity[:] = 0.0
         turned = np.zeros(len(p))
-        tread = self._indoor.treads_under(p.room)
+        tread = self.treads()
         if moving.any():
             # Turning comes first, within the first half of the second, so that a walk starts in the new direction.
             turn = p.turn_left * share
@@ -181,6 +181,15 @@ class Avatars:
         if carried is not None:
             p.velocity[carried[0]] = carried[1]
         self._animate(turned, tread, dt)
+
+    def treads(self) -> NDArray[np.float64]:
+        """Return how deep the treads of the stairs are that avatars walk on, metres, shape ``(n,)``; 0 elsewhere."""
+        p = self.people
+        found = self._indoor.treads_under(p.room)
+        if self._height.stairs is None:
+            return found
+        afoot = (p.room < 0) & (p.vehicle == Vehicle.NONE)
+        return np.where(afoot, self._height.going_at(p.position), found)
 
     def settle(self, who: NDArray[np.int64]) -> None:
         """Put feet on the ground or the floor."""

@@ -14,6 +14,7 @@ from vico.community.model import Resident
 from vico.seeds import rng
 from vico.sim.animation import Transition, clip_index, stride_length
 from vico.sim.animation.gait import WALK_START
+from vico.sim.animation.stride import pace_on
 from vico.sim.environment.weather import Weather
 from vico.sim.traffic.state import STOP, TALK, PedestrianGaits
 
@@ -71,8 +72,9 @@ def pedestrian_motion(gaits: PedestrianGaits, height: NDArray[np.float64], secon
     walk = np.where(gaits.cycling, clip_index("ride_bike"), clip_index("walk"))
     walking = gaits.time > 0.0
     n = np.arange(len(walking))
-    stride = stride_length(walk, gaits.pace, height)
-    in_stride = (np.where(gaits.cycling, 0.0, WALK_START) + gaits.walked / stride) % 1.0
+    start, stride = np.where(gaits.cycling, 0.0, WALK_START), stride_length(walk, gaits.pace, height)
+    on_treads = gaits.treads
+    in_stride = (start + gaits.walked / stride + (0.0 if on_treads is None else on_treads.cycles)) % 1.0
     # People at rest breathe by the clock, each at their own time.
     at_rest = (second * 0.5 + n * 0.37 + 0.1) % 1.0
     # Of two who talk one does and the other listens, by turns; one comes right after the other.
@@ -90,4 +92,15 @@ def pedestrian_motion(gaits: PedestrianGaits, height: NDArray[np.float64], secon
         gaits.pace,
         np.abs(gaits.time),
     )
-    return PedestrianMotion(np.where(walking, walk, still), np.where(walking, in_stride, at_rest), gaits.pace, after)
+    pace = gaits.pace
+    if on_treads is not None:
+        pace, pace_before = (pace_on(depth, gaits.pace, height) for depth in (on_treads.depth, on_treads.depth_before))
+        then = (start + on_treads.walked_then / stride + on_treads.cycles_then) % 1.0
+        steps = walking & ~gaits.cycling & (on_treads.time < gaits.time)
+        after = Transition(
+            np.where(steps, walk, after.clip),
+            np.where(steps, then, after.phase),
+            np.where(steps, pace_before, after.speed),
+            np.where(steps, on_treads.time, after.since),
+        )
+    return PedestrianMotion(np.where(walking, walk, still), np.where(walking, in_stride, at_rest), pace, after)

@@ -21,6 +21,7 @@ from vico.render.sensors.batch import PictureSet, Viewers
 from vico.render.sensors.lens import Lens
 from vico.render.skinning import skin
 from vico.render.world_scene import scene_of
+from vico.rules import STAIRS_SPEED
 from vico.sim.animation import (
     LONGEST_BLEND,
     Hands,
@@ -42,6 +43,7 @@ from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Posture, Vehicle
 from vico.sim.window_lights import WindowLights
 from vico.world.folder import World
+from vico.world.heights import HeightField
 from vico.world.mesh import Surface
 
 # The sun moves slowly: the light is set anew this often, seconds.
@@ -248,7 +250,7 @@ class SceneRenderer:
 
     def _motion(self, state: SimulationState) -> _Motion:
         """Return how everybody on legs moves."""
-        motion = _motion_of_agents(state)
+        motion = _motion_of_agents(state, self._sim.world.height)
         return motion if state.traffic is None else _joined_motion(motion, self._motion_of_pedestrians(state))
 
     def _holders(self, motion: _Motion, rotations: NDArray[np.float32], offsets: NDArray[np.float32]) -> Holders:
@@ -303,7 +305,7 @@ class SceneRenderer:
     ) -> NDArray[np.float64]:
         """Return the ground under everybody's feet in a motion: clip, phase and speed."""
         place = motion.position, motion.yaw
-        ground = ground_under_feet(*course, self._people.style, place, self._sim.world.height.near, roughly=roughly)
+        ground = ground_under_feet(*course, self._people.style, place, self._sim.world.height.footing, roughly=roughly)
         ground[~motion.on_ground] = 0.0
         indoor = self._sim.state.indoor
         for k in np.flatnonzero(indoor.treads_under(motion.room) > 0):
@@ -323,7 +325,8 @@ class SceneRenderer:
         clip, phase, pace, after = pedestrian_motion(gait, self._people.height[len(state.people) :], state.second)
         on_ground = gait.afoot
         still, outdoors = np.zeros(len(clip)), np.full(len(clip), -1, np.int32)
-        after = after._replace(moved=np.zeros((len(clip), 4)), over_ground=pace)
+        over_ground = pace if gait.treads is None else np.where(gait.treads.depth > 0.0, STAIRS_SPEED, pace)
+        after = after._replace(moved=np.zeros((len(clip), 4)), over_ground=over_ground)
         placard = state.traffic.gatherings.placards(walkers.position)
         hands = hands_of_pedestrians(self._people.habit, state.environment.weather.rain, placard)
         hands.share[~on_ground] = 0.0
@@ -358,13 +361,13 @@ def _widest(environment: Environment) -> tuple[float, float, float]:
     return max(environment.agenda.effects.dark, key=lambda circle: circle[2], default=(0.0, 0.0, 0.0))
 
 
-def _motion_of_agents(state: SimulationState) -> _Motion:
+def _motion_of_agents(state: SimulationState, height: HeightField) -> _Motion:
     """Return how residents and assistants move; who sits in a bus sits as the seat stands, wherever they look."""
     p = state.people
     in_seat = (p.vehicle == Vehicle.BUS) & (p.posture == Posture.SITTING)
     yaw = np.where(in_seat, p.vehicle_yaw, p.yaw)
     before = p.clip_before.astype(np.int64), p.phase_before.copy(), p.pace_before.copy(), p.clip_time.copy()
-    on_stairs = state.indoor.treads_under(p.room) > 0
+    on_stairs = (state.indoor.treads_under(p.room) > 0) | ((p.room < 0) & (height.going_at(p.position) > 0))
     over_ground = np.where(on_stairs, np.hypot(*p.velocity.T), p.pace)
     after = Transition(*before, moved=p.moved.copy(), over_ground=over_ground)
     on_ground = (p.room < 0) & (p.vehicle == Vehicle.NONE) & (p.seat < 0) & (p.passing == 0)

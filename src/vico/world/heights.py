@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vico.io.compiled import compiled
 from vico.world.decks import Decks
+from vico.world.stairs import Stairs
 
 EDGE_RANGE = 1.0
 """Metres of distance to an edge that a `Steps` field can tell; int8 127 stands for it."""
@@ -56,12 +57,15 @@ class HeightField:
         Kerbs, quays and their like; None where there are none.
     decks
         Surfaces above and below the ground that people and vehicles use, too; None where there are none.
+    stairs
+        Treads that feet stand on, where the heights are a slope; None where there are none.
     """
 
     heights: NDArray[np.float32]
     half: float
     steps: Steps | None = None
     decks: Decks | None = None
+    stairs: Stairs | None = None
 
     @property
     def cell(self) -> float:
@@ -108,6 +112,18 @@ class HeightField:
         flat = found.reshape(-1)
         self.decks.heights(points, flat)
         return flat.reshape(found.shape)
+
+    def footing(self, xyz: ArrayLike) -> NDArray[np.float64]:
+        """Heights of what feet stand on: as `near`, and of treads on stairs; shaped as those of `near`."""
+        found = self.near(xyz)
+        if self.stairs is not None:
+            flat = found.reshape(-1)
+            self.stairs.stand_on(np.asarray(xyz, np.float64).reshape(-1, 3), flat)
+        return found
+
+    def going_at(self, xyz: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How deep the treads are that one climbs at points ``(n, 3)``, metres, shape ``(n,)``; 0 off stairs."""
+        return np.zeros(len(xyz)) if self.stairs is None else self.stairs.going_at(xyz)
 
     def smooth(self, xy: ArrayLike) -> NDArray[np.float64]:
         """Heights without kerbs and their like, shaped as those of a call."""
@@ -160,7 +176,9 @@ class HeightField:
         found: dict[str, NDArray[Any]] = {"heights": self.heights, "half": np.array(self.half, np.float64)}
         if self.steps is not None:
             found |= {"edge": self.steps.edge, "low": self.steps.low, "high": self.steps.high}
-        return found if self.decks is None else found | self.decks.arrays()
+        for more in (self.decks, self.stairs):
+            found |= {} if more is None else more.arrays()
+        return found
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> HeightField:
@@ -168,13 +186,18 @@ class HeightField:
         heights = np.ascontiguousarray(arrays["heights"], np.float32)
         if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.shape[0] < 2:
             raise ValueError(f"heights of shape {heights.shape}, not square")
+        steps, half = cls._steps_from(arrays), float(arrays["half"])
+        return cls(heights, half, steps, Decks.from_arrays(arrays), Stairs.from_arrays(arrays))
+
+    @staticmethod
+    def _steps_from(arrays: Mapping[str, NDArray[Any]]) -> Steps | None:
         if "edge" not in arrays:
-            return cls(heights, float(arrays["half"]), decks=Decks.from_arrays(arrays))
+            return None
         edge = np.ascontiguousarray(arrays["edge"], np.int8)
         low, high = (np.ascontiguousarray(arrays[name], np.int16) for name in ("low", "high"))
         if edge.ndim != 2 or edge.shape[0] != edge.shape[1] or not edge.shape == low.shape == high.shape:
             raise ValueError(f"steps of shapes {edge.shape}, {low.shape}, {high.shape}")
-        return cls(heights, float(arrays["half"]), Steps(edge, low, high), Decks.from_arrays(arrays))
+        return Steps(edge, low, high)
 
 
 @compiled

@@ -30,6 +30,7 @@ from vico.worldgen.facts.site import SiteFacts, site_facts
 from vico.worldgen.ground.bridges.stage import bridges_of
 from vico.worldgen.ground.grading import graded
 from vico.worldgen.ground.stage import ground_from_osm
+from vico.worldgen.ground.stairs import flights_of
 from vico.worldgen.ground.terrain import flat_terrain, terrain_from_dem, terrain_from_tiles
 from vico.worldgen.ground.walkable import walkable_from_site
 from vico.worldgen.indoor.layout_llm import furnish_drawn
@@ -79,7 +80,9 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     site = _left(site, stages)
     bridges = run("bridges", bridges_of, site, height, streets)
     site = _left(site, stages)
-    levels = stages.digested(replace(height, decks=bridges.levels()))
+    flights = run("stairs", flights_of, site, height, streets.steps)
+    site = _left(site, stages)
+    levels = stages.digested(replace(height, decks=bridges.levels(), stairs=flights.treads()))
     write.terrain(levels, flat=evidence.samples is None and tiles is None)
 
     if tiles is not None:
@@ -145,7 +148,7 @@ def make_world(evidence: Evidence, request: WorldRequest, folder: Path, stages: 
     write.indoors(indoors, undrawn)
     objects = write.objects(outdoors, indoors)
 
-    ground = run("ground", ground_from_osm, site, height, streets, bridges, standing=solids)
+    ground = run("ground", ground_from_osm, site, height, streets, bridges, flights, standing=solids)
     stages.report("ground", {"faces": faces(ground)})
     with stages.timed("fronts"):
         fronts = street_fronts(indoors.places, entrances, buildings, built.walls, seed=seed)

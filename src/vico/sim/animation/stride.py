@@ -32,6 +32,12 @@ def pace_of_step(step, height):  # type: ignore[no-untyped-def]
     return max((2.0 * step / (_STRIDE * height)) ** (1.0 / _POWER), _SLOWEST)
 
 
+def pace_on(treads: NDArray[np.float64], pace: NDArray[np.float64], height: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the speed that strides are those of, m/s: of a tread a step where treads are so deep, else `pace`."""
+    on_treads = np.maximum(2.0 * treads / (_STRIDE * height), 0.0) ** (1.0 / _POWER)
+    return np.where(treads > 0.0, np.maximum(on_treads, _SLOWEST), pace)
+
+
 def stride_length(
     clip: NDArray[Any] | int, speed: NDArray[Any] | float, height: NDArray[Any] | float
 ) -> NDArray[np.float64]:

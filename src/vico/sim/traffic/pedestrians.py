@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from vico.io.compiled import compiled
+from vico.rules import STAIRS_SPEED
 from vico.sim.neighbours import search
 from vico.sim.traffic.companions import (
     goes_wrong_way,
@@ -348,10 +349,20 @@ def _note_progress(paths, walker, x, y, is_waiting, dt):  # type: ignore[no-unty
 def _note_gait(walker, is_walking, dt):  # type: ignore[no-untyped-def]
     """Count the time since somebody set out, upward, or stopped, downward."""
     if is_walking and walker.gait_time < 0.0:
-        walker.gait_time, walker.set_out = 0.0, walker.distance_walked
+        walker.gait_time, walker.set_out, walker.tread_cycles = 0.0, walker.distance_walked, 0.0
     elif not is_walking and walker.gait_time > 0.0:
         walker.gait_time = 0.0
     walker.gait_time = min(max(walker.gait_time + (dt if is_walking else -dt), -GAIT_TIME), GAIT_TIME)
+
+
+@compiled
+def _note_treads(walker, tread, dt):  # type: ignore[no-untyped-def]
+    """Note that somebody comes to stairs, or from them, and how far in its gait it is."""
+    walker.tread_time = min(walker.tread_time + dt, GAIT_TIME)
+    if tread != walker.tread:
+        walker.tread_before, walker.tread, walker.tread_time = walker.tread, tread, 0.0
+        walker.change_walked = walker.distance_walked - walker.set_out
+        walker.change_cycles = walker.tread_cycles
 
 
 @compiled
@@ -439,11 +450,12 @@ def _go_along(paths, pedestrians, junctions, shapes, who, near, is_asked, time):
 
 
 @compiled
-def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, pace, dt):  # type: ignore[no-untyped-def]
+def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, on, dt):  # type: ignore[no-untyped-def]
     """Advance all pedestrians by `dt` seconds; their bodies follow those of the vehicles in `shapes`, and in `grid`.
 
-    They walk at `pace` times the speed each prefers.
+    They walk `on` what is below them: at so many times the speed each prefers, on treads so deep, metres, ``(n,)``.
     """
+    pace, treads = on
     first = len(fleet)
     asked = asked_to_go(fleet, first, pedestrians)
     buffer = np.empty(len(shapes.x), np.int64)
@@ -454,15 +466,20 @@ def advance_pedestrians(paths, pedestrians, junctions, fleet, shapes, grid, pace
             continue
         b = first + i
         near = _nearby(shapes, grid, b, buffer)
+        _note_treads(walker, treads[i], dt)
+        own_pace = pace if treads[i] == 0.0 else min(pace, STAIRS_SPEED / walker.preferred_speed)
         if walker.stand_kind != 0:
-            step = _go_to_spot(paths, pedestrians, i, shapes, b, near, asked[i], (pace, dt))
+            step = _go_to_spot(paths, pedestrians, i, shapes, b, near, asked[i], (own_pace, dt))
         else:
-            step = _go_along(paths, pedestrians, junctions, shapes, (i, b), near, asked[i], (pace, dt))
+            step = _go_along(paths, pedestrians, junctions, shapes, (i, b), near, asked[i], (own_pace, dt))
         if step == 0.0:
             shapes.vx[b] = shapes.vy[b] = 0.0
         walker.speed = step / dt
         _note_gait(walker, step > 0.0, dt)
         walker.distance_walked += step
+        if walker.tread > 0.0:
+            walker.set_out += step
+            walker.tread_cycles += step / (2.0 * walker.tread)
 
 
 @compiled

@@ -350,7 +350,9 @@ class Traffic(SeenTraffic):
         mark_busy_crossings(net, fleet, junctions)
         widest = float(np.max(everybody.half_length + everybody.half_width, initial=0.0))
         grid = neighbour_grid(everybody.x, everybody.y, _CELL, widest + _DRIFT * dt)
-        advance_pedestrians(self.paths, self._walkers, junctions, fleet, everybody, grid, self._walking_pace, dt)
+        advance_pedestrians(
+            self.paths, self._walkers, junctions, fleet, everybody, grid, (self._walking_pace, self._treads()), dt
+        )
         junctions.vehicle_wait[:] = 0.0
         count_per_street(net, fleet, self._street_load)
         advance_vehicles(net, fleet, junctions, everybody, grid, self._street_load, dt)
@@ -363,6 +365,13 @@ class Traffic(SeenTraffic):
             getattr(mine, field)[:] = getattr(everybody, field)[: len(mine.x)]
         self._follow_levels(*before)
         self._bodies = None
+
+    def _treads(self) -> NDArray[np.float64]:
+        """Return how deep the treads are that each pedestrian walks on, metres; 0 off stairs."""
+        if self.height.stairs is None:
+            return np.zeros(self.pedestrians)
+        xy = np.column_stack([self.shapes.x, self.shapes.y])[self.vehicles :]
+        return self.height.going_at(np.column_stack([xy, self.height(xy)]))
 
     def _follow_levels(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
         """Take everybody along the decks they are on, from where they were before."""

@@ -15,7 +15,8 @@ from vico.sim.traffic.drawing import TrafficDrawing
 from vico.sim.traffic.jams import JamLog
 from vico.sim.traffic.levels import TrafficLevels
 from vico.sim.traffic.shapes import Shapes
-from vico.sim.traffic.state import GAIT_TIME, NONE, PRESENT, LaneNetwork, PedestrianGaits, WalkwayNetwork
+from vico.sim.traffic.state import GAIT_TIME, NONE, PRESENT, LaneNetwork, PedestrianGaits, StairGaits, WalkwayNetwork
+from vico.world.heights import HeightField
 from vico.world.lanes import LaneGraph
 from vico.world.mesh import Surface
 
@@ -36,6 +37,7 @@ class SeenTraffic:
     cyclists: int
     pedestrians: int
     lanes: LaneGraph
+    height: HeightField
     paths: WalkwayNetwork
     fleet: Any
     pedestrian_state: Any
@@ -152,4 +154,10 @@ class SeenTraffic:
             seated,
             cycling,
             afoot,
+            None if self.height.stairs is None else self._on_stairs(),
         )
+
+    def _on_stairs(self) -> StairGaits:
+        walkers, none = self.pedestrian_state, np.zeros(self.cyclists)
+        fields = "tread", "tread_before", "tread_time", "tread_cycles", "change_walked", "change_cycles"
+        return StairGaits(*(np.concatenate([walkers[name], none]) for name in fields))

@@ -208,8 +208,14 @@ PEDESTRIAN_RECORD = np.dtype(
         ("preferred_speed", _F),  # m/s
         ("speed", _F),  # measured over the last step, m/s
         ("distance_walked", _F),  # since the start, m
-        ("set_out", _F),  # `distance_walked` when it last set out, m
+        ("set_out", _F),  # `distance_walked` when it last set out, and what it has walked on treads since, m
         ("gait_time", _F),  # since it set out, or since it stopped if negative, s; counted up to `GAIT_TIME`
+        ("tread", _F),  # depth of the treads that it walks on, m; 0 off stairs
+        ("tread_before", _F),  # the same before that changed last
+        ("tread_time", _F),  # since it changed, s; counted up to `GAIT_TIME`
+        ("tread_cycles", _F),  # cycles of its gait on treads since it set out
+        ("change_walked", _F),  # metres off treads between when it set out and when the treads changed
+        ("change_cycles", _F),  # `tread_cycles` when they changed
         ("stuck_time", _F),  # within a metre of `progress_xy` since it last turned round, s
         ("jammed_time", _F),  # within a metre of `progress_xy`, s
         ("progress_xy", _F, (2,)),  # where it last got on, m
@@ -241,6 +247,29 @@ PEDESTRIAN_RECORD = np.dtype(
 )
 
 
+class StairGaits(NamedTuple):
+    """How pedestrians walk on stairs; one number of each.
+
+    Attributes
+    ----------
+    depth, depth_before
+        Of the treads they walk on now, and before those changed, metres; 0 off stairs.
+    time
+        Seconds since they changed, counted up to `GAIT_TIME`.
+    cycles
+        Of the gait on treads since they set out.
+    walked_then, cycles_then
+        `PedestrianGaits.walked` and `cycles` when the treads changed.
+    """
+
+    depth: NDArray[np.float64]
+    depth_before: NDArray[np.float64]
+    time: NDArray[np.float64]
+    cycles: NDArray[np.float64]
+    walked_then: NDArray[np.float64]
+    cycles_then: NDArray[np.float64]
+
+
 class PedestrianGaits(NamedTuple):
     """How pedestrians walk; one number of each.
 
@@ -249,7 +278,7 @@ class PedestrianGaits(NamedTuple):
     pace
         Speed that each prefers and that strides are those of, metres a second.
     walked
-        Metres since it last set out.
+        Metres since it last set out, but for those on stairs.
     time
         Seconds since then, or since it stopped if negative; counted up to `GAIT_TIME`.
     standing
@@ -260,6 +289,8 @@ class PedestrianGaits(NamedTuple):
         Whether it is a cyclist: it never stands for anything, and `walked` is what it has ridden.
     afoot
         Whether its feet are on the ground: it rides neither in a bus nor on a bicycle.
+    treads
+        On stairs; None where there are none.
     """
 
     pace: NDArray[np.float64]
@@ -269,6 +300,7 @@ class PedestrianGaits(NamedTuple):
     seated: NDArray[np.bool_]
     cycling: NDArray[np.bool_]
     afoot: NDArray[np.bool_]
+    treads: StairGaits | None = None
 
 
 class LaneNetwork(NamedTuple):

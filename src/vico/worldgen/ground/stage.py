@@ -35,7 +35,7 @@ from vico.worldgen.ground.grading import is_level, open_water, piped_waters
 from vico.worldgen.ground.kerbs import RAMP, Water, lowered_kerbs
 from vico.worldgen.ground.markings import Quads, pitch_lines, road_markings
 from vico.worldgen.ground.pavings import LOOKS, GroundStyle, coloured, ground_material, look_of
-from vico.worldgen.ground.stairs import flights_of
+from vico.worldgen.ground.stairs import Flights
 from vico.worldgen.ground.thinning import thinned
 from vico.worldgen.ground.upright import border_chains, faced_lines, hung, lowered, parted_by
 
@@ -58,6 +58,7 @@ def ground_from_osm(
     terrain: HeightField,
     streets: StreetPolygons,
     bridges: Bridges,
+    flights: Flights,
     *,
     standing: Sequence[BaseGeometry] = (),
     apron: float = 40.0,
@@ -74,6 +75,8 @@ def ground_from_osm(
         `road_polygons` of the same map.
     bridges
         `bridges_of` the same streets and terrain.
+    flights
+        `flights_of` the same streets and terrain.
     standing
         Footprints of the buildings as they were built, where they stand on the ground: nobody sees what lies well
         within them, and it is not drawn.
@@ -93,7 +96,6 @@ def ground_from_osm(
         pieces = {name: _without(shapes, holes) for name, shapes in pieces.items()}
     level = is_level(terrain)
     waters = open_water(terrain, pieces.get("water", []), piped_waters(osm)) if terrain.steps is not None else []
-    flights = flights_of(site, terrain, streets.steps)
     laid = _laid(pieces, terrain, waters, reach, hidden=_hidden(osm, standing), stairs=flights.area)
     wet = overlay.union_all([water.polygon for water in waters])
     exact: list[BaseGeometry] = [

@@ -14,12 +14,15 @@ from vico.geo import overlay
 from vico.geo.osm import OsmWay
 from vico.world.heights import HeightField
 from vico.world.mesh import Surface, surface_of_quads
+from vico.world.stairs import Stairs
 from vico.worldgen.facts.expendable import NamedShape, expendable, united
 from vico.worldgen.facts.site import SiteFacts
 from vico.worldgen.facts.tags import number, on_the_ground
 from vico.worldgen.ground.pavings import LOOKS, coloured, ground_material
 
 Floats = NDArray[np.float64]
+Face = tuple[Floats, Floats, float]
+"""Corners of a face, its normal, and how far it is from riser to riser on its flight."""
 
 RISE = 0.16
 """Metres a step is high."""
@@ -39,11 +42,22 @@ class Flights:
         Where they lie.
     quads
         Corners of their faces, metres, shape ``(n, 4, 3)``, counter-clockwise from outside; `normals` ``(n, 3)``.
+    going
+        How far it is on average from riser to riser on the flight that each face is of, metres, shape ``(n,)``.
     """
 
     area: BaseGeometry
     quads: Floats
     normals: Floats
+    going: Floats
+
+    def treads(self) -> Stairs | None:
+        """Return what feet stand on; None where there are no stairs."""
+        level = self.normals[:, 2] > 0.5
+        if not level.any():
+            return None
+        quads = self.quads[level]
+        return Stairs(np.ascontiguousarray(quads[..., :2]), quads[:, 0, 2].copy(), self.going[level])
 
     def surfaces(self) -> list[Surface]:
         """Return the faces with their texture."""
@@ -86,7 +100,7 @@ def flights_of(site: SiteFacts, terrain: HeightField, where: BaseGeometry) -> Fl
     """
     above = site.levels.above
     shapely.prepare(where)
-    faces: list[tuple[Floats, Floats]] = []
+    faces: list[Face] = []
     areas: list[NamedShape] = []
     for way in site.osm.ways:
         tags = way.tags
@@ -98,17 +112,16 @@ def flights_of(site: SiteFacts, terrain: HeightField, where: BaseGeometry) -> Fl
                 faces += own
     return Flights(
         united(areas) if areas else shapely.MultiPolygon(),
-        np.stack([quad for quad, _ in faces]) if faces else np.zeros((0, 4, 3)),
-        np.stack([normal for _, normal in faces]) if faces else np.zeros((0, 3)),
+        np.array([quad for quad, _, _ in faces]).reshape(-1, 4, 3),
+        np.array([normal for _, normal, _ in faces]).reshape(-1, 3),
+        np.array([going for *_, going in faces], np.float64),
     )
 
 
-def _flights(
-    way: OsmWay, terrain: HeightField, where: BaseGeometry
-) -> list[tuple[BaseGeometry, list[tuple[Floats, Floats]]]]:
+def _flights(way: OsmWay, terrain: HeightField, where: BaseGeometry) -> list[tuple[BaseGeometry, list[Face]]]:
     """Return the flights of a way: where each lies, and its faces with their normals."""
     width = min(max(number(way.tags.get("width")) or _WIDTH, 1.2), 12.0)
-    found: list[tuple[BaseGeometry, list[tuple[Floats, Floats]]]] = []
+    found: list[tuple[BaseGeometry, list[Face]]] = []
     for piece in shapely.get_parts(overlay.intersection(shapely.LineString(way.line), where)):
         if piece.geom_type != "LineString" or piece.length < 0.8 or np.abs(piece.bounds).max() > terrain.half - 1.0:
             continue
@@ -136,29 +149,30 @@ def _rising(line: Floats, terrain: HeightField) -> tuple[Floats, Floats] | None:
     return None if float((even - z).max()) > 0.1 else (points, even)
 
 
-def _flight(points: Floats, z: Floats, width: float) -> Iterable[tuple[Floats, Floats]]:
+def _flight(points: Floats, z: Floats, width: float) -> Iterable[Face]:
     """Faces of the steps along a rising line: tread, riser, and the two sides."""
-    rise = z[-1] - z[0]
     # On ground steeper than stairs can be, steps are as high as their going lets them be.
-    count = int(min(max(round(rise / RISE), 1), max(len(points) * 0.1 / 0.22, 1)))
-    edges = z[0] + rise * np.arange(count + 1) / count
-    edge = np.minimum(np.searchsorted(z, edges - 1e-9), len(points) - 1)
+    run = float(np.hypot(*np.diff(points, axis=0).T).sum())
+    count = int(min(max(round((z[-1] - z[0]) / RISE), 1), max(run / 0.22, 1)))
+    # All as deep, so that one climbs them in stride; where the ground is less steep, risers are lower.
+    edge = np.linspace(0.0, len(points) - 1.0, count + 1)
+    levels = np.interp(0.5 * (edge[:-1] + edge[1:]), np.arange(len(points)), z)
     along = np.gradient(points, axis=0)
     along /= np.maximum(np.hypot(*along.T)[:, None], 1e-9)
+    points, along = (
+        np.column_stack([np.interp(edge, np.arange(len(line)), line[:, axis]) for axis in (0, 1)])
+        for line in (points, along)
+    )
     left = np.stack([-along[:, 1], along[:, 0]], axis=1) * width / 2
     up = np.array([0.0, 0.0, 1.0])
-    for k in range(count):
-        a, b = int(edge[k]), int(edge[k + 1])
-        if a == b:
-            continue
-        top = (edges[k] + edges[k + 1]) / 2
-        below = top - rise / count if k else edges[0] - 0.1
+    for a, top in enumerate(levels.tolist()):
+        b, below = a + 1, levels[a - 1] if a else z[0] - 0.1
         r0, r1 = np.r_[points[a] - left[a], top], np.r_[points[b] - left[b], top]
         l0, l1 = np.r_[points[a] + left[a], top], np.r_[points[b] + left[b], top]
-        yield np.stack([r0, r1, l1, l0]), up
+        yield np.stack([r0, r1, l1, l0]), up, run / count
         down = up * (top - below)
-        yield np.stack([l0 - down, r0 - down, r0, l0]), np.r_[-along[a], 0.0]
+        yield np.stack([l0 - down, r0 - down, r0, l0]), np.r_[-along[a], 0.0], run / count
         deep = up * _STRING
         side = np.r_[left[a], 0.0] / (width / 2)
-        yield np.stack([r0 - deep, r1 - deep, r1, r0]), -side
-        yield np.stack([l1 - deep, l0 - deep, l0, l1]), side
+        yield np.stack([r0 - deep, r1 - deep, r1, r0]), -side, run / count
+        yield np.stack([l1 - deep, l0 - deep, l0, l1]), side, run / count
