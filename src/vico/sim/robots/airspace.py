@@ -11,9 +11,8 @@ from scipy import ndimage
 
 from vico.io.compiled import compiled
 from vico.world.folder import World
-from vico.world.walkable import CROSSING, ROADWAY
 from vico.world.routing import Router
-from vico.world.walkable import BLOCKED, SIDEWALK, WalkableMap
+from vico.world.walkable import BLOCKED, CROSSING, ROADWAY, SIDEWALK, WalkableMap
 
 Array = NDArray[np.float64]
 
