@@ -12,10 +12,12 @@ from vico.errors import InputError
 from vico.sim.bodies import Bodies
 from vico.sim.config import SimConfig
 from vico.sim.robots import RobotMode, RobotPopulation, RobotScene, RobotStatus
-from vico.sim.robots.airspace import CEILING, OVER
+from vico.sim.robots.airspace import CEILING, OVER, Airspace
 from vico.sim.robots.rotors import FlightPhase
 from vico.sim.robots.wind import air_at, gusts_of
 from vico.sim.simulation import Simulation
+from vico.world.folder import World
+from vico.world.walkable import CROSSING, ROADWAY
 
 #: A house: middle, extents; its flat roof is 4.5 m high, as walls of `field` are.
 HOUSE = (12.0, 0.0, 6.0, 12.0)
@@ -276,3 +278,14 @@ def test_agents_send_it_and_those_that_do_not_fly_are_told_so() -> None:
 def test_a_model_with_rotors_has_no_other_motors() -> None:
     with pytest.raises(InputError, match="has no other motors"):
         replace(robot_model("drone"), servos=("rotor", "rotor", "rotor", "force"))
+
+
+def test_on_a_street_it_lands_beside_the_roadway_to_recharge(helsinki: World) -> None:
+    space, walkable = Airspace(helsinki), helsinki.walkable
+    row, column = np.nonzero((walkable.cls == ROADWAY) & (walkable.clearance > 1.0))
+    for point in walkable.centre_of(np.column_stack([column, row])[:: len(row) // 20]):
+        spot = space.flat_near(point)
+        assert spot is not None
+        x, y = walkable.cell_of(spot)
+        assert walkable.cls[y, x] not in (ROADWAY, CROSSING)
+        assert space.is_flat(spot)

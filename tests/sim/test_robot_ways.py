@@ -7,8 +7,10 @@ from robot_field import field
 from vico.sim.bodies import CAR, Bodies
 from vico.sim.config import SimConfig
 from vico.sim.environment.agenda import EventEffects
-from vico.sim.robots import RobotPopulation, RobotStatus
+from vico.sim.robots import RobotPopulation, RobotScene, RobotStatus
 from vico.sim.simulation import Simulation
+from vico.world.folder import World
+from vico.world.walkable import ROADWAY
 
 CLOSED = ((8.0, 0.0, 4.0),)
 
@@ -97,3 +99,28 @@ def test_a_run_tells_robots_what_its_events_close_and_refuses_ways_there(monkeyp
     robots = sim.state.robots
     assert isinstance(robots, RobotPopulation)
     assert robots.run.closed_ground == CLOSED
+
+
+def steepest(world: World, way: np.ndarray) -> float:
+    """Return by how much the ground rises or falls within 0.1 m on a way, at most, metres."""
+    length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))])
+    places = np.arange(0.0, length[-1], 0.02)
+    heights = world.height(np.column_stack([np.interp(places, length, column) for column in way.T]))
+    return float(np.abs(heights[5:] - heights[:-5]).max())
+
+
+def test_ways_of_a_robot_lead_round_kerbs_that_are_too_high_for_it(helsinki: World) -> None:
+    scene = RobotScene(helsinki, ["manipulator", "husky"], packs=False)
+    row, column = np.nonzero(helsinki.walkable.connected & ~scene.narrow(0))
+    spots = helsinki.walkable.centre_of(np.column_stack([column, row])[:: len(row) // 40])
+    found = {0: [], 1: []}
+    for robot, ways in found.items():
+        for a, b in zip(spots[:20], spots[20:], strict=False):
+            way = scene.router.path(a, b, blocked=scene.narrow(robot))
+            if way is not None:
+                ways.append(steepest(helsinki, way))
+    assert len(found[0]) > 10
+    assert max(found[0]) < 0.07
+    assert max(found[1]) > 0.09  # others take them
+    is_roadway = helsinki.walkable.cls == ROADWAY
+    assert (is_roadway & ~scene.narrow(0)).any()

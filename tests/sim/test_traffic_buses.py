@@ -140,3 +140,16 @@ def test_vehicles_stop_where_no_turning_bus_sweeps_over_them() -> None:
         mine = [area for zone, area, own in swept if zone in zones and own != lane]
         backs = [_set_back(lanes, lane, area) for area in mine]
         assert max(backs) == found[lane]
+
+
+def test_a_bus_with_several_lanes_to_change_waits_for_the_first_change_where_it_may_begin_it() -> None:
+    traffic, bus = _traffic(0, start=15.5, stop=10.0)
+    there_and_back = [traffic.lanes.index[lane] for lane in (KERB, BESIDE, KERB, BESIDE)]
+    traffic._net.route[: len(there_and_back)] = there_and_back
+    length = traffic.lanes.length[traffic.lanes.index[KERB]]
+    assert length - room_to_change(traffic._net, traffic._vehicles[bus]) >= BUS_LENGTH + 3.0
+    reached = 0
+    for _ in range(180):
+        traffic.advance(0.1, Bodies.none())
+        reached = max(reached, int(traffic.fleet.route_index[bus]))
+    assert reached >= len(there_and_back) - 1

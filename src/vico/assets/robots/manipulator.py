@@ -49,6 +49,8 @@ HIGH = np.array([1.35, 3.18, 3.71, 3.79, 2.92, 1.79, 1.35])
 GRIP, OPENING = 0.175, 0.16
 WHEEL, TRACK = 0.1, 0.2
 RADIUS, HEIGHT = 0.30, 1.35
+#: Higher kerbs lift its wheels off the ground, as casters before and behind them stand on both sides, metres.
+KERB = 0.06
 #: Folded beside the torso, hand up.
 REST = np.array([-0.2, -0.55, 0.0, 2.35, 0.0, 1.2, 0.0])
 _MASSES = (2.47, 2.08, 1.4, 0.79, 0.82, 0.54, 0.6)
@@ -210,6 +212,7 @@ def manipulator(packs: bool = True) -> RobotModel:
         half_length=RADIUS,
         half_width=RADIUS,
         height=HEIGHT,
+        kerb=KERB,
         shapes={"base": _body(), "left_wheel": _wheel(), "right_wheel": _wheel()}
         | {name: _link(k) for k, name in enumerate(ARM)}
         | {name: _finger(sign) for name, sign in zip(FINGERS, (-1.0, 1.0), strict=True)},

@@ -389,6 +389,8 @@ class RobotModel:
         Height of the base's origin above level ground at `rest`, metres.
     half_length, half_width, height
         Upright box around the robot, metres, centred on the base.
+    kerb
+        Highest kerb that it drives or steps up, metres; its ways lead round higher ones. None: any.
     lookahead, arrival
         How far ahead on its way it steers for, and how near the end it has arrived, metres.
     fallen_below
@@ -424,6 +426,7 @@ class RobotModel:
     shapes: Mapping[str, list[Surface]] = field(repr=False)
     sensors: Sensors = Sensors()
     deck: DeckModel | None = None
+    kerb: float | None = None
     lookahead: float = 0.7
     arrival: float = 0.3
     fallen_below: float | None = 0.7

@@ -12,7 +12,7 @@ from scipy import ndimage
 from vico.io.compiled import compiled
 from vico.world.folder import World
 from vico.world.routing import Router
-from vico.world.walkable import BLOCKED, SIDEWALK, WalkableMap
+from vico.world.walkable import BLOCKED, CROSSING, ROADWAY, SIDEWALK, WalkableMap
 
 Array = NDArray[np.float64]
 
@@ -23,6 +23,8 @@ OVER, BESIDE, HOVER = 3.0, 2.0, 0.8
 CEILING = 120.0
 # Metres by which a spot to land on may be uneven, and within which it has to be even.
 _UNEVEN, _SPOT = 0.25, 0.5
+# Metres from roadways and crossings at which who rests is in nobody's way.
+_KERBSIDE = 1.0
 # Cells of the map on which ways round things are found, in cells of this one.
 _COARSE = 4
 # Speeds by which ways are compared, m/s: sideways, up and down.
@@ -89,7 +91,7 @@ class Airspace:
     """
 
     def __init__(self, world: World) -> None:
-        self.half, self.ground = float(world.half), world.height
+        self.half, self.ground, self._walkable = float(world.half), world.height, world.walkable
         n = round(2 * self.half / _CELL)
         axis = (np.arange(n) + 0.5) * _CELL - self.half
         xx, yy = np.meshgrid(axis, axis)
@@ -162,13 +164,24 @@ class Airspace:
         column, row = np.floor((np.asarray(xy, np.float64)[:2] + self.half) / _CELL).astype(int)
         return bool(self.flat[row, column])
 
+    @cached_property
+    def off_streets(self) -> NDArray[np.bool_]:
+        """Where one can land and stay in nobody's way: not on roadways and crossings; shape ``(n, n)``."""
+        row = (np.arange(len(self.flat)) + 0.5) * _CELL - self.half
+        column, line = np.moveaxis(self._walkable.cell_of(np.stack(np.meshgrid(row, row), axis=-1)), -1, 0)
+        street = np.isin(self._walkable.cls, (ROADWAY, CROSSING))[line, column]
+        return self.flat & ~ndimage.binary_dilation(street, iterations=math.ceil(_KERBSIDE / _CELL))
+
     def flat_near(self, xy: ArrayLike, reach: float = 30.0) -> Array | None:
-        """Return the nearest spot to land on, ENU metres, shape ``(2,)``; None if there is none within reach."""
+        """Return the nearest spot to land on, ENU metres, shape ``(2,)``; None if there is none within reach.
+
+        Where vehicles drive and people cross only if there is no other.
+        """
         point = np.asarray(xy, np.float64)[:2]
-        if self.is_flat(point):
-            return point.copy()
         rows, columns = self._window(float(point[0]), float(point[1]), reach)
-        found = np.argwhere(self.flat[rows, columns])
+        found = np.argwhere(self.off_streets[rows, columns])
+        if not len(found):
+            found = np.argwhere(self.flat[rows, columns])
         if not len(found):
             return None
         spots = (found[:, ::-1] + [columns.start, rows.start] + 0.5) * _CELL - self.half

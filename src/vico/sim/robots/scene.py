@@ -123,7 +123,7 @@ class RobotScene:
         self._router = router
         self._engine, self._indoor = physics, indoor
         self._room_physics: dict[str, PhysicsScene] = {}
-        self._narrow: dict[float, NDArray[np.bool_]] = {}
+        self._narrow: dict[tuple[float, float | None], NDArray[np.bool_]] = {}
 
     def __len__(self) -> int:
         return len(self.models)
@@ -180,11 +180,28 @@ class RobotScene:
         return np.array([place.position[:2] for place in self.world.places]).reshape(-1, 2)
 
     def narrow(self, robot: int) -> NDArray[np.bool_]:
-        """Return the cells of the walkable map that are too narrow for a robot; not to be written to."""
-        room = self.models[robot].half_width + _WALL_GAP
-        if room not in self._narrow:
-            self._narrow[room] = self.world.walkable.clearance < room
-        return self._narrow[room]
+        """Return the cells of the walkable map that a robot's ways keep off; not to be written to.
+
+        Those too narrow for it, and those beside kerbs that are too high for it.
+        """
+        model = self.models[robot]
+        room = model.half_width + _WALL_GAP
+        if (room, model.kerb) not in self._narrow:
+            narrow = self.world.walkable.clearance < room
+            if model.kerb is not None:
+                narrow |= _at_kerbs(self.world, higher=model.kerb, within=model.half_width)
+            self._narrow[room, model.kerb] = narrow
+        return self._narrow[room, model.kerb]
+
+
+def _at_kerbs(world: World, *, higher: float, within: float) -> NDArray[np.bool_]:
+    """Return the cells of the walkable map that lie so near to kerbs that are higher than that, metres."""
+    walkable, height = world.walkable, world.height
+    row = np.arange(walkable.n)
+    cells = walkable.centre_of(np.stack(np.meshgrid(row, row), axis=-1))
+    is_near = np.abs(height.edge_distance(cells)) < within
+    is_near[is_near] = height.upper(cells[is_near]) - height.lower(cells[is_near]) > higher
+    return is_near
 
 
 def _groups(models: Sequence[RobotModel]) -> tuple[RobotGroup, ...]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from vico.io.compiled import compiled
 from vico.sim.traffic.leader import ANY_BODY, TOUCH, touched_at
-from vico.sim.traffic.letting_in import lane_to_change_to
+from vico.sim.traffic.letting_in import first_place_to_change, lane_to_change_to
 from vico.sim.traffic.path import (
     LANE_CHANGE,
     PATH_POINT,
@@ -188,7 +188,7 @@ def change_lane(net, vehicle, target, view):  # type: ignore[no-untyped-def]
     """
     length = vehicle.length
     is_changing = vehicle.lateral_offset != 0.0 or vehicle.stopping != DRIVING
-    if vehicle.granted_count > 0 or is_changing or vehicle.offset < length + 3.0:
+    if vehicle.granted_count > 0 or is_changing or vehicle.offset < first_place_to_change(vehicle):
         return False
     lane = net.lanes[target]
     x, y, _, _ = point_on_path(view.path, vehicle.offset)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vico.io.compiled import compiled
-from vico.sim.traffic.path import LANE_CHANGE, project_on_polyline
+from vico.sim.traffic.path import LANE_CHANGE, STRAIGHT, end_of_lane_change, project_on_polyline
 from vico.sim.traffic.route import NEVER, route_lane
 from vico.sim.traffic.state import DRIVING, DRIVING_OUT, LEAVING, NONE, STANDING
 
@@ -14,7 +14,9 @@ _SET_BACK = 5.0  # m before a lane's end at which vehicles stay out of the way o
 _KEPT_OUT = 10.0  # ... and has waited for so long, s
 _CLOSER = 1.5  # m nearer to a bus than that, a vehicle still stays behind it
 _SWING_OUT, _WAITS_TO_LEAVE = 12.0, 20.0  # m behind a delivery from where one changes lanes; s
-_AFTER_ANOTHER = 2.0  # m driven straight between two lane changes
+_LEAST_ROOM = 1.0  # m before a lane's end
+# m that a vehicle's rear is past the beginning of a lane before it changes, and more where the other begins later.
+_ON_IT, _WELL_ON_IT = 3.0, 6.0
 
 
 @compiled
@@ -29,7 +31,7 @@ def lane_to_change_to(net, vehicle):  # type: ignore[no-untyped-def]
 def room_to_change(net, vehicle):  # type: ignore[no-untyped-def]
     """Return the metres before its lane's end at which a bus waits for room in the lane beside.
 
-    So many that it ends this lane change, and those that follow it, before the junction.
+    So many that it ends this lane change, and those that follow it, before the junction; but not before it may change.
     """
     change = LANE_CHANGE + vehicle.length
     room, lane = change, route_lane(net, vehicle, 1)
@@ -37,8 +39,17 @@ def room_to_change(net, vehicle):  # type: ignore[no-untyped-def]
         beside = route_lane(net, vehicle, k)
         if beside != net.lanes[lane].left and beside != net.lanes[lane].right:
             break
-        room, lane = room + change + _AFTER_ANOTHER + vehicle.length, beside
-    return room
+        room, lane = room + change + STRAIGHT + vehicle.length, beside
+    return max(min(room, net.lanes[vehicle.lane].length - first_place_to_change(vehicle) - _WELL_ON_IT), _LEAST_ROOM)
+
+
+@compiled
+def first_place_to_change(vehicle):  # type: ignore[no-untyped-def]
+    """Return the metres along its lane from which a vehicle may change to another: all of it is on the lane by then."""
+    first = vehicle.length + _ON_IT
+    if vehicle.lateral_offset != 0.0:
+        first = max(first, vehicle.offset + end_of_lane_change(vehicle) - vehicle.lane_change_distance)
+    return first
 
 
 @compiled

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vico.io.compiled import compiled
-from vico.sim.traffic.path import footprint
+from vico.sim.traffic.path import end_of_lane_change, footprint
 from vico.sim.traffic.state import BACKING_IN
 
 
@@ -20,6 +20,5 @@ def move_vehicle(vehicle, shapes, view, move, dt):  # type: ignore[no-untyped-de
     v = vehicle.index
     shapes.vx[v], shapes.vy[v] = (x - shapes.x[v]) / dt, (y - shapes.y[v]) / dt
     shapes.x[v], shapes.y[v], shapes.yaw[v] = x, y, np.arctan2(s, c)
-    length = vehicle.lane_change_length
-    if length > 0.0 and vehicle.lane_change_distance > length + 2.0 + view.outline.length:
+    if vehicle.lane_change_length > 0.0 and vehicle.lane_change_distance > end_of_lane_change(vehicle):
         vehicle.lateral_offset = 0.0

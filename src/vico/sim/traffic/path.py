@@ -17,6 +17,7 @@ from vico.sim.traffic.state import NONE, PREVIOUS_LANES
 PATH_POINT = np.dtype([("x", np.float64), ("y", np.float64), ("s", np.float64)])
 PATH_POINTS = 768  # points a path can have
 LANE_CHANGE = 12.0  # metres a lane change takes, and the vehicle's length more
+STRAIGHT = 2.0  # metres that all of a vehicle drives straight between two lane changes
 
 _SQUEEZE_AFTER = 6.0  # s stood after which a vehicle squeezes past people at the kerb
 _PERSON_GAP, _SQUEEZE_GAP = 0.3, 0.05  # m kept sideways from people
@@ -62,6 +63,12 @@ def vehicle_outline(vehicle):  # type: ignore[no-untyped-def]
         vehicle.lane_change_length,
         _PERSON_GAP if vehicle.stopped_time < _SQUEEZE_AFTER else _SQUEEZE_GAP,
     )
+
+
+@compiled
+def end_of_lane_change(vehicle):  # type: ignore[no-untyped-def]
+    """Return the metres a vehicle drives from where it begins to change lanes until it may change again."""
+    return vehicle.lane_change_length + STRAIGHT + vehicle.length
 
 
 @compiled
