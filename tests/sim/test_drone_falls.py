@@ -201,3 +201,16 @@ def test_on_errands_it_lands_in_a_gale_and_takes_off_when_that_is_over(helsinki:
     robots.set_wind(3.0, 0.0)
     run(robots, 8.0)
     assert flight(robots).arrays.phase[0] == FlightPhase.FLYING
+
+
+def test_one_that_is_blown_off_a_roof_while_it_lands_tries_again(scenes: dict[int, RobotScene]) -> None:
+    robots = drones(scenes, (0, 0, 0))
+    robots.land(0, [11, 2])
+    while flight(robots).arrays.phase[0] != FlightPhase.LANDING or place(robots)[2] > 6.5:
+        run(robots, 0.1)
+    robots.set_wind(-26.0, 0.0)
+    while place(robots)[0] > 7.0:
+        run(robots, 0.1)
+    robots.set_wind(0.0, 0.0)
+    assert run(robots, 40.0) == [(0, "landed")]
+    assert place(robots)[2] > 4.5

@@ -306,6 +306,9 @@ def _come_down(run: RobotRun, flight: Flight, row: int, robot: int, others: Arou
     a, base = flight.arrays, run.engine.base(robot)
     spot = flight.ways[row][-1]
     above = float(base.position[2]) - flight.model.stand - run.scene.airspace.top(spot, 0.5)
+    if above < -_TOUCH:  # blown off a roof: from below its edge it tries again
+        fly_to(run, robot, np.array([*spot[:2], run.scene.airspace.top(spot) + APPROACH]), lands=True)
+        return
     a.setpoint[row, :2], a.setpoint[row, 3:5], a.setpoint[row, TURNING] = spot[:2], 0.0, 0.0
     floor = others.floor(np.zeros(3))
     if above > 0.3 and base.position[2] - flight.model.stand - 0.3 < floor:
