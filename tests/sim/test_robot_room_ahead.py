@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
+from robot_field import HALF, field, people
+from vico.sim.bodies import Bodies
+from vico.sim.robots import RobotPopulation, RobotStatus
 from vico.sim.robots.navigation import NEIGHBOUR, SIGHT, free_ahead
+from vico.world.heights import HeightField
 
 HALF_LENGTH, HALF_WIDTH = 0.25, 0.3
 
@@ -34,3 +38,49 @@ def test_who_backs_off_stops_for_a_second_car_behind_and_for_one_that_follows() 
     two = np.concatenate([car(2.62, 0.0), car(-4.0, 0.0)])
     assert free(np.pi, two) == pytest.approx(4.0 - 2.3 - HALF_WIDTH - 0.15, abs=0.15)
     assert free(np.pi, car(2.62, 0.0, -1.0)) < 0.2
+
+
+#: Robots beside each other that are told to go downhill, 15 m down in 100 m, as fast as they can; y of each.
+KINDS = ("h1", "go2", "husky", "manipulator")
+LANES = np.arange(len(KINDS)) * 5.0 - 7.5
+
+
+def downhill(*walls: tuple[float, float, float, float]) -> RobotPopulation:
+    hill = HeightField(np.broadcast_to(-0.15 * np.linspace(-HALF, HALF, 81), (81, 81)).astype(np.float32), HALF)
+    robots = RobotPopulation(field(*walls, height=hill), KINDS, [[0.0, y, 0.0] for y in LANES], packs=False)
+    for robot in range(len(KINDS)):
+        robots.drive(robot, robots.models[robot].velocity_limit * [1, 0, 0])
+    return robots
+
+
+def noses(robots: RobotPopulation) -> np.ndarray:
+    """How far east each reaches."""
+    found: np.ndarray = robots.bodies().position[:, 0] + robots.scene.outlines.half_length
+    return found
+
+
+def test_robots_told_a_velocity_downhill_stop_before_somebody() -> None:
+    robots = downhill()
+    standing = people(*[(5.0, float(y)) for y in LANES])
+    standing.position[:, 2] = robots.world.height(standing.position)
+    furthest = np.full(len(KINDS), -np.inf)
+    for _ in range(90):
+        robots.advance(0.1, standing)
+        furthest = np.maximum(furthest, noses(robots))
+    assert (5.0 - 0.25 - furthest > 0.15).all()
+    assert (noses(robots) > 3.5).all()
+    assert (robots.status == RobotStatus.WAITING).all()
+    assert robots.events() == []
+
+
+def test_robots_told_a_velocity_downhill_touch_a_wall_slowly_and_stay_on_their_feet() -> None:
+    robots = downhill((6.0, 0.0, 2.0, 40.0))
+    before = np.zeros(len(KINDS))  # 2 cm and less from the wall, how fast each comes
+    for _ in range(120):
+        speed = robots.bodies().velocity[:, 0]
+        robots.advance(0.1, Bodies.none())
+        touching = (noses(robots) > 5.0 - 0.02) & (before == 0.0)
+        before[touching] = speed[touching]
+    assert (before < 0.6).all()
+    assert (noses(robots) > 5.0 - 0.2).all()
+    assert robots.events() == []

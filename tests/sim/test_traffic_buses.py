@@ -10,7 +10,7 @@ from vico.sim.traffic import Traffic, TrafficNetwork
 from vico.sim.traffic.letting_in import distance_to_let_in, places_to_let_in, room_to_change
 from vico.sim.traffic.population import PATIENCE
 from vico.sim.traffic.state import BusRoutes
-from vico.sim.traffic.stop_lines import BEFORE_JUNCTION, _passages, _set_back, _swept, stop_lines
+from vico.sim.traffic.stop_lines import BEFORE_JUNCTION, stop_lines
 from vico.sim.transit import plan_buses
 from vico.world.heights import HeightField
 
@@ -125,21 +125,49 @@ def test_a_bus_in_a_jam_whose_stop_is_taken_goes_on_from_before_it() -> None:
     assert not len(overlapping(Bodies.joined([traffic.bodies(), others]), 0.0))
 
 
-def test_vehicles_stop_where_no_turning_bus_sweeps_over_them() -> None:
+def test_stop_lines_are_set_back_at_few_lanes_and_only_for_buses() -> None:
     city = road_city()
     lanes, routes = city.lanes, plan_buses(city.transit, city.lanes, 8 * 3600.0).bus_routes.routes
     found = stop_lines(lanes, routes)
     assert (stop_lines(lanes, []) == BEFORE_JUNCTION).all()
     assert 0 < (found > BEFORE_JUNCTION).sum() < 20
     assert found.max() < 6.6
-    swept = [
-        (int(lanes.zone[way[1]]), _swept(lanes, way), way[0]) for route in routes for way in _passages(lanes, route)
-    ]
-    for lane in np.flatnonzero(found > BEFORE_JUNCTION).tolist():
-        zones = {int(lanes.zone[k]) for k in lanes.following(lane)}
-        mine = [area for zone, area, own in swept if zone in zones and own != lane]
-        backs = [_set_back(lanes, lane, area) for area in mine]
-        assert max(backs) == found[lane]
+
+
+@pytest.mark.parametrize(
+    ("bus_lane", "car_lane"),
+    [(KERB, BESIDE), ("127809159#2_1", "-4243036#0_1"), ("369151175#0_1", "14472965#0_1")],
+)
+def test_a_bus_turns_past_a_car_that_waits_at_the_end_of_another_lane(bus_lane: str, car_lane: str) -> None:
+    city = road_city()
+    lanes = city.lanes
+    start = lanes.index[bus_lane]
+    routes = [list(r) for r in plan_buses(city.transit, lanes, 8 * 3600.0).bus_routes.routes if start in r]
+    begin = routes[0].index(start)
+    route = routes[0][begin:] + routes[0][:begin]
+    traffic = Traffic(
+        TrafficNetwork.of(lanes, city.solids),
+        HeightField.flat(HALF),
+        cars=1,
+        pedestrians=0,
+        seed=1,
+        first_entity=1_000_000,
+        buses=BusRoutes([route], [0], [(0, float(lanes.length[start]) - 7.0)]),
+    )
+    fleet, car, bus = traffic.fleet, 0, 1
+    fleet.stop_route_index[bus] = len(route) - 2
+    _put(traffic, car, car_lane, float(lanes.length[lanes.index[car_lane]]) - 14.0)
+    waited, overlaps, is_past = 0, 0, False
+    for _ in range(180):
+        traffic.advance(0.1, Bodies.none())
+        overlaps += len(overlapping(traffic.bodies(), 0.0))
+        waited += lanes.ids[fleet.lane[car]] == car_lane and fleet.speed[car] < 0.1
+        on_street = fleet.lane[bus] != start and lanes.zone[fleet.lane[bus]] < 0
+        is_past |= bool(on_street and fleet.offset[bus] > BUS_LENGTH)
+    assert waited > 5
+    assert overlaps == 0
+    assert is_past
+    assert lanes.ids[fleet.lane[car]] != car_lane
 
 
 def test_a_bus_with_several_lanes_to_change_waits_for_the_first_change_where_it_may_begin_it() -> None:

@@ -36,7 +36,8 @@ _BUS_AT_STOP = 12.0
 _LATE, _LOST = 240.0, 300.0
 # Who comes so late by the way that is meant, seconds, is not late.
 _GRACE = 60.0
-# After so many seconds of trying when the bus should be there one steps back from the road for as long, so many metres.
+# After so many seconds of trying when the bus should be there one steps back from the road for as long, so many metres;
+# who stands on the road or a track for as long, as one gets no nearer to a stop, does without it.
 _IN_THE_WAY, _BACK = 15, 2.5
 # From so long before a bus is to leave who waits beside the place for it tries to come up to it, seconds.
 _COMES_UP = 10.0
@@ -222,9 +223,10 @@ class Traveller:
         """Begin the ride from as near as one gets, as others stand in the place for it; do without it from farther."""
         assert self.trip is not None
         away = _away(observation, self.trip.legs[self._leg + 1].start)
-        if away > _BY_OTHERS:
+        is_in_the_way = self._is_in_the_way(observation["pose"][:2])
+        if away > _BY_OTHERS or (is_in_the_way and self._still >= _IN_THE_WAY):
             self._close(leg)
-        elif not self._is_in_the_way(observation["pose"][:2]):
+        elif not is_in_the_way:
             self._leg += 1
         self._walker.stop()
         return {"type": "wait"}

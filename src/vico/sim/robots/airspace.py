@@ -21,10 +21,16 @@ _CELL = 0.5
 OVER, BESIDE, HOVER = 3.0, 2.0, 0.8
 #: Highest above ground: where most countries end the air that anybody may fly in.
 CEILING = 120.0
-# Metres by which a spot to land on may be uneven, and within which it has to be even.
-_UNEVEN, _SPOT = 0.25, 0.5
+# Metres by which a spot to land on may be uneven, and within which it has to be even: wind moves who comes down, into a
+# wall or off an edge.
+_UNEVEN, _SPOT = 0.25, 1.0
 # Metres from roadways and crossings at which who rests is in nobody's way.
 _KERBSIDE = 1.0
+# Metres above where it begins that things may be which do not keep it from going straight up, and above ground.
+_OVERHEAD, _LOW = 0.3, 1.0
+# Where it goes first then: metres above ground, and beside its way there that have to be free; how many of the nearest
+# places are looked at.
+_LEAD, _ALONG, _MOST_SPOTS = 1.5, 0.3, 400
 # Cells of the map on which ways round things are found, in cells of this one.
 _COARSE = 4
 # Speeds by which ways are compared, m/s: sideways, up and down.
@@ -139,12 +145,12 @@ class Airspace:
         shares = np.linspace(0.0, 1.0, max(2, math.ceil(away / max(beside, _CELL)) + 1))
         return max(self.top(a + share * (b - a), 1.2 * beside) for share in shares.tolist())
 
-    def is_clear(self, start: Array, end: Array, gap: float = HOVER) -> bool:
-        """Return whether a straight line keeps so far above everything."""
+    def is_clear(self, start: Array, end: Array) -> bool:
+        """Return whether a straight line keeps clear of everything, above and beside it."""
         away = float(np.linalg.norm(end - start))
         shares = np.linspace(0.0, 1.0, max(2, math.ceil(away / 1.0) + 1))
         points = start + shares[:, None] * (end - start)
-        return all(self.top(point, 1.0) + gap <= point[2] for point in points)
+        return all(self.top(point, BESIDE) + OVER / 2 <= point[2] for point in points)
 
     @cached_property
     def flat(self) -> NDArray[np.bool_]:
@@ -172,22 +178,33 @@ class Airspace:
         street = np.isin(self._walkable.cls, (ROADWAY, CROSSING))[line, column]
         return self.flat & ~ndimage.binary_dilation(street, iterations=math.ceil(_KERBSIDE / _CELL))
 
-    def flat_near(self, xy: ArrayLike, reach: float = 30.0) -> Array | None:
-        """Return the nearest spot to land on, ENU metres, shape ``(2,)``; None if there is none within reach.
+    def flat_near(self, xy: ArrayLike) -> Array | None:
+        """Return the nearest spot to land on, ENU metres, shape ``(2,)``; None if there is none in the world.
 
-        Where vehicles drive and people cross only if there is no other.
+        Where vehicles drive and people cross only if there is no other near.
         """
-        point = np.asarray(xy, np.float64)[:2]
+        point, everywhere = np.asarray(xy, np.float64)[:2], 2.0 * self.half
+        for cells, reach in ((self.off_streets, 30.0), (self.flat, 30.0), (self.off_streets, everywhere)):
+            spots = self._spots(cells, point, reach)
+            if len(spots):
+                return np.asarray(spots[0])
+        return None
+
+    def level_ground_near(self, xy: ArrayLike, reach: float) -> Array:
+        """Return spots of even ground under the open sky, the nearest first, ENU metres, shape ``(n, 2)``."""
+        inner = self.half - BESIDE
+        point = np.clip(np.asarray(xy, np.float64)[:2], -inner, inner)
+        return self._spots(self.flat & (self.tops - self._floor < 0.1), point, reach)
+
+    def _spots(self, cells: NDArray[np.bool_], point: Array, reach: float) -> Array:
+        """Return middles of cells within reach of a point, the nearest first, shape ``(n, 2)``."""
         rows, columns = self._window(float(point[0]), float(point[1]), reach)
-        found = np.argwhere(self.off_streets[rows, columns])
-        if not len(found):
-            found = np.argwhere(self.flat[rows, columns])
-        if not len(found):
-            return None
+        found = np.argwhere(cells[rows, columns])
         spots = (found[:, ::-1] + [columns.start, rows.start] + 0.5) * _CELL - self.half
         away = np.hypot(*(spots - point).T)
-        best = int(away.argmin())
-        return spots[best].copy() if away[best] <= reach else None
+        order = np.argsort(away, kind="stable")
+        found_spots: Array = spots[order[away[order] <= reach]]
+        return found_spots
 
     # Ways.
 
@@ -221,17 +238,21 @@ class Airspace:
         return np.vstack([lead, best])
 
     def _out_from_under(self, start: Array) -> Array:
-        """Return where to go first when something is overhead: the nearest place open to the sky."""
-        if self.top(start, 0.5) <= start[2] + 0.3:
-            return np.zeros((0, 3))
+        """Return where to go first when something is overhead, or a wall beside it: a place near open to the sky."""
         rows, columns = self._window(float(start[0]), float(start[1]), 20.0)
-        free = ndimage.maximum_filter(self.tops[rows, columns], 3) <= self._floor[rows, columns] + 1.0
-        found = np.argwhere(free)
-        if not len(found):
-            return np.zeros((0, 3))
-        spots = (found[:, ::-1] + [columns.start, rows.start] + 0.5) * _CELL - self.half
-        best = spots[int(np.hypot(*(spots - start[:2]).T).argmin())]
-        return np.array([[*best, max(start[2], float(self.ground(best)) + 1.5)]])
+        floor, tops = self._floor[rows, columns], self.tops[rows, columns]
+        for beside in (BESIDE, _CELL):
+            if self.top(start, beside) <= start[2] + _OVERHEAD:
+                return np.zeros((0, 3))
+            around = ndimage.maximum_filter(tops, 2 * round(beside / _CELL) + 1)
+            found = np.argwhere(around <= np.maximum(floor + _LOW, start[2] + _OVERHEAD))
+            spots = (found[:, ::-1] + [columns.start, rows.start] + 0.5) * _CELL - self.half
+            order = np.argsort(np.hypot(*(spots - start[:2]).T), kind="stable")
+            for spot in spots[order[:_MOST_SPOTS]]:
+                height = max(start[2], float(self.ground(spot)) + _LEAD)
+                if self.highest(start, spot, _ALONG) <= height - _OVERHEAD:
+                    return np.array([[*spot, height]])
+        return np.zeros((0, 3))
 
     def _over(self, start: Array, target: Array) -> Array:
         height = max(self.highest(start, target) + OVER, start[2], target[2])

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from vico.sim.bodies import Bodies
 from vico.sim.robots import commands
 from vico.sim.robots.flying import LOW_BATTERY, decide_flight
-from vico.sim.robots.navigation import GAP, SIGHT, NearbyBodies
+from vico.sim.robots.ground_ahead import slope_ahead, speed_at_walls
+from vico.sim.robots.navigation import SIGHT, NearbyBodies, braking, speed_to_stop
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.rooms import OUTDOORS
 from vico.sim.robots.state import RobotMode, RobotRun
@@ -94,12 +95,17 @@ def _stands_on_roadway(run: RobotRun, robot: int) -> bool:
 
 
 def _hold_velocity(run: RobotRun, robot: int, others: NDArray[np.void]) -> None:
-    """Follow the velocity asked for, but drive into nobody ahead."""
+    """Follow the velocity asked for, but drive into nobody ahead, and touch walls slowly."""
     velocity, base = run.arrays.velocity[robot], run.engine.base(robot)
     velocity[:] = run.arrays.command[robot, :3]
     run.arrays.status[robot] = RobotStatus.MOVING
-    if velocity[0] > 0.0 and run.followers[robot].free(base, others, float(velocity[0]))[0] < GAP:
-        velocity[0] = 0.0
+    if velocity[0] <= 0.0:
+        return
+    speed = max(float(velocity[0]), float(np.hypot(*base.velocity[:2])))
+    brake = braking(slope_ahead(run, robot, base))
+    most = speed_to_stop(run.followers[robot].free(base, others, speed)[0], brake)
+    velocity[0] = min(velocity[0], most, speed_at_walls(run, robot, base, brake))
+    if most == 0.0:
         run.arrays.status[robot] = RobotStatus.WAITING
 
 
@@ -134,7 +140,7 @@ def _go_on(run: RobotRun, robot: int, others: NDArray[np.void], dt: float) -> Ro
 def _steer(run: RobotRun, robot: int, others: NDArray[np.void], dt: float) -> RobotStatus:
     """Steer along the way, and round who stands in it; return how that goes."""
     follower, base = run.followers[robot], run.engine.base(robot)
-    run.arrays.velocity[robot] = follower.steer(base, others, dt)
+    run.arrays.velocity[robot] = follower.steer(base, others, dt, slope_ahead(run, robot, base))
     if follower.wants_detour:
         follower.detoured(way_on(run, robot, follower.path[-1], follower.closed(base, others)))
     return follower.status

@@ -4,39 +4,35 @@ from __future__ import annotations
 
 import numpy as np
 
+from vico.sim.bodies import Bodies
 from vico.sim.robots.controller import MotorController
+from vico.sim.robots.crashes import GIVE_UP, note_tilt, watch_crashes
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.state import RobotMode, RobotRun
 
-#: Seconds a robot has to be tilted to count as fallen; cosine of the tilt at which it may be up again.
-_FALL_TIME, _UPRIGHT = 0.3, 0.95
-#: Seconds after which a robot that can't get up is left lying.
-_GIVE_UP = 30.0
+#: Cosine of the tilt at which a robot may be up again.
+_UPRIGHT = 0.95
 # What the arrays hold: members of an enumeration are slow to look up.
 _FALLEN = int(RobotStatus.FALLEN)
 
 
-def watch_falls(run: RobotRun, dt: float) -> None:
-    """Note who fell, who is up again and who is lost, `dt` seconds after this was last asked."""
+def watch_falls(run: RobotRun, dt: float, obstacles: Bodies) -> None:
+    """Note who fell, who is up again and who is lost, `dt` seconds after this was last asked.
+
+    `obstacles` are bodies of everybody else outdoors.
+    """
     status = run.arrays.status.tolist()
-    for group in run.scene.groups:
+    for group, flight in zip(run.scene.groups, run.flights, strict=True):
+        if flight is not None:
+            watch_crashes(run, flight, dt, obstacles)
+            continue
         limit = group.model.fallen_below
         for robot in group.robots.tolist():
             if status[robot] == _FALLEN:
                 _watch_lying(run, robot, group.controller, dt)
             elif limit is not None:
                 tilted = float(run.engine.base(robot).rotation[2, 2]) < limit
-                _watch_standing(run, robot, dt if tilted else 0.0)
-
-
-def _watch_standing(run: RobotRun, robot: int, tilted: float) -> None:
-    arrays = run.arrays
-    lying = float(arrays.lying[robot]) + tilted if tilted else 0.0
-    arrays.lying[robot] = lying
-    if lying > _FALL_TIME:
-        arrays.status[robot] = RobotStatus.FALLEN
-        arrays.lying[robot] = 0.0
-        run.note(robot, "fallen")
+                note_tilt(run, robot, dt if tilted else 0.0)
 
 
 def _watch_lying(run: RobotRun, robot: int, controller: MotorController, dt: float) -> None:
@@ -51,5 +47,5 @@ def _watch_lying(run: RobotRun, robot: int, controller: MotorController, dt: flo
             run.engine.thrust(robot, lift[:1], np.zeros((1, 3)))
         arrays.lying[robot] = 0.0
         run.note(robot, "recovered")
-    elif lying - dt <= _GIVE_UP < lying:
+    elif lying - dt <= GIVE_UP < lying:
         run.note(robot, "lost")

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from vico.errors import InputError
 from vico.sim.bodies import Bodies
-from vico.sim.robots.airspace import BESIDE, CEILING, HOVER
+from vico.sim.robots.airspace import HOVER
+from vico.sim.robots.keeping_apart import Around, keep_apart, near_in_the_air
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.rotors import HEADING, POSITION, TURNING, VELOCITY, Flight, FlightPhase
 from vico.sim.robots.state import RobotMode, RobotRun
@@ -23,17 +24,22 @@ _FALLEN = int(RobotStatus.FALLEN)
 CRUISE, APPROACH = 10.0, 4.0
 #: Metres a second squared it speeds up and brakes with along its way; a corner counts as reached so near, metres.
 _BRAKE, _CORNER = 1.5, 0.6
+# Metres beside its way up to which it flies on as fast as it can, and from which on it only comes back: wind would blow
+# it on into what its way leads round.
+_ON_WAY, _OFF_WAY = 0.5, 2.0
 # Metres a second it comes down with, far above what is below and near it; metres that is.
 _SINK, _TOUCH, _NEAR = 1.5, 0.4, 3.0
 # Seconds without sinking, slower than so many metres a second, after which it has landed.
 _CALM, _STILL = 0.5, 0.08
-# Metres above and beside people and vehicles that it keeps to; seconds their motion is foreseen.
-_ABOVE, _ASIDE, _FORESIGHT = 1.5, 1.5, 1.5
 # Metres behind and above whom it follows, how far that one has to go for another way to be found.
 _BEHIND, _HIGHER, _DRIFT = 4.0, 5.0, 3.0
 # Seconds without getting nearer after which a way counts as blocked; share of its battery at which it lands.
 _PATIENCE, LOW_BATTERY = 30.0, 0.1
 _ERRAND_REST, _ERRAND_HEIGHT = 5.0, 15.0
+# Mean wind in which a robot on errands takes no more of them, but lands, m/s: what makers of such allow.
+_TOO_WINDY = 10.0
+# Metres beside the spot up to which it sinks onto it, near what it lands on.
+_ON_SPOT = 0.5
 
 
 def flight_of(run: RobotRun, robot: int) -> tuple[Flight, int] | None:
@@ -139,9 +145,10 @@ def decide_flight(run: RobotRun, flight: Flight, dt: float, everybody: Bodies, *
             flight.arrays.phase[row] = _FLYING if mode == _MOTORS else _LANDED
             continue
         _watch_battery(run, flight, row, robot)
+        mode = int(run.arrays.mode[robot])
         if mode == _IDLE and errands:
             _rest(run, flight, row, robot, dt)
-        others = _below_and_beside(everybody, int(run.entities[robot]), run.position(robot))
+        others = near_in_the_air(run, flight, row, everybody)
         if mode == _IDLE:
             flight.arrays.setpoint[row, VELOCITY] = 0.0
         elif mode == _VELOCITY:
@@ -153,28 +160,45 @@ def decide_flight(run: RobotRun, flight: Flight, dt: float, everybody: Bodies, *
             continue
         else:
             _keep_to_way(run, flight, row, robot, dt)
-        _keep_above(run, flight, row, robot, others)
+        keep_apart(run, flight, row, others)
 
 
 def _watch_battery(run: RobotRun, flight: Flight, row: int, robot: int) -> None:
-    """Have it land near where it is when its battery is low."""
+    """Have it land near where it is when its battery is low; with an empty one it comes down as it is."""
     a = flight.arrays
-    if a.warned[row] or a.charge[row] > LOW_BATTERY or a.phase[row] != _FLYING:
+    if a.phase[row] == _LANDED or a.charge[row] > LOW_BATTERY:
+        return
+    if a.charge[row] == 0.0:
+        run.note(robot, "battery_empty")
+        settle(run, robot)
+        run.set_mode(robot, RobotMode.IDLE)
+        a.phase[row] = _LANDED
+        return
+    if not a.warned[row]:
+        run.note(robot, "battery_low")
+    elif run.arrays.mode[robot] != _IDLE:
         return
     a.warned[row] = True
-    run.note(robot, "battery_low")
+    _land_near(run, flight, row, robot)
+
+
+def _land_near(run: RobotRun, flight: Flight, row: int, robot: int) -> None:
+    """Have one that is in the air land on the nearest even spot."""
     spot = run.scene.airspace.flat_near(run.position(robot))
-    if spot is not None:
+    if spot is not None and flight.arrays.phase[row] != _LANDED:
         land(run, robot, spot)
 
 
 def _rest(run: RobotRun, flight: Flight, row: int, robot: int, dt: float) -> None:
-    """Let time pass until the next errand; with a low battery there is none."""
+    """Let time pass until the next errand; with a low battery there is none, nor in wind that is too strong."""
     arrays = run.arrays
     arrays.rest[robot] += dt
     if flight.arrays.warned[row] or not (arrays.rest[robot] > _ERRAND_REST or arrays.errand[robot] == 0):
         return
     arrays.rest[robot] = 0.0
+    if float(np.hypot(*flight.arrays.wind)) > _TOO_WINDY:
+        _land_near(run, flight, row, robot)
+        return
     arrays.errand[robot] += 1
     goals, space = run.scene.goals, run.scene.airspace
     away = np.hypot(*(goals - run.position(robot)[:2]).T)
@@ -260,8 +284,11 @@ def _aim(flight: Flight, row: int, position: Array, way: Array, leg: int) -> Non
     for part, limit in ((level, float(reach[0])), (max(rise, 0.0), float(reach[2])), (max(-rise, 0.0), _SINK)):
         if part > 1e-6:
             speed = min(speed, limit / part)
+    on_way = start + done * along
+    beside = float(np.linalg.norm(position - on_way))
+    speed *= min(max((_OFF_WAY - beside) / (_OFF_WAY - _ON_WAY), 0.0), 1.0)
     a.setpoint[row, VELOCITY] = speed * along
-    a.setpoint[row, POSITION] = start + done * along
+    a.setpoint[row, POSITION] = on_way
     if level * left > 2.0:
         _turn(a.setpoint[row], math.atan2(along[1], along[0]), float(reach[3]))
     else:
@@ -274,13 +301,16 @@ def _turn(setpoint: Array, heading: float, fastest: float) -> None:
     setpoint[TURNING] = min(max(1.5 * error, -fastest), fastest)
 
 
-def _come_down(run: RobotRun, flight: Flight, row: int, robot: int, others: Bodies, dt: float) -> None:
+def _come_down(run: RobotRun, flight: Flight, row: int, robot: int, others: Around, dt: float) -> None:
     """Sink onto the spot; wait above it while anybody is there."""
     a, base = flight.arrays, run.engine.base(robot)
     spot = flight.ways[row][-1]
     above = float(base.position[2]) - flight.model.stand - run.scene.airspace.top(spot, 0.5)
+    if above < -_TOUCH:  # blown off a roof: from below its edge it tries again
+        fly_to(run, robot, np.array([*spot[:2], run.scene.airspace.top(spot) + APPROACH]), lands=True)
+        return
     a.setpoint[row, :2], a.setpoint[row, 3:5], a.setpoint[row, TURNING] = spot[:2], 0.0, 0.0
-    floor = _floor(others, base.position, np.zeros(3))
+    floor = others.floor(np.zeros(3))
     if above > 0.3 and base.position[2] - flight.model.stand - 0.3 < floor:
         run.arrays.status[robot] = RobotStatus.WAITING
         a.setpoint[row, 2] = floor + flight.model.stand
@@ -288,6 +318,8 @@ def _come_down(run: RobotRun, flight: Flight, row: int, robot: int, others: Bodi
         return
     run.arrays.status[robot] = RobotStatus.MOVING
     a.setpoint[row, 5] = -_SINK if above > _NEAR else -_TOUCH
+    if _TOUCH < above < _NEAR and float(np.hypot(*(base.position - spot)[:2])) > _ON_SPOT:
+        a.setpoint[row, 5] = 0.0
     still = above < 1.0 and abs(float(base.velocity[2])) < _STILL
     a.calm[row] = a.calm[row] + dt if still else 0.0
     if a.calm[row] > _CALM:
@@ -297,52 +329,6 @@ def _come_down(run: RobotRun, flight: Flight, row: int, robot: int, others: Bodi
         run.arrays.status[robot] = RobotStatus.ARRIVED
         run.arrays.rest[robot] = 0.0
         run.note(robot, "landed")
-
-
-def _below_and_beside(everybody: Bodies, own: int, position: Array) -> Bodies:
-    """Everybody else within some metres."""
-    away = np.hypot(*(everybody.position[:, :2] - position[:2]).T) - everybody.half_length
-    return everybody.where(np.flatnonzero((away < 20.0) & (everybody.entity != own)))
-
-
-def _floor(others: Bodies, position: Array, velocity: Array) -> float:
-    """How high it has to keep because of whoever is below it, or soon will be, ENU metres; -inf for nobody."""
-    if not len(others):
-        return -math.inf
-    least = np.full(len(others), np.inf)
-    for later in (0.0, 0.5 * _FORESIGHT, _FORESIGHT):
-        gap = others.position[:, :2] + others.velocity * later - (position[:2] + velocity[:2] * later)
-        least = np.minimum(least, np.hypot(gap[:, 0], gap[:, 1]) - others.half_length)
-    near = least < _ASIDE
-    return float((others.top[near]).max()) + _ABOVE if near.any() else -math.inf
-
-
-def _keep_above(run: RobotRun, flight: Flight, row: int, robot: int, others: Bodies) -> None:
-    """Climb, and come no nearer, while anybody is below or ahead."""
-    a, base = flight.arrays, run.engine.base(robot)
-    if a.phase[row] == _LANDED:
-        return
-    _keep_inside(run, a.setpoint[row], base.position)
-    bottom = float(base.position[2]) - flight.model.stand
-    floor = _floor(others, base.position, a.setpoint[row, VELOCITY])
-    if a.setpoint[row, 5] < 0.0 and bottom - 0.5 < floor:
-        a.setpoint[row, 5] = 0.0
-    if bottom < floor:
-        a.setpoint[row, VELOCITY] = 0.0, 0.0, 2.0
-        a.setpoint[row, POSITION] = base.position
-        if run.arrays.mode[robot] != _IDLE:
-            run.arrays.status[robot] = RobotStatus.WAITING
-
-
-def _keep_inside(run: RobotRun, setpoint: Array, position: Array) -> None:
-    """Fly neither out of the world nor too high."""
-    half = run.scene.airspace.half - BESIDE
-    ceiling = float(run.scene.world.height(position)) + CEILING
-    for axis, (low, high) in enumerate(((-half, half), (-half, half), (-math.inf, ceiling))):
-        outwards = setpoint[3 + axis]
-        if (position[axis] > high and outwards > 0.0) or (position[axis] < low and outwards < 0.0):
-            setpoint[3 + axis] = 0.0
-            setpoint[axis] = min(max(setpoint[axis], low), high)
 
 
 def _keep_near(run: RobotRun, flight: Flight, row: int, robot: int, everybody: Bodies) -> None:

@@ -35,10 +35,15 @@ GAP, SIDE_GAP = 0.6, 0.15
 _HEIGHT_GAP = 0.5
 #: Metres a second squared it brakes with; metres it looks ahead at most; seconds others' motion is foreseen.
 BRAKE, SIGHT, FORESIGHT = 0.8, 5.0, 3.0
+#: What a slope takes from that, m/s2 for each metre down in a metre ahead, and the least that is left: legs, and heavy
+#: bases on small wheels, stop so late.
+_PULL, _LEAST_BRAKE = 3.0, 0.3
 #: Metres by which who goes away from somebody is farther from them, for each metre.
 _LEAVES = 0.4
 #: Metres a second below which somebody stands still.
 STILL = 0.15
+# Metres a second below which a robot does not go on.
+_SLOWEST = 0.05
 #: Seconds the rest of a robot takes to follow its nose.
 FOLLOW = 1.5
 
@@ -210,12 +215,31 @@ def room_to_turn(x, y, radius, others):  # type: ignore[no-untyped-def]
     return is_free
 
 
-def towards(model: RobotModel, x: float, y: float, yaw: float, path: Array, along: float, free: float) -> Array:
+def braking(slope: float) -> float:
+    """Return how hard a robot brakes where the ground falls by so much for each metre ahead, m/s2."""
+    return max(BRAKE - _PULL * max(slope, 0.0), _LEAST_BRAKE)
+
+
+def speed_to_stop(free: float, brake: float) -> float:
+    """Return the fastest that a robot may go to stop `GAP` short of who is `free` metres ahead, m/s; 0: it has to wait.
+
+    `brake` is how hard it brakes, m/s2.
+    """
+    speed = math.sqrt(2.0 * brake * max(free - GAP, 0.0))
+    return speed if speed >= _SLOWEST else 0.0
+
+
+def towards(
+    model: RobotModel, pose: tuple[float, float, float], path: Array, along: float, free: float, brake: float
+) -> Array:
     """Velocity (vx, vy, wz) that follows `path`, `along` metres of which are done, with `free` metres ahead.
+
+    `pose` is x, y, yaw, and `brake` how hard it brakes, m/s2.
 
     The robot steers for a point some way ahead on the path, turns on the spot if that lies far aside, and brakes so
     that it could stop `GAP` short of whoever is ahead, and at the end.
     """
+    x, y, yaw = pose
     left = path_length(path) - along
     assert model.velocity_limit is not None
     fastest, _, turning = model.velocity_limit.tolist()
@@ -226,8 +250,7 @@ def towards(model: RobotModel, x: float, y: float, yaw: float, path: Array, alon
     if abs(error) > 0.8:
         return np.array([0.0, 0.0, turn])
     speed = fastest * max(0.3, math.cos(error) ** 2)
-    speed = min(speed, math.sqrt(2 * BRAKE * max(left, 0.02)))
-    speed = min(speed, math.sqrt(2 * BRAKE * max(free - GAP, 0.0)))
-    if speed < 0.05:
+    speed = min(speed, math.sqrt(2.0 * brake * max(left, 0.02)), speed_to_stop(free, brake))
+    if speed < _SLOWEST:
         return np.zeros(3)
     return np.array([speed, 0.0, turn])

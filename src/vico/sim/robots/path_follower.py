@@ -14,6 +14,7 @@ from vico.sim.physics.records import Base
 from vico.sim.robots.navigation import (
     GAP,
     STILL,
+    braking,
     free_ahead,
     path_length,
     progress,
@@ -96,8 +97,11 @@ class PathFollower:
         outline = (m.half_length, m.half_width)
         return free_ahead(x, y, base.yaw, speed, outline, self.path, self.along, others)
 
-    def steer(self, base: Base, others: NDArray[np.void], dt: float) -> NDArray[np.float64]:
-        """Velocity to follow for the next `dt` seconds; sets `status` and `wants_detour`."""
+    def steer(self, base: Base, others: NDArray[np.void], dt: float, slope: float = 0.0) -> NDArray[np.float64]:
+        """Velocity to follow for the next `dt` seconds; sets `status` and `wants_detour`.
+
+        `slope` is by how much the ground falls for each metre ahead.
+        """
         m, (x, y) = self._model, (float(v) for v in base.position[:2])
         self.wants_detour = False
         self.along = progress(self.path, self.along, x, y)
@@ -111,7 +115,7 @@ class PathFollower:
             return self._back_off(base, others, dt)
         speed = float(np.hypot(*base.velocity[:2]))
         free, who = self.free(base, others, max(speed, 0.3))
-        wanted = towards(m, x, y, base.yaw, self.path, self.along, free)
+        wanted = towards(m, (x, y, base.yaw), self.path, self.along, free, braking(slope))
         if wanted[0] == 0.0 and wanted[2] != 0.0 and not self._can_turn(x, y, others):
             wanted = np.zeros(3)
         if not wanted.any():

@@ -264,7 +264,7 @@ class RobotPopulation:
         self._loose.write_back()
         self.run.known_bodies = None
         if since + dt > whole - 1e-9:
-            watch_falls(self.run, whole)
+            watch_falls(self.run, whole, obstacles)
             watch_batteries(self.run, whole)
 
     def _step(self, ticks: int, left: int) -> None:

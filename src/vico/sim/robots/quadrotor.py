@@ -1,8 +1,8 @@
 """Four rotors: from where a robot should be to the speeds of its rotors, of all robots of a kind at once.
 
 A cascade: position, velocity, attitude, rates, rotors. Thrust that the rotors cannot give goes first from turning, then
-from tilting, and never from keeping up. Gains are PX4's defaults where those have units, and otherwise follow from the
-rotors' lag.
+from keeping up, and last from tilting: who can't tilt tumbles. Gains are PX4's defaults where those have units, and
+otherwise follow from the rotors' lag.
 """
 
 from __future__ import annotations
@@ -132,7 +132,10 @@ def _room(base, change, low, high):  # type: ignore[no-untyped-def]
 
 @compiled
 def _mix(frame, thrust, torque, out):  # type: ignore[no-untyped-def]
-    """Write the rotor speeds, rad/s, that give a thrust (N) and as much of a torque (Nm) as there is room for."""
+    """Write the rotor speeds, rad/s, that give a torque that tilts (Nm), a thrust (N) and a torque that turns.
+
+    As much of each as there is room for beside the one before.
+    """
     count = len(out)
     high = frame.thrust * frame.fastest**2
     low, high = _LEAST * high, _MOST * high
@@ -141,9 +144,13 @@ def _mix(frame, thrust, torque, out):  # type: ignore[no-untyped-def]
     for k in range(count):
         xx += frame.places[k, 0] ** 2
         yy += frame.places[k, 1] ** 2
+    largest = 0.0
     for k in range(count):
-        forces[k] = min(max(thrust / count, low), high)
         change[k] = torque[0] * frame.places[k, 1] / yy - torque[1] * frame.places[k, 0] / xx
+        largest = max(largest, abs(change[k]))
+    largest = min(largest, 0.5 * (high - low))
+    for k in range(count):
+        forces[k] = min(max(thrust / count, low + largest), high - largest)
     share = _room(forces, change, low, high)
     for k in range(count):
         forces[k] += share * change[k]
