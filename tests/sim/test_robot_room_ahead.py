@@ -84,3 +84,15 @@ def test_robots_told_a_velocity_downhill_touch_a_wall_slowly_and_stay_on_their_f
     assert (before < 0.6).all()
     assert (noses(robots) > 5.0 - 0.2).all()
     assert robots.events() == []
+
+
+def test_who_stands_on_a_slope_stays_there() -> None:
+    robots = downhill()
+    for robot in range(len(KINDS)):
+        robots.drive(robot, np.zeros(3))
+    before = robots.bodies().position[:, :2].copy()
+    for _ in range(200):
+        robots.advance(0.1, Bodies.none())
+    moved = np.hypot(*(robots.bodies().position[:, :2] - before).T)
+    assert moved[KINDS.index("husky")] < 0.06
+    assert moved[KINDS.index("manipulator")] < 0.06

@@ -191,10 +191,10 @@ class Airspace:
         return None
 
     def level_ground_near(self, xy: ArrayLike, reach: float) -> Array:
-        """Return spots of even ground under the open sky, the nearest first, ENU metres, shape ``(n, 2)``."""
+        """Return spots of even ground off streets, under the open sky, the nearest first, ENU metres, ``(n, 2)``."""
         inner = self.half - BESIDE
         point = np.clip(np.asarray(xy, np.float64)[:2], -inner, inner)
-        return self._spots(self.flat & (self.tops - self._floor < 0.1), point, reach)
+        return self._spots(self.off_streets & (self.tops - self._floor < 0.1), point, reach)
 
     def _spots(self, cells: NDArray[np.bool_], point: Array, reach: float) -> Array:
         """Return middles of cells within reach of a point, the nearest first, shape ``(n, 2)``."""

@@ -21,9 +21,14 @@ class WheelGeometry(NamedTuple):
     slip: float
 
 
-# What wheels remember: their command as far as it was let through, and the trim.
+# What wheels remember: their command as far as it was let through, the trim, and how far they have rolled since they
+# stand, metres.
 _COMMAND = slice(0, 3)
 _TRIM = slice(3, 3 + TRIM_SIZE)
+_ROLLED = 3 + TRIM_SIZE
+# On a slope wheels give way, slowly: they drive back by so much a second of what they have rolled, at most so fast,
+# m/s.
+_BACK, _BACK_SPEED = 4.0, 0.2
 
 
 @compiled
@@ -34,7 +39,10 @@ def _skid(trim, slew, top, wheels, motion, command, memory):  # type: ignore[no-
     out = np.zeros(len(top))
     if not command.any() and not wanted_now.any():  # brakes
         trim_memory[:] = 0.0
+        memory[_ROLLED] += motion[0] * trim.period
+        out[:] = min(max(-_BACK * memory[_ROLLED], -_BACK_SPEED), _BACK_SPEED) / wheels.radius
         return out
+    memory[_ROLLED] = 0.0
     wanted = trimmed(trim, motion, wanted_now, trim_memory)
     for k in range(len(top)):
         side = -1.0 if k % 2 == 0 else 1.0
@@ -65,7 +73,7 @@ class SkidSteer(MotorController):
         # Metres a second and radians a second the command may change by in one period.
         slew = np.array([1.0, 0.0, 2.5]) * period
         self._settings = (trim, slew, model.motor_limits[1], WheelGeometry(c.wheel_radius, c.half_track, c.slip))
-        self.memory = _TRIM.stop
+        self.memory = _ROLLED + 1
 
     def targets(self, motion: Motion, command: Array, memory: Array) -> Array:
         """Wheel speeds, rad/s."""
