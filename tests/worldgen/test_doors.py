@@ -10,7 +10,6 @@ import shapely
 
 from vico.geo.frame import LocalFrame
 from vico.geo.osm import OsmData
-from vico.rules import DOOR_REACH
 from vico.world.check.places import entrance_findings
 from vico.world.heights import HeightField
 from vico.world.model import Building
@@ -55,17 +54,3 @@ def test_the_spot_before_a_door_can_be_reached_as_it_is_written() -> None:
     assert door is not None
     outline = shapely.Polygon(house.footprint[0])
     assert list(entrance_findings(door, outline, finder.walkable, finder.height)) == []
-
-
-def test_one_can_stand_before_a_door_within_reach_of_it() -> None:
-    # Before the western half of the south wall the middles of the first free cells are 2 m off.
-    walkable = free_map()
-    walkable.cls[77:80, :80] = BLOCKED
-    ring = [(-12.0, 0.25), (12.0, 0.25), (12.0, 9.0), (-12.0, 9.0)]
-    finder, _ = finder_of(ring, walkable)
-    doors = finder._candidates(0)
-    south = doors.at[:, 1] < 0.3
-    cells = walkable.centre_of(walkable.cell_of(doors.approach))
-    away = np.hypot(*(cells - doors.at).T)
-    assert (away[south] < DOOR_REACH).all()
-    assert (doors.at[south, 0] > -0.5).all()

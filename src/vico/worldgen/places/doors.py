@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from vico.exact import dot
 from vico.geo import overlay
 from vico.geo.osm import OsmData, Tags
-from vico.rules import DOOR_REACH
 from vico.world.check.places import faces_into
 from vico.world.heights import HeightField
 from vico.world.model import Building, Category, Entrance, Place
@@ -35,9 +34,6 @@ _WHOLE = 0.7  # share of a building's ground above which an area in it is the bu
 _DEEP = 14.0  # metres from every wall at which a shop has none of its own
 _STEP = 0.8  # metres between the points of an outline that are tried as doors
 _APPROACHES = (0.7, 1.0, 1.3, 1.6, 1.9)
-# Who stands before a door has so much room there, or at the middle of the cell, which is free and no farther from the
-# door than it can be opened from; metres.
-_ROOM_TO_STAND, _FROM_CELL = 0.3, DOOR_REACH - 0.15
 _OUTDOORS = (Category.OPEN, Category.TRANSIT)
 
 
@@ -326,7 +322,7 @@ class Finder:
             # As it is written: a millimetre decides on which side of a cell's edge a spot lies.
             spot = np.round(where + out * distance, 3)
             found = price[self.walkable.class_at(spot)] + distance
-            found[~self.walkable.is_connected(spot) | ~self._has_room(spot, where)] = np.inf
+            found[~self.walkable.is_connected(spot)] = np.inf
             better = found < best
             best[better], approach[better] = found[better], spot[better]
         # In blocks the street is where the sidewalk is: count how far it is from the door, up to 12 m.
@@ -337,9 +333,3 @@ class Finder:
         good = np.isfinite(best) & ~faces_into(self.shapes[at], np.round(where, 3), out)
         self._doors[at] = _Doors(where[good], out[good], approach[good], (cost + best)[good])
         return self._doors[at]
-
-    def _has_room(self, spots: NDArray[np.float64], doors: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return at which spots before doors somebody can stand and open the door, shape ``(n,)``."""
-        middles = self.walkable.centre_of(self.walkable.cell_of(spots))
-        near = np.hypot(*(middles - doors).T) <= _FROM_CELL
-        return np.asarray(near | (self.walkable.clearance_at(spots) >= _ROOM_TO_STAND))
