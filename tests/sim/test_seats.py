@@ -12,17 +12,21 @@ from numpy.typing import NDArray
 
 import toy_city
 from vico.agents.schedule import ScheduleFollower
+from vico.assets.models.furniture import furniture_models
 from vico.assets.people import J
 from vico.seeds import rng
 from vico.sim.config import SimConfig
+from vico.sim.indoor import Indoor
 from vico.sim.moves import place_in_room
 from vico.sim.overlaps import overlaps_of
 from vico.sim.scene import SceneRenderer
+from vico.sim.seats import Seats
 from vico.sim.simulation import Simulation
 from vico.sim.state import Posture
 from vico.world.folder import World
 from vico.world.objects import Objects
 from vico.world.public import PublicMap
+from vico.worldgen.indoor.stage import furnish
 
 FLOOR = toy_city.FLOOR
 
@@ -56,7 +60,7 @@ def furnished(beds: Sequence[dict[str, Any]] | None = None) -> World:
         *([_piece("bed_double", 1.0, 10.0, np.pi / 2, (2.04, 1.64, 0.95), "r_back")] if beds is None else beds),
         _piece("bench", -20.0, -15.0, 0.0, (0.6, 1.7, 0.9), ""),
     ]
-    from vico.assets.models.furniture import furniture_models
+
     from vico.assets.models.street import street_models
 
     models = furniture_models() | street_models()
@@ -268,3 +272,49 @@ def test_a_thing_on_a_chair_keeps_people_off_it() -> None:
     sim.scenario.place_agent("assistant_0", (-19.0, -15.0))
     assert act(sim, "assistant_0", type="sit")["action_code"] == "no_seat"
     assert replace(state.seats).lies.sum() == 2
+
+
+def test_who_cannot_get_up_for_somebody_waits_a_while_and_that_one_moves_on() -> None:
+    # The bed stands in a lane, and can be left through a gap alone, before which somebody stands with nothing to do.
+    beside = [_piece("bookcase", 1.2, 9.07, 0.0, (0.7, 0.2, 2.0), "r_back")]
+    beside += [_piece("bookcase", 2.6, 9.07, 0.0, (0.8, 0.2, 2.0), "r_back")]
+    fence = [_piece("wardrobe", 0.65, 8.6, 0.0, (0.3, 1.14, 2.0), "r_back")]
+    fence += [_piece("bookcase", 1.75, 10.05, 0.0, (2.5, 0.3, 2.0), "r_back")]
+    sim = _asleep([_bed(1.9, 8.5, 0.0), *beside, *fence], people=2)
+    people, p = sim.community, sim.state.people
+    assert people is not None
+    public_map = PublicMap.from_world(sim.world)
+    awake = [toy_city.item("main", "00:00:00", "23:59:59", toy_city.CAFE)]
+    night = people.residents[1].schedule
+    gets_up, stands = (
+        ScheduleFollower(one.model_copy(update={"schedule": day}), public_map)
+        for one, day in zip(people.residents, (awake, night), strict=True)
+    )
+    assert p.posture.tolist() == [Posture.LYING, Posture.STANDING]
+    place_in_room(1, sim.state.indoor.index["r_back"], sim.state, near=np.array([1.9, 9.5]))
+    p.position[1, :2] = 1.9, 9.5
+    (observations, infos), tries = sim.observe(), 0
+    for _ in range(20):
+        actions = {
+            "resident_0": gets_up.act(observations["resident_0"], infos["resident_0"]),
+            "resident_1": stands.act(observations["resident_1"], infos["resident_1"]),
+        }
+        tries += actions["resident_0"]["type"] == "wake"
+        step = sim.step(actions)
+        observations, infos = step.observations, step.infos
+        if p.posture[0] != Posture.LYING:
+            break
+    assert p.posture[0] == Posture.STANDING
+    assert tries == 2
+
+
+def test_all_beds_of_homes_can_be_got_out_of(helsinki: World) -> None:
+    # Before, furniture cut one in twenty off from the door: half of the bunks in narrow children's rooms.
+    homes = [place.model_copy(update={"rooms": []}) for place in helsinki.places if place.kind == "apartments"]
+    made = furnish(homes, buildings=helsinki.buildings, height=helsinki.height, seed=1)
+    indoor = Indoor.from_world(made.rooms, made.places, made.furniture)
+    seats = Seats.of(made.furniture, furniture_models(), indoor, helsinki.height)
+    beds = np.flatnonzero(seats.lies)
+    assert len(beds) > 4 * len(homes)
+    cut_off = [made.rooms[seats.room[bed]].id for bed in beds.tolist() if seats.stand_before(bed, indoor) is None]
+    assert cut_off == []

@@ -22,6 +22,9 @@ from vico.assets.models.model import Model
 GRID = 0.1
 BODY = 0.3  # bodies are 0.25 m; the rest is for the raster
 STEP_IN = 0.6  # metres from a doorway to the spot inside it
+# A bed is got out of at a side, so far from the hips, at a spot no farther from there; metres. Points at which the line
+# to the hips is looked at for other furniture.
+_BESIDE_BED, _NEAR_SIDE, _SAMPLES = 0.85, 1.4, 16
 _DOOR_CLEAR = (1.1, 0.95)  # width and depth kept free before a doorway, metres
 _LOW = 1.0  # what is lower may stand before a window
 
@@ -56,6 +59,14 @@ class Opening:
             return (x if self.side == EAST else -x, self.at)
         y = size[1] / 2 - inwards
         return (self.at, y if self.side == NORTH else -y)
+
+
+class _Bed(NamedTuple):
+    """A place to lie: where the hips are, where one stands to its left and right, and the outline of the bed."""
+
+    hips: tuple[float, float]
+    sides: tuple[tuple[float, float], tuple[float, float]]
+    box: Box
 
 
 class _Hung(NamedTuple):
@@ -97,6 +108,7 @@ class RoomDraft:
         self.tall: list[Box] = []
         self._clear = [self._door_zone(door) for door in self.doors]
         self._hung: list[_Hung] = []
+        self._beds: list[_Bed] = []
         self.taken = self._empty()
         self._spots = [self._cell(door.point(size, STEP_IN)) for door in self.doors]
 
@@ -167,6 +179,26 @@ class RoomDraft:
         labels, _ = ndimage.label(~self.taken)
         home = labels[self._spots[0]] if self._spots else 0
         return np.asarray((labels == home) & (home > 0))
+
+    def _are_left(self, beds: Sequence[_Bed], new: Sequence[Box]) -> bool:
+        """Whether who came in by the first door can lie down in all of some beds, and get up, with new pieces there."""
+        if not beds:
+            return True
+        iy, ix = np.nonzero(self.reachable())
+        points = np.column_stack([ix + 0.5, iy + 0.5]) * GRID - np.array(self.size) / 2
+        return all(self._has_side(bed, points, [box for box in (*self.solid, *new) if box != bed.box]) for bed in beds)
+
+    @staticmethod
+    def _has_side(bed: _Bed, points: NDArray[np.float64], others: Sequence[Box]) -> bool:
+        """Whether one can stand beside a bed at one of some points with nothing but the bed up to the hips."""
+        away = np.min([np.hypot(*(points - side).T) for side in bed.sides], axis=0)
+        x, y = points[away <= _NEAR_SIDE].T
+        along = np.linspace(0.0, 1.0, _SAMPLES)
+        u, v = x[:, None] + along * (bed.hips[0] - x[:, None]), y[:, None] + along * (bed.hips[1] - y[:, None])
+        met = np.zeros(len(x), np.bool_)
+        for x0, y0, x1, y1 in others:
+            met |= ((u > x0 - 1e-6) & (u < x1 + 1e-6) & (v > y0 - 1e-6) & (v < y1 + 1e-6)).any(axis=1)
+        return not met.all()
 
     def _is_whole(self) -> bool:
         labels, _ = ndimage.label(~self.taken)
@@ -250,10 +282,12 @@ class RoomDraft:
         if not all(self._leaves_ring(window) for window in windows) and not self._is_whole():
             self.taken = before
             return False
-        if any(self.taken[cell] for cell in self._spots):
+        beds = [bed for thing, box, model in things for bed in _beds_of(thing, box, model)]
+        if any(self.taken[cell] for cell in self._spots) or not self._are_left([*self._beds, *beds], solid):
             self.taken = before
             return False
         self.solid += solid
+        self._beds += beds
         self.tall += [box for _, box, model in things if model.solid and model.size[2] > _LOW]
         self.items += [thing for thing, _, _ in things]
         if front is not None:
@@ -419,6 +453,19 @@ class RoomDraft:
                     self._hung.append(_Hung(side, s, wide, low, high))
                     return True
         return False
+
+
+def _beds_of(thing: Furnishing, box: Box, model: Model) -> list[_Bed]:
+    """Return the places to lie of a piece that stands in a room."""
+    if model.seat is None or not model.seat.lies:
+        return []
+    c, s = math.cos(thing.yaw), math.sin(thing.yaw)
+    found = []
+    for u, v in model.seat.places:
+        x, y = thing.x + c * u - s * v, thing.y + s * u + c * v
+        left, right = ((x - away * s, y + away * c) for away in (_BESIDE_BED, -_BESIDE_BED))
+        found.append(_Bed((x, y), (left, right), box))
+    return found
 
 
 def _outline(model: Model, x: float, y: float, yaw: float) -> Box:
