@@ -18,6 +18,7 @@ from vico.sim.bodies import Bodies
 from vico.sim.physics.engine import Actuate
 from vico.sim.physics.frames import COARSE, FINE
 from vico.sim.physics.genesis_contacts import contacts_of, read_contacts
+from vico.sim.physics.genesis_index import GenesisIndex
 from vico.sim.physics.genesis_objects import ObjectSlots
 from vico.sim.physics.genesis_rays import RayTwin
 from vico.sim.physics.genesis_scene import BuiltScene
@@ -97,6 +98,7 @@ class GenesisEngine:
         """Keep what queries answer from."""
         self._qpos, self._qvel = self._scene.positions.copy(), self._scene.speeds.copy()
         self._bases: list[Base] = []
+        self._motions: dict[bytes, Motion] = {}
 
     # Robots.
 
@@ -118,9 +120,12 @@ class GenesisEngine:
 
     def motion(self, robots: NDArray[np.int64]) -> Motion:
         """Motion of several robots of one kind."""
-        chosen = [self._scene.robots[robot] for robot in robots.tolist()]
-        angle, rate = np.array([one.angle for one in chosen]), np.array([one.rate for one in chosen])
-        return Motion(*motion_of(self._qpos, self._qvel, self._scene.first[robots], angle, rate))
+        key = robots.tobytes()
+        found = self._motions.get(key)
+        if found is None:
+            found = Motion(*motion_of(self._qpos, self._qvel, *self._scene.kind(robots)))
+            self._motions[key] = found
+        return found
 
     def motor_forces(self, robot: int) -> NDArray[np.float64]:
         """Torques of the motors in the last step."""
@@ -153,15 +158,9 @@ class GenesisEngine:
                 self._gain[stiff], self._bias[stiff, 1], self._bias[stiff, 2] = gains[0], -gains[0], -gains[1]
                 self._scene.gain[stiff], self._scene.bias[stiff] = self._gain[stiff], self._bias[stiff]
 
-    def _follow(self, index: Any, targets: NDArray[np.float64]) -> None:
-        if not len(index.driven):
-            return
-        wanted = index.targets(targets)
-        for name in ("ctrl_pos", "ctrl_vel", "ctrl_force"):
-            self._scene.state[f"dyn_state.dofs.{name}"][index.driven, 0] = 0.0
-        for mode, name in enumerate(("ctrl_pos", "ctrl_vel", "ctrl_force")):
-            mine = index.mode == mode
-            self._scene.state[f"dyn_state.dofs.{name}"][index.driven[mine], 0] = wanted[mine]
+    def _follow(self, index: GenesisIndex, targets: NDArray[np.float64]) -> None:
+        if len(index.driven):
+            index.follow(targets, self._scene.controls)
 
     def command_all(
         self, robots: NDArray[np.int64], targets: NDArray[np.float64], gains: Sequence[tuple[float, float] | None]

@@ -10,10 +10,34 @@ from numpy.typing import NDArray
 
 from vico.assets.robots import RobotModel
 from vico.errors import InputError
+from vico.io.compiled import compiled
 from vico.sim.quaternions import matrix_of
 
 #: How a joint is driven, as Genesis counts it: towards a position, towards a speed, by a force.
 POSITION, VELOCITY, FORCE = range(3)
+
+
+@compiled
+def _write_targets(joints, transmission, targets, controls):  # type: ignore[no-untyped-def]
+    """Write what joints follow for the motors that drive them to follow `targets`.
+
+    Parameters
+    ----------
+    joints
+        Degrees of freedom, and how each is driven.
+    transmission
+        What the motors' positions or speeds make of the joints', and the other way round.
+    controls
+        Positions, speeds and forces that all joints follow: written.
+    """
+    driven, mode = joints
+    joint_of, motor_of = transmission
+    for k in range(len(driven)):
+        wanted = 0.0
+        for motor in range(len(targets)):
+            wanted += (motor_of[motor, k] if mode[k] == FORCE else joint_of[k, motor]) * targets[motor]
+        for kind in range(len(controls)):
+            controls[kind][driven[k]] = wanted if kind == mode[k] else 0.0
 
 
 class GenesisIndex:
@@ -94,8 +118,9 @@ class GenesisIndex:
                 through.setdefault(joint, np.zeros(len(actuators)))[row] += share
         joints = list(through)
         #: What the speeds of the driven joints make of the speeds of the motors, shape ``(motors, n)``.
-        self._motor_of = np.array([through[joint] for joint in joints]).reshape(len(joints), len(actuators)).T
-        self._joint_of = np.linalg.pinv(self._motor_of)
+        of_joint = np.array([through[joint] for joint in joints]).reshape(len(joints), len(actuators))
+        self._motor_of = np.ascontiguousarray(of_joint.T)
+        self._joint_of = np.ascontiguousarray(np.linalg.pinv(self._motor_of))
         self.driven = np.array([self._dof[spec.joint(joint).name] for joint in joints], np.int64)
         count = len(joints)
         self.mode = np.zeros(count, np.int32)
@@ -137,12 +162,9 @@ class GenesisIndex:
         self.site_place = np.array(spec.site_pos, np.float64).reshape(-1, 3)
         self.site_turn = matrix_of(np.array(spec.site_quat, np.float64).reshape(-1, 4)).reshape(-1, 3, 3)
 
-    def targets(self, targets: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return what the driven joints follow for the motors to follow `targets`."""
-        followed: NDArray[np.float64] = self._joint_of @ targets
-        pushed = self.mode == FORCE
-        followed[pushed] = (self._motor_of.T @ targets)[pushed]
-        return followed
+    def follow(self, targets: NDArray[np.float64], controls: tuple[NDArray[np.float64], ...]) -> None:
+        """Have the motors follow `targets`: write what their joints do into `controls`, by `mode`."""
+        _write_targets((self.driven, self.mode), (self._joint_of, self._motor_of), targets, controls)
 
     def motor_forces(self, forces: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the motors' forces, given the driven joints'."""

@@ -232,11 +232,16 @@ class GenesisShapes:
     ----------
     solver
         Of a built scene.
+
+    Attributes
+    ----------
+    corners
+        Of the box around each shape, in its frame, metres, shape ``(n, 8, 3)``.
     """
 
     def __init__(self, solver: Any) -> None:
         info, collider = solver.dyn_info, solver.collider.collider_info
-        self._data, self._corners = view(info.geoms.data), view(solver.rigid_info.geoms_init_AABB)
+        self._data, self.corners = view(info.geoms.data), view(solver.rigid_info.geoms_init_AABB)
         self._vertices, self._link = view(info.verts.init_pos), view(info.geoms.link_idx)
         self._start, self._end = view(info.geoms.vert_start), view(info.geoms.vert_end)
         self._position, self._quaternion = view(info.geoms.pos), view(info.geoms.quat)
@@ -252,7 +257,7 @@ class GenesisShapes:
             if not size.any():
                 continue
             self._data[geom, :3] = (size[0] / 2, size[2], 0.0) if self._type[geom] == self._cylinder else size
-            self._corners[geom] = _CORNERS * size / 2
+            self.corners[geom] = _CORNERS * size / 2
             rows = slice(int(self._start[geom]), int(self._end[geom]))
             self._vertices[rows] = self._unit[rows] * size
         for link in np.unique(self._link[geoms]).tolist():
@@ -261,5 +266,5 @@ class GenesisShapes:
     def _bound(self, link: int) -> None:
         """Fit the box around a link's shapes, in its frame."""
         mine = range(int(self._first[link]), int(self._last[link]))
-        points = np.concatenate([self._corners[g] @ matrix_of(self._quaternion[g]).T + self._position[g] for g in mine])
+        points = np.concatenate([self.corners[g] @ matrix_of(self._quaternion[g]).T + self._position[g] for g in mine])
         self._link_low[link], self._link_high[link] = points.min(axis=0), points.max(axis=0)

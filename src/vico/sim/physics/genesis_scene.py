@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import threading
 import warnings
 from typing import Any, Protocol
@@ -75,6 +76,20 @@ def _carry(links, lift, middle, pushed, turned):  # type: ignore[no-untyped-def]
         _add_wrench(links[k], middle[links[k]], lift[k], np.zeros(3), pushed, turned)
 
 
+@compiled
+def _fit_boxes(geoms, corners, poses, boxes):  # type: ignore[no-untyped-def]
+    """Fit the boxes around shapes, which the solver does of those alone that can move."""
+    position, quaternion = poses
+    low, high = boxes
+    for geom in geoms:
+        low[geom], high[geom] = np.inf, -np.inf
+        for k in range(8):
+            corner = position[geom] + _rotated(quaternion[geom], corners[geom, k])
+            for axis in range(3):
+                low[geom, axis] = min(low[geom, axis], corner[axis])
+                high[geom, axis] = max(high[geom, axis], corner[axis])
+
+
 class Holder(Protocol):
     """A run whose state is in a scene."""
 
@@ -107,6 +122,10 @@ class BuiltScene:
         The same scene in MuJoCo, which answers what lies below a point; made when that is first asked.
     lock
         Held by whoever uses it.
+    positions, speeds
+        Of all joints.
+    controls
+        Positions, speeds and forces that all joints follow.
     state
         What Genesis carries from one step to the next, by name: views.
     party, owner, number
@@ -120,6 +139,8 @@ class BuiltScene:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             self.built = build_scene(self._gs, static, models, capacity, COARSE / STEPS[COARSE])
+            # Genesis leaves the picture on a level ground open: what warns of that is to be gone before others listen.
+            gc.collect()
         pairs = zip(models, self.built.specs, self.built.robots, strict=True)
         self.robots = [GenesisIndex(model, spec, entity) for model, spec, entity in pairs]
         self.first = np.array([(robot.root, robot.root_speed) for robot in self.robots], np.int64).reshape(-1, 2)
@@ -131,6 +152,8 @@ class BuiltScene:
         self.state = {name: array for name, array in state_of(solver) if array.size}
         self.positions, self.speeds = view(solver.rigid_info.qpos)[:, 0], view(solver.dyn_state.dofs.vel)[:, 0]
         self.applied = view(solver.dyn_state.dofs.qf_applied)[:, 0]
+        dofs = solver.dyn_state.dofs
+        self.controls = tuple(view(array)[:, 0] for array in (dofs.ctrl_pos, dofs.ctrl_vel, dofs.ctrl_force))
         self.link_position = view(solver.dyn_state.links.pos)[:, 0]
         self.link_quaternion = view(solver.dyn_state.links.quat)[:, 0]
         self.grip = view(solver.dyn_state.geoms.friction_ratio)[:, 0]
@@ -138,9 +161,9 @@ class BuiltScene:
         self.limit = view(solver.dyn_info.dofs.force_range)
         self.weightless = view(solver.dyn_info.entities.gravity_compensation)
         self._step = view(solver.rigid_info.substep_dt)
-        from genesis.engine.solvers.rigid.abd.forward_kinematics import kernel_update_cartesian_space
+        from vico.sim.physics._genesis_step import SolverStep
 
-        self._kinematics = kernel_update_cartesian_space
+        self._solver_step = SolverStep(solver)
         geoms = solver.dyn_state.geoms
         self._geom_position, self._geom_quaternion = view(geoms.pos)[:, 0], view(geoms.quat)[:, 0]
         self._placed = view(geoms.verts_updated)[:, 0]
@@ -155,7 +178,10 @@ class BuiltScene:
         self._weightless = np.concatenate([np.zeros(0, np.int64), *(robot.weightless for robot in self.robots)])
         self._lift = np.concatenate([np.zeros((0, 3)), *(robot.lift for robot in self.robots)])
         self._nothing = np.zeros((0, 6))
+        self._kinds: dict[bytes, tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]] = {}
         self._index_links()
+        self._boxes = view(geoms.aabb_min)[:, 0], view(geoms.aabb_max)[:, 0]
+        self._fit_boxes(np.arange(len(solver.geoms)))
         #: The state that Genesis is in when it has been built.
         self.pristine = self.save()
 
@@ -210,13 +236,11 @@ class BuiltScene:
         return np.flatnonzero((depth != 0.0) | direction.any(axis=1))
 
     def place_links(self) -> None:
-        """Compute poses of all links and shapes that can move from the state as it is.
+        """Compute poses and velocities of all links and shapes that can move from the state as it is.
 
         Those of solids stay, which are many: Genesis' own way computes them, too.
         """
-        s = self.solver
-        self._kinematics(s.dyn_state, s.dyn_info, s.rigid_info, s.rigid_config, False, False)
-        s._is_forward_pos_updated, s._is_forward_vel_updated = True, False
+        self._solver_step.place()
 
     def place_movers(self, poses: NDArray[np.float64], entity: NDArray[np.int32]) -> None:
         """Put kinematic bodies at their poses (middle and yaw), and those that are nobody out of the way."""
@@ -226,6 +250,11 @@ class BuiltScene:
         self._geom_position[self.mover_geom] = self.link_position[movers]
         self._geom_quaternion[self.mover_geom] = self.link_quaternion[movers]
         self._placed[self.mover_geom] = False
+        self._fit_boxes(self.mover_geom)
+
+    def _fit_boxes(self, geoms: NDArray[np.int64]) -> None:
+        poses = self._geom_position, self._geom_quaternion
+        _fit_boxes(geoms, self.built.shapes.corners, poses, self._boxes)
 
     def poses(self, links: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the poses of links, shape ``(n, 4, 4)``."""
@@ -263,7 +292,8 @@ class BuiltScene:
                 if actuate is not None:
                     actuate(k * frame / steps, frame / steps)
                 self._push(wrenches)
-                self.built.scene.step(update_visualizer=False)
+                self._solver_step.step()
+                self._pushed[:], self._turned[:] = 0.0, 0.0
             if self._failed.any():
                 self.solver.check_errno()
         except self._gs.GenesisException as error:
@@ -279,6 +309,15 @@ class BuiltScene:
         poses = self.link_position, self.link_quaternion, self._centre
         _push_sites((self._site_link, self._site_place, self._site_turn), wrench, poses, self._pushed, self._turned)
         _carry(self._weightless, self._lift, self._middle, self._pushed, self._turned)
+
+    def kind(self, robots: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+        """Where numbers of robots of one kind are: bases, and positions and speeds of joints; row = robot."""
+        key = robots.tobytes()
+        if key not in self._kinds:
+            chosen = [self.robots[robot] for robot in robots.tolist()]
+            joints = np.array([one.angle for one in chosen]), np.array([one.rate for one in chosen])
+            self._kinds[key] = (self.first[robots], *joints)
+        return self._kinds[key]
 
     def link_names(self, robot: int) -> tuple[str, ...]:
         """Names of a robot's links, base first."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vico.errors import InputError
 from vico.sim.bodies import Bodies
 from vico.sim.robots.airspace import HOVER
-from vico.sim.robots.keeping_apart import Around, keep_apart, near_in_the_air
+from vico.sim.robots.keeping_apart import BRAKE, Around, keep_apart, near_in_the_air
 from vico.sim.robots.path_follower import RobotStatus
 from vico.sim.robots.rotors import HEADING, POSITION, TURNING, VELOCITY, Flight, FlightPhase
 from vico.sim.robots.state import RobotMode, RobotRun
@@ -22,8 +22,8 @@ _IDLE, _VELOCITY, _MOTORS, _ROUTE, _FOLLOW, _ = (int(mode) for mode in RobotMode
 _FALLEN = int(RobotStatus.FALLEN)
 #: Metres above what is there at which `go_to` ends, and that a landing begins above.
 CRUISE, APPROACH = 10.0, 4.0
-#: Metres a second squared it speeds up and brakes with along its way; a corner counts as reached so near, metres.
-_BRAKE, _CORNER = 1.5, 0.6
+#: A corner of its way counts as reached so near, metres.
+_CORNER = 0.6
 # Metres beside its way up to which it flies on as fast as it can, and from which on it only comes back: wind would blow
 # it on into what its way leads round.
 _ON_WAY, _OFF_WAY = 0.5, 2.0
@@ -279,7 +279,7 @@ def _aim(flight: Flight, row: int, position: Array, way: Array, leg: int) -> Non
     along = along / length if length > 1e-6 else np.zeros(3)
     done = min(max(float((position - start) @ along), 0.0), length)
     left = length - done
-    speed = math.sqrt(2.0 * _BRAKE * max(left - 0.1, 0.0))
+    speed = math.sqrt(2.0 * BRAKE * max(left - 0.1, 0.0))
     level, rise = math.hypot(along[0], along[1]), float(along[2])
     for part, limit in ((level, float(reach[0])), (max(rise, 0.0), float(reach[2])), (max(-rise, 0.0), _SINK)):
         if part > 1e-6:

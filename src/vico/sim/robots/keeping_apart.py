@@ -16,6 +16,9 @@ from vico.sim.robots.state import RobotMode, RobotRun
 
 Array = NDArray[np.float64]
 
+#: Metres a second squared robots that fly speed up and brake with.
+BRAKE = 1.5
+
 _LANDED = int(FlightPhase.LANDED)
 _IDLE = int(RobotMode.IDLE)
 # Metres above and beside others that it keeps to.
@@ -124,7 +127,8 @@ def _keep_inside(run: RobotRun, setpoint: Array, position: Array) -> None:
     ceiling = float(run.scene.world.height(position)) + CEILING
     for axis, (low, high) in enumerate(((-half, half), (-half, half), (-math.inf, ceiling))):
         outwards = setpoint[3 + axis]
-        if (position[axis] > high and outwards > 0.0) or (position[axis] < low and outwards < 0.0):
-            setpoint[3 + axis] = 0.0
+        # As fast as it can stop at the edge: told only there, it would come metres too far, and swing to and fro.
+        room = high - position[axis] if outwards > 0.0 else position[axis] - low
+        setpoint[3 + axis] = math.copysign(min(abs(outwards), math.sqrt(2.0 * BRAKE * max(room, 0.0))), outwards)
         if not low <= position[axis] <= high:
             setpoint[axis] = min(max(setpoint[axis], low), high)
