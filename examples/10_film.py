@@ -46,6 +46,7 @@ from vico.world.walkable import CROSSING, ROADWAY
 RATE = 25
 ROBOTS = ("manipulator", "husky", "go2", "h1", "drone")
 PASSENGERS, ROAD = 6, (CROSSING, ROADWAY)
+SOON = 600  # seconds within which the bus of the ride is to come
 SEARCH = 180  # seconds of a walk of which the best part is shown
 CAMERA = 4.2  # metres that a camera may be away
 PARCEL = (0.12, 0.18, 0.2)
@@ -124,13 +125,10 @@ class UntilPlayed(Hook):
 
 
 class Passenger:
-    """An assistant who rides a bus from one stop of a line to another, half a round away."""
+    """An assistant who rides a bus from one stop to another."""
 
-    def __init__(self, public_map: PublicMap, seed: int, number: int) -> None:
-        stops = {stop.id: stop.wait for stop in public_map.stops}
-        line = max(public_map.lines, key=lambda line: line.travel[-1])
-        self.here, goal = (stops[line.stops[k]] for k in (1, 1 + len(line.stops) // 2))
-        self.goal = float(goal[0]), float(goal[1])
+    def __init__(self, public_map: PublicMap, goal: tuple[float, float], seed: int, number: int) -> None:
+        self.goal = goal
         self.traveller = Traveller(public_map, rng(seed, "passenger", number), modes=("bus",))
 
     def act(self, observation: dict, info: dict) -> dict:
@@ -369,6 +367,23 @@ def arrived(name: str, place: str) -> Callable[[Simulation], bool]:
     return lambda sim: sim.state.people.place[sim.state.people.names.index(name)] == sim.state.place_index[place]
 
 
+def longest_ride(public_map: PublicMap, second: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return where to wait, and where to go, for the longest ride in a bus that comes soon, all from one stop."""
+    waits = {stop.id: (float(stop.wait[0]), float(stop.wait[1])) for stop in public_map.stops}
+    best, found = 0.0, None
+    for line in public_map.lines:
+        for k, origin in enumerate(line.stops):
+            goal = waits[line.stops[(k + len(line.stops) // 2) % len(line.stops)]]
+            trip = public_map.trips.plan(waits[origin], goal, second, modes=("bus",), cash=20.0)
+            for leg in trip.legs if trip is not None else ():
+                lasts = leg.arrive - leg.depart
+                if leg.mode == "bus" and leg.origin == origin and leg.depart < second + SOON and lasts > best:
+                    best, found = lasts, (waits[origin], goal)
+    if found is None:
+        raise SystemExit("no bus of this world comes within ten minutes for a ride")
+    return found
+
+
 def rearmost(sim: Simulation) -> str:
     """Return which of the passengers sees most of the others: who sits farthest back."""
     people = sim.state.people
@@ -379,9 +394,11 @@ def rearmost(sim: Simulation) -> str:
 
 def in_a_moving_bus(sim: Simulation) -> bool:
     """Return whether a bus is on its way with most of those who wanted to ride."""
-    transit, aboard = sim.state.transit, sim.state.people.vehicle[-PASSENGERS:] > 0
-    buses = [bus for bus in range(transit.traffic.buses) if transit.aboard(bus)]
-    return int(aboard.sum()) > PASSENGERS // 2 and all(transit.stopped_at(bus) is None for bus in buses)
+    transit, ridden = sim.state.transit, sim.state.people.vehicle_entity[-PASSENGERS:]
+    for bus in range(transit.traffic.buses):
+        if int((ridden == transit.entity_of(bus)).sum()) > PASSENGERS // 2:
+            return transit.stopped_at(bus) is None
+    return False
 
 
 def works(who, stay: Stay) -> bool:
@@ -430,16 +447,18 @@ class Casting:
     def bus(self) -> Scene:
         """Return a ride, seen by who sits farthest back."""
         public_map = PublicMap.from_world(self.world)
-        riders = {f"assistant_{k}": Passenger(public_map, self.seed, k) for k in range(PASSENGERS)}
+        start = 9 * 3600
+        here, goal = longest_ride(public_map, start)
+        riders = {f"assistant_{k}": Passenger(public_map, goal, self.seed, k) for k in range(PASSENGERS)}
 
         def setup(sim: Simulation) -> None:
-            for name, rider in riders.items():
-                sim.scenario.place_agent(name, rider.here)
+            for name in riders:
+                sim.scenario.place_agent(name, here)
             sim.state.people.cash[-PASSENGERS:] = 20.0
 
         config = {"assistants": PASSENGERS}
         return Scene(
-            "In the bus", 9 * 3600, rearmost, ("eyes",), begins=in_a_moving_bus, config=config, setup=setup,
+            "In the bus", start, rearmost, ("eyes",), begins=in_a_moving_bus, config=config, setup=setup,
             players=riders,
         )  # fmt: skip
 
