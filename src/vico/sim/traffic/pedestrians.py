@@ -49,7 +49,7 @@ _TURNS_FIRST = (
     0.5,
     1.5,
 )  # rad from where one looks to where one goes: slower from the first on, on the spot from the second
-_LEAST_STEP = 0.004  # m
+_LEAST_STEP, _FIRST_STEP = 0.004, 0.04  # m
 _ACCELERATION = 4.0  # m/s2 with which one sets out
 _SETS_OUT = 0.2  # m that have to be free for who stands to set out
 _STRIDE_AHEAD = 0.4  # m ahead where a heading is tested against the walkway's sides
@@ -232,6 +232,15 @@ def _nearby(shapes, grid, b, buffer):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _leads_off(x, y, c, s, shapes, j):  # type: ignore[no-untyped-def]
+    """Return whether a first step along a heading comes no nearer to somebody than one may be, or away from them."""
+    tx, ty = x + c * _FIRST_STEP, y + s * _FIRST_STEP
+    if not disc_touches(tx, ty, RADIUS + _TOUCH, shapes, j):
+        return True
+    return distance_to(tx, ty, shapes, j) > distance_to(x, y, shapes, j)
+
+
+@compiled
 def _free_distance(x, y, c, s, shapes, near, gap):  # type: ignore[no-untyped-def]
     """Return the metres a walker can go along a heading before it touches somebody, at most `_SIGHT`."""
     free = _SIGHT
@@ -246,6 +255,9 @@ def _free_distance(x, y, c, s, shapes, near, gap):  # type: ignore[no-untyped-de
             if aside2 < reach * reach:
                 free = min(free, max(ahead - np.sqrt(reach * reach - aside2), 0.0))
         else:
+            # Beside somebody whom it all but touches a step nearer is refused, however free it is beyond.
+            if not _leads_off(x, y, c, s, shapes, j):
+                return 0.0
             d = 0.25
             while d < free:
                 if disc_touches(x + c * d, y + s * d, RADIUS + gap, shapes, j):

@@ -69,6 +69,7 @@ _HALF_SIZE = TRAM_SECTION / 2 - TRAM_BELLOWS, TRAM_WIDTH / 2  # metres, of a sec
 _BEHIND = np.arange(TRAM_SECTIONS) * TRAM_SECTION  # metres from a tram's front to each section's
 _STANDS = 0.1  # slower is standing, m/s
 _ASKS = 4.0  # metres before a tram that stands from which it asks people to go
+_BESIDE = 0.3  # ... and metres beside its sections, where they will be next
 _NEAR = TRAM_SECTION / 2 + _ASKS + TRAM_WIDTH  # metres from a first section's middle to whom it may ask
 _AT = 0.4  # metres from its stopping point at which a tram has arrived
 
@@ -182,15 +183,22 @@ class Trams:
         return arrived
 
     def _ask_to_go(self) -> None:
-        """Tell the pedestrians before whom a tram stands on its way that it waits for them to go."""
+        """Tell the pedestrians who keep a tram that stands from driving on that it waits for them to go.
+
+        Those before it on its way, and those beside whom its sections would swing out.
+        """
         walkers, shapes, first = self._traffic.pedestrian_state, self._traffic.shapes, self._traffic.vehicles
         walkers.before_tram[:] = False
         for tram in np.flatnonzero((self.front > AWAY) & (self.speed < _STANDS) & (self.dwell == 0.0)).tolist():
             ahead = int(max(self.front[tram], 0.0) / STEP) + 1
             points = self.tracks[int(self.line_of[tram])].across[ahead : ahead + int(_ASKS / STEP)]
-            near = np.flatnonzero(np.hypot(*(self._poses[tram, 0, :2, None] - [shapes.x, shapes.y])) < _NEAR)
+            poses = self._sections_at(tram, self.front[tram] + STEP)
+            sides = outlines(poses, inside_city(poses, self._half))
+            away = np.hypot(*(self._poses[tram, :, :2, None] - [shapes.x, shapes.y]).swapaxes(0, 1)).min(axis=0)
+            near = np.flatnonzero(away < _NEAR)
             near = near[near >= first]
-            found = in_way(points, np.column_stack([shapes.x[near], shapes.y[near]]), ACROSS_REACH + RADIUS)
+            people = np.column_stack([shapes.x[near], shapes.y[near]])
+            found = in_way(points, people, ACROSS_REACH + RADIUS) | in_way(sides, people, RADIUS + _BESIDE)
             walkers.before_tram[near[found] - first] = True
 
     def _come_in(self, now: float) -> None:
