@@ -100,10 +100,10 @@ def falls(run: Run) -> dict[str, Any]:
     counted: Counter[str] = Counter()
     down: dict[str, int] = {}
     for event in run.events:
-        if event["kind"] in _DOWN:
-            counted[event["kind"]] += 1
+        if event["kind"] == "robot" and event["text"] in _DOWN:
+            counted[event["text"]] += 1
             name = str(event["agent"])
-            down.pop(name, None) if event["kind"] == "recovered" else down.setdefault(name, event["step"])
+            down.pop(name, None) if event["text"] == "recovered" else down.setdefault(name, event["step"])
     return {**{kind: counted[kind] for kind in _DOWN}, "still down": down}
 
 

@@ -10,7 +10,8 @@ from vico.rules import TRAM_SECTION, TRAM_WIDTH
 from vico.sim.bodies import Bodies
 
 _NOWHERE = 1e9  # metres, x of who is not there
-_ALONG, _ACROSS = 24, 8  # points on a section's sides and ends: so close that nobody fits between
+# Points on a section's sides and ends, 0.25 m apart: nobody of 0.25 m reaches in between them, `_TOUCH` kept, unseen.
+_ALONG, _ACROSS = 35, 11
 
 
 def packed(bodies: Bodies) -> NDArray[np.float64]:
