@@ -43,7 +43,7 @@ def test_the_heuristic_delivers_what_is_near_enough(helsinki: World, few: Commun
     # wanted is seen from the door.
     steps = 240
     tasks = [generate_delivery(helsinki, seed=seed, steps=steps) for seed in range(8)]
-    nearest = sorted(tasks, key=metres_of_the_first_errand)[:3]
+    nearest = sorted(tasks, key=metres_of_the_first_errand)[:4]
     results = (run_episode(helsinki, few, task, method="heuristic") for task in reversed(nearest))
     result = next(result for result in results if result.success[0])
     assert [step is not None for step in result.done_at] == result.success
