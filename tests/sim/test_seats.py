@@ -274,40 +274,6 @@ def test_a_thing_on_a_chair_keeps_people_off_it() -> None:
     assert replace(state.seats).lies.sum() == 2
 
 
-def test_who_cannot_get_up_for_somebody_waits_a_while_and_that_one_moves_on() -> None:
-    # The bed stands in a lane, and can be left through a gap alone, before which somebody stands with nothing to do.
-    beside = [_piece("bookcase", 1.2, 9.07, 0.0, (0.7, 0.2, 2.0), "r_back")]
-    beside += [_piece("bookcase", 2.6, 9.07, 0.0, (0.8, 0.2, 2.0), "r_back")]
-    fence = [_piece("wardrobe", 0.65, 8.6, 0.0, (0.3, 1.14, 2.0), "r_back")]
-    fence += [_piece("bookcase", 1.75, 10.05, 0.0, (2.5, 0.3, 2.0), "r_back")]
-    sim = _asleep([_bed(1.9, 8.5, 0.0), *beside, *fence], people=2)
-    people, p = sim.community, sim.state.people
-    assert people is not None
-    public_map = PublicMap.from_world(sim.world)
-    awake = [toy_city.item("main", "00:00:00", "23:59:59", toy_city.CAFE)]
-    night = people.residents[1].schedule
-    gets_up, stands = (
-        ScheduleFollower(one.model_copy(update={"schedule": day}), public_map)
-        for one, day in zip(people.residents, (awake, night), strict=True)
-    )
-    assert p.posture.tolist() == [Posture.LYING, Posture.STANDING]
-    place_in_room(1, sim.state.indoor.index["r_back"], sim.state, near=np.array([1.9, 9.5]))
-    p.position[1, :2] = 1.9, 9.5
-    (observations, infos), tries = sim.observe(), 0
-    for _ in range(20):
-        actions = {
-            "resident_0": gets_up.act(observations["resident_0"], infos["resident_0"]),
-            "resident_1": stands.act(observations["resident_1"], infos["resident_1"]),
-        }
-        tries += actions["resident_0"]["type"] == "wake"
-        step = sim.step(actions)
-        observations, infos = step.observations, step.infos
-        if p.posture[0] != Posture.LYING:
-            break
-    assert p.posture[0] == Posture.STANDING
-    assert tries == 2
-
-
 def test_all_beds_of_homes_can_be_got_out_of(helsinki: World) -> None:
     # Before, furniture cut one in twenty off from the door: half of the bunks in narrow children's rooms.
     homes = [place.model_copy(update={"rooms": []}) for place in helsinki.places if place.kind == "apartments"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,8 +17,6 @@ _HIT_SOLID = code_name(ReasonCode.HIT_SOLID)
 _ALIGNED = math.radians(8.0)
 _REMEMBERED = 6  # rooms
 _REACH_OF_BUMPS = 0.4  # metres ahead of one's middle is what stopped a step
-# Who gets past others makes for a point of the way this far off, metres, so far from them, and so near to it.
-_BEYOND, _WITHIN, _CLEAR_OF_OTHERS, _NEAR_IT = 1.8, 2.8, 0.8, 0.3
 
 
 class IndoorWalker:
@@ -82,25 +79,6 @@ class IndoorWalker:
         if abs(turn) > _ALIGNED:
             return {"type": "turn_left" if turn > 0 else "turn_right", "degrees": abs(math.degrees(turn))}
         return {"type": "move_forward", "distance": max(0.1, min(_STRIDE, math.dist(position, aim)))}
-
-    def on_the_way(
-        self, observation: Observation, target: ArrayLike, *, near: float, others: Sequence[tuple[float, float]]
-    ) -> tuple[tuple[float, float], float]:
-        """Return a point of the way beyond some people near by, ENU metres, and how near to it will do, metres."""
-        position = np.asarray(observation["pose"], np.float64)[:2]
-        goal = np.asarray(target, np.float64)[:2]
-        route = self._grid_of(observation).route(position, goal, near=near * 0.9)
-        found = None
-        for x, y in route.tolist():
-            away = math.dist((x, y), position)
-            if away > _WITHIN:
-                break
-            if away >= _BEYOND and all(math.dist((x, y), other) >= _CLEAR_OF_OTHERS for other in others):
-                return (x, y), _NEAR_IT
-            found = (x, y)
-        if found is None or math.dist(position, goal) <= _WITHIN:
-            return (float(goal[0]), float(goal[1])), near
-        return found, _NEAR_IT
 
     def _grid_of(self, observation: Observation) -> DepthGrid:
         """Return the grid of the room one is in; what it holds was known before where one was there before."""

@@ -227,7 +227,7 @@ class DepthGrid:
         first = tuple(((a - self.corner) / self.cell).astype(int))
         aim = (b - self.corner) / self.cell
         reach = near / self.cell
-        return self.corner + (cells_to(blocked, first, aim, reach) + 0.5) * self.cell
+        return self.corner + (_a_star(blocked, first, aim, reach) + 0.5) * self.cell
 
     def _grown(self, radius: float) -> NDArray[np.bool_]:
         solid = self._bumps if self._hits is None else (self._hits >= 3) | self._bumps
@@ -249,18 +249,10 @@ def _within(box: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.floa
     )
 
 
-def cells_to(
+def _a_star(
     blocked: NDArray[np.bool_], start: tuple[int, ...], aim: NDArray[np.float64], reach: float
 ) -> NDArray[np.int64]:
-    """Return the cells ``(x, y)`` of a way from start (left out) to the first within reach of the aim, ``(k, 2)``.
-
-    Parameters
-    ----------
-    blocked
-        Cells that are not walked over, by row and column, shape ``(n, n)``; a start in one may be left.
-    aim, reach
-        In cells, the first one's corner being ``(0, 0)``.
-    """
+    """Cells ``(x, y)`` from start (left out) to the first one within reach of the aim, shape ``(k, 2)``."""
     n = blocked.shape[0]
     x, y = int(start[0]), int(start[1])
     if not (0 <= x < n and 0 <= y < n):

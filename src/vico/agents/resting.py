@@ -8,7 +8,6 @@ from typing import Literal
 
 from vico.agents.base import Action, Info, Observation
 from vico.agents.state import AgentState
-from vico.rules import ReasonCode, code_name
 
 Rest = Literal["sit", "lie"]
 #: Return the next action on the way to a point, None within some metres of it: the point, those metres, and what is
@@ -21,9 +20,6 @@ _REFUSALS = 3
 # Who was not asked for so long begins anew.
 _FORGOTTEN = 30.0
 _BEFORE_SEAT, _AT_DOOR = 0.3, 0.9
-# Who can't get up for somebody stands up again after so many seconds, twice as long each time, and at most so long.
-_WAIT, _LONGEST_WAIT = 5.0, 60.0
-_NO_FREE_SPOT = code_name(ReasonCode.NO_FREE_SPOT)
 _VERBS = {"sit": "sit", "lie": "sleep"}
 
 
@@ -90,37 +86,3 @@ class SeatSeeker:
         if found["door"]:
             return {"type": "enter", "place": found["door"]}
         return {"type": _VERBS[rest], "target": found["entity"]}
-
-
-class GettingUp:
-    """When to try to get up: at once, and after a while where somebody stands in the way, who may move on meanwhile."""
-
-    def __init__(self) -> None:
-        self._asked = self._not_before = -math.inf
-        self._tries = 0
-
-    def state(self) -> AgentState:
-        """Return all it remembers."""
-        times = [None if math.isinf(time) else time for time in (self._asked, self._not_before)]
-        return {"times": times, "tries": self._tries}
-
-    def restore(self, state: AgentState) -> None:
-        """Remember what `state` returned."""
-        self._asked, self._not_before = (-math.inf if time is None else float(time) for time in state["times"])
-        self._tries = int(state["tries"])
-
-    def tries_now(self, observation: Observation) -> bool:
-        """Return whether to try in the coming second."""
-        state = observation["state"]
-        time: float = state["time"]
-        if time < self._not_before:
-            return False
-        just_asked = 0.0 < time - self._asked <= 1.0
-        if just_asked and state["action_status"] == "refused" and state["action_code"] == _NO_FREE_SPOT:
-            self._not_before = time + min(_WAIT * 2**self._tries, _LONGEST_WAIT)
-            self._tries = min(self._tries + 1, 8)
-            return False
-        if time - self._not_before > _LONGEST_WAIT:
-            self._tries = 0
-        self._asked = time
-        return True

@@ -11,9 +11,9 @@ from vico.agents.base import Action, Info, Observation
 from vico.agents.buying import Buyer
 from vico.agents.change_of_plans import ChangeOfPlans
 from vico.agents.conversation import Acquaintance, Conversation, Speaker
-from vico.agents.indoor_steps import IndoorSteps
+from vico.agents.indoor_walk import IndoorWalker
 from vico.agents.residents import Residents
-from vico.agents.resting import GettingUp, SeatSeeker
+from vico.agents.resting import SeatSeeker
 from vico.agents.serving import Clerk
 from vico.agents.state import AgentState, generator_state, restore_generator
 from vico.agents.stays import Item, Stay, stays_of, with_ways
@@ -42,6 +42,8 @@ _BUYING = ("shop", "meal_out")
 _SERVING = ("work",)
 # One looks out of the window again after so many seconds, if nothing happens before: in snow one sets out earlier.
 _LOOK_OUT = 900.0
+# How often who is stopped indoors steps aside instead of trying again.
+_GIVE_WAY = 0.5
 _STROLL_SPEED, _RUN_SPEED = 0.9, 1.9
 
 
@@ -88,13 +90,13 @@ class ScheduleFollower:
         self._rng = generator
         self._walker = Walker(public_map, generator)
         self._traveller = Traveller(public_map, generator)
-        self._indoors = IndoorSteps(resident.id, generator)
+        self._indoors = IndoorWalker()
         self._seeker = SeatSeeker(self._step_towards)
         self._buyer = Buyer(self._step_towards)
         self._clerk = Clerk(self._step_towards)
-        self._getting_up = GettingUp()
         # Whether it is about to sit down.
         self._seeks = False
+        self._aside: list[Action] = []
         self._conversation = Conversation(resident, known, generator)
         self._posture = "standing"
         self._changes = ChangeOfPlans(public_map, self._stays, seed=seed, name=resident.id, age=resident.age)
@@ -145,11 +147,11 @@ class ScheduleFollower:
             "traveller": self._traveller.state() if self._traveller.plans else None,
             "indoors": self._indoors.state(),
             "seeker": self._seeker.state(),
-            "getting_up": self._getting_up.state(),
             "buyer": self._buyer.state(),
             "clerk": self._clerk.state(),
             "seeks": self._seeks,
             "conversation": self._conversation.state(),
+            "aside": [dict(action) for action in self._aside],
             "posture": self._posture,
             "tried": sorted(self._tried),
             "arrived": None if arrived is None else self._stays.index(arrived),
@@ -171,12 +173,12 @@ class ScheduleFollower:
             self._traveller.restore(state["traveller"])
         self._indoors.restore(state["indoors"])
         self._seeker.restore(state["seeker"])
-        self._getting_up.restore(state["getting_up"])
         self._buyer.restore(state["buyer"])
         self._clerk.restore(state["clerk"])
         self._seeks = bool(state["seeks"])
         self._conversation.restore(state["conversation"])
         arrived, stroll = state["arrived"], state["stroll"]
+        self._aside = [dict(action) for action in state["aside"]]
         self._posture, self._tried = state["posture"], set(state["tried"])
         self._arrived, self._arrived_at = None if arrived is None else self._stays[arrived], str(state["arrived_at"])
         self._stroll = None if stroll is None else (float(stroll[0]), float(stroll[1]))
@@ -201,7 +203,7 @@ class ScheduleFollower:
                 return line
         if self._is_there(observation, place):
             return self._stay(observation, info, stay, place)
-        up = self._get_up(observation)
+        up = self._get_up()
         if up is not None:
             return up
         return self._leave(observation, info) if state["room"] else self._walk(observation, info, stay, place)
@@ -234,7 +236,7 @@ class ScheduleFollower:
         time = observation["state"]["time"]
         if place.building is not None or stay.tag not in (*_STROLLING, *_RUNNING):
             return self._live(stay, observation, info)
-        up = self._get_up(observation)
+        up = self._get_up()
         if up is not None:
             return up
         if time < self._paused_until:
@@ -262,12 +264,10 @@ class ScheduleFollower:
         if stay.type == "sleep":
             return self._sleep(observation, info)
         if self._posture == "lying":
-            return self._rise(observation)
+            return self._become("standing")
         step = self._business(stay, observation, info)
         if step is not None:
-            return step if self._posture != "sitting" else self._rise(observation)
-        if (step := self._make_room(observation, info)) is not None:
-            return step
+            return step if self._posture != "sitting" else self._become("standing")
         eats = stay.type == "meal" or stay.tag in _EATING
         if self._posture == "sitting":
             self._seeks = False
@@ -281,7 +281,7 @@ class ScheduleFollower:
             return self._rest(time, second + _EAT_EVERY - tick % _EAT_EVERY, bite or "wait")
         if tick % _MOVE_EVERY == 0 and self._rng.random() < 0.5:
             if self._posture == "sitting":
-                return self._rise(observation)
+                return self._become("standing")
             self._seeks = True
             return {"type": "wait"}
         rest = second + min(_MOVE_EVERY - tick % _MOVE_EVERY, _DRINK_EVERY - tick % _DRINK_EVERY)
@@ -295,8 +295,7 @@ class ScheduleFollower:
         if stay.tag not in _SERVING:
             return None
         step = self._clerk.towards(errand, observation, info)
-        # Who waits on the way there, for somebody to pass, is asked again.
-        if step is not None and self._clerk.serves and step["type"] == "wait":
+        if step == {"type": "wait"}:
             time: float = observation["state"]["time"]
             return self._rest(time, time + _MOVE_EVERY)
         return step
@@ -306,8 +305,6 @@ class ScheduleFollower:
         time: float = observation["state"]["time"]
         if self._posture == "lying":
             return self._rest(time, math.inf)
-        if (step := self._make_room(observation, info)) is not None:
-            return step
         step = self._seeker.towards("lie", observation, info)
         if step is None and self._posture == "standing":
             step = self._seeker.towards("sit", observation, info)
@@ -315,11 +312,6 @@ class ScheduleFollower:
             return step
         later = self._seeker.again("lie")
         return self._rest(time, later if self._posture == "sitting" else min(later, self._seeker.again("sit")))
-
-    def _make_room(self, observation: Observation, info: Info) -> Action | None:
-        """Move on who only stands in a room where somebody wants to pass, or to get up."""
-        standing = self._posture == "standing" and observation["state"]["room"]
-        return self._indoors.make_room(observation, info) if standing else None
 
     def _rest(self, time: float, until: float, now: str = "wait") -> Action:
         """Wait, maybe after a sip or a bite, and say until when nothing else will come of being asked."""
@@ -349,12 +341,8 @@ class ScheduleFollower:
             return {"type": "stand"}
         return {"type": "sit" if posture == "sitting" else "sleep"}
 
-    def _get_up(self, observation: Observation) -> Action | None:
-        return None if self._posture == "standing" else self._rise(observation)
-
-    def _rise(self, observation: Observation) -> Action:
-        """Stand up, or wait until whoever stands in the way may have moved on."""
-        return self._become("standing") if self._getting_up.tries_now(observation) else {"type": "wait"}
+    def _get_up(self) -> Action | None:
+        return None if self._posture == "standing" else self._become("standing")
 
     def _leave(self, observation: Observation, info: Info) -> Action:
         """Walk to the door that leads out, and through it."""
@@ -383,7 +371,15 @@ class ScheduleFollower:
         state = observation["state"]
         if not state["room"]:
             return self._walker.towards((float(point[0]), float(point[1])), _STROLL_SPEED, observation, info)
-        return self._indoors.towards(point, near, observation, info)
+        if self._aside:
+            return self._aside.pop()
+        if state["action_status"] == "collision" and self._rng.random() < _GIVE_WAY:
+            # Two who want past each other would push for ever: a step aside, somewhere.
+            self._aside = [{"type": "move_forward", "distance": float(self._rng.uniform(0.3, 0.8))}]
+            side = "turn_left" if self._rng.random() < 0.5 else "turn_right"
+            return {"type": side, "degrees": float(self._rng.uniform(60.0, 170.0))}
+        self._indoors.notice(observation, info)
+        return self._indoors.towards(observation, point, near=near)
 
     def _walk(self, observation: Observation, info: Info, stay: Stay, place: PublicPlace) -> Action:
         self._arrived = None

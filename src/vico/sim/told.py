@@ -13,7 +13,6 @@ from vico.crowd import Crowd
 from vico.rules import ActionStatus, code_name
 from vico.sim.bodies import RESIDENT, Bodies
 from vico.sim.city import ANNOUNCED, has_news, known_events
-from vico.sim.hindrances import Hindrances
 from vico.sim.moves import eye_height
 from vico.sim.perception import OUTDOORS, AllInView, Eyes, in_view, opaque_grid
 from vico.sim.queues import place_in_line
@@ -110,7 +109,6 @@ class Told:
         self._in_view = look_about(state, stances, self._residents)
         self._seats_taken: NDArray[np.bool_] | None = None
         self._tills = _Tills(state)
-        self._hindrances = Hindrances(state)
         self._weather = state.environment.record()
         self._signals = state.traffic.signals_shown() if state.traffic is not None else None
         asks = range(people) if state.openings is not None else ()
@@ -147,10 +145,6 @@ class Told:
                 found["till"] = till
             if (counter := self._tills.counter_of(i, inside)) is not None:
                 found["counter"] = counter
-        if i in self._hindrances.stopped_by:
-            found["stopped_by"] = self._hindrances.stopped_by[i]
-        if i in self._hindrances.in_the_way_of:
-            found["in_the_way_of"] = self._hindrances.in_the_way_of[i]
         if i not in self._eyes_of:
             return found
         view = self._in_view.of(self._eyes_of[i])
@@ -182,7 +176,7 @@ class Told:
         # What is going on in the city may concern them, too.
         if has_news(self._state):
             heard[:] = True
-        heard[[*self._closed, *self._hindrances.in_the_way_of]] = True
+        heard[list(self._closed)] = True
         heard[[i for i, known in self._events.items() if any(one["known"] != ANNOUNCED for one in known)]] = True
         view = self._in_view
         # The first bodies are the people's, in their order; who else is in view is no agent one would speak to.
