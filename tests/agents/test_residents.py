@@ -76,7 +76,7 @@ def test_a_hundred_residents_of_helsinki(helsinki: World, hundred: Community, st
     config = SimConfig(start=int(start * 3600), observe=(), cars=20, pedestrians=20)
     asked, types = together_and_alone(helsinki, hundred, config, 160)
     assert {usual, "wait", "drink"} <= types
-    assert asked < 0.27  # a quarter, in homes as they are furnished now
+    assert asked < 0.25
 
 
 @pytest.fixture(scope="module")
