@@ -17,6 +17,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import shapely
 from PIL import Image, ImageDraw, ImageFont
 
 from vico.agents.indoor_walk import IndoorWalker
@@ -48,6 +49,7 @@ ROBOTS = ("manipulator", "husky", "go2", "h1", "drone")
 PASSENGERS, ROAD = 6, (CROSSING, ROADWAY)
 SOON = 600  # seconds within which the bus of the ride is to come
 SEARCH = 180  # seconds of a walk of which the best part is shown
+MORNING = 1200  # seconds of a morning, likewise
 CAMERA = 4.2  # metres that a camera may be away
 PARCEL = (0.12, 0.18, 0.2)
 AUTUMN = {"date": "2026-10-20", "utc_offset": 3.0}
@@ -64,18 +66,18 @@ class Scene:
     Attributes
     ----------
     caption
-        What is written below it.
+        What is written below it; ``{}`` is the name of who is followed.
     start
         Second of the day at which its run begins.
     follow, views
         Who is seen, and from where (`vico.viewer.follow.VIEWS`): one shot each, equally long. `follow` may be told by
-        how things are as the scene begins.
+        how things are as the scene begins; of several, whoever has the best part is seen.
     seconds
         How long it is.
     begins
         Whether it may begin, asked in every second of the run.
     search, worth
-        For how many seconds after that the best part is sought, and what makes a second worth seeing.
+        For how many seconds after that the best part is sought, and what makes a second of somebody worth seeing.
     config
         What its run has of its own.
     setup
@@ -86,12 +88,12 @@ class Scene:
 
     caption: str
     start: float
-    follow: str | Callable[[Simulation], str]
+    follow: str | tuple[str, ...] | Callable[[Simulation], str]
     views: tuple[str, ...] = ("behind",)
     seconds: int = 17
     begins: Callable[[Simulation], bool] = lambda sim: sim.metrics.steps >= 10
     search: int = 0
-    worth: Callable[[Simulation], float] = lambda sim: 0.0
+    worth: Callable[[Simulation, str], float] = lambda sim, name: 0.0
     config: dict = field(default_factory=dict)
     setup: Callable[[Simulation], None] = lambda sim: None
     players: dict = field(default_factory=dict)
@@ -101,27 +103,28 @@ class UntilPlayed(Hook):
     """Notes what the seconds of a scene are worth, and ends its run once it has been played, or an hour has passed."""
 
     def __init__(self, scene: Scene, sim: Simulation) -> None:
-        self.scene, self.sim, self.begun, self.follow = scene, sim, -1, scene.follow
-        self.worth: list[float] = []
+        self.scene, self.sim, self.begun = scene, sim, -1
+        self.cast: tuple[str, ...] = ()
+        self.worth: list[list[float]] = []
 
     def stepped(self, step: Step) -> None:
         """Look whether it begins or is over."""
         if self.begun < 0 and self.scene.begins(self.sim):
-            self.begun = step.number
-            self.follow = self.follow if isinstance(self.follow, str) else self.follow(self.sim)
+            follow = self.scene.follow if isinstance(self.scene.follow, (str, tuple)) else self.scene.follow(self.sim)
+            self.begun, self.cast = step.number, (follow,) if isinstance(follow, str) else follow
         if self.begun < 0:
             return
-        self.worth.append(self.scene.worth(self.sim))
+        self.worth.append([self.scene.worth(self.sim, name) for name in self.cast])
         if step.number >= self.begun + self.scene.search + self.scene.seconds:
             raise Enough
 
-    @property
-    def first(self) -> int:
-        """Step at which the best part begins; -1 where the scene did not come about."""
+    def best(self) -> tuple[int, str]:
+        """Return the step at which the best part begins, and who is seen; -1 where the scene did not come about."""
         if len(self.worth) <= self.scene.seconds:
-            return -1
-        sums = np.convolve(self.worth, np.ones(self.scene.seconds + 1), "valid")
-        return self.begun + int(np.argmax(sums))
+            return -1, ""
+        parts = np.lib.stride_tricks.sliding_window_view(np.array(self.worth), self.scene.seconds + 1, axis=0)
+        first, who = np.unravel_index(int(np.argmax(parts.sum(axis=-1))), parts.shape[:2])
+        return self.begun + int(first), self.cast[who]
 
 
 class Passenger:
@@ -291,8 +294,10 @@ def anybody(resident, stay: Stay) -> bool:
     return True
 
 
-def on_the_way(community: Community, world: World, early: str, late: str, wanted: Callable) -> tuple[str, Stay]:
-    """Return who has the longest walk that begins between two hours, and to which stay; best to where others are."""
+def ways_between(
+    community: Community, world: World, early: str, late: str, wanted: Callable
+) -> list[tuple[float, str, Stay]]:
+    """Return the walks that begin between two hours: how long, whose, and to which stay; the longest first."""
     first, last = (int(hour[:2]) * 3600 + int(hour[3:]) * 60 for hour in (early, late))
     found = []
     for resident in community.residents:
@@ -302,14 +307,41 @@ def on_the_way(community: Community, world: World, early: str, late: str, wanted
                 found.append((way(resident, world, stay, before.place), resident.id, stay))
     if not found:
         raise SystemExit(f"nobody of the community is on such a way between {early} and {late}; take more residents")
-    _, name, stay = max(found, key=lambda one: (one[0], one[1]))
+    return sorted(found, key=lambda one: (-one[0], one[1]))
+
+
+def on_the_way(community: Community, world: World, early: str, late: str, wanted: Callable) -> tuple[str, Stay]:
+    """Return who has the longest walk that begins between two hours, and to which stay."""
+    _, name, stay = ways_between(community, world, early, late, wanted)[0]
     return name, stay
 
 
-def liveliness(name: str) -> Callable[[Simulation], float]:
-    """Return how much goes on around somebody outdoors: who moves near by, with room for a camera before and behind."""
+class Sunshine:
+    """Says where the sun shines, from the heights of the houses."""
 
-    def worth(sim: Simulation) -> float:
+    def __init__(self, world: World) -> None:
+        self.houses = [shapely.Polygon(house.footprint[0]) for house in world.buildings]
+        self.tops = np.array([house.base + house.height for house in world.buildings])
+        self.tree = shapely.STRtree(self.houses)
+
+    def at(self, point: np.ndarray, sun: np.ndarray) -> bool:
+        """Whether it shines on a point, ENU metres; `sun` is the unit vector to it."""
+        flat = float(np.hypot(*sun[:2]))
+        if sun[2] < 0.05:
+            return False
+        ray = shapely.LineString([point[:2], point[:2] + sun[:2] / flat * 80.0])
+        here = shapely.Point(point[:2])
+        return not any(
+            self.tops[k] > point[2] + sun[2] / flat * here.distance(self.houses[k].intersection(ray))
+            for k in self.tree.query(ray, "intersects")
+        )
+
+
+def liveliness(world: World) -> Callable[[Simulation, str], float]:
+    """Return how much goes on around somebody outdoors: who moves near by, with room for a camera before and behind."""
+    sunshine = Sunshine(world)
+
+    def worth(sim: Simulation, name: str) -> float:
         people, bodies = sim.state.people, sim.state.obstacles()
         i = people.names.index(name)
         if people.room[i] >= 0 or people.vehicle[i] != 0:
@@ -330,24 +362,22 @@ def liveliness(name: str) -> Callable[[Simulation], float]:
             lively -= 3.0
         # Beyond the edge of the world there is a bare plain.
         lively -= 0.03 * max(150.0 - float(sim.world.half - np.abs(people.position[i, :2]).max()), 0.0)
+        if sunshine.at(people.position[i], sim.state.environment.sky.sun(float(sim.state.second))):
+            lively += 2.0
         walks = float(np.hypot(*people.velocity[i])) > 0.5
         return lively if walks else lively - 2.0
 
     return worth
 
 
-def business(name: str) -> Callable[[Simulation], float]:
+def business(sim: Simulation, name: str) -> float:
     """Return whether somebody indoors goes about something, and does not only stand there."""
-
-    def worth(sim: Simulation) -> float:
-        people = sim.state.people
-        i = people.names.index(name)
-        if people.room[i] < 0:
-            return -20.0
-        walks = float(np.hypot(*people.velocity[i])) > 0.3
-        return float(walks or people.action_clip[i] >= 0)
-
-    return worth
+    people = sim.state.people
+    i = people.names.index(name)
+    if people.room[i] < 0:
+        return -20.0
+    walks = float(np.hypot(*people.velocity[i])) > 0.3
+    return float(walks or people.action_clip[i] >= 0)
 
 
 def outdoors(name: str, seconds: int) -> Callable[[Simulation], bool]:
@@ -429,16 +459,22 @@ class Casting:
     ) -> Scene:
         """Return a scene of somebody on the way."""
         name, stay = on_the_way(self.community, self.world, early, late, wanted)
-        called = next(one.name for one in self.community.residents if one.id == name)
         start = stay.leave - 20
-        begins, worth = outdoors(name, after), liveliness(name)
-        return Scene(
-            caption.format(called), start, name, views, begins=begins, search=SEARCH, worth=worth, config=config
-        )
+        begins, worth = outdoors(name, after), liveliness(self.world)
+        return Scene(caption, start, name, views, begins=begins, search=SEARCH, worth=worth, config=config)
 
     def street(self) -> Scene:
-        """Return the morning."""
-        return self.walk("07:40", "09:30", "Morning: {} walks to work", works, after=20, pedestrians=360)
+        """Return the morning, of whoever of those on the way walks where most goes on."""
+        ways = ways_between(self.community, self.world, "08:30", "09:30", anybody)
+        return Scene(
+            "Morning: {} is on the way",
+            9 * 3600,
+            tuple(sorted({name for _, name, _ in ways})),
+            ("front", "behind"),
+            search=MORNING,
+            worth=liveliness(self.world),
+            config={"pedestrians": 360},
+        )
 
     def school(self) -> Scene:
         """Return a child on the way to school."""
@@ -471,7 +507,7 @@ class Casting:
             scene,
             views=("behind", "front"),
             begins=arrived(scene.follow, stay.place),
-            worth=business(scene.follow),
+            worth=business,
             config=scene.config | {"assistants": 1},
             setup=keeper.setup,
             players={"assistant_0": keeper},
@@ -530,9 +566,10 @@ def play(scene: Scene, out: Path, world: World, community: Community, seed: int)
         with suppress(Enough):
             Runner(sim, agents, hooks=[RecordedRun(recorder, faults), played], faults=faults).run(3600)
         recorder.close()
-    if played.first < 0:
+    first, follow = played.best()
+    if first < 0:
         raise SystemExit(f"{scene.caption!r} did not come about within an hour; take another seed, or more residents")
-    return RepeatedRun(read_run(out), world, community, setup=scene.setup), played.first, played.follow
+    return RepeatedRun(read_run(out), world, community, setup=scene.setup), first, follow
 
 
 def shots(repeated: RepeatedRun, scene: Scene, first: int, options: argparse.Namespace) -> Iterator[np.ndarray]:
@@ -582,7 +619,8 @@ def main() -> None:
             continue
         scene = getattr(casting, name)()
         repeated, first, follow = play(scene, arguments.out / name, world, community, arguments.seed)
-        scene = replace(scene, follow=follow)
+        called = {resident.id: resident.name for resident in community.residents}.get(follow, follow)
+        scene = replace(scene, follow=follow, caption=scene.caption.format(called))
         with FilmWriter(arguments.out / f"{name}.mp4", rate=arguments.rate, crf=18, threads=2) as film:
             for frame in captioned(
                 shots(repeated, scene, first, arguments), scene, float(repeated.run.times[first]), arguments.rate

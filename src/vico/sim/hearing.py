@@ -71,11 +71,12 @@ def hearers_of(state: SimulationState, i: int, reach: float) -> Heard:
         places += [(state.robots.names[k], positions[k], float(heights[k])) for k in np.flatnonzero(close).tolist()]
     mouth = p.position[i] + _up(eyes[i])
     found = Heard([], {})
+    vehicles = _driven(state) if outdoors and places else []
     for name, feet, height in places:
         ear = feet + _up(height)
         level = voice - 20.0 * math.log10(max(float(np.linalg.norm(ear - mouth)), 1.0))
         behind = outdoors and not is_clear(mouth, ear, opaque_grid(state.world))
-        noise = noise_at(state, ear) if outdoors else _BUS if p.room[i] < 0 else _ROOM
+        noise = _noise(state, vehicles, ear) if outdoors else _BUS if p.room[i] < 0 else _ROOM
         if level - (_CORNER if behind else 0.0) - noise >= UNDERSTOOD:
             found.hearers.append(name)
         else:
@@ -85,6 +86,10 @@ def hearers_of(state: SimulationState, i: int, reach: float) -> Heard:
 
 def noise_at(state: SimulationState, place: NDArray[np.float64]) -> float:
     """Return how loud it is somewhere outdoors, dB: the street, vehicles, rain and wind."""
+    return _noise(state, _driven(state), place)
+
+
+def _noise(state: SimulationState, vehicles: list[Bodies], place: NDArray[np.float64]) -> float:
     weather = state.environment.weather
     # Rain drums, and wind blows round the ears: a rough fit, 58 dB in 20 mm/h, 61 dB in 17 m/s.
     levels = [
@@ -94,10 +99,8 @@ def noise_at(state: SimulationState, place: NDArray[np.float64]) -> float:
     ]
     for one, loud in state.environment.agenda.effects.noises:
         levels.append(heard_from(loud, float(np.linalg.norm(one.middle - place))))
-    if state.traffic is not None:
-        levels += _of_vehicles(state.traffic.bodies(), place)
-    if state.transit is not None:
-        levels += _of_vehicles(state.transit.bodies(), place)
+    for bodies in vehicles:
+        levels += _of_vehicles(bodies, place)
     return 10.0 * math.log10(sum(10.0 ** (level / 10.0) for level in levels))
 
 
@@ -106,12 +109,17 @@ def heard_from(loud: float, away: float) -> float:
     return loud - 20.0 * math.log10(max(away, _NEAREST) / 10.0)
 
 
+def _driven(state: SimulationState) -> list[Bodies]:
+    """Return the cars, buses and trams."""
+    found = [owner.bodies() for owner in (state.traffic, state.transit) if owner is not None]
+    return [bodies.where(np.isin(bodies.kind, (CAR, BUS, TRAM))) for bodies in found]
+
+
 def _of_vehicles(bodies: Bodies, place: NDArray[np.float64]) -> list[float]:
     """Return how loud each vehicle that is near is there, dB."""
-    driven = (bodies.kind == CAR) | (bodies.kind == BUS) | (bodies.kind == TRAM)
     away = np.linalg.norm(bodies.position - place, axis=1)
     levels = []
-    for k in np.flatnonzero(driven & (away < _FAR)).tolist():
+    for k in np.flatnonzero(away < _FAR).tolist():
         speed = max(float(np.hypot(*bodies.velocity[k])), 0.1)
         level = max(_CAR + 30.0 * math.log10(speed / _PASSING_SPEED), _ENGINE)
         level += _BUS_MORE if bodies.kind[k] in (BUS, TRAM) else 0.0

@@ -86,9 +86,12 @@ def search(grid, x, y, reach, buffer):  # type: ignore[no-untyped-def]
             for at in range(grid.start[b], grid.start[b + 1]):
                 k = grid.order[at]
                 if grid.column[k] == column and grid.row[k] == row:
-                    buffer[n] = k
+                    # What is done with neighbours may depend on their order, and must not depend on the hash. They
+                    # are few, and those of a cell come in order: sorted at once.
+                    at_place = n
+                    while at_place > 0 and buffer[at_place - 1] > k:
+                        buffer[at_place] = buffer[at_place - 1]
+                        at_place -= 1
+                    buffer[at_place] = k
                     n += 1
-    found = buffer[:n]
-    # What is done with neighbours may depend on their order, and must not depend on the hash.
-    found.sort()
-    return found
+    return buffer[:n]

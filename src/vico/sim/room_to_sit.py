@@ -34,7 +34,7 @@ def _standing_in(room: int, i: int, state: SimulationState) -> Bodies:
         return everybody.where(~np.isin(everybody.entity, p.entity[p.seat >= 0]))
     standing = (p.room == room) & (p.seat < 0)
     standing[i] = False
-    bodies = p.bodies_of(np.flatnonzero(standing))
+    parts = [p.bodies_of(np.flatnonzero(standing))] if standing.any() else []
     if state.robots is not None and (state.robots.rooms == room).any():
-        bodies = Bodies.joined([bodies, state.robots.bodies().where(state.robots.rooms == room)])
-    return bodies
+        parts.append(state.robots.bodies().where(state.robots.rooms == room))
+    return Bodies.joined(parts)

@@ -65,7 +65,7 @@ class JunctionExit(NamedTuple):
     far: float
 
 
-@compiled
+@compiled(forceinline=True)
 def next_junction_request(net, vehicle, stop_distance, braking_distance, path_ends):  # type: ignore[no-untyped-def]
     """Return the first junction within the braking distance, and before its stop, that a vehicle was not let into."""
     index = NONE
@@ -197,7 +197,7 @@ def may_enter_junction(net, fleet, junctions, vehicle, request, leave, view):  #
     return not lets_out or _way_is_free(vehicle, leave, view, len(fleet))
 
 
-@compiled
+@compiled(forceinline=True)
 def request_junctions(net, fleet, junctions, vehicle, request, view):  # type: ignore[no-untyped-def]
     """Ask for the junctions ahead; return whether the vehicle has them now."""
     leave = _find_exit(net, junctions, vehicle, request)

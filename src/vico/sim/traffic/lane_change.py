@@ -56,7 +56,7 @@ def _vehicles_on(net, fleet, lane):  # type: ignore[no-untyped-def]
     return count
 
 
-@compiled
+@compiled(forceinline=True)
 def change_to_emptier_lane(net, fleet, vehicle, view):  # type: ignore[no-untyped-def]
     """Move a car to a neighbour lane with fewer vehicles if there is a gap."""
     lane = vehicle.lane

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vico.io.compiled import compiled
 from vico.sim.footprints import Rectangle, point_gap, separation
 from vico.sim.neighbours import NeighbourGrid, search
-from vico.sim.traffic.path import Outline, footprint, point_on_path
+from vico.sim.traffic.path import Outline, axles_at, footprint, footprint_between, point_on_path
 from vico.sim.traffic.shapes import Shapes, share_level, within
 from vico.sim.traffic.state import NONE
 
@@ -83,7 +83,7 @@ def bodies_around(v, x, y, reach, surroundings):  # type: ignore[no-untyped-def]
     return nearby_bodies(shapes, v, x, y, reach, search(grid, x, y, reach, candidates), found)
 
 
-@compiled
+@compiled(forceinline=True)
 def nearby_bodies(shapes, v, x, y, reach, candidates, buffer):  # type: ignore[no-untyped-def]
     """Write those of the candidates within `reach` metres of a point, on body v's level, into `buffer`; return them.
 
@@ -100,9 +100,12 @@ def nearby_bodies(shapes, v, x, y, reach, candidates, buffer):  # type: ignore[n
         if dx * dx + dy * dy < r * r and share_level(shapes, v, j):
             one, rounding = buffer[n], shapes.rounding[j]
             one.x, one.y = sx[j], sy[j]
-            one.cos, one.sin = np.cos(shapes.yaw[j]), np.sin(shapes.yaw[j])
             one.half_length, one.half_width = half[j] - rounding, shapes.half_width[j] - rounding
             one.rounding = rounding
+            if one.half_length == 0.0 and one.half_width == 0.0:  # a disc has no heading
+                one.cos, one.sin = 1.0, 0.0
+            else:
+                one.cos, one.sin = np.cos(shapes.yaw[j]), np.sin(shapes.yaw[j])
             one.radius = np.sqrt(one.half_length**2 + one.half_width**2) + rounding
             one.body = j
             n += 1
@@ -127,7 +130,13 @@ def touched_at(path, outline, front, bodies, vehicle_gap, person_gap, below=ANY_
     Sideways it keeps the given gaps from vehicles and people, metres. Bodies from index `below` on do not count, but
     those as long as a tram's section.
     """
-    cx, cy, c, s = footprint(path, outline, front)
+    return _touched_from(footprint(path, outline, front), outline, bodies, vehicle_gap, person_gap, below)
+
+
+@compiled
+def _touched_from(pose, outline, bodies, vehicle_gap, person_gap, below):  # type: ignore[no-untyped-def]
+    """As `touched_at`, of a vehicle that is where `footprint` says."""
+    cx, cy, c, s = pose
     length, width = outline.length / 2, outline.half_width
     reach = length + width + 0.5
     for k in range(len(bodies)):
@@ -172,10 +181,16 @@ def _near_path(path, outline, front, reach, one):  # type: ignore[no-untyped-def
             break
         ax, ay = path[p].x, path[p].y
         dx, dy = path[p + 1].x - ax, path[p + 1].y - ay
-        t = ((one.x - ax) * dx + (one.y - ay) * dy) / (dx * dx + dy * dy)
+        wx, wy = one.x - ax, one.y - ay
+        size2 = dx * dx + dy * dy
+        is_last = p == len(path) - 2
+        # Farther from the stretch's first point than its length and `close` together: (a + b)^2 <= 2 a^2 + 2 b^2.
+        if not is_last and wx * wx + wy * wy > 2.0 * (size2 + close * close):
+            continue
+        t = (wx * dx + wy * dy) / size2
         # The last stretch goes straight on.
-        t = max(t, 0.0) if p == len(path) - 2 else min(max(t, 0.0), 1.0)
-        ex, ey = one.x - ax - t * dx, one.y - ay - t * dy
+        t = max(t, 0.0) if is_last else min(max(t, 0.0), 1.0)
+        ex, ey = wx - t * dx, wy - t * dy
         if ex * ex + ey * ey < close * close:
             return True, path[p].s + t * (path[p + 1].s - path[p].s) - close - one.radius - 2.0
     return False, 0.0
@@ -210,7 +225,7 @@ def _gap_to(path, outline, front, low, high, one, person_gap, vehicle_gap):  # t
     return low
 
 
-@compiled
+@compiled(forceinline=True)
 def find_leader(view, front, reach, buffer):  # type: ignore[no-untyped-def]
     """Return the gap to the first body on the path and its index; `NO_GAP` and `NONE` without one within `reach`."""
     path, outline, nearby = view.path, view.outline, view.nearby
@@ -233,14 +248,17 @@ def find_leader(view, front, reach, buffer):  # type: ignore[no-untyped-def]
     ahead, beside = buffer[:apart], buffer[apart:m]
     person_gap = outline.person_gap
     x = max(0.0, np.floor(start - front))
+    at = 0, 0
     while x < reach:
         step = _COARSE_STEP if x >= _COARSE_FROM else _FINE_STEP
         x += step
-        hit = touched_at(path, outline, front + x, ahead, _VEHICLE_GAP, person_gap)
+        at = axles_at(path, outline, front + x, at)
+        pose = footprint_between(path, outline, front + x, at)
+        hit = _touched_from(pose, outline, ahead, _VEHICLE_GAP, person_gap, ANY_BODY)
         if hit >= 0:
             one = ahead[hit : hit + 1]
             return _gap_to(path, outline, front, x - step, x, one, person_gap, _VEHICLE_GAP), one[0].body
-        hit = touched_at(path, outline, front + x, beside, TOUCH, TOUCH) if len(beside) > 0 else NONE
+        hit = _touched_from(pose, outline, beside, TOUCH, TOUCH, ANY_BODY) if len(beside) > 0 else NONE
         if hit >= 0:
             one = beside[hit : hit + 1]
             return _gap_to(path, outline, front, x - step, x, one, TOUCH, TOUCH), one[0].body

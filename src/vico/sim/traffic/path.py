@@ -105,7 +105,7 @@ def lane_polyline(net, points, lane, buffer):  # type: ignore[no-untyped-def]
     return buffer[: _append_lane(net, points, lane, 0.0, buffer, 0)]
 
 
-@compiled
+@compiled(forceinline=True)
 def path_polyline(net, vehicle, behind, ahead, buffer):  # type: ignore[no-untyped-def]
     """Lay a vehicle's path, from `behind` metres before its lane's start to `ahead` metres after it, into `buffer`.
 
@@ -146,9 +146,24 @@ def point_on_path(path, s):  # type: ignore[no-untyped-def]
             a = middle
         else:
             b = middle
+    return _point_between(path, a, s)
+
+
+@compiled
+def _point_between(path, a, s):  # type: ignore[no-untyped-def]
+    """As `point_on_path`, where the stretch from point a of the path to the next is that of `s`."""
+    b = a + 1
     dx, dy, size = path[b].x - path[a].x, path[b].y - path[a].y, path[b].s - path[a].s
     share = (s - path[a].s) / size
     return path[a].x + dx * share, path[a].y + dy * share, dx, dy
+
+
+@compiled
+def _stretch_at(path, s, a):  # type: ignore[no-untyped-def]
+    """Return the stretch of a path on which `s` is, by its first point; it is no farther back than stretch a."""
+    while a + 2 < len(path) and path[a + 1].s <= s:
+        a += 1
+    return a
 
 
 @compiled
@@ -161,10 +176,23 @@ def _lateral_offset(outline, s):  # type: ignore[no-untyped-def]
 @compiled
 def footprint(path, outline, front):  # type: ignore[no-untyped-def]
     """Return centre x, y and heading cosine, sine of a vehicle whose front is at s = `front`: its axles follow."""
+    return footprint_between(path, outline, front, axles_at(path, outline, front, (0, 0)))
+
+
+@compiled
+def axles_at(path, outline, front, before):  # type: ignore[no-untyped-def]
+    """Return on which stretches of the path its axles are, front then rear; where it was `before`, or farther on."""
+    a = front - outline.overhang
+    return _stretch_at(path, a, before[0]), _stretch_at(path, a - outline.wheelbase, before[1])
+
+
+@compiled
+def footprint_between(path, outline, front, at):  # type: ignore[no-untyped-def]
+    """As `footprint`, with its axles on stretches that are known: see `axles_at`."""
     a = front - outline.overhang
     b = a - outline.wheelbase
-    ax, ay, adx, ady = point_on_path(path, a)
-    bx, by, bdx, bdy = point_on_path(path, b)
+    ax, ay, adx, ady = _point_between(path, at[0], a)
+    bx, by, bdx, bdy = _point_between(path, at[1], b)
     if outline.lateral_offset != 0.0:
         size = np.sqrt(adx * adx + ady * ady)
         off = _lateral_offset(outline, a) / size

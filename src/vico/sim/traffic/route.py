@@ -145,7 +145,7 @@ def _clear_with(net, lane, clear, room):  # type: ignore[no-untyped-def]
     return net.lanes[lane].length - begin + (clear if begin == 0.0 else 0.0)
 
 
-@compiled
+@compiled(forceinline=True)
 def plan_lanes(net, vehicle, street_load, reach):  # type: ignore[no-untyped-def]
     """Plan lanes until the path is `reach` metres long and ends where it can stand clear of junctions and tracks.
 

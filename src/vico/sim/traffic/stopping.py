@@ -110,7 +110,7 @@ def _place_to_stop_at(net, fleet, vehicle):  # type: ignore[no-untyped-def]
     return NONE
 
 
-@compiled
+@compiled(forceinline=True)
 def choose_place(net, fleet, vehicle):  # type: ignore[no-untyped-def]
     """Have a car that has just come onto a lane stop at a place beside it, or not."""
     k = _place_to_stop_at(net, fleet, vehicle)
@@ -221,7 +221,7 @@ def _holds_up(fleet, vehicle):  # type: ignore[no-untyped-def]
     return False
 
 
-@compiled
+@compiled(forceinline=True)
 def is_behind_delivery(net, fleet, vehicle):  # type: ignore[no-untyped-def]
     """Return whether a car has room to swing out behind a van that makes a delivery ahead on its lane."""
     lane = net.lanes[vehicle.lane]
