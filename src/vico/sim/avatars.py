@@ -38,7 +38,9 @@ _CARRY_LEFT, _CARRY_RIGHT = CLIP["carry_left"], CLIP["carry_right"]
 _ON_A_CHAIR = np.array([CLIP.get(f"sit_{name}", _SIT) for name in CLIPS])
 _ON_A_CHAIR[CLIP["enter_vehicle"]] = CLIP["enter_vehicle"]
 # Motions that are brought to an end, and where in them that is.
-_FINISHED, _DONE = [CLIP[name] for name in ("drink", "eat", "talk")], 0.95
+# Whether a clip is finished once it has begun; that of no clip, -1, is the last.
+_FINISHED = np.isin(np.arange(len(CLIP) + 1), [CLIP[name] for name in ("drink", "eat", "talk")])
+_DONE = 0.95
 _STANDING_UP, _SITTING = int(Posture.STANDING), int(Posture.SITTING)
 _IN_BUS, _ON_BIKE = int(Vehicle.BUS), int(Vehicle.BIKE)
 
@@ -125,7 +127,7 @@ class Avatars:
         p.reason_code[who] = ReasonCode.NONE
         # Who has a cup at the mouth puts it down again, and who has turned to somebody talks, unless they do otherwise.
         begun = (p.clip == _TURN) | ((p.phase > 1.0 - _DONE) & (p.phase < _DONE))
-        goes_on = np.isin(p.action_clip, _FINISHED) & begun
+        goes_on = _FINISHED[p.action_clip] & begun
         p.action_clip[who & ~goes_on & ~through] = -1
 
     def space(self) -> NDArray[np.int32]:

@@ -111,7 +111,13 @@ class Bodies:
 
     def where(self, chosen: NDArray[Any]) -> Bodies:
         """Return the bodies a mask or an index array picks."""
-        return Bodies(*(getattr(self, name)[chosen] for name in self.__dataclass_fields__))
+        return Bodies(*[column[chosen] for column in self._columns()])
+
+    def _columns(self) -> tuple[NDArray[Any], ...]:
+        return (
+            self.entity, self.kind, self.position, self.yaw,
+            self.half_length, self.half_width, self.height, self.velocity,
+        )  # fmt: skip
 
     @classmethod
     def none(cls) -> Bodies:
@@ -127,7 +133,7 @@ class Bodies:
         parts = [part for part in parts if len(part)]
         if len(parts) < 2:
             return parts[0] if parts else cls.none()
-        return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in cls.__dataclass_fields__))
+        return cls(*map(np.concatenate, zip(*[part._columns() for part in parts], strict=True)))
 
 
 @dataclass(frozen=True)

@@ -196,7 +196,7 @@ class MujocoEngine:
 
     def _set_gains(self, robot: int, gains: tuple[float, float] | None) -> None:
         if gains is not None and gains != self._gains_of[robot]:
-            mine = np.isin(self.compiled.servos, self.compiled.robots[robot].servo)
+            mine = self.compiled.servos_of[robot]
             self._parameters.stiffness[mine], self._parameters.damping[mine] = gains
             self._parameters.changed()
             self._gains_of[robot] = gains
@@ -240,7 +240,7 @@ class MujocoEngine:
         self._velocity_before[robot] = 0.0
         self._contacts = self._last_contacts()
         # As stiff as at the beginning, until its controller says otherwise.
-        mine = np.isin(self.compiled.servos, self.compiled.robots[robot].servo)
+        mine = self.compiled.servos_of[robot]
         self._parameters.stiffness[mine] = self.compiled.stiffness[mine]
         self._parameters.damping[mine] = self.compiled.damping[mine]
         self._parameters.changed()

@@ -191,6 +191,7 @@ class CompiledScene:
         self.base_position = np.array([np.arange(2) + robot.root for robot in self.robots], np.int64).reshape(-1, 2)
         self.first = np.array([(robot.root, robot.root_speed) for robot in self.robots], np.int64).reshape(-1, 2)
         self.servos = np.concatenate([np.zeros(0, np.int64), *(robot.servo for robot in self.robots)])
+        self.servos_of = [np.isin(self.servos, robot.servo) for robot in self.robots]
         movers = [m.body(f"person{i}").id for i in range(capacity.people)]
         movers += [m.body(f"vehicle{i}").id for i in range(capacity.vehicles)]
         self.mover_body = np.array(movers, np.int64)

@@ -386,8 +386,9 @@ class Traffic(SeenTraffic):
         where = [(float(everybody.x[v]), float(everybody.y[v])) for v in due.tolist()]
         stood, before = stopped[due], teleports[due]
         blockers = [self._before(v) for v in due.tolist()]
-        leaving = self._net.lanes["leaves"][self._vehicles["lane"]] | (stopped >= PATIENCE)
-        self._levels.clear(np.flatnonzero(leaving), (everybody.bottom, everybody.top))
+        if self._levels.any:
+            leaving = self._net.lanes["leaves"][self._vehicles["lane"]] | (stopped >= PATIENCE)
+            self._levels.clear(np.flatnonzero(leaving), (everybody.bottom, everybody.top))
         bring_back(self._net, self._vehicles, self.junctions, everybody, self._entries, _ENTRY_SPEED, PATIENCE)
         for k in np.flatnonzero(teleports[due] > before).tolist():
             self.jams.note_rescue(int(due[k]), where[k], float(stood[k]), blockers[k])

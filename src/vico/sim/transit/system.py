@@ -133,12 +133,14 @@ class TransitSystem(Services):
         for tram in self.trams.advance(float(self.clock[0]), dt, obstacles):
             if self.passengers is not None:
                 self.passengers.arrive(self.traffic.buses + tram)
+        presence, at_stop = fleet.presence, fleet.at_stop
         for bus, v in enumerate(self._vehicle.tolist()):
-            if fleet.presence[v] != PRESENT:
+            if presence[v] != PRESENT:
                 self._mind_depot(bus, v)
                 continue
-            self.open[bus] = moved_doors(float(self.open[bus]), self._holds_doors(bus, v), dt)
-            if not fleet.at_stop[v]:
+            holds = bool(at_stop[v]) and self._holds_doors(bus)
+            self.open[bus] = moved_doors(float(self.open[bus]), holds, dt)
+            if not at_stop[v]:
                 self.dwell[bus] = DWELL
                 continue
             if self.dwell[bus] == DWELL:
@@ -154,10 +156,8 @@ class TransitSystem(Services):
         if self.passengers is not None and math.floor(self.clock[0] + _TINY) > math.floor(self.clock[0] - dt + _TINY):
             self.passengers.advance(obstacles)
 
-    def _holds_doors(self, bus: int, v: int) -> bool:
-        """Whether a bus wants its doors open: at a stop, until shortly before it leaves."""
-        if not self.traffic.fleet.at_stop[v]:
-            return False
+    def _holds_doors(self, bus: int) -> bool:
+        """Whether a bus at a stop wants its doors open: until shortly before it leaves."""
         if self.dwell[bus] > DOOR_TIME:
             return True
         if self.ends_service(bus):
