@@ -20,13 +20,14 @@ from vico.sim.state import Vehicle
 
 VIEWS = ("behind", "front", "eyes", "above", "side", "orbit")
 
-# Where the camera is from what it looks at: metres back along the heading, degrees round it (0 is behind), degrees up.
+# Where the camera is from what it looks at: metres back along the heading, degrees round it (0 is behind), degrees up,
+# and so many in rooms: over clothes racks, counters and beds.
 _PLACES = {
-    "behind": (3.6, 0.0, 16.0),
-    "front": (4.0, 165.0, 5.0),
-    "side": (3.6, 80.0, 8.0),
-    "above": (15.0, 0.0, 62.0),
-    "orbit": (4.5, 0.0, 15.0),
+    "behind": (3.6, 0.0, 16.0, 40.0),
+    "front": (4.0, 165.0, 5.0, 24.0),
+    "side": (3.6, 80.0, 8.0, 34.0),
+    "above": (15.0, 0.0, 62.0, 62.0),
+    "orbit": (4.5, 0.0, 15.0, 34.0),
 }
 _ORBIT = math.radians(14.0)  # a second
 # How far back for those who ride, as a multiple.
@@ -36,8 +37,6 @@ _FOV, _EYES_FOV = math.radians(42.0), math.radians(60.0)
 # Seconds in which the camera makes up for two thirds of a change.
 _TURNS, _SHIFTS, _WIDENS, _NARROWS = 0.55, 0.12, 0.9, 0.12
 _ASIDE = tuple(math.radians(k) for k in (0, 35, -35, 70, -70, 110, -110, 150, -150, 180))
-# In rooms it rises, too: over clothes racks, counters and beds.
-_RAISED = tuple(math.radians(k) for k in (0, 20, 40))
 _SWING = 1.0  # radians a second at most
 _RIM = 0.25  # metres to whatever is behind the camera
 # Who comes as near to the camera as the first makes it rise, metres; at the second it is so far above them.
@@ -172,7 +171,6 @@ class FollowCamera:
     _distance: float = 0.0
     _angle: float = 0.0
     _aside: float = 0.0
-    _raised: float = 0.0
     _lift: float = 0.0
     _place: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     _room: int = -2
@@ -208,20 +206,18 @@ class FollowCamera:
         return self._from_outside(scene, target, dt, cut=cut)
 
     def _from_outside(self, scene: Scene, target: Target, dt: float, *, cut: bool) -> Cameras:
-        away, around, up = _PLACES[self.view]
+        away, around, outdoors, indoors = _PLACES[self.view]
+        up = indoors if target.room >= 0 else outdoors
         if self.view == "orbit":
             self._angle += dt * _ORBIT
         wanted = away * _RIDING[Vehicle(target.riding)] * float(np.clip(target.size / 1.75, 0.5, 4.0))
         turn = self._heading + math.pi + math.radians(around) + self._angle
-        raises = _RAISED if target.room >= 0 else _RAISED[:1]
-        aside, raised = self._roomiest(scene, turn, math.radians(up), wanted, raises)
+        aside = self._roomiest(scene, turn, math.radians(up), wanted)
         self._aside = aside if cut else self._aside + _part(dt, _TURNS) * math.remainder(aside - self._aside, math.tau)
-        self._raised = raised if cut else self._raised + _part(dt, _TURNS) * (raised - self._raised)
-        rise = math.radians(up) + self._raised
-        back = _direction(turn + self._aside, rise)
-        lift = self._over(target.others, self._focus + wanted * back if cut else self._place, wanted) - rise
+        back = _direction(turn + self._aside, math.radians(up))
+        lift = self._over(target.others, self._focus + wanted * back if cut else self._place, wanted) - math.radians(up)
         self._lift = max(lift, 0.0) if cut else self._lift + _part(dt, _LIFTS) * (max(lift, 0.0) - self._lift)
-        back = _direction(turn + self._aside, rise + self._lift)
+        back = _direction(turn + self._aside, math.radians(up) + self._lift)
         free = max(min(wanted, self._free(scene, back, wanted)), _NEAREST)
         if cut:
             self._distance = free
@@ -244,24 +240,17 @@ class FollowCamera:
         height = float((share * (others[:, 2] + _ABOVE - self._focus[2])).max())
         return math.asin(min(max(height / wanted, 0.0), 0.9))
 
-    def _roomiest(
-        self, scene: Scene, turn: float, rise: float, wanted: float, raises: tuple[float, ...]
-    ) -> tuple[float, float]:
-        """Return how far to the side of where it would like to be, and above, the camera has some room, radians."""
+    def _roomiest(self, scene: Scene, turn: float, rise: float, wanted: float) -> float:
+        """Return how far to the side of where it would like to be the camera has some room: not at all, if it has."""
         enough = min(0.45 * wanted, 1.7)
-        moved = max(abs(self._aside), self._raised)
         straight = self._free(scene, _direction(turn, rise), wanted)
         # It goes back only where there is plenty of room, and else stays where it is as long as that will do.
-        if straight >= (enough if moved < 0.02 else 1.6 * enough):
-            return 0.0, 0.0
-        if moved >= 0.02 and self._free(scene, _direction(turn + self._aside, rise + self._raised), wanted) >= enough:
-            return self._aside, self._raised
-        found = {
-            (aside, raised): self._free(scene, _direction(turn + aside, rise + raised), wanted)
-            for aside in _ASIDE
-            for raised in raises
-        }
-        return max(found, key=lambda k: min(found[k], 2.0 * enough) - 0.25 * enough * (abs(k[0]) + k[1]))
+        if straight >= (enough if abs(self._aside) < 0.02 else 1.6 * enough):
+            return 0.0
+        if abs(self._aside) >= 0.02 and self._free(scene, _direction(turn + self._aside, rise), wanted) >= enough:
+            return self._aside
+        found = {s: self._free(scene, _direction(turn + s, rise), wanted) for s in _ASIDE}
+        return max(_ASIDE, key=lambda s: min(found[s], 2.0 * enough) - 0.25 * enough * abs(s))
 
     def _free(self, scene: Scene, back: NDArray[np.float64], wanted: float) -> float:
         """Return how far one can go back from the focus before anything that never moves, metres."""

@@ -86,11 +86,11 @@ def near_in_the_air(run: RobotRun, flight: Flight, row: int, everybody: Bodies) 
     own, position = int(run.entities[robot]), run.position(robot)
     bottom = float(position[2]) - flight.model.stand
     fly = [run.entities[f.robots[f.arrays.phase != _LANDED]] for f in run.flights if f is not None]
-    flying = np.isin(everybody.entity, np.concatenate(fly))
     away = np.hypot(*(everybody.position[:, :2] - position[:2]).T) - everybody.half_length
-    near = (away < np.where(flying, _FLIGHT_NEAR, _NEAR)) & (everybody.entity != own)
-    chosen = np.flatnonzero(near)
-    others, flies = everybody.where(chosen), flying[chosen]
+    chosen = np.flatnonzero((away < max(_FLIGHT_NEAR, _NEAR)) & (everybody.entity != own))
+    flies = np.isin(everybody.entity[chosen], np.concatenate(fly))
+    near = away[chosen] < np.where(flies, _FLIGHT_NEAR, _NEAR)
+    others, flies = everybody.where(chosen[near]), flies[near]
     z = others.position[:, 2]
     below = (z < bottom) | ((z == bottom) & (others.entity < own))
     lower = np.where(flies, below, z < bottom + flight.model.height + _OVERHEAD)
