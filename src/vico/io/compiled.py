@@ -84,6 +84,15 @@ def compiled(function: Any = None, /, *, optimised_alone: bool = False, **option
     return _Kernel(function, settings, _Callee(function, settings, optimised=optimised_alone))
 
 
+def inlined(function: Any) -> Any:
+    """Compile a function as `compiled` does, into each of its compiled callers.
+
+    For what is called once or twice in a loop with many arrays, as tuples of them are: every field of every array is
+    copied onto the stack for a call, which takes longer than much of what is done with them. Results are the same.
+    """
+    return compiled(function, forceinline=True)
+
+
 def compiled_folder() -> Path:
     """Return where compiled code is kept: ``$NUMBA_CACHE_DIR``, else `compiled` in the cache folder."""
     return Path(numba.config.CACHE_DIR or cache_folder() / "compiled")

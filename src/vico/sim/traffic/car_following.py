@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vico.io.compiled import compiled
+from vico.io.compiled import compiled, inlined
 from vico.sim.traffic.leader import NO_GAP
 from vico.sim.traffic.letting_in import room_to_change
 from vico.sim.traffic.path import footprint
@@ -47,13 +47,13 @@ def distance_to_stop(vehicle):  # type: ignore[no-untyped-def]
     return distance_to_place(vehicle)
 
 
-@compiled(forceinline=True)
+@inlined
 def desired_speed(net, vehicle):  # type: ignore[no-untyped-def]
     """Return the speed a vehicle drives at on an empty lane, m/s."""
     return speed_into_place(vehicle, min(net.lanes[vehicle.lane].speed * vehicle.speed_factor, vehicle.target_speed))
 
 
-@compiled(forceinline=True)
+@inlined
 def stop_and_speed_limit(net, vehicle, look, stop_distance, let_in_distance, wanted):  # type: ignore[no-untyped-def]
     """Return where a vehicle has to stop and how fast it may be now.
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from vico.io.compiled import compiled
+from vico.io.compiled import compiled, inlined
 from vico.sim.traffic.claims import LETS_OUT, TAKEN, counted_wait, is_overtaken, take_junctions, what_stands_against
 from vico.sim.traffic.crossings import yields_to_pedestrians
 from vico.sim.traffic.leader import bodies_around, touched_at
@@ -65,7 +65,7 @@ class JunctionExit(NamedTuple):
     far: float
 
 
-@compiled(forceinline=True)
+@inlined
 def next_junction_request(net, vehicle, stop_distance, braking_distance, path_ends):  # type: ignore[no-untyped-def]
     """Return the first junction within the braking distance, and before its stop, that a vehicle was not let into."""
     index = NONE
@@ -197,7 +197,7 @@ def may_enter_junction(net, fleet, junctions, vehicle, request, leave, view):  #
     return not lets_out or _way_is_free(vehicle, leave, view, len(fleet))
 
 
-@compiled(forceinline=True)
+@inlined
 def request_junctions(net, fleet, junctions, vehicle, request, view):  # type: ignore[no-untyped-def]
     """Ask for the junctions ahead; return whether the vehicle has them now."""
     leave = _find_exit(net, junctions, vehicle, request)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vico.io.compiled import compiled
+from vico.io.compiled import compiled, inlined
 from vico.sim.traffic.leader import ANY_BODY, TOUCH, touched_at
 from vico.sim.traffic.letting_in import first_place_to_change, lane_to_change_to
 from vico.sim.traffic.path import (
@@ -56,7 +56,7 @@ def _vehicles_on(net, fleet, lane):  # type: ignore[no-untyped-def]
     return count
 
 
-@compiled(forceinline=True)
+@inlined
 def change_to_emptier_lane(net, fleet, vehicle, view):  # type: ignore[no-untyped-def]
     """Move a car to a neighbour lane with fewer vehicles if there is a gap."""
     lane = vehicle.lane

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.io.compiled import compiled
+from vico.io.compiled import compiled, inlined
 from vico.sim.footprints import Rectangle, point_gap, separation
 from vico.sim.neighbours import NeighbourGrid, search
 from vico.sim.traffic.path import Outline, axles_at, footprint, footprint_between, point_on_path
@@ -83,7 +83,7 @@ def bodies_around(v, x, y, reach, surroundings):  # type: ignore[no-untyped-def]
     return nearby_bodies(shapes, v, x, y, reach, search(grid, x, y, reach, candidates), found)
 
 
-@compiled(forceinline=True)
+@inlined
 def nearby_bodies(shapes, v, x, y, reach, candidates, buffer):  # type: ignore[no-untyped-def]
     """Write those of the candidates within `reach` metres of a point, on body v's level, into `buffer`; return them.
 
@@ -225,7 +225,7 @@ def _gap_to(path, outline, front, low, high, one, person_gap, vehicle_gap):  # t
     return low
 
 
-@compiled(forceinline=True)
+@inlined
 def find_leader(view, front, reach, buffer):  # type: ignore[no-untyped-def]
     """Return the gap to the first body on the path and its index; `NO_GAP` and `NONE` without one within `reach`."""
     path, outline, nearby = view.path, view.outline, view.nearby

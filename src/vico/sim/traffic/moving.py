@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from vico.io.compiled import compiled
+from vico.io.compiled import inlined
 from vico.sim.traffic.path import end_of_lane_change, footprint
 from vico.sim.traffic.state import BACKING_IN
 
 
-@compiled(forceinline=True)
+@inlined
 def move_vehicle(vehicle, shapes, view, move, dt):  # type: ignore[no-untyped-def]
     """Move a vehicle along its path, metres, in `dt` seconds, and put its body there."""
     x, y, c, s = footprint(view.path, view.outline, vehicle.offset + move)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vico.io.compiled import compiled
+from vico.io.compiled import compiled, inlined
 from vico.sim.traffic.state import NONE, PREVIOUS_LANES
 
 #: A point of a path: x, y (ENU metres) and `s`, metres from the start of the lane the vehicle is on.
@@ -105,7 +105,7 @@ def lane_polyline(net, points, lane, buffer):  # type: ignore[no-untyped-def]
     return buffer[: _append_lane(net, points, lane, 0.0, buffer, 0)]
 
 
-@compiled(forceinline=True)
+@inlined
 def path_polyline(net, vehicle, behind, ahead, buffer):  # type: ignore[no-untyped-def]
     """Lay a vehicle's path, from `behind` metres before its lane's start to `ahead` metres after it, into `buffer`.
 

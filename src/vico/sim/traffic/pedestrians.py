@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vico.io.compiled import compiled
+from vico.io.compiled import compiled, inlined
 from vico.rules import STAIRS_SPEED
 from vico.sim.neighbours import search
 from vico.sim.traffic.companions import (
@@ -217,7 +217,7 @@ def advance_follow_point(paths, walker, leader, junctions, is_asked, x, y, dt): 
     return False
 
 
-@compiled(forceinline=True)
+@inlined
 def _nearby(shapes, grid, b, buffer):  # type: ignore[no-untyped-def]
     """Return the indices of the bodies that body b, a walker, may meet."""
     x, y = shapes.x[b], shapes.y[b]
@@ -240,7 +240,7 @@ def _leads_off(x, y, c, s, shapes, j):  # type: ignore[no-untyped-def]
     return distance_to(tx, ty, shapes, j) > distance_to(x, y, shapes, j)
 
 
-@compiled(forceinline=True)
+@inlined
 def _free_distance(x, y, c, s, shapes, near, gap):  # type: ignore[no-untyped-def]
     """Return the metres a walker can go along a heading before it touches somebody, at most `_SIGHT`."""
     free = _SIGHT
@@ -266,7 +266,7 @@ def _free_distance(x, y, c, s, shapes, near, gap):  # type: ignore[no-untyped-de
     return free
 
 
-@compiled(forceinline=True)
+@inlined
 def best_heading(x, y, point, shapes, near, is_jammed, facing):  # type: ignore[no-untyped-def]
     """Return the heading (rad) that leads furthest towards the followed point, and the metres free along it.
 
@@ -309,7 +309,7 @@ def may_step_to(tx, ty, x, y, shapes, near):  # type: ignore[no-untyped-def]
     return True
 
 
-@compiled(forceinline=True)
+@inlined
 def _walk(walker, point, shapes, b, near, is_waiting, time):  # type: ignore[no-untyped-def]
     """Take a pedestrian, body b, a step towards a point; return the metres walked.
 
@@ -409,7 +409,7 @@ def _group_pace(paths, pedestrians, i, shapes, near, first, dt):  # type: ignore
     return keep_up(walker, leader, shapes, (b, first + walker.leader), near, heading, half, dt)
 
 
-@compiled(forceinline=True)
+@inlined
 def _go_to_spot(paths, pedestrians, i, shapes, b, near, is_asked, time):  # type: ignore[no-untyped-def]
     """Take who is to stand a step to where it stands, or turn it there; return the metres walked."""
     walker, dt = pedestrians[i], time[1]
@@ -431,7 +431,7 @@ def _go_to_spot(paths, pedestrians, i, shapes, b, near, is_asked, time):  # type
     return step
 
 
-@compiled(forceinline=True)
+@inlined
 def _go_along(paths, pedestrians, junctions, shapes, who, near, is_asked, time):  # type: ignore[no-untyped-def]
     """Take a pedestrian, by its row and its body in `who`, a step along its walkway; return the metres walked."""
     (i, b), (pace, dt) = who, time

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vico.io.compiled import compiled
+from vico.io.compiled import compiled, inlined
 from vico.sim.traffic.random_stream import next_random
 from vico.sim.traffic.state import HELD_JUNCTIONS, LEAVING, NONE, PLANNED_LANES, PRESENT, PREVIOUS_LANES, STANDING
 
@@ -145,7 +145,7 @@ def _clear_with(net, lane, clear, room):  # type: ignore[no-untyped-def]
     return net.lanes[lane].length - begin + (clear if begin == 0.0 else 0.0)
 
 
-@compiled(forceinline=True)
+@inlined
 def plan_lanes(net, vehicle, street_load, reach):  # type: ignore[no-untyped-def]
     """Plan lanes until the path is `reach` metres long and ends where it can stand clear of junctions and tracks.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vico.io.compiled import compiled
+from vico.io.compiled import compiled, inlined
 from vico.sim.neighbours import search
 from vico.sim.traffic.leader import TOUCH, VehicleView, bodies_around, nearby_bodies, touched_at
 from vico.sim.traffic.lights import LEFT, RIGHT
@@ -110,7 +110,7 @@ def _place_to_stop_at(net, fleet, vehicle):  # type: ignore[no-untyped-def]
     return NONE
 
 
-@compiled(forceinline=True)
+@inlined
 def choose_place(net, fleet, vehicle):  # type: ignore[no-untyped-def]
     """Have a car that has just come onto a lane stop at a place beside it, or not."""
     k = _place_to_stop_at(net, fleet, vehicle)
@@ -221,7 +221,7 @@ def _holds_up(fleet, vehicle):  # type: ignore[no-untyped-def]
     return False
 
 
-@compiled(forceinline=True)
+@inlined
 def is_behind_delivery(net, fleet, vehicle):  # type: ignore[no-untyped-def]
     """Return whether a car has room to swing out behind a van that makes a delivery ahead on its lane."""
     lane = net.lanes[vehicle.lane]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vico.io.compiled import compiled
+from vico.io.compiled import compiled, inlined
 from vico.sim.footprints import Rectangle
 from vico.sim.neighbours import search
 from vico.sim.traffic.backing_up import leaves_room_for, vehicles_backing_up
@@ -182,7 +182,7 @@ def advance_vehicles(net, fleet, junctions, shapes, grid, street_load, dt):  # t
         _change_lane(net, fleet, vehicle, view, stop_distance, (leader, gap, leading, wanted))
 
 
-@compiled(forceinline=True)
+@inlined
 def _change_lane(net, fleet, vehicle, view, stop_distance, ahead):  # type: ignore[no-untyped-def]
     """Change lanes as the route does, past a delivery, or out of a queue.
 
@@ -240,7 +240,7 @@ def _standing_speed(vehicle, dt):  # type: ignore[no-untyped-def]
     return min(STANDING, _STARTED * vehicle.acceleration * dt)
 
 
-@compiled(forceinline=True)
+@inlined
 def _look_around(net, vehicle, look, request, scratch, beyond):  # type: ignore[no-untyped-def]
     """Return what a vehicle sees: bodies near it, and its path, farther where it may have to see beyond a junction.
 
@@ -268,7 +268,7 @@ def _look_around(net, vehicle, look, request, scratch, beyond):  # type: ignore[
     return VehicleView(path, vehicle_outline(vehicle), nearby, beyond)
 
 
-@compiled(forceinline=True)
+@inlined
 def _move_without_contact(net, vehicle, view, move, gap, leader):  # type: ignore[no-untyped-def]
     """Return the move, gap and leader; no move where it would touch a body or leave the planned path."""
     if vehicle.planned_count == 0:
