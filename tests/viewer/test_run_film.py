@@ -165,7 +165,7 @@ def test_through_a_door_the_camera_is_there_at_once() -> None:
     assert target_between(a, b, 1.0).position.tolist() == [30, 0, 0]
 
 
-@pytest.mark.parametrize("view", ["behind", "side", "orbit"])
+@pytest.mark.parametrize("view", ["behind", "front", "side", "orbit"])
 def test_in_a_shop_the_camera_sees_whom_it_follows_over_the_racks(view: str) -> None:
     """Between racks 1.4 m high, 1.2 m apart, under a ceiling: it never comes so near that nobody is drawn."""
     racks = [box((3.0, 0.5, 1.4), (0.0, y, 0.7)) for y in (-2.55, -0.85, 0.85, 2.55)]

@@ -24,10 +24,10 @@ VIEWS = ("behind", "front", "eyes", "above", "side", "orbit")
 # and so many in rooms: over clothes racks, counters and beds.
 _PLACES = {
     "behind": (3.6, 0.0, 16.0, 40.0),
-    "front": (4.0, 165.0, 5.0, 24.0),
-    "side": (3.6, 80.0, 8.0, 34.0),
+    "front": (4.0, 165.0, 5.0, 36.0),
+    "side": (3.6, 80.0, 8.0, 40.0),
     "above": (15.0, 0.0, 62.0, 62.0),
-    "orbit": (4.5, 0.0, 15.0, 34.0),
+    "orbit": (4.5, 0.0, 15.0, 38.0),
 }
 _ORBIT = math.radians(14.0)  # a second
 # How far back for those who ride, as a multiple.
