@@ -132,6 +132,7 @@ def test_a_traveller_arrives_about_when_planned_and_a_restored_one_would(
     assert {name: k for name, k in change.items() if k} == brought
 
 
+@pytest.mark.slow
 def test_who_finds_the_rack_empty_plans_anew(helsinki_city: World, public: PublicMap) -> None:
     ends = ends_of_a_ride(public, "bike", 0)
     journey = Journey(helsinki_city, public, ends, ("walk", "bike"))

@@ -56,6 +56,7 @@ def test_a_file_that_can_not_grow_ends_a_build_in_one_sentence(tmp_path: Path, m
     assert not (tmp_path / "w").exists()
 
 
+@pytest.mark.slow
 def test_a_folder_that_is_taken_away_ends_a_build_in_one_sentence(tmp_path: Path) -> None:
     process = started(*_BUILD, tmp_path / "w")
     when_there(tmp_path / "w.partial" / "terrain.npz", process)

@@ -70,6 +70,7 @@ def test_a_killed_run_goes_on_to_the_same_end(
     assert "complete" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_so_it_does_with_the_same_command_and_isolated_agents(
     words: list[object], whole: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -122,6 +123,7 @@ def test_a_run_has_one_hash_whoever_looks_and_however_many_work(
     assert len(hashes) == 1
 
 
+@pytest.mark.slow
 def test_a_killed_evaluation_comes_to_the_same_table(helsinki_path: Path, tmp_path: Path) -> None:
     def words(out: Path) -> list[object]:
         steps = ["--seeds", 2, "--steps", 10, "--method", "random"]

@@ -72,6 +72,7 @@ def test_sampled_batches_of_actions_are_taken_and_batches_of_observations_fit(he
         vector.close()
 
 
+@pytest.mark.slow
 def test_a_vector_of_communities_plays_what_single_ones_play(helsinki_path: Path, helsinki_people: Path) -> None:
     def hashes(results: Any) -> list[str]:
         return [step[4]["resident_0"]["hash"] for step in results]

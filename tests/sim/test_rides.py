@@ -6,17 +6,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from vico.sim import rides
 from vico.sim.actions.check import check
 from vico.sim.actions.model import Refusal
-from vico.sim.avatars import clearances
+from vico.sim.avatars import clearances, cyclist_fits
 from vico.sim.config import SimConfig
 from vico.sim.overlaps import overlapping
 from vico.sim.simulation import Simulation
-from vico.sim.state import RADIUS, Posture
+from vico.sim.state import RADIUS, Posture, Vehicle
 from vico.sim.transit import BIKE_ASTRAY, BIKE_RATE, FARE
 from vico.world.folder import World
+from vico.world.walkable import CROSSING, ROADWAY
 
 
 @pytest.fixture
@@ -230,6 +232,37 @@ def test_who_gets_off_stands_beside_the_bicycle(sim: Simulation) -> None:
     standing = transit.bicycles.standing_bodies(np.array([bike]))
     assert clearances(sim.state.people.position[0, :2], standing).min() >= RADIUS
     assert np.hypot(*(transit.bicycles.xy[bike] - sim.state.people.position[0, :2])) < 8.0
+
+
+def test_a_bicycle_that_is_left_in_the_street_is_wheeled_off_it(sim: Simulation) -> None:
+    transit, walkable = sim.state.transit, sim.world.walkable
+    assert transit is not None
+    # On roadways so near their edge that a few steps lead off them, far from stations.
+    middle = slice(walkable.n // 4, -walkable.n // 4)
+    off = ndimage.distance_transform_edt(np.isin(walkable.cls, (ROADWAY, CROSSING))) * walkable.cell
+    rows, columns = np.nonzero((off[middle, middle] > 1.2) & (off[middle, middle] < 1.8))
+    spots = walkable.centre_of(np.column_stack([columns, rows]) + middle.start)
+    bike, left, tried = on_a_bicycle(sim), 0, 0
+    for spot in spots[:: len(spots) // 40]:
+        if not cyclist_fits(walkable, spot, 0.3, sim.state.obstacles_to(0)):
+            continue
+        sim.state.people.position[0, :2], sim.state.people.yaw[0] = spot, 0.3
+        transit.bicycles.carry(bike, float(spot[0]), float(spot[1]), 0.3)
+        if transit.bicycles.is_at_station(bike):
+            continue
+        rides.dismount(0, sim.state)
+        tried += 1
+        body = transit.bicycles.standing_bodies(np.array([bike]))
+        others = sim.state.obstacles_to(0)
+        others = others.where(others.entity != body.entity[0])
+        assert cyclist_fits(walkable, transit.bicycles.xy[bike], float(transit.bicycles.yaw[bike]), others)
+        assert clearances(sim.state.people.position[0, :2], body).min() >= RADIUS
+        left += int(walkable.class_of(*transit.bicycles.xy[bike].tolist()) in (ROADWAY, CROSSING))
+        transit.bicycles.mount(bike, 0, float(transit.clock[0]))
+        sim.state.people.vehicle[0], sim.state.people.vehicle_entity[0] = Vehicle.BIKE, int(body.entity[0])
+    # Where cars are parked along the kerb there may be no way through.
+    assert tried >= 20
+    assert left <= tried // 10
 
 
 def test_a_bicycle_left_takes_the_room_its_rider_took_with_it(sim: Simulation) -> None:

@@ -11,8 +11,9 @@ from vico.sim.avatars import clearances, cyclist_fits, free_ground
 from vico.sim.bodies import Bodies
 from vico.sim.moves import follow_hands, gesture, wrapped
 from vico.sim.simulation_state import SimulationState
-from vico.sim.state import RADIUS, Posture, Vehicle
+from vico.sim.state import RADIUS, RIDER_REACH, Posture, Vehicle
 from vico.sim.transit import FARE, TransitSystem
+from vico.world.walkable import CROSSING, ROADWAY, WalkableMap
 
 # Who gets off a bicycle steps beside it, no farther than this, metres.
 _BESIDE = 2.0
@@ -24,6 +25,13 @@ _STEPS = np.array(
     + [(r * math.cos(k * math.pi / 4), r * math.sin(k * math.pi / 4)) for r in (0.9, 1.8) for k in range(8)]
 )
 _RUN_UP = 4.0
+# Spots to which one that is left in the street is wheeled, in the same way: up to four steps.
+_ASIDE = np.array(
+    [(r * math.cos(k * math.pi / 8), r * math.sin(k * math.pi / 8)) for r in (0.9, 1.8, 2.7, 3.6) for k in range(16)]
+)
+# Where a bicycle that stands takes up room, relative to its middle: metres along it and to the left.
+_PARTS = np.array([(u * RIDER_REACH, v * RADIUS) for u in (-1.0, -0.5, 0.0, 0.5, 1.0) for v in (-1.0, 0.0, 1.0)])
+_ROAD = (ROADWAY, CROSSING)
 
 
 def board(i: int, state: SimulationState) -> None:
@@ -83,6 +91,7 @@ def dismount(i: int, state: SimulationState) -> None:
     """
     transit, p = _transit(state), state.people
     bike = int(p.vehicle_entity[i]) - transit.bicycles.first_entity
+    _wheel_off_the_road(i, bike, state, transit)
     spot = spot_beside_bicycle(i, state, transit)
     assert spot is not None
     price = transit.bicycles.dismount(bike, float(transit.clock[0]))
@@ -155,6 +164,44 @@ def spot_beside_bicycle(i: int, state: SimulationState, transit: TransitSystem) 
         others.append(transit.bicycles.standing_bodies(np.array([bike])))
     here = state.people.position[i]
     return free_ground(state.world.walkable, here, Bodies.joined(others), within=_BESIDE, connected=False)
+
+
+def _wheel_off_the_road(i: int, bike: int, state: SimulationState, transit: TransitSystem) -> None:
+    """Wheel a bicycle that is left where vehicles drive to a spot beside the road, if there is one within a few steps.
+
+    It would keep buses and cars there for hours.
+    """
+    p, walkable = state.people, state.world.walkable
+    here, yaw = p.position[i, :2].copy(), float(p.yaw[i])
+    if transit.bicycles.is_at_station(bike) or not _is_on_road(here, yaw, walkable):
+        return
+    others = state.obstacles_to(i)
+    for spot in here + _ASIDE:
+        if not _clear((here + spot) / 2, others, state):
+            continue
+        for turn in _TURNS:
+            there = wrapped(yaw + turn)
+            if _is_on_road(spot, there, walkable) or not cyclist_fits(walkable, spot, there, others):
+                continue
+            _stand_at(i, bike, (spot, there), state, transit)
+            if spot_beside_bicycle(i, state, transit) is not None:
+                return
+    _stand_at(i, bike, (here, yaw), state, transit)
+
+
+def _stand_at(
+    i: int, bike: int, pose: tuple[NDArray[np.float64], float], state: SimulationState, transit: TransitSystem
+) -> None:
+    (x, y), yaw = pose
+    state.people.position[i, :2], state.people.yaw[i] = (x, y), yaw
+    transit.bicycles.carry(bike, float(x), float(y), yaw)
+
+
+def _is_on_road(spot: NDArray[np.float64], yaw: float, walkable: WalkableMap) -> bool:
+    """Return whether any of a bicycle that stands at a spot is where vehicles drive."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    parts = spot + _PARTS @ np.array([[c, s], [-s, c]])
+    return any(walkable.class_of(x, y) in _ROAD for x, y in parts.tolist())
 
 
 def room_to_ride(i: int, bike: int, state: SimulationState, transit: TransitSystem) -> NDArray[np.float64] | None:
