@@ -65,6 +65,7 @@ def test_a_folder_that_is_taken_away_ends_a_build_in_one_sentence(tmp_path: Path
     assert not (tmp_path / "w").exists()
 
 
+@pytest.mark.slow
 def test_force_leaves_a_folder_alone_that_another_build_is_writing(tmp_path: Path) -> None:
     first = started(*_BUILD, tmp_path / "w")
     when_there(tmp_path / "w.partial" / "terrain.npz", first)

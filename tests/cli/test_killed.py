@@ -15,6 +15,7 @@ from vico.sim.recording import read_run
 from vico.world.folder import read_world
 
 
+@pytest.mark.slow
 def test_a_killed_build_leaves_no_world_and_begins_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out, partial = tmp_path / "w", tmp_path / "w.partial"
     words: list[object] = ["world", "build", "--lat", 60.1690, "--lon", 24.9435, "--radius", 60, "--out", out]

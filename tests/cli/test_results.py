@@ -155,6 +155,7 @@ def test_bench_says_where_benchmarks_are_to_be_had(
     assert "come with the repository" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_bench_world_measures_every_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = tmp_path / "results" / "world.md"
     assert bench.bench("world", table=table, json=True, options=("--radius", "60", "-n", "1")) == 0

@@ -60,6 +60,7 @@ def test_a_vector_of_agents_plays_what_single_environments_play(helsinki_path: P
     assert ends == [[False, False]] * 3 + [[True, True]] + [[False, False]] * 2
 
 
+@pytest.mark.slow
 def test_sampled_batches_of_actions_are_taken_and_batches_of_observations_fit(helsinki_path: Path) -> None:
     vector = vico.make_vec(helsinki_path, num_envs=2, observe=("assistant_0",), image=16)
     try:
