@@ -431,11 +431,6 @@ def in_a_moving_bus(sim: Simulation) -> bool:
     return False
 
 
-def works(who, stay: Stay) -> bool:
-    """Take who goes to work."""
-    return stay.tag == "work"
-
-
 def learns(who, stay: Stay) -> bool:
     """Take a child who goes to school."""
     return who.age < 14 and stay.tag == "study"

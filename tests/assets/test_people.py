@@ -186,7 +186,8 @@ def test_an_apron_goes_with_the_thighs_below_it() -> None:
     body = body_of(Appearance(over="apron", over_colour=colour, bottom="trousers"))
     apron = np.flatnonzero((np.round(body.colour) == colour).all(axis=1))
     low = apron[body.vertices[apron, 2] < body.rest_joints[J["left_knee"], 2] + 0.25]
-    assert len(low) >= 12
+    # Bodies made without the downloaded meshes have 14.
+    assert len(low) >= 14
     left, right = (
         np.where(body.weight_joints[low] == J[side], body.weights[low], 0.0).sum(axis=1)
         for side in ("left_hip", "right_hip")

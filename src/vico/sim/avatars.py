@@ -37,8 +37,7 @@ _CARRY_LEFT, _CARRY_RIGHT = CLIP["carry_left"], CLIP["carry_right"]
 # What a gesture is on a chair: most are made there too, for others one stays seated; who gets in sits down after it.
 _ON_A_CHAIR = np.array([CLIP.get(f"sit_{name}", _SIT) for name in CLIPS])
 _ON_A_CHAIR[CLIP["enter_vehicle"]] = CLIP["enter_vehicle"]
-# Motions that are brought to an end, and where in them that is.
-# Whether a clip is finished once it has begun; that of no clip, -1, is the last.
+# Whether a motion is brought to an end once it has begun (that of no clip, -1, is the last), and where in it that is.
 _FINISHED = np.isin(np.arange(len(CLIP) + 1), [CLIP[name] for name in ("drink", "eat", "talk")])
 _DONE = 0.95
 _STANDING_UP, _SITTING = int(Posture.STANDING), int(Posture.SITTING)

@@ -139,14 +139,7 @@ def path_polyline(net, vehicle, behind, ahead, buffer):  # type: ignore[no-untyp
 @compiled
 def point_on_path(path, s):  # type: ignore[no-untyped-def]
     """Return x, y and the direction (not of unit length) at `s` on a path; beyond its ends, straight on."""
-    a, b = 0, len(path) - 1
-    while b - a > 1:
-        middle = (a + b) // 2
-        if path[middle].s <= s:
-            a = middle
-        else:
-            b = middle
-    return _point_between(path, a, s)
+    return _point_between(path, _stretch_at(path, s, 0), s)
 
 
 @compiled
