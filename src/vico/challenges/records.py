@@ -64,7 +64,7 @@ class Job:
     setting: Setting
     world: Path
     seed: int
-    terms: Terms = Terms()
+    terms: Terms = field(default_factory=Terms)
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ class Challenge(Protocol):
         """All causes that a failed part may have."""
 
     def task(self, job: Job) -> Mapping[str, object]:
-        """What is asked in an episode, as JSON: the same for all methods.
+        """Return what is asked in an episode, as JSON: the same for all methods.
 
         Raises
         ------
