@@ -94,12 +94,15 @@ def sightings(observation: Mapping[str, Any], entities: Mapping[int, Mapping[str
     """
     shown = shown_in(observation)
     found = []
-    for entity, pixels, hits, position, box in zip(*(field.tolist() for field in shown), strict=True):
+    eye = np.asarray(observation["pose"], np.float64)[:3]
+    away = np.linalg.norm(shown.position - eye, axis=1)
+    for k in np.lexsort((shown.entity, away)).tolist():
+        entity, pixels = int(shown.entity[k]), int(shown.pixels[k])
         about = entities.get(entity, {})
-        if pixels >= SIGHT and hits and about.get("name"):
-            found.append(Sighting(entity, about["kind"], about["name"], pixels, np.array(position), tuple(box)))
-    eye = np.asarray(observation["pose"])[:3]
-    return sorted(found, key=lambda s: (float(np.linalg.norm(s.position - eye)), s.entity))
+        if pixels >= SIGHT and shown.hits[k] and about.get("name"):
+            box = tuple(shown.box[k].tolist())
+            found.append(Sighting(entity, about["kind"], about["name"], pixels, shown.position[k], box))
+    return found
 
 
 class DepthGrid:

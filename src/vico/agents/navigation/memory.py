@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,6 +20,8 @@ SURE_PIXELS, STALE_AFTER = 20.0, 60.0
 DIRECTIONS, _SIDE = 8, math.radians(45.0)
 #: Most things that are remembered; what was seen longest ago is forgotten first.
 MOST = 512
+# Seen within so many metres of where it was, it lies there still.
+_SAME_PLACE = 0.5
 _BEHIND = 0.35  # metres behind a thing's place that is seen: the thing is gone
 _NEVER_GONE = 0.4  # metres before the camera within which nothing is missed
 
@@ -58,7 +60,9 @@ class SeenMemory:
     """Remembers things with names, until they are seen to be gone, and from which rooms' corners one looked."""
 
     def __init__(self) -> None:
-        self._things: dict[int, SeenThing] = {}
+        self._rooms: dict[str, dict[int, SeenThing]] = {}
+        # In which room each thing is known, the one that was seen longest ago first.
+        self._room_of: dict[int, str] = {}
         self._looks: dict[str, int] = {}
 
     def notice(self, observation: Mapping[str, Any], things: Iterable[Sighting]) -> list[SeenThing]:
@@ -75,40 +79,45 @@ class SeenMemory:
         room, now = str(state["room"] or ""), float(state["time"])
         if room:
             self._looks[room] = self._looks.get(room, 0) | _directions(np.asarray(observation["pose"], np.float64))
-        shown = {thing.entity: thing for thing in things}
-        held = {int(entity or 0) for entity in state["held"]}
-        for entity, thing in shown.items():
-            before = self._things.pop(entity, None)
+        for thing in things:
+            before = self._taken(thing.entity)
             pixels = thing.pixels
-            if before is not None and math.dist(before.position, thing.position) < 0.5:
+            if before is not None and math.dist(before.position, thing.position) < _SAME_PLACE:
                 pixels = max(pixels, before.pixels)
-            self._things[entity] = SeenThing(
-                entity, thing.kind, thing.name, np.asarray(thing.position, np.float64), room, now, pixels
-            )
-        missing = [
-            thing
-            for entity, thing in self._things.items()
-            if entity not in shown and (entity in held or (thing.room == room and _is_gone(thing, observation)))
-        ]
+            self._put(SeenThing(thing.entity, thing.kind, thing.name, thing.position, room, now, pixels))
+        hidden = [thing for thing in self._rooms.get(room, {}).values() if thing.time != now]
+        missing = [thing for thing, gone in zip(hidden, _are_gone(hidden, observation), strict=True) if gone]
+        missing += [thing for entity in state["held"] if entity and (thing := self._thing(int(entity))) is not None]
         for thing in missing:
-            del self._things[thing.entity]
-        while len(self._things) > MOST:
-            del self._things[next(iter(self._things))]
+            self.forget(thing.entity)
+        while len(self._room_of) > MOST:
+            self.forget(next(iter(self._room_of)))
         return missing
+
+    def _thing(self, entity: int) -> SeenThing | None:
+        return self._rooms[self._room_of[entity]].get(entity) if entity in self._room_of else None
+
+    def _taken(self, entity: int) -> SeenThing | None:
+        room = self._room_of.pop(entity, None)
+        return None if room is None else self._rooms[room].pop(entity)
+
+    def _put(self, thing: SeenThing) -> None:
+        self._rooms.setdefault(thing.room, {})[thing.entity] = thing
+        self._room_of[thing.entity] = thing.room
 
     def last_seen(self, name: str) -> SeenThing | None:
         """Return where something was seen last, by its name; None if it was not, or is gone."""
-        found = [thing for thing in self._things.values() if thing.name == name]
+        found = [thing for thing in self._all() if thing.name == name]
         return max(found, key=lambda thing: (thing.time, thing.pixels, -thing.entity), default=None)
 
     def things(self, *, kind: str | None = None, room: str | None = None) -> list[SeenThing]:
         """Return what is remembered, the latest first; of one kind, or in one room (empty: outdoors)."""
-        found = [
-            thing
-            for thing in self._things.values()
-            if (kind is None or thing.kind == kind) and (room is None or thing.room == room)
-        ]
+        within = self._all() if room is None else self._rooms.get(room, {}).values()
+        found = [thing for thing in within if kind is None or thing.kind == kind]
         return sorted(found, key=lambda thing: (-thing.time, thing.entity))
+
+    def _all(self) -> list[SeenThing]:
+        return [self._rooms[room][entity] for entity, room in self._room_of.items()]
 
     def looked_at(self, room: str) -> float:
         """Return the share of the directions that one looked in from within a room, 0 to 1."""
@@ -116,11 +125,11 @@ class SeenMemory:
 
     def forget(self, entity: int) -> None:
         """Forget a thing: it was picked up, say."""
-        self._things.pop(entity, None)
+        self._taken(entity)
 
     def state(self) -> AgentState:
         """Return all of it."""
-        things = list(self._things.values())
+        things = self._all()
         return {
             "entity": [thing.entity for thing in things],
             "kind": [thing.kind for thing in things],
@@ -138,10 +147,9 @@ class SeenMemory:
             *(state[name] for name in ("entity", "kind", "name", "position", "room", "time", "pixels")), strict=True
         )
         things = [SeenThing(*row) for row in rows]
-        self._things = {
-            int(thing.entity): replace(thing, entity=int(thing.entity), position=np.array(thing.position, np.float64))
-            for thing in things
-        }
+        self._rooms, self._room_of = {}, {}
+        for thing in things:
+            self._put(replace(thing, entity=int(thing.entity), position=np.array(thing.position, np.float64)))
         self._looks = {str(room): int(looks) for room, looks in state["looks"].items()}
 
 
@@ -155,17 +163,23 @@ def _directions(pose: NDArray[np.float64]) -> int:
     return bits
 
 
-def _is_gone(thing: SeenThing, observation: Mapping[str, Any]) -> bool:
-    """Tell whether a picture shows what lies behind a thing's place."""
+def _are_gone(things: Sequence[SeenThing], observation: Mapping[str, Any]) -> NDArray[np.bool_]:
+    """Tell of which things a picture shows what lies behind their places."""
+    if not things:
+        return np.zeros(0, np.bool_)
     extrinsics, intrinsics = observation["extrinsics"], observation["intrinsics"]
-    x, y, z = extrinsics[:3, :3] @ thing.position + extrinsics[:3, 3]
-    if z < _NEVER_GONE:
-        return False
-    depth = observation["depth"]
-    column = int(intrinsics[0, 0] * x / z + intrinsics[0, 2])
-    row = int(intrinsics[1, 1] * y / z + intrinsics[1, 2])
+    depth = np.asarray(observation["depth"])
+    places = np.array([thing.position for thing in things])
+    x, y, z = extrinsics[:3, :3] @ places.T + extrinsics[:3, 3:]
+    ahead = z >= _NEVER_GONE
+    z = np.where(ahead, z, 1.0)
+    column, row = intrinsics[0, 0] * x / z + intrinsics[0, 2], intrinsics[1, 1] * y / z + intrinsics[1, 2]
+    inside = (column >= 1) & (column < depth.shape[1] - 1) & (row >= 1) & (row < depth.shape[0] - 1)
+    column, row = (np.where(inside, k, 1).astype(np.int64) for k in (column, row))
+    gone = ahead & inside
     # A little more than the pixel itself: what is small may lie beside it.
-    if not (1 <= column < depth.shape[1] - 1 and 1 <= row < depth.shape[0] - 1):
-        return False
-    around = np.asarray(depth[row - 1 : row + 2, column - 1 : column + 2])
-    return bool(((around == 0.0) | (around > z + _BEHIND)).all())
+    for dy in (-1, 0, 1):
+        for dx in (-1, 0, 1):
+            seen = depth[row + dy, column + dx]
+            gone &= (seen == 0.0) | (seen > z + _BEHIND)
+    return gone

@@ -61,6 +61,9 @@ class Navigator:
         self._keeper = PathKeeper(SIDE)
         self._target: Target | None = None
         self._waited = 0
+        # How often in a row something solid stopped a step, and whether the last action was one.
+        self._stumbles = 0
+        self._stepped = False
 
     @property
     def searches(self) -> int:
@@ -82,9 +85,14 @@ class Navigator:
         self._enter_space(observation)
         self._map.see(observation, info["entities"], ignore)
         state = observation["state"]
-        if self._space != OUTDOORS and state["action_status"] == "collision":
-            pose = np.asarray(observation["pose"], np.float64)
-            self._map.stumble(pose, int(state["time"]), solid=state["action_code"] == _HIT_SOLID)
+        if self._space == OUTDOORS:
+            return
+        if state["action_status"] == "collision":
+            self._stumbles += state["action_code"] == _HIT_SOLID
+            times = self._stumbles if state["action_code"] == _HIT_SOLID else 0
+            self._map.stumble(np.asarray(observation["pose"], np.float64), int(state["time"]), times=times)
+        elif self._stepped:
+            self._stumbles = 0
 
     def towards(self, observation: Observation, info: Info, target: Target, *, speed: float = 1.0) -> Action | None:
         """Return the next action on the way to a target; None once there, or where no way leads nearer.
@@ -98,6 +106,7 @@ class Navigator:
         speed
             Metres a second to walk at outdoors.
         """
+        self._stepped = False
         x, y = (float(value) for value in observation["pose"][:2])
         if target.away(x, y) <= target.near and self._is_level(observation, target):
             self.stop()
@@ -144,8 +153,7 @@ class Navigator:
             return VoxelMap(self._public.height.upper, least=2)
         if rise > _STOREY:
             return VoxelMap(None, lowest=lowest)
-        floor = self._floor
-        return VoxelMap(lambda points: np.full(len(points), floor))
+        return VoxelMap(self._floor)
 
     def _map_state(self) -> AgentState:
         return {"floor": self._floor, "climbs": self._map.climbs, "map": self._map.state()}
@@ -187,6 +195,7 @@ class Navigator:
         drift = _DRIFT if limit <= BESIDE_COST else _NARROW_DRIFT
         if math.cos(turn) <= 0.0 or stride * abs(math.sin(turn)) > drift:
             return {"type": "turn_left" if turn > 0 else "turn_right", "degrees": abs(math.degrees(turn))}
+        self._stepped = True
         return {"type": "move_forward", "distance": stride}
 
     # Outdoors.
@@ -210,6 +219,8 @@ class Navigator:
             "target": None if target is None else [target.x, target.y, target.yaw, target.half_length,
                                                    target.half_width, target.near, target.z],
             "waited": self._waited,
+            "stumbles": self._stumbles,
+            "stepped": self._stepped,
         }  # fmt: skip
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -226,4 +237,5 @@ class Navigator:
         self._keeper.restore(state["keeper"], self._map.cost)
         self.walker.restore(state["walker"])
         self._target = None if state["target"] is None else Target(*state["target"])
-        self._waited = int(state["waited"])
+        self._waited, self._stumbles = int(state["waited"]), int(state["stumbles"])
+        self._stepped = bool(state["stepped"])

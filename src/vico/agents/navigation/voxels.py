@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -45,8 +45,9 @@ _SAMPLES = 8  # heights of the ground along the side of a chunk
 _BELOW_DOORS = 0.25
 _STUMBLE = 0.34  # metres ahead of one's middle is what stopped a step
 _BODY = 0.5  # ... and the middle of a body that did
+_WIDEST = 4  # columns to either side that a stumble comes to cover
 
-Ground = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+Ground = Callable[[NDArray[np.float64]], NDArray[np.float64]] | float | None
 
 
 class VoxelMap:
@@ -57,15 +58,15 @@ class VoxelMap:
     Parameters
     ----------
     ground
-        Heights of the ground at points, shape ``(k, 2)``, ENU metres, shape ``(k,)``; None where it climbs unknown, as
-        on stairs: then the lowest that is seen in a column is its floor.
+        Heights of the ground at points, shape ``(k, 2)``, ENU metres, shape ``(k,)``; or the one height of a level
+        floor; None where it climbs unknown, as on stairs: then the lowest that is seen in a column is its floor.
     lowest
         Height of the lowest thing of interest where the ground is unknown, metres.
     least
         Voxels of a column, between ankle and head, that make it an obstacle.
     """
 
-    def __init__(self, ground: Ground | None, *, lowest: float = 0.0, least: int = 1) -> None:
+    def __init__(self, ground: Ground, *, lowest: float = 0.0, least: int = 1) -> None:
         self.climbs = ground is None
         self._ground, self._lowest, self._least = ground, lowest, least
         self.voxels = empty_voxels()
@@ -111,16 +112,28 @@ class VoxelMap:
         """Count what changed, and forget what was to be remembered up to a second of the day."""
         count_changes(self.voxels, now, self._least)
 
-    def stumble(self, pose: NDArray[np.float64], now: int, *, solid: bool) -> None:
-        """Remember that something stopped a step ahead: for long, if it is solid, else as what moves."""
-        away, wide, lasts = (_STUMBLE, 0.0, BUMP_LASTS) if solid else (_BODY, 0.1, FADES)
-        x, y = pose[:2] + away * pose[3:5]
+    def stumble(self, pose: NDArray[np.float64], now: int, *, times: int) -> None:
+        """Remember that something stopped a step ahead.
+
+        Parameters
+        ----------
+        pose
+            Of who was stopped.
+        now
+            Second of the day.
+        times
+            How often in a row something solid did: what stops one again is wider than was thought. 0 for a body that
+            moves, which is remembered for as long as one that was seen.
+        """
+        away, lasts = (_STUMBLE, BUMP_LASTS) if times else (_BODY, FADES)
+        wide = min(times, _WIDEST)
         self._open_chunks(pose[:2])
-        for dy in (-wide, wide):
-            for dx in (-wide, wide):
-                column, row = math.floor((x + dx) / VOXEL), math.floor((y + dy) / VOXEL)
-                self.voxels.until[row % SIDE, column % SIDE] = now + lasts
-                self.voxels.flags[(row // CHUNK) % CHUNKS, (column // CHUNK) % CHUNKS, TIMED] = True
+        for k in range(-wide, wide + 1):
+            x = float(pose[0] + away * pose[3] - k * VOXEL * pose[4])
+            y = float(pose[1] + away * pose[4] + k * VOXEL * pose[3])
+            column, row = math.floor(x / VOXEL), math.floor(y / VOXEL)
+            self.voxels.until[row % SIDE, column % SIDE] = now + lasts
+            self.voxels.flags[(row // CHUNK) % CHUNKS, (column // CHUNK) % CHUNKS, TIMED] = True
         self.refresh(now)
 
     def forget_passing(self) -> bool:
@@ -140,23 +153,33 @@ class VoxelMap:
         """Have a place for each chunk in reach."""
         side = CHUNK * VOXEL
         low, high = (np.floor((eye + away) / side).astype(int).tolist() for away in (-REACH - VOXEL, REACH + VOXEL))
+        missing = []
         for row in range(low[1], high[1] + 1):
             for column in range(low[0], high[0] + 1):
                 b, a = row % CHUNKS, column % CHUNKS
                 key = self.voxels.key[b, a]
                 if not (self.voxels.flags[b, a, THERE] and key[0] == column and key[1] == row):
-                    self._open(column, row)
+                    missing.append((column, row))
+        self._open(missing)
 
-    def _open(self, column: int, row: int) -> None:
-        base, levels = self.base, np.full((CHUNK, CHUNK), UNKNOWN, np.int8)
-        if self._ground is not None:
-            axis = (np.arange(_SAMPLES) + 0.5) * (CHUNK * VOXEL / _SAMPLES)
-            x, y = np.meshgrid(column * CHUNK * VOXEL + axis, row * CHUNK * VOXEL + axis)
-            heights = self._ground(np.column_stack([x.ravel(), y.ravel()])).reshape(x.shape)
-            base = float(heights.min()) - _BELOW_FLOOR
-            found = np.floor((heights - base) / VOXEL + 1e-6).astype(np.int8)
-            levels = np.repeat(np.repeat(found, CHUNK // _SAMPLES, 0), CHUNK // _SAMPLES, 1)
-        take_chunk(self.voxels, (row % CHUNKS, column % CHUNKS), (column, row), base, levels)
+    def _open(self, chunks: Sequence[tuple[int, int]]) -> None:
+        """Give chunks, by column and row, their places."""
+        if not chunks:
+            return
+        bases = np.full(len(chunks), self.base)
+        levels = np.full((len(chunks), 1, 1), UNKNOWN, np.int8)
+        if isinstance(self._ground, float):
+            bases[:], levels[:] = self._ground - _BELOW_FLOOR, FLOOR
+        elif self._ground is not None:
+            axis = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
+            corner = np.array(chunks, np.float64)[:, None, None, :]
+            points = (corner + np.stack(np.meshgrid(axis, axis), axis=-1)) * (CHUNK * VOXEL)
+            heights = self._ground(points.reshape(-1, 2)).reshape(points.shape[:3])
+            bases = heights.min(axis=(1, 2)) - _BELOW_FLOOR
+            levels = np.floor((heights - bases[:, None, None]) / VOXEL + 1e-6).astype(np.int8)
+        for (column, row), base, level in zip(chunks, bases.tolist(), levels, strict=True):
+            whole = level.repeat(CHUNK // len(level), 0).repeat(CHUNK // len(level), 1)
+            take_chunk(self.voxels, (row % CHUNKS, column % CHUNKS), (column, row), base, whole)
 
     # Plain data.
 
@@ -177,8 +200,7 @@ class VoxelMap:
         """Know what another map of the same ground knew."""
         self._lowest = float(state["lowest"])
         self.voxels = empty_voxels()
-        for column, row in np.asarray(state["chunks"]).reshape(-1, 2).tolist():
-            self._open(column, row)
+        self._open([(column, row) for column, row in np.asarray(state["chunks"]).reshape(-1, 2).tolist()])
         place = np.asarray(state["column"], np.int64)
         self.voxels.mask.ravel()[place] = np.asarray(state["mask"], np.uint64)
         self.voxels.until.ravel()[place] = np.asarray(state["until"], np.int64)
