@@ -15,17 +15,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.agents.indoor_walk import IndoorWalker
+from vico.agents.navigation.memory import SeenMemory
+from vico.agents.navigation.navigator import Navigator
+from vico.agents.navigation.search import Target
 from vico.agents.perception import Sighting, sightings
 from vico.agents.state import AgentState, generator_state, restore_generator
-from vico.agents.wayfinding import Walker
 from vico.world.public import PublicMap
 
 Action = dict[str, Any]
 
 WALK = 2.0  # metres a step
 OUTSIDE = "outside"  # where a door leads that leads into no other room
-ENTER_REACH = 1.8
+ENTER_REACH = 1.95  # metres from an entrance; the rules allow for 2
 DOOR_REACH = 1.5
 INNER_DOOR_REACH = 0.8
 # A point so much farther off than a doorway, and seen within so much of its middle, is seen through it, metres.
@@ -83,7 +84,7 @@ class ObservationView:
 
 
 class AssistantSkills:
-    """The skills of one assistant, with what it remembers of rooms.
+    """The skills of one assistant, with what it remembers of rooms and things.
 
     Parameters
     ----------
@@ -96,19 +97,19 @@ class AssistantSkills:
     def __init__(self, public_map: PublicMap, generator: np.random.Generator) -> None:
         self.map = public_map
         self._rng = generator
-        self._walker = Walker(public_map, generator)
-        self._indoors = IndoorWalker()
+        self.navigator = Navigator(public_map, generator)
+        self.seen = SeenMemory()
         #: Metres a second outdoors.
         self.pace = WALK
         self._trail: list[str] = []
         self._tries = 0
 
     def state(self) -> AgentState:
-        """Return the way under way, rooms known, and where chance stands."""
+        """Return the way under way, what is known of rooms and things, and where chance stands."""
         return {
             "generator": generator_state(self._rng),
-            "walker": self._walker.state(),
-            "indoors": self._indoors.state(),
+            "navigator": self.navigator.state(),
+            "seen": self.seen.state(),
             "trail": list(self._trail),
             "tries": self._tries,
         }
@@ -116,23 +117,23 @@ class AssistantSkills:
     def restore(self, state: AgentState) -> None:
         """Go on with what `state` returned."""
         restore_generator(self._rng, state["generator"])
-        self._walker.restore(state["walker"])
-        self._indoors.restore(state["indoors"])
+        self.navigator.restore(state["navigator"])
+        self.seen.restore(state["seen"])
         self._trail, self._tries = list(state["trail"]), state["tries"]
 
     def notice(self, view: ObservationView) -> None:
-        """Take in a new observation: the room's depth, and the way one came."""
+        """Take in a new observation: what stands where, what was seen, and the way one came."""
+        self.navigator.notice(
+            dict(view.observation), dict(view.info), ignore=[entity for entity in view.held if entity]
+        )
+        self.seen.notice(view.observation, view.things)
         room = view.room
         if room is None:
             self._trail.clear()
-            return
-        if room in self._trail:
+        elif room in self._trail:
             del self._trail[self._trail.index(room) + 1 :]
         else:
             self._trail.append(room)
-        carried = [entity for entity in view.held if entity]
-        goods = [thing.entity for thing in view.things if thing.kind == "object"]
-        self._indoors.notice(dict(view.observation), dict(view.info), ignore=carried + goods)
 
     def go_to(self, view: ObservationView, region: Mapping[str, Any]) -> Action | None:
         """Go to a region of a task: into the place, or to the middle of the spot outdoors."""
@@ -155,7 +156,9 @@ class AssistantSkills:
             self._tries = self._tries + 1 if view.refused else 1
             return {"type": "enter", "place": place_id}
         self._tries = 0
-        return self.walk_to(view, place.position, near=0.3) or {"type": "wait"}
+        # The spot before it that maps show may lie a little too far off.
+        step = self.walk_to(view, place.position, near=0.3) or self.walk_to(view, door, near=ENTER_REACH - 0.5)
+        return step or {"type": "wait"}
 
     def leave(self, view: ObservationView) -> Action | None:
         """Leave the building, room by room, the way one came."""
@@ -191,8 +194,11 @@ class AssistantSkills:
         return found
 
     def walk_indoors(self, view: ObservationView, target: ArrayLike, *, near: float) -> Action | None:
-        """Walk within a room around what depth images showed; None once within `near` metres of the target."""
-        return self._indoors.towards(dict(view.observation), target, near=near)
+        """Walk within a room around what depth images showed; None once within `near` metres of the target.
+
+        And where no way leads nearer.
+        """
+        return self.navigator.towards(dict(view.observation), dict(view.info), Target.disc(target, near))
 
     def approach(self, view: ObservationView, position: ArrayLike, *, near: float) -> Action | None:
         """Walk up to a point, indoors or out; None once within `near` metres."""
@@ -204,8 +210,11 @@ class AssistantSkills:
 
     def walk_to(self, view: ObservationView, point: ArrayLike, *, near: float) -> Action | None:
         """Walk outdoors on the public map; None once within `near` metres, or where no way leads nearer."""
-        if view.away(point) <= near:
-            self._walker.stop()
-            return None
-        x, y = (float(value) for value in np.asarray(point, np.float64)[:2])
-        return self._walker.towards((x, y), self.pace, dict(view.observation), dict(view.info))
+        point = np.asarray(point, np.float64)[:2]
+        return self.navigator.towards(
+            dict(view.observation), dict(view.info), Target.disc(point, near), speed=self.pace
+        )
+
+    def walk_to_box(self, view: ObservationView, box: Target) -> Action | None:
+        """Walk to a box, indoors or out; None once within its `near` metres, or where no way leads nearer."""
+        return self.navigator.towards(dict(view.observation), dict(view.info), box, speed=self.pace)
