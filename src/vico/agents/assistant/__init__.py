@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
+from vico.agents.assistant.choosing import ChoicePlanner
 from vico.agents.assistant.heuristic import HeuristicPlanner
+from vico.agents.assistant.mcts import MctsPlanner
+from vico.agents.assistant.ours import OurPlanner
 from vico.agents.assistant.random_planner import RandomPlanner
 from vico.agents.base import Agent
 from vico.errors import InputError
 from vico.world.public import PublicMap
 
-METHODS: dict[str, type[HeuristicPlanner] | type[RandomPlanner]] = {
+METHODS: dict[str, type[HeuristicPlanner] | type[RandomPlanner] | type[ChoicePlanner]] = {
     "random": RandomPlanner,
     "heuristic": HeuristicPlanner,
+    "mcts": MctsPlanner,
+    "ours": OurPlanner,
 }
 
 

@@ -44,9 +44,9 @@ class Option(Protocol):
 class GoTo:
     """Go to a region: into the place, or to the middle of the spot outdoors. Outcomes: ``arrived``, ``stuck``."""
 
-    def __init__(self, skills: AssistantSkills, region: Region) -> None:
+    def __init__(self, skills: AssistantSkills, region: Region, *, near: float = 1.0) -> None:
         self.outcome = ""
-        self._skills, self._region = skills, region
+        self._skills, self._region, self._near = skills, region, near
         self._steps = 0
 
     def state(self) -> AgentState:
@@ -59,7 +59,7 @@ class GoTo:
 
     def act(self, view: ObservationView) -> Action | None:
         """Return the next action on the way."""
-        action = self._skills.go_to(view, self._region)
+        action = self._skills.go_to(view, self._region, near=self._near)
         self._steps += 1
         if action is None or self._steps > _ON_THE_WAY:
             self.outcome = "arrived" if action is None else "stuck"

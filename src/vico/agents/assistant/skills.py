@@ -101,6 +101,8 @@ class AssistantSkills:
         self.seen = SeenMemory()
         #: Metres a second outdoors.
         self.pace = WALK
+        #: Which place each room that one was in belongs to.
+        self.places: dict[str, str] = {}
         self._trail: list[str] = []
         self._tries = 0
 
@@ -110,6 +112,7 @@ class AssistantSkills:
             "generator": generator_state(self._rng),
             "navigator": self.navigator.state(),
             "seen": self.seen.state(),
+            "places": dict(self.places),
             "trail": list(self._trail),
             "tries": self._tries,
         }
@@ -119,7 +122,7 @@ class AssistantSkills:
         restore_generator(self._rng, state["generator"])
         self.navigator.restore(state["navigator"])
         self.seen.restore(state["seen"])
-        self._trail, self._tries = list(state["trail"]), state["tries"]
+        self.places, self._trail, self._tries = dict(state["places"]), list(state["trail"]), state["tries"]
 
     def notice(self, view: ObservationView) -> None:
         """Take in a new observation: what stands where, what was seen, and the way one came."""
@@ -128,6 +131,8 @@ class AssistantSkills:
         )
         self.seen.notice(view.observation, view.things)
         room = view.room
+        if room is not None:
+            self.places[room] = view.place or ""
         if room is None:
             self._trail.clear()
         elif room in self._trail:
@@ -135,13 +140,13 @@ class AssistantSkills:
         else:
             self._trail.append(room)
 
-    def go_to(self, view: ObservationView, region: Mapping[str, Any]) -> Action | None:
-        """Go to a region of a task: into the place, or to the middle of the spot outdoors."""
+    def go_to(self, view: ObservationView, region: Mapping[str, Any], *, near: float = 1.0) -> Action | None:
+        """Go to a region of a task: into the place, or to within `near` metres of the middle of the spot outdoors."""
         if region["kind"] == "place":
             return self.go_inside(view, str(region["place"]))
         if view.room is not None:
             return self.leave(view)
-        return self.walk_to(view, region["centre"], near=1.0)
+        return self.walk_to(view, region["centre"], near=near)
 
     def go_inside(self, view: ObservationView, place_id: str) -> Action | None:
         """Go into a place by its entrance."""

@@ -291,7 +291,7 @@ def furthest_straight(costs, cells, x, y, most):  # type: ignore[no-untyped-def]
         samples = int(length * 2.0) + 1
         is_clear = True
         for s in range(1, samples + 1):
-            column, row = int(math.floor(x + dx * s / samples)), int(math.floor(y + dy * s / samples))
+            column, row = math.floor(x + dx * s / samples), math.floor(y + dy * s / samples)
             on_line = costs[row & wrap, column & wrap]
             if (on_line == 0 and limit < 255) or on_line > limit:
                 is_clear = False

@@ -1,0 +1,327 @@
+"""What planners choose among at each decision: looking for something in a region, fetching, delivering.
+
+A `Choice` is one of these for one subtask; an `Errand` carries it out by options, one after the other, to its end. The
+`Book` keeps what came of them: what was delivered, reported, looked through and refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from vico.agents.assistant.options import GoTo, Option, PickUp, PutDown, Search
+from vico.agents.assistant.people import PERSON, AwaitPerson, Escort, Meet, Report, Show
+from vico.agents.assistant.skills import Action, AssistantSkills, ObservationView
+from vico.agents.navigation.memory import SeenThing
+from vico.agents.perception import Sighting
+from vico.agents.state import AgentState
+
+Instruction = Mapping[str, Any]
+Kind = Literal["look", "fetch", "deliver"]
+
+#: Things that so many attempts did not reach are left; regions are looked through so often.
+REFUSALS, LOOKS = 2, 3
+# Who fetches what was seen outdoors walks up to it from so near, metres.
+_NEAR_SEEN = 5.0
+# How long one waits for somebody who was followed home, steps; how near a found thing is shown from, metres.
+_PATIENCE, _SHOW_WITHIN = 30, 4.6
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One thing to do next.
+
+    Attributes
+    ----------
+    kind
+        ``look``: go to a region and look for what the subtask is about, and go on with it as far as it goes there.
+        ``fetch``: go to where it was seen before. ``deliver``: bring what is in hand to the destination.
+    subtask
+        Its index.
+    region
+        Of its sources; -1 where none is meant.
+    """
+
+    kind: Kind
+    subtask: int
+    region: int = -1
+
+
+class Book:
+    """What is known of all subtasks.
+
+    Parameters
+    ----------
+    instructions
+        As told.
+    """
+
+    def __init__(self, instructions: Sequence[Instruction]) -> None:
+        self.instructions = {int(one["index"]): one for one in instructions}
+        #: Subtasks that are reported, or that a colleague does or has done.
+        self.closed: set[int] = set()
+        self.looked: dict[int, dict[int, int]] = {k: {} for k in self.instructions}
+        self.refused: dict[str, int] = {}
+        self.picked: dict[str, int] = {}
+        self.put: set[str] = set()
+
+    def state(self) -> AgentState:
+        """Return all of it."""
+        return {
+            "closed": sorted(self.closed),
+            "looked": {str(k): {str(r): n for r, n in regions.items()} for k, regions in self.looked.items()},
+            "refused": dict(self.refused),
+            "picked": dict(self.picked),
+            "put": sorted(self.put),
+        }
+
+    def restore(self, state: AgentState) -> None:
+        """Know what `state` returned."""
+        self.closed, self.put = set(state["closed"]), set(state["put"])
+        self.looked = {int(k): {int(r): int(n) for r, n in regions.items()} for k, regions in state["looked"].items()}
+        self.refused, self.picked = dict(state["refused"]), dict(state["picked"])
+
+    def category(self, k: int) -> str:
+        """Return what kind of subtask one is."""
+        return str(self.instructions[k]["category"])
+
+    def is_open(self, k: int) -> bool:
+        """Whether a subtask is still to do."""
+        return k not in self.closed
+
+    def wanted(self, k: int) -> list[str]:
+        """Names of a subtask's things that are still to be found."""
+        return [
+            n for n in self.instructions[k]["objects"] if n not in self.picked and n not in self.put and self._may(n)
+        ]
+
+    def _may(self, name: str) -> bool:
+        return self.refused.get(name, 0) < REFUSALS
+
+    def in_hand(self, k: int, view: ObservationView) -> list[int]:
+        """Entities of a subtask's things that one holds."""
+        mine = [self.picked.get(name, 0) for name in self.instructions[k]["objects"]]
+        return [entity for entity in view.held if entity and entity in mine]
+
+    def is_wanted(self, k: int, thing: Sighting | SeenThing) -> bool:
+        """Whether something seen is what a subtask is about: one of its things, or with Carry its person."""
+        if self.category(k) == "carry":
+            return thing.kind == PERSON and thing.name == self.instructions[k]["person"]["name"]
+        return thing.kind == "object" and thing.name in self.wanted(k)
+
+    def choices(self, view: ObservationView, seen: Mapping[int, SeenThing]) -> list[Choice]:
+        """Return everything that makes sense now.
+
+        Parameters
+        ----------
+        seen
+            By subtask, where what it is about was seen.
+        """
+        found: list[Choice] = []
+        for k, told in self.instructions.items():
+            if not self.is_open(k):
+                continue
+            if self.in_hand(k, view):
+                found.append(Choice("deliver", k))
+            if all(view.held) and self.category(k) != "search":
+                continue
+            if self.category(k) != "carry" and not self.wanted(k):
+                continue
+            if k in seen:
+                found.append(Choice("fetch", k))
+            least = min(self.looked[k].get(r, 0) for r in range(len(told["sources"])))
+            if least < LOOKS:
+                looks = self.looked[k]
+                found += [Choice("look", k, r) for r in range(len(told["sources"])) if looks.get(r, 0) == least]
+        return found
+
+
+class Errand:
+    """Carries a choice out, and notes in the book what comes of it.
+
+    Attributes
+    ----------
+    over
+        Whether it has come to its end.
+    """
+
+    def __init__(self, choice: Choice, book: Book, skills: AssistantSkills, seen: SeenThing | None = None) -> None:
+        self.choice = choice
+        self.over = False
+        self._book, self._skills, self._seen = book, skills, seen
+        self._stage = "go"
+        self._target: Sighting | None = None
+        self._option: Option | None = None
+
+    def state(self) -> AgentState:
+        """Return how far it came; its choice and its book are its owner's to save."""
+        seen = self._seen
+        return {
+            "stage": self._stage,
+            "over": self.over,
+            "target": None if self._target is None else self._target.state(),
+            "option": None if self._option is None else self._option.state(),
+            "seen": None
+            if seen is None
+            else {
+                "entity": seen.entity,
+                "kind": seen.kind,
+                "name": seen.name,
+                "position": seen.position.copy(),
+                "room": seen.room,
+                "time": seen.time,
+                "pixels": seen.pixels,
+            },
+        }
+
+    def restore(self, state: AgentState) -> None:
+        """Go on."""
+        self._seen = None if state["seen"] is None else SeenThing(**state["seen"])
+        self._stage, self.over = state["stage"], state["over"]
+        self._target = None if state["target"] is None else Sighting(**state["target"])
+        self._option = None
+        if state["option"] is not None:
+            self._option = self._begin()
+            self._option.restore(state["option"])
+
+    @property
+    def stage(self) -> str:
+        """What is being done: go, look, pick, show, meet, follow, put, await or report."""
+        return self._stage
+
+    def take(self, thing: Sighting) -> None:
+        """Turn to what was seen on the way: pick it up, show it, or meet them."""
+        self._target = thing
+        self._stage, self._option = {"carry": "meet", "search": "show"}.get(self._category, "pick"), None
+
+    def act(self, view: ObservationView) -> Action | None:
+        """Return the next action; None once it is over."""
+        for _ in range(8):
+            if self.over:
+                return None
+            if self._option is None:
+                self._option = self._begin()
+            action = self._option.act(view)
+            if action is not None:
+                return action
+            option, self._option = self._option, None
+            self._stage = self._after(option, view)
+            self.over = self._stage == "over"
+        return {"type": "wait"}
+
+    @property
+    def _told(self) -> Instruction:
+        return self._book.instructions[self.choice.subtask]
+
+    @property
+    def _category(self) -> str:
+        return self._book.category(self.choice.subtask)
+
+    @property
+    def _region(self) -> Mapping[str, Any]:
+        """Where to go first."""
+        if self.choice.kind == "deliver":
+            region: Mapping[str, Any] = self._told["destination"]
+            return region
+        if self._seen is not None:
+            place = self._skills.places.get(self._seen.room) or None
+            centre = [float(x) for x in self._seen.position]
+            kind = "outdoor" if place is None else "place"
+            return {"kind": kind, "place": place, "centre": centre, "radius": 3.0, "surface": None}
+        source: Mapping[str, Any] = self._told["sources"][max(self.choice.region, 0)]
+        return source
+
+    def _begin(self) -> Option:
+        """Make the option of the stage."""
+        told, person, target = self._told, str(self._told["person"]["name"]), self._target
+        k = self.choice.subtask
+        if self._stage in ("pick", "show"):
+            assert target is not None
+            return (
+                PickUp(self._skills, target)
+                if self._stage == "pick"
+                else Show(self._skills, target, within=_SHOW_WITHIN)
+            )
+        if self._stage == "put":
+            mine = frozenset(self._book.picked[n] for n in told["objects"] if n in self._book.picked)
+            return PutDown(self._skills, told["destination"], mine if self._category == "delivery" else None)
+        return {
+            "go": lambda: GoTo(self._skills, self._region, near=_NEAR_SEEN if self._seen is not None else 1.0),
+            "look": lambda: Search(
+                self._skills, lambda seen: self._book.is_wanted(k, seen), self._region, large=self._category == "carry"
+            ),
+            "meet": lambda: Meet(
+                self._skills, person, len(told["objects"]), None if target is None else target.position
+            ),
+            "follow": lambda: Escort(self._skills, person, told["destination"]),
+            "await": lambda: AwaitPerson(person, _PATIENCE),
+            "report": lambda: Report(k),
+        }[self._stage]()
+
+    def _after(self, option: Option, view: ObservationView) -> str:
+        """Return the stage that follows, ``over`` at the end; and write down what came of the last one."""
+        if isinstance(option, GoTo):
+            return self._after_way(view)
+        if isinstance(option, Search):
+            return self._after_search(option)
+        if isinstance(option, PickUp):
+            return self._after_pick(option, view)
+        if isinstance(option, Show):
+            self._target = option.target
+            return "report" if option.outcome == "shown" else "over"
+        if isinstance(option, Meet):
+            return "follow" if option.outcome == "handed" else "over"
+        if isinstance(option, Escort):
+            return "put"
+        if isinstance(option, PutDown):
+            return self._after_put(option)
+        if isinstance(option, AwaitPerson):
+            return self._closed("report" if option.outcome == "came" else "over")
+        return self._closed("over")
+
+    def _after_way(self, view: ObservationView) -> str:
+        if self.choice.kind == "deliver":
+            return "put"
+        seen = self._seen
+        if seen is None or seen.room != (view.room or ""):
+            return "look"
+        self.take(Sighting(seen.entity, seen.kind, seen.name, seen.pixels, seen.position))
+        return self._stage
+
+    def _after_search(self, search: Search) -> str:
+        if search.found is not None:
+            self.take(search.found)
+            return self._stage
+        if self.choice.kind == "look":
+            looks = self._book.looked[self.choice.subtask]
+            looks[self.choice.region] = looks.get(self.choice.region, 0) + 1
+        elif self._seen is not None:
+            self._skills.seen.forget(self._seen.entity)
+        return "over"
+
+    def _after_pick(self, pick: PickUp, view: ObservationView) -> str:
+        name = pick.target.name
+        if pick.outcome == "picked":
+            self._book.picked[name] = pick.target.entity
+            more = self._book.wanted(self.choice.subtask)
+            return "look" if more and not all(view.held) else "over"
+        if pick.outcome == "refused":
+            self._book.refused[name] = self._book.refused.get(name, 0) + 1
+        return "over"
+
+    def _after_put(self, put: PutDown) -> str:
+        if self._category == "carry":
+            return "await"
+        k = self.choice.subtask
+        if put.outcome == "empty hands":
+            for name in self._told["objects"]:
+                if name in self._book.picked:
+                    del self._book.picked[name]
+                    self._book.put.add(name)
+        return "over" if self._book.wanted(k) or put.outcome != "empty hands" else "report"
+
+    def _closed(self, stage: str) -> str:
+        if stage == "over":
+            self._book.closed.add(self.choice.subtask)
+        return stage

@@ -1,0 +1,76 @@
+"""What planners reckon with: how long ways, searches and hand-overs take, and how likely a search finds something.
+
+Times are guesses of ours from the public map and from what such things take on average; with `distance` off every way
+takes the same (the ablation of the paper's appendix on distance modelling).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.agents.assistant.skills import WALK
+from vico.world.public import PublicMap
+from vico.world.walkable import WalkableMap
+
+#: Seconds that a way takes where distances are not reckoned with.
+UNIFORM = 60.0
+# People, lights and corners: a way takes so many times what its length and the pace say.
+_DETOUR = 1.25
+# Going in or out; picking up; putting down and reporting; meeting somebody and being handed things, seconds.
+DOOR, PICK, PUT, MEET = 12.0, 6.0, 6.0, 25.0
+# Looking through a place, and a spot outdoors: for a thing, and for a person, seconds.
+_LOOK = {("place", False): 45.0, ("outdoor", False): 22.0, ("place", True): 25.0, ("outdoor", True): 6.0}
+# Chance that a look finds what is there.
+FINDS = 0.85
+
+
+class Estimates:
+    """Times and chances of one task.
+
+    Parameters
+    ----------
+    distance
+        Whether distances are reckoned with.
+    """
+
+    def __init__(
+        self, public_map: PublicMap, instructions: Sequence[Mapping[str, Any]], *, distance: bool = True
+    ) -> None:
+        self.distance = distance
+        self._map = public_map
+        self._fields: dict[tuple[float, float], NDArray[np.float32]] = {}
+
+    def travel(self, start: Sequence[float], goal: Sequence[float], *, pace: float = WALK) -> float:
+        """Seconds from a point to another, which is one of the task's: its distance field is kept."""
+        if not self.distance:
+            return UNIFORM
+        metres = self._metres(start, goal)
+        return _DETOUR * metres / pace
+
+    def look(self, region: Mapping[str, Any], *, person: bool) -> float:
+        """Seconds that looking through a region takes, with going in and out."""
+        doors = 2 * DOOR if region["kind"] == "place" else 0.0
+        return _LOOK[str(region["kind"]), person] + doors
+
+    def _metres(self, start: Sequence[float], goal: Sequence[float]) -> float:
+        key = (round(float(goal[0]), 2), round(float(goal[1]), 2))
+        if key not in self._fields:
+            self._fields[key] = self._map.router.distance_field(np.array(key))
+        metres = _at(self._fields[key], start, self._map.walkable)
+        straight = math.dist((float(start[0]), float(start[1])), key)
+        return metres if math.isfinite(metres) else 1.4 * straight
+
+
+def _at(field: NDArray[np.float32], point: Sequence[float], walkable: WalkableMap) -> float:
+    ix, iy = np.clip(walkable.cell_of(np.asarray(point, np.float64)[:2]), 0, walkable.n - 1)
+    value = float(field[iy, ix])
+    if math.isfinite(value):
+        return value
+    around = field[max(iy - 8, 0) : iy + 9, max(ix - 8, 0) : ix + 9]
+    finite = around[np.isfinite(around)]
+    return float(finite.min()) if len(finite) else math.inf

@@ -1,0 +1,95 @@
+"""Our planner: the best order of what is left, made anew whenever something new is known.
+
+- **Order**: the exact best order in the abstract model, with two hands, ways by the map and the time that is left.
+- **Memory**: whatever is seen on the way and is wanted is fetched when that fits the order.
+- **Allocation**: two assistants share the subtasks so that the worse of both plans ends soonest; both reckon alike from
+  what both were told, so that nothing need be said. Who has finished its own goes on with what the other does last.
+- **Search**: regions are looked through in the order of chance per second; what was looked at comes last.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import Any
+
+from vico.agents.assistant.choosing import ChoicePlanner
+from vico.agents.assistant.errands import Choice
+from vico.agents.assistant.ordering import Plan, best_plan
+from vico.agents.assistant.outlook import Model
+from vico.agents.assistant.skills import Action, ObservationView
+from vico.agents.state import AgentState
+
+# Stages of an errand that something new may interrupt.
+_MAY_TURN = ("go", "look")
+
+
+class OurPlanner(ChoicePlanner):
+    """Plans an order, and again when a wanted thing comes into view."""
+
+    method = "ours"
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self._share: list[int] | None = None
+        self._known: list[int] = []
+
+    def state(self) -> AgentState:
+        """Return what is under way, and all that is known."""
+        return super().state() | {"share": self._share, "known": list(self._known)}
+
+    def restore(self, state: AgentState) -> None:
+        """Go on where `state` was returned."""
+        super().restore(state)
+        self._share = None if state["share"] is None else [int(k) for k in state["share"]]
+        self._known = [int(entity) for entity in state["known"]]
+
+    def notice(self, view: ObservationView) -> Action | None:
+        """Plan anew when something that is wanted comes into view while one is on the way or looking."""
+        known = sorted({thing.entity for thing in self.seen(view).values()})
+        new = [entity for entity in known if entity not in self._known]
+        self._known = known
+        if new and self.errand is not None and self.errand.stage in _MAY_TURN:
+            choice = self.decide(view)
+            if choice is not None and choice != self.errand.choice and choice.kind == "fetch":
+                self.errand = None
+        return None
+
+    def decide(self, view: ObservationView) -> Choice | None:
+        """Return the first choice of the best plan."""
+        left = self.time_left(view)
+        if self._share is None:
+            self._share = self._shared(view, left)
+        plan = best_plan(self._model(self._share, view), left)
+        if not plan.choices and self.of > 1:
+            others = [k for k in self.book.instructions if k not in self._share]
+            plan = best_plan(self._model(others, view), left)
+        if plan.choices:
+            return plan.choices[0]
+        # Nothing can be done in time, as it seems: what is nearest to being done, then.
+        first = next(iter(self.book.choices(view, self.seen(view))), None)
+        return first if left > 0.0 else None
+
+    def _model(self, subtasks: list[int], view: ObservationView) -> Model:
+        return Model(self.book, self.estimates, subtasks, view, self.seen(view))
+
+    def _shared(self, view: ObservationView, left: float) -> list[int]:
+        """Return the subtasks that are this assistant's: of all ways to share, the one that ends best."""
+        subtasks = list(self.book.instructions)
+        if self.of == 1:
+            return subtasks
+        plans: dict[tuple[int, ...], Plan] = {}
+
+        def plan_of(part: tuple[int, ...]) -> Plan:
+            if part not in plans:
+                plans[part] = best_plan(self._model(list(part), view), left)
+            return plans[part]
+
+        best, shared = (-1.0, 0.0), (tuple(subtasks), ())
+        for count in range(1, len(subtasks)):
+            for first in combinations(subtasks, count):
+                second = tuple(k for k in subtasks if k not in first)
+                one, other = plan_of(first), plan_of(second)
+                value = (one.worth + other.worth, -max(one.time, other.time))
+                if value > best:
+                    best, shared = value, (first, second)
+        return list(shared[self.number % 2])
