@@ -16,7 +16,7 @@ from vico.agents.state import AgentState
 Region = Mapping[str, Any]
 
 PERSON = "resident"
-_OFFER = "Hello! I am here to help you carry that home. May I take it?"
+_OFFER = "Hello {}! I am here to help you carry that home. May I take it?"
 # One speaks from so near, stands so near to be handed something, metres; asks again after so many steps; and gives up
 # somebody who is out of view for so long, or hands nothing over, steps.
 _SPEAK, _STAND, _AGAIN, _LOST, _LONGEST = CALL_DISTANCE - 3.0, HAND_OVER_DISTANCE - 0.3, 20, 25, 150
@@ -86,7 +86,7 @@ class Meet:
         assert self._where is not None
         if view.away(self._where) <= _SPEAK and self._steps - self._spoke_at >= _AGAIN:
             self._spoke_at = self._steps
-            return {"type": "communicate", "text": _OFFER}
+            return {"type": "communicate", "text": _OFFER.format(self._person.split()[0])}
         self._skills.pace = _RUN if view.away(self._where) > _SPEAK else _WALK
         step = self._skills.approach(view, self._where, near=_STAND)
         self._skills.pace = _WALK
