@@ -27,6 +27,8 @@ _SPOT = 0.7
 # From where one tries to pick, metres; and how long one comes no nearer before one gives up, steps.
 _NEARER = (GRASP, 0.8, 0.4)
 _IN_VAIN = 14
+# Who moved so far, metres, is followed there at once; else not before so many steps after one was stopped.
+_AFAR, _HOLD = 6.0, 6
 
 
 class Option(Protocol):
@@ -57,15 +59,25 @@ class Pursuit:
         self.position = position
         self._skills = skills
         self._through = ""
+        # What is walked to: it follows the position by strides, so that a way round an obstacle is gone to its end.
+        self._goal: NDArray[np.float64] | None = None
+        self._holds = 0
 
     def state(self) -> AgentState:
         """Return where it was seen."""
-        return {"position": None if self.position is None else self.position.copy(), "through": self._through}
+        return {
+            "position": None if self.position is None else self.position.copy(),
+            "through": self._through,
+            "goal": None if self._goal is None else self._goal.copy(),
+            "holds": self._holds,
+        }
 
     def restore(self, state: AgentState) -> None:
         """Go on."""
-        self.position = None if state["position"] is None else np.array(state["position"], np.float64)
-        self._through = state["through"]
+        self.position, self._goal = (
+            None if state[name] is None else np.array(state[name], np.float64) for name in ("position", "goal")
+        )
+        self._through, self._holds = state["through"], state["holds"]
 
     def see(self, view: ObservationView, position: NDArray[np.float64]) -> None:
         """Take note of where it is now."""
@@ -85,7 +97,15 @@ class Pursuit:
             if action is not None:
                 return action
             self._through = ""
-        return None if self.position is None else self._skills.approach(view, self.position, near=near)
+        return None if self.position is None else self._skills.approach(view, self._aim(view, self.position), near=near)
+
+    def _aim(self, view: ObservationView, position: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what to walk to."""
+        self._holds = _HOLD if view.state["action_status"] == "collision" else max(0, self._holds - 1)
+        moved = math.inf if self._goal is None else float(np.hypot(*(position - self._goal)[:2]))
+        if self._goal is None or moved > _AFAR or (self._holds == 0 and moved > min(_AFAR, 0.3 * view.away(position))):
+            self._goal = position
+        return self._goal
 
 
 class GoTo:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -25,6 +26,9 @@ _SPEAK, _STAND, _AGAIN, _LOST, _LONGEST = CALL_DISTANCE - 3.0, HAND_OVER_DISTANC
 # and does so no longer than this, steps.
 _BEHIND, _RUN_BEYOND, _BESIDE = 1.7, 3.2, 1.0
 _ESCORT = 700
+# In a room, who has moved less than so much a step, metres, for so many steps is let pass: one goes out, makes room for
+# so many steps, and waits so long for them to come out.
+_STANDS, _LETS_PASS, _ROOM, _COMES_OUT = 0.15, 5, 3, 40
 # ... goes to where the person was last seen for so many steps, then home by the map.
 _TO_LAST_SEEN = 8
 # So many pixels are shown where 20 are asked for, from these distances, metres, of which the first is tried first.
@@ -102,16 +106,34 @@ class Escort:
         self.outcome = ""
         self._skills, self._person, self._home = skills, person, home
         self._pursuit = Pursuit(skills)
-        self._lost = self._steps = 0
+        self._lost = self._steps = self._still = 0
+        self._ahead = False
 
     def state(self) -> AgentState:
         """Return how far it came."""
-        return {"pursuit": self._pursuit.state(), "lost": self._lost, "steps": self._steps}
+        return {
+            "pursuit": self._pursuit.state(),
+            "lost": self._lost,
+            "steps": self._steps,
+            "still": self._still,
+            "ahead": self._ahead,
+        }
 
     def restore(self, state: AgentState) -> None:
         """Go on."""
         self._pursuit.restore(state["pursuit"])
         self._lost, self._steps = state["lost"], state["steps"]
+        self._still, self._ahead = state["still"], state["ahead"]
+
+    def _await_outside(self, view: ObservationView, in_view: bool) -> Action:
+        """Make room before the door, and look back until they come out."""
+        self._still += 1
+        if in_view or self._still > _COMES_OUT:
+            self._ahead, self._still = False, 0
+            return {"type": "wait"}
+        if self._still <= _ROOM:
+            return {"type": "move_forward", "distance": 1.0}
+        return {"type": "turn_left", "degrees": 88.0}
 
     def act(self, view: ObservationView) -> Action | None:
         """Return the next action on the way."""
@@ -121,9 +143,19 @@ class Escort:
             return None
         seen = person_in_view(view, self._person)
         self._lost = 0 if seen is not None else self._lost + 1
+        before = self._pursuit.position
         if seen is not None:
             self._pursuit.see(view, seen.position)
         away = self._pursuit.away(view)
+        if view.room is not None:
+            stands = seen is not None and before is not None and math.dist(before[:2], seen.position[:2]) < _STANDS
+            self._still = self._still + 1 if stands else 0
+            # In a room one may be in their way: going ahead opens it, and they come after.
+            self._ahead = self._ahead or self._still > _LETS_PASS
+            if self._ahead:
+                return self._skills.go_inside(view, str(self._home["place"])) or {"type": "wait"}
+        elif self._ahead:
+            return self._await_outside(view, seen is not None)
         if seen is not None and away <= _BEHIND:
             return {"type": "look_at", "target": [float(x) for x in seen.position]}
         if self._pursuit.position is not None and self._lost <= _TO_LAST_SEEN:
