@@ -104,6 +104,26 @@ class Walker:
         return math.sqrt(east * east + north * north) + self._left[self._next]
 
     @property
+    def corners_ahead(self) -> list[Point]:
+        """The corners of the way that are still to come, ENU metres."""
+        return self._path[self._next :] if self._goal is not None else []
+
+    def go_round(self, position: Point, spots: Sequence[tuple[float, float, float]]) -> None:
+        """Find a way round what was seen in the way.
+
+        Parameters
+        ----------
+        position
+            Where one stands, ENU metres.
+        spots
+            Squares to keep out of, x, y and half their side, metres; instead of those that were told before, and of
+            what one was stopped by.
+        """
+        self._closed = list(spots)
+        self._aside = []
+        self._rejoin(position)
+
+    @property
     def straight_on(self) -> tuple[float, float, float] | None:
         """The corner that the last step led towards, ENU metres, and how far it is from there to the end of the way.
 

@@ -97,7 +97,8 @@ def test_what_stops_one_is_remembered_and_wider_each_time() -> None:
         counts.append(int(voxels.voxels.solid.sum()))
     assert counts == sorted(set(counts))
     assert voxels.passing
-    assert voxels.forget_passing()
+    assert voxels.forget_stumbles(10)
+    assert not voxels.forget_moving()
     assert not voxels.voxels.counts.any()
 
 

@@ -17,7 +17,7 @@ from vico.agents.state import AgentState
 #: With so many pixels, and after so many seconds for what moves, confidence has come to, or fallen to, 63 % and 37 %.
 SURE_PIXELS, STALE_AFTER = 20.0, 60.0
 #: Directions that a look around in a room is counted in, and how far a picture reaches to either side, radians.
-DIRECTIONS, _SIDE = 8, math.radians(45.0)
+DIRECTIONS, _SIDE = 8, math.radians(45.001)
 #: Most things that are remembered; what was seen longest ago is forgotten first.
 MOST = 512
 # Seen within so many metres of where it was, it lies there still.

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vico.agents.base import Action, Info, Observation, heading, wrapped
 from vico.agents.navigation.keeping import PathKeeper
+from vico.agents.navigation.outlook import Outlook
 from vico.agents.navigation.search import Target, furthest_straight
 from vico.agents.navigation.voxel_kernels import BESIDE_COST, SIDE, VOXEL
 from vico.agents.navigation.voxels import VoxelMap
@@ -33,6 +34,8 @@ _INSIDE, _LEAST_NEAR = 0.06, 0.05
 _AHEAD, _AHEAD_ON_STAIRS = 120.0, 10.0
 # What moves and leaves no way is waited for so many steps.
 _PATIENCE = 5
+# Who has just come in stands so near to the door, metres.
+_CAME_IN = 1.2
 OUTDOORS = ""
 
 
@@ -64,6 +67,7 @@ class Navigator:
         # How often in a row something solid stopped a step, and whether the last action was one.
         self._stumbles = 0
         self._stepped = False
+        self._outlook = Outlook(public_map.walkable)
 
     @property
     def searches(self) -> int:
@@ -147,6 +151,19 @@ class Navigator:
         self._map = self._made_map(min([*heights, self._floor]), max(heights, default=0.0) - min(heights, default=0.0))
         if known is not None:
             self._map.restore(known["map"])
+        elif self._space != OUTDOORS:
+            self._assume_wall_behind(observation)
+
+    def _assume_wall_behind(self, observation: Observation) -> None:
+        """Take it that the wall of the door one has just come in by, which one has behind, is straight."""
+        pose = np.asarray(observation["pose"], np.float64)
+        doors = [np.asarray(door["position"], np.float64) for door in observation["state"]["doors"]]
+        near = [door for door in doors if np.linalg.norm(door - pose[:3]) <= _CAME_IN]
+        ahead = pose[3:5] / max(float(np.hypot(*pose[3:5])), 1e-9)
+        behind = [door for door in near if float((door - pose[:3])[:2] @ ahead) < 0.0]
+        if behind:
+            nearest = min(behind, key=lambda door: float(np.linalg.norm(door - pose[:3])))
+            self._map.assume_wall(nearest, ahead, int(observation["state"]["time"]))
 
     def _made_map(self, lowest: float, rise: float) -> VoxelMap:
         if self._space == OUTDOORS:
@@ -162,16 +179,15 @@ class Navigator:
 
     def _indoors(self, observation: Observation, target: Target) -> Action | None:
         cells = self._way(observation, target)
-        if len(cells) < 2:
-            if self._waited < _PATIENCE and self._map.passing:
-                self._waited += 1
-                return {"type": "wait"}
-            if not self._map.forget_passing():
-                return None
+        # What one bumped into may have been taken for wider than it is.
+        if len(cells) < 2 and self._map.forget_stumbles(int(observation["state"]["time"])):
             cells = self._way(observation, target)
-            if len(cells) < 2:
-                return None
-        return self._step(observation, cells)
+        if len(cells) < 2 and self._map.passing and self._waited < _PATIENCE:
+            self._waited += 1
+            return {"type": "wait"}
+        if len(cells) < 2 and self._map.forget_moving():
+            cells = self._way(observation, target)
+        return self._step(observation, cells) if len(cells) > 1 else None
 
     def _way(self, observation: Observation, target: Target) -> NDArray[np.int64]:
         """Return the cells of the best way known, from the one that one stands in."""
@@ -201,6 +217,10 @@ class Navigator:
     # Outdoors.
 
     def _outdoors(self, observation: Observation, info: Info, target: Target, speed: float) -> Action | None:
+        position = (float(observation["pose"][0]), float(observation["pose"][1]))
+        seen = self._outlook.in_the_way(self._map, position, self.walker.corners_ahead)
+        if seen:
+            self.walker.go_round(position, seen)
         return self.walker.towards((target.x, target.y), speed, observation, info)
 
     # Plain data.
@@ -221,6 +241,7 @@ class Navigator:
             "waited": self._waited,
             "stumbles": self._stumbles,
             "stepped": self._stepped,
+            "outlook": self._outlook.state(),
         }  # fmt: skip
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -239,3 +260,4 @@ class Navigator:
         self._target = None if state["target"] is None else Target(*state["target"])
         self._waited, self._stumbles = int(state["waited"]), int(state["stumbles"])
         self._stepped = bool(state["stepped"])
+        self._outlook.restore(state["outlook"])

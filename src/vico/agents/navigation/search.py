@@ -22,6 +22,9 @@ _LEVEL_COST = STRAIGHT * FREE_COST / _SLOPE
 _NO_LEVEL = -1000.0
 # Where no way leads there, a level that is left counts as so many columns.
 _LEVELS_COUNT = 3.0
+# A straight line may cost so many times what the cells of a way do, and two free columns more; after so many of
+# them that it does not lead to, no more are tried.
+_HARDLY_MORE, _ROUNDING, _MISSES = 1.1, 2 * STRAIGHT * FREE_COST, 12
 #: Heights at which unseen ground may be come to in one search, by how many levels are left to the target's.
 LAYERS, _LAYER_LEVELS = 4, 8.0
 
@@ -271,7 +274,7 @@ def _way_back(memory, x, y, layer):  # type: ignore[no-untyped-def]
 
 @compiled
 def furthest_straight(costs, cells, x, y, most):  # type: ignore[no-untyped-def]
-    """Return the last cell of a way that a straight line leads to through no costlier cells than the way itself.
+    """Return the last cell of a way that a straight line leads to for hardly more than the way itself costs.
 
     Parameters
     ----------
@@ -287,27 +290,33 @@ def furthest_straight(costs, cells, x, y, most):  # type: ignore[no-untyped-def]
     Returns
     -------
     which, limit
-        Index of the cell, 0 for the first; and the greatest cost on the line.
+        Index of the cell, 0 for the first; and the greatest cost on the line, 255 where it is blocked.
     """
-    wrap = costs.shape[0] - 1
-    best, best_limit, limit, misses = 0, 0, 0, 0
+    best, best_limit, misses = 0, 0, 0
     for k in range(1, len(cells)):
-        cost = costs[cells[k, 1] & wrap, cells[k, 0] & wrap]
-        limit = max(limit, np.int64(cost) if cost else 255)
         dx, dy = cells[k, 0] + 0.5 - x, cells[k, 1] + 0.5 - y
         length = math.sqrt(dx * dx + dy * dy)
-        if length > most or misses > 12:
+        if k > 1 and (length > most or misses > _MISSES):
             break
-        samples = int(length * 2.0) + 1
-        is_clear = True
-        for s in range(1, samples + 1):
-            column, row = int(math.floor(x + dx * s / samples)), int(math.floor(y + dy * s / samples))
-            on_line = costs[row & wrap, column & wrap]
-            if (on_line == 0 and limit < 255) or on_line > limit:
-                is_clear = False
-                break
-        if is_clear or k == 1:
+        limit, total = _line_cost(costs, x, y, dx, dy)
+        if k == 1 or (limit < 255 and total <= _HARDLY_MORE * (cells[k, 2] - cells[0, 2]) + _ROUNDING):
             best, best_limit, misses = k, limit, 0
         else:
             misses += 1
     return best, best_limit
+
+
+@compiled(inline="always")
+def _line_cost(costs, x, y, dx, dy):  # type: ignore[no-untyped-def]
+    """Return the greatest cost of a cell on a line, 255 for blocked ones, and the whole line's as a way's."""
+    wrap = costs.shape[0] - 1
+    length = math.sqrt(dx * dx + dy * dy)
+    samples = int(length * 2.0) + 1
+    limit, total = 0, 0
+    for s in range(1, samples + 1):
+        column, row = int(math.floor(x + dx * s / samples)), int(math.floor(y + dy * s / samples))
+        cost = np.int64(costs[row & wrap, column & wrap])
+        cost = cost if cost else 255
+        limit = max(limit, cost)
+        total += cost
+    return limit, STRAIGHT * length * total / samples
