@@ -29,6 +29,8 @@ _BLOCK, _GROW = 0.5, 0.4
 _REJOIN, _DETOUR = 8.0, 6.0
 # Degrees one turns for a step aside, and for one back; who is stopped so often steps back, for aside it is no wider.
 _ASIDE, _BACK, _BACK_FROM = (50.0, 90.0, 130.0), (130.0, 170.0, 90.0), 9
+# So many spots are kept out of at most, those told first forgotten first.
+_MOST_CLOSED = 200
 _HIT_SOLID = code_name(ReasonCode.HIT_SOLID)
 
 Point = tuple[float, float]
@@ -116,10 +118,9 @@ class Walker:
         position
             Where one stands, ENU metres.
         spots
-            Squares to keep out of, x, y and half their side, metres; instead of those that were told before, and of
-            what one was stopped by.
+            Squares to keep out of, x, y and half their side, metres; besides those of before, on the way to one goal.
         """
-        self._closed = list(spots)
+        self._closed = [*self._closed, *spots][-_MOST_CLOSED:]
         self._aside = []
         self._rejoin(position)
 

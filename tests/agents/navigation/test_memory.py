@@ -101,7 +101,9 @@ def test_rooms_are_looked_at_direction_by_direction_and_state_keeps_all() -> Non
 
 def test_sightings_are_what_counting_pixel_by_pixel_comes_to() -> None:
     chance = rng(0, "navigation test, pixels")
-    picture = view(parcel(), *(box((0.3, 0.3, 0.5), (*chance.uniform(1, 6, 2), 0.3)).of_entity(k) for k in range(20, 60)))
+    picture = view(
+        parcel(), *(box((0.3, 0.3, 0.5), (*chance.uniform(1, 6, 2), 0.3)).of_entity(k) for k in range(20, 60))
+    )
     picture["segmentation"][chance.random((256, 256)) < 0.1] = 0
     picture["depth"][chance.random((256, 256)) < 0.1] = 0.0
     entities = {k: {"kind": "object", "name": f"thing {k}"} for k in (7, *range(20, 60))}

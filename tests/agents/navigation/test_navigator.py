@@ -1,8 +1,9 @@
-"""An assistant walks where pictures let it: through a furnished hotel by its stairs, and round what maps do not show."""
+"""An assistant walks where pictures let it: through a hotel by its stairs, and round what maps do not show."""
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -90,7 +91,9 @@ def test_an_assistant_gets_up_and_down_the_stairs_of_a_hotel_and_out_again(visit
     while way[-1] != lower.to:  # the rooms between the entrance and the stairs
         way.append(next(d.to for d in rooms[way[-1]].doors if d.to and d.to not in way and not rooms[d.to].rise))
     for room in [*way[1:], stairs.id, upper.to]:
-        visitor.until(lambda room=room: skills.go_through(visitor.view, room), lambda room=room: visitor.view.room == room, 60)
+        visitor.until(
+            lambda room=room: skills.go_through(visitor.view, room), lambda room=room: visitor.view.room == room, 60
+        )
     assert visitor.view.pose[2] == pytest.approx(stairs.centre[2] + stairs.rise, abs=0.1)
     visitor.until(lambda: skills.leave(visitor.view), lambda: visitor.view.room is None, 150)
     assert visitor.collisions <= 3
@@ -109,7 +112,9 @@ def test_an_assistant_gets_to_every_surface_of_its_first_room_without_bumping_in
         spot = np.array(surface.reach)
         box = Target(*surface.centre[:2], surface.yaw, surface.size[0] / 2, surface.size[1] / 2, near=0.7)
         visitor.until(
-            lambda box=box: skills.walk_to_box(visitor.view, box), lambda box=box: box.away(*visitor.view.pose[:2]) <= 0.7, 40
+            lambda box=box: skills.walk_to_box(visitor.view, box),
+            lambda box=box: box.away(*visitor.view.pose[:2]) <= 0.7,
+            40,
         )
         visitor.until(
             lambda spot=spot: skills.approach(visitor.view, spot, near=GRASP),
@@ -167,7 +172,7 @@ def test_the_walker_goes_round_what_was_seen() -> None:
     spots = [(x / 2 + 0.25, y / 2 + 0.25, 0.0) for x in range(8, 12) for y in range(-4, 4)]
     walker.go_round((0.0, 0.0), spots)
     way = np.array([(0.0, 0.0), *walker.corners_ahead])
-    along = np.concatenate([np.linspace(a, b, 50) for a, b in zip(way[:-1], way[1:], strict=True)])
+    along = np.concatenate([np.linspace(a, b, 50) for a, b in pairwise(way)])
     inside = (along[:, 0] > 4.0) & (along[:, 0] < 6.0) & (np.abs(along[:, 1]) < 2.0)
     assert not inside.any()
     assert way[-1].tolist() == [20.0, 0.0]

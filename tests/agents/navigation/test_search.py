@@ -173,7 +173,9 @@ def test_stairs_are_climbed_around_the_wall_between_their_flights(seen: bool) ->
     if not seen:
         masks[20:, :] = 0  # the upper flight and the wall's far side were not in view yet
     door = Target(1.1, 2.55, near=0.3, z=3.4)
-    cells, reached = search((costs, masks), search_memory(N, layers=LAYERS), np.array([12, 15, 2.0]), door.values(0.0), True)
+    cells, reached = search(
+        (costs, masks), search_memory(N, layers=LAYERS), np.array([12, 15, 2.0]), door.values(0.0), True
+    )
     assert reached
     assert cells[:, 0].max() >= 42  # by the landing at the far end
     below_it = Target(1.1, 1.55, near=0.3, z=3.4).values(0.0)

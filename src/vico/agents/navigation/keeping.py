@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from vico.agents.navigation.search import (
     BOUND,
-    FREE_COST,
     LAYERS,
     STRAIGHT,
     SearchMemory,
@@ -18,9 +17,9 @@ from vico.agents.navigation.search import (
     search,
     search_memory,
 )
+from vico.agents.navigation.voxel_kernels import FREE_COST
 from vico.agents.state import AgentState
 from vico.io.compiled import compiled
-
 
 #: Side of the cells that ways on stairs are found on, around who walks there.
 ON_STAIRS = 256

@@ -87,9 +87,9 @@ class SeenMemory:
             self._put(SeenThing(thing.entity, thing.kind, thing.name, thing.position, room, now, pixels))
         hidden = [thing for thing in self._rooms.get(room, {}).values() if thing.time != now]
         missing = [thing for thing, gone in zip(hidden, _are_gone(hidden, observation), strict=True) if gone]
-        missing += [thing for entity in state["held"] if entity and (thing := self._thing(int(entity))) is not None]
-        for thing in missing:
-            self.forget(thing.entity)
+        missing += [seen for entity in state["held"] if entity and (seen := self._thing(int(entity))) is not None]
+        for gone in missing:
+            self.forget(gone.entity)
         while len(self._room_of) > MOST:
             self.forget(next(iter(self._room_of)))
         return missing

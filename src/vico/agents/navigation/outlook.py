@@ -18,6 +18,8 @@ Point = tuple[float, float]
 
 #: How far ahead on its way one looks for what stands, and for what moves, metres: that may have gone on until then.
 STANDING_AHEAD, MOVING_AHEAD = 6.0, 1.8
+#: On one way so often at most: where there is no end of it, one walks on and sees what stops one.
+MOST_TIMES = 6
 # Metres between the points of a way that are looked at; those within so many of oneself are not.
 _SPACING, _OWN = 0.2, 0.3
 # Cells are closed up to so many metres around what is in the way.
@@ -42,6 +44,11 @@ class Outlook:
     def __init__(self, walkable: WalkableMap) -> None:
         self._walkable = walkable
         self._last: Point | None = None
+        self._times = 0
+
+    def set_out(self) -> None:
+        """Begin a new way."""
+        self._last, self._times = None, 0
 
     def in_the_way(
         self, voxels: VoxelMap, position: Point, corners: Sequence[Point]
@@ -56,7 +63,7 @@ class Outlook:
             Where one stands, and the way ahead, ENU metres.
         """
         line = _sampled(position, corners)
-        if not len(line):
+        if not len(line) or self._times >= MOST_TIMES:
             return []
         i, j = (np.floor(line / VOXEL).astype(np.int64) % SIDE).T
         (taken,) = np.nonzero(voxels.voxels.counts[j, i, _NEAR])
@@ -66,6 +73,7 @@ class Outlook:
                 return []
             if math.dist(spot, position) <= MOVING_AHEAD or not _moves(voxels, int(i[k]), int(j[k])):
                 self._last = spot
+                self._times += 1
                 return self._cells_around(voxels, spot)
         if not len(taken):
             self._last = None
@@ -82,12 +90,12 @@ class Outlook:
         return [(x, y, 0.0) for x, y in centres[voxels.voxels.counts[j, i, _NEAR] > 0].tolist()]
 
     def state(self) -> AgentState:
-        """Return what was gone round last."""
-        return {"last": None if self._last is None else list(self._last)}
+        """Return what was gone round last, and how often something was."""
+        return {"last": None if self._last is None else list(self._last), "times": self._times}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Go on as `state` returned it."""
-        last = state["last"]
+        last, self._times = state["last"], int(state["times"])
         self._last = None if last is None else (float(last[0]), float(last[1]))
 
 

@@ -20,6 +20,8 @@ _STEP_LEVELS, _SLOPE = 3, 0.9
 _AT_LEVEL = 5  # levels that a target may lie above or below who has reached it
 _LEVEL_COST = STRAIGHT * FREE_COST / _SLOPE
 _NO_LEVEL = -1000.0
+# Who touches something gets free of it within so many columns, or not at all.
+_WAY_OUT = 3
 # Where no way leads there, a level that is left counts as so many columns.
 _LEVELS_COUNT = 3.0
 # A straight line may cost so many times what the cells of a way do, and two free columns more; after so many of
@@ -90,7 +92,7 @@ class SearchMemory(NamedTuple):
         Search that saw the cell, twice; one more where its cost is final; int32.
     low, high
         Between which levels the ground is there, float32: the same where it was seen.
-    count
+    searches
         Searches so far, twice, shape ``(1,)``.
     """
 
@@ -99,7 +101,7 @@ class SearchMemory(NamedTuple):
     stamp: NDArray[np.int32]
     low: NDArray[np.float32]
     high: NDArray[np.float32]
-    count: NDArray[np.int32]
+    searches: NDArray[np.int32]
 
 
 def search_memory(m: int = SIDE, *, layers: int = 1) -> SearchMemory:
@@ -159,8 +161,8 @@ def search(grid, memory, start, target, climb):  # type: ignore[no-untyped-def]
     m = memory.cost.shape[1]
     wrap, inner, middle, layers = costs.shape[0] - 1, m - 1, m // 2, memory.cost.shape[0] // m
     x0, y0 = int(start[0]), int(start[1])
-    memory.count[0] += 2
-    stamp = memory.count[0]
+    memory.searches[0] += 2
+    stamp = memory.searches[0]
     b, a = y0 & inner, x0 & inner
     memory.cost[b, a], memory.parent[b, a], memory.stamp[b, a] = 0, 8, stamp
     memory.low[b, a] = memory.high[b, a] = start[2]
@@ -190,9 +192,9 @@ def search(grid, memory, start, target, climb):  # type: ignore[no-untyped-def]
             cost = np.int64(costs[j & wrap, i & wrap])
             if cost == 0:
                 # A start that touches what is around it may still be left.
-                if not blocked:
+                if not blocked or max(abs(i - x0), abs(j - y0)) > _WAY_OUT:
                     continue
-                cost = 2 * NEAR_COST
+                cost = np.int64(2 * NEAR_COST)
             up, on = levels, 0
             if climb:
                 mask = masks[j & wrap, i & wrap]
@@ -200,7 +202,7 @@ def search(grid, memory, start, target, climb):  # type: ignore[no-untyped-def]
                 if up[0] > levels[1] + _STEP_LEVELS or up[1] < levels[0] - _STEP_LEVELS:
                     continue
                 if not mask:
-                    on = min(int(math.ceil(_levels_off(up, target) / _LAYER_LEVELS)), layers - 1)
+                    on = min(math.ceil(_levels_off(up, target) / _LAYER_LEVELS), layers - 1)
             d, c = on * m + (j & inner), i & inner
             if memory.stamp[d, c] == stamp + 1:
                 continue
@@ -312,11 +314,13 @@ def _line_cost(costs, x, y, dx, dy):  # type: ignore[no-untyped-def]
     wrap = costs.shape[0] - 1
     length = math.sqrt(dx * dx + dy * dy)
     samples = int(length * 2.0) + 1
-    limit, total = 0, 0
+    limit, total = np.int64(0), np.int64(0)
     for s in range(1, samples + 1):
-        column, row = int(math.floor(x + dx * s / samples)), int(math.floor(y + dy * s / samples))
+        column, row = math.floor(x + dx * s / samples), math.floor(y + dy * s / samples)
         cost = np.int64(costs[row & wrap, column & wrap])
-        cost = cost if cost else 255
-        limit = max(limit, cost)
+        if cost == 0:
+            cost = np.int64(255)
+        if cost > limit:
+            limit = cost
         total += cost
     return limit, STRAIGHT * length * total / samples

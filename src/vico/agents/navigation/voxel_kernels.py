@@ -135,8 +135,8 @@ def add_points(voxels, depth, segmentation, camera, special, limits):  # type: i
             x = (column + 0.5 - cx) / fx * z - shift[0]
             y = (row + 0.5 - cy) / fy * z - shift[1]
             z -= shift[2]
-            i = int(math.floor((rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z) * PER_METRE))
-            j = int(math.floor((rotation[0, 1] * x + rotation[1, 1] * y + rotation[2, 1] * z) * PER_METRE))
+            i = math.floor((rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z) * PER_METRE)
+            j = math.floor((rotation[0, 1] * x + rotation[1, 1] * y + rotation[2, 1] * z) * PER_METRE)
             up = rotation[0, 2] * x + rotation[1, 2] * y + rotation[2, 2] * z
             _enter(voxels, i, j, (up, eye), what == MOVES, until)
 
@@ -155,7 +155,7 @@ def _enter(voxels, i, j, heights, moves, until):  # type: ignore[no-untyped-def]
     if not voxels.flags[b, a, THERE] or voxels.key[b, a, 0] != i >> 5 or voxels.key[b, a, 1] != j >> 5:
         return
     up, eye = heights
-    level = int(math.floor((up - voxels.base[b, a]) * PER_METRE))
+    level = math.floor((up - voxels.base[b, a]) * PER_METRE)
     if level < 0 or level >= LEVELS:
         return
     i, j = i & (SIDE - 1), j & (SIDE - 1)
