@@ -11,7 +11,7 @@ import re
 import shutil
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -95,8 +95,9 @@ class Player:
         OutputError
             If nothing can be written: that is no episode's fault, and there is no use in going on.
         """
+        told = None if progress is None else partial(_told, progress, label_of(job))
         try:
-            return self._play(job, progress)
+            return self._play(job, told)
         except OutputError:
             raise
         except VicoError as error:
@@ -206,6 +207,11 @@ def _check(challenge: Challenge, record: EpisodeRecord) -> None:
     for part in record.parts:
         if part.success is bool(part.cause) or (part.cause and part.cause not in causes):
             raise ValueError(f"part {part.name!r}: success {part.success} with the cause {part.cause!r}")
+
+
+def _told(progress: Progress, label: str, _: str, step: int, limit: int) -> None:
+    """Tell how far an episode is, under a name that no other one has."""
+    progress(label, step, limit)
 
 
 def _task_name(job: Job, task: Mapping[str, object]) -> str:
