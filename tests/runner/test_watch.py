@@ -35,7 +35,7 @@ def check(name: str, folder: Path) -> AgentCheck:
         ("Thief", "fair", "reads the world's folder"),
         ("Sly", "fair", "reads the world's folder"),
         ("Generator", "fair", "imports vico.challenges"),
-        ("Killer", "fair", "signals another process"),
+        ("Killer", "fair", "signals the process that judges it"),
         ("Teleporter", "leaves", "changes the observation"),
         ("Impostor", "action", "agent"),
         ("Puppeteer", "action", "assistant_0"),

@@ -1,9 +1,9 @@
 """What an isolated agent reaches for and is not given: refused in its process, and said.
 
-Python tells audit hooks (PEP 578) of files that are opened and of looks at frames and at the garbage collector's list of
-objects, and finders of modules that are imported. This is a lock for honest people and lazy cheats, not a sandbox: compiled code and
-processes that an agent starts are not seen, and an agent's code that means to can undo it. docs/agents.md says what is
-caught and what is not.
+Python tells audit hooks (PEP 578) of files that are opened and of looks at frames and at the garbage collector's list
+of objects, and finders of the modules that are imported. This is a lock for honest people and lazy cheats, not a
+sandbox: compiled code and processes that an agent starts are not seen, and an agent's code that means to can undo it.
+docs/agents.md says what is caught and what is not.
 """
 
 from __future__ import annotations
@@ -125,7 +125,8 @@ class Watch:
         return f"imports {name}; put the agent into a module without it" if self._is_agents(frame) else None
 
     def _killed(self, frame: FrameType | None, arguments: tuple[Any, ...]) -> str | None:
-        return "signals another process" if arguments and arguments[0] != os.getpid() else None
+        # Processes that it started itself it may end.
+        return "signals the process that judges it" if arguments and arguments[0] in (os.getppid(), -1) else None
 
     def _searched(self, frame: FrameType | None, arguments: tuple[Any, ...]) -> str | None:
         return "searches the process's objects (gc)" if self._is_agents(frame) else None
