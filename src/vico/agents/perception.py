@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vico.agents.navigation.pixels import shown_in
 from vico.io.compiled import compiled
 
 #: Fewer pixels than this are not taken for a sighting.
@@ -23,8 +24,12 @@ class Sighting:
 
     Attributes
     ----------
+    pixels
+        How many show it.
     position
         Mean of its visible surface, ENU metres, shape ``(3,)``.
+    box
+        First column and row, last column and row in which the picture shows it.
     """
 
     entity: int
@@ -32,6 +37,7 @@ class Sighting:
     name: str
     pixels: int
     position: NDArray[np.float64]
+    box: tuple[int, ...] = (0, 0, 0, 0)
 
     def state(self) -> dict[str, Any]:
         """Return it as plain data; ``Sighting(**state)`` is the same again."""
@@ -41,6 +47,7 @@ class Sighting:
             "name": self.name,
             "pixels": self.pixels,
             "position": self.position.copy(),
+            "box": list(self.box),
         }
 
 
@@ -85,25 +92,17 @@ def sightings(observation: Mapping[str, Any], entities: Mapping[int, Mapping[str
     entities
         What the numbers of the segmentation stand for.
     """
-    segmentation = np.asarray(observation["segmentation"])
-    numbers, counts = np.unique(segmentation, return_counts=True)
+    shown = shown_in(observation)
     found = []
-    wanted = [
-        (int(number), int(count))
-        for number, count in zip(numbers, counts, strict=True)
-        if number and count >= SIGHT and entities.get(int(number), {}).get("name")
-    ]
-    if not wanted:
-        return []
-    points, pixels = points_from_depth(observation["depth"], observation["intrinsics"], observation["extrinsics"])
-    owner = segmentation.ravel()[pixels]
-    for number, count in wanted:
-        mine = points[owner == number]
-        if len(mine):
-            about = entities[number]
-            found.append(Sighting(number, about["kind"], about["name"], count, mine.mean(axis=0)))
-    eye = np.asarray(observation["pose"])[:3]
-    return sorted(found, key=lambda s: (float(np.linalg.norm(s.position - eye)), s.entity))
+    eye = np.asarray(observation["pose"], np.float64)[:3]
+    away = np.linalg.norm(shown.position - eye, axis=1)
+    for k in np.lexsort((shown.entity, away)).tolist():
+        entity, pixels = int(shown.entity[k]), int(shown.pixels[k])
+        about = entities.get(entity, {})
+        if pixels >= SIGHT and shown.hits[k] and about.get("name"):
+            box = tuple(shown.box[k].tolist())
+            found.append(Sighting(entity, about["kind"], about["name"], pixels, shown.position[k], box))
+    return found
 
 
 class DepthGrid:

@@ -9,7 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from vico.errors import InputError
 from vico.sim import moves
+from vico.sim.actions.hands import hold
 from vico.sim.avatars import free_ground
+from vico.sim.holding import free_hand
 from vico.sim.placing import Thing, free_spot_near, in_the_way
 from vico.sim.simulation_state import SimulationState
 from vico.world.mesh import Surface
@@ -82,6 +84,43 @@ class Scenario:
         state.entities[entity] = {"kind": "object", "name": name}
         return entity
 
+    def hand_object(
+        self, name: str, prototype: str, shape: Sequence[Surface], agent: str, *, size: ArrayLike = (0.3, 0.3, 0.3)
+    ) -> int:
+        """Add a movable object that a person holds.
+
+        Parameters
+        ----------
+        name, prototype, shape, size
+            As with `add_object`.
+        agent
+            Who holds it, in a free hand.
+
+        Returns
+        -------
+        int
+            Its entity.
+
+        Raises
+        ------
+        InputError
+            If nobody has that name, or both hands are full.
+        """
+        state = self._state
+        if agent not in state.people.names:
+            raise InputError(f"hand_object: {name}: nobody is called {agent!r}")
+        i = state.people.names.index(agent)
+        hand = free_hand(i, state)
+        if hand is None:
+            raise InputError(f"hand_object: {name}: {agent} has no free hand")
+        entity = state.objects.add(
+            name, prototype, state.people.position[i], int(state.people.room[i]), np.asarray(size, np.float64), 0.0
+        )
+        state.shapes[prototype] = list(shape)
+        state.entities[entity] = {"kind": "object", "name": name}
+        hold(state.objects.index(entity), i, hand, state)
+        return entity
+
     def place_agent(self, name: str, position: ArrayLike, *, yaw: float = 0.0) -> None:
         """Stand a person on free ground outdoors near a point.
 
@@ -126,6 +165,34 @@ class GroundTruth:
         """Return the name of the agent that carries an object; None if nobody does."""
         holder = int(self._state.objects.holder[self._index(name)])
         return self._state.entities[holder]["agent"] if holder else None
+
+    def object_entity(self, name: str) -> int:
+        """Return the entity of an object, as pictures show it."""
+        return int(self._state.objects.entity[self._index(name)])
+
+    def agent_entity(self, name: str) -> int:
+        """Return a person's entity, as pictures show it."""
+        return int(self._state.people.entity[self._person(name)])
+
+    def agent_position(self, name: str) -> NDArray[np.float64]:
+        """Return where a person stands, ENU metres, shape ``(3,)``."""
+        return self._state.people.position[self._person(name)].copy()
+
+    def agent_place(self, name: str) -> str | None:
+        """Return the id of the place a person is in; None outdoors."""
+        place = int(self._state.people.place[self._person(name)])
+        return self._state.world.places[place].id if place >= 0 else None
+
+    def agent_room(self, name: str) -> str | None:
+        """Return the id of the room a person is in; None outdoors."""
+        room = int(self._state.people.room[self._person(name)])
+        return self._state.indoor.rooms[room].id if room >= 0 else None
+
+    def _person(self, name: str) -> int:
+        names = self._state.people.names
+        if name not in names:
+            raise InputError(f"nobody is called {name!r}; there are {', '.join(names) or 'none'}")
+        return names.index(name)
 
     def _index(self, name: str) -> int:
         names = self._state.objects.names

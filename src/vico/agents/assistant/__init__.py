@@ -4,20 +4,27 @@ from __future__ import annotations
 
 from typing import Any
 
-from vico.agents.assistant.heuristic import HeuristicDelivery
+from vico.agents.assistant.heuristic import HeuristicPlanner
 from vico.agents.assistant.random_planner import RandomPlanner
 from vico.agents.base import Agent
 from vico.errors import InputError
 from vico.world.public import PublicMap
 
-METHODS: dict[str, type[HeuristicDelivery] | type[RandomPlanner]] = {
+METHODS: dict[str, type[HeuristicPlanner] | type[RandomPlanner]] = {
     "random": RandomPlanner,
-    "heuristic": HeuristicDelivery,
+    "heuristic": HeuristicPlanner,
 }
 
 
 def make_planner(
-    method: str, instructions: list[dict[str, Any]], public_map: PublicMap, *, seed: int, number: int = 0, of: int = 1
+    method: str,
+    instructions: list[dict[str, Any]],
+    public_map: PublicMap,
+    *,
+    seed: int,
+    number: int = 0,
+    of: int = 1,
+    distance: bool = True,
 ) -> Agent:
     """Make a planner by name.
 
@@ -27,6 +34,8 @@ def make_planner(
         What the task tells the assistants (`Task.instructions`).
     number, of
         Which of how many assistants this one is.
+    distance
+        Whether the planner may reckon with distances.
 
     Raises
     ------
@@ -35,4 +44,4 @@ def make_planner(
     """
     if method not in METHODS:
         raise InputError(f"no method called {method!r}; there are {', '.join(sorted(METHODS))}")
-    return METHODS[method](instructions, public_map, seed=seed, number=number, of=of)
+    return METHODS[method](instructions, public_map, seed=seed, number=number, of=of, distance=distance)

@@ -1,105 +1,94 @@
-"""The heuristic planner: the finite-state automaton of the paper's figure on the delivery task.
-
-::
-
-    0 goto(source) -> 1 search near source -> 2 navigate to object -> 3 pick object(s)
-    3 -> 1 no target and carrying nothing     3 -> 4 hands full, or no target and carrying something
-    4 goto(destination) -> 5 drop at destination
-    5 -> 0 empty hands, not all done          5 -> 6 empty hands, all done
-    6 send complete -> 7 finished
-
-One guard is ours: a search that has looked everywhere three times gives the errand up, where the figure would go on
-for ever.
-"""
+"""The heuristic planner: an automaton for each category, one subtask after the other in the order given."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from enum import IntEnum
-from typing import Any, ClassVar
+from collections.abc import Mapping
+from typing import Any
 
-from vico.agents.assistant.skills import GRASP, Action, AssistantSkills, LookAround, ObservationView
+from vico.agents.assistant.automata import AUTOMATA, ROUNDS
+from vico.agents.assistant.options import GoTo, Option, PickUp, PutDown, Search, WalkUp
+from vico.agents.assistant.people import PERSON, AwaitPerson, Escort, Meet, Report, Show
+from vico.agents.assistant.skills import Action, AssistantSkills, ObservationView
 from vico.agents.perception import Sighting
 from vico.agents.state import AgentState
 from vico.seeds import rng
 from vico.world.public import PublicMap
 
-SEARCH_ROUNDS = 3
+# States that are passed through in one step, at most.
+_CHAIN = 12
+# Things that so many attempts did not reach are left.
+_REFUSALS = 2
+# How long one waits for somebody who was followed home, steps.
+_PATIENCE = 45
+# What Search's reports are made from: nearer than any setting asks for, metres.
+_SHOW_WITHIN = 4.6
 
 
-class AutomatonState(IntEnum):
-    """States of the automaton, numbered as in the figure."""
-
-    GOTO_SOURCE = 0
-    SEARCH = 1
-    NAVIGATE = 2
-    PICK = 3
-    GOTO_DESTINATION = 4
-    DROP = 5
-    COMPLETE = 6
-    FINISHED = 7
-
-
-class HeuristicDelivery:
-    """Does the errands one after the other, in the order given.
+class HeuristicPlanner:
+    """Follows the automaton of the task's category.
 
     Parameters
     ----------
     instructions
-        The task's errands, as told.
+        The subtasks, as told.
     number, of
-        Several assistants share the errands: this one takes every `of`-th, from `number` on.
+        Several assistants share the subtasks: this one takes every `of`-th, from `number` on.
+    distance
+        Taken for the other planners' sake: the automata know no distances.
     """
 
     def __init__(
-        self, instructions: list[dict[str, Any]], public_map: PublicMap, *, seed: int, number: int = 0, of: int = 1
+        self,
+        instructions: list[dict[str, Any]],
+        public_map: PublicMap,
+        *,
+        seed: int,
+        number: int = 0,
+        of: int = 1,
+        distance: bool = True,
     ) -> None:
         self.errands = instructions[number::of]
         self.skills = AssistantSkills(public_map, rng(seed, "heuristic", number))
-        self.phase = AutomatonState.GOTO_SOURCE if self.errands else AutomatonState.FINISHED
-        self._current = 0
-        self._search: LookAround | None = None
-        self._rounds = 0
-        self._target: Sighting | None = None
+        self.automaton = AUTOMATA[str(instructions[0]["category"]) if instructions else "delivery"]
+        #: Subtasks still to do, by their place in `errands`, the one in hand first.
+        self.line = list(range(len(self.errands)))
+        self.number = 0 if self.line else self.automaton.final
+        self._tried = [0] * len(self.errands)
+        self._region = 0
         self._picked: set[str] = set()
-        self._near = GRASP
-        self._picking = ""
-        self._reported = 0
-        self._steps_here = 0
+        self._refused: list[str] = []
+        self._target: Sighting | None = None
+        self._option: Option | None = None
 
     def state(self) -> AgentState:
-        """Return the errand in hand and how far it came, and what the skills remember."""
+        """Return the subtask in hand and how far it came, and what the skills remember."""
         return {
             "skills": self.skills.state(),
-            "phase": int(self.phase),
-            "current": self._current,
-            "search": None if self._search is None else self._search.state(),
-            "rounds": self._rounds,
-            "target": None if self._target is None else self._target.state(),
+            "number": self.number,
+            "line": list(self.line),
+            "tried": list(self._tried),
+            "region": self._region,
             "picked": sorted(self._picked),
-            "near": self._near,
-            "picking": self._picking,
-            "reported": self._reported,
-            "steps_here": self._steps_here,
+            "refused": list(self._refused),
+            "target": None if self._target is None else self._target.state(),
+            "option": None if self._option is None else self._option.state(),
         }
 
     def restore(self, state: AgentState) -> None:
-        """Go on with the errands as `state` returned them."""
+        """Go on with the subtasks as `state` returned them."""
         self.skills.restore(state["skills"])
-        self.phase, self._current = AutomatonState(state["phase"]), state["current"]
-        self._search = None
-        if state["search"] is not None:
-            self._search = self._new_search()
-            self._search.restore(state["search"])
-        self._rounds, self._near = state["rounds"], state["near"]
+        self.number, self.line, self._tried = state["number"], list(state["line"]), list(state["tried"])
+        self._region, self._picked, self._refused = state["region"], set(state["picked"]), list(state["refused"])
         self._target = None if state["target"] is None else Sighting(**state["target"])
-        self._picked, self._picking = set(state["picked"]), state["picking"]
-        self._reported, self._steps_here = state["reported"], state["steps_here"]
+        self._option = None
+        if state["option"] is not None:
+            self._option = self._begin()
+            self._option.restore(state["option"])
 
     @property
     def errand(self) -> dict[str, Any]:
-        """The errand in hand."""
-        return self.errands[self._current]
+        """The subtask in hand."""
+        return self.errands[self.line[0]]
 
     def act(self, observation: Mapping[str, Any], info: Mapping[str, Any]) -> Action:
         """Return one action for one observation."""
@@ -107,134 +96,122 @@ class HeuristicDelivery:
             return {"type": "wait"}
         view = ObservationView(observation, info)
         self.skills.notice(view)
-        for _ in range(12):  # a chain of states that are done at once, each at most once or twice
-            before = self.phase
-            action = self._STEPS[self.phase](self, view)
-            self._steps_here = self._steps_here + 1 if self.phase == before else 0
+        for _ in range(_CHAIN):
+            if self.number == self.automaton.final:
+                break
+            if self._option is None:
+                self._option = self._begin()
+            action = self._option.act(view)
             if action is not None:
                 return action
+            outcome = self._outcome(self._option, view)
+            self.number, self._option = self.automaton.edges[self.number, outcome], None
         return {"type": "wait"}
 
-    def _wanted(self, thing: Sighting) -> bool:
-        return thing.name in self.errand["objects"] and thing.name not in self._picked
+    def _begin(self) -> Option:
+        """Make the option of the state one is in."""
+        return {"delivery": self._delivery, "search": self._search, "carry": self._carry}[self.automaton.category]()
 
-    def _new_search(self) -> LookAround:
-        return LookAround(self.skills, self._wanted, self.errand["source"])
+    def _delivery(self) -> Option:
+        errand, target = self.errand, self._target
+        if self.number in (2, 3):
+            assert target is not None
+            return WalkUp(self.skills, target) if self.number == 2 else PickUp(self.skills, target)
+        return {
+            0: lambda: GoTo(self.skills, self._source),
+            1: lambda: Search(self.skills, self._is_wanted, self._source),
+            4: lambda: GoTo(self.skills, errand["destination"]),
+            5: lambda: PutDown(self.skills, errand["destination"]),
+            6: lambda: Report(int(errand["index"])),
+        }[self.number]()
 
-    def _goto_source(self, view: ObservationView) -> Action | None:
-        action = self.skills.go_to(view, self.errand["source"])
-        if action is None:
-            self._search = self._new_search()
-            self.phase = AutomatonState.SEARCH
-        return action
+    def _search(self) -> Option:
+        if self.number == 2:
+            assert self._target is not None
+            return Show(self.skills, self._target, within=_SHOW_WITHIN)
+        return {
+            0: lambda: GoTo(self.skills, self._source),
+            1: lambda: Search(self.skills, self._is_wanted, self._source),
+            3: lambda: Report(int(self.errand["index"])),
+        }[self.number]()
 
-    def _look(self, view: ObservationView) -> Action | None:
-        assert self._search is not None
-        action = self._search.act(view)
-        if action is not None:
-            return action
-        if self._search.found is not None:
-            self._target, self._near = self._search.found, GRASP
-            self.phase = AutomatonState.NAVIGATE
-            return None
-        self._rounds += 1
-        if any(view.held):
-            self.phase = AutomatonState.GOTO_DESTINATION
-        elif self._rounds >= SEARCH_ROUNDS:
-            self._next_errand()
-        else:
-            self._search = self._new_search()
-            return {"type": "wait"}
-        return None
+    def _carry(self) -> Option:
+        errand, person = self.errand, str(self.errand["person"]["name"])
+        where = None if self._target is None else self._target.position
+        return {
+            0: lambda: GoTo(self.skills, self._source),
+            1: lambda: Search(
+                self.skills, lambda seen: seen.kind == PERSON and seen.name == person, self._source, large=True
+            ),
+            2: lambda: Meet(self.skills, person, len(errand["objects"]), where),
+            3: lambda: Escort(self.skills, person, errand["destination"]),
+            4: lambda: PutDown(self.skills, errand["destination"]),
+            5: lambda: AwaitPerson(person, _PATIENCE),
+            6: lambda: Report(int(errand["index"])),
+        }[self.number]()
 
-    def _navigate(self, view: ObservationView) -> Action | None:
-        assert self._target is not None
-        # What is in view again is placed better from nearer.
-        self._target = next((t for t in view.things if t.entity == self._target.entity), self._target)
-        action = self.skills.approach(view, self._target.position, near=self._near)
-        if action is not None and self._steps_here < 60:
-            return action
-        self.phase = AutomatonState.PICK
-        return None
+    @property
+    def _source(self) -> dict[str, Any]:
+        regions: list[dict[str, Any]] = self.errand["sources"]
+        return regions[self._region % len(regions)]
 
-    def _pick(self, view: ObservationView) -> Action | None:
-        assert self._target is not None
-        if self._picking:
-            name, self._picking = self._picking, ""
-            if not view.refused:
-                self._picked.add(name)
-            elif self._near > 0.5:
-                self._near -= 0.3
-                self.phase = AutomatonState.NAVIGATE
-                return None
-            else:
-                self.phase = AutomatonState.SEARCH
-                self._search = self._new_search()
-                return {"type": "wait"}
+    def _is_wanted(self, thing: Sighting) -> bool:
+        out_of_reach = self._refused.count(thing.name) >= _REFUSALS
+        return thing.name in self.errand["objects"] and thing.name not in self._picked and not out_of_reach
+
+    def _outcome(self, option: Option, view: ObservationView) -> str:
+        """Say what came of an option, in the words of the automaton's edges, and take note of it."""
+        state = self.automaton.states[self.number]
+        if isinstance(option, Search):
+            return self._after_search(option, view)
+        if isinstance(option, PickUp):
+            return self._after_pick(option, view)
+        if isinstance(option, WalkUp | Show):
+            self._target = option.target
+        if isinstance(option, PutDown) and self.automaton is AUTOMATA["delivery"]:
+            return self._after_put(option)
+        if state == "report":
+            return self._next("")
+        if option.outcome == "did not come":
+            return self._next("did not come, ")
+        return option.outcome
+
+    def _after_search(self, search: Search, view: ObservationView) -> str:
+        if search.found is not None:
+            self._target = search.found
+            return "found"
+        if self.automaton is AUTOMATA["delivery"] and any(view.held):
+            return "nothing, but carrying"
+        self._region += 1
+        if self._region % len(self.errand["sources"]):
+            return "nothing"
+        # Looked for everywhere: others first.
+        self._tried[self.line[0]] += 1
+        self.line.append(self.line.pop(0))
+        self.line = [k for k in self.line if self._tried[k] < ROUNDS]
+        self._region = 0
+        return "nothing" if self.line else "nothing left"
+
+    def _after_pick(self, pick: PickUp, view: ObservationView) -> str:
+        if pick.outcome == "picked":
+            self._picked.add(pick.target.name)
+            left = [name for name in self.errand["objects"] if name not in self._picked]
+            return "picked, more wanted" if left and not all(view.held) else "picked, all of it"
+        self._refused.append(pick.target.name)
+        return pick.outcome
+
+    def _after_put(self, put: PutDown) -> str:
+        if put.outcome == "stuck":
+            return "stuck"
         left = [name for name in self.errand["objects"] if name not in self._picked]
-        if not left or all(view.held):
-            self.phase = AutomatonState.GOTO_DESTINATION
-            return None
-        if self._target.name in left:
-            self._picking = self._target.name
-            return {"type": "pick", "hand": view.held.index(0), "object": self._target.entity}
-        seen = next((thing for thing in view.things if self._wanted(thing)), None)
-        if seen is not None:
-            self._target, self._near = seen, GRASP
-            self.phase = AutomatonState.NAVIGATE
-            return None
-        # More is wanted from here: one look around before carrying off what is in hand.
-        self._search = self._new_search()
-        self.phase = AutomatonState.SEARCH
-        return None
+        if not left:
+            return "empty hands"
+        self._tried[self.line[0]] += 1
+        return "empty hands, more wanted" if self._tried[self.line[0]] < ROUNDS else "empty hands"
 
-    def _goto_destination(self, view: ObservationView) -> Action | None:
-        action = self.skills.go_to(view, self.errand["destination"])
-        if action is None:
-            self.phase = AutomatonState.DROP
-        return action
-
-    def _drop(self, view: ObservationView) -> Action | None:
-        full = [hand for hand, entity in enumerate(view.held) if entity]
-        if full:
-            if view.refused and self._steps_here > 0:
-                if self._steps_here > 12:
-                    self.phase = AutomatonState.GOTO_DESTINATION
-                if self._steps_here % 2:
-                    return {"type": "turn_left", "degrees": 70.0}
-            return {"type": "put", "hand": full[0]}
-        left = [name for name in self.errand["objects"] if name not in self._picked]
-        if left and self._rounds < SEARCH_ROUNDS:
-            self.phase = AutomatonState.GOTO_SOURCE
-            return None
-        self._next_errand()
-        return None
-
-    def _next_errand(self) -> None:
-        self._current += 1
-        self._rounds = 0
-        self._search = None
+    def _next(self, prefix: str) -> str:
+        """Go on to the next subtask."""
+        self.line.pop(0)
+        self._region = 0
         self._target = None
-        self.phase = AutomatonState.GOTO_SOURCE if self._current < len(self.errands) else AutomatonState.COMPLETE
-
-    def _complete(self, view: ObservationView) -> Action | None:
-        if self._reported < len(self.errands):
-            index = int(self.errands[self._reported]["index"])
-            self._reported += 1
-            return {"type": "task_complete", "index": index}
-        self.phase = AutomatonState.FINISHED
-        return None
-
-    def _finished(self, view: ObservationView) -> Action | None:
-        return {"type": "wait"}
-
-    _STEPS: ClassVar[dict[AutomatonState, Callable[[HeuristicDelivery, ObservationView], Action | None]]] = {
-        AutomatonState.GOTO_SOURCE: _goto_source,
-        AutomatonState.SEARCH: _look,
-        AutomatonState.NAVIGATE: _navigate,
-        AutomatonState.PICK: _pick,
-        AutomatonState.GOTO_DESTINATION: _goto_destination,
-        AutomatonState.DROP: _drop,
-        AutomatonState.COMPLETE: _complete,
-        AutomatonState.FINISHED: _finished,
-    }
+        return f"{prefix}{'not all done' if self.line else 'all done'}"

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from vico.agents.assistant.skills import GRASP, Action, AssistantSkills, LookAround, ObservationView
+from vico.agents.assistant.looking import LookAround
+from vico.agents.assistant.skills import GRASP, Action, AssistantSkills, ObservationView
 from vico.agents.perception import Sighting
 from vico.agents.state import AgentState, generator_state, restore_generator
 from vico.seeds import rng
@@ -19,7 +20,14 @@ class RandomPlanner:
     """Draws among: go to a source or destination, search, pick what is in view, put down, report an errand done."""
 
     def __init__(
-        self, instructions: list[dict[str, Any]], public_map: PublicMap, *, seed: int, number: int = 0, of: int = 1
+        self,
+        instructions: list[dict[str, Any]],
+        public_map: PublicMap,
+        *,
+        seed: int,
+        number: int = 0,
+        of: int = 1,
+        distance: bool = True,
     ) -> None:
         self.errands = instructions
         self.skills = AssistantSkills(public_map, rng(seed, "random planner, feet", number))
@@ -79,7 +87,8 @@ class RandomPlanner:
         errand = self.errands[int(self._random.integers(len(self.errands)))]
         self._plan = ("go", "search", "pick", "put", "complete")[int(self._random.integers(5))]
         self._age = 0
-        self._region = errand["source" if self._random.random() < 0.5 else "destination"]
+        regions = [*errand["sources"], *([errand["destination"]] if errand["destination"] else [])]
+        self._region = regions[int(self._random.integers(len(regions)))]
         self._search = self._any_object()
         things = [thing for thing in view.things if thing.kind == "object" and thing.entity not in view.held]
         self._target = things[int(self._random.integers(len(things)))] if things else None

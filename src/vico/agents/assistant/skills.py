@@ -7,7 +7,7 @@ the public map, nothing else.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,19 +15,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.agents.indoor_walk import IndoorWalker
+from vico.agents.navigation.memory import SeenMemory
+from vico.agents.navigation.navigator import Navigator
+from vico.agents.navigation.search import Target
 from vico.agents.perception import Sighting, sightings
 from vico.agents.state import AgentState, generator_state, restore_generator
-from vico.agents.wayfinding import Walker
 from vico.world.public import PublicMap
 
 Action = dict[str, Any]
 
-WALK = 1.0  # metres a step
+WALK = 2.0  # metres a step
 OUTSIDE = "outside"  # where a door leads that leads into no other room
-ENTER_REACH = 1.8
+ENTER_REACH = 1.95  # metres from an entrance; the rules allow for 2
 DOOR_REACH = 1.5
 INNER_DOOR_REACH = 0.8
+# A point so much farther off than a doorway, and seen within so much of its middle, is seen through it, metres.
+_BEHIND_DOOR, _DOORWAY = 0.3, 0.7
 GRASP = 1.15  # metres from a thing at which one stops to pick it up; arms reach 1.5
 
 
@@ -81,7 +84,7 @@ class ObservationView:
 
 
 class AssistantSkills:
-    """The skills of one assistant, with what it remembers of rooms.
+    """The skills of one assistant, with what it remembers of rooms and things.
 
     Parameters
     ----------
@@ -94,17 +97,19 @@ class AssistantSkills:
     def __init__(self, public_map: PublicMap, generator: np.random.Generator) -> None:
         self.map = public_map
         self._rng = generator
-        self._walker = Walker(public_map, generator)
-        self._indoors = IndoorWalker()
+        self.navigator = Navigator(public_map, generator)
+        self.seen = SeenMemory()
+        #: Metres a second outdoors.
+        self.pace = WALK
         self._trail: list[str] = []
         self._tries = 0
 
     def state(self) -> AgentState:
-        """Return the way under way, rooms known, and where chance stands."""
+        """Return the way under way, what is known of rooms and things, and where chance stands."""
         return {
             "generator": generator_state(self._rng),
-            "walker": self._walker.state(),
-            "indoors": self._indoors.state(),
+            "navigator": self.navigator.state(),
+            "seen": self.seen.state(),
             "trail": list(self._trail),
             "tries": self._tries,
         }
@@ -112,23 +117,23 @@ class AssistantSkills:
     def restore(self, state: AgentState) -> None:
         """Go on with what `state` returned."""
         restore_generator(self._rng, state["generator"])
-        self._walker.restore(state["walker"])
-        self._indoors.restore(state["indoors"])
+        self.navigator.restore(state["navigator"])
+        self.seen.restore(state["seen"])
         self._trail, self._tries = list(state["trail"]), state["tries"]
 
     def notice(self, view: ObservationView) -> None:
-        """Take in a new observation: the room's depth, and the way one came."""
+        """Take in a new observation: what stands where, what was seen, and the way one came."""
+        self.navigator.notice(
+            dict(view.observation), dict(view.info), ignore=[entity for entity in view.held if entity]
+        )
+        self.seen.notice(view.observation, view.things)
         room = view.room
         if room is None:
             self._trail.clear()
-            return
-        if room in self._trail:
+        elif room in self._trail:
             del self._trail[self._trail.index(room) + 1 :]
         else:
             self._trail.append(room)
-        carried = [entity for entity in view.held if entity]
-        goods = [thing.entity for thing in view.things if thing.kind == "object"]
-        self._indoors.notice(dict(view.observation), dict(view.info), ignore=carried + goods)
 
     def go_to(self, view: ObservationView, region: Mapping[str, Any]) -> Action | None:
         """Go to a region of a task: into the place, or to the middle of the spot outdoors."""
@@ -151,7 +156,9 @@ class AssistantSkills:
             self._tries = self._tries + 1 if view.refused else 1
             return {"type": "enter", "place": place_id}
         self._tries = 0
-        return self.walk_to(view, place.position, near=0.3) or {"type": "wait"}
+        # The spot before it that maps show may lie a little too far off.
+        step = self.walk_to(view, place.position, near=0.3) or self.walk_to(view, door, near=ENTER_REACH - 0.5)
+        return step or {"type": "wait"}
 
     def leave(self, view: ObservationView) -> Action | None:
         """Leave the building, room by room, the way one came."""
@@ -173,9 +180,25 @@ class AssistantSkills:
         step = self.walk_indoors(view, door["position"], near=INNER_DOOR_REACH)
         return step or {"type": "enter", "place": room}
 
+    def door_before(self, view: ObservationView, point: ArrayLike) -> str:
+        """Return the room behind the door through which a point is seen; empty where it is in the same room."""
+        here, there = view.pose[:2], np.asarray(point, np.float64)[:2]
+        away = math.dist(here, there)
+        nearest, found = math.inf, ""
+        for door in view.state["doors"]:
+            at = np.asarray(door["position"], np.float64)[:2]
+            along = float((at - here) @ (there - here)) / max(away, 1e-9)
+            across = math.sqrt(max(math.dist(here, at) ** 2 - along**2, 0.0))
+            if door["to"] != OUTSIDE and 0.0 < along < away - _BEHIND_DOOR and across < _DOORWAY and along < nearest:
+                nearest, found = along, str(door["to"])
+        return found
+
     def walk_indoors(self, view: ObservationView, target: ArrayLike, *, near: float) -> Action | None:
-        """Walk within a room around what depth images showed; None once within `near` metres of the target."""
-        return self._indoors.towards(dict(view.observation), target, near=near)
+        """Walk within a room around what depth images showed; None once within `near` metres of the target.
+
+        And where no way leads nearer.
+        """
+        return self.navigator.towards(dict(view.observation), dict(view.info), Target.disc(target, near))
 
     def approach(self, view: ObservationView, position: ArrayLike, *, near: float) -> Action | None:
         """Walk up to a point, indoors or out; None once within `near` metres."""
@@ -187,125 +210,11 @@ class AssistantSkills:
 
     def walk_to(self, view: ObservationView, point: ArrayLike, *, near: float) -> Action | None:
         """Walk outdoors on the public map; None once within `near` metres, or where no way leads nearer."""
-        if view.away(point) <= near:
-            self._walker.stop()
-            return None
-        x, y = (float(value) for value in np.asarray(point, np.float64)[:2])
-        return self._walker.towards((x, y), WALK, dict(view.observation), dict(view.info))
+        point = np.asarray(point, np.float64)[:2]
+        return self.navigator.towards(
+            dict(view.observation), dict(view.info), Target.disc(point, near), speed=self.pace
+        )
 
-
-class LookAround:
-    """Search: turn about at one spot after the other, indoors in one room after the other.
-
-    Parameters
-    ----------
-    wanted
-        Tells whether a sighting is what is looked for.
-    region
-        Where to look; None for wherever one is.
-    """
-
-    def __init__(
-        self, skills: AssistantSkills, wanted: Callable[[Sighting], bool], region: Mapping[str, Any] | None
-    ) -> None:
-        self.skills = skills
-        self.wanted = wanted
-        self.turns = 0
-        self.found: Sighting | None = None
-        self._spots: list[NDArray[np.float64]] = []
-        self._rooms_done: set[str] = set()
-        self._ways: dict[str, list[str]] = {}  # rooms known to lie behind each room's doors
-        self._walked = 0
-        if region is not None and region["kind"] == "outdoor":
-            middle = np.asarray(region["centre"], np.float64)[:2]
-            reach = 0.6 * max(float(region["radius"]), 3.0)
-            ring = [middle + reach * np.array([math.cos(a), math.sin(a)]) for a in (0.0, 1.57, 3.14, 4.71)]
-            self._spots = [spot for spot in ring if skills.map.walkable.is_connected(spot)]
-
-    def state(self) -> AgentState:
-        """Return what was looked at so far, and what is still to be; the skills are their owner's to save."""
-        return {
-            "turns": self.turns,
-            "spots": np.array(self._spots, np.float64).reshape(-1, 2),
-            "rooms_done": sorted(self._rooms_done),
-            "ways": {room: list(beyond) for room, beyond in self._ways.items()},
-            "walked": self._walked,
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Go on with a search for the same thing in the same region."""
-        self.turns, self._walked = state["turns"], state["walked"]
-        self._spots = list(np.array(state["spots"], np.float64).reshape(-1, 2))
-        self._rooms_done = set(state["rooms_done"])
-        self._ways = {room: list(beyond) for room, beyond in state["ways"].items()}
-
-    def act(self, view: ObservationView) -> Action | None:
-        """Return the next action; None when something was found (see `found`) or everything was looked at."""
-        self.found = next((thing for thing in view.things if self.wanted(thing)), None)
-        if self.found is not None:
-            return None
-        if self.turns < 4:
-            self.turns += 1
-            return {"type": "turn_left", "degrees": 85.0}
-        return self._elsewhere(view)
-
-    def _elsewhere(self, view: ObservationView) -> Action | None:
-        if view.room is None:
-            while self._spots:
-                step = self.skills.approach(view, self._spots[0], near=1.0)
-                self._walked += 1
-                if step is not None and self._walked < 20:
-                    return step
-                self._spots.pop(0)
-                self._walked = 0
-                self.turns = 1
-                return {"type": "turn_left", "degrees": 85.0}
-            return None
-        if view.room not in self._rooms_done:
-            middle = self._room_middle(view)
-            self._walked += 1
-            step = self.skills.walk_indoors(view, middle, near=0.8) if self._walked < 12 else None
-            if step is not None:
-                return step
-            self._rooms_done.add(view.room)
-            self._walked = 0
-            self.turns = 1
-            return {"type": "turn_left", "degrees": 85.0}
-        if view.room not in self._ways:
-            self._ways[view.room] = [str(door["to"]) for door in view.state["doors"] if door["to"] != OUTSIDE]
-        onward = self._next_room(view.room)
-        if onward is None:
-            return None
-        step = self.skills.go_through(view, onward)
-        self._walked += 1
-        if step is not None and step["type"] == "enter":
-            self.turns = 4 if onward in self._rooms_done else 0  # no second look at what was seen
-            self._walked = 0
-        if self._walked > 40:
-            # That door can't be got to: the room behind it has to go without a look.
-            self._rooms_done.add(onward)
-            self._ways[view.room].remove(onward)
-            self._walked = 0
-        return step
-
-    def _next_room(self, here: str) -> str | None:
-        """Return the neighbour through which the nearest room lies that was not looked at; None if all were."""
-        first: dict[str, str] = {name: name for name in self._ways[here]}
-        queue = list(first)
-        while queue:
-            room = queue.pop(0)
-            if room not in self._rooms_done:
-                return first[room]
-            for name in self._ways.get(room, []):
-                if name != here and name not in first:
-                    first[name] = first[room]
-                    queue.append(name)
-        return None
-
-    @staticmethod
-    def _room_middle(view: ObservationView) -> NDArray[np.float64]:
-        """Middle of the doors' side and what is seen of the floor: a spot from which more of the room is in view."""
-        depth = np.asarray(view.observation["depth"])
-        ahead = float(np.median(depth[depth > 0])) if bool((depth > 0).any()) else 1.0
-        middle: NDArray[np.float64] = view.pose[:2] + view.pose[3:5] * min(ahead * 0.5, 3.0)
-        return middle
+    def walk_to_box(self, view: ObservationView, box: Target) -> Action | None:
+        """Walk to a box, indoors or out; None once within its `near` metres, or where no way leads nearer."""
+        return self.navigator.towards(dict(view.observation), dict(view.info), box, speed=self.pace)

@@ -3,22 +3,32 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import Annotated, Any, Literal, Self
 
-import numpy as np
-from numpy.typing import NDArray
-from pydantic import ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from vico.errors import SchemaError
 from vico.io.files import read_json, write_json
+from vico.world.folder import World
 from vico.world.model import Point2, Point3, Record
 
 SCHEMA = "vico.task"
-VERSION = 1
+VERSION = 2
+
+Category = Literal["carry", "delivery", "search"]
+CATEGORIES: tuple[Category, ...] = ("carry", "delivery", "search")
+
+
+class Surface(Record):
+    """A surface things can be put on, as it is named to agents: what, in which room, and its entity."""
+
+    room: str
+    kind: str
+    entity: int
 
 
 class Region(Record):
-    """Where something is to be found or brought to.
+    """Where something or somebody is to be found, or things are brought to.
 
     Attributes
     ----------
@@ -30,17 +40,32 @@ class Region(Record):
         The place's entrance, or the middle of the outdoor region, metres.
     radius
         Metres; 0 for places, whose rooms are the bounds.
+    surface
+        In the advanced setting, the surface beside which things are to lie; else None.
     """
 
     kind: Literal["place", "outdoor"]
     name: str
     place: str | None
     centre: Point3
-    radius: float
+    radius: Annotated[float, Field(ge=0.0)]
+    surface: Surface | None = None
+
+    @model_validator(mode="after")
+    def _place_if_inside(self) -> Self:
+        if (self.place is not None) != (self.kind == "place"):
+            raise ValueError(f"a region of kind {self.kind} {'has no' if self.place else 'needs a'} place")
+        return self
 
 
 class TaskObject(Record):
-    """A thing of the task, where it lies at the start. Agents are told its name, never where it is."""
+    """A thing of the task, where it is at the start. Agents are told its name, never where it is.
+
+    Attributes
+    ----------
+    holder
+        Agent name of the person who has it in hand; None: it lies at `position`.
+    """
 
     id: str
     kind: str
@@ -49,25 +74,61 @@ class TaskObject(Record):
     position: Point3
     yaw: float
     room: str | None
+    holder: str | None = None
 
 
-class Subtask(Record):
-    """One errand: what the agent is told, and what its choices were drawn from.
+class Person(Record):
+    """Who asks: what agents are told of them.
 
     Attributes
     ----------
-    object_candidates, source_candidates, destination_candidates
-        The nine each that object, source and destination were chosen from, as the chooser saw them.
+    agent
+        Name of the resident in the simulation; pictures name people by `name`.
+    looks
+        What they wear and look like, in words.
     """
 
-    index: int
+    agent: str
+    name: str
+    looks: str
+
+
+class Subtask(Record):
+    """One thing to do: what the agent is told, and what its choices were drawn from.
+
+    Attributes
+    ----------
+    person
+        Who asks; with Carry who is to be found and followed.
+    sources
+        Regions in which the thing lies, or where the person is often seen; one of them is right.
+    source
+        Which of them is; agents are not told.
+    destination
+        Where things are to be at the end; with Carry the person's home; None with Search.
+    candidates
+        What was chosen from, by question, as the chooser saw it.
+    """
+
+    index: Annotated[int, Field(ge=0)]
     text: str
-    objects: list[str]
-    source: Region
-    destination: Region
-    object_candidates: list[str]
-    source_candidates: list[str]
-    destination_candidates: list[str]
+    person: Person
+    objects: Annotated[list[str], Field(min_length=1)]
+    sources: Annotated[list[Region], Field(min_length=1)]
+    source: Annotated[int, Field(ge=0)]
+    destination: Region | None
+    candidates: dict[str, list[str]]
+
+    @model_validator(mode="after")
+    def _source_is_one_of_them(self) -> Self:
+        if self.source >= len(self.sources):
+            raise ValueError(f"source {self.source} of {len(self.sources)} sources")
+        return self
+
+    @property
+    def true_source(self) -> Region:
+        """The region in which the things are, or the person is expected."""
+        return self.sources[self.source]
 
 
 class Start(Record):
@@ -82,47 +143,53 @@ class Task(Record):
 
     Attributes
     ----------
-    world_digest
-        Identity of the world the task belongs to.
+    world_digest, community_digest
+        Identity of the world and of the community the task belongs to.
+    start
+        Time of day at which it begins, ``HH:MM``.
     """
 
     schema_name: str = SCHEMA
     version: int = VERSION
-    category: Literal["delivery"]
+    category: Category
+    advanced: bool
     world: str
     world_digest: str
+    community_digest: str
     seed: int
-    steps: int
-    assistants: list[Start]
+    start: Annotated[str, Field(pattern=r"^([01]\d|2[0-3]):[0-5]\d$")]
+    steps: Annotated[int, Field(ge=1)]
+    assistants: Annotated[list[Start], Field(min_length=1, max_length=2)]
     objects: list[TaskObject]
-    subtasks: list[Subtask]
+    subtasks: Annotated[list[Subtask], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _objects_are_known(self) -> Self:
+        known = {thing.id for thing in self.objects}
+        for subtask in self.subtasks:
+            if missing := [i for i in subtask.objects if i not in known]:
+                raise ValueError(f"subtask {subtask.index}: no object is called {missing[0]!r}")
+            if (subtask.destination is None) != (self.category == "search"):
+                raise ValueError(f"subtask {subtask.index}: {self.category} and its destination do not go together")
+        if [s.index for s in self.subtasks] != list(range(len(self.subtasks))):
+            raise ValueError("subtasks are not numbered 0, 1, 2, ...")
+        return self
 
     def instructions(self) -> list[dict[str, Any]]:
-        """Return what the assistants are told: no position of any object, no candidates."""
+        """Return what the assistants are told: no position of any object or person, no candidates."""
         names = {thing.id: thing.name for thing in self.objects}
         return [
             {
                 "index": subtask.index,
+                "category": self.category,
                 "text": subtask.text,
+                "person": subtask.person.model_dump(),
                 "objects": [names[i] for i in subtask.objects],
-                "source": subtask.source.model_dump(),
-                "destination": subtask.destination.model_dump(),
+                "sources": [region.model_dump() for region in subtask.sources],
+                "destination": None if subtask.destination is None else subtask.destination.model_dump(),
             }
             for subtask in self.subtasks
         ]
-
-
-class StateView(Protocol):
-    """What an evaluator may look at: the truth, not any agent's view of it."""
-
-    def object_position(self, name: str) -> NDArray[np.float64]:
-        """Where the thing called `name` is, metres, shape ``(3,)``."""
-
-    def object_room(self, name: str) -> str | None:
-        """Id of the room it is in; None outdoors."""
-
-    def object_holder(self, name: str) -> str | None:
-        """Name of the agent that holds it; None if nobody does."""
 
 
 def write_task(path: Path, task: Task) -> None:
@@ -130,13 +197,13 @@ def write_task(path: Path, task: Task) -> None:
     write_json(path, task.model_dump(mode="json"))
 
 
-def read_task(path: Path, *, world_digest: str | None = None) -> Task:
+def read_task(path: Path, *, world: World | None = None) -> Task:
     """Read a task file.
 
     Raises
     ------
     SchemaError
-        If the file is damaged, of another version, or made for another world.
+        If the file is damaged, of another version, made for another world, or names what the world does not have.
     """
     content = read_json(path)
     found = (content.get("schema_name"), content.get("version")) if isinstance(content, dict) else None
@@ -146,8 +213,23 @@ def read_task(path: Path, *, world_digest: str | None = None) -> Task:
         task = Task.model_validate(content)
     except ValidationError as error:
         first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
+        where = ".".join(str(part) for part in first["loc"]) or "task"
         raise SchemaError(f"{path}: {where}: {first['msg']}; generate the task anew") from None
-    if world_digest is not None and task.world_digest != world_digest:
-        raise SchemaError(f"{path}: made for another world ({task.world}); generate the task for this one")
+    if world is not None:
+        _check_against(task, world, path)
     return task
+
+
+def _check_against(task: Task, world: World, path: Path) -> None:
+    """Refuse a task whose world is another one, or lacks what it names."""
+    if task.world_digest != world.digest:
+        raise SchemaError(f"{path}: made for another world ({task.world}); generate the task for this one")
+    for subtask in task.subtasks:
+        for region in (*subtask.sources, *([subtask.destination] if subtask.destination else [])):
+            if region.place is not None and region.place not in world.place_by_id:
+                raise SchemaError(
+                    f"{path}: subtasks.{subtask.index}: the world has no place {region.place!r}; generate the task anew"
+                )
+    for thing in task.objects:
+        if thing.room is not None and thing.room not in world.room_by_id:
+            raise SchemaError(f"{path}: objects: {thing.id}: the world has no room {thing.room!r}; generate it anew")

@@ -82,7 +82,7 @@ def pick(values: Values, i: int, state: SimulationState) -> None:
     p, objects = state.people, state.objects
     k = objects.index(values["object"])
     above = lying_on(k, state) if objects.holder[k] == 0 else []
-    _hold(k, i, values["hand"], state)
+    hold(k, i, values["hand"], state)
     let_fall(above, state)
     gesture("pick", i, state, hand=values["hand"])
     state.events.add("pick", p.names[i], f"picks up {objects.names[k]}", p.position[i], object=int(objects.entity[k]))
@@ -145,7 +145,7 @@ def hand_over(values: Values, i: int, state: SimulationState) -> None:
     j = p.names.index(values["agent"])
     k = objects.index(int(p.held[i, values["hand"]]))
     p.held[i, values["hand"]] = 0
-    _hold(k, j, 0 if not p.held[j, 0] else 1, state)
+    hold(k, j, 0 if not p.held[j, 0] else 1, state)
     gesture("reach", i, state, hand=values["hand"])
     state.events.add(
         "hand_over",
@@ -157,7 +157,8 @@ def hand_over(values: Values, i: int, state: SimulationState) -> None:
     )
 
 
-def _hold(k: int, i: int, hand: int, state: SimulationState) -> None:
+def hold(k: int, i: int, hand: int, state: SimulationState) -> None:
+    """Put object `k` into a hand of person `i`."""
     p, objects = state.people, state.objects
     p.held[i, hand] = objects.entity[k]
     objects.holder[k] = p.entity[i]

@@ -1,0 +1,290 @@
+"""What planners choose among: go somewhere, search, pick up, put down, meet a person, follow them home, report.
+
+An option is asked once a step for an action, and answers None when it has come to its `outcome`. All planners share
+them, so that tables compare plans and not legs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+from vico.agents.assistant.looking import LookAround
+from vico.agents.assistant.skills import GRASP, Action, AssistantSkills, ObservationView
+from vico.agents.perception import Sighting
+from vico.agents.state import AgentState
+
+Region = Mapping[str, Any]
+
+# Steps after which one gives up: going somewhere, walking up to a thing, putting down.
+_ON_THE_WAY, _WALKING_UP, _PUTTING = 500, 60, 30
+# Metres from the middle of a spot outdoors at which things are put down there.
+_SPOT = 0.7
+# From where one tries to pick, metres; and how long one comes no nearer before one gives up, steps.
+_NEARER = (GRASP, 0.8, 0.4)
+_IN_VAIN = 14
+
+
+class Option(Protocol):
+    """One thing to do."""
+
+    outcome: str
+
+    def act(self, view: ObservationView) -> Action | None:
+        """Return the next action; None once `outcome` says what came of it."""
+
+    def state(self) -> AgentState:
+        """Return how far it came."""
+
+    def restore(self, state: AgentState) -> None:
+        """Go on where another one, made in the same way, was."""
+
+
+class GoTo:
+    """Go to a region: into the place, or to the middle of the spot outdoors. Outcomes: ``arrived``, ``stuck``."""
+
+    def __init__(self, skills: AssistantSkills, region: Region) -> None:
+        self.outcome = ""
+        self._skills, self._region = skills, region
+        self._steps = 0
+
+    def state(self) -> AgentState:
+        """Return how far it came."""
+        return {"steps": self._steps}
+
+    def restore(self, state: AgentState) -> None:
+        """Go on."""
+        self._steps = state["steps"]
+
+    def act(self, view: ObservationView) -> Action | None:
+        """Return the next action on the way."""
+        action = self._skills.go_to(view, self._region)
+        self._steps += 1
+        if action is None or self._steps > _ON_THE_WAY:
+            self.outcome = "arrived" if action is None else "stuck"
+            return None
+        return action
+
+
+class Search:
+    """Look through a region for something or somebody by name. Outcomes: ``found``, ``nothing``.
+
+    Attributes
+    ----------
+    found
+        What was found.
+    """
+
+    def __init__(
+        self,
+        skills: AssistantSkills,
+        wanted: Callable[[Sighting], bool],
+        region: Region | None,
+        *,
+        large: bool = False,
+    ) -> None:
+        self.outcome = ""
+        self.found: Sighting | None = None
+        self._look = LookAround(skills, wanted, region, large=large)
+
+    def state(self) -> AgentState:
+        """Return what was looked at."""
+        return self._look.state()
+
+    def restore(self, state: AgentState) -> None:
+        """Go on."""
+        self._look.restore(state)
+
+    def act(self, view: ObservationView) -> Action | None:
+        """Return the next action of looking about."""
+        action = self._look.act(view)
+        if action is None:
+            self.found = self._look.found
+            self.outcome = "found" if self.found is not None else "nothing"
+        return action
+
+
+class WalkUp:
+    """Walk up to a thing that was seen, through the door that it was seen through. Outcomes: ``arrived``, ``stuck``."""
+
+    def __init__(self, skills: AssistantSkills, target: Sighting, *, near: float = GRASP) -> None:
+        self.outcome = ""
+        self.target = target
+        self._skills, self._near = skills, near
+        self._through = ""
+        self._nearest = math.inf
+        self._steps = self._vain = 0
+
+    def state(self) -> AgentState:
+        """Return how far it came."""
+        return {
+            "target": self.target.state(),
+            "through": self._through,
+            "nearest": None if math.isinf(self._nearest) else self._nearest,
+            "steps": self._steps,
+            "vain": self._vain,
+        }
+
+    def restore(self, state: AgentState) -> None:
+        """Go on."""
+        self.target, self._through = Sighting(**state["target"]), state["through"]
+        self._nearest = math.inf if state["nearest"] is None else state["nearest"]
+        self._steps, self._vain = state["steps"], state["vain"]
+
+    def act(self, view: ObservationView) -> Action | None:
+        """Return the next action on the way."""
+        # What is in view again is placed better from nearer.
+        seen = next((thing for thing in view.things if thing.entity == self.target.entity), None)
+        if seen is not None:
+            self.target = seen
+            self._through = self._skills.door_before(view, seen.position)
+        self._steps += 1
+        if view.room and self._through == view.room:
+            self._through, self._nearest = "", math.inf
+        action = None
+        if view.room and self._through:
+            action = self._skills.go_through(view, self._through)
+        if action is None:
+            action = self._skills.approach(view, self.target.position, near=self._near)
+        if action is None or self._is_stuck(view):
+            self.outcome = "arrived" if action is None else "stuck"
+            return None
+        return action
+
+    def _is_stuck(self, view: ObservationView) -> bool:
+        """Whether it has come no nearer for a while, or takes too long."""
+        away = view.away(self.target.position)
+        self._vain = 0 if away < self._nearest - 0.2 else self._vain + 1
+        self._nearest = min(self._nearest, away)
+        return self._vain > _IN_VAIN or self._steps > _WALKING_UP
+
+
+class PickUp:
+    """Pick a thing up, from nearer if that is refused. Outcomes: ``picked``, ``refused``, ``hands full``."""
+
+    def __init__(self, skills: AssistantSkills, target: Sighting) -> None:
+        self.outcome = ""
+        self.target = target
+        self._skills = skills
+        self._tries = 0
+        self._walk: WalkUp | None = None
+        self._asked = False
+
+    def state(self) -> AgentState:
+        """Return how far it came."""
+        walk = None if self._walk is None else self._walk.state()
+        return {"tries": self._tries, "walk": walk, "asked": self._asked, "target": self.target.state()}
+
+    def restore(self, state: AgentState) -> None:
+        """Go on."""
+        self._tries, self._asked, self.target = state["tries"], state["asked"], Sighting(**state["target"])
+        self._walk = None
+        if state["walk"] is not None:
+            self._walk = WalkUp(self._skills, self.target, near=_NEARER[self._tries])
+            self._walk.restore(state["walk"])
+
+    def act(self, view: ObservationView) -> Action | None:
+        """Return the next action."""
+        if self._asked:
+            self._asked = False
+            if self.target.entity in view.held:
+                self.outcome = "picked"
+                return None
+            self._tries += 1
+            if self._tries >= len(_NEARER):
+                self.outcome = "refused"
+                return None
+            self._walk = WalkUp(self._skills, self.target, near=_NEARER[self._tries])
+        if self._walk is not None:
+            action = self._walk.act(view)
+            self.target = self._walk.target
+            if action is not None:
+                return action
+            self._walk = None
+        if all(view.held):
+            self.outcome = "hands full"
+            return None
+        self._asked = True
+        return {"type": "pick", "hand": view.held.index(0), "object": self.target.entity}
+
+
+class PutDown:
+    """Put down what is in hand at a destination: by the surface it names, else where one stands.
+
+    Outcomes: ``empty hands``, ``stuck``.
+    """
+
+    def __init__(self, skills: AssistantSkills, region: Region, entities: frozenset[int] | None = None) -> None:
+        self.outcome = ""
+        self._skills, self._region, self._entities = skills, region, entities
+        self._steps = 0
+        self._surface: Search | None = None
+        surface = region["surface"]
+        if surface is not None:
+            self._surface = Search(skills, lambda seen: bool(seen.entity == surface["entity"]), region)
+        self._walk: WalkUp | None = None
+        self._on = True
+
+    def state(self) -> AgentState:
+        """Return how far it came."""
+        return {
+            "steps": self._steps,
+            "surface": None if self._surface is None else self._surface.state(),
+            "walk": None if self._walk is None else self._walk.state(),
+            "on": self._on,
+        }
+
+    def restore(self, state: AgentState) -> None:
+        """Go on."""
+        self._steps, self._on = state["steps"], state["on"]
+        if state["surface"] is None:
+            self._surface = None
+        elif self._surface is not None:
+            self._surface.restore(state["surface"])
+        self._walk = None
+        if state["walk"] is not None:
+            self._walk = WalkUp(self._skills, Sighting(**state["walk"]["target"]))
+            self._walk.restore(state["walk"])
+
+    def act(self, view: ObservationView) -> Action | None:
+        """Return the next action."""
+        full = [
+            h for h, entity in enumerate(view.held) if entity and (self._entities is None or entity in self._entities)
+        ]
+        if not full:
+            self.outcome = "empty hands"
+            return None
+        action = self._to_surface(view)
+        if action is not None:
+            return action
+        self._steps += 1
+        if self._steps > _PUTTING:
+            self.outcome = "stuck"
+            return None
+        if self._region["kind"] == "outdoor" and view.away(self._region["centre"]) > _SPOT:
+            action = self._skills.approach(view, self._region["centre"], near=_SPOT)
+            if action is not None:
+                return action
+        if view.refused and self._steps > 1:
+            self._on = False
+            if self._steps % 2:
+                return {"type": "turn_left", "degrees": 70.0}
+        put: Action = {"type": "put", "hand": full[0]}
+        return put | {"target": self._region["surface"]["entity"]} if self._on and self._region["surface"] else put
+
+    def _to_surface(self, view: ObservationView) -> Action | None:
+        """Look for the surface that is named, and walk up to it."""
+        if self._surface is not None:
+            action = self._surface.act(view)
+            if action is not None:
+                return action
+            if self._surface.found is not None:
+                self._walk = WalkUp(self._skills, self._surface.found)
+            self._surface = None
+        if self._walk is not None:
+            action = self._walk.act(view)
+            if action is not None:
+                return action
+            self._walk = None
+        return None

@@ -1,0 +1,303 @@
+"""Ways on a grid of costs that wraps around: A* to a box, and the straight pieces of a way; compiled."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vico.agents.navigation.voxel_kernels import FREE_COST, NEAR_COST, SIDE, VOXEL, lowest_level
+from vico.io.compiled import compiled
+
+#: 5 : 7 for 1 : sqrt 2, a little less than that: distances bound costs from below when taken 0.98 times.
+STRAIGHT, DIAGONAL, BOUND = 5, 7, 0.98
+# Levels a walker may step up or down from column to column, and how steeply unseen ground may climb, levels a column.
+_STEP_LEVELS, _SLOPE = 3, 0.9
+_AT_LEVEL = 5  # levels that a target may lie above or below who has reached it
+_LEVEL_COST = STRAIGHT * FREE_COST / _SLOPE
+_NO_LEVEL = -1000.0
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where to go: to within so many metres of an oriented box; a box without extent makes it a disc.
+
+    Attributes
+    ----------
+    x, y
+        Its middle, ENU metres.
+    yaw, half_length, half_width
+        How it lies, radians and metres.
+    near
+        Metres from the box at which one is there.
+    z
+        Height at which one has to arrive, metres; it matters on stairs only.
+    """
+
+    x: float
+    y: float
+    yaw: float = 0.0
+    half_length: float = 0.0
+    half_width: float = 0.0
+    near: float = 0.0
+    z: float | None = None
+
+    @classmethod
+    def disc(cls, point: ArrayLike, near: float) -> Target:
+        """Return the disc around a point of two or three coordinates."""
+        values = [float(value) for value in np.asarray(point, np.float64).ravel()]
+        return cls(values[0], values[1], near=near, z=values[2] if len(values) > 2 else None)
+
+    def away(self, x: float, y: float) -> float:
+        """Metres from a point to the box, whatever is near enough."""
+        dx, dy = x - self.x, y - self.y
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        return math.hypot(
+            max(abs(c * dx + s * dy) - self.half_length, 0.0), max(abs(c * dy - s * dx) - self.half_width, 0.0)
+        )
+
+    def values(self, base: float) -> NDArray[np.float64]:
+        """Return it as the search takes it: in columns, its height as a level above `base`; shape ``(7,)``."""
+        level = _NO_LEVEL if self.z is None else (self.z - base) / VOXEL
+        sizes = np.array([self.half_length, self.half_width, self.near]) / VOXEL
+        return np.array([self.x / VOXEL, self.y / VOXEL, self.yaw, *sizes, level])
+
+
+class SearchMemory(NamedTuple):
+    """Working memory of searches.
+
+    Attributes
+    ----------
+    cost
+        Least cost to a cell, int32, shape ``(n, n)``; valid where `stamp` is the search's.
+    parent
+        Direction one came from, int8; 8 for the start.
+    stamp
+        Search that saw the cell, twice; one more where its cost is final; int32.
+    low, high
+        Between which levels the ground is there, float32: the same where it was seen.
+    count
+        Searches so far, twice, shape ``(1,)``.
+    """
+
+    cost: NDArray[np.int32]
+    parent: NDArray[np.int8]
+    stamp: NDArray[np.int32]
+    low: NDArray[np.float32]
+    high: NDArray[np.float32]
+    count: NDArray[np.int32]
+
+
+def search_memory(n: int = SIDE) -> SearchMemory:
+    """Return memory for grids of `n` x `n` cells."""
+    whole = (n, n)
+    return SearchMemory(
+        np.zeros(whole, np.int32),
+        np.zeros(whole, np.int8),
+        np.zeros(whole, np.int32),
+        np.zeros(whole, np.float32),
+        np.zeros(whole, np.float32),
+        np.zeros(1, np.int32),
+    )
+
+
+@compiled(inline="always")
+def box_distance(x, y, target):  # type: ignore[no-untyped-def]
+    """Return cells from a point to a box (`Target.values`)."""
+    dx, dy = x - target[0], y - target[1]
+    c, s = math.cos(target[2]), math.sin(target[2])
+    across = max(abs(c * dx + s * dy) - target[3], 0.0)
+    along = max(abs(c * dy - s * dx) - target[4], 0.0)
+    return math.sqrt(across * across + along * along)
+
+
+@compiled(inline="always")
+def bound(i, j, target):  # type: ignore[no-untyped-def]
+    """Return the least that any way from a cell to a target costs."""
+    left = max(box_distance(i + 0.5, j + 0.5, target) - target[5], 0.0)
+    return int(BOUND * STRAIGHT * FREE_COST * left)
+
+
+@compiled
+def search(grid, memory, start, target, climb):  # type: ignore[no-untyped-def]
+    """Run A* from a cell to the first cell within a target.
+
+    Parameters
+    ----------
+    grid
+        Costs, 0 where blocked, and masks, from which floors are found where `climb`; ``[iy, ix]``, wrapping around.
+    memory
+        `SearchMemory`.
+    start
+        Column, row, and level.
+    target
+        `Target.values`.
+    climb
+        Whether the ground climbs: then only steps of 0.3 m up or down are made, and the target's level counts.
+
+    Returns
+    -------
+    cells, reached
+        From the start on, with the cost up to each, int64, shape ``(k, 3)``; whether they lead into the target: else to
+        the nearest cell to it.
+    """
+    costs, masks = grid
+    n = costs.shape[0]
+    wrap, middle = n - 1, n // 2
+    x0, y0 = int(start[0]), int(start[1])
+    memory.count[0] += 2
+    stamp = memory.count[0]
+    memory.cost[y0 & wrap, x0 & wrap] = 0
+    memory.parent[y0 & wrap, x0 & wrap] = 8
+    memory.stamp[y0 & wrap, x0 & wrap] = stamp
+    memory.low[y0 & wrap, x0 & wrap] = memory.high[y0 & wrap, x0 & wrap] = start[2]
+    queue = [_entry(_guess(x0, y0, (start[2], start[2]), target, climb), middle, middle)]
+    best, best_away, best_x, best_y = False, np.inf, x0, y0
+    while len(queue) > 0:
+        packed = heapq.heappop(queue)
+        x, y = x0 + ((packed >> 12) & 4095) - middle, y0 + (packed & 4095) - middle
+        b, a = y & wrap, x & wrap
+        if memory.stamp[b, a] != stamp:
+            continue
+        memory.stamp[b, a] = stamp + 1
+        here, blocked, levels = memory.cost[b, a], costs[b, a] == 0, (memory.low[b, a], memory.high[b, a])
+        away = box_distance(x + 0.5, y + 0.5, target) - target[5]
+        at_level = not climb or _levels_off(levels, target) == 0.0
+        if away <= 0.0 and at_level:
+            return _way_back(memory, x0, y0, x, y), True
+        if away < best_away and not blocked and at_level:
+            best, best_away, best_x, best_y = True, away, x, y
+        for direction in range(8):
+            i, j = x + _dx(direction), y + _dy(direction)
+            if abs(i - x0) >= middle - 1 or abs(j - y0) >= middle - 1:
+                continue
+            d, c = j & wrap, i & wrap
+            if memory.stamp[d, c] == stamp + 1:
+                continue
+            cost = np.int64(costs[d, c])
+            if cost == 0:
+                # A start that touches what is around it may still be left.
+                if not blocked:
+                    continue
+                cost = 2 * NEAR_COST
+            up = levels
+            if climb:
+                up = _levels_at(masks[d, c], levels)
+                if up[0] > levels[1] + _STEP_LEVELS or up[1] < levels[0] - _STEP_LEVELS:
+                    continue
+            new = here + cost * (STRAIGHT if i == x or j == y else DIAGONAL)
+            if memory.stamp[d, c] != stamp or new < memory.cost[d, c]:
+                memory.cost[d, c], memory.parent[d, c], memory.stamp[d, c] = new, direction, stamp
+                memory.low[d, c], memory.high[d, c] = up
+                heapq.heappush(queue, _entry(new + _guess(i, j, up, target, climb), i - x0 + middle, j - y0 + middle))
+    if not best:
+        best_x, best_y = x0, y0
+    return _way_back(memory, x0, y0, best_x, best_y), False
+
+
+@compiled(inline="always")
+def _entry(cost, i, j):  # type: ignore[no-untyped-def]
+    """Pack an entry of the queue: ties are broken by position."""
+    return (np.int64(cost) << np.int64(24)) | (np.int64(i) << np.int64(12)) | np.int64(j)
+
+
+@compiled(inline="always")
+def _dx(direction):  # type: ignore[no-untyped-def]
+    return (1, -1, 0, 0, 1, -1, 1, -1)[direction]
+
+
+@compiled(inline="always")
+def _dy(direction):  # type: ignore[no-untyped-def]
+    return (0, 0, 1, -1, 1, -1, -1, 1)[direction]
+
+
+@compiled(inline="always")
+def _guess(i, j, levels, target, climb):  # type: ignore[no-untyped-def]
+    least = bound(i, j, target)
+    if climb:
+        least = max(least, int(_LEVEL_COST * _levels_off(levels, target)))
+    return least
+
+
+@compiled(inline="always")
+def _levels_off(levels, target):  # type: ignore[no-untyped-def]
+    """Return how many levels are left to climb or to go down to a target; 0 where its height is told by nobody."""
+    if target[6] == _NO_LEVEL:
+        return 0.0
+    return max(levels[0] - target[6] - _AT_LEVEL, target[6] - levels[1] - _AT_LEVEL, 0.0)
+
+
+@compiled(inline="always")
+def _levels_at(mask, levels):  # type: ignore[no-untyped-def]
+    """Return between which levels the ground is in a column, coming from one beside it."""
+    if mask:
+        level = np.float32(lowest_level(mask))
+        return level, level
+    return np.float32(levels[0] - _SLOPE), np.float32(levels[1] + _SLOPE)
+
+
+@compiled
+def _way_back(memory, x0, y0, x, y):  # type: ignore[no-untyped-def]
+    """Return the cells from the start to ``(x, y)``, with what each costs to get to."""
+    wrap = memory.cost.shape[0] - 1
+    count, i, j = 1, x, y
+    while i != x0 or j != y0:
+        direction = memory.parent[j & wrap, i & wrap]
+        i, j = i - _dx(direction), j - _dy(direction)
+        count += 1
+    cells = np.empty((count, 3), np.int64)
+    i, j = x, y
+    for k in range(count - 1, -1, -1):
+        cells[k, 0], cells[k, 1], cells[k, 2] = i, j, memory.cost[j & wrap, i & wrap]
+        direction = memory.parent[j & wrap, i & wrap]
+        if k:
+            i, j = i - _dx(direction), j - _dy(direction)
+    return cells
+
+
+@compiled
+def furthest_straight(costs, cells, x, y, most):  # type: ignore[no-untyped-def]
+    """Return the last cell of a way that a straight line leads to through no costlier cells than the way itself.
+
+    Parameters
+    ----------
+    costs
+        As `search` has them.
+    cells
+        As `search` returns them.
+    x, y
+        Where the line begins, in cells.
+    most
+        Cells that it may be long.
+
+    Returns
+    -------
+    which, limit
+        Index of the cell, 0 for the first; and the greatest cost on the line.
+    """
+    wrap = costs.shape[0] - 1
+    best, best_limit, limit, misses = 0, 0, 0, 0
+    for k in range(1, len(cells)):
+        cost = costs[cells[k, 1] & wrap, cells[k, 0] & wrap]
+        limit = max(limit, np.int64(cost) if cost else 255)
+        dx, dy = cells[k, 0] + 0.5 - x, cells[k, 1] + 0.5 - y
+        length = math.sqrt(dx * dx + dy * dy)
+        if length > most or misses > 12:
+            break
+        samples = int(length * 2.0) + 1
+        is_clear = True
+        for s in range(1, samples + 1):
+            column, row = int(math.floor(x + dx * s / samples)), int(math.floor(y + dy * s / samples))
+            on_line = costs[row & wrap, column & wrap]
+            if (on_line == 0 and limit < 255) or on_line > limit:
+                is_clear = False
+                break
+        if is_clear or k == 1:
+            best, best_limit, misses = k, limit, 0
+        else:
+            misses += 1
+    return best, best_limit

@@ -1,0 +1,216 @@
+"""Playing an assistant episode: a task, a world with its people, planners that see only what they may, a verdict."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from vico.agents.assistant import METHODS, make_planner
+from vico.agents.base import Agent
+from vico.agents.requester import Requester
+from vico.agents.schedule import followers_of
+from vico.agents.wrappers import usage_of
+from vico.assets.models.movable import movable_kinds, movable_prototype, movable_surfaces
+from vico.challenges.assistant.causes import Chronicle
+from vico.challenges.assistant.judge import Judge
+from vico.challenges.assistant.model import Category, Task
+from vico.challenges.assistant.thresholds import RESIDENTS
+from vico.challenges.records import EpisodeRecord, Part, Progress, Setting
+from vico.community import build_community
+from vico.community.model import Community
+from vico.envs import Simulation, make
+from vico.errors import InputError
+from vico.runner.faults import FaultLog
+from vico.runner.foreign import AbsentAgent, Terms, foreign_agents
+from vico.runner.gather import Gatherer
+from vico.runner.loading import AgentSeat
+from vico.runner.loop import Hook, Runner, Step
+from vico.world.folder import World, read_world
+from vico.world.public import PublicMap
+
+# In a window of 800 m; smaller ones have as many for their size, so that the cars find room.
+CARS, PEDESTRIANS = 30, 30
+
+
+@lru_cache(maxsize=2)
+def world_in(folder: Path) -> World:
+    """Read a world; the last two are kept."""
+    return read_world(folder)
+
+
+@lru_cache(maxsize=4)
+def world_and_people(folder: Path, category: Category) -> tuple[World, Community]:
+    """Read a world, and make the people among whom a category's episodes take place: always the same ones."""
+    world = world_in(folder)
+    return world, build_community(world, residents=RESIDENTS[category], seed=0)
+
+
+def play_task(
+    world: World,
+    community: Community,
+    task: Task,
+    *,
+    method: str,
+    setting: Setting | None = None,
+    terms: Terms | None = None,
+    hooks: Sequence[Hook] = (),
+    progress: Progress | None = None,
+) -> EpisodeRecord:
+    """Play one task through and judge it.
+
+    Parameters
+    ----------
+    method
+        Name of a planner (see `vico.agents.assistant.METHODS`), ``my_module:MyPlanner``, or two joined by ``+``, one
+        for each assistant.
+    setting
+        What planners are told beside the task: ``distance``, and what the record is to name.
+    terms
+        On which terms planners from elsewhere take part.
+    hooks
+        Who else follows the run, such as a recorder.
+    """
+    began = time.perf_counter()
+    names = [f"assistant_{i}" for i in range(len(task.assistants))]
+    env = make(
+        world,
+        community,
+        seed=task.seed,
+        start=task.start,
+        assistants=len(names),
+        cars=_for_size(CARS, world),
+        pedestrians=_for_size(PEDESTRIANS, world),
+        observe=tuple(names),
+        max_steps=task.steps,
+        setup=lambda simulation: _set_up(simulation, task),
+    )
+    sim = env.sim
+    terms = terms or Terms()
+    planners = _planners(method, names, task, world, terms, setting or {})
+    residents = _residents(task, community, env.public_map)
+    judge = Judge(task, world, sim.ground_truth, names)
+    chronicle = Chronicle(judge)
+    judge.watch(0)
+    followers: list[Hook] = [judge, chronicle, *hooks]
+    if progress is not None:
+        followers.append(_Reported(progress, f"{task.world}, {task.category}, seed {task.seed}", task.steps))
+    agents = Gatherer(residents | planners, trusted=residents, deadline=terms.deadline, workers=terms.workers)
+    runner = Runner(sim, agents, hooks=followers)
+    try:
+        runner.run(task.steps, until=lambda: judge.over)
+    finally:
+        agents.close()
+    return _record(task, method, setting or {}, chronicle, sim, runner.faults, planners, time.perf_counter() - began)
+
+
+class _Reported(Hook):
+    """Tells how far an episode is."""
+
+    def __init__(self, progress: Progress, label: str, steps: int) -> None:
+        self._progress, self._label, self._steps = progress, label, steps
+
+    def stepped(self, step: Step) -> None:
+        """Tell it."""
+        self._progress(self._label, step.number, self._steps)
+
+
+def _residents(task: Task, community: Community, public_map: PublicMap) -> dict[str, Agent]:
+    """Make those who live there; who is to be helped with carrying waits for helpers."""
+    residents: dict[str, Agent] = dict(followers_of(community, public_map, seed=task.seed))
+    if task.category == "carry":
+        for subtask in task.subtasks:
+            name = subtask.person.agent
+            day = residents[name]
+            residents[name] = Requester(day, community.resident_by_id[name], public_map, seed=task.seed)
+    return residents
+
+
+def _planners(
+    method: str, names: list[str], task: Task, world: World, terms: Terms, setting: Setting
+) -> dict[str, Agent]:
+    """Make the planners of an episode; those that can't be made fail at each of its steps."""
+    told, of = task.instructions(), len(names)
+    methods = method.split("+")
+    if len(methods) not in (1, of):
+        raise InputError(f"eval: {method!r} names {len(methods)} planners for {of} assistants")
+    public_map = PublicMap.from_world(world)
+    made: dict[str, Agent] = {}
+    for i, name in enumerate(names):
+        mine = methods[i % len(methods)]
+        if mine in METHODS:
+            made[name] = make_planner(
+                mine, told, public_map, seed=task.seed, number=i, of=of, distance=bool(setting.get("distance", True))
+            )
+            continue
+        try:
+            made |= foreign_agents(mine, [AgentSeat(name, task.seed, told, i, of)], world, terms)
+        except InputError as error:
+            made[name] = AbsentAgent(str(error))
+    return made
+
+
+def _for_size(number: int, world: World) -> int:
+    return min(number, round(number * (world.half / 400.0) ** 2))
+
+
+def _set_up(simulation: Simulation, task: Task) -> None:
+    for thing in task.objects:
+        kind, size = movable_kinds()[thing.kind], movable_kinds()[thing.kind].size
+        shape = movable_surfaces(kind.kind, thing.colour)
+        prototype = movable_prototype(kind.kind, thing.colour)
+        if thing.holder is not None:
+            simulation.scenario.hand_object(thing.name, prototype, shape, thing.holder, size=size)
+            continue
+        room = thing.room or ""
+        simulation.scenario.add_object(
+            thing.name, prototype, shape, thing.position, room=room, size=size, yaw=thing.yaw
+        )
+    for i, start in enumerate(task.assistants):
+        simulation.scenario.place_agent(f"assistant_{i}", (*start.position, 0.0), yaw=start.yaw)
+
+
+def _record(
+    task: Task,
+    method: str,
+    setting: Setting,
+    chronicle: Chronicle,
+    sim: Simulation,
+    faults: FaultLog,
+    planners: dict[str, Any],
+    seconds: float,
+) -> EpisodeRecord:
+    """Condense an episode."""
+    judge = chronicle.judge
+    success = judge.final()
+    parts = [
+        Part(str(k), done, "" if done else chronicle.cause_of(k), judge.since[k] if done else None)
+        for k, done in enumerate(success)
+    ]
+    finished = [part.done_at for part in parts if part.done_at is not None]
+    metrics = {
+        "SR": 100.0 * sum(success) / len(success),
+        "Ts": float(max(finished)) if all(success) else float(task.steps),
+    }
+    if task.category == "carry":
+        metrics["HR"], metrics["HR_escort"] = judge.following(task.steps)
+    return EpisodeRecord(
+        challenge="assistant",
+        category=task.category,
+        method=method,
+        setting=dict(setting) | {"assistants": len(task.assistants), "advanced": task.advanced, "steps": task.steps},
+        world=task.world,
+        seed=task.seed,
+        metrics=metrics,
+        parts=parts,
+        steps=sim.metrics.steps,
+        limit=task.steps,
+        wall_seconds=seconds,
+        state_hash=sim.state_hash(),
+        tokens=sum(usage_of(planner).tokens for planner in planners.values()),
+        cost=sum(usage_of(planner).cost for planner in planners.values()),
+        fault_counts=faults.by_kind(),
+        faults=faults.first,
+    )
