@@ -161,6 +161,7 @@ def test_the_papers_rows_are_those_of_the_setting() -> None:
     assert [row.method for row in one] == ["Random", "Heuristic", "MCTS Planner", "LLM Planner"]
     assert one[1].of("carry") == {"SR": 34.7, "HR": 16.5}
     assert one[1].label == "paper: Heuristic"
+    assert published_rows("assistant", {"assistants": 1, "advanced": False, "distance": True, "steps": 60}) == []
     two = published_rows("assistant", {"assistants": 2, "advanced": True, "distance": True, "steps": 1500})
     assert [(row.method, row.average) for row in two] == [("HP + HP", 9.26), ("LLM + LLM", 16.7), ("HP + LLM", 18.5)]
     assert [row.of("commute")["late_rate"] for row in published_rows("commute", {})][:2] == [10.43, 20.24]

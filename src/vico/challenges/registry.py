@@ -10,8 +10,8 @@ from vico.errors import InputError, line_of, sentence_of
 
 #: Name -> where its object is: ``module:OBJECT``.
 CHALLENGES = {
-    "assistant": "vico.challenges.assistant:ASSISTANT",
-    "commute": "vico.challenges.commute:COMMUTE",
+    "assistant": "vico.challenges.assistant.challenge:ASSISTANT",
+    "commute": "vico.challenges.commute.challenge:COMMUTE",
     "influence": "vico.challenges.influence:INFLUENCE",
 }
 _NEEDED = ("name", "categories", "methods", "metrics", "causes", "task", "play")

@@ -9,7 +9,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from rich.console import Console
-from rich.markdown import Markdown
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from vico.challenges.episodes import Outcome, label_of
@@ -142,8 +141,7 @@ def _tell(challenge: Challenge, outcomes: Sequence[Outcome], options: Evaluation
         print_json(results_content(challenge, summary, outcomes))
     else:
         published = published_rows(challenge.name, summary.setting) if options.compare else ()
-        page = results_page(challenge, summary, outcomes, published=published)
-        Console().print(Markdown(page))
+        print(results_page(challenge, summary, outcomes, published=published))
         print(options.out / "results.json")
     for line in [*fault_lines(outcomes), *(f"not played: {line}" for line in not_played_lines(outcomes))]:
         print(line, file=sys.stderr)
