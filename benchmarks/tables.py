@@ -6,8 +6,8 @@
 
 Tables: assistant (24 worlds; one and two assistants), advanced (three worlds), influence (five), commute (ten). A table
 that was cut short goes on with the same command. With `--reduced` there are four worlds and one seed; these worlds
-are built into OUT/worlds if `--worlds` is not given. Methods that need a language model are played where `--method` names
-them, with the model of the environment; without, their rows say "not run".
+are built into OUT/worlds if `--worlds` is not given. Methods that need a language model are played where `--method`
+names them, with the model of the environment; without, the page says that they were not run.
 """
 
 from __future__ import annotations
@@ -109,11 +109,12 @@ def play(arguments: argparse.Namespace, table: Table, block: Block, worlds: Sequ
     """Play a part of a table and write it; return whether all episodes were played."""
     challenge = load_challenge(block.challenge)
     methods = arguments.method or offline_methods(challenge)
+    setting = {**block.setting, "steps": arguments.steps} if arguments.steps else block.setting
     jobs = jobs_for(
         block.challenge,
         categories=arguments.category or challenge.categories,
         methods=methods,
-        setting=block.setting,
+        setting=setting,
         worlds=worlds,
         seeds=arguments.seeds or (1 if arguments.reduced else table.seeds),
     )
@@ -121,7 +122,7 @@ def play(arguments: argparse.Namespace, table: Table, block: Block, worlds: Sequ
     outcomes = evaluate(
         block.challenge, jobs, folder, workers=arguments.workers, record=arguments.record, finished=tell
     )  # fmt: skip
-    published = published_rows(challenge.name, block.setting)
+    published = published_rows(challenge.name, setting)
     reference = table.reference if table.reference in methods else ""
     write_results(folder, challenge, outcomes, reference=reference, published=published)
     page = (folder / "results.md").read_text(encoding="utf-8")
@@ -144,6 +145,7 @@ def main() -> int:
     parser.add_argument("--category", action="append", help="instead of all")
     parser.add_argument("--block", action="append", help="parts of the table instead of all: their names")
     parser.add_argument("--seeds", type=int, default=0)
+    parser.add_argument("--steps", type=int, default=0, help="shorter episodes of assistants, to try it out")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--record", action="store_true")
     arguments = parser.parse_args()

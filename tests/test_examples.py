@@ -1,5 +1,6 @@
 """The examples run as they are printed in the documentation."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -69,6 +70,13 @@ def test_an_agent_is_written_scored_and_ranked(helsinki_path: Path, tmp_path: Pa
     assert {entry["method"].rpartition(":")[2] for entry in read_json(out / "leaderboard.json")["entries"]} == {
         "Looker", "random",
     }  # fmt: skip
+
+
+def test_the_agent_of_the_page_is_the_one_that_runs() -> None:
+    page = (EXAMPLES.parent / "docs" / "write_an_agent.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    example = (EXAMPLES / "11_write_an_agent.py").read_text(encoding="utf-8")
+    assert code.removeprefix("import math\n").strip() in example
 
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.name)

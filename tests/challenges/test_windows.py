@@ -81,3 +81,17 @@ def test_the_script_shows_a_list_and_says_what_it_lacks(tmp_path: Path) -> None:
     assert lacking.returncode == 1
     assert "needs the extract monaco/monaco.osm.pbf; say with --places" in lacking.stderr
     assert "no window called nowhere" in run("--out", str(tmp_path / "w"), "--only", "nowhere").stderr
+
+
+def test_the_script_of_the_tables_says_what_it_lacks(tmp_path: Path) -> None:
+    def said(*words: str) -> str:
+        command = [sys.executable, str(SCRIPT.with_name("tables.py")), *words, "--out", str(tmp_path / "out")]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 2
+        return done.stderr
+
+    assert "the folder with the worlds of the list standard" in said("--table", "assistant")
+    assert "there are 1 assistant, advanced, 2 assistants, advanced" in said(
+        "--table", "advanced", "--worlds", str(tmp_path), "--block", "3 assistants"
+    )
+    assert "no method called 'best'" in said("--table", "assistant", "--worlds", str(tmp_path), "--method", "best")

@@ -20,6 +20,7 @@ from pydantic import TypeAdapter, ValidationError
 from vico.challenges.records import Challenge, EpisodeRecord, Job, Progress
 from vico.challenges.registry import foreign_parts
 from vico.errors import OutputError, SchemaError, VicoError, line_of, sentence_of
+from vico.io.data_files import own_folder
 from vico.io.files import read_json, write_json
 from vico.runner.loading import source_digest
 from vico.version import __version__
@@ -57,16 +58,21 @@ class Outcome:
     kept: bool = False
 
 
-@cache
 def code_digest() -> str:
-    """Return a hash of the installed package as far as episodes depend on it."""
-    root = Path(__file__).parents[1]
+    """Return a hash of the installed package and of the user's own data, as far as episodes depend on them."""
+    return _folder_digest(Path(__file__).parents[1], own_folder())
+
+
+@cache
+def _folder_digest(package: Path, own: Path | None) -> str:
     digest = hashlib.sha256()
-    for path in sorted(root.rglob("*")):
-        name = path.relative_to(root).as_posix()
-        if path.suffix in (".pyc", ".nbi", ".nbc") or not path.is_file() or name.startswith(_UNUSED):
-            continue
-        digest.update(f"{name}\0".encode() + hashlib.sha256(path.read_bytes()).digest())
+    unused = {package: _UNUSED} | ({own: ("challenges",)} if own is not None else {})
+    for root, prefixes in unused.items():
+        for path in sorted(root.rglob("*")):
+            name = path.relative_to(root).as_posix()
+            if path.suffix in (".pyc", ".nbi", ".nbc") or not path.is_file() or name.startswith(prefixes):
+                continue
+            digest.update(f"{name}\0".encode() + hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
 
 

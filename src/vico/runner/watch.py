@@ -69,7 +69,7 @@ class Watch:
     def start(self) -> None:
         """Begin; there is no end to it in this process."""
         sys.addaudithook(self._audit)
-        sys.meta_path.insert(0, self)  # type: ignore[arg-type]  # a finder that finds nothing; asked for each module
+        sys.meta_path.insert(0, self)  # a finder that finds nothing; asked for each module
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> None:
         """Look at the name of a module that is being imported for the first time, as a finder of modules."""
