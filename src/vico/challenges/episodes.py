@@ -127,6 +127,8 @@ class Player:
                 shutil.rmtree(run)  # of an episode that was cut short
             record = self.challenge.play(job, recording=run, progress=progress)
             _check(self.challenge, record)
+            if run is not None and not run.exists():
+                _log.warning("%s: the challenge recorded no run", label_of(job))
             # Only now: nobody who plays the task should find its answers lying about.
             write_json(self.folder / "tasks" / _task_name(job, task), task)
             write_episode(path, key, record)
