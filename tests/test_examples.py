@@ -1,10 +1,13 @@
 """The examples run as they are printed in the documentation."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from vico.io.files import read_json
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -57,6 +60,23 @@ def test_getting_around_prints_trips_and_arrives(helsinki_path: Path) -> None:
     printed = run("07_getting_around.py", "--world", str(helsinki_path), "--steps", "600")
     assert "on foot: walk" in printed
     assert " after " in printed
+
+
+def test_an_agent_is_written_scored_and_ranked(helsinki_path: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    printed = run("11_write_an_agent.py", "--worlds", str(helsinki_path), "--out", str(out), "--steps", "15")
+    assert "findings: []" in printed
+    assert printed.count(" of 6 found; why not: {") == 2
+    assert {entry["method"].rpartition(":")[2] for entry in read_json(out / "leaderboard.json")["entries"]} == {
+        "Looker", "random",
+    }  # fmt: skip
+
+
+def test_the_agent_of_the_page_is_the_one_that_runs() -> None:
+    page = (EXAMPLES.parent / "docs" / "write_an_agent.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    example = (EXAMPLES / "11_write_an_agent.py").read_text(encoding="utf-8")
+    assert code.removeprefix("import math\n").strip() in example
 
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.name)

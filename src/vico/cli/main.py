@@ -20,7 +20,8 @@ import tyro
 from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
-from vico.cli.options import AssistantOptions, CommaSeparated, FilmOptions, RunOptions, StillOptions, WorldBuildOptions
+from vico.cli.agent_verbs import check_agent, evaluation, leaderboard
+from vico.cli.options import CommaSeparated, FilmOptions, RunOptions, StillOptions, WorldBuildOptions
 from vico.errors import VicoError, line_of, sentence_of
 from vico.io.files import reason_of
 from vico.version import __version__
@@ -34,7 +35,6 @@ app = SubcommandApp()
 world = SubcommandApp()
 community = SubcommandApp()
 check = SubcommandApp()
-evaluation = SubcommandApp()
 assets = SubcommandApp()
 motion = SubcommandApp()
 
@@ -196,37 +196,6 @@ def check_community(path: Positional[Path], world: Path | None = None, json: boo
     return verb.check(path, world=world, json=json)
 
 
-@app.command(name="check-agent")
-def check_agent(
-    agent: Positional[Annotated[str, tyro.conf.arg(metavar="MODULE:NAME")]],
-    world: Path,
-    steps: int = 40,
-    seed: int = 0,
-    deadline: float = 1.0,
-    isolate: bool = False,
-    json: bool = False,
-) -> int:
-    """Check that an agent of yours keeps the contract, a line a finding. Exit 1 if anything is wrong.
-
-    It is made, it answers with actions and in time, it repeats itself, one restored from its state goes on as it does,
-    and it leaves what it is given as it is.
-
-    Example: vico check-agent my_agents:Walker --world helsinki
-
-    Args:
-        agent: my_module:MyAgent, or path/to/file.py:MyAgent.
-        world: World folder it plays an assistant in.
-        steps: How long, seconds.
-        seed: Of the simulation and the agent.
-        deadline: Seconds an action may take.
-        isolate: Ask it in a process of its own.
-        json: Print JSON.
-    """
-    from vico.cli import check_agent as verb
-
-    return verb.check(agent, world=world, steps=steps, seed=seed, deadline=deadline, isolate=isolate, json=json)
-
-
 @app.command(name="run")
 def run(options: Annotated[RunOptions, FLAT]) -> int:
     """Simulate a community: residents follow their schedules among robots, traffic and transit.
@@ -314,17 +283,6 @@ def demo(out: Path = Path("out/demo"), seed: int = 0, force: bool = False) -> in
     from vico.cli import demo as verb
 
     return verb.demo(out, seed=seed, force=force)
-
-
-@evaluation.command(name="assistant")
-def evaluate_assistant(options: Annotated[AssistantOptions, FLAT]) -> int:
-    """Judge a planner on the community assistant tasks.
-
-    Example: vico eval assistant --category delivery --method heuristic --worlds helsinki monaco --seeds 3 --out results
-    """
-    from vico.cli import evaluate as verb
-
-    return verb.assistant(options)
 
 
 @assets.command(name="install")
@@ -451,6 +409,8 @@ app.command(check, name="check", help="Check a world or a community.")
 app.command(assets, name="assets", help="Richer bodies and robots.")
 app.command(motion, name="motion", help="Motions of other programs, and of recorded people.")
 app.command(evaluation, name="eval", help="Judge agents on a challenge.")
+app.command(leaderboard, name="leaderboard", help="A public file of what methods came to.")
+app.command(name="check-agent")(check_agent)
 
 
 _log = logging.getLogger("vico")
