@@ -12,7 +12,10 @@ from vico.agents.commute.ours import DayPlanner
 from vico.agents.commute.question import Commuter
 from vico.agents.commute.rule import WalkPlanner
 from vico.errors import InputError
+from vico.io.data_files import PACKAGED
 from vico.world.public import PublicMap
+
+_POLICIES = PACKAGED / "commute"
 
 Instructions = list[dict[str, Any]]
 
@@ -31,6 +34,17 @@ def _mcts(instructions: Instructions, public_map: PublicMap, seed: int) -> Agent
 
 def _ours(instructions: Instructions, public_map: PublicMap, seed: int) -> Agent:
     return Commuter(DayPlanner(instructions, public_map), public_map, seed=seed)
+
+
+def _learned(name: str) -> Callable[[Instructions, PublicMap, int], Agent]:
+    """Return the maker of the agent that acts by a packaged policy."""
+
+    def made(instructions: Instructions, public_map: PublicMap, seed: int) -> Agent:
+        from vico.agents.commute.learning.policy import Network, PolicyCommuter  # compiled code, slow to import
+
+        return PolicyCommuter(Network.read(_POLICIES / f"{name}.npz"), public_map, seed=seed)
+
+    return made
 
 
 METHODS: dict[str, Callable[[Instructions, PublicMap, int], Agent]] = {

@@ -10,7 +10,7 @@ Slack: metres as the crow flies at 1 m/s, and a share of that time more, drawn f
 router has a part in it, so no method is on time by construction: a way that winds more than the draw allows is too long
 for who walks.
 
-Success: within 3 m of the place's point, on foot or on a bicycle, when the appointment starts.
+Success: within 3 m of the place's point, on foot or on a bicycle, when the appointment starts; at the last one on foot.
 """
 
 from __future__ import annotations

@@ -2,8 +2,9 @@
 
 Travel time counts from leaving (the first second more than 5 m from where the agent stood when its stay ended, or in a
 vehicle it was not in before) until arrival, the first second within 3 m of the appointment's point on foot or on a
-bicycle. Waiting before one leaves and waiting for the start of an appointment do not count. An appointment whose end
-passes is missed: that commute counts until then, and the next one begins where the agent is.
+bicycle; at the day's last one on foot, for the bicycle has to be back by then. Waiting before one leaves and waiting
+for the start of an appointment do not count. An appointment whose end passes is missed: that commute counts until then,
+and the next one begins where the agent is.
 """
 
 from __future__ import annotations
@@ -164,7 +165,9 @@ class DayJudge(Hook):
         boarded = now.vehicle not in ("", before.vehicle)
         if log.left is None and (boarded or math.dist(now.position, log.origin) > LEFT):
             log.left = time
-        if now.vehicle in ("", "bike") and math.dist(now.position, log.item.position) <= ARRIVAL:
+        last = len(self.logs) == self.task.commutes
+        arrives_as = ("",) if last else ("", "bike")
+        if now.vehicle in arrives_as and math.dist(now.position, log.item.position) <= ARRIVAL:
             log.arrived = time
             self._close(time, number)
         elif time >= log.item.end:

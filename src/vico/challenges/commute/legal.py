@@ -89,5 +89,6 @@ class CommuteInfo:
         self.index = 1
 
     def current(self) -> dict[str, Any]:
-        """Return number, place, position, start and end of the appointment."""
-        return {"index": self.index, **self._told[self.index]}
+        """Return number, place, position, start and end of the appointment, and whether it is the day's last."""
+        last = self.index == len(self._told) - 1
+        return {"index": self.index, "last": last, **self._told[self.index]}

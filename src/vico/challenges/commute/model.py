@@ -96,8 +96,8 @@ class CommuteTask(Record):
         for k, (before, after) in enumerate(pairwise(self.appointments)):
             if after.start <= before.end:
                 raise ValueError(
-                    f"appointments.{k + 1}.start: {clock_of(after.start)} is not after {clock_of(before.end)}, when the one "
-                    "before ends"
+                    f"appointments.{k + 1}.start: {clock_of(after.start)} is not after {clock_of(before.end)}, when "
+                    "the one before ends"
                 )
             away = math.dist(before.position, after.position)
             if away < LEAST_LEG:

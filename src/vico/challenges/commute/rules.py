@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from vico.rules import BIKE_SPEED, WALK_SPEED
 
-#: Who is this near to the point of an appointment, on foot or on a bicycle, is there, metres.
+#: Who is this near to the point of an appointment, on foot or on a bicycle (at the day's last one on foot), is there,
+#: metres.
 ARRIVAL = 3.0
 #: Who is this far from where a commute began has left, metres.
 LEFT = 5.0
