@@ -51,6 +51,8 @@ METHODS: dict[str, Callable[[Instructions, PublicMap, int], Agent]] = {
     "rule": _rule,
     "mcts": _mcts,
     "llm": _llm,
+    "ppo": _learned("ppo"),
+    "a2c": _learned("a2c"),
     "ours": _ours,
 }
 
