@@ -15,7 +15,7 @@ from vico.world.model import BikeStation, Point2
 from vico.world.public import PublicMap
 from vico.world.trips.model import Leg, Trip
 from vico.world.trips.network import DISMOUNT, MOUNT, TripNetwork
-from vico.world.trips.ways import NO_WAY, Way, find_way
+from vico.world.trips.ways import Way, find_way
 
 # Ways that are kept; more are found anew.
 _MOST_KEPT = 5_000
@@ -53,7 +53,7 @@ class LegMaker:
         if key not in self._ways:
             if len(self._ways) >= _MOST_KEPT:
                 self._ways.clear()
-            self._ways[key] = find_way(self._router, start, goal) if math.dist(start, goal) > 0.0 else NO_WAY
+            self._ways[key] = find_way(self._router, start, goal) if start != goal else Way(_polyline([start]), 0.0)
         return self._ways[key]
 
     def walk(self, start: Point2, goal: Point2, depart: float) -> Leg | None:

@@ -214,7 +214,7 @@ class MctsPlanner:
             )
             if ride is None:
                 continue
-            legs += [ride] if walk is None else [walk, ride]
+            legs += [ride] if walk is None or walk.metres == 0.0 else [walk, ride]
             here, now = ride.end, ride.arrive
         last = self._legs.walk(here, question.goal, now)
         if last is not None:
