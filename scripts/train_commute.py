@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import csv
 import hashlib
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -153,11 +154,10 @@ def main() -> None:
         writer.writeheader()
         writer.writerows(curve.rows)
     steps = model.num_timesteps
-    print(
-        f"{given.method}: {steps} steps in {wall:.1f} s ({steps / wall:,.0f}/s), {busy:.1f} CPU-s ({steps / busy:,.0f})"
+    sys.stdout.write(
+        f"{given.method}: {steps} steps in {wall:.1f} s ({steps / wall:,.0f}/s), {busy:.1f} CPU-s ({steps / busy:,.0f}/s)\n"
+        f"{path}: sha256 {hashlib.sha256(path.read_bytes()).hexdigest()}\nlast: {curve.rows[-1]}\n"
     )
-    print(f"{path}: sha256 {hashlib.sha256(path.read_bytes()).hexdigest()}")
-    print(f"last: {curve.rows[-1]}")
 
 
 if __name__ == "__main__":

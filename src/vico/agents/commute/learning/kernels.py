@@ -60,8 +60,8 @@ _STEP = 0.25  # metres between looks at what is ahead of who moves
 def clear_at(city: CityArrays, x: float, y: float) -> float:
     """Return the clearance of the cell at a point; 0 outside."""
     n = city.clearance.shape[0]
-    ix = int(math.floor((x + city.half) / city.cell))
-    iy = int(math.floor((y + city.half) / city.cell))
+    ix = math.floor((x + city.half) / city.cell)
+    iy = math.floor((y + city.half) / city.cell)
     if ix < 0 or iy < 0 or ix >= n or iy >= n:
         return 0.0
     return float(city.clearance[iy, ix])
