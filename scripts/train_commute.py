@@ -155,7 +155,8 @@ def main() -> None:
         writer.writerows(curve.rows)
     steps = model.num_timesteps
     sys.stdout.write(
-        f"{given.method}: {steps} steps in {wall:.1f} s ({steps / wall:,.0f}/s), {busy:.1f} CPU-s ({steps / busy:,.0f}/s)\n"
+        f"{given.method}: {steps} steps in {wall:.1f} s ({steps / wall:,.0f}/s), "
+        f"{busy:.1f} CPU-s ({steps / busy:,.0f}/s)\n"
         f"{path}: sha256 {hashlib.sha256(path.read_bytes()).hexdigest()}\nlast: {curve.rows[-1]}\n"
     )
 

@@ -53,7 +53,7 @@ def test_a_world_too_small_is_refused_in_a_sentence(corner: World) -> None:
 
 
 def test_hours_out_of_range_are_refused(corner: World) -> None:
-    with pytest.raises(InputError, match="give 2 to 14"):
+    with pytest.raises(InputError, match="give 1 to 14"):
         generate_commute(corner, seed=0, hours=0.5)
 
 

@@ -24,7 +24,7 @@ from vico.clock import DAY, clock_of
 from vico.errors import InputError, LlmBudgetError, LlmReplyError, SourceError
 from vico.llm import LanguageModel
 from vico.rules import BIKE_ASTRAY, BIKE_RATE, BUS_FARE, WALK_SPEED
-from vico.world.model import Point2
+from vico.world.model import Line, Point2, TramLine
 from vico.world.public import PublicMap
 from vico.world.trips import Leg, Trip
 
@@ -126,11 +126,14 @@ class LlmPlanner:
                 rounds=1,
             )
         except SourceError as error:
-            return self._fell_back("unreachable", error)
+            self._fell_back("unreachable", error)
+            return None
         except LlmBudgetError as error:
-            return self._fell_back("budget", error)
+            self._fell_back("budget", error)
+            return None
         except LlmReplyError as error:
-            return self._fell_back("garbage", error)
+            self._fell_back("garbage", error)
+            return None
         finally:
             spent = self._model.budget.spent
             self.tokens += spent.tokens - before[0]
@@ -168,7 +171,8 @@ class LlmPlanner:
 
     def _transit(self, now: float) -> dict[str, Any]:
         lines = []
-        for line in (*self._map.lines, *self._map.tram_lines):
+        every: list[Line | TramLine] = [*self._map.lines, *self._map.tram_lines]
+        for line in every:
             if not line.departures:
                 continue
             first = bisect_left(line.departures, now % DAY)

@@ -82,8 +82,8 @@ class CommuteTask(Record):
         Seed of the community the resident is of.
     """
 
-    schema_name: Literal["vico.commute"] = SCHEMA
-    version: Literal[1] = VERSION
+    schema_name: Literal["vico.commute"] = "vico.commute"
+    version: Literal[1] = 1
     world: str
     world_digest: str
     seed: int = Field(ge=0)

@@ -29,6 +29,7 @@ from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedRun
 from vico.sim.recorder import Recorder
 from vico.world.folder import World
+from vico.world.model import Stop, TramStop
 from vico.world.public import PublicMap
 
 AGENT = "assistant_0"
@@ -148,7 +149,8 @@ def _for_size(number: int, world: World) -> int:
 
 
 def _stops(public_map: PublicMap) -> list[tuple[float, float]]:
-    return [(s.wait[0], s.wait[1]) for s in (*public_map.stops, *public_map.tram_stops)]
+    stops: list[Stop | TramStop] = [*public_map.stops, *public_map.tram_stops]
+    return [(stop.wait[0], stop.wait[1]) for stop in stops]
 
 
 def _agent(job: Job, task: CommuteTask, world: World, public_map: PublicMap) -> Agent:

@@ -21,12 +21,12 @@ CANDIDATES = 9
 SLACK = (0.3, 1.1)
 
 #: A stay takes so long at least, and the last one so long exactly: who is not there by then does not arrive; seconds.
-LEAST_STAY = 600
+LEAST_STAY = 300
 LAST_STAY = 900
 
 #: From the end of the first stay to the end of the last, hours, unless a job's setting says otherwise; and its bounds.
 HOURS = 4.0
-LEAST_HOURS, MOST_HOURS = 2.0, 14.0
+LEAST_HOURS, MOST_HOURS = 1.0, 14.0
 #: The first stay ends in the hour from here on; bounds of all times; seconds of the day.
 MORNING = 8 * 3600
 EARLIEST, LATEST_END = 5 * 3600, 86_399

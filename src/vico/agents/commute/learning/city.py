@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.clock import DAY
+from vico.world.model import Stop, TramStop
 from vico.world.public import PublicMap
 from vico.world.timetable import LineTimes, TramTimes
 
@@ -68,7 +69,7 @@ def city_arrays(public_map: PublicMap, *, dwell: float) -> CityArrays:
     """
     walkable = public_map.walkable
     clearance = np.where(walkable.connected, walkable.clearance, 0.0).astype(np.float32)
-    stops = [*public_map.stops, *public_map.tram_stops]
+    stops: list[Stop | TramStop] = [*public_map.stops, *public_map.tram_stops]
     number = {stop.id: k for k, stop in enumerate(stops)}
     times: list[LineTimes | TramTimes] = [LineTimes.of(line) for line in public_map.lines if line.departures]
     times += [TramTimes(line) for line in public_map.tram_lines if line.departures]
