@@ -120,7 +120,7 @@ def make(method: str, env: LearnersEnv, seed: int) -> Any:
     common: dict[str, Any] = {"learning_rate": RATE, "gamma": GAMMA, "seed": seed, "device": "cpu", "verbose": 0}
     common["policy_kwargs"] = {"net_arch": {"pi": [64, 64], "vf": [64, 64]}}
     if method == "ppo":
-        return PPO("MlpPolicy", env, n_steps=256, batch_size=512, n_epochs=6, ent_coef=0.01, **common)
+        return PPO("MlpPolicy", env, n_steps=128, batch_size=4096, n_epochs=10, ent_coef=0.01, **common)
     return A2C("MlpPolicy", env, n_steps=16, ent_coef=0.01, use_rms_prop=False, gae_lambda=0.95, **common)
 
 
@@ -132,7 +132,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--curve", type=Path, required=True)
     parser.add_argument("--steps", type=int, default=STEPS)
-    parser.add_argument("--envs", type=int, default=120)
+    parser.add_argument("--envs", type=int, default=128)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
     torch.set_num_threads(1)
