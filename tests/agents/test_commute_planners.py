@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 
 from commute_map import EAST, RACK_EAST, RACK_WEST, WEST, commute_map, instructions
@@ -239,8 +240,6 @@ def test_every_method_acts_legally_and_remembers(method: str, monkeypatch: pytes
     first, second = make(), make()
     info = {"commute": {"index": 1, "last": False, **told[0]["appointments"][1]}, "entities": {}}
     state = {"time": 32_400.0, "cash": 60.0, "vehicle": "", "action_status": "ok", "action_code": "", "room": ""}
-    import numpy as np
-
     observation = {"pose": np.array([*WEST, 0.0, 1.0, 0.0, 0.0]), "state": state}
     actions = [first.act(observation, info) for _ in range(2)]
     assert all(a["type"] in ("move_forward", "turn_left", "turn_right", "wait", "enter_bus", "exit_bus", "enter_bike",
@@ -248,6 +247,24 @@ def test_every_method_acts_legally_and_remembers(method: str, monkeypatch: pytes
     assert second.act(observation, info) == actions[0]
     second.restore(first.state())
     assert second.act(observation, info) == first.act(observation, info)
+
+
+def test_a_kept_bicycle_is_ridden_to_the_place_and_not_left_there() -> None:
+    far = (-200.0, 300.0)
+    told = instructions(RACK_WEST, far, RACK_EAST)
+    agent = make_planner("ours", told, commute_map(), seed=1)
+    info = {"commute": {"index": 1, "last": False, **told[0]["appointments"][1]}, "entities": {}}
+    state = {"time": 32_450.0, "cash": 60.0, "vehicle": "bike", "action_status": "ok", "action_code": "", "room": ""}
+    actions, y = [], 250.0
+    for _ in range(30):
+        pose = np.array([far[0], y, 0.0, 0.0, 1.0, 0.0])
+        action = agent.act({"pose": pose, "state": dict(state)}, info)
+        y += float(action.get("distance", 0.0))
+        state["time"] = float(state["time"]) + 1.0  # type: ignore[arg-type]
+        actions.append(action["type"])
+    assert "exit_bike" not in actions
+    assert y == pytest.approx(far[1], abs=0.5)
+    assert actions[-1] == "wait"
 
 
 def test_an_unknown_method_is_refused() -> None:
