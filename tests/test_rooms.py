@@ -26,6 +26,7 @@ ALLOWED = {
         "envs",
         "llm",
         "io.compiled",
+        "io.data_files",
         "world.public",
         "world.routing",
         "world.trips",
@@ -34,7 +35,7 @@ ALLOWED = {
         "world.heights",
     },
     "runner": {"agents", "envs", "sim", "world", "io"},
-    "challenges": {"runner", "envs", "agents", "community", "world", "assets", "io"},
+    "challenges": {"runner", "envs", "agents", "community", "world", "assets", "llm", "io"},
 }
 OPEN = {"viewer", "cli"}  # and the front door, api.py
 
