@@ -85,6 +85,8 @@ class Courtship:
         said = self.strategy.dialogue.say(self._situation(time, here, seconds_to), talk, self._rng)
         said = None if said is None else shortened(said, _LONGEST)
         if not said:
+            if not talk.said:  # nothing new to say to them: others first
+                self.give_up(talk.target, time)
             return None
         talk.said.append(said)
         return f"{self._address[talk.target]}, {said}"

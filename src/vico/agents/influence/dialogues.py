@@ -38,14 +38,14 @@ class OwnInterestsDialogue:
     """Talks about oneself: one's own values, hobbies and groups, whoever listens."""
 
     def say(self, situation: Situation, talk: Talk, chance: np.random.Generator) -> str | None:
-        """Return the next thing about oneself."""
+        """Return the next thing about oneself; once all was told, some of it again."""
         known, me = lines(), situation.me
         told = [line for value in me.values if value in known.values for line in known.values[value].shared]
         told += [line.format(hobby=hobby) for hobby in me.hobbies for line in known.hobby.own]
         told += [line.format(group=_group_word(group)) for group in me.groups for line in known.group.own]
         before = [text for one in situation.talks_with(talk.target) for text in one.said]
         new = [line for line in told if not any(line in text for text in before)]
-        return f"{_one_of(new, chance)} {_one_of(known.endings.plain, chance)}" if new else None
+        return f"{_one_of(new or told, chance)} {_one_of(known.endings.plain, chance)}" if told else None
 
 
 class KindWordsDialogue:

@@ -96,7 +96,7 @@ class MainAgent:
         if time < self._thinks_at:
             return False
         self._thinks_at = time + _THINK
-        here = _position(observation)
+        here = self._door(observation)
         of_day = time % DAY
         seconds_to = self._seconds_from(here)
         target = self.courtship.choose(of_day, here, seconds_to)
@@ -130,7 +130,7 @@ class MainAgent:
         seen = seen_body(info, self._target)
         if seen is not None and seen[2] > TALKING_DISTANCE:
             return self._give_up(time)
-        here = _position(observation)
+        here = self._door(observation)
         text = self.courtship.message(time % DAY, here, self._seconds_from(here))
         if text is None:
             self._end()
@@ -145,6 +145,12 @@ class MainAgent:
 
     def _end(self) -> None:
         self._target, self._talks, self._thinks_at = "", False, -math.inf
+
+    def _door(self, observation: Observation) -> tuple[float, float]:
+        """Return where ways begin, ENU metres: where one stands; indoors, before the door of the place."""
+        inside = self._map.place_by_id.get(observation["state"]["place"])
+        x, y = observation["pose"][:2] if inside is None else inside.position[:2]
+        return float(x), float(y)
 
     def _seconds_from(self, here: tuple[float, float]) -> _Ways:
         return _Ways(self._map, here, self._ways)
@@ -163,8 +169,3 @@ class _Ways:
             far = math.inf if known is None else self._map.router.seconds(self._here, known.position, WALK_SPEED)
             self._known[key] = far
         return self._known[key]
-
-
-def _position(observation: Observation) -> tuple[float, float]:
-    x, y = observation["pose"][:2]
-    return float(x), float(y)

@@ -1,4 +1,4 @@
-"""What a main agent knows when it decides: public profiles, everybody's day, and its own conversations. Nothing else."""
+"""What a main agent knows when it decides: public profiles, everybody's day, its own conversations, nothing else."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Strategies by name: a target choice and a dialogue; ``ours/nearest`` takes the one from ours, the other from nearest."""
+"""Strategies by name: a target choice and a dialogue; ``ours/nearest`` takes one from ours, the other from nearest."""
 
 from __future__ import annotations
 

@@ -15,10 +15,9 @@ REST = 1800.0
 
 
 def _rested(situation: Situation, members: dict[str, float]) -> dict[str, float]:
-    """Return those with whom one has not just talked; all if that is everybody."""
+    """Return those with whom one has not just talked."""
     last = {talk.target: talk.began for talk in situation.talks}
-    rested = {m: s for m, s in members.items() if situation.time - last.get(m, -math.inf) > REST}
-    return rested
+    return {m: s for m, s in members.items() if situation.time - last.get(m, -math.inf) > REST}
 
 
 class RandomTarget:

@@ -1,4 +1,4 @@
-"""Going to somebody: to where their day says they are, in through the door, from room to room until they are in view."""
+"""Going to somebody: to where their day says they are, through the door, from room to room until they are in view."""
 
 from __future__ import annotations
 
@@ -129,8 +129,10 @@ class Visitor:
         if self._is_in:  # came out again: the place was searched
             return self._fail()
         if place.id in state["accessible_places"]:
-            self._refused += 1
-            return {"type": "enter", "place": place.id} if self._refused <= _REFUSALS else self._fail()
+            self._refused += state["action_status"] == "refused"
+            self._steps += 1
+            is_shut = self._refused > _REFUSALS or self._steps > _STEPS_A_ROOM
+            return self._fail() if is_shut else {"type": "enter", "place": place.id}
         goal = (float(place.position[0]), float(place.position[1]))
         return self._walker.towards(goal, WALK_SPEED, observation, info) or self._fail()
 
@@ -214,7 +216,7 @@ class Visitor:
 
 def seen_body(info: Info, agent: str) -> tuple[float, float, float] | None:
     """Return where an agent that is in view stands, ENU metres, and how far away; None if it is not in view."""
-    for body in info["in_view"] if "in_view" in info else ():
+    for body in info.get("in_view", ()):
         if body.agent == agent:
             return body.position[0], body.position[1], body.distance
     return None

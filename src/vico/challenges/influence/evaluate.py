@@ -61,7 +61,7 @@ def first_choices(ledger: Ledger, *, now: float, with_talk: bool) -> dict[str, d
     """
     model, found = ledger.model, {}
     for variant in model.variants:
-        opinions = model.opinions(ledger.heard if with_talk else [], now=now, variant=variant)
+        opinions = ledger.opinions(now, variant) if with_talk else model.opinions([], now=now, variant=variant)
         found[variant] = {member: model.ranking(opinions, member)[0] for member in model.members}
     if ledger.language is None:
         return found

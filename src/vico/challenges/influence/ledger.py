@@ -84,6 +84,8 @@ class Ledger:
         self._names = {member: words_of(address[member]) for member in model.members}
         self.utterances: list[Utterance] = []
         self.heard: list[Heard] = []
+        #: How each message in `heard` was received.
+        self.receptions: list[float] = []
 
     def answers(self) -> dict[str, Answer]:
         """Return what each member says when spoken to, by id."""
@@ -113,9 +115,11 @@ class Ledger:
         conversation, number = self._place_of(time, speaker, member)
         ignored = self._ignored(time, distance, on_the_way, number)
         message = Heard(time, speaker, member, text, conversation, number)
-        answer = self._said(message, ignored)
+        reception = self.model.reception(message, self.heard)
+        answer = self._said(message, ignored, reception)
         if ignored in ("", "enough"):
             self.heard.append(message)
+            self.receptions.append(reception)
         self.utterances.append(Utterance(time, speaker, member, text, answer or "", conversation, number, ignored))
         return answer
 
@@ -156,7 +160,7 @@ class Ledger:
             return "on the way"
         return "enough" if number >= ROUNDS else ""
 
-    def _said(self, message: Heard, ignored: Ignored) -> str | None:
+    def _said(self, message: Heard, ignored: Ignored, reception: float) -> str | None:
         if ignored in ("too far", "day over"):
             return None
         listener, speaker = self.model.profiles[message.listener], self.model.profiles[message.speaker]
@@ -169,8 +173,8 @@ class Ledger:
             told = self._asked(message, listener, speaker)
             if told is not None:
                 return told
-        words = line(self.model.tone(self.model.reception(message, self.heard)))
-        return f"{words} {line(self._stance(message, rival))}" if message.round == ROUNDS - 1 else words
+        words = line(self.model.tone(reception))
+        return f"{words} {line(self._stance(message, rival, reception))}" if message.round == ROUNDS - 1 else words
 
     def _asked(self, message: Heard, listener: Profile, speaker: Profile) -> str | None:
         assert self.language is not None
@@ -178,9 +182,15 @@ class Ledger:
         told = self.language.answer(listener, speaker, list(said))
         return None if told is None else told[:LONGEST_TEXT]
 
-    def _stance(self, message: Heard, rival: Profile) -> str:
+    def opinions(self, now: float, variant: str) -> dict[tuple[str, str], float]:
+        """Return what members think after all that was said so far; see `OpinionModel.opinions`."""
+        return self.model.opinions(self.heard, now=now, variant=variant, receptions=self.receptions)
+
+    def _stance(self, message: Heard, rival: Profile, reception: float) -> str:
         """Return which of the two a member stands with after a message, by the first variant."""
-        opinions = self.model.opinions([*self.heard, message], now=message.time, variant=self.model.variants[0])
+        heard, receptions = [*self.heard, message], [*self.receptions, reception]
+        variant = self.model.variants[0]
+        opinions = self.model.opinions(heard, now=message.time, variant=variant, receptions=receptions)
         ahead = opinions[message.listener, message.speaker] - opinions[message.listener, rival.id]
         return "undecided" if abs(ahead) < _DRAW else "stands_with_you" if ahead > 0 else "stands_with_rival"
 

@@ -155,11 +155,16 @@ class _Terms:
         self._terms = [term for term in (tuple(_pieces(text)) for text in terms) if term]
 
     def occur_in(self, words: Sequence[str]) -> bool:
-        return any(
-            all(_fits(piece, words[k + i]) for i, piece in enumerate(term))
-            for term in self._terms
-            for k in range(len(words) - len(term) + 1)
-        )
+        present = frozenset(words)
+        return any(_occurs(term, words, present) for term in self._terms)
+
+
+def _occurs(term: Sequence[str], words: Sequence[str], present: frozenset[str]) -> bool:
+    """Return whether a term's words stand one after another; most are told by their first word not being there."""
+    if not term[0].endswith("*") and term[0] not in present:
+        return False
+    last = len(words) - len(term) + 1
+    return any(all(_fits(piece, words[k + i]) for i, piece in enumerate(term)) for k in range(last))
 
 
 def words_of(text: str) -> list[str]:

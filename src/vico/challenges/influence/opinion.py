@@ -97,7 +97,9 @@ class OpinionModel:
         reply = self.constants.reply
         return "warm" if reception >= reply.warm else "cool" if reception < reply.cool else "neutral"
 
-    def opinions(self, heard: Sequence[Heard], *, now: float, variant: str) -> dict[tuple[str, str], float]:
+    def opinions(
+        self, heard: Sequence[Heard], *, now: float, variant: str, receptions: Sequence[float] | None = None
+    ) -> dict[tuple[str, str], float]:
         """Return what every member thinks of every main agent.
 
         Parameters
@@ -108,6 +110,8 @@ class OpinionModel:
             Seconds of the day.
         variant
             Name of a variant.
+        receptions
+            How each message was received, where that is known already.
 
         Raises
         ------
@@ -119,7 +123,7 @@ class OpinionModel:
             raise InputError(f"influence: no variant {variant!r}; there are {', '.join(self.variants)}")
         found = {
             (member, main): opinion_after(form, self.prior(member, main), impressions, now)
-            for (member, main), impressions in self._impressions(heard).items()
+            for (member, main), impressions in self._impressions(heard, receptions).items()
         }
         return self._after_talk_with_friends(form, found) if isinstance(form, SocialForm) else found
 
@@ -128,13 +132,16 @@ class OpinionModel:
         chance = {main: float(rng(self._seed, "tie", member, main).random()) for main in self.mains}
         return sorted(self.mains, key=lambda main: (-opinions[member, main], chance[main], main))
 
-    def _impressions(self, heard: Sequence[Heard]) -> dict[tuple[str, str], list[Impression]]:
+    def _impressions(
+        self, heard: Sequence[Heard], receptions: Sequence[float] | None
+    ) -> dict[tuple[str, str], list[Impression]]:
         found: dict[tuple[str, str], list[Impression]] = {
             (member, main): [] for member in self.members for main in self.mains
         }
         for k, message in enumerate(heard):
             if (message.listener, message.speaker) in found:
-                strength = self._strength(message, self.reception(message, heard[:k]))
+                reception = self.reception(message, heard[:k]) if receptions is None else receptions[k]
+                strength = self._strength(message, reception)
                 found[message.listener, message.speaker].append(Impression(message.time, strength))
         return found
 
