@@ -14,7 +14,7 @@ from vico.agents.influence.days import DayPlan, day_plan
 from vico.challenges.influence.day import Day
 from vico.clock import clock_of
 from vico.rules import WALK_SPEED
-from vico.world.public import PublicMap
+from vico.world.folder import World
 
 # Seconds: one thinks again after so long where there is nobody to see; it takes so long to find somebody at a place,
 # and so long to say something and be answered; who is to come is late by so much.
@@ -33,8 +33,8 @@ class _Mover:
 class Walks:
     """Tells how long the walks between places take; each is found once a world."""
 
-    def __init__(self, public_map: PublicMap) -> None:
-        self._map = public_map
+    def __init__(self, world: World) -> None:
+        self._world = world
         self._known: dict[tuple[str, str], float] = {}
 
     def seconds(self, start: str, goal: str) -> float:
@@ -43,14 +43,15 @@ class Walks:
             return 0.0
         key = min((start, goal), (goal, start))
         if key not in self._known:
-            places = self._map.place_by_id
-            near = places[start].position, places[goal].position
-            self._known[key] = self._map.router.seconds(*near, WALK_SPEED)
+            places = self._world.place_by_id
+            # In one direction always: the other one may come to a little more or less.
+            one, other = (places[place].position for place in key)
+            self._known[key] = self._world.router.seconds(one, other, WALK_SPEED)
         return self._known[key]
 
     def position(self, place: str) -> tuple[float, float]:
         """Return where a place is, ENU metres."""
-        x, y, _ = self._map.place_by_id[place].position
+        x, y, _ = self._world.place_by_id[place].position
         return x, y
 
 

@@ -21,13 +21,11 @@ from vico.challenges.influence.constants import opinion_constants
 from vico.challenges.influence.day import Day, Models, make_day
 from vico.challenges.influence.generate import community_of, generate_influence
 from vico.challenges.influence.model import (
-    Assignment,
     InfluenceSettings,
-    InfluenceTask,
     settings_of,
     strategies_of,
 )
-from vico.challenges.records import EpisodeRecord, Job, Metric, Part, Progress
+from vico.challenges.records import EpisodeRecord, Job, Metric, Progress
 from vico.community.model import Community
 from vico.envs import make
 from vico.io.files import write_json
@@ -37,7 +35,6 @@ from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedRun
 from vico.sim.recorder import Recorder
 from vico.world.folder import World, read_world
-from vico.world.public import PublicMap
 
 NAME = "influence"
 CATEGORY = "day"
@@ -248,11 +245,11 @@ def _community(path: Path, seed: int) -> Community:
 
 @lru_cache(maxsize=2)
 def _walks_of(path: Path) -> Walks:
-    return Walks(PublicMap.from_world(_world(path)))
+    return Walks(_world(path))
 
 
 def _walks(world: World) -> Walks:
-    return Walks(PublicMap.from_world(world)) if world.path is None else _walks_of(world.path)
+    return Walks(world) if world.path is None else _walks_of(world.path)
 
 
-__all__ = ["CATEGORY", "NAME", "Assignment", "Influence", "InfluenceTask", "Part"]
+__all__ = ["CATEGORY", "NAME", "Influence"]
