@@ -112,7 +112,7 @@ def test_every_dialogue_talks_up_to_three_rounds(name: str) -> None:
     courtship.begin("resident_2", 43200.0)
     said = [courtship.message(43200.0, (0.0, 0.0), lambda place: 0.0) for _ in range(4)]
     assert said[3] is None
-    assert all(text is not None and text.startswith("Carl, ") and len(text) <= 1000 for text in said[:3])
+    assert all(text is not None and text.startswith("Carl! ") and len(text) <= 1000 for text in said[:3])
     if name == "ours":
         assert len(set(said)) == 4
 

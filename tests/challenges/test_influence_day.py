@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +25,7 @@ from vico.challenges.records import Challenge, Job
 from vico.community.model import Community
 from vico.errors import InputError
 from vico.io.files import read_json
+from vico.sim.recording import read_run
 from vico.world.folder import World
 
 EVENING = 20 * 3600.0
@@ -285,12 +285,17 @@ def test_what_is_said_in_the_simulation_is_recorded(helsinki_path: Path, tmp_pat
     talks = read_json(tmp_path / "run" / "talks.json")
     said = [one for one in talks["utterances"] if not one["ignored"]]
     assert said
-    spoken: list[dict[str, Any]] = []
-    for path in sorted((tmp_path / "run").rglob("events.jsonl")):
-        spoken += [json.loads(line) for line in path.read_text().splitlines()]
+    spoken = read_run(tmp_path / "run").events
     messages = {(one["agent"], one["text"]) for one in spoken if one["kind"] == "message"}
     for one in said:
         assert (one["speaker"], one["text"]) in messages
         assert (one["listener"], one["answer"]) in messages
-    again = INFLUENCE.play(job)
+
+
+@pytest.mark.slow
+def test_a_day_in_the_simulation_is_repeatable_and_symmetric(helsinki_path: Path) -> None:
+    job = Job("influence", "day", "ours+ours", {"hours": 0.5}, helsinki_path, 0)
+    record, again = INFLUENCE.play(job), INFLUENCE.play(job)
     assert (again.state_hash, again.metrics) == (record.state_hash, record.metrics)
+    assert record.metrics["win"] == 50.0
+    assert record.fault_counts == {}

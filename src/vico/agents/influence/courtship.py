@@ -89,7 +89,7 @@ class Courtship:
                 self.give_up(talk.target, time)
             return None
         talk.said.append(said)
-        return f"{self._address[talk.target]}, {said}"
+        return f"{self._address[talk.target]}! {said[0].upper()}{said[1:]}"
 
     def heard(self, answer: str) -> None:
         """Note what the member answered."""

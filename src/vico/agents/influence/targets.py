@@ -58,14 +58,17 @@ class ExpectedGainTarget:
 
     It guesses from profiles and from what members said who is undecided, how much there is to talk about, and how much
     a further conversation is still worth; it knows when members will be where, also those who will only come later.
+    Everybody is seen once as soon as may be, and again towards the end of the day: what was said last is remembered.
     """
 
     # Guesses, not the model's numbers: what a tie or something shared is worth, how undecided reads as a distance, how
     # much less each further conversation brings, and the seconds a conversation takes.
     _VALUE, _HOBBY, _GROUP, _TIE, _LIKENESS = 0.5, 0.3, 0.3, 0.8, 0.5
-    _UNDECIDED = 0.6
-    _FURTHER = (1.0, 0.7, 0.2, 0.05)
+    _UNDECIDED = 1.2
+    _FURTHER = (1.0, 0.8, 0.3)
     _TALK = 45.0
+    # From how many hours before the end on a conversation after so many others is held.
+    _FROM = (math.inf, 2.0, 0.6)
     # A meeting so much before the end of a stay is sure enough, and one does not wait longer than this, seconds.
     _SURE, _PATIENCE = 90.0, 900.0
 
@@ -99,11 +102,14 @@ class ExpectedGainTarget:
         return ready if ready + self._SURE < min(stay.end, situation.ends) else None
 
     def gain(self, situation: Situation, member: str) -> float:
-        """Return what a conversation with a member is expected to be worth: the chance that it turns their ranking."""
+        """Return what a conversation with a member is expected to be worth; 0 for one that has its time later."""
         talks = situation.talks_with(member)
         if talks and situation.time - talks[-1].began < REST:
             return 0.0
-        further = self._FURTHER[min(len(talks), len(self._FURTHER) - 1)]
+        hours_left = (situation.ends - situation.time) / 3600.0
+        if len(talks) >= len(self._FURTHER) or hours_left > self._FROM[len(talks)]:
+            return 0.0
+        further = self._FURTHER[len(talks)]
         margin = self.margin(situation, member)
         undecided = math.exp(-((margin / self._UNDECIDED) ** 2))
         listener = situation.members[member]
