@@ -74,7 +74,7 @@ def test_ours_prefers_the_undecided_to_those_who_named_the_rival() -> None:
     twin = replace(invented_people()[2], id="resident_4", name="Eino Invented", ties=())
     members = {"resident_2": replace(invented_people()[2], ties=()), "resident_4": twin}
     days = {"resident_2": AT_HOME, "resident_4": AT_HOME}
-    now = situation(members=members, days=days, talks=(told, torn))
+    now = situation(time=68000.0, members=members, days=days, talks=(told, torn))
     assert ExpectedGainTarget().choose(now, np.random.default_rng(0)) == "resident_4"
 
 

@@ -65,10 +65,10 @@ class ExpectedGainTarget:
     # much less each further conversation brings, and the seconds a conversation takes.
     _VALUE, _HOBBY, _GROUP, _TIE, _LIKENESS = 0.5, 0.3, 0.3, 0.8, 0.5
     _UNDECIDED = 1.2
-    _FURTHER = (1.0, 0.8, 0.3)
+    _FURTHER = (1.0, 0.8)
     _TALK = 45.0
     # From how many hours before the end on a conversation after so many others is held.
-    _FROM = (math.inf, 2.0, 0.6)
+    _FROM = (math.inf, 2.0)
     # A meeting so much before the end of a stay is sure enough, and one does not wait longer than this, seconds.
     _SURE, _PATIENCE = 90.0, 900.0
 
