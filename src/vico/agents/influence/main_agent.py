@@ -43,7 +43,7 @@ class MainAgent:
         self._rng = rng(seed, "main agent", courtship.me.id)
         self._visitor = Visitor(public_map, self._rng)
         self._target = ""
-        self._thinks_at = self._until = self._starts = -math.inf
+        self._thinks_at = self._until = -math.inf
         self._talks = False
         self._spoke_at = -math.inf
         self._ways: dict[tuple[int, int, str], float] = {}
@@ -66,11 +66,9 @@ class MainAgent:
         if not self._target and not self._choose(observation, time):
             return {"type": "wait"}
         step = self._visitor.towards(observation, info)
-        if step is not None and time <= self._until:
-            return step
-        if step is not None or self._visitor.failed:
+        if self._visitor.failed or (step is not None and time > self._until):
             return self._give_up(time)
-        return self._begin(observation, info, time)
+        return self._begin(observation, info, time) if step is None else step
 
     def state(self) -> AgentState:
         """Return all it remembers."""
@@ -80,7 +78,7 @@ class MainAgent:
             "visitor": self._visitor.state(),
             "target": self._target,
             "talks": self._talks,
-            "times": np.array([self._thinks_at, self._until, self._starts, self._spoke_at]),
+            "times": np.array([self._thinks_at, self._until, self._spoke_at]),
         }
 
     def restore(self, state: AgentState) -> None:
@@ -89,7 +87,7 @@ class MainAgent:
         self.courtship.restore(state["courtship"])
         self._visitor.restore(state["visitor"])
         self._target, self._talks = str(state["target"]), bool(state["talks"])
-        self._thinks_at, self._until, self._starts, self._spoke_at = (float(t) for t in state["times"])
+        self._thinks_at, self._until, self._spoke_at = (float(t) for t in state["times"])
 
     def _choose(self, observation: Observation, time: float) -> bool:
         """Choose whom to see and set out; return whether there is anybody."""
@@ -104,8 +102,8 @@ class MainAgent:
         if target is None or stay is None or stay.place is None:
             return False
         self._target = target
-        self._starts = time + max(0.0, stay.start - of_day)
-        self._until = max(time + 1.5 * seconds_to(stay.place), self._starts) + _SEARCH
+        starts = time + max(0.0, stay.start - of_day)
+        self._until = max(time + 1.5 * seconds_to(stay.place), starts) + _SEARCH
         self._visitor.start(target, stay.place)
         return True
 

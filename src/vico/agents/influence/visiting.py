@@ -61,7 +61,7 @@ class Visitor:
         self._reset()
 
     def towards(self, observation: Observation, info: Info) -> Action | None:
-        """Return the next action; None once beside them, or when they could not be found (`failed`)."""
+        """Return the next action; None once beside them. Whoever cannot be found is waited for: `failed` says so."""
         assert self._place is not None
         state = observation["state"]
         if info.get("coming_out"):
@@ -205,8 +205,9 @@ class Visitor:
         onward = next((door for door in doors if door["to"] not in self._trail), doors[0] if doors else None)
         return self._fail() if onward is None else self._through(onward, observation)
 
-    def _fail(self) -> None:
+    def _fail(self) -> Action:
         self.failed = True
+        return {"type": "wait"}
 
     @staticmethod
     def _away(observation: Observation, point: Sequence[float]) -> float:
