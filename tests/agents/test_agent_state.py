@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import numpy as np
 import pytest
 
 import toy_city
@@ -13,6 +12,7 @@ from vico.agents.assistant import METHODS, make_planner
 from vico.agents.base import Agent, RandomAgent
 from vico.agents.requester import Requester
 from vico.agents.schedule import followers_of
+from vico.assets.models.movable import movable_kinds, movable_surfaces
 from vico.io.plain_data import decode, encode
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
@@ -49,10 +49,10 @@ INSTRUCTIONS: dict[str, list[dict[str, Any]]] = {
         asked(1, "delivery", ["blue box"], [IN_SHOP, IN_CAFE], outdoors(8.0, -6.0)),
     ],
     "search": [
-        asked(0, "search", ["blue box"], [IN_SHOP, IN_CAFE], None),
+        asked(0, "search", ["blue box"], [IN_CAFE, IN_SHOP], None),
         asked(1, "search", ["red box"], [outdoors(0.0, -6.0)], None),
     ],
-    "carry": [asked(0, "carry", ["red box"], [IN_SHOP, outdoors(0.0, -4.0)], IN_CAFE)],
+    "carry": [asked(0, "carry", ["red box"], [outdoors(0.0, -4.0), IN_SHOP], IN_CAFE)],
 }
 
 
@@ -129,15 +129,15 @@ DONE = {
 def scene(category: str) -> tuple[Simulation, dict[str, Agent], PublicMap]:
     """A red box outdoors, with Carry in Cleo's hand, and a blue one in the café; and Cleo, if she is needed."""
     community = toy_city.community() if category == "carry" else None
-    config = SimConfig(start=8 * 3600 - 20, assistants=1, observe=("assistant_0",), image=64)
+    config = SimConfig(start=8 * 3600 - 20, assistants=1, observe=("assistant_0",), image=128)
     sim = Simulation(toy_city.world(), community, config)
-    box = toy_city.quad([[-0.1, -0.1, 0.1], [0.1, -0.1, 0.1], [0.1, 0.1, 0.1], [-0.1, 0.1, 0.1]], (200, 20, 20), 0, "b")
-    size = np.array([0.2, 0.2, 0.2])
+    red, blue = (movable_surfaces("parcel", colour) for colour in ("red", "blue"))
+    size = movable_kinds()["parcel"].size
     if category == "carry":
-        sim.scenario.hand_object("red box", "red box", [box], "resident_2", size=size)
+        sim.scenario.hand_object("red box", "red box", red, "resident_2", size=size)
     else:
-        sim.scenario.add_object("red box", "red box", [box], (1.0, -6.0, 0.0), size=size)
-    sim.scenario.add_object("blue box", "blue box", [box], (-7.0, 10.0, toy_city.FLOOR), room="r_cafe", size=size)
+        sim.scenario.add_object("red box", "red box", red, (1.0, -6.0, 0.0), size=size)
+    sim.scenario.add_object("blue box", "blue box", blue, (-7.0, 10.0, toy_city.FLOOR), room="r_cafe", size=size)
     sim.scenario.place_agent("assistant_0", (0.0, -2.0))
     public_map = PublicMap.from_world(sim.world)
     people: dict[str, Agent] = {}

@@ -1,4 +1,4 @@
-"""The heuristic planner's automata hold together: every state is reached, every outcome leads on, the end is reached."""
+"""The heuristic planner's automata hold together: every state is reached, every outcome leads on to the end."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ IN_WORDS: dict[tuple[str, int], set[str]] = {
     ("delivery", 3): {"picked, more wanted", "picked, all of it", "refused", "hands full"},
     ("delivery", 5): {"empty hands, more wanted", "empty hands", "stuck"},
     ("carry", 5): {"came", "did not come, not all done", "did not come, all done"},
-} | {(name, state): REPORTED for name, state in (("delivery", 6), ("search", 3), ("carry", 6))}
+} | dict.fromkeys((("delivery", 6), ("search", 3), ("carry", 6)), REPORTED)
 
 
 def outcomes_of(option: type) -> set[str]:

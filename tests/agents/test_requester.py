@@ -47,7 +47,9 @@ class Meeting:
 
     def step(self, helper: dict[str, Any] | None = None) -> dict[str, Any]:
         """Let everybody act; return Cleo's action."""
-        self.actions = {name: agent.act(self.observations[name], self.infos[name]) for name, agent in self.agents.items()}
+        self.actions = {
+            name: agent.act(self.observations[name], self.infos[name]) for name, agent in self.agents.items()
+        }
         result = self.sim.step(self.actions | {HELPER: helper or dict(WAIT)})
         self.observations, self.infos = result.observations, result.infos
         return dict(self.actions[CLEO])

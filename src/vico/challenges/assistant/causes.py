@@ -202,9 +202,9 @@ class Chronicle(Hook):
                 story.refused.discard(name)
             elif name not in story.seen and self._sees(who, observation, state.object_entity(name), name):
                 story.seen[name] = self.steps
-            if refused and action.get("type") == "pick" and action.get("object") == state.object_entity(name):
-                if name not in story.held:
-                    story.refused.add(name)
+            picks = action.get("type") == "pick" and action.get("object") == state.object_entity(name)
+            if picks and refused and name not in story.held:
+                story.refused.add(name)
         if self.judge.task.category == "carry":
             self._note_person(story, subtask.person.agent, who, action, observation)
 

@@ -81,8 +81,8 @@ STANDARD = Thresholds()
 ADVANCED = Thresholds(destination_radius=1.5, home_radius=1.5, search_distance=5.0, surface_distance=1.5, regions=3)
 
 
-# How far a message to those who are to be helped carries, how near they hand a thing over and how long they wait for who
-# spoke to them is theirs to know; it is named here with the rest.
+# How far a message to those who are to be helped carries, how near they hand a thing over and how long they wait for
+# who spoke to them is theirs to know; it is named here with the rest.
 __all__ = [
     "ADVANCED",
     "APART",
