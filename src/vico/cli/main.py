@@ -20,7 +20,15 @@ import tyro
 from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
-from vico.cli.options import AssistantOptions, CommaSeparated, FilmOptions, RunOptions, StillOptions, WorldBuildOptions
+from vico.cli.options import (
+    AssistantOptions,
+    CommaSeparated,
+    CommunityBuildOptions,
+    FilmOptions,
+    RunOptions,
+    StillOptions,
+    WorldBuildOptions,
+)
 from vico.errors import VicoError, line_of, sentence_of
 from vico.io.files import reason_of
 from vico.version import __version__
@@ -118,29 +126,16 @@ def world_info(path: Positional[Path], json: bool = False) -> int:
 
 
 @community.command(name="build")
-def community_build(
-    path: Positional[Path],
-    out: Path,
-    residents: int = 15,
-    seed: int = 0,
-    force: bool = False,
-    json: bool = False,
-) -> int:
+def community_build(options: Annotated[CommunityBuildOptions, FLAT]) -> int:
     """People a world: homes, jobs, groups and a full day for each resident.
 
     Example: vico community build helsinki --residents 15 --out people
 
-    Args:
-        path: World folder.
-        out: Folder to make; refused if it exists, unless --force.
-        residents: How many people.
-        seed: Decides who they are.
-        force: Replace what is in the output folder.
-        json: Print the result as JSON.
+    Example: vico community build helsinki --llm --llm-budget-tokens 400000 --out people
     """
     from vico.cli import community as verb
 
-    return verb.build(path, out=out, residents=residents, seed=seed, force=force, json=json)
+    return verb.build(options)
 
 
 @app.command(name="export")
