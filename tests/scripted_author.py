@@ -85,25 +85,33 @@ def characters(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def network(data: dict[str, Any]) -> dict[str, Any]:
-    """Groups of four by the order of people, in the evening at a place that is open then; ties between neighbours."""
-    evening = [p for p in data["places"] if any(_covers(p, 19 * 60 + 30, 20 * 60 + 30))] or data["places"]
-    people = [person["id"] for person in data["people"]]
+    """Groups of four by the order of people, of late workers in the morning, at places that are open then; no ties."""
+    late = [p["id"] for p in data["people"] if p["at_work"] and p["at_work"][-5:] > "19:00"]
+    people = [p["id"] for p in data["people"] if p["id"] not in late]
+    if len(late) == 1 or len(people) == 1:
+        people, late = people + late, []
+    found = [*_groups(data, people, 19 * 60 + 30), *_groups(data, late, 10 * 60)]
+    return {"groups": found, "ties": []}
+
+
+def _groups(data: dict[str, Any], people: list[str], start: int) -> list[dict[str, Any]]:
+    places = [p for p in data["places"] if any(_covers(p, start, start + 60))] or data["places"]
     parts = [people[k : k + 4] for k in range(0, len(people), 4)]
     if len(parts) > 1 and len(parts[-1]) == 1:
-        parts[-2] += parts.pop()
-    groups = [
+        last = parts.pop()
+        parts[-1] += last
+    return [
         {
             "name": f"Kite menders {in_letters(members[0])}",
             "description": "They mend kites and tell each other where the wind was.",
             "activity": "Mend kites",
-            "place": evening[k % len(evening)]["name"],
+            "place": places[k % len(places)]["name"],
             "members": members,
-            "start_time": "19:30:00",
-            "end_time": "20:30:00",
+            "start_time": _clock(start),
+            "end_time": _clock(start + 60),
         }
         for k, members in enumerate(parts)
     ]
-    return {"groups": groups, "ties": []}
 
 
 def _covers(place: dict[str, Any], start: int, end: int) -> list[bool]:

@@ -45,6 +45,7 @@ check = SubcommandApp()
 evaluation = SubcommandApp()
 assets = SubcommandApp()
 motion = SubcommandApp()
+language_model = SubcommandApp()
 
 
 @world.command(name="build")
@@ -324,7 +325,7 @@ def evaluate_assistant(options: Annotated[AssistantOptions, FLAT]) -> int:
 
 @assets.command(name="install")
 def assets_install(
-    what: Positional[Literal["people", "robots", "things", "all"]] = "all",
+    what: Positional[Literal["people", "robots", "things", "llm", "all"]] = "all",
     pack: Path | None = None,
     force: bool = False,
 ) -> int:
@@ -333,7 +334,7 @@ def assets_install(
     Example: vico assets install people
 
     Args:
-        what: Which pack.
+        what: Which pack. "llm" is a small language model (98 MB), which "all" leaves out.
         pack: For "things": a .deb of sweethome3d-furniture or a folder with its archives. Without it the one the
             system has, else what apt-get downloads.
         force: Fetch and prepare again.
@@ -341,6 +342,25 @@ def assets_install(
     from vico.cli import assets as verb
 
     return verb.install(what, pack=pack, force=force)
+
+
+@language_model.command(name="serve")
+def llm_serve(model: Path | None = None, context: int = 8192, threads: int = 1, port: int = 0) -> int:
+    """Serve a language model on this machine, and print the variables that name it. Needs the extra "llm".
+
+    Example: vico llm serve
+
+    Example: vico llm serve --model qwen2.5-7b-instruct-q4_k_m.gguf --threads 8
+
+    Args:
+        model: Weights in GGUF. Without it the small ones of `vico assets install llm`, which only show that all works.
+        context: Longest question and answer together, tokens.
+        threads: Processor threads; beside other work, one is the fastest.
+        port: Of 127.0.0.1; 0 takes a free one.
+    """
+    from vico.cli import llm as verb
+
+    return verb.serve(model, context=context, threads=threads, port=port)
 
 
 @assets.command(name="status")
@@ -445,6 +465,7 @@ app.command(community, name="community", help="People a world.")
 app.command(check, name="check", help="Check a world or a community.")
 app.command(assets, name="assets", help="Richer bodies and robots.")
 app.command(motion, name="motion", help="Motions of other programs, and of recorded people.")
+app.command(language_model, name="llm", help="A language model on this machine.")
 app.command(evaluation, name="eval", help="Judge agents on a challenge.")
 
 

@@ -124,11 +124,20 @@ class DayFitter:
         self._home, self._work = resident.home, resident.workplace
         self._pace = walk_speed(resident.age)
 
-    def fit(self, movable: Sequence[Stay], fixed: Sequence[Stay] = ()) -> FittedDay:
+    def fit(self, movable: Sequence[Stay], fixed: Sequence[Stay] = (), *, drop: bool = False) -> FittedDay:
         """Fit stays into a day from 00:00:00 to 23:59:59, ways put in.
 
         What is fixed keeps its times. Other stays begin later or end sooner where the way to the next place takes
         longer than there is time for, by half their length at most; time to spare is spent where one is, or at home.
+
+        Parameters
+        ----------
+        movable
+            Stays that may be moved; who starts later interrupts who is there.
+        fixed
+            Stays whose times stand, in their order.
+        drop
+            Leave out what does not fit, but for sleep and what is fixed, instead of saying why it does not.
         """
         if clashes := [
             f"{a.activity!r} and {b.activity!r} are at the same time" for a, b in pairwise(fixed) if b.start < a.end
@@ -145,9 +154,15 @@ class DayFitter:
         whole = {(stay.start, stay.end) for stay in movable}
         findings: list[str] = []
         for stay in stays[1:]:
-            finding = self._join(line, stay)
             # What another stay has left of one may be too short to be worth the way there.
-            if finding and (stay.fixed or stay.minutes >= 2 * _LEAST or (stay.start, stay.end) in whole):
+            fragment = stay.minutes < 2 * _LEAST and (stay.start, stay.end) not in whole
+            finding = self._join(line, stay)
+            if not finding or ((drop or fragment) and _may_go(stay)):
+                continue
+            while drop and finding and len(line) > 1 and _may_go(line[-1]):
+                line.pop()
+                finding = self._join(line, stay)
+            if finding:
                 findings.append(finding)
                 line.append(stay)
         if line[-1].end < MIDNIGHT:
@@ -256,6 +271,11 @@ class DayFitter:
 def _room(stay: Stay) -> int:
     """By how many minutes a stay may be cut."""
     return 0 if stay.fixed else max(0, min(stay.minutes - _LEAST, stay.minutes // 2))
+
+
+def _may_go(stay: Stay) -> bool:
+    """Whether a day is still a day without a stay."""
+    return not stay.fixed and stay.type is not ItemType.SLEEP
 
 
 def _at_home(home: str, start: int, end: int) -> Stay:

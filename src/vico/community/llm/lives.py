@@ -83,7 +83,13 @@ class Lives:
         return found
 
     def day(
-        self, person: Resident, movable: Sequence[Stay], groups: Sequence[Group], *, others: Sequence[Stay] = ()
+        self,
+        person: Resident,
+        movable: Sequence[Stay],
+        groups: Sequence[Group],
+        *,
+        others: Sequence[Stay] = (),
+        drop: bool = False,
     ) -> FittedDay:
         """Fit a day around the meetings of groups and other fixed stays, and hold it to the validator.
 
@@ -95,9 +101,11 @@ class Lives:
             Whose meetings it has to hold.
         others
             Further stays whose times stand.
+        drop
+            Leave out what does not fit.
         """
         fixed = sorted([*self.meetings(person.id, groups), *others], key=lambda stay: stay.start)
-        fitted = DayFitter(self.cast.index, person).fit(movable, fixed)
+        fitted = DayFitter(self.cast.index, person).fit(movable, fixed, drop=drop)
         if fitted.findings:
             return fitted
         items = [self._tagged(item, person, groups) for item in fitted.items]
@@ -114,7 +122,8 @@ class Lives:
 
     def plain_day(self, resident: str, groups: Sequence[Group]) -> FittedDay:
         """Return the day that somebody has without the model, with the meetings of groups in it."""
-        return self.day(self.people[resident], self.plain_stays(resident), groups, others=self.lessons(resident))
+        lessons = self.lessons(resident)
+        return self.day(self.people[resident], self.plain_stays(resident), groups, others=lessons, drop=True)
 
     def _tagged(self, item: ScheduleItem, person: Resident, groups: Sequence[Group]) -> ScheduleItem:
         if item.tag is not None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 from vico.clock import seconds_of_day
@@ -24,6 +26,7 @@ _BATCH, _PLACES, _A_GROUP = 20, 24, 4
 _MEETING_PLACES = (Category.OPEN, Category.FOOD, Category.ENTERTAINMENT, Category.OFFICE)
 # Minutes a meeting takes.
 _SHORTEST, _LONGEST = 20, 240
+_MOST_DETAIL = 240
 _MOST_GROUPS = 2  # of one person
 
 
@@ -63,10 +66,7 @@ def write_network(
     people = [
         r.id for r in cast.base.residents if r.age >= GROWN_UP and r.id not in cast.coupled and r.id not in unasked
     ]
-    batches = [people[k : k + _BATCH] for k in range(0, len(people), _BATCH)]
-    if len(batches) > 1 and len(batches[-1]) < 2:
-        batches[-2] += batches.pop()
-    batches = [batch for batch in batches if len(batch) > 1]
+    batches = _in_parts(people, _BATCH)
     drafts = [_question(prompt, lives, batch, number) for number, batch in enumerate(batches)]
     network = Network()
     judge = _NetworkJudge(lives, batches)
@@ -77,6 +77,13 @@ def write_network(
             network.groups += kept.groups
             network.ties += kept.ties
     return network, {name: draft for batch, draft in zip(batches, drafts, strict=True) for name in batch}
+
+
+def _in_parts(people: Sequence[str], most: int) -> list[list[str]]:
+    """Return people in parts of about the same size, none of one person alone."""
+    count = -(-len(people) // most)
+    edges = [round(k * len(people) / count) for k in range(count + 1)] if len(people) > 1 else []
+    return [list(people[a:b]) for a, b in pairwise(edges)]
 
 
 def network_items(lives: Lives, network: Network, drafts: Mapping[str, Draft[SocialNetwork]]) -> list[AuthoredItem]:
@@ -93,16 +100,25 @@ def network_items(lives: Lives, network: Network, drafts: Mapping[str, Draft[Soc
             why = "their new group was given up for one that somebody else needs"
             items.append(AuthoredItem(item=name, origin=Origin.NOT_GROUNDED, detail=why))
         else:
-            items.append(AuthoredItem(item=name, origin=draft.origin, detail=draft.detail))
-    first = next(iter(drafts.values()), None)
-    if first is None:
-        items.append(AuthoredItem(item="community.relations", origin=Origin.NOT_ASKED, detail="nobody to be tied"))
-    else:
-        failed = next((d for d in drafts.values() if d.origin is not Origin.WRITTEN), first)
-        origin = Origin.WRITTEN if network.ties else failed.origin
-        detail = "" if origin is Origin.WRITTEN else failed.detail
-        items.append(AuthoredItem(item="community.relations", origin=origin, detail=detail))
+            mine = re.compile(rf"\b{resident.id}\b")
+            detail = next((finding[:_MOST_DETAIL] for finding in draft.findings if mine.search(finding)), draft.detail)
+            items.append(AuthoredItem(item=name, origin=draft.origin, detail=detail))
+    items.append(_relations_item(network, list({id(draft): draft for draft in drafts.values()}.values())))
     return items
+
+
+def _relations_item(network: Network, drafts: Sequence[Draft[SocialNetwork]]) -> AuthoredItem:
+    name = "community.relations"
+    if not drafts:
+        return AuthoredItem(item=name, origin=Origin.NOT_ASKED, detail="there is nobody to be tied")
+    answered = [draft.value for draft in drafts if draft.value is not None]
+    proposed = sum(len(value.ties) for value in answered)
+    if not answered or (proposed and not network.ties):
+        failed = next((draft for draft in drafts if draft.origin is not Origin.WRITTEN), drafts[0])
+        return AuthoredItem(item=name, origin=failed.origin, detail=failed.detail)
+    lost = proposed - len(network.ties)
+    detail = f"{lost} of {proposed} ties can't be, and were left out" if lost else ""
+    return AuthoredItem(item=name, origin=Origin.WRITTEN, detail=detail)
 
 
 def _question(prompt: Prompt, lives: Lives, batch: Sequence[str], number: int) -> Draft[SocialNetwork]:
