@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from vico.community.authorship import AuthoredItem, Origin
+from vico.community.jobs import job_of
 from vico.community.llm.asking import Draft, ModelDesk
 from vico.community.llm.cast import Cast
 from vico.community.llm.lives import Lives
@@ -135,7 +136,18 @@ class _CharacterJudge:
         cast = self._lives.cast
         found = self._lives.findings(person, "workplace", "biography")
         settled = [one for one in found if not (cast.keeps_work(person) and one.where.endswith(".workplace"))]
-        return [f"{one.where}: {one.what}; {one.mend}" for one in settled]
+        return [*self._trade(person), *(f"{one.where}: {one.what}; {one.mend}" for one in settled)]
+
+    def _trade(self, person: Resident) -> list[str]:
+        """Say whether somebody's place of work employs no such trade; the validator lets unknown ones pass."""
+        cast = self._lives.cast
+        if person.workplace is None or cast.keeps_work(person) or job_of(person.occupation) is not None:
+            return []
+        trades = cast.trades(person.workplace)
+        if person.occupation.startswith("student") and any(trade.startswith("student") for trade in trades):
+            return []
+        where, place = f"{person.id}.occupation", cast.labels[person.workplace]
+        return [f"{where}: {place} employs no {person.occupation!r}: choose of {', '.join(trades)}"]
 
     def _day(self, person: Resident) -> list[str]:
         """Say whether somebody could not live the plain day of such a life."""

@@ -24,7 +24,8 @@ from vico.world.model import Category
 # People of a question, meeting places in it, people a group.
 _BATCH, _PLACES, _A_GROUP = 20, 24, 4
 _MEETING_PLACES = (Category.OPEN, Category.FOOD, Category.ENTERTAINMENT, Category.OFFICE)
-# Minutes a meeting takes.
+# Minutes a meeting takes; when the first one of a day may begin, minute of the day.
+_EARLIEST = 6 * 60
 _SHORTEST, _LONGEST = 20, 240
 _MOST_DETAIL = 240
 _MOST_GROUPS = 2  # of one person
@@ -101,7 +102,8 @@ def network_items(lives: Lives, network: Network, drafts: Mapping[str, Draft[Soc
             items.append(AuthoredItem(item=name, origin=Origin.NOT_GROUNDED, detail=why))
         else:
             mine = re.compile(rf"\b{resident.id}\b")
-            detail = next((finding[:_MOST_DETAIL] for finding in draft.findings if mine.search(finding)), draft.detail)
+            own = (one for one in draft.findings if mine.search(one) and not one.startswith("groups: "))
+            detail = next(own, draft.detail)[:_MOST_DETAIL]
             items.append(AuthoredItem(item=name, origin=draft.origin, detail=detail))
     items.append(_relations_item(network, list({id(draft): draft for draft in drafts.values()}.values())))
     return items
@@ -216,6 +218,8 @@ class _NetworkJudge:
                 faults.append(
                     f"{where}: it meets for {end - start} min: between {_SHORTEST} and {_LONGEST} min fit a day"
                 )
+            if start < _EARLIEST:
+                faults.append(f"{where}: it meets at {reply.start_time}, when people sleep: meet from 06:00:00 on")
         except InputError as error:
             faults.append(f"{where}: {error}")
         if faults:
