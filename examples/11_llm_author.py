@@ -40,7 +40,7 @@ def character(person: dict[str, Any]) -> dict[str, Any]:
         **settled,
         "values": ["self-direction", "tradition"],
         "personality": {
-            "openness": 0.6, "conscientiousness": 0.9, "extraversion": 0.3, "agreeableness": 0.6, "neuroticism": 0.4,
+            "openness": 60, "conscientiousness": 90, "extraversion": 30, "agreeableness": 60, "neuroticism": 40,
             "traits": ["exact", "shy"],
         },
         "hobbies": ["sundials", "long walks"],
