@@ -6,19 +6,30 @@ import time
 from pathlib import Path
 
 from vico.cli.output import check_output, print_json, print_table, progress_bars
-from vico.community import build_community, check_community, digest_of, read_community, world_of, write_community
+from vico.community import (
+    build_community,
+    check_community,
+    date_of,
+    digest_of,
+    read_community,
+    world_of,
+    write_community,
+)
 from vico.errors import InputError
 from vico.world.folder import read_world
 
 
-def build(path: Path, *, out: Path, residents: int, seed: int, force: bool, json: bool) -> int:
+def build(
+    path: Path, *, out: Path, residents: int, seed: int, day: str | None, days: int, force: bool, json: bool
+) -> int:
     """People the world at `path`, write the community to `out`, and say who lives there."""
     check_output(out, path, force=force)
+    first = None if day is None else date_of(day)
     world = read_world(path)
     began = time.perf_counter()
     with progress_bars() as report:
         report("people and schedules", 0, 1)
-        community = build_community(world, residents=residents, seed=seed)
+        community = build_community(world, residents=residents, seed=seed, date=first, days=days)
         report("people and schedules", 1, 1)
     write_community(community, out, force=force or out.is_dir(), world=path)
     people = [
@@ -36,6 +47,7 @@ def build(path: Path, *, out: Path, residents: int, seed: int, force: bool, json
         "world": community.world.name,
         "digest": digest_of(community),
         "date": f"{community.weekday} {community.date}",
+        "days": len(community.dates),
         "residents": len(community.residents),
         "groups": len(community.groups),
         "relations": len(community.relations),
@@ -52,6 +64,20 @@ def build(path: Path, *, out: Path, residents: int, seed: int, force: bool, json
                 for p in people
             },
         )
+    return 0
+
+
+def day(path: Path, *, day: str, out: Path, force: bool, json: bool) -> int:
+    """Write one day of the community at `path` to `out`."""
+    check_output(out, path, force=force)
+    community = read_community(path)
+    one = community.on(date_of(day, community.dates))
+    write_community(one, out, force=force or out.is_dir(), world=world_of(path))
+    facts = {"path": str(out), "digest": digest_of(one), "date": f"{one.weekday} {one.date}"}
+    if json:
+        print_json(facts)
+    else:
+        print_table("Community", facts)
     return 0
 
 

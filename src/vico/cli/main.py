@@ -123,24 +123,46 @@ def community_build(
     out: Path,
     residents: int = 15,
     seed: int = 0,
+    day: str | None = None,
+    days: int = 1,
     force: bool = False,
     json: bool = False,
 ) -> int:
-    """People a world: homes, jobs, groups and a full day for each resident.
+    """People a world: homes, jobs, groups and a full day, or several, for each resident.
 
-    Example: vico community build helsinki --residents 15 --out people
+    Example: vico community build helsinki --residents 15 --day friday --days 3 --out people
 
     Args:
         path: World folder.
         out: Folder to make; refused if it exists, unless --force.
         residents: How many people.
         seed: Decides who they are.
+        day: First day, a date like 2025-06-07 or a day of the week like saturday; a working day by seed without it.
+        days: How many days everybody has a schedule for.
         force: Replace what is in the output folder.
         json: Print the result as JSON.
     """
     from vico.cli import community as verb
 
-    return verb.build(path, out=out, residents=residents, seed=seed, force=force, json=json)
+    return verb.build(path, out=out, residents=residents, seed=seed, day=day, days=days, force=force, json=json)
+
+
+@community.command(name="day")
+def community_day(path: Positional[Path], day: str, out: Path, force: bool = False, json: bool = False) -> int:
+    """Take one of several days of a community, as a community of its own that runs can live through.
+
+    Example: vico community day people --day saturday --out people_saturday
+
+    Args:
+        path: Community folder, built with --days.
+        day: A date like 2025-06-07, or a day of the week like saturday: the first one there is.
+        out: Folder to make; refused if it exists, unless --force.
+        force: Replace what is in the output folder.
+        json: Print the result as JSON.
+    """
+    from vico.cli import community as verb
+
+    return verb.day(path, day=day, out=out, force=force, json=json)
 
 
 @app.command(name="export")

@@ -210,6 +210,8 @@ class Circle(DataRecord):
         Whether meeting is a meal.
     tag
         What meeting is about: ``group``, or ``exercise`` and ``leisure`` for those who run and walk about together.
+    meets
+        On which days besides the first, at the same time: that day of the week, every working day, or every day.
     """
 
     name: str
@@ -226,6 +228,7 @@ class Circle(DataRecord):
     small_children: bool = False
     meal: bool = False
     tag: ActivityTag = ActivityTag.GROUP
+    meets: Literal["weekly", "working_days", "daily"] = "weekly"
 
     @property
     def starts(self) -> tuple[int, ...]:
@@ -296,11 +299,31 @@ class OutingKinds(DataRecord):
     sights: tuple[str, ...]
 
 
+class Together(DataRecord):
+    """Something those who share a home do together.
+
+    Attributes
+    ----------
+    kinds
+        Kinds of places for it; sets of them ("@green") are those of ``leisure.toml``.
+    minutes
+        Least and most it takes.
+    small_children
+        Whether it is for those with small children only.
+    """
+
+    activity: str
+    kinds: tuple[str, ...]
+    minutes: tuple[int, int]
+    small_children: bool = False
+
+
 class Errands(DataRecord):
     """What one goes to a kind of place for, and the kinds of places of other outings."""
 
     errands: dict[str, str]
     kinds: OutingKinds
+    together: tuple[Together, ...] = ()
 
 
 class BiographySentences(DataRecord):

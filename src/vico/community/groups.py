@@ -170,9 +170,16 @@ def _exactly(index: PlaceIndex, draft: ResidentDraft, meeting: Meeting, others: 
     return index.minutes(place, draft.home) is not None
 
 
+def can_come(index: PlaceIndex, draft: ResidentDraft, meeting: Meeting, others: Sequence[Meeting]) -> bool:
+    """Whether somebody is free for a meeting on the index's day, beside work, duties, sleep and other meetings."""
+    return bool(_Timetable.of(index, [draft]).free_for(index, meeting)[0]) and _exactly(index, draft, meeting, others)
+
+
 def _liking(draft: ResidentDraft, circle: Circle) -> float:
     """How much a circle appeals to somebody; 0 if it is not for them."""
-    if draft.status not in circle.statuses and not (draft.shift and draft.shift[0] >= 12 * 60):
+    late = draft.shift is not None and draft.shift[0] >= 12 * 60
+    off = draft.shift is None and draft.status in ("worker", "student")
+    if draft.status not in circle.statuses and not (late or off):
         return 0.0
     if circle.small_children or not circle.ages[0] <= draft.age <= circle.ages[1]:
         return 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterable
 from functools import cached_property
@@ -58,11 +59,21 @@ class PlaceIndex:
         self._inside = np.array([ways.seconds(p.rooms) for p in world.places], np.float64)
         self._estimates: dict[str, NDArray[np.int64]] = {}
         self._reachable: dict[str, bool] = {}
+        self._hours: dict[tuple[str, int], list[Span]] = {}
 
     @cached_property
     def rides(self) -> RideTimes:
         """Trips by bus, tram and bicycle."""
         return RideTimes(self.world.transit, self.walks)
+
+    def on(self, weekday: int) -> PlaceIndex:
+        """Return the same index for another day of the week, 0 Monday .. 6 Sunday; what is known of ways is shared."""
+        if weekday == self.weekday:
+            return self
+        _ = self.rides  # built once for all days
+        other = copy.copy(self)
+        other.weekday = weekday
+        return other
 
     def reachable(self, place: Place) -> bool:
         """Whether a place can be reached on foot from the map's edge."""
@@ -170,8 +181,11 @@ class PlaceIndex:
 
     def hours(self, place: Place) -> list[Span]:
         """When a place is open on the day, minutes: what it says, else what is usual for its kind."""
-        given = self.given_hours(place)
-        return usual_spans(kind_of(place), place.category) if given is None else given
+        key = place.id, self.weekday
+        if key not in self._hours:
+            given = self.given_hours(place)
+            self._hours[key] = usual_spans(kind_of(place), place.category, self.weekday) if given is None else given
+        return self._hours[key]
 
     def spawn_points(self, homes: list[str]) -> list[Point2]:
         """Return a free spot by each home: reachable, off the carriageway, at least `SPAWN_GAP` from all others.

@@ -77,6 +77,30 @@ def _joined(index: PlaceIndex, found: Sequence[Meeting], care: Care, people: Seq
     return None
 
 
+def come_to_play(index: PlaceIndex, cares: Sequence[Care], usual: Meeting, meeting: Meeting) -> None:
+    """Let the families of a group come to its meeting on another day, if that suits them.
+
+    Parameters
+    ----------
+    cares
+        Of that day.
+    usual
+        The meeting with all its members.
+    meeting
+        That of the day, as yet without members; updated.
+    """
+    members = {member.id for member in usual.members}
+    for care in cares:
+        people = [care.carer, *care.small]
+        at_home = meeting.place.id == care.carer.home
+        if members.issuperset(draft.id for draft in people) and (
+            _suits(index, care, meeting.place, meeting.start, meeting.end)
+            or (at_home and _ready(care) <= meeting.start)
+        ):
+            meeting.members += people
+            _set_out_together(index, care, meeting)
+
+
 def _options(
     rng: np.random.Generator, index: PlaceIndex, care: Care, circle: Circle, places: Sequence[Place]
 ) -> list[Meeting]:

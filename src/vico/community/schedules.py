@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from vico.community.place_index import PlaceIndex, kind_of
 from vico.community.school_days import SchoolDays
 from vico.world.model import Category
 
+# How much longer one sleeps on a day off, minutes, unless one rises early anyway.
+_LIE_IN = 70
+
 
 class DayWriter:
     """Writes the days of a community, so that people who do something together do it at the same time.
@@ -28,9 +31,19 @@ class DayWriter:
         Decides what is left open.
     index
         Places, walks and hours.
+    up_late
+        Until when each was up last night, minutes past midnight, 0 for those who were asleep; without it the day begins
+        as such a day ends.
+
+    Attributes
+    ----------
+    late
+        The same of the night after, by resident id.
     """
 
-    def __init__(self, rng: np.random.Generator, index: PlaceIndex) -> None:
+    def __init__(self, rng: np.random.Generator, index: PlaceIndex, up_late: Mapping[str, int] | None = None) -> None:
+        self._up_late = up_late
+        self.late: dict[str, int] = {}
         self._rng = rng
         self._index = index
         self._outings = Outings(rng, index)
@@ -89,8 +102,6 @@ class DayWriter:
             self._school.write(draft, day)
         elif draft.shift is not None:
             self._work(draft, day, lunch_group)
-        first, last = day.blocks[0], day.blocks[-1]
-        lead = day.walk(draft.home, first.place) or 0
         if draft.child:
             natural, sleep = SchoolDays.sleep(rng, draft)
         elif draft.status == "retired":
@@ -101,24 +112,45 @@ class DayWriter:
             natural, sleep = 450 + 110 * (1 - draft.early), 480
         else:
             natural, sleep = 380 + 120 * (1 - draft.early), 455
+        if draft.day_off:
+            natural += _LIE_IN * (1 - 0.5 * draft.early)
+        self._nights(draft, day, int(natural), int(sleep))
+        return day
+
+    def _nights(self, draft: ResidentDraft, day: Day, natural: int, sleep: int) -> None:
+        """Put sleep at both ends of a day, so that who has to be somewhere is up in time.
+
+        Parameters
+        ----------
+        natural
+            When they wake by themselves, minute of the day.
+        sleep
+            How long they sleep, minutes.
+        """
+        rng = self._rng
+        leave, home = MIDNIGHT, 0
+        if day.blocks:
+            first, last = day.blocks[0], day.blocks[-1]
+            leave = first.start - (day.walk(draft.home, first.place) or 0)
+            home = (day.walk(last.place, draft.home) or 0) + last.end
         prepare = 5 * int(rng.integers(9, 16))
-        wake = int(min(natural, first.start - lead - prepare) // 5 * 5)
+        wake = int(min(natural, leave - prepare) // 5 * 5)
         bed = in_fives(wake + MIDNIGHT - sleep - float(rng.integers(0, 45)))
-        home = (day.walk(last.place, draft.home) or 0) + last.end
         bed = max(bed, in_fives(home + 40 + float(rng.integers(0, 25))))
-        if bed >= MIDNIGHT - 10:
-            # Up past midnight: the end of such an evening is also how the day began.
-            over = max(10, bed - MIDNIGHT)
-            wake = max(wake, min(over + 360, first.start - lead - 35)) // 5 * 5
-            self._outings.put(day, Block(0, over, ItemType.MAIN, "Wind down after a long evening", draft.home, "home"))
-            self._outings.put(day, Block(over, wake, ItemType.SLEEP, "Sleep", draft.home, "sleep"))
+        over = max(10, bed - MIDNIGHT) if bed >= MIDNIGHT - 10 else 0
+        # Up past midnight: the end of such an evening is also how the day began, unless it is known how it did.
+        began = over if self._up_late is None else self._up_late[draft.id]
+        self.late[draft.id] = over
+        if began:
+            wake = max(wake, min(began + 360, leave - 35)) // 5 * 5
+            self._outings.put(day, Block(0, began, ItemType.MAIN, "Wind down after a long evening", draft.home, "home"))
+        self._outings.put(day, Block(began, wake, ItemType.SLEEP, "Sleep", draft.home, "sleep"))
+        if over:
             self._outings.put(
                 day, Block(MIDNIGHT - 5, MIDNIGHT, ItemType.MAIN, "Lie in bed and read a page", draft.home, "home")
             )
         else:
-            self._outings.put(day, Block(0, wake, ItemType.SLEEP, "Sleep", draft.home, "sleep"))
             self._outings.put(day, Block(bed, MIDNIGHT, ItemType.SLEEP, "Sleep", draft.home, "sleep"))
-        return day
 
     def _work(self, draft: ResidentDraft, day: Day, lunch_group: Block | None) -> None:
         rng, index, place = self._rng, self._index, draft.workplace

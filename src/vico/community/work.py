@@ -13,7 +13,7 @@ from vico.community.hours import Span, staffed_stretches
 from vico.community.jobs import jobs_at
 from vico.community.people import Household, ResidentDraft
 from vico.community.place_index import PlaceIndex, kind_of
-from vico.community.schooling import Care
+from vico.community.schooling import Care, between
 from vico.world.model import Category, Place
 
 #: Where students study. `workplace` of a student is one of these.
@@ -22,8 +22,13 @@ STUDY_KINDS = frozenset({"university", "college", "research_institute", "library
 # What any place with an open door offers: minutes before opening and after closing that staff are there, at most.
 _BEFORE, _AFTER = 45, 30
 _LATEST = 23 * 60 + 30
-# How often a parent looks for work that leaves time for the children, and how long such work is at least, minutes.
-_TRIES, _PART_TIME = 8, 4 * 60
+# Days of work in a week; trades that work from Monday to Friday only; and the other two days.
+_WORKING_DAYS = 5
+# Share of those who work the first part of a long day.
+_FIRST = 0.55
+_OFFICE_DAYS, _WEEKEND = ("office", "bank", "school"), (5, 6)
+# How often a parent looks for work that leaves time for the children.
+_TRIES = 8
 
 
 def assign_homes(rng: np.random.Generator, index: PlaceIndex, households: Sequence[Household]) -> None:
@@ -60,12 +65,10 @@ def _roomy(homes: list[Place], free: Counter[str], people: int) -> list[Place]:
 
 def employers(index: PlaceIndex) -> list[Place]:
     """Places where people work on the day: somebody's trade, and not closed."""
-    return [
-        p for p in index.places() if p.category is not Category.TRANSIT and jobs_at(p) and _workdays(index.hours(p))
-    ]
+    return [p for p in index.places() if p.category is not Category.TRANSIT and jobs_at(p) and workdays(index.hours(p))]
 
 
-def _workdays(spans: Sequence[Span]) -> list[list[Span]]:
+def workdays(spans: Sequence[Span]) -> list[list[Span]]:
     """Return the stretches of a place's hours that make a working day: four hours or more between six and midnight."""
     return [
         stretch
@@ -157,6 +160,7 @@ class _JobMarket:
         titles = [title for title in [*known, *sorted(set(offered) - set(known))] if title in offered]
         self._jobs = [offered[title] for title in titles]
         self._staff: Counter[str] = Counter()
+        self._off: dict[str, Counter[int]] = {}
         self._late = 0
         self.held: Counter[str] = Counter()
 
@@ -166,19 +170,36 @@ class _JobMarket:
             job = self._job(draft, by_day=care is not None)
             place = self._place(draft, job)
             shift = self._hours(draft, job, place)
+            first = shift[0] < 12 * 60
             if care is not None and care.stops:
-                free, until = care.free
-                there = self._index.minutes(care.stops[-1], place.id)
-                back = self._index.minutes(place.id, care.stops[0])
-                if there is None or back is None:
+                left = between(self._index, care, place.id, shift)
+                if left is None:
                     continue
-                start = max(shift[0], 5 * math.ceil((free + there) / 5))
-                shift = start, min(shift[1], (until - back) // 5 * 5)
-                if shift[1] - shift[0] < _PART_TIME:
-                    continue
+                shift = left
             self._take(draft, job, place, shift)
+            draft.first_shift = first
+            draft.days_off = self._days_off(job, place)
             return True
         return False
+
+    def _days_off(self, job: Job, place: Place) -> frozenset[int]:
+        """Return the days of the week somebody has off: the weekend, or of a place that is open then any two.
+
+        None is the day that jobs are planned for, and few of a place have the same.
+        """
+        if job.shift in _OFFICE_DAYS:
+            return frozenset(_WEEKEND)
+        open_on = [day for day in range(7) if workdays(self._index.on(day).hours(place))]
+        free: list[int] = []
+        options = [day for day in open_on if day != self._index.weekday]
+        for _ in range(len(open_on) - _WORKING_DAYS):
+            off = self._off.setdefault(place.id, Counter())
+            fewest = min(off[day] for day in options)
+            rarest = [day for day in options if off[day] == fewest]
+            free.append(rarest[int(self._rng.integers(len(rarest)))])
+            options.remove(free[-1])
+            off[free[-1]] += 1
+        return frozenset(free)
 
     def _take(self, draft: ResidentDraft, job: Job, place: Place, shift: tuple[int, int]) -> None:
         draft.job, draft.occupation, draft.workplace, draft.shift = job, job.title, place.id, shift
@@ -207,25 +228,55 @@ class _JobMarket:
         return places[int(self._rng.choice(len(places), p=w / w.sum()))]
 
     def _hours(self, draft: ResidentDraft, job: Job, place: Place) -> tuple[int, int]:
-        rng, index = self._rng, self._index
-        workdays = _workdays(index.hours(place))
-        start, end = _shift(rng, job.shift, workdays[int(rng.integers(len(workdays))) if len(workdays) > 1 else 0])
-        if end > 22 * 60:  # home before midnight, however far
-            end = min(end, 23 * 60 + 40 - (index.minutes(place.id, draft.home) or 0)) // 5 * 5
-        return start, end
+        return _working_hours(self._rng, self._index, draft, job, place, first=bool(self._rng.random() < _FIRST))
+
+
+def _working_hours(
+    rng: np.random.Generator, index: PlaceIndex, draft: ResidentDraft, job: Job, place: Place, *, first: bool
+) -> tuple[int, int]:
+    stretches = workdays(index.hours(place))
+    stretch = stretches[int(rng.integers(len(stretches))) if len(stretches) > 1 else 0]
+    start, end = _shift(rng, job.shift, stretch, first=first)
+    if end > 22 * 60:  # home before midnight, however far
+        end = min(end, 23 * 60 + 40 - (index.minutes(place.id, draft.home) or 0)) // 5 * 5
+    return start, end
+
+
+def shift_on(
+    rng: np.random.Generator, index: PlaceIndex, planned: PlaceIndex, draft: ResidentDraft
+) -> tuple[int, int] | None:
+    """Return the working hours of somebody on a day, minutes; None if they have it off or their place is closed.
+
+    Parameters
+    ----------
+    index, planned
+        Of that day, and of the day that their working hours were planned for.
+    """
+    if draft.workplace is None or draft.shift is None or index.weekday in draft.days_off:
+        return None
+    place = index.place_by_id[draft.workplace]
+    hours = index.hours(place)
+    if draft.status == "student":
+        start, end = draft.shift
+        fits = index.weekday not in _WEEKEND and any(a <= start and end <= b + _AFTER for a, b in hours)
+        return draft.shift if fits else None
+    if hours == planned.hours(place):
+        return draft.shift
+    if not workdays(hours) or draft.job is None:
+        return None
+    return _working_hours(rng, index, draft, draft.job, place, first=draft.first_shift)
 
 
 def _five(minutes: float) -> int:
     return round(minutes / 5) * 5
 
 
-def _shift(rng: np.random.Generator, pattern: str, spans: Sequence[Span]) -> tuple[int, int]:
+def _shift(rng: np.random.Generator, pattern: str, spans: Sequence[Span], *, first: bool) -> tuple[int, int]:
     """Working hours that fit the pattern of the trade and a stretch of the place's hours, minutes."""
     opens = max(min(start for start, _ in spans), 6 * 60)
     closes = min(max(end for _, end in spans), 24 * 60)
     low, high = max(5 * 60 + 30, opens - _BEFORE), min(_LATEST, closes + _AFTER)
     length = _five(float(rng.integers(455, 505)))
-    first = bool(rng.random() < 0.55)
     if pattern in ("office", "bank"):
         start = int(rng.choice([480, 495, 510, 525, 540, 555], p=[0.1, 0.2, 0.33, 0.15, 0.17, 0.05]))
         length += 10
