@@ -12,8 +12,9 @@ from typing import Protocol
 import numpy as np
 
 from vico.clock import clock_of
-from vico.community.biography import Biographer, lifestyle_of
+from vico.community.biography import Biographer, honest_character, lifestyle_of
 from vico.community.childhood import POCKET_MONEY
+from vico.community.day_measures import day_measures
 from vico.community.days import FIRST_DAY, DayDrafts, DaySchedules, drafts_on, planning_day, write_days
 from vico.community.findings import CommunityFinding
 from vico.community.groups import Meeting, form_groups, meetings_by_member
@@ -39,6 +40,8 @@ from vico.world.model import Category
 MOST_DAYS = 14
 
 _PROCEDURAL = "procedural"
+# Members of the largest household where nobody knows how many beds there are.
+_LARGEST = 5
 
 
 class Author(Protocol):
@@ -151,11 +154,11 @@ def _draft(index: PlaceIndex, count: int, seed: int, attempt: int, dates: Sequen
     playmates = form_playmates(stream("playmates"), first.index, first.cares)
     meetings = form_groups(stream("groups"), first.index, first.people, playmates)
     relations = draw_relations(stream("relations"), index, planned.households, meetings, dates[0].year)
-    days = write_days(planned, first, meetings, dates, stream)
+    days = write_days(planned, first, meetings, relations, dates, stream)
     groups = _groups(meetings)
     people = _residents(planned, days, meetings, stream)
     riding = [_ridden(people, groups, day, stream) for day in days]
-    return Community(
+    community = Community(
         producer=f"vico {__version__}",
         author=_PROCEDURAL,
         seed=seed,
@@ -171,6 +174,30 @@ def _draft(index: PlaceIndex, count: int, seed: int, attempt: int, dates: Sequen
             for day, residents in zip(days[1:], riding[1:], strict=True)
         ],
     )
+    return _told(community, planned, meetings, stream)
+
+
+def _told(
+    community: Community,
+    planned: DayDrafts,
+    meetings: Sequence[Meeting],
+    stream: Callable[[str], np.random.Generator],
+) -> Community:
+    """Put what is said of people into words, now that their days are known."""
+    measures = day_measures(community)
+    biographer = Biographer(stream("biographies"), planned.index)
+    joined = meetings_by_member(meetings)
+    residents = []
+    for resident, draft in zip(community.residents, planned.people, strict=True):
+        draft.personality = honest_character(draft, measures[draft.id])
+        household = planned.households[draft.household]
+        told = {
+            "personality": draft.personality,
+            "lifestyle": lifestyle_of(stream(f"ways/{draft.id}"), draft, resident.schedule, measures[draft.id]),
+            "biography": biographer.write(draft, household, joined.get(draft.id, [])),
+        }
+        residents.append(resident.model_copy(update=told))
+    return community.model_copy(update={"residents": residents})
 
 
 def _plan(index: PlaceIndex, count: int, stream: Callable[[str], np.random.Generator]) -> DayDrafts:
@@ -187,6 +214,7 @@ def _plan(index: PlaceIndex, count: int, stream: Callable[[str], np.random.Gener
         students=bool(study_places(index)),
         guests=bool(rooms),
         workers=bool(employers(index)),
+        largest=max((index.beds(home) for home in index.homes()[0]), default=0) or _LARGEST,
     )
     drafts = [s for h in households for s in h.members]
     uses: dict[str, int] = {}
@@ -207,9 +235,8 @@ def _residents(
     meetings: Sequence[Meeting],
     stream: Callable[[str], np.random.Generator],
 ) -> list[Resident]:
-    """Write everybody down, with the first day on foot."""
+    """Write everybody down, with the first day on foot, but for what is said of them."""
     index, households, drafts = planned.index, planned.households, planned.people
-    biographer = Biographer(stream("biographies"), index)
     looks = _looks(stream("looks"), households)
     spawns = index.spawn_points([s.home for s in drafts])
     joined = meetings_by_member(meetings)
@@ -229,8 +256,8 @@ def _residents(
                 values=draft.values,
                 personality=draft.character,
                 hobbies=[h.name for h in draft.hobbies],
-                lifestyle=lifestyle_of(chance, draft, days[0].items[draft.id]),
-                biography=biographer.write(draft, households[draft.household], mine),
+                lifestyle="",
+                biography="",
                 cash=_cash(chance, draft),
                 household=f"household_{draft.household}",
                 home=draft.home,

@@ -136,10 +136,48 @@ class TraitWords(DataRecord):
     low: tuple[str, ...]
 
 
+class Claim(DataRecord):
+    """What words for somebody say of their days: `measure` of `vico.community.day_measures.DayMeasures` in bounds."""
+
+    says: tuple[str, ...]
+    measure: Literal[
+        "out", "work", "company", "alone", "exercise", "meals_out", "dinners_out", "meals_home", "rides", "visiting",
+        "rises", "retires",
+    ]  # fmt: skip
+    least: float | None = None
+    most: float | None = None
+
+
+class Way(DataRecord):
+    """Something that is said of how somebody lives, if their days agree.
+
+    Attributes
+    ----------
+    text
+        Completes "Night owl; ...".
+    values, hobbies
+        Who it is said of first: those with one of these values or hobbies.
+    trait, least, most
+        Or those whose score of one of the big five lies within these bounds.
+    statuses
+        Ways of life it is for.
+    """
+
+    text: str
+    values: tuple[str, ...] = ()
+    hobbies: tuple[str, ...] = ()
+    trait: str | None = None
+    least: float = 0.0
+    most: float = 1.0
+    statuses: tuple[Status, ...] = ADULTS
+
+
 class Character(DataRecord):
     """What people care for, and the words for what they are like."""
 
     value: tuple[Value, ...] = ()
+    claim: tuple[Claim, ...] = ()
+    way: tuple[Way, ...] = ()
     traits: dict[str, TraitWords] = Field(default_factory=dict)
 
 
@@ -299,31 +337,11 @@ class OutingKinds(DataRecord):
     sights: tuple[str, ...]
 
 
-class Together(DataRecord):
-    """Something those who share a home do together.
-
-    Attributes
-    ----------
-    kinds
-        Kinds of places for it; sets of them ("@green") are those of ``leisure.toml``.
-    minutes
-        Least and most it takes.
-    small_children
-        Whether it is for those with small children only.
-    """
-
-    activity: str
-    kinds: tuple[str, ...]
-    minutes: tuple[int, int]
-    small_children: bool = False
-
-
 class Errands(DataRecord):
     """What one goes to a kind of place for, and the kinds of places of other outings."""
 
     errands: dict[str, str]
     kinds: OutingKinds
-    together: tuple[Together, ...] = ()
 
 
 class BiographySentences(DataRecord):
@@ -367,6 +385,18 @@ def ways_of_life() -> WaysOfLife:
 def basic_values() -> tuple[Value, ...]:
     """Return the basic values."""
     return tuple(value for _, file in _read("character", Character) for value in file.value)
+
+
+@cached_data
+def claims() -> tuple[Claim, ...]:
+    """Return what words for people say of their days."""
+    return tuple(claim for _, file in _read("character", Character) for claim in file.claim)
+
+
+@cached_data
+def ways() -> tuple[Way, ...]:
+    """Return what is said of how people live."""
+    return tuple(way for _, file in _read("character", Character) for way in file.way)
 
 
 @cached_data

@@ -9,7 +9,7 @@ from datetime import date, timedelta
 import numpy as np
 
 from vico.community.groups import Meeting, can_come
-from vico.community.model import WEEKDAYS, ScheduleItem
+from vico.community.model import WEEKDAYS, Relation, ScheduleItem
 from vico.community.people import Household, ResidentDraft
 from vico.community.place_index import PlaceIndex
 from vico.community.playmates import come_to_play
@@ -178,7 +178,12 @@ def _takes_place(index: PlaceIndex, meeting: Meeting, later: int) -> bool:
 
 
 def write_days(
-    planned: DayDrafts, first: DayDrafts, meetings: Sequence[Meeting], dates: Sequence[date], streams: Streams
+    planned: DayDrafts,
+    first: DayDrafts,
+    meetings: Sequence[Meeting],
+    relations: Sequence[Relation],
+    dates: Sequence[date],
+    streams: Streams,
 ) -> list[DaySchedules]:
     """Write everybody's schedules of several days, one after another.
 
@@ -188,6 +193,8 @@ def write_days(
         Everybody on the day that jobs were planned for, and on the first day.
     meetings
         Of the first day.
+    relations
+        Who may meet whom, or help.
     dates
         In order, the first day first.
     streams
@@ -201,7 +208,7 @@ def write_days(
             day = drafts_on(planned.index.on(when.weekday()), planned, streams)
             met = meetings_on(day, meetings, (when - dates[0]).days)
         writer = DayWriter(streams("days" if not later else f"days/{later}"), day.index, up_late)
-        items, frequented = writer.write(day.households, met)
+        items, frequented = writer.write(day.households, met, relations)
         found.append(DaySchedules(when, day.index, items, frequented, met))
         up_late = writer.late
     return found

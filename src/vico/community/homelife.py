@@ -9,6 +9,7 @@ import numpy as np
 from vico.community.catalogue import Pastime, at_home
 from vico.community.childhood import ALONE_FROM, childhood
 from vico.community.day import MIDNIGHT, Block, Day
+from vico.community.inclinations import inclinations
 from vico.community.model import ActivityTag, ItemType
 from vico.community.people import ResidentDraft
 
@@ -37,6 +38,7 @@ class Homelife:
         ways = at_home()
         pastimes = ways.pastimes
         hobbies = [Pastime(text=h.at_home, hours=_HOBBY_HOURS) for h in draft.hobbies if h.at_home]
+        hobbies += _inclinations(draft)
         extra = (
             pastimes.guest if guest else pastimes.old if draft.age >= 66 else pastimes.young if draft.age <= 35 else ()
         )
@@ -55,6 +57,7 @@ class Homelife:
         ways = childhood()
         pastimes = ways.pastimes.small if draft.age < ALONE_FROM else ways.pastimes.big
         hobbies = [Pastime(text=h.at_home, hours=_HOBBY_HOURS) for h in draft.hobbies if h.at_home]
+        hobbies += _inclinations(draft)
         others = [pastimes[int(k)] for k in self._rng.permutation(len(pastimes))]
         first = [*hobbies, *others[:2]]
         self._leisure = [first[int(k)] for k in self._rng.permutation(len(first))] + others[2:]
@@ -79,6 +82,12 @@ class Homelife:
     def length(self, low: int, high: int) -> int:
         """Draw a length of time, multiple of five minutes."""
         return 5 * int(self._rng.integers(low // 5, high // 5 + 1))
+
+
+def _inclinations(draft: ResidentDraft) -> list[Pastime]:
+    """Return what somebody does at home for the sake of what matters to them."""
+    ways = [one for one in inclinations().inclination if one.value in draft.values and not one.kinds]
+    return [Pastime(text=w.activity, hours=w.hours) for w in ways if w.ages[0] <= draft.age <= w.ages[1]]
 
 
 def fill_day(day: Day, life: Homelife) -> None:

@@ -97,6 +97,12 @@ class ResidentDraft:
         return self.shift is None and self.lessons is None and self.status in ("worker", "student", "pupil")
 
     @property
+    def drive(self) -> float:
+        """How much they work beyond what others do, about -0.6 to 0.7, 0 for most."""
+        ambition = 0.3 * ("achievement" in self.values) + 0.1 * ("power" in self.values)
+        return self.character.conscientiousness - 0.6 + ambition
+
+    @property
     def character(self) -> Personality:
         """Their personality, once drawn."""
         assert self.personality is not None

@@ -27,6 +27,8 @@ GUEST_KINDS = frozenset({"hotel", "hostel", "motel", "guest_house", "apartment",
 #: Distance that spawn points keep from each other, metres.
 SPAWN_GAP = 2.0
 
+# Rooms that one only passes through.
+_WAYS = frozenset({"corridor", "stairs", "lift", "lobby", "hall"})
 # A place that people can reach has its position on the walkable map, or a step beside it.
 _REACH = 2.0
 
@@ -110,6 +112,11 @@ class PlaceIndex:
         """How many people can lie in the beds of a place: wide beds are for two."""
         tops = (top for name in place.rooms for top in self._rooms[name].containers if top.kind == "bed")
         return sum(max(1, int(top.size[1] / BED_WIDTH + 1e-9)) for top in tops)
+
+    def floor_area(self, place: Place) -> float:
+        """Square metres of a place's rooms, without corridors, stairs and lifts."""
+        rooms = (self._rooms[name] for name in place.rooms)
+        return sum(room.size[0] * room.size[1] for room in rooms if room.kind not in _WAYS)
 
     def same_building(self, a: str, b: str) -> bool:
         """Whether two places are under one roof, or the same."""

@@ -61,7 +61,9 @@ def _set_out_together(index: PlaceIndex, care: Care, meeting: Meeting) -> None:
     leave = meeting.start - (index.minutes(care.carer.home, meeting.place.id) or 0)
     words = childhood().escort.ready.format(names=" and ".join(child.first for child in care.small))
     care.carer.duties = [Duty(leave - _READY, leave, words, care.carer.home)]
-    care.carer.out_until = leave - _READY
+    care.carer.out_until = 0
+    for child in care.small:
+        child.duties = [Duty(leave - _READY, leave, childhood().escort.dress, care.carer.home)]
 
 
 def _joined(index: PlaceIndex, found: Sequence[Meeting], care: Care, people: Sequence[ResidentDraft]) -> Meeting | None:

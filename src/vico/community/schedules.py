@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 
 from vico.community.catalogue import errands
 from vico.community.childhood import adults_only
+from vico.community.company import Company, Party
 from vico.community.day import MIDNIGHT, Block, Day, in_fives
 from vico.community.groups import Meeting, meetings_by_member
 from vico.community.homelife import Homelife, fill_day
-from vico.community.model import ActivityTag, ItemType, ScheduleItem
-from vico.community.outings import Companions, Outings
+from vico.community.hours import Span
+from vico.community.model import ActivityTag, ItemType, Relation, ScheduleItem
+from vico.community.outings import Outings
 from vico.community.people import Household, ResidentDraft
 from vico.community.place_index import PlaceIndex, kind_of
 from vico.community.school_days import SchoolDays
 from vico.world.model import Category
 
+# Places that close for so long, minutes, do so for a midday break; staff go home if they have so long there.
+_CLOSED, _HOME_FOR_LUNCH = 30, 40
 # How much longer one sleeps on a day off, minutes, unless one rises early anyway.
 _LIE_IN = 70
 
@@ -50,9 +55,14 @@ class DayWriter:
         self._school = SchoolDays(rng, index, self._outings.put)
 
     def write(
-        self, households: Sequence[Household], groups: Sequence[Meeting]
+        self, households: Sequence[Household], groups: Sequence[Meeting], relations: Sequence[Relation] = ()
     ) -> tuple[dict[str, list[ScheduleItem]], dict[str, list[str]]]:
         """Write everybody's schedule.
+
+        Parameters
+        ----------
+        relations
+            Who may meet whom, or help.
 
         Returns
         -------
@@ -64,8 +74,12 @@ class DayWriter:
         joined = meetings_by_member(groups)
         for draft in people:
             days[draft.id] = self._frame(draft, joined.get(draft.id, []))
+        company = Company(self._rng, self._index, self._outings)
         for household in households:
-            self._outings.plan_together([(m, days[m.id]) for m in household.members], household.kind)
+            company.household([(m, days[m.id]) for m in household.members], household.kind)
+        parties = {draft.id: (draft, days[draft.id]) for draft in people}
+        company.help(parties, relations)
+        company.friends(parties, relations)
         for draft in people:
             self._outings.plan_alone(draft, days[draft.id])
         lives = {s.id: Homelife(self._rng, s) for s in people}
@@ -157,21 +171,7 @@ class DayWriter:
         assert draft.shift is not None
         assert place is not None
         start, end = draft.shift
-        tag = ActivityTag.STUDY if draft.status == "student" else ActivityTag.WORK
-        if draft.status == "student":
-            first, second = f"Attend lectures in {draft.subject}", f"Work on {draft.subject} exercises"
-            if kind_of(index.place_by_id[place]) == "library":
-                first, second = f"Study {draft.subject}", f"Write on a {draft.subject} paper"
-        else:
-            assert draft.job is not None
-            first = second = draft.job.task
-            if draft.job.shift in ("office", "bank"):
-                first = f"Answer the morning's mail, then {_lower(first)}"
-            elif (
-                index.place_by_id[place].category != Category.OFFICE
-                and start < min(index.hours(index.place_by_id[place]))[0]
-            ):
-                first = f"Open up, then {_lower(first)}"
+        first, second, tag = self._tasks(draft, place, start)
         if lunch_group is not None:
             there, back = day.walk(place, lunch_group.place), day.walk(lunch_group.place, place)
             assert there is not None
@@ -179,6 +179,10 @@ class DayWriter:
             out, again = lunch_group.start - there, lunch_group.end + back
             self._outings.put(day, Block(start, out, ItemType.MAIN, first, place, "work", tag))
             self._outings.put(day, Block(again, end, ItemType.MAIN, second, place, "work", tag))
+            return
+        closed = _midday_closing(index.hours(index.place_by_id[place]), start, end)
+        if closed is not None:
+            self._over_midday(day, (start, end), closed, (first, tag))
             return
         if end - start < 5 * 60:
             self._outings.put(day, Block(start, end, ItemType.MAIN, first, place, "work", tag))
@@ -220,8 +224,47 @@ class DayWriter:
         self._outings.put(day, Block(noon, noon + pause, ItemType.MEAL, text, place, "dinner" if late else "lunch"))
         self._outings.put(day, Block(noon + pause, end, ItemType.MAIN, second, place, "work", tag))
 
+    def _tasks(self, draft: ResidentDraft, place: str, start: int) -> tuple[str, str, ActivityTag]:
+        """Return what somebody does in the first and in the second part of their working hours, and its tag."""
+        index = self._index
+        tag = ActivityTag.STUDY if draft.status == "student" else ActivityTag.WORK
+        if draft.status == "student":
+            first, second = f"Attend lectures in {draft.subject}", f"Work on {draft.subject} exercises"
+            if kind_of(index.place_by_id[place]) == "library":
+                first, second = f"Study {draft.subject}", f"Write on a {draft.subject} paper"
+        else:
+            assert draft.job is not None
+            first = second = draft.job.task
+            if draft.job.shift in ("office", "bank"):
+                first = f"Answer the morning's mail, then {_lower(first)}"
+            elif (
+                index.place_by_id[place].category != Category.OFFICE
+                and start < min(index.hours(index.place_by_id[place]))[0]
+            ):
+                first = f"Open up, then {_lower(first)}"
+        return first, second, tag
 
-def _eat_together(members: Companions) -> None:
+    def _over_midday(self, day: Day, shift: Span, closed: Span, work: tuple[str, ActivityTag]) -> None:
+        """Put working hours in with a break while the place is closed: at home where that is worth the way."""
+        (start, end), (closes, opens), (text, tag), place = shift, closed, work, day.workplace
+        assert place is not None
+        self._outings.put(day, Block(start, closes, ItemType.MAIN, text, place, "work", tag))
+        way = day.walk(place, day.home)
+        if way is None or opens - closes - 2 * way < _HOME_FOR_LUNCH:
+            words = "Eat a packed lunch and rest while it is closed"
+            self._outings.put(day, Block(closes, opens, ItemType.MEAL, words, place, "lunch"))
+        self._outings.put(day, Block(opens, end, ItemType.MAIN, text, place, "work", tag))
+
+
+def _midday_closing(spans: Sequence[Span], start: int, end: int) -> Span | None:
+    """Return when a place is closed within working hours, minutes, if it is for a while."""
+    for (_, closes), (opens, _) in pairwise(sorted(spans)):
+        if start + 60 <= closes and opens + 60 <= end and opens - closes >= _CLOSED:
+            return closes, opens
+    return None
+
+
+def _eat_together(members: Sequence[Party]) -> None:
     """Name the others in meals that people under one roof have at home at the same time."""
     for me, day in members:
         for block in day.blocks:

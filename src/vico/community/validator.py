@@ -18,6 +18,7 @@ from vico.community.jobs import job_of, jobs_at, works_at
 from vico.community.model import LAST, Community, Group, ItemType, Mode, Resident, ScheduleItem
 from vico.community.place_index import SPAWN_GAP, PlaceIndex
 from vico.community.rides import first_ride
+from vico.community.staff import staff_capacity
 from vico.community.tags import TAGS_OF_TYPE
 from vico.community.validator_households import households_of
 from vico.community.work import STUDY_KINDS
@@ -96,10 +97,20 @@ class _Check:
         self.unique()
         for resident in self.community.residents:
             self.person(resident)
+        self.jobs()
         self.day()
         self.relations()
         self.spawns()
         return self.found
+
+    def jobs(self) -> None:
+        """Places employ no more people than they have room for."""
+        staff = Counter(r.workplace for r in self.community.residents if r.workplace and is_employed(r))
+        for place_id, count in staff.items():
+            place = self.index.place_by_id.get(place_id)
+            if place is not None and count > (most := staff_capacity(self.index, place)):
+                what = f"{count} people work at {place.name}, which has room for {most}"
+                self.say(f"{place_id}.staff", what, f"let {count - most} of them work elsewhere")
 
     def day(self) -> None:
         """Check all that another day may have wrong."""
@@ -350,6 +361,11 @@ class _Check:
                 f"it is {gaps[i, j]:.2f} m from {residents[i].id}'s",
                 f"keep spawn points {SPAWN_GAP:g} m apart",
             )
+
+
+def is_employed(r: Resident) -> bool:
+    """Whether somebody's workplace is where they work, and not where they learn."""
+    return r.age >= GROWN_UP and not r.occupation.lower().startswith("student")
 
 
 def _length(item: ScheduleItem) -> int:
