@@ -1,4 +1,4 @@
-"""Communities of every size on every world: are they valid, how long do they take, and are their networks like real ones?
+"""Communities on many worlds: are they valid, how long do they take, and are their networks like real ones.
 
     python benchmarks/people.py WORLD [WORLD ...] [--residents 15 1000] [--seeds 10] [--days 1] [--table FILE]
 
@@ -29,23 +29,31 @@ from vico.community.social_network import NetworkMeasures, network_measures
 from vico.errors import EmptyInputError
 from vico.world.folder import World, read_world
 
-#: Networks of real people: name, source, people, mean degree, clustering, mean path, degree assortativity. None: not said.
+
+@dataclass(frozen=True)
+class RealNetwork:
+    """A published network; None where the source does not say."""
+
+    name: str
+    source: str
+    people: int
+    degree: float
+    clustering: float | None = None
+    transitivity: float | None = None
+    path: float | None = None
+    assortativity: float | None = None
+
+
+_SCHOOLS = "https://www.nature.com/articles/s41599-023-02124-9/tables/3"
+_COLLEGE = "https://pmc.ncbi.nlm.nih.gov/articles/PMC10922236/table/T2"
 REAL = (
-    (
-        "friends, boys of a high school in Illinois",
-        "Coleman 1964, as measured by [KONECT](http://konect.cc/networks/moreno_highschool)",
-        70, 10.5, 0.40, 2.66, 0.08,
+    RealNetwork(
+        "friends, boys of a high school, chosen and choosing", "[KONECT](http://konect.cc/networks/moreno_highschool)",
+        70, 10.5, clustering=0.40, path=2.66, assortativity=0.08,
     ),
-    (
-        "friends, a school year in Northern Ireland (first of six)",
-        "[Humanities and Social Sciences Communications 10, 2023, table 3](https://www.nature.com/articles/s41599-023-02124-9)",
-        73, 7.4, 0.45, None, None,
-    ),
-    (
-        "friends, a school year in Northern Ireland (sixth of six)",
-        "the same",
-        157, 7.8, 0.38, None, None,
-    ),
+    RealNetwork("friends named, a school year, the first of six", f"[table 3]({_SCHOOLS})", 73, 7.4, transitivity=0.45),
+    RealNetwork("friends named, a school year, the sixth of six", f"[table 3]({_SCHOOLS})", 157, 7.8, transitivity=0.38),
+    RealNetwork("friends named, first-year students", f"[table 2]({_COLLEGE})", 1236, 5.4),
 )  # fmt: skip
 
 
@@ -140,10 +148,18 @@ def network_lines(measured: Sequence[tuple[str, NetworkMeasures]]) -> list[str]:
             f"| {name} | {m.people} | {m.mean_degree:.1f} | {m.most_degree} | {m.degree_skew:.1f} | {m.clustering:.2f} "
             f"| {m.transitivity:.2f} | {m.mean_path:.1f} | {m.degree_assortativity:+.2f} | {m.age_assortativity:+.2f} |"
         )
-    for name, source, people, degree, clustering, path, assortativity in REAL:
-        shown = [f"{value:.2f}" if value is not None else "" for value in (path, assortativity)]
+    for real in REAL:
+        shown = [
+            form.format(value) if value is not None else ""
+            for form, value in (
+                ("{:.2f}", real.clustering),
+                ("{:.2f}", real.transitivity),
+                ("{:.1f}", real.path),
+                ("{:+.2f}", real.assortativity),
+            )
+        ]
         lines.append(
-            f"| *{name}* ({source}) | {people} | {degree} | | | | {clustering:.2f} | {shown[0]} | {shown[1]} | |"
+            f"| *{real.name}* ({real.source}) | {real.people} | {real.degree:.1f} | | | {' | '.join(shown)} | |"
         )
     return lines
 
