@@ -52,7 +52,7 @@ REAL = (
         70, 10.5, clustering=0.40, path=2.66, assortativity=0.08,
     ),
     RealNetwork("friends named, a school year, the first of six", f"[table 3]({_SCHOOLS})", 73, 7.4, transitivity=0.45),
-    RealNetwork("friends named, a school year, the sixth of six", f"[table 3]({_SCHOOLS})", 157, 7.8, transitivity=0.38),
+    RealNetwork("friends named, a school year, the last of six", f"[table 3]({_SCHOOLS})", 157, 7.8, transitivity=0.38),
     RealNetwork("friends named, first-year students", f"[table 2]({_COLLEGE})", 1236, 5.4),
 )  # fmt: skip
 

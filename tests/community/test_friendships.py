@@ -56,8 +56,8 @@ def test_nobody_knows_hundreds(large: Community) -> None:
 
 def test_the_outgoing_have_more_friends(town: World) -> None:
     friends, outgoing = [], []
-    for seed in range(4):
-        community = build_community(town, residents=80, seed=seed)
+    for seed in range(2):
+        community = build_community(town, residents=120, seed=seed)
         for resident in community.residents:
             friends.append(sum(r.kind is RelationKind.FRIEND for r in community.relations_of(resident.id)))
             outgoing.append(resident.personality.extraversion)

@@ -20,7 +20,15 @@ from vico.world.folder import read_world
 
 
 def build(
-    path: Path, *, out: Path, residents: int, seed: int, day: str | None, days: int, force: bool, json: bool
+    path: Path,
+    *,
+    out: Path,
+    residents: int,
+    seed: int,
+    day: str | None = None,
+    days: int = 1,
+    force: bool,
+    json: bool,
 ) -> int:
     """People the world at `path`, write the community to `out`, and say who lives there."""
     check_output(out, path, force=force)

@@ -317,7 +317,9 @@ class GuestMeals(DataRecord):
 
 
 class AtHome(DataRecord):
-    """What people do at home: one of each list is somebody's way."""
+    """What people do at home: one of each list is somebody's way; `brief` is what there is time for in minutes."""
+
+    brief: str = "Change and set out again"
 
     morning: tuple[str, ...]
     breakfast: tuple[str, ...]

@@ -225,6 +225,7 @@ class Company:
             for me, day in parties:
                 names = " and ".join(one.first for one, _ in parties if one is not me)
                 text = f"{plan.activity} with {names}"
+                day.done.add(plan.activity)
                 self._outings.put(day, Block(start, start + length, kind, text, place.id, plan.role, plan.tag))
             return True
         return False

@@ -157,10 +157,11 @@ class Outings:
     def _hobby(self, draft: ResidentDraft, day: Day, window: tuple[int, int]) -> bool:
         for k in self._rng.permutation(len(draft.hobbies)):
             hobby = draft.hobbies[int(k)]
-            if not hobby.out:
+            if not hobby.out or hobby.out in day.done:
                 continue
             minutes = (115, 130) if "cinema" in hobby.kinds or "theatre" in hobby.kinds else (45, 85)
             if self.go(day, Outing(hobby.out, hobby.kinds, minutes, tag=hobby.about), window):
+                day.done.add(hobby.out)
                 return True
         return False
 

@@ -82,7 +82,7 @@ class DayWriter:
         company.friends(parties, relations)
         for draft in people:
             self._outings.plan_alone(draft, days[draft.id])
-        lives = {s.id: Homelife(self._rng, s) for s in people}
+        lives = {s.id: Homelife(self._rng, s, days[s.id].done) for s in people}
         for household in households:
             # People under one roof eat at the same time, when both are in.
             early, late = (207, 222) if household.children else (210, 236)
@@ -126,18 +126,17 @@ class DayWriter:
             natural, sleep = 450 + 110 * (1 - draft.early), 480
         else:
             natural, sleep = 380 + 120 * (1 - draft.early), 455
-        if draft.day_off:
-            natural += _LIE_IN * (1 - 0.5 * draft.early)
-        self._nights(draft, day, int(natural), int(sleep))
+        lie_in = _LIE_IN * (1 - 0.5 * draft.early) if draft.day_off else 0.0
+        self._nights(draft, day, (int(natural), int(lie_in)), int(sleep))
         return day
 
-    def _nights(self, draft: ResidentDraft, day: Day, natural: int, sleep: int) -> None:
+    def _nights(self, draft: ResidentDraft, day: Day, wakes: tuple[int, int], sleep: int) -> None:
         """Put sleep at both ends of a day, so that who has to be somewhere is up in time.
 
         Parameters
         ----------
-        natural
-            When they wake by themselves, minute of the day.
+        wakes
+            When they wake by themselves, minute of the day, and how much longer they sleep today.
         sleep
             How long they sleep, minutes.
         """
@@ -148,8 +147,8 @@ class DayWriter:
             leave = first.start - (day.walk(draft.home, first.place) or 0)
             home = (day.walk(last.place, draft.home) or 0) + last.end
         prepare = 5 * int(rng.integers(9, 16))
-        wake = int(min(natural, leave - prepare) // 5 * 5)
-        bed = in_fives(wake + MIDNIGHT - sleep - float(rng.integers(0, 45)))
+        wake = int(min(sum(wakes), leave - prepare) // 5 * 5)
+        bed = in_fives(min(wake, wakes[0]) + MIDNIGHT - sleep - float(rng.integers(0, 45)))
         bed = max(bed, in_fives(home + 40 + float(rng.integers(0, 25))))
         over = max(10, bed - MIDNIGHT) if bed >= MIDNIGHT - 10 else 0
         # Up past midnight: the end of such an evening is also how the day began, unless it is known how it did.
