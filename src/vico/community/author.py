@@ -29,7 +29,7 @@ from vico.community.schooling import assign_schools, plan_care, settle_care
 from vico.community.tags import with_tags
 from vico.community.validator import check_community
 from vico.community.wardrobe import Wardrobe
-from vico.community.work import assign_homes, assign_work, employers, study_places
+from vico.community.work import assign_homes, assign_work, check_beds, employers, study_places
 from vico.errors import EmptyInputError, InputError
 from vico.seeds import rng
 from vico.version import __version__
@@ -203,6 +203,7 @@ def _told(
 def _plan(index: PlaceIndex, count: int, stream: Callable[[str], np.random.Generator]) -> DayDrafts:
     """Draw everybody with home, school and work, as they are on a working day."""
     _, rooms = index.homes()
+    check_beds(index, count)
     if not index.places([c for c in Category if c not in (Category.ACCOMMODATION, Category.TRANSIT)]):
         raise EmptyInputError(
             f"community: world {index.world.manifest.name!r} has no reachable place but homes and stops: nowhere to "

@@ -62,12 +62,7 @@ def assign_homes(rng: np.random.Generator, index: PlaceIndex, households: Sequen
         free = Counter({p.id: beds[p.id] - taken[p.id] for p in (*dwellings, *rooms)})
         fitting = [p for p in options if free[p.id] >= size] or [p for p in (*dwellings, *rooms) if free[p.id] >= size]
         if not fitting and beds.total():
-            housed = taken.total()
-            raise EmptyInputError(
-                f"community: world {index.world.manifest.name!r} has {beds.total()} beds, and of {people} residents in "
-                f"{len(households)} households {housed} find some under one roof; ask for at most "
-                f"{int(_FILLED * beds.total())} residents, or build a world with a larger --radius"
-            )
+            raise _too_few_beds(index, people, beds.total())
         options = fitting or options
         if crowded:
             spare = min(free[p.id] for p in options)
@@ -83,6 +78,27 @@ def assign_homes(rng: np.random.Generator, index: PlaceIndex, households: Sequen
         taken[home.id] += len(household.members)
         for member in household.members:
             member.home = home.id
+
+
+def check_beds(index: PlaceIndex, people: int) -> None:
+    """See to it that there are beds for some people, where it is known how many there are.
+
+    Raises
+    ------
+    EmptyInputError
+        If there are too few.
+    """
+    beds = sum(index.beds(place) for homes in index.homes() for place in homes)
+    if 0 < beds < people:
+        raise _too_few_beds(index, people, beds)
+
+
+def _too_few_beds(index: PlaceIndex, people: int, beds: int) -> EmptyInputError:
+    return EmptyInputError(
+        f"community: world {index.world.manifest.name!r} has {beds} beds, too few for {people} residents in households "
+        f"that live under one roof each; ask for at most {int(_FILLED * beds)} residents, or build a world with a larger "
+        "--radius"
+    )
 
 
 def employers(index: PlaceIndex) -> list[Place]:
