@@ -96,8 +96,8 @@ def check_beds(index: PlaceIndex, people: int) -> None:
 def _too_few_beds(index: PlaceIndex, people: int, beds: int) -> EmptyInputError:
     return EmptyInputError(
         f"community: world {index.world.manifest.name!r} has {beds} beds, too few for {people} residents in households "
-        f"that live under one roof each; ask for at most {int(_FILLED * beds)} residents, or build a world with a larger "
-        "--radius"
+        f"that live under one roof each; ask for at most {int(_FILLED * beds)} residents, or build a world with a "
+        "larger --radius"
     )
 
 
