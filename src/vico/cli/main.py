@@ -127,15 +127,33 @@ def world_info(path: Positional[Path], json: bool = False) -> int:
 
 @community.command(name="build")
 def community_build(options: Annotated[CommunityBuildOptions, FLAT]) -> int:
-    """People a world: homes, jobs, groups and a full day for each resident.
+    """People a world: homes, jobs, groups and a full day, or several, for each resident.
 
-    Example: vico community build helsinki --residents 15 --out people
+    Example: vico community build helsinki --residents 15 --day friday --days 3 --out people
 
     Example: vico community build helsinki --llm --llm-budget-tokens 400000 --out people
     """
     from vico.cli import community as verb
 
     return verb.build(options)
+
+
+@community.command(name="day")
+def community_day(path: Positional[Path], day: str, out: Path, force: bool = False, json: bool = False) -> int:
+    """Take one of several days of a community, as a community of its own that runs can live through.
+
+    Example: vico community day people --day saturday --out people_saturday
+
+    Args:
+        path: Community folder, built with --days.
+        day: A date like 2025-06-07, or a day of the week like saturday: the first one there is.
+        out: Folder to make; refused if it exists, unless --force.
+        force: Replace what is in the output folder.
+        json: Print the result as JSON.
+    """
+    from vico.cli import community as verb
+
+    return verb.day(path, day=day, out=out, force=force, json=json)
 
 
 @app.command(name="export")

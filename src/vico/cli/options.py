@@ -151,6 +151,10 @@ class CommunityBuildOptions:
         How many people.
     seed
         Decides who they are.
+    day
+        First day, a date like 2025-06-07 or a day of the week like saturday; a working day by seed without it.
+    days
+        How many days everybody has a schedule for.
     llm
         A language model writes them (VICO_LLM_BASE_URL, VICO_LLM_MODEL, VICO_LLM_KEY); what it leaves is written by
         rule.
@@ -180,6 +184,8 @@ class CommunityBuildOptions:
     out: Path
     residents: int = 15
     seed: int = 0
+    day: str | None = None
+    days: int = 1
     llm: bool = False
     llm_only: bool = False
     llm_concurrency: int = 4
