@@ -10,8 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from vico.agents.assistant.options import GoTo, Option, PickUp, PutDown, Search
+from vico.agents.assistant.options import GoTo, Option, PickUp, Search
 from vico.agents.assistant.people import PERSON, AwaitPerson, Escort, Meet, Report, Show
+from vico.agents.assistant.putting import PutDown
 from vico.agents.assistant.skills import Action, AssistantSkills, ObservationView
 from vico.agents.navigation.memory import SeenThing
 from vico.agents.perception import Sighting

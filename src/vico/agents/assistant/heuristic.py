@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from vico.agents.assistant.automata import AUTOMATA, ROUNDS
-from vico.agents.assistant.options import GoTo, Option, PickUp, PutDown, Search, WalkUp
+from vico.agents.assistant.options import GoTo, Option, PickUp, Search, WalkUp
 from vico.agents.assistant.people import PERSON, AwaitPerson, Escort, Meet, Report, Show
+from vico.agents.assistant.putting import PutDown
 from vico.agents.assistant.skills import Action, AssistantSkills, ObservationView
 from vico.agents.perception import Sighting
 from vico.agents.state import AgentState
