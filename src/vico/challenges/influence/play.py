@@ -56,7 +56,7 @@ class Influence:
 
     name = NAME
     categories: Sequence[str] = (CATEGORY,)
-    methods: Sequence[str] = tuple(name for name in NAMES if name != "llm")
+    methods: Sequence[str] = NAMES
 
     def metrics(self, category: str) -> Sequence[Metric]:
         """Columns of the table."""
