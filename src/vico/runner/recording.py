@@ -96,6 +96,18 @@ class RecordedRun(Hook):
         self._recorder, self._faults = recorder, faults
         self._told = -1
 
+    @classmethod
+    def into(
+        cls, out: Path, sim: Simulation, faults: FaultLog, *, wanted: int, notes: Mapping[str, Any] | None = None
+    ) -> RecordedRun:
+        """Record a simulation into a new folder; the parameters are those of `vico.sim.recorder.Recorder`."""
+        sources = {"world": str(sim.world.path)}
+        return cls(Recorder(out, sim, sources=sources, wanted=wanted, notes=notes), faults)
+
+    def close(self) -> None:
+        """End the recording."""
+        self._recorder.close()
+
     def begin(self, observations: Mapping[str, dict[str, Any]]) -> None:
         """Record how things stand before the first step; a run that goes on has that already."""
         self._recorder.begin(observations)

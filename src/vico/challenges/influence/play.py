@@ -33,7 +33,6 @@ from vico.runner.faults import Fault, FaultLog
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedRun
-from vico.sim.recorder import Recorder
 from vico.world.folder import World, read_world
 
 NAME = "influence"
@@ -56,7 +55,7 @@ class Influence:
 
     name = NAME
     categories: Sequence[str] = (CATEGORY,)
-    methods: Sequence[str] = tuple(name for name in NAMES if name != "llm")
+    methods: Sequence[str] = NAMES
 
     def metrics(self, category: str) -> Sequence[Metric]:
         """Columns of the table."""
@@ -177,8 +176,8 @@ def _simulated(
     runner = Runner(env.sim, agents, hooks=hooks)
     if recording is not None:
         notes = {"challenge": NAME, "task": task.record()}
-        recorder = Recorder(recording, env.sim, sources={"world": str(world.path)}, wanted=settings.steps, notes=notes)
-        runner.hooks.append(RecordedRun(recorder, runner.faults))
+        recorder = RecordedRun.into(recording, env.sim, runner.faults, wanted=settings.steps, notes=notes)
+        runner.hooks.append(recorder)
     if progress is not None:
         label = f"{task.world}, seed {seed}"
         runner.hooks.append(_Reported(progress, label, settings.steps))
