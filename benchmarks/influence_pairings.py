@@ -22,7 +22,7 @@ from vico.challenges.influence import INFLUENCE
 from vico.challenges.influence.constants import opinion_digest
 from vico.challenges.influence.model import settings_of
 from vico.challenges.records import Job, Setting
-from vico.challenges.results import interval
+from vico.challenges.tables.means import estimate
 from vico.io.files import read_json, write_json
 from vico.version import __version__
 
@@ -53,8 +53,9 @@ def table(rows: dict[str, list[dict[str, object]]], keys: Sequence[str]) -> str:
             if not values:
                 cells.append("-")
                 continue
-            mean, low, high = interval(values)
-            cells.append(f"{mean:.1f} ({max(low, 0):.0f} to {min(high, 100):.0f})")
+            found = estimate(values, range(len(values))).clipped(0.0, 100.0)
+            bounds = "one community" if found.low is None else f"{found.low:.0f} to {found.high:.0f}"
+            cells.append(f"{found.mean:.1f} ({bounds})")
         wall = sum(r["wall_seconds"] for r in records) / len(records)
         lines.append(f"| {method} | {len(records)} | " + " | ".join(cells) + f" | {wall:.0f} |")
     return "\n".join(lines)

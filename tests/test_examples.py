@@ -91,6 +91,13 @@ def test_events_close_a_street_and_cut_the_power(helsinki_path: Path) -> None:
     assert "0 of 15 cars on Mikonkatu, 0 vanished" in printed
 
 
+def test_a_function_stands_in_for_a_language_model(corner_path: Path) -> None:
+    printed = run("11_llm_author.py", "--world", str(corner_path), "--residents", "3")
+    assert printed.count("can tell the time by shadows") == 3
+    assert "character {'written by the model': 3}" in printed
+    assert "schedule {'no usable reply': 3}" in printed
+
+
 @pytest.mark.slow
 def test_a_scene_of_the_film_is_filmed(helsinki_path: Path, tmp_path: Path) -> None:
     small = ("--residents", "20", "--size", "128x72", "--samples", "1", "--scenes", "street")
