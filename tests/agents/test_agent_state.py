@@ -157,6 +157,7 @@ def test_planners(method: str, category: str) -> None:
         return scene(category)[1] | {"assistant_0": planner} if category == "carry" else {"assistant_0": planner}
 
     types, _ = carried_on(sim, make, steps=300, every=25)
-    assert {"move_forward", "turn_left"} <= types
+    assert "move_forward" in types
+    assert types & {"turn_left", "turn_right"}
     if method in ("heuristic", "ours"):
         assert DONE[category] <= types

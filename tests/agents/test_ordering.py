@@ -31,7 +31,7 @@ class Crow:
 
 
 def view_from(x: float, y: float, held: Sequence[int] = (0, 0), *, room: str = "") -> ObservationView:
-    state = {"room": room, "held": list(held)}
+    state = {"room": room, "held": list(held), "time": 28800.0}
     return ObservationView({"pose": [x, y, 0.0, 1.0, 0.0, 0.0], "state": state}, {})
 
 

@@ -277,14 +277,17 @@ def test_beside_the_wrong_surface_is_the_wrong_place(city: World) -> None:
     assert story.cause() == "wrong place"
 
 
-def test_what_another_one_sees_from_afar_or_through_a_window_is_not_seen(city: World) -> None:
+def test_what_is_seen_from_afar_is_not_seen(city: World) -> None:
     story = search(city)
     story.truth.put(RED, GREEN)
     go(story, (GREEN[0] + 10.5, GREEN[1], 0.0))
     story.step(TURN, sees={RED: 300})
-    story.truth.put(WHO, IN_SHOP, "r_shop")
-    story.step(TURN, sees={RED: 300})
     assert story.chronicle.stories[0].seen == {}
+    go(story, (GREEN[0] + 9.5, GREEN[1], 0.0))
+    story.step(TURN, sees={RED: 19})
+    assert story.chronicle.stories[0].seen == {}
+    story.step(TURN, sees={RED: 20})
+    assert story.chronicle.stories[0].seen == {RED: story.number}
 
 
 def test_the_tests_above_reach_every_cause() -> None:
