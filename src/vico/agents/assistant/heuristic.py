@@ -201,7 +201,8 @@ class HeuristicPlanner:
             self._picked.add(pick.target.name)
             left = [name for name in self.errand["objects"] if name not in self._picked]
             return "picked, more wanted" if left and not all(view.held) else "picked, all of it"
-        self._refused.append(pick.target.name)
+        if pick.outcome == "refused":
+            self._refused.append(pick.target.name)
         return pick.outcome
 
     def _after_put(self, put: PutDown) -> str:
