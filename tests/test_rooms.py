@@ -34,7 +34,7 @@ ALLOWED = {
         "world.heights",
     },
     "runner": {"agents", "envs", "sim", "world", "io"},
-    "challenges": {"runner", "envs", "agents", "community", "world", "assets", "io"},
+    "challenges": {"runner", "envs", "agents", "community", "world", "assets", "llm", "io"},
 }
 OPEN = {"viewer", "cli"}  # and the front door, api.py
 

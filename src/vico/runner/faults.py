@@ -12,7 +12,8 @@ from vico.sim.actions import AgentFault
 
 #: ``late``: no action in time. ``crashed``: it raised an error. ``ended``: its process ended. ``malformed``: what it
 #: answered is no action, or names agents or places that nobody knows. ``state``: it could not say what it remembers.
-FaultKind = Literal["late", "crashed", "ended", "malformed", "state"]
+#: ``model``: it went on without the language model that it plans with.
+FaultKind = Literal["late", "crashed", "ended", "malformed", "state", "model"]
 FAULT_KINDS: tuple[FaultKind, ...] = get_args(FaultKind)
 
 #: So many faults are told one by one; more are only counted.
