@@ -1,4 +1,4 @@
-"""The LLM planner against real servers: it plans by what it is told, and no failure makes it do what is not on offer."""
+"""The LLM planner against real servers: it plans by what it is told, and never does what is not on offer."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vico.agents.assistant import make_planner
 from vico.agents.assistant.errands import Choice
 from vico.agents.assistant.llm_planner import LlmPlanner
 from vico.agents.assistant.skills import ObservationView
-from vico.agents.perception import Sighting
+from vico.agents.navigation.memory import SeenThing
 from vico.agents.wrappers import model_faults_of, usage_of
 from vico.errors import InputError
 from vico.io.plain_data import read_plain, write_plain
@@ -80,15 +80,7 @@ def moment(
 
 def in_view(made: LlmPlanner, view: ObservationView, name: str, x: float, y: float, *, kind: str = "object") -> None:
     """Let something have been seen just now."""
-    thing = Sighting(7, kind, name, 60, np.array([x, y, 0.0]))
-    made.skills.seen._put(made_of(thing, view))
-
-
-def made_of(thing: Sighting, view: ObservationView) -> Any:
-    from vico.agents.navigation.memory import SeenThing
-
-    now = float(view.state["time"])
-    return SeenThing(thing.entity, thing.kind, thing.name, thing.position, "", now, thing.pixels)
+    made.skills.seen._put(SeenThing(7, kind, name, np.array([x, y, 0.0]), "", float(view.state["time"]), 60))
 
 
 def test_a_model_that_reads_what_it_is_told_goes_where_it_is_near(public_map: PublicMap) -> None:
@@ -126,7 +118,8 @@ def test_without_distances_nothing_is_told_of_where_anything_is(public_map: Publ
     assert told["locations"][0] == {"name": "Corner Café", "kind": "place, indoors"}
     assert [set(one) for one in told["actions"]] == [{"action", "do"}] * 5
     assert told["state"]["seen"] == [{"what": "blue cup", "where": "outdoors", "seconds_ago": 0}]
-    assert "position" not in server.texts[0] and "metres" not in server.texts[0]
+    assert "position" not in server.texts[0]
+    assert "metres" not in server.texts[0]
 
 
 def test_what_was_done_and_what_came_of_it_is_told(public_map: PublicMap) -> None:
@@ -376,6 +369,7 @@ def test_all_planners_of_a_process_share_a_model(public_map: PublicMap, monkeypa
     monkeypatch.setenv("VICO_LLM_BASE_URL", "http://127.0.0.1:9/v1")
     monkeypatch.setenv("VICO_LLM_MODEL", "planner")
     made = [make_planner("llm", TASKS, public_map, seed=0, number=k, of=2) for k in range(2)]
-    assert isinstance(made[0], LlmPlanner) and isinstance(made[1], LlmPlanner)
+    assert isinstance(made[0], LlmPlanner)
+    assert isinstance(made[1], LlmPlanner)
     assert made[0].access.model is made[1].access.model
     assert json.loads(json.dumps(made[0].access.state()))["tokens"] == 0
