@@ -34,7 +34,7 @@ def test_the_model_is_told_who_asks_and_its_choice_is_taken() -> None:
         chooser = llm_chooser(impatient(base))
         assert chooser(question(), NAMES) == 7
         said = script.last_words(0)
-    assert "kind delivery: things are fetched from one place and brought to another" in said
+    assert "of the kind delivery is being made up: things are fetched from one place and brought to another." in said
     assert '"name": "Ada Berg", "age": 30, "occupation": "baker", "hobbies": ["chess"]' in said
     assert '{"index": 8, "name": "Place 8"}' in said
     assert WHO.home not in said  # ids of the world are of no use to it
