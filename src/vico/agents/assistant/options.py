@@ -10,6 +10,9 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from vico.agents.assistant.looking import LookAround
 from vico.agents.assistant.skills import GRASP, Action, AssistantSkills, ObservationView
 from vico.agents.perception import Sighting
@@ -24,6 +27,8 @@ _SPOT = 0.7
 # From where one tries to pick, metres; and how long one comes no nearer before one gives up, steps.
 _NEARER = (GRASP, 0.8, 0.4)
 _IN_VAIN = 14
+# Who moved so far, metres, is followed there at once; else not before so many steps after one was stopped.
+_AFAR, _HOLD = 6.0, 6
 
 
 class Option(Protocol):
@@ -39,6 +44,68 @@ class Option(Protocol):
 
     def restore(self, state: AgentState) -> None:
         """Go on where another one, made in the same way, was."""
+
+
+class Pursuit:
+    """Going up to something that was seen, or somebody who moves, through the door that they were seen through.
+
+    Attributes
+    ----------
+    position
+        Where it was seen last, ENU metres, shape ``(3,)``; None before.
+    """
+
+    def __init__(self, skills: AssistantSkills, position: NDArray[np.float64] | None = None) -> None:
+        self.position = position
+        self._skills = skills
+        self._through = ""
+        # What is walked to: it follows the position by strides, so that a way round an obstacle is gone to its end.
+        self._goal: NDArray[np.float64] | None = None
+        self._holds = 0
+
+    def state(self) -> AgentState:
+        """Return where it was seen."""
+        return {
+            "position": None if self.position is None else self.position.copy(),
+            "through": self._through,
+            "goal": None if self._goal is None else self._goal.copy(),
+            "holds": self._holds,
+        }
+
+    def restore(self, state: AgentState) -> None:
+        """Go on."""
+        self.position, self._goal = (
+            None if state[name] is None else np.array(state[name], np.float64) for name in ("position", "goal")
+        )
+        self._through, self._holds = state["through"], state["holds"]
+
+    def see(self, view: ObservationView, position: NDArray[np.float64]) -> None:
+        """Take note of where it is now."""
+        self.position = position
+        self._through = self._skills.door_before(view, position)
+
+    def away(self, view: ObservationView) -> float:
+        """Metres to where it was seen last; infinite where that is unknown or behind a door."""
+        return math.inf if self.position is None or (view.room and self._through) else view.away(self.position)
+
+    def step(self, view: ObservationView, *, near: float) -> Action | None:
+        """Return the next action on the way there; None once within `near` metres, or where no way leads nearer."""
+        if view.room is None or self._through == view.room:
+            self._through = ""
+        if self._through:
+            action = self._skills.go_through(view, self._through)
+            if action is not None:
+                return action
+            self._through = ""
+        return None if self.position is None else self._skills.approach(view, self._aim(view, self.position), near=near)
+
+    def _aim(self, view: ObservationView, position: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what to walk to."""
+        self._holds = _HOLD if view.state["action_status"] == "collision" else max(0, self._holds - 1)
+        moved = math.inf if self._goal is None else float(np.hypot(*(position - self._goal)[:2]))
+        if self._goal is None or moved > _AFAR or (self._holds == 0 and moved > min(_AFAR, 0.3 * view.away(position))):
+            self._goal = position
+        return self._goal
 
 
 class GoTo:
@@ -106,13 +173,13 @@ class Search:
 
 
 class WalkUp:
-    """Walk up to a thing that was seen, through the door that it was seen through. Outcomes: ``arrived``, ``stuck``."""
+    """Walk up to a thing that was seen. Outcomes: ``arrived``, ``stuck``."""
 
     def __init__(self, skills: AssistantSkills, target: Sighting, *, near: float = GRASP) -> None:
         self.outcome = ""
         self.target = target
-        self._skills, self._near = skills, near
-        self._through = ""
+        self._near = near
+        self._pursuit = Pursuit(skills, target.position)
         self._nearest = math.inf
         self._steps = self._vain = 0
 
@@ -120,7 +187,7 @@ class WalkUp:
         """Return how far it came."""
         return {
             "target": self.target.state(),
-            "through": self._through,
+            "pursuit": self._pursuit.state(),
             "nearest": None if math.isinf(self._nearest) else self._nearest,
             "steps": self._steps,
             "vain": self._vain,
@@ -128,7 +195,8 @@ class WalkUp:
 
     def restore(self, state: AgentState) -> None:
         """Go on."""
-        self.target, self._through = Sighting(**state["target"]), state["through"]
+        self.target = Sighting(**state["target"])
+        self._pursuit.restore(state["pursuit"])
         self._nearest = math.inf if state["nearest"] is None else state["nearest"]
         self._steps, self._vain = state["steps"], state["vain"]
 
@@ -138,15 +206,9 @@ class WalkUp:
         seen = next((thing for thing in view.things if thing.entity == self.target.entity), None)
         if seen is not None:
             self.target = seen
-            self._through = self._skills.door_before(view, seen.position)
+            self._pursuit.see(view, seen.position)
         self._steps += 1
-        if view.room and self._through == view.room:
-            self._through, self._nearest = "", math.inf
-        action = None
-        if view.room and self._through:
-            action = self._skills.go_through(view, self._through)
-        if action is None:
-            action = self._skills.approach(view, self.target.position, near=self._near)
+        action = self._pursuit.step(view, near=self._near)
         if action is None or self._is_stuck(view):
             self.outcome = "arrived" if action is None else "stuck"
             return None

@@ -122,12 +122,12 @@ class _Reported(Hook):
 
 def _residents(task: Task, community: Community, public_map: PublicMap) -> dict[str, Agent]:
     """Make those who live there; who is to be helped with carrying waits for helpers."""
-    residents: dict[str, Agent] = dict(followers_of(community, public_map, seed=task.seed))
+    followers = followers_of(community, public_map, seed=task.seed)
+    residents: dict[str, Agent] = dict(followers)
     if task.category == "carry":
         for subtask in task.subtasks:
             name = subtask.person.agent
-            day = residents[name]
-            residents[name] = Requester(day, community.resident_by_id[name], public_map, seed=task.seed)
+            residents[name] = Requester(followers[name], community.resident_by_id[name], public_map, seed=task.seed)
     return residents
 
 
