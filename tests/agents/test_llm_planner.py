@@ -20,8 +20,10 @@ from vico.agents.assistant.skills import ObservationView
 from vico.agents.navigation.memory import SeenThing
 from vico.agents.wrappers import model_faults_of, usage_of
 from vico.errors import InputError
-from vico.io.plain_data import read_plain, write_plain
+from vico.io.plain_data import decode, encode, read_plain, write_plain
 from vico.llm import Budget, LanguageModel
+from vico.sim.config import SimConfig
+from vico.sim.simulation import Simulation
 from vico.world.public import PublicMap
 
 BEGAN = 9 * 3600.0
@@ -334,6 +336,44 @@ def test_it_goes_on_where_its_state_was_saved(public_map: PublicMap, tmp_path: P
     assert server.told[-1]["previous"] != []
     assert again.tokens == made.tokens == 240
     assert again.model_faults == made.model_faults == [(3, "tried")]
+
+
+def test_two_that_are_restored_while_they_act_go_on_as_the_others_do(public_map: PublicMap) -> None:
+    sim = Simulation(toy_city.world(), None, SimConfig(assistants=2, observe=None, image=64))
+    box = toy_city.quad([[-0.1, -0.1, 0.1], [0.1, -0.1, 0.1], [0.1, 0.1, 0.1], [-0.1, 0.1, 0.1]], (200, 20, 20), 0, "b")
+    for name, position, room in (
+        ("red bag", (-7.0, 10.0, toy_city.FLOOR), "r_cafe"),
+        ("blue cup", (1.0, -24.0, 0), ""),
+    ):
+        sim.scenario.add_object(name, name, [box], position, room=room, size=np.array([0.2, 0.2, 0.2]))
+    for k in range(2):
+        sim.scenario.place_agent(f"assistant_{k}", (3.0 * k, -20.0))
+    server = ScriptedPlanner(nearest, lines=("I look for the cup.", "I go to the café."))
+    with planner_server(server) as base:
+        model = impatient(base)
+
+        def pair() -> dict[str, LlmPlanner]:
+            return {
+                f"assistant_{k}": LlmPlanner(TASKS[:2], public_map, seed=1, number=k, of=2, model=model)
+                for k in range(2)
+            }
+
+        going_on, restored = pair(), list[dict[str, LlmPlanner]]()
+        observations, infos = sim.observe()
+        types = []
+        for step in range(100):
+            if step in (8, 30, 55, 80):
+                restored.append(pair())
+                for name, agent in restored[-1].items():
+                    agent.restore(decode(encode(going_on[name].state())))
+            actions = {name: agent.act(observations[name], infos[name]) for name, agent in going_on.items()}
+            for others in restored:
+                assert {name: agent.act(observations[name], infos[name]) for name, agent in others.items()} == actions
+            types += [str(action["type"]) for action in actions.values()]
+            result = sim.step(actions)
+            observations, infos = result.observations, result.infos
+    assert types.count("communicate") == 2
+    assert {"pick", "enter"} <= set(types)
 
 
 def test_a_recording_gives_the_same_choices(public_map: PublicMap, tmp_path: Path) -> None:
