@@ -90,7 +90,9 @@ class Briefing:
         told, k = self._book.instructions[choice.subtask], choice.subtask
         category = self._book.category(k)
         if choice.kind == "deliver":
-            return f"task {k}: bring what is in hand to {told['destination']['name']} and put it down there"
+            held = " and the ".join(name for name in told["objects"] if name in self._book.picked)
+            what = f"the {held}" if held else "what is in hand"
+            return f"task {k}: bring {what} to {told['destination']['name']} and put it down there"
         what = told["person"]["name"] if category == "carry" else " and the ".join(self._book.wanted(k))
         what = what if category == "carry" else f"the {what}"
         then = {

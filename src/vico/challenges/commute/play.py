@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from vico.agents.base import Agent
 from vico.agents.commute import METHODS, make_planner
@@ -26,8 +24,7 @@ from vico.runner.gather import Gatherer
 from vico.runner.isolated import IsolatedAgent
 from vico.runner.loading import AgentSeat
 from vico.runner.loop import Hook, Runner, Step
-from vico.runner.recording import RecordedRun
-from vico.sim.recorder import Recorder
+from vico.runner.recording import recorded_in
 from vico.world.folder import World
 from vico.world.model import Stop, TramStop
 from vico.world.public import PublicMap
@@ -69,8 +66,8 @@ def play_day(
         if isinstance(inner, IsolatedAgent):
             stack.callback(inner.close)
         if recording is not None:
-            recorder = Recorder(recording, sim, sources={"world": str(job.world)}, wanted=task.seconds)
-            runner.hooks.append(_Recorded(RecordedRun(stack.enter_context(recorder), runner.faults)))
+            recorded = recorded_in(recording, sim, runner.faults, world=job.world, wanted=task.seconds)
+            runner.hooks.append(stack.enter_context(recorded))
         while not judge.over:
             runner.run(task.seconds, until=lambda: judge.stays or judge.over)
             if judge.stays:
@@ -94,21 +91,6 @@ class _Index(Hook):
 
     def stepped(self, step: Step) -> None:
         self._info.index = len(self._judge.logs)
-
-
-class _Recorded(Hook):
-    """Records a run that is gone on with after every stay: it begins once."""
-
-    def __init__(self, recorded: RecordedRun) -> None:
-        self._recorded, self._begun = recorded, False
-
-    def begin(self, observations: Mapping[str, dict[str, Any]]) -> None:
-        if not self._begun:
-            self._recorded.begin(observations)
-        self._begun = True
-
-    def stepped(self, step: Step) -> None:
-        self._recorded.stepped(step)
 
 
 class _Reported(Hook):
