@@ -55,7 +55,7 @@ class Estimates:
         """Seconds from a point to another, which is one of the task's: its distance field is kept."""
         if not self.distance:
             return UNIFORM
-        metres = self._metres(start, goal)
+        metres = self.metres(start, goal)
         return _DETOUR * metres / pace
 
     def look(self, region: Mapping[str, Any], *, person: bool) -> float:
@@ -74,7 +74,8 @@ class Estimates:
         food = self._map.place_by_id[str(region["place"])].category == "food"
         return _AT_MEALS if food and eats else 1.0 / _AT_MEALS if food else 1.0
 
-    def _metres(self, start: Sequence[float], goal: Sequence[float]) -> float:
+    def metres(self, start: Sequence[float], goal: Sequence[float]) -> float:
+        """Metres on foot between the same; where no way is known, a guess from the straight line."""
         key = (round(float(goal[0]), 2), round(float(goal[1]), 2))
         if key not in self._fields:
             self._fields[key] = self._map.router.distance_field(np.array(key))
