@@ -10,6 +10,7 @@ from typing import Literal
 from rich.console import Console
 from rich.table import Table
 
+from vico.assets.language_model import SMALL_LANGUAGE_MODEL, small_language_model
 from vico.assets.packages import FetchError, Package, fetch, installed
 from vico.assets.people.anny import available, baked_file
 from vico.assets.people.bake import PEOPLE, bake
@@ -18,7 +19,7 @@ from vico.assets.things.pack import PACK, available_things, credits_of, fetch_th
 from vico.cli.output import print_json
 from vico.io.cache import cache_folder
 
-Pack = Literal["people", "robots", "things", "all"]
+Pack = Literal["people", "robots", "things", "llm", "all"]
 
 
 def _say(sentence: str) -> None:
@@ -55,6 +56,9 @@ def install(what: Pack = "all", *, pack: Path | None = None, force: bool = False
         for name in robot_names():
             robot_model(name)
             _say(f"robots: {name} is ready")
+    if what == "llm":
+        fetch(SMALL_LANGUAGE_MODEL, force=force, say=_say)
+        _say(f"llm: {small_language_model()}, for `vico llm serve`")
     if what in ("things", "all"):
         try:
             baked = fetch_things(pack, force=force, say=_say)
@@ -70,6 +74,7 @@ def install(what: Pack = "all", *, pack: Path | None = None, force: bool = False
 def status(*, json: bool = False) -> int:
     """Say which packs are installed, with their licences."""
     rows = [("people", PEOPLE, available())]
+    rows.append(("llm", SMALL_LANGUAGE_MODEL, installed(SMALL_LANGUAGE_MODEL) is not None))
     rows += [("robots", package, installed(package) is not None) for package in robot_packages()]
     if json:
         print_json([*(_entry(pack, package, ready) for pack, package, ready in rows), *_things()])

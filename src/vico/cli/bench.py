@@ -10,6 +10,7 @@ from contextlib import redirect_stdout
 from pathlib import Path
 
 from vico.cli import community, world
+from vico.cli.options import CommunityBuildOptions
 from vico.cli.output import print_json
 from vico.errors import MissingFileError, VicoError
 from vico.worldgen.packaged import packaged_extract
@@ -76,7 +77,7 @@ def _prepare(here: Path, parts: tuple[str, ...]) -> None:
         if "world" in parts:
             world.build(Sources(place.path), out=here / "world", centre=(place.lat, place.lon), half=place.half)
         if "people" in parts:
-            community.build(here / "world", out=here / "people", residents=RESIDENTS, seed=0, force=False, json=False)
+            community.build(CommunityBuildOptions(here / "world", here / "people", residents=RESIDENTS))
 
 
 def tables_of(text: str) -> list[dict[str, object]]:

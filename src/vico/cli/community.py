@@ -4,24 +4,103 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
+from typing import Any
 
-from vico.cli.output import check_output, print_json, print_table, progress_bars
-from vico.community import build_community, check_community, digest_of, read_community, world_of, write_community
+from vico.cli.options import CommunityBuildOptions
+from vico.cli.output import Report, check_output, print_json, print_table, progress_bars
+from vico.community import (
+    Author,
+    Community,
+    build_community,
+    check_community,
+    digest_of,
+    read_community,
+    world_of,
+    write_community,
+)
+from vico.community.authorship import Origin
+from vico.community.llm import LlmCommunityAuthor
 from vico.errors import InputError
-from vico.world.folder import read_world
+from vico.world.folder import World, read_world
+
+# The longest answer that a model may give, tokens: the day of a busy person has about two thousand.
+_LONGEST_ANSWER = 4096
+# What went wrong is told for so many items; the rest is in authorship.json.
+_MOST_TROUBLES = 8
 
 
-def build(path: Path, *, out: Path, residents: int, seed: int, force: bool, json: bool) -> int:
-    """People the world at `path`, write the community to `out`, and say who lives there."""
-    check_output(out, path, force=force)
-    world = read_world(path)
+def build(options: CommunityBuildOptions) -> int:
+    """People a world, write the community, and say who lives there and who wrote what."""
+    asks_model = options.asks_model
+    check_output(options.out, options.path, force=options.force)
+    world = read_world(options.path)
     began = time.perf_counter()
     with progress_bars() as report:
-        report("people and schedules", 0, 1)
-        community = build_community(world, residents=residents, seed=seed)
-        report("people and schedules", 1, 1)
-    write_community(community, out, force=force or out.is_dir(), world=path)
-    people = [
+        author = llm_author(options, report) if asks_model else None
+        community = _written(world, options, author, report)
+    write_community(community, options.out, force=options.force or options.out.is_dir(), world=options.path)
+    facts = {
+        "path": str(options.out),
+        "world": community.world.name,
+        "digest": digest_of(community),
+        "author": community.author,
+        "date": f"{community.weekday} {community.date}",
+        "residents": len(community.residents),
+        "groups": len(community.groups),
+        "relations": len(community.relations),
+        "seconds": round(time.perf_counter() - began, 2),
+    }
+    people = _people(community, world)
+    told = _told(author) if author is not None else None
+    if options.json:
+        print_json({**facts, "people": people, **({} if told is None else {"llm": told})})
+        return 0
+    print_table("Community", facts)
+    print_table(
+        "Residents",
+        {
+            str(p["name"]): f"{p['age']}, {p['occupation']}" + (f" at {p['workplace']}" if p["workplace"] else "")
+            for p in people
+        },
+    )
+    if told is not None:
+        _print_authorship(told)
+    return 0
+
+
+def llm_author(options: CommunityBuildOptions, report: Report) -> LlmCommunityAuthor:
+    """Return the language model that options and environment name, as an author.
+
+    Raises
+    ------
+    InputError, MissingFileError, SchemaError
+        If no model is named, or an option is unusable.
+    """
+    from vico.io.cache import cache_folder
+    from vico.llm import Budget, Connection, LanguageModel, Sampling
+
+    given: dict[str, Any] = {"record": options.llm_record, "replay": options.llm_replay}
+    model = LanguageModel.from_environment(
+        cache=options.llm_cache or cache_folder() / "llm",
+        budget=Budget(tokens=options.llm_budget_tokens, cost=options.llm_budget_cost),
+        sampling=Sampling(seed=options.seed, max_tokens=_LONGEST_ANSWER),
+        connection=Connection(timeout=options.llm_timeout),
+        **{name: value for name, value in given.items() if value is not None},
+    )
+    return LlmCommunityAuthor(model, workers=options.llm_concurrency, only=options.llm_only, progress=report)
+
+
+def _written(world: World, options: CommunityBuildOptions, author: Author | None, report: Report) -> Community:
+    if author is not None:
+        return build_community(world, residents=options.residents, seed=options.seed, author=author)
+    report("people and schedules", 0, 1)
+    community = build_community(world, residents=options.residents, seed=options.seed)
+    report("people and schedules", 1, 1)
+    return community
+
+
+def _people(community: Community, world: World) -> list[dict[str, Any]]:
+    return [
         {
             "name": r.name,
             "age": r.age,
@@ -31,28 +110,46 @@ def build(path: Path, *, out: Path, residents: int, seed: int, force: bool, json
         }
         for r in community.residents
     ]
-    facts = {
-        "path": str(out),
-        "world": community.world.name,
-        "digest": digest_of(community),
-        "date": f"{community.weekday} {community.date}",
-        "residents": len(community.residents),
-        "groups": len(community.groups),
-        "relations": len(community.relations),
-        "seconds": round(time.perf_counter() - began, 2),
+
+
+def _told(author: LlmCommunityAuthor) -> dict[str, Any]:
+    """Return who wrote what, what it took, and what went wrong."""
+    assert author.report is not None
+    authorship, spent = author.report.authorship, author.model.budget.spent
+    return {
+        "model": authorship.model,
+        "items": {kind: {o.value: n for o, n in counts.items()} for kind, counts in authorship.counts.items()},
+        "written": authorship.written,
+        "fallen_back": [
+            {"item": one.item, "why": one.origin.value, "detail": one.detail} for one in authorship.fallen_back
+        ],
+        "troubles": author.report.troubles,
+        "stopped": author.report.over,
+        "calls": spent.calls,
+        "tokens": spent.tokens,
+        "dollars": round(spent.cost, 6),
     }
-    if json:
-        print_json({**facts, "people": people})
-    else:
-        print_table("Community", facts)
-        print_table(
-            "Residents",
-            {
-                str(p["name"]): f"{p['age']}, {p['occupation']}" + (f" at {p['workplace']}" if p["workplace"] else "")
-                for p in people
-            },
-        )
-    return 0
+
+
+def _print_authorship(told: dict[str, Any]) -> None:
+    rows = {
+        kind: ", ".join(f"{counts[o.value]} {o.value}" for o in Origin if counts.get(o.value))
+        for kind, counts in told["items"].items()
+    }
+    rows["spent"] = f"{told['calls']} calls, {told['tokens']:,} tokens" + (
+        f", ${told['dollars']:.4f}" if told["dollars"] else ""
+    )
+    print_table(f"Written by {told['model']}", rows)
+    if told["stopped"]:
+        print(f"The model was not asked to the end: {told['stopped']}")
+    left = told["fallen_back"]
+    if left:
+        what = "everything" if not told["written"] else f"{len(left)} items"
+        print(f"By rule, as the model did not write them so that they hold: {what} (authorship.json lists them)")
+    for one in left[:_MOST_TROUBLES]:
+        print(f"  {one['item']}: {one['why']}" + (f" ({one['detail']})" if one["detail"] else ""))
+    if len(left) > _MOST_TROUBLES:
+        print(f"  and {len(left) - _MOST_TROUBLES} more")
 
 
 def check(path: Path, *, world: Path | None = None, json: bool = False) -> int:

@@ -15,7 +15,7 @@ from vico.cli import community as community_verb
 from vico.cli import replay as replay_verb
 from vico.cli import run as run_verb
 from vico.cli import world as world_verb
-from vico.cli.options import RunOptions
+from vico.cli.options import CommunityBuildOptions, RunOptions
 from vico.cli.output import check_output
 from vico.errors import StageError
 from vico.worldgen.packaged import packaged_extract
@@ -39,7 +39,7 @@ def demo(out: Path, *, seed: int = 0, force: bool = False) -> int:
     console.rule("1 of 5: the world")
     world_verb.build(Sources(extract.path), out=world, centre=(extract.lat, extract.lon), half=extract.half, seed=seed)
     console.rule("2 of 5: its people")
-    community_verb.build(world, out=people, residents=15, seed=seed, force=False, json=False)
+    community_verb.build(CommunityBuildOptions(world, people, seed=seed))
     with ThreadPoolExecutor(1) as beside:
         console.rule("3 of 5: half an hour of their morning; beside it, an evening in the rain with robots")
         filmed = beside.submit(_evening, world, people, evening, seed)

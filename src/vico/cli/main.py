@@ -20,7 +20,15 @@ import tyro
 from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
-from vico.cli.options import AssistantOptions, CommaSeparated, FilmOptions, RunOptions, StillOptions, WorldBuildOptions
+from vico.cli.options import (
+    AssistantOptions,
+    CommaSeparated,
+    CommunityBuildOptions,
+    FilmOptions,
+    RunOptions,
+    StillOptions,
+    WorldBuildOptions,
+)
 from vico.errors import VicoError, line_of, sentence_of
 from vico.io.files import reason_of
 from vico.version import __version__
@@ -37,6 +45,7 @@ check = SubcommandApp()
 evaluation = SubcommandApp()
 assets = SubcommandApp()
 motion = SubcommandApp()
+language_model = SubcommandApp()
 
 
 @world.command(name="build")
@@ -118,29 +127,16 @@ def world_info(path: Positional[Path], json: bool = False) -> int:
 
 
 @community.command(name="build")
-def community_build(
-    path: Positional[Path],
-    out: Path,
-    residents: int = 15,
-    seed: int = 0,
-    force: bool = False,
-    json: bool = False,
-) -> int:
+def community_build(options: Annotated[CommunityBuildOptions, FLAT]) -> int:
     """People a world: homes, jobs, groups and a full day for each resident.
 
     Example: vico community build helsinki --residents 15 --out people
 
-    Args:
-        path: World folder.
-        out: Folder to make; refused if it exists, unless --force.
-        residents: How many people.
-        seed: Decides who they are.
-        force: Replace what is in the output folder.
-        json: Print the result as JSON.
+    Example: vico community build helsinki --llm --llm-budget-tokens 400000 --out people
     """
     from vico.cli import community as verb
 
-    return verb.build(path, out=out, residents=residents, seed=seed, force=force, json=json)
+    return verb.build(options)
 
 
 @app.command(name="export")
@@ -329,7 +325,7 @@ def evaluate_assistant(options: Annotated[AssistantOptions, FLAT]) -> int:
 
 @assets.command(name="install")
 def assets_install(
-    what: Positional[Literal["people", "robots", "things", "all"]] = "all",
+    what: Positional[Literal["people", "robots", "things", "llm", "all"]] = "all",
     pack: Path | None = None,
     force: bool = False,
 ) -> int:
@@ -338,7 +334,7 @@ def assets_install(
     Example: vico assets install people
 
     Args:
-        what: Which pack.
+        what: Which pack. "llm" is a small language model (98 MB), which "all" leaves out.
         pack: For "things": a .deb of sweethome3d-furniture or a folder with its archives. Without it the one the
             system has, else what apt-get downloads.
         force: Fetch and prepare again.
@@ -346,6 +342,25 @@ def assets_install(
     from vico.cli import assets as verb
 
     return verb.install(what, pack=pack, force=force)
+
+
+@language_model.command(name="serve")
+def llm_serve(model: Path | None = None, context: int = 8192, threads: int = 1, port: int = 0) -> int:
+    """Serve a language model on this machine, and print the variables that name it. Needs the extra "llm".
+
+    Example: vico llm serve
+
+    Example: vico llm serve --model qwen2.5-7b-instruct-q4_k_m.gguf --threads 8
+
+    Args:
+        model: Weights in GGUF. Without it the small ones of `vico assets install llm`, which only show that all works.
+        context: Longest question and answer together, tokens.
+        threads: Processor threads; beside other work, one is the fastest.
+        port: Of 127.0.0.1; 0 takes a free one.
+    """
+    from vico.cli import llm as verb
+
+    return verb.serve(model, context=context, threads=threads, port=port)
 
 
 @assets.command(name="status")
@@ -450,6 +465,7 @@ app.command(community, name="community", help="People a world.")
 app.command(check, name="check", help="Check a world or a community.")
 app.command(assets, name="assets", help="Richer bodies and robots.")
 app.command(motion, name="motion", help="Motions of other programs, and of recorded people.")
+app.command(language_model, name="llm", help="A language model on this machine.")
 app.command(evaluation, name="eval", help="Judge agents on a challenge.")
 
 

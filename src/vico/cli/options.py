@@ -138,6 +138,83 @@ class WorldBuildOptions:
 
 
 @dataclass(frozen=True)
+class CommunityBuildOptions:
+    """What `vico community build` is asked for.
+
+    Attributes
+    ----------
+    path
+        World folder.
+    out
+        Folder to make; refused if it exists, unless --force.
+    residents
+        How many people.
+    seed
+        Decides who they are.
+    llm
+        A language model writes them (VICO_LLM_BASE_URL, VICO_LLM_MODEL, VICO_LLM_KEY); what it leaves is written by
+        rule.
+    llm_only
+        Refuse to leave anything to the rules.
+    llm_concurrency
+        Questions to it under way at a time.
+    llm_budget_tokens
+        Most tokens.
+    llm_budget_cost
+        Most dollars, at the prices of VICO_LLM_PRICE.
+    llm_timeout
+        Seconds until an answer has to be there.
+    llm_cache
+        Folder of its answers, in which the same question is found again; without it, one in the user's cache.
+    llm_record
+        File to which all its answers are appended.
+    llm_replay
+        Such a file, from which they are taken instead; no server is needed.
+    force
+        Replace what is in the output folder.
+    json
+        Print the result as JSON.
+    """
+
+    path: Positional[Path]
+    out: Path
+    residents: int = 15
+    seed: int = 0
+    llm: bool = False
+    llm_only: bool = False
+    llm_concurrency: int = 4
+    llm_budget_tokens: int | None = None
+    llm_budget_cost: float | None = None
+    llm_timeout: float = 120.0
+    llm_cache: Path | None = None
+    llm_record: Path | None = None
+    llm_replay: Path | None = None
+    force: bool = False
+    json: bool = False
+
+    @property
+    def asks_model(self) -> bool:
+        """Whether a language model is asked: --llm, or a recording of one.
+
+        Raises
+        ------
+        InputError
+            If an option of the language model is given without it.
+        """
+        asks = self.llm or self.llm_only or self.llm_replay is not None
+        given = {
+            "--llm-budget-tokens": self.llm_budget_tokens,
+            "--llm-budget-cost": self.llm_budget_cost,
+            "--llm-cache": self.llm_cache,
+            "--llm-record": self.llm_record,
+        }
+        unused = [name for name, value in given.items() if value is not None]
+        if unused and not asks:
+            raise InputError(f"community build: {unused[0]} is for a language model: add --llm")
+        return asks
+
+
+@dataclass(frozen=True)
 class RunOptions:
     """What `vico run` is asked for.
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from vico.assets.people import PASSERS_BY, body_of, passer_by
 from vico.cli import community, replay, run, world
-from vico.cli.options import RunOptions
+from vico.cli.options import CommunityBuildOptions, RunOptions
 from vico.sim.robots.navigation import NEIGHBOUR, room_to_turn
 from vico.world.walkable import fill_polygon
 from vico.worldgen.packaged import packaged_extract
@@ -32,7 +32,7 @@ def warm_up() -> int:
     with tempfile.TemporaryDirectory(prefix="vico-") as folder, redirect_stdout(io.StringIO()):
         here = Path(folder)
         world.build(Sources(place.path), out=here / "world", centre=(place.lat, place.lon), half=_RADIUS)
-        community.build(here / "world", out=here / "people", residents=6, seed=0, force=False, json=False)
+        community.build(CommunityBuildOptions(here / "world", here / "people", residents=6))
         run.run(RunOptions(here / "world", here / "people", out=here / "run", steps=60, cars=5, pedestrians=5))
         replay.replay(here / "run", film=True)
     # What so small a place and so short a time may not need: ramps of bridges, a robot that turns on the spot.

@@ -5,6 +5,7 @@
     community.json   manifest, written last: a folder that has it is whole
     residents.json   people with their schedules
     groups.json relations.json
+    authorship.json  who wrote what, where a language model was asked
     origin.json      where the world was; not hashed, no part of the community's identity
 """
 
@@ -19,6 +20,7 @@ from typing import TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
+from vico.community.authorship import Authorship
 from vico.community.model import SCHEMA, VERSION, Community, CommunityManifest, Group, Relation, Resident
 from vico.community.tags import with_tags
 from vico.errors import MissingFileError, OutputExistsError, SchemaError
@@ -30,7 +32,8 @@ from vico.world.model import Record
 R = TypeVar("R", bound=Record)
 
 _PARTS = ("residents.json", "groups.json", "relations.json")
-_FILES = ("community.json", "origin.json", *_PARTS)
+_AUTHORSHIP = "authorship.json"
+_FILES = ("community.json", "origin.json", _AUTHORSHIP, *_PARTS)
 
 
 def _rows(records: Sequence[Record]) -> bytes:
@@ -42,6 +45,10 @@ def _contents(community: Community) -> tuple[dict[str, bytes], bytes]:
     """Return the bytes of the parts, and of the manifest."""
     lists: tuple[Sequence[Record], ...] = (community.residents, community.groups, community.relations)
     parts = {name: _rows(records) for name, records in zip(_PARTS, lists, strict=True)}
+    if community.authorship is not None:
+        parts[_AUTHORSHIP] = (
+            json.dumps(community.authorship.model_dump(mode="json"), ensure_ascii=False, indent=1) + "\n"
+        ).encode()
     manifest = CommunityManifest(
         producer=community.producer,
         author=community.author,
@@ -159,6 +166,7 @@ def read_community(path: Path, world: World | None = None) -> Community:
         residents=_records(path / "residents.json", Resident, manifest),
         groups=_records(path / "groups.json", Group, manifest),
         relations=_records(path / "relations.json", Relation, manifest),
+        authorship=_authorship(path / _AUTHORSHIP, manifest) if _AUTHORSHIP in manifest.files else None,
     )
     # Folders of earlier versions, and days that a language model wrote, may say nothing about what an item is about.
     return with_tags(community, () if world is None else world.places)
@@ -178,15 +186,26 @@ def world_of(path: Path) -> Path | None:
 
 def _records(path: Path, kind: type[R], manifest: CommunityManifest) -> list[R]:
     try:
+        return TypeAdapter(list[kind]).validate_json(_content(path, manifest))  # type: ignore[valid-type]
+    except ValidationError as error:
+        raise _invalid(path, error) from None
+
+
+def _authorship(path: Path, manifest: CommunityManifest) -> Authorship:
+    try:
+        return Authorship.model_validate_json(_content(path, manifest))
+    except ValidationError as error:
+        raise _invalid(path, error) from None
+
+
+def _content(path: Path, manifest: CommunityManifest) -> bytes:
+    try:
         content = path.read_bytes()
     except FileNotFoundError:
         raise MissingFileError(f"{path}: no such file; build the community anew") from None
     if hashlib.sha256(content).hexdigest() != manifest.files.get(path.name):
         raise SchemaError(f"{path}: changed since the community was built; restore it, or build the community anew")
-    try:
-        return TypeAdapter(list[kind]).validate_json(content)  # type: ignore[valid-type]
-    except ValidationError as error:
-        raise _invalid(path, error) from None
+    return content
 
 
 def _invalid(path: Path, error: ValidationError) -> SchemaError:

@@ -15,6 +15,7 @@ from pydantic import AfterValidator, ConfigDict, Field, with_config
 from typing_extensions import TypedDict
 
 from vico.clock import DAY, clock_of
+from vico.community.authorship import Authorship
 from vico.world.model import Point2, Record
 
 SCHEMA = "vico.community"
@@ -269,6 +270,8 @@ class Community(Record):
         Who wrote it: ``procedural``, or the name of a language model.
     date
         The day that the schedules are for, ISO.
+    authorship
+        Who wrote what, where a language model was asked; else None.
     """
 
     producer: str
@@ -279,6 +282,7 @@ class Community(Record):
     residents: list[Resident]
     groups: list[Group]
     relations: list[Relation]
+    authorship: Authorship | None = None
 
     @property
     def weekday(self) -> str:

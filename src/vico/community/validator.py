@@ -61,6 +61,29 @@ def check_community(community: Community, world: World) -> list[CommunityFinding
     return _Check(community, PlaceIndex(world, community.date.weekday())).run()
 
 
+def check_resident(resident: Resident, community: Community, index: PlaceIndex) -> list[CommunityFinding]:
+    """Check what can be said of one resident alone: who they are and their day, not their groups' days or their spawn.
+
+    Parameters
+    ----------
+    resident
+        Need not be in the community yet.
+    community
+        Whose day and groups count.
+    index
+        The community's world on its day.
+
+    Returns
+    -------
+    list of CommunityFinding
+        Empty if all is well.
+    """
+    check = _Check(community, index)
+    check.person(resident)
+    check.schedule(resident)
+    return check.found
+
+
 class _Check:
     def __init__(self, community: Community, index: PlaceIndex) -> None:
         self.community = community

@@ -132,6 +132,11 @@ class LanguageModel:
         return self._recorder is not None or self._replay is not None
 
     @property
+    def replays(self) -> bool:
+        """Whether all answers come from a recording."""
+        return self._replay is not None
+
+    @property
     def name(self) -> str:
         """The model and all that its answers hang on besides the questions, for a key: no secret is in it."""
         options = ", ".join(f"{key} {value}" for key, value in self._options.items() if value is not None)
