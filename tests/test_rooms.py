@@ -26,6 +26,7 @@ ALLOWED = {
         "envs",
         "llm",
         "io.compiled",
+        "io.data_files",
         "world.public",
         "world.routing",
         "world.trips",
