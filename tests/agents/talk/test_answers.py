@@ -102,7 +102,7 @@ def test_ways_and_places() -> None:
     place, steps = claims_in(way)
     assert (place.kind, place.place, place.metres, place.direction) == ("place", "South Green", 30, "south")
     assert (steps.kind, steps.place, steps.metres) == ("way", "South Green", 30)
-    assert steps.text.startswith("go south along the way for about 30 m")
+    assert steps.text.startswith("go south along the path for about 30 m")
     assert ask(knows, "way", "Moon") == read_sentences().say("unknown_place")
     assert ask(knows, "where", "Hat Shop", moment(place=SHOP)) == "This is Hat Shop, you are there already."
 

@@ -133,12 +133,12 @@ def way_in_words(
     legs = legs_of(points, public_map)
     first = legs[0]
     said = [sentences.step("start", direction=sentences.direction(*first.begins), **_of(first, sentences))]
-    told = legs[: MOST_LEGS - 1]
+    told = legs[:MOST_LEGS]
     said += [
         sentences.step(turn_between(before.ends, leg.begins), **_of(leg, sentences)) for before, leg in pairwise(told)
     ]
-    if len(legs) == len(told):
-        said.append(sentences.steps[_door(place, points[-1], legs[-1].ends)])
+    whole = len(legs) == len(told)
+    said.append(sentences.steps[_door(place, points[-1], legs[-1].ends) if whole else "further"])
     return ", ".join(said), metres
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from vico.agents.base import Info, Observation
@@ -177,14 +178,20 @@ class Knowledge:
         return None if person is None else self.public_map.place_by_id.get(person.home)
 
     def place_called(self, what: str, position: tuple[float, float]) -> PublicPlace | None:
-        """Return the nearest place of a name, or of a kind, that one knows: a haunt, or one near by."""
+        """Return the nearest place of a name or kind that one knows: near by, or where one or one's friends go."""
         bare = read_grammar().bare
         wanted = bare(what).lower()
-        near = {place.id for place in self.public_map.places_near(position, NEAR)}
-        known = [place for place in self.public_map.places if place.id in near or place.id in self.me.places]
+        ids = {place.id for place in self.public_map.places_near(position, NEAR)} | self._haunts
+        known = [place for place in self.public_map.places if place.id in ids]
         found = [place for place in known if bare(place.name).lower() == wanted]
         found = found or [place for place in known if place.kind.replace("_", " ") == wanted]
         return min(found, key=lambda place: math.dist(place.position[:2], position), default=None)
+
+    @cached_property
+    def _haunts(self) -> set[str]:
+        """Ids of places where one goes, or people whom one knows."""
+        theirs = {habit.place for one in self.known.values() for habit in one.habits}
+        return {*self.me.places, *theirs, *(one.home for one in self.known.values())}
 
     def beside(self, x: float, y: float) -> PublicPlace | None:
         """Return the nearest place that a point lies beside, of those with names of their own."""

@@ -50,7 +50,7 @@ SENTENCES: Mapping[str, frozenset[str]] = {
 STEPS: Mapping[str, frozenset[str]] = {
     "start": frozenset({"direction", "street", "metres"}),
     **{turn: frozenset({"street", "metres"}) for turn in ("left", "right", "straight", "back")},
-    **{door: frozenset() for door in ("door_left", "door_right", "door_ahead")},
+    **{door: frozenset() for door in ("door_left", "door_right", "door_ahead", "further")},
 }
 #: How each field is read; what is not listed may be any words.
 _READ = {
@@ -68,7 +68,6 @@ _FIELD = re.compile(r"\{(\w+)\}")
 class _File(DataRecord):
     compass: Annotated[list[str], Field(min_length=8, max_length=8)]
     unnamed: Annotated[str, Field(min_length=1)]
-    outdoors: Annotated[str, Field(min_length=1)]
     sentence: dict[str, str]
     step: dict[str, str]
 
@@ -79,7 +78,6 @@ class Sentences:
 
     compass: tuple[str, ...]
     unnamed: str
-    outdoors: str
     sentences: Mapping[str, str]
     steps: Mapping[str, str]
 
@@ -130,7 +128,7 @@ def read_sentences() -> Sentences:
         for name, text in said.items():
             if fault := _fault(text, wanted[name], reads=table == "sentence"):
                 raise SchemaError(f"{path}: {table}.{name}: {fault}; see {GUIDE}")
-    return Sentences(tuple(file.compass), file.unnamed, file.outdoors, file.sentence, file.step)
+    return Sentences(tuple(file.compass), file.unnamed, file.sentence, file.step)
 
 
 def _fault(text: str, wanted: frozenset[str], *, reads: bool) -> str:
