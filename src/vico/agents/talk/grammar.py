@@ -21,7 +21,6 @@ Kind = Literal["seen", "way", "where", "doing", "did", "plans", "who"]
 ABOUT = ("seen", "way", "where")
 # Longer messages are no questions, characters; and so long may be what is asked for.
 _MOST, _MOST_WHAT = 400, 100
-_FORM = re.compile(r"[a-z' ]*(\{what\})?[a-z' ]*")
 
 
 class QuestionForms(DataRecord):
@@ -59,6 +58,12 @@ def _pattern(form: str) -> re.Pattern[str]:
     """Return what a form at the end of something said is known by."""
     words = [re.escape(part) for part in form.split("{what}")]
     return re.compile(r"(?:^|(?<=[\s,;:.!]))" + f"(?P<what>.{{1,{_MOST_WHAT}}}?)".join(words) + "$", re.IGNORECASE)
+
+
+def _is_form(form: str, *, about: bool) -> bool:
+    """Whether a form is written as it should be; `about`: it names what it is about."""
+    words = form.replace("{what}", "", 1 if about else 0).strip()
+    return bool(words) and form == form.lower() and ("{what}" in form) == about and not re.search(r"[{}?|()]", words)
 
 
 @dataclass(frozen=True)
@@ -138,7 +143,7 @@ def read_grammar() -> Grammar:
         file = read_record(path, _File, guide=GUIDE)
         for question in file.question:
             for form in question.forms:
-                if not _FORM.fullmatch(form) or ("{what}" in form) != (question.kind in ABOUT):
+                if not _is_form(form, about=question.kind in ABOUT):
                     raise SchemaError(
                         f"{path}: question {question.kind!r}: {form!r}; write small letters, with {{what}} once if it "
                         f"is one of {', '.join(ABOUT)}, and without otherwise; see {GUIDE}"
