@@ -6,9 +6,11 @@
 
 The full simulation, with 15 residents who follow their day and traffic; one assistant that sees 256 x 256 pictures uses
 `AssistantSkills` alone. A *leg* is one errand: from some 40 m off through the entrance into a place (*in*), through a
-door to the next room (*door*; *stairs* where the room is one), to within 1.15 m of a thing on a surface (*surface*), out
-into the street again (*out*), between two points outdoors (*walk*). Shortest walks come from the ground truth: seconds
-at 1 m/s (0.5 on stairs) on a 0.1 m grid indoors, the router's outdoors, without turns. To be compared, two states of the sources run the same tours.
+door to the next room (*door*; *stairs* where the room is one), to within 1.15 m of a thing on a surface (*surface*),
+out into the street again (*out*), between two points outdoors (*walk*). Shortest walks come from the ground truth:
+seconds at 1 m/s (0.5 on stairs) on a 0.1 m grid indoors, the router's outdoors, without turns. The time of a step is
+processor time of all perception and navigation, done anew for the first 300 steps. To be compared, two
+states of the sources run the same tours.
 """
 
 from __future__ import annotations
@@ -47,6 +49,7 @@ _CELL = 0.1
 _KEPT = 300  # steps
 _ME = "assistant_0"
 Action = dict[str, Any]
+Skill = Callable[[ObservationView], Action | None]
 Script = Generator[Action, ObservationView, None]
 
 
@@ -92,7 +95,7 @@ class Tour:
         self.rooms_by_id = {room.id: room for room in self.world.rooms}
         self._script = self._whole()
         self._begun = False
-        self._kept: list[tuple[dict[str, Any], dict[str, Any], Callable[[ObservationView], Action | None] | None]] = []
+        self._kept: list[tuple[dict[str, Any], dict[str, Any], Skill | None]] = []
         self._view: ObservationView | None = None
 
     def act(self, observation: dict[str, Any], info: dict[str, Any]) -> Action:
@@ -118,7 +121,7 @@ class Tour:
             return {"type": "wait"}
 
     def processor_time(self) -> float:
-        """Do the same perception and navigation anew, for the first steps; return milliseconds of processor time a step.
+        """Do the same perception and navigation anew, for the first steps; return milliseconds of processor a step.
 
         Whatever else a step takes (pictures, the simulation) is left out, and so is what other programs take.
         """
@@ -381,8 +384,8 @@ def table(args: argparse.Namespace) -> None:
         "",
         machine(),
         "",
-        "What the columns mean: `benchmarks/navigation.py`. *Over* is the median of steps to seconds of the shortest walk,",
-        "where that takes a second at least; turns take a step each and are not in the shortest walk.",
+        "What the columns mean: `benchmarks/navigation.py`. *Over* is the median of steps to seconds of the shortest",
+        "walk, where that takes a second at least; turns take a step each and are not in the shortest walk.",
         "",
         "| sources, world | leg | reached | mean steps | over | collisions a minute | refused |",
         "|---|---|---|---|---|---|---|",

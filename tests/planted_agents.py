@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 import gc
+import importlib
+import inspect
+import logging
 import os
+import signal
 import sys
+import tempfile
 import threading
+from collections import namedtuple
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -188,6 +195,109 @@ class Spy(Honest):
             found += [value for value in frame.f_locals.values() if isinstance(value, (Simulation, SimulationState))]
             frame = frame.f_back
         return {"type": "communicate", "text": f"found {len(found)}"}
+
+
+class Searcher(Honest):
+    """Looks for the simulation among all objects, and goes where it says the goal is."""
+
+    def act(self, observation: Observation, info: dict[str, Any]) -> dict[str, Any]:
+        found = [thing for thing in gc.get_objects() if type(thing).__name__ == "Simulation"]
+        return {"type": "communicate", "text": f"found {len(found)}"}
+
+
+class FrameWalker(Honest):
+    """Looks for the simulation in the frames that call it."""
+
+    def act(self, observation: Observation, info: dict[str, Any]) -> dict[str, Any]:
+        frame: Any = sys._getframe()
+        while frame is not None:
+            if "sim" in frame.f_locals:
+                return {"type": "communicate", "text": "found it"}
+            frame = frame.f_back
+        return dict(WAIT)
+
+
+class Inspector(Honest):
+    """Does so with Python's own tools."""
+
+    def act(self, observation: Observation, info: dict[str, Any]) -> dict[str, Any]:
+        frame = inspect.currentframe()
+        return {"type": "communicate", "text": f"called by {frame and frame.f_back}"}
+
+
+class Thief(Honest):
+    """Reads the task that lies beside the world, and what the world holds; the environment says where."""
+
+    def act(self, observation: Observation, info: dict[str, Any]) -> dict[str, Any]:
+        with open(os.path.join(os.environ["PLANTED_WORLD"], "task.json")) as file:
+            return {"type": "communicate", "text": file.read()}
+
+
+class Sly(Honest):
+    """Reads it, and hides that it was refused."""
+
+    def act(self, observation: Observation, info: dict[str, Any]) -> dict[str, Any]:
+        with suppress(Exception):
+            Thief.act(self, observation, info)
+        return dict(WAIT)
+
+
+class Generator(Honest):
+    """Makes the task itself, with all its answers."""
+
+    def act(self, observation: Observation, info: dict[str, Any]) -> dict[str, Any]:
+        importlib.import_module("vico.challenges.assistant.delivery")
+        return dict(WAIT)
+
+
+class Killer(Honest):
+    """Ends the process that judges it."""
+
+    def act(self, observation: Observation, info: dict[str, Any]) -> dict[str, Any]:
+        os.kill(os.getppid(), signal.SIGTERM)
+        return dict(WAIT)
+
+
+class Teleporter(Honest):
+    """Writes where it wants to be into what it is given."""
+
+    def act(self, observation: Observation, info: dict[str, Any]) -> dict[str, Any]:
+        observation["pose"][:2] = 30.0
+        return dict(WAIT)
+
+
+class Impostor(Honest):
+    """Names somebody else as the one who acts."""
+
+    def act(self, observation: Observation, info: dict[str, Any]) -> dict[str, Any]:
+        return {"type": "move_forward", "distance": 1.0, "agent": "resident_0"}
+
+
+class Puppeteer(Honest):
+    """Answers with everybody's actions."""
+
+    def act(self, observation: Observation, info: dict[str, Any]) -> Any:
+        return {"assistant_0": dict(WAIT), "resident_0": {"type": "move_forward", "distance": 3.0}}
+
+
+class Driver(Honest):
+    """Sends a robot that is not its own."""
+
+    def act(self, observation: Observation, info: dict[str, Any]) -> dict[str, Any]:
+        return {"type": "go_to", "target": [0.0, 0.0, 0.0]}
+
+
+class Respectable(Honest):
+    """Does what an honest agent may: logs, warns, keeps a file of its own, uses libraries that look at frames."""
+
+    def act(self, observation: Observation, info: dict[str, Any]) -> dict[str, Any]:
+        logging.getLogger("mine").info("at %s", observation["pose"])
+        kind = namedtuple("kind", "x y")
+        with tempfile.TemporaryFile("w") as file:
+            file.write(str(kind(*observation["pose"][:2])))
+        importlib.import_module("vico.agents.base")
+        gc.collect()
+        return dict(WAIT)
 
 
 def function(observation: Observation, info: dict[str, Any]) -> dict[str, Any]:

@@ -73,8 +73,8 @@ def characters(data: dict[str, Any]) -> dict[str, Any]:
                 "workplace": workplace,
                 "values": ["benevolence", "self-direction", "security"],
                 "personality": {
-                    "openness": 0.7, "conscientiousness": 0.5, "extraversion": 0.4, "agreeableness": 0.8,
-                    "neuroticism": 0.2, "traits": ["patient", "wry"],
+                    "openness": 70, "conscientiousness": 50, "extraversion": 40, "agreeableness": 80,
+                    "neuroticism": 20, "traits": ["patient", "wry"],
                 },
                 "hobbies": ["kite repair", "street maps"],
                 "lifestyle": "Walks where others ride, and knows every bench.",

@@ -1,10 +1,13 @@
 """The examples run as they are printed in the documentation."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from vico.io.files import read_json
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -59,6 +62,23 @@ def test_getting_around_prints_trips_and_arrives(helsinki_path: Path) -> None:
     assert " after " in printed
 
 
+def test_an_agent_is_written_scored_and_ranked(helsinki_path: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    printed = run("11_write_an_agent.py", "--worlds", str(helsinki_path), "--out", str(out), "--steps", "15")
+    assert "findings: []" in printed
+    assert printed.count(" of 6 found; why not: {") == 2
+    assert {entry["method"].rpartition(":")[2] for entry in read_json(out / "leaderboard.json")["entries"]} == {
+        "Looker", "random",
+    }  # fmt: skip
+
+
+def test_the_agent_of_the_page_is_the_one_that_runs() -> None:
+    page = (EXAMPLES.parent / "docs" / "write_an_agent.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    example = (EXAMPLES / "11_write_an_agent.py").read_text(encoding="utf-8")
+    assert code.removeprefix("import math\n").strip() in example
+
+
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.name)
 def test_each_example_says_how_it_is_run(path: Path) -> None:
     assert f"python examples/{path.name} " in path.read_text()
@@ -71,6 +91,13 @@ def test_events_close_a_street_and_cut_the_power(helsinki_path: Path) -> None:
     assert "0 of 15 cars on Mikonkatu, 0 vanished" in printed
 
 
+def test_a_function_stands_in_for_a_language_model(corner_path: Path) -> None:
+    printed = run("11_llm_author.py", "--world", str(corner_path), "--residents", "3")
+    assert printed.count("can tell the time by shadows") == 3
+    assert "character {'written by the model': 3}" in printed
+    assert "schedule {'no usable reply': 3}" in printed
+
+
 @pytest.mark.slow
 def test_a_scene_of_the_film_is_filmed(helsinki_path: Path, tmp_path: Path) -> None:
     small = ("--residents", "20", "--size", "128x72", "--samples", "1", "--scenes", "street")
@@ -81,7 +108,7 @@ def test_a_scene_of_the_film_is_filmed(helsinki_path: Path, tmp_path: Path) -> N
 
 def test_people_are_asked_and_answer(helsinki_path: Path, helsinki_people: Path) -> None:
     printed = run(
-        "11_asking_people.py", "--world", str(helsinki_path), "--community", str(helsinki_people), "--steps", "60"
+        "12_asking_people.py", "--world", str(helsinki_path), "--community", str(helsinki_people), "--steps", "60"
     )
     assert "assistant: Excuse me, have you seen" in printed
     assert "   understood: " in printed

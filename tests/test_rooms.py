@@ -27,15 +27,17 @@ ALLOWED = {
         "llm",
         "io.compiled",
         "io.data_files",
+        "io.npz",
         "world.public",
         "world.routing",
         "world.trips",
+        "world.timetable",
         "world.walkable",
         "world.model",
         "world.heights",
     },
     "runner": {"agents", "envs", "sim", "world", "io"},
-    "challenges": {"runner", "envs", "agents", "community", "world", "assets", "io"},
+    "challenges": {"runner", "envs", "agents", "community", "world", "assets", "llm", "io"},
 }
 OPEN = {"viewer", "cli"}  # and the front door, api.py
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
-from vico.community import Community, CommunityFinding, read_community, write_community
+from vico.community import Community, CommunityFinding, date_of, read_community, write_community
 from vico.community import build_community as _build_community
 from vico.community import check_community as _check_community
 from vico.errors import InputError
@@ -102,9 +102,15 @@ def check_world(world: World | Path | str) -> list[WorldFinding]:
 
 
 def build_community(
-    world: World | Path | str, residents: int = 15, seed: int = 0, *, out: Path | str | None = None
+    world: World | Path | str,
+    residents: int = 15,
+    seed: int = 0,
+    *,
+    out: Path | str | None = None,
+    day: str | None = None,
+    days: int = 1,
 ) -> Community:
-    """People a world with residents who have homes, jobs, friends, groups and a full day.
+    """People a world with residents who have homes, jobs, friends, groups and a full day, or several.
 
     Parameters
     ----------
@@ -116,16 +122,20 @@ def build_community(
         Decides who they are.
     out
         Folder to write the community to; None only returns it.
+    day, days
+        First day, a date like ``2025-06-07`` or a day of the week like ``saturday``, and how many days everybody has a
+        schedule for.
 
     Raises
     ------
     EmptyInputError
-        If the world has no homes, or nowhere to meet.
+        If the world has no homes, too few beds, or nowhere to meet.
     InputError, OutputExistsError
         If `residents` is not positive, or `out` holds something.
     """
     place = _world(world)
-    community = _build_community(place, residents=residents, seed=seed)
+    first = None if day is None else date_of(day)
+    community = _build_community(place, residents=residents, seed=seed, date=first, days=days)
     if out is not None:
         write_community(community, Path(out), world=place.path)
     return community

@@ -191,7 +191,7 @@ def test_a_run_that_cannot_be_is_refused(
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (("--method", "frob"), "there are heuristic, random"),
+        (("--method", "frob"), "no method called 'frob'; there are "),
         (("--assistants", 3), "3 assistants"),
         (("--seeds", 0), "at least one"),
         (("--steps", 0), "at least one"),

@@ -30,7 +30,7 @@ WORLD_KEYS = {
 RUN_KEYS = {
     "steps", "wall_seconds", "real_time_factor", "peak_rss_mb", "state_hash", "collisions", "arrivals", "late",
 }  # fmt: skip
-EVAL_KEYS = {"category", "method", "assistants", "subtasks", "SR", "Ts", "episodes", "wall_seconds"}
+EVAL_KEYS = {"rows", "differences", "averages", "episodes", "not_played", "setting", "worlds", "challenge", "vico"}
 
 
 def printed(capsys: pytest.CaptureFixture[str]) -> Any:
@@ -97,10 +97,12 @@ def test_eval_tells_rates_and_leaves_tasks_and_results(
     assert vico("eval", "assistant", "--worlds", helsinki_path, *words, "--out", out, "--json") == 0
     told = printed(capsys)
     assert told.keys() >= EVAL_KEYS
-    assert (told["episodes"], told["subtasks"], told["SR"], told["Ts"]) == (1, 6, 0.0, 3.0)
+    (row,) = told["rows"]
+    assert (row["category"], row["method"], row["episodes"], row["parts"]) == ("delivery", "random", 1, 6)
+    assert (row["metrics"]["SR"]["mean"], row["metrics"]["Ts"]["mean"]) == (0.0, 3.0)
     assert len(list((out / "tasks").glob("*.json"))) == 1
-    assert json.loads((out / "results.json").read_text())["summary"] == told
-    assert "| delivery | random | 1 | 1 | 6 |" in (out / "results.md").read_text()
+    assert json.loads((out / "results.json").read_text()) == told
+    assert "| random | 0.0 (one episode) | 3" in (out / "results.md").read_text()
 
 
 def test_a_run_leaves_nothing_beside_its_folder(helsinki_path: Path, helsinki_people: Path, tmp_path: Path) -> None:

@@ -123,28 +123,6 @@ def test_a_run_has_one_hash_whoever_looks_and_however_many_work(
     assert len(hashes) == 1
 
 
-@pytest.mark.slow
-def test_a_killed_evaluation_comes_to_the_same_table(helsinki_path: Path, tmp_path: Path) -> None:
-    def words(out: Path) -> list[object]:
-        steps = ["--seeds", 2, "--steps", 10, "--method", "random"]
-        return ["eval", "assistant", "--worlds", helsinki_path, *steps, "--out", out]
-
-    def table(out: Path) -> tuple[Any, Any]:
-        content = read_json(out / "results.json")
-        for row in (content["summary"], *content["episodes"]):
-            del row["wall_seconds"]
-        return content["summary"], content["episodes"]
-
-    assert vico(*words(tmp_path / "whole")) == 0
-    out = tmp_path / "cut"
-    # In the second episode: its task is there, its outcome is not.
-    tasks = out.with_name("cut.partial") / "tasks"
-    kill_once(words(out), lambda: tasks.is_dir() and len(list(tasks.iterdir())) == 2)
-    assert not out.exists()
-    assert vico(*words(out)) == 0
-    assert table(out) == table(tmp_path / "whole")
-
-
 def test_a_run_whose_agent_has_no_state_says_so(
     helsinki_path: Path, helsinki_people: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from vico.cli.main import main
+from vico.community import read_community
 
 
 def run(*arguments: object) -> int:
@@ -56,3 +57,17 @@ def test_an_existing_folder_exits_2_with_one_sentence(
 
 def test_a_missing_world_exits_2(tmp_path: Path) -> None:
     assert run("community", "build", tmp_path / "none", "--out", tmp_path / "p") == 2
+
+
+def test_days_are_built_and_one_is_taken(
+    helsinki_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = ("--residents", 5, "--day", "friday", "--days", 3, "--out", tmp_path / "people")
+    assert run("community", "build", helsinki_path, *asked) == 0
+    assert len(read_community(tmp_path / "people").dates) == 3
+    assert run("community", "day", tmp_path / "people", "--day", "sunday", "--out", tmp_path / "sunday") == 0
+    assert run("check", "community", tmp_path / "sunday", "--world", helsinki_path) == 0
+    assert read_community(tmp_path / "sunday").weekday == "Sunday"
+    capsys.readouterr()
+    assert run("community", "day", tmp_path / "people", "--day", "monday", "--out", tmp_path / "no") != 0
+    assert "no monday among 2025-06-06 (Friday)" in capsys.readouterr().err

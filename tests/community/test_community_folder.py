@@ -34,6 +34,7 @@ def test_the_manifest_counts_what_is_there(community: Community, folder: Path) -
         "residents": 15,
         "groups": len(community.groups),
         "relations": len(community.relations),
+        "days": 0,
     }
 
 

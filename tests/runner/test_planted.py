@@ -137,10 +137,14 @@ def test_overwriting_what_one_is_given_changes_nothing(tmp_path: Path) -> None:
     assert vandals == honest
 
 
-def test_in_a_process_of_its_own_there_is_no_simulation_to_be_found(tmp_path: Path) -> None:
+def test_in_a_process_of_its_own_nobody_may_look_for_the_simulation(tmp_path: Path) -> None:
     # In this process there is one, so the search does find what there is.
-    assert "found 0" not in play("Spy", tmp_path, isolate=False, steps=1)[2]
-    assert "found 0" in play("Spy", tmp_path, isolate=True, steps=1)[2]
+    said = [text for text in play("Spy", tmp_path, isolate=False, steps=1)[2] if text.startswith("found ")]
+    assert len(said) == 1
+    assert said != ["found 0"]
+    runner, _, heard = play("Spy", tmp_path, isolate=True, steps=1)
+    assert not any(text.startswith("found ") for text in heard)
+    assert runner.faults.by_agent() == {"assistant_0": {"unfair": 1}}
 
 
 def test_memory_is_limited(tmp_path: Path) -> None:
@@ -168,7 +172,7 @@ import sys, time
 from pathlib import Path
 from vico.runner.isolated import IsolatedAgent
 from vico.runner.loading import AgentSeat
-agent = IsolatedAgent(sys.argv[1], AgentSeat("assistant_0"), world=Path("."))
+agent = IsolatedAgent(sys.argv[1], AgentSeat("assistant_0"), world=Path("nowhere"))
 print(agent._process.pid, flush=True)
 agent.act({}, {})
 """

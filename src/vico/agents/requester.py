@@ -60,7 +60,7 @@ class Dweller(Scheduled, Protocol):
 class Requester:
     """Lives its day with things in hand; when a helper speaks to it, it hands them over, thanks, and goes home.
 
-    Who is spoken to within 10 m stops, and waits a minute for the helper to come within 1.4 m with a free hand.
+    Who is spoken to by name within 10 m stops, and waits a minute for the helper to come within 1.4 m with a free hand.
 
     Parameters
     ----------
@@ -120,12 +120,13 @@ class Requester:
         return self._day.act(observation, info)
 
     def _listen(self, observation: Observation, time: float) -> None:
-        """Wait for a helper who speaks near by."""
+        """Wait for a helper near by who says one's first name: others may be near, too."""
         x, y = observation["pose"][:2]
         for message in observation["events"]:
             speaker = str(message["speaker"])
             away = math.hypot(message["position"][0] - x, message["position"][1] - y)
-            if speaker.startswith(HELPERS) and away <= CALL_DISTANCE:
+            called = self._resident.name.split()[0].casefold() in str(message["text"]).casefold()
+            if speaker.startswith(HELPERS) and called and away <= CALL_DISTANCE:
                 if self._helper != speaker:
                     self._said = _HERE
                 self._helper, self._waits_until = speaker, time + WAITS_FOR

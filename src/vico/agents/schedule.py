@@ -164,6 +164,11 @@ class ScheduleFollower:
         """When the resident last spoke with agents, seconds."""
         return self._conversation.greeted
 
+    def has_arrived(self, time: float) -> bool:
+        """Return whether it is where it means to be at a time, seconds: not on the way, and not about to leave."""
+        stay = self._stay_at(time % DAY)
+        return stay is not None and self._arrived == stay
+
     def state(self) -> AgentState:
         """Return all that decides what is done next, beside the day and the map."""
         arrived = self._arrived

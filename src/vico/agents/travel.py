@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -65,6 +65,12 @@ _NO_VEHICLE, _NO_FREE_SPOT, _NO_MONEY, _CLOSED, _HIT_BODY = map(
 )
 
 
+#: Plans a trip from what one observes to a point, without what was found to be out of use (ids, closed ground); None if
+#: there is none. For who rides a bicycle it begins with a leg of mode ``bike``; one without a destination ends at its
+#: end with the rider on the bicycle still, who keeps it.
+TripPlanner = Callable[[Observation, tuple[float, float], tuple[Closure, ...]], Trip | None]
+
+
 class Traveller:
     """Goes from door to door by the trip that arrives first, from observations and the public map alone.
 
@@ -79,6 +85,10 @@ class Traveller:
         Decides how to get around others.
     modes
         Ways to get about that it may choose, of `vico.world.trips.MODES`.
+    planner
+        Plans its trips; None: the trip that arrives first.
+    fastest
+        Metres a second that it does not exceed on foot.
 
     Attributes
     ----------
@@ -89,11 +99,18 @@ class Traveller:
     """
 
     def __init__(
-        self, public_map: PublicMap, generator: np.random.Generator, *, modes: Collection[str] = MODES
+        self,
+        public_map: PublicMap,
+        generator: np.random.Generator,
+        *,
+        modes: Collection[str] = MODES,
+        planner: TripPlanner | None = None,
+        fastest: float = RUN,
     ) -> None:
         self._map = public_map
         self._rng = generator
         self._modes = tuple(modes)
+        self._planner, self._fastest = planner, fastest
         self._walker = Walker(public_map, generator)
         self._goal: tuple[float, float] | None = None
         self.trip: Trip | None = None
@@ -204,7 +221,7 @@ class Traveller:
         if vehicle in ("bus", "tram", "train"):
             return self._ride_bus(observation)
         if vehicle == "bike":
-            return self._ride_bike(observation, info)
+            return self._ride_bike(goal, observation, info)
         leg = self._leg_on_foot(goal, observation)
         if leg is None:
             return None
@@ -240,10 +257,8 @@ class Traveller:
             if _away(observation, leg.end) > _BUS_AT_STOP:
                 trip = None
             self._leg, self._tries = self._leg + 1, 0
-        if trip is None:
-            trip = self._planned(goal, observation)
-            self.trip, self._leg, self._tries = trip, 0, 0
-            self.plans += 1
+        self.trip = trip
+        trip = self.trip or self._begin(goal, observation)
         if trip is None:
             return None
         leg = trip.legs[self._leg]
@@ -254,8 +269,16 @@ class Traveller:
             leg = trip.legs[self._leg]
         return leg
 
+    def _begin(self, goal: tuple[float, float], observation: Observation) -> Trip | None:
+        """Plan a trip and begin it; None if there is none."""
+        self.trip, self._leg, self._tries = self._planned(goal, observation), 0, 0
+        self.plans += 1
+        return self.trip
+
     def _planned(self, goal: tuple[float, float], observation: Observation) -> Trip | None:
         """Return the trip that is meant, if there is one in time; else the one that arrives first."""
+        if self._planner is not None:
+            return self._planner(observation, goal, (*self._closed, *self._ground))
         state = observation["state"]
         here, now, cash = observation["pose"][:2], float(state["time"]), float(state["cash"])
         meant, self._fresh = self._ride if self._fresh else None, False
@@ -275,7 +298,7 @@ class Traveller:
         if ride is None or ride.mode not in _RIDDEN:
             return speed
         left = ride.depart - AHEAD - float(observation["state"]["time"])
-        return max(speed, min(RUN, self.remaining(observation["pose"]) / max(left, 1.0)))
+        return max(speed, min(self._fastest, self.remaining(observation["pose"]) / max(left, 1.0)))
 
     def _is_at_the_ride(self, ride: Leg, observation: Observation) -> bool:
         """Return whether one stands where a ride begins."""
@@ -388,10 +411,15 @@ class Traveller:
             return {"type": "move_forward", "distance": 0.8}
         return {"type": "enter_bike"}
 
-    def _ride_bike(self, observation: Observation, info: Info) -> Action:
-        """Ride to the station, and leave the bicycle there."""
+    def _ride_bike(self, goal: tuple[float, float], observation: Observation, info: Info) -> Action | None:
+        """Ride to the station, and leave the bicycle there; None once there with a bicycle that is kept."""
         trip = self.trip
+        if trip is None and self._planner is not None:
+            trip = self._begin(goal, observation)
         leg = trip.legs[self._leg] if trip is not None and self._leg < len(trip.legs) else None
+        if leg is not None and leg.mode == "bike" and leg.destination is None:
+            freed = self._freed(observation)
+            return freed or self._walker.towards(leg.end, BIKE_SPEED, observation, info, room=_TURNING)
         end = leg.end if leg is not None and leg.mode == "bike" else self._nearest_station(observation)
         if end is None or _away(observation, end) <= _TO_RACK:
             refused = self._asked == "exit_bike" and observation["state"]["action_code"] == _NO_FREE_SPOT
@@ -409,6 +437,9 @@ class Traveller:
             return None
         self._tries += 1
         if self._tries > _PUSHES:
+            leg = self.trip.legs[self._leg] if self.trip is not None and self._leg < len(self.trip.legs) else None
+            if leg is not None and leg.origin is not None:
+                self._closed.append(leg.origin)  # there is no getting away from that rack
             return {"type": "exit_bike"}
         # Ahead a little, or round the other way.
         if self._tries % 2:
@@ -453,4 +484,4 @@ def _restored_leg(state: dict[str, Any]) -> Leg:
     return Leg(start=start, end=end, polyline=polyline, **{name: state[name] for name in _FIELDS})
 
 
-__all__ = ["Traveller"]
+__all__ = ["Traveller", "TripPlanner"]

@@ -6,18 +6,27 @@ from dataclasses import asdict
 from pathlib import Path
 
 from vico.cli.output import print_json
+from vico.cli.small_world import small_world
 from vico.errors import InputError
 from vico.runner.check import check_agent
 from vico.world.folder import read_world
 
 
-def check(agent: str, *, world: Path, steps: int, seed: int, deadline: float, isolate: bool, json: bool) -> int:
-    """Let an agent play an assistant in a world; say what is wrong, a line a finding; 1 if anything is."""
+def check(agent: str, *, world: Path | None, steps: int, seed: int, deadline: float, isolate: bool, json: bool) -> int:
+    """Let an agent play an assistant in a world; say what is wrong, a line a finding; 1 if anything is.
+
+    Parameters
+    ----------
+    world
+        None for a small one of the packaged place.
+    """
     if steps < 2:
         raise InputError(f"check-agent: --steps {steps}; it has to be 2 or more")
     if not deadline > 0:
         raise InputError(f"check-agent: --deadline {deadline:g}; give seconds above 0")
-    found = check_agent(agent, read_world(world), steps=steps, seed=seed, deadline=deadline, isolate=isolate)
+    found = check_agent(
+        agent, read_world(world or small_world()), steps=steps, seed=seed, deadline=deadline, isolate=isolate
+    )
     if json:
         print_json(
             {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from datetime import date as Date
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from vico.community import (
     Community,
     build_community,
     check_community,
+    date_of,
     digest_of,
     read_community,
     world_of,
@@ -33,11 +35,14 @@ def build(options: CommunityBuildOptions) -> int:
     """People a world, write the community, and say who lives there and who wrote what."""
     asks_model = options.asks_model
     check_output(options.out, options.path, force=options.force)
+    if asks_model and (options.day is not None or options.days != 1):
+        raise InputError("community build: a language model writes one working day; leave out --day and --days")
+    first = None if options.day is None else date_of(options.day)
     world = read_world(options.path)
     began = time.perf_counter()
     with progress_bars() as report:
         author = llm_author(options, report) if asks_model else None
-        community = _written(world, options, author, report)
+        community = _written(world, options, first, author, report)
     write_community(community, options.out, force=options.force or options.out.is_dir(), world=options.path)
     facts = {
         "path": str(options.out),
@@ -45,6 +50,7 @@ def build(options: CommunityBuildOptions) -> int:
         "digest": digest_of(community),
         "author": community.author,
         "date": f"{community.weekday} {community.date}",
+        "days": len(community.dates),
         "residents": len(community.residents),
         "groups": len(community.groups),
         "relations": len(community.relations),
@@ -90,11 +96,13 @@ def llm_author(options: CommunityBuildOptions, report: Report) -> LlmCommunityAu
     return LlmCommunityAuthor(model, workers=options.llm_concurrency, only=options.llm_only, progress=report)
 
 
-def _written(world: World, options: CommunityBuildOptions, author: Author | None, report: Report) -> Community:
+def _written(
+    world: World, options: CommunityBuildOptions, first: Date | None, author: Author | None, report: Report
+) -> Community:
     if author is not None:
         return build_community(world, residents=options.residents, seed=options.seed, author=author)
     report("people and schedules", 0, 1)
-    community = build_community(world, residents=options.residents, seed=options.seed)
+    community = build_community(world, residents=options.residents, seed=options.seed, date=first, days=options.days)
     report("people and schedules", 1, 1)
     return community
 
@@ -150,6 +158,20 @@ def _print_authorship(told: dict[str, Any]) -> None:
         print(f"  {one['item']}: {one['why']}" + (f" ({one['detail']})" if one["detail"] else ""))
     if len(left) > _MOST_TROUBLES:
         print(f"  and {len(left) - _MOST_TROUBLES} more")
+
+
+def day(path: Path, *, day: str, out: Path, force: bool, json: bool) -> int:
+    """Write one day of the community at `path` to `out`."""
+    check_output(out, path, force=force)
+    community = read_community(path)
+    one = community.on(date_of(day, community.dates))
+    write_community(one, out, force=force or out.is_dir(), world=world_of(path))
+    facts = {"path": str(out), "digest": digest_of(one), "date": f"{one.weekday} {one.date}"}
+    if json:
+        print_json(facts)
+    else:
+        print_table("Community", facts)
+    return 0
 
 
 def check(path: Path, *, world: Path | None = None, json: bool = False) -> int:

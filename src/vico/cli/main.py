@@ -20,8 +20,8 @@ import tyro
 from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
+from vico.cli.agent_verbs import check_agent, evaluation, leaderboard
 from vico.cli.options import (
-    AssistantOptions,
     CommaSeparated,
     CommunityBuildOptions,
     FilmOptions,
@@ -42,7 +42,6 @@ app = SubcommandApp()
 world = SubcommandApp()
 community = SubcommandApp()
 check = SubcommandApp()
-evaluation = SubcommandApp()
 assets = SubcommandApp()
 motion = SubcommandApp()
 language_model = SubcommandApp()
@@ -128,15 +127,33 @@ def world_info(path: Positional[Path], json: bool = False) -> int:
 
 @community.command(name="build")
 def community_build(options: Annotated[CommunityBuildOptions, FLAT]) -> int:
-    """People a world: homes, jobs, groups and a full day for each resident.
+    """People a world: homes, jobs, groups and a full day, or several, for each resident.
 
-    Example: vico community build helsinki --residents 15 --out people
+    Example: vico community build helsinki --residents 15 --day friday --days 3 --out people
 
     Example: vico community build helsinki --llm --llm-budget-tokens 400000 --out people
     """
     from vico.cli import community as verb
 
     return verb.build(options)
+
+
+@community.command(name="day")
+def community_day(path: Positional[Path], day: str, out: Path, force: bool = False, json: bool = False) -> int:
+    """Take one of several days of a community, as a community of its own that runs can live through.
+
+    Example: vico community day people --day saturday --out people_saturday
+
+    Args:
+        path: Community folder, built with --days.
+        day: A date like 2025-06-07, or a day of the week like saturday: the first one there is.
+        out: Folder to make; refused if it exists, unless --force.
+        force: Replace what is in the output folder.
+        json: Print the result as JSON.
+    """
+    from vico.cli import community as verb
+
+    return verb.day(path, day=day, out=out, force=force, json=json)
 
 
 @app.command(name="export")
@@ -190,37 +207,6 @@ def check_community(path: Positional[Path], world: Path | None = None, json: boo
     from vico.cli import community as verb
 
     return verb.check(path, world=world, json=json)
-
-
-@app.command(name="check-agent")
-def check_agent(
-    agent: Positional[Annotated[str, tyro.conf.arg(metavar="MODULE:NAME")]],
-    world: Path,
-    steps: int = 40,
-    seed: int = 0,
-    deadline: float = 1.0,
-    isolate: bool = False,
-    json: bool = False,
-) -> int:
-    """Check that an agent of yours keeps the contract, a line a finding. Exit 1 if anything is wrong.
-
-    It is made, it answers with actions and in time, it repeats itself, one restored from its state goes on as it does,
-    and it leaves what it is given as it is.
-
-    Example: vico check-agent my_agents:Walker --world helsinki
-
-    Args:
-        agent: my_module:MyAgent, or path/to/file.py:MyAgent.
-        world: World folder it plays an assistant in.
-        steps: How long, seconds.
-        seed: Of the simulation and the agent.
-        deadline: Seconds an action may take.
-        isolate: Ask it in a process of its own.
-        json: Print JSON.
-    """
-    from vico.cli import check_agent as verb
-
-    return verb.check(agent, world=world, steps=steps, seed=seed, deadline=deadline, isolate=isolate, json=json)
 
 
 @app.command(name="run")
@@ -310,17 +296,6 @@ def demo(out: Path = Path("out/demo"), seed: int = 0, force: bool = False) -> in
     from vico.cli import demo as verb
 
     return verb.demo(out, seed=seed, force=force)
-
-
-@evaluation.command(name="assistant")
-def evaluate_assistant(options: Annotated[AssistantOptions, FLAT]) -> int:
-    """Judge a planner on the community assistant tasks.
-
-    Example: vico eval assistant --category delivery --method heuristic --worlds helsinki monaco --seeds 3 --out results
-    """
-    from vico.cli import evaluate as verb
-
-    return verb.assistant(options)
 
 
 @assets.command(name="install")
@@ -467,6 +442,8 @@ app.command(assets, name="assets", help="Richer bodies and robots.")
 app.command(motion, name="motion", help="Motions of other programs, and of recorded people.")
 app.command(language_model, name="llm", help="A language model on this machine.")
 app.command(evaluation, name="eval", help="Judge agents on a challenge.")
+app.command(leaderboard, name="leaderboard", help="A public file of what methods came to.")
+app.command(name="check-agent")(check_agent)
 
 
 _log = logging.getLogger("vico")

@@ -151,6 +151,10 @@ class CommunityBuildOptions:
         How many people.
     seed
         Decides who they are.
+    day
+        First day, a date like 2025-06-07 or a day of the week like saturday; a working day by seed without it.
+    days
+        How many days everybody has a schedule for.
     llm
         A language model writes them (VICO_LLM_BASE_URL, VICO_LLM_MODEL, VICO_LLM_KEY); what it leaves is written by
         rule.
@@ -180,6 +184,8 @@ class CommunityBuildOptions:
     out: Path
     residents: int = 15
     seed: int = 0
+    day: str | None = None
+    days: int = 1
     llm: bool = False
     llm_only: bool = False
     llm_concurrency: int = 4
@@ -423,31 +429,38 @@ class StillOptions:
 
 
 @dataclass(frozen=True)
-class AssistantOptions:
-    """What `vico eval assistant` is asked for.
+class EvaluationOptions:
+    """What every `vico eval` is asked for.
 
     Attributes
     ----------
     worlds
-        World folders; one episode for each world and seed.
+        World folders; one episode for each world, seed, category and method.
     out
-        Folder for tasks and results; refused if it exists, unless --force.
-    category
-        What is asked for.
+        Folder for tasks, episodes and results; refused if it exists, unless --resume or --force.
     method
-        Planner: random, heuristic, or my_module:MyPlanner (path/to/file.py:MyPlanner).
-    deadline
-        Seconds a planner of yours has for an action; who is late waits a step. 0 waits for it as long as it takes.
-    isolate
-        Ask each planner of yours in a process of its own.
-    workers
-        Threads that render, and planners of yours asked at a time where there is no deadline; 0 is one a processor.
-    assistants
-        How many assistants work together.
+        One of the challenge's, my_module:MyAgent (path/to/file.py:MyAgent), or two joined by +. Give it several times
+        to judge several in the same tasks.
+    against
+        The method that the others are compared with; the first one without.
     seeds
         Episodes a world, seeded 0, 1, ...
-    steps
-        Seconds an episode may last.
+    workers
+        Processes side by side; 0 is one a processor. Decides nothing but how long it takes.
+    resume
+        Go on in OUT: episodes that are there and would come to the same are kept, what is missing is played.
+    record
+        Keep each episode's run (OUT/runs), for vico replay and the viewer.
+    compare
+        Put the published rows beside ours.
+    leaderboard
+        Add what it comes to to this leaderboard file; it is made if it is not there.
+    date
+        Of the leaderboard's entries, YYYY-MM-DD; left out without.
+    deadline
+        Seconds an agent of yours has for an action; who is late waits a step. 0 waits for it as long as it takes.
+    in_process
+        Ask agents of yours in the process that simulates, where nothing keeps them from the truth: for a debugger.
     force
         Replace what is in the output folder.
     json
@@ -456,16 +469,88 @@ class AssistantOptions:
 
     worlds: list[Path]
     out: Path
-    category: Literal["delivery"] = "delivery"
-    method: str = "heuristic"
-    deadline: float = 60.0
-    isolate: bool = False
-    workers: int = 0
-    assistants: int = 1
+    method: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="METHOD")] = ()
+    against: str = ""
     seeds: int = 3
-    steps: int = 1500
+    workers: int = 0
+    resume: bool = False
+    record: bool = False
+    compare: bool = False
+    leaderboard: Path | None = None
+    date: str | None = None
+    deadline: float = 60.0
+    in_process: bool = False
     force: bool = False
     json: bool = False
+
+
+Common = Annotated[EvaluationOptions, tyro.conf.arg(name="")]
+
+
+@dataclass(frozen=True)
+class AssistantOptions:
+    """What `vico eval assistant` is asked for.
+
+    Attributes
+    ----------
+    common
+        What every evaluation is asked for.
+    category
+        What is asked of the assistants.
+    assistants
+        How many of them work together.
+    advanced
+        The harder tasks: more places to look in, half the distances.
+    no_distance
+        Planners do not reckon with distances.
+    steps
+        Seconds an episode may last.
+    """
+
+    common: Common
+    category: Literal["carry", "delivery", "search", "all"] = "delivery"
+    assistants: int = 1
+    advanced: bool = False
+    no_distance: bool = False
+    steps: int = 1500
+
+
+@dataclass(frozen=True)
+class InfluenceOptions:
+    """What `vico eval influence` is asked for.
+
+    Attributes
+    ----------
+    common
+        What every evaluation is asked for.
+    variant
+        Of the opinion model that members have offline; the challenge's own without.
+    target_model
+        Language model that chooses whom to talk to, for methods that have one.
+    dialogue_model
+        Language model that talks.
+    """
+
+    common: Common
+    variant: str = ""
+    target_model: str = ""
+    dialogue_model: str = ""
+
+
+@dataclass(frozen=True)
+class CommuteOptions:
+    """What `vico eval commute` is asked for.
+
+    Attributes
+    ----------
+    common
+        What every evaluation is asked for.
+    hours
+        From the first leaving to the end of the day; 0 for the challenge's own.
+    """
+
+    common: Common
+    hours: float = 0.0
 
 
 def lat_lon(text: str, option: str) -> tuple[float, float]:

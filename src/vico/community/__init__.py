@@ -1,11 +1,13 @@
 """Who lives in a world: residents, groups, schedules, and the validator that keeps them grounded."""
 
 from vico.community.author import Author, build_community, procedural_author
+from vico.community.days import date_of
 from vico.community.findings import CommunityFinding
 from vico.community.folder import digest_of, read_community, read_manifest, world_of, write_community
 from vico.community.model import (
     ActivityTag,
     Community,
+    CommunityDay,
     CommunityManifest,
     Group,
     ItemType,
@@ -24,6 +26,7 @@ __all__ = [
     "ActivityTag",
     "Author",
     "Community",
+    "CommunityDay",
     "CommunityFinding",
     "CommunityManifest",
     "Group",
@@ -37,6 +40,7 @@ __all__ = [
     "ScheduleItem",
     "build_community",
     "check_community",
+    "date_of",
     "digest_of",
     "procedural_author",
     "read_community",

@@ -3,40 +3,45 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from datetime import date, timedelta
+from collections.abc import Callable, Sequence
+from datetime import date as Date  # parameters of that name would hide it
+from datetime import timedelta
+from functools import partial
 from typing import Protocol
 
 import numpy as np
 
 from vico.clock import clock_of
-from vico.community.biography import Biographer, lifestyle_of
+from vico.community.biography import Biographer, honest_character, lifestyle_of
 from vico.community.childhood import POCKET_MONEY
+from vico.community.day_measures import day_measures
+from vico.community.days import FIRST_DAY, DayDrafts, DaySchedules, drafts_on, planning_day, write_days
 from vico.community.findings import CommunityFinding
 from vico.community.groups import Meeting, form_groups, meetings_by_member
 from vico.community.households import draw_households
-from vico.community.model import Community, Group, Resident, ResidentAppearance, WorldIdentity
+from vico.community.model import Community, CommunityDay, Group, Resident, ResidentAppearance, WorldIdentity
 from vico.community.people import Household, ResidentDraft, draw_character
 from vico.community.place_index import PlaceIndex
 from vico.community.playmates import form_playmates
 from vico.community.relations import draw_relations
 from vico.community.rides import with_rides
-from vico.community.schedules import DayWriter
 from vico.community.schooling import assign_schools, plan_care, settle_care
 from vico.community.tags import with_tags
 from vico.community.validator import check_community
 from vico.community.wardrobe import Wardrobe
-from vico.community.work import assign_homes, assign_work, employers, study_places
+from vico.community.work import assign_homes, assign_work, check_beds, employers, study_places
 from vico.errors import EmptyInputError, InputError
 from vico.seeds import rng
 from vico.version import __version__
 from vico.world.folder import World
 from vico.world.model import Category
 
-#: A Monday; the day of a community is one of the five from it on.
-FIRST_DAY = date(2025, 6, 2)
+#: For so many days, at most, schedules are written.
+MOST_DAYS = 14
 
 _PROCEDURAL = "procedural"
+# Members of the largest household where nobody knows how many beds there are.
+_LARGEST = 5
 
 
 class Author(Protocol):
@@ -51,7 +56,14 @@ class Author(Protocol):
 
 
 def build_community(
-    world: World, residents: int = 15, seed: int = 0, *, author: Author | None = None, tries: int = 3
+    world: World,
+    residents: int = 15,
+    seed: int = 0,
+    *,
+    author: Author | None = None,
+    tries: int = 3,
+    date: Date | None = None,
+    days: int = 1,
 ) -> Community:
     """People a world, and see to it that the validator has nothing to say.
 
@@ -67,17 +79,25 @@ def build_community(
         Who writes; the procedural one unless given.
     tries
         How often the author may mend its draft.
+    date, days
+        Of the procedural author: the first day, one of five working days by seed unless given, and how many days
+        everybody has a schedule for.
 
     Raises
     ------
     EmptyInputError
         If the world has no homes, or nowhere to meet.
     InputError
-        If `residents` is not positive, or the author's last draft is still not grounded.
+        If `residents` or `days` is not positive or too large, a day is asked of another author, or the author's last
+        draft is still not grounded.
     """
     if residents < 1:
         raise InputError(f"community build: {residents} residents; ask for at least 1")
-    write: Author = procedural_author if author is None else author
+    if not 1 <= days <= MOST_DAYS:
+        raise InputError(f"community build: {days} days; ask for 1 to {MOST_DAYS}")
+    if author is not None and (date is not None or days != 1):
+        raise InputError("community build: only the procedural author takes a date or several days; leave them out")
+    write: Author = partial(procedural_author, date=date, days=days) if author is None else author
     findings: list[CommunityFinding] = []
     for _ in range(max(1, tries)):
         draft = with_tags(write(world, residents=residents, seed=seed, findings=findings), world.places)
@@ -92,7 +112,13 @@ def build_community(
 
 
 def procedural_author(
-    world: World, *, residents: int = 15, seed: int = 0, findings: Sequence[CommunityFinding] = ()
+    world: World,
+    *,
+    residents: int = 15,
+    seed: int = 0,
+    findings: Sequence[CommunityFinding] = (),
+    date: Date | None = None,
+    days: int = 1,
 ) -> Community:
     """Write a community by rule and by chance, without any language model.
 
@@ -104,28 +130,83 @@ def procedural_author(
     EmptyInputError
         If the world has no homes, or nowhere to meet.
     """
-    day = FIRST_DAY + timedelta(days=int(rng(seed, "community", "day").integers(5)))
-    index = PlaceIndex(world, day.weekday())
+    day = date or FIRST_DAY + timedelta(days=int(rng(seed, "community", "day").integers(5)))
+    dates = [day + timedelta(days=k) for k in range(days)]
+    index = PlaceIndex(world, planning_day(day.weekday()))
     problem: EmptyInputError | None = None
     # Few people or few places may leave somebody who is never free with others: other jobs, another try.
     for attempt in range(len(findings and [0]), 12):
         try:
-            return _draft(index, residents, seed, attempt, day)
+            return _draft(index, residents, seed, attempt, dates)
         except EmptyInputError as error:
             problem = problem or error
     assert problem is not None
     raise problem
 
 
-def _draft(index: PlaceIndex, count: int, seed: int, attempt: int, day: date) -> Community:
+def _draft(index: PlaceIndex, count: int, seed: int, attempt: int, dates: Sequence[Date]) -> Community:
     def stream(name: str) -> np.random.Generator:
         return rng(seed, "community", name, attempt)
 
-    world = index.world
+    planned = _plan(index, count, stream)
+    working_day = dates[0].weekday() == index.weekday
+    first = planned if working_day else drafts_on(index.on(dates[0].weekday()), planned, stream)
+    playmates = form_playmates(stream("playmates"), first.index, first.cares)
+    meetings = form_groups(stream("groups"), first.index, first.people, playmates)
+    relations = draw_relations(stream("relations"), index, planned.households, meetings, dates[0].year)
+    days = write_days(planned, first, meetings, relations, dates, stream)
+    groups = _groups(meetings)
+    people = _residents(planned, days, meetings, stream)
+    riding = [_ridden(people, groups, day, stream) for day in days]
+    community = Community(
+        producer=f"vico {__version__}",
+        author=_PROCEDURAL,
+        seed=seed,
+        date=dates[0],
+        world=WorldIdentity(name=index.world.manifest.name, digest=index.world.digest),
+        residents=riding[0],
+        groups=groups,
+        relations=relations,
+        further_days=[
+            CommunityDay(
+                date=day.date, absent=_absent(meetings, groups, day), schedules={r.id: r.schedule for r in residents}
+            )
+            for day, residents in zip(days[1:], riding[1:], strict=True)
+        ],
+    )
+    return _told(community, planned, meetings, stream)
+
+
+def _told(
+    community: Community,
+    planned: DayDrafts,
+    meetings: Sequence[Meeting],
+    stream: Callable[[str], np.random.Generator],
+) -> Community:
+    """Put what is said of people into words, now that their days are known."""
+    measures = day_measures(community)
+    biographer = Biographer(stream("biographies"), planned.index)
+    joined = meetings_by_member(meetings)
+    residents = []
+    for resident, draft in zip(community.residents, planned.people, strict=True):
+        draft.personality = honest_character(draft, measures[draft.id])
+        household = planned.households[draft.household]
+        told = {
+            "personality": draft.personality,
+            "lifestyle": lifestyle_of(stream(f"ways/{draft.id}"), draft, resident.schedule, measures[draft.id]),
+            "biography": biographer.write(draft, household, joined.get(draft.id, [])),
+        }
+        residents.append(resident.model_copy(update=told))
+    return community.model_copy(update={"residents": residents})
+
+
+def _plan(index: PlaceIndex, count: int, stream: Callable[[str], np.random.Generator]) -> DayDrafts:
+    """Draw everybody with home, school and work, as they are on a working day."""
     _, rooms = index.homes()
+    check_beds(index, count)
     if not index.places([c for c in Category if c not in (Category.ACCOMMODATION, Category.TRANSIT)]):
         raise EmptyInputError(
-            f"community: world {world.manifest.name!r} has no reachable place but homes and stops: nowhere to "
+            f"community: world {index.world.manifest.name!r} has no reachable place but homes and stops: nowhere to "
             "work or to meet; build a world with a larger --radius"
         )
     households = draw_households(
@@ -134,29 +215,37 @@ def _draft(index: PlaceIndex, count: int, seed: int, attempt: int, day: date) ->
         students=bool(study_places(index)),
         guests=bool(rooms),
         workers=bool(employers(index)),
+        largest=max((index.beds(home) for home in index.homes()[0]), default=0) or _LARGEST,
     )
     drafts = [s for h in households for s in h.members]
     uses: dict[str, int] = {}
     for draft in drafts:
-        draw_character(rng(seed, "community", "character", attempt, draft.id), draft, uses)
+        draw_character(stream(f"character/{draft.id}"), draft, uses)
     assign_homes(stream("homes"), index, households)
     assign_schools(stream("schools"), index, households)
     cares = plan_care(stream("care"), index, households)
     assign_work(stream("work"), index, drafts, cares)
     for care in cares:
         settle_care(index, care)
-    meetings = form_groups(stream("groups"), index, drafts, form_playmates(stream("playmates"), index, cares))
-    schedules, frequented = DayWriter(stream("days"), index).write(households, meetings)
-    relations = draw_relations(stream("relations"), index, households, meetings, day.year)
-    biographer = Biographer(stream("biographies"), index)
+    return DayDrafts(index, households, cares)
+
+
+def _residents(
+    planned: DayDrafts,
+    days: Sequence[DaySchedules],
+    meetings: Sequence[Meeting],
+    stream: Callable[[str], np.random.Generator],
+) -> list[Resident]:
+    """Write everybody down, with the first day on foot, but for what is said of them."""
+    index, households, drafts = planned.index, planned.households, planned.people
     looks = _looks(stream("looks"), households)
     spawns = index.spawn_points([s.home for s in drafts])
     joined = meetings_by_member(meetings)
     people = []
     for draft, spawn in zip(drafts, spawns, strict=True):
-        chance = rng(seed, "community", "details", attempt, draft.id)
+        chance = stream(f"details/{draft.id}")
         mine = joined.get(draft.id, [])
-        assert draft.personality is not None
+        frequented = [place for day in days for place in day.frequented[draft.id]]
         people.append(
             Resident(
                 id=draft.id,
@@ -166,31 +255,39 @@ def _draft(index: PlaceIndex, count: int, seed: int, attempt: int, day: date) ->
                 appearance=looks[draft.id],
                 occupation=draft.occupation,
                 values=draft.values,
-                personality=draft.personality,
+                personality=draft.character,
                 hobbies=[h.name for h in draft.hobbies],
-                lifestyle=lifestyle_of(chance, draft, schedules[draft.id]),
-                biography=biographer.write(draft, households[draft.household], mine),
+                lifestyle="",
+                biography="",
                 cash=_cash(chance, draft),
                 household=f"household_{draft.household}",
                 home=draft.home,
                 workplace=draft.workplace,
-                known_places=_known(index, draft, frequented[draft.id], mine),
+                known_places=_known(index, draft, frequented, mine),
                 spawn=spawn,
-                schedule=schedules[draft.id],
+                schedule=days[0].items[draft.id],
             )
         )
-    groups = _groups(meetings)
-    people = with_rides(people, groups, index, lambda name: rng(seed, "community", "rides", attempt, name))
-    return Community(
-        producer=f"vico {__version__}",
-        author=_PROCEDURAL,
-        seed=seed,
-        date=day,
-        world=WorldIdentity(name=world.manifest.name, digest=world.digest),
-        residents=people,
-        groups=groups,
-        relations=relations,
-    )
+    return people
+
+
+def _ridden(
+    people: Sequence[Resident], groups: Sequence[Group], day: DaySchedules, stream: Callable[[str], np.random.Generator]
+) -> list[Resident]:
+    """Return everybody with the schedule of a day, rides put in."""
+    there = [resident.model_copy(update={"schedule": day.items[resident.id]}) for resident in people]
+    return with_rides(there, groups, day.index, lambda name: stream(f"rides/{name}"))
+
+
+def _absent(meetings: Sequence[Meeting], groups: Sequence[Group], day: DaySchedules) -> dict[str, list[str]]:
+    """Return who does not come to which group on a further day."""
+    met = {(m.circle.name, m.place.id, m.start): {member.id for member in m.members} for m in day.meetings}
+    found = {}
+    for meeting, group in zip(meetings, groups, strict=True):
+        here = met.get((meeting.circle.name, meeting.place.id, meeting.start), set())
+        if absent := [member for member in group.members if member not in here]:
+            found[group.id] = absent
+    return found
 
 
 def _looks(chance: np.random.Generator, households: Sequence[Household]) -> dict[str, ResidentAppearance]:

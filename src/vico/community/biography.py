@@ -7,17 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from vico.clock import seconds_of_day
-from vico.community.catalogue import basic_values, biography_sentences, ways_of_life
+from vico.community.catalogue import Way, basic_values, biography_sentences, trait_words, ways, ways_of_life
 from vico.community.childhood import childhood, schools
+from vico.community.day_measures import DayMeasures, agrees
 from vico.community.groups import Meeting
-from vico.community.model import ItemType, ScheduleItem
+from vico.community.model import ItemType, Personality, ScheduleItem
 from vico.community.people import Household, ResidentDraft
 from vico.community.place_index import GUEST_KINDS, PlaceIndex, kind_of
 from vico.community.relations import describe_household
 from vico.world.model import Place
 
 # When one rises early, rises late, and goes to bed late, seconds of the day.
-_EARLY_RISE, _LATE_RISE, _LATE_TO_BED = 6 * 3600 + 1800, 7 * 3600 + 1800, 23 * 3600
+_EARLY_RISE, _LATE_RISE, _LATE_TO_BED = 6 * 3600 + 1800, 8 * 3600, 23 * 3600
 
 
 class Biographer:
@@ -182,35 +183,42 @@ def rhythm_of(day: Sequence[ScheduleItem], *, works_late: bool = False) -> str:
     return "Keeps regular hours"
 
 
-def lifestyle_of(rng: np.random.Generator, draft: ResidentDraft, day: Sequence[ScheduleItem]) -> str:
-    """Return how somebody lives, in a sentence that their day agrees with."""
+def lifestyle_of(
+    rng: np.random.Generator, draft: ResidentDraft, day: Sequence[ScheduleItem], measures: DayMeasures
+) -> str:
+    """Return how somebody lives, in a sentence that their days agree with."""
+    rhythm = rhythm_of(day, works_late=draft.shift is not None and draft.shift[0] >= 12 * 60)
+    if not agrees(rhythm, measures):  # on other days than the first
+        rhythm = "Keeps regular hours"
     if draft.child:
         told = childhood().biography.ways
-        return f"{rhythm_of(day)}; {join([told[int(k)] for k in rng.choice(len(told), 2, replace=False)])}."
-    rhythm = rhythm_of(day, works_late=draft.shift is not None and draft.shift[0] >= 12 * 60)
-    ways = []
-    if any(h.active for h in draft.hobbies):
-        ways.append("stays fit")
-    if "hedonism" in draft.values:
-        ways.append("eats out with pleasure")
-    elif any(h.name in ("cooking", "baking bread") for h in draft.hobbies):
-        ways.append("cooks from scratch")
-    if "security" in draft.values:
-        ways.append("spends carefully")
-    if "universalism" in draft.values:
-        ways.append(str(rng.choice(["buys second-hand", "eats little meat", "mends rather than replaces"])))
-    if draft.character.extraversion > 0.66:
-        ways.append("is seldom alone")
-    elif draft.character.extraversion < 0.42:
-        ways.append("needs an hour alone every day")
-    spare = ["walks everywhere", "likes a tidy flat" if draft.status != "guest" else "travels light", 
-             "reads the news on paper",
-             "goes by bus when it rains", "drinks a lot of coffee", "keeps the phone in another room"]  # fmt: skip
-    for k in rng.permutation(len(spare)):
-        if len(ways) >= 2:
-            break
-        ways.append(spare[int(k)])
-    return f"{rhythm}; {join(ways[:3])}."
+        return f"{rhythm}; {join([told[int(k)] for k in rng.choice(len(told), 2, replace=False)])}."
+    options = [way for way in ways() if draft.status in way.statuses and agrees(way.text, measures)]
+    first = [way.text for way in options if _is_told_of(way, draft)]
+    anybody = [way.text for way in options if not (way.values or way.hobbies or way.trait)]
+    spare = [anybody[int(k)] for k in rng.permutation(len(anybody))]
+    picked = [first[int(k)] for k in rng.permutation(len(first))][:3]
+    return f"{rhythm}; {join([*picked, *spare[: max(0, 2 - len(picked))]])}."
+
+
+def _is_told_of(way: Way, draft: ResidentDraft) -> bool:
+    """Whether something is said of somebody for their values, hobbies or character."""
+    fits = bool(set(way.values) & set(draft.values) or set(way.hobbies) & {hobby.name for hobby in draft.hobbies})
+    return fits or (way.trait is not None and way.least <= getattr(draft.character, way.trait) <= way.most)
+
+
+def honest_character(draft: ResidentDraft, measures: DayMeasures) -> Personality:
+    """Return somebody's character in words that their days agree with: others of the same kind, or of another trait."""
+    character, words = draft.character, trait_words()
+    scores = {name: float(getattr(character, name)) for name in words}
+    order = sorted(scores, key=lambda name: (-abs(scores[name] - 0.5), name))
+    ranked = [words[name].high if scores[name] >= 0.5 else words[name].low for name in order]
+    told: list[str] = []
+    for word in character.traits:
+        kind = next((options for options in ranked if word in options), ())
+        rest = [one for options in ranked for one in options if not any(set(options) & {t} for t in character.traits)]
+        told += [one for one in (word, *kind, *rest) if one not in told and agrees(one, measures)][:1]
+    return character.model_copy(update={"traits": told})
 
 
 def join(parts: Sequence[str]) -> str:

@@ -136,10 +136,48 @@ class TraitWords(DataRecord):
     low: tuple[str, ...]
 
 
+class Claim(DataRecord):
+    """What words for somebody say of their days: `measure` of `vico.community.day_measures.DayMeasures` in bounds."""
+
+    says: tuple[str, ...]
+    measure: Literal[
+        "out", "work", "company", "alone", "exercise", "meals_out", "dinners_out", "meals_home", "rides", "visiting",
+        "rises", "retires",
+    ]  # fmt: skip
+    least: float | None = None
+    most: float | None = None
+
+
+class Way(DataRecord):
+    """Something that is said of how somebody lives, if their days agree.
+
+    Attributes
+    ----------
+    text
+        Completes "Night owl; ...".
+    values, hobbies
+        Who it is said of first: those with one of these values or hobbies.
+    trait, least, most
+        Or those whose score of one of the big five lies within these bounds.
+    statuses
+        Ways of life it is for.
+    """
+
+    text: str
+    values: tuple[str, ...] = ()
+    hobbies: tuple[str, ...] = ()
+    trait: str | None = None
+    least: float = 0.0
+    most: float = 1.0
+    statuses: tuple[Status, ...] = ADULTS
+
+
 class Character(DataRecord):
     """What people care for, and the words for what they are like."""
 
     value: tuple[Value, ...] = ()
+    claim: tuple[Claim, ...] = ()
+    way: tuple[Way, ...] = ()
     traits: dict[str, TraitWords] = Field(default_factory=dict)
 
 
@@ -210,6 +248,8 @@ class Circle(DataRecord):
         Whether meeting is a meal.
     tag
         What meeting is about: ``group``, or ``exercise`` and ``leisure`` for those who run and walk about together.
+    meets
+        On which days besides the first, at the same time: that day of the week, every working day, or every day.
     """
 
     name: str
@@ -226,6 +266,7 @@ class Circle(DataRecord):
     small_children: bool = False
     meal: bool = False
     tag: ActivityTag = ActivityTag.GROUP
+    meets: Literal["weekly", "working_days", "daily"] = "weekly"
 
     @property
     def starts(self) -> tuple[int, ...]:
@@ -276,7 +317,9 @@ class GuestMeals(DataRecord):
 
 
 class AtHome(DataRecord):
-    """What people do at home: one of each list is somebody's way."""
+    """What people do at home: one of each list is somebody's way; `brief` is what there is time for in minutes."""
+
+    brief: str = "Change and set out again"
 
     morning: tuple[str, ...]
     breakfast: tuple[str, ...]
@@ -344,6 +387,18 @@ def ways_of_life() -> WaysOfLife:
 def basic_values() -> tuple[Value, ...]:
     """Return the basic values."""
     return tuple(value for _, file in _read("character", Character) for value in file.value)
+
+
+@cached_data
+def claims() -> tuple[Claim, ...]:
+    """Return what words for people say of their days."""
+    return tuple(claim for _, file in _read("character", Character) for claim in file.claim)
+
+
+@cached_data
+def ways() -> tuple[Way, ...]:
+    """Return what is said of how people live."""
+    return tuple(way for _, file in _read("character", Character) for way in file.way)
 
 
 @cached_data

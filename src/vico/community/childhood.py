@@ -85,8 +85,8 @@ class Escorts(DataRecord):
     ----------
     at_home
         What they do themselves when they come home.
-    ready
-        Before one goes out with them.
+    ready, dress
+        Before one goes out with them: what one does, and what they do.
     """
 
     bring: str
@@ -94,6 +94,7 @@ class Escorts(DataRecord):
     bring_home: str
     at_home: str
     ready: str
+    dress: str
 
 
 class ChildrenAtHome(DataRecord):

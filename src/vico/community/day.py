@@ -58,6 +58,8 @@ class Day:
         Until when they go out alone, minutes.
     barred
         Kinds of places that are not for them.
+    done
+        Activities that they go out for: once a day is enough.
     """
 
     def __init__(self, index: PlaceIndex, home: str, workplace: str | None = None, *, pace: float = WALK_SPEED) -> None:
@@ -68,6 +70,7 @@ class Day:
         self.home = home
         self.workplace = workplace
         self.blocks: list[Block] = []
+        self.done: set[str] = set()
 
     def walk(self, a: str, b: str) -> int | None:
         """Return the minutes to allow for the walk between two places; None if there is no way."""

@@ -6,6 +6,7 @@
     residents.json   people with their schedules
     groups.json relations.json
     authorship.json  who wrote what, where a language model was asked
+    days.json        schedules of further days; empty where there are none, missing in folders of version 1
     origin.json      where the world was; not hashed, no part of the community's identity
 """
 
@@ -21,7 +22,7 @@ from typing import TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from vico.community.authorship import Authorship
-from vico.community.model import SCHEMA, VERSION, Community, CommunityManifest, Group, Relation, Resident
+from vico.community.model import SCHEMA, VERSION, Community, CommunityDay, CommunityManifest, Group, Relation, Resident
 from vico.community.tags import with_tags
 from vico.errors import MissingFileError, OutputExistsError, SchemaError
 from vico.io.files import read_json, write_bytes, write_json
@@ -31,7 +32,9 @@ from vico.world.model import Record
 
 R = TypeVar("R", bound=Record)
 
-_PARTS = ("residents.json", "groups.json", "relations.json")
+_PARTS = ("residents.json", "groups.json", "relations.json", "days.json")
+# Version 1 had one day, and everybody came to every meeting; what version 2 adds has defaults that say so.
+_READ = (1, VERSION)
 _AUTHORSHIP = "authorship.json"
 _FILES = ("community.json", "origin.json", _AUTHORSHIP, *_PARTS)
 
@@ -43,7 +46,12 @@ def _rows(records: Sequence[Record]) -> bytes:
 
 def _contents(community: Community) -> tuple[dict[str, bytes], bytes]:
     """Return the bytes of the parts, and of the manifest."""
-    lists: tuple[Sequence[Record], ...] = (community.residents, community.groups, community.relations)
+    lists: tuple[Sequence[Record], ...] = (
+        community.residents,
+        community.groups,
+        community.relations,
+        community.further_days,
+    )
     parts = {name: _rows(records) for name, records in zip(_PARTS, lists, strict=True)}
     if community.authorship is not None:
         parts[_AUTHORSHIP] = (
@@ -124,10 +132,10 @@ def read_manifest(path: Path) -> CommunityManifest:
     found = content.get("schema_name") if isinstance(content, dict) else type(content).__name__
     if found != SCHEMA:
         raise SchemaError(f"{path}/community.json: schema {found!r} is not {SCHEMA!r}; give a community folder")
-    if content.get("version") != VERSION:
+    if content.get("version") not in _READ:
         raise SchemaError(
             f"{path}/community.json: version {content.get('version')!r} of {SCHEMA}, but this vico reads "
-            f"version {VERSION}; build the community anew"
+            f"version {VERSION} and before; build the community anew"
         )
     try:
         return CommunityManifest.model_validate_json(json.dumps(content))
@@ -167,6 +175,7 @@ def read_community(path: Path, world: World | None = None) -> Community:
         groups=_records(path / "groups.json", Group, manifest),
         relations=_records(path / "relations.json", Relation, manifest),
         authorship=_authorship(path / _AUTHORSHIP, manifest) if _AUTHORSHIP in manifest.files else None,
+        further_days=_records(path / "days.json", CommunityDay, manifest) if "days.json" in manifest.files else [],
     )
     # Folders of earlier versions, and days that a language model wrote, may say nothing about what an item is about.
     return with_tags(community, () if world is None else world.places)

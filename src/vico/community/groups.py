@@ -18,7 +18,8 @@ from vico.community.place_index import PlaceIndex, kind_of
 from vico.errors import EmptyInputError
 from vico.world.model import Category, Place
 
-_MAX_MEMBERSHIPS = 2
+# Most groups of somebody reserved, of others, and of the outgoing, by extraversion.
+_RESERVED, _OUTGOING, _MEMBERSHIPS = 0.4, 0.68, (1, 2, 3)
 _MAX_LUNCH_WALK = 7
 
 
@@ -170,9 +171,16 @@ def _exactly(index: PlaceIndex, draft: ResidentDraft, meeting: Meeting, others: 
     return index.minutes(place, draft.home) is not None
 
 
+def can_come(index: PlaceIndex, draft: ResidentDraft, meeting: Meeting, others: Sequence[Meeting]) -> bool:
+    """Whether somebody is free for a meeting on the index's day, beside work, duties, sleep and other meetings."""
+    return bool(_Timetable.of(index, [draft]).free_for(index, meeting)[0]) and _exactly(index, draft, meeting, others)
+
+
 def _liking(draft: ResidentDraft, circle: Circle) -> float:
     """How much a circle appeals to somebody; 0 if it is not for them."""
-    if draft.status not in circle.statuses and not (draft.shift and draft.shift[0] >= 12 * 60):
+    late = draft.shift is not None and draft.shift[0] >= 12 * 60
+    off = draft.shift is None and draft.status in ("worker", "student")
+    if draft.status not in circle.statuses and not (late or off):
         return 0.0
     if circle.small_children or not circle.ages[0] <= draft.age <= circle.ages[1]:
         return 0.0
@@ -263,6 +271,10 @@ class _Forming:
         self._drafts = sorted(drafts, key=_number)
         self._joined: list[list[Meeting]] = [[] for _ in drafts]
         self._counts = np.zeros(len(drafts), np.int64)
+        outgoing = np.array([draft.character.extraversion for draft in self._drafts])
+        # How much one has to like a group to join it besides another.
+        self._enough = np.where(outgoing >= _OUTGOING, 0.8, 1.5)
+        self._most = np.array(_MEMBERSHIPS)[np.digitize(outgoing, (_RESERVED, _OUTGOING))]
         self._names: Counter[str] = Counter()
         self._spots: Counter[str] = Counter()
         self._slots: Counter[str] = Counter()
@@ -276,7 +288,7 @@ class _Forming:
             self.groups.append(meeting)
             for member in meeting.members:
                 self._joined[row[member.id]].append(meeting)
-                self._counts[row[member.id]] = _MAX_MEMBERSHIPS
+                self._counts[row[member.id]] = max(_MEMBERSHIPS)
 
     def form_most_liked(self, options: Sequence[Meeting], weights: Sequence[float], wanted: int) -> None:
         """Form the groups that most people like most, until there are `wanted` more or none is left."""
@@ -336,7 +348,7 @@ class _Forming:
         """
         if (meeting.circle.name, meeting.place.id) in self._tried:
             return 0.0
-        liked = np.where(self._counts < _MAX_MEMBERSHIPS, likes, 0.0)
+        liked = np.where(self._counts < self._most, likes, 0.0)
         fresh = self._counts == 0
         if not (liked[fresh] > 0).any() or np.count_nonzero(liked) < min(2, len(self._drafts)):
             return 0.0
@@ -368,7 +380,7 @@ class _Forming:
     def _members(self, meeting: Meeting, likes: NDArray[np.float64], limit: int) -> list[int]:
         """Return who comes: those who are in no group first; nobody if none of them can."""
         order = np.argsort(-likes, kind="stable")
-        order = order[(likes[order] > 0) & (self._counts[order] < _MAX_MEMBERSHIPS)]
+        order = order[(likes[order] > 0) & (self._counts[order] < self._most[order])]
         members: list[int] = []
         for person in order[self._counts[order] == 0].tolist():
             if len(members) == limit:
@@ -379,7 +391,7 @@ class _Forming:
             return []
         # Those who are in a group already come along if this is just their thing, or to make it three.
         for person in order[self._counts[order] > 0].tolist():
-            if len(members) == limit or not (likes[person] > 1.5 or len(members) < 3):
+            if len(members) == limit or not (likes[person] > self._enough[person] or len(members) < 3):
                 break
             if _exactly(self._index, self._drafts[person], meeting, self._joined[person]):
                 members.append(person)

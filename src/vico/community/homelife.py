@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from itertools import pairwise
 
 import numpy as np
@@ -9,11 +10,16 @@ import numpy as np
 from vico.community.catalogue import Pastime, at_home
 from vico.community.childhood import ALONE_FROM, childhood
 from vico.community.day import MIDNIGHT, Block, Day
+from vico.community.inclinations import inclinations
 from vico.community.model import ActivityTag, ItemType
 from vico.community.people import ResidentDraft
 
 #: Shorter stays at home than this aren't worth the way, minutes.
 _WORTH_IT = 20
+# In less time at home than this nothing is begun, and a stay of less after a meeting is spent on the way, minutes.
+_BRIEF, _CHAT = 10, 5
+# More time than this is not walked in, minutes.
+_DAWDLE = 8
 #: Between which hours of the day hobbies are pursued at home.
 _HOBBY_HOURS = (8, 23)
 
@@ -21,14 +27,20 @@ _HOBBY_HOURS = (8, 23)
 class Homelife:
     """Somebody's ways at home; gives activities, none twice a day while there are others.
 
+    Parameters
+    ----------
+    done
+        What they went out for today: those hobbies come last.
+
     Attributes
     ----------
     dinner_at
         When their household eats in the evening, minutes.
     """
 
-    def __init__(self, rng: np.random.Generator, draft: ResidentDraft) -> None:
+    def __init__(self, rng: np.random.Generator, draft: ResidentDraft, done: Collection[str] = ()) -> None:
         self._rng = rng
+        self._done = done
         self.dinner_at = 18 * 60 + 30
         if draft.child:
             self._as_child(draft)
@@ -36,7 +48,8 @@ class Homelife:
         guest = draft.status == "guest"
         ways = at_home()
         pastimes = ways.pastimes
-        hobbies = [Pastime(text=h.at_home, hours=_HOBBY_HOURS) for h in draft.hobbies if h.at_home]
+        hobbies = self._hobbies(draft)
+        hobbies += _inclinations(draft)
         extra = (
             pastimes.guest if guest else pastimes.old if draft.age >= 66 else pastimes.young if draft.age <= 35 else ()
         )
@@ -54,7 +67,8 @@ class Homelife:
     def _as_child(self, draft: ResidentDraft) -> None:
         ways = childhood()
         pastimes = ways.pastimes.small if draft.age < ALONE_FROM else ways.pastimes.big
-        hobbies = [Pastime(text=h.at_home, hours=_HOBBY_HOURS) for h in draft.hobbies if h.at_home]
+        hobbies = self._hobbies(draft)
+        hobbies += _inclinations(draft)
         others = [pastimes[int(k)] for k in self._rng.permutation(len(pastimes))]
         first = [*hobbies, *others[:2]]
         self._leisure = [first[int(k)] for k in self._rng.permutation(len(first))] + others[2:]
@@ -62,6 +76,10 @@ class Homelife:
         self.morning, self.breakfast = self._one(home.morning), self._one(home.breakfast)
         self.lunch, self.dinner = self._one(home.lunch), self._one(home.dinner)
         self.wind_down = self._one(home.wind_down)
+
+    def _hobbies(self, draft: ResidentDraft) -> list[Pastime]:
+        likes = [h for h in draft.hobbies if h.at_home and h.out not in self._done]
+        return [Pastime(text=h.at_home, hours=_HOBBY_HOURS) for h in likes]
 
     def _one(self, options: tuple[str, ...]) -> str:
         return options[int(self._rng.integers(len(options)))]
@@ -81,47 +99,57 @@ class Homelife:
         return 5 * int(self._rng.integers(low // 5, high // 5 + 1))
 
 
+def _inclinations(draft: ResidentDraft) -> list[Pastime]:
+    """Return what somebody does at home for the sake of what matters to them."""
+    ways = [one for one in inclinations().inclination if one.value in draft.values and not one.kinds]
+    return [Pastime(text=w.activity, hours=w.hours) for w in ways if w.ages[0] <= draft.age <= w.ages[1]]
+
+
 def fill_day(day: Day, life: Homelife) -> None:
     """Fill the gaps of a day: home where it is worth the way, else a longer stay; then meals and pastimes at home."""
     stays: list[tuple[int, int]] = []
     for before, after in pairwise(list(day.blocks)):
         walk = day.walk(before.place, after.place)
         assert walk is not None
-        if after.start - before.end == walk:
+        spare = after.start - before.end - walk
+        if spare == 0:
             continue
+        stay, come = _elsewhere(day, before, after, spare)
+        at_home = day.home in (before.place, after.place)
         # As the crow flies is the least it can take: no need to ask for routes that can't be worth it.
         least = (day.index.metres(before.place, day.home) + day.index.metres(day.home, after.place)) / 60
-        if day.home not in (before.place, after.place) and after.start - before.end - least < _WORTH_IT:
-            _stay_longer(day, before, after, after.start - before.end - walk)
+        if not at_home and after.start - before.end - least < _WORTH_IT and spare - stay - come <= _DAWDLE:
+            _stay_longer(day, before, after, (stay, come))
             continue
         out, back = day.walk(before.place, day.home), day.walk(day.home, after.place)
         assert out is not None
         assert back is not None
         start, end = before.end + out, after.start - back
-        # From home or to home there is no detour: even five minutes are spent there.
-        if end - start >= (5 if 0 in (out, back) else _WORTH_IT) or (0 in (out, back) and end > start):
+        # From home or to home there is no detour: even minutes are spent there, and where nothing else is open.
+        worth = 1 if at_home else _WORTH_IT if spare - stay - come <= _DAWDLE else 5
+        if end - start >= worth:
             stays.append((start, end))
         else:
-            _stay_longer(day, before, after, after.start - before.end - walk)
+            _stay_longer(day, before, after, (stay, come))
     for start, end in stays:
         _at_home(day, life, start, end)
     day.blocks.sort(key=lambda b: b.start)
 
 
-def _stay_longer(day: Day, before: Block, after: Block, minutes: int) -> None:
-    """Spend minutes that are too few to go home for where one is, or where one goes, as long as these are open.
+def _elsewhere(day: Day, before: Block, after: Block, minutes: int) -> tuple[int, int]:
+    """Return how many of some minutes can be spent where one is, and where one goes, as long as these are open."""
+    stay = max((end - before.end for start, end in day.open_spans(before.place) if start <= before.start), default=0)
+    come = max((after.start - start for start, end in day.open_spans(after.place) if after.end <= end), default=0)
+    if stay >= minutes:
+        return minutes, 0
+    if come >= minutes:
+        return 0, minutes
+    return max(0, stay), min(max(0, come), minutes - max(0, stay))
 
-    What is left is walked in: the way takes longer.
-    """
-    can_stay = max(
-        (end - before.end for start, end in day.open_spans(before.place) if start <= before.start), default=0
-    )
-    can_come = max((after.start - start for start, end in day.open_spans(after.place) if after.end <= end), default=0)
-    stay = minutes if can_stay >= minutes else 0
-    come = minutes if not stay and can_come >= minutes else 0
-    if not stay and not come:
-        stay = max(0, can_stay)
-        come = min(max(0, can_come), minutes - stay)
+
+def _stay_longer(day: Day, before: Block, after: Block, minutes: tuple[int, int]) -> None:
+    """Stay some minutes longer where one is, and come some earlier to where one goes; the rest is walked in."""
+    stay, come = minutes
     if stay:
         _stay_on(day, before, stay)
     if come:
@@ -133,6 +161,8 @@ def _stay_longer(day: Day, before: Block, after: Block, minutes: int) -> None:
 def _stay_on(day: Day, block: Block, minutes: int) -> None:
     """Stay some minutes longer."""
     text = {"work": "Finish up and put things away", "group": "Stay on and chat"}.get(block.role)
+    if block.role == "group" and minutes < _CHAT:
+        return
     if text is None or (block.role == "work" and minutes < 10):
         block.end += minutes
         return
@@ -182,7 +212,8 @@ def _at_home(day: Day, life: Homelife, start: int, end: int) -> None:
         pieces = max(1, round((e - s) / 75))
         cuts = [s, *(s + 5 * round((e - s) * k / pieces / 5) for k in range(1, pieces)), e]
         for a, b in pairwise(cuts):
-            day.blocks.append(Block(a, b, ItemType.MAIN, life.leisure(a, b), day.home, "home"))
+            text = at_home().brief if b - a < _BRIEF else life.leisure(a, b)
+            day.blocks.append(Block(a, b, ItemType.MAIN, text, day.home, "home"))
     day.blocks.extend(fixed)
 
 

@@ -45,7 +45,7 @@ _BETWEEN, _FIRST_CHILD = (1, 2, 6), (20, 29, 42)
 
 
 def draw_households(
-    rng: np.random.Generator, count: int, *, students: bool, guests: bool, workers: bool
+    rng: np.random.Generator, count: int, *, students: bool, guests: bool, workers: bool, largest: int = 5
 ) -> list[Household]:
     """Draw households for `count` people whose ways of life come in believable shares.
 
@@ -53,6 +53,8 @@ def draw_households(
     ----------
     students, guests, workers
         Whether the world has somewhere to study, to stay for a while, and to work.
+    largest
+        Most members of a household: the beds of the largest home.
     """
     shares = dict(_SHARES)
     for letter, possible in (("s", students), ("g", guests), ("w", workers)):
@@ -65,7 +67,7 @@ def draw_households(
     while people < count:
         weights = np.zeros(len(_HOUSEHOLDS))
         for k, (_, weight, members) in enumerate(_HOUSEHOLDS):
-            if people + len(members) > count or any(shares[m] == 0 for m in members):
+            if people + len(members) > count or len(members) > largest or any(shares[m] == 0 for m in members):
                 continue
             room = min(quota[m] - (members.count(m) - 1) for m in members)
             weights[k] = weight * (max(room, 0.02) if room < 1 else room**0.5)

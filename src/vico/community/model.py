@@ -1,4 +1,4 @@
-"""What a community is, as records: residents, groups, relations and the schedule of one day."""
+"""What a community is, as records: residents, groups, relations and the schedules of one or several days."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ from typing_extensions import TypedDict
 
 from vico.clock import DAY, clock_of
 from vico.community.authorship import Authorship
+from vico.errors import InputError
 from vico.world.model import Point2, Record
 
 SCHEMA = "vico.community"
-VERSION = 1
+VERSION = 2
 
 LAST = "23:59:59"
 WEEKDAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")
@@ -210,7 +211,10 @@ class Group(Record):
     members
         Ids of residents.
     start, end
-        When they meet on the community's day; every member's schedule has it.
+        When they meet on the community's day; the schedule of every member has it who is not `absent`.
+    absent
+        Ids of members who don't come on that day: they are at work, the place is closed, or the group meets on another
+        day of the week.
     """
 
     id: Annotated[str, Field(pattern=r"^group_\d+$")]
@@ -221,6 +225,7 @@ class Group(Record):
     members: list[str]
     start: Clock
     end: Clock
+    absent: list[str] = Field(default_factory=list)
 
 
 class RelationKind(StrEnum):
@@ -261,15 +266,33 @@ class WorldIdentity(Record):
     digest: str
 
 
+class CommunityDay(Record):
+    """A further day of a community.
+
+    Attributes
+    ----------
+    absent
+        Who does not come to a group that day, by its id; groups that all come to are missing.
+    schedules
+        By resident id.
+    """
+
+    date: Date
+    absent: dict[str, list[str]]
+    schedules: dict[str, list[ScheduleItem]]
+
+
 class Community(Record):
-    """Residents of a world, what ties them, and one day of each.
+    """Residents of a world, what ties them, and one day or several days of each.
 
     Attributes
     ----------
     author
         Who wrote it: ``procedural``, or the name of a language model.
     date
-        The day that the schedules are for, ISO.
+        The day that the residents' schedules are for, ISO.
+    further_days
+        Days besides, in order.
     authorship
         Who wrote what, where a language model was asked; else None.
     """
@@ -283,6 +306,35 @@ class Community(Record):
     groups: list[Group]
     relations: list[Relation]
     authorship: Authorship | None = None
+    further_days: list[CommunityDay] = Field(default_factory=list)
+
+    @property
+    def dates(self) -> list[Date]:
+        """The days there are schedules for, the residents' own first."""
+        return [self.date, *(day.date for day in self.further_days)]
+
+    def on(self, date: Date) -> Community:
+        """Return the same community on one of its days, as one of a single day.
+
+        Raises
+        ------
+        InputError
+            If there are no schedules for that day.
+        """
+        if date == self.date:
+            return self.model_copy(update={"further_days": []})
+        day = next((one for one in self.further_days if one.date == date), None)
+        if day is None:
+            there = ", ".join(f"{one} ({WEEKDAYS[one.weekday()]})" for one in self.dates)
+            raise InputError(f"community: no schedules for {date}; there are {there}; build it with more --days")
+        return self.model_copy(
+            update={
+                "date": date,
+                "residents": [r.model_copy(update={"schedule": day.schedules[r.id]}) for r in self.residents],
+                "groups": [g.model_copy(update={"absent": day.absent.get(g.id, [])}) for g in self.groups],
+                "further_days": [],
+            }
+        )
 
     @property
     def weekday(self) -> str:

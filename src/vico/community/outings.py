@@ -1,26 +1,28 @@
-"""What people go out for: together with those they live with, then alone, where it fits into their days."""
+"""What people go out for alone, where it fits into their days."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from vico.community.catalogue import errands, kind_sets, ways_of_life
 from vico.community.day import MIDNIGHT, Block, Day, in_fives
+from vico.community.inclinations import inclinations
 from vico.community.model import ActivityTag, ItemType
 from vico.community.people import ResidentDraft
 from vico.community.place_index import PlaceIndex, kind_of
+from vico.community.schooling import SCHOOL_DAYS
 from vico.world.model import Category, Place
 
 # Roles of blocks that are meals.
 _MEALS = ("breakfast", "lunch", "dinner")
+# How often one goes out for the sake of one's first, second and third value.
+_OFTEN = (0.5, 0.3, 0.2)
 # Where children spend their pocket money.
 _SWEETS = ("kiosk", "convenience", "ice_cream", "bakery", "confectionery", "newsagent", "supermarket")
-
-Companions = Sequence[tuple[ResidentDraft, Day]]
 
 
 @dataclass(frozen=True)
@@ -90,59 +92,7 @@ class Outings:
         picks = self._rng.choice(len(keep), min(6, len(keep)), replace=False, p=weights / weights.sum())
         return [found[keep[int(k)]] for k in picks]
 
-    def plan_together(self, members: Companions, kind: str) -> None:
-        """Let those who share a home do something together, if their days allow."""
-        if len(members) < 2 or kind == "guest":
-            return
-        rng = self._rng
-        (a, first), (b, _) = members[0], members[1]
-        plans: list[tuple[str, ItemType, tuple[str, ...], int, tuple[int, int], str]] = []
-        if kind == "couple" and a.status == b.status == "retired":
-            plans.append(
-                (
-                    "Take a walk",
-                    ItemType.MAIN,
-                    self._kinds["green"],
-                    5 * int(rng.integers(7, 13)),
-                    (540, 1020),
-                    "outing",
-                )
-            )
-        if kind == "couple" and rng.random() < 0.5:
-            plans.append(
-                (
-                    "Have dinner",
-                    ItemType.MEAL,
-                    self._outings_to.dinner[:2],
-                    5 * int(rng.integers(11, 17)),
-                    (1050, 1290),
-                    "dinner",
-                )
-            )
-        if kind in ("flatmates", "siblings") and rng.random() < 0.5:
-            plans.append(("Have a drink", ItemType.MAIN, ("pub", "bar", "cafe"), 60, (1050, 1320), "outing"))
-        if kind == "parent" and rng.random() < 0.7:
-            plans.append(("Have dinner", ItemType.MEAL, self._outings_to.dinner[:2], 60, (1050, 1260), "dinner"))
-        for text, item, kinds, minutes, window, role in plans:
-            if role == "dinner" and any(_dines(day) for _, day in members[:2]):
-                continue
-            for place in self.near(a.home, kinds)[:4]:
-                spans = self._index.hours(place)
-                common = set(first.starts(place.id, minutes, window, spans))
-                for _, other in members[1:2]:
-                    common &= set(other.starts(place.id, minutes, window, spans))
-                if not common:
-                    continue
-                start = sorted(common)[int(rng.integers(len(common)))]
-                if all(day.fits(start, start + minutes, place.id) for _, day in members[:2]):
-                    for me, day in members[:2]:
-                        partner = b if me is a else a
-                        self.put(
-                            day, Block(start, start + minutes, item, f"{text} with {partner.first}", place.id, role)
-                        )
-                    break
-
-    def _go(
+    def go(
         self, day: Day, outing: Outing, window: tuple[int, int], *, anchor: str | None = None, soon: bool = False
     ) -> bool:
         """Add an outing where it fits in the window, minutes; `soon`: as early as possible."""
@@ -175,7 +125,7 @@ class Outings:
         done = draft.shift[1] if draft.shift and draft.shift[0] < 12 * 60 else 15 * 60
         breakfasts_in_company = any(b.type is ItemType.MEAL and b.start < 12 * 60 for b in day.blocks)
         if rng.random() < (0.6 if draft.status == "guest" else 0.3) and not (breakfasts_in_company or draft.duties):
-            self._go(
+            self.go(
                 day,
                 Outing("Have breakfast", self._kinds["cafes"][:3], (20, 30), role="breakfast"),
                 (wake + 20, min(leave, wake + 150)),
@@ -183,13 +133,17 @@ class Outings:
             )
         elif leave >= 9 * 60 + 10 and wake <= 7 * 60 + 50 and rng.random() < 0.9:
             self._before_the_day(day, (max(wake + 30, 7 * 60 + 55), min(leave, 8 * 60 + 55)))
-        {"retired": self._retired, "freelancer": self._freelancer, "guest": self._guest}.get(
-            draft.status, self._after_work
-        )(draft, day, wake, done)
+        weekend = self._index.weekday not in SCHOOL_DAYS
+        if draft.day_off or (weekend and draft.status == "freelancer"):
+            self._day_off(draft, day, wake)
+        else:
+            ways = {"retired": self._retired, "freelancer": self._freelancer, "guest": self._guest}
+            ways.get(draft.status, self._after_work)(draft, day, wake, done)
+        self._incline(draft, day, (wake + 60, 21 * 60 + 30))
 
     def _before_the_day(self, day: Day, window: tuple[int, int]) -> None:
         """Let those who have an hour in the morning go out for bread or air."""
-        if self._rng.random() < 0.5 and self._go(
+        if self._rng.random() < 0.5 and self.go(
             day,
             Outing(
                 "Fetch fresh bread", ("bakery", "convenience", "supermarket", "kiosk"), (5, 10), tag=ActivityTag.SHOP
@@ -198,23 +152,53 @@ class Outings:
             soon=True,
         ):
             return
-        self._go(day, Outing("Take a turn in the fresh air", self._kinds["green"], (15, 25)), window, soon=True)
+        self.go(day, Outing("Take a turn in the fresh air", self._kinds["green"], (15, 25)), window, soon=True)
 
     def _hobby(self, draft: ResidentDraft, day: Day, window: tuple[int, int]) -> bool:
         for k in self._rng.permutation(len(draft.hobbies)):
             hobby = draft.hobbies[int(k)]
-            if not hobby.out:
+            if not hobby.out or hobby.out in day.done:
                 continue
             minutes = (115, 130) if "cinema" in hobby.kinds or "theatre" in hobby.kinds else (45, 85)
-            if self._go(day, Outing(hobby.out, hobby.kinds, minutes, tag=hobby.about), window):
+            if self.go(day, Outing(hobby.out, hobby.kinds, minutes, tag=hobby.about), window):
+                day.done.add(hobby.out)
                 return True
         return False
+
+    def _incline(self, draft: ResidentDraft, day: Day, window: tuple[int, int]) -> None:
+        """Let somebody go out for the sake of what matters to them, the first value most."""
+        for value, often in zip(draft.values, _OFTEN, strict=False):
+            ways = [one for one in inclinations().inclination if one.value == value and one.kinds]
+            ways = [one for one in ways if one.ages[0] <= draft.age <= one.ages[1]]
+            if not ways or self._rng.random() > often:
+                continue
+            way = ways[int(self._rng.integers(len(ways)))]
+            hours = max(window[0], 60 * way.hours[0]), min(window[1], 60 * way.hours[1])
+            self.go(day, Outing(way.activity, way.kinds, way.minutes, tag=ActivityTag.LEISURE), hours)
+
+    def _day_off(self, draft: ResidentDraft, day: Day, wake: int) -> None:
+        """Let somebody spend a day off: shopping, hobbies, air, sights, a meal out."""
+        rng, mind = self._rng, draft.character
+        if rng.random() < 0.6:
+            shopping = Outing("Do the week's shopping", self._outings_to.groceries, (25, 50), tag=ActivityTag.SHOP)
+            self.go(day, shopping, (max(wake + 50, 9 * 60), 18 * 60))
+        self._hobby(draft, day, (max(wake + 60, 9 * 60 + 30), 14 * 60))
+        if rng.random() < 0.25 + 0.5 * mind.openness:
+            sights = Outing(_sight, self._outings_to.sights, (40, 90), tag=ActivityTag.VISIT)
+            self.go(day, sights, (11 * 60, 18 * 60))
+        if rng.random() < 0.5:
+            self.go(day, Outing("Take a long walk", self._kinds["green"], (40, 75)), (10 * 60, 19 * 60))
+        if not dines(day) and rng.random() < _eats_out(draft, 0.35):
+            dinner = Outing("Have dinner", self._outings_to.dinner, (50, 80), role="dinner")
+            self.go(day, dinner, (17 * 60 + 15, 21 * 60))
+        if rng.random() < mind.extraversion:
+            self._hobby(draft, day, (15 * 60, 22 * 60))
 
     def _errand(self, day: Day, window: tuple[int, int], *, soon: bool = False) -> bool:
         kinds = list(self._errands)
         chosen = [kinds[int(k)] for k in self._rng.choice(len(kinds), 4, replace=False)]
         return any(
-            self._go(
+            self.go(
                 day,
                 Outing(
                     self._errands[kind], (kind,), (30, 45) if kind == "hairdresser" else (10, 20), tag=ActivityTag.SHOP
@@ -227,21 +211,25 @@ class Outings:
 
     def _pupil(self, draft: ResidentDraft, day: Day) -> None:
         """Let children who may go out alone do so after school."""
-        done = draft.shift[1] if draft.shift else 15 * 60
-        if self._rng.random() < 0.55:
+        free = draft.lessons is None
+        done = draft.shift[1] if draft.shift else 10 * 60 if free else 15 * 60
+        if self._rng.random() < (0.85 if free else 0.3 + 0.5 * draft.character.extraversion):
             self._hobby(draft, day, (done, 20 * 60))
+        if free and self._rng.random() < 0.6:
+            self.go(day, Outing("Be out and about", (*self._kinds["green"], "playground"), (40, 75)), (done, 18 * 60))
+        self._incline(draft, day, (done, 19 * 60))
         if self._rng.random() < 0.2:
             sweets = Outing("Buy sweets", _SWEETS, (5, 10), tag=ActivityTag.SHOP)
-            self._go(day, sweets, (done, 19 * 60), anchor=draft.workplace, soon=True)
+            self.go(day, sweets, (done, 19 * 60), anchor=draft.workplace, soon=True)
 
     def _after_work(self, draft: ResidentDraft, day: Day, wake: int, done: int) -> None:
         rng, work = self._rng, draft.workplace or day.home
         late = draft.shift is not None and draft.shift[0] >= 12 * 60
         free = (wake + 60, draft.shift[0]) if late and draft.shift else (done, 21 * 60 + 30)
-        if rng.random() < 0.6:
+        if rng.random() < 0.35 + 0.5 * draft.character.extraversion:
             self._hobby(draft, day, free)
         if rng.random() < 0.45:
-            self._go(
+            self.go(
                 day,
                 Outing("Buy groceries", self._outings_to.groceries, (10, 25), tag=ActivityTag.SHOP),
                 free,
@@ -250,8 +238,8 @@ class Outings:
             )
         elif rng.random() < 0.5:
             self._errand(day, free, soon=True)
-        if not late and not _dines(day) and rng.random() < 0.2:
-            self._go(
+        if not late and not dines(day) and rng.random() < _eats_out(draft, 0.2):
+            self.go(
                 day,
                 Outing("Have dinner", self._outings_to.dinner, (40, 60), role="dinner"),
                 (17 * 60 + 15, 20 * 60 + 30),
@@ -261,17 +249,17 @@ class Outings:
         rng = self._rng
         if rng.random() < 0.75:
             early = max(wake + 50, 7 * 60 + 50)
-            self._go(
+            self.go(
                 day, Outing("Take the morning walk", self._kinds["green"], (25, 40)), (early, 9 * 60 + 15), soon=True
             )
         if rng.random() < 0.7:
-            self._go(
+            self.go(
                 day,
                 Outing("Do the day's shopping", self._outings_to.groceries, (20, 35), tag=ActivityTag.SHOP),
                 (8 * 60 + 30, 12 * 60),
             )
         if rng.random() < 0.4:
-            self._go(
+            self.go(
                 day, Outing("Have lunch", self._outings_to.lunch[:1], (45, 60), role="lunch"), (11 * 60 + 30, 14 * 60)
             )
         self._hobby(draft, day, (13 * 60, 17 * 60 + 30))
@@ -281,7 +269,7 @@ class Outings:
     def _freelancer(self, draft: ResidentDraft, day: Day, wake: int, done: int) -> None:
         rng = self._rng
         desk, cafe = next((f.at_desk, f.at_cafe) for f in ways_of_life().freelancer if f.title == draft.occupation)
-        self._go(
+        self.go(
             day,
             Outing(cafe, (*self._kinds["cafes"], "library", "coworking_space"), (75, 110), role="work"),
             (9 * 60 + 30, 16 * 60),
@@ -293,12 +281,16 @@ class Outings:
                 block = Block(starts[0], starts[0] + minutes, ItemType.MAIN, desk, day.home, "work") if starts else None
                 if block is not None and day.add(block):
                     break
-        if rng.random() < 0.5:
-            self._go(day, Outing("Have lunch", self._outings_to.lunch, (30, 45), role="lunch"), (11 * 60 + 30, 14 * 60))
-        if rng.random() < 0.6:
+        if draft.drive > 0.25:
+            starts = day.starts(day.home, 60, (17 * 60 + 30, 21 * 60), [(0, MIDNIGHT)])
+            if starts:
+                day.add(Block(starts[0], starts[0] + 60, ItemType.MAIN, desk, day.home, "work"))
+        if rng.random() < _eats_out(draft, 0.5):
+            self.go(day, Outing("Have lunch", self._outings_to.lunch, (30, 45), role="lunch"), (11 * 60 + 30, 14 * 60))
+        if rng.random() < 0.35 + 0.5 * draft.character.extraversion:
             self._hobby(draft, day, (16 * 60, 21 * 60 + 30))
         if rng.random() < 0.6:
-            self._go(
+            self.go(
                 day,
                 Outing("Buy groceries", self._outings_to.groceries, (15, 25), tag=ActivityTag.SHOP),
                 (15 * 60, 20 * 60),
@@ -315,14 +307,19 @@ class Outings:
         if starts:
             length = 90 if starts[0] < 12 * 60 else 60
             day.add(Block(starts[0], starts[0] + length, ItemType.MAIN, desk, day.home, "work"))
-        self._go(day, Outing("Have lunch", self._outings_to.lunch[:1], (40, 60), role="lunch"), (11 * 60 + 30, 14 * 60))
-        if not _dines(day):
-            self._go(
+        self.go(day, Outing("Have lunch", self._outings_to.lunch[:1], (40, 60), role="lunch"), (11 * 60 + 30, 14 * 60))
+        if not dines(day):
+            self.go(
                 day, Outing("Have dinner", self._outings_to.dinner[:1], (55, 75), role="dinner"), (18 * 60, 21 * 60)
             )
         for _ in range(2 + int(rng.integers(2))):
-            self._go(day, Outing(_sight, self._outings_to.sights, (30, 75), tag=ActivityTag.VISIT), (9 * 60, 18 * 60))
+            self.go(day, Outing(_sight, self._outings_to.sights, (30, 75), tag=ActivityTag.VISIT), (9 * 60, 18 * 60))
         self._errand(day, (10 * 60, 18 * 60))
+
+
+def _eats_out(draft: ResidentDraft, often: float) -> float:
+    """Return the chance that somebody eats out: `often`, more for who enjoys life, less for who counts pennies."""
+    return float(np.clip(often + 0.3 * ("hedonism" in draft.values) - 0.2 * ("security" in draft.values), 0.02, 0.9))
 
 
 def _sight(place: Place) -> str:
@@ -333,6 +330,6 @@ def _sight(place: Place) -> str:
     )
 
 
-def _dines(day: Day) -> bool:
+def dines(day: Day) -> bool:
     """Whether dinner is settled."""
     return any(b.type is ItemType.MEAL and b.start >= 17 * 60 for b in day.blocks)

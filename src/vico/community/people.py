@@ -56,6 +56,10 @@ class ResidentDraft:
         What they do for the children of their household, in the order of the day.
     out_until, home_by
         Until when they go out alone, and when they are back from meetings, minutes of the day.
+    first_shift
+        Whether they work the first part of a long day rather than the last.
+    days_off
+        Days of the week on which they don't work though their place is open, 0 Monday .. 6 Sunday.
     """
 
     id: str
@@ -79,11 +83,24 @@ class ResidentDraft:
     duties: list[Duty] = field(default_factory=list)
     out_until: int = 24 * 60
     home_by: int = 24 * 60
+    first_shift: bool = True
+    days_off: frozenset[int] = frozenset()
 
     @property
     def child(self) -> bool:
         """Whether they are not grown up."""
         return self.age < GROWN_UP
+
+    @property
+    def day_off(self) -> bool:
+        """Whether they neither work nor learn on the day though on others they do."""
+        return self.shift is None and self.lessons is None and self.status in ("worker", "student", "pupil")
+
+    @property
+    def drive(self) -> float:
+        """How much they work beyond what others do, about -0.6 to 0.7, 0 for most."""
+        ambition = 0.3 * ("achievement" in self.values) + 0.1 * ("power" in self.values)
+        return self.character.conscientiousness - 0.6 + ambition
 
     @property
     def character(self) -> Personality:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterable
 from functools import cached_property
@@ -26,6 +27,8 @@ GUEST_KINDS = frozenset({"hotel", "hostel", "motel", "guest_house", "apartment",
 #: Distance that spawn points keep from each other, metres.
 SPAWN_GAP = 2.0
 
+# Rooms that one only passes through.
+_WAYS = frozenset({"corridor", "stairs", "lift", "lobby", "hall"})
 # A place that people can reach has its position on the walkable map, or a step beside it.
 _REACH = 2.0
 
@@ -58,11 +61,21 @@ class PlaceIndex:
         self._inside = np.array([ways.seconds(p.rooms) for p in world.places], np.float64)
         self._estimates: dict[str, NDArray[np.int64]] = {}
         self._reachable: dict[str, bool] = {}
+        self._hours: dict[tuple[str, int], list[Span]] = {}
 
     @cached_property
     def rides(self) -> RideTimes:
         """Trips by bus, tram and bicycle."""
         return RideTimes(self.world.transit, self.walks)
+
+    def on(self, weekday: int) -> PlaceIndex:
+        """Return the same index for another day of the week, 0 Monday .. 6 Sunday; what is known of ways is shared."""
+        if weekday == self.weekday:
+            return self
+        _ = self.rides  # built once for all days
+        other = copy.copy(self)
+        other.weekday = weekday
+        return other
 
     def reachable(self, place: Place) -> bool:
         """Whether a place can be reached on foot from the map's edge."""
@@ -99,6 +112,11 @@ class PlaceIndex:
         """How many people can lie in the beds of a place: wide beds are for two."""
         tops = (top for name in place.rooms for top in self._rooms[name].containers if top.kind == "bed")
         return sum(max(1, int(top.size[1] / BED_WIDTH + 1e-9)) for top in tops)
+
+    def floor_area(self, place: Place) -> float:
+        """Square metres of a place's rooms, without corridors, stairs and lifts."""
+        rooms = (self._rooms[name] for name in place.rooms)
+        return sum(room.size[0] * room.size[1] for room in rooms if room.kind not in _WAYS)
 
     def same_building(self, a: str, b: str) -> bool:
         """Whether two places are under one roof, or the same."""
@@ -170,8 +188,11 @@ class PlaceIndex:
 
     def hours(self, place: Place) -> list[Span]:
         """When a place is open on the day, minutes: what it says, else what is usual for its kind."""
-        given = self.given_hours(place)
-        return usual_spans(kind_of(place), place.category) if given is None else given
+        key = place.id, self.weekday
+        if key not in self._hours:
+            given = self.given_hours(place)
+            self._hours[key] = usual_spans(kind_of(place), place.category, self.weekday) if given is None else given
+        return self._hours[key]
 
     def spawn_points(self, homes: list[str]) -> list[Point2]:
         """Return a free spot by each home: reachable, off the carriageway, at least `SPAWN_GAP` from all others.

@@ -61,7 +61,9 @@ def _set_out_together(index: PlaceIndex, care: Care, meeting: Meeting) -> None:
     leave = meeting.start - (index.minutes(care.carer.home, meeting.place.id) or 0)
     words = childhood().escort.ready.format(names=" and ".join(child.first for child in care.small))
     care.carer.duties = [Duty(leave - _READY, leave, words, care.carer.home)]
-    care.carer.out_until = leave - _READY
+    care.carer.out_until = 0
+    for child in care.small:
+        child.duties = [Duty(leave - _READY, leave, childhood().escort.dress, care.carer.home)]
 
 
 def _joined(index: PlaceIndex, found: Sequence[Meeting], care: Care, people: Sequence[ResidentDraft]) -> Meeting | None:
@@ -75,6 +77,30 @@ def _joined(index: PlaceIndex, found: Sequence[Meeting], care: Care, people: Seq
             meeting.members += people
             return meeting
     return None
+
+
+def come_to_play(index: PlaceIndex, cares: Sequence[Care], usual: Meeting, meeting: Meeting) -> None:
+    """Let the families of a group come to its meeting on another day, if that suits them.
+
+    Parameters
+    ----------
+    cares
+        Of that day.
+    usual
+        The meeting with all its members.
+    meeting
+        That of the day, as yet without members; updated.
+    """
+    members = {member.id for member in usual.members}
+    for care in cares:
+        people = [care.carer, *care.small]
+        at_home = meeting.place.id == care.carer.home
+        if members.issuperset(draft.id for draft in people) and (
+            _suits(index, care, meeting.place, meeting.start, meeting.end)
+            or (at_home and _ready(care) <= meeting.start)
+        ):
+            meeting.members += people
+            _set_out_together(index, care, meeting)
 
 
 def _options(

@@ -7,6 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
+from vico.community.friendships import Acquaintance, draw_friendships
 from vico.community.groups import Meeting
 from vico.community.model import Relation, RelationKind
 from vico.community.people import Household, ResidentDraft
@@ -18,6 +19,10 @@ _NEXT_DOOR = 40.0
 _RANK = list(RelationKind)
 # Children have friends from this age, years; friends are of one age, to within so many years.
 _FRIENDS_FROM, _OF_ONE_AGE = 3, 2
+# Of many at one workplace one knows so many to either side, this share of them across; pupils know so many teachers.
+_TEAM, _ACROSS, _TEACHERS = 3, 0.15, 2
+# How many one knows in a house, and next door; and the largest chance to know somebody next door.
+_KNOWN_IN_HOUSE, _KNOWN_NEXT_DOOR, _NEXT_DOOR_KNOWN = 5.0, 2.5, 0.5
 
 
 def draw_relations(
@@ -34,8 +39,19 @@ def draw_relations(
         _tie_household(rng, network, household)
     for group in groups:
         _tie_group(rng, network, group)
-    _tie_colleagues(rng, network, people)
-    _tie_neighbours(rng, network, index, people)
+    house, street = _neighbours(rng, index, people)
+    colleagues = _colleagues(rng, people)
+    same_class, same_school = _pupils(people)
+    acquaintances = [
+        Acquaintance("work", colleagues),
+        Acquaintance("class", same_class),
+        Acquaintance("school", same_school),
+        Acquaintance("house", house),
+        Acquaintance("street", street),
+    ]
+    _tie_friends(rng, network, people, groups, acquaintances)
+    _tie_colleagues(rng, network, people, colleagues)
+    _tie_neighbours(rng, network, people, house, street)
     return network.relations()
 
 
@@ -107,66 +123,138 @@ def _tie_family(rng: np.random.Generator, network: _Network, a: ResidentDraft, b
     network.tie(a, b, (RelationKind.FAMILY, bond), strength, years)
 
 
-def _tie_group(rng: np.random.Generator, network: _Network, group: Meeting) -> None:
-    bond = RelationKind.FRIEND, f"both in the {group.circle.name.lower()}"
-    for a, b in combinations(group.members, 2):
-        if a.household == b.household:
-            continue
-        alike = len({h.name for h in a.hobbies} & {h.name for h in b.hobbies}) + len(set(a.values) & set(b.values))
-        strength = rng.uniform(0.25, 0.55) + 0.07 * alike - 0.003 * abs(a.age - b.age)
-        strength += 0.2 * (a.character.agreeableness + b.character.agreeableness - 1)
-        if a.child != b.child:
-            note = f"{bond[1]}, a child and a grown-up"
-            network.tie(a, b, (RelationKind.NEIGHBOUR, note), float(np.clip(strength, 0.15, 0.5)), rng.exponential(2))
-            continue
-        network.tie(a, b, bond, float(np.clip(strength, 0.15, 0.9)), rng.exponential(3.5))
-
-
-def _tie_colleagues(rng: np.random.Generator, network: _Network, people: Sequence[ResidentDraft]) -> None:
-    staff: dict[str, list[ResidentDraft]] = {}
-    for s in people:
-        if s.workplace is not None:
-            staff.setdefault(s.workplace, []).append(s)
-    for colleagues in staff.values():
-        for a, b in combinations(colleagues, 2):
-            if a.child and b.child:
-                _tie_pupils(rng, network, a, b)
-                continue
-            note = "fellow students" if a.status == b.status == "student" else "work at the same place"
-            if a.child != b.child:
-                note = "pupil and teacher" if "teach" in f"{a.occupation} {b.occupation}" else "from the same school"
-            network.tie(a, b, (RelationKind.COLLEAGUE, note), rng.uniform(0.3, 0.7), rng.exponential(3))
-
-
-def _tie_pupils(rng: np.random.Generator, network: _Network, a: ResidentDraft, b: ResidentDraft) -> None:
-    """Tie two of one school: those of an age are friends, the others know each other by sight at most."""
-    apart = abs(a.age - b.age)
-    if a.household == b.household or apart > _OF_ONE_AGE:
-        return
-    note = "in the same class" if apart == 0 else "go to the same school"
-    if apart == 0 or rng.random() < 0.4:
-        network.tie(a, b, (RelationKind.FRIEND, note), rng.uniform(0.3, 0.9) - 0.1 * apart, rng.exponential(3))
-
-
-def _tie_neighbours(
-    rng: np.random.Generator, network: _Network, index: PlaceIndex, people: Sequence[ResidentDraft]
+def _tie_friends(
+    rng: np.random.Generator,
+    network: _Network,
+    people: Sequence[ResidentDraft],
+    groups: Sequence[Meeting],
+    acquaintances: Sequence[Acquaintance],
 ) -> None:
+    for friendship in draw_friendships(rng, people, groups, acquaintances):
+        a, b = (people[k] for k in friendship.pair)
+        alike = len({h.name for h in a.hobbies} & {h.name for h in b.hobbies}) + len(set(a.values) & set(b.values))
+        strength = rng.uniform(0.3, 0.65) + 0.07 * alike - 0.003 * abs(a.age - b.age)
+        strength += 0.2 * (a.character.agreeableness + b.character.agreeableness - 1)
+        bond = RelationKind.FRIEND, friendship.note
+        network.tie(a, b, bond, float(np.clip(strength, 0.15, 0.95)), rng.exponential(3.5))
+
+
+def _tie_group(rng: np.random.Generator, network: _Network, group: Meeting) -> None:
+    """Let children and grown-ups of a group know each other."""
+    note = f"both in the {group.circle.name.lower()}, a child and a grown-up"
+    for a, b in combinations(group.members, 2):
+        if a.child != b.child and a.household != b.household:
+            network.tie(a, b, (RelationKind.NEIGHBOUR, note), rng.uniform(0.15, 0.5), rng.exponential(2))
+
+
+def _circle(rng: np.random.Generator, members: Sequence[int]) -> list[tuple[int, int]]:
+    """Return who of many knows whom: those near each other in an order, and a few across; all of few.
+
+    A small world after Watts and Strogatz (Nature 393, 1998).
+    """
+    n = len(members)
+    if n <= 2 * _TEAM + 1:
+        return list(combinations(members, 2))
+    pairs = set()
+    for k in range(n):
+        for step in range(1, _TEAM + 1):
+            other = (k + step) % n if rng.random() > _ACROSS else int(rng.integers(n))
+            if other != k:
+                pairs.add((members[min(k, other)], members[max(k, other)]))
+    return sorted(pairs)
+
+
+def _colleagues(rng: np.random.Generator, people: Sequence[ResidentDraft]) -> list[tuple[int, int]]:
+    """Return who knows whom at work and at university: teams, and those of one subject."""
+    staff: dict[tuple[str, bool], list[int]] = {}
+    for k, s in enumerate(people):
+        if s.workplace is not None and not s.child:
+            staff.setdefault((s.workplace, s.status == "student"), []).append(k)
+    found: list[tuple[int, int]] = []
+    for (_, _), members in sorted(staff.items()):
+        order = [members[int(k)] for k in rng.permutation(len(members))]
+        found += _circle(rng, sorted(order, key=lambda k: people[k].subject if people[k].status == "student" else ""))
+    return found
+
+
+def _pupils(people: Sequence[ResidentDraft]) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+    """Return who is in one class, and who else goes to one school at nearly the same age."""
+    pupils: dict[str, list[int]] = {}
+    for k, s in enumerate(people):
+        if s.child and s.workplace is not None:
+            pupils.setdefault(s.workplace, []).append(k)
+    pairs = [pair for members in pupils.values() for pair in combinations(members, 2)]
+    same = [(i, j) for i, j in pairs if people[i].age == people[j].age]
+    near = [(i, j) for i, j in pairs if 0 < abs(people[i].age - people[j].age) <= _OF_ONE_AGE]
+    return same, near
+
+
+def _tie_colleagues(
+    rng: np.random.Generator, network: _Network, people: Sequence[ResidentDraft], pairs: Sequence[tuple[int, int]]
+) -> None:
+    for i, j in pairs:
+        a, b = people[i], people[j]
+        note = "fellow students" if a.status == b.status == "student" else "work at the same place"
+        network.tie(a, b, (RelationKind.COLLEAGUE, note), rng.uniform(0.3, 0.7), rng.exponential(3))
+    teachers: dict[str, list[ResidentDraft]] = {}
+    for s in people:
+        if s.workplace is not None and s.status == "worker":
+            teachers.setdefault(s.workplace, []).append(s)
+    for s in people:
+        if not s.child or s.workplace not in teachers:
+            continue
+        known = teachers[s.workplace]
+        for k in rng.choice(len(known), min(_TEACHERS, len(known)), replace=False).tolist():
+            note = "pupil and teacher" if "teach" in known[k].occupation else "from the same school"
+            network.tie(s, known[k], (RelationKind.COLLEAGUE, note), rng.uniform(0.3, 0.7), rng.exponential(3))
+
+
+def _neighbours(
+    rng: np.random.Generator, index: PlaceIndex, people: Sequence[ResidentDraft]
+) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+    """Return who knows whom in one house, and next door: of many in a large house one knows some."""
     positions = np.array([index.place_by_id[s.home].position[:2] for s in people])
     from scipy.spatial import cKDTree  # slow to import, and most who import this build no community
 
-    near = cKDTree(positions).query_pairs(_NEXT_DOOR, output_type="ndarray")
+    near = np.sort(cKDTree(positions).query_pairs(_NEXT_DOOR, output_type="ndarray"), axis=1)
     homes: dict[str, list[int]] = {}
     for k, s in enumerate(people):
         homes.setdefault(index.place_by_id[s.home].building or f"at {s.home}", []).append(k)
-    together = [pair for members in homes.values() for pair in combinations(members, 2)]
-    for i, j in sorted({*together, *map(tuple, np.sort(near, axis=1).tolist())}):
-        a, b = people[i], people[j]
-        if a.household == b.household or "guest" in (a.status, b.status):
-            continue
-        if index.same_building(a.home, b.home):
-            network.tie(a, b, (RelationKind.NEIGHBOUR, "same house"), rng.uniform(0.2, 0.55), rng.exponential(5))
-        elif rng.random() < 0.6:
-            network.tie(a, b, (RelationKind.NEIGHBOUR, "next door"), rng.uniform(0.15, 0.45), rng.exponential(5))
+    crowd = np.zeros(len(people))
+    together = set()
+    for members in homes.values():
+        crowd[members] = len(members)
+        together |= set(combinations(members, 2))
+    next_door = sorted(set(map(tuple, near.tolist())) - together)
+    beside = np.bincount(np.array(next_door, np.int64).reshape(-1, 2).ravel(), minlength=len(people))
+
+    def strangers(i: int, j: int) -> bool:
+        return people[i].household == people[j].household or "guest" in (people[i].status, people[j].status)
+
+    house = [
+        (i, j)
+        for i, j in sorted(together)
+        if not strangers(i, j) and rng.random() < min(1.0, _KNOWN_IN_HOUSE / max(crowd[i] - 1, 1))
+    ]
+    street = [
+        (i, j)
+        for i, j in next_door
+        if not strangers(i, j) and rng.random() < min(_NEXT_DOOR_KNOWN, _KNOWN_NEXT_DOOR / max(beside[i], beside[j]))
+    ]
+    return house, street
+
+
+def _tie_neighbours(
+    rng: np.random.Generator,
+    network: _Network,
+    people: Sequence[ResidentDraft],
+    house: Sequence[tuple[int, int]],
+    street: Sequence[tuple[int, int]],
+) -> None:
+    for pairs, note, (low, high) in ((house, "same house", (0.2, 0.55)), (street, "next door", (0.15, 0.45))):
+        for i, j in pairs:
+            bond = RelationKind.NEIGHBOUR, note
+            network.tie(people[i], people[j], bond, rng.uniform(low, high), rng.exponential(5))
 
 
 def describe_household(household: Household, draft: ResidentDraft, relations: Mapping[str, str]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -25,6 +26,8 @@ _LAST_FETCH, _SEEING_IN = 17 * 60 + 10, 10
 _AT_HOME = (9 * 60, 14 * 60 + 30)
 # Until when children go out alone, and when they are back from meetings, minutes of the day by age.
 _AGES, _OUT, _BACK = (10, 13, 17), (18 * 60, 19 * 60, 21 * 60), (19 * 60 + 15, 20 * 60, 21 * 60 + 30)
+# How long work beside children is at least, minutes.
+_PART_TIME = 4 * 60
 # When a parent who is alone with small children is back for the evening.
 _ALONE_WITH = 19 * 60
 
@@ -33,13 +36,13 @@ def school_places(index: PlaceIndex) -> list[tuple[School, list[Place]]]:
     """Return the places that there are for each kind of school, those open for long enough on the day."""
     found = []
     for school in schools():
-        places = [p for p in index.places() if kind_of(p) in school.kinds and _span(index, p) is not None]
+        places = [p for p in index.places() if kind_of(p) in school.kinds and lesson_span(index, p) is not None]
         found.append((school, places))
     return found
 
 
-def _span(index: PlaceIndex, place: Place) -> Span | None:
-    """Return the opening hours that lessons fit in, minutes."""
+def lesson_span(index: PlaceIndex, place: Place) -> Span | None:
+    """Return the opening hours that lessons fit in, minutes; None on a day on which the school is closed."""
     spans = [(max(a, _EARLIEST), min(b, _LATEST)) for a, b in index.hours(place) if a <= 10 * 60]
     return max((s for s in spans if s[1] - s[0] >= _LEAST), key=lambda s: s[1] - s[0], default=None)
 
@@ -74,7 +77,7 @@ def _to_school(
         learn_at_home(index, child)
         return
     child.occupation, child.workplace = school.title, place.id
-    span = _span(index, place)
+    span = lesson_span(index, place)
     assert span is not None
     # All of a school begin at the same time.
     if place.id not in begins:
@@ -90,6 +93,56 @@ def learn_at_home(index: PlaceIndex, child: ResidentDraft) -> None:
     """Let a child learn at home."""
     child.occupation, child.workplace, child.shift = childhood().home_school.title, None, None
     child.lessons = Lessons(None, None, *_AT_HOME) if index.weekday in SCHOOL_DAYS else None
+
+
+def lessons_on(index: PlaceIndex, child: ResidentDraft) -> Lessons | None:
+    """Return a child's lessons on another day than the one they were planned for; None on a day without."""
+    lessons = child.lessons
+    if lessons is None or index.weekday not in SCHOOL_DAYS:
+        return None
+    if lessons.place is None:
+        return lessons
+    span = lesson_span(index, index.place_by_id[lessons.place])
+    if span is None:
+        return None
+    start = max(lessons.start, span[0] + 2 * _AT_THE_GATE)
+    return Lessons(lessons.school, lessons.place, start, max(min(lessons.end, span[1]), start + _LEAST - 30))
+
+
+def care_on(index: PlaceIndex, household: Household, carer: ResidentDraft) -> Care:
+    """Plan who takes children where on another day; their carer has what time for work that leaves.
+
+    Parameters
+    ----------
+    household, carer
+        As they are on that day.
+    """
+    care = Care(household, carer)
+    while not _plan_stops(index, care):
+        for child in care.small:
+            if child.workplace == care.stops[-1]:
+                child.lessons = child.shift = None
+    carer.shift = _beside(index, care)
+    carer.out_until = 0
+    settle_care(index, care)
+    return care
+
+
+def _beside(index: PlaceIndex, care: Care) -> tuple[int, int] | None:
+    carer = care.carer
+    if carer.shift is None or carer.workplace is None or not care.stops:
+        return None  # with children at home nobody goes to work
+    return between(index, care, carer.workplace, carer.shift)
+
+
+def between(index: PlaceIndex, care: Care, workplace: str, shift: tuple[int, int]) -> tuple[int, int] | None:
+    """Return what of working hours at a place lies between bringing and fetching children; None for too little."""
+    free, until = care.free
+    there, back = index.minutes(care.stops[-1], workplace), index.minutes(workplace, care.stops[0])
+    if there is None or back is None:
+        return None
+    start, end = max(shift[0], 5 * math.ceil((free + there) / 5)), min(shift[1], (until - back) // 5 * 5)
+    return (start, end) if end - start >= _PART_TIME else None
 
 
 @dataclass

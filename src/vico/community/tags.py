@@ -41,18 +41,32 @@ def with_tags(community: Community, places: Sequence[Place] = ()) -> Community:
     places
         Of its world; without them only home, workplace and groups are known apart.
     """
-    if all(item.tag is not None for resident in community.residents for item in resident.schedule):
+    further = [items for day in community.further_days for items in day.schedules.values()]
+    if all(item.tag is not None for items in [*(r.schedule for r in community.residents), *further] for item in items):
         return community
     by_id = {place.id: place for place in places}
-    residents = []
-    for resident in community.residents:
-        groups = community.groups_of(resident.id)
-        schedule = [
-            item if item.tag is not None else item.model_copy(update={"tag": tag_of(item, resident, groups, by_id)})
-            for item in resident.schedule
+    groups: dict[str, list[Group]] = {}
+    for group in community.groups:
+        for member in group.members:
+            groups.setdefault(member, []).append(group)
+
+    def tagged(resident: Resident, items: Sequence[ScheduleItem]) -> list[ScheduleItem]:
+        mine = groups.get(resident.id, [])
+        return [
+            item if item.tag is not None else item.model_copy(update={"tag": tag_of(item, resident, mine, by_id)})
+            for item in items
         ]
-        residents.append(resident.model_copy(update={"schedule": schedule}))
-    return community.model_copy(update={"residents": residents})
+
+    people = community.resident_by_id
+    return community.model_copy(
+        update={
+            "residents": [r.model_copy(update={"schedule": tagged(r, r.schedule)}) for r in community.residents],
+            "further_days": [
+                day.model_copy(update={"schedules": {i: tagged(people[i], s) for i, s in day.schedules.items()}})
+                for day in community.further_days
+            ],
+        }
+    )
 
 
 def tag_of(item: ScheduleItem, resident: Resident, groups: Sequence[Group], places: Mapping[str, Place]) -> ActivityTag:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from vico.community.hours import Span, open_spans
+from vico.community.hours import DAYS, Span, open_spans
 from vico.errors import SchemaError
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 
@@ -25,10 +25,10 @@ class _HoursFile(DataRecord):
 
 @dataclass(frozen=True)
 class UsualHours:
-    """Spans of a working day by kind or category of place, and of all others."""
+    """Spans of the seven days, Monday first, by kind or category of place, and of all others."""
 
-    by_kind: Mapping[str, list[Span]]
-    otherwise: list[Span]
+    by_kind: Mapping[str, list[list[Span]]]
+    otherwise: list[list[Span]]
 
 
 @cached_data
@@ -40,25 +40,32 @@ def usual_hours() -> UsualHours:
     SchemaError
         If a file can't be used, or hours can't be read.
     """
-    by_kind: dict[str, list[Span]] = {}
-    otherwise: list[Span] = []
+    by_kind: dict[str, list[list[Span]]] = {}
+    otherwise: list[list[Span]] = [[] for _ in DAYS]
     for path in data_files("community", "hours"):
         file = read_record(path, _HoursFile, guide=_GUIDE)
         for k, entry in enumerate(file.usual):
-            by_kind |= dict.fromkeys(entry.kinds, _spans(path, f"usual.{k}.hours", entry.hours))
+            by_kind |= dict.fromkeys(entry.kinds, _week(path, f"usual.{k}.hours", entry.hours))
         if file.otherwise is not None:
-            otherwise = _spans(path, "otherwise", file.otherwise)
+            otherwise = _week(path, "otherwise", file.otherwise)
     return UsualHours(by_kind, otherwise)
 
 
-def usual_spans(kind: str, category: str) -> list[Span]:
-    """When a place of this kind is usually open on a working day."""
+def usual_spans(kind: str, category: str, weekday: int = 1) -> list[Span]:
+    """When a place of this kind is usually open on a day, minutes; empty where it is closed.
+
+    Parameters
+    ----------
+    weekday
+        0 Monday .. 6 Sunday; a working day unless given.
+    """
     usual = usual_hours()
-    return list(usual.by_kind.get(kind) or usual.by_kind.get(category, usual.otherwise))
+    week = usual.by_kind.get(kind) or usual.by_kind.get(category, usual.otherwise)
+    return list(week[weekday])
 
 
-def _spans(path: Path, where: str, text: str) -> list[Span]:
-    spans = open_spans(text, 1)
-    if not spans:
+def _week(path: Path, where: str, text: str) -> list[list[Span]]:
+    week = [open_spans(text, day) or [] for day in range(len(DAYS))]
+    if not any(week[:5]):
         raise SchemaError(f"{path}: {where}: {text!r} says no hours of a working day; write them like 09:00-17:00")
-    return spans
+    return week

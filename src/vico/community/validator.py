@@ -15,9 +15,10 @@ from vico.community.childhood import GROWN_UP, POCKET_MONEY
 from vico.community.findings import CommunityFinding
 from vico.community.hours import staffed
 from vico.community.jobs import job_of, jobs_at, works_at
-from vico.community.model import LAST, Community, ItemType, Mode, Resident, ScheduleItem
+from vico.community.model import LAST, Community, Group, ItemType, Mode, Resident, ScheduleItem
 from vico.community.place_index import SPAWN_GAP, PlaceIndex
 from vico.community.rides import first_ride
+from vico.community.staff import staff_capacity
 from vico.community.tags import TAGS_OF_TYPE
 from vico.community.validator_households import households_of
 from vico.community.work import STUDY_KINDS
@@ -58,7 +59,25 @@ def check_community(community: Community, world: World) -> list[CommunityFinding
         ]
     if not community.residents:
         return [CommunityFinding("residents", "nobody lives here", "write at least one resident")]
-    return _Check(community, PlaceIndex(world, community.date.weekday())).run()
+    index = PlaceIndex(world, community.date.weekday())
+    found = _Check(community.on(community.date), index).run()
+    for k, day in enumerate(community.further_days):
+        found += _further_day(community, k, index.on(day.date.weekday()))
+    return found
+
+
+def _further_day(community: Community, k: int, index: PlaceIndex) -> list[CommunityFinding]:
+    """Check what a further day may have wrong that the first has not."""
+    day, where = community.further_days[k], f"further_days[{k}]"
+    if day.date <= community.dates[k]:
+        return [CommunityFinding(where, f"{day.date} does not come after {community.dates[k]}", "put days in order")]
+    people = [r.id for r in community.residents]
+    if missing := sorted(set(people) ^ set(day.schedules)):
+        what = f"{', '.join(missing[:5])}: residents without a schedule, or schedules of nobody"
+        return [CommunityFinding(f"{where}.schedules", what, "write one schedule for each resident")]
+    check = _Check(community.on(day.date), index)
+    check.day()
+    return [CommunityFinding(f"{where}.{one.where}", one.what, one.mend) for one in check.found]
 
 
 def check_resident(resident: Resident, community: Community, index: PlaceIndex) -> list[CommunityFinding]:
@@ -89,6 +108,10 @@ class _Check:
         self.community = community
         self.index = index
         self.found: list[CommunityFinding] = []
+        self.groups_of: dict[str, list[Group]] = {}
+        for group in community.groups:
+            for member in group.members:
+                self.groups_of.setdefault(member, []).append(group)
 
     def say(self, where: str, what: str, mend: str) -> None:
         self.found.append(CommunityFinding(where, what, mend))
@@ -97,12 +120,28 @@ class _Check:
         self.unique()
         for resident in self.community.residents:
             self.person(resident)
-            self.schedule(resident)
-        self.found += households_of(self.community, self.index)
-        self.groups()
+        self.jobs()
+        self.day()
         self.relations()
         self.spawns()
         return self.found
+
+    def jobs(self) -> None:
+        """Places employ no more people than they have room for."""
+        staff = Counter(r.workplace for r in self.community.residents if r.workplace and is_employed(r))
+        for place_id, count in staff.items():
+            place = self.index.place_by_id.get(place_id)
+            if place is not None and count > (most := staff_capacity(self.index, place)):
+                what = f"{count} people work at {place.name}, which has room for {most}"
+                self.say(f"{place_id}.staff", what, f"let {count - most} of them work elsewhere")
+
+    def day(self) -> None:
+        """Check all that another day may have wrong."""
+        for resident in self.community.residents:
+            self.known(resident)
+            self.schedule(resident)
+        self.found += households_of(self.community, self.index)
+        self.groups()
 
     def place(self, where: str, place_id: str) -> Place | None:
         """Look a place up; say so if it doesn't exist or can't be reached."""
@@ -139,19 +178,22 @@ class _Check:
             self.say(f"{r.id}.cash", f"{r.cash} is not in {least}..{most}", "give an amount in that range")
         for k, known in enumerate(r.known_places):
             self.place(f"{r.id}.known_places[{k}]", known)
-        used = {r.home, *([r.workplace] if r.workplace else []), *(i.place for i in r.schedule if i.place)}
-        used |= {g.place for g in self.community.groups_of(r.id)}
-        if unknown := sorted(used - set(r.known_places)):
-            self.say(
-                f"{r.id}.known_places", f"{', '.join(unknown)} are used but not known", "add them to the known places"
-            )
-        if not self.community.groups_of(r.id):
+        if r.id not in self.groups_of:
             self.say(r.id, f"{r.name} is in no group", "add them to a group they like and are free for")
         if int(r.appearance["age"]) != r.age or r.appearance["gender"] != (0.0 if r.gender == "female" else 1.0):
             self.say(
                 f"{r.id}.appearance",
                 f"age {r.appearance['age']:g}, gender {r.appearance['gender']:g} don't agree with {r.age}, {r.gender}",
                 "use the resident's age; gender 0 for female, 1 for male",
+            )
+
+    def known(self, r: Resident) -> None:
+        """Everywhere that somebody is, lives, works or meets is known to them."""
+        used = {r.home, *([r.workplace] if r.workplace else []), *(i.place for i in r.schedule if i.place)}
+        used |= {g.place for g in self.groups_of.get(r.id, ())}
+        if unknown := sorted(used - set(r.known_places)):
+            self.say(
+                f"{r.id}.known_places", f"{', '.join(unknown)} are used but not known", "add them to the known places"
             )
 
     def workplace(self, r: Resident) -> None:
@@ -293,7 +335,11 @@ class _Check:
                 self.say(f"{g.id}.members", "somebody is named twice", "name each member once")
             if len(g.members) < min(2, len(people)):
                 self.say(f"{g.id}.members", f"{len(g.members)} members make no group", "find at least two")
+            if strangers := sorted(set(g.absent) - set(g.members)):
+                self.say(f"{g.id}.absent", f"{', '.join(strangers)} are no members", "name members only")
             for member in g.members:
+                if member in g.absent and member in people:
+                    continue
                 if member not in people:
                     self.say(f"{g.id}.members", f"there is no resident {member!r}", "use ids of residents")
                 elif not any(
@@ -338,6 +384,11 @@ class _Check:
                 f"it is {gaps[i, j]:.2f} m from {residents[i].id}'s",
                 f"keep spawn points {SPAWN_GAP:g} m apart",
             )
+
+
+def is_employed(r: Resident) -> bool:
+    """Whether somebody's workplace is where they work, and not where they learn."""
+    return r.age >= GROWN_UP and not r.occupation.lower().startswith("student")
 
 
 def _length(item: ScheduleItem) -> int:

@@ -10,7 +10,7 @@ from vico.community.childhood import ALONE_FROM, GROWN_UP, YOUNGEST, adults_only
 from vico.community.findings import CommunityFinding
 from vico.community.model import ActivityTag, Community, ItemType, RelationKind, Resident, ScheduleItem
 from vico.community.place_index import PlaceIndex, kind_of
-from vico.community.schooling import SCHOOL_DAYS, school_places
+from vico.community.schooling import SCHOOL_DAYS, lesson_span, school_places
 
 # Years between a child and at least one adult it lives with.
 _PARENT = (16, 60)
@@ -116,12 +116,16 @@ class _Child:
         """Whether nothing keeps a child from school: the small ones' way may not fit with that to another school."""
         return self.child.age >= ALONE_FROM
 
+    def _is_open(self, school: str | None) -> bool:
+        place = self.index.place_by_id.get(school or "")
+        return place is None or lesson_span(self.index, place) is not None
+
     def _day(self) -> Iterator[CommunityFinding]:
         child = self.child
         school = child.workplace
         learning = [i for i in child.schedule if i.tag is ActivityTag.STUDY and i.place == (school or child.home)]
         least = _AT_HOME if school is None else _AT_SCHOOL
-        if self.school_day and sum(map(_length, learning)) < least:
+        if self.school_day and self._is_open(school) and sum(map(_length, learning)) < least:
             what = f"{sum(map(_length, learning)) / 3600:.1f} h of lessons on a school day"
             yield self._of("schedule", what, f"plan {least / 3600:g} h or more with the tag study")
         if sum(_length(i) for i in child.schedule if i.type is ItemType.SLEEP) < _SLEEP:

@@ -13,32 +13,60 @@ from vico.community.hours import Span, staffed_stretches
 from vico.community.jobs import jobs_at
 from vico.community.people import Household, ResidentDraft
 from vico.community.place_index import PlaceIndex, kind_of
-from vico.community.schooling import Care
+from vico.community.schooling import Care, between
+from vico.community.staff import staff_capacity
+from vico.errors import EmptyInputError
 from vico.world.model import Category, Place
 
+# From this share of the beds on homes are chosen that leave few free; so many can be filled with households.
+_CROWDED, _FILLED = 0.5, 0.9
 #: Where students study. `workplace` of a student is one of these.
 STUDY_KINDS = frozenset({"university", "college", "research_institute", "library", "music_school"})
 
 # What any place with an open door offers: minutes before opening and after closing that staff are there, at most.
 _BEFORE, _AFTER = 45, 30
 _LATEST = 23 * 60 + 30
-# How often a parent looks for work that leaves time for the children, and how long such work is at least, minutes.
-_TRIES, _PART_TIME = 8, 4 * 60
+# Days of work in a week; trades that work from Monday to Friday only; and the other two days.
+_WORKING_DAYS = 5
+# Trades that one may stay longer at, and how much longer than others the most ambitious of all would, minutes.
+_OPEN_ENDED, _OVERTIME = ("office", "bank", "school", "health", "day"), 200
+# Share of those who work the first part of a long day.
+_FIRST = 0.55
+_OFFICE_DAYS, _WEEKEND = ("office", "bank", "school"), (5, 6)
+# How often a parent looks for work that leaves time for the children.
+_TRIES = 8
 
 
 def assign_homes(rng: np.random.Generator, index: PlaceIndex, households: Sequence[Household]) -> None:
-    """Give each household a home: guests a room, all others a dwelling, with a bed for each while there are any.
+    """Give each household a home: guests a room, all others a dwelling, with a bed for each.
 
-    Large households choose first. They take the emptiest homes, at times a neighbour's.
+    Large households choose first. They take the emptiest homes, at times a neighbour's; where most beds are needed,
+    those with the fewest to spare, and rooms for guests when the dwellings are full. In worlds without rooms, whose
+    beds nobody knows, all find a place.
+
+    Raises
+    ------
+    EmptyInputError
+        If there are too few beds.
     """
     dwellings, rooms = index.homes()
     beds = Counter({p.id: index.beds(p) for p in (*dwellings, *rooms)})
+    people = sum(len(household.members) for household in households)
+    crowded = people > _CROWDED * sum(beds.values()) > 0
     taken: Counter[str] = Counter()
     for household in sorted(households, key=lambda one: -len(one.members)):
         options = (rooms or dwellings) if household.kind == "guest" else (dwellings or rooms)
         if household.kind == "flatmates" and household.members[0].status == "student":
             options = [p for p in options if kind_of(p) == "dormitory"] or options
-        options = _roomy(options, Counter({p.id: beds[p.id] - taken[p.id] for p in options}), len(household.members))
+        size = len(household.members)
+        free = Counter({p.id: beds[p.id] - taken[p.id] for p in (*dwellings, *rooms)})
+        fitting = [p for p in options if free[p.id] >= size] or [p for p in (*dwellings, *rooms) if free[p.id] >= size]
+        if not fitting and beds.total():
+            raise _too_few_beds(index, people, beds.total())
+        options = fitting or options
+        if crowded:
+            spare = min(free[p.id] for p in options)
+            options = [p for p in options if free[p.id] == spare]
         fewest = min(taken[p.id] for p in options)
         neighbours = [p for p in options if 0 < taken[p.id] < 4]
         if neighbours and rng.random() < 0.15:
@@ -52,20 +80,33 @@ def assign_homes(rng: np.random.Generator, index: PlaceIndex, households: Sequen
             member.home = home.id
 
 
-def _roomy(homes: list[Place], free: Counter[str], people: int) -> list[Place]:
-    """Return the homes with a free bed for each of some people; where none has so many, those that lack the fewest."""
-    most = max(free[p.id] for p in homes)
-    return [p for p in homes if free[p.id] >= min(people, most)]
+def check_beds(index: PlaceIndex, people: int) -> None:
+    """See to it that there are beds for some people, where it is known how many there are.
+
+    Raises
+    ------
+    EmptyInputError
+        If there are too few.
+    """
+    beds = sum(index.beds(place) for homes in index.homes() for place in homes)
+    if 0 < beds < people:
+        raise _too_few_beds(index, people, beds)
+
+
+def _too_few_beds(index: PlaceIndex, people: int, beds: int) -> EmptyInputError:
+    return EmptyInputError(
+        f"community: world {index.world.manifest.name!r} has {beds} beds, too few for {people} residents in households "
+        f"that live under one roof each; ask for at most {int(_FILLED * beds)} residents, or build a world with a "
+        "larger --radius"
+    )
 
 
 def employers(index: PlaceIndex) -> list[Place]:
     """Places where people work on the day: somebody's trade, and not closed."""
-    return [
-        p for p in index.places() if p.category is not Category.TRANSIT and jobs_at(p) and _workdays(index.hours(p))
-    ]
+    return [p for p in index.places() if p.category is not Category.TRANSIT and jobs_at(p) and workdays(index.hours(p))]
 
 
-def _workdays(spans: Sequence[Span]) -> list[list[Span]]:
+def workdays(spans: Sequence[Span]) -> list[list[Span]]:
     """Return the stretches of a place's hours that make a working day: four hours or more between six and midnight."""
     return [
         stretch
@@ -113,7 +154,9 @@ def assign_work(
             start = int(rng.choice([8 * 60 + 15, 8 * 60 + 30, 9 * 60 + 15, 10 * 60 + 15]))
             opens = min(s for s, e in index.hours(place) if e >= 16 * 60)
             start = max(start, 5 * math.ceil(opens / 5))
-            draft.shift = (start, start + 5 * int(rng.integers(60, 73)))
+            closes = max(e for s, e in index.hours(place) if e >= 16 * 60)
+            end = start + 5 * int(rng.integers(60, 73)) + _five(_OVERTIME * draft.drive / 2)
+            draft.shift = (start, max(start + 240, min(end, closes)))
         elif draft.status == "freelancer":
             draft.occupation = _rare(rng, [f.title for f in ways.freelancer], held)
         elif draft.status == "retired":
@@ -157,6 +200,9 @@ class _JobMarket:
         titles = [title for title in [*known, *sorted(set(offered) - set(known))] if title in offered]
         self._jobs = [offered[title] for title in titles]
         self._staff: Counter[str] = Counter()
+        self._off: dict[str, Counter[int]] = {}
+        self._firsts: Counter[str] = Counter()
+        self._coin = True
         self._late = 0
         self.held: Counter[str] = Counter()
 
@@ -164,29 +210,59 @@ class _JobMarket:
         """Find somebody a job; False, and nothing changed, where none leaves time for the children."""
         for _ in range(1 if care is None else _TRIES):
             job = self._job(draft, by_day=care is not None)
+            if job is None:
+                return False
             place = self._place(draft, job)
             shift = self._hours(draft, job, place)
             if care is not None and care.stops:
-                free, until = care.free
-                there = self._index.minutes(care.stops[-1], place.id)
-                back = self._index.minutes(place.id, care.stops[0])
-                if there is None or back is None:
+                left = between(self._index, care, place.id, shift)
+                if left is None:
                     continue
-                start = max(shift[0], 5 * math.ceil((free + there) / 5))
-                shift = start, min(shift[1], (until - back) // 5 * 5)
-                if shift[1] - shift[0] < _PART_TIME:
-                    continue
+                shift = left
             self._take(draft, job, place, shift)
+            draft.days_off = self._days_off(job, place)
             return True
         return False
 
+    def _days_off(self, job: Job, place: Place) -> frozenset[int]:
+        """Return the days of the week somebody has off: the weekend, or of a place that is open then any two.
+
+        None is the day that jobs are planned for, and few of a place have the same.
+        """
+        if job.shift in _OFFICE_DAYS:
+            return frozenset(_WEEKEND)
+        open_on = [day for day in range(7) if workdays(self._index.on(day).hours(place))]
+        free: list[int] = []
+        options = [day for day in open_on if day != self._index.weekday]
+        for _ in range(len(open_on) - _WORKING_DAYS):
+            off = self._off.setdefault(place.id, Counter())
+            fewest = min(off[day] for day in options)
+            rarest = [day for day in options if off[day] == fewest]
+            free.append(rarest[int(self._rng.integers(len(rarest)))])
+            options.remove(free[-1])
+            off[free[-1]] += 1
+        return frozenset(free)
+
     def _take(self, draft: ResidentDraft, job: Job, place: Place, shift: tuple[int, int]) -> None:
         draft.job, draft.occupation, draft.workplace, draft.shift = job, job.title, place.id, shift
+        draft.first_shift = self._next_is_first(place)
+        self._firsts[place.id] += 1 if draft.first_shift else -1
+        if self._staff[place.id] + 1 >= staff_capacity(self._index, place):
+            for offers in self._offers.values():
+                if place in offers:
+                    offers.remove(place)
         self.held[job.title] += 1
         self._staff[place.id] += 1
         self._late += shift[1] > 21 * 60
 
-    def _job(self, draft: ResidentDraft, *, by_day: bool) -> Job:
+    def _next_is_first(self, place: Place) -> bool:
+        """Whether the next to be hired works the first part of a long day: the other one than most of the staff."""
+        balance = self._firsts[place.id]
+        return balance < 0 or (balance == 0 and self._coin)
+
+    def _job(self, draft: ResidentDraft, *, by_day: bool) -> Job | None:
+        """Draw a trade; None where every place has all the staff it has room for."""
+        self._coin = bool(self._rng.random() < _FIRST)
         weights = np.zeros(len(self._jobs))
         for k, job in enumerate(self._jobs):
             low, high = job.ages
@@ -196,6 +272,8 @@ class _JobMarket:
             weights[k] *= 1.0 if low <= draft.age <= high else 1e-6
             weights[k] *= (1e-6 if by_day else 0.25**self._late) if job.shift == "evening" else 1.0
             weights[k] *= 1.4 if job.shift in ("office", "bank", "school", "health") else 1.0
+        if not weights.any():
+            return None
         return self._jobs[int(self._rng.choice(len(self._jobs), p=weights / weights.sum()))]
 
     def _place(self, draft: ResidentDraft, job: Job) -> Place:
@@ -207,25 +285,65 @@ class _JobMarket:
         return places[int(self._rng.choice(len(places), p=w / w.sum()))]
 
     def _hours(self, draft: ResidentDraft, job: Job, place: Place) -> tuple[int, int]:
-        rng, index = self._rng, self._index
-        workdays = _workdays(index.hours(place))
-        start, end = _shift(rng, job.shift, workdays[int(rng.integers(len(workdays))) if len(workdays) > 1 else 0])
-        if end > 22 * 60:  # home before midnight, however far
-            end = min(end, 23 * 60 + 40 - (index.minutes(place.id, draft.home) or 0)) // 5 * 5
-        return start, end
+        return _working_hours(self._rng, self._index, draft, job, place, first=self._next_is_first(place))
+
+
+def _working_hours(
+    rng: np.random.Generator, index: PlaceIndex, draft: ResidentDraft, job: Job, place: Place, *, first: bool
+) -> tuple[int, int]:
+    stretches = workdays(index.hours(place))
+    stretch = stretches[int(rng.integers(len(stretches))) if len(stretches) > 1 else 0]
+    start, end = _shift(rng, job.shift, stretch, first=first, more=_five(_OVERTIME * draft.drive))
+    if end > 22 * 60:  # home before midnight, however far
+        end = min(end, 23 * 60 + 40 - (index.minutes(place.id, draft.home) or 0)) // 5 * 5
+    return start, end
+
+
+def shift_on(
+    rng: np.random.Generator, index: PlaceIndex, planned: PlaceIndex, draft: ResidentDraft
+) -> tuple[int, int] | None:
+    """Return the working hours of somebody on a day, minutes; None if they have it off or their place is closed.
+
+    Parameters
+    ----------
+    index, planned
+        Of that day, and of the day that their working hours were planned for.
+    """
+    if draft.workplace is None or draft.shift is None or index.weekday in draft.days_off:
+        return None
+    place = index.place_by_id[draft.workplace]
+    hours = index.hours(place)
+    if draft.status == "student":
+        start, end = draft.shift
+        fits = index.weekday not in _WEEKEND and any(a <= start and end <= b + _AFTER for a, b in hours)
+        return draft.shift if fits else None
+    if hours == planned.hours(place):
+        return draft.shift
+    if not workdays(hours) or draft.job is None:
+        return None
+    return _working_hours(rng, index, draft, draft.job, place, first=draft.first_shift)
 
 
 def _five(minutes: float) -> int:
     return round(minutes / 5) * 5
 
 
-def _shift(rng: np.random.Generator, pattern: str, spans: Sequence[Span]) -> tuple[int, int]:
-    """Working hours that fit the pattern of the trade and a stretch of the place's hours, minutes."""
+def _shift(
+    rng: np.random.Generator, pattern: str, spans: Sequence[Span], *, first: bool, more: int = 0
+) -> tuple[int, int]:
+    """Working hours that fit the pattern of the trade and a stretch of the place's hours, minutes.
+
+    Parameters
+    ----------
+    first
+        Whether they are the first part of a long day.
+    more
+        How much longer somebody stays than others, where nobody waits for them to leave.
+    """
     opens = max(min(start for start, _ in spans), 6 * 60)
     closes = min(max(end for _, end in spans), 24 * 60)
     low, high = max(5 * 60 + 30, opens - _BEFORE), min(_LATEST, closes + _AFTER)
     length = _five(float(rng.integers(455, 505)))
-    first = bool(rng.random() < 0.55)
     if pattern in ("office", "bank"):
         start = int(rng.choice([480, 495, 510, 525, 540, 555], p=[0.1, 0.2, 0.33, 0.15, 0.17, 0.05]))
         length += 10
@@ -243,9 +361,11 @@ def _shift(rng: np.random.Generator, pattern: str, spans: Sequence[Span]) -> tup
         start = opens - 45 if first and opens <= 12 * 60 else min(closes + 15, _LATEST) - length
         start = max(start, 8 * 60)
     elif pattern == "early":
-        start = opens - int(rng.choice([20, 30])) if first else opens + int(rng.choice([45, 75, 90]))
+        start = opens - int(rng.choice([20, 30])) if first else min(closes + 10, 22 * 60) - length
     else:  # shop, day
         start = opens - int(rng.choice([10, 15, 20])) if first else min(closes + 10, 21 * 60) - length
+    if pattern in _OPEN_ENDED:
+        length += more
     if opens > start + 300:  # opens in the evening only
         start = low
     start = _five(max(low, min(start, high - min(length, high - low))))

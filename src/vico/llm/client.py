@@ -16,6 +16,7 @@ from vico.io.http import Backoff, with_retries
 from vico.llm.budget import Budget, Usage
 from vico.llm.endpoint import Endpoint
 from vico.llm.messages import Message, checked, tokens_of, user
+from vico.llm.prompts import data_block
 from vico.llm.recording import Answer, Cache, CallRecorder, Replay, digest_of, recorded_endpoint
 from vico.llm.replies import Check, instruction, plain, read, response_format
 from vico.llm.transport import Connection, RequestError, post
@@ -218,8 +219,9 @@ class LanguageModel:
     @staticmethod
     def _repair(text: str, findings: Sequence[str], reply: type[BaseModel]) -> list[Message]:
         """Return what is said after a bad reply: that reply alone, so that requests don't grow from round to round."""
-        listed = "\n".join(f"- {finding}" for finding in findings)
-        turns = [user(f"This can't be used:\n{listed}\nMend it. {instruction(reply)}")]
+        # They quote what was asked and said, so they are data, too.
+        listed = data_block("findings", list(findings))
+        turns = [user(f"This can't be used. What is wrong with it:\n{listed}\nMend it. {instruction(reply)}")]
         return [{"role": "assistant", "content": text[:_MOST_QUOTED]}, *turns] if text.strip() else turns
 
     def _whole(self, said: Sequence[Message], reply: type[BaseModel]) -> dict[str, Any]:

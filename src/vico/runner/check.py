@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from statistics import median
@@ -17,9 +16,10 @@ from vico.runner.answers import MalformedError, plain_action
 from vico.runner.faults import is_malformed
 from vico.runner.foreign import Terms, foreign_agents
 from vico.runner.gather import failure_of
-from vico.runner.given import own_info, own_observation, sent_info
+from vico.runner.given import digest_of, own_info, own_observation
 from vico.runner.isolated import IsolatedAgent
 from vico.runner.loading import AgentSeat
+from vico.runner.watch import UnfairError
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
 from vico.world.folder import World
@@ -34,7 +34,7 @@ class AgentFinding:
     Attributes
     ----------
     promise
-        ``made``, ``acts``, ``action``, ``deadline``, ``repeatable``, ``leaves``, ``state`` or ``usage``.
+        ``made``, ``fair``, ``acts``, ``action``, ``deadline``, ``repeatable``, ``leaves``, ``state`` or ``usage``.
     where
         The step it was found at; "" for the whole.
     what
@@ -113,7 +113,7 @@ def check_agent(
         No findings if it keeps the contract.
     """
     check = AgentCheck()
-    terms = Terms(isolate=isolate)
+    terms = Terms(isolate=isolate, checked=isolate)
     seat = AgentSeat(NAME, seed, instructions or [])
     with ExitStack() as made:
 
@@ -125,6 +125,9 @@ def check_agent(
 
         try:
             agent, twin = another(), another()
+        except UnfairError as error:
+            check.add("fair", 0, str(error))
+            return check
         except InputError as error:
             check.add("made", 0, str(error))
             return check
@@ -151,13 +154,13 @@ def _play(
         if step == steps // 2:
             restored = _restored(check, agent, another, step)
         given = own_observation(seen), own_info(info)
-        before, began = _digest(*given), time.perf_counter()
+        before, began = digest_of(*given), time.perf_counter()
         action = _asked(check, agent, given, step)
         seconds = time.perf_counter() - began
         check.milliseconds.append(1000 * seconds)
         if seconds > deadline:
             check.add("deadline", step, f"took {seconds:.2f} s for an action; it has {deadline:g} s")
-        if _digest(*given) != before:
+        if digest_of(*given) != before or (isinstance(agent, IsolatedAgent) and not agent.left):
             check.add("leaves", step, "changes the observation or info it is given; take a copy of what is to change")
         if action is None:
             return
@@ -190,7 +193,8 @@ def _asked(check: AgentCheck, agent: Agent, given: tuple[dict[str, Any], dict[st
         check.add("action", step, str(error))
         return {"type": "wait"}
     except BaseException as error:
-        check.add("acts", step, failure_of(error).reason)
+        failure = failure_of(error)
+        check.add("fair" if failure.kind == "unfair" else "acts", step, failure.reason)
         return None
 
 
@@ -200,10 +204,13 @@ def _restored(check: AgentCheck, agent: Agent, another: Callable[[], Agent], ste
         state: AgentState = decode(encode(agent.state()))
         fresh = another()
         fresh.restore(state)
+    except UnfairError as error:
+        check.add("fair", step, str(error))
     except (InputError, SchemaError) as error:
         check.add("state", step, str(error))
     except BaseException as error:
-        check.add("state", step, failure_of(error).reason)
+        failure = failure_of(error)
+        check.add("fair" if failure.kind == "unfair" else "state", step, failure.reason)
     else:
         return fresh
     return None
@@ -213,10 +220,3 @@ def _usage(check: AgentCheck, agent: Agent) -> None:
     tokens, cost = getattr(agent, "tokens", 0), getattr(agent, "cost", 0.0)
     if not isinstance(tokens, int) or tokens < 0 or not isinstance(cost, (int, float)) or not cost >= 0:
         check.add("usage", 0, f"tokens {tokens!r:.40} and cost {cost!r:.40} have to be numbers of 0 or more")
-
-
-def _digest(observation: Mapping[str, Any], info: Mapping[str, Any]) -> bytes:
-    try:
-        return hashlib.blake2b(encode([observation, sent_info(info)])).digest()
-    except (InputError, AttributeError, KeyError, TypeError, ValueError):
-        return b"no longer what it was"

@@ -10,12 +10,13 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from vico.agents.base import Agent
+from vico.agents.base import Action, Agent, Info, Observation
 from vico.agents.wrappers import usage_of
 from vico.errors import VicoError, sentence_of
 from vico.runner.answers import MalformedError, plain_action
-from vico.runner.given import received_info
-from vico.runner.loading import AgentSeat, load, make_agent
+from vico.runner.given import digest_of, received_info
+from vico.runner.loading import AgentSeat, load, make_agent, source_of
+from vico.runner.watch import Watch
 from vico.runner.wire import ClosedError, packed, receive, send
 from vico.world.folder import read_world
 from vico.world.public import PublicMap
@@ -27,38 +28,80 @@ def main(channel_number: int, lifeline: int) -> None:
     """Serve one agent until the other side closes the channel."""
     channel = socket.socket(fileno=channel_number)
     threading.Thread(target=_end_with_the_run, args=(lifeline,), daemon=True).start()
-    agent: Agent | None = None
+    served = _Served()
     while True:
         try:
             message = receive(channel, limit=_LONGEST)
         except ClosedError:
             return
         try:
-            if message["do"] == "make":
-                agent, answer = _make(message), None
-            else:
-                assert agent is not None
-                answer = _do(agent, message)
-            usage = usage_of(agent)
-            reply = packed({"answer": answer, "tokens": usage.tokens, "cost": usage.cost})
+            answer = served.answer(message)
+            usage = usage_of(served.agent)
+            reply = {"answer": answer, "tokens": usage.tokens, "cost": usage.cost, "left": served.left}
+            sent = packed(reply)
         except BaseException as error:
-            reply = packed({"error": _said(error), "malformed": isinstance(error, MalformedError)})
-        send(channel, reply)
+            kind = "malformed" if isinstance(error, MalformedError) else "crashed"
+            sent = packed({"error": _said(error), "kind": kind})
+        if unfair := served.unfair():
+            sent = packed({"error": unfair[:1000], "kind": "unfair"})
+        send(channel, sent)
 
 
-def _do(agent: Agent, message: dict[str, Any]) -> Any:
-    if message["do"] == "act":
-        return plain_action(agent.act(message["observation"], received_info(message["info"])))
-    if message["do"] == "state":
-        return agent.state()
-    agent.restore(message["state"])
-    return None
+class _Served:
+    """The agent of this process, once it is made, and who watches it.
 
+    Attributes
+    ----------
+    left
+        Whether the agent left what it was last given as it was; looked at where that is asked for.
+    """
 
-def _make(message: dict[str, Any]) -> Agent:
-    _limit_memory(int(message["memory"]))
-    seat = AgentSeat(**message["seat"])
-    return make_agent(load(message["spec"]), seat, lambda: PublicMap.from_world(read_world(Path(message["world"]))))
+    def __init__(self) -> None:
+        self.left = True
+        self._agent: Agent | None = None
+        self._watch: Watch | None = None
+        self._checked = False
+
+    @property
+    def agent(self) -> Agent:
+        """The agent."""
+        assert self._agent is not None
+        return self._agent
+
+    def unfair(self) -> str:
+        """Return what the agent reached for and is not given, since this was last asked; empty if nothing."""
+        return "" if self._watch is None else self._watch.taken()
+
+    def answer(self, message: dict[str, Any]) -> Any:
+        """Do what is asked."""
+        if message["do"] == "make":
+            self._make(message)
+            return None
+        if message["do"] == "act":
+            return self._act(message["observation"], received_info(message["info"]))
+        if message["do"] == "state":
+            return self.agent.state()
+        self.agent.restore(message["state"])
+        return None
+
+    def _act(self, observation: Observation, info: Info) -> Action:
+        before = digest_of(observation, info) if self._checked else b""
+        action = plain_action(self.agent.act(observation, info))
+        self.left = not self._checked or digest_of(observation, info) == before
+        return action
+
+    def _make(self, message: dict[str, Any]) -> None:
+        _limit_memory(int(message["memory"]))
+        self._checked = bool(message["checked"])
+        world, spec = Path(message["world"]), message["spec"]
+        watch = self._watch = Watch(world, source_of(spec))
+        watch.start()
+
+        def public_map() -> PublicMap:
+            with watch.paused():
+                return PublicMap.from_world(read_world(world))
+
+        self._agent = make_agent(load(spec), AgentSeat(**message["seat"]), public_map)
 
 
 def _limit_memory(megabytes: int) -> None:

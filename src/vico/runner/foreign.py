@@ -31,12 +31,15 @@ class Terms:
         How many are asked at a time where there is no deadline.
     memory
         MiB an isolated agent's process may have.
+    checked
+        Whether it is looked at if isolated agents leave what they are given as it is.
     """
 
     deadline: float | None = None
     isolate: bool = False
     workers: int = 1
     memory: int = MEMORY
+    checked: bool = False
 
     def __post_init__(self) -> None:
         if self.deadline is not None and not 0.0 < self.deadline < 1e6:
@@ -83,6 +86,8 @@ def foreign_agents(spec: str, seats: Sequence[AgentSeat], world: World, terms: T
 
     Raises
     ------
+    UnfairError
+        If an isolated one reaches for what it is not given.
     InputError, MissingFileError
         If one can't be loaded or made, or isolated agents are asked for in a world that is in no folder.
     """
@@ -94,7 +99,7 @@ def foreign_agents(spec: str, seats: Sequence[AgentSeat], world: World, terms: T
     made: dict[str, Agent] = {}
     try:
         for seat in seats:
-            made[seat.name] = IsolatedAgent(spec, seat, world=world.path, memory=terms.memory)
+            made[seat.name] = IsolatedAgent(spec, seat, world=world.path, memory=terms.memory, checked=terms.checked)
     except BaseException:
         for agent in made.values():
             if isinstance(agent, IsolatedAgent):

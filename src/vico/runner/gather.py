@@ -16,6 +16,7 @@ from vico.runner.faults import Failure, FaultKind
 from vico.runner.given import own_info, own_observation
 from vico.runner.isolated import AgentProcessError, EndedError, IsolatedAgent
 from vico.runner.threads import AgentThread
+from vico.runner.watch import UnfairError
 from vico.sim.actions import AgentFault
 
 log = logging.getLogger(__name__)
@@ -186,6 +187,8 @@ def failure_of(error: BaseException) -> Failure:
         kind = "malformed"
     elif isinstance(error, EndedError):
         kind = "ended"
+    elif isinstance(error, UnfairError):
+        kind = "unfair"
     try:
         said = str(error).strip().splitlines()[:1]
     except Exception:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import hashlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
@@ -12,6 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vico.agents.base import Info, Observation
+from vico.errors import InputError
+from vico.io.plain_data import encode
 from vico.sim.perception import SeenBody
 from vico.world.public import PublicMap
 
@@ -98,6 +101,14 @@ def received_info(sent: Mapping[str, Any]) -> Info:
     if in_view is not None:
         info["in_view"] = ListedInView.of(in_view)
     return info
+
+
+def digest_of(observation: Mapping[str, Any], info: Mapping[str, Any]) -> bytes:
+    """Return a hash of all that an agent is given; of what is no longer that, a fixed one."""
+    try:
+        return hashlib.blake2b(encode([observation, sent_info(info)])).digest()
+    except (InputError, AttributeError, KeyError, TypeError, ValueError):
+        return b"no longer what it was"
 
 
 def _listed(in_view: Any) -> ListedInView:

@@ -18,6 +18,7 @@ from vico.errors import InputError, SchemaError
 from vico.runner.answers import MalformedError
 from vico.runner.given import sent_info
 from vico.runner.loading import AgentSeat
+from vico.runner.watch import UnfairError
 from vico.runner.wire import ClosedError, packed, receive, send
 
 #: Memory an agent's process may have, MiB.
@@ -37,6 +38,10 @@ class AgentProcessError(RuntimeError):
     """An agent failed in its process; the message is what it said."""
 
 
+_ERRORS: dict[str, type[Exception]] = {"malformed": MalformedError, "unfair": UnfairError}
+_FORMS = ({"error", "kind"}, {"answer", "tokens", "cost", "left"})
+
+
 class IsolatedAgent:
     """An agent that is made and asked in a process of its own.
 
@@ -53,14 +58,24 @@ class IsolatedAgent:
         Folder of the world whose public map it is given, if its constructor asks for it.
     memory
         MiB the process may have.
+    checked
+        Whether `left` is looked at.
+
+    Attributes
+    ----------
+    left
+        Whether it left what it was last given as it was.
 
     Raises
     ------
+    UnfairError
+        If it reaches for what it is not given while it is loaded or made.
     InputError
         If it can't be loaded or made; the message says why.
     """
 
-    def __init__(self, spec: str, seat: AgentSeat, *, world: Path, memory: int = MEMORY) -> None:
+    def __init__(self, spec: str, seat: AgentSeat, *, world: Path, memory: int = MEMORY, checked: bool = False) -> None:
+        self.left = True
         self.tokens = 0
         self.cost = 0.0
         self._spec = spec
@@ -79,10 +94,19 @@ class IsolatedAgent:
         finally:
             theirs.close()
             os.close(lifeline)
-        told = {"spec": spec, "seat": asdict(seat), "world": str(world.resolve()), "memory": memory}
+        told = {
+            "spec": spec,
+            "seat": asdict(seat),
+            "world": str(world.resolve()),
+            "memory": memory,
+            "checked": checked,
+        }
         try:
             self._channel.settimeout(_START)
             self._ask({"do": "make", **told}, _LONGEST_ANSWER)
+        except UnfairError as error:
+            self.close()
+            raise UnfairError(f"{seat.name}: {error}") from None
         except (EndedError, AgentProcessError, SchemaError) as error:
             self.close()
             raise InputError(f"{seat.name}: {error}") from None
@@ -133,10 +157,11 @@ class IsolatedAgent:
         except SchemaError:
             self._end_it()  # what follows in the channel is anyone's guess
             raise
-        if not isinstance(reply, dict) or reply.keys() not in ({"error", "malformed"}, {"answer", "tokens", "cost"}):
+        if not isinstance(reply, dict) or reply.keys() not in _FORMS:
             raise SchemaError("an answer of another form than vico.runner.child gives")
         if "error" in reply:
-            raise (MalformedError if reply["malformed"] is True else AgentProcessError)(str(reply["error"])[:1000])
+            raise _ERRORS.get(str(reply["kind"]), AgentProcessError)(str(reply["error"])[:1000])
+        self.left = reply["left"] is True
         self._spent(reply["tokens"], reply["cost"])
         return reply["answer"]
 

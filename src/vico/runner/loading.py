@@ -74,6 +74,12 @@ def load(spec: str) -> Any:
 
 def source_digest(spec: str) -> str:
     """Return a hash of the file that `load` would read for a spec, without running it; "" if there is none."""
+    path = source_of(spec)
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path is not None else ""
+
+
+def source_of(spec: str) -> Path | None:
+    """Return the file that `load` would read for a spec; None if there is none."""
     place = spec.rpartition(":")[0]
     path = Path(place) if place.endswith(".py") else Path.cwd() / (place.replace(".", "/") + ".py")
     if not path.is_file() and not place.endswith(".py"):
@@ -82,7 +88,7 @@ def source_digest(spec: str) -> str:
         except (ImportError, ValueError):
             found = None
         path = Path((found and found.origin) or path)
-    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+    return path if path.is_file() else None
 
 
 def make_agent(thing: Any, seat: AgentSeat, public_map: Callable[[], PublicMap]) -> Agent:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from vico.agents.base import AgentState
@@ -35,6 +37,50 @@ def go_on_from(checkpoint: Checkpoint, agents: Gatherer, sim: Simulation) -> Fau
     return FaultLog.of(checkpoint.notes["faults"])
 
 
+@contextmanager
+def recorded_in(out: Path, sim: Simulation, faults: FaultLog, *, world: Path, wanted: int) -> Iterator[Hook]:
+    """Give a hook that records a run into a folder; when the block ends, the run is complete, or was stopped.
+
+    It may follow a run that is gone on with by further calls of `Runner.run`.
+
+    Parameters
+    ----------
+    out
+        Folder to write; must not exist, or be empty.
+    faults
+        Of the runner.
+    world
+        The world's folder, for the reader.
+    wanted
+        Steps the run is meant to have at most.
+
+    Raises
+    ------
+    OutputExistsError
+        If the folder holds something.
+    """
+    with Recorder(out, sim, sources={"world": str(world)}, wanted=wanted) as recorder:
+        yield _BegunOnce(RecordedRun(recorder, faults))
+
+
+class _BegunOnce(Hook):
+    """Passes on what happens, and the beginning of the first of several runs alone."""
+
+    def __init__(self, inner: Hook) -> None:
+        self._inner, self._begun = inner, False
+
+    def begin(self, observations: Mapping[str, dict[str, Any]]) -> None:
+        if not self._begun:
+            self._inner.begin(observations)
+        self._begun = True
+
+    def stepped(self, step: Step) -> None:
+        self._inner.stepped(step)
+
+    def checkpoint(self, states: Mapping[str, AgentState]) -> None:
+        self._inner.checkpoint(states)
+
+
 class RecordedRun(Hook):
     """Hands every step to a recorder, and what agents did wrong; saves the run where it can be gone on with.
 
@@ -49,6 +95,18 @@ class RecordedRun(Hook):
     def __init__(self, recorder: Recorder, faults: FaultLog) -> None:
         self._recorder, self._faults = recorder, faults
         self._told = -1
+
+    @classmethod
+    def into(
+        cls, out: Path, sim: Simulation, faults: FaultLog, *, wanted: int, notes: Mapping[str, Any] | None = None
+    ) -> RecordedRun:
+        """Record a simulation into a new folder; the parameters are those of `vico.sim.recorder.Recorder`."""
+        sources = {"world": str(sim.world.path)}
+        return cls(Recorder(out, sim, sources=sources, wanted=wanted, notes=notes), faults)
+
+    def close(self) -> None:
+        """End the recording."""
+        self._recorder.close()
 
     def begin(self, observations: Mapping[str, dict[str, Any]]) -> None:
         """Record how things stand before the first step; a run that goes on has that already."""

@@ -78,4 +78,4 @@ def _hours_of(place: Place, weekday: int) -> list[Span]:
     if place.category is Category.ACCOMMODATION:
         return [(0, MINUTES)]
     said = open_spans(place.opening_hours, weekday) if place.opening_hours else None
-    return usual_spans(place.kind, place.category) if said is None else said
+    return usual_spans(place.kind, place.category, weekday) if said is None else said

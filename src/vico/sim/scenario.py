@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vico.errors import InputError
+from vico.rules import ride_price
 from vico.sim import moves
 from vico.sim.actions.hands import hold
 from vico.sim.avatars import free_ground
 from vico.sim.holding import free_hand
 from vico.sim.placing import Thing, free_spot_near, in_the_way
 from vico.sim.simulation_state import SimulationState
+from vico.sim.state import Vehicle
 from vico.world.mesh import Surface
 
 # An object that cannot lie where it is asked for lies no farther away than this, metres.
@@ -139,6 +142,21 @@ class Scenario:
             raise InputError(f"place_agent: {name}: no free ground within 8 m of {np.asarray(position)[:2].tolist()}")
         moves.put_outdoors(i, spot, yaw, state)
 
+    def give_cash(self, name: str, amount: float) -> None:
+        """Let a person carry so much money, instead of what they had.
+
+        Raises
+        ------
+        InputError
+            If nobody has the name, or the amount is negative or no number.
+        """
+        people = self._state.people
+        if name not in people.names:
+            raise InputError(f"give_cash: nobody is called {name!r}; there are {', '.join(people.names)}")
+        if not 0.0 <= amount < math.inf:
+            raise InputError(f"give_cash: {name}: {amount}; give an amount of 0 or more")
+        people.cash[people.names.index(name)] = amount
+
 
 class GroundTruth:
     """Answers an evaluator's questions from the state itself; agents never get it.
@@ -165,6 +183,22 @@ class GroundTruth:
         """Return the name of the agent that carries an object; None if nobody does."""
         holder = int(self._state.objects.holder[self._index(name)])
         return self._state.entities[holder]["agent"] if holder else None
+
+    def money(self, name: str) -> float:
+        """Return what a person has, less what they owe for rides."""
+        i = self._person(name)
+        return float(self._state.people.cash[i] - self._state.people.owed[i])
+
+    def bicycle_price(self, name: str) -> float:
+        """Return what a person would have to pay who left their bicycle here and now; 0 for who rides none."""
+        state = self._state
+        i = self._person(name)
+        if state.transit is None or state.people.vehicle[i] != Vehicle.BIKE:
+            return 0.0
+        bicycles = state.transit.bicycles
+        bike = int(state.people.vehicle_entity[i]) - bicycles.first_entity
+        seconds = float(state.transit.clock[0] - bicycles.since[bike])
+        return ride_price(seconds, returned=bicycles.is_at_station(bike))
 
     def object_entity(self, name: str) -> int:
         """Return the entity of an object, as pictures show it."""

@@ -6,12 +6,13 @@ A `Choice` is one of these for one subtask; an `Errand` carries it out by option
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from vico.agents.assistant.options import GoTo, Option, PickUp, PutDown, Search
+from vico.agents.assistant.options import GoTo, Option, PickUp, Search
 from vico.agents.assistant.people import PERSON, AwaitPerson, Escort, Meet, Report, Show
+from vico.agents.assistant.putting import PutDown
 from vico.agents.assistant.skills import Action, AssistantSkills, ObservationView
 from vico.agents.navigation.memory import SeenThing
 from vico.agents.perception import Sighting
@@ -246,7 +247,7 @@ class Errand:
         if self._stage == "put":
             mine = frozenset(self._book.picked[n] for n in told["objects"] if n in self._book.picked)
             return PutDown(self._skills, told["destination"], mine if self._category == "delivery" else None)
-        return {
+        makers: dict[str, Callable[[], Option]] = {
             "go": lambda: GoTo(self._skills, self._region, near=_NEAR_SEEN if self._seen is not None else 1.0),
             "look": lambda: Search(
                 self._skills, lambda seen: self._book.is_wanted(k, seen), self._region, large=self._category == "carry"
@@ -257,7 +258,8 @@ class Errand:
             "follow": lambda: Escort(self._skills, person, told["destination"]),
             "await": lambda: AwaitPerson(person, _PATIENCE),
             "report": lambda: Report(k),
-        }[self._stage]()
+        }
+        return makers[self._stage]()
 
     def _after(self, option: Option, view: ObservationView) -> str:
         """Return the stage that follows, ``over`` at the end; and write down what came of the last one."""

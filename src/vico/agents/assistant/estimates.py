@@ -25,6 +25,8 @@ _DETOUR = 1.25
 DOOR, PICK, PUT, MEET = 12.0, 6.0, 6.0, 25.0
 # Looking through a place, and a spot outdoors: for a thing, and for a person, seconds.
 _LOOK = {("place", False): 45.0, ("outdoor", False): 22.0, ("place", True): 25.0, ("outdoor", True): 6.0}
+# Hours of meals, and how many times as likely somebody is at a place for them then, and less so else.
+_MEALS, _AT_MEALS = ((7.0, 9.0), (11.5, 13.75), (18.0, 20.0)), 2.0
 # Chance that a look finds what is there.
 FINDS = 0.85
 
@@ -42,6 +44,8 @@ class Estimates:
         self, public_map: PublicMap, instructions: Sequence[Mapping[str, Any]], *, distance: bool = True
     ) -> None:
         self.distance = distance
+        #: Second of the day, as far as it is known.
+        self.time = 12 * 3600.0
         self._map = public_map
         self._fields: dict[tuple[float, float], NDArray[np.float32]] = {}
 
@@ -56,6 +60,15 @@ class Estimates:
         """Seconds that looking through a region takes, with going in and out."""
         doors = 2 * DOOR if region["kind"] == "place" else 0.0
         return _LOOK[str(region["kind"]), person] + doors
+
+    def weight(self, region: Mapping[str, Any], *, person: bool) -> float:
+        """Return how likely a region is beside others: people are where one eats at the hours for it."""
+        if not person or region["place"] is None:
+            return 1.0
+        hour = self.time / 3600.0 % 24.0
+        eats = any(since <= hour < until for since, until in _MEALS)
+        food = self._map.place_by_id[str(region["place"])].category == "food"
+        return _AT_MEALS if food and eats else 1.0 / _AT_MEALS if food else 1.0
 
     def _metres(self, start: Sequence[float], goal: Sequence[float]) -> float:
         key = (round(float(goal[0]), 2), round(float(goal[1]), 2))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from vico.agents.assistant.automata import AUTOMATA, ROUNDS
-from vico.agents.assistant.options import GoTo, Option, PickUp, PutDown, Search, WalkUp
+from vico.agents.assistant.options import GoTo, Option, PickUp, Search, WalkUp
 from vico.agents.assistant.people import PERSON, AwaitPerson, Escort, Meet, Report, Show
+from vico.agents.assistant.putting import PutDown
 from vico.agents.assistant.skills import Action, AssistantSkills, ObservationView
 from vico.agents.perception import Sighting
 from vico.agents.state import AgentState
@@ -117,28 +118,30 @@ class HeuristicPlanner:
         if self.number in (2, 3):
             assert target is not None
             return WalkUp(self.skills, target) if self.number == 2 else PickUp(self.skills, target)
-        return {
+        makers: dict[int, Callable[[], Option]] = {
             0: lambda: GoTo(self.skills, self._source),
             1: lambda: Search(self.skills, self._is_wanted, self._source),
             4: lambda: GoTo(self.skills, errand["destination"]),
             5: lambda: PutDown(self.skills, errand["destination"]),
             6: lambda: Report(int(errand["index"])),
-        }[self.number]()
+        }
+        return makers[self.number]()
 
     def _search(self) -> Option:
         if self.number == 2:
             assert self._target is not None
             return Show(self.skills, self._target, within=_SHOW_WITHIN)
-        return {
+        makers: dict[int, Callable[[], Option]] = {
             0: lambda: GoTo(self.skills, self._source),
             1: lambda: Search(self.skills, self._is_wanted, self._source),
             3: lambda: Report(int(self.errand["index"])),
-        }[self.number]()
+        }
+        return makers[self.number]()
 
     def _carry(self) -> Option:
         errand, person = self.errand, str(self.errand["person"]["name"])
         where = None if self._target is None else self._target.position
-        return {
+        makers: dict[int, Callable[[], Option]] = {
             0: lambda: GoTo(self.skills, self._source),
             1: lambda: Search(
                 self.skills, lambda seen: seen.kind == PERSON and seen.name == person, self._source, large=True
@@ -148,7 +151,8 @@ class HeuristicPlanner:
             4: lambda: PutDown(self.skills, errand["destination"]),
             5: lambda: AwaitPerson(person, _PATIENCE),
             6: lambda: Report(int(errand["index"])),
-        }[self.number]()
+        }
+        return makers[self.number]()
 
     @property
     def _source(self) -> dict[str, Any]:

@@ -34,7 +34,8 @@ class LookAround:
     region
         Where to look, as instructions name it; None for wherever one is.
     large
-        Whether it is as large as a person: then outdoors one look from the middle of the region is enough.
+        Whether it is as large as a person: then one look from the middle of a region outdoors, and one from the door of
+        each room, is enough.
 
     Attributes
     ----------
@@ -55,6 +56,7 @@ class LookAround:
         self.found: Sighting | None = None
         self._place = None if region is None else region["place"]
         self._views = 0
+        self._large = large
         self._spots = [] if large else _spots_of(region, skills)
         self._rooms_done: set[str] = set()
         self._ways: dict[str, list[str]] = {}  # rooms known to lie behind each room's doors
@@ -103,13 +105,14 @@ class LookAround:
         """Look from the middle of the room, too, then go on to the next one."""
         if room not in self._rooms_done:
             self._walked += 1
-            near_by = self._walked < _MIDDLE and self._place in (None, view.place)
+            near_by = not self._large and self._walked < _MIDDLE and self._place in (None, view.place)
             step = self.skills.walk_indoors(view, _middle(view), near=0.8) if near_by else None
             if step is not None:
                 return step
             self._rooms_done.add(room)
-            self._look_again(1)
-            return {"type": "turn_left", "degrees": _TURN}
+            if not self._large:
+                self._look_again(1)
+                return {"type": "turn_left", "degrees": _TURN}
         if room not in self._ways:
             self._ways[room] = [str(door["to"]) for door in view.state["doors"] if door["to"] != OUTSIDE]
         onward = self._next_room(room)

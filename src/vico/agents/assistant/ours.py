@@ -84,7 +84,8 @@ class OurPlanner(ChoicePlanner):
                 plans[part] = best_plan(self._model(list(part), view), left)
             return plans[part]
 
-        best, shared = (-1.0, 0.0), (tuple(subtasks), ())
+        best = (-1.0, 0.0)
+        shared: tuple[tuple[int, ...], tuple[int, ...]] = (tuple(subtasks), ())
         for count in range(1, len(subtasks)):
             for first in combinations(subtasks, count):
                 second = tuple(k for k in subtasks if k not in first)

@@ -60,6 +60,7 @@ class Model:
         seen: Mapping[int, SeenThing],
     ) -> None:
         self.book, self.estimates, self.seen = book, estimates, seen
+        self.estimates.time = float(view.state["time"])
         held = {k: len(book.in_hand(k, view)) for k in subtasks}
         self.subtasks = [k for k in subtasks if book.is_open(k) and (held[k] or self._regions(k) or k in seen)]
         #: How many hands each subtask's things take.
@@ -95,14 +96,13 @@ class Model:
             yield Choice("fetch", k), self._after(outlook, i, k, point, seconds), 0.95
             return
         regions = self._regions(k)
-        for r in regions:
+        weights = [self.estimates.weight(told["sources"][r], person=category == "carry") for r in regions]
+        for r, weight in zip(regions, weights, strict=True):
             region = told["sources"][r]
             point = (float(region["centre"][0]), float(region["centre"][1]))
             seconds = self.estimates.travel(outlook.at, point)
             seconds += self.estimates.look(region, person=category == "carry")
-            # Where it is not in this one it is in another, which takes as long again.
-            seconds *= 1.0 + 0.5 * (len(regions) - 1)
-            yield Choice("look", k, r), self._after(outlook, i, k, point, seconds), FINDS
+            yield Choice("look", k, r), self._after(outlook, i, k, point, seconds), FINDS * weight / sum(weights)
 
     def _after(self, outlook: Outlook, i: int, k: int, point: Point, seconds: float) -> Outlook:
         """Return what finding leads to: the thing in hand; with Carry all of it, with Search the report."""

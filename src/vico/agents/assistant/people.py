@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.assistant.skills import Action, AssistantSkills, ObservationView
+from vico.agents.assistant.options import Pursuit
+from vico.agents.assistant.skills import WALK, Action, AssistantSkills, ObservationView
 from vico.agents.perception import Sighting
 from vico.agents.requester import CALL_DISTANCE, HAND_OVER_DISTANCE
 from vico.agents.state import AgentState
@@ -16,12 +18,17 @@ from vico.agents.state import AgentState
 Region = Mapping[str, Any]
 
 PERSON = "resident"
-_OFFER = "Hello! I am here to help you carry that home. May I take it?"
+_OFFER = "Hello {}! I am here to help you carry that home. May I take it?"
 # One speaks from so near, stands so near to be handed something, metres; asks again after so many steps; and gives up
 # somebody who is out of view for so long, or hands nothing over, steps.
 _SPEAK, _STAND, _AGAIN, _LOST, _LONGEST = CALL_DISTANCE - 3.0, HAND_OVER_DISTANCE - 0.3, 20, 25, 150
-# Who follows keeps behind by so much, runs where it is more than the second, metres.
-_BEHIND, _RUN_BEYOND, _RUN, _WALK = 1.7, 3.2, 2.2, 1.0
+# Who follows keeps behind by so much, runs where it is more than the second, metres, and else walks as they do, m/s;
+# and does so no longer than this, steps.
+_BEHIND, _RUN_BEYOND, _BESIDE = 1.7, 3.2, 1.0
+_ESCORT = 700
+# In a room, who has moved less than so much a step, metres, for so many steps is let pass: one goes out, makes room for
+# so many steps, and waits so long for them to come out.
+_STANDS, _LETS_PASS, _ROOM, _COMES_OUT = 0.15, 5, 3, 40
 # ... goes to where the person was last seen for so many steps, then home by the map.
 _TO_LAST_SEEN = 8
 # So many pixels are shown where 20 are asked for, from these distances, metres, of which the first is tried first.
@@ -40,7 +47,7 @@ class Meet:
     def __init__(self, skills: AssistantSkills, person: str, count: int, where: NDArray[np.float64] | None) -> None:
         self.outcome = ""
         self._skills, self._person, self._count = skills, person, count
-        self._where = where
+        self._pursuit = Pursuit(skills, where)
         self._unseen = self._steps = 0
         self._spoke_at = -_AGAIN
         self._before: int | None = None
@@ -48,7 +55,7 @@ class Meet:
     def state(self) -> AgentState:
         """Return how far it came."""
         return {
-            "where": None if self._where is None else self._where.copy(),
+            "pursuit": self._pursuit.state(),
             "unseen": self._unseen,
             "steps": self._steps,
             "spoke_at": self._spoke_at,
@@ -57,8 +64,7 @@ class Meet:
 
     def restore(self, state: AgentState) -> None:
         """Go on."""
-        where = state["where"]
-        self._where = None if where is None else np.array(where, np.float64)
+        self._pursuit.restore(state["pursuit"])
         self._unseen, self._steps = state["unseen"], state["steps"]
         self._spoke_at, self._before = state["spoke_at"], state["before"]
 
@@ -77,20 +83,20 @@ class Meet:
             self.outcome = "handed" if held > self._before else "lost"
             return None
         if seen is not None:
-            self._where = seen.position
-        elif self._where is None or view.away(self._where) < 1.0 or self._unseen % 5 == 0:
-            return {"type": "turn_left", "degrees": 88.0}
+            self._pursuit.see(view, seen.position)
         return self._go_up(view)
 
     def _go_up(self, view: ObservationView) -> Action:
-        assert self._where is not None
-        if view.away(self._where) <= _SPEAK and self._steps - self._spoke_at >= _AGAIN:
+        away = self._pursuit.away(view)
+        if self._unseen == 0 and away <= _SPEAK and self._steps - self._spoke_at >= _AGAIN:
             self._spoke_at = self._steps
-            return {"type": "communicate", "text": _OFFER}
-        self._skills.pace = _RUN if view.away(self._where) > _SPEAK else _WALK
-        step = self._skills.approach(view, self._where, near=_STAND)
-        self._skills.pace = _WALK
-        return step or {"type": "wait"}
+            return {"type": "communicate", "text": _OFFER.format(self._person.split()[0])}
+        self._skills.pace = WALK if away > _SPEAK else _BESIDE
+        step = self._pursuit.step(view, near=_STAND)
+        self._skills.pace = WALK
+        if step is not None and self._unseen % 6 != 5:
+            return step
+        return {"type": "turn_left", "degrees": 88.0} if self._unseen else {"type": "wait"}
 
 
 class Escort:
@@ -99,42 +105,66 @@ class Escort:
     def __init__(self, skills: AssistantSkills, person: str, home: Region) -> None:
         self.outcome = ""
         self._skills, self._person, self._home = skills, person, home
-        self._last: NDArray[np.float64] | None = None
-        self._lost = self._steps = 0
+        self._pursuit = Pursuit(skills)
+        self._lost = self._steps = self._still = 0
+        self._ahead = False
 
     def state(self) -> AgentState:
         """Return how far it came."""
-        last = None if self._last is None else self._last.copy()
-        return {"last": last, "lost": self._lost, "steps": self._steps}
+        return {
+            "pursuit": self._pursuit.state(),
+            "lost": self._lost,
+            "steps": self._steps,
+            "still": self._still,
+            "ahead": self._ahead,
+        }
 
     def restore(self, state: AgentState) -> None:
         """Go on."""
-        self._last = None if state["last"] is None else np.array(state["last"], np.float64)
+        self._pursuit.restore(state["pursuit"])
         self._lost, self._steps = state["lost"], state["steps"]
+        self._still, self._ahead = state["still"], state["ahead"]
+
+    def _await_outside(self, view: ObservationView, in_view: bool) -> Action:
+        """Make room before the door, and look back until they come out."""
+        self._still += 1
+        if in_view or self._still > _COMES_OUT:
+            self._ahead, self._still = False, 0
+            return {"type": "wait"}
+        if self._still <= _ROOM:
+            return {"type": "move_forward", "distance": 1.0}
+        return {"type": "turn_left", "degrees": 88.0}
 
     def act(self, view: ObservationView) -> Action | None:
         """Return the next action on the way."""
         self._steps += 1
-        if view.place == self._home["place"] or self._steps > 1000:
+        if view.place == self._home["place"] or self._steps > _ESCORT:
             self.outcome = "home" if view.place == self._home["place"] else "stuck"
             return None
         seen = person_in_view(view, self._person)
         self._lost = 0 if seen is not None else self._lost + 1
+        before = self._pursuit.position
         if seen is not None:
-            self._last = seen.position
-            return self._keep_up(view, self._last)
-        if self._last is not None and self._lost <= _TO_LAST_SEEN and view.away(self._last) > _BEHIND:
-            return self._keep_up(view, self._last)
-        return self._skills.go_inside(view, str(self._home["place"]))
-
-    def _keep_up(self, view: ObservationView, point: NDArray[np.float64]) -> Action:
-        away = view.away(point)
-        if away <= _BEHIND:
-            return {"type": "look_at", "target": [float(x) for x in point]}
-        self._skills.pace = _RUN if away > _RUN_BEYOND else _WALK
-        step = self._skills.approach(view, point, near=_BEHIND)
-        self._skills.pace = _WALK
-        return step or {"type": "wait"}
+            self._pursuit.see(view, seen.position)
+        away = self._pursuit.away(view)
+        if view.room is not None:
+            stands = seen is not None and before is not None and math.dist(before[:2], seen.position[:2]) < _STANDS
+            self._still = self._still + 1 if stands else 0
+            # In a room one may be in their way: going ahead opens it, and they come after.
+            self._ahead = self._ahead or self._still > _LETS_PASS
+            if self._ahead:
+                return self._skills.go_inside(view, str(self._home["place"])) or {"type": "wait"}
+        elif self._ahead:
+            return self._await_outside(view, seen is not None)
+        if seen is not None and away <= _BEHIND:
+            return {"type": "look_at", "target": [float(x) for x in seen.position]}
+        if self._pursuit.position is not None and self._lost <= _TO_LAST_SEEN:
+            self._skills.pace = WALK if away > _RUN_BEYOND else _BESIDE
+            step = self._pursuit.step(view, near=_BEHIND)
+            self._skills.pace = WALK
+            if step is not None:
+                return step
+        return self._skills.go_inside(view, str(self._home["place"])) or {"type": "wait"}
 
 
 class Show:

@@ -10,15 +10,19 @@ from numpy.typing import NDArray
 
 from vico.agents.navigation.search import (
     BOUND,
-    FREE_COST,
+    LAYERS,
     STRAIGHT,
     SearchMemory,
     bound,
     search,
     search_memory,
 )
+from vico.agents.navigation.voxel_kernels import FREE_COST
 from vico.agents.state import AgentState
 from vico.io.compiled import compiled
+
+#: Side of the cells that ways on stairs are found on, around who walks there.
+ON_STAIRS = 256
 
 
 class PathKeeper:
@@ -36,6 +40,8 @@ class PathKeeper:
 
     def __init__(self, n: int) -> None:
         self._memory: SearchMemory = search_memory(n)
+        # Stairs are few, and short.
+        self._memory_on_stairs: SearchMemory | None = None
         self._planned = np.zeros((n, n), np.uint8)
         self._cells = np.zeros((0, 3), np.int64)
         self._target = np.zeros(0)
@@ -71,7 +77,11 @@ class PathKeeper:
         self.searches += 1
         self._planned[:] = costs
         self._target = target.copy()
-        self._cells, self.reached = search((costs, masks), self._memory, np.array(start), target, climb)
+        memory = self._memory
+        if climb:
+            self._memory_on_stairs = self._memory_on_stairs or search_memory(ON_STAIRS, layers=LAYERS)
+            memory = self._memory_on_stairs
+        self._cells, self.reached = search((costs, masks), memory, np.array(start), target, climb)
         return self._cells
 
     def forget(self) -> None:

@@ -17,7 +17,7 @@ from vico.agents.state import AgentState
 #: With so many pixels, and after so many seconds for what moves, confidence has come to, or fallen to, 63 % and 37 %.
 SURE_PIXELS, STALE_AFTER = 20.0, 60.0
 #: Directions that a look around in a room is counted in, and how far a picture reaches to either side, radians.
-DIRECTIONS, _SIDE = 8, math.radians(45.0)
+DIRECTIONS, _SIDE = 8, math.radians(45.001)
 #: Most things that are remembered; what was seen longest ago is forgotten first.
 MOST = 512
 # Seen within so many metres of where it was, it lies there still.
@@ -87,9 +87,9 @@ class SeenMemory:
             self._put(SeenThing(thing.entity, thing.kind, thing.name, thing.position, room, now, pixels))
         hidden = [thing for thing in self._rooms.get(room, {}).values() if thing.time != now]
         missing = [thing for thing, gone in zip(hidden, _are_gone(hidden, observation), strict=True) if gone]
-        missing += [thing for entity in state["held"] if entity and (thing := self._thing(int(entity))) is not None]
-        for thing in missing:
-            self.forget(thing.entity)
+        missing += [seen for entity in state["held"] if entity and (seen := self._thing(int(entity))) is not None]
+        for gone in missing:
+            self.forget(gone.entity)
         while len(self._room_of) > MOST:
             self.forget(next(iter(self._room_of)))
         return missing

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vico.agents.base import Action, Info, Observation, heading, wrapped
 from vico.agents.navigation.keeping import PathKeeper
+from vico.agents.navigation.outlook import Outlook
 from vico.agents.navigation.search import Target, furthest_straight
 from vico.agents.navigation.voxel_kernels import BESIDE_COST, SIDE, VOXEL
 from vico.agents.navigation.voxels import VoxelMap
@@ -33,6 +34,10 @@ _INSIDE, _LEAST_NEAR = 0.06, 0.05
 _AHEAD, _AHEAD_ON_STAIRS = 120.0, 10.0
 # What moves and leaves no way is waited for so many steps.
 _PATIENCE = 5
+# What one bumped into on the way to one target is forgotten so often, where no way is left.
+_FORGIVEN = 2
+# Who has just come in stands so near to the door, metres.
+_CAME_IN = 1.2
 OUTDOORS = ""
 
 
@@ -40,7 +45,7 @@ class Navigator:
     """Knows what stands where from pictures, and walks to targets around it.
 
     Indoors, ways are found on the 0.1 m columns of the voxels. Outdoors they are the public map's router's, on its
-    cells of 0.5 m, of which those are closed in which something was seen that the map does not have.
+    cells of 0.5 m; with `goes_round`, those are closed in which something was seen that the map does not have.
 
     Parameters
     ----------
@@ -48,9 +53,12 @@ class Navigator:
         What one knows of the world.
     generator
         Decides how one gets out of others' way outdoors.
+    goes_round
+        Whether what is seen on the way outdoors is gone round before it stops one. Off: measured, it saves no
+        collisions to speak of, and sends one to and fro where steep ground is taken for something in the way.
     """
 
-    def __init__(self, public_map: PublicMap, generator: np.random.Generator) -> None:
+    def __init__(self, public_map: PublicMap, generator: np.random.Generator, *, goes_round: bool = False) -> None:
         self._public = public_map
         self.walker = Walker(public_map, generator)
         # The space one is in, and the last few before it, as plain data: a map takes ten times as much memory.
@@ -61,9 +69,12 @@ class Navigator:
         self._keeper = PathKeeper(SIDE)
         self._target: Target | None = None
         self._waited = 0
+        self._forgiven = 0
         # How often in a row something solid stopped a step, and whether the last action was one.
         self._stumbles = 0
         self._stepped = False
+        self._outlook = Outlook(public_map.walkable)
+        self._goes_round = goes_round
 
     @property
     def searches(self) -> int:
@@ -83,7 +94,8 @@ class Navigator:
             Entities that are in nobody's way: what one carries.
         """
         self._enter_space(observation)
-        self._map.see(observation, info["entities"], ignore)
+        if self._space != OUTDOORS or self._goes_round:
+            self._map.see(observation, info["entities"], ignore)
         state = observation["state"]
         if self._space == OUTDOORS:
             return
@@ -112,7 +124,8 @@ class Navigator:
             self.stop()
             return None
         if target != self._target:
-            self._target, self._waited = target, 0
+            self._target, self._waited, self._forgiven = target, 0, 0
+            self._outlook.set_out()
         if self._space == OUTDOORS:
             return self._outdoors(observation, info, target, speed)
         return self._indoors(observation, target)
@@ -147,6 +160,19 @@ class Navigator:
         self._map = self._made_map(min([*heights, self._floor]), max(heights, default=0.0) - min(heights, default=0.0))
         if known is not None:
             self._map.restore(known["map"])
+        elif self._space != OUTDOORS:
+            self._assume_wall_behind(observation)
+
+    def _assume_wall_behind(self, observation: Observation) -> None:
+        """Take it that the wall of the door one has just come in by, which one has behind, is straight."""
+        pose = np.asarray(observation["pose"], np.float64)
+        doors = [np.asarray(door["position"], np.float64) for door in observation["state"]["doors"]]
+        near = [door for door in doors if np.linalg.norm(door - pose[:3]) <= _CAME_IN]
+        ahead = pose[3:5] / max(float(np.hypot(*pose[3:5])), 1e-9)
+        behind = [door for door in near if float((door - pose[:3])[:2] @ ahead) < 0.0]
+        if behind:
+            nearest = min(behind, key=lambda door: float(np.linalg.norm(door - pose[:3])))
+            self._map.assume_wall(nearest, ahead, int(observation["state"]["time"]))
 
     def _made_map(self, lowest: float, rise: float) -> VoxelMap:
         if self._space == OUTDOORS:
@@ -162,16 +188,17 @@ class Navigator:
 
     def _indoors(self, observation: Observation, target: Target) -> Action | None:
         cells = self._way(observation, target)
-        if len(cells) < 2:
-            if self._waited < _PATIENCE and self._map.passing:
-                self._waited += 1
-                return {"type": "wait"}
-            if not self._map.forget_passing():
-                return None
+        # What one bumped into may have been taken for wider than it is.
+        now = int(observation["state"]["time"])
+        if len(cells) < 2 and self._forgiven < _FORGIVEN and self._map.forget_stumbles(now):
+            self._forgiven += 1
             cells = self._way(observation, target)
-            if len(cells) < 2:
-                return None
-        return self._step(observation, cells)
+        if len(cells) < 2 and self._map.passing and self._waited < _PATIENCE:
+            self._waited += 1
+            return {"type": "wait"}
+        if len(cells) < 2 and self._map.forget_moving():
+            cells = self._way(observation, target)
+        return self._step(observation, cells) if len(cells) > 1 else None
 
     def _way(self, observation: Observation, target: Target) -> NDArray[np.int64]:
         """Return the cells of the best way known, from the one that one stands in."""
@@ -201,6 +228,9 @@ class Navigator:
     # Outdoors.
 
     def _outdoors(self, observation: Observation, info: Info, target: Target, speed: float) -> Action | None:
+        position = (float(observation["pose"][0]), float(observation["pose"][1]))
+        if self._goes_round and (seen := self._outlook.in_the_way(self._map, position, self.walker.corners_ahead)):
+            self.walker.go_round(position, seen)
         return self.walker.towards((target.x, target.y), speed, observation, info)
 
     # Plain data.
@@ -219,8 +249,10 @@ class Navigator:
             "target": None if target is None else [target.x, target.y, target.yaw, target.half_length,
                                                    target.half_width, target.near, target.z],
             "waited": self._waited,
+            "forgiven": self._forgiven,
             "stumbles": self._stumbles,
             "stepped": self._stepped,
+            "outlook": self._outlook.state(),
         }  # fmt: skip
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -238,4 +270,5 @@ class Navigator:
         self.walker.restore(state["walker"])
         self._target = None if state["target"] is None else Target(*state["target"])
         self._waited, self._stumbles = int(state["waited"]), int(state["stumbles"])
-        self._stepped = bool(state["stepped"])
+        self._stepped, self._forgiven = bool(state["stepped"]), int(state["forgiven"])
+        self._outlook.restore(state["outlook"])

@@ -20,6 +20,15 @@ _STEP_LEVELS, _SLOPE = 3, 0.9
 _AT_LEVEL = 5  # levels that a target may lie above or below who has reached it
 _LEVEL_COST = STRAIGHT * FREE_COST / _SLOPE
 _NO_LEVEL = -1000.0
+# Who touches something gets free of it within so many columns, or not at all.
+_WAY_OUT = 3
+# Where no way leads there, a level that is left counts as so many columns.
+_LEVELS_COUNT = 3.0
+# A straight line may cost so many times what the cells of a way do, and two free columns more; after so many of
+# them that it does not lead to, no more are tried.
+_HARDLY_MORE, _ROUNDING, _MISSES = 1.1, 2 * STRAIGHT * FREE_COST, 12
+#: Heights at which unseen ground may be come to in one search, by how many levels are left to the target's.
+LAYERS, _LAYER_LEVELS = 4, 8.0
 
 
 @dataclass(frozen=True)
@@ -68,19 +77,22 @@ class Target:
 
 
 class SearchMemory(NamedTuple):
-    """Working memory of searches.
+    """Working memory of searches, for cells up to half its side `m` away from the start.
+
+    On ground that climbs a cell may be come to at several heights, as far as is known: it has a layer for each. Shapes
+    are ``(layers * m, m)``.
 
     Attributes
     ----------
     cost
-        Least cost to a cell, int32, shape ``(n, n)``; valid where `stamp` is the search's.
+        Least cost to a cell, int32; valid where `stamp` is the search's.
     parent
-        Direction one came from, int8; 8 for the start.
+        Direction one came from, and 16 times the layer; 8 for the start; int8.
     stamp
         Search that saw the cell, twice; one more where its cost is final; int32.
     low, high
         Between which levels the ground is there, float32: the same where it was seen.
-    count
+    searches
         Searches so far, twice, shape ``(1,)``.
     """
 
@@ -89,12 +101,12 @@ class SearchMemory(NamedTuple):
     stamp: NDArray[np.int32]
     low: NDArray[np.float32]
     high: NDArray[np.float32]
-    count: NDArray[np.int32]
+    searches: NDArray[np.int32]
 
 
-def search_memory(n: int = SIDE) -> SearchMemory:
-    """Return memory for grids of `n` x `n` cells."""
-    whole = (n, n)
+def search_memory(m: int = SIDE, *, layers: int = 1) -> SearchMemory:
+    """Return memory for ways on `m` x `m` cells, a power of 2; `layers`: 1 to `LAYERS`."""
+    whole = (layers * m, m)
     return SearchMemory(
         np.zeros(whole, np.int32),
         np.zeros(whole, np.int8),
@@ -146,63 +158,67 @@ def search(grid, memory, start, target, climb):  # type: ignore[no-untyped-def]
         the nearest cell to it.
     """
     costs, masks = grid
-    n = costs.shape[0]
-    wrap, middle = n - 1, n // 2
+    m = memory.cost.shape[1]
+    wrap, inner, middle, layers = costs.shape[0] - 1, m - 1, m // 2, memory.cost.shape[0] // m
     x0, y0 = int(start[0]), int(start[1])
-    memory.count[0] += 2
-    stamp = memory.count[0]
-    memory.cost[y0 & wrap, x0 & wrap] = 0
-    memory.parent[y0 & wrap, x0 & wrap] = 8
-    memory.stamp[y0 & wrap, x0 & wrap] = stamp
-    memory.low[y0 & wrap, x0 & wrap] = memory.high[y0 & wrap, x0 & wrap] = start[2]
-    queue = [_entry(_guess(x0, y0, (start[2], start[2]), target, climb), middle, middle)]
-    best, best_away, best_x, best_y = False, np.inf, x0, y0
+    memory.searches[0] += 2
+    stamp = memory.searches[0]
+    b, a = y0 & inner, x0 & inner
+    memory.cost[b, a], memory.parent[b, a], memory.stamp[b, a] = 0, 8, stamp
+    memory.low[b, a] = memory.high[b, a] = start[2]
+    queue = [_entry(_guess(x0, y0, (start[2], start[2]), target, climb), middle, middle, 0)]
+    best_away, best_x, best_y, best_layer = np.inf, x0, y0, 0
     while len(queue) > 0:
         packed = heapq.heappop(queue)
+        layer = (packed >> 24) & 3
         x, y = x0 + ((packed >> 12) & 4095) - middle, y0 + (packed & 4095) - middle
-        b, a = y & wrap, x & wrap
+        b, a = layer * m + (y & inner), x & inner
         if memory.stamp[b, a] != stamp:
             continue
         memory.stamp[b, a] = stamp + 1
-        here, blocked, levels = memory.cost[b, a], costs[b, a] == 0, (memory.low[b, a], memory.high[b, a])
+        here, blocked = memory.cost[b, a], costs[y & wrap, x & wrap] == 0
+        levels = (memory.low[b, a], memory.high[b, a])
         away = box_distance(x + 0.5, y + 0.5, target) - target[5]
-        at_level = not climb or _levels_off(levels, target) == 0.0
-        if away <= 0.0 and at_level:
-            return _way_back(memory, x0, y0, x, y), True
-        if away < best_away and not blocked and at_level:
-            best, best_away, best_x, best_y = True, away, x, y
+        off = _levels_off(levels, target) if climb else 0.0
+        if away <= 0.0 and off == 0.0:
+            return _way_back(memory, x, y, layer), True
+        away = max(away, 0.0) + _LEVELS_COUNT * off
+        if away < best_away and not blocked:
+            best_away, best_x, best_y, best_layer = away, x, y, layer
         for direction in range(8):
             i, j = x + _dx(direction), y + _dy(direction)
             if abs(i - x0) >= middle - 1 or abs(j - y0) >= middle - 1:
                 continue
-            d, c = j & wrap, i & wrap
-            if memory.stamp[d, c] == stamp + 1:
-                continue
-            cost = np.int64(costs[d, c])
+            cost = np.int64(costs[j & wrap, i & wrap])
             if cost == 0:
                 # A start that touches what is around it may still be left.
-                if not blocked:
+                if not blocked or max(abs(i - x0), abs(j - y0)) > _WAY_OUT:
                     continue
-                cost = 2 * NEAR_COST
-            up = levels
+                cost = np.int64(2 * NEAR_COST)
+            up, on = levels, 0
             if climb:
-                up = _levels_at(masks[d, c], levels)
+                mask = masks[j & wrap, i & wrap]
+                up = _levels_at(mask, levels)
                 if up[0] > levels[1] + _STEP_LEVELS or up[1] < levels[0] - _STEP_LEVELS:
                     continue
+                if not mask:
+                    on = min(math.ceil(_levels_off(up, target) / _LAYER_LEVELS), layers - 1)
+            d, c = on * m + (j & inner), i & inner
+            if memory.stamp[d, c] == stamp + 1:
+                continue
             new = here + cost * (STRAIGHT if i == x or j == y else DIAGONAL)
             if memory.stamp[d, c] != stamp or new < memory.cost[d, c]:
-                memory.cost[d, c], memory.parent[d, c], memory.stamp[d, c] = new, direction, stamp
+                memory.cost[d, c], memory.parent[d, c], memory.stamp[d, c] = new, direction + 16 * layer, stamp
                 memory.low[d, c], memory.high[d, c] = up
-                heapq.heappush(queue, _entry(new + _guess(i, j, up, target, climb), i - x0 + middle, j - y0 + middle))
-    if not best:
-        best_x, best_y = x0, y0
-    return _way_back(memory, x0, y0, best_x, best_y), False
+                guess = _guess(i, j, up, target, climb)
+                heapq.heappush(queue, _entry(new + guess, i - x0 + middle, j - y0 + middle, on))
+    return _way_back(memory, best_x, best_y, best_layer), False
 
 
 @compiled(inline="always")
-def _entry(cost, i, j):  # type: ignore[no-untyped-def]
+def _entry(cost, i, j, layer):  # type: ignore[no-untyped-def]
     """Pack an entry of the queue: ties are broken by position."""
-    return (np.int64(cost) << np.int64(24)) | (np.int64(i) << np.int64(12)) | np.int64(j)
+    return (np.int64(cost) << np.int64(26)) | (np.int64(layer) << np.int64(24)) | (np.int64(i) << np.int64(12)) | j
 
 
 @compiled(inline="always")
@@ -241,27 +257,26 @@ def _levels_at(mask, levels):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _way_back(memory, x0, y0, x, y):  # type: ignore[no-untyped-def]
+def _way_back(memory, x, y, layer):  # type: ignore[no-untyped-def]
     """Return the cells from the start to ``(x, y)``, with what each costs to get to."""
-    wrap = memory.cost.shape[0] - 1
-    count, i, j = 1, x, y
-    while i != x0 or j != y0:
-        direction = memory.parent[j & wrap, i & wrap]
-        i, j = i - _dx(direction), j - _dy(direction)
-        count += 1
-    cells = np.empty((count, 3), np.int64)
-    i, j = x, y
-    for k in range(count - 1, -1, -1):
-        cells[k, 0], cells[k, 1], cells[k, 2] = i, j, memory.cost[j & wrap, i & wrap]
-        direction = memory.parent[j & wrap, i & wrap]
-        if k:
-            i, j = i - _dx(direction), j - _dy(direction)
+    m = memory.cost.shape[1]
+    found = []
+    while True:
+        b, a = layer * m + (y & (m - 1)), x & (m - 1)
+        found.append((x, y, np.int64(memory.cost[b, a])))
+        came = memory.parent[b, a]
+        if came == 8:
+            break
+        x, y, layer = x - _dx(came & 7), y - _dy(came & 7), came >> 4
+    cells = np.empty((len(found), 3), np.int64)
+    for k in range(len(found)):
+        cells[len(found) - 1 - k, 0], cells[len(found) - 1 - k, 1], cells[len(found) - 1 - k, 2] = found[k]
     return cells
 
 
 @compiled
 def furthest_straight(costs, cells, x, y, most):  # type: ignore[no-untyped-def]
-    """Return the last cell of a way that a straight line leads to through no costlier cells than the way itself.
+    """Return the last cell of a way that a straight line leads to for hardly more than the way itself costs.
 
     Parameters
     ----------
@@ -277,27 +292,35 @@ def furthest_straight(costs, cells, x, y, most):  # type: ignore[no-untyped-def]
     Returns
     -------
     which, limit
-        Index of the cell, 0 for the first; and the greatest cost on the line.
+        Index of the cell, 0 for the first; and the greatest cost on the line, 255 where it is blocked.
     """
-    wrap = costs.shape[0] - 1
-    best, best_limit, limit, misses = 0, 0, 0, 0
+    best, best_limit, misses = 0, 0, 0
     for k in range(1, len(cells)):
-        cost = costs[cells[k, 1] & wrap, cells[k, 0] & wrap]
-        limit = max(limit, np.int64(cost) if cost else 255)
         dx, dy = cells[k, 0] + 0.5 - x, cells[k, 1] + 0.5 - y
         length = math.sqrt(dx * dx + dy * dy)
-        if length > most or misses > 12:
+        if k > 1 and (length > most or misses > _MISSES):
             break
-        samples = int(length * 2.0) + 1
-        is_clear = True
-        for s in range(1, samples + 1):
-            column, row = math.floor(x + dx * s / samples), math.floor(y + dy * s / samples)
-            on_line = costs[row & wrap, column & wrap]
-            if (on_line == 0 and limit < 255) or on_line > limit:
-                is_clear = False
-                break
-        if is_clear or k == 1:
+        limit, total = _line_cost(costs, x, y, dx, dy)
+        if k == 1 or (limit < 255 and total <= _HARDLY_MORE * (cells[k, 2] - cells[0, 2]) + _ROUNDING):
             best, best_limit, misses = k, limit, 0
         else:
             misses += 1
     return best, best_limit
+
+
+@compiled(inline="always")
+def _line_cost(costs, x, y, dx, dy):  # type: ignore[no-untyped-def]
+    """Return the greatest cost of a cell on a line, 255 for blocked ones, and the whole line's as a way's."""
+    wrap = costs.shape[0] - 1
+    length = math.sqrt(dx * dx + dy * dy)
+    samples = int(length * 2.0) + 1
+    limit, total = np.int64(0), np.int64(0)
+    for s in range(1, samples + 1):
+        column, row = math.floor(x + dx * s / samples), math.floor(y + dy * s / samples)
+        cost = np.int64(costs[row & wrap, column & wrap])
+        if cost == 0:
+            cost = np.int64(255)
+        if cost > limit:
+            limit = cost
+        total += cost
+    return limit, STRAIGHT * length * total / samples

@@ -47,6 +47,10 @@ _STUMBLE = 0.34  # metres ahead of one's middle is what stopped a step
 _BODY = 0.5  # ... and the middle of a body that did
 _WIDEST = 4  # columns to either side that a stumble comes to cover
 
+# The wall of a door is taken to go on so many columns to either side, and lies so far behind the door, metres.
+_WALL, _BEHIND_WALL = 70, 0.05
+_WHOLE_COLUMN = np.uint64((1 << 50) - 1)
+
 Ground = Callable[[NDArray[np.float64]], NDArray[np.float64]] | float | None
 
 
@@ -126,7 +130,7 @@ class VoxelMap:
             moves, which is remembered for as long as one that was seen.
         """
         away, lasts = (_STUMBLE, BUMP_LASTS) if times else (_BODY, FADES)
-        wide = min(times, _WIDEST)
+        wide = min(times - 1, _WIDEST) if times else 1
         self._open_chunks(pose[:2])
         for k in range(-wide, wide + 1):
             x = float(pose[0] + away * pose[3] - k * VOXEL * pose[4])
@@ -136,12 +140,39 @@ class VoxelMap:
             self.voxels.flags[(row // CHUNK) % CHUNKS, (column // CHUNK) % CHUNKS, TIMED] = True
         self.refresh(now)
 
-    def forget_passing(self) -> bool:
-        """Forget what moved and what one bumped into; return whether there was any."""
+    def assume_wall(self, point: NDArray[np.float64], ahead: NDArray[np.float64], now: int) -> None:
+        """Take it that a wall stands across, until it is seen through: that of the door one came in by.
+
+        Parameters
+        ----------
+        point
+            On the wall, ENU metres.
+        ahead
+            Unit vector away from it, into the room.
+        now
+            Second of the day.
+        """
+        self._open_chunks(point[:2])
+        for k in range(-_WALL, _WALL + 1):
+            x = float(point[0] - _BEHIND_WALL * ahead[0] - k * VOXEL * ahead[1])
+            y = float(point[1] - _BEHIND_WALL * ahead[1] + k * VOXEL * ahead[0])
+            column, row = math.floor(x / VOXEL), math.floor(y / VOXEL)
+            self.voxels.mask[row % SIDE, column % SIDE] |= _WHOLE_COLUMN
+            self.voxels.flags[(row // CHUNK) % CHUNKS, (column // CHUNK) % CHUNKS, CHANGED] = True
+        self.refresh(now)
+
+    def forget_stumbles(self, now: int) -> bool:
+        """Forget what one bumped into; return whether there was any."""
+        bumps = self.voxels.until > now + FADES
+        self.voxels.until[bumps] = 0
+        self.refresh(now)
+        return bool(bumps.any())
+
+    def forget_moving(self) -> bool:
+        """Forget where what moves was seen; return whether there was any."""
         there = bool(self.voxels.until.any())
-        if there:
-            self.voxels.until[:] = 0
-            self.refresh(0)
+        self.voxels.until[:] = 0
+        self.refresh(0)
         return there
 
     @property

@@ -208,8 +208,6 @@ class Chronicle(Hook):
     def _sees(self, who: str, observation: Mapping[str, Any], entity: int, name: str) -> bool:
         """Whether a thing is in view and near; the picture is looked at only where it can be."""
         state = self.judge.state
-        if state.agent_room(who) != state.object_room(name):
-            return False
         if float(np.hypot(*(state.agent_position(who) - state.object_position(name))[:2])) > SEEN_DISTANCE:
             return False
         return bool(np.count_nonzero(np.asarray(observation["segmentation"]) == entity) >= SEEN_PIXELS)

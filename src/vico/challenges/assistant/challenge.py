@@ -54,7 +54,14 @@ class AssistantChallenge:
         task = self._task(job)
         world, people = world_and_people(job.world, task.category)
         return play_task(
-            world, people, task, method=job.method, setting=job.setting, terms=job.terms, progress=progress
+            world,
+            people,
+            task,
+            method=job.method,
+            setting=job.setting,
+            terms=job.terms,
+            recording=recording,
+            progress=progress,
         )
 
     def _task(self, job: Job) -> Task:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from contextlib import ExitStack
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ from vico.runner.foreign import AbsentAgent, Terms, foreign_agents
 from vico.runner.gather import Gatherer
 from vico.runner.loading import AgentSeat
 from vico.runner.loop import Hook, Runner, Step
+from vico.runner.recording import recorded_in
 from vico.world.folder import World, read_world
 from vico.world.public import PublicMap
 
@@ -56,7 +57,7 @@ def play_task(
     method: str,
     setting: Setting | None = None,
     terms: Terms | None = None,
-    hooks: Sequence[Hook] = (),
+    recording: Path | None = None,
     progress: Progress | None = None,
 ) -> EpisodeRecord:
     """Play one task through and judge it.
@@ -70,8 +71,8 @@ def play_task(
         What planners are told beside the task: ``distance``, and what the record is to name.
     terms
         On which terms planners from elsewhere take part.
-    hooks
-        Who else follows the run, such as a recorder.
+    recording
+        Folder to which the run is recorded; None records nothing.
     """
     began = time.perf_counter()
     names = [f"assistant_{i}" for i in range(len(task.assistants))]
@@ -94,15 +95,21 @@ def play_task(
     judge = Judge(task, world, sim.ground_truth, names)
     chronicle = Chronicle(judge)
     judge.watch(0)
-    followers: list[Hook] = [judge, chronicle, *hooks]
+    followers: list[Hook] = [judge, chronicle]
     if progress is not None:
         followers.append(_Reported(progress, f"{task.world}, {task.category}, seed {task.seed}", task.steps))
     agents = Gatherer(residents | planners, trusted=residents, deadline=terms.deadline, workers=terms.workers)
     runner = Runner(sim, agents, hooks=followers)
-    try:
+    with ExitStack() as stack:
+        stack.callback(agents.close)
+        if recording is not None:
+            if world.path is None:
+                raise InputError(
+                    "assistant: a world in memory has no folder that a recording could name; write it first"
+                )
+            recorded = recorded_in(recording, sim, runner.faults, world=world.path, wanted=task.steps)
+            runner.hooks.append(stack.enter_context(recorded))
         runner.run(task.steps, until=lambda: judge.over)
-    finally:
-        agents.close()
     return _record(task, method, setting or {}, chronicle, sim, runner.faults, planners, time.perf_counter() - began)
 
 
@@ -119,12 +126,12 @@ class _Reported(Hook):
 
 def _residents(task: Task, community: Community, public_map: PublicMap) -> dict[str, Agent]:
     """Make those who live there; who is to be helped with carrying waits for helpers."""
-    residents: dict[str, Agent] = dict(followers_of(community, public_map, seed=task.seed))
+    followers = followers_of(community, public_map, seed=task.seed)
+    residents: dict[str, Agent] = dict(followers)
     if task.category == "carry":
         for subtask in task.subtasks:
             name = subtask.person.agent
-            day = residents[name]
-            residents[name] = Requester(day, community.resident_by_id[name], public_map, seed=task.seed)
+            residents[name] = Requester(followers[name], community.resident_by_id[name], public_map, seed=task.seed)
     return residents
 
 

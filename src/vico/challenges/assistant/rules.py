@@ -87,8 +87,7 @@ def has_arrived(person: str, home: Region, state: StateView, world: World, limit
 
 def is_in_view(name: str, who: str, observation: Mapping[str, Any], state: StateView, limits: Thresholds) -> bool:
     """Whether so much of a thing is in an assistant's picture, from near enough."""
-    if state.agent_room(who) != state.object_room(name):
-        return False
+    # Through a door that stands open it counts as well.
     if _away(state.agent_position(who), state.object_position(name)) > limits.search_distance:
         return False
     pixels = np.count_nonzero(np.asarray(observation["segmentation"]) == state.object_entity(name))

@@ -12,7 +12,7 @@ SUBTASKS = 6
 STEPS = 1500
 
 #: People who live in the world: for Carry more, for six of them are to be out, near by and not far from home.
-RESIDENTS = {"carry": 30, "delivery": 15, "search": 15}
+RESIDENTS = {"carry": 45, "delivery": 15, "search": 15}
 
 #: Candidates that each object and place is chosen from.
 CANDIDATES = 9

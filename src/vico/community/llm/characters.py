@@ -104,7 +104,7 @@ class _CharacterJudge:
         else:
             workplace = None if reply.workplace is None else cast.labels.place(reply.workplace)
         scores = reply.personality.model_dump()
-        rounded = {name: value if name == "traits" else round(value, 2) for name, value in scores.items()}
+        shares = {name: value if name == "traits" else value / 100 for name, value in scores.items()}
         known = [place for place in (resident.home, workplace, *resident.known_places) if place is not None]
         return resident.model_copy(
             update={
@@ -112,7 +112,7 @@ class _CharacterJudge:
                 "occupation": occupation,
                 "workplace": workplace,
                 "values": list(dict.fromkeys(reply.values)),
-                "personality": Personality(**rounded),
+                "personality": Personality(**shares),
                 "hobbies": [" ".join(one.split()) for one in dict.fromkeys(reply.hobbies)],
                 "lifestyle": reply.lifestyle.strip(),
                 "biography": reply.biography.strip(),

@@ -274,7 +274,7 @@ class _NetworkJudge:
         if faults := faults_of(where, "note", [reply.note]):
             return None, faults[0]
         return Relation(
-            between=(a, b), kind=RelationKind(reply.kind), note=reply.note.strip(), strength=round(reply.strength, 2),
+            between=(a, b), kind=RelationKind(reply.kind), note=reply.note.strip(), strength=reply.strength / 100,
             since=reply.since,
         ), ""  # fmt: skip
 

@@ -9,7 +9,8 @@ from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from vico.community.catalogue import basic_values
 
-Score = Annotated[float, Field(ge=0, le=1)]
+# Whole numbers: servers that hold replies to a schema know their bounds, but not those of fractions.
+Percent = Annotated[int, Field(ge=0, le=100)]
 
 # The longest lists that are read: what is longer is no draft but a model that does not end.
 _MOST_ACTIVITIES, _MOST_GROUPS, _MOST_TIES = 48, 40, 120
@@ -20,13 +21,13 @@ class _Reply(BaseModel):
 
 
 class PersonalityReply(_Reply):
-    """The big five, 0..1, and words for what stands out."""
+    """The big five, 0..100, and words for what stands out."""
 
-    openness: Score
-    conscientiousness: Score
-    extraversion: Score
-    agreeableness: Score
-    neuroticism: Score
+    openness: Percent
+    conscientiousness: Percent
+    extraversion: Percent
+    agreeableness: Percent
+    neuroticism: Percent
     traits: Annotated[list[str], Field(min_length=1, max_length=4)]
 
 
@@ -68,7 +69,7 @@ class TieReply(_Reply):
     between: Annotated[list[str], Field(min_length=2, max_length=2)]
     kind: Literal["friend", "colleague"]
     note: str
-    strength: Score
+    strength: Percent
     since: int
 
 

@@ -1,0 +1,171 @@
+"""Play the episodes of one of the paper's tables again, on our worlds, with every method that needs no language model.
+
+    python benchmarks/worlds.py --list standard --places EXTRACTS --out WORLDS
+    python benchmarks/tables.py --table assistant --worlds WORLDS --out OUT [--workers 2]
+    python benchmarks/tables.py --table assistant --reduced --out OUT        # builds four windows of the packaged map
+
+Tables: assistant (24 worlds; one and two assistants), advanced (three worlds), influence (five), commute (ten). A table
+that was cut short goes on with the same command. With `--reduced` there are four worlds and one seed; these worlds
+are built into OUT/worlds if `--worlds` is not given. Methods that need a language model are played where `--method`
+names them, with the model of the environment; without, the page says that they were not run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from worlds import locate, row_of
+
+from vico.challenges.episodes import Outcome, label_of
+from vico.challenges.evaluation import evaluate, jobs_for
+from vico.challenges.records import Challenge, Setting
+from vico.challenges.registry import load_challenge
+from vico.challenges.tables.files import write_results
+from vico.challenges.tables.published import published_rows
+from vico.challenges.windows import window_list
+from vico.errors import VicoError
+from vico.io.files import write_bytes
+from vico.worldgen.many import build_many
+
+
+@dataclass(frozen=True)
+class Block:
+    """A part of a table: one challenge in one setting."""
+
+    name: str
+    challenge: str
+    setting: Setting = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Table:
+    """What is played for a table: its parts, its list of worlds, and how many seeds a world."""
+
+    blocks: tuple[Block, ...]
+    windows: str
+    seeds: int
+    reference: str
+
+
+def _assistants(count: int, *, advanced: bool = False) -> Setting:
+    return {"assistants": count, "advanced": advanced, "distance": True, "steps": 1500}
+
+
+TABLES = {
+    "assistant": Table(
+        (
+            Block("1 assistant", "assistant", _assistants(1)),
+            Block("2 assistants", "assistant", _assistants(2)),
+            Block("1 assistant, without distance modelling", "assistant", {**_assistants(1), "distance": False}),
+            Block("2 assistants, without distance modelling", "assistant", {**_assistants(2), "distance": False}),
+        ),
+        "standard", 1, "heuristic",
+    ),
+    "advanced": Table(
+        (
+            Block("1 assistant, advanced", "assistant", _assistants(1, advanced=True)),
+            Block("2 assistants, advanced", "assistant", _assistants(2, advanced=True)),
+        ),
+        "advanced", 3, "heuristic",
+    ),
+    "influence": Table((Block("pairings", "influence"),), "influence", 1, ""),
+    "commute": Table((Block("a day of commutes", "commute"),), "commute", 10, "rule"),
+}  # fmt: skip
+
+
+def offline_methods(challenge: Challenge) -> list[str]:
+    """Return the methods that need no language model; where methods compete, every pair of two of them."""
+    methods = [method for method in challenge.methods if "llm" not in method]
+    if challenge.name == "influence":
+        return [f"{one}+{other}" for i, one in enumerate(methods) for other in methods[i + 1 :]]
+    return methods
+
+
+def world_folders(arguments: argparse.Namespace, table: Table) -> list[Path]:
+    """Return the worlds of a table; those of the reduced list are built if none are given."""
+    windows = window_list("reduced" if arguments.reduced else table.windows).windows
+    folder: Path = arguments.worlds or arguments.out / "worlds"
+    if arguments.reduced and arguments.worlds is None:
+        for outcome in build_many([row_of(window, None) for window in windows], folder, locate=locate):
+            print(f"{outcome.name}: {outcome.state} {outcome.reason}", file=sys.stderr, flush=True)
+    return [folder / window.name for window in windows]
+
+
+def tell(outcome: Outcome, done: int, total: int) -> None:
+    """Say that an episode is over."""
+    what = (
+        outcome.reason
+        if outcome.record is None
+        else ", ".join(f"{k} {v:.4g}" for k, v in outcome.record.metrics.items())
+    )
+    print(f"{done} of {total}: {label_of(outcome.job)}: {what}", file=sys.stderr, flush=True)
+
+
+def play(arguments: argparse.Namespace, table: Table, block: Block, worlds: Sequence[Path]) -> bool:
+    """Play a part of a table and write it; return whether all episodes were played."""
+    challenge = load_challenge(block.challenge)
+    methods = arguments.method or offline_methods(challenge)
+    setting = {**block.setting, "steps": arguments.steps} if arguments.steps else block.setting
+    jobs = jobs_for(
+        block.challenge,
+        categories=arguments.category or challenge.categories,
+        methods=methods,
+        setting=setting,
+        worlds=worlds,
+        seeds=arguments.seeds or (1 if arguments.reduced else table.seeds),
+    )
+    folder = arguments.out / block.name.replace(", ", "_").replace(" ", "_")
+    outcomes = evaluate(
+        block.challenge, jobs, folder, workers=arguments.workers, record=arguments.record, finished=tell
+    )  # fmt: skip
+    published = published_rows(challenge.name, setting)
+    reference = table.reference if table.reference in methods else ""
+    write_results(folder, challenge, outcomes, reference=reference, published=published)
+    page = (folder / "results.md").read_text(encoding="utf-8")
+    not_run = [method for method in challenge.methods if "llm" in method and method not in methods]
+    if not_run:
+        page += f"\nNot run, for want of a language model: {', '.join(not_run)}.\n"
+        write_bytes(folder / "results.md", page.encode())
+    print(page)
+    return all(outcome.record is not None for outcome in outcomes)
+
+
+def main() -> int:
+    """Play a table; 1 if an episode could not be played."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--table", choices=sorted(TABLES), required=True)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--worlds", type=Path, help="folder of the worlds of the table's list")
+    parser.add_argument("--reduced", action="store_true")
+    parser.add_argument("--method", action="append", help="instead of all methods without a language model")
+    parser.add_argument("--category", action="append", help="instead of all")
+    parser.add_argument("--block", action="append", help="parts of the table instead of all: their names")
+    parser.add_argument("--seeds", type=int, default=0)
+    parser.add_argument("--steps", type=int, default=0, help="shorter episodes of assistants, to try it out")
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--record", action="store_true")
+    arguments = parser.parse_args()
+    table = TABLES[arguments.table]
+    if arguments.worlds is None and not arguments.reduced:
+        parser.error(
+            f"--worlds: the folder with the worlds of the list {table.windows}; benchmarks/worlds.py builds them"
+        )
+    names = [block.name for block in table.blocks]
+    if unknown := set(arguments.block or ()) - set(names):
+        parser.error(f"--block: {', '.join(sorted(unknown))}; there are {', '.join(names)}")
+    try:
+        worlds = world_folders(arguments, table)
+        blocks = [block for block in table.blocks if not arguments.block or block.name in arguments.block]
+        played = [play(arguments, table, block, worlds) for block in blocks]
+    except VicoError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0 if all(played) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

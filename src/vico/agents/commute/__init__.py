@@ -1,0 +1,75 @@
+"""Agents for the commute challenge."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from vico.agents.base import Agent
+from vico.agents.commute.llm import LlmPlanner
+from vico.agents.commute.mcts import MctsPlanner
+from vico.agents.commute.ours import DayPlanner
+from vico.agents.commute.question import Commuter
+from vico.agents.commute.rule import WalkPlanner
+from vico.errors import InputError
+from vico.io.data_files import PACKAGED
+from vico.world.public import PublicMap
+
+_POLICIES = PACKAGED / "commute"
+
+Instructions = list[dict[str, Any]]
+
+
+def _rule(instructions: Instructions, public_map: PublicMap, seed: int) -> Agent:
+    return Commuter(WalkPlanner(public_map), public_map, seed=seed)
+
+
+def _llm(instructions: Instructions, public_map: PublicMap, seed: int) -> Agent:
+    return Commuter(LlmPlanner(instructions, public_map), public_map, seed=seed)
+
+
+def _mcts(instructions: Instructions, public_map: PublicMap, seed: int) -> Agent:
+    return Commuter(MctsPlanner(public_map, seed=seed), public_map, seed=seed)
+
+
+def _ours(instructions: Instructions, public_map: PublicMap, seed: int) -> Agent:
+    return Commuter(DayPlanner(instructions, public_map), public_map, seed=seed)
+
+
+def _learned(name: str) -> Callable[[Instructions, PublicMap, int], Agent]:
+    """Return the maker of the agent that acts by a packaged policy."""
+
+    def made(instructions: Instructions, public_map: PublicMap, seed: int) -> Agent:
+        from vico.agents.commute.learning.policy import Network, PolicyCommuter  # compiled code, slow to import
+
+        return PolicyCommuter(Network.read(_POLICIES / f"{name}.npz"), public_map, seed=seed)
+
+    return made
+
+
+METHODS: dict[str, Callable[[Instructions, PublicMap, int], Agent]] = {
+    "rule": _rule,
+    "mcts": _mcts,
+    "llm": _llm,
+    "ppo": _learned("ppo"),
+    "a2c": _learned("a2c"),
+    "ours": _ours,
+}
+
+
+def make_planner(method: str, instructions: Instructions, public_map: PublicMap, *, seed: int) -> Agent:
+    """Make an agent by the name of its method.
+
+    Parameters
+    ----------
+    instructions
+        What the task tells the agent (`CommuteTask.instructions`).
+
+    Raises
+    ------
+    InputError
+        If there is no such method.
+    """
+    if method not in METHODS:
+        raise InputError(f"no method called {method!r}; there are {', '.join(METHODS)}")
+    return METHODS[method](instructions, public_map, seed)

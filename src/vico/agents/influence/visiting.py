@@ -1,0 +1,223 @@
+"""Going to somebody: to where their day says they are, through the door, from room to room until they are in view."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from vico.agents.base import Action, Info, Observation
+from vico.agents.indoor_walk import IndoorWalker
+from vico.agents.state import AgentState
+from vico.agents.wayfinding import Walker
+from vico.rules import WALK_SPEED
+from vico.world.public import PublicMap, PublicPlace
+
+OUTSIDE = "outside"
+# One stops this near to somebody to talk, metres, and looks about in quarter turns.
+_BESIDE = 1.6
+_TURN, _TURNS = 85.0, 4
+# In the open people stroll so far from a place's position; so many spots there are looked from, metres.
+_AROUND, _SPOTS = 25.0, 4
+# A room, or the way to a door, is given up after so many steps; a door after so many refusals.
+_STEPS_A_ROOM, _REFUSALS = 60, 3
+_AT_PLACE = 2.5
+
+
+class Visitor:
+    """Finds somebody by a place and by what is in view.
+
+    Parameters
+    ----------
+    public_map
+        Streets and places.
+    generator
+        Decides where to look from, and how to get around others.
+    """
+
+    def __init__(self, public_map: PublicMap, generator: np.random.Generator) -> None:
+        self._map, self._rng = public_map, generator
+        self._walker = Walker(public_map, generator)
+        self._indoors = IndoorWalker()
+        #: Whether the one who is looked for could not be found.
+        self.failed = False
+        self._target = ""
+        self._place: PublicPlace | None = None
+        self._reset()
+
+    def _reset(self) -> None:
+        self._is_in = False
+        self._turns = self._steps = self._refused = self._spots = 0
+        self._seen_rooms: list[str] = []
+        self._trail: list[str] = []
+        self._spot: tuple[float, float] | None = None
+
+    def start(self, target: str, place: str) -> None:
+        """Look for somebody at a place from now on."""
+        self.failed = False
+        self._target, self._place = target, self._map.place_by_id[place]
+        self._walker.stop()
+        self._reset()
+
+    def towards(self, observation: Observation, info: Info) -> Action | None:
+        """Return the next action; None once beside them. Whoever cannot be found is waited for: `failed` says so."""
+        assert self._place is not None
+        state = observation["state"]
+        if info.get("coming_out"):
+            return {"type": "wait"}
+        if state["posture"] != "standing":
+            return {"type": "wake" if state["posture"] == "lying" else "stand"}
+        if state["room"]:
+            self._indoors.notice(observation, info)
+        seen = seen_body(info, self._target)
+        if seen is not None:
+            return self._approach(seen, observation, info)
+        if state["room"]:
+            return self._search(observation, info) if self._has_come(observation) else self._leave(observation)
+        self._trail = []
+        return self._go(observation, info)
+
+    def state(self) -> AgentState:
+        """Return whom it looks for, and where it has looked; the generator is its owner's to save."""
+        return {
+            "walker": self._walker.state(),
+            "indoors": self._indoors.state(),
+            "failed": self.failed,
+            "target": self._target,
+            "place": None if self._place is None else self._place.id,
+            "is_in": self._is_in,
+            "counts": [self._turns, self._steps, self._refused, self._spots],
+            "seen_rooms": list(self._seen_rooms),
+            "trail": list(self._trail),
+            "spot": None if self._spot is None else list(self._spot),
+        }
+
+    def restore(self, state: AgentState) -> None:
+        """Go on where `state` was."""
+        self._walker.restore(state["walker"])
+        self._indoors.restore(state["indoors"])
+        self.failed, self._target, self._is_in = bool(state["failed"]), str(state["target"]), bool(state["is_in"])
+        self._place = None if state["place"] is None else self._map.place_by_id[state["place"]]
+        self._turns, self._steps, self._refused, self._spots = (int(n) for n in state["counts"])
+        self._seen_rooms, self._trail = list(state["seen_rooms"]), list(state["trail"])
+        spot = state["spot"]
+        self._spot = None if spot is None else (float(spot[0]), float(spot[1]))
+
+    def _approach(self, seen: tuple[float, float, float], observation: Observation, info: Info) -> Action | None:
+        x, y, distance = seen
+        if distance <= _BESIDE:
+            return None
+        if observation["state"]["room"]:
+            return self._indoors.towards(observation, (x, y), near=_BESIDE)
+        return self._walker.towards((x, y), WALK_SPEED, observation, info) or self._fail()
+
+    def _has_come(self, observation: Observation) -> bool:
+        """Return whether one has come into the place that is wanted, or was in it all along."""
+        assert self._place is not None
+        self._is_in = self._is_in or observation["state"]["place"] == self._place.id
+        return self._is_in
+
+    def _go(self, observation: Observation, info: Info) -> Action | None:
+        """Walk to the place, and in; in the open, look about there."""
+        assert self._place is not None
+        state, place = observation["state"], self._place
+        if place.building is None and self._away(observation, place.position) <= _AT_PLACE + _AROUND * bool(
+            self._spots
+        ):
+            return self._look_around_outdoors(observation, info)
+        if self._is_in:  # came out again: the place was searched
+            return self._fail()
+        if place.id in state["accessible_places"]:
+            self._refused += state["action_status"] == "refused"
+            self._steps += 1
+            is_shut = self._refused > _REFUSALS or self._steps > _STEPS_A_ROOM
+            return self._fail() if is_shut else {"type": "enter", "place": place.id}
+        goal = (float(place.position[0]), float(place.position[1]))
+        return self._walker.towards(goal, WALK_SPEED, observation, info) or self._fail()
+
+    def _look_around_outdoors(self, observation: Observation, info: Info) -> Action | None:
+        assert self._place is not None
+        if self._spot is not None:
+            self._steps += 1
+            step = self._walker.towards(self._spot, WALK_SPEED, observation, info)
+            if step is not None and self._steps <= _STEPS_A_ROOM:
+                return step
+            self._spot, self._turns, self._steps = None, 0, 0
+        if self._turns < _TURNS:
+            self._turns += 1
+            return {"type": "turn_left", "degrees": _TURN}
+        if self._spots >= _SPOTS:
+            return self._fail()
+        self._spots += 1
+        x, y = self._map.walkable.random_point(self._rng, near=self._place.position[:2], radius=_AROUND)
+        self._spot = float(x), float(y)
+        return {"type": "wait"}
+
+    def _search(self, observation: Observation, info: Info) -> Action | None:
+        """Look about in a room, then go on to the next one that was not seen, and back where there is none."""
+        room = observation["state"]["room"]
+        if room in self._trail:
+            del self._trail[self._trail.index(room) + 1 :]
+        else:
+            self._trail.append(room)
+        if room not in self._seen_rooms:
+            if self._turns < _TURNS:
+                self._turns += 1
+                return {"type": "turn_left", "degrees": _TURN}
+            self._seen_rooms.append(room)
+            self._steps = 0
+        doors = [door for door in observation["state"]["doors"] if door["to"] != OUTSIDE]
+        onward = next((door for door in doors if door["to"] not in self._seen_rooms), None)
+        if onward is None:
+            back = self._trail[-2] if len(self._trail) > 1 else ""
+            onward = next((door for door in doors if door["to"] == back), None)
+        if onward is None:
+            return self._fail()
+        self._steps += 1
+        if self._steps > _STEPS_A_ROOM:
+            self._seen_rooms.append(onward["to"])
+            self._steps = 0
+        return self._through(onward, observation)
+
+    def _through(self, door: dict[str, object], observation: Observation) -> Action:
+        position = door["position"]
+        assert isinstance(position, Sequence)
+        step = self._indoors.towards(observation, position, near=0.9)
+        if step is not None:
+            return step
+        self._turns = 0
+        return {"type": "enter", "place": door["to"]}
+
+    def _leave(self, observation: Observation) -> Action | None:
+        """Go out, room by room: through the door to the street, else through one that was not tried."""
+        state = observation["state"]
+        self._steps += 1
+        if self._steps > 4 * _STEPS_A_ROOM:
+            return self._fail()
+        room, doors = state["room"], state["doors"]
+        if room not in self._trail:
+            self._trail.append(room)
+        out = next((door for door in doors if door["to"] == OUTSIDE), None)
+        if out is not None:
+            step = self._indoors.towards(observation, out["position"], near=1.9)
+            return step or {"type": "exit"}
+        onward = next((door for door in doors if door["to"] not in self._trail), doors[0] if doors else None)
+        return self._fail() if onward is None else self._through(onward, observation)
+
+    def _fail(self) -> Action:
+        self.failed = True
+        return {"type": "wait"}
+
+    @staticmethod
+    def _away(observation: Observation, point: Sequence[float]) -> float:
+        x, y = observation["pose"][:2]
+        return math.hypot(x - point[0], y - point[1])
+
+
+def seen_body(info: Info, agent: str) -> tuple[float, float, float] | None:
+    """Return where an agent that is in view stands, ENU metres, and how far away; None if it is not in view."""
+    for body in info.get("in_view", ()):
+        if body.agent == agent:
+            return body.position[0], body.position[1], body.distance
+    return None

@@ -1,0 +1,8 @@
+"""The influence challenge: two main agents court the members of a community for a day."""
+
+from vico.challenges.influence.play import Influence
+
+#: The challenge, for whoever runs challenges.
+INFLUENCE = Influence()
+
+__all__ = ["INFLUENCE", "Influence"]

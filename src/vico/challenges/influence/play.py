@@ -1,0 +1,254 @@
+"""Playing the influence challenge: a day or two, judged, as one record."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from vico.agents.influence.language import Asker
+from vico.agents.influence.main_agent import MainAgent
+from vico.agents.influence.member import courted_members
+from vico.agents.influence.strategies import NAMES
+from vico.agents.influence.strategies import parts_of as strategy_parts
+from vico.agents.schedule import followers_of
+from vico.challenges.influence import evaluate
+from vico.challenges.influence.by_schedule import Walks, play_by_schedule
+from vico.challenges.influence.constants import opinion_constants
+from vico.challenges.influence.day import Day, Models, make_day
+from vico.challenges.influence.generate import community_of, generate_influence
+from vico.challenges.influence.model import (
+    InfluenceSettings,
+    settings_of,
+    strategies_of,
+)
+from vico.challenges.records import EpisodeRecord, Job, Metric, Progress
+from vico.community.model import Community
+from vico.envs import make
+from vico.io.files import write_json
+from vico.runner.faults import Fault, FaultLog
+from vico.runner.gather import Gatherer
+from vico.runner.loop import Hook, Runner, Step
+from vico.runner.recording import RecordedRun
+from vico.world.folder import World, read_world
+
+NAME = "influence"
+CATEGORY = "day"
+_TALKS_FILE = "talks.json"
+
+
+class Influence:
+    """The influence challenge, as `vico.challenges.records.Challenge` has it.
+
+    Task: two main agents court the thirteen other members of a community until the day of talk is over. They see
+    everybody's profile and schedule, walk to members, and talk with them: up to three messages a conversation, from
+    within 2 m; who is on the way somewhere does not listen.
+
+    Randomisation: the community; which two of its adults court the others; what members think of them at first.
+
+    Success: a member is won who ranks the main agent first at day's end. Win is the share of members won; Conv the
+    share of those who at first ranked the rival first and now do not.
+    """
+
+    name = NAME
+    categories: Sequence[str] = (CATEGORY,)
+    methods: Sequence[str] = NAMES
+
+    def metrics(self, category: str) -> Sequence[Metric]:
+        """Columns of the table."""
+        return evaluate.columns([variant.name for variant in opinion_constants().variant])
+
+    def causes(self, category: str) -> Sequence[str]:
+        """Why members are not won."""
+        return evaluate.CAUSES
+
+    def task(self, job: Job) -> Mapping[str, object]:
+        """Return what is asked in an episode; the same for all strategies."""
+        settings = settings_of(job.setting)
+        world = _world(job.world)
+        community = _community(job.world, job.seed)
+        return generate_influence(world, community, job.seed, settings).record()
+
+    def play(
+        self,
+        job: Job,
+        *,
+        recording: Path | None = None,
+        progress: Progress | None = None,
+        models: Models | None = None,
+    ) -> EpisodeRecord:
+        """Play an episode and judge it: as many days as the assignment asks for.
+
+        Parameters
+        ----------
+        recording
+            Folder for the runs and what was said in them; a folder a day in it where two are played.
+        models
+            Makes what asks a language model; those of the environment unless given.
+
+        Raises
+        ------
+        InputError
+            If a strategy or setting is unknown, or a language model is needed and none is set.
+        """
+        began = time.perf_counter()
+        settings = settings_of(job.setting)
+        for name in strategies_of(job.method):
+            strategy_parts(name)
+        world, community = _world(job.world), _community(job.world, job.seed)
+        task = generate_influence(world, community, job.seed, settings)
+        names = {resident.id: f"{resident.id} {resident.name}" for resident in community.residents}
+        verdicts, parts, hashes = [], [], []
+        askers: list[Asker] = []
+        faults: list[FaultLog] = []
+        talks = 0
+        for assignment in settings.assignments:
+            day = make_day(task, community, job.method, settings, assignment, models)
+            before = evaluate.first_choices(day.ledger, now=task.begins, with_talk=False)
+            folder = (
+                None if recording is None else recording / assignment if len(settings.assignments) > 1 else recording
+            )
+            state_hash, log = _played(day, world, settings, folder, progress)
+            verdict = evaluate.judge(day, before)
+            parts += evaluate.parts_of(verdict, names, assignment, settings.steps)
+            verdicts.append(verdict)
+            hashes.append(state_hash)
+            askers += day.askers
+            faults.append(log)
+            talks += len({(u.listener, u.conversation) for u in day.ledger.utterances if u.speaker == day.ours})
+            if folder is not None:
+                folder.mkdir(parents=True, exist_ok=True)
+                write_json(folder / _TALKS_FILE, _told(day, verdict))
+        metrics = evaluate.metrics_of(verdicts) | {"talks": talks / len(verdicts)}
+        return EpisodeRecord(
+            challenge=NAME,
+            category=job.category,
+            method=job.method,
+            setting=settings.record(),
+            world=world.manifest.name,
+            seed=job.seed,
+            metrics=metrics,
+            parts=parts,
+            steps=settings.steps * len(verdicts),
+            limit=settings.steps * len(verdicts),
+            wall_seconds=time.perf_counter() - began,
+            state_hash=_joined(hashes),
+            tokens=sum(asker.usage.tokens for asker in askers),
+            cost=sum(asker.usage.cost for asker in askers),
+            **_faults(faults, askers),
+        )
+
+
+def _played(
+    day: Day, world: World, settings: InfluenceSettings, recording: Path | None, progress: Progress | None
+) -> tuple[str, FaultLog]:
+    """Play a day; return the hash of how it ended, and what agents did wrong."""
+    if settings.simulation == "schedule":
+        play_by_schedule(day, _walks(world))
+        return sha256(repr(day.ledger.utterances).encode()).hexdigest(), FaultLog()
+    return _simulated(day, world, settings, recording, progress)
+
+
+def _simulated(
+    day: Day, world: World, settings: InfluenceSettings, recording: Path | None, progress: Progress | None
+) -> tuple[str, FaultLog]:
+    """Play a day in the simulation: nobody is given pictures, and there is no traffic but buses and bicycles."""
+    task, seed = day.task, day.task.seed
+    env = make(
+        world,
+        day.community,
+        seed=seed,
+        start=settings.start,
+        cars=0,
+        pedestrians=0,
+        observe=(),
+        max_steps=settings.steps,
+    )
+    followers = followers_of(day.community, env.public_map, seed=seed)
+    members = courted_members(followers, task.mains, day.ledger.answers(), env.public_map.walkable)
+    mains = {name: MainAgent(one, env.public_map, seed=seed) for name, one in day.courtships.items()}
+    agents = Gatherer({**members, **mains}, trusted=[*members, *mains])
+    hooks: list[Hook] = []
+    recorder = None
+    runner = Runner(env.sim, agents, hooks=hooks)
+    if recording is not None:
+        notes = {"challenge": NAME, "task": task.record()}
+        recorder = RecordedRun.into(recording, env.sim, runner.faults, wanted=settings.steps, notes=notes)
+        runner.hooks.append(recorder)
+    if progress is not None:
+        label = f"{task.world}, seed {seed}"
+        runner.hooks.append(_Reported(progress, label, settings.steps))
+    try:
+        runner.run(settings.steps)
+    finally:
+        agents.close()
+        if recorder is not None:
+            recorder.close()
+    return env.sim.state_hash(), runner.faults
+
+
+class _Reported(Hook):
+    """Tells how far a day is."""
+
+    def __init__(self, progress: Progress, label: str, steps: int) -> None:
+        self._progress, self._label, self._steps = progress, label, steps
+
+    def stepped(self, step: Step) -> None:
+        """Tell it."""
+        self._progress(self._label, step.number, self._steps)
+
+
+def _faults(logs: Sequence[FaultLog], askers: Sequence[Asker]) -> dict[str, Any]:
+    """Return what agents did wrong, and how often an offline part had to decide for a language model."""
+    counts: dict[str, int] = {}
+    for log in logs:
+        for kind, number in log.by_kind().items():
+            counts[kind] = counts.get(kind, 0) + number
+    fallbacks = sum(asker.fallbacks for asker in askers)
+    if fallbacks:
+        counts["fallback"] = fallbacks
+    told = [fault for log in logs for fault in log.first]
+    told += [Fault(0, "language model", "fallback", reason) for asker in askers for reason in asker.reasons]
+    return {"fault_counts": counts, "faults": told}
+
+
+def _told(day: Day, verdict: evaluate.Verdict) -> dict[str, Any]:
+    """Return what was said and how it was judged, as plain data."""
+    return {
+        "schema_name": "vico.influence.talks",
+        "version": 1,
+        "task": day.task.record(),
+        "strategies": {main: one.strategy.name for main, one in day.courtships.items()},
+        "utterances": day.ledger.record(),
+        "before": verdict.before,
+        "after": verdict.after,
+    }
+
+
+def _joined(hashes: Sequence[str]) -> str:
+    return hashes[0] if len(hashes) == 1 else sha256("".join(hashes).encode()).hexdigest()
+
+
+@lru_cache(maxsize=2)
+def _world(path: Path) -> World:
+    return read_world(Path(path))
+
+
+@lru_cache(maxsize=8)
+def _community(path: Path, seed: int) -> Community:
+    return community_of(_world(path), seed)
+
+
+@lru_cache(maxsize=2)
+def _walks_of(path: Path) -> Walks:
+    return Walks(_world(path))
+
+
+def _walks(world: World) -> Walks:
+    return Walks(world) if world.path is None else _walks_of(world.path)
+
+
+__all__ = ["CATEGORY", "NAME", "Influence"]
