@@ -63,9 +63,8 @@ class Scheduled(Speaker, Protocol):
 class ScheduleFollower:
     """Follows a resident's day from observations and the public map alone.
 
-    Sets out when the schedule says, walks the routed way (faster when late), goes through doors, sits, eats, drinks
-    and sleeps where that belongs, steps aside for others, lets cars pass, greets those it knows, remembers whom it saw,
-    and answers what it is asked.
+    Sets out when the schedule says, walks the routed way (faster when late), goes through doors, sits, eats, drinks and
+    sleeps where that belongs, steps aside, lets cars pass, greets those it knows, remembers, and answers questions.
 
     Parameters
     ----------
