@@ -26,7 +26,7 @@ REFUSALS, LOOKS = 2, 3
 # Who fetches what was seen outdoors walks up to it from so near, metres.
 _NEAR_SEEN = 5.0
 # How long one waits for somebody who was followed home, steps; how near a found thing is shown from, metres.
-_PATIENCE, _SHOW_WITHIN = 30, 4.6
+_PATIENCE, _SHOW_WITHIN = 5, 4.6
 
 
 @dataclass(frozen=True)
