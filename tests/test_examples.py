@@ -92,7 +92,7 @@ def test_events_close_a_street_and_cut_the_power(helsinki_path: Path) -> None:
 
 
 def test_a_function_stands_in_for_a_language_model(corner_path: Path) -> None:
-    printed = run("11_llm_author.py", "--world", str(corner_path), "--residents", "3")
+    printed = run("13_llm_author.py", "--world", str(corner_path), "--residents", "3")
     assert printed.count("can tell the time by shadows") == 3
     assert "character {'written by the model': 3}" in printed
     assert "schedule {'no usable reply': 3}" in printed
