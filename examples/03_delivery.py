@@ -1,4 +1,4 @@
-"""Generate a delivery task, let the heuristic planner do it, and see the verdict.
+"""Draw a delivery task, let the heuristic planner do it, and see the verdict.
 
 python examples/03_delivery.py --world out/demo/world --seed 0 --steps 600
 """
@@ -6,9 +6,9 @@ python examples/03_delivery.py --world out/demo/world --seed 0 --steps 600
 import argparse
 from pathlib import Path
 
-from vico.challenges.assistant.delivery import generate_delivery
-from vico.challenges.assistant.runner import community_for, run_episode
-from vico.world.folder import read_world
+from vico.challenges.assistant.challenge import ASSISTANT
+from vico.challenges.assistant.model import Task
+from vico.challenges.records import Job
 
 
 def main() -> None:
@@ -18,13 +18,15 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=600)
     arguments = parser.parse_args()
 
-    world = read_world(arguments.world)
-    task = generate_delivery(world, seed=arguments.seed, steps=arguments.steps)
+    setting = {"steps": arguments.steps}
+    job = Job("assistant", "delivery", "heuristic", setting, world=arguments.world, seed=arguments.seed)
+    task = Task.model_validate(ASSISTANT.task(job))
     for errand in task.instructions():
         print(f"{errand['index']}. {errand['text']}")
-    result = run_episode(world, community_for(world, residents=3), task, method="heuristic")
-    for errand, done in zip(task.subtasks, result.done_at, strict=True):
-        print(f"{errand.index}. {'not done' if done is None else f'done at step {done}'}")
+    record = ASSISTANT.play(job)
+    for part in record.parts:
+        print(f"{part.name}. {f'done at step {part.done_at}' if part.success else f'not done: {part.cause}'}")
+    print(f"SR {record.metrics['SR']:.0f} %, Ts {record.metrics['Ts']:.0f} steps")
 
 
 if __name__ == "__main__":

@@ -246,7 +246,7 @@ class Generator(Honest):
     """Makes the task itself, with all its answers."""
 
     def act(self, observation: Observation, info: dict[str, Any]) -> dict[str, Any]:
-        importlib.import_module("vico.challenges.assistant.delivery")
+        importlib.import_module("vico.challenges.assistant.generate")
         return dict(WAIT)
 
 

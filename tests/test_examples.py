@@ -104,3 +104,11 @@ def test_a_scene_of_the_film_is_filmed(helsinki_path: Path, tmp_path: Path) -> N
     printed = run("10_film.py", "--world", str(helsinki_path), "--out", str(tmp_path / "film"), *small)
     assert "walks to work, from step" in printed
     assert printed.endswith("film.mp4: 17 s\n")
+
+
+def test_people_are_asked_and_answer(helsinki_path: Path, helsinki_people: Path) -> None:
+    printed = run(
+        "12_asking_people.py", "--world", str(helsinki_path), "--community", str(helsinki_people), "--steps", "60"
+    )
+    assert "assistant: Excuse me, have you seen" in printed
+    assert "   understood: " in printed

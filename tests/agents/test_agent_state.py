@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import numpy as np
 import pytest
 
 import toy_city
 from vico.agents.assistant import METHODS, make_planner
 from vico.agents.base import Agent, RandomAgent
+from vico.agents.requester import Requester
 from vico.agents.schedule import followers_of
+from vico.assets.models.movable import movable_kinds, movable_surfaces
 from vico.io.plain_data import decode, encode
 from vico.sim.config import SimConfig
 from vico.sim.simulation import Simulation
@@ -21,23 +22,38 @@ Make = Callable[[], Mapping[str, Agent]]
 
 
 def region(place: str, x: float) -> dict[str, Any]:
-    return {"kind": "place", "name": place, "place": place, "centre": (x, 4.0, 0.0), "radius": 0.0}
+    return {"kind": "place", "name": place, "place": place, "centre": (x, 4.0, 0.0), "radius": 0.0, "surface": None}
 
 
 def outdoors(x: float, y: float) -> dict[str, Any]:
-    return {"kind": "outdoor", "name": "outside", "place": None, "centre": (x, y, 0.0), "radius": 4.0}
+    return {
+        "kind": "outdoor", "name": "outside", "place": None, "centre": (x, y, 0.0), "radius": 6.0, "surface": None
+    }  # fmt: skip
 
 
-INSTRUCTIONS: list[dict[str, Any]] = [
-    {
-        "index": 0, "text": "bring it", "objects": ["red box"], "source": outdoors(0.0, -6.0),
-        "destination": region(toy_city.SHOP, 5.0),
-    },
-    {
-        "index": 1, "text": "fetch it", "objects": ["blue box"], "source": region(toy_city.CAFE, -5.0),
-        "destination": outdoors(8.0, -6.0),
-    },
-]  # fmt: skip
+def by_table(place: str, x: float, room: str, entity: int) -> dict[str, Any]:
+    return region(place, x) | {"surface": {"room": room, "kind": "table", "entity": entity}}
+
+
+def asked(index: int, category: str, things: list[str], sources: list[Any], destination: Any) -> dict[str, Any]:
+    return {
+        "index": index, "category": category, "text": "help me", "objects": things, "sources": sources,
+        "destination": destination, "person": {"agent": "resident_2", "name": "Cleo Ek", "looks": "a woman"},
+    }  # fmt: skip
+
+
+IN_SHOP, IN_CAFE = region(toy_city.SHOP, 5.0), region(toy_city.CAFE, -5.0)
+INSTRUCTIONS: dict[str, list[dict[str, Any]]] = {
+    "delivery": [
+        asked(0, "delivery", ["red box"], [outdoors(0.0, -6.0)], by_table(toy_city.SHOP, 5.0, "r_shop", 200_003)),
+        asked(1, "delivery", ["blue box"], [IN_SHOP, IN_CAFE], outdoors(8.0, -6.0)),
+    ],
+    "search": [
+        asked(0, "search", ["blue box"], [IN_CAFE, IN_SHOP], None),
+        asked(1, "search", ["red box"], [outdoors(0.0, -6.0)], None),
+    ],
+    "carry": [asked(0, "carry", ["red box"], [outdoors(0.0, -4.0), IN_SHOP], IN_CAFE)],
+}
 
 
 def carried_on(sim: Simulation, make: Make, *, steps: int, every: int) -> tuple[set[str], int]:
@@ -102,21 +118,46 @@ def test_random_agent() -> None:
     assert "turn_left" in types
 
 
-# That of `llm`, which asks a server, is in test_llm_planner.py.
-@pytest.mark.parametrize("method", sorted(METHODS.keys() - {"llm"}))
-def test_planners(method: str) -> None:
-    sim = Simulation(toy_city.world(), None, SimConfig(assistants=1, observe=None, image=64))
-    box = toy_city.quad([[-0.1, -0.1, 0.1], [0.1, -0.1, 0.1], [0.1, 0.1, 0.1], [-0.1, 0.1, 0.1]], (200, 20, 20), 0, "b")
-    for name, position, room in (
-        ("red box", (1.0, -6.0, 0.0), ""),
-        ("blue box", (-7.0, 10.0, toy_city.FLOOR), "r_cafe"),
-    ):
-        sim.scenario.add_object(name, name, [box], position, room=room, size=np.array([0.2, 0.2, 0.2]))
+#: What each category's planner has done in the end, if it is any good.
+DONE = {
+    "delivery": {"pick", "put", "task_complete"},
+    "search": {"task_complete"},
+    "carry": {"communicate", "put", "task_complete"},
+}
+
+
+def scene(category: str) -> tuple[Simulation, dict[str, Agent], PublicMap]:
+    """A red box outdoors, with Carry in Cleo's hand, and a blue one in the café; and Cleo, if she is needed."""
+    community = toy_city.community() if category == "carry" else None
+    config = SimConfig(start=8 * 3600 - 20, assistants=1, observe=("assistant_0",), image=128)
+    sim = Simulation(toy_city.world(), community, config)
+    red, blue = (movable_surfaces("parcel", colour) for colour in ("red", "blue"))
+    size = movable_kinds()["parcel"].size
+    if category == "carry":
+        sim.scenario.hand_object("red box", "red box", red, "resident_2", size=size)
+    else:
+        sim.scenario.add_object("red box", "red box", red, (1.0, -6.0, 0.0), size=size)
+    sim.scenario.add_object("blue box", "blue box", blue, (-7.0, 10.0, toy_city.FLOOR), room="r_cafe", size=size)
     sim.scenario.place_agent("assistant_0", (0.0, -2.0))
     public_map = PublicMap.from_world(sim.world)
-    types, _ = carried_on(
-        sim, lambda: {"assistant_0": make_planner(method, INSTRUCTIONS, public_map, seed=1)}, steps=300, every=25
-    )
-    assert {"move_forward", "turn_left", "enter"} <= types
-    if method == "heuristic":
-        assert {"pick", "put", "task_complete"} <= types
+    people: dict[str, Agent] = {}
+    if community is not None:
+        people = dict(followers_of(community, public_map))
+        people["resident_2"] = Requester(people["resident_2"], community.resident_by_id["resident_2"], public_map)
+    return sim, people, public_map
+
+
+@pytest.mark.parametrize("category", sorted(INSTRUCTIONS))
+# That of `llm`, which asks a server, is in test_llm_planner.py.
+@pytest.mark.parametrize("method", sorted(METHODS.keys() - {"llm"}))
+def test_planners(method: str, category: str) -> None:
+    sim, _, public_map = scene(category)
+
+    def make() -> dict[str, Agent]:
+        planner = make_planner(method, INSTRUCTIONS[category], public_map, seed=1)
+        return scene(category)[1] | {"assistant_0": planner} if category == "carry" else {"assistant_0": planner}
+
+    types, _ = carried_on(sim, make, steps=300, every=25)
+    assert {"move_forward", "turn_left"} <= types
+    if method in ("heuristic", "ours"):
+        assert DONE[category] <= types

@@ -1,8 +1,9 @@
-"""Whole episodes on a real place: repeatable, and a planner that sees only what it may gets something done."""
+"""Whole assistant episodes on a real place: repeatable, and planners that see only what they may get something done."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -10,61 +11,95 @@ from typing import Any
 import pytest
 
 import planted_agents
-from vico.challenges.assistant import runner
-from vico.challenges.assistant.delivery import generate_delivery
-from vico.challenges.assistant.model import Task
-from vico.challenges.assistant.runner import community_for, run_episode
-from vico.challenges.results import EpisodeResult
+from vico.challenges.assistant import episode as playing
+from vico.challenges.assistant.causes import CAUSES
+from vico.challenges.assistant.challenge import ASSISTANT
+from vico.challenges.assistant.episode import play_task
+from vico.challenges.assistant.generate import generate_task
+from vico.challenges.assistant.model import Category, Task, read_task, write_task
+from vico.challenges.assistant.thresholds import RESIDENTS
+from vico.challenges.records import EpisodeRecord, Job
+from vico.community import build_community
 from vico.community.model import Community
-from vico.io.files import read_json
+from vico.errors import InputError
 from vico.runner.faults import Fault
 from vico.runner.foreign import Terms
 from vico.world.folder import World
 
 
 @pytest.fixture(scope="module")
-def few(helsinki: World) -> Community:
-    return community_for(helsinki, residents=2)
+def people(helsinki: World) -> Community:
+    return build_community(helsinki, residents=RESIDENTS["carry"], seed=0)
 
 
-def play(world: World, people: Community, *, method: str, steps: int, seed: int, assistants: int = 1) -> EpisodeResult:
-    task = generate_delivery(world, seed=seed, assistants=assistants, steps=steps)
-    return run_episode(world, people, task, method=method)
+@pytest.fixture(scope="module")
+def few(people: Community) -> Community:
+    """A few of them, for what needs nobody in particular: they cost time."""
+    return people.model_copy(update={"residents": people.residents[:6], "relations": [], "groups": []})
 
 
-def metres_of_the_first_errand(task: Task) -> float:
-    """From the start to where the things lie, and from there to where they belong; as the crow flies."""
-    stops = (task.assistants[0].position, task.subtasks[0].source.centre, task.subtasks[0].destination.centre)
-    return sum(math.dist(here[:2], there[:2]) for here, there in pairwise(stops))
+def shortened(task: Task, subtask: int, steps: int) -> Task:
+    """Return a task of one subtask only."""
+    one = task.subtasks[subtask].model_copy(update={"index": 0})
+    things = [thing for thing in task.objects if thing.id in one.objects]
+    return task.model_copy(update={"subtasks": [one], "objects": things, "steps": steps})
+
+
+def near_ones(world: World, community: Community, category: Category, *, steps: int, seeds: int) -> list[Task]:
+    """Single subtasks, by how far one walks in them as the crow flies."""
+    found: list[tuple[float, Task]] = []
+    for seed in range(seeds):
+        task = generate_task(world, community, category, seed=seed)
+        for k, subtask in enumerate(task.subtasks):
+            ends = [] if subtask.destination is None else [subtask.destination.centre]
+            stops = [task.assistants[0].position, subtask.true_source.centre, *ends]
+            metres = sum(math.dist(here[:2], there[:2]) for here, there in pairwise(stops))
+            found.append((metres, shortened(task, k, steps)))
+    return [task for _, task in sorted(found, key=lambda pair: pair[0])]
 
 
 def test_the_heuristic_delivers_what_is_near_enough(helsinki: World, few: Community) -> None:
-    # How far the first errand of an episode is, is luck: half of them take longer than this. So is whether what is
-    # wanted is seen from the door.
-    steps = 240
-    tasks = [generate_delivery(helsinki, seed=seed, steps=steps) for seed in range(8)]
-    nearest = sorted(tasks, key=metres_of_the_first_errand)[:4]
-    results = (run_episode(helsinki, few, task, method="heuristic") for task in reversed(nearest))
-    result = next(result for result in results if result.success[0])
-    assert [step is not None for step in result.done_at] == result.success
-    assert all(20 < step <= steps for step in result.done_at if step is not None)
-    assert result.steps == steps  # not everything was done
+    tasks = near_ones(helsinki, few, "delivery", steps=240, seeds=2)
+    records = (play_task(helsinki, few, task, method="heuristic") for task in tasks[:4])
+    record = next(record for record in records if record.parts[0].success)
+    assert record.metrics == {"SR": 100.0, "Ts": float(record.parts[0].done_at or 0)}
+    assert 20 < record.metrics["Ts"] <= 240
+    assert record.steps < record.limit == 240  # it was reported, so the episode was over
+
+
+def test_ours_finds_what_is_lost_near_by(helsinki: World, few: Community) -> None:
+    tasks = near_ones(helsinki, few, "search", steps=240, seeds=2)
+    records = (play_task(helsinki, few, task, method="ours") for task in tasks[:4])
+    record = next(record for record in records if record.parts[0].success)
+    assert 5 < record.metrics["Ts"] == record.steps
+
+
+@pytest.mark.slow
+def test_a_person_is_met_followed_and_things_are_put_down_at_home(helsinki: World, people: Community) -> None:
+    tasks = near_ones(helsinki, people, "carry", steps=700, seeds=2)
+    records = (play_task(helsinki, people, task, method="ours") for task in tasks[:5])
+    record = next(record for record in records if record.parts[0].success)
+    assert record.metrics.keys() == {"SR", "Ts", "HR", "HR_escort"}
+    assert record.metrics["HR_escort"] > 30.0
+    assert 0.0 < record.metrics["HR"] < 100.0
 
 
 @pytest.mark.parametrize(
-    ("method", "assistants"), [pytest.param("random", 1, marks=pytest.mark.slow), ("heuristic", 2)]
+    ("category", "method", "assistants"),
+    [("delivery", "heuristic", 2), ("search", "random", 1), ("search", "mcts", 1), ("carry", "ours+heuristic", 2)],
 )
-def test_an_episode_repeats_itself(helsinki: World, few: Community, method: str, assistants: int) -> None:
-    first, again = (
-        play(helsinki, few, method=method, steps=25, seed=2, assistants=assistants) for _ in range(2)
-    )  # fmt: skip
-    assert first.state_hash == again.state_hash
-    assert first.success == again.success
-
-
-def test_another_seed_is_another_episode(helsinki: World, few: Community) -> None:
-    hashes = {play(helsinki, few, method="random", steps=5, seed=seed).state_hash for seed in (0, 1)}
-    assert len(hashes) == 2
+def test_an_episode_repeats_itself_also_from_its_file(
+    helsinki: World, people: Community, few: Community, tmp_path: Path, category: Category, method: str, assistants: int
+) -> None:
+    community = people if category == "carry" else few
+    task = generate_task(helsinki, community, category, seed=1, assistants=assistants, steps=20)
+    write_task(tmp_path / "t.json", task)
+    first = play_task(helsinki, community, task, method=method)
+    again = play_task(helsinki, community, read_task(tmp_path / "t.json", world=helsinki), method=method)
+    assert replace(first, wall_seconds=0.0) == replace(again, wall_seconds=0.0)
+    assert first.steps == first.limit == 20
+    assert all(part.cause in CAUSES for part in first.parts if not part.success)
+    assert first.setting["assistants"] == assistants
 
 
 class _Saboteur:
@@ -89,70 +124,62 @@ class _Saboteur:
         return lies[self._turn % len(lies)]
 
 
-def test_a_planner_that_crashes_and_lies_ends_no_evaluation(
-    helsinki: World, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+def test_a_planner_that_crashes_and_lies_ends_no_episode(
+    helsinki: World, few: Community, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(runner, "make_planner", lambda *_, **__: _Saboteur())
-    monkeypatch.setattr(runner, "community_for", lambda world: community_for(world, residents=2))
-    (episode,) = runner.evaluate([helsinki], method="heuristic", assistants=1, seeds=1, steps=21, folder=tmp_path)
-    assert not any(episode.success)
-    assert episode.fault_counts == {"crashed": 7, "malformed": 12}
-    assert Fault(3, "assistant_0", "crashed", "ZeroDivisionError: no plan") in episode.faults
-    told = (tmp_path / "results.md").read_text()
-    assert "| 7 crashed, 12 malformed |" in told
-    assert "assistant_0 crashed at step 3 (ZeroDivisionError: no plan); 7 times in the episode" in told
+    monkeypatch.setattr(playing, "make_planner", lambda *_, **__: _Saboteur())
+    task = generate_task(helsinki, few, "delivery", seed=0, steps=21)
+    record = play_task(helsinki, few, task, method="heuristic")
+    assert record.metrics["SR"] == 0.0
+    assert record.fault_counts == {"crashed": 7, "malformed": 12}
+    assert Fault(3, "assistant_0", "crashed", "ZeroDivisionError: no plan") in record.faults
 
 
-def test_a_planner_from_elsewhere_is_judged_alone_in_its_process(
-    helsinki: World, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setattr(runner, "community_for", lambda world: community_for(world, residents=2))
+def test_planners_from_elsewhere_are_judged_alone_in_their_process(helsinki: World, few: Community) -> None:
+    task = generate_task(helsinki, few, "search", seed=0, assistants=2, steps=4)
 
-    def evaluation(name: str) -> EpisodeResult:
-        method, folder = f"{planted_agents.__file__}:{name}", tmp_path / name
+    def record_of(name: str) -> EpisodeRecord:
         terms = Terms(deadline=60.0, isolate=True)
-        (episode,) = runner.evaluate(
-            [helsinki], method=method, assistants=2, seeds=1, steps=4, folder=folder, terms=terms
-        )
-        return episode
+        return play_task(helsinki, few, task, method=f"{planted_agents.__file__}:{name}", terms=terms)
 
     # It ends its process in the third step; one that can't be made fails in each.
-    assert evaluation("Quitter").fault_counts == {"ended": 4}
-    broken = evaluation("Broken")
+    assert record_of("Quitter").fault_counts == {"ended": 4}
+    broken = record_of("Broken")
     assert broken.fault_counts == {"crashed": 8}
     assert "LookupError: no weights" in broken.faults[0].reason
-    honest = evaluation("Honest")
+    honest = record_of("Honest")
     assert (honest.fault_counts, honest.tokens, honest.cost) == ({}, 80, 4.0)
 
 
-def test_an_interrupted_evaluation_goes_on_and_comes_to_the_same(
-    helsinki: World, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setattr(runner, "community_for", lambda world: community_for(world, residents=2))
+def job(world: World, **more: Any) -> Job:
+    assert world.path is not None
+    fields: dict[str, Any] = {
+        "category": "search",
+        "method": "heuristic",
+        "setting": {},
+        "world": world.path,
+        "seed": 0,
+    }
+    return Job(challenge="assistant", **(fields | more))
 
-    def evaluation(folder: Path) -> list[str]:
-        episodes = runner.evaluate([helsinki], method="random", assistants=1, seeds=3, steps=5, folder=folder)
-        return [episode.state_hash for episode in episodes]
 
-    whole = evaluation(tmp_path / "whole")
-    played = runner.run_episode
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [({"category": "sell"}, "no category called 'sell'"), ({"setting": {"assistants": 3}}, "for 1 or 2"),
+     ({"method": "heuristic+random", "setting": {"assistants": 1, "steps": 3}}, "2 planners for 1 assistants")],
+)  # fmt: skip
+def test_what_can_not_be_played_is_refused(helsinki: World, asked: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        ASSISTANT.play(job(helsinki, **asked))
 
-    def killed_at_the_second(*arguments: Any, **options: Any) -> EpisodeResult:
-        if "seed 1" in options["label"]:
-            raise KeyboardInterrupt
-        return played(*arguments, **options)
 
-    monkeypatch.setattr(runner, "run_episode", killed_at_the_second)
-    with pytest.raises(KeyboardInterrupt):
-        evaluation(tmp_path / "cut")
-    labels: list[str] = []
-
-    def noted(*arguments: Any, **options: Any) -> EpisodeResult:
-        labels.append(options["label"])
-        return played(*arguments, **options)
-
-    monkeypatch.setattr(runner, "run_episode", noted)
-    assert evaluation(tmp_path / "cut") == whole
-    assert [label[-6:] for label in labels] == ["seed 1", "seed 2"]
-    first, second = (read_json(tmp_path / name / "results.json")["summary"] for name in ("whole", "cut"))
-    assert first | {"wall_seconds": 0} == second | {"wall_seconds": 0}
+def test_the_challenge_plays_jobs(helsinki: World) -> None:
+    asked = job(helsinki, setting={"steps": 3, "advanced": True, "assistants": 2, "distance": False})
+    told: list[tuple[str, int, int]] = []
+    record = ASSISTANT.play(asked, progress=lambda *what: told.append(what))
+    assert record.setting == {"steps": 3, "advanced": True, "assistants": 2, "distance": False}
+    assert len(record.parts) == 6
+    assert record.metrics.keys() == {metric.key for metric in ASSISTANT.metrics("search")} == {"SR", "Ts"}
+    assert [(number, limit) for _, number, limit in told] == [(1, 3), (2, 3), (3, 3)]
+    task = ASSISTANT.task(asked)
+    assert Task.model_validate(task).steps == 3

@@ -12,6 +12,7 @@ import pytest
 from challenges.invented_people import about, invented_people
 from toytown import make_world
 from vico.agents.influence.days import DayPlan, Stay
+from vico.agents.influence.language import Asker
 from vico.agents.influence.profiles import forms_of_address
 from vico.agents.influence.strategies import make_strategy
 from vico.challenges.influence import INFLUENCE, evaluate
@@ -23,7 +24,7 @@ from vico.challenges.influence.model import InfluenceSettings, settings_of, stra
 from vico.challenges.influence.opinion import OpinionModel
 from vico.challenges.records import Challenge, Job
 from vico.community.model import Community
-from vico.errors import InputError
+from vico.errors import InputError, SourceError
 from vico.io.files import read_json
 from vico.sim.recording import read_run
 from vico.world.folder import World
@@ -223,6 +224,29 @@ def test_main_agents_are_adults_of_different_households(town: World, people: Com
         assert one.household != other.household
         assert len(task.members) == 13
         assert set(task.members).isdisjoint(task.mains)
+
+
+def test_a_dead_model_leaves_the_day_to_the_offline_parts_and_says_so(
+    town: World, people: Community, played: Callable[[str, str], tuple[Day, evaluate.Verdict]]
+) -> None:
+    class Dead:
+        def ask(self, messages: Any, reply: Any, *, check: Any = None) -> Any:
+            raise SourceError("nobody answers")
+
+    settings = InfluenceSettings(simulation="schedule", start="10:00", hours=3.0, members="llm")
+    task = generate_influence(town, people, 0, settings)
+    day = make_day(task, people, "llm+ours", settings, "first", lambda purpose: Asker(Dead()))
+    before = evaluate.first_choices(day.ledger, now=task.begins, with_talk=False)
+    play_by_schedule(day, Walks(town))
+    verdict = evaluate.judge(day, before)
+    # What `nearest` and the opinion model would have done.
+    offline, expected = played("nearest+ours", "first")
+    assert day.ledger.record() == offline.ledger.record()
+    assert verdict.after["llm"] == verdict.after["sum"] == expected.after["sum"]
+    assert len(day.askers) == 3
+    for asker in day.askers:
+        assert asker.fallbacks > 3
+        assert asker.reasons[0].startswith("SourceError: nobody answers")
 
 
 # -- settings, strategies, bad input -----------------------------------------------------------------------------------

@@ -1,163 +1,265 @@
-"""Delivery tasks drawn from a real neighbourhood."""
+"""Assistant tasks drawn from a real neighbourhood and the people who live there."""
 
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import toy_city
+from assistant_by_hand import Truth
+from vico.agents.assistant import METHODS
 from vico.assets.models.movable import movable_colours, movable_kinds
-from vico.challenges.assistant.choose import CANDIDATES
-from vico.challenges.assistant.delivery import SOURCE_RADIUS, SUBTASKS, delivered, generate_delivery
-from vico.challenges.assistant.model import Task, read_task, write_task
-from vico.errors import EmptyInputError, SchemaError
+from vico.challenges.assistant.generate import generate_task
+from vico.challenges.assistant.model import CATEGORIES, Category, Region, Subtask, Task
+from vico.challenges.assistant.rules import is_carried_home, is_delivered
+from vico.challenges.assistant.thresholds import (
+    APART,
+    CANDIDATES,
+    CARRY_REACH,
+    HAUNTS,
+    OFF_MIDDLE,
+    REACH,
+    RESIDENTS,
+    SEARCH_RADIUS,
+    SOURCE_RADIUS,
+    SUBTASKS,
+    thresholds,
+)
+from vico.clock import seconds_of_day
+from vico.community import build_community
+from vico.community.model import Community
+from vico.errors import EmptyInputError
 from vico.world.folder import World
-from vico.world.routing import Router
 
-SEEDS = range(4)
+Made = dict[tuple[Category, bool], Task]
 
 
 @pytest.fixture(scope="module")
-def tasks(helsinki: World) -> list[Task]:
-    return [generate_delivery(helsinki, seed=seed) for seed in SEEDS]
+def people(helsinki: World) -> Community:
+    """As many as Carry asks for; the other categories do with them, too."""
+    return build_community(helsinki, residents=RESIDENTS["carry"], seed=0)
 
 
-def test_the_same_seed_gives_the_same_task_and_another_another(helsinki: World, tasks: list[Task]) -> None:
-    assert generate_delivery(helsinki, seed=1) == tasks[1]
-    assert len({task.model_dump_json() for task in tasks}) == len(tasks)
+@pytest.fixture(scope="module")
+def tasks(helsinki: World, people: Community) -> Made:
+    """A task of each category in each setting."""
+    return {
+        (category, advanced): generate_task(helsinki, people, category, seed=1, advanced=advanced)
+        for category in CATEGORIES
+        for advanced in (False, True)
+    }
 
 
-def test_a_second_assistant_changes_nothing_else(helsinki: World, tasks: list[Task]) -> None:
-    two = generate_delivery(helsinki, seed=1, assistants=2)
-    assert two.model_copy(update={"assistants": two.assistants[:1]}) == tasks[1]
+def regions_of(subtask: Subtask) -> list[Region]:
+    return [*subtask.sources, *([] if subtask.destination is None else [subtask.destination])]
+
+
+def middles_of(task: Task) -> np.ndarray:
+    return np.array([region.centre[:2] for subtask in task.subtasks for region in regions_of(subtask)])
+
+
+@pytest.mark.parametrize("category", CATEGORIES)
+def test_a_seed_is_a_task_and_a_second_assistant_changes_nothing_else(
+    helsinki: World, people: Community, tasks: Made, category: Category
+) -> None:
+    task = tasks[category, False]
+    two = generate_task(helsinki, people, category, seed=1, assistants=2)
+    alone = two.model_copy(update={"assistants": two.assistants[:1]})
+    assert alone.model_dump_json() == task.model_dump_json()  # the same bytes
     apart = np.hypot(*np.subtract(two.assistants[0].position, two.assistants[1].position))
-    assert apart <= 6.0
+    assert 0.0 < apart <= 6.0
+    assert all(helsinki.walkable.is_connected(start.position) for start in two.assistants)
 
 
-def test_every_episode_has_six_errands_over_things_with_names_of_their_own(tasks: list[Task]) -> None:
-    for task in tasks:
+def test_another_seed_and_the_other_setting_are_other_tasks(helsinki: World, people: Community, tasks: Made) -> None:
+    other = generate_task(helsinki, people, "search", seed=2)
+    texts = {task.model_dump_json(exclude={"seed", "advanced"}) for task in (other, *tasks.values())}
+    assert len(texts) == 1 + len(tasks)
+
+
+def test_every_episode_has_six_subtasks_over_things_with_names_of_their_own(tasks: Made) -> None:
+    for task in tasks.values():
         assert len(task.subtasks) == SUBTASKS
         assert len({thing.name for thing in task.objects}) == len(task.objects)
         assert sorted(i for s in task.subtasks for i in s.objects) == sorted(thing.id for thing in task.objects)
         assert all(thing.kind in movable_kinds() and thing.colour in movable_colours() for thing in task.objects)
+        assert {len(s.objects) for s in task.subtasks} <= ({1} if task.category == "search" else {1, 2})
 
 
-def test_choices_are_made_among_nine(tasks: list[Task]) -> None:
-    for task in tasks:
+def test_choices_are_made_among_nine_or_as_many_as_there_are(tasks: Made) -> None:
+    for task in tasks.values():
         kinds = {thing.id: thing.kind for thing in task.objects}
         for subtask in task.subtasks:
-            assert len(set(subtask.object_candidates)) == CANDIDATES
-            assert {kinds[i] for i in subtask.objects} <= set(subtask.object_candidates)
-            assert len(subtask.source_candidates) == CANDIDATES
-            assert subtask.source.name in subtask.source_candidates
-            # Destinations nearer than 20 m to the source are no candidates.
-            assert 1 <= len(subtask.destination_candidates) <= CANDIDATES
-            assert subtask.destination.name in subtask.destination_candidates
+            assert len(subtask.candidates) == {"carry": 2, "delivery": 3, "search": 2}[task.category]
+            assert all(1 <= len(names) <= CANDIDATES for names in subtask.candidates.values())
+            (of_kinds,) = (
+                names for names in subtask.candidates.values() if kinds[subtask.objects[0]] in names
+            )  # fmt: skip
+            assert len(set(of_kinds)) == CANDIDATES
+            chosen = {kinds[i] for i in subtask.objects} | {subtask.person.name, *(r.name for r in regions_of(subtask))}
+            assert all(chosen & set(names) for names in subtask.candidates.values())
 
 
-def test_things_lie_inside_their_source(helsinki: World, tasks: list[Task]) -> None:
-    for task in tasks:
+def test_things_lie_inside_their_source_and_can_be_walked_to(helsinki: World, tasks: Made) -> None:
+    for (category, _), task in tasks.items():
         things = {thing.id: thing for thing in task.objects}
-        for subtask in task.subtasks:
+        for subtask in task.subtasks if category != "carry" else []:
+            source = subtask.true_source
             for thing in (things[i] for i in subtask.objects):
-                if subtask.source.kind == "outdoor":
+                assert thing.holder is None
+                if source.kind == "outdoor":
                     assert thing.room is None
-                    assert np.hypot(*np.subtract(thing.position[:2], subtask.source.centre[:2])) <= SOURCE_RADIUS
+                    radius = SEARCH_RADIUS if category == "search" else SOURCE_RADIUS
+                    assert np.hypot(*np.subtract(thing.position[:2], source.centre[:2])) <= radius == source.radius
+                    assert helsinki.walkable.is_connected(thing.position[:2]), thing.name
                     continue
+                assert thing.room is not None
                 room = helsinki.room_by_id[thing.room]
-                assert room.place == subtask.source.place
+                assert room.place == source.place
                 c, s = np.cos(room.yaw), np.sin(room.yaw)
                 x, y = np.subtract(thing.position[:2], room.centre[:2])
-                inside = np.abs([c * x + s * y, c * y - s * x]) <= np.asarray(room.size[:2]) / 2
-                assert inside.all()
+                assert (np.abs([c * x + s * y, c * y - s * x]) <= np.asarray(room.size[:2]) / 2).all()
 
 
-def test_things_and_places_can_be_walked_to(helsinki: World, tasks: list[Task]) -> None:
-    router = Router(helsinki.walkable)
-    for task in tasks:
-        start = task.assistants[0].position
-        assert helsinki.walkable.is_connected(start)
+@pytest.mark.parametrize("category", CATEGORIES)
+def test_places_are_within_a_walk_of_the_start(helsinki: World, tasks: Made, category: Category) -> None:
+    reach = CARRY_REACH if category == "carry" else REACH
+    for task in (tasks[category, False], tasks[category, True]):
+        field = helsinki.router.distance_field(np.asarray(task.assistants[0].position))
+        walkable = helsinki.walkable
         for subtask in task.subtasks:
-            for region in (subtask.source, subtask.destination):
-                assert router.path(np.asarray(start), np.asarray(region.centre[:2])) is not None, region.name
+            for region in regions_of(subtask):
+                ix, iy = np.clip(walkable.cell_of(np.asarray(region.centre[:2])), 0, walkable.n - 1)
+                assert field[iy, ix] <= reach, region.name
+
+
+def test_whoever_asks_knows_the_places(helsinki: World, people: Community, tasks: Made) -> None:
+    for task in tasks.values():
+        for subtask in task.subtasks:
+            who = people.resident_by_id[subtask.person.agent]
+            assert subtask.person.name == who.name
+            known = {who.home, *who.known_places, *(item.place for item in who.schedule if item.place)}
+            told = {region.place for region in regions_of(subtask) if region.place is not None}
+            assert told <= known
+            near = np.array([helsinki.place_by_id[place].position[:2] for place in known])
+            for region in regions_of(subtask):
+                if region.kind == "outdoor":
+                    assert np.hypot(*(near - region.centre[:2]).T).min() <= 40.0
+
+
+@pytest.mark.parametrize("category", CATEGORIES)
+def test_the_advanced_setting_names_three_times_as_many_regions_and_surfaces(
+    helsinki: World, tasks: Made, category: Category
+) -> None:
+    usual, advanced = tasks[category, False], tasks[category, True]
+    base = HAUNTS if category == "carry" else 1
+    assert {len(s.sources) for s in usual.subtasks} == {base}
+    assert {len(s.sources) for s in advanced.subtasks} == {3 * base}
+    assert all(region.surface is None for s in usual.subtasks for region in regions_of(s))
+    indoors = [s.destination for s in advanced.subtasks if s.destination is not None and s.destination.place]
+    assert indoors or category == "search"
+    for region in indoors:
+        assert region.surface is not None
+        room = helsinki.room_by_id[region.surface.room]
+        assert room.place == region.place
+        (surface,) = (one for one in room.containers if one.entity == region.surface.entity)
+        assert surface.kind == region.surface.kind != "floor"
+    for subtask in advanced.subtasks:
+        centres = [region.centre for region in subtask.sources]
+        assert len(set(centres)) == len(centres)
+        if category == "delivery":
+            assert subtask.destination is not None
+            assert subtask.destination.centre not in centres
+
+
+def test_deliveries_go_somewhere_else(tasks: Made) -> None:
+    for advanced in (False, True):
+        for subtask in tasks["delivery", advanced].subtasks:
+            assert subtask.destination is not None
+            apart = np.hypot(*np.subtract(subtask.true_source.centre[:2], subtask.destination.centre[:2]))
+            assert apart > APART
+
+
+def test_carry_asks_for_six_people_who_are_out(helsinki: World, people: Community, tasks: Made) -> None:
+    for advanced in (False, True):
+        task = tasks["carry", advanced]
+        assert len({subtask.person.agent for subtask in task.subtasks}) == SUBTASKS
+        holders = {thing.id: thing.holder for thing in task.objects}
+        now = seconds_of_day(task.start + ":00")
+        for subtask in task.subtasks:
+            who = people.resident_by_id[subtask.person.agent]
+            assert subtask.destination is not None
+            assert subtask.destination.place == who.home
+            assert who.home not in {region.place for region in subtask.sources}
+            assert {holders[i] for i in subtask.objects} == {who.id}
+            assert subtask.person.looks in subtask.text
+            # At the start, or on the way then, they are expected where the right source is.
+            during = [i for i in who.schedule if seconds_of_day(i.start) < now + 750 and seconds_of_day(i.end) > now]
+            assert during
+            assert who.home not in {item.place for item in during}
+            place = next(helsinki.place_by_id[item.place] for item in during if item.place)
+            source = subtask.true_source
+            near = np.hypot(*np.subtract(place.position[:2], source.centre[:2])) < 1.0
+            assert source.place == place.id or (source.place is None and near)
+
+
+def test_nothing_is_done_yet(helsinki: World, tasks: Made) -> None:
+    for (category, advanced), task in tasks.items():
+        truth, limits = Truth(helsinki), thresholds(advanced=advanced)
+        names = {thing.id: thing.name for thing in task.objects}
         for thing in task.objects:
-            if thing.room is None:
-                assert helsinki.walkable.is_connected(thing.position[:2]), thing.name
+            truth.put(thing.name, thing.position, thing.room)
+            if thing.holder is not None:
+                truth.holders[thing.name] = thing.holder
+        for subtask in task.subtasks if category != "search" else []:
+            assert subtask.destination is not None
+            rule = is_delivered if category == "delivery" else is_carried_home
+            assert not any(rule(names[i], subtask.destination, truth, helsinki, limits) for i in subtask.objects)
 
 
-def test_nothing_is_delivered_yet(helsinki: World, tasks: list[Task]) -> None:
-    class AtStart:
-        def __init__(self, task: Task) -> None:
-            self.things = {thing.id: thing for thing in task.objects}
-
-        def object_position(self, name: str) -> np.ndarray:
-            return np.array(self.things[name].position)
-
-        def object_room(self, name: str) -> str | None:
-            return self.things[name].room
-
-        def object_holder(self, name: str) -> str | None:
-            return None
-
-    for task in tasks:
-        assert not any(delivered(subtask, AtStart(task), helsinki) for subtask in task.subtasks)
+def test_instructions_tell_no_position_of_any_thing(tasks: Made) -> None:
+    for task in tasks.values():
+        told = json.dumps(task.instructions())
+        for thing in task.objects:
+            if thing.holder is None:
+                assert np.hypot(*(middles_of(task) - thing.position[:2]).T).min() >= OFF_MIDDLE
+                assert "{}, {}".format(*thing.position[:2]) not in told
+            rooms = {one.destination.surface.room for one in task.subtasks
+                     if one.destination is not None and one.destination.surface is not None}  # fmt: skip
+            assert thing.room is None or thing.room in rooms or f'"{thing.room}"' not in told
 
 
-def test_instructions_tell_no_position_of_any_thing(tasks: list[Task]) -> None:
-    for task in tasks:
-        told = task.instructions()
-        rooms = {thing.room for thing in task.objects if thing.room is not None}
-        assert not any(room in json.dumps(told) for room in rooms)
-        for errand in told:
-            assert errand.keys() == {"index", "text", "objects", "source", "destination"}
-            regions = errand["source"], errand["destination"]
-            assert all(region.keys() == {"kind", "name", "place", "centre", "radius"} for region in regions)
-            # The middles of regions are all that is told of where: no thing lies on one.
-            middles = np.array([region["centre"][:2] for region in regions])
-            for thing in task.objects:
-                assert np.hypot(*(middles - thing.position[:2]).T).min() > 0.2
-        assert {thing.name for thing in task.objects} == {name for errand in told for name in errand["objects"]}
-
-
-def test_the_chooser_decides(helsinki: World) -> None:
-    asked: list[str] = []
+@pytest.mark.parametrize("category", ["delivery", "search"])
+def test_the_chooser_decides(helsinki: World, people: Community, category: Category) -> None:
+    asked: list[int] = []
 
     def last(question: str, candidates: object) -> int:
-        asked.append(question)
-        return len(candidates) - 1  # type: ignore[arg-type]
+        asked.append(len(candidates))  # type: ignore[arg-type]
+        return asked[-1] - 1
 
-    task = generate_delivery(helsinki, seed=0, chooser=last)
-    assert len(asked) == 3 * SUBTASKS
-    kinds = {thing.id: thing.kind for thing in task.objects}
-    assert all(kinds[s.objects[0]] == s.object_candidates[-1] for s in task.subtasks)
-    assert all(s.source.name == s.source_candidates[-1] for s in task.subtasks)
-
-
-def test_a_task_file_reads_back(tasks: list[Task], helsinki: World, tmp_path: Path) -> None:
-    write_task(tmp_path / "t.json", tasks[0])
-    assert read_task(tmp_path / "t.json", world_digest=helsinki.digest) == tasks[0]
+    task = generate_task(helsinki, people, category, seed=0, chooser=last)
+    assert len(asked) == SUBTASKS * (3 if category == "delivery" else 2)
+    assert max(asked) == CANDIDATES
+    chosen = [names[-1] for subtask in task.subtasks for names in subtask.candidates.values()]
+    kinds = [next(t.kind for t in task.objects if t.id == s.objects[0]) for s in task.subtasks]
+    assert set(kinds) <= set(chosen)
+    assert all(s.true_source.name in chosen for s in task.subtasks)
 
 
-def test_a_task_file_of_another_version_world_or_shape_is_refused(tasks: list[Task], tmp_path: Path) -> None:
-    path = tmp_path / "t.json"
-    write_task(path, tasks[0])
-    content = json.loads(path.read_text())
-    with pytest.raises(SchemaError, match="another world"):
-        read_task(path, world_digest="0" * 64)
-    path.write_text(json.dumps({**content, "version": 2}))
-    with pytest.raises(SchemaError, match="version 1"):
-        read_task(path)
-    path.write_text(json.dumps({**content, "steps": "many"}))
-    with pytest.raises(SchemaError, match=r"steps: .*; generate the task anew"):
-        read_task(path)
-    path.write_text("[]")
-    with pytest.raises(SchemaError):
-        read_task(path)
+def test_a_chooser_who_names_none_of_them_is_refused(helsinki: World, people: Community) -> None:
+    with pytest.raises(ValueError, match=r"chooser: 99 is none of \d candidates"):
+        generate_task(helsinki, people, "search", seed=0, chooser=lambda question, candidates: 99)
 
 
-def test_a_world_with_too_few_places_says_so() -> None:
-    with pytest.raises(EmptyInputError, match="use a larger world"):
-        generate_delivery(toy_city.world(), seed=0)
+def test_a_world_with_too_few_places_and_one_with_too_few_people_say_so(helsinki: World, people: Community) -> None:
+    with pytest.raises(EmptyInputError, match=r"nobody knows 3 places .* within a walk of 160 m .* use a larger world"):
+        generate_task(toy_city.world(), toy_city.community(), "delivery", seed=0)
+    five = people.model_copy(update={"residents": people.residents[:5]})
+    with pytest.raises(EmptyInputError, match=r"carry: at no time of day are 6 people out within 350 m .*, [0-5] at"):
+        generate_task(helsinki, five, "carry", seed=0)
+
+
+def test_methods_are_those_of_the_page() -> None:
+    assert {"random", "heuristic", "mcts", "ours"} <= set(METHODS)

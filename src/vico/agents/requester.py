@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -125,7 +126,7 @@ class Requester:
         for message in observation["events"]:
             speaker = str(message["speaker"])
             away = math.hypot(message["position"][0] - x, message["position"][1] - y)
-            called = self._resident.name.split()[0].casefold() in str(message["text"]).casefold()
+            called = is_called(self._resident.name, str(message["text"]))
             if speaker.startswith(HELPERS) and called and away <= CALL_DISTANCE:
                 if self._helper != speaker:
                     self._said = _HERE
@@ -159,4 +160,10 @@ class Requester:
         return ScheduleFollower(_WayHome(self._resident, plan), self._map, seed=self._seed)
 
 
-__all__ = ["CALL_DISTANCE", "HAND_OVER_DISTANCE", "HELPERS", "WAITS_FOR", "Requester"]
+def is_called(name: str, text: str) -> bool:
+    """Whether a text has somebody's first name in it, as a word of its own: Ida is not called by "Aida!"."""
+    first = re.escape(name.split()[0].casefold())
+    return re.search(rf"(?<![\w-]){first}(?![\w-])", text.casefold()) is not None
+
+
+__all__ = ["CALL_DISTANCE", "HAND_OVER_DISTANCE", "HELPERS", "WAITS_FOR", "Requester", "is_called"]

@@ -437,6 +437,9 @@ class Traveller:
             return None
         self._tries += 1
         if self._tries > _PUSHES:
+            leg = self.trip.legs[self._leg] if self.trip is not None and self._leg < len(self.trip.legs) else None
+            if leg is not None and leg.origin is not None:
+                self._closed.append(leg.origin)  # there is no getting away from that rack
             return {"type": "exit_bike"}
         # Ahead a little, or round the other way.
         if self._tries % 2:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from vico.agents.base import AgentState
-from vico.errors import SchemaError
+from vico.errors import InputError, SchemaError
 from vico.runner.faults import FaultLog
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Hook, Step
@@ -38,7 +38,9 @@ def go_on_from(checkpoint: Checkpoint, agents: Gatherer, sim: Simulation) -> Fau
 
 
 @contextmanager
-def recorded_in(out: Path, sim: Simulation, faults: FaultLog, *, world: Path, wanted: int) -> Iterator[Hook]:
+def recorded_in(
+    out: Path, sim: Simulation, faults: FaultLog, *, wanted: int, notes: Mapping[str, Any] | None = None
+) -> Iterator[Hook]:
     """Give a hook that records a run into a folder; when the block ends, the run is complete, or was stopped.
 
     It may follow a run that is gone on with by further calls of `Runner.run`.
@@ -49,17 +51,21 @@ def recorded_in(out: Path, sim: Simulation, faults: FaultLog, *, world: Path, wa
         Folder to write; must not exist, or be empty.
     faults
         Of the runner.
-    world
-        The world's folder, for the reader.
     wanted
         Steps the run is meant to have at most.
+    notes
+        What the run's manifest says besides.
 
     Raises
     ------
     OutputExistsError
         If the folder holds something.
+    InputError
+        If the world is in memory alone: a recording names its folder.
     """
-    with Recorder(out, sim, sources={"world": str(world)}, wanted=wanted) as recorder:
+    if sim.world.path is None:
+        raise InputError(f"{out}: a world in memory has no folder that a recording could name; write it first")
+    with Recorder(out, sim, sources={"world": str(sim.world.path)}, wanted=wanted, notes=notes) as recorder:
         yield _BegunOnce(RecordedRun(recorder, faults))
 
 

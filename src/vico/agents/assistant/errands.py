@@ -10,8 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from vico.agents.assistant.options import GoTo, Option, PickUp, PutDown, Search
+from vico.agents.assistant.options import GoTo, Option, PickUp, Search
 from vico.agents.assistant.people import PERSON, AwaitPerson, Escort, Meet, Report, Show
+from vico.agents.assistant.putting import PutDown
 from vico.agents.assistant.skills import Action, AssistantSkills, ObservationView
 from vico.agents.navigation.memory import SeenThing
 from vico.agents.perception import Sighting
@@ -25,7 +26,7 @@ REFUSALS, LOOKS = 2, 3
 # Who fetches what was seen outdoors walks up to it from so near, metres.
 _NEAR_SEEN = 5.0
 # How long one waits for somebody who was followed home, steps; how near a found thing is shown from, metres.
-_PATIENCE, _SHOW_WITHIN = 30, 4.6
+_PATIENCE, _SHOW_WITHIN = 5, 4.6
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from vico.agents.assistant.automata import AUTOMATA, ROUNDS
-from vico.agents.assistant.options import GoTo, Option, PickUp, PutDown, Search, WalkUp
+from vico.agents.assistant.options import GoTo, Option, PickUp, Search, WalkUp
 from vico.agents.assistant.people import PERSON, AwaitPerson, Escort, Meet, Report, Show
+from vico.agents.assistant.putting import PutDown
 from vico.agents.assistant.skills import Action, AssistantSkills, ObservationView
 from vico.agents.perception import Sighting
 from vico.agents.state import AgentState
@@ -19,7 +20,7 @@ _CHAIN = 12
 # Things that so many attempts did not reach are left.
 _REFUSALS = 2
 # How long one waits for somebody who was followed home, steps.
-_PATIENCE = 45
+_PATIENCE = 8
 # What Search's reports are made from: nearer than any setting asks for, metres.
 _SHOW_WITHIN = 4.6
 
@@ -200,7 +201,8 @@ class HeuristicPlanner:
             self._picked.add(pick.target.name)
             left = [name for name in self.errand["objects"] if name not in self._picked]
             return "picked, more wanted" if left and not all(view.held) else "picked, all of it"
-        self._refused.append(pick.target.name)
+        if pick.outcome == "refused":
+            self._refused.append(pick.target.name)
         return pick.outcome
 
     def _after_put(self, put: PutDown) -> str:

@@ -20,13 +20,12 @@ from vico.agents.state import AgentState
 
 Region = Mapping[str, Any]
 
-# Steps after which one gives up: going somewhere, walking up to a thing, putting down.
-_ON_THE_WAY, _WALKING_UP, _PUTTING = 500, 60, 30
-# Metres from the middle of a spot outdoors at which things are put down there.
-_SPOT = 0.7
+# Steps after which one gives up: going somewhere, walking up to a thing.
+_ON_THE_WAY, _WALKING_UP = 500, 60
 # From where one tries to pick, metres; and how long one comes no nearer before one gives up, steps.
 _NEARER = (GRASP, 0.8, 0.4)
 _IN_VAIN = 14
+_VIEWS = 4
 # Who moved so far, metres, is followed there at once; else not before so many steps after one was stopped.
 _AFAR, _HOLD = 6.0, 6
 
@@ -62,6 +61,8 @@ class Pursuit:
         # What is walked to: it follows the position by strides, so that a way round an obstacle is gone to its end.
         self._goal: NDArray[np.float64] | None = None
         self._holds = 0
+        # Views to take in a room that one came into after it, before one walks to where it is thought to be.
+        self._views = 0
 
     def state(self) -> AgentState:
         """Return where it was seen."""
@@ -70,6 +71,7 @@ class Pursuit:
             "through": self._through,
             "goal": None if self._goal is None else self._goal.copy(),
             "holds": self._holds,
+            "views": self._views,
         }
 
     def restore(self, state: AgentState) -> None:
@@ -77,12 +79,13 @@ class Pursuit:
         self.position, self._goal = (
             None if state[name] is None else np.array(state[name], np.float64) for name in ("position", "goal")
         )
-        self._through, self._holds = state["through"], state["holds"]
+        self._through, self._holds, self._views = state["through"], state["holds"], state["views"]
 
     def see(self, view: ObservationView, position: NDArray[np.float64]) -> None:
         """Take note of where it is now."""
         self.position = position
         self._through = self._skills.door_before(view, position)
+        self._views = 0
 
     def away(self, view: ObservationView) -> float:
         """Metres to where it was seen last; infinite where that is unknown or behind a door."""
@@ -90,8 +93,13 @@ class Pursuit:
 
     def step(self, view: ObservationView, *, near: float) -> Action | None:
         """Return the next action on the way there; None once within `near` metres, or where no way leads nearer."""
+        if view.room is not None and self._through == view.room:
+            self._views = _VIEWS
         if view.room is None or self._through == view.room:
             self._through = ""
+        if self._views > 0:
+            self._views -= 1
+            return {"type": "turn_left", "degrees": 88.0}
         if self._through:
             action = self._skills.go_through(view, self._through)
             if action is not None:
@@ -230,7 +238,7 @@ class PickUp:
         self.target = target
         self._skills = skills
         self._tries = 0
-        self._walk: WalkUp | None = None
+        self._walk: WalkUp | None = WalkUp(skills, target)
         self._asked = False
 
     def state(self) -> AgentState:
@@ -269,84 +277,3 @@ class PickUp:
             return None
         self._asked = True
         return {"type": "pick", "hand": view.held.index(0), "object": self.target.entity}
-
-
-class PutDown:
-    """Put down what is in hand at a destination: by the surface it names, else where one stands.
-
-    Outcomes: ``empty hands``, ``stuck``.
-    """
-
-    def __init__(self, skills: AssistantSkills, region: Region, entities: frozenset[int] | None = None) -> None:
-        self.outcome = ""
-        self._skills, self._region, self._entities = skills, region, entities
-        self._steps = 0
-        self._surface: Search | None = None
-        surface = region["surface"]
-        if surface is not None:
-            self._surface = Search(skills, lambda seen: bool(seen.entity == surface["entity"]), region)
-        self._walk: WalkUp | None = None
-        self._on = True
-
-    def state(self) -> AgentState:
-        """Return how far it came."""
-        return {
-            "steps": self._steps,
-            "surface": None if self._surface is None else self._surface.state(),
-            "walk": None if self._walk is None else self._walk.state(),
-            "on": self._on,
-        }
-
-    def restore(self, state: AgentState) -> None:
-        """Go on."""
-        self._steps, self._on = state["steps"], state["on"]
-        if state["surface"] is None:
-            self._surface = None
-        elif self._surface is not None:
-            self._surface.restore(state["surface"])
-        self._walk = None
-        if state["walk"] is not None:
-            self._walk = WalkUp(self._skills, Sighting(**state["walk"]["target"]))
-            self._walk.restore(state["walk"])
-
-    def act(self, view: ObservationView) -> Action | None:
-        """Return the next action."""
-        full = [
-            h for h, entity in enumerate(view.held) if entity and (self._entities is None or entity in self._entities)
-        ]
-        if not full:
-            self.outcome = "empty hands"
-            return None
-        action = self._to_surface(view)
-        if action is not None:
-            return action
-        self._steps += 1
-        if self._steps > _PUTTING:
-            self.outcome = "stuck"
-            return None
-        if self._region["kind"] == "outdoor" and view.away(self._region["centre"]) > _SPOT:
-            action = self._skills.approach(view, self._region["centre"], near=_SPOT)
-            if action is not None:
-                return action
-        if view.refused and self._steps > 1:
-            self._on = False
-            if self._steps % 2:
-                return {"type": "turn_left", "degrees": 70.0}
-        put: Action = {"type": "put", "hand": full[0]}
-        return put | {"target": self._region["surface"]["entity"]} if self._on and self._region["surface"] else put
-
-    def _to_surface(self, view: ObservationView) -> Action | None:
-        """Look for the surface that is named, and walk up to it."""
-        if self._surface is not None:
-            action = self._surface.act(view)
-            if action is not None:
-                return action
-            if self._surface.found is not None:
-                self._walk = WalkUp(self._skills, self._surface.found)
-            self._surface = None
-        if self._walk is not None:
-            action = self._walk.act(view)
-            if action is not None:
-                return action
-            self._walk = None
-        return None

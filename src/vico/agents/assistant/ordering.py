@@ -1,8 +1,8 @@
 """The best order of choices: the most subtasks done in time, in the least time, exactly, in the abstract model.
 
-Chances are left out: a plan is made anew whenever something comes out otherwise. Among outlooks with the same place
-and stages the earliest dominates, so a sweep over them by the number of choices made finds the optimum; six subtasks
-have at most some ten thousand.
+Failures are left out: a plan is made anew whenever something comes out otherwise. Of two plans that lead to the same
+place and stages one dominates that is neither later nor worth less, so a sweep over them by the number of choices made
+finds the optimum (label setting, as for shortest paths with two criteria).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from vico.agents.assistant.errands import Choice
 from vico.agents.assistant.outlook import DONE, Model, Outlook
 
-#: More outlooks than this are not looked at in one sweep; the earliest are kept.
+#: More plans than this are not looked at in one sweep; those worth most are kept, and the earliest among them.
 _WIDEST = 3000
 # How much a subtask that is done late counts less than one that is done at once.
 _IMPATIENCE = 0.25
@@ -40,6 +40,10 @@ class Plan:
     worth: float = 0.0
 
 
+#: Where a plan leads, and the plan.
+_Label = tuple[Outlook, Plan]
+
+
 def best_plan(model: Model, left: float) -> Plan:
     """Return the best plan.
 
@@ -49,29 +53,36 @@ def best_plan(model: Model, left: float) -> Plan:
         Seconds to the end.
     """
     best = Plan()
-    front: dict[tuple[object, ...], tuple[Outlook, Plan]] = {_key(model.start): (model.start, best)}
+    front: list[_Label] = [(model.start, best)]
     while front:
-        after: dict[tuple[object, ...], tuple[Outlook, Plan]] = {}
-        for outlook, plan in front.values():
+        after: dict[tuple[object, ...], list[_Label]] = {}
+        for outlook, plan in front:
             for choice, reached, likely in model.steps(outlook):
                 if reached.time > left:
                     continue
-                gained = sum(s == DONE for s in reached.stages) - sum(s == DONE for s in outlook.stages)
-                worth = plan.worth + gained * likely * (1.0 - _IMPATIENCE * reached.time / max(left, 1.0))
-                done = plan.done + gained
-                longer = Plan((*plan.choices, choice), done, reached.time if gained else plan.time, worth)
-                key = _key(reached)
-                known = after.get(key)
-                if known is None or (reached.time, -worth) < (known[0].time, -known[1].worth):
-                    after[key] = reached, longer
-                if (worth, -longer.time) > (best.worth, -best.time):
+                longer = _and_then(plan, choice, outlook, reached, likely=likely, left=left)
+                if not _add(after.setdefault((reached.at, reached.stages), []), (reached, longer)):
+                    continue
+                if (longer.worth, -longer.time) > (best.worth, -best.time):
                     best = longer
-        if len(after) > _WIDEST:
-            earliest = sorted(after.values(), key=lambda pair: (-pair[1].worth, pair[0].time))[:_WIDEST]
-            after = {_key(outlook): (outlook, plan) for outlook, plan in earliest}
-        front = after
+        front = [label for labels in after.values() for label in labels]
+        if len(front) > _WIDEST:
+            front = sorted(front, key=lambda label: (-label[1].worth, label[0].time))[:_WIDEST]
     return best
 
 
-def _key(outlook: Outlook) -> tuple[object, ...]:
-    return (outlook.at, outlook.stages)
+def _and_then(plan: Plan, choice: Choice, outlook: Outlook, reached: Outlook, *, likely: float, left: float) -> Plan:
+    """Return a plan that is one choice longer."""
+    gained = sum(s == DONE for s in reached.stages) - sum(s == DONE for s in outlook.stages)
+    worth = plan.worth + gained * likely * (1.0 - _IMPATIENCE * reached.time / max(left, 1.0))
+    return Plan((*plan.choices, choice), plan.done + gained, reached.time if gained else plan.time, worth)
+
+
+def _add(labels: list[_Label], new: _Label) -> bool:
+    """Keep a plan unless another one that leads to the same is as early and as good; drop those it is better than."""
+    time, worth = new[0].time, new[1].worth
+    if any(outlook.time <= time and plan.worth >= worth for outlook, plan in labels):
+        return False
+    labels[:] = [(outlook, plan) for outlook, plan in labels if outlook.time < time or plan.worth > worth]
+    labels.append(new)
+    return True

@@ -189,13 +189,14 @@ class AssistantSkills:
         """Return the room behind the door through which a point is seen; empty where it is in the same room."""
         here, there = view.pose[:2], np.asarray(point, np.float64)[:2]
         away = math.dist(here, there)
-        nearest, found = math.inf, ""
+        least, found = _DOORWAY, ""
         for door in view.state["doors"]:
             at = np.asarray(door["position"], np.float64)[:2]
             along = float((at - here) @ (there - here)) / max(away, 1e-9)
             across = math.sqrt(max(math.dist(here, at) ** 2 - along**2, 0.0))
-            if door["to"] != OUTSIDE and 0.0 < along < away - _BEHIND_DOOR and across < _DOORWAY and along < nearest:
-                nearest, found = along, str(door["to"])
+            # The way of sight leaves the room once: by the door whose middle it passes nearest to.
+            if door["to"] != OUTSIDE and 0.0 < along < away - _BEHIND_DOOR and across < least:
+                least, found = across, str(door["to"])
         return found
 
     def walk_indoors(self, view: ObservationView, target: ArrayLike, *, near: float) -> Action | None:

@@ -12,8 +12,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
+
+import numpy as np
 
 from vico.agents.commute.legs import LegMaker
 from vico.agents.commute.question import Question
@@ -21,6 +23,9 @@ from vico.rules import BIKE_RATE
 from vico.world.model import Point2
 from vico.world.public import PublicMap
 from vico.world.trips import Leg, Trip
+
+# A bicycle is turned where there is so much room to walls, within so many metres of its station.
+_ROOM, _ROOM_WITHIN = 1.0, 2.0
 
 
 @dataclass(frozen=True)
@@ -91,9 +96,16 @@ class DayPlanner:
         self._weights = weights or Weights()
         # Cost of the rest of the day from an appointment on, by its number and whether one has a bicycle there.
         self._rest: dict[tuple[int, bool], float] = {}
+        # Stations that were of no use on this day, or where there is no room to turn a bicycle.
+        self._useless = {name for name in self._legs.stations if not self._has_room(public_map, name)}
 
     def __call__(self, question: Question) -> Trip | None:
         """Return the trip with the least cost of the rest of the day."""
+        useless = self._useless | {name for name in question.closed if name in self._legs.stations}
+        if useless != self._useless:
+            self._useless = useless
+            self._rest.clear()
+        question = replace(question, closed=tuple(dict.fromkeys((*question.closed, *sorted(useless)))))
         if question.vehicle == "bike":
             found = list(self._with_bicycle(question))
         else:
@@ -102,6 +114,14 @@ class DayPlanner:
             return None
         best = min(found, key=lambda option: option.cost + self._after(question.index, option.keeps))
         return self._departing(best.trip, question.now)
+
+    def _has_room(self, public_map: PublicMap, station: str) -> bool:
+        """Whether a bicycle can be turned within a few steps of a station."""
+        x, y = self._legs.point_of(station)
+        steps = np.arange(-_ROOM_WITHIN, _ROOM_WITHIN + 0.1, 0.5)
+        around = np.stack(np.meshgrid(x + steps, y + steps), axis=-1).reshape(-1, 2)
+        free = public_map.walkable.is_connected(around)
+        return bool((free & (public_map.walkable.clearance_at(around) >= _ROOM)).any())
 
     # -- the rest of the day -----------------------------------------------------------------------------------------
 
@@ -119,7 +139,7 @@ class DayPlanner:
                 cash=math.inf,
                 vehicle="bike" if keeps else "",
                 index=index + 1,
-                closed=(),
+                closed=tuple(sorted(self._useless)),
                 first=True,
             )
             options = self._with_bicycle(question) if keeps else self._on_foot(question)

@@ -103,11 +103,7 @@ def play_task(
     with ExitStack() as stack:
         stack.callback(agents.close)
         if recording is not None:
-            if world.path is None:
-                raise InputError(
-                    "assistant: a world in memory has no folder that a recording could name; write it first"
-                )
-            recorded = recorded_in(recording, sim, runner.faults, world=world.path, wanted=task.steps)
+            recorded = recorded_in(recording, sim, runner.faults, wanted=task.steps)
             runner.hooks.append(stack.enter_context(recorded))
         runner.run(task.steps, until=lambda: judge.over)
         for name, planner in planners.items():

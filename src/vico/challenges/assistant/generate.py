@@ -70,13 +70,19 @@ class Draw:
         spots = self.hood.spots_of(who, self.chance, radius=radius)
         return places if (inside and places) or not spots else spots
 
-    def among_others(self, source: Region, who: Resident, *, radius: float, count: int) -> tuple[list[Region], int]:
-        """Return the source among the nearest others that somebody knows, `count` in all if there are so many."""
+    def among_others(
+        self, source: Region, who: Resident, *, radius: float, count: int, target: Region | None = None
+    ) -> tuple[list[Region], int]:
+        """Return the source among the nearest others that somebody knows, `count` in all if there are so many.
+
+        None of the others is where things are brought to.
+        """
         if count <= 1:
             return [source], 0
         others = [place_region(place) for place in self.hood.places_of(who) if place.id != who.home]
         others += self.hood.spots_of(who, self.chance, radius=radius)
         others = [r for r in self.things.untold(others) if r.place is None or r.place != source.place]
+        others = [r for r in others if target is None or _apart(r, target)]
         others.sort(key=lambda r: float(np.hypot(*np.subtract(r.centre[:2], source.centre[:2]))))
         near = others[: 2 * (count - 1)]
         order = self.chance.permutation(len(near))[: count - 1]
@@ -159,7 +165,7 @@ def _delivery(draw: Draw, index: int, before: list[Subtask]) -> Subtask:
     names = draw.names_for(index)
     for name in names:
         draw.things.make(name, kind, in_region=source, middles=[*told_before, source, target])
-    regions, right = draw.among_others(source, who, radius=SOURCE_RADIUS, count=limits.regions)
+    regions, right = draw.among_others(source, who, radius=SOURCE_RADIUS, count=limits.regions, target=target)
     text = f"{who.name} asks: bring {draw.things.described(names)} from {either(regions)} to {told(target)}."
     return _subtask(index, text, who, names, regions, right, target, candidates)
 

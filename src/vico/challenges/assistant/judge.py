@@ -116,8 +116,9 @@ class Judge(Hook):
             if escort.handed_at is None:
                 shares.append(0.0)
                 continue
-            frames = (steps if escort.arrived_at is None else escort.arrived_at) - escort.handed_at
-            shares.append(min(1.0, escort.followed / frames) if frames else 1.0)
+            # Both ends count: whoever was near at the hand-over, too.
+            frames = (steps if escort.arrived_at is None else escort.arrived_at) - escort.handed_at + 1
+            shares.append(escort.followed / frames)
         return 100.0 * sum(e.followed for e in self.escorts) / max(steps, 1), 100.0 * float(np.mean(shares))
 
     def _is_done(self, k: int, subtask: Subtask) -> bool:

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
+from vico.assets.models.movable import movable_colours, movable_kinds
 from vico.errors import SchemaError
 from vico.io.files import read_json, write_json
 from vico.world.folder import World
@@ -175,6 +176,18 @@ class Task(Record):
             raise ValueError("subtasks are not numbered 0, 1, 2, ...")
         return self
 
+    @model_validator(mode="after")
+    def _objects_can_be_told_apart(self) -> Self:
+        for field in ("id", "name"):
+            values = [getattr(thing, field) for thing in self.objects]
+            if twice := sorted({value for value in values if values.count(value) > 1}):
+                raise ValueError(f"objects: two have the {field} {twice[0]!r}")
+        people = {subtask.person.agent for subtask in self.subtasks} if self.category == "carry" else set()
+        for thing in self.objects:
+            if thing.holder is not None and thing.holder not in people:
+                raise ValueError(f"objects: {thing.id}: {thing.holder!r}, who holds it, asks for no help with carrying")
+        return self
+
     def instructions(self) -> list[dict[str, Any]]:
         """Return what the assistants are told: no position of any object or person, no candidates."""
         names = {thing.id: thing.name for thing in self.objects}
@@ -226,10 +239,29 @@ def _check_against(task: Task, world: World, path: Path) -> None:
         raise SchemaError(f"{path}: made for another world ({task.world}); generate the task for this one")
     for subtask in task.subtasks:
         for region in (*subtask.sources, *([subtask.destination] if subtask.destination else [])):
-            if region.place is not None and region.place not in world.place_by_id:
+            if missing := _missing(region, world):
                 raise SchemaError(
-                    f"{path}: subtasks.{subtask.index}: the world has no place {region.place!r}; generate the task anew"
+                    f"{path}: subtasks.{subtask.index}: the world has no {missing}; generate the task anew"
                 )
     for thing in task.objects:
+        if thing.kind not in movable_kinds() or thing.colour not in movable_colours():
+            raise SchemaError(
+                f"{path}: objects: {thing.id}: there is no {thing.colour} {thing.kind}; add it to the movable things, "
+                "or generate the task anew"
+            )
         if thing.room is not None and thing.room not in world.room_by_id:
             raise SchemaError(f"{path}: objects: {thing.id}: the world has no room {thing.room!r}; generate it anew")
+
+
+def _missing(region: Region, world: World) -> str:
+    """Say what a region names that a world does not have; empty if it has all of it."""
+    if region.place is None:
+        return "" if region.surface is None else f"surface outdoors ({region.surface.kind})"
+    if region.place not in world.place_by_id:
+        return f"place {region.place!r}"
+    if region.surface is None:
+        return ""
+    if region.surface.room not in world.place_by_id[region.place].rooms:
+        return f"room {region.surface.room!r} in {region.place!r}"
+    entities = {one.entity for one in world.room_by_id[region.surface.room].containers}
+    return "" if region.surface.entity in entities else f"surface {region.surface.entity} in {region.surface.room!r}"

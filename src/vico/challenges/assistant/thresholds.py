@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from vico.agents.requester import CALL_DISTANCE, HAND_OVER_DISTANCE, WAITS_FOR
+
 #: Subtasks of an episode, and its longest duration, steps of one second.
 SUBTASKS = 6
 STEPS = 1500
@@ -35,12 +37,6 @@ APART = 20.0
 
 #: Places where somebody who is to be helped is often seen: so many are told, one of them right.
 HAUNTS = 3
-
-#: How far a message to them carries, and how near they hand a thing over, metres; how long they wait for who spoke to
-#: them to come near, steps.
-CALL_DISTANCE = 10.0
-HAND_OVER_DISTANCE = 1.4
-WAITS_FOR = 60
 
 #: Nearer than this to the person one follows them, metres.
 FOLLOW_DISTANCE = 5.0
@@ -83,6 +79,35 @@ class Thresholds:
 
 STANDARD = Thresholds()
 ADVANCED = Thresholds(destination_radius=1.5, home_radius=1.5, search_distance=5.0, surface_distance=1.5, regions=3)
+
+
+# How far a message to those who are to be helped carries, how near they hand a thing over and how long they wait for
+# who spoke to them is theirs to know; it is named here with the rest.
+__all__ = [
+    "ADVANCED",
+    "APART",
+    "BLOCKED_DISTANCE",
+    "BLOCKED_STEPS",
+    "CALL_DISTANCE",
+    "CANDIDATES",
+    "CARRY_REACH",
+    "FOLLOW_DISTANCE",
+    "HAND_OVER_DISTANCE",
+    "HAUNTS",
+    "OFF_MIDDLE",
+    "REACH",
+    "RESIDENTS",
+    "SEARCH_RADIUS",
+    "SEEN_DISTANCE",
+    "SEEN_PIXELS",
+    "SOURCE_RADIUS",
+    "STANDARD",
+    "STEPS",
+    "SUBTASKS",
+    "WAITS_FOR",
+    "Thresholds",
+    "thresholds",
+]
 
 
 def thresholds(*, advanced: bool) -> Thresholds:

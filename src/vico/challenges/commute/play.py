@@ -66,7 +66,7 @@ def play_day(
         if isinstance(inner, IsolatedAgent):
             stack.callback(inner.close)
         if recording is not None:
-            recorded = recorded_in(recording, sim, runner.faults, world=job.world, wanted=task.seconds)
+            recorded = recorded_in(recording, sim, runner.faults, wanted=task.seconds)
             runner.hooks.append(stack.enter_context(recorded))
         while not judge.over:
             runner.run(task.seconds, until=lambda: judge.stays or judge.over)

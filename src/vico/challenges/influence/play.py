@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
@@ -32,8 +33,7 @@ from vico.io.files import write_json
 from vico.runner.faults import Fault, FaultLog
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Hook, Runner, Step
-from vico.runner.recording import RecordedRun
-from vico.sim.recorder import Recorder
+from vico.runner.recording import recorded_in
 from vico.world.folder import World, read_world
 
 NAME = "influence"
@@ -56,7 +56,7 @@ class Influence:
 
     name = NAME
     categories: Sequence[str] = (CATEGORY,)
-    methods: Sequence[str] = tuple(name for name in NAMES if name != "llm")
+    methods: Sequence[str] = NAMES
 
     def metrics(self, category: str) -> Sequence[Metric]:
         """Columns of the table."""
@@ -173,21 +173,17 @@ def _simulated(
     mains = {name: MainAgent(one, env.public_map, seed=seed) for name, one in day.courtships.items()}
     agents = Gatherer({**members, **mains}, trusted=[*members, *mains])
     hooks: list[Hook] = []
-    recorder = None
     runner = Runner(env.sim, agents, hooks=hooks)
-    if recording is not None:
-        notes = {"challenge": NAME, "task": task.record()}
-        recorder = Recorder(recording, env.sim, sources={"world": str(world.path)}, wanted=settings.steps, notes=notes)
-        runner.hooks.append(RecordedRun(recorder, runner.faults))
     if progress is not None:
         label = f"{task.world}, seed {seed}"
         runner.hooks.append(_Reported(progress, label, settings.steps))
-    try:
+    with ExitStack() as stack:
+        stack.callback(agents.close)
+        if recording is not None:
+            notes = {"challenge": NAME, "task": task.record()}
+            recorded = recorded_in(recording, env.sim, runner.faults, wanted=settings.steps, notes=notes)
+            runner.hooks.append(stack.enter_context(recorded))
         runner.run(settings.steps)
-    finally:
-        agents.close()
-        if recorder is not None:
-            recorder.close()
     return env.sim.state_hash(), runner.faults
 
 
