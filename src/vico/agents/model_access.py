@@ -29,7 +29,7 @@ _PATIENCE = 3  # questions in a row that a server may fail at before it is left 
 _ROUNDS = 2  # how often a reply may be mended
 _MOST_DETAIL = 240
 # A world waits for the answer: there are many questions, and each is short.
-_CONNECTION = Connection(timeout=60.0, retries=2)
+_CONNECTION = Connection(timeout=120.0, retries=2)
 _SAMPLING = Sampling(seed=0, temperature=0.0, max_tokens=1500)
 
 
