@@ -92,7 +92,7 @@ def test_events_close_a_street_and_cut_the_power(helsinki_path: Path) -> None:
 
 
 def test_a_function_stands_in_for_a_language_model(corner_path: Path) -> None:
-    printed = run("11_llm_author.py", "--world", str(corner_path), "--residents", "3")
+    printed = run("13_llm_author.py", "--world", str(corner_path), "--residents", "3")
     assert printed.count("can tell the time by shadows") == 3
     assert "character {'written by the model': 3}" in printed
     assert "schedule {'no usable reply': 3}" in printed
@@ -104,3 +104,11 @@ def test_a_scene_of_the_film_is_filmed(helsinki_path: Path, tmp_path: Path) -> N
     printed = run("10_film.py", "--world", str(helsinki_path), "--out", str(tmp_path / "film"), *small)
     assert "walks to work, from step" in printed
     assert printed.endswith("film.mp4: 17 s\n")
+
+
+def test_people_are_asked_and_answer(helsinki_path: Path, helsinki_people: Path) -> None:
+    printed = run(
+        "12_asking_people.py", "--world", str(helsinki_path), "--community", str(helsinki_people), "--steps", "60"
+    )
+    assert "assistant: Excuse me, have you seen" in printed
+    assert "   understood: " in printed

@@ -148,7 +148,8 @@ def scene(category: str) -> tuple[Simulation, dict[str, Agent], PublicMap]:
 
 
 @pytest.mark.parametrize("category", sorted(INSTRUCTIONS))
-@pytest.mark.parametrize("method", sorted(METHODS))
+# That of `llm`, which asks a server, is in test_llm_planner.py.
+@pytest.mark.parametrize("method", sorted(METHODS.keys() - {"llm"}))
 def test_planners(method: str, category: str) -> None:
     sim, _, public_map = scene(category)
 

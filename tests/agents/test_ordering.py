@@ -21,13 +21,18 @@ LOOK = 20.0
 
 
 class Crow:
-    """Ways as the crow flies, at 2 m/s; every look takes the same."""
+    """Ways as the crow flies, at 2 m/s; every look takes the same, and no region is likelier than another."""
+
+    time = 0.0
 
     def travel(self, start: Sequence[float], goal: Sequence[float], *, pace: float = 2.0) -> float:
         return math.dist(start[:2], goal[:2]) / pace
 
     def look(self, region: dict[str, Any], *, person: bool) -> float:
         return LOOK
+
+    def weight(self, region: dict[str, Any], *, person: bool) -> float:
+        return 1.0
 
 
 def view_from(x: float, y: float, held: Sequence[int] = (0, 0), *, room: str = "") -> ObservationView:

@@ -35,8 +35,13 @@ class Counting:
         return action
 
 
-def together_and_alone(world: World, people: Community, config: SimConfig, steps: int) -> tuple[float, set[str]]:
-    """Compare the group's actions with the single ones at every step.
+Said = dict[int, dict[str, Any]]
+
+
+def together_and_alone(
+    world: World, people: Community, config: SimConfig, steps: int, said: Said | None = None
+) -> tuple[float, set[str]]:
+    """Compare the group's actions with the single ones at every step; `said`: what others do, by step.
 
     Returns the share of the residents that the group asked, and the types of actions there were.
     """
@@ -55,7 +60,7 @@ def together_and_alone(world: World, people: Community, config: SimConfig, steps
         single = {name: alone[name].act(observations[name], infos[name]) for name in names}
         assert together == single, f"step {step}"
         types |= {str(action["type"]) for action in single.values()}
-        result = sim.step(single)
+        result = sim.step(single | (said or {}).get(step, {}))
         observations, infos = result.observations, result.infos
     for name in names:
         assert encode(alone[name].state()) == encode(members[name].state()), name
@@ -66,6 +71,18 @@ def test_in_a_small_town_around_opening_time() -> None:
     people, config = toy_city.community(), SimConfig(start=8 * 3600 - 20, observe=())
     _, types = together_and_alone(toy_city.world(), people, config, 400)
     assert {"move_forward", "enter", "wait", "communicate"} <= types
+
+
+def test_answering_questions() -> None:
+    """Their states, which are compared at the end, hold whom they saw and what they heard."""
+    config = SimConfig(start=8 * 3600 - 20, observe=(), assistants=1)
+    questions = ["Have you seen Cleo Ek?", "Bo, have you seen Ada?", "How do I get to South Green?", "Who are you?"]
+    said: Said = {
+        step: {"assistant_0": {"type": "communicate", "text": questions[k % len(questions)]}}
+        for k, step in enumerate(range(2, 120, 3))
+    }
+    _, types = together_and_alone(toy_city.world(), toy_city.community(), config, 150, said)
+    assert "communicate" in types
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,8 @@ class Agent(Protocol):
     """Whoever acts: residents, planners, learners, people at a keyboard, submissions.
 
     Turns observations into actions, once a step, and sees nothing else of the world but public maps. One that spends
-    on language models has attributes ``tokens`` and ``cost`` (US dollars), what it spent so far.
+    on language models has attributes ``tokens`` and ``cost`` (US dollars), what it spent so far; one that goes on where
+    its model gives nothing of use says so in ``model_faults``, pairs of a step and a reason.
     """
 
     def act(self, observation: Observation, info: Info) -> Action:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 
 from vico.agents.base import Action, Info, Observation
 from vico.agents.state import AgentState
+from vico.agents.talk.acquaintance import Acquaintance
 from vico.clock import DAY
 
 # People greet within this distance, metres, and not twice within this time, seconds.
@@ -46,22 +46,6 @@ class Speaker(Protocol):
     @property
     def hobbies(self) -> list[str]:
         """What they like to do."""
-
-
-@dataclass(frozen=True)
-class Acquaintance:
-    """Somebody a resident knows: name, what ties them (friend, colleague, ...; the note says more), and age, years."""
-
-    agent: str
-    name: str
-    kind: str
-    note: str
-    age: int = 35
-
-    @property
-    def first_name(self) -> str:
-        """What one calls them."""
-        return self.name.split()[0]
 
 
 class Conversation:
@@ -104,6 +88,11 @@ class Conversation:
     def greeted(self) -> Mapping[str, float]:
         """When the speaker last spoke with agents, seconds."""
         return self._greeted
+
+    def meet(self, agent: str, time: float) -> None:
+        """Take note that one speaks with somebody, seconds: whom one has just answered one doesn't greet."""
+        self._greeted[agent] = time
+        self.encounters += 1
 
     def line(self, observation: Observation, info: Info, errand: Callable[[], str]) -> Action | None:
         """Return something to say now, or None.

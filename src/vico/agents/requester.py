@@ -155,7 +155,8 @@ class Requester:
         home = self._resident.home
         plan = (
             _Item("commute", now, _BY, "walk home", None),
-            _Item("main", _BY, "23:59:59", "be at home", home, tag="leisure"),
+            # Who comes home sits down, and leaves the hall to others.
+            _Item("meal", _BY, "23:59:59", "have a rest at home", home, tag="meal_home"),
         )
         return ScheduleFollower(_WayHome(self._resident, plan), self._map, seed=self._seed)
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from vico.agents.base import Action, Info, Observation
 from vico.agents.conversation import GREETING_DISTANCE, GREETING_PAUSE
 from vico.agents.strides import Stride, stride_lengths
+from vico.agents.talk.crowd_memory import CrowdMemory
 from vico.clock import DAY
 from vico.crowd import Crowd
 from vico.world.walkable import WalkableMap
@@ -54,7 +55,8 @@ class Residents:
     """Residents that are asked together: each does what it would do alone.
 
     Those who rest where they were when they last decided to, or are on a straight way, heard nothing and see nobody
-    they would greet are found in arrays; they wait, or walk on. Only the others are asked.
+    they would greet are found in arrays; they wait, or walk on. Only the others are asked. Whom all of them see is
+    taken down for their memories.
 
     Parameters
     ----------
@@ -88,6 +90,7 @@ class Residents:
         self._encounters = [-1] * n
         self._changed = set(range(n))
         self._rows: tuple[Mapping[str, int], NDArray[np.int64]] | None = None
+        self._memories = CrowdMemory([getattr(member, "memory", None) for member in self._members])
 
     def forget(self, name: str) -> None:
         """Take nothing for granted of a member any more: it acted, or was restored."""
@@ -104,6 +107,8 @@ class Residents:
         observations = getattr(observations, "without_pictures", observations)
         infos = getattr(infos, "without_pictures", infos)
         numbers = np.array([self._number[name] for name in names], np.int64)
+        if crowd is not None:
+            self._memories.look(crowd, numbers, lambda: self._members_by_row(crowd))
         going_on = np.full(len(names), np.nan) if crowd is None else self._going_on(crowd, numbers)
         found: dict[str, Action | Exception] = {}
         for name, k, distance in zip(names, numbers.tolist(), going_on.tolist(), strict=True):
@@ -151,9 +156,7 @@ class Residents:
         self._learn_greetings()
         n = len(self._members)
         meeting = np.zeros(n, bool)
-        number = np.full(len(crowd.pose), -1, np.int64)
-        rows = self._rows_in(crowd)
-        number[rows[rows >= 0]] = np.flatnonzero(rows >= 0)
+        number = self._members_by_row(crowd)
         near = crowd.distance <= GREETING_DISTANCE
         me, other = number[crowd.viewer[near]], number[crowd.seen[near]]
         both = (me >= 0) & (other >= 0)
@@ -174,6 +177,13 @@ class Residents:
             for pair in range(self._first_pair[k], self._first_pair[k + 1]):
                 self._greeted[pair] = greeted.get(self._acquaintances[pair], _NEVER)
         self._changed.clear()
+
+    def _members_by_row(self, crowd: Crowd) -> NDArray[np.int64]:
+        """Return the member's number by row of the crowd; -1 for others."""
+        number = np.full(len(crowd.pose), -1, np.int64)
+        rows = self._rows_in(crowd)
+        number[rows[rows >= 0]] = np.flatnonzero(rows >= 0)
+        return number
 
     def _rows_in(self, crowd: Crowd) -> NDArray[np.int64]:
         """Return the members' rows; -1 for those who take no part in a run."""

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
+from types import MappingProxyType
 from typing import Any, Protocol
 
 from vico.agents.base import Action, Info, Observation
 from vico.agents.buying import Buyer
 from vico.agents.change_of_plans import ChangeOfPlans
-from vico.agents.conversation import Acquaintance, Conversation, Speaker
+from vico.agents.conversation import Conversation, Speaker
 from vico.agents.indoor_walk import IndoorWalker
 from vico.agents.residents import Residents
 from vico.agents.resting import SeatSeeker
@@ -18,6 +19,10 @@ from vico.agents.serving import Clerk
 from vico.agents.state import AgentState, generator_state, restore_generator
 from vico.agents.stays import Item, Stay, stays_of, with_ways
 from vico.agents.strides import Stride, pace_in_time, paces_of
+from vico.agents.talk.acquaintance import Acquaintance, acquaintances_of
+from vico.agents.talk.facts import Knowledge, moment_of, person_of
+from vico.agents.talk.memory import ResidentMemory
+from vico.agents.talk.talker import RANGE, Talk, Talker
 from vico.agents.travel import Traveller
 from vico.agents.wayfinding import Walker
 from vico.clock import DAY
@@ -58,8 +63,8 @@ class Scheduled(Speaker, Protocol):
 class ScheduleFollower:
     """Follows a resident's day from observations and the public map alone.
 
-    Sets out when the schedule says, walks the routed way (faster when late), goes through doors, sits, eats, drinks
-    and sleeps where that belongs, steps aside for others, lets cars pass, and greets those it knows.
+    Sets out when the schedule says, walks the routed way (faster when late), goes through doors, sits, eats, drinks and
+    sleeps where that belongs, steps aside, lets cars pass, greets those it knows, remembers, and answers questions.
 
     Parameters
     ----------
@@ -71,10 +76,21 @@ class ScheduleFollower:
         Whom the resident knows.
     seed
         Of the run.
+    talk
+        How it answers questions; None: in the sentences of templates.
+    names
+        What people are called whom it sees or hears, by agent.
     """
 
     def __init__(
-        self, resident: Scheduled, public_map: PublicMap, *, known: Sequence[Acquaintance] = (), seed: int = 0
+        self,
+        resident: Scheduled,
+        public_map: PublicMap,
+        *,
+        known: Sequence[Acquaintance] = (),
+        seed: int = 0,
+        talk: Talk | None = None,
+        names: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         generator = rng(seed, "schedule follower", resident.id)
         self.group: Residents | None = None
@@ -98,6 +114,9 @@ class ScheduleFollower:
         self._seeks = False
         self._aside: list[Action] = []
         self._conversation = Conversation(resident, known, generator)
+        memory = ResidentMemory(public_map.place_ids)
+        people = {person.agent: person for person in known}
+        self._talker = Talker(Knowledge(person_of(resident), public_map, people, names, memory, self._stays), talk)
         self._posture = "standing"
         self._changes = ChangeOfPlans(public_map, self._stays, seed=seed, name=resident.id, age=resident.age)
         # So that not everybody takes a sip at once.
@@ -117,6 +136,7 @@ class ScheduleFollower:
         if self.group is not None:
             self.group.forget(self._name)
         self.rests_until, self.stride = -math.inf, None
+        self._talker.notice(observation, info)
         if info.get("coming_out"):  # of a door: nobody does anything else meanwhile
             return {"type": "wait"}
         action = self._decide(observation, info)
@@ -127,6 +147,11 @@ class ScheduleFollower:
     def known(self) -> Collection[str]:
         """Agents whom the resident knows."""
         return self._conversation.known
+
+    @property
+    def memory(self) -> ResidentMemory:
+        """Whom it saw, where it was and what it heard."""
+        return self._talker.knows.memory
 
     @property
     def encounters(self) -> int:
@@ -156,6 +181,7 @@ class ScheduleFollower:
             "clerk": self._clerk.state(),
             "seeks": self._seeks,
             "conversation": self._conversation.state(),
+            "talker": self._talker.state(),
             "aside": [dict(action) for action in self._aside],
             "posture": self._posture,
             "tried": sorted(self._tried),
@@ -182,6 +208,7 @@ class ScheduleFollower:
         self._clerk.restore(state["clerk"])
         self._seeks = bool(state["seeks"])
         self._conversation.restore(state["conversation"])
+        self._talker.restore(state["talker"])
         arrived, stroll = state["arrived"], state["stroll"]
         self._aside = [dict(action) for action in state["aside"]]
         self._posture, self._tried = state["posture"], set(state["tried"])
@@ -203,15 +230,26 @@ class ScheduleFollower:
             return self._travel(observation, info, stay, place)
         if self._posture != "lying":
             errand = partial(self._errand, observation, stay, place)
-            line = self._conversation.line(observation, info, errand)
+            line = self._answer(observation, info, errand) or self._conversation.line(observation, info, errand)
             if line is not None:
                 return line
         if self._is_there(observation, place):
             return self._stay(observation, info, stay, place)
+        self.memory.leave(state["time"])
         up = self._get_up()
         if up is not None:
             return up
         return self._leave(observation, info) if state["room"] else self._walk(observation, info, stay, place)
+
+    def _answer(self, observation: Observation, info: Info, errand: Callable[[], str]) -> Action | None:
+        """Answer what is asked, if anything is."""
+        if not observation["events"]:
+            return None
+        answered = self._talker.reply(observation, moment_of(observation, info, self._map, errand))
+        if answered is None:
+            return None
+        self._conversation.meet(answered[0], observation["state"]["time"])
+        return {"type": "communicate", "text": answered[1], "range": RANGE}
 
     def _stay_at(self, second: float) -> Stay | None:
         departures = self._changes.departures
@@ -238,6 +276,7 @@ class ScheduleFollower:
             self._seeks = False
             self._walker.stop()
             self._traveller.stop()
+            self.memory.arrive(observation["state"]["time"], self._stays.index(stay), place.id)
         time = observation["state"]["time"]
         if place.building is not None or stay.tag not in (*_STROLLING, *_RUNNING):
             return self._live(stay, observation, info)
@@ -431,27 +470,25 @@ class ScheduleFollower:
         return "on my way home" if home else f"on my way to {place.name}, to {doing}"
 
 
-def followers_of(community: Any, public_map: PublicMap, *, seed: int = 0) -> dict[str, ScheduleFollower]:
+def followers_of(
+    community: Any, public_map: PublicMap, *, seed: int = 0, talk: Talk | None = None
+) -> dict[str, ScheduleFollower]:
     """Make a follower for every resident of a community, by agent's name; they may be asked as a group.
 
     Parameters
     ----------
     community
         Anything with ``residents`` and ``relations`` as `vico.community.model.Community` has them.
+    talk
+        How they answer questions; None: in the sentences of templates (docs/talk.md).
     """
     residents = {resident.id: resident for resident in community.residents}
     if len(residents) >= _MANY:
         public_map.router.learn_landmarks()
-    known: dict[str, list[Acquaintance]] = {name: [] for name in residents}
-    for relation in community.relations:
-        first, second = relation.between
-        for me, other in ((first, second), (second, first)):
-            if me in residents and other in residents:
-                known[me].append(
-                    Acquaintance(other, residents[other].name, str(relation.kind), relation.note, residents[other].age)
-                )
+    known = acquaintances_of(residents, community.relations)
+    names = {name: resident.name for name, resident in residents.items()}
     followers = {
-        name: ScheduleFollower(resident, public_map, known=known[name], seed=seed)
+        name: ScheduleFollower(resident, public_map, known=known[name], seed=seed, talk=talk, names=names)
         for name, resident in residents.items()
     }
     group = Residents(followers, public_map.walkable)

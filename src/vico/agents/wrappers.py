@@ -30,6 +30,18 @@ def usage_of(agent: object) -> AgentUsage:
     return AgentUsage(whole, dollars)
 
 
+def model_faults_of(agent: object) -> list[tuple[int, str]]:
+    """Return when an agent went on without the language model it plans with: steps, and why.
+
+    It says so itself, in its attribute ``model_faults``; what is no such list counts as nothing.
+    """
+    said = getattr(agent, "model_faults", ())
+    if not isinstance(said, list | tuple):
+        return []
+    pairs = [one for one in said if isinstance(one, list | tuple) and len(one) == 2]
+    return [(step, why) for step, why in pairs if isinstance(step, int) and isinstance(why, str)]
+
+
 def as_agent(thing: Any, *, name: str = "agent") -> Agent:
     """Make an agent of what acts.
 

@@ -30,7 +30,7 @@ SCHEMA = "vico.episode"
 VERSION = 1
 
 _log = logging.getLogger(__name__)
-_LLM_VARIABLES = ("VICO_LLM_BASE_URL", "OPENAI_BASE_URL", "VICO_LLM_MODEL")
+_LLM_VARIABLES = ("VICO_LLM_BASE_URL", "OPENAI_BASE_URL", "VICO_LLM_MODEL", "VICO_LLM_EPISODE_TOKENS")
 # What no episode depends on: worlds are told apart by their digests, and tables are made of what was played.
 _UNUSED = ("cli", "viewer", "datasets", "worldgen", "geo", "challenges/tables", "data/challenges")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -144,7 +144,13 @@ class LanguageModel:
         return f"{self.endpoint.model} at {self.endpoint.base}" + (f" ({options})" if options else "")
 
     def ask(
-        self, messages: Sequence[Message], reply: type[T], *, check: Check[T] | None = None, rounds: int = 3
+        self,
+        messages: Sequence[Message],
+        reply: type[T],
+        *,
+        check: Check[T] | None = None,
+        rounds: int = 3,
+        spent: Callable[[Usage], None] | None = None,
     ) -> Reply[T]:
         """Ask for a record.
 
@@ -162,6 +168,8 @@ class LanguageModel:
             Says what else is wrong with a record, one sentence each; an empty list accepts it.
         rounds
             How often a bad reply may be repaired.
+        spent
+            Told what each answer took as it comes, those of no use too.
 
         Returns
         -------
@@ -190,6 +198,8 @@ class LanguageModel:
         for attempt in range(1, rounds + 2):
             answer = self._answer(turns, reply)
             used += answer.usage
+            if spent is not None:
+                spent(answer.usage)
             if answer.refusal:
                 raise _unusable(self.endpoint, f"refuses: {answer.refusal[:300]}", [answer.refusal], answer.text)
             found = read(answer.text, reply, check)

@@ -13,7 +13,8 @@ from vico.sim.actions import AgentFault
 #: ``late``: no action in time. ``crashed``: it raised an error. ``ended``: its process ended. ``malformed``: what it
 #: answered is no action, or names agents or places that nobody knows. ``state``: it could not say what it remembers.
 #: ``unfair``: in a process of its own, it reached for what it is not given (see `vico.runner.watch`).
-FaultKind = Literal["late", "crashed", "ended", "malformed", "state", "unfair"]
+#: ``model``: it went on without the language model that it plans with.
+FaultKind = Literal["late", "crashed", "ended", "malformed", "state", "unfair", "model"]
 FAULT_KINDS: tuple[FaultKind, ...] = get_args(FaultKind)
 
 #: So many faults are told one by one; more are only counted.

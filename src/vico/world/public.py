@@ -12,6 +12,7 @@ from vico.world.folder import World
 from vico.world.heights import HeightField
 from vico.world.model import BikeStation, Category, Line, Point3, Ring, Stop, TramLine, TramStop, Transit
 from vico.world.routing import Router
+from vico.world.streets import PublicStreet, StreetIndex, named_streets
 from vico.world.trips import Trips
 from vico.world.walkable import WalkableMap
 
@@ -56,6 +57,8 @@ class PublicMap:
         Half the side of the square world, metres.
     shared_router
         The world's router: what it learns about ways serves all who ask. None: the map has one of its own.
+    streets
+        Those that have a name; a street may come in several pieces.
     """
 
     half: float
@@ -69,6 +72,7 @@ class PublicMap:
     shared_router: Router | None = field(default=None, repr=False, compare=False)
     tram_stops: list[TramStop] = field(default_factory=list)
     tram_lines: list[TramLine] = field(default_factory=list)
+    streets: list[PublicStreet] = field(default_factory=list)
 
     @classmethod
     def from_world(cls, world: World) -> PublicMap:
@@ -94,12 +98,18 @@ class PublicMap:
             world.router,
             transit.tram_stops,
             transit.tram_lines,
+            named_streets(world.roads),
         )
 
     @cached_property
     def router(self) -> Router:
         """Finds walks on the map."""
         return self.shared_router or Router(self.walkable)
+
+    @cached_property
+    def street_index(self) -> StreetIndex:
+        """Tells which street a point lies in."""
+        return StreetIndex(self.streets)
 
     @cached_property
     def transit(self) -> Transit:
@@ -122,6 +132,11 @@ class PublicMap:
     def place_by_id(self) -> dict[str, PublicPlace]:
         """Places by id."""
         return {place.id: place for place in self.places}
+
+    @cached_property
+    def place_ids(self) -> list[str]:
+        """Ids of places, in their order."""
+        return [place.id for place in self.places]
 
     @cached_property
     def _positions(self) -> NDArray[np.float64]:

@@ -6,6 +6,7 @@ from typing import Any
 
 from vico.agents.assistant.choosing import ChoicePlanner
 from vico.agents.assistant.heuristic import HeuristicPlanner
+from vico.agents.assistant.llm_planner import LlmPlanner
 from vico.agents.assistant.mcts import MctsPlanner
 from vico.agents.assistant.ours import OurPlanner
 from vico.agents.assistant.random_planner import RandomPlanner
@@ -17,6 +18,7 @@ METHODS: dict[str, type[HeuristicPlanner] | type[RandomPlanner] | type[ChoicePla
     "random": RandomPlanner,
     "heuristic": HeuristicPlanner,
     "mcts": MctsPlanner,
+    "llm": LlmPlanner,
     "ours": OurPlanner,
 }
 
@@ -45,7 +47,7 @@ def make_planner(
     Raises
     ------
     InputError
-        If there is no such method.
+        If there is no such method, or it asks a language model and the environment names none.
     """
     if method not in METHODS:
         raise InputError(f"no method called {method!r}; there are {', '.join(sorted(METHODS))}")

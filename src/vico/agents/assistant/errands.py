@@ -26,7 +26,7 @@ REFUSALS, LOOKS = 2, 3
 # Who fetches what was seen outdoors walks up to it from so near, metres.
 _NEAR_SEEN = 5.0
 # How long one waits for somebody who was followed home, steps; how near a found thing is shown from, metres.
-_PATIENCE, _SHOW_WITHIN = 30, 4.6
+_PATIENCE, _SHOW_WITHIN = 5, 4.6
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Book:
     """
 
     def __init__(self, instructions: Sequence[Instruction]) -> None:
-        self.instructions = {int(one["index"]): one for one in instructions}
+        self.instructions = {int(one["index"]): dict(one) | {"sources": list(one["sources"])} for one in instructions}
         #: Subtasks that are reported, or that a colleague does or has done.
         self.closed: set[int] = set()
         self.looked: dict[int, dict[int, int]] = {k: {} for k in self.instructions}
@@ -82,6 +82,15 @@ class Book:
         self.closed, self.put = set(state["closed"]), set(state["put"])
         self.looked = {int(k): {int(r): int(n) for r, n in regions.items()} for k, regions in state["looked"].items()}
         self.refused, self.picked = dict(state["refused"]), dict(state["picked"])
+
+    def add_source(self, k: int, region: Mapping[str, Any]) -> None:
+        """Look for a subtask's person in one more region, or once more in one that is known."""
+        sources = self.instructions[k]["sources"]
+        known = next((r for r, one in enumerate(sources) if one["place"] == region["place"]), None)
+        if known is None:
+            sources.append(region)
+        else:
+            self.looked[k].pop(known, None)
 
     def category(self, k: int) -> str:
         """Return what kind of subtask one is."""

@@ -25,6 +25,8 @@ _DETOUR = 1.25
 DOOR, PICK, PUT, MEET = 12.0, 6.0, 6.0, 25.0
 # Looking through a place, and a spot outdoors: for a thing, and for a person, seconds.
 _LOOK = {("place", False): 45.0, ("outdoor", False): 22.0, ("place", True): 25.0, ("outdoor", True): 6.0}
+# How likely somebody is at a spot outdoors, where a place counts 1: most of a day is spent indoors.
+_OUTDOORS = 0.35
 # Hours of meals, and how many times as likely somebody is at a place for them then, and less so else.
 _MEALS, _AT_MEALS = ((7.0, 9.0), (11.5, 13.75), (18.0, 20.0)), 2.0
 # Chance that a look finds what is there.
@@ -53,7 +55,7 @@ class Estimates:
         """Seconds from a point to another, which is one of the task's: its distance field is kept."""
         if not self.distance:
             return UNIFORM
-        metres = self._metres(start, goal)
+        metres = self.metres(start, goal)
         return _DETOUR * metres / pace
 
     def look(self, region: Mapping[str, Any], *, person: bool) -> float:
@@ -63,14 +65,17 @@ class Estimates:
 
     def weight(self, region: Mapping[str, Any], *, person: bool) -> float:
         """Return how likely a region is beside others: people are where one eats at the hours for it."""
-        if not person or region["place"] is None:
+        if not person:
             return 1.0
+        if region["place"] is None:
+            return _OUTDOORS
         hour = self.time / 3600.0 % 24.0
         eats = any(since <= hour < until for since, until in _MEALS)
         food = self._map.place_by_id[str(region["place"])].category == "food"
         return _AT_MEALS if food and eats else 1.0 / _AT_MEALS if food else 1.0
 
-    def _metres(self, start: Sequence[float], goal: Sequence[float]) -> float:
+    def metres(self, start: Sequence[float], goal: Sequence[float]) -> float:
+        """Metres on foot between the same; where no way is known, a guess from the straight line."""
         key = (round(float(goal[0]), 2), round(float(goal[1]), 2))
         if key not in self._fields:
             self._fields[key] = self._map.router.distance_field(np.array(key))

@@ -20,7 +20,7 @@ _CHAIN = 12
 # Things that so many attempts did not reach are left.
 _REFUSALS = 2
 # How long one waits for somebody who was followed home, steps.
-_PATIENCE = 45
+_PATIENCE = 8
 # What Search's reports are made from: nearer than any setting asks for, metres.
 _SHOW_WITHIN = 4.6
 

@@ -2,6 +2,7 @@
 
 - **Order**: the exact best order in the abstract model, with two hands, ways by the map and the time that is left.
 - **Memory**: whatever is seen on the way and is wanted is fetched when that fits the order.
+- **Asking**: whoever is met is asked for the people that are looked for; where they point to is looked at, too.
 - **Allocation**: two assistants share the subtasks so that the worse of both plans ends soonest; both reckon alike from
   what both were told, so that nothing need be said. Who has finished its own goes on with what the other does last.
 - **Search**: regions are looked through in the order of chance per second; what was looked at comes last.
@@ -12,6 +13,7 @@ from __future__ import annotations
 from itertools import combinations
 from typing import Any
 
+from vico.agents.assistant.asking import Enquiries, region_of
 from vico.agents.assistant.choosing import ChoicePlanner
 from vico.agents.assistant.errands import Choice
 from vico.agents.assistant.ordering import Plan, best_plan
@@ -32,13 +34,20 @@ class OurPlanner(ChoicePlanner):
         super().__init__(*arguments, **options)
         self._share: list[int] | None = None
         self._known: list[int] = []
+        self._enquiries = Enquiries(self.skills.map)
 
     def state(self) -> AgentState:
         """Return what is under way, and all that is known."""
-        return super().state() | {"share": self._share, "known": list(self._known)}
+        mine = {"share": self._share, "known": list(self._known), "enquiries": self._enquiries.state()}
+        return super().state() | mine
 
     def restore(self, state: AgentState) -> None:
         """Go on where `state` was returned."""
+        self._enquiries.restore(state["enquiries"])
+        places = self.skills.map.place_by_id
+        for k, told in self.book.instructions.items():
+            for place in self._enquiries.places.get(told["person"]["name"], []):
+                self.book.add_source(k, region_of(places[place]))
         super().restore(state)
         self._share = None if state["share"] is None else [int(k) for k in state["share"]]
         self._known = [int(entity) for entity in state["known"]]
@@ -52,7 +61,22 @@ class OurPlanner(ChoicePlanner):
             choice = self.decide(view)
             if choice is not None and choice != self.errand.choice and choice.kind == "fetch":
                 self.errand = None
-        return None
+        return self._ask(view)
+
+    def _ask(self, view: ObservationView) -> Action | None:
+        """Ask whoever is near for those who are looked for, and note what is answered."""
+        wanted = {
+            k: str(told["person"]["name"])
+            for k, told in self.book.instructions.items()
+            if self.book.category(k) == "carry" and self.book.is_open(k) and not self.book.in_hand(k, view)
+        }
+        if not wanted:
+            return None
+        for k, place in self._enquiries.listen(view, wanted):
+            self.book.add_source(k, region_of(place))
+        if self.errand is None or self.errand.stage not in _MAY_TURN or view.state["vehicle"]:
+            return None
+        return self._enquiries.question(view, wanted)
 
     def decide(self, view: ObservationView) -> Choice | None:
         """Return the first choice of the best plan."""

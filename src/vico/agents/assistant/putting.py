@@ -7,19 +7,20 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vico.agents.assistant.options import Search, WalkUp
-from vico.agents.assistant.skills import Action, AssistantSkills, ObservationView
+from vico.agents.assistant.skills import OUTSIDE, Action, AssistantSkills, ObservationView
 from vico.agents.perception import Sighting
 from vico.agents.state import AgentState
 
 # Steps after which one gives up, and for which one goes further into a room; how far, metres.
-_LONGEST, _GOING_IN, _INTO = 36, 4, 1.8
+_LONGEST, _GOING_IN, _INTO = 50, 4, 1.8
+# A room with so many doors to others is a hall, which one tries to leave for so many steps.
+_DOORS_OF_HALL, _LEAVING_HALL = 4, 15
 # Metres from the middle of a spot outdoors at which things are put down there.
 _SPOT = 0.7
-# Directions that are tried, degrees from straight away from the door; the last ones where nothing else is free.
-_BEARINGS = (0.0, 50.0, -50.0, 95.0, -95.0, 140.0, -140.0)
+# So many directions around are tried, those first that lie farthest from the ways to the room's doors.
+_DIRECTIONS = 9
 _LOW = 0.6  # metres above the floor that one looks at
 
 
@@ -47,6 +48,9 @@ class PutDown:
         self._on = surface is not None
         self._steps = self._went = self._bearing = 0
         self._aimed = self._put = False
+        # Steps on the way out of a hall, -1 once that is over; and the room one goes to.
+        self._hall = 0
+        self._room = ""
 
     def state(self) -> AgentState:
         """Return how far it came."""
@@ -59,12 +63,15 @@ class PutDown:
             "bearing": self._bearing,
             "aimed": self._aimed,
             "put": self._put,
+            "hall": self._hall,
+            "room": self._room,
         }
 
     def restore(self, state: AgentState) -> None:
         """Go on."""
         self._steps, self._on, self._went = state["steps"], state["on"], state["went"]
         self._bearing, self._aimed, self._put = state["bearing"], state["aimed"], state["put"]
+        self._hall, self._room = state["hall"], state["room"]
         if state["surface"] is None:
             self._surface = None
         elif self._surface is not None:
@@ -88,7 +95,7 @@ class PutDown:
         if self._steps > _LONGEST:
             self.outcome = "stuck"
             return None
-        return self._go_to_spot(view) or self._lay_down(view, full[0])
+        return self._out_of_hall(view) or self._go_to_spot(view) or self._lay_down(view, full[0])
 
     def _lay_down(self, view: ObservationView, hand: int) -> Action:
         """Put a thing on the surface that is named; else ahead, in one direction after the other."""
@@ -109,8 +116,7 @@ class PutDown:
 
     def _aim(self, view: ObservationView) -> list[float]:
         """Return a point ahead, in the direction that is next."""
-        away = _away_from_door(view)
-        angle = math.atan2(away[1], away[0]) + math.radians(_BEARINGS[self._bearing % len(_BEARINGS)])
+        angle = _free_directions(view)[self._bearing % _DIRECTIONS]
         x, y, z = (float(value) for value in view.pose[:3])
         return [x + math.cos(angle), y + math.sin(angle), z + _LOW]
 
@@ -125,8 +131,22 @@ class PutDown:
         if view.state["action_status"] == "collision":
             self._went = _GOING_IN
             return None
-        into = view.pose[:2] + _INTO * _away_from_door(view) / self._went
+        angle = _free_directions(view)[0]
+        into = view.pose[:2] + _INTO / self._went * np.array([math.cos(angle), math.sin(angle)])
         return self._skills.walk_indoors(view, into, near=0.4)
+
+    def _out_of_hall(self, view: ObservationView) -> Action | None:
+        """Go into the next room from a hall: what lies there is in everybody's way, one's own first."""
+        if self._on or not view.room or self._hall < 0:
+            return None
+        inner = [door for door in view.state["doors"] if door["to"] != OUTSIDE]
+        if view.room == self._room or len(inner) < _DOORS_OF_HALL or self._hall >= _LEAVING_HALL:
+            self._hall = -1
+            return None
+        self._hall += 1
+        if not self._room:
+            self._room = str(min(inner, key=lambda door: view.away(door["position"]))["to"])
+        return self._skills.go_through(view, self._room)
 
     def _to_surface(self, view: ObservationView) -> Action | None:
         """Look for the surface that is named, and walk up to it."""
@@ -145,12 +165,13 @@ class PutDown:
         return None
 
 
-def _away_from_door(view: ObservationView) -> NDArray[np.float64]:
-    """Return the unit vector away from the nearest door of the room; straight ahead outdoors."""
-    here = view.pose[:2]
-    doors = [np.asarray(door["position"], np.float64)[:2] for door in view.state["doors"]]
-    if not doors:
-        return np.asarray(view.pose[3:5] / max(float(np.hypot(*view.pose[3:5])), 1e-9), np.float64)
-    away = here - min(doors, key=lambda door: math.dist(door, here))
-    length = float(np.hypot(*away))
-    return away / length if length > 0.05 else np.asarray(view.pose[3:5], np.float64)
+def _free_directions(view: ObservationView) -> list[float]:
+    """Return directions around, radians, the one first that lies farthest from the ways to the room's doors."""
+    ahead = math.atan2(float(view.pose[4]), float(view.pose[3]))
+    around = [ahead + 2.0 * math.pi * k / _DIRECTIONS for k in range(_DIRECTIONS)]
+    doors = np.array([door["position"][:2] for door in view.state["doors"]], np.float64).reshape(-1, 2) - view.pose[:2]
+    if not len(doors):
+        return around
+    ways = np.arctan2(doors[:, 1], doors[:, 0])
+    clear = [float(np.abs((ways - angle + math.pi) % (2.0 * math.pi) - math.pi).min()) for angle in around]
+    return [around[k] for k in np.argsort([-c for c in clear], kind="stable")]

@@ -216,7 +216,9 @@ class Chronicle(Hook):
         apart = state.agent_position(person)[:2] - state.agent_position(who)[:2]
         if not near or float(np.hypot(*apart)) > _MET:
             return
-        if action.get("type") == "communicate":
+        # Others may be asked something in their hearing.
+        first = next(s.person.name for s in self.judge.task.subtasks if s.person.agent == person).split()[0]
+        if action.get("type") == "communicate" and first.casefold() in str(action.get("text", "")).casefold():
             story.spoke = True
         shown = np.asarray(observation["segmentation"]) == state.agent_entity(person)
         if story.met_at is None and np.count_nonzero(shown) >= SEEN_PIXELS:

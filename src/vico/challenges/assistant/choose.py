@@ -7,14 +7,37 @@ object selection).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from vico.challenges.assistant.model import Category
 from vico.challenges.assistant.thresholds import CANDIDATES
+from vico.community.model import Resident
 from vico.world.model import Record
 
+
+@dataclass(frozen=True)
+class Question:
+    """What has to be settled.
+
+    Attributes
+    ----------
+    text
+        In words.
+    category
+        Of the task.
+    requester
+        Who asks; None where just that is the question.
+    """
+
+    text: str
+    category: Category
+    requester: Resident | None = None
+
+
 #: Given a question and the candidates' descriptions, the index of the one that is chosen.
-Chooser = Callable[[str, Sequence[str]], int]
+Chooser = Callable[[Question, Sequence[str]], int]
 
 
 def seeded_chooser(rng: np.random.Generator) -> Chooser:
@@ -29,7 +52,7 @@ class Choice(Record):
     candidates: list[str]
 
 
-def choose(question: str, candidates: Sequence[str], chooser: Chooser) -> Choice:
+def choose(question: Question, candidates: Sequence[str], chooser: Chooser) -> Choice:
     """Put at most nine candidates to the chooser.
 
     Raises
@@ -40,5 +63,5 @@ def choose(question: str, candidates: Sequence[str], chooser: Chooser) -> Choice
     put = list(candidates[:CANDIDATES])
     chosen = chooser(question, put)
     if not 0 <= chosen < len(put):
-        raise ValueError(f"chooser: {chosen} is none of {len(put)} candidates for {question!r}")
+        raise ValueError(f"chooser: {chosen} is none of {len(put)} candidates for {question.text!r}")
     return Choice(chosen=chosen, candidates=put)

@@ -12,7 +12,7 @@ from vico.agents.assistant import METHODS, make_planner
 from vico.agents.base import Agent
 from vico.agents.requester import Requester
 from vico.agents.schedule import followers_of
-from vico.agents.wrappers import usage_of
+from vico.agents.wrappers import model_faults_of, usage_of
 from vico.assets.models.movable import movable_kinds, movable_prototype, movable_surfaces
 from vico.challenges.assistant.causes import Chronicle
 from vico.challenges.assistant.judge import Judge
@@ -106,6 +106,9 @@ def play_task(
             recorded = recorded_in(recording, sim, runner.faults, wanted=task.steps)
             runner.hooks.append(stack.enter_context(recorded))
         runner.run(task.steps, until=lambda: judge.over)
+        for name, planner in planners.items():
+            for step, why in model_faults_of(planner):
+                runner.faults.add(step, name, "model", why)
     return _record(task, method, setting or {}, chronicle, sim, runner.faults, planners, time.perf_counter() - began)
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vico.assets.models.movable import movable_kinds
 from vico.assets.people.words import looks_in_words
-from vico.challenges.assistant.choose import Chooser, choose, seeded_chooser
+from vico.challenges.assistant.choose import Chooser, Question, choose, seeded_chooser
 from vico.challenges.assistant.model import Category, Person, Region, Start, Subtask, Task
 from vico.challenges.assistant.regions import Neighbourhood, either, place_region, told, with_surface
 from vico.challenges.assistant.starts import Occasion, carry_occasion, errand_occasion
@@ -36,6 +36,7 @@ class Draw:
     """One episode as it is drawn."""
 
     world: World
+    category: Category
     occasion: Occasion
     chance: np.random.Generator
     chooser: Chooser
@@ -47,16 +48,16 @@ class Draw:
         """What lies within a walk of the start."""
         return self.occasion.hood
 
-    def pick(self, question: str, names: list[str], into: dict[str, list[str]]) -> int:
-        """Have one of nine chosen, and note what it was chosen from."""
-        choice = choose(question, names, self.chooser)
+    def pick(self, question: str, names: list[str], into: dict[str, list[str]], who: Resident | None) -> int:
+        """Have one of nine chosen, for whom who asks, and note what it was chosen from."""
+        choice = choose(Question(question, self.category, who), names, self.chooser)
         into[question] = choice.candidates
         return choice.chosen
 
-    def kind(self, question: str, into: dict[str, list[str]]) -> str:
+    def kind(self, question: str, into: dict[str, list[str]], who: Resident) -> str:
         """Have the kind of a thing chosen."""
         kinds = [str(kind) for kind in self.chance.permutation(sorted(movable_kinds()))[:CANDIDATES]]
-        return kinds[self.pick(question, kinds, into)]
+        return kinds[self.pick(question, kinds, into, who)]
 
     def names_for(self, index: int) -> list[str]:
         """Return ids for the one thing or the two things of a subtask."""
@@ -119,7 +120,7 @@ def generate_task(
     """
     chance = rng(seed, "assistant task", category, world.digest, str(advanced))
     occasion = (carry_occasion if category == "carry" else errand_occasion)(world, community, chance)
-    draw = Draw(world, occasion, chance, chooser or seeded_chooser(chance), Things(world, chance), advanced)
+    draw = Draw(world, category, occasion, chance, chooser or seeded_chooser(chance), Things(world, chance), advanced)
     subtask = {"carry": _carry, "delivery": _delivery, "search": _search}[category]
     subtasks: list[Subtask] = []
     for index in range(SUBTASKS):
@@ -147,7 +148,7 @@ def _delivery(draw: Draw, index: int, before: list[Subtask]) -> Subtask:
     sources = draw.things.untold(draw.regions(who, indoors=0.5, radius=SOURCE_RADIUS))
     if not sources:
         raise EmptyInputError("delivery: a thing lies in the middle of every region there is; use a larger world")
-    source = sources[draw.pick("Where do the things lie?", [r.name for r in sources], candidates)]
+    source = sources[draw.pick("Where do the things lie?", [r.name for r in sources], candidates, who)]
     targets = draw.things.untold(draw.regions(who, indoors=0.6, radius=limits.destination_radius))
     targets = [r for r in targets if _apart(r, source)] or [
         r
@@ -156,10 +157,10 @@ def _delivery(draw: Draw, index: int, before: list[Subtask]) -> Subtask:
     ]
     if not targets:
         raise EmptyInputError(f"delivery: nothing lies {APART:.0f} m or more from {source.name}; use a larger world")
-    target = targets[draw.pick("Where are the things brought to?", [r.name for r in targets], candidates)]
+    target = targets[draw.pick("Where are the things brought to?", [r.name for r in targets], candidates, who)]
     if draw.advanced:
         target = with_surface(target, draw.world, draw.chance)
-    kind = draw.kind(f"What is carried from {source.name} to {target.name}?", candidates)
+    kind = draw.kind(f"What is carried from {source.name} to {target.name}?", candidates, who)
     told_before = [region for one in before for region in _told_of(one)]
     names = draw.names_for(index)
     for name in names:
@@ -176,8 +177,8 @@ def _search(draw: Draw, index: int, before: list[Subtask]) -> Subtask:
     sources = draw.things.untold(draw.regions(who, indoors=0.6, radius=SEARCH_RADIUS))
     if not sources:
         raise EmptyInputError("search: a thing lies in the middle of every region there is; use a larger world")
-    source = sources[draw.pick("Where is it lost?", [r.name for r in sources], candidates)]
-    kind = draw.kind(f"What is lost at {source.name}?", candidates)
+    source = sources[draw.pick("Where is it lost?", [r.name for r in sources], candidates, who)]
+    kind = draw.kind(f"What is lost at {source.name}?", candidates, who)
     told_before = [region for one in before for region in _told_of(one)]
     names = [f"object_{index}_0"]
     draw.things.make(names[0], kind, in_region=source, middles=[*told_before, source])
@@ -192,14 +193,14 @@ def _carry(draw: Draw, index: int, before: list[Subtask]) -> Subtask:
     candidates: dict[str, list[str]] = {}
     taken = {one.person.agent for one in before}
     people = [who for who in draw.occasion.people if who.id not in taken]
-    who = people[draw.pick("Who needs a hand?", [p.name for p in people], candidates)]
+    who = people[draw.pick("Who needs a hand?", [p.name for p in people], candidates, None)]
     home = place_region(draw.world.place_by_id[who.home])
     if draw.advanced:
         home = with_surface(home, draw.world, draw.chance)
     count = HAUNTS * thresholds(advanced=draw.advanced).regions
     source = draw.occasion.whereabouts[who.id]
     regions, right = draw.among_others(source, who, radius=SOURCE_RADIUS, count=count)
-    kind = draw.kind(f"What does {who.name} carry home?", candidates)
+    kind = draw.kind(f"What does {who.name} carry home?", candidates, who)
     names = draw.names_for(index)
     for name in names:
         draw.things.hand(name, kind, holder=who.id, near=source.centre)

@@ -1,6 +1,6 @@
 """Have a language model write a town's people, and see what it wrote and what was left to the rules.
 
-python examples/11_llm_author.py --world out/demo/world --residents 4
+python examples/13_llm_author.py --world out/demo/world --residents 4
 
 With VICO_LLM_BASE_URL and VICO_LLM_MODEL it asks that model. Without, a function of this file stands in for one: it
 writes characters, poor ones, and refuses groups and days, so those are written by rule.
