@@ -85,9 +85,16 @@ def characters(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def network(data: dict[str, Any]) -> dict[str, Any]:
-    """Groups of four by the order of people, of late workers in the morning, at places that are open then; no ties."""
+    """Groups of four by the order of people, of late workers in the morning, at places that are open then; no ties.
+
+    A late worker who is the only one meets somebody in the morning who is at no workplace.
+    """
     late = [p["id"] for p in data["people"] if p["at_work"] and p["at_work"][-5:] > "19:00"]
     people = [p["id"] for p in data["people"] if p["id"] not in late]
+    idle = [p["id"] for p in data["people"] if not p["at_work"]]
+    if len(late) == 1 and len(people) > 2 and idle:
+        people.remove(idle[-1])
+        late.append(idle[-1])
     if len(late) == 1 or len(people) == 1:
         people, late = people + late, []
     found = [*_groups(data, people, 19 * 60 + 30), *_groups(data, late, 10 * 60)]

@@ -25,12 +25,14 @@ RESIDENTS = 8
 VICTIM = "Scripte"
 
 
-def built(world: World, twist: Twist | None, *, timeout: float = 20.0) -> tuple[Community, ScriptedAuthor]:
+def built(
+    world: World, twist: Twist | None, *, timeout: float = 20.0, residents: int = RESIDENTS
+) -> tuple[Community, ScriptedAuthor]:
     script = ScriptedAuthor(twist)
     with serve(script) as base:
         connection = Connection(timeout=timeout, retries=0, sleep=lambda seconds: None)
         author = LlmCommunityAuthor(LanguageModel(Endpoint(f"{base}/v1", "scripted"), connection=connection), rounds=1)
-        made = build_community(world, residents=RESIDENTS, seed=0, author=author)
+        made = build_community(world, residents=residents, seed=0, author=author)
     assert check_community(made, world) == []
     return made, script
 
@@ -343,6 +345,37 @@ def test_groups_that_can_not_meet_are_replaced_by_those_of_the_rules(
     assert all(made.groups_of(r.id) for r in made.residents)
 
 
+def test_who_has_new_hours_of_work_does_not_keep_an_old_meeting_in_them(town: World, community: Community) -> None:
+    """The model gives people other jobs, and copies the procedural author's groups, which left time for their old."""
+    names = {place.id: place.name for place in town.places}
+
+    def twist(record: str, data: dict[str, Any], body: dict[str, Any]) -> str | None:
+        if record != "SocialNetwork":
+            return None
+        ids, places = {p["id"] for p in data["people"]}, {p["name"] for p in data["places"]}
+        old = [
+            {
+                "name": f"Old {group.name}", "description": group.description, "activity": group.activity,
+                "place": names[group.place], "members": [m for m in group.members if m in ids],
+                "start_time": group.start, "end_time": group.end,
+            }
+            for group in community.groups
+            if names[group.place] in places
+        ]  # fmt: skip
+        return json.dumps({"groups": old, "ties": []})
+
+    made, _ = built(town, twist, residents=len(community.residents))
+    assert made.authorship is not None
+    at_work = {
+        one.item.partition(".")[0]
+        for one in made.authorship.fallen_back
+        if f"{one.item.partition('.')[0]} can't be there: it is in their working hours" in one.detail
+    }
+    changed = {r.id for r in community.residents if made.resident_by_id[r.id].workplace != r.workplace}
+    assert at_work
+    assert at_work <= changed
+
+
 def test_ties_that_can_not_be_are_left_out(town: World) -> None:
     def twist(record: str, data: dict[str, Any], body: dict[str, Any]) -> str | None:
         if record != "SocialNetwork":
@@ -365,14 +398,19 @@ def test_ties_that_can_not_be_are_left_out(town: World) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_whatever_fails_of_it_the_community_is_sound(town: World, seed: int) -> None:
-    """A fifth of the questions is refused, groups meet at any hour and place, some days can't be lived."""
+    """A fifth of the questions is refused, groups meet at any hour and place, some days can't be lived.
+
+    All of that may be mended when asked again, as luck has it; the first household's question is refused each time.
+    """
 
     def share(what: str) -> float:
         return zlib.crc32(f"{seed} {what}".encode()) / 2**32
 
     def twist(record: str, data: dict[str, Any], body: dict[str, Any]) -> str | None:
         luck = share(f"{record} {json.dumps(data)} {len(body['messages'])}")
-        if luck < 0.2:
+        if luck < 0.2 or any(
+            person["id"] == "resident_0" for person in data.get("people", ()) if record == "Characters"
+        ):
             return "no"
         if record == "DayPlan" and luck < 0.3:
             return plan(data, activity="")
@@ -391,7 +429,7 @@ def test_whatever_fails_of_it_the_community_is_sound(town: World, seed: int) -> 
         made = build_community(town, residents=15, seed=seed, author=author)
     assert check_community(made, town) == []
     assert made.authorship is not None
-    assert made.authorship.fallen_back
+    assert "resident_0.character" in {one.item for one in made.authorship.fallen_back}
     assert made.authorship.written > 15
     # Each fault was dealt with where it was: nothing turned up when all was put together.
     assert not any("in the whole community" in one.detail for one in made.authorship.items)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from vico.community import Community, Resident
+from vico.community.homelife import CHAT
 from vico.community.llm.fitting import MIDNIGHT, DayFitter, Stay, minute_of, overlaid, stays_of
 from vico.community.model import ItemType
 from vico.community.place_index import PlaceIndex
@@ -69,6 +70,23 @@ def test_a_way_takes_as_long_as_it_does(index: PlaceIndex, adult: Resident, town
     assert minute_of(commute.end) - minute_of(commute.start) == way
     assert fitted.moved == way
     assert (fitted.items[0].start, fitted.items[-1].end) == ("00:00:00", "23:59:59")
+
+
+@pytest.mark.parametrize(("spare", "stays_on"), [(CHAT - 1, False), (CHAT, True)])
+def test_few_minutes_after_a_meeting_are_spent_on_the_way(
+    index: PlaceIndex, adult: Resident, town: World, spare: int, stays_on: bool
+) -> None:
+    park, square = place_of(town, "Linden Park"), place_of(town, "Market Square")
+    way = index.minutes(park, square)
+    assert way is not None
+    after = 660 + way + spare
+    plan = [
+        stay(0, 480, adult.home, "Sleep"), stay(after, after + 60, square), stay(1320, MIDNIGHT, adult.home, "Sleep"),
+    ]  # fmt: skip
+    fitted = DayFitter(index, adult).fit(plan, [stay(600, 660, park, "Meet", fixed=True)])
+    at = next(k for k, item in enumerate(fitted.items) if item.activity == "Meet")
+    assert (fitted.items[at].end, minute_of(fitted.items[at + (3 if stays_on else 2)].start)) == ("11:00:00", after)
+    assert (fitted.items[at + 1].activity == "Stay on for a while") == stays_on
 
 
 def test_what_is_fixed_keeps_its_times(index: PlaceIndex, adult: Resident, town: World) -> None:

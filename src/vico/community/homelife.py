@@ -16,8 +16,10 @@ from vico.community.people import ResidentDraft
 
 #: Shorter stays at home than this aren't worth the way, minutes.
 _WORTH_IT = 20
-# In less time at home than this nothing is begun, and a stay of less after a meeting is spent on the way, minutes.
-_BRIEF, _CHAT = 10, 5
+# In less time at home than this nothing is begun, minutes.
+_BRIEF = 10
+#: A stay of less after a meeting is spent on the way, minutes.
+CHAT = 5
 # More time than this is not walked in, minutes.
 _DAWDLE = 8
 #: Between which hours of the day hobbies are pursued at home.
@@ -161,7 +163,7 @@ def _stay_longer(day: Day, before: Block, after: Block, minutes: tuple[int, int]
 def _stay_on(day: Day, block: Block, minutes: int) -> None:
     """Stay some minutes longer."""
     text = {"work": "Finish up and put things away", "group": "Stay on and chat"}.get(block.role)
-    if block.role == "group" and minutes < _CHAT:
+    if block.role == "group" and minutes < CHAT:
         return
     if text is None or (block.role == "work" and minutes < 10):
         block.end += minutes

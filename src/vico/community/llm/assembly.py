@@ -107,7 +107,9 @@ def _relations(lives: Lives, groups: Sequence[Group], network: Network) -> list[
         if found.get(tie.between) is None or found[tie.between].kind is not RelationKind.FAMILY:
             found[tie.between] = tie
     for pair, name in together.items():
-        if pair not in found and people[pair[0]].household != people[pair[1]].household:
+        # Of the procedural author's groups, who became friends was decided there.
+        new = pair not in found and pair not in old_together
+        if new and people[pair[0]].household != people[pair[1]].household:
             found[pair] = Relation(
                 between=pair, kind=RelationKind.FRIEND, note=f"both in {name}", strength=_ACQUAINTED,
                 since=base.date.year,

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from vico.clock import clock_of, seconds_of_day
+from vico.community.homelife import CHAT
 from vico.community.hours import staffed
 from vico.community.model import LAST, ActivityTag, ItemType, Resident, ScheduleItem
 from vico.community.place_index import PlaceIndex
@@ -211,11 +212,13 @@ class DayFitter:
         """Spend the time before a stay, but for the way there; return the stay, which may begin sooner."""
         last = line[-1]
         leave = stay.start - way
+        if way and _met(last) and leave - last.end < CHAT:
+            return stay  # as in the procedural author's days, the way takes these minutes longer
         if leave - last.end > _WAIT and (at_home := self._between(last, stay)) is not None:
             line.append(at_home)
             return stay
         if self.may_stay(last.place, last.start, leave):
-            if last.fixed:
+            if _met(last):
                 line.append(Stay(last.end, leave, ItemType.MAIN, "Stay on for a while", last.place, last.tag))
             else:
                 line[-1] = replace(last, end=leave)
@@ -271,6 +274,11 @@ class DayFitter:
 def _room(stay: Stay) -> int:
     """By how many minutes a stay may be cut."""
     return 0 if stay.fixed else max(0, min(stay.minutes - _LEAST, stay.minutes // 2))
+
+
+def _met(stay: Stay) -> bool:
+    """Whether the end of a stay is not one's own to choose: it stands, or others meet there."""
+    return stay.fixed or stay.tag is ActivityTag.GROUP
 
 
 def _may_go(stay: Stay) -> bool:
