@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from vico.community import build_community, write_community
 from vico.io.files import read_json
+from vico.world.folder import World
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -106,9 +108,11 @@ def test_a_scene_of_the_film_is_filmed(helsinki_path: Path, tmp_path: Path) -> N
     assert printed.endswith("film.mp4: 17 s\n")
 
 
-def test_people_are_asked_and_answer(helsinki_path: Path, helsinki_people: Path) -> None:
+def test_people_are_asked_and_answer(helsinki: World, helsinki_path: Path, tmp_path: Path) -> None:
+    # Among thirty somebody is out of doors at noon who knows somebody indoors.
+    write_community(build_community(helsinki, residents=30), tmp_path / "people", world=helsinki_path)
     printed = run(
-        "12_asking_people.py", "--world", str(helsinki_path), "--community", str(helsinki_people), "--steps", "60"
+        "12_asking_people.py", "--world", str(helsinki_path), "--community", str(tmp_path / "people"), "--steps", "60"
     )
     assert "assistant: Excuse me, have you seen" in printed
     assert "   understood: " in printed

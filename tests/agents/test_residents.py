@@ -87,7 +87,7 @@ def test_answering_questions() -> None:
 
 @pytest.mark.parametrize(
     ("start", "usual"),
-    [(7.9, "move_forward"), pytest.param(12.0, "eat", marks=pytest.mark.slow), (21.49, "sleep")],
+    [(7.9, "move_forward"), pytest.param(12.0, "eat", marks=pytest.mark.slow), (23.249, "sleep")],
 )
 def test_a_hundred_residents_of_helsinki(helsinki: World, hundred: Community, start: float, usual: str) -> None:
     config = SimConfig(start=int(start * 3600), observe=(), cars=20, pedestrians=20)

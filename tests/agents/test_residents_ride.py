@@ -57,7 +57,9 @@ def test_who_rides_sets_out_later_than_on_foot_and_never_for_a_short_way(
             on_foot = index.minutes(before.place or "", after.place or "", walk_speed(resident.age))
             assert on_foot is not None
             assert on_foot >= 6
-            assert seconds_of_day(way.end) - seconds_of_day(way.start) <= 60 * on_foot
+            # Who takes the bus sets out a minute sooner than the way to its stop asks for.
+            spare = 1 if mode is Mode.BUS else 0
+            assert seconds_of_day(way.end) - seconds_of_day(way.start) <= 60 * (on_foot + spare)
 
 
 def test_who_takes_the_bus_has_a_minute_to_spare_on_the_way_to_the_stop(

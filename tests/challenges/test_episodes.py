@@ -58,7 +58,6 @@ def near_ones(world: World, community: Community, category: Category, *, steps: 
     return [task for _, task in sorted(found, key=lambda pair: pair[0])]
 
 
-@pytest.mark.slow
 def test_the_heuristic_delivers_what_is_near_enough(helsinki: World, few: Community) -> None:
     tasks = near_ones(helsinki, few, "delivery", steps=240, seeds=2)
     records = (play_task(helsinki, few, task, method="heuristic") for task in tasks[:4])
@@ -89,9 +88,9 @@ def test_a_person_is_met_followed_and_things_are_put_down_at_home(helsinki: Worl
     ("category", "method", "assistants"),
     [
         ("delivery", "heuristic", 2),
-        pytest.param("search", "random", 1, marks=pytest.mark.slow),
+        ("search", "random", 1),
         ("search", "mcts", 1),
-        pytest.param("carry", "ours+heuristic", 2, marks=pytest.mark.slow),
+        ("carry", "ours+heuristic", 2),
     ],
 )
 def test_an_episode_repeats_itself_also_from_its_file(
@@ -141,7 +140,6 @@ def test_a_planner_that_crashes_and_lies_ends_no_episode(
     assert Fault(3, "assistant_0", "crashed", "ZeroDivisionError: no plan") in record.faults
 
 
-@pytest.mark.slow
 def test_planners_from_elsewhere_are_judged_alone_in_their_process(helsinki: World, few: Community) -> None:
     task = generate_task(helsinki, few, "search", seed=0, assistants=2, steps=4)
 

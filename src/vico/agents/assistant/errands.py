@@ -21,8 +21,9 @@ from vico.agents.state import AgentState
 Instruction = Mapping[str, Any]
 Kind = Literal["look", "fetch", "deliver"]
 
-#: Things that so many attempts did not reach are left; regions are looked through so often.
-REFUSALS, LOOKS = 2, 3
+#: Things that so many attempts did not reach are left; regions are looked through so often, and so many attempts made
+#: to meet somebody.
+REFUSALS, LOOKS, MEETINGS = 2, 3, 4
 # Who fetches what was seen outdoors walks up to it from so near, metres.
 _NEAR_SEEN = 5.0
 # How long one waits for somebody who was followed home, steps; how near a found thing is shown from, metres.
@@ -117,7 +118,8 @@ class Book:
     def is_wanted(self, k: int, thing: Sighting | SeenThing) -> bool:
         """Whether something seen is what a subtask is about: one of its things, or with Carry its person."""
         if self.category(k) == "carry":
-            return thing.kind == PERSON and thing.name == self.instructions[k]["person"]["name"]
+            mine = thing.kind == PERSON and thing.name == self.instructions[k]["person"]["name"]
+            return mine and self.refused.get(thing.name, 0) < MEETINGS
         return thing.kind == "object" and thing.name in self.wanted(k)
 
     def choices(self, view: ObservationView, seen: Mapping[int, SeenThing]) -> list[Choice]:
@@ -280,9 +282,9 @@ class Errand:
             return self._after_pick(option, view)
         if isinstance(option, Show):
             self._target = option.target
-            return "report" if option.outcome == "shown" else "over"
+            return "report" if option.outcome == "shown" else self._given_up(option.target.name)
         if isinstance(option, Meet):
-            return "follow" if option.outcome == "handed" else "over"
+            return self._after_meeting(option, view)
         if isinstance(option, Escort):
             return "put"
         if isinstance(option, PutDown):
@@ -321,8 +323,26 @@ class Errand:
             self._book.refused[name] = self._book.refused.get(name, 0) + 1
         return "over"
 
+    def _after_meeting(self, meet: Meet, view: ObservationView) -> str:
+        if meet.outcome != "handed":
+            return self._given_up(str(self._told["person"]["name"]))
+        mine = [entity for entity in view.held if entity and entity not in self._book.picked.values()]
+        self._book.picked.update(zip(self._told["objects"], mine, strict=False))
+        return "follow"
+
+    def _given_up(self, name: str) -> str:
+        """Note an attempt in vain, and forget where it was thought to be: it is not to be tried for ever."""
+        self._book.refused[name] = self._book.refused.get(name, 0) + 1
+        known = self._skills.seen.last_seen(name)
+        if known is not None:
+            self._skills.seen.forget(known.entity)
+        return "over"
+
     def _after_put(self, put: PutDown) -> str:
         if self._category == "carry":
+            if put.outcome == "empty hands":
+                for name in self._told["objects"]:
+                    self._book.picked.pop(name, None)
             return "await"
         k = self.choice.subtask
         if put.outcome == "empty hands":

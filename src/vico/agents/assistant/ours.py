@@ -10,8 +10,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 from typing import Any
+
+import numpy as np
 
 from vico.agents.assistant.asking import Enquiries, region_of
 from vico.agents.assistant.choosing import ChoicePlanner
@@ -90,8 +93,9 @@ class OurPlanner(ChoicePlanner):
         if plan.choices:
             return plan.choices[0]
         # Nothing can be done in time, as it seems: what is nearest to being done, then.
-        first = next(iter(self.book.choices(view, self.seen(view))), None)
-        return first if left > 0.0 else None
+        choices = self.book.choices(view, self.seen(view))
+        mine = [choice for choice in choices if choice.subtask in self._share]
+        return next(iter(mine or choices), None) if left > 0.0 else None
 
     def _model(self, subtasks: list[int], view: ObservationView) -> Model:
         return Model(self.book, self.estimates, subtasks, view, self.seen(view))
@@ -102,10 +106,15 @@ class OurPlanner(ChoicePlanner):
         if self.of == 1:
             return subtasks
         plans: dict[tuple[int, ...], Plan] = {}
+        # Both reckon from one point that both know, not from where each stands: so they come to the same shares.
+        told = [region["centre"] for one in self.book.instructions.values() for region in one["sources"]]
+        middle = (float(np.mean([at[0] for at in told])), float(np.mean([at[1] for at in told])))
 
         def plan_of(part: tuple[int, ...]) -> Plan:
             if part not in plans:
-                plans[part] = best_plan(self._model(list(part), view), left)
+                model = self._model(list(part), view)
+                model.start = replace(model.start, at=middle, time=0.0)
+                plans[part] = best_plan(model, left)
             return plans[part]
 
         best = (-1.0, 0.0)
