@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ from vico.assets.models.movable import movable_kinds
 from vico.challenges.assistant.episode import play_task
 from vico.challenges.assistant.model import Person, Region, Start, Subtask, Task, TaskObject
 from vico.challenges.records import EpisodeRecord
+from vico.challenges.registry import check_methods, load_challenge
 from vico.errors import InputError
 
 STEPS = 120
@@ -129,3 +131,11 @@ def test_a_pair_with_a_model_that_nobody_named_is_refused_before_it_begins(named
     named.delenv("VICO_LLM_BASE_URL", raising=False)
     with pytest.raises(InputError, match="method llm: no language model is named"):
         play("heuristic+llm", assistants=2)
+
+
+def test_a_method_that_asks_a_model_is_refused_before_anything_is_played(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in os.environ if name.startswith(("VICO_LLM_", "OPENAI_"))]:
+        monkeypatch.delenv(name)
+    for challenge in ("assistant", "commute"):
+        with pytest.raises(InputError, match="VICO_LLM_BASE_URL"):
+            check_methods(load_challenge(challenge), ["llm"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import cast
 
+from vico.agents.model_access import model_from_environment
 from vico.challenges.records import Challenge
 from vico.errors import InputError, line_of, sentence_of
 
@@ -14,6 +15,8 @@ CHALLENGES = {
     "commute": "vico.challenges.commute.challenge:COMMUTE",
     "influence": "vico.challenges.influence:INFLUENCE",
 }
+#: The method, of any challenge, that asks a language model.
+ASKS_A_MODEL = "llm"
 _NEEDED = ("name", "categories", "methods", "metrics", "causes", "task", "play")
 
 
@@ -50,10 +53,12 @@ def check_methods(challenge: Challenge, methods: list[str]) -> None:
     Raises
     ------
     InputError
-        If one is not; the message names those there are.
+        If one is not; the message names those there are. And if one asks a language model, and none is named.
     """
     for method in methods:
         for part in parts_of(method):
+            if part == ASKS_A_MODEL and part in challenge.methods:
+                model_from_environment(method=part)  # before anything is drawn or played
             if part not in challenge.methods and ":" not in part:
                 raise InputError(
                     f"{challenge.name}: no method called {part!r}; there are {', '.join(sorted(challenge.methods))}, "
