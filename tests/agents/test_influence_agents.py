@@ -14,16 +14,25 @@ from challenges.invented_people import invented_people
 from llm_server import model_server
 from vico.agents.influence.courtship import Courtship
 from vico.agents.influence.days import DayPlan, Stay
-from vico.agents.influence.language import Asker, LanguageDialogue, LanguageMember, LanguageTarget, shortened
+from vico.agents.influence.language import (
+    Asker,
+    LanguageDialogue,
+    LanguageMember,
+    LanguageTarget,
+    MessageReply,
+    RankingReply,
+    TargetReply,
+    shortened,
+)
 from vico.agents.influence.lines import lines
 from vico.agents.influence.profiles import forms_of_address
-from vico.agents.influence.prompts import prompt
 from vico.agents.influence.situation import Situation, Talk
 from vico.agents.influence.strategies import DIALOGUES, TARGETS, make_strategy
 from vico.agents.influence.targets import ExpectedGainTarget, NearestTarget, RandomTarget
 from vico.challenges.influence.lexicon import Lexicon, Topic, lexicon_files
 from vico.errors import InputError, LlmReplyError, SchemaError, SourceError
 from vico.llm import Connection, Endpoint, LanguageModel, Reply, Usage
+from vico.llm.prompts import read_prompt
 
 AT_HOME = DayPlan((Stay(0.0, 86400.0, "home", "main", "Rest"),))
 AWAY = DayPlan((Stay(0.0, 86400.0, None, "commute", "Walk"),))
@@ -213,10 +222,16 @@ def test_a_real_server_that_dies_ends_nothing() -> None:
 
 
 def test_prompts_take_their_inputs_and_no_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    names = ("choose_target", "first_message", "next_message", "member_reply", "member_ranking")
-    for name in names:
-        with pytest.raises(InputError, match="missing or unknown"):
-            prompt(name).messages(nonsense=1)
+    replies = {
+        "choose_target": TargetReply,
+        "first_message": MessageReply,
+        "next_message": MessageReply,
+        "member_reply": MessageReply,
+        "member_ranking": RankingReply,
+    }
+    for name, reply in replies.items():
+        with pytest.raises(InputError, match="no value is given for it"):
+            read_prompt("influence", name, reply).messages(nonsense=1)
     own = tmp_path / "prompts" / "influence"
     own.mkdir(parents=True)
     (own / "first_message.toml").write_text(
@@ -224,5 +239,5 @@ def test_prompts_take_their_inputs_and_no_others(tmp_path: Path, monkeypatch: py
         '[inputs.you]\nkind = "words"\nabout = "b"\n'
     )
     monkeypatch.setenv("VICO_DATA", str(tmp_path))
-    with pytest.raises(SchemaError, match="'me' is named in the text or among the inputs, but not in both"):
-        prompt("first_message")
+    with pytest.raises(SchemaError, match=r"{{me}} is no input"):
+        read_prompt("influence", "first_message", MessageReply)

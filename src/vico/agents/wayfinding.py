@@ -29,8 +29,6 @@ _BLOCK, _GROW = 0.5, 0.4
 _REJOIN, _DETOUR = 8.0, 6.0
 # Degrees one turns for a step aside, and for one back; who is stopped so often steps back, for aside it is no wider.
 _ASIDE, _BACK, _BACK_FROM = (50.0, 90.0, 130.0), (130.0, 170.0, 90.0), 9
-# So many spots are kept out of at most, those told first forgotten first.
-_MOST_CLOSED = 200
 _HIT_SOLID = code_name(ReasonCode.HIT_SOLID)
 
 Point = tuple[float, float]
@@ -104,25 +102,6 @@ class Walker:
         east, north = corner[0] - float(position[0]), corner[1] - float(position[1])
         # As `vico.agents.strides` reckons for many, to the last bit.
         return math.sqrt(east * east + north * north) + self._left[self._next]
-
-    @property
-    def corners_ahead(self) -> list[Point]:
-        """The corners of the way that are still to come, ENU metres."""
-        return self._path[self._next :] if self._goal is not None else []
-
-    def go_round(self, position: Point, spots: Sequence[tuple[float, float, float]]) -> None:
-        """Find a way round what was seen in the way.
-
-        Parameters
-        ----------
-        position
-            Where one stands, ENU metres.
-        spots
-            Squares to keep out of, x, y and half their side, metres; besides those of before, on the way to one goal.
-        """
-        self._closed = [*self._closed, *spots][-_MOST_CLOSED:]
-        self._aside = []
-        self._rejoin(position)
 
     @property
     def straight_on(self) -> tuple[float, float, float] | None:

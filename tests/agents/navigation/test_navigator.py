@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import toy_city
 from vico.agents.assistant.skills import GRASP, OUTSIDE, AssistantSkills, ObservationView
-from vico.agents.navigation.navigator import Navigator
-from vico.agents.navigation.outlook import Outlook
 from vico.agents.navigation.search import Target
-from vico.agents.navigation.voxels import VoxelMap
 from vico.assets.models.furniture import furniture_models
 from vico.io.plain_data import decode, encode
 from vico.seeds import rng
@@ -148,31 +144,3 @@ def open_ground() -> PublicMap:
     return PublicMap(
         40.0, WalkableMap(np.full((160, 160), OPEN, np.uint8), 40.0), HeightField.flat(40.0), [], [], [], []
     )
-
-
-def test_what_stands_on_the_way_outdoors_closes_cells_of_the_map_and_what_moves_only_when_near() -> None:
-    public = open_ground()
-    voxels, outlook = VoxelMap(public.height.upper, least=1), Outlook(public.walkable)
-    voxels.stumble(np.array([3.66, 0.0, 0.0, 1.0, 0.0, 0.0]), 0, times=1)
-    line = [(10.0, 0.0)]
-    assert outlook.in_the_way(voxels, (0.0, 0.0), line) == []  # known from a stumble: it may be gone by then
-    closed = outlook.in_the_way(voxels, (2.5, 0.0), line)
-    assert closed
-    assert all(math.dist((x, y), (4.0, 0.0)) < 0.6 for x, y, _ in closed)
-    assert outlook.in_the_way(voxels, (2.5, 0.0), line) == []  # once is enough
-    assert Outlook(public.walkable).in_the_way(voxels, (0.0, 2.0), [(10.0, 2.0)]) == []
-
-
-def test_the_walker_goes_round_what_was_seen() -> None:
-    public = open_ground()
-    walker = Navigator(public, rng(0, "navigation test")).walker
-    state = {"action_status": "ok", "action_code": ""}
-    observation = {"pose": np.array([0.0, 0, 0, 1, 0, 0]), "state": state}
-    walker.towards((20.0, 0.0), 1.0, observation, {"entities": {}})
-    spots = [(x / 2 + 0.25, y / 2 + 0.25, 0.0) for x in range(8, 12) for y in range(-4, 4)]
-    walker.go_round((0.0, 0.0), spots)
-    way = np.array([(0.0, 0.0), *walker.corners_ahead])
-    along = np.concatenate([np.linspace(a, b, 50) for a, b in pairwise(way)])
-    inside = (along[:, 0] > 4.0) & (along[:, 0] < 6.0) & (np.abs(along[:, 1]) < 2.0)
-    assert not inside.any()
-    assert way[-1].tolist() == [20.0, 0.0]

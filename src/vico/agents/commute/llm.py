@@ -18,11 +18,11 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from vico.agents.commute.legs import LegMaker
-from vico.agents.commute.prompt import filled_prompt
 from vico.agents.commute.question import Question
 from vico.clock import DAY, clock_of
 from vico.errors import InputError, LlmBudgetError, LlmReplyError, SourceError
 from vico.llm import LanguageModel
+from vico.llm.prompts import read_prompt
 from vico.rules import BIKE_ASTRAY, BIKE_RATE, BUS_FARE, WALK_SPEED
 from vico.world.model import Line, Point2, TramLine
 from vico.world.public import PublicMap
@@ -120,7 +120,7 @@ class LlmPlanner:
         before = (spent.tokens, spent.cost)
         try:
             reply = self._model.ask(
-                filled_prompt("plan", self.inputs(question)),
+                read_prompt("commute", "plan", CommutePlan).messages(**self.inputs(question)),
                 CommutePlan,
                 check=partial(self.findings, question),
                 rounds=1,

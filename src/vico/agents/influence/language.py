@@ -13,11 +13,11 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from vico.agents.influence.profiles import Profile
-from vico.agents.influence.prompts import prompt
 from vico.agents.influence.situation import Dialogue, Situation, Talk, TargetChoice
 from vico.clock import clock_of
 from vico.errors import LlmBudgetError, SourceError, VicoError, sentence_of
 from vico.llm import LanguageModel, Message, Reply, Usage
+from vico.llm.prompts import read_prompt
 
 #: So many characters of a message are said; the rest is cut off at a word.
 LONGEST = 600
@@ -84,7 +84,7 @@ class Asker:
             self.fallbacks += 1
             return None
         try:
-            answer = self._model.ask(prompt(name).messages(**inputs), reply, check=check)
+            answer = self._model.ask(read_prompt("influence", name, reply).messages(**inputs), reply, check=check)
         except VicoError as error:
             self._failed = self._failed + 1 if isinstance(error, (SourceError, LlmBudgetError)) else 0
             self.fallbacks += 1

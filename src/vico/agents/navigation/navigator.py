@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from vico.agents.base import Action, Info, Observation, heading, wrapped
 from vico.agents.navigation.keeping import PathKeeper
-from vico.agents.navigation.outlook import Outlook
 from vico.agents.navigation.search import Target, furthest_straight
 from vico.agents.navigation.voxel_kernels import BESIDE_COST, SIDE, VOXEL
 from vico.agents.navigation.voxels import VoxelMap
@@ -45,7 +44,7 @@ class Navigator:
     """Knows what stands where from pictures, and walks to targets around it.
 
     Indoors, ways are found on the 0.1 m columns of the voxels. Outdoors they are the public map's router's, on its
-    cells of 0.5 m; with `goes_round`, those are closed in which something was seen that the map does not have.
+    cells of 0.5 m; what stops one there is stepped round.
 
     Parameters
     ----------
@@ -53,12 +52,9 @@ class Navigator:
         What one knows of the world.
     generator
         Decides how one gets out of others' way outdoors.
-    goes_round
-        Whether what is seen on the way outdoors is gone round before it stops one. Off: measured, it saves no
-        collisions to speak of, and sends one to and fro where steep ground is taken for something in the way.
     """
 
-    def __init__(self, public_map: PublicMap, generator: np.random.Generator, *, goes_round: bool = False) -> None:
+    def __init__(self, public_map: PublicMap, generator: np.random.Generator) -> None:
         self._public = public_map
         self.walker = Walker(public_map, generator)
         # The space one is in, and the last few before it, as plain data: a map takes ten times as much memory.
@@ -73,8 +69,6 @@ class Navigator:
         # How often in a row something solid stopped a step, and whether the last action was one.
         self._stumbles = 0
         self._stepped = False
-        self._outlook = Outlook(public_map.walkable)
-        self._goes_round = goes_round
 
     @property
     def searches(self) -> int:
@@ -94,11 +88,10 @@ class Navigator:
             Entities that are in nobody's way: what one carries.
         """
         self._enter_space(observation)
-        if self._space != OUTDOORS or self._goes_round:
-            self._map.see(observation, info["entities"], ignore)
-        state = observation["state"]
         if self._space == OUTDOORS:
             return
+        self._map.see(observation, info["entities"], ignore)
+        state = observation["state"]
         if state["action_status"] == "collision":
             self._stumbles += state["action_code"] == _HIT_SOLID
             times = self._stumbles if state["action_code"] == _HIT_SOLID else 0
@@ -125,7 +118,6 @@ class Navigator:
             return None
         if target != self._target:
             self._target, self._waited, self._forgiven = target, 0, 0
-            self._outlook.set_out()
         if self._space == OUTDOORS:
             return self._outdoors(observation, info, target, speed)
         return self._indoors(observation, target)
@@ -228,9 +220,6 @@ class Navigator:
     # Outdoors.
 
     def _outdoors(self, observation: Observation, info: Info, target: Target, speed: float) -> Action | None:
-        position = (float(observation["pose"][0]), float(observation["pose"][1]))
-        if self._goes_round and (seen := self._outlook.in_the_way(self._map, position, self.walker.corners_ahead)):
-            self.walker.go_round(position, seen)
         return self.walker.towards((target.x, target.y), speed, observation, info)
 
     # Plain data.
@@ -252,7 +241,6 @@ class Navigator:
             "forgiven": self._forgiven,
             "stumbles": self._stumbles,
             "stepped": self._stepped,
-            "outlook": self._outlook.state(),
         }  # fmt: skip
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -271,4 +259,3 @@ class Navigator:
         self._target = None if state["target"] is None else Target(*state["target"])
         self._waited, self._stumbles = int(state["waited"]), int(state["stumbles"])
         self._stepped, self._forgiven = bool(state["stepped"]), int(state["forgiven"])
-        self._outlook.restore(state["outlook"])
