@@ -18,7 +18,7 @@ from vico.sim.animation.standing import TURN_CYCLE, TURN_START
 from vico.sim.animation.stride import pace_of_step, stride_of
 from vico.sim.bodies import Bodies
 from vico.sim.collisions import SolidMap, sweep
-from vico.sim.footprints import IN_BUS, Rectangle, gaps, records_of
+from vico.sim.footprints import IN_BUS, Rectangle, gaps, joined_records, records_of
 from vico.sim.indoor import Indoor
 from vico.sim.state import RADIUS, RIDER_REACH, People, Posture, Vehicle
 from vico.world.heights import HeightField
@@ -131,7 +131,7 @@ class Avatars:
 
     def space(self) -> NDArray[np.int32]:
         """Return the room each avatar is in, `OUTDOORS` or `IN_BUS`: only those of one space can touch."""
-        return np.where(self.people.vehicle == Vehicle.BUS, IN_BUS, self.people.room).astype(np.int32)
+        return np.where(self.people.vehicle == _IN_BUS, IN_BUS, self.people.room).astype(np.int32)
 
     def advance(
         self,
@@ -166,7 +166,7 @@ class Avatars:
             pace = np.where(tread > 0.0, np.minimum(STAIRS_SPEED, p.move_speed), p.move_speed)
             distance = np.minimum(p.move_left, pace * dt)
             before = p.position[:, :2].copy()
-            bodies = np.concatenate([records_of(p.bodies_of(slice(None)), self.space()), obstacles])
+            bodies = joined_records([records_of(p.bodies_of(slice(None)), self.space()), obstacles])
             moved, contact = sweep(distance, turn, p.yaw, bodies, self.solids)
             p.position[:, 0], p.position[:, 1] = bodies["x"][: len(p)], bodies["y"][: len(p)]
             turned = turn
@@ -178,7 +178,7 @@ class Avatars:
             p.status[hit] = ActionStatus.COLLISION
             p.contact[hit] = contact[hit]
             p.velocity[:] = (p.position[:, :2] - before) / dt
-            self.settle(np.flatnonzero(moved > 0.0))
+            self.settle((moved > 0.0).nonzero()[0])
         if carried is not None:
             p.velocity[carried[0]] = carried[1]
         self._animate(turned, tread, dt)
@@ -195,10 +195,12 @@ class Avatars:
     def settle(self, who: NDArray[np.int64]) -> None:
         """Put feet on the ground or the floor."""
         p = self.people
-        outdoors = who[p.room[who] < 0]
-        p.position[outdoors, 2] = self._height(p.position[outdoors, :2])
-        indoors = who[p.room[who] >= 0]
-        p.position[indoors, 2] = self._indoor.floors_at(p.room[indoors], p.position[indoors])
+        in_room = p.room[who] >= 0
+        outdoors, indoors = who[~in_room], who[in_room]
+        if len(outdoors):
+            p.position[outdoors, 2] = self._height(p.position[outdoors, :2])
+        if len(indoors):
+            p.position[indoors, 2] = self._indoor.floors_at(p.room[indoors], p.position[indoors])
 
     def _animate(self, turned: NDArray[np.float64], tread: NDArray[np.float64], dt: float) -> None:
         p = self.people

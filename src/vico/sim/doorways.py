@@ -68,7 +68,7 @@ def _touch(i: int, state: SimulationState) -> None:
 def walk_up(state: SimulationState, share: NDArray[np.float64], dt: float) -> None:
     """Turn and set going who is on the way to a door; `share`, as `Avatars.advance` takes it, is theirs after it."""
     p = state.people
-    for i in np.flatnonzero(p.at_door()).tolist():
+    for i in p.at_door().nonzero()[0].tolist():
         if p.passing[i]:
             p.turn_left[i] = p.move_left[i] = 0.0
             continue
@@ -86,7 +86,7 @@ def walk_up(state: SimulationState, share: NDArray[np.float64], dt: float) -> No
 def follow(state: SimulationState, dt: float) -> None:
     """Let doors be opened and gone through for `dt` seconds."""
     p = state.people
-    for i in np.flatnonzero((p.door >= 0) & (p.passing == 0)).tolist():
+    for i in ((p.door >= 0) & (p.passing == 0)).nonzero()[0].tolist():
         # Whom something stops opens the door from there.
         stopped = p.status[i] == ActionStatus.COLLISION
         if stopped:

@@ -8,6 +8,7 @@ distance is how deep they are in each other.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -58,11 +59,21 @@ def records_of(bodies: Bodies, space: NDArray[Any] | int = OUTDOORS) -> NDArray[
     """Return bodies as kernels take them, dtype `BODY`; extents in ENU metres, `space` one for all or one each."""
     found = np.empty(len(bodies), BODY)
     found["entity"], found["space"] = bodies.entity, space
-    half = np.column_stack([bodies.half_length, bodies.half_width])
-    extent = np.column_stack([bodies.bottom, bodies.top])
-    columns = (bodies.position, bodies.yaw, half, bodies.rounding, extent, bodies.velocity)
+    half, extent = (bodies.half_length, bodies.half_width), (bodies.bottom, bodies.top)
     # One layout for all: another one would have to be compiled.
-    _fill(found, *(np.ascontiguousarray(column, np.float64) for column in columns))
+    half, extent = (tuple(np.ascontiguousarray(side, np.float64) for side in pair) for pair in (half, extent))
+    columns = (bodies.position, bodies.yaw, bodies.rounding, bodies.velocity)
+    position, yaw, rounding, velocity = (np.ascontiguousarray(column, np.float64) for column in columns)
+    _fill(found, position, yaw, half, rounding, extent, velocity)
+    return found
+
+
+def joined_records(parts: Sequence[NDArray[np.void]]) -> NDArray[np.void]:
+    """Return bodies one after the other, dtype `BODY`: NumPy's own way takes ten times as long for records."""
+    found, at = np.empty(sum(map(len, parts)), BODY), 0
+    for part in parts:
+        found[at : at + len(part)] = part
+        at += len(part)
     return found
 
 
@@ -74,11 +85,11 @@ def _fill(found, position, yaw, half, rounding, extent, velocity):  # type: igno
         one.index = k
         one.x, one.y = position[k, 0], position[k, 1]
         one.cos, one.sin = math.cos(yaw[k]), math.sin(yaw[k])
-        one.half_length, one.half_width = half[k, 0], half[k, 1]
+        one.half_length, one.half_width = half[0][k], half[1][k]
         one.rounding = rounding[k]
         u, v = one.half_length - one.rounding, one.half_width - one.rounding
         one.radius = math.sqrt(u * u + v * v) + one.rounding
-        one.bottom, one.top = extent[k, 0], extent[k, 1]
+        one.bottom, one.top = extent[0][k], extent[1][k]
         one.vx, one.vy = velocity[k, 0], velocity[k, 1]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.models.movable import movable_grip
+from vico.io.data_files import cached_data
 from vico.rules import WALK_SPEED
 from vico.seeds import rng
 from vico.sim.animation import Hold
@@ -26,6 +27,7 @@ _FIRST, _LAST = 0.2, 1.6
 ARMS_TIME = 0.6
 # Faster ones run.
 _RUNS = 1.6 * WALK_SPEED
+_ON_FOOT, _LYING = int(Vehicle.NONE), int(Posture.LYING)
 _LEFT, _RIGHT, _CHEST = int(Hold.UMBRELLA_LEFT), int(Hold.UMBRELLA_RIGHT), int(Hold.BEFORE_CHEST)
 
 
@@ -54,21 +56,22 @@ def take_umbrella(who: int | slice, state: SimulationState) -> None:
 def advance(state: SimulationState, dt: float) -> None:
     """Have arms come up to what they are to hold, or down from it, for `dt` seconds."""
     p = state.people
-    carried = np.flatnonzero(state.objects.hand >= 0)
+    objects = state.objects
+    carried = (objects.hand >= 0).nonzero()[0]
     rain = state.environment.weather.rain
     if rain <= _FIRST and not len(carried) and not p.hold.any():
         return
     wanted = np.zeros(len(p), np.int8)
     _put_umbrellas_up(wanted, rain, state)
-    for k in carried.tolist():
+    rows = {entity: i for i, entity in enumerate(p.entity.tolist())} if len(carried) else {}
+    for k, holder in zip(carried.tolist(), objects.holder[carried].tolist(), strict=True):
         # Both arms where the other hand is free; under one arm else.
-        i = int(np.flatnonzero(p.entity == state.objects.holder[k])[0])
-        if (
-            np.count_nonzero(p.held[i]) == 1
-            and movable_grip(state.objects.prototypes[k], state.objects.size[k]) == "arms"
-        ):
-            wanted[i] = _CHEST if p.vehicle[i] == Vehicle.NONE and p.posture[i] != Posture.LYING else 0
+        left, right = p.held[i := rows[holder]].tolist()
+        if (left != 0) + (right != 0) == 1 and _is_for_arms(objects.prototypes[k], tuple(objects.size[k].tolist())):
+            wanted[i] = _CHEST if p.vehicle[i] == _ON_FOOT and p.posture[i] != _LYING else 0
     going = p.hold == wanted
+    if not wanted.any() and going.all():
+        return
     step = dt / ARMS_TIME
     p.hold_share[going] = np.minimum(p.hold_share[going] + step * (p.hold[going] > 0), 1.0)
     p.hold_share[~going] = np.maximum(p.hold_share[~going] - step, 0.0)
@@ -76,10 +79,18 @@ def advance(state: SimulationState, dt: float) -> None:
     p.hold[turned] = wanted[turned]
 
 
+@cached_data
+def _is_for_arms(prototype: str, size: tuple[float, float, float]) -> bool:
+    """Whether a thing is carried before the chest."""
+    return movable_grip(prototype, size) == "arms"
+
+
 def _put_umbrellas_up(wanted: NDArray[np.int8], rain: float, state: SimulationState) -> None:
     p = state.people
-    up = p.umbrella & (rain > bearable_rain(p.umbrella_habit)) & (p.room < 0) & (p.vehicle == Vehicle.NONE)
-    up &= (p.posture != Posture.LYING) & (p.move_speed <= _RUNS) & ~p.held.all(axis=1)
+    if rain <= _FIRST:
+        return  # nobody minds
+    up = p.umbrella & (rain > bearable_rain(p.umbrella_habit)) & (p.room < 0) & (p.vehicle == _ON_FOOT)
+    up &= (p.posture != _LYING) & (p.move_speed <= _RUNS) & ~p.held.all(axis=1)
     wanted[up] = np.where(p.held[up, 1] == 0, _RIGHT, _LEFT)
 
 

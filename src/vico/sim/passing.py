@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vico.rules import ActionStatus, ReasonCode
 from vico.sim.avatars import free_ground
-from vico.sim.footprints import OUTDOORS, Rectangle, gaps, records_of
+from vico.sim.footprints import OUTDOORS, Rectangle, gaps, joined_records, records_of
 from vico.sim.holding import take_umbrella
 from vico.sim.moves import place_in_room, put_outdoors, spot_outside, wrapped
 from vico.sim.simulation_state import SimulationState
@@ -123,7 +123,7 @@ def walk_through(
         Who was moved and is outdoors or in a door now, and how fast, m/s; None if nobody was.
     """
     p = state.people
-    passing = np.flatnonzero(p.passing != 0)
+    passing = (p.passing != 0).nonzero()[0]
     if not len(passing):
         return None
     velocity = np.array([_pass_on(i, state, others, dt) for i in passing.tolist()])
@@ -179,7 +179,7 @@ def _is_in_the_way(
     beside &= others["space"] == OUTDOORS
     if not len(near) and not beside.any():
         return False
-    bodies = np.concatenate([records_of(p.bodies_of(near)), others[beside]])
+    bodies = joined_records([records_of(p.bodies_of(near)), others[beside]])
     bodies = bodies[bodies["space"] == OUTDOORS]
     if not len(bodies):
         return False

@@ -112,6 +112,8 @@ def follow(state: SimulationState) -> None:
     transit, p = state.transit, state.people
     if transit is None:
         return
+    if not p.vehicle.any():
+        return
     for i in np.flatnonzero(p.vehicle == Vehicle.BUS).tolist():
         bus = bus_of(i, state, transit)
         if transit.ends(bus) and spot_beside(bus, state, transit) is not None:

@@ -50,6 +50,10 @@ class Vehicle(IntEnum):
     BIKE = 2
 
 
+# By number: looking an enumeration's member up, and comparing arrays with it, costs more than the comparison.
+_IN_BUS, _ON_BIKE = int(Vehicle.BUS), int(Vehicle.BIKE)
+
+
 class Posture(IntEnum):
     """How an avatar holds itself while nothing else is going on."""
 
@@ -288,15 +292,15 @@ class People(ArrayState):
 
     def outdoors(self) -> NDArray[np.bool_]:
         """Who stands or rides in the street on their own feet or bicycle (not in a room, not in a bus)."""
-        return np.asarray((self.room < 0) & (self.vehicle != Vehicle.BUS))
+        return np.asarray((self.room < 0) & (self.vehicle != _IN_BUS))
 
     def bodies(self) -> Bodies:
         """Those outdoors: what traffic, transit and robots have to keep clear of."""
-        return self.bodies_of(np.flatnonzero(self.outdoors()))
+        return self.bodies_of(self.outdoors().nonzero()[0])
 
     def bodies_of(self, who: NDArray[np.int64] | slice) -> Bodies:
         """Bodies of the avatars with the given indices; a cyclist's is as long as the bicycle, see `Bodies`."""
-        riding = self.vehicle[who] == Vehicle.BIKE
+        riding = self.vehicle[who] == _ON_BIKE
         radius = body_radius(self.height[who])
         return Bodies(
             self.entity[who],
@@ -394,7 +398,7 @@ class MovableObjects(ArrayState):
 
     def bodies(self) -> Bodies:
         """Those that lie outdoors: what people carry, or what lies on a robot, is part of whoever carries it."""
-        return self.bodies_of(np.flatnonzero((self.holder == 0) & (self.room < 0)))
+        return self.bodies_of(((self.holder == 0) & (self.room < 0)).nonzero()[0])
 
     def bodies_of(self, which: NDArray[np.int64]) -> Bodies:
         """Bodies of the objects with the given indices: their boxes, or what is around them where they lie tilted."""
@@ -439,7 +443,7 @@ class MovableObjects(ArrayState):
 
     def in_rooms(self) -> NDArray[np.int64]:
         """Return the indices of those that lie in rooms, on the floor or on furniture."""
-        return np.flatnonzero((self.holder == 0) & (self.room >= 0))
+        return ((self.holder == 0) & (self.room >= 0)).nonzero()[0]
 
     def index(self, entity: int) -> int:
         """Index of an entity, -1 if it is none of the objects."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from vico.rules import ActionStatus, ReasonCode
 from vico.sim import doorways, holding, lifts, moves, passing, rides, robot_doors
 from vico.sim.bodies import ROBOT, Bodies, HasBodies, Subsystem
-from vico.sim.footprints import records_of
+from vico.sim.footprints import joined_records, records_of
 from vico.sim.metrics import StopWatch
 from vico.sim.periods import ACTION_TICKS, SUBSTEP, SUBSTEP_TICKS, TICKS_PER_SECOND, ControlPeriods
 from vico.sim.simulation_state import SimulationState
@@ -16,6 +16,8 @@ from vico.sim.state import REASON_LENGTH
 
 #: Metres that people keep from robots: these move after them in the same sub-step, and in physics bodies give a little.
 ROBOT_MARGIN = 0.03
+# By number: looking an enumeration's member up, and comparing arrays with it, costs more than the comparison.
+_COLLISION, _NO_REASON = int(ActionStatus.COLLISION), int(ReasonCode.NONE)
 
 
 def advance_ticks(state: SimulationState, ticks: int, periods: ControlPeriods, watch: StopWatch) -> int:
@@ -76,11 +78,11 @@ def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _A
     lying = state.objects.in_rooms()
     if len(lying):
         in_rooms = records_of(state.objects.bodies_of(lying), state.objects.room[lying])
-        obstacles = np.concatenate([obstacles, in_rooms])
+        obstacles = joined_records([obstacles, in_rooms])
     if state.robots is not None and (state.robots.rooms >= 0).any():
         inside = np.flatnonzero(state.robots.rooms >= 0)
         at = records_of(state.robots.bodies().where(inside), state.robots.rooms[inside])
-        obstacles = np.concatenate([obstacles, at])
+        obstacles = joined_records([obstacles, at])
     carried = passing.walk_through(state, obstacles, SUBSTEP)
     state.avatars.advance(SUBSTEP, obstacles, share=share, carried=carried)
     rides.follow(state)
@@ -97,7 +99,7 @@ def _advance_substep(state: SimulationState, periods: ControlPeriods, bodies: _A
 
 def _held_off(others: Bodies) -> NDArray[np.void]:
     """Return bodies as avatars are kept off them, dtype `vico.sim.footprints.BODY`: robots with some room to yield."""
-    records, robots = records_of(others), np.flatnonzero(others.kind == ROBOT)
+    records, robots = records_of(others), (others.kind == ROBOT).nonzero()[0]
     if len(robots):
         for name in ("half_length", "half_width"):
             records[name][robots] += ROBOT_MARGIN
@@ -108,7 +110,7 @@ def _held_off(others: Bodies) -> NDArray[np.void]:
 def _report_collisions(state: SimulationState) -> int:
     """Say what has just stopped whom, as reasons and events; return how many were stopped."""
     p = state.people
-    stopped = np.flatnonzero((p.status == ActionStatus.COLLISION) & (p.reason_code == ReasonCode.NONE))
+    stopped = ((p.status == _COLLISION) & (p.reason_code == _NO_REASON)).nonzero()[0]
     for i in stopped:
         entity = int(p.contact[i])
         what = "something solid" if entity < 0 else state.entity(entity)["kind"]

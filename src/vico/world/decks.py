@@ -23,6 +23,8 @@ be under such a deck, or above such a floor."""
 
 _ENDS = 0.5  # metres that a deck goes on beyond its ends, so that no gap is left in bends and at joints
 
+_SLACK = 1e-3  # metres by which the box around a strip is larger than it is, for rounding
+
 Floats = NDArray[np.float64]
 
 
@@ -67,8 +69,17 @@ class Decks:
 
     def heights(self, points: Floats, ground: Floats) -> None:
         """Replace heights of the ground (`ground`, metres) by those of the surfaces nearest to points, ``(n, 3)``."""
-        strips = self.first, self.points, self.half_width, self.pavement, self.rise, self.box
-        _nearest_surface(strips, np.ascontiguousarray(points, np.float64), ground)
+        _nearest_surface(self._strips, np.ascontiguousarray(points, np.float64), ground)
+
+    @cached_property
+    def _strips(self) -> tuple[NDArray[Any], ...]:
+        """The strips as the kernel takes them: with the box around all of them, and around each."""
+        boxes = np.empty((len(self), 4))
+        for s in range(len(self)):
+            middle = self.points[self.first[s] : self.first[s + 1], :2]
+            reach = float(self.half_width[s]) + _ENDS + _SLACK
+            boxes[s, :2], boxes[s, 2:] = middle.min(axis=0) - reach, middle.max(axis=0) + reach
+        return self.first, self.points, self.half_width, self.pavement, self.rise, self.box, boxes
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return them as named arrays, for a file."""
@@ -94,7 +105,7 @@ class Decks:
 @compiled
 def _nearest_surface(strips, places, ground):  # type: ignore[no-untyped-def]
     """Replace `ground` by the height of the strip nearest to each place, where one is nearer."""
-    first, points, half_width, pavement, rise, box = strips
+    first, points, half_width, pavement, rise, box, boxes = strips
     for k in range(len(places)):
         px, py, pz = places[k, 0], places[k, 1], places[k, 2]
         if px < box[0] or py < box[1] or px > box[2] or py > box[3]:
@@ -102,6 +113,8 @@ def _nearest_surface(strips, places, ground):  # type: ignore[no-untyped-def]
         best, low = ground[k], ground[k]
         found = abs(pz - best)
         for s in range(len(half_width)):
+            if px < boxes[s, 0] or py < boxes[s, 1] or px > boxes[s, 2] or py > boxes[s, 3]:
+                continue
             for m in range(first[s], first[s + 1] - 1):
                 ax, ay = points[m, 0], points[m, 1]
                 dx, dy = points[m + 1, 0] - ax, points[m + 1, 1] - ay

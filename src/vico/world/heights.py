@@ -105,13 +105,11 @@ class HeightField:
         ndarray
             Metres, shape ``(...)``; those of the ground where there are no decks.
         """
-        found = self._look_up(xyz, 0)
-        if self.decks is None:
-            return found
-        points = np.asarray(xyz, np.float64).reshape(-1, 3)
-        flat = found.reshape(-1)
-        self.decks.heights(points, flat)
-        return flat.reshape(found.shape)
+        points = np.asarray(xyz, np.float64)
+        found = self._look_up(points, 0)
+        if self.decks is not None:
+            self.decks.heights(points.reshape(-1, 3), found.reshape(-1))
+        return found
 
     def footing(self, xyz: ArrayLike) -> NDArray[np.float64]:
         """Heights of what feet stand on: as `near`, and of treads on stairs; shaped as those of `near`."""
@@ -162,13 +160,12 @@ class HeightField:
         return np.asarray((south * (1.0 - fv) + north * fv) * (EDGE_RANGE / 127.0), np.float64)
 
     def _look_up(self, xy: ArrayLike, which: int) -> NDArray[np.float64]:
-        points = np.asarray(xy, np.float64)
-        x = np.ascontiguousarray(points[..., 0]).ravel()
-        y = np.ascontiguousarray(points[..., 1]).ravel()
-        found = np.empty(len(x))
-        _smooth(self.heights, self.half, x, y, found)
+        points = np.ascontiguousarray(xy, np.float64)
+        flat = points.reshape(-1, points.shape[-1])
+        found = np.empty(len(flat))
+        _smooth(self.heights, self.half, flat, found)
         if self.steps is not None and which != 1:
-            _stepped(self.steps.edge, self.steps.low, self.steps.high, self.half, x, y, which, found)
+            _stepped(self.steps.edge, self.steps.low, self.steps.high, self.half, flat, which, found)
         return found.reshape(points.shape[:-1])
 
     def arrays(self) -> dict[str, NDArray[Any]]:
@@ -201,12 +198,12 @@ class HeightField:
 
 
 @compiled
-def _smooth(heights, half, x, y, out):  # type: ignore[no-untyped-def]
+def _smooth(heights, half, places, out):  # type: ignore[no-untyped-def]
     n = heights.shape[0]
     scale = (n - 1) / (2.0 * half)
-    for k in range(len(x)):
-        u = min(max((x[k] + half) * scale, 0.0), n - 1.0)
-        v = min(max((y[k] + half) * scale, 0.0), n - 1.0)
+    for k in range(len(places)):
+        u = min(max((places[k, 0] + half) * scale, 0.0), n - 1.0)
+        v = min(max((places[k, 1] + half) * scale, 0.0), n - 1.0)
         i, j = min(int(u), n - 2), min(int(v), n - 2)
         fu, fv = u - i, v - j
         south = np.float64(heights[j, i]) * (1.0 - fu) + np.float64(heights[j, i + 1]) * fu
@@ -215,13 +212,13 @@ def _smooth(heights, half, x, y, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _stepped(edge, low, high, half, x, y, which, out):  # type: ignore[no-untyped-def]
+def _stepped(edge, low, high, half, places, which, out):  # type: ignore[no-untyped-def]
     """Add the steps: at the point itself (0), or as if it lay on the lower (2) or upper (3) side."""
     n = edge.shape[0]
     scale = (n - 1) / (2.0 * half)
-    for k in range(len(x)):
-        u = min(max((x[k] + half) * scale, 0.0), n - 1.0)
-        v = min(max((y[k] + half) * scale, 0.0), n - 1.0)
+    for k in range(len(places)):
+        u = min(max((places[k, 0] + half) * scale, 0.0), n - 1.0)
+        v = min(max((places[k, 1] + half) * scale, 0.0), n - 1.0)
         i, j = min(int(u), n - 2), min(int(v), n - 2)
         fu, fv = u - i, v - j
         a, b, c, d = (1.0 - fu) * (1.0 - fv), fu * (1.0 - fv), (1.0 - fu) * fv, fu * fv

@@ -37,6 +37,14 @@ class _Leads(NamedTuple):
     down: NDArray[np.bool_]
 
 
+class _Surfaces(NamedTuple):
+    """Where bodies are (to be written to), shape ``(n, 3)``; how high ground and surface are there, shape ``(n,)``."""
+
+    points: Floats
+    ground: Floats
+    z: Floats
+
+
 class TrafficLevels:
     """Heights and extents of traffic's bodies, vehicles before pedestrians.
 
@@ -71,11 +79,11 @@ class TrafficLevels:
 
     def heights(self, xy: Floats) -> Floats:
         """Return how high bodies at their places are, metres, shape ``(n,)``."""
-        return self._height.near(np.c_[xy, self.z]) if self.any else self._height(xy)
+        return self._height.near(_points(xy, self.z)) if self.any else self._height(xy)
 
     def at(self, xy: Floats, who: slice) -> Floats:
         """Return how high points near some bodies are, metres: of the surface those are on."""
-        return self._height.near(np.c_[xy, self.z[who]]) if self.any else self._height(xy)
+        return self._height.near(_points(xy, self.z[who])) if self.any else self._height(xy)
 
     def follow(
         self,
@@ -102,36 +110,47 @@ class TrafficLevels:
             return
         vehicles = len(lane[0])
         jumped = np.hypot(xy[:, 0] - before[0], xy[:, 1] - before[1]) > _JUMP
-        for k in np.flatnonzero(jumped).tolist():
+        for k in jumped.nonzero()[0].tolist():
             graph, (row, offset), i = (self._lanes, lane, k) if k < vehicles else (self._walks, walkway, k - vehicles)
             self.z[k] = _height_on(graph, int(row[i]), float(offset[i]))
-        self.z[:] = self._height.near(np.c_[xy, self.z])
+        ground, points = self._height(xy), _points(xy, self.z)
+        self.z[:] = self._surface(points, ground)
         on_lanes, on_walks = self._lane_leads, self._walk_leads
         leads = _Leads(
             np.concatenate([on_lanes.up[lane[0]], on_walks.up[walkway[0]]]),
             np.concatenate([on_lanes.down[lane[0]], on_walks.down[walkway[0]]]),
         )
-        extents[0][:], extents[1][:] = self._extents(xy, self.z, self._bottoms, self._heights, leads)
+        surfaces = _Surfaces(points, ground, self.z)
+        extents[0][:], extents[1][:] = self._extents(surfaces, self._bottoms, self._heights, leads)
 
     def extents_of(self, bodies: Bodies) -> tuple[Floats, Floats]:
         """Return the extents of other bodies as kernels compare them, metres."""
-        bottom, top = bodies.levels(self._height)
         if not self.any or not len(bodies):
-            return bottom, top
+            return bodies.levels(self._height)
+        points = np.array(bodies.position)
+        ground = self._height(points)
+        surface = self._surface(points, ground)
+        bottom, top = bodies.bottom - surface, bodies.top - surface
         # Who stands is seen from both levels wherever it is not below a deck, or above a tunnel.
         leads = _Leads(bottom < _APART, np.full(len(bodies), self._has_tunnels))
-        position = bodies.position
-        surface = self._height.near(position)
-        return self._extents(position[:, :2], surface, bottom, top, leads)
+        return self._extents(_Surfaces(points, ground, surface), bottom, top, leads)
 
     def clear(self, who: NDArray[np.int64], extents: tuple[Floats, Floats]) -> None:
         """Have some count as on every level: those that are put elsewhere in a step."""
         if self.any:
             extents[0][who], extents[1][who] = -_REACH if self._has_tunnels else 0.0, _REACH
 
-    def _extents(self, xy: Floats, z: Floats, bottom: Floats, top: Floats, leads: _Leads) -> tuple[Floats, Floats]:
-        ground = self._height(xy)
-        above = self._height.near(np.c_[xy, np.full(len(xy), _ABOVE_ALL)]) > ground + _OFF
+    def _surface(self, points: Floats, ground: Floats) -> Floats:
+        """Return how high the surfaces are that are nearest to points, metres, as `HeightField.near`."""
+        found = ground.copy()
+        if self._height.decks is not None:
+            self._height.decks.heights(points, found)
+        return found
+
+    def _extents(self, surfaces: _Surfaces, bottom: Floats, top: Floats, leads: _Leads) -> tuple[Floats, Floats]:
+        points, ground, z = surfaces
+        points[:, 2] = _ABOVE_ALL
+        above = self._surface(points, ground) > ground + _OFF
         rise = z - ground
         on_deck = rise > _OFF
         high = on_deck & (rise >= _APART)
@@ -139,11 +158,19 @@ class TrafficLevels:
         low, upper = np.where(high, _APART, bottom), np.where(high | both, np.maximum(_REACH, top), top)
         if not self._has_tunnels:
             return low, upper
-        below = self._height.near(np.c_[xy, np.full(len(xy), -_ABOVE_ALL)]) < ground - _OFF
+        points[:, 2] = -_ABOVE_ALL
+        below = self._surface(points, ground) < ground - _OFF
         in_tunnel = rise < -_OFF
         deep = in_tunnel & (rise <= -_APART)
         down = (in_tunnel & ~deep) | (~in_tunnel & ~on_deck & leads.down & ~below)
         return np.where(deep | down, -_REACH, low), np.where(deep, -_OFF, upper)
+
+
+def _points(xy: Floats, z: Floats) -> Floats:
+    """Return points of places and heights, shape ``(n, 3)``."""
+    found = np.empty((len(xy), 3))
+    found[:, :2], found[:, 2] = xy, z
+    return found
 
 
 def _leads_of(height: HeightField, graph: LaneGraph | Walkways, start: NDArray[Any], end: NDArray[Any]) -> _Leads:

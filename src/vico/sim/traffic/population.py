@@ -345,10 +345,10 @@ class Traffic(SeenTraffic):
     def advance(self, dt: float, obstacles: Bodies) -> None:
         """Advance everybody by `dt` seconds; nobody touches anybody, `obstacles` (all other bodies) among them."""
         mine, others = self.shapes, shapes_of(obstacles, self._levels)
-        everybody = Shapes(*(np.concatenate([getattr(mine, f), getattr(others, f)]) for f in Shapes._fields))
+        everybody = Shapes(*map(np.concatenate, zip(mine, others, strict=True)))
         net, fleet, junctions = self._net, self._vehicles, self.junctions
         mark_busy_crossings(net, fleet, junctions)
-        widest = float(np.max(everybody.half_length + everybody.half_width, initial=0.0))
+        widest = float((everybody.half_length + everybody.half_width).max(initial=0.0))
         grid = neighbour_grid(everybody.x, everybody.y, _CELL, widest + _DRIFT * dt)
         advance_pedestrians(
             self.paths, self._walkers, junctions, fleet, everybody, grid, (self._walking_pace, self._treads()), dt
@@ -360,9 +360,9 @@ class Traffic(SeenTraffic):
         self._entities = np.concatenate([self._own_entities, obstacles.entity])
         self.jams.elapsed += dt
         self._bring_back(everybody)
-        before = mine.x.copy(), mine.y.copy()
-        for field in ("x", "y", "yaw", "vx", "vy"):
-            getattr(mine, field)[:] = getattr(everybody, field)[: len(mine.x)]
+        before, n = (mine.x.copy(), mine.y.copy()), len(mine.x)
+        mine.x[:], mine.y[:], mine.yaw[:] = everybody.x[:n], everybody.y[:n], everybody.yaw[:n]
+        mine.vx[:], mine.vy[:] = everybody.vx[:n], everybody.vy[:n]
         self._follow_levels(*before)
         self._bodies = None
 
@@ -370,8 +370,10 @@ class Traffic(SeenTraffic):
         """Return how deep the treads are that each pedestrian walks on, metres; 0 off stairs."""
         if self.height.stairs is None:
             return np.zeros(self.pedestrians)
-        xy = np.column_stack([self.shapes.x, self.shapes.y])[self.vehicles :]
-        return self.height.going_at(np.column_stack([xy, self.height(xy)]))
+        points = np.empty((self.pedestrians, 3))
+        points[:, 0], points[:, 1] = self.shapes.x[self.vehicles :], self.shapes.y[self.vehicles :]
+        points[:, 2] = self.height(points)
+        return self.height.going_at(points)
 
     def _follow_levels(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
         """Take everybody along the decks they are on, from where they were before."""
@@ -382,18 +384,20 @@ class Traffic(SeenTraffic):
     def _bring_back(self, everybody: Shapes) -> None:
         """Bring cars back in that left the map, and vehicles that were stuck for too long; the latter are noted."""
         stopped, teleports = self._vehicles["stopped_time"], self._vehicles["teleports"]
-        due = np.flatnonzero(stopped >= PATIENCE)
+        stuck = stopped >= PATIENCE
+        due = stuck.nonzero()[0]
         where = [(float(everybody.x[v]), float(everybody.y[v])) for v in due.tolist()]
         stood, before = stopped[due], teleports[due]
         blockers = [self._before(v) for v in due.tolist()]
         if self._levels.any:
-            leaving = self._net.lanes["leaves"][self._vehicles["lane"]] | (stopped >= PATIENCE)
-            self._levels.clear(np.flatnonzero(leaving), (everybody.bottom, everybody.top))
+            leaving = self._net.lanes["leaves"][self._vehicles["lane"]] | stuck
+            self._levels.clear(leaving.nonzero()[0], (everybody.bottom, everybody.top))
         bring_back(self._net, self._vehicles, self.junctions, everybody, self._entries, _ENTRY_SPEED, PATIENCE)
-        for k in np.flatnonzero(teleports[due] > before).tolist():
+        for k in (teleports[due] > before).nonzero()[0].tolist():
             self.jams.note_rescue(int(due[k]), where[k], float(stood[k]), blockers[k])
-        coming = np.flatnonzero(self._vehicles["presence"] == COMING)
-        self._levels.clear(coming, (everybody.bottom, everybody.top))
+        coming = (self._vehicles["presence"] == COMING).nonzero()[0]
+        if len(coming):
+            self._levels.clear(coming, (everybody.bottom, everybody.top))
         for v in coming.tolist():
             come_back(self._net, self._vehicles, v, everybody)
 
