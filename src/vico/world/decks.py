@@ -23,7 +23,7 @@ be under such a deck, or above such a floor."""
 
 _ENDS = 0.5  # metres that a deck goes on beyond its ends, so that no gap is left in bends and at joints
 
-_SLACK = 1e-3  # metres by which the box around a strip is larger than it is, for rounding
+_SLACK = 1e-3  # metres by which the box around a piece of a strip is larger than that, for rounding
 
 Floats = NDArray[np.float64]
 
@@ -73,12 +73,10 @@ class Decks:
 
     @cached_property
     def _strips(self) -> tuple[NDArray[Any], ...]:
-        """The strips as the kernel takes them: with the box around all of them, and around each."""
-        boxes = np.empty((len(self), 4))
-        for s in range(len(self)):
-            middle = self.points[self.first[s] : self.first[s + 1], :2]
-            reach = float(self.half_width[s]) + _ENDS + _SLACK
-            boxes[s, :2], boxes[s, 2:] = middle.min(axis=0) - reach, middle.max(axis=0) + reach
+        """The strips as the kernel takes them: with the box around all of them, and around each of their pieces."""
+        start, end = self.points[:-1, :2], self.points[1:, :2]
+        reach = (np.repeat(self.half_width, np.diff(self.first))[:-1] + _ENDS + _SLACK)[:, None]
+        boxes = np.column_stack([np.minimum(start, end) - reach, np.maximum(start, end) + reach])
         return self.first, self.points, self.half_width, self.pavement, self.rise, self.box, boxes
 
     def arrays(self) -> dict[str, NDArray[Any]]:
@@ -113,9 +111,9 @@ def _nearest_surface(strips, places, ground):  # type: ignore[no-untyped-def]
         best, low = ground[k], ground[k]
         found = abs(pz - best)
         for s in range(len(half_width)):
-            if px < boxes[s, 0] or py < boxes[s, 1] or px > boxes[s, 2] or py > boxes[s, 3]:
-                continue
             for m in range(first[s], first[s + 1] - 1):
+                if px < boxes[m, 0] or py < boxes[m, 1] or px > boxes[m, 2] or py > boxes[m, 3]:
+                    continue
                 ax, ay = points[m, 0], points[m, 1]
                 dx, dy = points[m + 1, 0] - ax, points[m + 1, 1] - ay
                 length = np.sqrt(dx * dx + dy * dy)
