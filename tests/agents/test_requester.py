@@ -75,7 +75,8 @@ class Meeting:
 @pytest.mark.parametrize(
     ("text", "called"),
     [("Hello Cleo!", True), ("cleo, wait", True), ("CLEO?", True), ("It is (Cleo).", True), ("Hello Ek", False),
-     ("Hello you", False), ("Cleopatra", False), ("Macleo is here", False), ("Anne-Cleo", False), ("", False)],
+     ("Hello you", False), ("Excuse me, have you seen Cleo Ek?", False), ("Cleo, have you seen Ida Roth?", True),
+     ("Cleopatra", False), ("Macleo is here", False), ("Anne-Cleo", False), ("", False)],
 )  # fmt: skip
 def test_a_first_name_is_a_word(text: str, called: bool) -> None:
     assert is_called("Cleo Ek", text) is called

@@ -91,6 +91,7 @@ class ScheduleFollower:
         seed: int = 0,
         talk: Talk | None = None,
         names: Mapping[str, str] = MappingProxyType({}),
+        paces: tuple[float, float] | None = None,
     ) -> None:
         generator = rng(seed, "schedule follower", resident.id)
         self.group: Residents | None = None
@@ -100,7 +101,7 @@ class ScheduleFollower:
         self.stride: Stride | None = None
         self.walks_until = -math.inf
         self._name = resident.id
-        self._ease, self._haste = paces_of(resident.age)
+        self._ease, self._haste = paces or paces_of(resident.age)
         self._map = public_map
         self._stays = with_ways(stays_of(resident.schedule, public_map.place_by_id), public_map, self._ease)
         self._rng = generator

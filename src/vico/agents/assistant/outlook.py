@@ -9,13 +9,12 @@ from vico.agents.assistant.errands import LOOKS, Book, Choice
 from vico.agents.assistant.estimates import DOOR, FINDS, MEET, PICK, PUT, Estimates
 from vico.agents.assistant.skills import ObservationView
 from vico.agents.navigation.memory import SeenThing
+from vico.agents.requester import PACE_HOME
 
 Point = tuple[float, float]
 
 #: How far a subtask has come: to be found, in hand, done; or out of the question.
 OPEN, IN_HAND, DONE = 0, 1, 2
-# Whoever is followed walks, metres a second.
-_THEIR_PACE = 1.0
 
 
 @dataclass(frozen=True)
@@ -114,7 +113,7 @@ class Model:
             return Outlook(point, time + PICK * load, _with(outlook.stages, i, IN_HAND), outlook.hands - load)
         home = self.book.instructions[k]["destination"]["centre"]
         end = (float(home[0]), float(home[1]))
-        walk = self.estimates.travel(point, end, pace=_THEIR_PACE)
+        walk = self.estimates.travel(point, end, pace=PACE_HOME)
         return Outlook(end, time + MEET + walk + DOOR + PUT, _with(outlook.stages, i, DONE), outlook.hands)
 
     def _delivered(self, outlook: Outlook, i: int, k: int) -> Outlook:

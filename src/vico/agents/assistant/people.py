@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vico.agents.assistant.options import Pursuit
 from vico.agents.assistant.skills import WALK, Action, AssistantSkills, ObservationView
 from vico.agents.perception import Sighting
-from vico.agents.requester import CALL_DISTANCE, HAND_OVER_DISTANCE
+from vico.agents.requester import CALL_DISTANCE, HAND_OVER_DISTANCE, PACE_HOME
 from vico.agents.state import AgentState
 
 Region = Mapping[str, Any]
@@ -22,9 +22,9 @@ _OFFER = "Hello {}! I am here to help you carry that home. May I take it?"
 # One speaks from so near, stands so near to be handed something, metres; asks again after so many steps; and gives up
 # somebody who is out of view for so long, or hands nothing over, steps.
 _SPEAK, _STAND, _AGAIN, _LOST, _LONGEST = CALL_DISTANCE - 3.0, HAND_OVER_DISTANCE - 0.3, 20, 25, 150
-# Who follows keeps behind by so much, runs where it is more than the second, metres, and else walks as they do, m/s;
-# and does so no longer than this, steps.
-_BEHIND, _RUN_BEYOND, _BESIDE = 1.7, 3.2, 1.0
+# Who follows keeps behind by so much, runs where it is more than the second, metres, and else walks as they do; no longer
+# than for so many steps.
+_BEHIND, _RUN_BEYOND = 1.7, 2.2
 _ESCORT = 700
 # In a room, who has moved less than so much a step, metres, for so many steps is let pass: one goes out, makes room for
 # so many steps, and waits so long for them to come out.
@@ -91,7 +91,7 @@ class Meet:
         if self._unseen == 0 and away <= _SPEAK and self._steps - self._spoke_at >= _AGAIN:
             self._spoke_at = self._steps
             return {"type": "communicate", "text": _OFFER.format(self._person.split()[0])}
-        self._skills.pace = WALK if away > _SPEAK else _BESIDE
+        self._skills.pace = WALK if away > _SPEAK else PACE_HOME
         step = self._pursuit.step(view, near=_STAND)
         self._skills.pace = WALK
         if step is not None and self._unseen % 6 != 5:
@@ -159,7 +159,7 @@ class Escort:
         if seen is not None and away <= _BEHIND:
             return {"type": "look_at", "target": [float(x) for x in seen.position]}
         if self._pursuit.position is not None and self._lost <= _TO_LAST_SEEN:
-            self._skills.pace = WALK if away > _RUN_BEYOND else _BESIDE
+            self._skills.pace = WALK if away > _RUN_BEYOND else PACE_HOME
             step = self._pursuit.step(view, near=_BEHIND)
             self._skills.pace = WALK
             if step is not None:

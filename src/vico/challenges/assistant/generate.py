@@ -81,12 +81,31 @@ class Draw:
             return [source], 0
         others = [place_region(place) for place in self.hood.places_of(who) if place.id != who.home]
         others += self.hood.spots_of(who, self.chance, radius=radius)
-        others = [r for r in self.things.untold(others) if r.place is None or r.place != source.place]
-        others = [r for r in others if target is None or _apart(r, target)]
-        others.sort(key=lambda r: float(np.hypot(*np.subtract(r.centre[:2], source.centre[:2]))))
-        near = others[: 2 * (count - 1)]
+        near = self._others(source, others, target)[: 2 * (count - 1)]
         order = self.chance.permutation(len(near))[: count - 1]
-        regions = [source, *(near[int(k)] for k in order)]
+        return self._mixed(source, [near[int(k)] for k in order])
+
+    def haunts(self, source: Region, who: Resident, home: Region, *, count: int) -> tuple[list[Region], int]:
+        """Return the source among other places of somebody's day, `count` in all if there are so many.
+
+        Where the day has fewer, the nearest others that they know fill up.
+        """
+        of_day = [region for region in self.hood.stays_of(who, radius=SOURCE_RADIUS) if region.place != who.home]
+        known = [place_region(place) for place in self.hood.places_of(who) if place.id != who.home]
+        known += self.hood.spots_of(who, self.chance, radius=SOURCE_RADIUS)
+        days = self._others(source, of_day, home)
+        more = [region for region in self._others(source, known, home) if region.place is None or region not in days]
+        chosen = [days[int(k)] for k in self.chance.permutation(len(days))]
+        return self._mixed(source, [*chosen, *more][: count - 1])
+
+    def _others(self, source: Region, regions: list[Region], target: Region | None) -> list[Region]:
+        """Return regions other than the source, where no thing is told to lie and none is brought to; nearest first."""
+        others = [r for r in self.things.untold(regions) if r.place is None or r.place != source.place]
+        others = [r for r in others if target is None or _apart(r, target)]
+        return sorted(others, key=lambda r: float(np.hypot(*np.subtract(r.centre[:2], source.centre[:2]))))
+
+    def _mixed(self, source: Region, others: list[Region]) -> tuple[list[Region], int]:
+        regions = [source, *others]
         shuffled = self.chance.permutation(len(regions))
         return [regions[int(k)] for k in shuffled], int(np.flatnonzero(shuffled == 0)[0])
 
@@ -199,7 +218,7 @@ def _carry(draw: Draw, index: int, before: list[Subtask]) -> Subtask:
         home = with_surface(home, draw.world, draw.chance)
     count = HAUNTS * thresholds(advanced=draw.advanced).regions
     source = draw.occasion.whereabouts[who.id]
-    regions, right = draw.among_others(source, who, radius=SOURCE_RADIUS, count=count)
+    regions, right = draw.haunts(source, who, home, count=count)
     kind = draw.kind(f"What does {who.name} carry home?", candidates, who)
     names = draw.names_for(index)
     for name in names:

@@ -57,6 +57,16 @@ class Neighbourhood:
         known = dict.fromkeys((*of_day, person.home, *person.known_places))
         return [self.places[place] for place in known if place in self.places]
 
+    def stays_of(self, person: Resident, *, radius: float) -> list[Region]:
+        """Regions within reach where somebody spends time on that day, in its order: places, and spots outdoors."""
+        of_day = dict.fromkeys(item.place for item in person.schedule if item.place is not None)
+        places = [self.world.place_by_id[place] for place in of_day]
+        return [self.whereabouts(place, radius=radius) for place in places if self.is_near(place.position)]
+
+    def whereabouts(self, place: Place, *, radius: float) -> Region:
+        """Return where somebody is who is at a place: inside, or about the spot where it has no rooms."""
+        return place_region(place) if place.rooms else self.spot(np.asarray(place.position[:2]), radius=radius)
+
     def spots_of(self, person: Resident, chance: np.random.Generator, *, radius: float) -> list[Region]:
         """Spots on pavements and squares, with free room around them, near places that somebody knows."""
         walkable = self.world.walkable

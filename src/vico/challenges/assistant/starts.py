@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.agents.requester import PACE_HOME
 from vico.challenges.assistant.model import Region
-from vico.challenges.assistant.regions import Neighbourhood, place_region
+from vico.challenges.assistant.regions import Neighbourhood
 from vico.challenges.assistant.thresholds import APART, CARRY_REACH, REACH, SOURCE_RADIUS, STEPS, SUBTASKS
 from vico.clock import clock_of, seconds_of_day
 from vico.community.model import Community, Resident, ScheduleItem
@@ -21,9 +23,11 @@ from vico.world.routing import Router
 # Hours at which errands are asked for, and half hours at which somebody may want help with carrying.
 _HOURS = tuple(range(9, 18))
 _HALF_HOURS = tuple(range(2 * 9, 2 * 19))
-# Starts that are tried; with Carry until a subtask takes no longer a walk than this on average, metres.
-_TRIES = 30
-_ENOUGH = 230.0
+# Starts that are tried; with Carry until a subtask takes no longer walks than this on average, seconds, where one comes
+# to somebody at the first pace, metres a second.
+_TRIES, _CARRY_TRIES = 30, 12
+_ENOUGH = 110.0
+_COMES = 2.0
 # Whoever asks for errands goes out alone, years; so many of them, where there are; each knows so many places near by.
 _AGE = 10
 _ASKERS, _KNOWN = 3, 3
@@ -90,24 +94,40 @@ def carry_occasion(world: World, community: Community, chance: np.random.Generat
         If there never are.
     """
     people = [who for who in community.residents if who.age >= _AGE]
-    hoods = [Neighbourhood(world, _router(world), start, reach=CARRY_REACH) for start in _spots(world, people, chance)]
+    starts = islice(_spots(world, people, chance), _CARRY_TRIES)
+    hoods = [Neighbourhood(world, _router(world), start, reach=CARRY_REACH) for start in starts]
+    ways = _WaysHome(world)
     best: tuple[float, Occasion] | None = None
     most = 0
     for half in chance.permutation(_HALF_HOURS):
         time = int(half) * 1800
+        whereabouts = {who.id: place for who in people if (place := _out_at(who, time, world)) is not None}
         for hood in hoods:
-            out = {who.id: place for who in people if (place := _out_at(who, time, hood, world)) is not None}
+            out = {
+                who.id: whereabouts[who.id]
+                for who in people
+                if who.id in whereabouts and who.home in hood.places and hood.is_near(whereabouts[who.id].position)
+            }
             most = max(most, len(out))
             if len(out) < SUBTASKS:
                 continue
             # Who is near and has not far to go home comes first: six of them can then be walked in time.
-            metres = {who.id: _walk(who, out, hood, world) for who in people if who.id in out}
-            mine = sorted((who for who in people if who.id in out), key=lambda who: metres[who.id])
-            cost = sum(metres[who.id] for who in mine[:SUBTASKS])
+            seconds = {
+                who.id: hood.distance(out[who.id].position) / _COMES + ways.metres(who, out[who.id]) / PACE_HOME
+                for who in people
+                if who.id in out
+            }
+            mine = sorted((who for who in people if who.id in out), key=lambda who: seconds[who.id])
+            cost = sum(seconds[who.id] for who in mine[:SUBTASKS])
             if best is None or cost < best[0]:
                 best = (
                     cost,
-                    Occasion(hood, clock_of(time)[:5], mine, {who.id: _whereabouts(out[who.id], hood) for who in mine}),
+                    Occasion(
+                        hood,
+                        clock_of(time)[:5],
+                        mine,
+                        {who.id: hood.whereabouts(out[who.id], radius=SOURCE_RADIUS) for who in mine},
+                    ),
                 )
         if best is not None and best[0] <= _ENOUGH * SUBTASKS:
             break
@@ -119,30 +139,38 @@ def carry_occasion(world: World, community: Community, chance: np.random.Generat
     )
 
 
-def _whereabouts(place: Place, hood: Neighbourhood) -> Region:
-    return place_region(place) if place.rooms else hood.spot(np.asarray(place.position[:2]), radius=SOURCE_RADIUS)
+class _WaysHome:
+    """How far people have to go home."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._fields: dict[str, NDArray[np.float32]] = {}
+
+    def metres(self, who: Resident, place: Place) -> float:
+        """Walk from a place to somebody's home; infinite where there is none."""
+        if who.home not in self._fields:
+            self._fields[who.home] = _router(self._world).distance_field(_door(self._world.place_by_id[who.home]))
+        walkable = self._world.walkable
+        ix, iy = np.clip(walkable.cell_of(_door(place)), 0, walkable.n - 1)
+        return float(self._fields[who.home][iy, ix])
 
 
-def _out_at(who: Resident, time: int, hood: Neighbourhood, world: World) -> Place | None:
-    """Return where somebody is expected at a time who is out then and for a while; None if they are not, or too far."""
+def _door(place: Place) -> NDArray[np.float64]:
+    return np.asarray(place.position[:2], np.float64)
+
+
+def _out_at(who: Resident, time: int, world: World) -> Place | None:
+    """Return where somebody is expected at a time who is out then and for a while; None if they are not."""
     home = world.place_by_id[who.home]
-    if who.home not in hood.places:
-        return None
     during = [item for item in who.schedule if _overlaps(item, time, time + _OUT_FOR * STEPS)]
     if any(item.place == who.home for item in during):
         return None
     place = next((world.place_by_id[item.place] for item in during if item.place is not None), None)
-    if place is None or not hood.is_near(place.position) or place.building == home.building is not None:
+    if place is None or place.building == home.building is not None:
         return None
     if float(np.hypot(*np.subtract(place.position[:2], home.position[:2]))) < APART:
         return None
     return place
-
-
-def _walk(who: Resident, whereabouts: Mapping[str, Place], hood: Neighbourhood, world: World) -> float:
-    """Return how far it is from the start to somebody, and about how far from there to their home, metres."""
-    home, where = world.place_by_id[who.home], whereabouts[who.id].position
-    return hood.distance(where) + float(np.hypot(*np.subtract(where[:2], home.position[:2])))
 
 
 def _overlaps(item: ScheduleItem, since: float, until: float) -> bool:
