@@ -23,6 +23,8 @@ _END = 0.2
 _CAR_NEAR, _PATIENCE = 9.0, 8
 # Red is waited for this long, seconds; and it counts this far beside its crossing, metres.
 _SIGNAL_PATIENCE, _BESIDE = 150, 0.5
+# A goal that moved no farther than this is the same one still; and from so far from walls there is much room, metres.
+_SAME, _WIDE = 12.0, 1.5
 # Radius of what is taken to be closed where one keeps being stopped, and its growth each time, metres.
 _BLOCK, _GROW = 0.5, 0.4
 # Who stepped aside joins its way again this far on, metres, unless that is longer than straight on by so much.
@@ -43,9 +45,15 @@ class Walker:
         Its router finds the ways.
     generator
         Decides how long to wait for somebody and which side to pass on.
+
+    Attributes
+    ----------
+    wide_drift
+        How far off its line a step may lead where there is much room, metres; who turns less is there sooner.
     """
 
     def __init__(self, public_map: PublicMap, generator: np.random.Generator) -> None:
+        self.wide_drift = DRIFT
         self._map = public_map
         self._rng = generator
         self._goal: tuple[float, float] | None = None
@@ -135,8 +143,10 @@ class Walker:
             self._goal = None
             self._avoid(avoided)
         if goal != self._goal:
-            self._goal, self._closed, self._blocked = goal, [], 0
-            self._aside = []
+            # Who goes after somebody has a goal that moves: what stands in the way is passed all the same.
+            if self._goal is None or math.dist(goal, self._goal) > _SAME:
+                self._closed, self._blocked, self._aside = [], 0, []
+            self._goal = goal
             self._plan(position)
         if observation["state"]["action_status"] == "collision":
             self._meet_obstacle(position, observation)
@@ -227,7 +237,8 @@ class Walker:
         error = wrapped(math.atan2(north, east) - heading(observation))
         stride = min(away, speed)
         # Where it is narrow there is no room for drifting.
-        drift = DRIFT if self._room(position) > NARROW else NARROW_DRIFT
+        room = self._room(position)
+        drift = NARROW_DRIFT if room <= NARROW else DRIFT if room <= _WIDE else self.wide_drift
         if abs(error) > 1e-3 and (abs(stride * math.sin(error)) > drift or math.cos(error) <= 0.0):
             return {"type": "turn_left" if error > 0 else "turn_right", "degrees": abs(math.degrees(error))}
         scale = 1.0 / max(away, 1e-9)

@@ -48,8 +48,8 @@ class Enquiries:
         self._last, self._step = state["last"], state["step"]
         self.places = {who: list(places) for who, places in state["places"].items()}
 
-    def listen(self, view: ObservationView, wanted: Mapping[int, str]) -> list[tuple[int, PublicPlace]]:
-        """Take in what was said; return where people may be that nobody had said before, by subtask.
+    def listen(self, view: ObservationView, wanted: Mapping[int, str]) -> list[tuple[int, PublicPlace, str]]:
+        """Take in what was said; return by subtask where people may be that nobody had said before, and what was said.
 
         Parameters
         ----------
@@ -57,14 +57,16 @@ class Enquiries:
             Names of those who are looked for, by subtask.
         """
         self._step += 1
-        found: list[tuple[int, PublicPlace]] = []
+        found: list[tuple[int, PublicPlace, str]] = []
         for message in view.observation["events"]:
             for k, name in wanted.items():
-                for claim in whereabouts(str(message["text"]), name)[:1]:
+                # Where somebody lives is known.
+                claims = [one for one in whereabouts(str(message["text"]), name) if one.kind != "lives"]
+                for claim in claims[:1]:
                     place = place_named(self._map, claim.place) if claim.place else None
                     if place is not None and place.id not in self.places.setdefault(name, []):
                         self.places[name].append(place.id)
-                        found.append((k, place))
+                        found.append((k, place, claim.kind))
         return found
 
     def question(self, view: ObservationView, wanted: Mapping[int, str]) -> Action | None:

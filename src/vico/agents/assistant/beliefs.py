@@ -20,7 +20,9 @@ from vico.world.public import PublicMap
 # People stay where they were seen, or were not, for about so long, seconds.
 _STAYS = 1200.0
 # How much likelier a region is where somebody was seen, and where somebody says that they are, were or often are.
-_SEEN, _TOLD = 4.0, 1.5
+_SEEN = 4.0
+_TOLD = {"see": 3.0, "myself": 3.0, "saw_in": 1.5, "saw_near": 1.0, "told": 1.0, "usual": 0.4}
+_SAID = 0.3
 # Chance that things are where nobody said; and people, who are at one of the places that are told at first and go on
 # later: at first, and by how much more each second.
 _ELSEWHERE_THINGS, _ELSEWHERE, _ELSEWHERE_LATER, _ELSEWHERE_MOST = 0.03, 0.03, 0.0002, 0.35
@@ -48,6 +50,7 @@ class Beliefs:
         self._looked_at: dict[Spot, float] = {}
         self._seen_at: dict[Spot, float] = {}
         self._told_at: dict[Spot, float] = {}
+        self._told: dict[Spot, float] = {}
         self._began: float | None = None
 
     def state(self) -> AgentState:
@@ -57,6 +60,7 @@ class Beliefs:
             "looked_at": _rows(self._looked_at),
             "seen_at": _rows(self._seen_at),
             "told_at": _rows(self._told_at),
+            "told": _rows(self._told),
             "began": self._began,
         }
 
@@ -64,8 +68,9 @@ class Beliefs:
         """Know what `state` returned."""
         self._looks = {(int(k), int(r)): int(n) for k, r, n in state["looks"]}
         self._began = state["began"]
-        self._looked_at, self._seen_at, self._told_at = (
-            {(int(k), int(r)): float(at) for k, r, at in state[name]} for name in ("looked_at", "seen_at", "told_at")
+        self._looked_at, self._seen_at, self._told_at, self._told = (
+            {(int(k), int(r)): float(at) for k, r, at in state[name]}
+            for name in ("looked_at", "seen_at", "told_at", "told")
         )
 
     def notice(self, view: ObservationView, skills: AssistantSkills) -> None:
@@ -86,11 +91,17 @@ class Beliefs:
             if thing is not None and r is not None:
                 self._seen_at[k, r] = thing.time
 
-    def hear(self, k: int, place: str, now: float) -> None:
-        """Take in that somebody is said to be at a place, which is one of the subtask's regions."""
+    def hear(self, k: int, place: str, now: float, how: str) -> None:
+        """Take in that somebody is said to be at a place, which is one of the subtask's regions.
+
+        Parameters
+        ----------
+        how
+            What was said: a kind of `vico.agents.talk.understanding.Claim`.
+        """
         r = self._region_at(k, place)
         if r is not None:
-            self._told_at[k, r] = now
+            self._told_at[k, r], self._told[k, r] = now, _TOLD.get(how, _SAID)
 
     def _region_at(self, k: int, place: str) -> int | None:
         sources = self._book.instructions[k]["sources"]
@@ -115,7 +126,7 @@ class Beliefs:
         """Return what is left of a region's weight after all that was learnt of it."""
         if person:
             told, seen = self._told_at.get(spot), self._seen_at.get(spot)
-            weight += 0.0 if told is None else _TOLD * math.exp(-(now - told) / _STAYS)
+            weight += 0.0 if told is None else self._told[spot] * math.exp(-(now - told) / _STAYS)
             weight += 0.0 if seen is None else _SEEN * math.exp(-(now - seen) / _STAYS)
         looked = self._looked_at.get(spot)
         if looked is None or (person and looked < self._seen_at.get(spot, -math.inf)):

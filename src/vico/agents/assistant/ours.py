@@ -93,9 +93,9 @@ class OurPlanner(ChoicePlanner):
         }
         if not wanted:
             return None
-        for k, place in self._enquiries.listen(view, wanted):
+        for k, place, how in self._enquiries.listen(view, wanted):
             self.book.add_source(k, region_of(place))
-            self._beliefs.hear(k, place.id, float(view.state["time"]))
+            self._beliefs.hear(k, place.id, float(view.state["time"]), how)
         if self.errand is None or self.errand.stage not in _MAY_TURN or view.state["vehicle"]:
             return None
         return self._enquiries.question(view, wanted)

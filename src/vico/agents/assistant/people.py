@@ -22,7 +22,7 @@ _OFFER = "Hello {}! I am here to help you carry that home. May I take it?"
 # One speaks from so near, stands so near to be handed something, metres; asks again after so many steps; and gives up
 # somebody who is out of view for so long, or hands nothing over, steps.
 _SPEAK, _STAND, _AGAIN, _LOST, _LONGEST = CALL_DISTANCE - 3.0, HAND_OVER_DISTANCE - 0.3, 20, 25, 150
-# Who follows keeps behind by so much, runs where it is more than the second, metres, and else walks as they do; no longer
+# Who follows keeps behind by so much, runs where it is more than the second, metres, else walks as they do; no longer
 # than for so many steps.
 _BEHIND, _RUN_BEYOND = 1.7, 2.2
 _ESCORT = 700

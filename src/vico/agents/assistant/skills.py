@@ -25,6 +25,7 @@ from vico.world.public import PublicMap
 Action = dict[str, Any]
 
 WALK = 2.0  # metres a step
+_DRIFT = 0.3  # metres off the line in the open: what stands there is seen
 OUTSIDE = "outside"  # where a door leads that leads into no other room
 ENTER_REACH = 1.95  # metres from an entrance; the rules allow for 2
 DOOR_REACH = 1.5
@@ -98,6 +99,7 @@ class AssistantSkills:
         self.map = public_map
         self._rng = generator
         self.navigator = Navigator(public_map, generator)
+        self.navigator.walker.wide_drift = _DRIFT
         self.seen = SeenMemory()
         #: Metres a second outdoors.
         self.pace = WALK
