@@ -26,6 +26,8 @@ _NARROWER = 0.02
 # Points at which a line beside a bed is looked at for furniture.
 _SAMPLES = 16
 _LEVEL = 0.5  # metres a door may lie above or below who goes through it
+# Kinds of rooms in whose seats nobody sits down who finds another one: they would be in the way.
+_PASSAGES = frozenset({"hall", "corridor"})
 
 
 @dataclass(frozen=True)
@@ -122,6 +124,11 @@ class Indoor:
     def _treads(self) -> NDArray[np.float64]:
         """Of each room, and last 0 for those who are in none."""
         return np.array([(r.size[0] - 2 * LANDING) / FLIGHT_STEPS if r.rise else 0.0 for r in self.rooms] + [0.0])
+
+    @cached_property
+    def is_passage(self) -> NDArray[np.bool_]:
+        """Whether people only pass through each room."""
+        return np.array([room.kind in _PASSAGES for room in self.rooms], np.bool_)
 
     @cached_property
     def _climbs(self) -> NDArray[np.bool_]:

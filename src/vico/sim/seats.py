@@ -246,6 +246,8 @@ def find_rest(
 ) -> Rest | None:
     """Return the nearest free seat of one's room, else the way to the nearest room of the same place that has one.
 
+    Seats in halls and corridors, where others want to pass, are taken where no room has any.
+
     Parameters
     ----------
     here
@@ -260,7 +262,21 @@ def find_rest(
         near = [k for k in seats.near(point, -1, lies=lies, reach=_BENCH).tolist() if not taken[k]]
         seat = next((k for k in near if has_room(k)), None)
         return None if seat is None else Rest(int(seats.entity[seat]), "", _triple(seats.before(seat)))
-    wanted = (seats.lies == lies) & ~taken
+    free = (seats.lies == lies) & ~taken
+    in_rooms = free & ~indoor.is_passage[seats.room]
+    found = _rest_in(here, in_rooms, seats, indoor, has_room)
+    return _rest_in(here, free, seats, indoor, has_room) if found is None else found
+
+
+def _rest_in(
+    here: tuple[ArrayLike, int],
+    wanted: NDArray[np.bool_],
+    seats: Seats,
+    indoor: Indoor,
+    has_room: Callable[[int], bool],
+) -> Rest | None:
+    """Return the same among some of the seats."""
+    _, room = here
     found = _nearest_in(here, wanted, seats, indoor, has_room)
     if found is not None:
         seat, stand = found

@@ -97,7 +97,7 @@ def choose(situation: Situation, chance: np.random.Generator, *, worlds: int) ->
     """
     values = _values(situation, *draw_worlds(situation, chance, worlds))
     best = int(np.argmax(values)) if len(values) else -1
-    return best if best >= 0 and values[best] >= 0.0 else -1
+    return best if best >= 0 and values[best] > 0.0 else -1
 
 
 def worth(situation: Situation, chance: np.random.Generator, *, worlds: int) -> float:

@@ -94,9 +94,10 @@ class Draw:
         known = [place_region(place) for place in self.hood.places_of(who) if place.id != who.home]
         known += self.hood.spots_of(who, self.chance, radius=SOURCE_RADIUS)
         days = self._others(source, of_day, home)
-        more = [region for region in self._others(source, known, home) if region.place is None or region not in days]
+        more = self._others(source, known, home)
         chosen = [days[int(k)] for k in self.chance.permutation(len(days))]
-        return self._mixed(source, [*chosen, *more][: count - 1])
+        apart = {region.centre: region for region in (*chosen, *more) if region.centre != source.centre}
+        return self._mixed(source, list(apart.values())[: count - 1])
 
     def _others(self, source: Region, regions: list[Region], target: Region | None) -> list[Region]:
         """Return regions other than the source, where no thing is told to lie and none is brought to; nearest first."""
