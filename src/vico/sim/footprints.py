@@ -59,11 +59,11 @@ def records_of(bodies: Bodies, space: NDArray[Any] | int = OUTDOORS) -> NDArray[
     """Return bodies as kernels take them, dtype `BODY`; extents in ENU metres, `space` one for all or one each."""
     found = np.empty(len(bodies), BODY)
     found["entity"], found["space"] = bodies.entity, space
-    half, extent = (bodies.half_length, bodies.half_width), (bodies.bottom, bodies.top)
     # One layout for all: another one would have to be compiled.
-    half, extent = (tuple(np.ascontiguousarray(side, np.float64) for side in pair) for pair in (half, extent))
+    half = _plain(bodies.half_length), _plain(bodies.half_width)
+    extent = _plain(bodies.bottom), _plain(bodies.top)
     columns = (bodies.position, bodies.yaw, bodies.rounding, bodies.velocity)
-    position, yaw, rounding, velocity = (np.ascontiguousarray(column, np.float64) for column in columns)
+    position, yaw, rounding, velocity = (_plain(column) for column in columns)
     _fill(found, position, yaw, half, rounding, extent, velocity)
     return found
 
@@ -75,6 +75,10 @@ def joined_records(parts: Sequence[NDArray[np.void]]) -> NDArray[np.void]:
         found[at : at + len(part)] = part
         at += len(part)
     return found
+
+
+def _plain(column: NDArray[Any]) -> NDArray[np.float64]:
+    return np.ascontiguousarray(column, np.float64)
 
 
 @compiled

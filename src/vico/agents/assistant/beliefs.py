@@ -87,9 +87,9 @@ class Beliefs:
                 continue
             thing = skills.seen.last_seen(str(told["person"]["name"]))
             place = None if thing is None else skills.places.get(thing.room)
-            r = None if place is None else self._region_at(k, place)
-            if thing is not None and r is not None:
-                self._seen_at[k, r] = thing.time
+            at = None if place is None else self._region_at(k, place)
+            if thing is not None and at is not None:
+                self._seen_at[k, at] = thing.time
 
     def hear(self, k: int, place: str, now: float, how: str) -> None:
         """Take in that somebody is said to be at a place, which is one of the subtask's regions.
