@@ -20,15 +20,14 @@ def test_the_standard_list_is_24_windows_of_ten_cities() -> None:
     assert len(windows) == 24
     assert len({window.osm for window in windows}) == 10
     assert all(window.radius >= 200 for window in windows)
-    # Two windows of one city share a little where the centre and the corners of an extract are all used.
-    shares = [share for _, _, share in overlaps(window_list("standard"))]
-    assert len(shares) == 6
-    assert max(shares) < 0.11
+    assert overlaps(window_list("standard")) == []
+    tuned_on = {window.name for window in window_list("tuning").windows}
+    assert not tuned_on & {window.name for name in ("standard", "advanced") for window in window_list(name).windows}
 
 
 def test_the_other_lists_are_what_the_tables_need() -> None:
     counts = {name: len(found.windows) for name, found in window_lists().items()}
-    assert counts == {"standard": 24, "advanced": 3, "influence": 5, "commute": 10, "reduced": 4}
+    assert counts == {"standard": 24, "advanced": 3, "influence": 5, "commute": 10, "reduced": 4, "tuning": 6}
     assert all(window.radius == 400 for window in window_list("commute").windows)
 
 
@@ -55,7 +54,7 @@ def test_a_list_of_ones_own_is_read_strictly(tmp_path: Path, monkeypatch: pytest
     one = '[[windows]]\nname = "mine"\nosm = "mine.osm.pbf"\nlat = 1.0\nlon = 2.0\nradius = 250.0\n'
     cases = [
         (one, None), (one * 2, "mine twice"), (one + "moon = 1\n", "moon"), (one.replace("1.0", "91.0"), "lat"),
-        (one.replace('"mine"', '"../mine"'), "name"), (one.replace('"mine"', '"helsinki_a"'), "another window"),
+        (one.replace('"mine"', '"../mine"'), "name"), (one.replace('"mine"', '"helsinki_b"'), "another window"),
         ("", "windows"),
     ]  # fmt: skip
     for number, (text, says) in enumerate(cases):
@@ -67,7 +66,7 @@ def test_a_list_of_ones_own_is_read_strictly(tmp_path: Path, monkeypatch: pytest
         with pytest.raises(SchemaError, match=says):
             window_list("mine")
     monkeypatch.delenv("VICO_DATA")
-    with pytest.raises(InputError, match="there are advanced, commute, influence, reduced, standard"):
+    with pytest.raises(InputError, match="there are advanced, commute, influence, reduced, standard, tuning"):
         window_list("mine")
 
 
@@ -76,8 +75,9 @@ def test_the_script_shows_a_list_and_says_what_it_lacks(tmp_path: Path) -> None:
         return subprocess.run([sys.executable, str(SCRIPT), *words], capture_output=True, text=True, check=False)
 
     shown = run("--show")
-    assert "helsinki_a and helsinki_b share 10.2 %" in shown.stdout
-    lacking = run("--out", str(tmp_path / "w"), "--only", "monaco_a")
+    assert "monaco_b" in shown.stdout
+    assert "share" not in shown.stdout  # no two of them have ground in common
+    lacking = run("--out", str(tmp_path / "w"), "--only", "monaco_b")
     assert lacking.returncode == 1
     assert "needs the extract monaco/monaco.osm.pbf; say with --places" in lacking.stderr
     assert "no window called nowhere" in run("--out", str(tmp_path / "w"), "--only", "nowhere").stderr
