@@ -8,6 +8,9 @@ Tables: assistant (24 worlds; one and two assistants), advanced (three worlds), 
 that was cut short goes on with the same command. With `--reduced` there are four worlds and one seed; these worlds
 are built into OUT/worlds if `--worlds` is not given. Methods that need a language model are played where `--method`
 names them, with the model of the environment; without, the page says that they were not run.
+
+Reported seeds are drawn from the commit at which a method was frozen, so nobody can have tuned on them:
+`--first-seed N` with N the first six hexadecimal digits of that commit's hash, as an integer (`echo $((16#e6541f))`).
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from worlds import locate, row_of
@@ -110,7 +113,7 @@ def play(arguments: argparse.Namespace, table: Table, block: Block, worlds: Sequ
     challenge = load_challenge(block.challenge)
     methods = arguments.method or offline_methods(challenge)
     setting = {**block.setting, "steps": arguments.steps} if arguments.steps else block.setting
-    jobs = jobs_for(
+    drawn = jobs_for(
         block.challenge,
         categories=arguments.category or challenge.categories,
         methods=methods,
@@ -118,6 +121,7 @@ def play(arguments: argparse.Namespace, table: Table, block: Block, worlds: Sequ
         worlds=worlds,
         seeds=arguments.seeds or (1 if arguments.reduced else table.seeds),
     )
+    jobs = [replace(job, seed=arguments.first_seed + job.seed) for job in drawn]
     folder = arguments.out / block.name.replace(", ", "_").replace(" ", "_")
     outcomes = evaluate(
         block.challenge, jobs, folder, workers=arguments.workers, record=arguments.record, finished=tell
@@ -145,6 +149,7 @@ def main() -> int:
     parser.add_argument("--category", action="append", help="instead of all")
     parser.add_argument("--block", action="append", help="parts of the table instead of all: their names")
     parser.add_argument("--seeds", type=int, default=0)
+    parser.add_argument("--first-seed", type=int, default=0, help="N: episodes are seeded N, N + 1, ...")
     parser.add_argument("--steps", type=int, default=0, help="shorter episodes of assistants, to try it out")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--record", action="store_true")
