@@ -434,6 +434,10 @@ class Traveller:
         if freed is not None:
             return freed
         action = self._walker.towards(end, BIKE_SPEED, observation, info, room=_TURNING)
+        if action is None and _away(observation, end) > _TO_RACK:
+            # Where there is room to turn is not near enough: the rest of the way is narrow.
+            self._walker.stop()
+            action = self._walker.towards(end, BIKE_SPEED, observation, info)
         return {"type": "exit_bike"} if action is None else action
 
     def _freed(self, observation: Observation) -> Action | None:

@@ -116,6 +116,9 @@ class DayPlanner:
             found = list(self._with_bicycle(question))
         else:
             found = list(self._on_foot(question))
+        if not found and question.vehicle == "bike":
+            # Wherever it was of no use: a bicycle has to be back at a station.
+            return self._legs.brought_back(question.here, question.goal, question.now)
         if not found:
             return None
         best = min(found, key=lambda option: option.cost + self._after(question.index, option.keeps))
