@@ -205,7 +205,9 @@ class DayPlanner:
         late = weights.late * _probability(lateness / math.sqrt(variance))
         # Of two that are late the one that is less so.
         late += max(0.0, lateness)
-        cost = travel + weights.metre * trip.walked + weights.money * trip.price + late
+        # A kept bicycle is paid for while one waits for the start, too.
+        early = BIKE_RATE * max(0.0, -lateness) / 60.0 if keeps else 0.0
+        cost = travel + weights.metre * trip.walked + weights.money * (trip.price + early) + late
         return Option(trip, cost, keeps)
 
     def _uncertainty(self, legs: Sequence[Leg]) -> tuple[float, float]:
