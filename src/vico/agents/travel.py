@@ -244,8 +244,10 @@ class Traveller:
     def _at_the_ways_end(self, leg: Leg, observation: Observation) -> Action:
         """Begin the ride from as near as one gets, as others stand in the place for it; do without it from farther."""
         assert self.trip is not None
-        away = _away(observation, self.trip.legs[self._leg + 1].start)
-        is_in_the_way = self._is_in_the_way(observation["pose"][:2])
+        ride = self.trip.legs[self._leg + 1]
+        away = _away(observation, ride.start)
+        # Nobody waits at a rack: there one is in no bus's way.
+        is_in_the_way = ride.mode in _RIDDEN and self._is_in_the_way(observation["pose"][:2])
         if away > _BY_OTHERS or (is_in_the_way and self._still >= _IN_THE_WAY):
             self._close(leg)
         elif not is_in_the_way:
