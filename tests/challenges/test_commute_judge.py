@@ -118,24 +118,38 @@ def test_a_bicycle_may_be_kept_on_the_way_but_not_at_the_end(day: Day) -> None:
     day.judge.begin(day.seen(298.0, "bike"))
     day.go(599.0, "bike")
     assert not day.judge.over
-    day.purse.money_left -= 21.4
+    day.purse.money_left -= 24.2
     day.go(599.0)
     assert day.judge.over
     assert day.judge.logs[1].arrived == 33_602.0
-    assert day.judge.logs[1].spent == pytest.approx(21.4)
+    assert day.judge.logs[1].spent == pytest.approx(24.2)
     assert day.judge.logs[1].astray == 1
+
+
+def test_the_rent_of_a_long_ride_is_not_taken_for_a_bicycle_left_astray(day: Day) -> None:
+    day.time = 27_300.0
+    day.go(0.0, "bike")
+    day.time = 32_400.0
+    day.go(298.0, "bike")
+    day.release()
+    day.judge.begin(day.seen(298.0, "bike"))
+    day.go(590.0, "bike")
+    day.purse.money_left -= 21.2  # 106 minutes, and brought back
+    day.go(599.0)
+    assert day.judge.logs[1].spent == pytest.approx(21.2)
+    assert day.judge.logs[1].astray == 0
 
 
 def test_a_bicycle_that_is_ridden_when_the_day_is_over_is_paid_for(day: Day) -> None:
     day.go(298.0)
     day.release()
     day.judge.begin(day.seen(298.0))
-    day.purse.due = 24.0
+    day.purse.due = 24.4
     day.go(400.0, "bike", seconds=1300)
     log = day.judge.logs[1]
     assert day.judge.over
     assert log.late
-    assert log.spent == 24.0
+    assert log.spent == 24.4
     assert log.astray == 1
 
 

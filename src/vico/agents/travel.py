@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Sequence
-from typing import Any
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from vico.agents.base import Action, Info, Observation
+from vico.agents.base import Action, Info, Observation, heading
+from vico.agents.narrow_places import way_out
+from vico.agents.saved_trips import leg_state, restored_leg
 from vico.agents.state import AgentState
 from vico.agents.stays import RUN
 from vico.agents.wayfinding import Walker, closed_ground
@@ -47,8 +48,8 @@ _EARLY = 2 * BUS_DWELL
 _STILL, _STANDS = 0.05, 3
 # How often one looks for another spot to get on a bicycle before going elsewhere.
 _TRIES = 4
-# How often one tries to turn a bicycle where it is narrow before leaving it there.
-_PUSHES = 40
+# How often one tries to turn a bicycle where it is narrow before leaving it there: that costs as much as 100 minutes.
+_PUSHES = 120
 
 #: Modes in which one is taken along.
 _RIDDEN = ("bus", "tram")
@@ -127,6 +128,8 @@ class Traveller:
         self._ground: list[tuple[float, float, float]] = []
         self._asked = ""
         self._tries = 0
+        # What is still to be done to get a bicycle out of a narrow place.
+        self._out: list[Action] = []
         self._last: tuple[float, float] | None = None
         self._still = 0
 
@@ -137,13 +140,14 @@ class Traveller:
             "walker": self._walker.state(),
             "goal": None if self._goal is None else list(self._goal),
             "depart": None if trip is None else trip.depart,
-            "legs": {} if trip is None else {str(k): _leg_state(leg) for k, leg in enumerate(trip.legs)},
+            "legs": {} if trip is None else {str(k): leg_state(leg) for k, leg in enumerate(trip.legs)},
             "plans": self.plans,
             "leg": self._leg,
             "closed": list(self._closed),
             "fresh": self._fresh,
             "asked": self._asked,
             "tries": self._tries,
+            "out": [dict(action) for action in self._out],
             "last": None if self._last is None else list(self._last),
             "still": self._still,
         }
@@ -152,12 +156,13 @@ class Traveller:
         """Go on with the trip that `state` returned."""
         self._walker.restore(state["walker"])
         self._goal = None if state["goal"] is None else (float(state["goal"][0]), float(state["goal"][1]))
-        legs = tuple(_restored_leg(state["legs"][str(k)]) for k in range(len(state["legs"])))
+        legs = tuple(restored_leg(state["legs"][str(k)]) for k in range(len(state["legs"])))
         self.trip = None if state["depart"] is None else Trip(float(state["depart"]), legs)
         self.plans, self._leg = int(state["plans"]), int(state["leg"])
         self._closed, self._asked = [str(name) for name in state["closed"]], str(state["asked"])
         self._fresh = bool(state["fresh"])
         self._tries, self._still = int(state["tries"]), int(state["still"])
+        self._out = [dict(action) for action in state["out"]]
         self._last = None if state["last"] is None else (float(state["last"][0]), float(state["last"][1]))
 
     def stop(self) -> None:
@@ -239,8 +244,10 @@ class Traveller:
     def _at_the_ways_end(self, leg: Leg, observation: Observation) -> Action:
         """Begin the ride from as near as one gets, as others stand in the place for it; do without it from farther."""
         assert self.trip is not None
-        away = _away(observation, self.trip.legs[self._leg + 1].start)
-        is_in_the_way = self._is_in_the_way(observation["pose"][:2])
+        ride = self.trip.legs[self._leg + 1]
+        away = _away(observation, ride.start)
+        # Nobody waits at a rack: there one is in no bus's way.
+        is_in_the_way = ride.mode in _RIDDEN and self._is_in_the_way(observation["pose"][:2])
         if away > _BY_OTHERS or (is_in_the_way and self._still >= _IN_THE_WAY):
             self._close(leg)
         elif not is_in_the_way:
@@ -429,23 +436,41 @@ class Traveller:
         if freed is not None:
             return freed
         action = self._walker.towards(end, BIKE_SPEED, observation, info, room=_TURNING)
+        if action is None and _away(observation, end) > _TO_RACK:
+            # Where there is room to turn is not near enough: the rest of the way is narrow.
+            self._walker.stop()
+            action = self._walker.towards(end, BIKE_SPEED, observation, info)
         return {"type": "exit_bike"} if action is None else action
 
     def _freed(self, observation: Observation) -> Action | None:
         """Return what gets a bicycle out of a place where it can't be turned; None where it can."""
-        if observation["state"]["action_status"] != "collision" or self._asked not in ("turn_left", "turn_right"):
-            return None
+        stopped = observation["state"]["action_status"] == "collision"
+        self._out = [] if stopped else self._out
+        if self._out:
+            return self._out.pop(0)
+        if not stopped or self._asked not in ("turn_left", "turn_right"):
+            return self._out_of_narrow_place(observation) if self._asked == "enter_bike" else None
         self._tries += 1
+        # Every second time, for others may stand where the map has room.
+        out = self._out_of_narrow_place(observation) if self._tries % 2 else None
+        if out is not None and self._tries <= _PUSHES:
+            return out
         if self._tries > _PUSHES:
             leg = self.trip.legs[self._leg] if self.trip is not None and self._leg < len(self.trip.legs) else None
             if leg is not None and leg.origin is not None:
                 self._closed.append(leg.origin)  # there is no getting away from that rack
             return {"type": "exit_bike"}
         # Ahead a little, or round the other way.
-        if self._tries % 2:
+        if self._tries % 4 == 1:
             return {"type": "move_forward", "distance": float(self._rng.uniform(0.3, 1.2))}
         other = "turn_right" if self._asked == "turn_left" else "turn_left"
         return {"type": other, "degrees": float(self._rng.uniform(20.0, 120.0))}
+
+    def _out_of_narrow_place(self, observation: Observation) -> Action | None:
+        """Return the first action on the way to where a bicycle can be turned, the others to come; None if it can."""
+        self._out = way_out(self._map.walkable, observation["pose"][:2], heading(observation)) or []
+        self._walker.stop()
+        return self._out.pop(0) if self._out else None
 
     def _nearest_station(self, observation: Observation) -> tuple[float, float] | None:
         spots = [(s.position[0], s.position[1]) for s in self._map.bike_stations]
@@ -468,20 +493,6 @@ class Traveller:
 def _away(observation: Observation, point: tuple[float, ...]) -> float:
     x, y = observation["pose"][:2]
     return math.hypot(float(x) - point[0], float(y) - point[1])
-
-
-_FIELDS = ("mode", "depart", "arrive", "metres", "price", "line", "origin", "destination")
-
-
-def _leg_state(leg: Leg) -> dict[str, Any]:
-    fields = {name: getattr(leg, name) for name in _FIELDS}
-    return fields | {"start": list(leg.start), "end": list(leg.end), "polyline": leg.polyline.copy()}
-
-
-def _restored_leg(state: dict[str, Any]) -> Leg:
-    start, end = ((float(x), float(y)) for x, y in (state["start"], state["end"]))
-    polyline = np.array(state["polyline"], np.float64).reshape(-1, 2)
-    return Leg(start=start, end=end, polyline=polyline, **{name: state[name] for name in _FIELDS})
 
 
 __all__ = ["Traveller", "TripPlanner"]

@@ -32,6 +32,10 @@ _REJOIN, _DETOUR = 8.0, 6.0
 # Degrees one turns for a step aside, and for one back; who is stopped so often steps back, for aside it is no wider.
 _ASIDE, _BACK, _BACK_FROM = (50.0, 90.0, 130.0), (130.0, 170.0, 90.0), 9
 _HIT_SOLID = code_name(ReasonCode.HIT_SOLID)
+# Who rides and is stopped by a vehicle lets it pass, so many times two seconds: a tram is long and stands at stops.
+_LETS_PASS, _LETS_TRAM_PASS = 2, 15
+# Who rides steps aside where there is so much room to walls, metres, that the bicycle can be turned there.
+_TURNED = 0.9
 
 Point = tuple[float, float]
 
@@ -269,6 +273,10 @@ class Walker:
         if self._blocked == 1 and not solid:
             self._aside = [{"type": "wait"}] * int(self._rng.integers(1, 3))
             return
+        if self._turns_in and self._blocked <= _patience_with(observation):
+            # It goes on when it can: who presses on beside it gets stuck between it and a wall.
+            self._aside = [{"type": "wait"}] * 2
+            return
         if self._blocked % 4 == 0:
             x, y = _ahead(position, yaw, 0.9)
             # Stopped near a closed spot again: what stands there is wider than was thought.
@@ -276,11 +284,12 @@ class Walker:
             self._closed = [*self._closed[-5:], (x, y, _BLOCK + _GROW * again)]
         # Everybody passes on the right, mostly: so two who meet don't mirror each other.
         first = -1.0 if self._rng.random() < 0.8 else 1.0
+        least = _TURNED if self._turns_in and self._room(position) >= _TURNED else 0.3
         for side in (first, -first):
             for degrees in _ASIDE if self._blocked < _BACK_FROM else _BACK:
                 angle = yaw + side * math.radians(degrees)
                 reach = 0.8 + 0.2 * min(self._blocked, 4)
-                if self._room(_ahead(position, angle, reach)) >= 0.3 and (
+                if self._room(_ahead(position, angle, reach)) >= least and (
                     self._room(_ahead(position, angle, reach / 2)) >= 0.28
                 ):
                     turn = "turn_left" if side > 0 else "turn_right"
@@ -307,6 +316,14 @@ def closed_ground(info: Info) -> list[tuple[float, float, float]]:
     """Return the ground that events close now, as far as one knows of them: x, y and radius, ENU metres."""
     known = [event for event in info.get("events", ()) if event["goes_on"]]
     return [(x, y, radius) for event in known for x, y, radius in event["closed_ground"]]
+
+
+def _patience_with(observation: Observation) -> int:
+    """Return how often who rides waits for what stopped it to go on."""
+    what = str(observation["state"]["action_reason"]).removeprefix("stopped by ")
+    if what == "tram":
+        return _LETS_TRAM_PASS
+    return _LETS_PASS if what in VEHICLES else 0
 
 
 def _ahead(position: Point, yaw: float, reach: float) -> Point:

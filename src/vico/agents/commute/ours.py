@@ -19,13 +19,14 @@ import numpy as np
 
 from vico.agents.commute.legs import LegMaker
 from vico.agents.commute.question import Question
+from vico.agents.narrow_places import leads_out
 from vico.rules import BIKE_RATE
 from vico.world.model import Point2
 from vico.world.public import PublicMap
 from vico.world.trips import Leg, Trip
 
-# A bicycle is turned where there is so much room to walls, within so many metres of its station.
-_ROOM, _ROOM_WITHIN = 1.0, 2.0
+# Who keeps a bicycle is at an appointment this near to its point, where there is so much room to walls, metres.
+_THERE, _ROOM = 2.5, 1.1
 
 
 @dataclass(frozen=True)
@@ -96,8 +97,13 @@ class DayPlanner:
         self._weights = weights or Weights()
         # Cost of the rest of the day from an appointment on, by its number and whether one has a bicycle there.
         self._rest: dict[tuple[int, bool], float] = {}
-        # Stations that were of no use on this day, or where there is no room to turn a bicycle.
-        self._useless = {name for name in self._legs.stations if not self._has_room(public_map, name)}
+        # Stations that were of no use on this day, or from where no bicycle can be ridden off.
+        self._walkable = public_map.walkable
+        # Where one is at an appointment with a bicycle, by its point.
+        self._spots: dict[Point2, Point2 | None] = {}
+        self._useless = {
+            name for name in self._legs.stations if not leads_out(self._walkable, self._legs.point_of(name))
+        }
 
     def __call__(self, question: Question) -> Trip | None:
         """Return the trip with the least cost of the rest of the day."""
@@ -110,18 +116,13 @@ class DayPlanner:
             found = list(self._with_bicycle(question))
         else:
             found = list(self._on_foot(question))
+        if not found and question.vehicle == "bike":
+            # Wherever it was of no use: a bicycle has to be back at a station.
+            return self._legs.brought_back(question.here, question.goal, question.now)
         if not found:
             return None
         best = min(found, key=lambda option: option.cost + self._after(question.index, option.keeps))
         return self._departing(best.trip, question.now)
-
-    def _has_room(self, public_map: PublicMap, station: str) -> bool:
-        """Whether a bicycle can be turned within a few steps of a station."""
-        x, y = self._legs.point_of(station)
-        steps = np.arange(-_ROOM_WITHIN, _ROOM_WITHIN + 0.1, 0.5)
-        around = np.stack(np.meshgrid(x + steps, y + steps), axis=-1).reshape(-1, 2)
-        free = public_map.walkable.is_connected(around)
-        return bool((free & (public_map.walkable.clearance_at(around) >= _ROOM)).any())
 
     # -- the rest of the day -----------------------------------------------------------------------------------------
 
@@ -156,20 +157,22 @@ class DayPlanner:
         cash = None if math.isinf(q.cash) else q.cash
         for trip in self._trips.alternatives(q.here, q.goal, q.now, cash=cash, closed=q.closed):
             yield self._option(trip, q, keeps=False)
-        if q.cash < 2 * BIKE_RATE:
+        spot = self._spot_for_bicycle(q.goal)
+        if q.cash < 2 * BIKE_RATE or spot is None:
             return
         for station in self._legs.stations.values():
             if station.bikes == 0 or station.id in q.closed:
                 continue
             walk = self._legs.walk(q.here, self._legs.point_of(station.id), q.now)
-            ride = walk and self._legs.rent(station.id, None, q.goal, walk.arrive)
+            ride = walk and self._legs.rent(station.id, None, spot, walk.arrive)
             if walk is not None and ride is not None:
                 yield self._option(Trip(q.now, (walk, ride)), q, keeps=True)
 
     def _with_bicycle(self, question: Question) -> Iterator[Option]:
         """Yield the trips of who rides a bicycle."""
         q = question
-        on = self._legs.ride_on(q.here, None, q.goal, q.now)
+        spot = self._spot_for_bicycle(q.goal)
+        on = self._legs.ride_on(q.here, None, spot, q.now) if spot is not None else None
         if on is not None:
             yield self._option(Trip(q.now, (on,)), q, keeps=True)
         for station in self._legs.stations.values():
@@ -179,6 +182,18 @@ class DayPlanner:
             walk = ride and self._legs.walk(self._legs.point_of(station.id), q.goal, ride.arrive)
             if ride is not None and walk is not None:
                 yield self._option(Trip(q.now, (ride, walk)), q, keeps=False)
+
+    def _spot_for_bicycle(self, goal: Point2) -> Point2 | None:
+        """Return the nearest spot at which one is there and has room to turn a bicycle; None if there is none."""
+        if goal not in self._spots:
+            steps = np.arange(-_THERE, _THERE + 0.01, 0.25)
+            around = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+            away = np.hypot(around[:, 0], around[:, 1])
+            around = np.asarray(goal) + around[np.argsort(away, kind="stable")][: int((away <= _THERE).sum())]
+            walkable = self._walkable
+            wide = np.flatnonzero(walkable.is_connected(around) & (walkable.clearance_at(around) >= _ROOM))
+            self._spots[goal] = (float(around[wide[0], 0]), float(around[wide[0], 1])) if len(wide) else None
+        return self._spots[goal]
 
     # -- what they cost ----------------------------------------------------------------------------------------------
 
@@ -190,7 +205,9 @@ class DayPlanner:
         late = weights.late * _probability(lateness / math.sqrt(variance))
         # Of two that are late the one that is less so.
         late += max(0.0, lateness)
-        cost = travel + weights.metre * trip.walked + weights.money * trip.price + late
+        # A kept bicycle is paid for while one waits for the start, too.
+        early = BIKE_RATE * max(0.0, -lateness) / 60.0 if keeps else 0.0
+        cost = travel + weights.metre * trip.walked + weights.money * (trip.price + early) + late
         return Option(trip, cost, keeps)
 
     def _uncertainty(self, legs: Sequence[Leg]) -> tuple[float, float]:

@@ -16,7 +16,7 @@ from typing import Any, Protocol
 
 from vico.challenges.commute.model import Appointment, CommuteTask
 from vico.challenges.commute.rules import ARRIVAL, LEFT
-from vico.rules import BIKE_ASTRAY
+from vico.rules import BIKE_ASTRAY, BIKE_RATE, ride_price
 from vico.runner.loop import Hook, Step
 
 #: Who stands this near to where one waits for a bus or tram, metres, waits for one.
@@ -131,6 +131,7 @@ class DayJudge(Hook):
     stays: bool = False
     over: bool = False
     _seen: _Seen | None = None
+    _mounted: float = 0.0
 
     def begin(self, observations: Mapping[str, dict[str, Any]]) -> None:
         """Take in how things stand when the agent is asked again, at the start or after a stay."""
@@ -161,8 +162,10 @@ class DayJudge(Hook):
         log.waits += on_foot and moved < _STILL and self._is_at_stop(now.position)
         log.walked += moved if on_foot else 0.0
         log.spent += before.money - now.money
-        log.astray += before.money - now.money >= BIKE_ASTRAY
+        log.astray += self._is_astray(before.money - now.money, time)
         boarded = now.vehicle not in ("", before.vehicle)
+        if boarded:
+            self._mounted = time
         if log.left is None and (boarded or math.dist(now.position, log.origin) > LEFT):
             log.left = time
         last = len(self.logs) == self.task.commutes
@@ -180,11 +183,16 @@ class DayJudge(Hook):
         if self.over:
             left = self.purse.bicycle_price(self.name)
             log.spent += left
-            log.astray += left >= BIKE_ASTRAY
+            log.astray += self._is_astray(left, time)
         elif log.arrived is not None:
             self.stays = True
         else:
             self._open(time)
+
+    def _is_astray(self, paid: float, time: float) -> bool:
+        """Whether what was paid for a bicycle is more than its rent: that of a long ride may be as much."""
+        rent = ride_price(time - self._mounted, returned=True)
+        return paid >= BIKE_ASTRAY and paid - rent >= BIKE_ASTRAY - 2 * BIKE_RATE
 
     def _open(self, time: float) -> None:
         assert self._seen is not None

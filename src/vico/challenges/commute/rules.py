@@ -25,7 +25,9 @@ LEAST_STAY = 300
 LAST_STAY = 900
 
 #: From the end of the first stay to the end of the last, hours, unless a job's setting says otherwise; and its bounds.
-HOURS = 4.0
+#: A day that does not fit is longer: with the least of them stays take no longer than they must, and nearly all that is
+#: simulated are ways.
+HOURS = 1.0
 LEAST_HOURS, MOST_HOURS = 1.0, 14.0
 #: The first stay ends in the hour from here on; bounds of all times; seconds of the day.
 MORNING = 8 * 3600
