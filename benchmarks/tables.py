@@ -34,11 +34,12 @@ from vico.worldgen.many import build_many
 
 @dataclass(frozen=True)
 class Block:
-    """A part of a table: one challenge in one setting."""
+    """A part of a table: one challenge in one setting; `methods` instead of all that need no language model."""
 
     name: str
     challenge: str
     setting: Setting = field(default_factory=dict)
+    methods: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,8 @@ class Table:
 def _assistants(count: int, *, advanced: bool = False) -> Setting:
     return {"assistants": count, "advanced": advanced, "distance": True, "steps": 1500}
 
+
+_ABLATION = ("ours+nearest/ours", "ours+ours/nearest", "ours+persuadable/ours", "ours+ours/persuadable")
 
 TABLES = {
     "assistant": Table(
@@ -72,7 +75,14 @@ TABLES = {
         ),
         "advanced", 3, "heuristic",
     ),
-    "influence": Table((Block("pairings", "influence"),), "influence", 1, ""),
+    "influence": Table(
+        (
+            Block("pairings", "influence"),
+            # The same dialogue on both sides, then the same target choice: what each of the two is worth.
+            Block("ablation", "influence", methods=_ABLATION),
+        ),
+        "influence", 1, "",
+    ),
     "commute": Table((Block("a day of commutes", "commute"),), "commute", 10, "rule"),
 }  # fmt: skip
 
@@ -108,7 +118,7 @@ def tell(outcome: Outcome, done: int, total: int) -> None:
 def play(arguments: argparse.Namespace, table: Table, block: Block, worlds: Sequence[Path]) -> bool:
     """Play a part of a table and write it; return whether all episodes were played."""
     challenge = load_challenge(block.challenge)
-    methods = arguments.method or offline_methods(challenge)
+    methods = arguments.method or block.methods or offline_methods(challenge)
     setting = {**block.setting, "steps": arguments.steps} if arguments.steps else block.setting
     jobs = jobs_for(
         block.challenge,

@@ -118,6 +118,7 @@ def test_every_dialogue_talks_up_to_three_rounds(name: str) -> None:
         ends=72000.0,
         seed=0,
     )
+    courtship.set_out("resident_2", "home", 43100.0)
     courtship.begin("resident_2", 43200.0)
     said = [courtship.message(43200.0, (0.0, 0.0), lambda place: 0.0) for _ in range(4)]
     assert said[3] is None

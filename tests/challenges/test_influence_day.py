@@ -210,7 +210,7 @@ def test_conv_counts_those_who_first_preferred_the_other() -> None:
     assert verdict.won("sum") == (2, 4)
     assert verdict.converted("sum") == (2, 3)
     parts = evaluate.parts_of(verdict, {m: m for m in "abcd"}, "first", 60)
-    assert [part.cause for part in parts] == ["lost to the rival", "", "", "never talked with"]
+    assert [part.cause for part in parts] == ["lost to the rival", "", "", "never sought"]
     assert evaluate.metrics_of([verdict])["win"] == 50.0
     assert evaluate.metrics_of([verdict])["conv"] == pytest.approx(200 / 3)
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 
 from vico.agents.base import Action, Info, Observation
 from vico.agents.indoor_walk import IndoorWalker
+from vico.agents.influence.visits import Ending
 from vico.agents.state import AgentState
 from vico.agents.wayfinding import Walker
 from vico.rules import WALK_SPEED
@@ -40,8 +42,8 @@ class Visitor:
         self._map, self._rng = public_map, generator
         self._walker = Walker(public_map, generator)
         self._indoors = IndoorWalker()
-        #: Whether the one who is looked for could not be found.
-        self.failed = False
+        #: Why the one who is looked for could not be found; empty while looking.
+        self.failure: Ending | Literal[""] = ""
         self._target = ""
         self._place: PublicPlace | None = None
         self._reset()
@@ -53,15 +55,20 @@ class Visitor:
         self._trail: list[str] = []
         self._spot: tuple[float, float] | None = None
 
+    @property
+    def is_there(self) -> bool:
+        """Whether one has come to the place: in, or where one looks about in the open."""
+        return self._is_in or self._spots > 0 or self._turns > 0
+
     def start(self, target: str, place: str) -> None:
         """Look for somebody at a place from now on."""
-        self.failed = False
+        self.failure = ""
         self._target, self._place = target, self._map.place_by_id[place]
         self._walker.stop()
         self._reset()
 
     def towards(self, observation: Observation, info: Info) -> Action | None:
-        """Return the next action; None once beside them. Whoever cannot be found is waited for: `failed` says so."""
+        """Return the next action; None once beside them. Whoever cannot be found is waited for: `failure` says so."""
         assert self._place is not None
         state = observation["state"]
         if info.get("coming_out"):
@@ -83,7 +90,7 @@ class Visitor:
         return {
             "walker": self._walker.state(),
             "indoors": self._indoors.state(),
-            "failed": self.failed,
+            "failure": self.failure,
             "target": self._target,
             "place": None if self._place is None else self._place.id,
             "is_in": self._is_in,
@@ -97,7 +104,7 @@ class Visitor:
         """Go on where `state` was."""
         self._walker.restore(state["walker"])
         self._indoors.restore(state["indoors"])
-        self.failed, self._target, self._is_in = bool(state["failed"]), str(state["target"]), bool(state["is_in"])
+        self.failure, self._target, self._is_in = state["failure"], str(state["target"]), bool(state["is_in"])
         self._place = None if state["place"] is None else self._map.place_by_id[state["place"]]
         self._turns, self._steps, self._refused, self._spots = (int(n) for n in state["counts"])
         self._seen_rooms, self._trail = list(state["seen_rooms"]), list(state["trail"])
@@ -110,7 +117,7 @@ class Visitor:
             return None
         if observation["state"]["room"]:
             return self._indoors.towards(observation, (x, y), near=_BESIDE)
-        return self._walker.towards((x, y), WALK_SPEED, observation, info) or self._fail()
+        return self._walker.towards((x, y), WALK_SPEED, observation, info) or self._fail("not reached")
 
     def _has_come(self, observation: Observation) -> bool:
         """Return whether one has come into the place that is wanted, or was in it all along."""
@@ -127,14 +134,14 @@ class Visitor:
         ):
             return self._look_around_outdoors(observation, info)
         if self._is_in:  # came out again: the place was searched
-            return self._fail()
+            return self._fail("not found")
         if place.id in state["accessible_places"]:
             self._refused += state["action_status"] == "refused"
             self._steps += 1
             is_shut = self._refused > _REFUSALS or self._steps > _STEPS_A_ROOM
-            return self._fail() if is_shut else {"type": "enter", "place": place.id}
+            return self._fail("not reached") if is_shut else {"type": "enter", "place": place.id}
         goal = (float(place.position[0]), float(place.position[1]))
-        return self._walker.towards(goal, WALK_SPEED, observation, info) or self._fail()
+        return self._walker.towards(goal, WALK_SPEED, observation, info) or self._fail("not reached")
 
     def _look_around_outdoors(self, observation: Observation, info: Info) -> Action | None:
         assert self._place is not None
@@ -148,7 +155,7 @@ class Visitor:
             self._turns += 1
             return {"type": "turn_left", "degrees": _TURN}
         if self._spots >= _SPOTS:
-            return self._fail()
+            return self._fail("not found")
         self._spots += 1
         x, y = self._map.walkable.random_point(self._rng, near=self._place.position[:2], radius=_AROUND)
         self._spot = float(x), float(y)
@@ -173,7 +180,7 @@ class Visitor:
             back = self._trail[-2] if len(self._trail) > 1 else ""
             onward = next((door for door in doors if door["to"] == back), None)
         if onward is None:
-            return self._fail()
+            return self._fail("not found")
         self._steps += 1
         if self._steps > _STEPS_A_ROOM:
             self._seen_rooms.append(onward["to"])
@@ -194,7 +201,7 @@ class Visitor:
         state = observation["state"]
         self._steps += 1
         if self._steps > 4 * _STEPS_A_ROOM:
-            return self._fail()
+            return self._fail("not reached")
         room, doors = state["room"], state["doors"]
         if room not in self._trail:
             self._trail.append(room)
@@ -203,10 +210,10 @@ class Visitor:
             step = self._indoors.towards(observation, out["position"], near=1.9)
             return step or {"type": "exit"}
         onward = next((door for door in doors if door["to"] not in self._trail), doors[0] if doors else None)
-        return self._fail() if onward is None else self._through(onward, observation)
+        return self._fail("not reached") if onward is None else self._through(onward, observation)
 
-    def _fail(self) -> Action:
-        self.failed = True
+    def _fail(self, why: Ending) -> Action:
+        self.failure = why
         return {"type": "wait"}
 
     @staticmethod
