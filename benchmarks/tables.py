@@ -90,8 +90,8 @@ TABLES = {
 def offline_methods(challenge: Challenge) -> list[str]:
     """Return the methods that need no language model; where methods compete, every pair of two of them."""
     methods = [method for method in challenge.methods if "llm" not in method]
-    if challenge.name == "influence":
-        return [f"{one}+{other}" for i, one in enumerate(methods) for other in methods[i + 1 :]]
+    if challenge.name == "influence":  # ours, which comes last, is the first of its pairs
+        return [f"{other}+{one}" for i, one in enumerate(methods) for other in methods[i + 1 :]]
     return methods
 
 
@@ -127,6 +127,7 @@ def play(arguments: argparse.Namespace, table: Table, block: Block, worlds: Sequ
         setting=setting,
         worlds=worlds,
         seeds=arguments.seeds or (1 if arguments.reduced else table.seeds),
+        first_seed=arguments.first_seed,
     )
     folder = arguments.out / block.name.replace(", ", "_").replace(" ", "_")
     outcomes = evaluate(
@@ -155,6 +156,7 @@ def main() -> int:
     parser.add_argument("--category", action="append", help="instead of all")
     parser.add_argument("--block", action="append", help="parts of the table instead of all: their names")
     parser.add_argument("--seeds", type=int, default=0)
+    parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--steps", type=int, default=0, help="shorter episodes of assistants, to try it out")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--record", action="store_true")
