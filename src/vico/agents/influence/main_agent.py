@@ -19,7 +19,7 @@ from vico.world.public import PublicMap
 
 # One thinks again after so many seconds where there is nobody to see, waits so long for an answer, and looks for
 # somebody no longer than the way takes and so many seconds more.
-_THINK, _ANSWER, _SEARCH = 30.0, 6.0, 240.0
+_THINK, _ANSWER, _SEARCH = 30.0, 6.0, 600.0
 # How far a voice is to carry, metres.
 _VOICE = 3.0
 _ON_THE_WAY = "on my way"
