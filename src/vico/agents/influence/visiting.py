@@ -183,6 +183,8 @@ class Visitor:
     def _search(self, observation: Observation, info: Info) -> Action | None:
         """Look about in a room, then go on to the next one that was not seen, and back where there is none."""
         room = observation["state"]["room"]
+        if self._trail[-1:] != [room]:
+            self._steps = 0  # of another room; else the next door would be given up for the way back from the last one
         if room in self._trail:
             del self._trail[self._trail.index(room) + 1 :]
         else:
