@@ -18,7 +18,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from worlds import locate, row_of
@@ -37,11 +37,12 @@ from vico.worldgen.many import build_many
 
 @dataclass(frozen=True)
 class Block:
-    """A part of a table: one challenge in one setting."""
+    """A part of a table: one challenge in one setting; `methods` instead of all that need no language model."""
 
     name: str
     challenge: str
     setting: Setting = field(default_factory=dict)
+    methods: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,8 @@ class Table:
 def _assistants(count: int, *, advanced: bool = False) -> Setting:
     return {"assistants": count, "advanced": advanced, "distance": True, "steps": 1500}
 
+
+_ABLATION = ("ours+nearest/ours", "ours+ours/nearest", "ours+persuadable/ours", "ours+ours/persuadable")
 
 TABLES = {
     "assistant": Table(
@@ -75,7 +78,14 @@ TABLES = {
         ),
         "advanced", 3, "heuristic",
     ),
-    "influence": Table((Block("pairings", "influence"),), "influence", 1, ""),
+    "influence": Table(
+        (
+            Block("pairings", "influence"),
+            # The same dialogue on both sides, then the same target choice: what each of the two is worth.
+            Block("ablation", "influence", methods=_ABLATION),
+        ),
+        "influence", 1, "",
+    ),
     "commute": Table((Block("a day of commutes", "commute"),), "commute", 10, "rule"),
 }  # fmt: skip
 
@@ -83,8 +93,8 @@ TABLES = {
 def offline_methods(challenge: Challenge) -> list[str]:
     """Return the methods that need no language model; where methods compete, every pair of two of them."""
     methods = [method for method in challenge.methods if "llm" not in method]
-    if challenge.name == "influence":
-        return [f"{one}+{other}" for i, one in enumerate(methods) for other in methods[i + 1 :]]
+    if challenge.name == "influence":  # ours, which comes last, is the first of its pairs
+        return [f"{other}+{one}" for i, one in enumerate(methods) for other in methods[i + 1 :]]
     return methods
 
 
@@ -111,17 +121,17 @@ def tell(outcome: Outcome, done: int, total: int) -> None:
 def play(arguments: argparse.Namespace, table: Table, block: Block, worlds: Sequence[Path]) -> bool:
     """Play a part of a table and write it; return whether all episodes were played."""
     challenge = load_challenge(block.challenge)
-    methods = arguments.method or offline_methods(challenge)
+    methods = arguments.method or block.methods or offline_methods(challenge)
     setting = {**block.setting, "steps": arguments.steps} if arguments.steps else block.setting
-    drawn = jobs_for(
+    jobs = jobs_for(
         block.challenge,
         categories=arguments.category or challenge.categories,
         methods=methods,
         setting=setting,
         worlds=worlds,
         seeds=arguments.seeds or (1 if arguments.reduced else table.seeds),
+        first_seed=arguments.first_seed,
     )
-    jobs = [replace(job, seed=arguments.first_seed + job.seed) for job in drawn]
     folder = arguments.out / block.name.replace(", ", "_").replace(" ", "_")
     outcomes = evaluate(
         block.challenge, jobs, folder, workers=arguments.workers, record=arguments.record, finished=tell

@@ -118,12 +118,42 @@ def test_every_dialogue_talks_up_to_three_rounds(name: str) -> None:
         ends=72000.0,
         seed=0,
     )
+    courtship.set_out("resident_2", "home", 43100.0)
     courtship.begin("resident_2", 43200.0)
     said = [courtship.message(43200.0, (0.0, 0.0), lambda place: 0.0) for _ in range(4)]
     assert said[3] is None
     assert all(text is not None and text.startswith("Carl! ") and len(text) <= 1000 for text in said[:3])
     if name == "ours":
         assert len(set(said)) == 4
+    assert [visit.ending for visit in courtship.visits] == ["talked"]
+
+
+def test_a_main_agents_mind_goes_on_where_it_was() -> None:
+    people = invented_people()
+
+    def mind() -> Courtship:
+        return Courtship(
+            people[0],
+            people[1],
+            people[2:],
+            {p.id: AT_HOME for p in people},
+            forms_of_address(people[2:]),
+            strategy=make_strategy("random/ours"),
+            ends=72000.0,
+            seed=0,
+        )
+
+    one, other = mind(), mind()
+    one.set_out("resident_2", "home", 43000.0)
+    one.give_up("resident_2", 43100.0, "not found")
+    one.set_out("resident_3", "home", 43100.0)
+    one.begin("resident_3", 43200.0)
+    one.message(43200.0, (0.0, 0.0), lambda place: 0.0)
+    other.restore(one.state())
+    assert other.state() == one.state()
+    one.break_off(43210.0, "no answer")
+    assert [visit.ending for visit in one.visits] == ["not found", "no answer"]
+    assert [visit.ending for visit in other.visits] == ["not found", "day over"]
 
 
 # -- language models ---------------------------------------------------------------------------------------------------

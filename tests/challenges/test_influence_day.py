@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +16,16 @@ from vico.agents.influence.days import DayPlan, Stay
 from vico.agents.influence.language import Asker
 from vico.agents.influence.profiles import forms_of_address
 from vico.agents.influence.strategies import make_strategy
+from vico.agents.influence.visits import Ending
 from vico.challenges.influence import INFLUENCE, evaluate
 from vico.challenges.influence.by_schedule import Walks, play_by_schedule
 from vico.challenges.influence.day import Day, make_day
-from vico.challenges.influence.generate import community_of, generate_influence
+from vico.challenges.influence.generate import community_of, generate_influence, rides_in
 from vico.challenges.influence.ledger import Ledger
 from vico.challenges.influence.model import InfluenceSettings, settings_of, strategies_of
 from vico.challenges.influence.opinion import OpinionModel
 from vico.challenges.records import Challenge, Job
-from vico.community.model import Community
+from vico.community.model import Community, ItemType
 from vico.errors import InputError, SourceError
 from vico.io.files import read_json
 from vico.sim.recording import read_run
@@ -203,6 +205,61 @@ def test_nobody_on_the_way_is_a_target(played: Callable[[str, str], tuple[Day, e
             assert commutes == (one.ignored == "on the way")
 
 
+def test_every_visit_ends_and_every_talk_is_one(
+    played: Callable[[str, str], tuple[Day, evaluate.Verdict]],
+) -> None:
+    for method in ("ours+nearest", "random+persuadable"):
+        day, verdict = played(method, "first")
+        heard = {(u.speaker, u.listener, u.conversation) for u in day.ledger.utterances if not u.ignored}
+        for main, courtship in day.courtships.items():
+            talked = [visit for visit in courtship.visits if visit.ending == "talked"]
+            assert len(talked) == sum(speaker == main for speaker, _, _ in heard)
+            # Only the last visit may be under way when the day is over.
+            assert all(visit.ending != "day over" for visit in courtship.visits[:-1])
+            assert all(one.ended <= other.began for one, other in pairwise(courtship.visits))
+        found = evaluate.metrics_of([verdict])
+        failed = sum(value for key, value in found.items() if key.startswith("visits_"))
+        assert found["visits"] - failed == len([v for v in day.courtships[day.ours].visits if v.ending == "talked"])
+
+
+def test_the_last_visit_says_why_a_member_was_not_talked_with() -> None:
+    everybody = {"sum": dict.fromkeys("abcd", "y")}
+    visits: dict[str, list[Ending]] = {"a": ["not found", "on the way"], "b": ["talked"], "c": ["not reached"]}
+    verdict = evaluate.Verdict("x", everybody, everybody, frozenset({"b"}), visits)
+    parts = evaluate.parts_of(verdict, {m: m for m in "abcd"}, "first", 60)
+    assert [part.cause for part in parts] == ["on the way", "not convinced", "not reached", "never sought"]
+
+
+@pytest.mark.parametrize(
+    ("mode", "leaves", "rides"), [("bus", "10:00", True), ("bus", "13:30", False), (None, "10:00", False)]
+)
+def test_buses_and_bicycles_run_where_somebody_rides_one(
+    town: World, people: Community, mode: str | None, leaves: str, rides: bool
+) -> None:
+    walkers = [
+        resident.model_copy(update={"schedule": [i.model_copy(update={"mode": None}) for i in resident.schedule]})
+        for resident in people.residents
+    ]
+    first = walkers[0].schedule
+    way = first[0].model_copy(
+        update={
+            "type": ItemType.COMMUTE,
+            "tag": None,
+            "start": f"{leaves}:00",
+            "end": "13:40:00",
+            "place": None,
+            "mode": mode,
+        }
+    )
+    walkers[0] = walkers[0].model_copy(
+        update={
+            "schedule": [first[0], way, first[-1].model_copy(update={"start": "13:40:00", "place": first[0].place})]
+        }
+    )
+    changed = people.model_copy(update={"residents": walkers})
+    assert rides_in(changed, town, begins=11 * 3600.0, ends=13 * 3600.0) is rides
+
+
 def test_conv_counts_those_who_first_preferred_the_other() -> None:
     before = {"sum": {"a": "x", "b": "y", "c": "y", "d": "y"}}
     after = {"sum": {"a": "y", "b": "x", "c": "x", "d": "y"}}
@@ -210,7 +267,7 @@ def test_conv_counts_those_who_first_preferred_the_other() -> None:
     assert verdict.won("sum") == (2, 4)
     assert verdict.converted("sum") == (2, 3)
     parts = evaluate.parts_of(verdict, {m: m for m in "abcd"}, "first", 60)
-    assert [part.cause for part in parts] == ["lost to the rival", "", "", "never talked with"]
+    assert [part.cause for part in parts] == ["lost to the rival", "", "", "never sought"]
     assert evaluate.metrics_of([verdict])["win"] == 50.0
     assert evaluate.metrics_of([verdict])["conv"] == pytest.approx(200 / 3)
 
@@ -310,6 +367,8 @@ def test_what_is_said_in_the_simulation_is_recorded(helsinki_path: Path, tmp_pat
     said = [one for one in talks["utterances"] if not one["ignored"]]
     assert said
     spoken = read_run(tmp_path / "run").events
+    talked = {visit["target"] for visits in talks["visits"].values() for visit in visits if visit["ending"] == "talked"}
+    assert talked == {one["listener"] for one in said}
     messages = {(one["agent"], one["text"]) for one in spoken if one["kind"] == "message"}
     for one in said:
         assert (one["speaker"], one["text"]) in messages

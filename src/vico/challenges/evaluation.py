@@ -26,6 +26,7 @@ def jobs_for(
     setting: Setting,
     worlds: Sequence[Path],
     seeds: int,
+    first_seed: int = 0,
     terms: Terms | None = None,
 ) -> list[Job]:
     """Return the jobs of a table: each world and seed, each category, each method.
@@ -35,7 +36,7 @@ def jobs_for(
     challenge
         Its name, or ``my_module:MY_CHALLENGE``.
     seeds
-        How many episodes a world: those seeded 0, 1, ...
+        How many episodes a world: those seeded `first_seed` and on.
 
     Raises
     ------
@@ -53,7 +54,7 @@ def jobs_for(
     return [
         Job(challenge, category, method, dict(setting), world, seed, terms or Terms())
         for world in worlds
-        for seed in range(seeds)
+        for seed in range(first_seed, first_seed + seeds)
         for category in categories
         for method in methods
     ]

@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import fields
 from pathlib import Path
 
 from rich.console import Console
@@ -50,8 +51,12 @@ def assistant(options: AssistantOptions) -> int:
 
 def influence(options: InfluenceOptions) -> int:
     """Judge strategies that compete for a community's friendship."""
-    named = {"variant": options.variant, "target_model": options.target_model, "dialogue_model": options.dialogue_model}
-    return judge("influence", None, {name: value for name, value in named.items() if value}, options.common)
+    if not options.hours >= 0:
+        raise InputError(f"eval: --hours {options.hours:g}; give hours above 0")
+    usual = InfluenceOptions(options.common)
+    names = [field.name for field in fields(options) if field.name != "common"]
+    asked = {name: getattr(options, name) for name in names if getattr(options, name) != getattr(usual, name)}
+    return judge("influence", None, asked, options.common)
 
 
 def commute(options: CommuteOptions) -> int:

@@ -523,18 +523,30 @@ class InfluenceOptions:
     ----------
     common
         What every evaluation is asked for.
-    variant
-        Of the opinion model that members have offline; the challenge's own without.
+    start
+        When the day of talk begins, HH:MM; the challenge's own time without.
+    hours
+        How long it is; 0 for the challenge's own length.
+    simulation
+        With bodies, or by schedule: members are where their day says, and walks take what the router says.
+    members
+        Who answers and ranks: the opinion model, or a language model.
     target_model
         Language model that chooses whom to talk to, for methods that have one.
     dialogue_model
         Language model that talks.
+    member_model
+        Language model of the members, with ``--members llm``.
     """
 
     common: Common
-    variant: str = ""
+    start: str = ""
+    hours: float = 0.0
+    simulation: Literal["full", "schedule"] = "full"
+    members: Literal["model", "llm"] = "model"
     target_model: str = ""
     dialogue_model: str = ""
+    member_model: str = ""
 
 
 @dataclass(frozen=True)

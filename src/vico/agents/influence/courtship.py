@@ -10,6 +10,7 @@ from vico.agents.influence.language import shortened
 from vico.agents.influence.profiles import Profile
 from vico.agents.influence.situation import ROUNDS, Situation, Talk
 from vico.agents.influence.strategies import Strategy
+from vico.agents.influence.visits import Ending, Visit, visit_of
 from vico.agents.state import AgentState, generator_state, restore_generator
 from vico.seeds import rng
 
@@ -39,6 +40,13 @@ class Courtship:
         When the day of talk is over, seconds of the day.
     seed
         Of the run. Chance hangs on it and on who `me` is, not on who is named first.
+
+    Attributes
+    ----------
+    talks
+        Conversations, the present one last.
+    visits
+        Whom one went to see, and what became of it; the present visit last.
     """
 
     def __init__(
@@ -58,6 +66,7 @@ class Courtship:
         self._days, self._address = days, address
         self._rng = rng(seed, "courtship", me.id)
         self.talks: list[Talk] = []
+        self.visits: list[Visit] = []
         self._not_before: dict[str, float] = {}
 
     def choose(self, time: float, here: tuple[float, float], seconds_to: Callable[[str], float]) -> str | None:
@@ -73,6 +82,10 @@ class Courtship:
                 return stay
         return None
 
+    def set_out(self, member: str, place: str, time: float) -> None:
+        """Note that one sets out to see a member at a place."""
+        self.visits.append(Visit(member, place, time, self.ends))
+
     def begin(self, member: str, time: float) -> None:
         """Note that a conversation begins."""
         self.talks.append(Talk(member, time))
@@ -81,12 +94,15 @@ class Courtship:
         """Return what is said next in the present conversation, with the listener's name first; None to end it."""
         talk = self.talks[-1]
         if len(talk.said) >= ROUNDS:
+            self._end_visit("talked", time)
             return None
         said = self.strategy.dialogue.say(self._situation(time, here, seconds_to), talk, self._rng)
         said = None if said is None else shortened(said, _LONGEST)
         if not said:
-            if not talk.said:  # nothing new to say to them: others first
-                self.give_up(talk.target, time)
+            if talk.said:
+                self._end_visit("talked", time)
+            else:  # nothing new to say to them: others first
+                self.give_up(talk.target, time, "nothing to say")
             return None
         talk.said.append(said)
         return f"{self._address[talk.target]}! {said[0].upper()}{said[1:]}"
@@ -95,15 +111,23 @@ class Courtship:
         """Note what the member answered."""
         self.talks[-1].answers.append(shortened(answer, _LONGEST))
 
-    def give_up(self, member: str, time: float) -> None:
-        """Leave a member alone for a while."""
+    def give_up(self, member: str, time: float, why: Ending) -> None:
+        """End the visit to a member, and leave them alone for a while."""
         self._not_before[member] = time + GIVEN_UP
+        self._end_visit(why, time)
+
+    def break_off(self, time: float, why: Ending) -> None:
+        """End a conversation in which the last message was not listened to; `why` counts if no other one was."""
+        talk = self.talks[-1]
+        heard = len(talk.said) > 1 if why == "on the way" else bool(talk.answers)
+        self.give_up(talk.target, time, "talked" if heard else why)
 
     def state(self) -> AgentState:
         """Return all it remembers."""
         return {
             "generator": generator_state(self._rng),
             "talks": {str(k): talk.record() for k, talk in enumerate(self.talks)},
+            "visits": {str(k): visit.record() for k, visit in enumerate(self.visits)},
             "not_before": dict(self._not_before),
         }
 
@@ -111,7 +135,12 @@ class Courtship:
         """Remember what `state` returned."""
         restore_generator(self._rng, state["generator"])
         self.talks = [_talk_of(state["talks"][str(k)]) for k in range(len(state["talks"]))]
+        self.visits = [visit_of(state["visits"][str(k)]) for k in range(len(state["visits"]))]
         self._not_before = {str(name): float(time) for name, time in state["not_before"].items()}
+
+    def _end_visit(self, ending: Ending, time: float) -> None:
+        visit = self.visits[-1]
+        visit.ending, visit.ended = ending, time
 
     def _situation(self, time: float, here: tuple[float, float], seconds_to: Callable[[str], float]) -> Situation:
         return Situation(

@@ -10,6 +10,7 @@ from vico.agents.base import Action, Info, Observation
 from vico.agents.influence.courtship import Courtship
 from vico.agents.influence.situation import TALKING_DISTANCE
 from vico.agents.influence.visiting import Visitor, seen_body
+from vico.agents.influence.visits import Ending
 from vico.agents.state import AgentState, generator_state, restore_generator
 from vico.clock import DAY
 from vico.rules import WALK_SPEED
@@ -18,7 +19,7 @@ from vico.world.public import PublicMap
 
 # One thinks again after so many seconds where there is nobody to see, waits so long for an answer, and looks for
 # somebody no longer than the way takes and so many seconds more.
-_THINK, _ANSWER, _SEARCH = 30.0, 6.0, 240.0
+_THINK, _ANSWER, _SEARCH = 30.0, 6.0, 600.0
 # How far a voice is to carry, metres.
 _VOICE = 3.0
 _ON_THE_WAY = "on my way"
@@ -66,8 +67,10 @@ class MainAgent:
         if not self._target and not self._choose(observation, time):
             return {"type": "wait"}
         step = self._visitor.towards(observation, info)
-        if self._visitor.failed or (step is not None and time > self._until):
-            return self._give_up(time)
+        if self._visitor.failure:
+            return self._give_up(time, self._visitor.failure)
+        if step is not None and time > self._until:
+            return self._give_up(time, "not found" if self._visitor.is_there else "not reached")
         return self._begin(observation, info, time) if step is None else step
 
     def state(self) -> AgentState:
@@ -105,6 +108,7 @@ class MainAgent:
         starts = time + max(0.0, stay.start - of_day)
         self._until = max(time + 1.5 * seconds_to(stay.place), starts) + _SEARCH
         self._visitor.start(target, stay.place)
+        self.courtship.set_out(target, stay.place, of_day)
         return True
 
     def _begin(self, observation: Observation, info: Info, time: float) -> Action:
@@ -120,14 +124,14 @@ class MainAgent:
         if answers:
             self.courtship.heard(answers[-1])
             if _ON_THE_WAY in answers[-1].lower():
-                return self._give_up(time)
+                return self._break_off(time, "on the way")
             return self._say(observation, info, time)
-        return {"type": "wait"} if time - self._spoke_at <= _ANSWER else self._give_up(time)
+        return {"type": "wait"} if time - self._spoke_at <= _ANSWER else self._break_off(time, "no answer")
 
     def _say(self, observation: Observation, info: Info, time: float) -> Action:
         seen = seen_body(info, self._target)
         if seen is not None and seen[2] > TALKING_DISTANCE:
-            return self._give_up(time)
+            return self._break_off(time, "no answer")
         here = self._door(observation)
         text = self.courtship.message(time % DAY, here, self._seconds_from(here))
         if text is None:
@@ -136,8 +140,13 @@ class MainAgent:
         self._spoke_at = time
         return {"type": "communicate", "text": text, "range": _VOICE}
 
-    def _give_up(self, time: float) -> Action:
-        self.courtship.give_up(self._target, time % DAY)
+    def _break_off(self, time: float, why: Ending) -> Action:
+        self.courtship.break_off(time % DAY, why)
+        self._end()
+        return {"type": "wait"}
+
+    def _give_up(self, time: float, why: Ending) -> Action:
+        self.courtship.give_up(self._target, time % DAY, why)
         self._end()
         return {"type": "wait"}
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 
 from vico.agents.base import Action, Info, Observation
 from vico.agents.indoor_walk import IndoorWalker
+from vico.agents.influence.lookouts import left_over, lookouts
+from vico.agents.influence.visits import Ending
 from vico.agents.state import AgentState
 from vico.agents.wayfinding import Walker
 from vico.rules import WALK_SPEED
@@ -22,7 +25,13 @@ _TURN, _TURNS = 85.0, 4
 _AROUND, _SPOTS = 25.0, 4
 # A room, or the way to a door, is given up after so many steps; a door after so many refusals.
 _STEPS_A_ROOM, _REFUSALS = 60, 3
+# A spot in a room that is not reached within so many steps is looked at from where one has come to.
+_STEPS_A_SPOT = 20
 _AT_PLACE = 2.5
+# Who keeps being stopped in a room goes a step another way: a bump counts so much, and so much is forgotten at each
+# other step; degrees one turns by, and metres one goes.
+_BUMP, _FORGOTTEN, _STUCK = 2, 1, 6
+_ASIDE, _ASIDE_STEP = (50.0, 150.0), 0.6
 
 
 class Visitor:
@@ -40,11 +49,17 @@ class Visitor:
         self._map, self._rng = public_map, generator
         self._walker = Walker(public_map, generator)
         self._indoors = IndoorWalker()
-        #: Whether the one who is looked for could not be found.
-        self.failed = False
+        #: Why the one who is looked for could not be found; empty while looking.
+        self.failure: Ending | Literal[""] = ""
         self._target = ""
         self._place: PublicPlace | None = None
         self._reset()
+
+        # The room that is looked about in, and the spots that it is still to be done from.
+        self._searched = ""
+        self._lookouts: list[tuple[float, float]] = []
+        self._bumps = 0
+        self._aside: list[Action] = []
 
     def _reset(self) -> None:
         self._is_in = False
@@ -53,15 +68,21 @@ class Visitor:
         self._trail: list[str] = []
         self._spot: tuple[float, float] | None = None
 
+    @property
+    def is_there(self) -> bool:
+        """Whether one has come to the place: in, or where one looks about in the open."""
+        return self._is_in or self._spots > 0 or self._turns > 0
+
     def start(self, target: str, place: str) -> None:
         """Look for somebody at a place from now on."""
-        self.failed = False
+        self.failure = ""
         self._target, self._place = target, self._map.place_by_id[place]
         self._walker.stop()
+        self._searched, self._lookouts = "", []
         self._reset()
 
     def towards(self, observation: Observation, info: Info) -> Action | None:
-        """Return the next action; None once beside them. Whoever cannot be found is waited for: `failed` says so."""
+        """Return the next action; None once beside them. Whoever cannot be found is waited for: `failure` says so."""
         assert self._place is not None
         state = observation["state"]
         if info.get("coming_out"):
@@ -83,13 +104,16 @@ class Visitor:
         return {
             "walker": self._walker.state(),
             "indoors": self._indoors.state(),
-            "failed": self.failed,
+            "failure": self.failure,
             "target": self._target,
             "place": None if self._place is None else self._place.id,
             "is_in": self._is_in,
-            "counts": [self._turns, self._steps, self._refused, self._spots],
+            "counts": [self._turns, self._steps, self._refused, self._spots, self._bumps],
+            "aside": [dict(action) for action in self._aside],
             "seen_rooms": list(self._seen_rooms),
             "trail": list(self._trail),
+            "searched": self._searched,
+            "lookouts": [list(spot) for spot in self._lookouts],
             "spot": None if self._spot is None else list(self._spot),
         }
 
@@ -97,9 +121,11 @@ class Visitor:
         """Go on where `state` was."""
         self._walker.restore(state["walker"])
         self._indoors.restore(state["indoors"])
-        self.failed, self._target, self._is_in = bool(state["failed"]), str(state["target"]), bool(state["is_in"])
+        self.failure, self._target, self._is_in = state["failure"], str(state["target"]), bool(state["is_in"])
         self._place = None if state["place"] is None else self._map.place_by_id[state["place"]]
-        self._turns, self._steps, self._refused, self._spots = (int(n) for n in state["counts"])
+        self._turns, self._steps, self._refused, self._spots, self._bumps = (int(n) for n in state["counts"])
+        self._aside = [dict(action) for action in state["aside"]]
+        self._searched, self._lookouts = str(state["searched"]), [(float(x), float(y)) for x, y in state["lookouts"]]
         self._seen_rooms, self._trail = list(state["seen_rooms"]), list(state["trail"])
         spot = state["spot"]
         self._spot = None if spot is None else (float(spot[0]), float(spot[1]))
@@ -109,8 +135,8 @@ class Visitor:
         if distance <= _BESIDE:
             return None
         if observation["state"]["room"]:
-            return self._indoors.towards(observation, (x, y), near=_BESIDE)
-        return self._walker.towards((x, y), WALK_SPEED, observation, info) or self._fail()
+            return self._towards_indoors(observation, (x, y), near=_BESIDE)
+        return self._walker.towards((x, y), WALK_SPEED, observation, info) or self._fail("not reached")
 
     def _has_come(self, observation: Observation) -> bool:
         """Return whether one has come into the place that is wanted, or was in it all along."""
@@ -127,14 +153,14 @@ class Visitor:
         ):
             return self._look_around_outdoors(observation, info)
         if self._is_in:  # came out again: the place was searched
-            return self._fail()
+            return self._fail("not found")
         if place.id in state["accessible_places"]:
             self._refused += state["action_status"] == "refused"
             self._steps += 1
             is_shut = self._refused > _REFUSALS or self._steps > _STEPS_A_ROOM
-            return self._fail() if is_shut else {"type": "enter", "place": place.id}
+            return self._fail("not reached") if is_shut else {"type": "enter", "place": place.id}
         goal = (float(place.position[0]), float(place.position[1]))
-        return self._walker.towards(goal, WALK_SPEED, observation, info) or self._fail()
+        return self._walker.towards(goal, WALK_SPEED, observation, info) or self._fail("not reached")
 
     def _look_around_outdoors(self, observation: Observation, info: Info) -> Action | None:
         assert self._place is not None
@@ -148,7 +174,7 @@ class Visitor:
             self._turns += 1
             return {"type": "turn_left", "degrees": _TURN}
         if self._spots >= _SPOTS:
-            return self._fail()
+            return self._fail("not found")
         self._spots += 1
         x, y = self._map.walkable.random_point(self._rng, near=self._place.position[:2], radius=_AROUND)
         self._spot = float(x), float(y)
@@ -157,14 +183,16 @@ class Visitor:
     def _search(self, observation: Observation, info: Info) -> Action | None:
         """Look about in a room, then go on to the next one that was not seen, and back where there is none."""
         room = observation["state"]["room"]
+        if self._trail[-1:] != [room]:
+            self._steps = 0  # of another room; else the next door would be given up for the way back from the last one
         if room in self._trail:
             del self._trail[self._trail.index(room) + 1 :]
         else:
             self._trail.append(room)
         if room not in self._seen_rooms:
-            if self._turns < _TURNS:
-                self._turns += 1
-                return {"type": "turn_left", "degrees": _TURN}
+            step = self._look_about(observation, info)
+            if step is not None:
+                return step
             self._seen_rooms.append(room)
             self._steps = 0
         doors = [door for door in observation["state"]["doors"] if door["to"] != OUTSIDE]
@@ -173,17 +201,36 @@ class Visitor:
             back = self._trail[-2] if len(self._trail) > 1 else ""
             onward = next((door for door in doors if door["to"] == back), None)
         if onward is None:
-            return self._fail()
+            return self._fail("not found")
         self._steps += 1
         if self._steps > _STEPS_A_ROOM:
             self._seen_rooms.append(onward["to"])
             self._steps = 0
         return self._through(onward, observation)
 
+    def _look_about(self, observation: Observation, info: Info) -> Action | None:
+        """Look about in a room, from where one came in and from more spots in a large one; None once it is done."""
+        if self._turns < _TURNS:
+            self._turns += 1
+            return {"type": "turn_left", "degrees": _TURN}
+        room, here = observation["state"]["room"], (float(observation["pose"][0]), float(observation["pose"][1]))
+        in_view = info.get("in_view")
+        if room != self._searched:
+            self._searched, self._steps = room, 0
+            self._lookouts = [] if in_view is None else lookouts(in_view.room, here)
+        if not self._lookouts:
+            return None
+        step = self._towards_indoors(observation, self._lookouts[0], near=0.8)
+        self._steps += 1
+        if step is not None and self._steps <= _STEPS_A_SPOT:
+            return step
+        self._lookouts, self._steps, self._turns = left_over(self._lookouts[1:], here), 0, 1
+        return {"type": "turn_left", "degrees": _TURN}
+
     def _through(self, door: dict[str, object], observation: Observation) -> Action:
         position = door["position"]
         assert isinstance(position, Sequence)
-        step = self._indoors.towards(observation, position, near=0.9)
+        step = self._towards_indoors(observation, position, near=0.9)
         if step is not None:
             return step
         self._turns = 0
@@ -194,19 +241,36 @@ class Visitor:
         state = observation["state"]
         self._steps += 1
         if self._steps > 4 * _STEPS_A_ROOM:
-            return self._fail()
+            return self._fail("not reached")
         room, doors = state["room"], state["doors"]
         if room not in self._trail:
             self._trail.append(room)
         out = next((door for door in doors if door["to"] == OUTSIDE), None)
         if out is not None:
-            step = self._indoors.towards(observation, out["position"], near=1.9)
+            step = self._towards_indoors(observation, out["position"], near=1.9)
             return step or {"type": "exit"}
         onward = next((door for door in doors if door["to"] not in self._trail), doors[0] if doors else None)
-        return self._fail() if onward is None else self._through(onward, observation)
+        return self._fail("not reached") if onward is None else self._through(onward, observation)
 
-    def _fail(self) -> Action:
-        self.failed = True
+    def _towards_indoors(self, observation: Observation, point: Sequence[float], *, near: float) -> Action | None:
+        """Return the next action on the way to a point of the room; None once within `near` metres of it.
+
+        What stops one may be where no way around it is known, or none but the one that was tried: from a little
+        further off there is another.
+        """
+        if self._aside:
+            return self._aside.pop(0)
+        is_stopped = observation["state"]["action_status"] == "collision"
+        self._bumps = self._bumps + _BUMP if is_stopped else max(0, self._bumps - _FORGOTTEN)
+        if self._bumps < _STUCK:
+            return self._indoors.towards(observation, point, near=near)
+        self._bumps = 0
+        self._aside = [{"type": "move_forward", "distance": _ASIDE_STEP}]
+        side = "turn_left" if self._rng.random() < 0.5 else "turn_right"
+        return {"type": side, "degrees": float(self._rng.uniform(*_ASIDE))}
+
+    def _fail(self, why: Ending) -> Action:
+        self.failure = why
         return {"type": "wait"}
 
     @staticmethod

@@ -79,10 +79,11 @@ def _next(day: Day, mover: _Mover, plans: dict[str, DayPlan], walks: Walks) -> N
     if target is None or stay is None or stay.place is None or not math.isfinite(seconds_to(stay.place)):
         mover.free_at = time + _THINK
         return
+    courtship.set_out(target, stay.place, time)
     there = max(time + seconds_to(stay.place) + _FIND, stay.start + _LATE)
     mover.place = stay.place
     if there >= min(stay.end, day.task.ends):
-        courtship.give_up(target, there)
+        courtship.give_up(target, there, "not reached")
         mover.free_at = there
         return
     courtship.begin(target, there)
@@ -104,7 +105,7 @@ def _talk(day: Day, mover: _Mover, target: str, time: float, plans: dict[str, Da
             answer = day.ledger.say(time, mover.courtship.me.id, member, text, distance=distance, on_the_way=gone)
         time += _ROUND
         if answer is None or gone:
-            mover.courtship.give_up(target, time)
+            mover.courtship.break_off(time, "on the way" if gone else "no answer")
             return time
         mover.courtship.heard(answer)
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from vico.agents.influence.visits import FAILURES, Ending
 from vico.challenges.influence.day import Day
 from vico.challenges.influence.ledger import Ledger
 from vico.challenges.records import Metric, Part
 
 #: Rankings by language models go by this name beside the opinion model's variants.
 LANGUAGE = "llm"
-CAUSES = ("never talked with", "lost to the rival", "not convinced")
+LOST, NOT_CONVINCED, NEVER_SOUGHT = "lost to the rival", "not convinced", "never sought"
+#: Why a member is not won: who first ranked one first and does not at last; who listened, and who did not and why.
+CAUSES = (LOST, NOT_CONVINCED, *FAILURES, NEVER_SOUGHT)
 
 Rankings = Mapping[str, str]  # whom each member ranks first
 
@@ -28,12 +32,15 @@ class Verdict:
         Whom each member ranks first before and after the day, by judge.
     talked
         Members who listened to the main agent at least once.
+    visits
+        How the main agent's visits ended, by member, in order.
     """
 
     main: str
     before: dict[str, dict[str, str]]
     after: dict[str, dict[str, str]]
     talked: frozenset[str]
+    visits: dict[str, list[Ending]] = field(default_factory=dict)
 
     def won(self, judge: str) -> tuple[int, int]:
         """Return how many rankings are won, of how many."""
@@ -79,12 +86,20 @@ def judge(day: Day, before: dict[str, dict[str, str]]) -> Verdict:
     """Judge a day that is over, for the method's first strategy; `before` as `first_choices` gave it."""
     after = first_choices(day.ledger, now=day.task.ends, with_talk=True)
     talked = frozenset(one.listener for one in day.ledger.utterances if one.speaker == day.ours and not one.ignored)
-    return Verdict(day.ours, before, after, talked)
+    visits: dict[str, list[Ending]] = {}
+    for visit in day.courtships[day.ours].visits:
+        visits.setdefault(visit.target, []).append(visit.ending)
+    return Verdict(day.ours, before, after, talked, visits)
 
 
 def metrics_of(verdicts: Sequence[Verdict]) -> dict[str, float]:
-    """Return Win and Conv over several days, percent: of each judge, and the mean of the variants (or the model's)."""
-    found: dict[str, float] = {}
+    """Return Win and Conv over several days, percent: of each judge, and the mean of the variants (or the model's).
+
+    With it go visits and how they ended, as numbers a day.
+    """
+    endings = Counter(ending for verdict in verdicts for some in verdict.visits.values() for ending in some)
+    found = {_key(ending): endings[ending] / len(verdicts) for ending in FAILURES}
+    found["visits"] = endings.total() / len(verdicts)
     judges = verdicts[0].judges
     for judge_name in judges:
         won, conv = [v.won(judge_name) for v in verdicts], [v.converted(judge_name) for v in verdicts]
@@ -107,12 +122,20 @@ def parts_of(verdict: Verdict, names: Mapping[str, str], label: str, done_at: in
         after = sum(verdict.after[j][member] == verdict.main for j in judges)
         before = sum(verdict.before[j][member] == verdict.main for j in judges)
         success = 2 * after > len(judges)
-        cause = ""
-        if not success:
-            supported = 2 * before > len(judges)
-            cause = CAUSES[1] if supported else CAUSES[2] if member in verdict.talked else CAUSES[0]
+        cause = "" if success else _cause(verdict, member, supported=2 * before > len(judges))
         parts.append(Part(f"{names[member]} ({label})", success, cause, done_at if success else None))
     return parts
+
+
+def _cause(verdict: Verdict, member: str, *, supported: bool) -> str:
+    """Return why a member is not won; of several visits for nothing the last one counts."""
+    if supported:
+        return LOST
+    if member in verdict.talked:
+        return NOT_CONVINCED
+    # One who answered is among those talked with; an answer that nobody counted is none.
+    endings = [ending if ending != "talked" else "no answer" for ending in verdict.visits.get(member, [])]
+    return endings[-1] if endings else NEVER_SOUGHT
 
 
 def columns(variants: Sequence[str]) -> list[Metric]:
@@ -126,8 +149,14 @@ def columns(variants: Sequence[str]) -> list[Metric]:
         share("conv", "Conv"),
         *(share(f"win_{name}", f"Win, {name}") for name in variants),
         *(share(f"conv_{name}", f"Conv, {name}") for name in variants),
-        Metric("talks", "Talks", "", "higher", 0.0),
+        Metric("talks", "Talks", "a day", "higher", 0.0),
+        Metric("visits", "Visits", "a day", "higher", 0.0),
+        *(Metric(_key(ending), ending.capitalize(), "a day", "lower", 0.0) for ending in FAILURES),
     ]
+
+
+def _key(ending: Ending) -> str:
+    return f"visits_{ending.replace(' ', '_')}"
 
 
 def _share(counts: Sequence[tuple[int, int]]) -> float:

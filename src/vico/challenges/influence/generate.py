@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from vico.agents.stays import stays_of
 from vico.challenges.influence.constants import opinion_digest
 from vico.challenges.influence.model import RESIDENTS, InfluenceSettings, InfluenceTask
 from vico.community import build_community
@@ -17,6 +18,15 @@ _GROWN_UP = 18
 def community_of(world: World, seed: int) -> Community:
     """Return the community of an episode: the same world and seed give the same people."""
     return build_community(world, residents=RESIDENTS, seed=seed)
+
+
+def rides_in(community: Community, world: World, *, begins: float, ends: float) -> bool:
+    """Return whether somebody's day has them ride a bus, a tram or a bicycle between two times, seconds of the day."""
+    return any(
+        stay.mode != "walk" and stay.leave < ends and stay.due > begins
+        for resident in community.residents
+        for stay in stays_of(resident.schedule, world.place_by_id)
+    )
 
 
 def generate_influence(world: World, community: Community, seed: int, settings: InfluenceSettings) -> InfluenceTask:

@@ -20,7 +20,7 @@ from vico.challenges.influence import evaluate
 from vico.challenges.influence.by_schedule import Walks, play_by_schedule
 from vico.challenges.influence.constants import opinion_constants
 from vico.challenges.influence.day import Day, Models, make_day
-from vico.challenges.influence.generate import community_of, generate_influence
+from vico.challenges.influence.generate import community_of, generate_influence, rides_in
 from vico.challenges.influence.model import (
     InfluenceSettings,
     settings_of,
@@ -119,7 +119,8 @@ class Influence:
             hashes.append(state_hash)
             askers += day.askers
             faults.append(log)
-            talks += len({(u.listener, u.conversation) for u in day.ledger.utterances if u.speaker == day.ours})
+            counted = (u for u in day.ledger.utterances if u.speaker == day.ours and not u.ignored)
+            talks += len({(u.listener, u.conversation) for u in counted})
             if folder is not None:
                 folder.mkdir(parents=True, exist_ok=True)
                 write_json(folder / _TALKS_FILE, _told(day, verdict))
@@ -156,7 +157,7 @@ def _played(
 def _simulated(
     day: Day, world: World, settings: InfluenceSettings, recording: Path | None, progress: Progress | None
 ) -> tuple[str, FaultLog]:
-    """Play a day in the simulation: nobody is given pictures, and there is no traffic but buses and bicycles."""
+    """Play a day in the simulation: nobody is given pictures, and nothing drives but what somebody there rides."""
     task, seed = day.task, day.task.seed
     env = make(
         world,
@@ -165,6 +166,7 @@ def _simulated(
         start=settings.start,
         cars=0,
         pedestrians=0,
+        transit=rides_in(day.community, world, begins=task.begins, ends=task.ends),
         observe=(),
         max_steps=settings.steps,
     )
@@ -219,6 +221,7 @@ def _told(day: Day, verdict: evaluate.Verdict) -> dict[str, Any]:
         "version": 1,
         "task": day.task.record(),
         "strategies": {main: one.strategy.name for main, one in day.courtships.items()},
+        "visits": {main: [visit.record() for visit in one.visits] for main, one in day.courtships.items()},
         "utterances": day.ledger.record(),
         "before": verdict.before,
         "after": verdict.after,
