@@ -8,6 +8,7 @@ Takes communities as Carry has them. Give worlds that no reported task takes pla
 from __future__ import annotations
 
 import argparse
+import sys
 from collections import Counter
 from pathlib import Path
 
@@ -36,11 +37,12 @@ def main() -> None:
                 for hour in range(24):
                     middle = (hour + 0.5) * _HOUR
                     there[category, hour] += any(a <= middle < b and one == place for a, b, one in stays)
-    print(f'about = "Measured by scripts/measure_habits.py on {", ".join(folder.name for folder in worlds)}."\n')
-    print("[places]")
+    lines = [f'about = "Measured by scripts/measure_habits.py on {", ".join(folder.name for folder in worlds)}."', ""]
+    lines += ["[places]"]
     for category in sorted(known):
         shares = ", ".join(f"{there[category, hour] / known[category]:.2f}" for hour in range(24))
-        print(f"{category} = [{shares}]")
+        lines += [f"{category} = [{shares}]"]
+    sys.stdout.write("\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":
