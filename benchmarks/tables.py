@@ -5,9 +5,10 @@
     python benchmarks/tables.py --table assistant --reduced --out OUT        # builds four windows of the packaged map
 
 Tables: assistant (24 worlds; one and two assistants), advanced (three worlds), influence (five), commute (ten). A table
-that was cut short goes on with the same command. With `--reduced` there are four worlds and one seed; these worlds
-are built into OUT/worlds if `--worlds` is not given. Methods that need a language model are played where `--method`
-names them, with the model of the environment; without, the page says that they were not run.
+that was cut short goes on with the same command. With `--reduced` there are four worlds, one seed and shorter episodes
+of the first part, so that all is over in ten minutes on two cores; these worlds are built into OUT/worlds if `--worlds`
+is not given. Methods that need a language model are played where `--method` names them, with the model of the
+environment; without, the page says that they were not run.
 
 Reported seeds are drawn from the commit at which a method was frozen, so nobody can have tuned on them:
 `--first-seed N` with N the first six hexadecimal digits of that commit's hash, as an integer (`echo $((16#e6541f))`).
@@ -47,12 +48,16 @@ class Block:
 
 @dataclass(frozen=True)
 class Table:
-    """What is played for a table: its parts, its list of worlds, and how many seeds a world."""
+    """What is played for a table: its parts, its list of worlds, and how many seeds a world.
+
+    `reduced` names the parts that `--reduced` plays, with what is shorter in each.
+    """
 
     blocks: tuple[Block, ...]
     windows: str
     seeds: int
     reference: str
+    reduced: dict[str, Setting]
 
 
 def _assistants(count: int, *, advanced: bool = False) -> Setting:
@@ -69,14 +74,14 @@ TABLES = {
             Block("1 assistant, without distance modelling", "assistant", {**_assistants(1), "distance": False}),
             Block("2 assistants, without distance modelling", "assistant", {**_assistants(2), "distance": False}),
         ),
-        "standard", 1, "heuristic",
+        "standard", 1, "heuristic", {"1 assistant": {"steps": 500}},
     ),
     "advanced": Table(
         (
             Block("1 assistant, advanced", "assistant", _assistants(1, advanced=True)),
             Block("2 assistants, advanced", "assistant", _assistants(2, advanced=True)),
         ),
-        "advanced", 3, "heuristic",
+        "advanced", 3, "heuristic", {"1 assistant, advanced": {"steps": 500}},
     ),
     "influence": Table(
         (
@@ -84,9 +89,11 @@ TABLES = {
             # The same dialogue on both sides, then the same target choice: what each of the two is worth.
             Block("ablation", "influence", methods=_ABLATION),
         ),
-        "influence", 1, "",
+        "influence", 1, "", {"pairings": {"hours": 0.5}},
     ),
-    "commute": Table((Block("a day of commutes", "commute"),), "commute", 10, "rule"),
+    "commute": Table(
+        (Block("a day of commutes", "commute"),), "commute", 10, "rule", {"a day of commutes": {}}
+    ),
 }  # fmt: skip
 
 
@@ -122,7 +129,9 @@ def play(arguments: argparse.Namespace, table: Table, block: Block, worlds: Sequ
     """Play a part of a table and write it; return whether all episodes were played."""
     challenge = load_challenge(block.challenge)
     methods = arguments.method or block.methods or offline_methods(challenge)
-    setting = {**block.setting, "steps": arguments.steps} if arguments.steps else block.setting
+    setting = {**block.setting, **(table.reduced[block.name] if arguments.reduced else {})}
+    if arguments.steps:
+        setting["steps"] = arguments.steps
     jobs = jobs_for(
         block.challenge,
         categories=arguments.category or challenge.categories,
@@ -169,12 +178,12 @@ def main() -> int:
         parser.error(
             f"--worlds: the folder with the worlds of the list {table.windows}; benchmarks/worlds.py builds them"
         )
-    names = [block.name for block in table.blocks]
-    if unknown := set(arguments.block or ()) - set(names):
-        parser.error(f"--block: {', '.join(sorted(unknown))}; there are {', '.join(names)}")
+    known = list(table.reduced) if arguments.reduced else [block.name for block in table.blocks]
+    if unknown := set(arguments.block or ()) - set(known):
+        parser.error(f"--block: {', '.join(sorted(unknown))}; there are {', '.join(known)}")
     try:
         worlds = world_folders(arguments, table)
-        blocks = [block for block in table.blocks if not arguments.block or block.name in arguments.block]
+        blocks = [block for block in table.blocks if block.name in (arguments.block or known)]
         played = [play(arguments, table, block, worlds) for block in blocks]
     except VicoError as error:
         print(error, file=sys.stderr)

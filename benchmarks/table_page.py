@@ -1,0 +1,82 @@
+"""Join what benchmarks/tables.py wrote of a table to one page; nothing on it is typed by hand.
+
+python benchmarks/tables.py --table assistant --worlds WORLDS --first-seed N --out OUT
+python benchmarks/table_page.py OUT --title "The community assistant" --frozen COMMIT --page FILE
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from vico.challenges.tables.files import read_results
+from vico.errors import InputError, VicoError
+from vico.io.files import write_bytes
+
+
+def blocks_in(out: Path) -> list[Path]:
+    """Return the folders of the parts that were played, in the order of their names.
+
+    Raises
+    ------
+    InputError
+        If there are none.
+    """
+    found = sorted(path.parent for path in out.glob("*/results.md"))
+    if not found:
+        raise InputError(f"{out}: no results; play a table with benchmarks/tables.py --out {out}")
+    return found
+
+
+def page(blocks: Sequence[Path], title: str, frozen: str) -> str:
+    """Return the page: what it was played with, and each part's own page a level lower."""
+    first, _ = read_results(blocks[0] / "results.json")
+    seconds = sum(record.wall_seconds for block in blocks for _, record in read_results(block / "results.json")[1])
+    lines = [
+        f"# {title}",
+        "",
+        f"Written by `benchmarks/table_page.py` from what `benchmarks/tables.py` played. vico {first['vico']}, code "
+        f"`{first['code'][:12]}`, Python {platform.python_version()}, {platform.machine()}, {os.cpu_count()} cores "
+        f"shared with other work; {seconds / 3600:.1f} hours of episodes on the clock.",
+        "",
+    ]
+    if frozen:
+        lines += [
+            f"`ours` is frozen at commit `{frozen}`; seeds begin with its first six hexadecimal digits, "
+            f"{int(frozen[:6], 16)}. What is comparable with the paper's rows, and what is not: "
+            "[docs/challenges.md](../../docs/challenges.md#results).",
+            "",
+        ]
+    for block in blocks:
+        text = (block / "results.md").read_text(encoding="utf-8")
+        lines += [re.sub(r"^(#+) ", r"#\1 ", text, flags=re.MULTILINE).rstrip(), ""]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Write the page."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", type=Path, help="folder that benchmarks/tables.py wrote")
+    parser.add_argument("--title", required=True)
+    parser.add_argument("--frozen", default="", help="hash of the commit at which ours was frozen")
+    parser.add_argument("--page", type=Path, help="file to write instead of printing it")
+    arguments = parser.parse_args(words)
+    try:
+        text = page(blocks_in(arguments.out), arguments.title, arguments.frozen)
+        if arguments.page is None:
+            print(text)
+        else:
+            write_bytes(arguments.page, text.encode())
+    except VicoError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
