@@ -21,7 +21,7 @@ from vico.challenges.assistant.thresholds import RESIDENTS
 from vico.challenges.records import EpisodeRecord, Job
 from vico.community import build_community
 from vico.community.model import Community
-from vico.errors import InputError
+from vico.errors import InputError, SchemaError
 from vico.runner.faults import Fault
 from vico.runner.foreign import Terms
 from vico.world.folder import World
@@ -105,6 +105,16 @@ def test_an_episode_repeats_itself_also_from_its_file(
     assert first.steps == first.limit == 20
     assert all(part.cause in CAUSES for part in first.parts if not part.success)
     assert first.setting["assistants"] == assistants
+
+
+def test_a_task_of_other_people_or_of_another_world_is_refused(helsinki: World, few: Community) -> None:
+    task = generate_task(helsinki, few, "search", seed=1, steps=20)
+    others = few.model_copy(update={"residents": few.residents[1:]})
+    with pytest.raises(SchemaError, match=r"task: made for another community \(\w{12}\) than this one of 5 residents"):
+        play_task(helsinki, others, task, method="heuristic")
+    moved = task.model_copy(update={"world": "atlantis", "world_digest": "0" * 64})
+    with pytest.raises(SchemaError, match=r"task: made for another world \('atlantis', 000000000000\)"):
+        play_task(helsinki, few, moved, method="heuristic")
 
 
 class _Saboteur:
