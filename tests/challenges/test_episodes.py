@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 import pytest
 
 import planted_agents
+from command_line import vico
 from vico.challenges.assistant import episode as playing
 from vico.challenges.assistant.causes import CAUSES
 from vico.challenges.assistant.challenge import ASSISTANT
@@ -21,9 +23,11 @@ from vico.challenges.assistant.thresholds import RESIDENTS
 from vico.challenges.records import EpisodeRecord, Job
 from vico.community import build_community
 from vico.community.model import Community
-from vico.errors import InputError
+from vico.errors import InputError, SchemaError
 from vico.runner.faults import Fault
 from vico.runner.foreign import Terms
+from vico.sim.recording import read_run
+from vico.viewer.repeat import RepeatedRun
 from vico.world.folder import World
 
 
@@ -105,6 +109,35 @@ def test_an_episode_repeats_itself_also_from_its_file(
     assert first.steps == first.limit == 20
     assert all(part.cause in CAUSES for part in first.parts if not part.success)
     assert first.setting["assistants"] == assistants
+
+
+def test_a_recorded_episode_can_be_looked_at_from_anywhere(
+    helsinki: World, people: Community, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    task = generate_task(helsinki, people, "carry", seed=1, steps=8)
+    record = play_task(helsinki, people, task, method="heuristic", recording=tmp_path / "out.partial" / "runs" / "one")
+    (tmp_path / "out.partial").rename(tmp_path / "out")
+    monkeypatch.chdir(tmp_path / "out")
+    path = Path("runs") / "one"
+    who, look = task.subtasks[0].person.agent, ("--size", "64x64", "--samples", 1, "--quality", "plain")
+    assert vico("still", path, "--follow", who, "--at", 5, *look, "--out", "still.png") == 0
+    assert Path("still.png").is_file()
+    repeated = RepeatedRun.of_folders(read_run(path))
+    repeated.go_to(8)
+    assert repeated.sim.state_hash() == record.state_hash
+    assert repeated.sim.ground_truth.object_holder(task.objects[0].name) == task.objects[0].holder
+    shutil.rmtree(path / "community")
+    assert vico("film", path, "--follow", who, *look, "--out", "film.mp4") == 2
+
+
+def test_a_task_of_other_people_or_of_another_world_is_refused(helsinki: World, few: Community) -> None:
+    task = generate_task(helsinki, few, "search", seed=1, steps=20)
+    others = few.model_copy(update={"residents": few.residents[1:]})
+    with pytest.raises(SchemaError, match=r"task: made for another community \(\w{12}\) than this one of 5 residents"):
+        play_task(helsinki, others, task, method="heuristic")
+    moved = task.model_copy(update={"world": "atlantis", "world_digest": "0" * 64})
+    with pytest.raises(SchemaError, match=r"task: made for another world \('atlantis', 000000000000\)"):
+        play_task(helsinki, few, moved, method="heuristic")
 
 
 class _Saboteur:

@@ -15,6 +15,7 @@ from vico.challenges.assistant.episode import play_task
 from vico.challenges.assistant.model import Person, Region, Start, Subtask, Task, TaskObject
 from vico.challenges.records import EpisodeRecord
 from vico.challenges.registry import check_methods, load_challenge
+from vico.community.folder import digest_of
 from vico.errors import InputError
 
 STEPS = 120
@@ -53,8 +54,8 @@ def task(assistants: int) -> Task:
         category="search",
         advanced=False,
         world="toy",
-        world_digest="",
-        community_digest="",
+        world_digest=toy_city.world().digest,
+        community_digest=digest_of(toy_city.community()),
         seed=3,
         start="09:00",
         steps=STEPS,

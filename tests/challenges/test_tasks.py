@@ -10,6 +10,7 @@ import pytest
 import toy_city
 from assistant_by_hand import Truth
 from vico.agents.assistant import METHODS
+from vico.agents.requester import first_name
 from vico.assets.models.movable import movable_colours, movable_kinds
 from vico.challenges.assistant.generate import generate_task
 from vico.challenges.assistant.model import CATEGORIES, Category, Region, Subtask, Task
@@ -203,6 +204,54 @@ def test_carry_asks_for_six_people_who_are_out(helsinki: World, people: Communit
             source = subtask.true_source
             near = np.hypot(*np.subtract(place.position[:2], source.centre[:2])) < 1.0
             assert source.place == place.id or (source.place is None and near)
+
+
+def renamed(people: Community, names: dict[str, str]) -> Community:
+    """Return a community some of whose people have other names, by id."""
+    residents = [who.model_copy(update={"name": names[who.id]}) if who.id in names else who for who in people.residents]
+    return people.model_copy(update={"residents": residents})
+
+
+def asked_for(task: Task) -> list[str]:
+    return [subtask.person.agent for subtask in task.subtasks]
+
+
+def test_nobody_who_needs_a_hand_is_called_like_another(helsinki: World, people: Community, tasks: Made) -> None:
+    before = tasks["carry", False]
+    first, _, third = asked_for(before)[:3]
+    called = people.resident_by_id[first].name.split()[0]
+    task = generate_task(helsinki, renamed(people, {third: f"{called.upper()} Other"}), "carry", seed=1)
+    assert third not in asked_for(task)
+    assert asked_for(task)[:2] == asked_for(before)[:2]  # only from there on is anything drawn anew
+    assert len({first_name(subtask.person.name) for subtask in task.subtasks}) == SUBTASKS
+
+
+def test_names_change_no_task_in_which_nobody_is_called_like_another(
+    helsinki: World, people: Community, tasks: Made
+) -> None:
+    before = tasks["carry", False]
+    first, last = asked_for(before)[0], asked_for(before)[-1]
+    candidates = before.subtasks[-1].candidates["Who needs a hand?"]
+    other = next(who for who in people.residents if who.name in candidates and who.id not in asked_for(before))
+    called = people.resident_by_id[first].name.split()[0]
+    task = generate_task(helsinki, renamed(people, {other.id: f"{called} Other"}), "carry", seed=1)
+    assert asked_for(task) == asked_for(before)
+    assert last == asked_for(task)[-1]
+    differs = {"community_digest": True, "subtasks": {"__all__": {"candidates"}}}
+    assert task.model_dump(exclude=differs) == before.model_dump(exclude=differs)
+
+
+def test_carry_needs_six_first_names(helsinki: World, people: Community) -> None:
+    alike = renamed(people, {who.id: f"Kim {who.name.split()[-1]}" for who in people.residents})
+    with pytest.raises(EmptyInputError, match=r"carry: at no time of day are 6 people out .*, 1 at most; use a larger"):
+        generate_task(helsinki, alike, "carry", seed=1)
+    # Six are enough, wherever they are drawn: all others are called like one of them.
+    named = asked_for(generate_task(helsinki, people, "carry", seed=1))
+    like = renamed(
+        people, {who.id: f"Kim {who.name.split()[-1]}" for who in people.residents if who.id not in named[:-1]}
+    )
+    task = generate_task(helsinki, like, "carry", seed=1)
+    assert len({first_name(subtask.person.name) for subtask in task.subtasks}) == SUBTASKS
 
 
 def test_nothing_is_done_yet(helsinki: World, tasks: Made) -> None:

@@ -166,16 +166,21 @@ class Requester:
         return ScheduleFollower(_WayHome(self._resident, plan), self._map, seed=self._seed, paces=(briskly, briskly))
 
 
+def first_name(name: str) -> str:
+    """Return what somebody is called by, in small letters."""
+    return name.split()[0].casefold()
+
+
 def is_called(name: str, text: str) -> bool:
     """Whether a text calls somebody: their first name is in it, and not as that of somebody who is asked for.
 
     The name is a word of its own: Ida is not called by "Aida!", nor Ida Roth by "Have you seen Ida Roth?".
     """
-    first = name.split()[0].casefold()
+    first = first_name(name)
     question = read_grammar().question_in(text, names=(name, name.split()[0]))
     if question is not None and first in question.what.casefold().split():
         return first in question.to.casefold().split()
     return re.search(rf"(?<![\w-]){re.escape(first)}(?![\w-])", text.casefold()) is not None
 
 
-__all__ = ["CALL_DISTANCE", "HAND_OVER_DISTANCE", "HELPERS", "WAITS_FOR", "Requester", "is_called"]
+__all__ = ["CALL_DISTANCE", "HAND_OVER_DISTANCE", "HELPERS", "WAITS_FOR", "Requester", "first_name", "is_called"]

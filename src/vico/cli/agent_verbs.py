@@ -9,7 +9,7 @@ import tyro
 from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
-from vico.cli.options import AssistantOptions, CommuteOptions, InfluenceOptions
+from vico.cli.evaluation_options import AssistantOptions, CommuteOptions, InfluenceOptions
 
 # The fields of a record are options of the verb itself, not of a part of it.
 _FLAT = tyro.conf.arg(name="")

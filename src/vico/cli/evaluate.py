@@ -22,7 +22,7 @@ from vico.challenges.tables.markdown import fault_lines, not_played_lines, resul
 from vico.challenges.tables.published import published_rows
 from vico.challenges.tables.summary import summarise
 from vico.cli import leaderboard
-from vico.cli.options import AssistantOptions, CommuteOptions, EvaluationOptions, InfluenceOptions
+from vico.cli.evaluation_options import AssistantOptions, CommuteOptions, EvaluationOptions, InfluenceOptions
 from vico.cli.output import check_output, print_json
 from vico.errors import InputError, OutputError
 from vico.io.files import write_errors

@@ -35,7 +35,7 @@ def film(options: FilmOptions) -> int:
     last = step_of(recorded, options.stop, default=recorded.last)
     with progress_bars() as report:
         report("reading the run", 0, 1)
-        repeated = RepeatedRun.of_folders(recorded, world=options.world)
+        repeated = RepeatedRun.of_folders(recorded, world=options.world, community=options.community)
         report("reading the run", 1, 1)
         frames = write_run_film(
             out, repeated, settings, first=first, last=last, report=lambda done, count: report("film", done, count)
@@ -58,7 +58,9 @@ def still(options: StillOptions) -> int:
     )
     recorded = read_run(options.run)
     step = step_of(recorded, options.at, default=recorded.last)
-    write_still(options.out, RepeatedRun.of_folders(recorded, world=options.world), settings, step)
+    write_still(
+        options.out, RepeatedRun.of_folders(recorded, world=options.world, community=options.community), settings, step
+    )
     print(options.out)
     return 0
 

@@ -29,7 +29,7 @@ def replay(path: Path, *, film: bool = True, world: Path | None = None) -> int:
         The world it ran in, if it is no longer where it was.
     """
     run = read_run(path)
-    folder = world or Path(run.manifest["world"]["path"])
+    folder = world or run.source("world")
     if not (folder / "world.json").exists():
         raise MissingFileError(f"{path}: its world is no longer at {folder}; say where it is with --world")
     place = read_world(folder)

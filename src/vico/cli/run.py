@@ -11,6 +11,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from vico.agents.schedule import followers_of
+from vico.agents.talk.language_model import LlmTalk
 from vico.cli.options import RunOptions
 from vico.cli.output import Report, check_output, print_json, print_table, progress_bars
 from vico.clock import seconds_of_day
@@ -18,6 +19,7 @@ from vico.community import Community, read_community
 from vico.errors import InputError, OutputExistsError, SchemaError
 from vico.io.files import read_json
 from vico.io.folders import remove
+from vico.llm import LanguageModel, Sampling
 from vico.runner.faults import FaultLog
 from vico.runner.foreign import Terms, foreign_agents
 from vico.runner.gather import Gatherer
@@ -61,20 +63,48 @@ def run(options: RunOptions) -> int:
         raise InputError(f"run: --steps {options.steps}; it has to be 1 or more")
     if options.agent and not options.assistants:
         raise InputError("run: --agent plays assistants; say how many, for example --assistants 1")
+    talk = _talk_of(options)
     use_workers(options.workers)
-    metrics = _Job.of(options, options.world, options.community, options.out).done()
+    metrics = _Job.of(options, options.world, options.community, options.out, talk).done()
     if options.json:
         print_json(metrics)
     else:
         counted = {name: value.get("count", value) for name, value in metrics.items() if isinstance(value, dict)}
         shown = {name: value for name, value in (metrics | counted).items() if not isinstance(value, dict)}
         print_table(str(options.out), shown)
+    if talk is not None:
+        print(_talk_told(talk), file=sys.stderr)
     return _judged(metrics)
 
 
 def named_or_read(text: str) -> str | dict[str, Any]:
     """Return what an option names, of weather or events: itself, or the content of a file."""
     return read_json(Path(text)) if text.endswith(".json") else text
+
+
+def _talk_of(options: RunOptions) -> LlmTalk | None:
+    """Return what words the residents' answers; None for templates.
+
+    Raises
+    ------
+    InputError
+        If a language model is to, and the environment names none that can be used.
+    """
+    if options.talk == "templates":
+        return None
+    try:
+        return LlmTalk(LanguageModel.from_environment(sampling=Sampling(seed=options.seed, temperature=0.0)))
+    except InputError as error:
+        raise InputError(f"run: --talk llm: {error}; or leave --talk out") from None
+
+
+def _talk_told(talk: LlmTalk) -> str:
+    """Say how many answers were the model's."""
+    why = f" ({talk.reason})" if talk.reason else ""
+    return (
+        f"{talk.answered} answers of residents by the language model, {talk.usage.read + talk.usage.written} tokens; "
+        f"{talk.fallbacks} left to templates{why}"
+    )
 
 
 def _judged(metrics: dict[str, Any]) -> int:
@@ -99,6 +129,8 @@ class _Job:
     ----------
     found
         Manifest of the unfinished run that is in `out`; empty if it had none yet, None if nothing is there.
+    talk
+        What words the residents' answers; None for templates.
     """
 
     options: RunOptions
@@ -108,9 +140,10 @@ class _Job:
     config: SimConfig
     sources: dict[str, str]
     found: dict[str, Any] | None
+    talk: LlmTalk | None = None
 
     @classmethod
-    def of(cls, options: RunOptions, world: Path, community: Path, out: Path) -> _Job:
+    def of(cls, options: RunOptions, world: Path, community: Path, out: Path, talk: LlmTalk | None = None) -> _Job:
         """Read what is needed, and look at what is in the output folder."""
         found = None if options.force else _cut_short(out)
         check_output(out, world, community, force=options.force or found is not None)
@@ -142,7 +175,7 @@ class _Job:
         place = read_world(world)
         people = read_community(community, place)
         sources = {"world": str(world.resolve()), "community": str(community.resolve())}
-        return cls(options, out, place, people, config, sources, found)
+        return cls(options, out, place, people, config, sources, found, talk)
 
     def done(self) -> dict[str, Any]:
         """Do it; return its metrics."""
@@ -177,7 +210,7 @@ class _Job:
     def _agents(self) -> Gatherer:
         """Return who acts: residents who follow their schedules, and whoever plays the assistants."""
         options = self.options
-        followers = followers_of(self.community, PublicMap.from_world(self.world), seed=options.seed)
+        followers = followers_of(self.community, PublicMap.from_world(self.world), seed=options.seed, talk=self.talk)
         terms = Terms(deadline=options.deadline or None, isolate=options.isolate, workers=workers())
         seats = [
             AgentSeat(f"assistant_{i}", options.seed, [], i, options.assistants) for i in range(options.assistants)

@@ -65,7 +65,8 @@ def recorded_in(
     """
     if sim.world.path is None:
         raise InputError(f"{out}: a world in memory has no folder that a recording could name; write it first")
-    with Recorder(out, sim, sources={"world": str(sim.world.path)}, wanted=wanted, notes=notes) as recorder:
+    # The community may have been made for this run alone: the recorder writes it down.
+    with Recorder(out, sim, sources={"world": str(sim.world.path.resolve())}, wanted=wanted, notes=notes) as recorder:
         yield _BegunOnce(RecordedRun(recorder, faults))
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from vico.community.folder import write_community
 from vico.errors import EmptyInputError, InputError, OutputError, OutputExistsError
 from vico.io.files import write_errors, write_json
 from vico.io.folders import FolderLock, folder_errors
@@ -26,8 +27,9 @@ from vico.sim.recording.checkpoints import (
 from vico.sim.recording.films import ViewFilms, drop_views_after
 from vico.sim.recording.manifest import agents_record, describer, read_manifest, run_record
 from vico.sim.recording.samples import StepSamples, everybody
-from vico.sim.recording.schema import AGENTS, MANIFEST, METRICS, SEGMENT_STEPS
+from vico.sim.recording.schema import AGENTS, COMMUNITY, MANIFEST, METRICS, SEGMENT_STEPS
 from vico.sim.recording.segments import drop_after, segments_of, write_segment
+from vico.sim.recording.setup import write_setup
 from vico.sim.simulation import Simulation, StepResult
 
 
@@ -41,7 +43,8 @@ class Recorder:
     sim
         Before its first step.
     sources
-        Where world and community came from: ``{"world": path, "community": path}``; kept for the reader.
+        Where world and community came from: ``{"world": path, "community": path}``; kept for the reader. A community
+        that came from nowhere is written into the run's folder.
     wanted
         Steps the run is meant to have.
     states_every
@@ -82,6 +85,8 @@ class Recorder:
             out.mkdir(parents=True, exist_ok=True)
         self._open(out, sim, sources=sources, wanted=wanted, states_every=states_every, keep=keep)
         with self._errors():
+            if sim.community is not None and self._sources["community"] == COMMUNITY:
+                write_community(sim.community, out / COMMUNITY, world=sim.world.path)
             self._write_manifest("running")
             write_json(out / AGENTS, {"agents": agents_record(sim)})
 
@@ -103,7 +108,8 @@ class Recorder:
         # Held as long as this process lives, so that nobody takes the run for one that was killed.
         self._lock = FolderLock(out)
         self.out, self.sim, self.wanted, self.states_every = out, sim, wanted, states_every
-        self._sources = dict(sources)
+        # Relative to the run's folder: it may be moved, as an evaluation's is when all episodes are over.
+        self._sources = {"community": COMMUNITY} | dict(sources)
         self._closed = False
         self._samples = StepSamples(sim)
         self._films = ViewFilms(out)
@@ -183,6 +189,7 @@ class Recorder:
         if self._resumed:
             return
         with self._errors():
+            write_setup(self.out, self.sim)
             self._take(None, {}, observations)
 
     def write(self, result: StepResult, actions: Mapping[str, Any] | None = None) -> None:

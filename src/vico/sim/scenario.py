@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,9 +19,52 @@ from vico.sim.placing import Thing, free_spot_near, in_the_way
 from vico.sim.simulation_state import SimulationState
 from vico.sim.state import Vehicle
 from vico.world.mesh import Surface
+from vico.world.model import Point3, Record
 
 # An object that cannot lie where it is asked for lies no farther away than this, metres.
 _NEARBY = 2.0
+
+
+class AddedObject(Record):
+    """A call of `Scenario.add_object`, without the shape."""
+
+    call: Literal["add_object"] = "add_object"
+    name: str
+    prototype: str
+    position: Point3
+    room: str
+    size: Point3
+    yaw: float
+
+
+class HandedObject(Record):
+    """A call of `Scenario.hand_object`, without the shape."""
+
+    call: Literal["hand_object"] = "hand_object"
+    name: str
+    prototype: str
+    agent: str
+    size: Point3
+
+
+class PlacedAgent(Record):
+    """A call of `Scenario.place_agent`."""
+
+    call: Literal["place_agent"] = "place_agent"
+    name: str
+    position: tuple[float, ...]
+    yaw: float
+
+
+class GivenCash(Record):
+    """A call of `Scenario.give_cash`."""
+
+    call: Literal["give_cash"] = "give_cash"
+    name: str
+    amount: float
+
+
+Call = AddedObject | HandedObject | PlacedAgent | GivenCash
 
 
 class Scenario:
@@ -30,10 +74,39 @@ class Scenario:
     ----------
     state
         Of the simulation; changed in place.
+
+    Attributes
+    ----------
+    calls
+        What was done, in order: `repeat` does it to another simulation that is made in the same way.
     """
 
     def __init__(self, state: SimulationState) -> None:
         self._state = state
+        self.calls: list[Call] = []
+
+    def repeat(self, call: Call, shapes: Mapping[str, Sequence[Surface]]) -> None:
+        """Do what was done to another simulation.
+
+        Parameters
+        ----------
+        shapes
+            Of objects, by prototype.
+
+        Raises
+        ------
+        InputError
+            If it can't be done to this one.
+        """
+        match call:
+            case AddedObject(name=name, prototype=prototype, position=position, room=room, size=size, yaw=yaw):
+                self.add_object(name, prototype, shapes[prototype], position, room=room, size=size, yaw=yaw)
+            case HandedObject(name=name, prototype=prototype, agent=agent, size=size):
+                self.hand_object(name, prototype, shapes[prototype], agent, size=size)
+            case PlacedAgent(name=name, position=position, yaw=yaw):
+                self.place_agent(name, position, yaw=yaw)
+            case GivenCash(name=name, amount=amount):
+                self.give_cash(name, amount)
 
     def add_object(
         self,
@@ -85,6 +158,16 @@ class Scenario:
         entity = state.objects.add(name, prototype, spot, index, extents, yaw)
         state.shapes[prototype] = list(shape)
         state.entities[entity] = {"kind": "object", "name": name}
+        self.calls.append(
+            AddedObject(
+                name=name,
+                prototype=prototype,
+                position=_triple(point),
+                room=room,
+                size=_triple(extents),
+                yaw=float(yaw),
+            )
+        )
         return entity
 
     def hand_object(
@@ -122,6 +205,7 @@ class Scenario:
         state.shapes[prototype] = list(shape)
         state.entities[entity] = {"kind": "object", "name": name}
         hold(state.objects.index(entity), i, hand, state)
+        self.calls.append(HandedObject(name=name, prototype=prototype, agent=agent, size=_triple(size)))
         return entity
 
     def place_agent(self, name: str, position: ArrayLike, *, yaw: float = 0.0) -> None:
@@ -141,6 +225,7 @@ class Scenario:
         if spot is None:
             raise InputError(f"place_agent: {name}: no free ground within 8 m of {np.asarray(position)[:2].tolist()}")
         moves.put_outdoors(i, spot, yaw, state)
+        self.calls.append(PlacedAgent(name=name, position=tuple(near.tolist()), yaw=float(yaw)))
 
     def give_cash(self, name: str, amount: float) -> None:
         """Let a person carry so much money, instead of what they had.
@@ -156,6 +241,12 @@ class Scenario:
         if not 0.0 <= amount < math.inf:
             raise InputError(f"give_cash: {name}: {amount}; give an amount of 0 or more")
         people.cash[people.names.index(name)] = amount
+        self.calls.append(GivenCash(name=name, amount=float(amount)))
+
+
+def _triple(values: ArrayLike) -> Point3:
+    x, y, z = np.asarray(values, np.float64).tolist()
+    return x, y, z
 
 
 class GroundTruth:

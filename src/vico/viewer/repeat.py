@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 from pydantic import TypeAdapter
 
@@ -12,7 +12,9 @@ from vico.community import Community, read_community
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.rules import ActionStatus
 from vico.sim.config import SimConfig
+from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.recording import Run
+from vico.sim.recording.setup import repeat_setup
 from vico.sim.simulation import Simulation
 from vico.sim.simulation_state import SimulationState
 from vico.world.folder import World, read_world
@@ -30,7 +32,8 @@ class RepeatedRun:
     world, community
         That it was made with.
     setup
-        What was done to the simulation before its first step, such as adding objects.
+        What was done to the simulation before its first step, such as adding objects; what the recording says of it
+        if None.
 
     Attributes
     ----------
@@ -49,13 +52,16 @@ class RepeatedRun:
         world: World,
         community: Community | None,
         *,
-        setup: Callable[[Simulation], None] = lambda sim: None,
+        setup: Callable[[Simulation], None] | None = None,
     ) -> None:
         self.run = run
         manifest = run.manifest
         config = TypeAdapter(SimConfig).validate_python(manifest["config"])
         self.sim = Simulation(world, community, config)
-        setup(self.sim)
+        if setup is None:
+            repeat_setup(run.path, self.sim.scenario)
+        else:
+            setup(self.sim)
         if self.sim.identity != manifest["identity"]:
             raise SchemaError(
                 f"{run.path}: was made by {manifest['producer']} with another configuration, world or community than "
@@ -75,10 +81,10 @@ class RepeatedRun:
         MissingFileError
             If they are not there.
         """
-        place = read_world(_folder(run, world, run.manifest["world"], "world"))
+        place = read_world(_folder(run, world, "world"))
         people = None
         if run.manifest["community"] is not None:
-            people = read_community(_folder(run, community, run.manifest["community"], "community"), place)
+            people = read_community(_folder(run, community, "community"), place)
         return cls(run, place, people)
 
     def go_to(self, step: int) -> None:
@@ -105,6 +111,7 @@ class RepeatedRun:
 
     def _step(self) -> None:
         step = self._at + 1
+        self._pass_unrecorded(step)
         actions: dict[str, Any] = {}
         faults: dict[str, tuple[ActionStatus, str]] = {}
         for name, record in self.run.at(step).agents.items():
@@ -117,6 +124,18 @@ class RepeatedRun:
         if result.hash != self.run.hashes[step]:
             raise self._differs(step)
 
+    def _pass_unrecorded(self, step: int) -> None:
+        """Let the time pass in which nobody was asked for anything before a step, such as during an appointment."""
+        now, times = self.sim.state.tick, self.run.times
+        ticks = round(float(times[step] - times[step - 1]) * TICKS_PER_SECOND)
+        ticks -= self.sim.periods.next_due(now) - now
+        if ticks <= 0:
+            return
+        watcher, self.sim.state.on_substep = self.sim.state.on_substep, None
+        self.sim.act({})
+        self.sim.advance(ticks / TICKS_PER_SECOND)
+        self.sim.state.on_substep = watcher
+
     def _differs(self, step: int) -> SchemaError:
         return SchemaError(
             f"{self.run.path}: simulated again, step {step} is another one than recorded: the run was changed while it "
@@ -124,8 +143,8 @@ class RepeatedRun:
         )
 
 
-def _folder(run: Run, given: Path | None, source: dict[str, Any], what: str) -> Path:
-    folder = given or Path(source["path"])
+def _folder(run: Run, given: Path | None, what: Literal["world", "community"]) -> Path:
+    folder = given or run.source(what)
     if not (folder / f"{what}.json").exists():
         raise MissingFileError(f"{run.path}: its {what} is no longer at {folder}; say where it is with --{what}")
     return folder

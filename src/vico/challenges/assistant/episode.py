@@ -20,9 +20,10 @@ from vico.challenges.assistant.model import Category, Task
 from vico.challenges.assistant.thresholds import RESIDENTS
 from vico.challenges.records import EpisodeRecord, Part, Progress, Setting
 from vico.community import build_community
+from vico.community.folder import digest_of
 from vico.community.model import Community
 from vico.envs import Simulation, make
-from vico.errors import InputError
+from vico.errors import InputError, SchemaError
 from vico.runner.faults import FaultLog
 from vico.runner.foreign import AbsentAgent, Terms, foreign_agents
 from vico.runner.gather import Gatherer
@@ -73,8 +74,16 @@ def play_task(
         On which terms planners from elsewhere take part.
     recording
         Folder to which the run is recorded; None records nothing.
+
+    Raises
+    ------
+    SchemaError
+        If the task was made for another world, or for other people.
+    InputError
+        If the method names more or fewer planners than there are assistants.
     """
     began = time.perf_counter()
+    _check_made_for(task, world, community)
     names = [f"assistant_{i}" for i in range(len(task.assistants))]
     env = make(
         world,
@@ -110,6 +119,21 @@ def play_task(
             for step, why in model_faults_of(planner):
                 runner.faults.add(step, name, "model", why)
     return _record(task, method, setting or {}, chronicle, sim, runner.faults, planners, time.perf_counter() - began)
+
+
+def _check_made_for(task: Task, world: World, community: Community) -> None:
+    """Refuse a task of another world or community: who is asked for, and where, would be somebody else."""
+    if task.world_digest != world.digest:
+        raise SchemaError(
+            f"task: made for another world ({task.world!r}, {task.world_digest[:12]}) than {world.manifest.name!r} "
+            f"({world.digest[:12]}); give that world, or generate the task for this one"
+        )
+    if task.community_digest != (digest := digest_of(community)):
+        raise SchemaError(
+            f"task: made for another community ({task.community_digest[:12]}) than this one of "
+            f"{len(community.residents)} residents ({digest[:12]}); give that community, or generate the task for "
+            "this one"
+        )
 
 
 class _Reported(Hook):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vico.agents.requester import first_name
 from vico.assets.models.movable import movable_kinds
 from vico.assets.people.words import looks_in_words
 from vico.challenges.assistant.choose import Chooser, Question, choose, seeded_chooser
@@ -211,9 +212,7 @@ def _search(draw: Draw, index: int, before: list[Subtask]) -> Subtask:
 def _carry(draw: Draw, index: int, before: list[Subtask]) -> Subtask:
     """Find somebody, take what they hand over, follow them home, put it down there."""
     candidates: dict[str, list[str]] = {}
-    taken = {one.person.agent for one in before}
-    people = [who for who in draw.occasion.people if who.id not in taken]
-    who = people[draw.pick("Who needs a hand?", [p.name for p in people], candidates, None)]
+    who = _who_needs_a_hand(draw, before, candidates)
     home = place_region(draw.world.place_by_id[who.home])
     if draw.advanced:
         home = with_surface(home, draw.world, draw.chance)
@@ -229,6 +228,20 @@ def _carry(draw: Draw, index: int, before: list[Subtask]) -> Subtask:
         f"{draw.things.described(names)} from them, follow them home to {told(home)} and put it down there."
     )
     return _subtask(index, text, who, names, regions, right, home, candidates)
+
+
+def _who_needs_a_hand(draw: Draw, before: list[Subtask], into: dict[str, list[str]]) -> Resident:
+    """Have somebody chosen who has not been, and is called by another first name than those who have.
+
+    Who is called like one of them is struck off and another one chosen; where nobody is, one choice is made.
+    """
+    taken = {one.person.agent for one in before}
+    called = {first_name(one.person.name) for one in before}
+    people = [who for who in draw.occasion.people if who.id not in taken]
+    while True:  # ends: on the occasion there are as many first names as subtasks
+        who = people.pop(draw.pick("Who needs a hand?", [one.name for one in people], into, None))
+        if first_name(who.name) not in called:
+            return who
 
 
 def _subtask(

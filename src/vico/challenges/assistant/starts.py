@@ -9,7 +9,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from vico.agents.requester import PACE_HOME
+from vico.agents.requester import PACE_HOME, first_name
 from vico.challenges.assistant.model import Region
 from vico.challenges.assistant.regions import Neighbourhood
 from vico.challenges.assistant.thresholds import APART, CARRY_REACH, REACH, SOURCE_RADIUS, STEPS, SUBTASKS
@@ -88,6 +88,8 @@ def errand_occasion(world: World, community: Community, chance: np.random.Genera
 def carry_occasion(world: World, community: Community, chance: np.random.Generator) -> Occasion:
     """Return a start and a time of day at which six people are out, near by and not far from their homes.
 
+    Six can be told apart when they are called, by their first names; there may be more people.
+
     Raises
     ------
     EmptyInputError
@@ -108,8 +110,9 @@ def carry_occasion(world: World, community: Community, chance: np.random.Generat
                 for who in people
                 if who.id in whereabouts and who.home in hood.places and hood.is_near(whereabouts[who.id].position)
             }
-            most = max(most, len(out))
-            if len(out) < SUBTASKS:
+            apart = len({first_name(who.name) for who in people if who.id in out})
+            most = max(most, apart)
+            if apart < SUBTASKS:
                 continue
             # Who is near and has not far to go home comes first: six of them can then be walked in time.
             seconds = {
@@ -134,8 +137,8 @@ def carry_occasion(world: World, community: Community, chance: np.random.Generat
     if best is not None:
         return best[1]
     raise EmptyInputError(
-        f"carry: at no time of day are {SUBTASKS} people out within {CARRY_REACH:.0f} m who live there, "
-        f"{most} at most; use a larger world or more residents"
+        f"carry: at no time of day are {SUBTASKS} people out within {CARRY_REACH:.0f} m who live there and have "
+        f"different first names, {most} at most; use a larger world or more residents"
     )
 
 

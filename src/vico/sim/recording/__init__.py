@@ -8,6 +8,8 @@
     segments/FIRST-LAST/*.parquet  some steps in a row: a file a table (`schema.TABLES`)
     checkpoints/STEP/              the exact state of the simulation and its agents
     views/AGENT/FIRST.mp4          what an agent saw, a frame a step
+    community/                     who lives there, where no folder of theirs could be named
+    setup.json setup.glb           what was done before the first step, where anything was
     metrics.json                   counts and seconds; written at the end
 
 `vico.sim.recorder.Recorder` writes it, `read_run` reads it. `docs/formats.md` describes it for other programs.

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pyarrow as pa
@@ -148,6 +149,10 @@ class Run:
         return self.last > before
 
     # What there is.
+
+    def source(self, what: Literal["world", "community"]) -> Path:
+        """Return the folder of the world or the community of the run; it may be there no longer."""
+        return Path(os.path.normpath(self.path / self.manifest[what]["path"]))
 
     @property
     def complete(self) -> bool:
