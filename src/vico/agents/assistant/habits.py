@@ -13,6 +13,8 @@ from vico.errors import SchemaError
 from vico.io.data_files import DataRecord, cached_data, data_files, read_record
 
 GUIDE = "docs/challenges.md"
+#: How the file calls spots outdoors, and the category that stands for those that it does not name.
+OUTDOORS, OTHER = "outdoors", "entertainment"
 _HOURS = 24
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -35,10 +37,6 @@ class Habits(DataRecord):
         return self.places[category if category in self.places else OTHER][int(hour) % _HOURS]
 
 
-#: What stands for categories that the file does not name.
-OTHER = "entertainment"
-
-
 @cached_data
 def read_habits() -> Habits:
     """Return what is known of habits.
@@ -54,7 +52,3 @@ def read_habits() -> Habits:
     if missing:
         raise SchemaError(f"{path}: places: {', '.join(sorted(missing))} must be there")
     return habits
-
-
-#: How the file calls spots outdoors.
-OUTDOORS = "outdoors"
