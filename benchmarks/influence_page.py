@@ -14,12 +14,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from reporting import write_page
+
 from vico.agents.influence.visits import FAILURES
 from vico.challenges.influence import INFLUENCE
 from vico.challenges.influence.evaluate import CAUSES
 from vico.challenges.tables.markdown import setting_words, table
-from vico.errors import InputError, VicoError
-from vico.io.files import read_json, write_bytes
+from vico.errors import InputError
+from vico.io.files import read_json
 
 BLOCKS = {
     "pairings": "Every pairing of the offline strategies",
@@ -150,19 +152,7 @@ def _interval(found: Mapping[str, Any] | None) -> str:
 def main(words: Sequence[str] | None = None) -> int:
     """Write the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("out", type=Path, help="folder that benchmarks/tables.py wrote")
-    parser.add_argument("--page", type=Path, help="file to write instead of printing it")
-    arguments = parser.parse_args(words)
-    try:
-        text = page(results_in(arguments.out))
-        if arguments.page is None:
-            print(text)
-        else:
-            write_bytes(arguments.page, text.encode())
-    except VicoError as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
+    return write_page(parser, lambda it: page(results_in(it.out)), words)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
-"""What the benchmarks share: naming the machine, running a child and weighing it, and a table in markdown."""
+"""What the benchmarks share: naming the machine, running a child and weighing it, tables and pages in markdown."""
 
 from __future__ import annotations
 
+import argparse
 import importlib.metadata
 import os
 import platform
@@ -9,9 +10,12 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+from vico.errors import VicoError
+from vico.io.files import write_bytes
 
 _VERSIONS = ("numpy", "numba", "mujoco", "shapely")
 
@@ -71,3 +75,30 @@ def publish(lines: Sequence[str], table: Path | None) -> None:
     if table is not None:
         table.parent.mkdir(parents=True, exist_ok=True)
         table.write_text(text, encoding="utf-8")
+
+
+def write_page(
+    parser: argparse.ArgumentParser, make: Callable[[argparse.Namespace], str], words: Sequence[str] | None = None
+) -> int:
+    """Write or print a page of what benchmarks/tables.py wrote into a folder; 2 if that can't be read.
+
+    Parameters
+    ----------
+    parser
+        With the script's own options; the folder and ``--page`` are added.
+    make
+        Makes the page of the options.
+    """
+    parser.add_argument("out", type=Path, help="folder that benchmarks/tables.py wrote")
+    parser.add_argument("--page", type=Path, help="file to write instead of printing it")
+    arguments = parser.parse_args(words)
+    try:
+        text = make(arguments)
+        if arguments.page is None:
+            print(text)
+        else:
+            write_bytes(arguments.page, text.encode())
+    except VicoError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0

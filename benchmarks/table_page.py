@@ -7,16 +7,15 @@ python benchmarks/table_page.py OUT --title "The community assistant" --frozen C
 from __future__ import annotations
 
 import argparse
-import os
-import platform
 import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from reporting import write_page
+
 from vico.challenges.tables.files import read_results
-from vico.errors import InputError, VicoError
-from vico.io.files import write_bytes
+from vico.errors import InputError
 
 
 def blocks_in(out: Path) -> list[Path]:
@@ -33,17 +32,18 @@ def blocks_in(out: Path) -> list[Path]:
     return found
 
 
-def page(blocks: Sequence[Path], title: str, frozen: str) -> str:
+def page(blocks: Sequence[Path], title: str, frozen: str = "", note: str = "") -> str:
     """Return the page: what it was played with, and each part's own page a level lower."""
-    first, _ = read_results(blocks[0] / "results.json")
-    seconds = sum(record.wall_seconds for block in blocks for _, record in read_results(block / "results.json")[1])
+    found = [read_results(block / "results.json") for block in blocks]
+    first, _ = found[0]
+    seconds = sum(record.wall_seconds for _, records in found for _, record in records)
     lines = [
         f"# {title}",
         "",
         f"Written by `benchmarks/table_page.py` from what `benchmarks/tables.py` played. vico {first['vico']}, code "
-        f"`{first['code'][:12]}`, Python {platform.python_version()}, {platform.machine()}, {os.cpu_count()} cores "
-        f"shared with other work; {seconds / 3600:.1f} hours of episodes on the clock.",
+        f"`{first['code'][:12]}`; {seconds / 3600:.1f} hours of episodes on the clock.",
         "",
+        *([note, ""] if note else []),
     ]
     if frozen:
         lines += [
@@ -61,21 +61,10 @@ def page(blocks: Sequence[Path], title: str, frozen: str) -> str:
 def main(words: Sequence[str] | None = None) -> int:
     """Write the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("out", type=Path, help="folder that benchmarks/tables.py wrote")
     parser.add_argument("--title", required=True)
     parser.add_argument("--frozen", default="", help="hash of the commit at which ours was frozen")
-    parser.add_argument("--page", type=Path, help="file to write instead of printing it")
-    arguments = parser.parse_args(words)
-    try:
-        text = page(blocks_in(arguments.out), arguments.title, arguments.frozen)
-        if arguments.page is None:
-            print(text)
-        else:
-            write_bytes(arguments.page, text.encode())
-    except VicoError as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
+    parser.add_argument("--note", default="", help="a sentence on how and where it was played")
+    return write_page(parser, lambda it: page(blocks_in(it.out), it.title, it.frozen, it.note), words)
 
 
 if __name__ == "__main__":

@@ -55,6 +55,35 @@ def walk(walker: Walker, body: Point, goal: tuple[float, float], limit: int) -> 
     raise AssertionError(f"still {walker.remaining(body.pose[:2]):.1f} m to go after {limit} steps")
 
 
+def test_who_goes_after_somebody_gets_around_what_is_in_the_way() -> None:
+    walker, body = Walker(map_with_wall(), rng(0, "walk")), Point(-30.0, 0.0)
+    body.discs = [(-28.0, 0.0, 0.9)]
+    for step in range(30):  # they go on, a little further each second
+        status = {"action_status": "collision" if body.collided else "ok", "action_code": "hit_body"}
+        goal = (-20.0, 0.5 * step)
+        action = walker.towards(goal, 1.0, {"pose": body.pose, "state": status}, {"entities": {}})
+        if action is None:
+            break
+        body.do(action)
+    assert math.dist(body.pose[:2], goal) < 6.0
+
+
+def test_who_may_drift_turns_less() -> None:
+    turns = {}
+    for drift in (0.12, 0.3):
+        walker, body = Walker(map_with_wall(), rng(0, "walk")), Point(-30.0, 0.0)
+        walker.wide_drift, turned = drift, 0
+        for step in range(20):
+            observation = {"pose": body.pose, "state": {"action_status": "ok", "action_code": ""}}
+            action = walker.towards((-10.0, 0.3 * step), 2.0, observation, {"entities": {}})
+            if action is None:
+                break
+            turned += action["type"] != "move_forward"
+            body.do(action)
+        turns[drift] = turned
+    assert turns[0.3] < turns[0.12]
+
+
 def test_walker_goes_around_a_wall_it_knows_of() -> None:
     body = Point(-20.0, -20.0)
     steps = walk(Walker(map_with_wall(), rng(0, "walk")), body, (20.0, -20.0), 200)

@@ -204,6 +204,13 @@ def test_carry_asks_for_six_people_who_are_out(helsinki: World, people: Communit
             source = subtask.true_source
             near = np.hypot(*np.subtract(place.position[:2], source.centre[:2])) < 1.0
             assert source.place == place.id or (source.place is None and near)
+            # So are the others that are told, as far as the day has some within reach.
+            day = [helsinki.place_by_id[item.place] for item in who.schedule if item.place]
+            told = [
+                any(r.place == one.id or np.allclose(r.centre[:2], one.position[:2]) for one in day)
+                for r in subtask.sources
+            ]
+            assert sum(told) >= 2
 
 
 def renamed(people: Community, names: dict[str, str]) -> Community:

@@ -236,6 +236,21 @@ def test_nobody_sits_down_into_whoever_stands_beside_the_seat() -> None:
     assert overlaps_of(sim.state) == []
 
 
+def test_a_seat_in_a_hall_is_taken_only_where_no_room_has_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    sim = _asleep([_piece("chair", 1.0, 9.0, 0.0, (0.44, 0.42, 0.9), "r_back")])
+    state, room = sim.state, sim.state.indoor.index["r_back"]
+    place_in_room(0, room, state, near=np.array([1.9, 9.0]))
+
+    def leads_to() -> str:
+        return str(sim.observe()[1]["resident_0"]["rest"]["sit"]["door"])
+
+    assert leads_to() == ""
+    state.indoor.is_passage[room] = True
+    assert leads_to() == "r_cafe"
+    monkeypatch.setattr(type(state), "seats_taken", lambda self: self.seats.room != room)
+    assert leads_to() == ""
+
+
 def test_random_people_never_sit_in_the_air() -> None:
     sim = Simulation(furnished(), None, SimConfig(assistants=3, observe=()))
     draw = rng(1, "sitting")

@@ -13,7 +13,8 @@ import numpy as np
 
 from vico.agents.assistant.choosing import ChoicePlanner
 from vico.agents.assistant.errands import Choice
-from vico.agents.assistant.outlook import DONE, Model, Outlook
+from vico.agents.assistant.outlook import Model, Outlook
+from vico.agents.assistant.rollouts import DONE
 from vico.agents.assistant.skills import ObservationView
 from vico.seeds import rng
 

@@ -10,12 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from vico.agents.assistant.errands import Choice
-from vico.agents.assistant.outlook import DONE, Model, Outlook
+from vico.agents.assistant.outlook import Model, Outlook
+from vico.agents.assistant.rollouts import DONE, IMPATIENCE
 
 #: More plans than this are not looked at in one sweep; those worth most are kept, and the earliest among them.
 _WIDEST = 3000
-# How much a subtask that is done late counts less than one that is done at once.
-_IMPATIENCE = 0.25
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,7 @@ def best_plan(model: Model, left: float) -> Plan:
 def _and_then(plan: Plan, choice: Choice, outlook: Outlook, reached: Outlook, *, likely: float, left: float) -> Plan:
     """Return a plan that is one choice longer."""
     gained = sum(s == DONE for s in reached.stages) - sum(s == DONE for s in outlook.stages)
-    worth = plan.worth + gained * likely * (1.0 - _IMPATIENCE * reached.time / max(left, 1.0))
+    worth = plan.worth + gained * likely * (1.0 - IMPATIENCE * reached.time / max(left, 1.0))
     return Plan((*plan.choices, choice), plan.done + gained, reached.time if gained else plan.time, worth)
 
 

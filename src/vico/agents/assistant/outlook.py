@@ -7,14 +7,12 @@ from dataclasses import dataclass
 
 from vico.agents.assistant.errands import LOOKS, Book, Choice
 from vico.agents.assistant.estimates import DOOR, FINDS, MEET, PICK, PUT, Estimates
+from vico.agents.assistant.rollouts import DONE, IN_HAND, OPEN
 from vico.agents.assistant.skills import ObservationView
 from vico.agents.navigation.memory import SeenThing
 from vico.agents.requester import PACE_HOME
 
 Point = tuple[float, float]
-
-#: How far a subtask has come: to be found, in hand, done; or out of the question.
-OPEN, IN_HAND, DONE = 0, 1, 2
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from vico.io.compiled import compiled
 
-#: How far a subtask has come.
+#: How far a subtask has come: to be found, in hand, done.
 OPEN, IN_HAND, DONE = 0, 1, 2
 #: How much a subtask that is done at the end counts less than one that is done at once.
 IMPATIENCE = 0.25
