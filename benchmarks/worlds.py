@@ -14,7 +14,7 @@ from pathlib import Path
 
 from vico.challenges.windows import PACKAGED_MAP, Window, WindowList, overlaps, window_list
 from vico.errors import VicoError
-from vico.worldgen.many import PlaceRow, build_many
+from vico.worldgen.many import Outcome, PlaceRow, build_many
 from vico.worldgen.packaged import map_for
 
 
@@ -41,6 +41,12 @@ def show(windows: WindowList) -> None:
         print(f"{first} and {second} share {100 * share:.1f} %")
 
 
+def tell(outcome: Outcome, *_: int) -> None:
+    """Say what became of a world."""
+    what = outcome.reason or f"{outcome.buildings} buildings, {outcome.places} places, {outcome.seconds:.1f} s"
+    print(f"{outcome.name}: {outcome.state}: {what}", flush=True)
+
+
 def main() -> int:
     """Build them; 1 if one failed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -62,15 +68,11 @@ def main() -> int:
         if unknown := set(names) - {window.name for window in windows.windows}:
             parser.error(f"--only: no window called {', '.join(sorted(unknown))} in the list {arguments.list}")
         rows = [row_of(w, arguments.places) for w in windows.windows if not names or w.name in names]
-        failed = 0
-        for outcome in build_many(rows, arguments.out, locate=locate, workers=arguments.workers):
-            what = outcome.reason or f"{outcome.buildings} buildings, {outcome.places} places, {outcome.seconds:.1f} s"
-            print(f"{outcome.name}: {outcome.state}: {what}", flush=True)
-            failed += outcome.state == "failed"
+        outcomes = build_many(rows, arguments.out, locate=locate, workers=arguments.workers, finished=tell)
     except VicoError as error:
         print(error, file=sys.stderr)
         return 2
-    return 1 if failed else 0
+    return 1 if any(outcome.state == "failed" for outcome in outcomes) else 0
 
 
 if __name__ == "__main__":

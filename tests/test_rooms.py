@@ -13,11 +13,12 @@ GROUND = {"errors", "version", "seeds", "threads", "exact", "rules", "clock", "c
 # Room -> the rooms (or single modules) of ours it may import. docs/architecture.md explains the order.
 ALLOWED = {
     "io": set(),
+    "jobs": {"io"},
     "geo": {"io"},
     "world": {"geo.frame", "geo.overlay", "io"},
     "assets": {"world", "io"},
     "llm": {"io"},
-    "worldgen": {"geo", "world", "assets", "render", "llm", "io"},
+    "worldgen": {"geo", "world", "assets", "render", "llm", "jobs", "io"},
     "community": {"world", "llm", "io"},
     "render": {"world", "assets", "io"},
     "sim": {"world", "community", "render", "assets", "io"},
@@ -37,7 +38,7 @@ ALLOWED = {
         "world.heights",
     },
     "runner": {"agents", "envs", "sim", "world", "io"},
-    "challenges": {"runner", "envs", "agents", "community", "world", "assets", "llm", "io"},
+    "challenges": {"runner", "envs", "agents", "community", "world", "assets", "llm", "jobs", "io"},
 }
 OPEN = {"viewer", "cli"}  # and the front door, api.py
 

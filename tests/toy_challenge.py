@@ -9,10 +9,12 @@ import signal
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from pydantic import BaseModel
 
 import toy_city
+from vico.challenges.evaluation import jobs_for
 from vico.challenges.records import EpisodeRecord, Job, Metric, Part, Progress
 from vico.errors import InputError
 from vico.llm import Budget, Connection, LanguageModel, user
@@ -20,6 +22,7 @@ from vico.runner.faults import Fault
 from vico.seeds import rng
 from vico.world.folder import manifest_bytes, read_world
 
+NAME = "toy_challenge:TOY"
 SKILL = {"good": 0.9, "fair": 0.5, "bad": 0.1}
 PARTS = 6
 LIMIT = 100
@@ -112,3 +115,17 @@ def toy_world(folder: Path) -> Path:
     manifest = toy_city.world().manifest.model_copy(update={"name": folder.name})
     (folder / "world.json").write_bytes(manifest_bytes(manifest))
     return folder
+
+
+def toy_jobs(
+    worlds: list[Path], *, methods: tuple[str, ...] = ("good", "bad"), seeds: int = 2, **setting: Any
+) -> list[Job]:
+    """Return the jobs of both categories."""
+    return jobs_for(
+        NAME, categories=("fetch", "find"), methods=methods, setting=setting, worlds=worlds, seeds=seeds
+    )  # fmt: skip
+
+
+def played(count: Path) -> list[str]:
+    """Return which episodes were played, of the file that the setting ``count_in`` names."""
+    return [line.rsplit(" ", 1)[0] for line in count.read_text().splitlines()] if count.exists() else []

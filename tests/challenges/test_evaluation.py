@@ -14,13 +14,13 @@ from typing import Any
 
 import pytest
 
-from toy_challenge import toy_world
+from toy_challenge import NAME as TOY
+from toy_challenge import played, toy_world
+from toy_challenge import toy_jobs as jobs
 from vico.challenges.episodes import Outcome
 from vico.challenges.evaluation import evaluate, jobs_for
-from vico.challenges.records import EpisodeRecord, Job
+from vico.challenges.records import EpisodeRecord
 from vico.errors import InputError, OutputError
-
-TOY = "toy_challenge:TOY"
 
 
 @pytest.fixture
@@ -28,20 +28,8 @@ def worlds(tmp_path: Path) -> list[Path]:
     return [toy_world(tmp_path / "worlds" / name) for name in ("east", "west")]
 
 
-def jobs(
-    worlds: list[Path], *, methods: tuple[str, ...] = ("good", "bad"), seeds: int = 2, **setting: Any
-) -> list[Job]:
-    return jobs_for(
-        TOY, categories=("fetch", "find"), methods=methods, setting=setting, worlds=worlds, seeds=seeds
-    )  # fmt: skip
-
-
 def records(outcomes: list[Outcome]) -> list[EpisodeRecord | None]:
     return [outcome.record for outcome in outcomes]
-
-
-def played(count: Path) -> list[str]:
-    return [line.rsplit(" ", 1)[0] for line in count.read_text().splitlines()] if count.exists() else []
 
 
 def test_workers_and_order_decide_nothing(worlds: list[Path], tmp_path: Path) -> None:

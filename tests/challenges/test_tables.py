@@ -120,9 +120,9 @@ def test_the_page_has_every_table_and_marks_what_was_not_played() -> None:
     page = results_page(TOY, summarise(TOY, outcomes), outcomes, published=[published()])
     lines = page.splitlines()
     assert lines[0] == "# toy: assistants 1"
-    assert "| paper: Theirs | 12.3 | - | - | - | - | - | - | - | - |" in lines
-    assert "| bad | 0.0 (0.0 to 0.0) | 100 (100 to 100) | 2 | 0 | 0 of 4 | 2.5 | 6 | 0.50 | 7 crashed |" in lines
-    assert "| good | 100.0 (100.0 to 100.0) | 80 (80 to 80) | 2 | 1 | 4 of 4 | 2.5 | 6 | 0.50 | 0 |" in lines
+    assert "| paper: Theirs | 12.3 | - | - | - | - | - | - | - |" in lines
+    assert "| bad | 0.0 (0.0 to 0.0) | 100 (100 to 100) | 2 | 0 | 0 of 4 | 6 | 0.50 | 7 crashed |" in lines
+    assert "| good | 100.0 (100.0 to 100.0) | 80 (80 to 80) | 2 | 1 | 4 of 4 | 6 | 0.50 | 0 |" in lines
     assert "| good | **+100.0 (+100.0 to +100.0)** | **-20 (-20 to -20)** | 2 |" in lines
     assert "| bad | 4 | 4 |" in lines
     assert "- fetch, a, seed 0, bad: assistant_0 crashed at step 3 (no plan); 7 times in the episode" in lines
@@ -147,12 +147,19 @@ def test_results_on_disk_come_back(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "results.md").read_text().startswith("# toy: n 1\n")
     path = tmp_path / "out" / "results.json"
     whole = path.read_text()
+    assert "wall_seconds" not in whole
+    path.with_name("timing.json").unlink()
+    assert [record.wall_seconds for _, record in read_results(path)[1]] == [0.0] * len(outcomes)
+    path.with_name("timing.json").write_text('{"schema_name": "vico.timing", "version": 1, "episodes": [{}]}')
+    with pytest.raises(SchemaError, match="delete it"):
+        read_results(path)
+    path.with_name("timing.json").unlink()
     for damage in ('"SR": ', '"parts": ', '"worlds": '):
         path.write_text(whole.replace(damage, '"odd": ') if damage != '"SR": ' else whole.replace(damage, '"SR": "x'))
         with pytest.raises(SchemaError):
             read_results(path)
     path.write_text(json.dumps({**content, "version": 3}))
-    with pytest.raises(SchemaError, match="not results of version 4"):
+    with pytest.raises(SchemaError, match="not results of version 5"):
         read_results(path)
 
 

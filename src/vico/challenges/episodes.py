@@ -8,7 +8,6 @@ import logging
 import math
 import os
 import re
-import shutil
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cache, partial
@@ -21,7 +20,8 @@ from vico.challenges.records import Challenge, EpisodeRecord, Job, Progress
 from vico.challenges.registry import foreign_parts
 from vico.errors import OutputError, SchemaError, VicoError, line_of, sentence_of
 from vico.io.data_files import own_folder
-from vico.io.files import read_json, write_json
+from vico.io.files import json_bytes
+from vico.io.stores import Store
 from vico.runner.loading import source_digest
 from vico.version import __version__
 from vico.world.folder import read_world
@@ -32,7 +32,7 @@ VERSION = 1
 _log = logging.getLogger(__name__)
 _LLM_VARIABLES = ("VICO_LLM_BASE_URL", "OPENAI_BASE_URL", "VICO_LLM_MODEL", "VICO_LLM_EPISODE_TOKENS")
 # What no episode depends on: worlds are told apart by their digests, and tables are made of what was played.
-_UNUSED = ("cli", "viewer", "datasets", "worldgen", "geo", "challenges/tables", "data/challenges")
+_UNUSED = ("cli", "viewer", "datasets", "jobs", "worldgen", "geo", "challenges/tables", "data/challenges")
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Player:
 
     Parameters
     ----------
-    folder
+    store
         Where ``episodes``, ``tasks`` and, if runs are recorded, ``runs`` lie.
     code
         `code_digest` of who asks for the episodes.
@@ -89,8 +89,8 @@ class Player:
         Whether each episode is recorded as a run.
     """
 
-    def __init__(self, challenge: Challenge, folder: Path, *, code: str, record: bool = False) -> None:
-        self.challenge, self.folder, self.code, self.record = challenge, folder, code, record
+    def __init__(self, challenge: Challenge, store: Store, *, code: str, record: bool = False) -> None:
+        self.challenge, self.store, self.code, self.record = challenge, store, code, record
         self._last_task: tuple[tuple[str | int, ...], Mapping[str, object]] | None = None
 
     def play(self, job: Job, progress: Progress | None = None) -> Outcome:
@@ -118,21 +118,29 @@ class Player:
         task = self._task(job, world)
         key = _key(self.challenge, job, world, task, self.code)
         name = f"{_slug(job.category)}.{_slug(job.method)}.{_slug(job.world.name)}.{job.seed}.{key[:16]}"
-        path = self.folder / "episodes" / f"{name}.json"
-        run = self.folder / "runs" / name if self.record else None
-        record = read_episode(path, key)
-        kept = record is not None and (run is None or run.exists())
+        path = f"episodes/{name}.json"
+        run = f"runs/{name}" if self.record else None
+        record = read_episode(self.store, path, key)
+        kept = record is not None and (run is None or self.store.has(run))
         if record is None or not kept:
-            if run is not None and run.exists():
-                shutil.rmtree(run)  # of an episode that was cut short
-            record = self.challenge.play(job, recording=run, progress=progress)
-            _check(self.challenge, record)
-            if run is not None and not run.exists():
-                _log.warning("%s: the challenge recorded no run", label_of(job))
+            record = self._played(job, run, progress)
             # Only now: nobody who plays the task should find its answers lying about.
-            write_json(self.folder / "tasks" / _task_name(job, task), task)
-            write_episode(path, key, record)
+            self.store.write(f"tasks/{_task_name(job, task)}", json_bytes(task))
+            write_episode(self.store, path, key, record)
         return Outcome(job, record, world_digest=world, kept=kept)
+
+    def _played(self, job: Job, run: str | None, progress: Progress | None) -> EpisodeRecord:
+        """Play an episode, and record it as a run of that name."""
+        if run is None:
+            record = self.challenge.play(job, progress=progress)
+        else:
+            self.store.remove(run)  # of an episode that was cut short
+            with self.store.new_folder(run) as folder:
+                record = self.challenge.play(job, recording=folder, progress=progress)
+                if not folder.exists():
+                    _log.warning("%s: the challenge recorded no run", label_of(job))
+        _check(self.challenge, record)
+        return record
 
     def _task(self, job: Job, world: str) -> Mapping[str, object]:
         """Return a job's task; methods that follow each other in it share it."""
@@ -142,7 +150,7 @@ class Player:
         return self._last_task[1]
 
 
-def write_episode(path: Path, key: str, record: EpisodeRecord) -> None:
+def write_episode(store: Store, name: str, key: str, record: EpisodeRecord) -> None:
     """Write what an episode came to, whole or not at all.
 
     Parameters
@@ -150,21 +158,23 @@ def write_episode(path: Path, key: str, record: EpisodeRecord) -> None:
     key
         Digest of all that decides the episode.
     """
-    write_json(path, {"schema_name": SCHEMA, "version": VERSION, "key": key, "episode": asdict(record)})
+    content = {"schema_name": SCHEMA, "version": VERSION, "key": key, "episode": asdict(record)}
+    store.write(name, json_bytes(content))
 
 
-def read_episode(path: Path, key: str) -> EpisodeRecord | None:
+def read_episode(store: Store, name: str, key: str) -> EpisodeRecord | None:
     """Read what `write_episode` wrote; None if there is none, it is of another episode, or it is damaged."""
-    if not path.exists():
+    content = store.read(name)
+    if content is None:
         return None
     try:
-        content = read_json(path)
+        found = json.loads(content)
         known = (SCHEMA, VERSION, key)
-        if not isinstance(content, dict) or known != tuple(content.get(n) for n in ("schema_name", "version", "key")):
+        if not isinstance(found, dict) or known != tuple(found.get(n) for n in ("schema_name", "version", "key")):
             return None
-        return record_of(content.get("episode"))
-    except SchemaError as error:
-        _log.warning("%s: damaged, and played again (%s)", path, error)
+        return record_of(found.get("episode"))
+    except (SchemaError, ValueError, RecursionError) as error:
+        _log.warning("%s/%s: damaged, and played again (%s)", store, name, error)
         return None
 
 

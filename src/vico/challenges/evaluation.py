@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from vico.challenges.episodes import Outcome, Player, code_digest
-from vico.challenges.pool import WorkerPool
+from vico.challenges.episodes import Outcome, code_digest
 from vico.challenges.records import Job, Progress, Setting
 from vico.challenges.registry import check_methods, load_challenge
-from vico.challenges.worker import plain_job
+from vico.challenges.worker import episodes_service, outcome_of, plain_job
 from vico.errors import InputError
+from vico.io.stores import FolderStore, Store
+from vico.jobs import Answer, Task, open_executor
+from vico.jobs.shared import seen_by_all
 from vico.runner.foreign import Terms
 
 #: Called with each outcome as it comes, how many there are by now, and how many there will be.
@@ -63,30 +66,35 @@ def jobs_for(
 def evaluate(
     challenge: str,
     jobs: Sequence[Job],
-    folder: Path,
+    where: Path | Store,
     *,
     workers: int = 1,
+    ray: str | None = None,
     record: bool = False,
     progress: Progress | None = None,
     finished: Finished | None = None,
 ) -> list[Outcome]:
-    """Play every job whose episode is not in the folder yet.
+    """Play every job whose episode is not there yet.
 
-    What an episode came to goes to ``folder/episodes`` as soon as it is over, its task to ``folder/tasks``. A job that
-    can't be played, because its world does not hold what the task needs or is gone, or because its process was ended
-    twice, does not end the others: its outcome says why. Nothing depends on how many workers there are, nor on the
+    What an episode came to goes to ``episodes`` as soon as it is over, its task to ``tasks``. A job that can't be
+    played, because its world does not hold what the task needs or is gone, or because its process was ended twice, does
+    not end the others: its outcome says why. Nothing depends on how many workers or machines there are, nor on the
     order of the jobs.
 
     Parameters
     ----------
     challenge
         Its name, or ``my_module:MY_CHALLENGE``.
+    where
+        A folder, which all machines share if there are several, or a store.
     workers
         Processes side by side; with one, episodes are played in this process.
+    ray
+        Play them on a Ray cluster instead: its address, or ``auto``; see `vico.jobs.open_executor`.
     record
-        Whether each episode is recorded as a run, in ``folder/runs``, that the viewer replays.
+        Whether each episode is recorded as a run, in ``runs``, that the viewer replays.
     progress
-        Told how far each episode is.
+        Told how far each episode is, on this machine.
     finished
         Told of each outcome.
 
@@ -98,35 +106,40 @@ def evaluate(
     Raises
     ------
     InputError
-        If there is no such challenge, or one job is given twice.
+        If there is no such challenge, one job is given twice, or a machine of the cluster lacks what is needed.
     OutputError
-        If the folder can't be written. What is there by then stays, as it does after Ctrl-C.
+        If nothing can be written. What is there by then stays, as it does after Ctrl-C.
     """
-    if workers < 1:
-        raise InputError(f"workers: {workers}; at least one is needed")
     if len({json.dumps(plain_job(job), sort_keys=True) for job in jobs}) < len(jobs):
         raise InputError("evaluate: a job is given twice; its episode would count twice")
-    known = load_challenge(challenge)
+    load_challenge(challenge)
+    store = FolderStore(where) if isinstance(where, Path) else where
+    tasks = [Task(plain_job(job), near=str(job.world)) for job in jobs]
     outcomes: dict[int, Outcome] = {}
 
-    def done(index: int, outcome: Outcome) -> None:
-        outcomes[index] = outcome
+    def done(index: int, answer: Answer) -> None:
+        job = jobs[index]
+        content = answer.content
+        outcomes[index] = Outcome(job, None, answer.reason) if content is None else outcome_of(job, content)
         if finished is not None:
-            finished(outcome, len(outcomes), len(jobs))
+            finished(outcomes[index], len(outcomes), len(jobs))
 
-    _clear(folder)
-    if min(workers, len(jobs)) <= 1:
-        player = Player(known, folder, code=code_digest(), record=record)
-        for index, job in enumerate(jobs):
-            done(index, player.play(job, progress))
-    else:
-        with WorkerPool(challenge, folder, code=code_digest(), record=record, workers=workers) as pool:
-            pool.play(jobs, done, progress)
+    def told(message: Mapping[str, Any]) -> None:
+        if progress is not None:
+            progress(message["label"], message["step"], message["limit"])
+
+    if isinstance(store, FolderStore):
+        _clear(store.folder)
+    if ray is None:
+        workers = min(workers, max(1, len(jobs)))
+    with open_executor(workers=workers, ray=ray) as executor, seen_by_all(store, executor) as seen:
+        service = episodes_service(challenge, str(store), code=code_digest(), record=record, seen=seen)
+        executor.run(service, tasks, done=done, told=told)
     return [outcomes[index] for index in range(len(jobs))]
 
 
 def _clear(folder: Path) -> None:
     """Take away what was being written when an evaluation was killed."""
-    for part in ("episodes", "tasks"):
-        for path in (folder / part).glob(".*"):
+    for pattern in (".seen-*", "episodes/.*", "tasks/.*"):
+        for path in folder.glob(pattern):
             path.unlink(missing_ok=True)

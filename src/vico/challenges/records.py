@@ -56,6 +56,9 @@ class Job:
         Its folder.
     terms
         On which terms agents from elsewhere take part.
+    world_url
+        Where the world is copied from by whoever plays the job, if it lies in an object store: `world` need hold no
+        more than its manifest then.
     """
 
     challenge: str
@@ -65,6 +68,7 @@ class Job:
     world: Path
     seed: int
     terms: Terms = field(default_factory=Terms)
+    world_url: str = ""
 
 
 @dataclass(frozen=True)

@@ -1,70 +1,75 @@
-"""A process that plays jobs: it is told which over a connection, and says what came of them, in JSON."""
+"""What a process does that plays jobs: the service of `vico.jobs` that evaluations hand out, in plain data."""
 
 from __future__ import annotations
 
-import json
-import multiprocessing
 import os
-import signal
-import threading
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from multiprocessing.connection import Connection, wait
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from vico.challenges.episodes import Outcome, Player, record_of
+from vico.challenges.episodes import Outcome, Player, code_digest, record_of
 from vico.challenges.records import Job
 from vico.challenges.registry import load_challenge
-from vico.errors import OutputError
+from vico.errors import InputError
+from vico.io.stores import store_at
+from vico.jobs import Service
+from vico.jobs.shared import check_seen
 from vico.runner.foreign import Terms
-from vico.threads import WORKERS
+from vico.version import __version__
+from vico.world.remote import fetch_world
 
 _TOLD_EVERY = 10  # steps
 
 
-@dataclass(frozen=True)
-class WorkerOptions:
-    """What a worker is told when it starts.
+def episodes_service(challenge: str, store: str, *, code: str, record: bool, seen: str = "") -> Service:
+    """Return the service that plays the jobs of a challenge.
 
-    Attributes
+    Parameters
     ----------
     challenge
         Its name, or ``my_module:MY_CHALLENGE``.
-    code
-        `vico.challenges.episodes.code_digest` of who asks.
-    threads
-        How many it may use.
+    store, code, record
+        As `vico.challenges.episodes.Player` has them.
+    seen
+        Name of a file of the store that whoever plays must see, for other machines; and their code must be ours then.
     """
-
-    challenge: str
-    folder: str
-    code: str
-    record: bool
-    threads: int
+    options = {"challenge": challenge, "store": store, "code": code, "record": record, "seen": seen}
+    return Service("vico.challenges.worker:player", options)
 
 
-def serve(connection: Connection, options: WorkerOptions) -> None:
-    """Play jobs until the other side closes the connection."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who started this process; it ends it then
-    threading.Thread(target=_end_with_the_parent, daemon=True).start()
-    os.environ[WORKERS] = str(options.threads)
-    challenge = load_challenge(options.challenge)
-    player = Player(challenge, Path(options.folder), code=options.code, record=options.record)
+def player(
+    options: Mapping[str, Any], tell: Callable[[Mapping[str, Any]], None]
+) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
+    """Return what plays a job, of `plain_job`, and returns what came of it, for `outcome_of`.
+
+    Raises
+    ------
+    InputError
+        If this machine does not see what the others see, or has other code: what it played would be filed wrongly.
+    """
+    store = store_at(options["store"])
+    check_seen(store, options["seen"])
+    if options["seen"] and code_digest() != options["code"]:
+        raise InputError(
+            f"vico {__version__} there is other code, or its $VICO_DATA holds other data, than where the episodes are "
+            "asked for; install the same on every machine"
+        )
+    episodes = Player(load_challenge(options["challenge"]), store, code=options["code"], record=options["record"])
 
     def progress(label: str, step: int, limit: int) -> None:
         if step % _TOLD_EVERY == 0 or step == limit:
-            _send(connection, {"progress": [label, step, limit]})
+            tell({"label": label, "step": step, "limit": limit})
 
-    while True:
-        try:
-            job = job_of(json.loads(connection.recv_bytes()))
-        except EOFError:
-            return
-        try:
-            _send(connection, {"outcome": plain_outcome(player.play(job, progress))})
-        except OutputError as error:
-            _send(connection, {"output_error": str(error)})
+    def play(content: Mapping[str, Any]) -> dict[str, Any]:
+        url = content["world_url"]
+        world = str(fetch_world(url)) if url else content["world"]
+        outcome = plain_outcome(episodes.play(job_of({**content, "world": world}), progress))
+        if options["seen"] and outcome["reason"] and not os.path.isdir(world):
+            outcome["reason"] += f" (on the machine {os.uname().nodename})"
+        return outcome
+
+    return play
 
 
 def plain_job(job: Job) -> dict[str, Any]:
@@ -87,14 +92,3 @@ def outcome_of(job: Job, content: Mapping[str, Any]) -> Outcome:
     """Make an outcome of what `plain_outcome` returned."""
     record = content["record"]
     return Outcome(job, **{**content, "record": None if record is None else record_of(record)})
-
-
-def _send(connection: Connection, message: Mapping[str, Any]) -> None:
-    connection.send_bytes(json.dumps(message).encode())
-
-
-def _end_with_the_parent() -> None:
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    wait([parent.sentinel])
-    os._exit(1)

@@ -4,33 +4,40 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import fields
+from dataclasses import fields, replace
+from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from vico.challenges.episodes import Outcome, label_of
 from vico.challenges.evaluation import Finished, evaluate, jobs_for
-from vico.challenges.records import Challenge, Job, Setting
+from vico.challenges.records import Challenge, Setting
 from vico.challenges.records import Progress as Told
 from vico.challenges.registry import foreign_parts, load_challenge
 from vico.challenges.tables.files import results_content, write_results
-from vico.challenges.tables.markdown import fault_lines, not_played_lines, results_page
+from vico.challenges.tables.markdown import fault_lines, not_played_lines, results_page, time_lines
 from vico.challenges.tables.published import published_rows
 from vico.challenges.tables.summary import summarise
 from vico.cli import leaderboard
 from vico.cli.evaluation_options import AssistantOptions, CommuteOptions, EvaluationOptions, InfluenceOptions
 from vico.cli.output import check_output, print_json
-from vico.errors import InputError, OutputError
+from vico.errors import InputError, OutputError, OutputExistsError
 from vico.io.files import write_errors
 from vico.io.folders import is_being_written, new_folder
+from vico.io.stores import Store, is_url, store_at
 from vico.runner.foreign import Terms
 from vico.runner.loading import load
 from vico.threads import workers as processors
 from vico.world.folder import read_world
+from vico.world.remote import fetch_manifest
+
+#: `evaluate` with all but where to, and who is told.
+Play = Callable[..., list[Outcome]]
 
 
 def assistant(options: AssistantOptions) -> int:
@@ -77,6 +84,7 @@ def judge(
     """Play the episodes; leave tasks, episodes, ``results.json`` and ``results.md`` in ``options.out``.
 
     Until all are over they are in a neighbour, ``OUT.partial``; the same command goes on there after an interruption.
+    In an object store they are where they stay.
 
     Parameters
     ----------
@@ -96,47 +104,77 @@ def judge(
         raise InputError(f"eval: needs a --method; there are {', '.join(sorted(challenge.methods))}")
     if options.against and options.against not in methods:
         raise InputError(f"eval: --against {options.against}, which is none of the methods; add --method")
+    worlds = {fetch_manifest(one) if is_url(one) else Path(one): one for one in options.worlds}
+    if len(worlds) < len(options.worlds):
+        raise InputError(f"{name}: a world is given twice; its episodes would count twice")
     jobs = jobs_for(
         name,
         categories=categories or challenge.categories,
         methods=methods,
         setting=setting,
-        worlds=options.worlds,
+        worlds=list(worlds),
         seeds=options.seeds,
         terms=_terms(challenge, methods, options),
     )
     if not 0 <= options.workers <= 256:
         raise InputError(f"--workers {options.workers}; give a number of processes in 1..256, or 0 for one a processor")
-    check_output(options.out, *options.worlds, force=options.force or options.resume)
-    for path in options.worlds:
+    for path in worlds:
         read_world(path)  # a world that is none is said before anything is played
-    outcomes = _played(name, challenge, jobs, options)
-    _tell(challenge, outcomes, options)
-    if options.leaderboard is not None:
-        leaderboard.add(options.out, file=options.leaderboard, date=options.date, replace=False, told=not options.json)
+    play = partial(
+        evaluate,
+        name,
+        [replace(job, world_url=worlds[job.world]) if is_url(worlds[job.world]) else job for job in jobs],
+        workers=options.workers or processors(),
+        ray=options.ray,
+        record=options.record,
+    )
+    written = _in_store if is_url(options.out) else _in_folder
+    with written(challenge, play, options) as (folder, outcomes):
+        _tell(challenge, outcomes, options)
+        if options.leaderboard is not None:
+            leaderboard.add(folder, file=options.leaderboard, date=options.date, replace=False, told=not options.json)
     return 1 if any(outcome.record is None for outcome in outcomes) else 0
 
 
-def _played(name: str, challenge: Challenge, jobs: Sequence[Job], options: EvaluationOptions) -> list[Outcome]:
-    """Play the jobs, and write the results."""
-    out = options.out
-    partial = out.with_name(f"{out.name}.partial")
+@contextmanager
+def _in_folder(challenge: Challenge, play: Play, options: EvaluationOptions) -> Iterator[tuple[Path, list[Outcome]]]:
+    """Play the jobs, and write the results beside the episodes; give their folder and the outcomes."""
+    out = Path(options.out)
+    check_output(out, *(Path(one) for one in options.worlds if not is_url(one)), force=options.force or options.resume)
+    partial_folder = out.with_name(f"{out.name}.partial")
     if options.resume:
-        _take_up(out, partial)
-    with new_folder(out, force=options.force, work=partial) as folder:
-        with _reporting() as (progress, finished):
-            outcomes = evaluate(
-                name,
-                jobs,
-                folder,
-                workers=min(options.workers or processors(), len(jobs)),
-                record=options.record,
-                progress=progress,
-                finished=finished,
-            )
-        published = published_rows(challenge.name, jobs[0].setting) if options.compare else ()
-        write_results(folder, challenge, outcomes, reference=options.against, published=published)
-    return outcomes
+        _take_up(out, partial_folder)
+    with new_folder(out, force=options.force, work=partial_folder) as folder:
+        outcomes = _played(play, folder)
+        _write(folder, challenge, outcomes, options)
+    yield out, outcomes
+
+
+@contextmanager
+def _in_store(challenge: Challenge, play: Play, options: EvaluationOptions) -> Iterator[tuple[Path, list[Outcome]]]:
+    """Play the jobs, and copy the results to the store, ``results.json`` last: where that is, an evaluation is over."""
+    store = store_at(options.out)
+    if store.has("results.json") and not options.resume:
+        if not options.force:
+            raise OutputExistsError(f"{store}: exists already; choose another --out, or replace it with --force")
+        store.remove("")
+    outcomes = _played(play, store)
+    with TemporaryDirectory(prefix="vico-") as temporary:
+        folder = Path(temporary)
+        _write(folder, challenge, outcomes, options)
+        for path in sorted(folder.iterdir(), key=lambda path: path.name == "results.json"):
+            store.write(path.name, path.read_bytes())
+        yield folder, outcomes
+
+
+def _played(play: Play, where: Path | Store) -> list[Outcome]:
+    with _reporting() as (progress, finished):
+        return play(where, progress=progress, finished=finished)
+
+
+def _write(folder: Path, challenge: Challenge, outcomes: Sequence[Outcome], options: EvaluationOptions) -> None:
+    published = published_rows(challenge.name, outcomes[0].job.setting) if options.compare else ()
+    write_results(folder, challenge, outcomes, reference=options.against, published=published)
 
 
 def _tell(challenge: Challenge, outcomes: Sequence[Outcome], options: EvaluationOptions) -> None:
@@ -147,7 +185,9 @@ def _tell(challenge: Challenge, outcomes: Sequence[Outcome], options: Evaluation
     else:
         published = published_rows(challenge.name, summary.setting) if options.compare else ()
         print(results_page(challenge, summary, outcomes, published=published))
-        print(options.out / "results.json")
+        print(f"{options.out.rstrip('/')}/results.json")
+    for line in time_lines(summary):
+        print(line, file=sys.stderr)
     for line in [*fault_lines(outcomes), *(f"not played: {line}" for line in not_played_lines(outcomes))]:
         print(line, file=sys.stderr)
 

@@ -8,6 +8,8 @@ from typing import Annotated, Literal
 
 import tyro
 
+from vico.cli.options import RayAddress
+
 
 @dataclass(frozen=True)
 class EvaluationOptions:
@@ -16,9 +18,11 @@ class EvaluationOptions:
     Attributes
     ----------
     worlds
-        World folders; one episode for each world, seed, category and method.
+        World folders, or their URLs (s3://BUCKET/worlds/helsinki); one episode for each world, seed, category and
+        method.
     out
-        Folder for tasks, episodes and results; refused if it exists, unless --resume or --force.
+        Folder for tasks, episodes and results, or a URL like s3://BUCKET/results (the extra "s3"); refused if it
+        exists, unless --resume or --force.
     method
         One of the challenge's, my_module:MyAgent (path/to/file.py:MyAgent), or two joined by +. Give it several times
         to judge several in the same tasks.
@@ -28,6 +32,9 @@ class EvaluationOptions:
         Episodes a world, seeded 0, 1, ...
     workers
         Processes side by side; 0 is one a processor. Decides nothing but how long it takes.
+    ray
+        Play on a Ray cluster instead (the extra "ray"): its address; without one on that which runs here, or on one
+        that is started for the occasion. OUT and the worlds must be on a folder that all machines share, or URLs.
     resume
         Go on in OUT: episodes that are there and would come to the same are kept, what is missing is played.
     record
@@ -48,12 +55,13 @@ class EvaluationOptions:
         Print the results as JSON.
     """
 
-    worlds: list[Path]
-    out: Path
+    worlds: list[str]
+    out: str
     method: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="METHOD")] = ()
     against: str = ""
     seeds: int = 3
     workers: int = 0
+    ray: RayAddress = None
     resume: bool = False
     record: bool = False
     compare: bool = False

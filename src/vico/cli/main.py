@@ -26,9 +26,11 @@ from vico.cli.options import (
     CommaSeparated,
     CommunityBuildOptions,
     FilmOptions,
+    RayAddress,
     RunOptions,
     StillOptions,
     WorldBuildOptions,
+    with_ray_address,
 )
 from vico.errors import VicoError, line_of, sentence_of
 from vico.io.files import reason_of
@@ -84,9 +86,9 @@ def world_rebuild(path: Positional[Path], stage: CommaSeparated, layout_llm: boo
 @world.command(name="build-many")
 def world_build_many(
     table: Positional[Path],
-    out: Path,
+    out: str,
     workers: int = 0,
-    ray: bool = False,
+    ray: RayAddress = None,
     force: bool = False,
     json: bool = False,
 ) -> int:
@@ -97,11 +99,13 @@ def world_build_many(
 
     Example: vico world build-many places.csv --out worlds --workers 4
 
+    Example: vico world build-many places.csv --out s3://bucket/worlds --ray
+
     Args:
         table: The places; file names in it are relative to it.
-        out: Parent folder of the worlds.
+        out: Parent folder of the worlds, or a URL like s3://BUCKET/worlds (the extra "s3").
         workers: Processes side by side; 0 is one a processor.
-        ray: Hand the places to a Ray cluster instead (the extra "scale").
+        ray: Hand the places to a Ray cluster instead (the extra "ray"): its address; without one, that which runs here.
         force: Build anew worlds that are there.
         json: Print the outcomes as JSON.
     """
@@ -436,7 +440,7 @@ def main(arguments: list[str] | None = None) -> None:
         code = app.cli(
             prog="vico",
             description="An open world for humans, robots and society.",
-            args=given,
+            args=with_ray_address(given),
             config=(tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes),
         )
     except VicoError as error:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -12,6 +14,9 @@ from tyro.conf import Positional
 from vico.errors import InputError
 
 CommaSeparated = Annotated[str, tyro.conf.arg(metavar="A,B,...")]
+#: Of a Ray cluster; a bare ``--ray`` becomes ``--ray auto``.
+RayAddress = Annotated[str | None, tyro.conf.arg(metavar="[ADDRESS]")]
+_RAY_ADDRESS = re.compile(r"auto|local|ray://.+|[^/\s]+:\d+")
 
 
 @dataclass(frozen=True)
@@ -451,3 +456,13 @@ def lat_lon(text: str, option: str) -> tuple[float, float]:
     except ValueError:
         raise InputError(f"{option}: {text!r} is not LAT,LON; write for example 60.1690,24.9435") from None
     return lat, lon
+
+
+def with_ray_address(words: Sequence[str]) -> list[str]:
+    """Return a command line in which ``--ray`` has an address: ``auto`` where none follows it."""
+    found: list[str] = []
+    for word, following in zip(words, [*words[1:], ""], strict=True):
+        found.append(word)
+        if word == "--ray" and not _RAY_ADDRESS.fullmatch(following):
+            found.append("auto")
+    return found

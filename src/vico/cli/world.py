@@ -122,20 +122,24 @@ def rebuild(path: Path, stages: Sequence[str], *, author: LlmLayoutAuthor | None
 
 
 def build_table(
-    table: Path, *, out: Path, workers: int, ray: bool = False, force: bool = False, json: bool = False
+    table: Path, *, out: str, workers: int, ray: str | None = None, force: bool = False, json: bool = False
 ) -> int:
     """Build a table of places; 1 if any failed."""
+    from vico.io.stores import store_at
     from vico.worldgen.many import build_many, read_place_table
 
     rows = read_place_table(table)
-    outcomes = []
     with progress_bars() as report:
         report("places", 0, len(rows))
-        for outcome in build_many(rows, out, locate=locate, workers=workers, force=force, ray=ray):
-            outcomes.append(outcome)
-            report("places", len(outcomes), len(rows))
-    order = {row.name: k for k, row in enumerate(rows)}
-    outcomes.sort(key=lambda outcome: order[outcome.name])
+        outcomes = build_many(
+            rows,
+            store_at(out),
+            locate=locate,
+            workers=workers,
+            force=force,
+            ray=ray,
+            finished=lambda _, done, total: report("places", done, total),
+        )
     failed = [outcome for outcome in outcomes if outcome.state == "failed"]
     if json:
         print_json({"ok": not failed, "places": [asdict(outcome) for outcome in outcomes]})

@@ -1,19 +1,20 @@
-"""Many worlds side by side: a table of places, a process each, or tasks of a Ray cluster."""
+"""Many worlds side by side: a table of places, a task each for processes of this machine or a Ray cluster."""
 
 from __future__ import annotations
 
 import csv
-import multiprocessing
-import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass, fields
+import importlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from vico import threads
-from vico.errors import InputError, MissingExtraError, MissingFileError, SchemaError, VicoError
+from vico.errors import MissingFileError, SchemaError, VicoError
+from vico.io.stores import FolderStore, Store, store_at
+from vico.jobs import Answer, Service, Task, open_executor
+from vico.jobs.shared import check_seen, seen_by_all
 from vico.world.folder import read_world, stage_seconds
+from vico.world.remote import fetch_manifest
 from vico.worldgen.pipeline import build_world
 from vico.worldgen.sources import SERVICES, Sources
 
@@ -53,6 +54,8 @@ class Outcome:
 
 
 Locate = Callable[[float, float, float], Path]
+#: Called with each outcome as it comes, how many there are by now, and how many there will be.
+Finished = Callable[[Outcome, int, int], None]
 
 
 def read_place_table(path: Path) -> list[PlaceRow]:
@@ -130,13 +133,14 @@ def _beside(text: str, table: Path) -> str:
 
 def build_many(
     rows: Sequence[PlaceRow],
-    out: Path,
+    out: Path | Store,
     *,
     locate: Locate,
     workers: int = 1,
     force: bool = False,
-    ray: bool = False,
-) -> Iterator[Outcome]:
+    ray: str | None = None,
+    finished: Finished | None = None,
+) -> list[Outcome]:
     """Build every place into a folder of `out`; a world that is there and whole is kept, one that fails is told.
 
     Parameters
@@ -144,65 +148,68 @@ def build_many(
     rows
         The places.
     out
-        Parent folder of the worlds.
+        Parent folder of the worlds, or a store.
     locate
         Finds a map for a place without a file: latitude, longitude, half side to a path. A function of a module, as
         other processes must find it.
     workers
-        How many processes side by side (not used with `ray`).
+        How many processes side by side; with one, all is done in this process.
     force
         Build worlds anew that are there.
     ray
-        Hand the places to a Ray cluster (the extra ``scale``).
+        Hand the places to a Ray cluster instead: its address, or ``auto``; see `vico.jobs.open_executor`.
+    finished
+        Told of each outcome as it comes, how many there are by now, and how many there will be.
 
-    Yields
-    ------
-    Outcome
-        As each is done, in no fixed order.
+    Returns
+    -------
+    list of Outcome
+        In the order of the rows.
 
     Raises
     ------
+    InputError
+        If `workers` is no number of processes, or there is no such cluster.
     MissingExtraError
         If `ray` is asked for and not installed.
     """
-    if workers < 1:
-        raise InputError(f"workers: {workers}; at least one is needed")
-    how: dict[str, Any] = {
-        "out": Path(out).absolute(),
-        "locate": locate,
-        "force": force,
-    }
-    if ray:
-        yield from _with_ray(rows, how)
-        return
-    workers = min(workers, len(rows))
-    if workers <= 1:
-        for row in rows:
-            yield build_one(row, **how)
-        return
-    # Fresh processes: a fork of one with compiled code and threads in it may hang. They share the processors.
-    pool = ProcessPoolExecutor(
-        workers,
-        mp_context=multiprocessing.get_context("spawn"),
-        initializer=_use_threads,
-        initargs=(max(1, threads.workers() // workers),),
-    )
-    with pool:
-        for done in as_completed([pool.submit(build_one, row, **how) for row in rows]):
-            yield done.result()
+    store = FolderStore(out) if isinstance(out, Path) else out
+    outcomes: dict[int, Outcome] = {}
+
+    def done(index: int, answer: Answer) -> None:
+        name = rows[index].name
+        content = answer.content or asdict(Outcome(name, "failed", reason=answer.reason))
+        outcomes[index] = Outcome(**content)
+        if finished is not None:
+            finished(outcomes[index], len(outcomes), len(rows))
+
+    if ray is None:
+        workers = min(workers, max(1, len(rows)))
+    options = {"out": str(store), "locate": f"{locate.__module__}:{locate.__qualname__}", "force": force}
+    with open_executor(workers=workers, ray=ray) as executor, seen_by_all(store, executor) as seen:
+        service = Service("vico.worldgen.many:builder", {**options, "seen": seen})
+        executor.run(service, [Task(asdict(row)) for row in rows], done=done)
+    return [outcomes[index] for index in range(len(rows))]
 
 
-def _use_threads(count: int) -> None:
-    os.environ[threads.WORKERS] = str(count)
+def builder(options: Mapping[str, Any], _: object) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
+    """Return what builds a place, of the fields of a `PlaceRow`, and returns the fields of an `Outcome`."""
+    store = store_at(options["out"])
+    check_seen(store, options["seen"])
+    module, _, name = options["locate"].partition(":")
+    locate: Locate = getattr(importlib.import_module(module), name)
+
+    def build(content: Mapping[str, Any]) -> dict[str, Any]:
+        return asdict(build_one(PlaceRow(**content), store=store, locate=locate, force=options["force"]))
+
+    return build
 
 
-def build_one(row: PlaceRow, *, out: Path, locate: Locate, force: bool) -> Outcome:
+def build_one(row: PlaceRow, *, store: Store, locate: Locate, force: bool) -> Outcome:
     """Build one place; bad input becomes an outcome, so that it does not end the others."""
-    folder = Path(out) / row.name
     try:
-        if not force and (folder / "world.json").exists():
-            counts = read_world(folder).manifest.counts
-            return Outcome(row.name, "kept", counts["buildings"], counts["places"])
+        if not force and store.has(f"{row.name}/world.json"):
+            return _kept(row, store)
         sources = Sources(
             osm=Path(row.osm) if row.osm else locate(row.lat, row.lon, row.radius),
             dem=tuple(Path(p) for p in row.dem.split(";") if p),
@@ -213,30 +220,25 @@ def build_one(row: PlaceRow, *, out: Path, locate: Locate, force: bool) -> Outco
             layouts=Path(row.layouts) if row.layouts else None,
             installed_things=row.things == "installed",
         )
-        manifest = build_world(
-            sources,
-            lat=row.lat,
-            lon=row.lon,
-            half=row.radius,
-            seed=row.seed,
-            out=folder,
-            force=force,
-        )
+        with store.new_folder(row.name, last="world.json") as folder:
+            build_world(
+                sources,
+                lat=row.lat,
+                lon=row.lon,
+                half=row.radius,
+                seed=row.seed,
+                out=folder,
+                force=force,
+            )
+            world = read_world(folder)
+            counts, seconds = world.manifest.counts, sum(stage_seconds(world).values())
     except (VicoError, OSError) as error:
         return Outcome(row.name, "failed", reason=str(error))
-    counts, seconds = manifest.counts, sum(stage_seconds(read_world(folder)).values())
     return Outcome(row.name, "built", counts["buildings"], counts["places"], round(seconds, 2))
 
 
-def _with_ray(rows: Sequence[PlaceRow], how: dict[str, Any]) -> Iterator[Outcome]:
-    try:
-        import ray
-    except ImportError:
-        raise MissingExtraError("Ray is not installed: pip install 'virtual-community[scale]'") from None
-    if not ray.is_initialized():
-        ray.init(include_dashboard=False, log_to_driver=False)
-    task = ray.remote(build_one)
-    waiting = [task.remote(row, **how) for row in rows]
-    while waiting:
-        done, waiting = ray.wait(waiting)
-        yield from ray.get(done)
+def _kept(row: PlaceRow, store: Store) -> Outcome:
+    """Return the outcome of a world that is there."""
+    there = store.folder / row.name if isinstance(store, FolderStore) else fetch_manifest(f"{store}/{row.name}")
+    counts = read_world(there).manifest.counts
+    return Outcome(row.name, "kept", counts["buildings"], counts["places"])

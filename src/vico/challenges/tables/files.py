@@ -1,9 +1,13 @@
-"""``results.json`` and ``results.md``: written as an evaluation goes on, and read for the leaderboard."""
+"""``results.json``, ``results.md`` and ``timing.json``: written when an evaluation is over, read for the leaderboard.
+
+Nothing of the first two depends on the machine: the same episodes come to the same bytes wherever they are played. How
+long it took is in the third.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +21,10 @@ from vico.io.files import read_json, write_bytes, write_json
 from vico.version import __version__
 
 SCHEMA = "vico.results"
-VERSION = 4
+VERSION = 5
+_OLDER = 4  # had the seconds in it
+TIMING, TIMING_VERSION = "vico.timing", 1
+_SECONDS = "wall_seconds"
 
 
 def results_content(challenge: Challenge, summary: Summary, outcomes: Sequence[Outcome]) -> dict[str, Any]:
@@ -32,10 +39,12 @@ def results_content(challenge: Challenge, summary: Summary, outcomes: Sequence[O
         "setting": dict(summary.setting),
         "reference": summary.reference,
         "worlds": {outcome.job.world.name: outcome.world_digest for outcome in played},
-        "rows": [asdict(row) for row in summary.rows],
+        "rows": [_timeless(asdict(row)) for row in summary.rows],
         "differences": [asdict(one) for one in summary.differences],
         "averages": [asdict(one) for one in summary.averages],
-        "episodes": [{"world_folder": o.job.world.name, **asdict(o.record)} for o in played if o.record is not None],
+        "episodes": [
+            {"world_folder": o.job.world.name, **_timeless(asdict(o.record))} for o in played if o.record is not None
+        ],
         "not_played": [
             {
                 "category": o.job.category,
@@ -50,6 +59,19 @@ def results_content(challenge: Challenge, summary: Summary, outcomes: Sequence[O
     }
 
 
+def timing_content(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    """Return what ``timing.json`` holds: the seconds of each episode, by the clock of the machine that played it."""
+    return {
+        "schema_name": TIMING,
+        "version": TIMING_VERSION,
+        "episodes": [
+            {**dict(zip(_WHICH, _which(o.job.world.name, o.record), strict=True)), _SECONDS: o.record.wall_seconds}
+            for o in outcomes
+            if o.record is not None
+        ],
+    }
+
+
 def write_results(
     folder: Path,
     challenge: Challenge,
@@ -58,8 +80,9 @@ def write_results(
     reference: str = "",
     published: Sequence[Published] = (),
 ) -> Summary:
-    """Write ``results.json`` and ``results.md`` of the outcomes of one setting; return the summary."""
+    """Write results and timing of the outcomes of one setting; return the summary."""
     summary = summarise(challenge, outcomes, reference=reference)
+    write_json(folder / "timing.json", timing_content(outcomes))
     write_json(folder / "results.json", results_content(challenge, summary, outcomes))
     write_bytes(folder / "results.md", results_page(challenge, summary, outcomes, published=published).encode())
     return summary
@@ -67,6 +90,8 @@ def write_results(
 
 def read_results(path: Path) -> tuple[dict[str, Any], list[tuple[str, EpisodeRecord]]]:
     """Read ``results.json``: all of it, and its episodes with the folder name of the world each was played in.
+
+    How long episodes took is read from ``timing.json`` beside it; 0 where that is not there.
 
     Raises
     ------
@@ -77,19 +102,47 @@ def read_results(path: Path) -> tuple[dict[str, Any], list[tuple[str, EpisodeRec
     """
     content = read_json(path)
     found = (content.get("schema_name"), content.get("version")) if isinstance(content, dict) else None
-    if found != (SCHEMA, VERSION):
+    if found not in ((SCHEMA, VERSION), (SCHEMA, _OLDER)):
         raise SchemaError(f"{path}: not results of version {VERSION}; evaluate anew")
+    timing = _read_timing(path.with_name("timing.json"))
     try:
-        episodes = [
-            (
-                str(one["world_folder"]),
-                record_of({name: value for name, value in one.items() if name != "world_folder"}),
+        episodes = []
+        for one in content["episodes"]:
+            fields = {_SECONDS: 0.0, **one}
+            world = str(fields.pop("world_folder"))
+            record = record_of(fields)
+            episodes.append(
+                (world, replace(record, wall_seconds=timing.get(_which(world, record), record.wall_seconds)))
             )
-            for one in content["episodes"]
-        ]
         for world, _ in episodes:
             content["worlds"][world]
         content["rows"], content["setting"], content["challenge"], content["vico"]
     except (KeyError, TypeError, AttributeError) as error:
         raise SchemaError(f"{path}: damaged ({type(error).__name__}: {error}); evaluate anew") from None
     return content, episodes
+
+
+#: What tells an evaluation's episodes apart.
+_WHICH = ("world_folder", "category", "method", "seed")
+
+
+def _which(world: str, record: EpisodeRecord) -> tuple[str, str, str, int]:
+    return world, record.category, record.method, record.seed
+
+
+def _timeless(content: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in content.items() if name != _SECONDS}
+
+
+def _read_timing(path: Path) -> dict[tuple[Any, ...], float]:
+    """Return the seconds of each episode; none if the file is not there."""
+    if not path.exists():
+        return {}
+    content = read_json(path)
+    found = (content.get("schema_name"), content.get("version")) if isinstance(content, dict) else None
+    try:
+        if found != (TIMING, TIMING_VERSION):
+            raise KeyError("version")
+        return {tuple(one[name] for name in _WHICH): float(one[_SECONDS]) for one in content["episodes"]}
+    except (KeyError, TypeError, ValueError) as error:
+        raise SchemaError(f"{path}: damaged ({type(error).__name__}: {error}); delete it, the results stay") from None

@@ -90,6 +90,15 @@ def fault_lines(outcomes: Sequence[Outcome]) -> list[str]:
     return lines
 
 
+def time_lines(summary: Summary) -> list[str]:
+    """Say how long a row's episodes took on average, by the clock: a line each. It is in no table: machines differ."""
+    return [
+        f"{row.category}, {row.method}: {row.wall_seconds / row.episodes:.1f} s an episode"
+        for row in summary.rows
+        if row.episodes
+    ]
+
+
 def not_played_lines(outcomes: Sequence[Outcome]) -> list[str]:
     """Say which episodes were not played, and why: a line each."""
     return [f"{label_of(outcome.job)}: {_plain(outcome.reason)}" for outcome in outcomes if outcome.record is None]
@@ -108,7 +117,6 @@ def _results(metrics: Sequence[Metric], rows: Sequence[Row], published: Sequence
         "Episodes",
         "Not played",
         "Done",
-        "s/episode",
         "Tokens",
         "Cost $",
         "Faults",
@@ -117,14 +125,13 @@ def _results(metrics: Sequence[Metric], rows: Sequence[Row], published: Sequence
     for other in published:
         values = other.of(rows[0].category)
         cells = [f"{values[m.key]:.{m.digits}f}" if m.key in values else _NOTHING for m in metrics]
-        body.append([other.label, *cells, *[_NOTHING] * 7])
+        body.append([other.label, *cells, *[_NOTHING] * 6])
     for row in rows:
         cells = [_mean(row.metrics.get(metric.key), metric) for metric in metrics]
-        seconds = f"{row.wall_seconds / row.episodes:.1f}" if row.episodes else _NOTHING
         faults = ", ".join(f"{number} {kind}" for kind, number in row.faults.items()) or "0"
         body.append(
             [
-                row.method, *cells, str(row.episodes), str(row.not_played), f"{row.done} of {row.parts}", seconds,
+                row.method, *cells, str(row.episodes), str(row.not_played), f"{row.done} of {row.parts}",
                 str(row.tokens), f"{row.cost:.2f}", faults,
             ]
         )  # fmt: skip
