@@ -2,6 +2,11 @@
 
     python scripts/train_commute.py --method ppo --worlds W1 W2 --out src/vico/data/commute --curve benchmarks/results
 
+    python scripts/train_commute.py --method ppo --worlds W1 W2 --ray --out OUT --curve OUT      # a city a machine
+
+With --processes each city is stepped in a process of its own, with --ray on a Ray cluster (extra ``ray``); both come to
+the same policy, which is another one than without, where all cities draw their episodes from one stream.
+
 The paper's reward and learning rate (3e-4), a million steps, one seed. It writes ``ppo.npz`` (layers as arrays, to be
 evaluated by numpy alone) and ``commute_ppo.csv`` (a row for 10,000 steps); it prints steps a second and the hash.
 """
@@ -24,6 +29,9 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from vico.agents.commute.learning.env import CommuteVectorEnv
 from vico.agents.commute.learning.worlds import training_city
+from vico.challenges.commute.shards import ShardedCommuters, shard_makers
+from vico.envs.workers import Workers
+from vico.jobs.actors import RayActors
 from vico.world.folder import read_world
 from vico.world.public import PublicMap
 
@@ -36,7 +44,7 @@ GAMMA, SCALE = 0.995, 100.0
 class LearnersEnv(VecEnv):
     """The environment as stable-baselines3 wants it."""
 
-    def __init__(self, env: CommuteVectorEnv) -> None:
+    def __init__(self, env: CommuteVectorEnv | ShardedCommuters) -> None:
         self.env = env
         self.ended: list[tuple[float, float, bool]] = []
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
@@ -124,6 +132,16 @@ def make(method: str, env: LearnersEnv, seed: int) -> Any:
     return A2C("MlpPolicy", env, n_steps=16, ent_coef=0.01, use_rms_prop=False, gae_lambda=0.95, **common)
 
 
+def environment(given: argparse.Namespace) -> CommuteVectorEnv | ShardedCommuters:
+    """Return the environment: in this process, or a city a process, here or on a cluster."""
+    if not given.processes and given.ray is None:
+        cities = [training_city(PublicMap.from_world(read_world(path))) for path in given.worlds]
+        return CommuteVectorEnv(cities, num_envs=given.envs, seed=given.seed)
+    makers = shard_makers(given.worlds, num_envs=given.envs, seed=given.seed)
+    group = Workers(makers, what="city") if given.ray is None else RayActors(makers, address=given.ray)
+    return ShardedCommuters(group, num_envs=given.envs)
+
+
 def main() -> None:
     """Train, and write what came of it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -134,10 +152,12 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=STEPS)
     parser.add_argument("--envs", type=int, default=128)
     parser.add_argument("--seed", type=int, default=1)
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--processes", action="store_true", help="a process a city")
+    where.add_argument("--ray", nargs="?", const="auto", metavar="ADDRESS", help="a task of a Ray cluster a city")
     given = parser.parse_args()
     torch.set_num_threads(1)
-    cities = [training_city(PublicMap.from_world(read_world(path))) for path in given.worlds]
-    env = LearnersEnv(CommuteVectorEnv(cities, num_envs=given.envs, seed=given.seed))
+    env = LearnersEnv(environment(given))
     env.reset()
     env.step_async(np.zeros(given.envs, np.int64))
     env.step_wait()  # compiles

@@ -53,7 +53,7 @@ class RayCluster:
     """
 
     def __init__(self, address: str, *, processors: int) -> None:
-        self._ray = _ray()
+        self._ray = ray_module()
         self._mine = not self._ray.is_initialized()
         if self._mine:
             connect(address, processors)
@@ -119,14 +119,14 @@ class RayCluster:
                 if self._ray.cluster_resources().get("CPU", 0) < 1:
                     _log.warning("Ray: %d tasks wait, and no machine of the cluster has a processor", len(flying))
         except (ConnectionError, self._ray.exceptions.RaySystemError) as error:
-            raise SourceError(f"the Ray cluster went away ({_line(error)}); give the same command again") from None
+            raise SourceError(f"the Ray cluster went away ({first_line(error)}); give the same command again") from None
 
     def _answer(self, ref: Any) -> Answer:
         """Return what came of a task; that its process died too often is one, too."""
         try:
             return answer_of(json.loads(self._ray.get(ref)))
         except self._ray.exceptions.RayTaskError as error:
-            raise InputError(f"Ray: {_line(error)}; is the same vico installed on every machine?") from None
+            raise InputError(f"Ray: {first_line(error)}; is the same vico installed on every machine?") from None
         except self._ray.exceptions.RayError as error:
             how = f"{type(error).__name__}, {RETRIES + 1} times"
             return Answer(None, f"its process or its machine died ({how}); it may lack memory")
@@ -140,7 +140,7 @@ def connect(address: str, processors: int) -> None:
     InputError
         If there is no such cluster, or it cannot be used from here.
     """
-    ray = _ray()
+    ray = ray_module()
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
     how = {"log_to_driver": False, "logging_level": logging.ERROR}
@@ -151,7 +151,7 @@ def connect(address: str, processors: int) -> None:
             ray.init(address, **how)
     except (ConnectionError, RuntimeError, ValueError, TimeoutError, ray.exceptions.RayError) as error:
         raise InputError(
-            f"--ray {address}: {_line(error)}; start a cluster with ray start --head, or give the address of one"
+            f"--ray {address}: {first_line(error)}; start a cluster with ray start --head, or give the address of one"
         ) from None
 
 
@@ -169,7 +169,14 @@ def _start(ray: Any, processors: int, how: dict[str, Any]) -> None:
     ray.init("local", num_cpus=processors, include_dashboard=False, **how)
 
 
-def _ray() -> Any:
+def ray_module() -> Any:
+    """Return Ray.
+
+    Raises
+    ------
+    MissingExtraError
+        If it is not installed.
+    """
     try:
         import ray
     except ImportError:
@@ -177,6 +184,7 @@ def _ray() -> Any:
     return ray
 
 
-def _line(error: BaseException) -> str:
+def first_line(error: BaseException) -> str:
+    """Return the line of what Ray says that says most."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     return (lines[-1] if "Traceback" in str(error) else lines[0])[:300] if lines else type(error).__name__
