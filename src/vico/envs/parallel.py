@@ -74,13 +74,16 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         self.events: list[Event] = []
         self._setup = setup
         self._episode = 0
+        self._arranged = False
         # Made at once, so that the agents and their spaces are known before the first reset.
         self._simulation: Simulation | None = self._fresh(self.config.seed)
         self._last: StepResult | None = None
         self.possible_agents: list[str] = list(self.sim.agents)
         self.agents: list[str] = []
         #: How each agent is told of what it observes, and how it answers.
-        self.forms: dict[str, Form] = forms_of(FormOptions.of(self.spec.form), self.sim, self.public_map)
+        options = FormOptions.of(self.spec.form)
+        self.forms: dict[str, Form] = forms_of(options, self.sim, self.public_map)
+        self._plain_infos = options.name == "arrays"
         self._index = {name: i for i, name in enumerate(self.possible_agents)}
 
     @property
@@ -119,8 +122,9 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
     ) -> tuple[dict[str, Any], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
         """Let time pass until somebody is due; who has no action waits, bad actions are refused with a reason.
 
-        `infos` hold ``entities`` (kind and name of what is in view) and ``hash`` (of the whole state); in the array
-        form ``action_mask``, too.
+        `infos` hold ``entities`` (kind and name of what is in view), ``hash`` (of the whole state) and more; see
+        `vico.sim.observations.observe`. In the array form they hold people's ``action_mask`` alone: libraries for many
+        agents make tensors of them.
         """
         result = self.advance(actions, agent_faults)
         observations, infos = self._told(result)
@@ -141,12 +145,28 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         self._episode += 1
         drawn = self.config.seed if number == 0 else int(rng(self.config.seed, "episode", number).integers(2**31))
         unused = self.sim.metrics.steps == 0 and self.sim.config.seed == drawn and not self.agents
-        if not unused:
+        if self._arranged or not unused:
+            self._arranged = False
             self._simulation = self._fresh(drawn)
         self.agents = list(self.possible_agents)
         self.events = []
         self._last = StepResult(*self.sim.observe(), [], "")
         return self._last
+
+    def arrange(self, setup: Setup | None = None, **changes: Any) -> None:
+        """Have the episodes from the next one on begin otherwise.
+
+        Parameters
+        ----------
+        setup
+            Called with the fresh simulation at each reset, instead of the one before; None leaves that.
+        changes
+            Fields of the simulation's configuration (`vico.sim.config.SimConfig`) that decide neither who takes part
+            nor what they observe: ``start``, ``robot_places``, ``weather`` and the like.
+        """
+        self.config = replace(self.config, **changes)
+        self._setup = self._setup if setup is None else setup
+        self._arranged = True
 
     def advance(self, actions: Mapping[str, Any], agent_faults: Mapping[str, AgentFault] | None = None) -> StepResult:
         """Make a step as `step` does; return what the simulation tells, in no form: each part when asked for.
@@ -182,8 +202,12 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         return encoded, info
 
     def _told(self, result: StepResult) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-        both = {name: self.told(name, result) for name in result.observations}
-        return {name: one for name, (one, _) in both.items()}, {name: info for name, (_, info) in both.items()}
+        observations: dict[str, Any] = {}
+        infos: dict[str, dict[str, Any]] = {}
+        for name in result.observations:
+            observations[name], info = self.told(name, result)
+            infos[name] = {k: v for k, v in info.items() if k == "action_mask"} if self._plain_infos else info
+        return observations, infos
 
     def render(self) -> NDArray[np.uint8]:
         """Return what the seeing agents see, side by side, uint8, shape ``(image, k * image, 3)``."""

@@ -88,7 +88,7 @@ class SingleAgentEnv(gymnasium.Env[Any, Any]):
         community = self.community
         mask = community.forms[self.agent].mask(community.possible_agents.index(self.agent), community.sim.state)
         if mask is None:
-            raise InputError("env: there are masks with form='arrays' alone")
+            raise InputError("env: there are masks with form='arrays' alone, and for people alone")
         return mask.astype(bool)
 
     def render(self) -> NDArray[np.uint8]:

@@ -14,7 +14,7 @@ simulation refuses the action and says why; masks tell before.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -155,7 +155,13 @@ class ActionTable:
         return self._number[self.canonical(entry)]
 
     def mask(
-        self, agent: int, state: SimulationState, around: Surroundings, *, riding: bool = False
+        self,
+        agent: int,
+        state: SimulationState,
+        around: Surroundings,
+        *,
+        allows: Callable[[Mapping[str, Any]], bool],
+        riding: bool = False,
     ) -> NDArray[np.int8]:
         """Return which entries of `menu` would be accepted, 0 or 1, int8, shape ``(len(menu),)``.
 
@@ -163,6 +169,8 @@ class ActionTable:
         ----------
         agent
             Its index in ``state.names``.
+        allows
+            What else decides whether an action may be done.
         """
         judged: dict[Entry, bool] = {}
         mask = np.zeros(len(self.menu), np.int8)
@@ -172,7 +180,7 @@ class ActionTable:
             if one not in judged:
                 action = self.action_of(one, around, riding=riding)
                 judged[one] = not isinstance(check(action, agent, state), Refusal)
-            mask[k] = judged[one]
+            mask[k] = judged[one] and allows(self.action_of(entry, around, riding=riding))
         return mask
 
     def parts_mask(self, mask: NDArray[np.int8]) -> NDArray[np.int8]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -53,7 +53,10 @@ class ArrayForm:
         self.options, self.public_map = options, public_map
         self.parts = observation_parts(lens, readings, outputs=outputs, texts=options.texts)
         self.table = ActionTable(options.kinds)
-        self._around = Surroundings()
+        #: What the agent's last observation told of.
+        self.around = Surroundings()
+        #: What the rules of a task allow beside those of the simulation; everything unless told.
+        self.allows: Callable[[Mapping[str, Any]], bool] = lambda action: True
         self._riding = False
         self._is_flat = options.observation == "box"
         if self._is_flat and lens is not None:
@@ -68,9 +71,9 @@ class ArrayForm:
 
     def encode(self, observation: Mapping[str, Any], info: Mapping[str, Any]) -> Any:
         """Return an observation as an element of `observation_space`, and remember what choices are made of."""
-        self._around = surroundings_of(observation, info, self.public_map)
+        self.around = surroundings_of(observation, info, self.public_map)
         self._riding = observation["state"]["vehicle"] == "bike"
-        arrays = observation_arrays(observation, self._around, self.public_map, parts=self.parts)
+        arrays = observation_arrays(observation, self.around, self.public_map, parts=self.parts)
         return self.joined(arrays) if self._is_flat else arrays
 
     def decode(self, action: Any) -> Any:
@@ -80,7 +83,7 @@ class ArrayForm:
         numbers = np.asarray(action)
         if isinstance(self.action_space, spaces.Box):
             return {"type": "control", "vector": [float(value) for value in numbers.reshape(-1)]}
-        return self.table.action_of(self._entry(numbers), self._around, riding=self._riding)
+        return self.table.action_of(self._entry(numbers), self.around, riding=self._riding)
 
     def number(self, action: Mapping[str, Any]) -> Any:
         """Return the element of `action_space` that stands for an action in the short form, for demonstrations.
@@ -92,13 +95,13 @@ class ArrayForm:
         """
         if isinstance(self.action_space, spaces.Box):
             return np.asarray(action["vector"], np.float32)
-        entry = self.table.entry_of(action, self._around)
+        entry = self.table.entry_of(action, self.around)
         if isinstance(self.action_space, spaces.Discrete):
             return np.int64(self.table.number_of(entry))
         return np.array(entry, np.int64)
 
-    def mask(self, agent: int, state: SimulationState) -> NDArray[np.int8]:
-        """Return which numbers are possible now, as libraries with masks take it; all ones for a robot's vector.
+    def mask(self, agent: int, state: SimulationState) -> NDArray[np.int8] | None:
+        """Return which numbers are possible now, as libraries with masks take it; None for a robot's vector.
 
         Parameters
         ----------
@@ -106,8 +109,8 @@ class ArrayForm:
             Its index in ``state.names``.
         """
         if isinstance(self.action_space, spaces.Box):
-            return np.ones(self.action_space.shape, np.int8)
-        mask = self.table.mask(agent, state, self._around, riding=self._riding)
+            return None
+        mask = self.table.mask(agent, state, self.around, allows=self.allows, riding=self._riding)
         return mask if isinstance(self.action_space, spaces.Discrete) else self.table.parts_mask(mask)
 
     def joined(self, arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
