@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vico.agents.navigation.pixels import shown_in
 from vico.io.compiled import compiled
+from vico.pixels import shown_in
 
 #: Fewer pixels than this are not taken for a sighting.
 SIGHT = 4

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Unpack
 
-from vico.agents.base import Agent
+from vico.agents.base import Action, Agent, Info, Observation, by_group
 from vico.agents.schedule import followers_of
 from vico.envs.parallel import CommunityEnv, CommunitySource, WorldSource, make
-from vico.envs.single import SingleAgentEnv
+from vico.envs.single import Answers, SingleAgentEnv
 from vico.envs.spec import EnvOptions
 from vico.envs.vector import VectorAgentEnv, makers
 
@@ -19,6 +19,34 @@ def residents_of(env: CommunityEnv, seed: int) -> Mapping[str, Agent]:
         return {}
     followers = followers_of(env.community, env.public_map, seed=seed)
     return {name: follower for name, follower in followers.items() if name in env.possible_agents}
+
+
+def answers_of(agents: Mapping[str, Agent]) -> Answers:
+    """Return what asks agents for their actions: those that belong together at once, the others one by one.
+
+    An error of an agent's is raised.
+    """
+    groups, alone = by_group(agents)
+
+    def answers(observations: Mapping[str, Observation], infos: Mapping[str, Info]) -> dict[str, Action]:
+        found: dict[str, Action] = {}
+        for group, members in groups:
+            asked = group.act_for([name for name in members if name in observations], observations, infos)
+            for name, answer in asked.items():
+                if isinstance(answer, Exception):
+                    raise answer
+                found[name] = answer
+        for name in alone:
+            if name in observations:
+                found[name] = agents[name].act(observations[name], infos[name])
+        return found
+
+    return answers
+
+
+def residents_together(env: CommunityEnv, seed: int) -> Answers:
+    """Return what asks all residents that take part, who follow their schedules."""
+    return answers_of(residents_of(env, seed))
 
 
 def make_single(
@@ -44,7 +72,7 @@ def make_single(
         If there is no such agent, or the community belongs to another world.
     """
     given: EnvOptions = {"assistants": 1, "observe": (agent,), **options}
-    return SingleAgentEnv(make(world, community, **given), agent, others=residents_of)
+    return SingleAgentEnv(make(world, community, **given), agent, others=residents_together)
 
 
 def make_vec(

@@ -7,7 +7,7 @@ from vico.envs.single import SingleAgentEnv
 from vico.envs.spec import EnvSpec
 from vico.envs.vector import ParallelVectorEnv, VectorAgentEnv, make_parallel_vec
 from vico.envs.workers import WorkerError
-from vico.sim.simulation import Simulation
+from vico.sim.simulation import Simulation, StepResult
 
 register_ids()
 
@@ -18,6 +18,7 @@ __all__ = [
     "ParallelVectorEnv",
     "Simulation",
     "SingleAgentEnv",
+    "StepResult",
     "VectorAgentEnv",
     "WorkerError",
     "check_env",

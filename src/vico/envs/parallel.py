@@ -14,14 +14,14 @@ from pettingzoo import ParallelEnv
 
 from vico.community import read_community
 from vico.community.model import Community
-from vico.envs.spaces import action_space, observation_space, robot_space, short_form
+from vico.envs.form_options import FormOptions
+from vico.envs.forms import Form, forms_of
 from vico.envs.spec import EnvOptions, EnvSpec
 from vico.errors import InputError
 from vico.seeds import rng
 from vico.sim.actions import AgentFault
 from vico.sim.events import Event
-from vico.sim.eyes import lenses_of
-from vico.sim.simulation import Simulation
+from vico.sim.simulation import Simulation, StepResult
 from vico.world.folder import World, read_world
 from vico.world.public import PublicMap
 
@@ -35,8 +35,8 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
     """A community in a world.
 
     Agents are called ``resident_0``, ``assistant_0``, ``robot_0`` and so on. Observations and actions are described
-    in `vico.envs.spaces`. There is no reward of its own (0 for everybody): tasks judge the state. An episode ends,
-    truncated, after ``spec.max_steps`` steps.
+    in `vico.envs.spaces`, and in `vico.envs.arrays` for ``spec.form`` ``"arrays"``. There is no reward of its own (0
+    for everybody): tasks judge the state. An episode ends, truncated, after ``spec.max_steps`` steps.
 
     A step is a second, unless ``spec.periods`` give some agents other control periods: then it lasts until the next
     agent is due, and what `step` returns holds those alone who are due, while ``agents`` lists all as ever. Only when
@@ -74,32 +74,17 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         self.events: list[Event] = []
         self._setup = setup
         self._episode = 0
-        # What one may enter: places from the street, rooms from within.
-        self._places = [place.id for place in world.places] + [room.id for room in world.rooms]
+        self._arranged = False
         # Made at once, so that the agents and their spaces are known before the first reset.
         self._simulation: Simulation | None = self._fresh(self.config.seed)
-        self._views: dict[str, Any] = {}
+        self._last: StepResult | None = None
         self.possible_agents: list[str] = list(self.sim.agents)
         self.agents: list[str] = []
-        seeing = {self.possible_agents[i] for i in self.sim.seeing}
-        people = self.sim.state.people.names
-        robots = self.sim.state.robots
-        numbers = {} if robots is None else {name: k for k, name in enumerate(robots.names)}
-        lenses = lenses_of(self.sim.state, self.config)
-        self._observation_spaces = {
-            name: observation_space(
-                lenses[name] if name in seeing else None,
-                robots.readings(numbers[name]) if robots is not None and name in numbers else None,
-                outputs=self.config.outputs,
-            )
-            for name in self.possible_agents
-        }
-        self._action_spaces: dict[str, spaces.Dict] = {
-            name: action_space(len(self._places), len(people), world.half) for name in people
-        }
-        if robots is not None:
-            own = {name: next(iter(robots.action_spaces(k).values())) for name, k in numbers.items()}
-            self._action_spaces |= {name: robot_space(space) for name, space in own.items()}
+        #: How each agent is told of what it observes, and how it answers.
+        options = FormOptions.of(self.spec.form)
+        self.forms: dict[str, Form] = forms_of(options, self.sim, self.public_map)
+        self._plain_infos = options.name == "arrays"
+        self._index = {name: i for i, name in enumerate(self.possible_agents)}
 
     @property
     def sim(self) -> Simulation:
@@ -108,17 +93,17 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
             raise InputError("env: closed; make a new one with vico.make")
         return self._simulation
 
-    def observation_space(self, agent: str) -> spaces.Dict:
+    def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Space of an agent's observations; the same object each time."""
-        return self._observation_spaces[self._known(agent)]
+        return self.forms[self._known(agent)].observation_space
 
-    def action_space(self, agent: str) -> spaces.Dict:
+    def action_space(self, agent: str) -> spaces.Space[Any]:
         """Space of an agent's actions; the same object each time."""
-        return self._action_spaces[self._known(agent)]
+        return self.forms[self._known(agent)].action_space
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
+    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         """Start an episode.
 
         Parameters
@@ -129,56 +114,106 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         options
             Not used.
         """
+        result = self.begin(seed)
+        return self._told(result)
+
+    def step(
+        self, actions: Mapping[str, Any], agent_faults: Mapping[str, AgentFault] | None = None
+    ) -> tuple[dict[str, Any], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+        """Let time pass until somebody is due; who has no action waits, bad actions are refused with a reason.
+
+        `infos` hold ``entities`` (kind and name of what is in view), ``hash`` (of the whole state) and more; see
+        `vico.sim.observations.observe`. In the array form they hold people's ``action_mask`` alone: libraries for many
+        agents make tensors of them.
+        """
+        result = self.advance(actions, agent_faults)
+        observations, infos = self._told(result)
+        over = not self.agents
+        return (
+            observations,
+            dict.fromkeys(observations, 0.0),
+            dict.fromkeys(observations, False),
+            dict.fromkeys(observations, over),
+            infos,
+        )
+
+    def begin(self, seed: int | None = None) -> StepResult:
+        """Start an episode as `reset` does; return what the simulation tells, in no form: each part when asked for."""
         if seed is not None:
             self.config, self._episode = replace(self.config, seed=seed), 0
         number = self._episode
         self._episode += 1
         drawn = self.config.seed if number == 0 else int(rng(self.config.seed, "episode", number).integers(2**31))
         unused = self.sim.metrics.steps == 0 and self.sim.config.seed == drawn and not self.agents
-        if not unused:
+        if self._arranged or not unused:
+            self._arranged = False
             self._simulation = self._fresh(drawn)
         self.agents = list(self.possible_agents)
         self.events = []
-        told, infos = self.sim.observe()
-        self._views = observations = dict(told)
-        return observations, dict(infos)
+        self._last = StepResult(*self.sim.observe(), [], "")
+        return self._last
 
-    def step(
-        self, actions: Mapping[str, Any], agent_faults: Mapping[str, AgentFault] | None = None
-    ) -> tuple[
-        dict[str, dict[str, Any]], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
-    ]:
-        """Let time pass until somebody is due; who has no action waits, bad actions are refused with a reason.
+    def arrange(self, setup: Setup | None = None, **changes: Any) -> None:
+        """Have the episodes from the next one on begin otherwise.
 
-        `infos` hold ``entities`` (kind and name of what is in view) and ``hash`` (of the whole state).
+        Parameters
+        ----------
+        setup
+            Called with the fresh simulation at each reset, instead of the one before; None leaves that.
+        changes
+            Fields of the simulation's configuration (`vico.sim.config.SimConfig`) that decide neither who takes part
+            nor what they observe: ``start``, ``robot_places``, ``weather`` and the like.
+        """
+        self.config = replace(self.config, **changes)
+        self._setup = self._setup if setup is None else setup
+        self._arranged = True
+
+    def advance(self, actions: Mapping[str, Any], agent_faults: Mapping[str, AgentFault] | None = None) -> StepResult:
+        """Make a step as `step` does; return what the simulation tells, in no form: each part when asked for.
+
+        Raises
+        ------
+        InputError
+            If the episode is over, or has not begun.
         """
         if not self.agents:
             raise InputError("env: the episode is over (or has not begun); call reset() before step()")
-        short = {
-            name: short_form(action, self._places, self.sim.state.people.names) for name, action in actions.items()
-        }
+        short = {name: self.forms[name].decode(action) for name, action in actions.items() if name in self.forms}
         result = self.sim.step(short, agent_faults)
-        over = self.sim.metrics.steps >= self.max_steps
-        observations, found = result.observations, result.infos
-        if over:
-            if len(observations) < len(self.agents):
-                observations, found = self.sim.observe()
+        if self.sim.metrics.steps >= self.max_steps:
+            if len(result.observations) < len(self.agents):
+                observations, infos = self.sim.observe()
+                result = replace(result, observations=observations, infos=infos)
             self.agents = []
-        names = list(observations)
         self.events = result.events
-        self._views = dict(observations)
-        infos = {name: {**found[name], "hash": result.hash} for name in names}
-        return (
-            self._views,
-            dict.fromkeys(names, 0.0),
-            dict.fromkeys(names, False),
-            dict.fromkeys(names, over),
-            infos,
-        )
+        self._last = result
+        return result
+
+    def told(self, name: str, result: StepResult) -> tuple[Any, dict[str, Any]]:
+        """Return one agent's observation, in its form, and its info."""
+        observation, found = result.observations[name], result.infos[name]
+        info = dict(found)
+        if result.hash:
+            info["hash"] = result.hash
+        form = self.forms[name]
+        encoded = form.encode(observation, found)
+        if (mask := form.mask(self._index[name], self.sim.state)) is not None:
+            info["action_mask"] = mask
+        return encoded, info
+
+    def _told(self, result: StepResult) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+        observations: dict[str, Any] = {}
+        infos: dict[str, dict[str, Any]] = {}
+        for name in result.observations:
+            observations[name], info = self.told(name, result)
+            infos[name] = {k: v for k, v in info.items() if k == "action_mask"} if self._plain_infos else info
+        return observations, infos
 
     def render(self) -> NDArray[np.uint8]:
         """Return what the seeing agents see, side by side, uint8, shape ``(image, k * image, 3)``."""
-        pictures = [view["rgb"] for view in self._views.values() if "rgb" in view]
+        seeing = [self.possible_agents[i] for i in self.sim.seeing]
+        seen = {} if self._last is None else self._last.observations
+        pictures = [seen[name]["rgb"] for name in seeing if name in seen and "rgb" in seen[name]]
         if not pictures:
             raise InputError("env: nobody's views are rendered; make the env with observe='all', and reset it")
         return np.concatenate(pictures, axis=1)
@@ -199,7 +234,7 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
 
     def close(self) -> None:
         """Let go of the simulation."""
-        self._simulation = None
+        self._simulation = self._last = None
         self.agents = []
 
     def _fresh(self, seed: int) -> Simulation:
@@ -211,7 +246,7 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
         return simulation
 
     def _known(self, agent: str) -> str:
-        if agent not in self._action_spaces:
+        if agent not in self.forms:
             raise InputError(f"env: no agent is called {agent!r}; there are {', '.join(self.possible_agents)}")
         return agent
 
@@ -231,7 +266,7 @@ def make(
         Called with the fresh `Simulation` at each reset.
     options
         `seed`, `start`, `residents`, `assistants`, `robots`, `robot_places`, `errands`, `cars`, `cyclists`,
-        `pedestrians`, `junctions`, `traffic`, `transit`, `observe`, `image`, `periods` and `max_steps`, as
+        `pedestrians`, `junctions`, `traffic`, `transit`, `observe`, `image`, `periods`, `max_steps` and `form`, as
         `vico.envs.spec.EnvSpec` has them.
 
     Raises

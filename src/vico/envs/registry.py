@@ -9,6 +9,19 @@ import pettingzoo
 ID = "vico/Community-v0"
 
 
+#: Tasks for one learner, by id, and what makes them in `vico.challenges.learning.make`: that stands on a higher floor,
+#: and is imported when one is made.
+TASKS = {
+    "vico/PointGoal-v0": "make_point_goal",
+    "vico/RobotPointGoal-v0": "make_robot_point_goal",
+    "vico/Commute-v0": "make_commute",
+    "vico/Carry-v0": "make_carry",
+    "vico/Delivery-v0": "make_delivery",
+    "vico/Search-v0": "make_search",
+    "vico/Influence-v0": "make_influence",
+}
+
+
 def register_ids() -> None:
     """Register the environments; once is enough, and more does no harm.
 
@@ -23,6 +36,9 @@ def register_ids() -> None:
             vector_entry_point="vico.agents.single:make_vec",
             disable_env_checker=True,
         )
+    for name, maker in TASKS.items():
+        if name not in gymnasium.registry:
+            gymnasium.register(name, entry_point=f"vico.challenges.learning.make:{maker}", disable_env_checker=True)
     registry = getattr(pettingzoo, "parallel_registry", None)
     if registry is not None and ID not in registry:
         pettingzoo.register("parallel", ID, entry_point="vico.envs.parallel:make")

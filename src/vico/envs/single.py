@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.envs.parallel import CommunityEnv
+from vico.errors import InputError
+from vico.sim.simulation import StepResult
 
 
 class Policy(Protocol):
@@ -19,11 +21,13 @@ class Policy(Protocol):
         """Return the action for the coming second."""
 
 
-#: Given the community's environment and the seed of an episode, the policies of agents by name.
-Others = Callable[[CommunityEnv, int], Mapping[str, Policy]]
+#: Given what all observe and their infos, as the simulation tells them, the actions of some agents by name.
+Answers = Callable[[Mapping[str, dict[str, Any]], Mapping[str, dict[str, Any]]], Mapping[str, dict[str, Any]]]
+#: Given the community's environment and the seed of an episode, the policies of agents by name, or what asks them all.
+Others = Callable[[CommunityEnv, int], Mapping[str, Policy] | Answers]
 
 
-class SingleAgentEnv(gymnasium.Env[dict[str, Any], Any]):
+class SingleAgentEnv(gymnasium.Env[Any, Any]):
     """One agent among others.
 
     Parameters
@@ -50,41 +54,65 @@ class SingleAgentEnv(gymnasium.Env[dict[str, Any], Any]):
         self.observation_space = env.observation_space(agent)
         self.action_space = env.action_space(agent)
         self._make_others = others
-        self._others: Mapping[str, Policy] = {}
-        self._seen: tuple[dict[str, Any], dict[str, Any]] = ({}, {})
+        self._others: Answers = _nobody
+        self._last: StepResult | None = None
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start an episode; see `CommunityEnv.reset`."""
         super().reset(seed=seed)
-        self._seen = self.community.reset(seed=seed, options=options)
+        self._last = self.community.begin(seed)
         if self._make_others is not None:
-            policies = self._make_others(self.community, self.community.sim.config.seed)
-            self._others = {name: policy for name, policy in policies.items() if name != self.agent}
-        observations, infos = self._seen
-        return observations[self.agent], infos[self.agent]
+            made = self._make_others(self.community, self.community.sim.config.seed)
+            self._others = made if callable(made) else _one_by_one(made)
+        return self.community.told(self.agent, self._last)
 
-    def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Advance until the agent is due again; the others act upon what they saw last."""
-        me = self.agent
-        actions = {me: action}
+        own = {self.agent: action}
         while True:
-            observations, infos = self._seen
-            actions |= {
-                n: policy.act(observations[n], infos[n]) for n, policy in self._others.items() if n in observations
-            }
-            observations, rewards, ended, cut, infos = self.community.step(actions)
-            self._seen = observations, infos
-            if me in observations:
-                return observations[me], rewards[me], ended[me], cut[me], infos[me]
-            actions = {}
+            others = {} if self._last is None else self._others(self._last.observations, self._last.infos)
+            self._last = self.community.advance({**others, **own})
+            if self.agent in self._last.observations:
+                observation, info = self.community.told(self.agent, self._last)
+                return observation, 0.0, False, not self.community.agents, info
+            own = {}
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Return which actions are possible now, as `sb3_contrib.MaskablePPO` asks for it.
+
+        Raises
+        ------
+        InputError
+            If the form of the environment has no masks.
+        """
+        community = self.community
+        mask = community.forms[self.agent].mask(community.possible_agents.index(self.agent), community.sim.state)
+        if mask is None:
+            raise InputError("env: there are masks with form='arrays' alone, and for people alone")
+        return mask.astype(bool)
 
     def render(self) -> NDArray[np.uint8]:
         """Return what the agent sees, uint8, shape ``(image, image, 3)``."""
-        seen = self._seen[0].get(self.agent, {})
+        seen = {} if self._last is None else self._last.observations[self.agent]
         return seen["rgb"] if "rgb" in seen else self.community.render()
 
     def close(self) -> None:
         """Let go of the simulation."""
         self.community.close()
+
+
+def _nobody(
+    observations: Mapping[str, dict[str, Any]], infos: Mapping[str, dict[str, Any]]
+) -> Mapping[str, dict[str, Any]]:
+    return {}
+
+
+def _one_by_one(policies: Mapping[str, Policy]) -> Answers:
+    """Ask each of some policies that has an observation."""
+
+    def answers(
+        observations: Mapping[str, dict[str, Any]], infos: Mapping[str, dict[str, Any]]
+    ) -> Mapping[str, dict[str, Any]]:
+        return {n: one.act(observations[n], infos[n]) for n, one in policies.items() if n in observations}
+
+    return answers

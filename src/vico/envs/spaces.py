@@ -1,14 +1,20 @@
-"""Spaces: what an observation looks like, and actions as plain numbers for learners.
+"""The rich form: what an observation looks like in Gymnasium's own spaces, and actions as plain numbers for learners.
 
 Actions may be given in two forms. The short one names the action and its fields, as in
 ``{"type": "move_forward", "distance": 1.0}``. The other is an element of `action_space`: ``type`` is the action's
 number in `vico.sim.actions.PEOPLE_ACTIONS`, and every slot is there, whether the action uses it or not. Which slot each
 field of an action is read from stands in the table of actions, `vico.sim.actions.ACTIONS`.
+
+Every space is one of Gymnasium's own, so that libraries that know those know ours: numbers are `Box`es without axes,
+texts `Text`s, lists `Sequence`s. `vico.envs.rich` turns what the simulation tells into elements of them.
 """
 
 from __future__ import annotations
 
+import string
 from collections.abc import Mapping, Sequence
+from copy import copy
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -20,97 +26,29 @@ from vico.sim.actions.fields import Field
 from vico.sim.eyes import USUAL_OUTPUTS, Lens, shape_of
 from vico.sim.robots import ActionSpace, Reading
 
-_PHRASES = ("Hello!", "Good morning.", "Excuse me.", "Thank you.", "See you later.", "Do you need help?")
+#: Characters that texts of observations hold: ASCII, and the letters of Latin, Greek and Cyrillic script with their
+#: marks and punctuation. `Text` keeps each in several tables, so all of Unicode would take seconds and megabytes for
+#: each text; `vico.envs.rich.told_text` writes others as ``\\u4eac``.
+CHARACTERS = "".join(
+    ["\t\n", *map(chr, range(0x20, 0x7F)), *map(chr, range(0xA0, 0x0530)), *map(chr, range(0x2010, 0x2030)), "€№→−"]
+)
+#: Characters of messages that are sampled; in the short form messages may hold any.
+_SPOKEN = string.ascii_letters + string.digits + string.punctuation + " "
+#: Numbers of times and money, and of entities, are no greater than these.
+FAR, MOST_ENTITIES = 1e7, 2**31 - 1
+#: Names and ids have so many characters at most.
+LONGEST_NAME = 64
 
 
-class TextSpace(spaces.Space[str]):
-    """Text in any script, up to a length; samples are everyday phrases."""
-
-    def __init__(self, longest: int, *, seed: int | None = None) -> None:
-        super().__init__(dtype=str, seed=seed)
-        self.longest = longest
-
-    def sample(self, mask: Any = None, probability: Any = None) -> str:
-        """Return one of a few phrases."""
-        return _PHRASES[int(self.np_random.integers(len(_PHRASES)))]
-
-    def contains(self, x: Any) -> bool:
-        """Whether `x` is text that is not too long."""
-        return isinstance(x, str) and len(x) <= self.longest
-
-    @property
-    def is_np_flattenable(self) -> bool:
-        """Text does not flatten to numbers."""
-        return False
-
-    def __repr__(self) -> str:
-        return f"TextSpace({self.longest})"
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, TextSpace) and other.longest == self.longest
-
-    __hash__ = None  # type: ignore[assignment]
+def told_space(longest: int) -> spaces.Text:
+    """Return the space of texts in observations that are no longer than so many characters."""
+    # A copy shares the tables of characters, which take ten milliseconds, but not the stream of chance.
+    return copy(_text_space(longest))
 
 
-class ListSpace(spaces.Space[list[Any]]):
-    """Lists of any length whose elements belong to one space; samples hold up to three."""
-
-    def __init__(self, element: spaces.Space[Any], *, seed: int | None = None) -> None:
-        super().__init__(seed=seed)
-        self.element = element
-
-    def sample(self, mask: Any = None, probability: Any = None) -> list[Any]:
-        """Return up to three samples of the element's space."""
-        return [self.element.sample() for _ in range(int(self.np_random.integers(4)))]
-
-    def contains(self, x: Any) -> bool:
-        """Whether `x` is a list of elements of the space."""
-        return isinstance(x, list) and all(self.element.contains(part) for part in x)
-
-    @property
-    def is_np_flattenable(self) -> bool:
-        """Lists of any length do not flatten."""
-        return False
-
-    def __repr__(self) -> str:
-        return f"ListSpace({self.element})"
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, ListSpace) and other.element == self.element
-
-    __hash__ = None  # type: ignore[assignment]
-
-
-class NumberSpace(spaces.Space[float]):
-    """A plain Python number within bounds."""
-
-    def __init__(self, low: float, high: float, *, whole: bool = False, seed: int | None = None) -> None:
-        super().__init__(seed=seed)
-        self.low, self.high, self.whole = low, high, whole
-
-    def sample(self, mask: Any = None, probability: Any = None) -> float:
-        """Return a number, uniform between the bounds (or within a thousand of the lower one, where it is far)."""
-        value = float(self.np_random.uniform(self.low, min(self.high, self.low + 1000.0)))
-        return int(value) if self.whole else value
-
-    def contains(self, x: Any) -> bool:
-        """Whether `x` is a number within the bounds."""
-        good = isinstance(x, int) if self.whole else isinstance(x, (int, float))
-        return good and not isinstance(x, bool) and self.low <= x <= self.high
-
-    @property
-    def is_np_flattenable(self) -> bool:
-        """These stay plain numbers."""
-        return False
-
-    def __repr__(self) -> str:
-        return f"NumberSpace({self.low}, {self.high})"
-
-    def __eq__(self, other: object) -> bool:
-        mine = (self.low, self.high, self.whole)
-        return isinstance(other, NumberSpace) and (other.low, other.high, other.whole) == mine
-
-    __hash__ = None  # type: ignore[assignment]
+@cache
+def _text_space(longest: int) -> spaces.Text:
+    return spaces.Text(longest, min_length=0, charset=CHARACTERS)
 
 
 def _number(low: float, high: float, *shape: int, dtype: Any = np.float64) -> spaces.Box:
@@ -131,53 +69,52 @@ def observation_space(
     outputs
         What its pictures show.
     """
-    far, entity = 1e7, 2**31 - 1
-    point = ListSpace(NumberSpace(-far, far))
     message = spaces.Dict(
         {
-            "time": NumberSpace(0.0, far),
-            "speaker": TextSpace(64),
-            "text": TextSpace(LONGEST_TEXT),
-            "position": point,
+            "time": _number(0.0, FAR),
+            "speaker": told_space(LONGEST_NAME),
+            "text": told_space(LONGEST_TEXT),
+            "position": _number(-FAR, FAR, 3),
         }
     )
+    door = spaces.Dict({"to": told_space(LONGEST_NAME), "position": _number(-FAR, FAR, 3)})
     state = spaces.Dict(
         {
-            "time": NumberSpace(0.0, far),
-            "cash": NumberSpace(-far, far),
-            "held": ListSpace(NumberSpace(0, entity, whole=True)),
-            "vehicle": TextSpace(16),
-            "building": TextSpace(64),
-            "room": TextSpace(64),
-            "place": TextSpace(64),
-            "accessible_places": ListSpace(TextSpace(64)),
-            "doors": ListSpace(spaces.Dict({"to": TextSpace(64), "position": point})),
-            "posture": TextSpace(16),
-            "action_status": TextSpace(16),
-            "action_code": TextSpace(32),
-            "action_reason": TextSpace(1000),
+            "time": _number(0.0, FAR),
+            "cash": _number(-FAR, FAR),
+            "held": spaces.Box(0, MOST_ENTITIES, (2,), np.int64),
+            "vehicle": told_space(LONGEST_NAME),
+            "building": told_space(LONGEST_NAME),
+            "room": told_space(LONGEST_NAME),
+            "place": told_space(LONGEST_NAME),
+            "accessible_places": spaces.Sequence(told_space(LONGEST_NAME)),
+            "doors": spaces.Sequence(door),
+            "posture": told_space(LONGEST_NAME),
+            "action_status": told_space(LONGEST_NAME),
+            "action_code": told_space(LONGEST_NAME),
+            "action_reason": told_space(LONGEST_TEXT),
         }
     )
     parts: dict[str, spaces.Space[Any]] = {
-        "pose": _number(-far, far, 6),
-        "events": ListSpace(message),
+        "pose": _number(-FAR, FAR, 6),
+        "events": spaces.Sequence(message),
         "state": state,
     }
     if readings is not None:
         parts["sensors"] = sensor_space(readings)
     if lens is not None:
-        parts |= {name: _picture(name, lens, entity) for name in outputs}
+        parts |= {name: picture_space(name, lens) for name in outputs}
         parts["extrinsics"] = _number(-np.inf, np.inf, 4, 4)
         parts["intrinsics"] = _number(-np.inf, np.inf, 3, 3)
     return spaces.Dict(parts)
 
 
-def _picture(output: str, lens: Lens, entity: int) -> spaces.Box:
-    """Return the space of one kind of picture; entities are numbers up to `entity`."""
+def picture_space(output: str, lens: Lens) -> spaces.Box:
+    """Return the space of one kind of picture."""
     bounds = {
         "rgb": (0, 255),
         "depth": (0.0, np.inf),
-        "segmentation": (0, entity),
+        "segmentation": (0, MOST_ENTITIES),
         "normals": (-1.001, 1.001),
         "flow": (-np.inf, np.inf),
         "semantic": (0, 255),
@@ -213,7 +150,7 @@ def action_space(places: int, people: int, half: float) -> spaces.Dict:
             "agent": spaces.Discrete(max(1, people)),
             "place": spaces.Discrete(max(1, places)),
             "index": spaces.Discrete(64),
-            "text": TextSpace(LONGEST_TEXT),
+            "text": spaces.Text(LONGEST_TEXT, charset=_SPOKEN),
             "where": spaces.Discrete(3),
         }
     )

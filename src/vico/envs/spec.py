@@ -46,6 +46,7 @@ class EnvOptions(TypedDict, total=False):
     events: str | Mapping[str, Any]
     periods: Mapping[str, float | str]
     max_steps: int
+    form: str | Mapping[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,6 +63,9 @@ class EnvSpec(SimSettings):
         Whose views are rendered: ``"all"``, ``"none"``, or names.
     max_steps
         Length of an episode, steps: seconds, unless `periods` ask for others.
+    form
+        In which observations and actions are given: ``"rich"``, ``"arrays"``, or the fields of
+        `vico.envs.form_options.FormOptions`.
     """
 
     world: str | None = None
@@ -69,6 +73,7 @@ class EnvSpec(SimSettings):
     start: str = "08:00"
     observe: str | tuple[str, ...] = "all"
     max_steps: int = 1500
+    form: str | Mapping[str, Any] = "rich"
 
     @classmethod
     def of(cls, world: Any, community: Any, options: EnvOptions) -> EnvSpec:

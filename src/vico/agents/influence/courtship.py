@@ -71,7 +71,7 @@ class Courtship:
 
     def choose(self, time: float, here: tuple[float, float], seconds_to: Callable[[str], float]) -> str | None:
         """Return whom to see next; None to wait a little."""
-        member = self.strategy.target.choose(self._situation(time, here, seconds_to), self._rng)
+        member = self.strategy.target.choose(self.situation(time, here, seconds_to), self._rng)
         return member if member in self._members else None
 
     def meeting(self, member: str, time: float, seconds_to: Callable[[str], float]) -> Stay | None:
@@ -96,7 +96,7 @@ class Courtship:
         if len(talk.said) >= ROUNDS:
             self._end_visit("talked", time)
             return None
-        said = self.strategy.dialogue.say(self._situation(time, here, seconds_to), talk, self._rng)
+        said = self.strategy.dialogue.say(self.situation(time, here, seconds_to), talk, self._rng)
         said = None if said is None else shortened(said, _LONGEST)
         if not said:
             if talk.said:
@@ -142,7 +142,8 @@ class Courtship:
         visit = self.visits[-1]
         visit.ending, visit.ended = ending, time
 
-    def _situation(self, time: float, here: tuple[float, float], seconds_to: Callable[[str], float]) -> Situation:
+    def situation(self, time: float, here: tuple[float, float], seconds_to: Callable[[str], float]) -> Situation:
+        """Return what is known when a target is chosen or something is said."""
         return Situation(
             time=time,
             ends=self.ends,

@@ -91,16 +91,16 @@ def play_task(
         seed=task.seed,
         start=task.start,
         assistants=len(names),
-        cars=_for_size(CARS, world),
-        pedestrians=_for_size(PEDESTRIANS, world),
+        cars=for_size(CARS, world),
+        pedestrians=for_size(PEDESTRIANS, world),
         observe=tuple(names),
         max_steps=task.steps,
-        setup=lambda simulation: _set_up(simulation, task),
+        setup=lambda simulation: set_up(simulation, task),
     )
     sim = env.sim
     terms = terms or Terms()
     planners = _planners(method, names, task, world, terms, setting or {})
-    residents = _residents(task, community, env.public_map)
+    residents = residents_of_task(task, community, env.public_map)
     judge = Judge(task, world, sim.ground_truth, names)
     chronicle = Chronicle(judge)
     judge.watch(0)
@@ -147,7 +147,7 @@ class _Reported(Hook):
         self._progress(self._label, step.number, self._steps)
 
 
-def _residents(task: Task, community: Community, public_map: PublicMap) -> dict[str, Agent]:
+def residents_of_task(task: Task, community: Community, public_map: PublicMap) -> dict[str, Agent]:
     """Make those who live there; who is to be helped with carrying waits for helpers."""
     followers = followers_of(community, public_map, seed=task.seed)
     residents: dict[str, Agent] = dict(followers)
@@ -182,11 +182,13 @@ def _planners(
     return made
 
 
-def _for_size(number: int, world: World) -> int:
+def for_size(number: int, world: World) -> int:
+    """Return how many there are in a world, of so many in a window of 800 m."""
     return min(number, round(number * (world.half / 400.0) ** 2))
 
 
-def _set_up(simulation: Simulation, task: Task) -> None:
+def set_up(simulation: Simulation, task: Task) -> None:
+    """Put the things of a task where they are at its start, and the assistants where they begin."""
     for thing in task.objects:
         kind, size = movable_kinds()[thing.kind], movable_kinds()[thing.kind].size
         shape = movable_surfaces(kind.kind, thing.colour)

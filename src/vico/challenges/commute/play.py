@@ -54,7 +54,7 @@ def play_day(
     info = CommuteInfo(told)
     inner = _agent(job, task, world, public_map)
     agent = LegalAgent(inner, info)
-    judge = DayJudge(task, AGENT, sim.ground_truth, _stops(public_map))
+    judge = DayJudge(task, AGENT, sim.ground_truth, stops_of(public_map))
     own = job.method in METHODS
     agents = Gatherer({AGENT: agent}, trusted=[AGENT] if own else [], deadline=job.terms.deadline)
     hooks: list[Hook] = [judge, _Index(judge, info)]
@@ -113,24 +113,27 @@ def _env(world: World, task: CommuteTask, job: Job) -> CommunityEnv:
         seed=task.seed,
         start=clock_of(task.appointments[0].end),
         assistants=1,
-        cars=_for_size(rules.CARS, world),
-        pedestrians=_for_size(rules.PEDESTRIANS, world),
+        cars=for_size(rules.CARS, world),
+        pedestrians=for_size(rules.PEDESTRIANS, world),
         observe=() if job.method in METHODS else (AGENT,),
         max_steps=task.seconds,
-        setup=partial(_set_up, task=task),
+        setup=partial(set_up, task=task),
     )
 
 
-def _set_up(simulation: Simulation, *, task: CommuteTask) -> None:
+def set_up(simulation: Simulation, *, task: CommuteTask) -> None:
+    """Stand the agent where the day begins, with its money."""
     simulation.scenario.place_agent(AGENT, (*task.appointments[0].position, 0.0))
     simulation.scenario.give_cash(AGENT, task.resident.cash)
 
 
-def _for_size(number: int, world: World) -> int:
+def for_size(number: int, world: World) -> int:
+    """Return how many there are in a world, of so many in a window of 800 m."""
     return min(number, round(number * (world.half / 400.0) ** 2))
 
 
-def _stops(public_map: PublicMap) -> list[tuple[float, float]]:
+def stops_of(public_map: PublicMap) -> list[tuple[float, float]]:
+    """Return where one waits for buses and trams, ENU metres."""
     stops: list[Stop | TramStop] = [*public_map.stops, *public_map.tram_stops]
     return [(stop.wait[0], stop.wait[1]) for stop in stops]
 

@@ -7,6 +7,7 @@ out what bodies bring: members who are late, doors, looking for somebody in a ho
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from vico.agents.influence.courtship import Courtship
@@ -22,7 +23,7 @@ _THINK, _FIND, _ROUND, _LATE = 30.0, 30.0, 3.0, 30.0
 
 
 @dataclass
-class _Mover:
+class Mover:
     """A main agent without a body: where it is, and when it is next to decide."""
 
     courtship: Courtship
@@ -57,17 +58,27 @@ class Walks:
 
 def play_by_schedule(day: Day, walks: Walks) -> None:
     """Play a day through; what was said stands in its ledger."""
-    plans = {resident.id: day_plan(resident.schedule) for resident in day.community.residents}
+    plans = plans_of(day)
+    movers = movers_of(day, plans)
+    while (mover := min(movers, key=lambda one: (one.free_at, one.courtship.me.id))).free_at < day.task.ends:
+        next_visit(day, mover, plans, walks)
+
+
+def plans_of(day: Day) -> dict[str, DayPlan]:
+    """Return everybody's day by id."""
+    return {resident.id: day_plan(resident.schedule) for resident in day.community.residents}
+
+
+def movers_of(day: Day, plans: Mapping[str, DayPlan]) -> list[Mover]:
+    """Return the main agents where the day finds them."""
     homes = {resident.id: resident.home for resident in day.community.residents}
-    movers = [
-        _Mover(courtship, plans[main].at(day.task.begins).place or homes[main], day.task.begins)
+    return [
+        Mover(courtship, plans[main].at(day.task.begins).place or homes[main], day.task.begins)
         for main, courtship in sorted(day.courtships.items())
     ]
-    while (mover := min(movers, key=lambda one: (one.free_at, one.courtship.me.id))).free_at < day.task.ends:
-        _next(day, mover, plans, walks)
 
 
-def _next(day: Day, mover: _Mover, plans: dict[str, DayPlan], walks: Walks) -> None:
+def next_visit(day: Day, mover: Mover, plans: dict[str, DayPlan], walks: Walks) -> None:
     """Let a main agent see somebody, or wait."""
     time, courtship = mover.free_at, mover.courtship
 
@@ -90,7 +101,7 @@ def _next(day: Day, mover: _Mover, plans: dict[str, DayPlan], walks: Walks) -> N
     mover.free_at = _talk(day, mover, target, there, plans, walks)
 
 
-def _talk(day: Day, mover: _Mover, target: str, time: float, plans: dict[str, DayPlan], walks: Walks) -> float:
+def _talk(day: Day, mover: Mover, target: str, time: float, plans: dict[str, DayPlan], walks: Walks) -> float:
     """Talk until one has nothing more to say, or is not answered; return when that was."""
     here = walks.position(mover.place)
     while True:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 import zipfile
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,7 +116,7 @@ class PolicyCommuter:
 
     def act(self, observation: Observation, info: Info) -> Action:
         """Return an action drawn by the network's chances."""
-        self._take(observation, info)
+        take_in(self._state, observation, info["commute"])
         see(self._city, self._state, self._seen)
         logits = self._network.logits(self._seen).astype(np.float64)
         chances = np.exp(logits - logits.max())
@@ -127,17 +129,6 @@ class PolicyCommuter:
             return {"type": name, "degrees": math.degrees(TURN)}
         return {"type": name}
 
-    def _take(self, observation: Observation, info: Info) -> None:
-        state, told, commute = self._state, observation["state"], info["commute"]
-        state[X], state[Y] = observation["pose"][:2]
-        state[HEADING] = heading(observation)
-        state[VEHICLE] = {"": FOOT, "bike": BIKE}.get(told["vehicle"], BUS)
-        state[TIME], state[DUE] = told["time"], commute["start"]
-        state[GOAL_X], state[GOAL_Y] = commute["position"]
-        state[CASH] = told["cash"]
-        state[LAST] = float(commute["last"])
-        state[HIT] = float(told["action_status"] == "collision")
-
     def state(self) -> AgentState:
         """Return where its stream of chance stands."""
         return {"generator": generator_state(self._rng)}
@@ -145,3 +136,24 @@ class PolicyCommuter:
     def restore(self, state: AgentState) -> None:
         """Go on where another one was."""
         restore_generator(self._rng, state["generator"])
+
+
+def take_in(state: NDArray[np.float64], observation: Observation, commute: Mapping[str, Any]) -> None:
+    """Note what an agent observes and is told in the fields that `kernels.see` reads.
+
+    Parameters
+    ----------
+    state
+        Filled in, shape ``(ALL_FIELDS,)``.
+    commute
+        The appointment it is on its way to, as ``info["commute"]`` has it.
+    """
+    told = observation["state"]
+    state[X], state[Y] = observation["pose"][:2]
+    state[HEADING] = heading(observation)
+    state[VEHICLE] = {"": FOOT, "bike": BIKE}.get(told["vehicle"], BUS)
+    state[TIME], state[DUE] = told["time"], commute["start"]
+    state[GOAL_X], state[GOAL_Y] = commute["position"]
+    state[CASH] = told["cash"]
+    state[LAST] = float(commute["last"])
+    state[HIT] = float(told["action_status"] == "collision")

@@ -1,0 +1,118 @@
+"""What makes each registered task: ``gymnasium.make("vico/PointGoal-v0", world=...)``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from vico.challenges.assistant.episode import world_and_people
+from vico.challenges.assistant.model import Category
+from vico.challenges.assistant.thresholds import RESIDENTS
+from vico.challenges.commute.rules import LEGAL
+from vico.challenges.learning.env import TaskEnv
+from vico.challenges.learning.influence import InfluenceEnv
+from vico.challenges.learning.point_goal import KINDS, PointGoal, PointGoalOptions
+from vico.community import build_community
+from vico.community.model import Community
+from vico.world.folder import World, read_world
+
+_OF_ENV = ("tasks", "seed", "render_mode")
+
+
+def make_point_goal(world: World | Path | str, **options: Any) -> TaskEnv:
+    """Make ``vico/PointGoal-v0``: go to a point.
+
+    Parameters
+    ----------
+    options
+        Those of `PointGoalOptions`, of `TaskEnv` (`tasks`, `seed`, `render_mode`) and of `vico.envs.spec.EnvSpec`
+        (`observe`, `image`, `form`, ...).
+    """
+    of_env, rest = _split(options, _OF_ENV)
+    of_task, settings = _split(rest, [field.name for field in fields(PointGoalOptions)])
+    settings.setdefault("form", {"name": "arrays", "actions": "discrete", "kinds": KINDS})
+    return TaskEnv(PointGoal(world_of(world), PointGoalOptions(**of_task), **settings), **of_env)
+
+
+def make_robot_point_goal(world: World | Path | str, **options: Any) -> TaskEnv:
+    """Make ``vico/RobotPointGoal-v0``: drive a robot to a point by velocities; see `make_point_goal`."""
+    return make_point_goal(world, **{"robot": "go2:velocity", "max_steps": 200, **options})
+
+
+def make_commute(world: World | Path | str, **options: Any) -> TaskEnv:
+    """Make ``vico/Commute-v0``: be in time at every place of a day.
+
+    Parameters
+    ----------
+    options
+        Those of `CommuteOptions`, of `TaskEnv` and of `vico.envs.spec.EnvSpec`.
+    """
+    from vico.challenges.learning.commute import CommuteOptions, CommuteTaskEnv  # compiled code, slow to import
+
+    of_env, rest = _split(options, _OF_ENV)
+    of_task, settings = _split(rest, [field.name for field in fields(CommuteOptions)])
+    settings.setdefault("form", {"name": "arrays", "actions": "discrete", "kinds": LEGAL})
+    return TaskEnv(CommuteTaskEnv(world_of(world), CommuteOptions(**of_task), **settings), **of_env)
+
+
+def make_carry(world: World | Path | str, **options: Any) -> TaskEnv:
+    """Make ``vico/Carry-v0``; see `make_assistant`."""
+    return make_assistant(world, "carry", **options)
+
+
+def make_delivery(world: World | Path | str, **options: Any) -> TaskEnv:
+    """Make ``vico/Delivery-v0``; see `make_assistant`."""
+    return make_assistant(world, "delivery", **options)
+
+
+def make_search(world: World | Path | str, **options: Any) -> TaskEnv:
+    """Make ``vico/Search-v0``; see `make_assistant`."""
+    return make_assistant(world, "search", **options)
+
+
+def make_assistant(world: World | Path | str, category: Category, **options: Any) -> TaskEnv:
+    """Make an environment of the community assistant's tasks, with the people of the challenge.
+
+    Parameters
+    ----------
+    options
+        Those of `vico.challenges.learning.assistant.AssistantOptions`, of `TaskEnv` and of `vico.envs.spec.EnvSpec`.
+    """
+    from vico.challenges.learning.assistant import AssistantOptions, AssistantTask
+
+    of_env, rest = _split(options, _OF_ENV)
+    of_task, settings = _split(rest, [field.name for field in fields(AssistantOptions)])
+    settings.setdefault("form", "arrays")
+    if isinstance(world, World):
+        found, people = world, _people_of(world, category)
+    else:
+        found, people = world_and_people(Path(world), category)
+    return TaskEnv(AssistantTask(found, people, category, AssistantOptions(**of_task), **settings), **of_env)
+
+
+def make_influence(world: World | Path | str, **options: Any) -> InfluenceEnv:
+    """Make ``vico/Influence-v0``; see `InfluenceEnv` for its options."""
+    return InfluenceEnv(world_of(world), **options)
+
+
+def world_of(source: World | Path | str) -> World:
+    """Return a world; one that is read from a folder is kept."""
+    return source if isinstance(source, World) else _world(Path(source))
+
+
+@lru_cache(maxsize=2)
+def _world(folder: Path) -> World:
+    return read_world(folder)
+
+
+def _split(options: Mapping[str, Any], names: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the options of these names, and the others."""
+    mine = {name: value for name, value in options.items() if name in names}
+    return mine, {name: value for name, value in options.items() if name not in names}
+
+
+def _people_of(world: World, category: Category) -> Community:
+    return build_community(world, residents=RESIDENTS[category], seed=0)

@@ -1,0 +1,1 @@
+"""The array form: observations and actions as arrays of fixed shape, for learners."""
