@@ -58,7 +58,7 @@ class Contents:
     @classmethod
     def of(cls, record: Mapping[str, Any]) -> Contents:
         """Return what `record` returned as JSON."""
-        values = {name: tuple(value) if isinstance(value, list) else value for name, value in record.items()}
+        values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in record.items()}
         return cls(**values)
 
 

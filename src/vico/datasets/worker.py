@@ -91,7 +91,7 @@ def plain_job(job: Job) -> dict[str, Any]:
 def _make(task: Mapping[str, Any], folder: Path, contents: Contents, work: Path, tell: Tell) -> None:
     if "run" in task:
         run = read_run(Path(task["run"]))
-        world = _world_of(run, task.get("world"))
+        world = world_of_run(run, task.get("world"))
         facts = facts_of_run(run.path, int(run.manifest["seed"]))
         agents = chosen_agents(run, contents)
         pictures: PictureSource = RecordedPictures(run)
@@ -198,7 +198,7 @@ def chosen_agents(run: Run, contents: Contents) -> list[str]:
     return assistants or seen
 
 
-def _world_of(run: Run, given: str | None) -> World | None:
+def world_of_run(run: Run, given: str | None) -> World | None:
     """Return the world of a run, if it is still there."""
     folder = Path(given) if given else run.source("world")
     if not (folder / "world.json").exists():

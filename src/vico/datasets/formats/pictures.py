@@ -180,7 +180,7 @@ def frames_of_video(path: Path, first: int, count: int, *, fps: int) -> Iterator
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
         if first:
-            container.seek(int(first / fps / stream.time_base), stream=stream, backward=True)  # type: ignore[operator]
+            container.seek(int(first / fps / stream.time_base), stream=stream, backward=True)
         for frame in container.decode(stream):
             place = round(float(frame.time) * fps)
             if place >= first + count:
