@@ -39,6 +39,7 @@ ALLOWED = {
     },
     "runner": {"agents", "envs", "sim", "world", "io"},
     "challenges": {"runner", "envs", "agents", "community", "world", "assets", "llm", "jobs", "io"},
+    "datasets": {"challenges", "runner", "sim", "world", "assets", "io"},
 }
 OPEN = {"viewer", "cli"}  # and the front door, api.py
 

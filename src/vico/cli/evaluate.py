@@ -14,6 +14,7 @@ from tempfile import TemporaryDirectory
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
+from vico.challenges.assistant.thresholds import SUBTASKS
 from vico.challenges.episodes import Outcome, label_of
 from vico.challenges.evaluation import Finished, evaluate, jobs_for
 from vico.challenges.records import Challenge, Setting
@@ -52,6 +53,8 @@ def assistant(options: AssistantOptions) -> int:
         "distance": not options.no_distance,
         "steps": options.steps,
     }
+    if options.subtasks != SUBTASKS:
+        setting = {**setting, "subtasks": options.subtasks}
     categories = None if options.category == "all" else (options.category,)
     return judge("assistant", categories, setting, options.common, methods=("heuristic",))
 

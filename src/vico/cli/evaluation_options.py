@@ -94,6 +94,8 @@ class AssistantOptions:
         Planners do not reckon with distances.
     steps
         Seconds an episode may last.
+    subtasks
+        How many of the six subtasks of a task are asked for: the first ones.
     """
 
     common: Common
@@ -102,6 +104,7 @@ class AssistantOptions:
     advanced: bool = False
     no_distance: bool = False
     steps: int = 1500
+    subtasks: int = 6
 
 
 @dataclass(frozen=True)

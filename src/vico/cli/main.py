@@ -21,6 +21,7 @@ from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
 from vico.cli.agent_verbs import check_agent, evaluation, leaderboard
+from vico.cli.dataset_verbs import dataset
 from vico.cli.motion_verbs import motion
 from vico.cli.options import (
     CommaSeparated,
@@ -397,6 +398,7 @@ app.command(assets, name="assets", help="Richer bodies and robots.")
 app.command(motion, name="motion", help="Motions of other programs, and of recorded people.")
 app.command(language_model, name="llm", help="A language model on this machine.")
 app.command(evaluation, name="eval", help="Judge agents on a challenge.")
+app.command(dataset, name="dataset", help="Datasets of demonstrations, for trainers.")
 app.command(leaderboard, name="leaderboard", help="A public file of what methods came to.")
 app.command(name="check-agent")(check_agent)
 

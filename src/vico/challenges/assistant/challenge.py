@@ -7,10 +7,10 @@ from pathlib import Path
 
 from vico.agents.assistant import METHODS
 from vico.challenges.assistant.causes import CAUSES
-from vico.challenges.assistant.episode import play_task, world_and_people
-from vico.challenges.assistant.generate import generate_task
+from vico.challenges.assistant.episode import Reported, play_task, world_and_people
+from vico.challenges.assistant.generate import generate_task, shortened
 from vico.challenges.assistant.model import CATEGORIES, Task
-from vico.challenges.assistant.thresholds import STEPS
+from vico.challenges.assistant.thresholds import STEPS, SUBTASKS
 from vico.challenges.records import EpisodeRecord, Job, Metric, Progress
 from vico.errors import InputError
 
@@ -61,7 +61,7 @@ class AssistantChallenge:
             setting=job.setting,
             terms=job.terms,
             recording=recording,
-            progress=progress,
+            hooks=[] if progress is None else [Reported(progress, task)],
         )
 
     def _task(self, job: Job) -> Task:
@@ -72,7 +72,7 @@ class AssistantChallenge:
         assistants = int(job.setting.get("assistants", 1))
         if not 1 <= assistants <= 2:
             raise InputError(f"assistant: {assistants} assistants; the tasks are for 1 or 2")
-        return generate_task(
+        task = generate_task(
             world,
             people,
             category,
@@ -81,6 +81,7 @@ class AssistantChallenge:
             advanced=bool(job.setting.get("advanced", False)),
             steps=int(job.setting.get("steps", STEPS)),
         )
+        return shortened(task, subtasks=int(job.setting.get("subtasks", SUBTASKS)))
 
 
 ASSISTANT = AssistantChallenge()

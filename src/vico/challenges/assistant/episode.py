@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import lru_cache
 from pathlib import Path
@@ -59,7 +60,7 @@ def play_task(
     setting: Setting | None = None,
     terms: Terms | None = None,
     recording: Path | None = None,
-    progress: Progress | None = None,
+    hooks: Sequence[Hook] = (),
 ) -> EpisodeRecord:
     """Play one task through and judge it.
 
@@ -74,6 +75,8 @@ def play_task(
         On which terms planners from elsewhere take part.
     recording
         Folder to which the run is recorded; None records nothing.
+    hooks
+        Who else follows the run, told after the judge.
 
     Raises
     ------
@@ -104,11 +107,8 @@ def play_task(
     judge = Judge(task, world, sim.ground_truth, names)
     chronicle = Chronicle(judge)
     judge.watch(0)
-    followers: list[Hook] = [judge, chronicle]
-    if progress is not None:
-        followers.append(_Reported(progress, f"{task.world}, {task.category}, seed {task.seed}", task.steps))
     agents = Gatherer(residents | planners, trusted=residents, deadline=terms.deadline, workers=terms.workers)
-    runner = Runner(sim, agents, hooks=followers)
+    runner = Runner(sim, agents, hooks=[judge, chronicle, *hooks])
     with ExitStack() as stack:
         stack.callback(agents.close)
         if recording is not None:
@@ -136,11 +136,12 @@ def _check_made_for(task: Task, world: World, community: Community) -> None:
         )
 
 
-class _Reported(Hook):
-    """Tells how far an episode is."""
+class Reported(Hook):
+    """Tells how far the episode of a task is."""
 
-    def __init__(self, progress: Progress, label: str, steps: int) -> None:
-        self._progress, self._label, self._steps = progress, label, steps
+    def __init__(self, progress: Progress, task: Task) -> None:
+        self._progress, self._label = progress, f"{task.world}, {task.category}, seed {task.seed}"
+        self._steps = task.steps
 
     def stepped(self, step: Step) -> None:
         """Tell it."""

@@ -27,7 +27,7 @@ from vico.challenges.assistant.thresholds import (
 )
 from vico.community.folder import digest_of
 from vico.community.model import Community, Resident
-from vico.errors import EmptyInputError
+from vico.errors import EmptyInputError, InputError
 from vico.seeds import rng
 from vico.world.folder import World
 
@@ -159,6 +159,19 @@ def generate_task(
         objects=draw.things.made,
         subtasks=subtasks,
     )
+
+
+def shortened(task: Task, *, subtasks: int) -> Task:
+    """Return a task that asks for its first subtasks alone; the things of the others lie where they lay.
+
+    Raises
+    ------
+    InputError
+        If it has fewer, or none are asked for.
+    """
+    if not 1 <= subtasks <= len(task.subtasks):
+        raise InputError(f"assistant: {subtasks} subtasks; a task has 1 to {len(task.subtasks)}")
+    return task.model_copy(update={"subtasks": task.subtasks[:subtasks]})
 
 
 def _delivery(draw: Draw, index: int, before: list[Subtask]) -> Subtask:

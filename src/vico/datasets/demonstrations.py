@@ -1,0 +1,263 @@
+"""From a recorded run to demonstrations: what one agent saw, knew, was asked for and did, an agent step a frame."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.assets.robots import robot_model
+from vico.datasets.actions import ActionForm
+from vico.datasets.tasks import EpisodeFacts, current_part
+from vico.datasets.vectors import (
+    PERSON_STATE,
+    goal_vector,
+    recorded_person_states,
+    recorded_robot_states,
+    robot_state_names,
+)
+from vico.errors import EmptyInputError, InputError
+from vico.sim.periods import TICKS_PER_SECOND
+from vico.sim.recording import Run
+
+#: What stands for an instruction where nobody gave one.
+NO_INSTRUCTION = "No instruction."
+_WORLD_POSE = ("x", "y", "z", "yaw")
+
+
+@dataclass(frozen=True)
+class Demonstration:
+    """One agent's part in one run: frame *t* holds what it observed then and what it did next.
+
+    Attributes
+    ----------
+    agent, kind
+        Its name, and ``resident``, ``assistant`` or ``robot``.
+    body
+        What acts: ``person``, or a robot's model.
+    person
+        Id of the resident it is; empty for others.
+    steps
+        Recorded step of each frame, shape ``(n,)``.
+    fps
+        Frames a second of simulated time: how often the agent acts.
+    state_names, form
+        What the numbers of `state` are, and how `action` is made and read.
+    state, action
+        float32, shapes ``(n, len(state_names))`` and ``(n, len(form.names))``.
+    goal
+        float32, shape ``(n, len(GOAL))``; None where there is no task.
+    text
+        Text of each action; see `vico.datasets.actions`.
+    status
+        How each action went, `vico.rules.ActionStatus`, int64, shape ``(n,)``.
+    instructions
+        Of each frame, in words.
+    success
+        Whether what was asked for was done in the end; None where nobody judged.
+    facts
+        What the episode was.
+    """
+
+    agent: str
+    kind: str
+    body: str
+    person: str
+    steps: NDArray[np.int64]
+    fps: int
+    state_names: tuple[str, ...]
+    form: ActionForm
+    state: NDArray[np.float32]
+    action: NDArray[np.float32]
+    goal: NDArray[np.float32] | None
+    text: list[str]
+    status: NDArray[np.int64]
+    instructions: list[str]
+    success: bool | None
+    facts: EpisodeFacts
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+
+def demonstrations_of(
+    run: Run, facts: EpisodeFacts, agents: Sequence[str], *, instruction: str = ""
+) -> list[Demonstration]:
+    """Return the demonstrations of some agents of a run.
+
+    Parameters
+    ----------
+    facts
+        What the run was an episode of.
+    agents
+        Names.
+    instruction
+        What to say where no task and no schedule says what was asked for.
+
+    Raises
+    ------
+    InputError
+        If nobody has a name, an agent's period gives no whole number of frames a second, or an action fits into no
+        vector.
+    EmptyInputError
+        If the run has no step yet.
+    """
+    known = {agent["name"]: agent for agent in run.agents}
+    if unknown := [name for name in agents if name not in known]:
+        raise InputError(f"{run.path}: nobody is called {unknown[0]!r}; there are {', '.join(known)}")
+    if run.last < 1:
+        raise EmptyInputError(f"{run.path}: the run has no step; nothing was done in it")
+    return [_demonstration(run, facts, known[name], instruction) for name in agents]
+
+
+def _demonstration(run: Run, facts: EpisodeFacts, agent: Mapping[str, Any], instruction: str) -> Demonstration:
+    period = _period(run, agent)
+    steps = _due_steps(run, period)
+    rows = _rows_of(run, "agents", agent["entity"]) | {"time": run.times}
+    body = _rows_of(run, "bodies", agent["entity"])
+    pose = np.column_stack([body[name] for name in _WORLD_POSE])
+    actions = [_action(text) for text in rows["action"]]
+    # What a row says of actions happened on the way to its step.
+    taken = [actions[step + 1] for step in steps]
+    own = [int(step) for step in steps]
+    if agent["kind"] == "robot":
+        names, state, form, model = _robot(run, agent, rows)
+    else:
+        model, form, names = "person", ActionForm(), PERSON_STATE
+        state = recorded_person_states(rows | {name: body[name] for name in _WORLD_POSE})
+    vectors, texts = _encoded(form, taken, pose[own], f"{run.path}: {agent['name']}")
+    parts = current_part(taken, len(facts.instructions))
+    # An agent that shares the task with others is told of all of it.
+    told = [facts.instructions[part] if facts.instructions else None for part in parts]
+    goal = None
+    if facts.instructions:
+        goal = np.array([goal_vector(pose[k], one) for k, one in zip(own, told, strict=True)], np.float32)
+    return Demonstration(
+        agent=agent["name"],
+        kind=agent["kind"],
+        body=model,
+        person=agent["resident"] or "",
+        steps=steps,
+        fps=round(TICKS_PER_SECOND / period),
+        state_names=tuple(names),
+        form=form,
+        state=state[own],
+        action=vectors,
+        goal=goal,
+        text=texts,
+        status=rows["status"][steps + 1].astype(np.int64),
+        instructions=_instructions(run, agent, told, run.times[own], instruction),
+        success=facts.success,
+        facts=facts,
+    )
+
+
+def _rows_of(run: Run, table: str, entity: int) -> dict[str, NDArray[Any]]:
+    """Return the columns of a table that are about one entity, a row a step."""
+    columns = run.columns(table)
+    mine = columns["entity"] == entity
+    found = {name: values[mine] for name, values in columns.items()}
+    order = np.argsort(found["step"], kind="stable")
+    return {name: values[order] for name, values in found.items()}
+
+
+def _action(text: str | None) -> Any:
+    return None if text is None else json.loads(text)
+
+
+def _encoded(
+    form: ActionForm, actions: Sequence[Any], poses: NDArray[np.float64], who: str
+) -> tuple[NDArray[np.float32], list[str]]:
+    vectors = np.zeros((len(actions), len(form.names)), np.float32)
+    texts: list[str] = []
+    for k, action in enumerate(actions):
+        try:
+            vectors[k], text = form.encode(action, poses[k].tolist())
+        except InputError as error:
+            raise InputError(f"{who}: step {k}: {error}") from None
+        texts.append(text)
+    return vectors, texts
+
+
+def _robot(
+    run: Run, agent: Mapping[str, Any], rows: Mapping[str, NDArray[Any]]
+) -> tuple[tuple[str, ...], NDArray[np.float32], ActionForm, str]:
+    """Return names and values of a robot's state, the form of its actions, and its model."""
+    model = str(run.manifest["config"]["robots"][int(str(agent["name"]).rpartition("_")[2])]).partition(":")[0]
+    joints = run.columns("joints")
+    mine = joints["entity"] == agent["entity"]
+    steps = run.last + 1
+    order = np.lexsort([joints["joint"][mine], joints["step"][mine]])
+    angles = joints["angle"][mine][order].reshape(steps, -1) if mine.any() else np.zeros((steps, 0))
+    state = recorded_robot_states(dict(rows) | _rows_of(run, "robots", agent["entity"]), angles)
+    space, own = next(iter(robot_model(model).action_spaces.items()))
+    return robot_state_names(angles.shape[1]), state, ActionForm(robot=True, width=len(own), space=space), model
+
+
+def _period(run: Run, agent: Mapping[str, Any]) -> int:
+    """Return how often an agent acts, ticks.
+
+    Raises
+    ------
+    InputError
+        If that is no whole number of frames a second.
+    """
+    config = run.manifest["config"]
+    robot, asked = agent["kind"] == "robot", config.get("periods", {})
+    period = asked.get(agent["name"], asked.get("robots", 1.0) if robot else 1.0)
+    if period == "model":
+        model = str(config["robots"][int(str(agent["name"]).rpartition("_")[2])]).partition(":")[0]
+        period = robot_model(model).control_period
+    ticks = round(float(period) * TICKS_PER_SECOND)
+    if ticks <= 0 or TICKS_PER_SECOND % ticks:
+        raise InputError(
+            f"{run.path}: {agent['name']} acts every {float(period):g} s, which is no whole number of times a second, "
+            "as formats of trainers want it; record it with a period like 1, 0.5, 0.2 or 0.1"
+        )
+    return ticks
+
+
+def _due_steps(run: Run, period: int) -> NDArray[np.int64]:
+    """Return the steps at which an agent acted: those at multiples of its period, but for the run's last."""
+    ticks = np.rint((run.times - run.times[0]) * TICKS_PER_SECOND).astype(np.int64)
+    return np.flatnonzero(ticks[:-1] % period == 0)
+
+
+def _instructions(
+    run: Run,
+    agent: Mapping[str, Any],
+    told: Sequence[Mapping[str, Any] | None],
+    times: NDArray[np.float64],
+    instruction: str,
+) -> list[str]:
+    """Return what was asked for at each frame: by the task, by the person's schedule, or as the caller says."""
+    planned = _schedule(agent)
+    found: list[str] = []
+    for one, time in zip(told, times, strict=True):
+        if one is not None:
+            found.append(str(one["text"]))
+        else:
+            found.append(instruction or planned(float(time)) or NO_INSTRUCTION)
+    return found
+
+
+def _schedule(agent: Mapping[str, Any]) -> Callable[[float], str]:
+    """Return what tells what a resident's day says at a time, seconds since midnight."""
+    items = (agent.get("person") or {}).get("schedule") or []
+    entries = [(_seconds(item["start"]), _seconds(item["end"]), str(item["activity"])) for item in items]
+
+    def planned(time: float) -> str:
+        second = math.fmod(time, 86400.0)
+        return next((activity for start, end, activity in entries if start <= second < end), "")
+
+    return planned
+
+
+def _seconds(clock: str) -> float:
+    hours, minutes, *rest = (float(part) for part in str(clock).split(":"))
+    return 3600.0 * hours + 60.0 * minutes + (rest[0] if rest else 0.0)

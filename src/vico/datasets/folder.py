@@ -1,0 +1,214 @@
+"""What a dataset holds beside what its format wants: ``dataset.json``, ``episodes.parquet``, ``entities.parquet``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from vico.datasets.actions import ActionForm
+from vico.datasets.formats.registry import FORMATS
+from vico.datasets.layout import STATUSES, Layout
+from vico.errors import InputError, MissingFileError, SchemaError
+from vico.io.files import read_json, sha256_of, write_json
+from vico.version import __version__
+
+SCHEMA, VERSION = "vico.dataset", 1
+RECORD, EPISODES, ENTITIES = "dataset.json", "episodes.parquet", "entities.parquet"
+_EPISODE_FIELDS = {
+    "frames": pa.int64(),
+    "agent": pa.string(),
+    "kind": pa.string(),
+    "person": pa.string(),
+    "challenge": pa.string(),
+    "category": pa.string(),
+    "method": pa.string(),
+    "seed": pa.int64(),
+    "success": pa.bool_(),
+    "persons": pa.list_(pa.string()),
+    "instructions": pa.list_(pa.string()),
+    "run": pa.string(),
+    "producer": pa.string(),
+    "gaps": pa.int64(),
+}
+
+
+class _World(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    name: str
+    digest: str
+    episodes: int
+    sources: list[dict[str, Any]]
+
+
+class _Record(BaseModel):
+    """``dataset.json``."""
+
+    model_config = ConfigDict(extra="forbid")
+    schema_name: Literal["vico.dataset"]
+    version: Literal[1]
+    producer: str
+    format: str
+    body: str
+    fps: int
+    size: int
+    outputs: list[str]
+    episodes: int
+    frames: int
+    successes: int
+    judged: int
+    splits: dict[str, tuple[int, int]]
+    features: dict[str, list[str]]
+    action: dict[str, Any]
+    statuses: dict[str, str]
+    worlds: list[_World]
+    made: dict[str, Any]
+    missing: list[str]
+    files: dict[str, str]
+
+
+class Dataset:
+    """A dataset that was written, of any format.
+
+    Parameters
+    ----------
+    path
+        Its folder.
+
+    Raises
+    ------
+    MissingFileError, SchemaError
+        If it is none, damaged, or of another version.
+    """
+
+    def __init__(self, path: Path) -> None:
+        if not (path / RECORD).exists():
+            raise MissingFileError(f"{path}: holds no {RECORD}; make a dataset with vico dataset build")
+        content = read_json(path / RECORD)
+        if not isinstance(content, dict) or content.get("schema_name") != SCHEMA:
+            raise SchemaError(f"{path / RECORD}: not a {SCHEMA} file; give the folder of a dataset")
+        try:
+            self.about = _Record.model_validate(content)
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(str(part) for part in first["loc"])
+            raise SchemaError(f"{path / RECORD}: {where}: {first['msg']}; build it anew") from None
+        if self.about.format not in FORMATS:
+            raise SchemaError(f"{path / RECORD}: format {self.about.format!r}; there are {', '.join(FORMATS)}")
+        self.path = path
+
+    @property
+    def form(self) -> ActionForm:
+        """How its action vectors are read."""
+        return ActionForm(**self.about.action)
+
+    def episodes(self) -> list[dict[str, Any]]:
+        """Return a record of each episode, in their order.
+
+        Raises
+        ------
+        SchemaError
+            If the table is damaged.
+        """
+        try:
+            rows: list[dict[str, Any]] = pq.read_table(self.path / EPISODES, memory_map=False).to_pylist()
+        except (pa.ArrowException, OSError) as error:
+            raise SchemaError(
+                f"{self.path / EPISODES}: not readable ({' '.join(str(error).split())[:200]}); build it anew"
+            ) from None
+        return rows
+
+    def entities(self, episode: int) -> dict[int, tuple[str, str]]:
+        """Return kind and name of what an episode's segmentation shows, by entity."""
+        rows = pq.read_table(self.path / ENTITIES, filters=[("episode_index", "=", episode)]).to_pylist()
+        return {row["entity"]: (row["kind"], row["name"]) for row in rows}
+
+    def frames(self, episode: int) -> Iterator[dict[str, Any]]:
+        """Yield an episode's frames: values by name (docs/datasets.md), with ``pictures`` by output.
+
+        Raises
+        ------
+        InputError
+            If there is no such episode.
+        """
+        if not 0 <= episode < self.about.episodes:
+            raise InputError(f"{self.path}: no episode {episode}; there are 0 to {self.about.episodes - 1}")
+        read = FORMATS[self.about.format].episode_frames
+        yield from read(self.path, episode, self.about.outputs, self.about.fps)
+
+    def damaged_files(self) -> list[str]:
+        """Return the names of files that are gone, or are not what was written."""
+        found: list[str] = []
+        for name, digest in sorted(self.about.files.items()):
+            path = self.path / name
+            if not path.is_file():
+                found.append(f"{name}: is gone")
+            elif sha256_of(path) != digest:
+                found.append(f"{name}: is not what was written")
+        return found
+
+    @staticmethod
+    def record_of(layout: Layout, made: Mapping[str, Any], missing: Sequence[str]) -> dict[str, Any]:
+        """Return what ``dataset.json`` says, but for the files."""
+        judged = [one for one in layout.successes if one is not None]
+        features = {"observation.state": layout.state_names, "action": list(layout.form.names)}
+        if layout.goal_names:
+            features["observation.environment_state"] = layout.goal_names
+        form = layout.form
+        return {
+            "schema_name": SCHEMA,
+            "version": VERSION,
+            "producer": f"vico {__version__}",
+            "format": layout.contents.to,
+            "body": layout.body,
+            "fps": layout.fps,
+            "size": layout.contents.size,
+            "outputs": list(layout.contents.outputs),
+            "episodes": len(layout.episodes),
+            "frames": layout.frames,
+            "successes": sum(judged),
+            "judged": len(judged),
+            "splits": {name: list(bounds) for name, bounds in layout.splits.items()},
+            "features": features,
+            "action": {"robot": form.robot, "width": form.width, "space": form.space},
+            "statuses": {str(value): name for value, name in STATUSES.items()},
+            "worlds": _worlds(layout),
+            "made": dict(made),
+            "missing": list(missing),
+        }
+
+
+def _worlds(layout: Layout) -> list[dict[str, Any]]:
+    found: dict[str, dict[str, Any]] = {}
+    for episode in layout.episodes:
+        world = episode.about["world"]
+        known = found.setdefault(world["digest"], {**world, "episodes": 0, "sources": list(episode.about["sources"])})
+        known["episodes"] += 1
+    return sorted(found.values(), key=lambda world: (world["name"], world["digest"]))
+
+
+def write_tables(folder: Path, layout: Layout) -> None:
+    """Write ``episodes.parquet`` and ``entities.parquet``."""
+    columns: dict[str, Any] = {
+        "episode_index": pa.array(range(len(layout.episodes)), pa.int64()),
+        "split": pa.array([layout.split_of(k) for k in range(len(layout.episodes))], pa.string()),
+        "world": pa.array([episode.about["world"]["name"] for episode in layout.episodes], pa.string()),
+        "world_digest": pa.array([episode.about["world"]["digest"] for episode in layout.episodes], pa.string()),
+    }
+    for name, kind in _EPISODE_FIELDS.items():
+        columns[name] = pa.array([episode.about[name] for episode in layout.episodes], kind)
+    pq.write_table(pa.table(columns), folder / EPISODES, compression="zstd")
+    rows = [
+        {"episode_index": k} | one for k, episode in enumerate(layout.episodes) for one in episode.about["entities"]
+    ]
+    schema = pa.schema({"episode_index": pa.int64(), "entity": pa.int64(), "kind": pa.string(), "name": pa.string()})
+    pq.write_table(pa.Table.from_pylist(rows, schema), folder / ENTITIES, compression="zstd")
+
+
+def write_dataset_record(folder: Path, record: Mapping[str, Any]) -> None:
+    """Write ``dataset.json``, the last file of a dataset."""
+    write_json(folder / RECORD, record)

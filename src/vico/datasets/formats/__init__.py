@@ -1,0 +1,1 @@
+"""How a dataset lies on the disk: one module a format."""

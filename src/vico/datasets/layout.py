@@ -1,0 +1,230 @@
+"""What all formats have in common: the episodes in their order, the splits, the names of what vectors hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.datasets.actions import ActionForm
+from vico.datasets.parts import Contents, PartEpisode, array_of
+from vico.datasets.statistics import Statistics, colour_statistics, depth_statistics, vector_statistics
+from vico.datasets.vectors import GOAL
+from vico.errors import EmptyInputError, InputError
+from vico.rules import ActionStatus
+
+#: What has to be the same in all episodes of a dataset, and what to do about it.
+_SAME = {
+    "body": "choose --agents of one kind",
+    "fps": "choose --agents that act equally often",
+    "state_names": "choose --agents of one kind",
+    "width": "choose --agents of one kind",
+    "goal": "choose runs that all have a task, or none",
+}
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A dataset before it is written.
+
+    Attributes
+    ----------
+    contents
+        What every frame holds.
+    episodes
+        In their order: those of a split follow each other.
+    splits
+        First episode and the one after the last, by name.
+    """
+
+    contents: Contents
+    episodes: Sequence[PartEpisode]
+    splits: Mapping[str, tuple[int, int]]
+
+    def __post_init__(self) -> None:
+        if not self.episodes:
+            raise EmptyInputError("dataset: there is no episode; nothing to write")
+        first = self.episodes[0].about
+        for name, advice in _SAME.items():
+            for episode in self.episodes:
+                if episode.about[name] != first[name]:
+                    raise InputError(
+                        f"dataset: {first['agent']} and {episode.about['agent']} differ in {name} "
+                        f"({_short(first[name])} and {_short(episode.about[name])}); {advice}"
+                    )
+
+    @property
+    def fps(self) -> int:
+        """Frames a second of simulated time."""
+        return int(self.episodes[0].about["fps"])
+
+    @property
+    def body(self) -> str:
+        """What acts: ``person``, or a robot's model."""
+        return str(self.episodes[0].about["body"])
+
+    @property
+    def state_names(self) -> list[str]:
+        """What the numbers of ``observation.state`` are."""
+        return list(self.episodes[0].about["state_names"])
+
+    @property
+    def goal_names(self) -> list[str]:
+        """What the numbers of ``observation.environment_state`` are; empty without tasks."""
+        return list(GOAL) if self.episodes[0].about["goal"] else []
+
+    @property
+    def form(self) -> ActionForm:
+        """How actions are made of vectors, and vectors of actions."""
+        about = self.episodes[0].about
+        return ActionForm(robot=self.body != "person", width=about["width"], space=about["space"])
+
+    @property
+    def frames(self) -> int:
+        """How many there are."""
+        return sum(episode.frames for episode in self.episodes)
+
+    @cached_property
+    def instructions(self) -> list[str]:
+        """All that was asked for, in words, in the order of their first mention."""
+        return list(dict.fromkeys(text for episode in self.episodes for text in episode.about["instructions"]))
+
+    @property
+    def successes(self) -> list[bool | None]:
+        """Whether each episode came to what was asked for; None where nobody judged."""
+        return [episode.about["success"] for episode in self.episodes]
+
+    def split_of(self, index: int) -> str:
+        """Return the split of an episode."""
+        return next(name for name, (first, end) in self.splits.items() if first <= index < end)
+
+    def columns(self) -> Iterator[EpisodeColumns]:
+        """Yield each episode's numbers."""
+        number = {text: k for k, text in enumerate(self.instructions)}
+        before = 0
+        for index, episode in enumerate(self.episodes):
+            yield EpisodeColumns.of(index, before, episode, number, goal=bool(self.goal_names))
+            before += episode.frames
+
+    def statistics(self) -> dict[str, Statistics]:
+        """Return statistics over all episodes, by feature; vectors exactly, over all frames at once."""
+        parts: dict[str, list[NDArray[Any]]] = {}
+        for columns in self.columns():
+            for name, values in columns.numbers().items():
+                parts.setdefault(name, []).append(values)
+        found = {name: vector_statistics(np.concatenate(values)) for name, values in parts.items()}
+        return found | self.picture_statistics(self.episodes)
+
+    def picture_statistics(self, episodes: Sequence[PartEpisode]) -> dict[str, Statistics]:
+        """Return statistics of the pictures of some episodes, by feature."""
+        tallies = [(episode.about["tally"], episode.frames) for episode in episodes]
+        frames = sum(count for _, count in tallies)
+        found: dict[str, Statistics] = {}
+        if "rgb" in self.contents.outputs:
+            counts = sum(np.array(tally["rgb"], np.int64) for tally, _ in tallies)
+            found[IMAGES["rgb"]] = colour_statistics(np.asarray(counts), frames)
+        if "depth" in self.contents.outputs:
+            found[IMAGES["depth"]] = depth_statistics([tally["depth"] for tally, _ in tallies], frames)
+        return found
+
+
+#: What trainers call each picture.
+IMAGES = {
+    "rgb": "observation.images.ego",
+    "depth": "observation.depth",
+    "segmentation": "observation.segmentation",
+}
+
+
+@dataclass(frozen=True)
+class EpisodeColumns:
+    """An episode's numbers, a row a frame, under the names that trainers know.
+
+    Attributes
+    ----------
+    index
+        Of the episode.
+    first
+        Index of its first frame in the dataset.
+    vectors
+        float32, shape ``(n, d)``, by name.
+    text
+        Of each action.
+    task
+        Number of each frame's instruction.
+    step, status, done, success
+        Recorded step; how the action went; whether the frame is the last; whether it ended with all done.
+    fps
+        Frames a second.
+    """
+
+    index: int
+    first: int
+    vectors: Mapping[str, NDArray[np.float32]]
+    text: Sequence[str]
+    task: NDArray[np.int64]
+    step: NDArray[np.int64]
+    status: NDArray[np.int64]
+    done: NDArray[np.bool_]
+    success: NDArray[np.bool_]
+    fps: int
+
+    @classmethod
+    def of(
+        cls, index: int, first: int, episode: PartEpisode, number: Mapping[str, int], *, goal: bool
+    ) -> EpisodeColumns:
+        """Read them from a part."""
+        table = episode.table()
+        names = {"observation.state": "state", "action": "action"}
+        if goal:
+            names["observation.environment_state"] = "goal"
+        done = np.arange(len(table)) == len(table) - 1
+        return cls(
+            index,
+            first,
+            {name: array_of(table, column) for name, column in names.items()},
+            table["text"].to_pylist(),
+            np.array([number[text] for text in table["instruction"].to_pylist()], np.int64),
+            table["step"].to_numpy(),
+            table["status"].to_numpy(),
+            done,
+            done & (episode.about["success"] is True),
+            int(episode.about["fps"]),
+        )
+
+    def __len__(self) -> int:
+        return len(self.step)
+
+    @property
+    def timestamp(self) -> NDArray[np.float32]:
+        """Seconds since the episode's first frame, by the frames."""
+        return (np.arange(len(self)) / self.fps).astype(np.float32)
+
+    def numbers(self) -> dict[str, NDArray[Any]]:
+        """Return what statistics are told of."""
+        n = len(self)
+        return {
+            **self.vectors,
+            "timestamp": self.timestamp,
+            "frame_index": np.arange(n),
+            "episode_index": np.full(n, self.index),
+            "index": self.first + np.arange(n),
+            "task_index": self.task,
+            "next.done": self.done,
+            "next.success": self.success,
+            "action.status": self.status,
+            "step": self.step,
+        }
+
+
+#: Names of the numbers of ``action.status``.
+STATUSES = {status.value: status.name.lower() for status in ActionStatus}
+
+
+def _short(value: Any) -> str:
+    text = str(value)
+    return text if len(text) <= 40 else f"{text[:37]}..."

@@ -1,0 +1,212 @@
+"""Making one part of a dataset: play an episode, or read a recorded run, and encode what came of it.
+
+Everything in and out is JSON, and the same task twice leaves the same bytes: whoever hands out the tasks may use
+processes, a cluster, or nothing of the kind.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from vico.challenges.assistant.challenge import ASSISTANT
+from vico.challenges.assistant.episode import Reported, play_task, world_and_people
+from vico.challenges.assistant.model import Task
+from vico.challenges.records import Job
+from vico.datasets.demonstrations import Demonstration, demonstrations_of
+from vico.datasets.episode_records import Tally, episode_record
+from vico.datasets.formats.pictures import PictureFiles
+from vico.datasets.formats.registry import FORMATS
+from vico.datasets.parts import Contents, read_part, write_part
+from vico.datasets.pictures import PictureKeeper, PictureSource, RecordedPictures
+from vico.datasets.tasks import EpisodeFacts, facts_of_episode, facts_of_run
+from vico.errors import InputError, OutputError, VicoError
+from vico.runner.foreign import Terms
+from vico.runner.loop import Hook
+from vico.sim.recording import Run, read_run
+from vico.world.folder import World, read_world
+
+Tell = Callable[[Mapping[str, Any]], None]
+_KINDS = {"residents": "resident", "assistants": "assistant", "robots": "robot"}
+# Beside the parts, so that it lies on the same disk; no part's name begins with a dot.
+_SCRATCH = ".scratch"
+
+
+def player(options: Mapping[str, Any], tell: Tell) -> Callable[[Mapping[str, Any]], Mapping[str, Any]]:
+    """Return what makes parts.
+
+    Parameters
+    ----------
+    options
+        ``parts``: folder of the parts; ``contents``: `vico.datasets.parts.Contents`, as JSON.
+    tell
+        Told ``label``, ``step`` and ``limit`` while an episode is played.
+
+    Returns
+    -------
+    callable
+        Makes the part of a task: ``key`` and ``folder`` (its name), and either ``run`` (path) and ``world`` (path or
+        null), or ``job`` (`plain_job`). Returns ``frames``, or ``reason``: why there is no part.
+    """
+    parts, contents = Path(options["parts"]), Contents.of(options["contents"])
+
+    def make(task: Mapping[str, Any]) -> Mapping[str, Any]:
+        folder = parts / str(task["folder"])
+        made = read_part(folder, task["key"])
+        if made is None:
+            shutil.rmtree(folder, ignore_errors=True)
+            scratch = parts / _SCRATCH
+            scratch.mkdir(parents=True, exist_ok=True)
+            try:
+                with tempfile.TemporaryDirectory(dir=scratch, prefix=f"{task['folder']}.") as work:
+                    _make(task, folder, contents, Path(work), tell)
+            except OutputError:
+                raise  # of no use to go on
+            except VicoError as error:
+                return {"reason": " ".join(str(error).split())}
+            made = read_part(folder, task["key"])
+        assert made is not None
+        return {"frames": sum(episode.frames for episode in made)}
+
+    return make
+
+
+def plain_job(job: Job) -> dict[str, Any]:
+    """Return a job as JSON."""
+    terms = {"deadline": job.terms.deadline, "isolate": job.terms.isolate, "memory": job.terms.memory}
+    return {
+        "category": job.category,
+        "method": job.method,
+        "setting": dict(job.setting),
+        "world": str(job.world),
+        "seed": job.seed,
+        "terms": terms,
+    }
+
+
+def _make(task: Mapping[str, Any], folder: Path, contents: Contents, work: Path, tell: Tell) -> None:
+    if "run" in task:
+        run = read_run(Path(task["run"]))
+        world = world_of_run(run, task.get("world"))
+        facts = facts_of_run(run.path, int(run.manifest["seed"]))
+        agents = chosen_agents(run, contents)
+        pictures: PictureSource = RecordedPictures(run)
+    else:
+        run, facts, pictures, world = _played(task["job"], contents, work, tell)
+        agents = chosen_agents(run, contents)
+    staged = work / "staged"
+    staged.mkdir()
+    made = demonstrations_of(run, facts, agents, instruction=contents.instruction)
+    episodes = [
+        (_encoded(demonstration, pictures, PictureFiles(staged, str(k)), contents, run, world), demonstration)
+        for k, demonstration in enumerate(made)
+    ]
+    write_part(folder, task["key"], episodes, staged)
+
+
+def _played(
+    job: Mapping[str, Any], contents: Contents, work: Path, tell: Tell
+) -> tuple[Run, EpisodeFacts, PictureSource, World]:
+    """Play an episode, its run recorded and its pictures kept."""
+    asked = Job(
+        "assistant",
+        job["category"],
+        job["method"],
+        job["setting"],
+        Path(job["world"]),
+        job["seed"],
+        Terms(**job["terms"]),
+    )
+    content = ASSISTANT.task(asked)
+    task = Task.model_validate(content)
+    world, people = world_and_people(asked.world, task.category)
+    names = [f"assistant_{i}" for i in range(len(task.assistants))]
+    keeper = PictureKeeper(work / "pictures", names, size=contents.size, outputs=contents.outputs)
+
+    def told(label: str, step: int, limit: int) -> None:
+        tell({"label": label, "step": step, "limit": limit})
+
+    hooks: list[Hook] = [keeper, Reported(told, task)]
+    record = play_task(
+        world,
+        people,
+        task,
+        method=asked.method,
+        setting=asked.setting,
+        terms=asked.terms,
+        recording=work / "run",
+        hooks=hooks,
+    )
+    if record.fault_counts.get("crashed", 0) >= record.steps:
+        first = record.faults[0].reason if record.faults else ""
+        raise InputError(f"{asked.method}: failed at every step of the episode ({first}); nothing was demonstrated")
+    return read_run(work / "run"), facts_of_episode(record, content), keeper.close(), world
+
+
+def _encoded(
+    demonstration: Demonstration,
+    pictures: PictureSource,
+    files: PictureFiles,
+    contents: Contents,
+    run: Run,
+    world: World | None,
+) -> dict[str, Any]:
+    """Encode a demonstration's pictures; return what is said of it."""
+    tally = Tally()
+    if contents.outputs:
+        writer = FORMATS[contents.to].writer(
+            files, contents.outputs, size=contents.size, fps=demonstration.fps, frames=len(demonstration)
+        )
+        steps = demonstration.steps.tolist()
+        for seen in pictures.of(demonstration.agent, steps, size=contents.size, outputs=contents.outputs):
+            tally.add(seen)
+            writer.add(seen)
+        writer.close()
+    return episode_record(demonstration, tally, run, world)
+
+
+def chosen_agents(run: Run, contents: Contents) -> list[str]:
+    """Return the names of the agents whose demonstrations are taken.
+
+    Raises
+    ------
+    InputError
+        If there is nobody of a name, or nobody at all.
+    """
+    known = {agent["name"]: agent["kind"] for agent in run.agents}
+    if contents.agents:
+        found: list[str] = []
+        for asked in contents.agents:
+            mine = [name for name, kind in known.items() if kind == _KINDS.get(asked)] or [asked]
+            if mine[0] not in known:
+                raise InputError(
+                    f"{run.path}: nobody is called {asked!r}; there are {', '.join(known)}, or residents, assistants, "
+                    "robots"
+                )
+            found += mine
+        return list(dict.fromkeys(found))
+    assistants = [name for name, kind in known.items() if kind == "assistant"]
+    seen = [name for name in known if name in run.views] if contents.outputs else list(known)
+    if not (assistants or seen):
+        raise InputError(
+            f"{run.path}: holds nobody's pictures: record it with --observe NAME, or build with --outputs none"
+        )
+    return assistants or seen
+
+
+def world_of_run(run: Run, given: str | None) -> World | None:
+    """Return the world of a run, if it is still there."""
+    folder = Path(given) if given else run.source("world")
+    if not (folder / "world.json").exists():
+        return None
+    world = _read_world(folder)
+    return world if world.digest == run.manifest["world"]["digest"] else None
+
+
+@lru_cache(maxsize=2)
+def _read_world(folder: Path) -> World:
+    return read_world(folder)
