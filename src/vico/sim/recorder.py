@@ -255,6 +255,16 @@ class Recorder:
         with suppress(OutputError) if isinstance(error, OutputError) else nullcontext():
             self.close("complete" if kind is None else "stopped")
 
+    @property
+    def latest(self) -> Mapping[str, Mapping[str, Any]]:
+        """Rows that were taken of the last step, by table; see `StepSamples.latest`."""
+        return self._samples.latest
+
+    @property
+    def latest_cast(self) -> list[dict[str, Any]]:
+        """Lines of the cast that the last step brought."""
+        return self._cast.latest
+
     def metrics(self) -> dict[str, Any]:
         """Return counts and seconds so far; see `docs/formats.md`."""
         sim = self.sim
