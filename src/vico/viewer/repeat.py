@@ -87,6 +87,11 @@ class RepeatedRun:
             people = read_community(_folder(run, community, "community"), place)
         return cls(run, place, people)
 
+    @property
+    def step(self) -> int:
+        """The step that was repeated last."""
+        return self._at
+
     def go_to(self, step: int) -> None:
         """Go to a step, from the checkpoint before it."""
         kept = [k for k in self.run.checkpoints if k <= step]

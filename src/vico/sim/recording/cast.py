@@ -40,6 +40,8 @@ class CastMember:
     intervals
         First step at which it was there, and the first at which it no longer was (None: to the end), once for each
         time that it came.
+    model
+        Shape it is drawn with: of vehicles, robots and things; None for people, and in runs from before it was told.
     """
 
     entity: int
@@ -49,6 +51,7 @@ class CastMember:
     agent: str | None
     pedestrian: int | None
     intervals: tuple[tuple[int, int | None], ...]
+    model: str | None = None
 
     def present(self, step: int) -> bool:
         """Whether it was there at a step."""
@@ -61,7 +64,7 @@ class CastLog:
     Parameters
     ----------
     describe
-        Returns ``name``, ``agent`` and ``pedestrian`` of an entity.
+        Returns ``name``, ``agent``, ``pedestrian`` and ``model`` of an entity.
     """
 
     def __init__(self, describe: Callable[[int], Mapping[str, Any]]) -> None:
@@ -135,7 +138,8 @@ def take_line(found: dict[int, CastMember], line: Mapping[str, Any]) -> None:
     length, width, height = line["size"]
     size = (float(length), float(width), float(height))
     agent, pedestrian = line["agent"], line["pedestrian"]
-    found[entity] = CastMember(entity, line["kind"], line["name"], size, agent, pedestrian, intervals)
+    model = line.get("model")
+    found[entity] = CastMember(entity, line["kind"], line["name"], size, agent, pedestrian, intervals, model)
 
 
 def cast_lines(run: Path) -> Iterator[dict[str, Any]]:

@@ -152,7 +152,13 @@ def _weather(step: int, sim: Simulation) -> Rows:
     sky = sim.state.environment
     weather = sky.weather
     now = {name: [getattr(weather, name)] for name in WEATHER}
-    return now | {"step": [step], "wet": [sky.wet], "snow_cover": [sky.snow_cover], "ice": [sky.ice], "lamps": [sky.lamps]}
+    return now | {
+        "step": [step],
+        "wet": [sky.wet],
+        "snow_cover": [sky.snow_cover],
+        "ice": [sky.ice],
+        "lamps": [sky.lamps],
+    }
 
 
 def _bodies(step: int, bodies: Bodies, traffic: TrafficSystem | None) -> Rows:
