@@ -20,6 +20,7 @@ import tyro
 from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
+from vico.cli import viewer_verbs
 from vico.cli.agent_verbs import check_agent, evaluation, leaderboard
 from vico.cli.motion_verbs import motion
 from vico.cli.options import (
@@ -395,6 +396,8 @@ app.command(language_model, name="llm", help="A language model on this machine."
 app.command(evaluation, name="eval", help="Judge agents on a challenge.")
 app.command(leaderboard, name="leaderboard", help="A public file of what methods came to.")
 app.command(name="check-agent")(check_agent)
+app.command(name="view")(viewer_verbs.view)
+app.command(name="live")(viewer_verbs.live)
 
 
 _log = logging.getLogger("vico")

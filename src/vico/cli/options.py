@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -301,6 +301,16 @@ class RunOptions:
         Decides everything that is left to chance.
     check
         Look for overlaps of bodies after every sub-step; with any, the exit code is 1.
+    interventions
+        A file of what is done to the run from outside (interventions.jsonl of a run's folder): it is done again.
+    live
+        Show the run in a browser while it goes on, and let hands reach it from there (the extra "viewer").
+    speed
+        With --live: simulated seconds a second at most; 0 is as fast as it goes.
+    paused
+        With --live: wait before the first step until somebody lets it go on.
+    port
+        With --live: where the page is, on this machine alone; 0 takes a free one.
     force
         Replace what is in the output folder.
     json
@@ -342,8 +352,86 @@ class RunOptions:
     workers: int = 0
     seed: int = 0
     check: Literal["none", "overlaps"] = "none"
+    interventions: Path | None = None
+    live: bool = False
+    speed: float = 0.0
+    paused: bool = False
+    port: int = 0
     force: bool = False
     json: bool = False
+
+
+@dataclass(frozen=True)
+class LiveOptions:
+    """What `vico live` is asked for; what else a run can be asked for, `vico run --live` is.
+
+    Attributes
+    ----------
+    world
+        World folder.
+    community
+        Community folder, made for that world.
+    out
+        Folder to record into; without it, out/live, which is replaced.
+    robots
+        Names, separated by commas; none for no robots.
+    agent
+        Who plays an assistant beside the residents: my_module:MyAgent, or path/to/file.py:MyAgent.
+    assistants
+        How many of them.
+    start
+        Time of day, HH:MM or HH:MM:SS.
+    date
+        Of the first day, YYYY-MM-DD.
+    weather
+        A kind of weather, "changing", or a weather file (.json).
+    events
+        Of the city: none, "changing", or a file of events (.json).
+    steps
+        Seconds to simulate at most.
+    cars, cyclists, pedestrians
+        How many drive, ride and walk around that nobody plays.
+    observe
+        Whose views are rendered and recorded all the time; those of anybody are when somebody looks.
+    speed
+        Simulated seconds a second at most; 0 is as fast as it goes.
+    paused
+        Wait before the first step until somebody lets it go on.
+    interventions
+        What was done to an earlier run (its interventions.jsonl), to be done again.
+    port
+        Where the page is, on this machine alone; 0 takes a free one.
+    seed
+        Decides everything that is left to chance.
+    """
+
+    world: Positional[Annotated[Path, tyro.conf.arg(metavar="WORLD")]]
+    community: Positional[Annotated[Path, tyro.conf.arg(metavar="COMMUNITY")]]
+    out: Path | None = None
+    robots: CommaSeparated = "husky,go2"
+    agent: Annotated[str, tyro.conf.arg(metavar="MODULE:NAME")] = ""
+    assistants: int = 0
+    start: str = "08:00"
+    date: str = "2026-06-21"
+    weather: str = "fair"
+    events: str = "none"
+    steps: int = 86_400
+    cars: int = 30
+    cyclists: int = 0
+    pedestrians: int = 30
+    observe: CommaSeparated = "none"
+    speed: float = 1.0
+    paused: bool = False
+    interventions: Path | None = None
+    port: int = 0
+    seed: int = 0
+
+    def run_options(self) -> RunOptions:
+        """Return the same as options of a run."""
+        given = {field.name: getattr(self, field.name) for field in fields(self)}
+        given["assistants"] = self.assistants or (1 if self.agent else 0)
+        given |= {"out": self.out or Path("out/live"), "force": self.out is None, "live": True}
+        return RunOptions(**given)
 
 
 @dataclass(frozen=True)

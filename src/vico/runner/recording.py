@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -97,10 +97,14 @@ class RecordedRun(Hook):
         Of the same simulation.
     faults
         Of the same runner.
+    notes
+        Gives what else a checkpoint is to keep, plain data; nothing if None.
     """
 
-    def __init__(self, recorder: Recorder, faults: FaultLog) -> None:
-        self._recorder, self._faults = recorder, faults
+    def __init__(
+        self, recorder: Recorder, faults: FaultLog, *, notes: Callable[[], Mapping[str, Any]] | None = None
+    ) -> None:
+        self._recorder, self._faults, self._notes = recorder, faults, notes
         self._told = -1
 
     def begin(self, observations: Mapping[str, dict[str, Any]]) -> None:
@@ -111,7 +115,8 @@ class RecordedRun(Hook):
         """Save the simulation, what every agent remembers, what they did wrong, and overlaps where they are counted."""
         check = self._recorder.sim.overlap_check
         overlaps = None if check is None else check.state()
-        self._recorder.checkpoint(states, notes={"faults": self._faults.record(), "overlaps": overlaps})
+        notes = {} if self._notes is None else dict(self._notes())
+        self._recorder.checkpoint(states, notes=notes | {"faults": self._faults.record(), "overlaps": overlaps})
 
     def stepped(self, step: Step) -> None:
         """Record a step."""

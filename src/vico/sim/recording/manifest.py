@@ -17,15 +17,20 @@ if TYPE_CHECKING:
     from vico.sim.simulation import Simulation
 
 
-def run_record(sim: Simulation, status: str, digest: str, sources: Mapping[str, str], wanted: int) -> dict[str, Any]:
-    """Return what ``run.json`` says of a simulation whose state has the hash `digest`."""
+def run_record(
+    sim: Simulation, status: str, digest: str, sources: Mapping[str, str], wanted: int, identity: str
+) -> dict[str, Any]:
+    """Return what ``run.json`` says of a simulation whose state has the hash `digest`.
+
+    `identity` is the simulation's from before its first step: things may have been dropped since.
+    """
     community = sim.community
     return {
         "schema_name": SCHEMA,
         "version": VERSION,
         "producer": f"vico {__version__}",
         "status": status,
-        "identity": sim.identity,
+        "identity": identity,
         "seed": sim.config.seed,
         "config": sim.config.record(),
         "world": {"path": sources.get("world", ""), "digest": sim.world.digest},

@@ -1,4 +1,4 @@
-"""One client of the stream: what it is owed, in queues that are bounded; what it cannot take is dropped or it is closed."""
+"""One client of the stream: what it is owed, in bounded queues; what it cannot take is dropped, or it is closed."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import itertools
 import json
 from collections import deque
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,10 +56,11 @@ class Client:
         self._waiting: deque[dict[str, Any]] = deque()
         self._ranges: dict[int, _Range] = {}
         self._period: float | None = None
-        self._next = self._next_counts = 0.0
+        self._next = self._next_counts = self._next_control = 0.0
         self._sent = self._told = -1
         self._control: dict[str, Any] | None = None
         self._you = -1
+        self._epoch = hub.epoch
         self._overflow = False
 
     def tell(self, message: dict[str, Any]) -> None:
@@ -125,9 +127,14 @@ class Client:
     def _look(self) -> None:
         """Put what is new into the queue: how the run stands, the agent that is played, counts."""
         state, now = self._hub.state, asyncio.get_running_loop().time()
-        if state.hands is not None and (control := state.hands.told()) != self._control:
-            if self._control is None or _differs(control, self._control) or now >= self._next_counts:
-                self._control = control
+        if self._epoch != self._hub.epoch:
+            self._epoch, self._sent, self._you = self._hub.epoch, -1, -1
+            self._told = state.source.last
+            self.tell({"type": "run", "path": str(state.source.path), "last": state.source.last})
+        if state.hands is not None:
+            control = state.hands.told()
+            if self._control is None or _differs(control, self._control) or now >= self._next_control:
+                self._control, self._next_control = control, now + COUNTS_EVERY
                 self.tell({"type": "control", **control})
         if state.player is not None and state.player.owner() == self.number:
             you = state.player.newest()
@@ -194,10 +201,8 @@ class Client:
         timeout: float | None = None
         if self._period is not None and self._hub.state.source.last != self._sent:
             timeout = max(self._next - asyncio.get_running_loop().time(), 0.001)
-        try:
+        with suppress(TimeoutError):
             await asyncio.wait_for(self._awake.wait(), timeout)
-        except TimeoutError:
-            pass
 
 
 def _differs(control: Mapping[str, Any], before: Mapping[str, Any]) -> bool:

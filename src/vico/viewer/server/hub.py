@@ -14,6 +14,8 @@ _MOST_EVENTS = 200
 _LOOKS_EVERY, _COUNTS_EVERY = 1.0, 1.0
 # Rows of the cast are told beyond this many steps only when they are asked for anew.
 _MOST_STEPS = 100_000
+# News of some steps are kept for the clients that are told the same.
+_MOST_NEWS = 16
 
 
 class Hub:
@@ -32,7 +34,10 @@ class Hub:
         self.listeners: set[asyncio.Event] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._pending = False
+        #: Which run is shown: another number, another run.
+        self.epoch = 0
         self._frame = -1, b""
+        self._news: dict[tuple[int, int], list[dict[str, Any]]] = {}
 
     async def run(self) -> None:
         """Look for what another process has recorded; while the run goes on in this one, tell how it stands."""
@@ -40,9 +45,8 @@ class Hub:
         state = self.state
         while True:
             await asyncio.sleep(_LOOKS_EVERY)
-            if state.hands is not None:
-                self._wake()
-            elif state.source.manifest["status"] == "running" and await asyncio.to_thread(state.source.refresh):
+            grows = state.hands is None and state.source.manifest["status"] == "running"
+            if state.hands is not None or (grows and await asyncio.to_thread(state.source.refresh)):
                 self._wake()
 
     def notify(self) -> None:
@@ -61,9 +65,16 @@ class Hub:
 
     def news(self, since: int, until: int) -> list[dict[str, Any]]:
         """Return messages of events and of the cast, of the steps after `since`, up to `until`."""
-        source, told = self.state.source, list[dict[str, Any]]()
         if until <= since or until - since > _MOST_STEPS:
-            return told
+            return []
+        if (since, until) not in self._news:
+            if len(self._news) >= _MOST_NEWS:
+                self._news.pop(next(iter(self._news)))
+            self._news[since, until] = self._new(since, until)
+        return self._news[since, until]
+
+    def _new(self, since: int, until: int) -> list[dict[str, Any]]:
+        source, told = self.state.source, list[dict[str, Any]]()
         events = source.events(since + 1, until, _MOST_EVENTS)
         if events["events"]:
             told.append({"type": "events", "step": until, **events})
@@ -71,6 +82,16 @@ class Hub:
         if cast["cast"]:
             told.append({"type": "cast", **cast})
         return told
+
+    def change(self) -> None:
+        """Say that the run is another one from here on; from any thread."""
+        if self._loop is not None:
+            self._loop.call_soon_threadsafe(self._change)
+
+    def _change(self) -> None:
+        self._frame, self._news = (-1, b""), {}
+        self.epoch += 1
+        self._wake()
 
     def counts(self) -> dict[str, Any]:
         """Return the message ``metrics`` of the newest step."""

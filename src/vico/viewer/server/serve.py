@@ -20,12 +20,13 @@ from starlette.routing import WebSocketRoute
 from starlette.types import ASGIApp
 
 from vico.errors import OutputError
-from vico.io.files import read_json, write_json
+from vico.io.files import json_bytes, read_json
 from vico.viewer.server.gate import Gate
 from vico.viewer.server.hub import Hub
 from vico.viewer.server.routes import routes
 from vico.viewer.server.state import ViewerState
 from vico.viewer.server.stream import LONGEST_MESSAGE, Stream
+from vico.viewer.sources.source import Source
 from vico.world.model import Record
 
 #: Where a run's folder keeps the server's port and token.
@@ -100,6 +101,11 @@ class ViewerServer:
         """Say that the run has gone on."""
         self.hub.notify()
 
+    def change_source(self, source: Source) -> None:
+        """Show another run from here on, and tell all clients so."""
+        self.state.source = source
+        self.hub.change()
+
     def __enter__(self) -> Self:
         self._thread.start()
         for _ in range(int(_STARTS_WITHIN / 0.01)):
@@ -154,9 +160,12 @@ def known_address(folder: Path) -> Address | None:
 
 def _keep(folder: Path, address: Address) -> None:
     """Keep an address where its owner alone can read it; a folder that cannot be written keeps none."""
+    path, work = folder / ADDRESS, folder / f".{ADDRESS}.partial"
     with contextlib.suppress(OSError):
-        write_json(folder / ADDRESS, address.model_dump())
-        os.chmod(folder / ADDRESS, 0o600)
+        work.unlink(missing_ok=True)
+        with os.fdopen(os.open(work, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+            file.write(json_bytes(address.model_dump()))
+        os.replace(work, path)
 
 
 def _listening(asked: int, before: int) -> socket.socket:

@@ -19,7 +19,7 @@ class Hands(Protocol):
     """Takes commands to a run that goes on, in this process; asked from the server's threads."""
 
     def told(self) -> dict[str, Any]:
-        """Return what the message ``control`` holds: ``paused``, ``speed``, ``step``, ``status``, ``factor``, ``can``."""
+        """Return what the message ``control`` holds."""
 
     def command(self, name: str, arguments: Mapping[str, Any]) -> Future[dict[str, Any]]:
         """Have a command done between two steps; its result is the reply, its error a sentence."""

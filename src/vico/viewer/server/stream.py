@@ -99,8 +99,8 @@ class Stream:
         return {"type": "hello", "protocol": PROTOCOL, "run": run, "live": state.source.live, **state.more()}
 
     def _range(self, client: Client, message: Mapping[str, Any]) -> None:
-        numbers = [_whole(message, name) for name in ("id", "first", "last")]
-        client.ask(*numbers, _whole(message, "every", 1))
+        number, first, last = (_whole(message, name) for name in ("id", "first", "last"))
+        client.ask(number, first, last, _whole(message, "every", 1))
 
     def _cancel(self, client: Client, message: Mapping[str, Any]) -> None:
         client.cancel(_whole(message, "id"))

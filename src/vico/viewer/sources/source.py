@@ -253,7 +253,7 @@ class Source:
     ) -> dict[str, Any]:
         name, mine = self.names[row["entity"]], joints["entity"] == row["entity"]
         cast = self.tables.cast()
-        touched = [e["data"].get("with") for e in events if e["kind"] == "collision" and e["agent"] == name]
+        touched = [e["data"].get("entity", 0) for e in events if e["kind"] == "collision" and e["agent"] == name]
         return {
             "action": None if row["action"] is None else json.loads(row["action"]),
             "status": _STATUSES[row["status"]],
@@ -267,7 +267,7 @@ class Source:
             "cash": round(row["cash"], 2),
             "clip": "" if motion is None else CLIPS[motion["clip"]],
             "joints": [round(float(a), 4) for a in joints["angle"][mine] * TABLES["joints"]["angle"].unit],
-            "contacts": [{"with": other} for other in touched if other],
+            "contacts": [_entity(entity, cast) for entity in touched if entity > 0],
         }
 
 
