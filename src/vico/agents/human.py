@@ -201,7 +201,7 @@ def walk(held: Held, observation: Observation) -> Action:
     """
     state = observation["state"]
     ahead, aside = held.axis("y", "forward", "back"), held.axis("x", "right", "left")
-    if state["vehicle"] == "bus":
+    if state["vehicle"] not in ("", "bike"):
         ahead = aside = 0.0
     push = min(math.hypot(ahead, aside), 1.0)
     speed = BIKE_SPEED if state["vehicle"] == "bike" else RUN_SPEED if "run" in held.keys else WALK_SPEED

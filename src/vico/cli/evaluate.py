@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 from rich.console import Console
@@ -23,6 +23,7 @@ from vico.challenges.tables.published import published_rows
 from vico.challenges.tables.summary import summarise
 from vico.cli import leaderboard
 from vico.cli.evaluation_options import AssistantOptions, CommuteOptions, EvaluationOptions, InfluenceOptions
+from vico.cli.live import city_of, told
 from vico.cli.output import check_output, print_json
 from vico.errors import InputError, OutputError
 from vico.io.files import write_errors
@@ -30,6 +31,7 @@ from vico.io.folders import is_being_written, new_folder
 from vico.runner.foreign import Terms
 from vico.runner.loading import load
 from vico.threads import workers as processors
+from vico.viewer.server import require_server
 from vico.world.folder import read_world
 
 
@@ -46,7 +48,19 @@ def assistant(options: AssistantOptions) -> int:
         "steps": options.steps,
     }
     categories = None if options.category == "all" else (options.category,)
+    if any("human" in method.split("+") for method in options.common.method):
+        return _by_hand(categories, setting, options)
     return judge("assistant", categories, setting, options.common, methods=("heuristic",))
+
+
+def _by_hand(categories: Sequence[str] | None, setting: Setting, options: AssistantOptions) -> int:
+    """Judge a person, who plays at a page of this machine, one episode after the other, each recorded."""
+    from vico.viewer import theatre
+
+    require_server()
+    theatre.AT_THE_PAGE.open(city=city_of, announce=told, port=options.port, waits=options.waits)
+    common = replace(options.common, workers=1, record=True)
+    return judge(theatre.CHALLENGE, categories, setting, common)
 
 
 def influence(options: InfluenceOptions) -> int:
@@ -103,6 +117,7 @@ def judge(
         setting=setting,
         worlds=options.worlds,
         seeds=options.seeds,
+        first_seed=options.first_seed,
         terms=_terms(challenge, methods, options),
     )
     if not 0 <= options.workers <= 256:

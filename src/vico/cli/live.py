@@ -17,7 +17,7 @@ from vico.world.folder import World
 
 if TYPE_CHECKING:
     from vico.viewer.live import LiveViewer
-    from vico.viewer.server.state import Player
+    from vico.viewer.play import PlayedAgent
 
 #: Options of a run that decide how it is shown, and nothing in it.
 LIVE = ("live", "speed", "paused", "port")
@@ -25,7 +25,7 @@ LIVE = ("live", "speed", "paused", "port")
 
 @contextmanager
 def live_viewer(
-    options: RunOptions, world: World, control: Control | None, player: Player | None = None
+    options: RunOptions, world: World, control: Control | None, player: PlayedAgent | None = None
 ) -> Iterator[LiveViewer]:
     """Show a run while the block lasts.
 

@@ -398,6 +398,7 @@ app.command(leaderboard, name="leaderboard", help="A public file of what methods
 app.command(name="check-agent")(check_agent)
 app.command(name="view")(viewer_verbs.view)
 app.command(name="live")(viewer_verbs.live)
+app.command(name="play")(viewer_verbs.play)
 
 
 _log = logging.getLogger("vico")

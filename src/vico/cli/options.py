@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 from tyro.conf import Positional
@@ -432,6 +432,75 @@ class LiveOptions:
         given["assistants"] = self.assistants or (1 if self.agent else 0)
         given |= {"out": self.out or Path("out/live"), "force": self.out is None, "live": True}
         return RunOptions(**given)
+
+
+@dataclass(frozen=True)
+class PlayOptions:
+    """What `vico play` is asked for.
+
+    Attributes
+    ----------
+    world
+        World folder.
+    community
+        Community folder, made for that world; tasks have people of their own and take none.
+    played
+        Who you are: resident_3, assistant_0 or robot_0. Without it assistant_0, or robot_0 where robots are given.
+    task
+        A task for the assistant, which is judged at the end.
+    advanced
+        The harder form of it.
+    out
+        Folder to record into; without it, out/play, which is replaced.
+    robots
+        Names, separated by commas; none for no robots.
+    start
+        Time of day, HH:MM or HH:MM:SS.
+    date
+        Of the first day, YYYY-MM-DD.
+    weather
+        A kind of weather, "changing", or a weather file (.json).
+    seconds
+        To simulate at most.
+    cars, cyclists, pedestrians
+        How many drive, ride and walk around that nobody plays.
+    view
+        What whom you play sees is rendered and recorded, which a demonstration needs.
+    port
+        Where the page is, on this machine alone; 0 takes a free one.
+    waits
+        With a task: seconds that it waits for you at its page.
+    seed
+        Decides everything that is left to chance, and the task.
+    """
+
+    world: Positional[Annotated[Path, tyro.conf.arg(metavar="WORLD")]]
+    community: Positional[Annotated[Path | None, tyro.conf.arg(metavar="COMMUNITY")]] = None
+    played: Annotated[str, tyro.conf.arg(name="as", metavar="AGENT")] = ""
+    task: Literal["none", "carry", "delivery", "search"] = "none"
+    advanced: bool = False
+    out: Path | None = None
+    robots: CommaSeparated = "none"
+    start: str = "08:00"
+    date: str = "2026-06-21"
+    weather: str = "fair"
+    seconds: int = 36_000
+    cars: int = 30
+    cyclists: int = 0
+    pedestrians: int = 30
+    view: Literal["recorded", "none"] = "recorded"
+    port: int = 0
+    waits: float = 600.0
+    seed: int = 0
+
+    def run_options(self, played: str, steps: int) -> RunOptions:
+        """Return the same as options of a run."""
+        names = ("world", "community", "robots", "start", "date", "weather", "cars", "cyclists", "pedestrians", "port")
+        given: dict[str, Any] = {name: getattr(self, name) for name in (*names, "seed")}
+        given["assistants"] = int(played.removeprefix("assistant_")) + 1 if played.startswith("assistant_") else 0
+        given |= {"observe": played if self.view == "recorded" else "none", "states_every": steps // self.seconds * 300}
+        given |= {"out": self.out or Path("out/play"), "force": self.out is None, "steps": steps}
+        return RunOptions(**given, live=True, speed=1.0)
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from vico.agents.base import Agent
+from vico.agents.human import PERIOD
 from vico.agents.schedule import followers_of
 from vico.agents.talk.language_model import LlmTalk
 from vico.cli.live import LIVE, live_viewer, wait_for_interrupt
@@ -41,6 +43,7 @@ from vico.world.public import PublicMap
 
 if TYPE_CHECKING:
     from vico.viewer.live import LiveViewer
+    from vico.viewer.play import PlayedAgent
 
 #: Steps between checkpoints unless a run says otherwise.
 STATES_EVERY = 300
@@ -72,7 +75,7 @@ def run(options: RunOptions) -> int:
         raise InputError("run: --agent plays assistants; say how many, for example --assistants 1")
     talk = _talk_of(options)
     use_workers(options.workers)
-    metrics = _Job.of(options, options.world, options.community, options.out, talk).done()
+    metrics = Job.of(options, options.world, options.community, options.out, talk=talk).done()
     if options.json:
         print_json(metrics)
     else:
@@ -129,7 +132,7 @@ def _judged(metrics: dict[str, Any]) -> int:
 
 
 @dataclass(frozen=True)
-class _Job:
+class Job:
     """A run that is about to begin or to go on.
 
     Attributes
@@ -138,6 +141,8 @@ class _Job:
         Manifest of the unfinished run that is in `out`; empty if it had none yet, None if nothing is there.
     talk
         What words the residents' answers; None for templates.
+    played
+        Who is played by a person at the page; None for nobody.
     """
 
     options: RunOptions
@@ -148,9 +153,19 @@ class _Job:
     sources: dict[str, str]
     found: dict[str, Any] | None
     talk: LlmTalk | None = None
+    played: PlayedAgent | None = None
 
     @classmethod
-    def of(cls, options: RunOptions, world: Path, community: Path, out: Path, talk: LlmTalk | None = None) -> _Job:
+    def of(
+        cls,
+        options: RunOptions,
+        world: Path,
+        community: Path,
+        out: Path,
+        *,
+        talk: LlmTalk | None = None,
+        played: PlayedAgent | None = None,
+    ) -> Job:
         """Read what is needed, and look at what is in the output folder."""
         found = None if options.force else _cut_short(out)
         check_output(out, world, community, force=options.force or found is not None)
@@ -178,11 +193,12 @@ class _Job:
             renderer=options.renderer,
             cameras=read_json(options.cameras) if options.cameras is not None else {},
             worn=_worn(options.wear),
+            periods={} if played is None else {played.agent: PERIOD},
         )
         place = read_world(world)
         people = read_community(community, place)
         sources = {"world": str(world.resolve()), "community": str(community.resolve())}
-        return cls(options, out, place, people, config, sources, found, talk)
+        return cls(options, out, place, people, config, sources, found, talk, played)
 
     def done(self) -> dict[str, Any]:
         """Do it; return its metrics."""
@@ -195,7 +211,7 @@ class _Job:
             agents = stack.enter_context(closing(self._agents()))
             every = _states_every(options, agents)
             control = self._control(script, manageable=bool(every))
-            viewer = stack.enter_context(live_viewer(options, self.world, control)) if options.live else None
+            viewer = self._viewer(stack, control) if options.live else None
             leg = self._begin(agents, every, goes_on=goes_on, control=control)
             report("setting the scene", 1, 1)
             while True:
@@ -207,6 +223,11 @@ class _Job:
                 control.end()
                 wait_for_interrupt(f"the run is over; {viewer.url} still shows it (Ctrl+C ends)")
             return metrics
+
+    def _viewer(self, stack: ExitStack, control: Control | None) -> LiveViewer:
+        if self.played is not None:
+            stack.callback(self.played.human.close, "the run has ended")
+        return stack.enter_context(live_viewer(self.options, self.world, control, self.played))
 
     def _control(self, script: list[Line], *, manageable: bool) -> Control | None:
         """Return what lets hands reach into the run; None where none are to."""
@@ -299,7 +320,12 @@ class _Job:
             AgentSeat(f"assistant_{i}", options.seed, [], i, options.assistants) for i in range(options.assistants)
         ]
         players = foreign_agents(options.agent, seats, self.world, terms) if options.agent else {}
-        return Gatherer(followers | players, trusted=followers, deadline=terms.deadline, workers=terms.workers)
+        everybody: dict[str, Agent] = followers | players
+        trusted = set(followers)
+        if self.played is not None:
+            everybody[self.played.agent] = self.played.human
+            trusted.add(self.played.agent)
+        return Gatherer(everybody, trusted=trusted, deadline=terms.deadline, workers=terms.workers)
 
     def _command(self) -> dict[str, Any]:
         """Return the options that decide the run, as JSON has them."""

@@ -8,7 +8,7 @@ from typing import Annotated
 import tyro
 from tyro.conf import Positional
 
-from vico.cli.options import LiveOptions
+from vico.cli.options import LiveOptions, PlayOptions
 
 _FLAT = tyro.conf.arg(name="")
 
@@ -44,3 +44,19 @@ def live(options: Annotated[LiveOptions, _FLAT]) -> int:
     from vico.cli import run as verb
 
     return verb.run(options.run_options())
+
+
+def play(options: Annotated[PlayOptions, _FLAT]) -> int:
+    """Walk through a world among its people, from a page in the browser; or do a task there, and be judged.
+
+    Example: vico play helsinki people
+
+    Example: vico play helsinki people --as resident_3
+
+    Example: vico play helsinki people --robots drone --as robot_0
+
+    Example: vico play helsinki --task delivery --seed 0
+    """
+    from vico.cli import play as verb
+
+    return verb.play(options)

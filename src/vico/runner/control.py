@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,19 +34,8 @@ T = TypeVar("T")
 FASTEST = 1000.0
 
 _MOST_WAITING = 256
-_MANAGING = (
-    "pause",
-    "resume",
-    "step",
-    "speed",
-    "stop",
-    "snapshot",
-    "back",
-    "branch",
-    "bookmark",
-    "bookmarks",
-    "things",
-)
+# Commands that need everybody's state.
+_KEEPING = ("snapshot", "back", "branch")
 
 
 class Switch(NamedTuple):
@@ -90,6 +79,8 @@ class Control:
         Interventions that are done again, as a run's folder holds them.
     manageable
         Whether a snapshot of everybody can be taken: whether the run can go back.
+    allowed
+        Commands that are done; None for all.
 
     Attributes
     ----------
@@ -107,6 +98,7 @@ class Control:
         paused: bool = False,
         script: Sequence[Line] = (),
         manageable: bool = True,
+        allowed: Collection[str] | None = None,
     ) -> None:
         self.out, self.paused = out, paused
         self.switch: Switch | None = None
@@ -114,7 +106,7 @@ class Control:
         self.step = 0
         self._pace = Pace(speed)
         self._script = deque(script)
-        self._manageable = manageable
+        self._manageable, self._allowed = manageable, allowed
         self._lines = 0
         self._pending: dict[str, Action] = {}
         self._steps_left = 0
@@ -209,9 +201,8 @@ class Control:
     # Commands.
 
     def _can(self) -> list[str]:
-        return [
-            name for name in (*_MANAGING, *COMMANDS) if self._manageable or name not in ("snapshot", "back", "branch")
-        ]
+        known = [name for name in (*_COMMANDS, *COMMANDS) if self._manageable or name not in _KEEPING]
+        return known if self._allowed is None else [name for name in known if name in self._allowed]
 
     def _holds(self) -> bool:
         return self.paused and not self._steps_left
@@ -237,10 +228,10 @@ class Control:
                     self.switch = result._replace(told=one.told)
 
     def _commanded(self, runner: Runner, name: str, arguments: Mapping[str, Any]) -> Any:
-        if name in COMMANDS:
-            return self._intervened(runner, Line(after=self.step, command=name, arguments=dict(arguments)))
         if name not in self._can():
             raise InputError(f"{name!r} is no command here; there are {', '.join(self._can())}")
+        if name in COMMANDS:
+            return self._intervened(runner, Line(after=self.step, command=name, arguments=dict(arguments)))
         return _COMMANDS[name](self, runner, Arguments(name, arguments))
 
     def _intervened(self, runner: Runner, line: Line) -> dict[str, Any]:

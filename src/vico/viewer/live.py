@@ -13,8 +13,9 @@ from vico.runner.control import Control, waited
 from vico.runner.gather import Gatherer
 from vico.runner.loop import Hook, Runner, Step
 from vico.sim.recorder import Recorder
+from vico.viewer.play import PlayedAgent
 from vico.viewer.server.serve import ViewerServer
-from vico.viewer.server.state import Player, ViewerState
+from vico.viewer.server.state import ViewerState
 from vico.viewer.sources.source import Source
 from vico.viewer.sources.tables import LiveTables
 from vico.viewer.sources.views import RecordedViews, Seen, picture_of, seen_by
@@ -42,7 +43,13 @@ class LiveViewer(Hook):
     """
 
     def __init__(
-        self, control: Control, world: World, *, city: Path | None = None, player: Player | None = None, port: int = 0
+        self,
+        control: Control,
+        world: World,
+        *,
+        city: Path | None = None,
+        player: PlayedAgent | None = None,
+        port: int = 0,
     ) -> None:
         self.control = control
         self._world, self._city, self._player, self._port = world, city, player, port
@@ -86,11 +93,15 @@ class LiveViewer(Hook):
         self._tables.begin()
         if self._recorder.latest:
             self._tables.add(0, self._recorder.latest, self._recorder.latest_cast)
+        if self._player is not None:
+            self._player.tell(self._recorder.sim)
 
     def stepped(self, step: Step) -> None:
         """Keep a step, and say that it is there."""
         assert self._recorder is not None
         self._tables.add(step.number, self._recorder.latest, self._recorder.latest_cast)
+        if self._player is not None:
+            self._player.tell(self._recorder.sim)
         if self._server is not None:
             self._server.notify()
 
