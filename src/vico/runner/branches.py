@@ -7,11 +7,12 @@ import shutil
 from pathlib import Path
 
 from vico.errors import MissingFileError, OutputExistsError
-from vico.io.files import write_errors
+from vico.io.files import write_errors, write_json
 from vico.runner.bookmarks import FILE as BOOKMARKS
 from vico.sim.interventions import FILE as INTERVENTIONS
 from vico.sim.recording.cast import cut_cast
 from vico.sim.recording.checkpoints import checkpoint_steps
+from vico.sim.recording.manifest import read_manifest
 from vico.sim.recording.schema import (
     AGENTS,
     CAST,
@@ -78,7 +79,8 @@ def branched_run(run: Path, step: int, name: str) -> Path:
             if (run / file).exists():
                 shutil.copy2(run / file, work / file)
         cut_cast(work, step)
-        shutil.copy2(run / MANIFEST, work / MANIFEST)  # written last, as in every folder
+        # Written last, as in every folder; the first run may be complete, its branch is not.
+        write_json(work / MANIFEST, read_manifest(run) | {"status": "stopped"})
         os.replace(work, out)
     return out
 

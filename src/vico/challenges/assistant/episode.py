@@ -20,6 +20,7 @@ from vico.challenges.assistant.model import Category, Task
 from vico.challenges.assistant.theatre import HUMAN, Performance, PlayedByHand, Seconds
 from vico.challenges.assistant.thresholds import RESIDENTS
 from vico.challenges.records import EpisodeRecord, Part, Progress, Setting
+from vico.clock import seconds_of_day
 from vico.community import build_community
 from vico.community.folder import digest_of
 from vico.community.model import Community
@@ -113,7 +114,7 @@ def play_task(
     judge = Judge(task, world, sim.ground_truth, names)
     chronicle = Chronicle(judge)
     judge.watch(0)
-    followers: list[Hook] = [Seconds(sim, judge, chronicle, start=task.start)] if played else [judge, chronicle]
+    followers: list[Hook] = [Seconds(sim, judge, chronicle, start=sim.state.second)] if played else [judge, chronicle]
     if progress is not None:
         followers.append(_Reported(progress, f"{task.world}, {task.category}, seed {task.seed}", task.steps))
     agents = Gatherer(residents | planners, trusted=residents, deadline=terms.deadline, workers=terms.workers)
@@ -150,7 +151,7 @@ def _perform(runner: Runner, performance: Performance, judge: Judge, task: Task)
     sim = runner.sim
     runner.hooks += performance.hooks
     runner.director = performance.director
-    end = task.start + task.steps
+    end = sim.state.second + task.steps
     steps = 100 * task.steps  # more than there can be: seconds decide
     runner.run(steps, until=lambda: judge.over or performance.over or sim.state.second >= end)
     performance.confirm()
@@ -162,7 +163,7 @@ def _asked(task: Task, judge: Judge, second: float) -> dict[str, Any]:
         {"index": subtask.index, "text": subtask.text, "done": verdict is not None}
         for subtask, verdict in zip(task.subtasks, judge.verdicts, strict=True)
     ]
-    left = max(task.start + task.steps - second, 0.0)
+    left = max(seconds_of_day(task.start) + task.steps - second, 0.0)
     return {"instruction": task.category, "subtasks": subtasks, "seconds_left": left}
 
 
@@ -282,7 +283,7 @@ def _record(
         seed=task.seed,
         metrics=metrics,
         parts=parts,
-        steps=round(sim.state.second - task.start),
+        steps=round(sim.state.second) - seconds_of_day(task.start),
         limit=task.steps,
         wall_seconds=seconds,
         state_hash=sim.state_hash(),
