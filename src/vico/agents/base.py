@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from vico.agents.state import AgentState, generator_state, restore_generator
@@ -14,7 +15,48 @@ Action = dict[str, Any]
 Observation = dict[str, Any]
 Info = dict[str, Any]
 
+# Of a plan that is told: so many goals, points and letters.
+_MOST_GOALS, _LONGEST_PATH, _LONGEST_WHY = 20, 500, 400
+
 AHEAD = slice(3, 5)  # of an observation's pose: east and north of the direction it looks along
+
+
+@dataclass(frozen=True)
+class Goal:
+    """Something an agent means to do.
+
+    Attributes
+    ----------
+    text
+        In words.
+    position
+        Where, ENU metres; None where that is not known.
+    place
+        Name of the place; "" where it is none.
+    """
+
+    text: str
+    position: tuple[float, float, float] | None = None
+    place: str = ""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What an agent means to do, as it may tell whoever looks at it.
+
+    Attributes
+    ----------
+    goals
+        What, the next first.
+    path
+        Points of the way that it is about to go, ENU metres.
+    why
+        A sentence.
+    """
+
+    goals: tuple[Goal, ...] = ()
+    path: tuple[tuple[float, float, float], ...] = ()
+    why: str = ""
 
 
 class Agent(Protocol):
@@ -22,7 +64,9 @@ class Agent(Protocol):
 
     Turns observations into actions, once a step, and sees nothing else of the world but public maps. One that spends
     on language models has attributes ``tokens`` and ``cost`` (US dollars), what it spent so far; one that goes on where
-    its model gives nothing of use says so in ``model_faults``, pairs of a step and a reason.
+    its model gives nothing of use says so in ``model_faults``, pairs of a step and a reason. One that wants to be
+    understood has a method ``plan()``, which returns a `Plan`, or None while it has none; it is asked between two steps
+    when somebody looks at the agent, and changes nothing.
     """
 
     def act(self, observation: Observation, info: Info) -> Action:
@@ -48,6 +92,40 @@ class GroupAgent(Protocol):
         self, names: Sequence[str], observations: Mapping[str, Observation], infos: Mapping[str, Info]
     ) -> dict[str, Action | Exception]:
         """Return the members' actions for the coming second, by name; the error of one that failed in its place."""
+
+
+def plan_record(agent: object) -> dict[str, Any] | None:
+    """Return the plan that an agent publishes, as JSON has it; None if it publishes none, or fails to.
+
+    Parameters
+    ----------
+    agent
+        Asked for ``plan()``, if it has that.
+    """
+    ask = getattr(agent, "plan", None)
+    if not callable(ask):
+        return None
+    try:
+        plan = ask()
+        if plan is None:
+            return None
+        goals = [
+            {
+                "text": goal.text,
+                "place": goal.place,
+                "position": None if goal.position is None else _triple(goal.position),
+            }
+            for goal in plan.goals[:_MOST_GOALS]
+        ]
+        path = [_triple(point) for point in plan.path[:_LONGEST_PATH]]
+        return {"goals": goals, "path": path, "why": str(plan.why)[:_LONGEST_WHY]}
+    except Exception as error:  # anybody's code: who cannot say what it plans still acts
+        return {"goals": [], "path": [], "why": f"its plan cannot be told: {type(error).__name__}"}
+
+
+def _triple(point: Sequence[float]) -> list[float]:
+    x, y, z = (round(float(value), 2) for value in point)
+    return [x, y, z]
 
 
 def by_group(agents: Mapping[str, Agent]) -> tuple[list[tuple[GroupAgent, list[str]]], list[str]]:
@@ -119,12 +197,15 @@ __all__ = [
     "Action",
     "Agent",
     "AgentState",
+    "Goal",
     "GroupAgent",
     "Info",
     "Observation",
+    "Plan",
     "PublicMap",
     "RandomAgent",
     "by_group",
     "heading",
+    "plan_record",
     "wrapped",
 ]

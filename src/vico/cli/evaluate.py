@@ -26,6 +26,7 @@ from vico.challenges.tables.published import published_rows
 from vico.challenges.tables.summary import summarise
 from vico.cli import leaderboard
 from vico.cli.evaluation_options import AssistantOptions, CommuteOptions, EvaluationOptions, InfluenceOptions
+from vico.cli.live import city_of, told
 from vico.cli.output import check_output, print_json
 from vico.errors import InputError, OutputError, OutputExistsError
 from vico.io.files import write_errors
@@ -34,6 +35,7 @@ from vico.io.stores import Store, is_url, store_at
 from vico.runner.foreign import Terms
 from vico.runner.loading import load
 from vico.threads import workers as processors
+from vico.viewer.server import require_server
 from vico.world.folder import read_world
 from vico.world.remote import fetch_manifest
 
@@ -56,7 +58,19 @@ def assistant(options: AssistantOptions) -> int:
     if options.subtasks != SUBTASKS:
         setting = {**setting, "subtasks": options.subtasks}
     categories = None if options.category == "all" else (options.category,)
+    if any("human" in method.split("+") for method in options.common.method):
+        return _by_hand(categories, setting, options)
     return judge("assistant", categories, setting, options.common, methods=("heuristic",))
+
+
+def _by_hand(categories: Sequence[str] | None, setting: Setting, options: AssistantOptions) -> int:
+    """Judge a person, who plays at a page of this machine, one episode after the other, each recorded."""
+    from vico.viewer import theatre
+
+    require_server()
+    theatre.AT_THE_PAGE.open(city=city_of, announce=told, port=options.port, waits=options.waits)
+    common = replace(options.common, workers=1, record=True)
+    return judge(theatre.CHALLENGE, categories, setting, common)
 
 
 def influence(options: InfluenceOptions) -> int:
@@ -117,6 +131,7 @@ def judge(
         setting=setting,
         worlds=list(worlds),
         seeds=options.seeds,
+        first_seed=options.first_seed,
         terms=_terms(challenge, methods, options),
     )
     if not 0 <= options.workers <= 256:

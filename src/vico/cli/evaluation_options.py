@@ -24,12 +24,15 @@ class EvaluationOptions:
         Folder for tasks, episodes and results, or a URL like s3://BUCKET/results (the extra "s3"); refused if it
         exists, unless --resume or --force.
     method
-        One of the challenge's, my_module:MyAgent (path/to/file.py:MyAgent), or two joined by +. Give it several times
+        One of the challenge's (of assistant tasks also human: you, at a page), my_module:MyAgent
+        (path/to/file.py:MyAgent), or two joined by +. Give it several times
         to judge several in the same tasks.
     against
         The method that the others are compared with; the first one without.
     seeds
         Episodes a world, seeded 0, 1, ...
+    first_seed
+        Or this and on.
     workers
         Processes side by side; 0 is one a processor. Decides nothing but how long it takes.
     ray
@@ -60,6 +63,7 @@ class EvaluationOptions:
     method: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="METHOD")] = ()
     against: str = ""
     seeds: int = 3
+    first_seed: int = 0
     workers: int = 0
     ray: RayAddress = None
     resume: bool = False
@@ -96,6 +100,11 @@ class AssistantOptions:
         Seconds an episode may last.
     subtasks
         How many of the six subtasks of a task are asked for: the first ones.
+    port
+        With --method human: where the page is that one plays at; 0 takes a free one.
+    waits
+        With --method human: seconds that an episode waits for a person who has not come, or has left; it counts as not
+        played then.
     """
 
     common: Common
@@ -105,6 +114,8 @@ class AssistantOptions:
     no_distance: bool = False
     steps: int = 1500
     subtasks: int = 6
+    port: int = 0
+    waits: float = 600.0
 
 
 @dataclass(frozen=True)

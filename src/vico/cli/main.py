@@ -20,6 +20,7 @@ import tyro
 from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
+from vico.cli import viewer_verbs
 from vico.cli.agent_verbs import check_agent, evaluation, leaderboard
 from vico.cli.dataset_verbs import dataset
 from vico.cli.motion_verbs import motion
@@ -401,6 +402,9 @@ app.command(evaluation, name="eval", help="Judge agents on a challenge.")
 app.command(dataset, name="dataset", help="Datasets of demonstrations, for trainers.")
 app.command(leaderboard, name="leaderboard", help="A public file of what methods came to.")
 app.command(name="check-agent")(check_agent)
+app.command(name="view")(viewer_verbs.view)
+app.command(name="live")(viewer_verbs.live)
+app.command(name="play")(viewer_verbs.play)
 
 
 _log = logging.getLogger("vico")

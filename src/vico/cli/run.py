@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import sys
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from vico.agents.base import Agent
+from vico.agents.human import PERIOD
 from vico.agents.schedule import followers_of
 from vico.agents.talk.language_model import LlmTalk
+from vico.cli.live import LIVE, live_viewer, wait_for_interrupt
 from vico.cli.options import RunOptions
 from vico.cli.output import Report, check_output, print_json, print_table, progress_bars
 from vico.clock import seconds_of_day
@@ -20,6 +23,8 @@ from vico.errors import InputError, OutputExistsError, SchemaError
 from vico.io.files import read_json
 from vico.io.folders import remove
 from vico.llm import LanguageModel, Sampling
+from vico.runner.branches import branched_run
+from vico.runner.control import Control
 from vico.runner.faults import FaultLog
 from vico.runner.foreign import Terms, foreign_agents
 from vico.runner.gather import Gatherer
@@ -27,6 +32,7 @@ from vico.runner.loading import AgentSeat
 from vico.runner.loop import Hook, Runner, Step
 from vico.runner.recording import RecordedRun, go_on_from
 from vico.sim.config import SimConfig
+from vico.sim.interventions import Line, read_interventions
 from vico.sim.recorder import Recorder
 from vico.sim.recording.checkpoints import checkpoint_steps
 from vico.sim.recording.manifest import read_manifest
@@ -35,11 +41,15 @@ from vico.threads import use_workers, workers
 from vico.world.folder import World, read_world
 from vico.world.public import PublicMap
 
+if TYPE_CHECKING:
+    from vico.viewer.live import LiveViewer
+    from vico.viewer.play import PlayedAgent
+
 #: Steps between checkpoints unless a run says otherwise.
 STATES_EVERY = 300
 
 # Options that decide nothing of what is in the run folder; the others are kept in its run.json.
-_NOT_KEPT = ("out", "resume", "workers", "force", "json")
+_NOT_KEPT = ("out", "resume", "workers", "force", "json", *LIVE)
 
 
 def run(options: RunOptions) -> int:
@@ -65,7 +75,7 @@ def run(options: RunOptions) -> int:
         raise InputError("run: --agent plays assistants; say how many, for example --assistants 1")
     talk = _talk_of(options)
     use_workers(options.workers)
-    metrics = _Job.of(options, options.world, options.community, options.out, talk).done()
+    metrics = Job.of(options, options.world, options.community, options.out, talk=talk).done()
     if options.json:
         print_json(metrics)
     else:
@@ -122,7 +132,7 @@ def _judged(metrics: dict[str, Any]) -> int:
 
 
 @dataclass(frozen=True)
-class _Job:
+class Job:
     """A run that is about to begin or to go on.
 
     Attributes
@@ -131,6 +141,8 @@ class _Job:
         Manifest of the unfinished run that is in `out`; empty if it had none yet, None if nothing is there.
     talk
         What words the residents' answers; None for templates.
+    played
+        Who is played by a person at the page; None for nobody.
     """
 
     options: RunOptions
@@ -141,9 +153,19 @@ class _Job:
     sources: dict[str, str]
     found: dict[str, Any] | None
     talk: LlmTalk | None = None
+    played: PlayedAgent | None = None
 
     @classmethod
-    def of(cls, options: RunOptions, world: Path, community: Path, out: Path, talk: LlmTalk | None = None) -> _Job:
+    def of(
+        cls,
+        options: RunOptions,
+        world: Path,
+        community: Path,
+        out: Path,
+        *,
+        talk: LlmTalk | None = None,
+        played: PlayedAgent | None = None,
+    ) -> Job:
         """Read what is needed, and look at what is in the output folder."""
         found = None if options.force else _cut_short(out)
         check_output(out, world, community, force=options.force or found is not None)
@@ -171,41 +193,123 @@ class _Job:
             renderer=options.renderer,
             cameras=read_json(options.cameras) if options.cameras is not None else {},
             worn=_worn(options.wear),
+            periods={} if played is None else {played.agent: PERIOD},
         )
         place = read_world(world)
         people = read_community(community, place)
         sources = {"world": str(world.resolve()), "community": str(community.resolve())}
-        return cls(options, out, place, people, config, sources, found, talk)
+        return cls(options, out, place, people, config, sources, found, talk, played)
 
     def done(self) -> dict[str, Any]:
         """Do it; return its metrics."""
-        options, steps = self.options, self.options.steps
+        options = self.options
         goes_on = self._goes_on()
-        with progress_bars() as report:
+        script = read_interventions(options.interventions) if options.interventions is not None else []
+        with ExitStack() as stack:
+            report = stack.enter_context(progress_bars())
             report("setting the scene", 0, 1)
-            # Residents act on what they have in view and hear; mostly, the recorder alone looks at pictures.
-            sim = Simulation(self.world, self.community, self.config, defer_pictures=True)
-            if options.check == "overlaps":
-                sim.check_overlaps()
-            with closing(self._agents()) as agents:
-                every = _states_every(options, agents)
-                report("setting the scene", 1, 1)
-                faults = FaultLog()
-                how: Any = {"sources": self.sources, "wanted": steps, "states_every": every or None}
-                how["keep"] = _names(options.keep)
-                how["notes"] = {"command": self._command(), "faults": faults.record()}
-                if goes_on:
-                    recorder, checkpoint = Recorder.resume(self.out, sim, **how)
-                    faults = go_on_from(checkpoint, agents, sim)
-                    recorder.notes["faults"] = faults.record()
-                else:
-                    # Only now: whatever is wrong with the input has been said, nothing was replaced for nothing.
-                    remove(self.out)
-                    recorder = Recorder(self.out, sim, **how)
-                with recorder:
-                    hooks = [_Progress(report, steps), RecordedRun(recorder, faults)]
-                    Runner(sim, agents, hooks=hooks, states_every=every, faults=faults).run(steps)
-                    return recorder.close()
+            agents = stack.enter_context(closing(self._agents()))
+            every = _states_every(options, agents)
+            control = self._control(script, manageable=bool(every))
+            viewer = self._viewer(stack, control) if options.live else None
+            leg = self._begin(agents, every, goes_on=goes_on, control=control)
+            report("setting the scene", 1, 1)
+            while True:
+                metrics = self._go(leg, control, viewer, report)
+                if control is None or control.switch is None:
+                    break
+                leg = self._switched(leg, control)
+            if viewer is not None and control is not None:
+                control.end()
+                wait_for_interrupt(f"the run is over; {viewer.url} still shows it (Ctrl+C ends)")
+            return metrics
+
+    def _viewer(self, stack: ExitStack, control: Control | None) -> LiveViewer:
+        if self.played is not None:
+            stack.callback(self.played.human.close, "the run has ended")
+        return stack.enter_context(live_viewer(self.options, self.world, control, self.played))
+
+    def _control(self, script: list[Line], *, manageable: bool) -> Control | None:
+        """Return what lets hands reach into the run; None where none are to."""
+        options = self.options
+        if not options.live and not script:
+            return None
+        speed, paused = (options.speed, options.paused) if options.live else (0.0, False)
+        return Control(self.out, script=script, manageable=manageable, speed=speed, paused=paused)
+
+    def _begin(self, agents: Gatherer, every: int, *, goes_on: bool, control: Control | None) -> Leg:
+        """Set the scene, and open the recording or go on with it."""
+        sim, faults = self._simulation(), FaultLog()
+        if goes_on:
+            return self._resumed(sim, agents, every, self.out, control)
+        # Only now: whatever is wrong with the input has been said, nothing was replaced for nothing.
+        remove(self.out)
+        how = self._how(every)
+        how["notes"]["faults"] = faults.record()
+        return Leg(sim, agents, Recorder(self.out, sim, **how), faults, every)
+
+    def _resumed(
+        self, sim: Simulation, agents: Gatherer, every: int, out: Path, control: Control | None, **notes: Any
+    ) -> Leg:
+        """Go on with a recording from its last checkpoint."""
+        how = self._how(every)
+        how["notes"] |= notes
+        recorder, checkpoint = Recorder.resume(out, sim, **how)
+        faults = go_on_from(checkpoint, agents, sim)
+        recorder.notes["faults"] = faults.record()
+        if control is not None:
+            control.restore(checkpoint.notes, out=out)
+        return Leg(sim, agents, recorder, faults, every)
+
+    def _switched(self, leg: Leg, control: Control) -> Leg:
+        """Go on from a checkpoint in a sibling of the run's folder; the run so far stays whole."""
+        assert control.switch is not None
+        step, name, told = control.switch
+        out = branched_run(leg.recorder.out, step, name)
+        found = self._resumed(
+            self._simulation(),
+            leg.agents,
+            leg.every,
+            out,
+            control,
+            branch_of={"run": leg.recorder.out.name, "step": step},
+        )
+        told.set_result({"step": step, "path": str(out)})
+        return found
+
+    def _simulation(self) -> Simulation:
+        # Residents act on what they have in view and hear; mostly, the recorder alone looks at pictures.
+        sim = Simulation(self.world, self.community, self.config, defer_pictures=True)
+        if self.options.check == "overlaps":
+            sim.check_overlaps()
+        return sim
+
+    def _how(self, every: int) -> dict[str, Any]:
+        """Return what recorders are asked for."""
+        how: dict[str, Any] = {
+            "sources": self.sources,
+            "wanted": self.options.steps,
+            "states_every": every or None,
+            "keep": _names(self.options.keep),
+        }
+        return how | {"notes": {"command": self._command()}}
+
+    def _go(self, leg: Leg, control: Control | None, viewer: LiveViewer | None, report: Report) -> dict[str, Any]:
+        """Run until the end, or until the run is to go on elsewhere; return the metrics."""
+        steps, notes = self.options.steps, None if control is None else control.notes
+        with leg.recorder as recorder:
+            hooks: list[Hook] = [_Progress(report, steps), RecordedRun(recorder, leg.faults, notes=notes)]
+            if viewer is not None:
+                viewer.show(recorder, leg.agents)
+                hooks.append(viewer)
+            runner = Runner(
+                leg.sim, leg.agents, hooks=hooks, states_every=leg.every, faults=leg.faults, director=control
+            )
+            if control is None:
+                runner.run(steps)
+            else:
+                runner.run(steps, until=lambda: control.over)
+            return recorder.close("complete" if leg.sim.metrics.steps >= steps else "stopped")
 
     def _agents(self) -> Gatherer:
         """Return who acts: residents who follow their schedules, and whoever plays the assistants."""
@@ -216,12 +320,18 @@ class _Job:
             AgentSeat(f"assistant_{i}", options.seed, [], i, options.assistants) for i in range(options.assistants)
         ]
         players = foreign_agents(options.agent, seats, self.world, terms) if options.agent else {}
-        return Gatherer(followers | players, trusted=followers, deadline=terms.deadline, workers=terms.workers)
+        everybody: dict[str, Agent] = followers | players
+        trusted = set(followers)
+        if self.played is not None:
+            everybody[self.played.agent] = self.played.human
+            trusted.add(self.played.agent)
+        return Gatherer(everybody, trusted=trusted, deadline=terms.deadline, workers=terms.workers)
 
     def _command(self) -> dict[str, Any]:
         """Return the options that decide the run, as JSON has them."""
         kept = asdict(self.options) | self.sources
-        kept["cameras"] = None if self.options.cameras is None else str(self.options.cameras)
+        for name in ("cameras", "interventions"):
+            kept[name] = None if kept[name] is None else str(kept[name])
         return {name: value for name, value in kept.items() if name not in _NOT_KEPT}
 
     def _goes_on(self) -> bool:
@@ -250,6 +360,17 @@ class _Job:
         steps = f"{self.found['steps']} of {self.found['wanted_steps']} steps"
         print(f"{self.out}: an unfinished run ({steps}) {what}", file=sys.stderr)
         return bool(checkpoints)
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A run as far as it goes on in one folder."""
+
+    sim: Simulation
+    agents: Gatherer
+    recorder: Recorder
+    faults: FaultLog
+    every: int
 
 
 class _Progress(Hook):
@@ -293,9 +414,10 @@ def _resumed(options: RunOptions, out: Path) -> RunOptions:
     SchemaError
         If it does not say how it was begun.
     """
-    given = replace(options, resume=None, agent="", workers=0, json=False)
-    if given != RunOptions():
-        raise InputError("run: --resume takes everything but --agent, --workers and --json from the run itself")
+    usual = RunOptions()
+    taken = {name: getattr(usual, name) for name in ("resume", "agent", "workers", "json", *LIVE)}
+    if replace(options, **taken) != usual:
+        raise InputError("run: --resume takes everything but --agent, --workers, --json and --live from the run itself")
     manifest = read_manifest(out)
     if manifest["status"] == "complete":
         raise InputError(f"{out}: the run is complete; there is nothing to go on with")
@@ -309,7 +431,8 @@ def _resumed(options: RunOptions, out: Path) -> RunOptions:
         # Code is named by who gives the command, never by a file that may come from anywhere.
         named = f"--agent {begun.agent}" if begun.agent else "no --agent"
         raise InputError(f"{out}: was begun with {named}; give the same with --resume")
-    return replace(begun, out=out, workers=options.workers, json=options.json)
+    live = {name: getattr(options, name) for name in LIVE}
+    return replace(begun, out=out, workers=options.workers, json=options.json, **live)
 
 
 def _cut_short(out: Path) -> dict[str, Any] | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 from vico.agents.base import Action, AgentState
 from vico.envs.spaces import short_form
@@ -53,6 +53,13 @@ class Hook:
         """Save what every agent remembers, together with the simulation as it stands now."""
 
 
+class Director(Protocol):
+    """Reaches into a run from outside: holds it up, changes the simulation, has agents do something else."""
+
+    def before_step(self, runner: Runner) -> Mapping[str, Action]:
+        """Do what is due between two steps; return what agents do in the next one in place of their own actions."""
+
+
 class Runner:
     """Runs a simulation with agents.
 
@@ -68,6 +75,8 @@ class Runner:
         After every so many steps all agents' states are taken and handed to the hooks; 0 never.
     faults
         Where to note what agents do wrong; where a run is resumed, with what they did before.
+    director
+        Who reaches into the run; nobody if None.
     """
 
     def __init__(
@@ -78,12 +87,14 @@ class Runner:
         hooks: Sequence[Hook] = (),
         states_every: int = 0,
         faults: FaultLog | None = None,
+        director: Director | None = None,
     ) -> None:
         self.sim = sim
         self.agents = agents
         self.hooks = list(hooks)
         self.states_every = states_every
         self.faults = FaultLog() if faults is None else faults
+        self.director = director
         self._looked_at = bool(set(agents.others) & {sim.agents[i] for i in sim.seeing})
 
     def run(self, steps: int, *, until: Callable[[], bool] = lambda: False) -> None:
@@ -107,6 +118,9 @@ class Runner:
         for hook in self.hooks:
             hook.begin(observations)
         while sim.metrics.steps < steps and not until():
+            directed = {} if self.director is None else self.director.before_step(self)
+            if until():
+                break
             if sim.defer_pictures and self._looked_at:
                 sim.picture_waiter()()
             gathered = self.agents.gather(observations, infos)
@@ -117,9 +131,16 @@ class Runner:
                     gathered.failures[name] = Failure("malformed", f"there is no agent {other[:40]!r}")
                 else:
                     actions[name] = short
+            for name, action in directed.items():
+                actions[name] = short_form(action, places, people)
+                gathered.failures.pop(name, None)
             result = sim.step(actions, gathered.agent_faults)
             observations, infos = result.observations, result.infos
             self._note(Step(sim.metrics.steps, actions, gathered.failures, result))
+
+    def save(self) -> bool:
+        """Have the hooks keep the state between two steps; return whether every agent said what it remembers."""
+        return self._save(self.sim.metrics.steps)
 
     def _note(self, step: Step) -> None:
         """Count what agents did wrong, tell the hooks, and save if it is time."""
@@ -136,7 +157,7 @@ class Runner:
         if self.states_every and step.number % self.states_every == 0:
             self._save(step.number)
 
-    def _save(self, number: int) -> None:
+    def _save(self, number: int) -> bool:
         states, failures = self.agents.states()
         for name, failure in failures.items():
             # Without everybody's state the run could not go on from here; it can from the checkpoint before.
@@ -144,6 +165,7 @@ class Runner:
         if not failures:
             for hook in self.hooks:
                 hook.checkpoint(states)
+        return not failures
 
     def _fault(self, number: int, name: str, failure: Failure) -> None:
         if not self.faults.counts[name, failure.kind]:

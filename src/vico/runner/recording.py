@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -40,7 +40,7 @@ def go_on_from(checkpoint: Checkpoint, agents: Gatherer, sim: Simulation) -> Fau
 @contextmanager
 def recorded_in(
     out: Path, sim: Simulation, faults: FaultLog, *, wanted: int, notes: Mapping[str, Any] | None = None
-) -> Iterator[Hook]:
+) -> Iterator[RecordedOnce]:
     """Give a hook that records a run into a folder; when the block ends, the run is complete, or was stopped.
 
     It may follow a run that is gone on with by further calls of `Runner.run`.
@@ -67,24 +67,34 @@ def recorded_in(
         raise InputError(f"{out}: a world in memory has no folder that a recording could name; write it first")
     # The community may have been made for this run alone: the recorder writes it down.
     with Recorder(out, sim, sources={"world": str(sim.world.path.resolve())}, wanted=wanted, notes=notes) as recorder:
-        yield _BegunOnce(RecordedRun(recorder, faults))
+        yield RecordedOnce(recorder, faults)
 
 
-class _BegunOnce(Hook):
-    """Passes on what happens, and the beginning of the first of several runs alone."""
+class RecordedOnce(Hook):
+    """Records what happens, and the beginning of the first of several runs alone.
 
-    def __init__(self, inner: Hook) -> None:
-        self._inner, self._begun = inner, False
+    Attributes
+    ----------
+    recorder
+        What it hands everything to.
+    """
+
+    def __init__(self, recorder: Recorder, faults: FaultLog) -> None:
+        self.recorder = recorder
+        self._inner, self._begun = RecordedRun(recorder, faults), False
 
     def begin(self, observations: Mapping[str, dict[str, Any]]) -> None:
+        """Record how things stand, the first time."""
         if not self._begun:
             self._inner.begin(observations)
         self._begun = True
 
     def stepped(self, step: Step) -> None:
+        """Record a step."""
         self._inner.stepped(step)
 
     def checkpoint(self, states: Mapping[str, AgentState]) -> None:
+        """Save the run."""
         self._inner.checkpoint(states)
 
 
@@ -97,10 +107,14 @@ class RecordedRun(Hook):
         Of the same simulation.
     faults
         Of the same runner.
+    notes
+        Gives what else a checkpoint is to keep, plain data; nothing if None.
     """
 
-    def __init__(self, recorder: Recorder, faults: FaultLog) -> None:
-        self._recorder, self._faults = recorder, faults
+    def __init__(
+        self, recorder: Recorder, faults: FaultLog, *, notes: Callable[[], Mapping[str, Any]] | None = None
+    ) -> None:
+        self._recorder, self._faults, self._notes = recorder, faults, notes
         self._told = -1
 
     def begin(self, observations: Mapping[str, dict[str, Any]]) -> None:
@@ -111,7 +125,8 @@ class RecordedRun(Hook):
         """Save the simulation, what every agent remembers, what they did wrong, and overlaps where they are counted."""
         check = self._recorder.sim.overlap_check
         overlaps = None if check is None else check.state()
-        self._recorder.checkpoint(states, notes={"faults": self._faults.record(), "overlaps": overlaps})
+        notes = {} if self._notes is None else dict(self._notes())
+        self._recorder.checkpoint(states, notes=notes | {"faults": self._faults.record(), "overlaps": overlaps})
 
     def stepped(self, step: Step) -> None:
         """Record a step."""
@@ -119,3 +134,6 @@ class RecordedRun(Hook):
             self._told = self._faults.count
             self._recorder.notes["faults"] = self._faults.record()
         self._recorder.write(step.result, actions=step.actions)
+
+
+__all__ = ["RecordedOnce", "RecordedRun", "Recorder", "go_on_from", "recorded_in"]

@@ -96,12 +96,22 @@ class Events:
         self.time = 0.0
         self.log: list[Event] = []
         self.heard: dict[str, list[Message]] = {name: [] for name in names}
+        # What is said between two steps: it is heard in the next one.
+        self._later: list[dict[str, Any]] = []
 
     def begin(self, step: int, time: float, observed: Iterable[str]) -> None:
         """Start a step: forget what the last one held, and what those have heard who have `observed` it."""
         self.step, self.time = step, time
         self.log = []
         self.heard |= {name: [] for name in observed}
+        for said in self._later:
+            self.say(said["speaker"], said["text"], np.array(said["position"]), said["listeners"])
+        self._later = []
+
+    def say_later(self, speaker: str, text: str, position: NDArray[Any], listeners: list[str]) -> None:
+        """Deliver a message at the beginning of the next step; see `say`."""
+        place = [float(value) for value in position[:3]]
+        self._later.append({"speaker": speaker, "text": text, "position": place, "listeners": listeners})
 
     def add(self, kind: str, agent: str, text: str, position: NDArray[Any], **data: Any) -> None:
         """Note that something happened."""
@@ -132,12 +142,16 @@ class Events:
         """Return the messages in the air, as bytes: they are part of what the next observation holds."""
         heard = {name: [m.record() for m in messages] for name, messages in self.heard.items() if messages}
         text = json.dumps(heard, sort_keys=True, ensure_ascii=False)
-        return {"heard": np.frombuffer(text.encode(), np.uint8)}
+        later = json.dumps(self._later, sort_keys=True, ensure_ascii=False).encode() if self._later else b""
+        told = {"heard": np.frombuffer(text.encode(), np.uint8)}
+        return told | ({"later": np.frombuffer(later, np.uint8)} if later else {})
 
     def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
         """Hear again what `arrays` held."""
         heard = json.loads(np.asarray(arrays["heard"], np.uint8).tobytes().decode())
         self.log = []
+        later = np.asarray(arrays.get("later", []), np.uint8).tobytes().decode()
+        self._later = json.loads(later) if later else []
         self.heard = {
             name: [
                 Message(m["time"], m["speaker"], m["text"], (m["position"][0], m["position"][1], m["position"][2]))

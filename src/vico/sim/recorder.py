@@ -16,6 +16,7 @@ from vico.errors import EmptyInputError, InputError, OutputError, OutputExistsEr
 from vico.io.files import write_errors, write_json
 from vico.io.folders import FolderLock, folder_errors
 from vico.sim.bodies import Bodies
+from vico.sim.interventions import read_interventions, repeat_drops
 from vico.sim.recording.cast import CastLog, append_cast, cut_cast
 from vico.sim.recording.checkpoints import (
     Checkpoint,
@@ -118,6 +119,8 @@ class Recorder:
         self._began = time.perf_counter()
         self._earlier, self._resumed = 0.0, False
         self._cast = CastLog(describer(sim))
+        # Of the run, whatever is dropped into it later.
+        self._identity = sim.identity
 
     @classmethod
     def resume(
@@ -164,11 +167,14 @@ class Recorder:
         steps = [step for step in checkpoint_steps(out) if any(s.last == step for s in segments_of(out))]
         if not steps:
             raise EmptyInputError(f"{out}: the run was stopped before its first checkpoint; run it anew")
-        checkpoint = read_checkpoint(out, steps[-1], owner=sim.identity)
+        identity = sim.identity
+        checkpoint = read_checkpoint(out, steps[-1], owner=identity)
+        repeat_drops(sim, read_interventions(out)[: checkpoint.interventions])
         sim.restore(checkpoint.arrays)
         self = cls.__new__(cls)
         self.notes = dict(notes or {})
         self._open(out, sim, sources=sources, wanted=wanted, states_every=states_every, keep=keep)
+        self._identity = identity
         with self._errors():
             drop_after(out, checkpoint.step)
             drop_checkpoints_after(out, checkpoint.step)
@@ -188,6 +194,7 @@ class Recorder:
         """
         if self._resumed:
             return
+        self._identity = self.sim.identity
         with self._errors():
             write_setup(self.out, self.sim)
             self._take(None, {}, observations)
@@ -227,7 +234,7 @@ class Recorder:
             self._films.end_part()
             clock = {"wall_seconds": self._wall(), "seconds_by_phase": dict(self.sim.metrics.seconds)}
             checkpoint = Checkpoint(self.sim.metrics.steps, self.sim.arrays(), dict(agents), dict(notes or {}), clock)
-            write_checkpoint(self.out, checkpoint, owner=self.sim.identity)
+            write_checkpoint(self.out, checkpoint, owner=self._identity)
             self._write_manifest("running")
 
     def close(self, status: str = "complete") -> dict[str, Any]:
@@ -254,6 +261,16 @@ class Recorder:
         # What cannot be written any more was said by the error that ended the block.
         with suppress(OutputError) if isinstance(error, OutputError) else nullcontext():
             self.close("complete" if kind is None else "stopped")
+
+    @property
+    def latest(self) -> Mapping[str, Mapping[str, Any]]:
+        """Rows that were taken of the last step, by table; see `StepSamples.latest`."""
+        return self._samples.latest
+
+    @property
+    def latest_cast(self) -> list[dict[str, Any]]:
+        """Lines of the cast that the last step brought."""
+        return self._cast.latest
 
     def metrics(self) -> dict[str, Any]:
         """Return counts and seconds so far; see `docs/formats.md`."""
@@ -313,7 +330,7 @@ class Recorder:
         write_segment(self.out, first, last, self._samples.tables())
 
     def _write_manifest(self, status: str) -> None:
-        record = run_record(self.sim, status, self._hash, self._sources, self.wanted)
+        record = run_record(self.sim, status, self._hash, self._sources, self.wanted, self._identity)
         write_json(self.out / MANIFEST, self.notes | record | {"states_every": self.states_every})
 
 

@@ -12,6 +12,7 @@ from vico.community import Community, read_community
 from vico.errors import InputError, MissingFileError, SchemaError
 from vico.rules import ActionStatus
 from vico.sim.config import SimConfig
+from vico.sim.interventions import intervene, read_interventions, repeat_drops
 from vico.sim.periods import TICKS_PER_SECOND
 from vico.sim.recording import Run
 from vico.sim.recording.setup import repeat_setup
@@ -55,21 +56,27 @@ class RepeatedRun:
         setup: Callable[[Simulation], None] | None = None,
     ) -> None:
         self.run = run
-        manifest = run.manifest
+        self._world, self._community, self._setup = world, community, setup
+        self._lines = read_interventions(run.path)
+        self._begin()
+
+    def _begin(self) -> None:
+        """Set the scene as it was before the first step."""
+        manifest = self.run.manifest
         config = TypeAdapter(SimConfig).validate_python(manifest["config"])
-        self.sim = Simulation(world, community, config)
-        if setup is None:
-            repeat_setup(run.path, self.sim.scenario)
+        self.sim = Simulation(self._world, self._community, config)
+        if self._setup is None:
+            repeat_setup(self.run.path, self.sim.scenario)
         else:
-            setup(self.sim)
+            self._setup(self.sim)
         if self.sim.identity != manifest["identity"]:
             raise SchemaError(
-                f"{run.path}: was made by {manifest['producer']} with another configuration, world or community than "
-                "this vico would take; record it anew"
+                f"{self.run.path}: was made by {manifest['producer']} with another configuration, world or community "
+                "than this vico would take; record it anew"
             )
         self.sim.seeing = []
-        self._at = 0
-        if self.sim.state_hash() != run.hashes[0]:
+        self._at = self._done = 0
+        if self.sim.state_hash() != self.run.hashes[0]:
             raise self._differs(0)
 
     @classmethod
@@ -87,12 +94,21 @@ class RepeatedRun:
             people = read_community(_folder(run, community, "community"), place)
         return cls(run, place, people)
 
+    @property
+    def step(self) -> int:
+        """The step that was repeated last."""
+        return self._at
+
     def go_to(self, step: int) -> None:
         """Go to a step, from the checkpoint before it."""
         kept = [k for k in self.run.checkpoints if k <= step]
         if kept and (self._at > step or kept[-1] > self._at):
-            self.sim.restore(self.run.checkpoint(kept[-1]).arrays)
-            self._at = kept[-1]
+            checkpoint = self.run.checkpoint(kept[-1])
+            if checkpoint.interventions < self._done:
+                self._begin()  # what was dropped since can't be taken away
+            repeat_drops(self.sim, self._lines[self._done : checkpoint.interventions])
+            self.sim.restore(checkpoint.arrays)
+            self._at, self._done = kept[-1], checkpoint.interventions
         if self._at > step:
             raise InputError(f"{self.run.path}: step {step} is behind; repeat the run from its beginning")
         while self._at < step:
@@ -111,6 +127,10 @@ class RepeatedRun:
 
     def _step(self) -> None:
         step = self._at + 1
+        while self._done < len(self._lines) and self._lines[self._done].after <= self._at:
+            # What agents were made to do is among the recorded actions.
+            intervene(self.sim, self._lines[self._done].intervention)
+            self._done += 1
         self._pass_unrecorded(step)
         actions: dict[str, Any] = {}
         faults: dict[str, tuple[ActionStatus, str]] = {}

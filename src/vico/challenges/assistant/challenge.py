@@ -10,6 +10,7 @@ from vico.challenges.assistant.causes import CAUSES
 from vico.challenges.assistant.episode import Reported, play_task, world_and_people
 from vico.challenges.assistant.generate import generate_task, shortened
 from vico.challenges.assistant.model import CATEGORIES, Task
+from vico.challenges.assistant.theatre import PlayedByHand
 from vico.challenges.assistant.thresholds import STEPS, SUBTASKS
 from vico.challenges.records import EpisodeRecord, Job, Metric, Progress
 from vico.errors import InputError
@@ -51,13 +52,18 @@ class AssistantChallenge:
 
     def play(self, job: Job, *, recording: Path | None = None, progress: Progress | None = None) -> EpisodeRecord:
         """Play one episode and judge it."""
+        return self._play(job, job.method, recording, progress)
+
+    def _play(
+        self, job: Job, method: str | PlayedByHand, recording: Path | None, progress: Progress | None
+    ) -> EpisodeRecord:
         task = self._task(job)
         world, people = world_and_people(job.world, task.category)
         return play_task(
             world,
             people,
             task,
-            method=job.method,
+            method=method,
             setting=job.setting,
             terms=job.terms,
             recording=recording,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +18,10 @@ from vico.assets.models.movable import movable_kinds, movable_prototype, movable
 from vico.challenges.assistant.causes import Chronicle
 from vico.challenges.assistant.judge import Judge
 from vico.challenges.assistant.model import Category, Task
+from vico.challenges.assistant.theatre import HUMAN, Performance, PlayedByHand, Seconds
 from vico.challenges.assistant.thresholds import RESIDENTS
 from vico.challenges.records import EpisodeRecord, Part, Progress, Setting
+from vico.clock import seconds_of_day
 from vico.community import build_community
 from vico.community.folder import digest_of
 from vico.community.model import Community
@@ -30,7 +32,7 @@ from vico.runner.foreign import AbsentAgent, Terms, foreign_agents
 from vico.runner.gather import Gatherer
 from vico.runner.loading import AgentSeat
 from vico.runner.loop import Hook, Runner, Step
-from vico.runner.recording import recorded_in
+from vico.runner.recording import RecordedOnce, recorded_in
 from vico.world.folder import World, read_world
 from vico.world.public import PublicMap
 
@@ -56,7 +58,7 @@ def play_task(
     community: Community,
     task: Task,
     *,
-    method: str,
+    method: str | PlayedByHand,
     setting: Setting | None = None,
     terms: Terms | None = None,
     recording: Path | None = None,
@@ -68,7 +70,7 @@ def play_task(
     ----------
     method
         Name of a planner (see `vico.agents.assistant.METHODS`), ``my_module:MyPlanner``, or two joined by ``+``, one
-        for each assistant.
+        for each assistant; with its theatre where one of them is ``human``, which needs a recording.
     setting
         What planners are told beside the task: ``distance``, and what the record is to name.
     terms
@@ -83,11 +85,16 @@ def play_task(
     SchemaError
         If the task was made for another world, or for other people.
     InputError
-        If the method names more or fewer planners than there are assistants.
+        If the method names more or fewer planners than there are assistants, or a person does not play to the end.
     """
     began = time.perf_counter()
+    theatre = method.theatre if isinstance(method, PlayedByHand) else None
+    method = method.method if isinstance(method, PlayedByHand) else method
     _check_made_for(task, world, community)
     names = [f"assistant_{i}" for i in range(len(task.assistants))]
+    played = _played_by_a_person(method, names)
+    if played and (theatre is None or recording is None):
+        raise InputError("eval: a person plays at a page: vico eval assistant --method human, or vico play --task")
     env = make(
         world,
         community,
@@ -98,27 +105,67 @@ def play_task(
         pedestrians=for_size(PEDESTRIANS, world),
         observe=tuple(names),
         max_steps=task.steps,
+        periods={} if theatre is None else dict.fromkeys(played, theatre.period),
         setup=lambda simulation: set_up(simulation, task),
     )
     sim = env.sim
     terms = terms or Terms()
     planners = _planners(method, names, task, world, terms, setting or {})
+    if theatre is not None:
+        planners |= {name: theatre.agent(name) for name in played}
     residents = residents_of_task(task, community, env.public_map)
     judge = Judge(task, world, sim.ground_truth, names)
     chronicle = Chronicle(judge)
     judge.watch(0)
+    judges: list[Hook] = [Seconds(sim, judge, chronicle, start=sim.state.second)] if played else [judge, chronicle]
     agents = Gatherer(residents | planners, trusted=residents, deadline=terms.deadline, workers=terms.workers)
-    runner = Runner(sim, agents, hooks=[judge, chronicle, *hooks])
+    runner = Runner(sim, agents, hooks=[*judges, *hooks])
     with ExitStack() as stack:
         stack.callback(agents.close)
+        recorded: RecordedOnce | None = None
         if recording is not None:
-            recorded = recorded_in(recording, sim, runner.faults, wanted=task.steps)
-            runner.hooks.append(stack.enter_context(recorded))
-        runner.run(task.steps, until=lambda: judge.over)
+            wanted = task.steps if theatre is None else round(task.steps / theatre.period)
+            recorded = stack.enter_context(recorded_in(recording, sim, runner.faults, wanted=wanted))
+            runner.hooks.append(recorded)
+        if theatre is not None and recorded is not None:
+            shown = theatre.perform(recorded.recorder, agents, partial(_asked, task, judge))
+            _perform(runner, stack.enter_context(shown), judge, task)
+        else:
+            runner.run(task.steps, until=lambda: judge.over)
         for name, planner in planners.items():
             for step, why in model_faults_of(planner):
                 runner.faults.add(step, name, "model", why)
     return _record(task, method, setting or {}, chronicle, sim, runner.faults, planners, time.perf_counter() - began)
+
+
+def _played_by_a_person(method: str, names: list[str]) -> list[str]:
+    """Return the assistants that a person plays: one, or nobody."""
+    methods = method.split("+")
+    found = [name for i, name in enumerate(names) if methods[i % len(methods)] == HUMAN]
+    if len(found) > 1:
+        raise InputError("eval: one person plays one assistant; name a planner for the other one: human+heuristic")
+    return found
+
+
+def _perform(runner: Runner, performance: Performance, judge: Judge, task: Task) -> None:
+    """Run an episode that a person plays: as many seconds as any other."""
+    sim = runner.sim
+    runner.hooks += performance.hooks
+    runner.director = performance.director
+    end = sim.state.second + task.steps
+    steps = 100 * task.steps  # more than there can be: seconds decide
+    runner.run(steps, until=lambda: judge.over or performance.over or sim.state.second >= end)
+    performance.confirm()
+
+
+def _asked(task: Task, judge: Judge, second: float) -> dict[str, Any]:
+    """Return what a person is told of the task, at a second of the simulation."""
+    subtasks = [
+        {"index": subtask.index, "text": subtask.text, "done": verdict is not None}
+        for subtask, verdict in zip(task.subtasks, judge.verdicts, strict=True)
+    ]
+    left = max(seconds_of_day(task.start) + task.steps - second, 0.0)
+    return {"instruction": task.category, "subtasks": subtasks, "seconds_left": left}
 
 
 def _check_made_for(task: Task, world: World, community: Community) -> None:
@@ -171,6 +218,8 @@ def _planners(
     made: dict[str, Agent] = {}
     for i, name in enumerate(names):
         mine = methods[i % len(methods)]
+        if mine == HUMAN:
+            continue
         if mine in METHODS:
             made[name] = make_planner(
                 mine, told, public_map, seed=task.seed, number=i, of=of, distance=bool(setting.get("distance", True))
@@ -238,7 +287,7 @@ def _record(
         seed=task.seed,
         metrics=metrics,
         parts=parts,
-        steps=sim.metrics.steps,
+        steps=round(sim.state.second) - seconds_of_day(task.start),
         limit=task.steps,
         wall_seconds=seconds,
         state_hash=sim.state_hash(),

@@ -66,6 +66,10 @@ class Judge(Hook):
     def stepped(self, step: Step) -> None:
         """Look at the state after a step, and take the reports that were made in it."""
         self.watch(step.number)
+        self.take_reports(step)
+
+    def take_reports(self, step: Step) -> None:
+        """Take the reports that were made in a step."""
         for name, action in step.actions.items():
             if action.get("type") != "task_complete" or name not in self.assistants:
                 continue

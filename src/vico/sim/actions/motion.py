@@ -30,7 +30,7 @@ def check_move_forward(values: Values, i: int, state: SimulationState) -> Refusa
 
 
 def move_forward(values: Values, i: int, state: SimulationState) -> None:
-    """Walk or ride straight ahead over the coming second; on snow and ice one gets less far."""
+    """Walk or ride ahead over the coming second, turning meanwhile if asked; on snow and ice one gets less far."""
     p = state.people
     outdoors = state.environment.conditions
     if p.room.item(i) >= 0:
@@ -39,6 +39,7 @@ def move_forward(values: Values, i: int, state: SimulationState) -> None:
         gets_on = outdoors.cycling if p.vehicle.item(i) == _BIKE else outdoors.walking
     p.move_left[i] = values["distance"] * gets_on
     p.move_speed[i] = values["distance"] * gets_on
+    p.turn_left[i] = math.radians(values.get("turn") or 0.0)
     p.pitch[i] = LEVEL_GAZE
 
 
@@ -79,10 +80,14 @@ _DEGREES = Field("number", low=0.0, high=360.0, unit="degrees", slot="amount", s
 MOTION = (
     ActionType(
         "move_forward",
-        "Walk (to 1 m), run (to 2.5 m) or ride (to 3 m) straight ahead; what is in the way stops it with `collision`.",
+        "Walk (to 1 m), run (to 2.5 m) or ride (to 3 m) ahead, straight or turning meanwhile (to the left above 0); "
+        "what is in the way stops it with `collision`.",
         move_forward,
         check_move_forward,
-        {"distance": Field("number", low=0.0, high=BIKE_SPEED, unit="m", slot="amount", scale=RUN_SPEED)},
+        {
+            "distance": Field("number", low=0.0, high=BIKE_SPEED, unit="m", slot="amount", scale=RUN_SPEED),
+            "turn": Field("number", required=False, low=-360.0, high=360.0, unit="degrees"),
+        },
         when=Situation.ON_FOOT | Situation.ON_BIKE,
     ),
     ActionType("turn_left", "Turn to the left.", turn_left, fields={"degrees": _DEGREES}, when=Situation.AWAKE),

@@ -40,6 +40,8 @@ class CastMember:
     intervals
         First step at which it was there, and the first at which it no longer was (None: to the end), once for each
         time that it came.
+    model
+        Shape it is drawn with: of vehicles, robots and things; None for people, and in runs from before it was told.
     """
 
     entity: int
@@ -49,6 +51,7 @@ class CastMember:
     agent: str | None
     pedestrian: int | None
     intervals: tuple[tuple[int, int | None], ...]
+    model: str | None = None
 
     def present(self, step: int) -> bool:
         """Whether it was there at a step."""
@@ -61,7 +64,7 @@ class CastLog:
     Parameters
     ----------
     describe
-        Returns ``name``, ``agent`` and ``pedestrian`` of an entity.
+        Returns ``name``, ``agent``, ``pedestrian`` and ``model`` of an entity.
     """
 
     def __init__(self, describe: Callable[[int], Mapping[str, Any]]) -> None:
@@ -69,19 +72,23 @@ class CastLog:
         self._entity = np.zeros(0, np.int32)
         self._shape = np.zeros((0, 4))
         self.lines: list[dict[str, Any]] = []
+        #: What was different at the step watched last.
+        self.latest: list[dict[str, Any]] = []
 
     def watch(self, step: int, bodies: Bodies) -> None:
         """Note what is different at a step; lines wait in `lines` until they are written."""
+        self.latest = []
         shape = np.column_stack([bodies.kind, 2 * bodies.half_length, 2 * bodies.half_width, bodies.height])
         if np.array_equal(bodies.entity, self._entity) and np.array_equal(shape, self._shape):
             return
         before = dict(zip(self._entity.tolist(), self._shape, strict=True))
         now = dict(zip(bodies.entity.tolist(), shape, strict=True))
         for entity in sorted(before.keys() - now.keys()):
-            self.lines.append({"step": step, "entity": entity, "gone": True})
+            self.latest.append({"step": step, "entity": entity, "gone": True})
         for entity, row in now.items():
             if entity not in before or not np.array_equal(before[entity], row):
-                self.lines.append(self._line(step, entity, row))
+                self.latest.append(self._line(step, entity, row))
+        self.lines += self.latest
         self._entity, self._shape = bodies.entity.copy(), shape
 
     def _line(self, step: int, entity: int, row: NDArray[np.float64]) -> dict[str, Any]:
@@ -110,23 +117,29 @@ def read_cast(run: Path, last: int) -> dict[int, CastMember]:
     """Return everybody and everything that was there at some step up to `last`, by entity, in the order of coming."""
     found: dict[int, CastMember] = {}
     for line in cast_lines(run):
-        entity, step = line["entity"], line["step"]
-        if step > last:
+        if line["step"] > last:
             break
-        known = found.get(entity)
-        if line.get("gone"):
-            if known is not None:
-                intervals = (*known.intervals[:-1], (known.intervals[-1][0], step))
-                found[entity] = replace(known, intervals=intervals)
-            continue
-        intervals = known.intervals if known is not None else ()
-        if not intervals or intervals[-1][1] is not None:
-            intervals = (*intervals, (step, None))
-        length, width, height = line["size"]
-        size = (float(length), float(width), float(height))
-        agent, pedestrian = line["agent"], line["pedestrian"]
-        found[entity] = CastMember(entity, line["kind"], line["name"], size, agent, pedestrian, intervals)
+        take_line(found, line)
     return found
+
+
+def take_line(found: dict[int, CastMember], line: Mapping[str, Any]) -> None:
+    """Take in a line of the cast: who comes, is different, or goes."""
+    entity, step = line["entity"], line["step"]
+    known = found.get(entity)
+    if line.get("gone"):
+        if known is not None:
+            intervals = (*known.intervals[:-1], (known.intervals[-1][0], step))
+            found[entity] = replace(known, intervals=intervals)
+        return
+    intervals = known.intervals if known is not None else ()
+    if not intervals or intervals[-1][1] is not None:
+        intervals = (*intervals, (step, None))
+    length, width, height = line["size"]
+    size = (float(length), float(width), float(height))
+    agent, pedestrian = line["agent"], line["pedestrian"]
+    model = line.get("model")
+    found[entity] = CastMember(entity, line["kind"], line["name"], size, agent, pedestrian, intervals, model)
 
 
 def cast_lines(run: Path) -> Iterator[dict[str, Any]]:

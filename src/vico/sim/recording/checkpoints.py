@@ -45,6 +45,11 @@ class Checkpoint:
     notes: dict[str, Any]
     clock: dict[str, Any]
 
+    @property
+    def interventions(self) -> int:
+        """How many lines of the run's interventions had been done by then."""
+        return int(self.notes.get("interventions", 0))
+
 
 def write_checkpoint(run: Path, checkpoint: Checkpoint, *, owner: str) -> None:
     """Write a checkpoint, whole or not at all; `owner` is the identity of its simulation."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ from vico.errors import InputError
 from vico.seeds import rng
 from vico.sim.animation import STYLE, Transition, pose, style_of
 from vico.sim.passers_by import looks_of_strangers, manner_of_pedestrian
+from vico.sim.recording.cast import CastMember
 from vico.sim.recording.run import Run
 
 
@@ -56,7 +57,7 @@ class PosedPeople:
     def __init__(self, run: Run) -> None:
         self._run = run
         self._styles: dict[int, Any] = {}
-        self._looks, self._manners = _people_of(run)
+        self._looks, self._manners = looks_and_manners(run.manifest["seed"], run.agents, run.cast)
 
     def at(self, step: int, entities: Sequence[int] | None = None) -> JointPoses:
         """Return the joint poses at a step, of all people or of some.
@@ -120,12 +121,24 @@ def motion_of(run: Run, agent: str) -> MotionClip:
     return MotionClip(agent, rate, np.asarray(position, np.float32), orientation, rotations[:, 1:])
 
 
-def _people_of(run: Run) -> tuple[dict[int, Appearance], dict[int, str]]:
-    """Return looks, and names of the streams that decide the manner, by entity."""
-    people = [agent for agent in run.agents if agent["kind"] != "robot"]
+def looks_and_manners(
+    seed: int, agents: Sequence[Mapping[str, Any]], cast: Mapping[int, CastMember]
+) -> tuple[dict[int, Appearance], dict[int, str]]:
+    """Return how the people of a run look, and names of the streams that decide their manner, by entity.
+
+    Parameters
+    ----------
+    seed
+        Of the run.
+    agents
+        Records of its ``agents.json``.
+    cast
+        Its bodies, pedestrians among them.
+    """
+    people = [agent for agent in agents if agent["kind"] != "robot"]
     assistants = [agent for agent in people if agent["person"] is None]
-    pedestrians = {m.entity: m.pedestrian for m in run.cast.values() if m.pedestrian is not None}
-    strangers = looks_of_strangers(run.manifest["seed"], len(assistants) + max(pedestrians.values(), default=-1) + 1)
+    pedestrians = {m.entity: m.pedestrian for m in cast.values() if m.pedestrian is not None}
+    strangers = looks_of_strangers(seed, len(assistants) + max(pedestrians.values(), default=-1) + 1)
     looks = {a["entity"]: Appearance.from_dict(a["person"]["appearance"]) for a in people if a["person"] is not None}
     looks |= {a["entity"]: strangers[k] for k, a in enumerate(assistants)}
     looks |= {entity: strangers[len(assistants) + k] for entity, k in pedestrians.items()}

@@ -17,15 +17,20 @@ if TYPE_CHECKING:
     from vico.sim.simulation import Simulation
 
 
-def run_record(sim: Simulation, status: str, digest: str, sources: Mapping[str, str], wanted: int) -> dict[str, Any]:
-    """Return what ``run.json`` says of a simulation whose state has the hash `digest`."""
+def run_record(
+    sim: Simulation, status: str, digest: str, sources: Mapping[str, str], wanted: int, identity: str
+) -> dict[str, Any]:
+    """Return what ``run.json`` says of a simulation whose state has the hash `digest`.
+
+    `identity` is the simulation's from before its first step: things may have been dropped since.
+    """
     community = sim.community
     return {
         "schema_name": SCHEMA,
         "version": VERSION,
         "producer": f"vico {__version__}",
         "status": status,
-        "identity": sim.identity,
+        "identity": identity,
         "seed": sim.config.seed,
         "config": sim.config.record(),
         "world": {"path": sources.get("world", ""), "digest": sim.world.digest},
@@ -64,15 +69,44 @@ def agents_record(sim: Simulation) -> list[dict[str, Any]]:
     return found
 
 
+class _Models:
+    """Tells which shape entities are drawn with."""
+
+    def __init__(self, sim: Simulation) -> None:
+        self._sim, self._known, self._step = sim, dict[int, str](), -1
+
+    def of(self, entity: int) -> str | None:
+        """Return the model of an entity; None for people, and for what nothing is drawn of."""
+        if entity not in self._known and self._step != self._sim.metrics.steps:
+            self._step = self._sim.metrics.steps
+            self._known = _models_of(self._sim) | self._known
+        return self._known.get(entity)
+
+
+def _models_of(sim: Simulation) -> dict[int, str]:
+    state, found = sim.state, dict[int, str]()
+    if state.robots is not None:
+        found |= dict(zip(state.robots.bodies().entity.tolist(), sim.config.robots, strict=True))
+    found |= dict(zip(state.objects.entity.tolist(), state.objects.prototypes, strict=True))
+    systems = [system for system in (state.traffic, state.transit, state.things) if system is not None]
+    for drawn in (system.draw() for system in systems if system is not state.things or len(state.things)):
+        for entity, index in zip(drawn.entity.tolist(), drawn.index.tolist(), strict=True):
+            # Bodies come before their parts: lamps, leaves of doors.
+            found.setdefault(entity, drawn.prototypes[index])
+    return found
+
+
 def describer(sim: Simulation) -> Callable[[int], dict[str, Any]]:
-    """Return what tells how an entity is called, whose body it is, and which pedestrian, as the cast says it."""
+    """Return what tells an entity's name, whose body it is, which pedestrian and which model, as the cast says it."""
+    models = _Models(sim)
     agents = {agent["entity"]: agent["name"] for agent in agents_record(sim)}
     walkers = sim.state.traffic.walkers.entity.tolist() if sim.state.traffic is not None else []
     pedestrians = {entity: k for k, entity in enumerate(walkers)}
 
     def describe(entity: int) -> dict[str, Any]:
         name = sim.entity(entity)["name"]
-        return {"name": name, "agent": agents.get(entity), "pedestrian": pedestrians.get(entity)}
+        played = {"agent": agents.get(entity), "pedestrian": pedestrians.get(entity)}
+        return {"name": name, "model": models.of(entity), **played}
 
     return describe
 

@@ -11,6 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from vico.sim.bodies import OBJECT, Bodies
+from vico.sim.environment.weather import NAMES as WEATHER
 from vico.sim.events import Event
 from vico.sim.passers_by import looks_of_strangers, pedestrian_motion
 from vico.sim.recording.action_text import action_text
@@ -32,6 +33,13 @@ class StepSamples:
     ----------
     sim
         The simulation they are taken from.
+
+    Attributes
+    ----------
+    steps
+        Those that were taken and wait.
+    latest
+        Rows of the step that was taken last, by table, in quantities, not sorted; nobody may change them.
     """
 
     def __init__(self, sim: Simulation) -> None:
@@ -41,6 +49,7 @@ class StepSamples:
         pedestrians = len(state.traffic.walkers) if state.traffic is not None else 0
         looks = looks_of_strangers(sim.config.seed, strangers + pedestrians)[strangers:]
         self._stature = np.array([look.height for look in looks], np.float64)
+        self.latest: dict[str, Rows] = {}
         self._begin()
 
     def _begin(self) -> None:
@@ -66,7 +75,9 @@ class StepSamples:
         """
         sim, step = self._sim, self._sim.metrics.steps
         self.steps.append(step)
+        self.latest = {}
         self._add("steps", {"step": [step], "hash": [digest], **_counts(sim)})
+        self._add("weather", _weather(step, sim))
         self._add("bodies", _bodies(step, bodies, sim.state.traffic))
         self._add("people", self._people(step))
         self._add("agents", _agents(step, sim, actions))
@@ -99,6 +110,7 @@ class StepSamples:
         # Copies, for the state's arrays go on changing; they are scaled all at once when they are written.
         kept = {key: np.array(values) if isinstance(values, np.ndarray) else values for key, values in rows.items()}
         self._rows[name].append(kept)
+        self.latest[name] = kept
 
 
 def everybody(sim: Simulation) -> Bodies:
@@ -133,6 +145,19 @@ def _counts(sim: Simulation) -> Rows:
         "refused": [sim.metrics.refused],
         "arrivals": [int(sim.punctuality.arrivals.sum())],
         "late": [int(sim.punctuality.late.sum())],
+    }
+
+
+def _weather(step: int, sim: Simulation) -> Rows:
+    sky = sim.state.environment
+    weather = sky.weather
+    now = {name: [getattr(weather, name)] for name in WEATHER}
+    return now | {
+        "step": [step],
+        "wet": [sky.wet],
+        "snow_cover": [sky.snow_cover],
+        "ice": [sky.ice],
+        "lamps": [sky.lamps],
     }
 
 

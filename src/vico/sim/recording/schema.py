@@ -48,6 +48,7 @@ class Column(NamedTuple):
 _WHOLE, _SMALL, _TEXT = Column(pa.int32()), Column(pa.int8()), Column(pa.string())
 _METRES, _TURN = Column(pa.int32(), 1e-3), Column(pa.int32(), 1e-4)
 _PHASE, _PACE = Column(pa.int32(), 1e-4), Column(pa.int32(), 1e-3, 1.0)
+_FLOAT = Column(pa.float32())
 
 #: Tables by name; columns by name. Positions are to the millimetre, angles to 0.1 mrad.
 TABLES: dict[str, dict[str, Column]] = {
@@ -59,6 +60,20 @@ TABLES: dict[str, dict[str, Column]] = {
         "refused": _WHOLE,
         "arrivals": _WHOLE,
         "late": _WHOLE,
+    },
+    "weather": {
+        "step": _WHOLE,
+        "clouds": _FLOAT,
+        "rain": _FLOAT,
+        "snow": _FLOAT,
+        "visibility": _FLOAT,
+        "wind": _FLOAT,
+        "wind_from": _FLOAT,
+        "temperature": _FLOAT,
+        "wet": _FLOAT,
+        "snow_cover": _FLOAT,
+        "ice": _FLOAT,
+        "lamps": _FLOAT,
     },
     "bodies": {
         "entity": _WHOLE,

@@ -99,6 +99,8 @@ class written_folder:
         if kind is not None:
             shutil.rmtree(self._work, ignore_errors=True)
             return
+        # A checkpoint may be taken twice after one step, when somebody has done something in between.
+        shutil.rmtree(self._folder, ignore_errors=True)
         os.replace(self._work, self._folder)
         handle = os.open(self._folder.parent, os.O_RDONLY)
         try:

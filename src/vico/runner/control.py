@@ -1,0 +1,352 @@
+"""Hands in a run: it is paused, paced, looked into and changed between two steps, by commands from other threads."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Collection, Mapping, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+from vico.agents.base import Action
+from vico.errors import InputError, VicoError
+from vico.runner.arguments import Arguments
+from vico.runner.bookmarks import add_bookmark, bookmarks_of
+from vico.runner.loop import Runner
+from vico.runner.pace import Pace
+from vico.sim.interventions import (
+    COMMANDS,
+    Line,
+    append_intervention,
+    intervene,
+    intervention_of,
+    read_interventions,
+    things_to_drop,
+    write_interventions,
+)
+from vico.sim.recording.checkpoints import checkpoint_steps
+
+T = TypeVar("T")
+
+#: How fast a run may be asked to go, simulated seconds a second; 0 is as fast as it goes.
+FASTEST = 1000.0
+
+_MOST_WAITING = 256
+# Commands that need everybody's state.
+_KEEPING = ("snapshot", "back", "branch")
+
+
+class Switch(NamedTuple):
+    """A run is to go on elsewhere: from a checkpoint, in another folder.
+
+    Attributes
+    ----------
+    step
+        Of the checkpoint.
+    name
+        Of the branch.
+    told
+        Is answered when it goes on there.
+    """
+
+    step: int
+    name: str
+    told: Future[dict[str, Any]]
+
+
+@dataclass
+class _Waiting:
+    """Something to do between two steps."""
+
+    do: Callable[[Runner], Any]
+    told: Future[Any]
+
+
+class Control:
+    """Directs a run (`vico.runner.loop.Director`); its methods may be called from any thread.
+
+    Parameters
+    ----------
+    out
+        The run's folder: what is done to the run is written there.
+    speed
+        Simulated seconds a second at most; 0 for as fast as it goes.
+    paused
+        Whether it waits before its first step.
+    script
+        Interventions that are done again, as a run's folder holds them.
+    manageable
+        Whether a snapshot of everybody can be taken: whether the run can go back.
+    allowed
+        Commands that are done; None for all.
+
+    Attributes
+    ----------
+    switch
+        Where the run is to go on instead; None for here.
+    stopping
+        Whether it is to end.
+    """
+
+    def __init__(
+        self,
+        out: Path,
+        *,
+        speed: float = 0.0,
+        paused: bool = False,
+        script: Sequence[Line] = (),
+        manageable: bool = True,
+        allowed: Collection[str] | None = None,
+    ) -> None:
+        self.out, self.paused = out, paused
+        self.switch: Switch | None = None
+        self.stopping = self._ended = False
+        self.step = 0
+        self._pace = Pace(speed)
+        self._script = deque(script)
+        self._manageable, self._allowed = manageable, allowed
+        self._lines = 0
+        self._pending: dict[str, Action] = {}
+        self._steps_left = 0
+        self._waiting: deque[_Waiting] = deque()
+        self._something = threading.Condition()
+
+    # Asked by others.
+
+    def told(self) -> dict[str, Any]:
+        """Return how the run stands, as the viewer's protocol has it."""
+        status = "ended" if self._ended else "paused" if self._holds() else "running"
+        return {
+            "paused": self.paused,
+            "speed": self._pace.speed,
+            "step": self.step,
+            "status": status,
+            "factor": round(self._pace.factor, 2),
+            "can": [] if self._ended else self._can(),
+        }
+
+    def command(self, name: str, arguments: Mapping[str, Any]) -> Future[dict[str, Any]]:
+        """Have a command done between two steps; its result is the reply.
+
+        The errors that the reply may be are `InputError`.
+        """
+        return self.ask(lambda runner: self._commanded(runner, name, arguments))
+
+    def ask(self, do: Callable[[Runner], T]) -> Future[T]:
+        """Have something done between two steps, in the thread that simulates."""
+        waiting = _Waiting(do, Future())
+        with self._something:
+            if self._ended:
+                waiting.told.set_exception(InputError("the run has ended"))
+            elif len(self._waiting) >= _MOST_WAITING:
+                waiting.told.set_exception(InputError(f"{_MOST_WAITING} commands are waited for already"))
+            else:
+                self._waiting.append(waiting)
+                self._something.notify_all()
+        return waiting.told
+
+    # Asked by the runner.
+
+    def before_step(self, runner: Runner) -> Mapping[str, Action]:
+        """Do what is waiting, hold the run up while it is paused or too fast; return what agents do in its place."""
+        self.step = runner.sim.metrics.steps
+        self._follow_script(runner)
+        while True:
+            self._do_waiting(runner)
+            if self.over:
+                return {}
+            with self._something:
+                if self._waiting:
+                    continue
+                if self._holds():
+                    self._pace.forget()
+                    self._something.wait()
+                    continue
+                ahead = self._pace.ahead(runner.sim.state.second)
+                if ahead <= 0.0:
+                    break
+                self._something.wait(ahead)
+        self._steps_left = max(self._steps_left - 1, 0)
+        due = runner.sim.due
+        return {name: self._pending.pop(name) for name in list(self._pending) if name in due}
+
+    @property
+    def over(self) -> bool:
+        """Whether the run is not to go on here; for `Runner.run`'s `until`."""
+        return self.stopping or self.switch is not None
+
+    def end(self) -> None:
+        """Say that the run has ended: whoever waits is told so."""
+        with self._something:
+            self._ended = True
+            waiting, self._waiting = list(self._waiting), deque()
+        for one in waiting:
+            one.told.set_exception(InputError("the run has ended"))
+
+    def notes(self) -> dict[str, Any]:
+        """Return what a checkpoint has to keep of it."""
+        return {"interventions": self._lines, "pending": dict(self._pending)}
+
+    def restore(self, notes: Mapping[str, Any], *, out: Path) -> None:
+        """Go on from a checkpoint of a run in a folder, with what had been done to it by then."""
+        self.out, self.switch = out, None
+        self._lines, self._pending = int(notes.get("interventions", 0)), dict(notes.get("pending", {}))
+        done = read_interventions(out)[: self._lines]
+        write_interventions(out, done)
+        self._script = deque(line for line in self._script if line not in done)
+        self._pace.forget()
+
+    # Commands.
+
+    def _can(self) -> list[str]:
+        known = [name for name in (*_COMMANDS, *COMMANDS) if self._manageable or name not in _KEEPING]
+        return known if self._allowed is None else [name for name in known if name in self._allowed]
+
+    def _holds(self) -> bool:
+        return self.paused and not self._steps_left
+
+    def _do_waiting(self, runner: Runner) -> None:
+        while True:
+            with self._something:
+                if not self._waiting:
+                    return
+                one = self._waiting.popleft()
+            if not one.told.set_running_or_notify_cancel():
+                continue
+            try:
+                result = one.do(runner)
+            except VicoError as error:
+                one.told.set_exception(error)
+            except Exception as error:  # a fault of the program: told, and the run goes on
+                one.told.set_exception(InputError(f"this could not be done: {type(error).__name__}: {error}"))
+            else:
+                if not isinstance(result, Switch):
+                    one.told.set_result(result)
+                else:
+                    self.switch = result._replace(told=one.told)
+
+    def _commanded(self, runner: Runner, name: str, arguments: Mapping[str, Any]) -> Any:
+        if name not in self._can():
+            raise InputError(f"{name!r} is no command here; there are {', '.join(self._can())}")
+        if name in COMMANDS:
+            return self._intervened(runner, Line(after=self.step, command=name, arguments=dict(arguments)))
+        return _COMMANDS[name](self, runner, Arguments(name, arguments))
+
+    def _intervened(self, runner: Runner, line: Line) -> dict[str, Any]:
+        told, actions = intervene(runner.sim, intervention_of(line.command, line.arguments))
+        self._pending |= actions
+        append_intervention(self.out, line)
+        self._lines += 1
+        return told
+
+    def _follow_script(self, runner: Runner) -> None:
+        while self._script and self._script[0].after <= self.step:
+            line = self._script.popleft()
+            if line.after == self.step:
+                self._intervened(runner, line)
+
+    def pause(self, runner: Runner, given: Arguments) -> dict[str, Any]:
+        """Hold the run up."""
+        self.paused, self._steps_left = True, 0
+        return {}
+
+    def resume(self, runner: Runner, given: Arguments) -> dict[str, Any]:
+        """Let it go on."""
+        self.paused = False
+        return {}
+
+    def do_steps(self, runner: Runner, given: Arguments) -> dict[str, Any]:
+        """Make some steps, and hold it up again."""
+        self.paused, self._steps_left = True, int(given.number("steps", 1, 1, 100_000))
+        return {}
+
+    def set_speed(self, runner: Runner, given: Arguments) -> dict[str, Any]:
+        """Set how fast it goes at most."""
+        self._pace.speed = given.number("factor", None, 0, FASTEST)
+        self._pace.forget()
+        return {}
+
+    def stop(self, runner: Runner, given: Arguments) -> dict[str, Any]:
+        """End it."""
+        self.stopping = True
+        return {}
+
+    def snapshot(self, runner: Runner, given: Arguments) -> dict[str, Any]:
+        """Write a checkpoint."""
+        name = given.text("name")
+        self._save(runner)
+        if name:
+            add_bookmark(self.out, step=self.step, time=runner.sim.state.second, text=name)
+        return {"step": self.step}
+
+    def back(self, runner: Runner, given: Arguments) -> Switch:
+        """Have the run go on from a checkpoint at or before a step, in a folder of its own."""
+        step = int(given.number("step", None, 0, self.step))
+        before = [k for k in checkpoint_steps(self.out) if k <= step]
+        if not before:
+            first = next(iter(checkpoint_steps(self.out)), None)
+            known = "there is none" if first is None else f"the first is of step {first}"
+            raise InputError(f"back: no checkpoint at or before step {step}; {known}")
+        return Switch(before[-1], given.text("name") or f"from-{before[-1]}", Future())
+
+    def branch(self, runner: Runner, given: Arguments) -> Switch:
+        """Have the run go on in a folder of its own, from here or from an earlier checkpoint."""
+        name = given.text("name")
+        if given.has("step"):
+            switch = self.back(runner, given)
+            return switch._replace(name=name or switch.name)
+        self._save(runner)
+        return Switch(self.step, name or f"branch-{self.step}", Future())
+
+    def bookmark(self, runner: Runner, given: Arguments) -> dict[str, Any]:
+        """Remember a step with a text."""
+        step = int(given.number("step", self.step, 0, self.step))
+        add_bookmark(
+            self.out, step=step, time=given.number("time", runner.sim.state.second, 0, 1e9), text=given.text("text")
+        )
+        return self.bookmarks(runner, given)
+
+    def bookmarks(self, runner: Runner, given: Arguments) -> dict[str, Any]:
+        """Tell all bookmarks."""
+        return {"bookmarks": bookmarks_of(self.out)}
+
+    def things(self, runner: Runner, given: Arguments) -> dict[str, Any]:
+        """Tell what can be dropped."""
+        return {"things": things_to_drop()}
+
+    def _save(self, runner: Runner) -> None:
+        if not runner.save():
+            raise InputError(
+                "an agent does not say what it remembers now: nothing was kept; try again after the next step"
+            )
+
+
+_COMMANDS: dict[str, Callable[[Control, Runner, Arguments], Any]] = {
+    "pause": Control.pause,
+    "resume": Control.resume,
+    "step": Control.do_steps,
+    "speed": Control.set_speed,
+    "stop": Control.stop,
+    "snapshot": Control.snapshot,
+    "back": Control.back,
+    "branch": Control.branch,
+    "bookmark": Control.bookmark,
+    "bookmarks": Control.bookmarks,
+    "things": Control.things,
+}
+
+
+def waited(told: Future[T], seconds: float) -> T:
+    """Return what something came to that was asked of a run, or say that the run is busy.
+
+    Raises
+    ------
+    InputError
+        If it takes longer than some seconds.
+    """
+    try:
+        return told.result(seconds)
+    except TimeoutError:
+        raise InputError(f"the run did not come to it within {seconds:g} s") from None

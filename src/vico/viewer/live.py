@@ -1,0 +1,144 @@
+"""A run that goes on, with the viewer beside it: its steps are kept for the page, and the page's hands reach it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from vico.agents.base import plan_record
+from vico.errors import InputError
+from vico.runner.control import Control, waited
+from vico.runner.gather import Gatherer
+from vico.runner.loop import Hook, Runner, Step
+from vico.sim.recorder import Recorder
+from vico.viewer.play import PlayedAgent
+from vico.viewer.server.serve import ViewerServer
+from vico.viewer.server.state import ViewerState
+from vico.viewer.sources.source import Source
+from vico.viewer.sources.tables import LiveTables
+from vico.viewer.sources.views import RecordedViews, Seen, picture_of, seen_by
+from vico.world.folder import World
+
+# Seconds that pictures and plans are waited for: a first picture needs the scene to be made.
+_PICTURE_WITHIN, _PLAN_WITHIN = 60.0, 5.0
+
+
+class LiveViewer(Hook):
+    """Follows a run and shows it; a hook after the one that records.
+
+    Parameters
+    ----------
+    control
+        Of the run.
+    world
+        Where it happens.
+    city
+        Folder of the world's static files; None where there are none.
+    player
+        Who is played by a person at the page; None for nobody.
+    port
+        To listen on; 0 takes the one that the run was shown on before, or a free one.
+    """
+
+    def __init__(
+        self,
+        control: Control,
+        world: World,
+        *,
+        city: Path | None = None,
+        player: PlayedAgent | None = None,
+        port: int = 0,
+    ) -> None:
+        self.control = control
+        self._world, self._city, self._player, self._port = world, city, player, port
+        self._server: ViewerServer | None = None
+        self._recorder: Recorder | None = None
+        self._tables = LiveTables(control.out)
+        self._seen: tuple[str, int, Seen] | None = None
+        self._recorded: RecordedViews | None = None
+        #: Told the address once the page is there.
+        self.announce: Callable[[str], None] = lambda url: None
+
+    @property
+    def url(self) -> str:
+        """What to open in a browser."""
+        assert self._server is not None
+        return self._server.url
+
+    def show(self, recorder: Recorder, agents: Gatherer) -> None:
+        """Show the run that a recorder begins or goes on with; begin to serve it, or tell the pages that it is another.
+
+        Parameters
+        ----------
+        agents
+            Who may be asked for their plans.
+        """
+        self._recorder, self._recorded, self._seen = recorder, None, None
+        self._tables = LiveTables(recorder.out)
+        self._tables.begin()
+        source = Source(recorder.out, self._tables, self._world, live=True)
+        source.plans = lambda names: self._plans(agents, names)
+        if self._server is None:
+            state = ViewerState(source, self.view, city=self._city, hands=self.control, player=self._player)
+            self._server = ViewerServer(state, port=self._port, keep=recorder.out).__enter__()
+            self.announce(self.url)
+        else:
+            self._server.change_source(source)
+
+    def begin(self, observations: Mapping[str, dict[str, Any]]) -> None:
+        """Take in how things stand before the first step."""
+        assert self._recorder is not None
+        self._tables.begin()
+        if self._recorder.latest:
+            self._tables.add(0, self._recorder.latest, self._recorder.latest_cast)
+        if self._player is not None:
+            self._player.tell(self._recorder.sim)
+
+    def stepped(self, step: Step) -> None:
+        """Keep a step, and say that it is there."""
+        assert self._recorder is not None
+        self._tables.add(step.number, self._recorder.latest, self._recorder.latest_cast)
+        if self._player is not None:
+            self._player.tell(self._recorder.sim)
+        if self._server is not None:
+            self._server.notify()
+
+    def view(self, agent: str, step: int, output: str) -> tuple[bytes | dict[str, Any], str]:
+        """Return what an agent sees: now, rendered between two steps, or at an earlier step, from the recording."""
+        seen = self._seen
+        if seen is not None and seen[:2] == (agent, step):
+            return picture_of(seen[2], output)
+        if step < self._tables.last or self.control.told()["status"] == "ended":
+            run = self._tables.run
+            if run is None or run.last < step:
+                raise InputError(f"step {step} is not written yet: look at it again in a minute")
+            self._recorded = self._recorded or RecordedViews(run)
+            return self._recorded.view(agent, step, output)
+
+        def render(runner: Runner) -> tuple[int, Seen]:
+            return runner.sim.metrics.steps, seen_by(runner.sim, agent)
+
+        at, found = waited(self.control.ask(render), _PICTURE_WITHIN)
+        self._seen = agent, at, found
+        return picture_of(found, output)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.control.end()
+        if self._server is not None:
+            self._server.__exit__(kind, error, trace)
+
+    def _plans(self, agents: Gatherer, names: Sequence[str]) -> Mapping[str, Any]:
+        def ask(runner: Runner) -> dict[str, Any]:
+            found = {name: plan_record(agents.agents[name]) for name in names if name in agents.agents}
+            return {name: plan for name, plan in found.items() if plan is not None}
+
+        if self.control.told()["status"] == "ended":
+            return {}
+        return waited(self.control.ask(ask), _PLAN_WITHIN)

@@ -1,0 +1,147 @@
+"""Frames: what the page needs to draw a step, and their bytes (docs/viewer_protocol.md)."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vico.errors import SchemaError
+from vico.viewer.sources.skylight import SKY_FIELDS, Skylight
+from vico.viewer.sources.tables import Columns, StepTables
+
+MAGIC, VERSION = 0x56, 1
+#: Flags: it answers a range; it is the newest.
+OF_RANGE, NEWEST = 1, 2
+
+#: Columns by table, each with its type, in their order.
+FRAME_COLUMNS: dict[str, dict[str, str]] = {
+    "bodies": {"entity": "<i4", "x": "<i4", "y": "<i4", "z": "<i4", "yaw": "<i4", "speed": "<i4", "lights": "u1"},
+    "people": {
+        "entity": "<i4",
+        "phase": "<i4",
+        "pace": "<i4",
+        "phase_before": "<i4",
+        "pace_before": "<i4",
+        "clip_time": "<i4",
+        "clip": "i1",
+        "clip_before": "i1",
+    },
+    "agents": {
+        "entity": "<i4",
+        "pitch": "<i4",
+        "room": "<i4",
+        "place": "<i4",
+        "vehicle": "<i4",
+        "held_left": "<i4",
+        "held_right": "<i4",
+        "cash": "<i4",
+        "posture": "i1",
+        "status": "i1",
+    },
+    "robots": dict.fromkeys(("entity", "x", "y", "z", "qw", "qx", "qy", "qz"), "<i4"),
+    "joints": dict.fromkeys(("entity", "joint", "angle"), "<i4"),
+}
+
+# Magic, version, flags, 0; step; time; rows of each table; the range's id.
+_HEAD = struct.Struct("<BBBBId5II")
+_HEAD_BYTES = _HEAD.size + 4 * SKY_FIELDS
+# Steps whose rows are looked for at once.
+_CHUNK = 60
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A step, as it is drawn.
+
+    Attributes
+    ----------
+    step, time
+        Its number, and seconds since midnight of the first day.
+    sky
+        As `vico.viewer.sources.skylight` has it, float32, shape ``(16,)``.
+    tables
+        Columns by table, as stored, of the types in `FRAME_COLUMNS`.
+    """
+
+    step: int
+    time: float
+    sky: NDArray[np.float32]
+    tables: Mapping[str, Columns]
+
+    def encoded(self, *, flags: int = 0, range_id: int = 0) -> bytes:
+        """Return the bytes of the frame."""
+        counts = [len(self.tables[name]["entity"]) for name in FRAME_COLUMNS]
+        head = _HEAD.pack(MAGIC, VERSION, flags, 0, self.step, self.time, *counts, range_id)
+        parts = [head, self.sky.astype("<f4").tobytes()]
+        for name, form in FRAME_COLUMNS.items():
+            for key, kind in form.items():
+                content = self.tables[name][key].astype(kind).tobytes()
+                parts.append(content + bytes(-len(content) % 4))
+        return b"".join(parts)
+
+
+def decoded(content: bytes) -> tuple[Frame, int, int]:
+    """Return the frame that some bytes are, its flags, and the id of the range that it answers.
+
+    Raises
+    ------
+    SchemaError
+        If they are no frame of this version.
+    """
+    if len(content) < _HEAD_BYTES or content[0] != MAGIC or content[1] != VERSION:
+        raise SchemaError(f"frame: {len(content)} bytes are no frame of version {VERSION}")
+    _, _, flags, _, step, time, *counts, range_id = _HEAD.unpack_from(content)
+    sky = np.frombuffer(content, "<f4", SKY_FIELDS, _HEAD.size)
+    at, tables = _HEAD_BYTES, dict[str, Columns]()
+    for (name, form), n in zip(FRAME_COLUMNS.items(), counts, strict=True):
+        tables[name] = {}
+        for key, kind in form.items():
+            size = n * np.dtype(kind).itemsize
+            if at + size > len(content):
+                raise SchemaError(f"frame: ends within {name}.{key}")
+            tables[name][key] = np.frombuffer(content, kind, n, at)
+            at += size + -size % 4
+    return Frame(step, time, sky, tables), flags, range_id
+
+
+def frames_between(tables: StepTables, skylight: Skylight, first: int, last: int, every: int = 1) -> Iterator[Frame]:
+    """Yield the frames of steps `first` to `last`, both included, every so many.
+
+    Raises
+    ------
+    InputError
+        If the steps are not there.
+    """
+    wanted = range(first, last + 1, every)
+    chunk = max(_CHUNK // every, 1)
+    for begin in range(0, len(wanted), chunk):
+        steps = wanted[begin : begin + chunk]
+        yield from _frames(tables, skylight, steps)
+
+
+def _frames(tables: StepTables, skylight: Skylight, steps: range) -> Iterator[Frame]:
+    first, last = steps[0], steps[-1]
+    times = tables.stored("steps", first, last)["time"]
+    weather = tables.stored("weather", first, last)
+    rows = {name: _ByStep(tables.stored(name, first, last)) for name in FRAME_COLUMNS}
+    for step in steps:
+        time = float(times[step - first])
+        air = {key: values[step - first] for key, values in weather.items()} if len(weather["step"]) else None
+        found = {name: rows[name].of(step, FRAME_COLUMNS[name]) for name in FRAME_COLUMNS}
+        yield Frame(step, time, skylight.sky(time, air), found)
+
+
+class _ByStep:
+    """Rows of a table, found by their step."""
+
+    def __init__(self, columns: Columns) -> None:
+        order = np.argsort(columns["step"], kind="stable")
+        self._columns = {key: values[order] for key, values in columns.items()}
+
+    def of(self, step: int, form: Mapping[str, str]) -> Columns:
+        begin, end = np.searchsorted(self._columns["step"], [step, step + 1])
+        return {key: self._columns[key][begin:end].astype(kind) for key, kind in form.items()}
