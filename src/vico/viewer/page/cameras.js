@@ -145,7 +145,7 @@ export class Cameras {
 
   /**
    * @param {number} seconds since the last time
-   * @param {{x: number, y: number, z: number, yaw: number, height: number, pitch: number} | null} followed
+   * @param {{x: number, y: number, z: number, yaw: number, height: number, pitch: number, room?: number} | null} followed
    */
   update(seconds, followed) {
     if (this.mode === "play") return;
@@ -172,11 +172,15 @@ export class Cameras {
       turn = Math.atan2(Math.sin(turn), Math.cos(turn));
       this.yaw += turn * (1 - Math.exp(-2.5 * seconds));
     }
-    const flat = Math.cos(this.pitch) * this.distance;
-    const z = this.target.z + Math.sin(this.pitch) * this.distance;
+    const isInside = Boolean(followed) && (followed?.room ?? -1) >= 0 && this.mode !== "bird";
+    if (isInside && followed) this.target.set(followed.x, followed.y, followed.z + 1);
+    const distance = isInside ? Math.min(this.distance, 11) : this.distance;
+    const pitch = isInside && this.mode === "orbit" ? Math.max(this.pitch, 0.55) : this.pitch;
+    const flat = Math.cos(pitch) * distance;
+    const z = this.target.z + Math.sin(pitch) * distance;
     camera.position.set(this.target.x + Math.cos(this.yaw) * flat, this.target.y + Math.sin(this.yaw) * flat, z);
     const floor = this.groundAt(camera.position) + 0.5;
-    if (camera.position.z < floor && this.target.z > floor - 3) camera.position.z = floor;
+    if (!isInside && camera.position.z < floor) camera.position.z = floor;
     if (this.mode === "bird") {
       camera.up.set(-Math.cos(this.yaw), -Math.sin(this.yaw), 0);
       camera.lookAt(this.target);

@@ -22,11 +22,21 @@ export class City {
     this.tiles = [];
     /** @type {any[]} */
     this.materials = [];
+    /** @type {any[]} */
+    this.insideMaterials = [];
+    /** @type {{value: any}[]} */
+    this.pictures = [];
+    /** @type {ArrayBuffer | undefined} */
+    this.robotShapes = undefined;
+    /** Which file of rooms is shown, -1 for none: then one is inside. */
+    this.inside = -1;
     /** @type {Map<string, any>} */
     this.models = new Map();
     this.textured = false;
     /** Metres within which tiles are drawn whole. */
     this.nearReach = 130;
+    /** How many parts have come so far. */
+    this.arrived = 0;
     /** @type {Instances | null} */
     this.instances = null;
     this._round = 0;
@@ -37,16 +47,22 @@ export class City {
     this._roomFiles = new Map();
   }
 
-  /** Fetch what the first picture needs: the outlook over the whole city. */
-  async open() {
-    this.manifest = await getJson("/city/manifest.json");
+  /**
+   * Fetch what the first picture needs: the outlook over the whole city.
+   * @param {import("./ground.js").CityBase} base
+   * @returns {Promise<ArrayBuffer>}
+   */
+  async open({ manifest, picture }) {
+    this.manifest = manifest;
     const outlook = await bytes("/city/outlook.bin");
-    this.materials = this.manifest.arrays.map(() => cityMaterial(this.light, pictureArray({ width: 1, height: 1 }, 1)));
-    const picture = await groundPicture();
-    this.groundPicture = picture;
+    const pictures = this.manifest.arrays.map(() => ({ value: pictureArray({ width: 1, height: 1 }, 1) }));
+    this.pictures = pictures;
+    this.materials = pictures.map((/** @type {any} */ array) => cityMaterial(this.light, array));
+    this.insideMaterials = pictures.map((/** @type {any} */ array) => cityMaterial(this.light, array, true));
     this._outlook(outlook, new THREE.CanvasTexture(picture));
     this._shapes(outlook);
     this._textures();
+    return outlook;
   }
 
   /** @param {ArrayBuffer} outlook @param {any} texture */
@@ -85,6 +101,7 @@ export class City {
     const ring = new THREE.RingGeometry(half * 0.9, half + 2500, 48, 8);
     const plane = new THREE.Mesh(ring, material);
     plane.position.z = low - 1.5;
+    this._plane = plane;
     this.scene.add(plane);
   }
 
@@ -119,11 +136,12 @@ export class City {
     let left = this.manifest.arrays.length;
     worker.onmessage = ({ data }) => {
       if (data.layers) {
-        this.materials[data.number].uniforms.pictures.value = pictureArray(data, data.layers, data.data);
+        this.pictures[data.number].value = pictureArray(data, data.layers, data.data);
       }
       if (--left === 0) {
         worker.terminate();
         this.textured = true;
+        this.arrived++;
       }
     };
     const { textures, arrays } = this.manifest;
@@ -142,13 +160,19 @@ export class City {
       const dx = Math.max(tile.entry.x - x, 0, x - tile.entry.x - side);
       const dy = Math.max(tile.entry.y - y, 0, y - tile.entry.y - side);
       const away = Math.hypot(dx, dy, Math.max(0, z - 40));
+      if (this.inside >= 0) {
+        tile.far.visible = false;
+        if (tile.near) tile.near.visible = false;
+        continue;
+      }
       const isNear = away < this.nearReach * (tile.near?.visible ? 1.1 : 1) && this.textured;
       if (isNear && !tile.near && !tile.loading) this._load(tile);
       if (isNear) tile.wanted = this._round;
       if (tile.near) tile.near.visible = isNear;
       tile.far.visible = !(isNear && tile.near);
     }
-    this.instances?.update(camera);
+    if (this.instances) this.instances.update(camera, this.inside >= 0);
+    if (this._plane) this._plane.visible = this.inside < 0;
   }
 
   /** @param {any} tile */
@@ -161,6 +185,7 @@ export class City {
         group.add(new THREE.Mesh(meshGeometry(buffer, entry), this.materials[entry.array]));
       }
       tile.near = group;
+      this.arrived++;
       this.scene.add(group);
       this._forget();
     } finally {
@@ -195,17 +220,19 @@ export class City {
     }
     const wanted = room >= 0 && this.rooms?.rooms ? this.rooms.rooms[room] : -1;
     for (const [number, group] of this._roomFiles) if (group) group.visible = number === wanted;
+    this.inside = wanted;
     if (wanted < 0 || this._roomFiles.has(wanted)) return;
     this._roomFiles.set(wanted, null);
     const entry = this.rooms.files[wanted];
     const buffer = await bytes(`/city/${entry.file}`);
     const group = new THREE.Group();
-    for (const mesh of entry.near) group.add(new THREE.Mesh(meshGeometry(buffer, mesh), this.materials[mesh.array]));
-    const furniture = new Instances(group, this, { near: 45, far: 0 });
+    for (const mesh of entry.near) group.add(new THREE.Mesh(meshGeometry(buffer, mesh), this.insideMaterials[mesh.array]));
+    const furniture = new Instances(group, this, { near: 45, far: 0 }, this.insideMaterials);
     for (const instance of entry.instances) furniture.add(instance, buffer);
     furniture.fillAll();
     this.scene.add(group);
     this._roomFiles.set(wanted, group);
+    this.arrived++;
   }
 
   /** Meshes to aim at: far walls, with the building of each vertex. */
@@ -219,17 +246,6 @@ export async function bytes(path) {
   const answer = await fetch(path);
   if (!answer.ok) throw new Error(`${path}: ${answer.status}`);
   return answer.arrayBuffer();
-}
-
-/** @returns {Promise<HTMLCanvasElement>} */
-async function groundPicture() {
-  const answer = await fetch("/city/ground.jpg");
-  const picture = await createImageBitmap(await answer.blob());
-  const canvas = document.createElement("canvas");
-  canvas.width = picture.width;
-  canvas.height = picture.height;
-  /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d")).drawImage(picture, 0, 0);
-  return canvas;
 }
 
 /**

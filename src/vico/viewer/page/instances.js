@@ -10,9 +10,12 @@ export class Instances {
    * @param {any} parent
    * @param {import("./city.js").City} city
    * @param {{near: number, far: number}} [reach] metres
+   * @param {any[]} [materials] by texture array
    */
-  constructor(parent, city, reach = { near: 45, far: 420 }) {
+  constructor(parent, city, reach = { near: 45, far: 420 }, materials = city.materials) {
     this.parent = parent;
+    this.materials = materials;
+    this._hidden = false;
     this.city = city;
     this.reach = reach;
     /** @type {any[]} */
@@ -40,7 +43,7 @@ export class Instances {
 
   /** @param {any} part @param {number} count */
   _mesh(part, count) {
-    const mesh = new THREE.InstancedMesh(part.geometry, this.city.materials[part.array], count);
+    const mesh = new THREE.InstancedMesh(part.geometry, this.materials[part.array], count);
     mesh.frustumCulled = false;
     mesh.count = 0;
     this.parent.add(mesh);
@@ -57,10 +60,15 @@ export class Instances {
     }
   }
 
-  /** @param {any} camera */
-  update(camera) {
+  /** @param {any} camera @param {boolean} [hidden] whether nothing is to be seen */
+  update(camera, hidden = false) {
     const now = camera.matrixWorldInverse;
-    if (closeTo(this._last, now)) return;
+    if (hidden !== this._hidden) {
+      this._hidden = hidden;
+      this._last.identity();
+      for (const set of this.sets) for (const level of set.levels) show(level, 0);
+    }
+    if (hidden || closeTo(this._last, now)) return;
     this._last.copy(now);
     const both = new THREE.Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse);
     this._frustum.setFromProjectionMatrix(both);

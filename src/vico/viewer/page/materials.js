@@ -126,15 +126,30 @@ export function lightUniforms(light) {
 /**
  * Return the material of everything textured that lies in one texture array.
  * @param {import("./light.js").Light} light
- * @param {any} pictures a texture array
+ * @param {{value: any}} pictures a texture array
+ * @param {boolean} [inside] of rooms
  */
-export function cityMaterial(light, pictures) {
+export function cityMaterial(light, pictures, inside = false) {
   return new THREE.ShaderMaterial({
-    uniforms: { ...lightUniforms(light), pictures: { value: pictures } },
+    uniforms: { ...lightUniforms(light), ...(inside ? insideLight() : {}), pictures },
     vertexShader: CITY_VERTEX,
     fragmentShader: CITY_FRAGMENT,
-    side: THREE.DoubleSide,
+    // Walls of rooms are seen from inside alone, so that one can look in from anywhere.
+    side: inside ? THREE.FrontSide : THREE.DoubleSide,
   });
+}
+
+/** Lamps of rooms, whatever the time. */
+export function insideLight() {
+  return {
+    sunColour: { value: new THREE.Color(0.22, 0.21, 0.19) },
+    sun: { value: new THREE.Vector3(0.35, 0.25, 0.9) },
+    sky: { value: new THREE.Color(0.78, 0.76, 0.72) },
+    ground: { value: new THREE.Color(0.5, 0.49, 0.47) },
+    reach: { value: 4000 },
+    snow: { value: 0 },
+    wet: { value: 0 },
+  };
 }
 
 /**

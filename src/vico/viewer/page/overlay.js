@@ -18,6 +18,7 @@ export class Overlay {
     view.canvas.parentElement?.append(this.layer);
     /** @type {{at: any, element: HTMLElement}[]} */
     this.labels = [];
+    this._key = "null";
     /** @type {Map<number, HTMLElement>} */
     this.names = new Map();
   }

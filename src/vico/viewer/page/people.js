@@ -46,12 +46,19 @@ varying float vFog;
 void main() { gl_FragColor = vec4(mix(vColour, fog, vFog), 1.0); }`;
 
 export class People {
-  /** @param {any} scene @param {import("./light.js").Light} light @param {import("./source.js").Source} source */
-  constructor(scene, light, source) {
+  /**
+   * @param {any} scene
+   * @param {import("./light.js").Light} light
+   * @param {import("./source.js").Source} source
+   * @param {import("./city.js").City} city
+   */
+  constructor(scene, light, source, city) {
     this.scene = scene;
     this.light = light;
     this.source = source;
+    this.city = city;
     this.nearReach = 28;
+    this.arrived = 0;
     this.bones = new Float32Array(4 * WIDTH * ROWS);
     this.texture = new THREE.DataTexture(this.bones, WIDTH, ROWS, THREE.RGBAFormat, THREE.FloatType);
     this.texture.minFilter = this.texture.magFilter = THREE.NearestFilter;
@@ -92,8 +99,8 @@ export class People {
       const away = camera.position.distanceTo(this._sphere.center);
       if (away > FARTHEST || !this._frustum.intersectsSphere(this._sphere)) continue;
       const room = roomOf(before, entity);
-      // Rooms lie below the ground: who is in one is seen from inside alone.
-      if (room >= 0 && (Math.abs(camera.position.z - body.z) > 3.2 || away > 40)) continue;
+      // Rooms lie below the ground: who is in one is seen from inside alone, and from there nobody else.
+      if ((room >= 0 ? (this.city.rooms?.rooms?.[room] ?? -2) : -1) !== this.city.inside) continue;
       const person = this.known.get(entity);
       if (!person) wanted.push([away, entity, row]);
       else if (person.group && entity !== hidden) this._draw(person, between, row, body, away);
@@ -146,6 +153,7 @@ export class People {
     try {
       const file = new PersonFile(await bytes(`/api/person/${entity}.bin`));
       this.known.set(entity, this._person(entity, file));
+      this.arrived++;
     } catch {
       // Tried again when a while has passed: they may be dressing.
       setTimeout(() => this.known.delete(entity), 3000);

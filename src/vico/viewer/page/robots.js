@@ -31,7 +31,8 @@ export class Robots {
   /** @param {number} entity @returns {any} */
   _make(entity) {
     const name = this.modelOf(entity);
-    if (!name || !this.city.robotShapes) return null;
+    const shapes = this.city.robotShapes;
+    if (!name || !shapes) return null;
     const model = this.city.manifest.robots[name];
     const group = new THREE.Group();
     const links = model.links.map((/** @type {any} */ link) => {
@@ -41,7 +42,7 @@ export class Robots {
       const far = new THREE.Group();
       for (const [into, meshes] of [[near, link.near], [far, link.far]]) {
         for (const mesh of meshes) {
-          const part = new THREE.Mesh(meshGeometry(this.city.robotShapes, mesh), this.city.materials[mesh.array]);
+          const part = new THREE.Mesh(meshGeometry(shapes, mesh), this.city.materials[mesh.array]);
           part.frustumCulled = false;
           into.add(part);
         }

@@ -20,6 +20,8 @@ const CARE = [
   { pixels: 1.5, tiles: 220, bodies: 70, things: 80, far: 800 },
 ];
 const GOAL = 30;
+/** The level of a picture that rests. */
+const FINE = 4;
 
 export class View {
   /** @param {HTMLCanvasElement} canvas @param {import("./source.js").Source} source */
@@ -36,28 +38,34 @@ export class View {
     this.city = new City(this.scene, this.light);
     this.cameras = new Cameras(this.camera, canvas, (p) => this.groundAt(p));
     this.sky = new Sky(this.scene, this.light);
-    this.people = new People(this.scene, this.light, source);
+    this.people = new People(this.scene, this.light, source, this.city);
     this.vehicles = new Vehicles(this.scene, this.city, this.light, source);
     this.robots = new Robots(this.scene, this.city, source);
+    this.vehicles.people = this.people;
     this.overlay = new Overlay(this.scene, this);
     this.care = 3;
     /** Whether the level of care follows the frames a second. */
     this.adapts = true;
     this.stats = { fps: 0, triangles: 0, calls: 0, care: 3, first: 0 };
     this._since = 0;
+    this._size = "";
+    this._key = "";
+    this._moved = 0;
+    this._fine = false;
+    this._fineSince = 0;
+    this._careBefore = 3;
+    this._resize = true;
     this._frames = 0;
     this._heights = null;
     this.setCare(3);
   }
 
-  async open() {
-    await this.city.open();
-    const { count, ground, tile, half } = this.city.manifest;
-    const outlook = await (await fetch("/city/outlook.bin")).arrayBuffer();
+  /** @param {import("./ground.js").CityBase} base */
+  async open(base) {
+    const outlook = await this.city.open(base);
+    const { count, ground, tile, half } = base.manifest;
     this._heights = { data: new Float32Array(outlook, ground.offset, ground.points ** 2 * count ** 2), count, ground, tile, half };
-    const at = this.source.run.world;
     this.cameras.target.set(0, 0, this.groundAt({ x: 0, y: 0 }) + 1.4);
-    void at;
   }
 
   /** @param {{x: number, y: number}} at @returns {number} height of the ground, roughly */
@@ -114,18 +122,54 @@ export class View {
     this.light.time.value = now / 1000;
     this.cameras.update(seconds, followed);
     this.camera.updateMatrixWorld();
-    const indoors = followed ? followed.room >= 0 : false;
+    const indoors = Boolean(followed) && followed.room >= 0 && this.cameras.mode !== "bird";
     if (before) {
       this.sky.update(before.sky, this.camera, indoors);
       this.people.update(between, this.camera, this.cameras.mode === "first" ? followed?.entity : 0);
       this.vehicles.update(between, this.camera, now);
       this.robots.update(between, this.camera, now);
     }
+    if (this._isStill(between, now)) return;
     this.city.showRoom(indoors ? followed.room : -1);
     this.city.update(this.camera);
     this.overlay.update();
     this.renderer.render(this.scene, this.camera);
     this._count(now);
+  }
+
+  /**
+   * Whether the picture need not be drawn again. One that rests is drawn with all care, once, and then not any more.
+   * @param {import("./between.js").Between} between
+   * @param {number} now
+   */
+  _isStill(between, now) {
+    const { elements } = this.camera.matrixWorld;
+    const { ring, plan, names } = this.overlay;
+    const key = `${between.time} ${elements.map((/** @type {number} */ v) => v.toFixed(4))} ${ring.position.x} ${ring.visible} ${plan.children.length} ${names.size} ${this.canvas.clientWidth}x${this.canvas.clientHeight} ${this.city.arrived} ${this.people.arrived}`;
+    if (key !== this._key || this._falls()) {
+      this._key = key;
+      this._moved = now;
+      if (this._fine) {
+        this._fine = false;
+        this.setCare(this._careBefore);
+        this.resize();
+      }
+      return false;
+    }
+    if (this._fine) return now - this._fineSince > 2500;
+    if (now - this._moved > 450) {
+      this._fine = true;
+      this._fineSince = now;
+      this._careBefore = this.care;
+      this.setCare(Math.max(this.care, FINE));
+      this.resize();
+    }
+    return false;
+  }
+
+  /** Whether rain or snow is on its way: then nothing rests. */
+  _falls() {
+    return this.sky.rain.visible || this.sky.snow.visible;
   }
 
   /** @param {number} now */
@@ -139,7 +183,7 @@ export class View {
     this.stats.fps = (1000 * this._frames) / (now - this._since);
     this._since = now;
     this._frames = 0;
-    if (!this.adapts || document.hidden) return;
+    if (!this.adapts || document.hidden || this._fine || now - this._moved > 400) return;
     if (this.stats.fps < GOAL * 0.85) this.setCare(this.care - 1);
     else if (this.stats.fps > GOAL * 1.6 && this.care < CARE.length - 1) this.setCare(this.care + 1);
   }
