@@ -12,8 +12,10 @@ export class Cameras {
    * @param {any} camera
    * @param {HTMLElement} canvas
    * @param {(target: {x: number, y: number}) => number} groundAt
+   * @param {(from: any, way: any, reach: number) => number} sight how far one sees from a point, metres
    */
-  constructor(camera, canvas, groundAt) {
+  constructor(camera, canvas, groundAt, sight) {
+    this.sight = sight;
     this.camera = camera;
     this.canvas = canvas;
     this.groundAt = groundAt;
@@ -141,6 +143,27 @@ export class Cameras {
     this.setMode(this.mode === "bird" ? "bird" : "orbit");
     this.target.set(x, y, z);
     this.distance = this.mode === "bird" ? Math.max(distance, 120) : distance;
+    if (this.mode === "orbit") this._findSight();
+  }
+
+  /** Turn, and look down more steeply, until nothing stands between camera and target. */
+  _findSight() {
+    const turns = [0, 0.5, -0.5, 1, -1, 1.6, -1.6, 2.3, -2.3, 3.1];
+    for (const pitch of [this.pitch, 0.45, 0.65, 0.9]) {
+      if (pitch < this.pitch) continue;
+      for (const turn of turns) {
+        if (this.sight(this.target, this._away(this.yaw + turn, pitch), this.distance) < this.distance) continue;
+        this.yaw += turn;
+        this.pitch = pitch;
+        return;
+      }
+    }
+    this.pitch = Math.max(this.pitch, 1.2);
+  }
+
+  /** @param {number} yaw @param {number} pitch @returns {any} the way from the target to the camera */
+  _away(yaw, pitch) {
+    return new THREE.Vector3(Math.cos(yaw) * Math.cos(pitch), Math.sin(yaw) * Math.cos(pitch), Math.sin(pitch));
   }
 
   /**
@@ -174,7 +197,8 @@ export class Cameras {
     }
     const isInside = Boolean(followed) && (followed?.room ?? -1) >= 0 && this.mode !== "bird";
     if (isInside && followed) this.target.set(followed.x, followed.y, followed.z + 1);
-    const distance = isInside ? Math.min(this.distance, 11) : this.distance;
+    let distance = isInside ? Math.min(this.distance, 11) : this.distance;
+    if (!isInside && this.mode === "follow") distance = Math.max(1.2, this.sight(this.target, this._away(this.yaw, this.pitch), distance) - 0.3);
     const pitch = isInside && this.mode === "orbit" ? Math.max(this.pitch, 0.55) : this.pitch;
     const flat = Math.cos(pitch) * distance;
     const z = this.target.z + Math.sin(pitch) * distance;

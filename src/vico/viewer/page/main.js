@@ -343,8 +343,8 @@ class Page {
       if (near > most) [best, most] = [one, near];
     }
     if (!best) return;
-    this.view.cameras.lookAt(best.x, best.y, best.z + 2, 42);
     this.view.cameras.pitch = 0.3;
+    this.view.cameras.lookAt(best.x, best.y, best.z + 2, 38);
   }
 
   /** @param {number} seconds @param {number} now */
@@ -401,7 +401,7 @@ class Page {
       this.charts.update(clock.time);
     }
     if (between.before) byId("weather").textContent = weatherText(between.before.sky);
-    this.map?.draw(between.bodies, (entity) => between.before?.agents.room[between.before?.rows.agents.get(entity) ?? -1] ?? -1, {
+    this.map?.draw(between.bodies, (/** @type {number} */ entity) => between.before?.agents.room[between.before?.rows.agents.get(entity) ?? -1] ?? -1, {
       selected: this.selected,
       camera: view ? cameraOnMap(view) : null,
       plan: this.plan,

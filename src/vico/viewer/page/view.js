@@ -36,7 +36,8 @@ export class View {
     this.camera = new THREE.PerspectiveCamera(55, 1, 0.25, 6000);
     this.light = makeLight();
     this.city = new City(this.scene, this.light);
-    this.cameras = new Cameras(this.camera, canvas, (p) => this.groundAt(p));
+    this.cameras = new Cameras(this.camera, canvas, (p) => this.groundAt(p), (from, way, reach) => this.sight(from, way, reach));
+    this._ray = new THREE.Raycaster();
     this.sky = new Sky(this.scene, this.light);
     this.people = new People(this.scene, this.light, source, this.city);
     this.vehicles = new Vehicles(this.scene, this.city, this.light, source);
@@ -81,6 +82,13 @@ export class View {
     const jx = Math.min(Math.round((u - ix * tile) / ground.step), n - 1);
     const jy = Math.min(Math.round((v - iy * tile) / ground.step), n - 1);
     return data[(iy * count + ix) * n * n + jy * n + jx];
+  }
+
+  /** @param {any} from @param {any} way @param {number} reach @returns {number} metres to the first wall, at most `reach` */
+  sight(from, way, reach) {
+    this._ray.set(from, way);
+    this._ray.far = reach;
+    return this._ray.intersectObjects(this.city.walls, false)[0]?.distance ?? reach;
   }
 
   /** @param {number} level */
