@@ -301,7 +301,7 @@ def demo(out: Path = Path("out/demo"), seed: int = 0, force: bool = False) -> in
 
 @assets.command(name="install")
 def assets_install(
-    what: Positional[Literal["people", "robots", "things", "llm", "all"]] = "all",
+    what: Positional[Literal["people", "robots", "viewer", "things", "llm", "all"]] = "all",
     pack: Path | None = None,
     force: bool = False,
 ) -> int:
