@@ -12,6 +12,7 @@ from PIL import Image
 from vico.io.cache import cache_folder
 from vico.io.files import write_bytes, write_json
 from vico.io.folders import new_folder
+from vico.render.lamps.found import LAMP_KINDS, with_lit_heads
 from vico.version import __version__
 from vico.viewer.city.models import moving_models, write_instances, write_models
 from vico.viewer.city.pack import Blob, PackedMesh, array_entries
@@ -22,7 +23,7 @@ from vico.viewer.city.tiles import TILE, Grid, far_tiles, ground_grid, ground_pi
 from vico.world.folder import World
 
 #: Of the files' layout; another number, and they are written anew.
-CITY_FORMAT = 1
+CITY_FORMAT = 2
 MANIFEST = "manifest.json"
 
 
@@ -52,7 +53,8 @@ def write_city(world: World, folder: Path) -> None:
     shapes = Blob()
     standing = world.prototypes()
     used = {entry["prototype"] for entry in instances}
-    models = {name: standing[name] for name in used} | moving_models()
+    lamps = lamps_of(world)
+    models = {name: with_lit_heads(standing[name]) if name in lamps else standing[name] for name in used} | moving_models()
     written = write_models(models, textures, shapes)
     robots = write_robots(textures, shapes)
     write_json(folder / "rooms.json", write_rooms(world, textures, folder))
@@ -74,6 +76,7 @@ def write_city(world: World, folder: Path) -> None:
             "ground": ground,
             "tiles": tiles,
             "instances": instances,
+            "lamps": sorted(lamps),
             "models": written,
             "robots": robots,
             "buildings": [
@@ -82,6 +85,12 @@ def write_city(world: World, folder: Path) -> None:
             ],
         },
     )
+
+
+def lamps_of(world: World) -> set[str]:
+    """Return the prototypes that shine at night."""
+    is_lamp = np.isin(world.objects.kind, LAMP_KINDS) & (world.objects.room == "")
+    return set(world.objects.prototype[is_lamp].tolist())
 
 
 def _tile(

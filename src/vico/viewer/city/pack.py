@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from vico.viewer.city.textures import SHAPES, TextureLayers
 from vico.world.mesh import Surface
 
-_CUTOUT, _EMISSIVE = 127, 64
+# The fourth number of normals: alpha means holes; or how many hundredths of its colour a surface gives at night.
+_CUTOUT, _FULLY = 127, 100
 
 
 @dataclass(frozen=True)
@@ -26,8 +27,8 @@ class PackedMesh:
     position, uv
         float32, shapes ``(n, 3)`` and ``(n, 2)``.
     normal
-        int8, shape ``(n, 4)``, unit vectors times 127; the fourth is 127 where the texture's alpha means holes, 64 where
-        the whole surface shines by itself at night, else 0.
+        int8, shape ``(n, 4)``, unit vectors times 127; the fourth is 127 where the texture's alpha means holes, else
+        the material's emission times 100.
     colour
         uint8, shape ``(n, 4)``: sRGB that multiplies the texture, and the layer.
     entity
@@ -58,7 +59,7 @@ def packed(surfaces: Iterable[Surface], textures: TextureLayers) -> list[PackedM
         if not len(surface.triangles):
             continue
         layer = textures.layer_of(surface.material)
-        flag = _CUTOUT if layer.cutout else (_EMISSIVE if surface.material.emission > 0 else 0)
+        flag = _CUTOUT if layer.cutout else round(_FULLY * min(surface.material.emission, 1.0))
         by_array.setdefault(layer.array, []).append((surface, layer.layer, flag))
     return [_joined(array, parts) for array, parts in sorted(by_array.items())]
 

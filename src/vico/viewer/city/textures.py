@@ -30,7 +30,7 @@ class Layer:
     layer
         Index in that array, below 256.
     cutout
-        Whether alpha means holes; else it is the share of light that a texel gives at night.
+        Whether alpha means holes; else it is the share of the material's emission that a texel gives.
     colour
         Mean colour, sRGB 0..255, float64, shape ``(3,)``.
     """
@@ -61,9 +61,7 @@ class TextureLayers:
 
     def __post_init__(self) -> None:
         """Begin with the white layer."""
-        white = np.full((*SHAPES[0], 4), 255, np.uint8)
-        white[:, :, 3] = 0
-        self.pictures[0].append(white)
+        self.pictures[0].append(np.full((*SHAPES[0], 4), 255, np.uint8))
 
     def layer_of(self, material: Material) -> Layer:
         """Return where a material's texture is, adding it if it is new."""
@@ -93,7 +91,7 @@ class TextureLayers:
         for array, layers in enumerate(self.pictures):
             for number, picture in enumerate(layers):
                 yield {"array": array, "layer": number, "what": "colour"}, _encoded(picture[:, :, :3], "JPEG")
-                if picture[:, :, 3].any():
+                if picture[:, :, 3].min() < 255:
                     yield {"array": array, "layer": number, "what": "alpha"}, _encoded(picture[:, :, 3], "PNG")
 
 
@@ -102,7 +100,7 @@ def _with_alpha(material: Material) -> NDArray[np.uint8]:
     assert texture is not None
     if texture.shape[2] == 4:
         return texture
-    alpha = np.zeros((*texture.shape[:2], 1), np.uint8)
+    alpha = np.full((*texture.shape[:2], 1), 255, np.uint8)
     return np.concatenate([texture, alpha], axis=2)
 
 

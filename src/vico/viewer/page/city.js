@@ -112,6 +112,8 @@ export class City {
     this.robotShapes = shapes;
     this.instances = new Instances(this.scene, this);
     for (const entry of this.manifest.instances) this.instances.add(entry, outlook);
+    this.pools = lampPools(this, outlook);
+    if (this.pools) this.scene.add(this.pools);
     this._resolveReady?.(null);
   }
 
@@ -172,6 +174,7 @@ export class City {
       tile.far.visible = !(isNear && tile.near);
     }
     if (this.instances) this.instances.update(camera, this.inside >= 0);
+    if (this.pools) this.pools.visible = this.light.night.value > 0.2 && this.inside < 0;
     if (this._plane) this._plane.visible = this.inside < 0;
   }
 
@@ -284,4 +287,43 @@ function groundGeometry(outlook, ground, entry, half) {
   geometry.setAttribute("tint", new THREE.BufferAttribute(new Uint8Array(4 * n * n).fill(255), 4, true));
   geometry.setIndex(index);
   return geometry;
+}
+
+/**
+ * Make the spots of light below lamps: one call for all.
+ * @param {City} city
+ * @param {ArrayBuffer} outlook
+ */
+function lampPools(city, outlook) {
+  const shining = new Set(city.manifest.lamps ?? []);
+  const places = [];
+  for (const { prototype, offset, count } of city.manifest.instances) {
+    if (!shining.has(prototype)) continue;
+    const table = new Float32Array(outlook, offset, 5 * count);
+    const model = city.models.get(prototype);
+    for (let k = 0; k < count; k++) {
+      const height = (model?.high[2] ?? 5) * table[5 * k + 4];
+      const arm = (model?.high[0] ?? 0) > 0.8 ? model.high[0] * 0.8 : 0;
+      const yaw = table[5 * k + 3];
+      places.push([table[5 * k] + Math.cos(yaw) * arm, table[5 * k + 1] + Math.sin(yaw) * arm, table[5 * k + 2], Math.min(2.2 * height, 13)]);
+    }
+  }
+  if (!places.length) return null;
+  const material = new THREE.ShaderMaterial({
+    uniforms: { night: city.light.night },
+    vertexShader: `varying vec2 at; void main() { at = position.xy; gl_Position = projectionMatrix * modelViewMatrix * instanceMatrix * vec4(position, 1.0); }`,
+    fragmentShader: `uniform float night; varying vec2 at; void main() { float r = length(at); if (r > 1.0) discard;
+      gl_FragColor = vec4(vec3(1.0, 0.8, 0.52) * 0.55 * night * pow(1.0 - r, 1.6), 1.0); }`,
+    transparent: true,
+    depthWrite: false,
+    blending: THREE.AdditiveBlending,
+    polygonOffset: true,
+    polygonOffsetFactor: -3,
+    polygonOffsetUnits: -6,
+  });
+  const mesh = new THREE.InstancedMesh(new THREE.CircleGeometry(1, 20), material, places.length);
+  places.forEach(([x, y, z, r], k) => mesh.instanceMatrix.array.set([r, 0, 0, 0, 0, r, 0, 0, 0, 0, 1, 0, x, y, z + 0.14, 1], 16 * k));
+  mesh.frustumCulled = false;
+  mesh.renderOrder = 1;
+  return mesh;
 }

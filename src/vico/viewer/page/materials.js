@@ -62,10 +62,10 @@ void main() {
   vec4 texel = texture(pictures, vec3(vUv, floor(vTint.a + 0.5)));
   vec3 base = texel.rgb * vTint.rgb;
   vec3 colour = base * vLight;
-  if (vFlag > 0.75) { if (texel.a < 0.5) discard; }
+  if (vFlag > 0.9) { if (texel.a < 0.5) discard; }
   else {
-    float shine = vFlag > 0.25 ? 1.0 : texel.a;
-    colour = mix(colour, base * vec3(1.15, 1.0, 0.78) + vec3(0.08, 0.06, 0.02), shine * night);
+    float shine = min(vFlag * 1.27, 1.0) * texel.a;
+    colour = mix(colour, base * vec3(1.25, 1.05, 0.75) + vec3(0.16, 0.11, 0.04), shine * night);
   }
   gl_FragColor = vec4(mix(colour, fog, vFog), 1.0);
 }`;
@@ -173,7 +173,6 @@ export function plainMaterial(light, picture = null) {
  */
 export function pictureArray(size, layers, data) {
   const white = data ?? new Uint8Array(4).fill(255);
-  if (!data) white[3] = 0;
   const texture = data
     ? new THREE.DataArrayTexture(data, size.width, size.height, layers)
     : new THREE.DataArrayTexture(white, 1, 1, 1);

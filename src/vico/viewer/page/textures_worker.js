@@ -21,7 +21,6 @@ self.onmessage = async (/** @type {MessageEvent} */ message) => {
       const start = entry.layer * width * height * 4;
       if (entry.what === "colour") {
         data.set(pixels, start);
-        for (let k = start + 3; k < start + pixels.length; k += 4) data[k] = 0;
       } else for (let k = 0; k < pixels.length; k += 4) data[start + k + 3] = pixels[k];
     }
     /** @type {any} */ (self).postMessage({ number, width, height, layers, data }, [data.buffer]);
