@@ -117,6 +117,13 @@ export class City {
     this._resolveReady?.(null);
   }
 
+  /** Whether textures, models, tiles or rooms are still on their way. */
+  get pending() {
+    if (!this.textured || !this.instances) return true;
+    for (const group of this._roomFiles.values()) if (!group) return true;
+    return this.tiles.some((tile) => tile.loading);
+  }
+
   /** Resolves when the shapes of vehicles and the like are there. */
   get ready() {
     return this._ready;

@@ -56,6 +56,8 @@ class Page {
     this._talking = new Map();
     this._charted = 0;
     this._begun = false;
+    /** Whether somebody else draws: stills and films. */
+    this.frozen = false;
     this._last = performance.now();
     this._slow = 0;
   }
@@ -314,6 +316,7 @@ class Page {
 
   /** @param {number} now */
   _tick(now) {
+    if (this.frozen) return;
     const seconds = Math.min((now - this._last) / 1000, 0.5);
     this._last = now;
     const { source, clock, between } = this;
@@ -347,15 +350,25 @@ class Page {
     this.view.cameras.lookAt(best.x, best.y, best.z + 2, 38);
   }
 
+  /** Who is followed, as cameras want it; null for nobody. */
+  followed() {
+    const { between, selected } = this;
+    const body = between.bodies.get(selected);
+    const member = this.source.cast.get(selected);
+    const row = between.before?.rows.agents.get(selected);
+    const agents = between.before?.agents;
+    if (!body) return null;
+    const height = member?.size[2] ?? 1.7;
+    if (row === undefined || !agents) return { ...body, entity: selected, height, room: -1, pitch: 0 };
+    return { ...body, entity: selected, height, room: agents.room[row], pitch: agents.pitch[row] / 10000 };
+  }
+
   /** @param {number} seconds @param {number} now */
   _draw(seconds, now) {
     const { view, between } = this;
+    const followed = this.followed();
     const body = between.bodies.get(this.selected);
     const member = this.source.cast.get(this.selected);
-    const row = between.before?.rows.agents.get(this.selected);
-    const followed = body
-      ? { ...body, entity: this.selected, height: member?.size[2] ?? 1.7, room: row === undefined ? -1 : between.before?.agents.room[row], pitch: row === undefined ? 0 : (between.before?.agents.pitch[row] ?? 0) / 10000 }
-      : null;
     view.overlay.select(body ? { x: body.x, y: body.y, z: body.z, radius: Math.max(...(member?.size.slice(0, 2) ?? [0.6])) * 0.75 } : this.spot && { ...this.spot, radius: 0.6 });
     this._names();
     view.draw(between, seconds, followed, now);
@@ -460,6 +473,7 @@ const page = new Page();
   get keys() { return page.keys; },
   get ui() { return { keys: page.keys, toast, layer: byId("play-layer") }; },
   select: (/** @type {number} */ entity) => page.select(entity),
+  stills: () => import("/page/stills.js"),
 };
 page.open().catch((error) => {
   console.error(error);

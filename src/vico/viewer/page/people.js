@@ -59,6 +59,8 @@ export class People {
     this.city = city;
     this.nearReach = 28;
     this.arrived = 0;
+    /** How many in view are still on their way. */
+    this.pending = 0;
     this.bones = new Float32Array(4 * WIDTH * ROWS);
     this.texture = new THREE.DataTexture(this.bones, WIDTH, ROWS, THREE.RGBAFormat, THREE.FloatType);
     this.texture.minFilter = this.texture.magFilter = THREE.NearestFilter;
@@ -105,6 +107,7 @@ export class People {
       if (!person) wanted.push([away, entity, row]);
       else if (person.group && entity !== hidden) this._draw(person, between, row, body, away);
     }
+    this.pending = wanted.length + this.fetching;
     wanted.sort((a, b) => a[0] - b[0]);
     for (const [, entity] of wanted.slice(0, AT_ONCE - this.fetching)) this._fetch(entity);
     this.shadows.count = this.drawn;

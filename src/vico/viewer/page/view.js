@@ -122,8 +122,9 @@ export class View {
    * @param {number} seconds since the last picture
    * @param {any} followed
    * @param {number} now milliseconds
+   * @param {boolean} [always] whether also a picture that is as it was
    */
-  draw(between, seconds, followed, now) {
+  draw(between, seconds, followed, now, always = false) {
     this.resize();
     const { before } = between;
     if (before) setLight(this.light, before.sky);
@@ -137,7 +138,7 @@ export class View {
       this.vehicles.update(between, this.camera, now);
       this.robots.update(between, this.camera, now);
     }
-    if (this._isStill(between, now)) return;
+    if (!always && this._isStill(between, now)) return;
     this.city.showRoom(indoors ? followed.room : -1);
     this.city.update(this.camera);
     this.overlay.update();
@@ -194,6 +195,11 @@ export class View {
     if (!this.adapts || document.hidden || this._fine || now - this._moved > 400) return;
     if (this.stats.fps < GOAL * 0.85) this.setCare(this.care - 1);
     else if (this.stats.fps > GOAL * 1.6 && this.care < CARE.length - 1) this.setCare(this.care + 1);
+  }
+
+  /** Whether something in view is still on its way. */
+  get pending() {
+    return this.city.pending || this.people.pending > 0;
   }
 
   /** @param {string} [type] @returns {string} the picture as a data address */
