@@ -255,6 +255,8 @@ def still(options: Annotated[StillOptions, FLAT]) -> int:
     """Take a picture of somebody in a recorded run.
 
     Example: vico still morning --follow resident_3 --at 08:05 --view side --out walk.png
+
+    Example: vico still morning --follow resident_3 --at 08:05 --headless --out walk.png
     """
     from vico.cli import film as verb
 

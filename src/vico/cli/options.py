@@ -466,6 +466,8 @@ class FilmOptions:
         Its community, if it is no longer where it was.
     force
         Replace the file if it is there.
+    headless
+        Have the page of `vico view` draw it, in Chromium without a window: nothing is simulated again.
     """
 
     run: Positional[Path]
@@ -481,6 +483,7 @@ class FilmOptions:
     world: Path | None = None
     community: Path | None = None
     force: bool = False
+    headless: bool = False
 
 
 @dataclass(frozen=True)
@@ -511,6 +514,8 @@ class StillOptions:
         Its community, if it is no longer where it was.
     force
         Replace the file if it is there.
+    headless
+        Have the page of `vico view` draw it, in Chromium without a window: nothing is simulated again.
     """
 
     run: Positional[Path]
@@ -524,6 +529,7 @@ class StillOptions:
     world: Path | None = None
     community: Path | None = None
     force: bool = False
+    headless: bool = False
 
 
 def lat_lon(text: str, option: str) -> tuple[float, float]:

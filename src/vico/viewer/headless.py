@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -37,6 +38,8 @@ class Shot:
         What is looked at where nobody is followed, ENU metres.
     yaw, pitch
         From where, radians: on which side of the target, and how far above the horizon; None: as the page has them.
+    turn
+        On which side of whoever is followed, radians to the left of where they face.
     distance
         Metres; None: as the page has it.
     width, height
@@ -47,6 +50,7 @@ class Shot:
     mode: Literal["orbit", "follow", "first", "bird"] = "orbit"
     target: tuple[float, float, float] | None = None
     yaw: float | None = None
+    turn: float | None = None
     pitch: float | None = None
     distance: float | None = None
     width: int = 1920
@@ -91,7 +95,7 @@ class Stage:
         wish: dict[str, Any] = {"time": time, "mode": shot.mode, "type": form, "entity": self._entity(shot.agent)}
         if shot.target is not None:
             wish["target"] = dict(zip("xyz", shot.target, strict=True))
-        given = {"yaw": shot.yaw, "pitch": shot.pitch, "distance": shot.distance, "seconds": seconds}
+        given = {"yaw": shot.yaw, "turn": shot.turn, "pitch": shot.pitch, "distance": shot.distance, "seconds": seconds}
         wish |= {key: value for key, value in given.items() if value is not None}
         told = self._page.evaluate(f"vico.stills().then((s) => s.still(vico.page, {json.dumps(wish)}))")
         return base64.b64decode(str(told).partition(",")[2])
@@ -103,6 +107,39 @@ class Stage:
             names = ", ".join(list(self._agents)[:12])
             raise InputError(f"headless: nobody is called {agent!r}; there are {names}")
         return int(self._agents[agent])
+
+
+# Views of `vico.viewer.follow.VIEWS`: mode, degrees to the left of the face, degrees up, metres.
+_VIEWS: dict[str, tuple[Literal["follow", "first"], float, float, float]] = {
+    "behind": ("follow", 180.0, 16.0, 5.0),
+    "front": ("follow", 15.0, 8.0, 5.0),
+    "side": ("follow", 100.0, 8.0, 4.5),
+    "above": ("follow", 180.0, 62.0, 16.0),
+    "orbit": ("follow", 150.0, 15.0, 6.0),
+    "eyes": ("first", 0.0, 16.0, 5.0),
+}
+
+
+def shot_of(agent: str, view: str, *, width: int, height: int) -> Shot:
+    """Return the shot of somebody in one of `vico.viewer.follow.VIEWS`.
+
+    Raises
+    ------
+    InputError
+        If there is no such view.
+    """
+    if view not in _VIEWS:
+        raise InputError(f"view: {view!r}; it has to be one of {', '.join(_VIEWS)}")
+    mode, turn, pitch, distance = _VIEWS[view]
+    return Shot(
+        agent=agent,
+        mode=mode,
+        turn=math.radians(turn),
+        pitch=math.radians(pitch),
+        distance=distance,
+        width=width,
+        height=height,
+    )
 
 
 @contextmanager

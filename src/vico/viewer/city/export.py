@@ -54,7 +54,9 @@ def write_city(world: World, folder: Path) -> None:
     standing = world.prototypes()
     used = {entry["prototype"] for entry in instances}
     lamps = lamps_of(world)
-    models = {name: with_lit_heads(standing[name]) if name in lamps else standing[name] for name in used} | moving_models()
+    models = {
+        name: with_lit_heads(standing[name]) if name in lamps else standing[name] for name in used
+    } | moving_models()
     written = write_models(models, textures, shapes)
     robots = write_robots(textures, shapes)
     write_json(folder / "rooms.json", write_rooms(world, textures, folder))

@@ -7,6 +7,7 @@
  * @property {"orbit" | "follow" | "first" | "bird"} [mode]
  * @property {{x: number, y: number, z: number}} [target] what is looked at, where nobody is followed
  * @property {number} [yaw] radians
+ * @property {number} [turn] radians to the left of where who is followed faces
  * @property {number} [pitch] radians
  * @property {number} [distance] metres
  * @property {number} [seconds] since the picture before, of a film
@@ -69,6 +70,7 @@ function aim(cameras, wish) {
   if (wish.mode) cameras.setMode(wish.mode);
   if (wish.target) cameras.target.set(wish.target.x, wish.target.y, wish.target.z);
   if (wish.yaw !== undefined) cameras.yaw = wish.yaw;
+  if (wish.turn !== undefined) cameras._relative = wish.turn;
   if (wish.pitch !== undefined) cameras.pitch = wish.pitch;
   if (wish.distance !== undefined) cameras.distance = wish.distance;
 }
