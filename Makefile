@@ -27,10 +27,11 @@ endef
 	$(call install,$(DEV))
 	@touch .venv/demo $@
 
-# Bodies and robots with real meshes, from the packages that ship them. Compiled code is warmed once, here.
+# Bodies and robots with real meshes, and the page's 3D library, from the packages that ship them. Compiled code is warmed once, here.
 .venv/assets: .venv/demo
 	$(BIN)/vico assets install people
 	$(BIN)/vico assets install robots
+	$(BIN)/vico assets install viewer
 	$(BIN)/vico warm-up
 	@touch $@
 

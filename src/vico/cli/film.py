@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
+from vico.cli.live import city_of
 from vico.cli.options import FilmOptions, StillOptions
 from vico.cli.output import progress_bars
 from vico.clock import seconds_of_day
-from vico.errors import InputError, OutputExistsError
+from vico.errors import InputError, MissingFileError, OutputExistsError
 from vico.render.quality import RenderQuality
 from vico.sim.recording import Run, read_run
 from vico.viewer.repeat import RepeatedRun
 from vico.viewer.run_film import FilmSettings, write_run_film, write_still
+from vico.viewer.server import require_server
 
 
 def film(options: FilmOptions) -> int:
@@ -31,6 +35,8 @@ def film(options: FilmOptions) -> int:
         quality=RenderQuality.of(options.quality),
     )
     recorded = read_run(options.run)
+    if options.headless:
+        return _film_of_page(options, recorded)
     first = step_of(recorded, options.start, default=0)
     last = step_of(recorded, options.stop, default=recorded.last)
     with progress_bars() as report:
@@ -57,12 +63,72 @@ def still(options: StillOptions) -> int:
         quality=RenderQuality.of(options.quality),
     )
     recorded = read_run(options.run)
+    if options.headless:
+        return _still_of_page(options, recorded)
     step = step_of(recorded, options.at, default=recorded.last)
     write_still(
         options.out, RepeatedRun.of_folders(recorded, world=options.world, community=options.community), settings, step
     )
     print(options.out)
     return 0
+
+
+def _film_of_page(options: FilmOptions, run: Run) -> int:
+    """Film what the page draws of a run."""
+    from vico.viewer.headless import shot_of, write_film
+
+    width, height = size_of(options.size)
+    shot = shot_of(options.follow, options.view, width=width, height=height)
+    first, last = step_of(run, options.start, default=0), step_of(run, options.stop, default=run.last)
+    with _page_of(options.run, options.world) as address, progress_bars() as report:
+        frames = write_film(
+            address,
+            options.out,
+            shot,
+            first=first,
+            last=last,
+            rate=options.fps,
+            report=lambda done, count: report("film", done, count),
+        )
+    print(f"{options.out}: {frames} frames, {frames / options.fps:.1f} s")
+    return 0
+
+
+def _still_of_page(options: StillOptions, run: Run) -> int:
+    """Take a picture of what the page draws of a run."""
+    from vico.viewer.headless import shot_of, write_still
+
+    width, height = size_of(options.size)
+    shot = shot_of(options.follow, options.view, width=width, height=height)
+    step = step_of(run, options.at, default=run.last)
+    with _page_of(options.run, options.world) as address:
+        write_still(address, options.out, shot, step)
+    print(options.out)
+    return 0
+
+
+@contextmanager
+def _page_of(path: Path, world: Path | None) -> Iterator[str]:
+    """Serve a run's page while the block lasts; give its address."""
+    from vico.viewer.browser import browser_program
+    from vico.viewer.three import three_module
+
+    require_server()
+    # What is missing is said before anything is begun.
+    browser_program()
+    three_module()
+    from vico.viewer.server.serve import ViewerServer
+    from vico.viewer.server.state import ViewerState
+    from vico.viewer.sources.source import Source
+    from vico.viewer.sources.views import RecordedViews
+
+    source = Source.recorded(path, world=world)
+    run = source.tables.run
+    assert run is not None
+    if source.world is None:
+        raise MissingFileError(f"{path}: its world is no longer there; give its folder with --world")
+    with ViewerServer(ViewerState(source, RecordedViews(run).view, city=city_of(source.world))) as server:
+        yield server.url
 
 
 def size_of(text: str) -> tuple[int, int]:

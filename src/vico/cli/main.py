@@ -260,6 +260,8 @@ def still(options: Annotated[StillOptions, FLAT]) -> int:
     """Take a picture of somebody in a recorded run.
 
     Example: vico still morning --follow resident_3 --at 08:05 --view side --out walk.png
+
+    Example: vico still morning --follow resident_3 --at 08:05 --headless --out walk.png
     """
     from vico.cli import film as verb
 
@@ -306,7 +308,7 @@ def demo(out: Path = Path("out/demo"), seed: int = 0, force: bool = False) -> in
 
 @assets.command(name="install")
 def assets_install(
-    what: Positional[Literal["people", "robots", "things", "llm", "all"]] = "all",
+    what: Positional[Literal["people", "robots", "viewer", "things", "llm", "all"]] = "all",
     pack: Path | None = None,
     force: bool = False,
 ) -> int:

@@ -540,6 +540,8 @@ class FilmOptions:
         Its community, if it is no longer where it was.
     force
         Replace the file if it is there.
+    headless
+        Have the page of `vico view` draw it, in Chromium without a window: nothing is simulated again.
     """
 
     run: Positional[Path]
@@ -555,6 +557,7 @@ class FilmOptions:
     world: Path | None = None
     community: Path | None = None
     force: bool = False
+    headless: bool = False
 
 
 @dataclass(frozen=True)
@@ -585,6 +588,8 @@ class StillOptions:
         Its community, if it is no longer where it was.
     force
         Replace the file if it is there.
+    headless
+        Have the page of `vico view` draw it, in Chromium without a window: nothing is simulated again.
     """
 
     run: Positional[Path]
@@ -598,6 +603,7 @@ class StillOptions:
     world: Path | None = None
     community: Path | None = None
     force: bool = False
+    headless: bool = False
 
 
 def lat_lon(text: str, option: str) -> tuple[float, float]:

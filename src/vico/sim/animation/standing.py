@@ -150,7 +150,7 @@ def _stand_upright(body: Any, p: float, clip: int) -> None:
             lifts[side], pivots[side] = _pivot((p + 0.5 * side) % 1.0)
         shift[Y] = 0.025 * np.sin(_TAU * p)
     elif clip in (IDLE, STAND, PHONE):
-        weight, yaw, glance = _restless(body)
+        weight, yaw, glance = restlessness(body.second, style.asymmetry, style.rhythm)
         if clip == PHONE:
             up = _raised(p)
             yaw, glance = yaw * (1.0 - up), glance * (1.0 - up) + 0.5 * up
@@ -190,11 +190,9 @@ def _whim(second: float, every: float, stream: float, rhythm: float) -> float:
 
 
 @compiled
-def _restless(body: Any) -> Any:
+def restlessness(second: float, asymmetry: float, rhythm: float) -> Any:
     """Return where the weight is (-1 right, 1 left), where the head turns and how it nods, of who stands and waits."""
-    style, second = body.style, body.second
-    rhythm = style.rhythm
-    weight = _whim(second, 6.0 + 5.0 * style.asymmetry, 1.0, rhythm)
+    weight = _whim(second, 6.0 + 5.0 * asymmetry, 1.0, rhythm)
     look = _whim(second, 4.0 + 3.0 * rhythm, 2.0, rhythm)
     # Mostly people look ahead.
     away = 0.9 * (look - 0.35 * min(max(look / 0.35, -1.0), 1.0))

@@ -1,0 +1,6 @@
+"""What a browser draws of a world: tiles, textures, models, robots and people, as files of columns."""
+
+from vico.viewer.city.export import city_folder, write_city
+from vico.viewer.city.people import PeopleFiles
+
+__all__ = ["PeopleFiles", "city_folder", "write_city"]

@@ -1,0 +1,336 @@
+// The city that stands: tiles near and far, the ground, what stands in the street, and rooms one goes into.
+
+import { THREE } from "./three.js";
+import { getJson } from "./source.js";
+import { cityMaterial, meshGeometry, pictureArray, plainMaterial } from "./materials.js";
+import { Instances } from "./instances.js";
+
+/** Tiles of which the whole geometry is kept in memory. */
+const KEPT = 40;
+
+export class City {
+  /**
+   * @param {any} scene
+   * @param {import("./light.js").Light} light
+   */
+  constructor(scene, light) {
+    this.scene = scene;
+    this.light = light;
+    /** @type {any} */
+    this.manifest = null;
+    /** @type {any[]} */
+    this.tiles = [];
+    /** @type {any[]} */
+    this.materials = [];
+    /** @type {any[]} */
+    this.insideMaterials = [];
+    /** @type {{value: any}[]} */
+    this.pictures = [];
+    /** @type {ArrayBuffer | undefined} */
+    this.robotShapes = undefined;
+    /** Which file of rooms is shown, -1 for none: then one is inside. */
+    this.inside = -1;
+    /** @type {Map<string, any>} */
+    this.models = new Map();
+    this.textured = false;
+    /** Metres within which tiles are drawn whole. */
+    this.nearReach = 130;
+    /** How many parts have come so far. */
+    this.arrived = 0;
+    /** @type {Instances | null} */
+    this.instances = null;
+    this._round = 0;
+    this._ready = new Promise((resolve) => (this._resolveReady = resolve));
+    /** @type {any} */
+    this.rooms = null;
+    /** @type {Map<number, any>} */
+    this._roomFiles = new Map();
+  }
+
+  /**
+   * Fetch what the first picture needs: the outlook over the whole city.
+   * @param {import("./ground.js").CityBase} base
+   * @returns {Promise<ArrayBuffer>}
+   */
+  async open({ manifest, picture }) {
+    this.manifest = manifest;
+    const outlook = await bytes("/city/outlook.bin");
+    const pictures = this.manifest.arrays.map(() => ({ value: pictureArray({ width: 1, height: 1 }, 1) }));
+    this.pictures = pictures;
+    this.materials = pictures.map((/** @type {any} */ array) => cityMaterial(this.light, array));
+    this.insideMaterials = pictures.map((/** @type {any} */ array) => cityMaterial(this.light, array, true));
+    this._outlook(outlook, new THREE.CanvasTexture(picture));
+    this._shapes(outlook);
+    this._textures();
+    return outlook;
+  }
+
+  /** @param {ArrayBuffer} outlook @param {any} texture */
+  _outlook(outlook, texture) {
+    const { half, ground } = this.manifest;
+    texture.anisotropy = 4;
+    const groundMaterial = plainMaterial(this.light, texture);
+    const wallMaterial = plainMaterial(this.light);
+    for (const entry of this.manifest.tiles) {
+      const tile = { entry, near: /** @type {any} */ (null), far: new THREE.Group(), wanted: 0, loading: false };
+      const floor = new THREE.Mesh(groundGeometry(outlook, ground, entry, half), groundMaterial);
+      tile.far.add(floor);
+      if (entry.far) {
+        const walls = new THREE.Mesh(meshGeometry(outlook, entry.far), wallMaterial);
+        walls.name = "walls";
+        tile.far.add(walls);
+      }
+      this.scene.add(tile.far);
+      this.tiles.push(tile);
+    }
+    this._surroundings(outlook, ground);
+  }
+
+  /** @param {ArrayBuffer} outlook @param {any} ground */
+  _surroundings(outlook, ground) {
+    const heights = new Float32Array(outlook, ground.offset, ground.points * ground.points * this.manifest.count ** 2);
+    const low = heights.reduce((a, b) => Math.min(a, b), Infinity);
+    const material = new THREE.ShaderMaterial({
+      uniforms: { colour: this.light.ground, fog: this.light.fog, reach: this.light.reach },
+      vertexShader: `uniform float reach; varying float f; void main() { vec4 v = modelViewMatrix * vec4(position, 1.0);
+        float d = length(v.xyz) / min(reach, 420.0); f = 1.0 - exp(-d * d * 0.6); gl_Position = projectionMatrix * v; }`,
+      fragmentShader: `uniform vec3 colour, fog; varying float f;
+        void main() { gl_FragColor = vec4(mix(colour * 1.25, fog, f), 1.0); }`,
+    });
+    const { half } = this.manifest;
+    const ring = new THREE.RingGeometry(half * 0.9, half + 2500, 48, 8);
+    const plane = new THREE.Mesh(ring, material);
+    plane.position.z = low - 1.5;
+    this._plane = plane;
+    this.scene.add(plane);
+  }
+
+  /** @param {ArrayBuffer} outlook */
+  async _shapes(outlook) {
+    const shapes = await bytes("/city/models.bin");
+    for (const [name, entry] of Object.entries(this.manifest.models)) this._addModel(name, entry, shapes);
+    this.robotShapes = shapes;
+    this.instances = new Instances(this.scene, this);
+    for (const entry of this.manifest.instances) this.instances.add(entry, outlook);
+    this.pools = lampPools(this, outlook);
+    if (this.pools) this.scene.add(this.pools);
+    this._resolveReady?.(null);
+  }
+
+  /** Whether textures, models, tiles or rooms are still on their way. */
+  get pending() {
+    if (!this.textured || !this.instances) return true;
+    for (const group of this._roomFiles.values()) if (!group) return true;
+    return this.tiles.some((tile) => tile.loading);
+  }
+
+  /** Resolves when the shapes of vehicles and the like are there. */
+  get ready() {
+    return this._ready;
+  }
+
+  /** @param {string} name @param {any} entry @param {ArrayBuffer} shapes */
+  _addModel(name, entry, shapes) {
+    this.models.set(name, {
+      near: entry.near.map((/** @type {any} */ mesh) => ({ geometry: meshGeometry(shapes, mesh), array: mesh.array })),
+      far: entry.far.map((/** @type {any} */ mesh) => ({ geometry: meshGeometry(shapes, mesh), array: mesh.array })),
+      low: entry.low,
+      high: entry.high,
+    });
+  }
+
+  async _textures() {
+    const buffer = await bytes("/city/textures.bin");
+    const worker = new Worker("/page/textures_worker.js", { type: "module" });
+    let left = this.manifest.arrays.length;
+    worker.onmessage = ({ data }) => {
+      if (data.layers) {
+        this.pictures[data.number].value = pictureArray(data, data.layers, data.data);
+      }
+      if (--left === 0) {
+        worker.terminate();
+        this.textured = true;
+        this.arrived++;
+      }
+    };
+    const { textures, arrays } = this.manifest;
+    worker.postMessage({ buffer, textures, arrays }, [buffer]);
+  }
+
+  /**
+   * Draw tiles near the camera whole, and the others from afar.
+   * @param {any} camera
+   */
+  update(camera) {
+    const { tile: side } = this.manifest;
+    const { x, y, z } = camera.position;
+    this._round++;
+    for (const tile of this.tiles) {
+      const dx = Math.max(tile.entry.x - x, 0, x - tile.entry.x - side);
+      const dy = Math.max(tile.entry.y - y, 0, y - tile.entry.y - side);
+      const away = Math.hypot(dx, dy, Math.max(0, z - 40));
+      if (this.inside >= 0) {
+        tile.far.visible = false;
+        if (tile.near) tile.near.visible = false;
+        continue;
+      }
+      const isNear = away < this.nearReach * (tile.near?.visible ? 1.1 : 1) && this.textured;
+      if (isNear && !tile.near && !tile.loading) this._load(tile);
+      if (isNear) tile.wanted = this._round;
+      if (tile.near) tile.near.visible = isNear;
+      tile.far.visible = !(isNear && tile.near);
+    }
+    if (this.instances) this.instances.update(camera, this.inside >= 0);
+    if (this.pools) this.pools.visible = this.light.night.value > 0.2 && this.inside < 0;
+    if (this._plane) this._plane.visible = this.inside < 0;
+  }
+
+  /** @param {any} tile */
+  async _load(tile) {
+    tile.loading = true;
+    try {
+      const buffer = await bytes(`/city/${tile.entry.file}`);
+      const group = new THREE.Group();
+      for (const entry of tile.entry.near) {
+        group.add(new THREE.Mesh(meshGeometry(buffer, entry), this.materials[entry.array]));
+      }
+      tile.near = group;
+      this.arrived++;
+      this.scene.add(group);
+      this._forget();
+    } finally {
+      tile.loading = false;
+    }
+  }
+
+  /** Let go of the tiles that were not wanted for longest. */
+  _forget() {
+    const held = this.tiles.filter((tile) => tile.near);
+    if (held.length <= KEPT) return;
+    held.sort((a, b) => a.wanted - b.wanted);
+    for (const tile of held.slice(0, held.length - KEPT)) {
+      this.scene.remove(tile.near);
+      for (const mesh of tile.near.children) mesh.geometry.dispose();
+      tile.near = null;
+    }
+  }
+
+  /**
+   * Show the rooms of the building that a room is in; none for -1.
+   * @param {number} room index in the world
+   */
+  async showRoom(room) {
+    if (!this.rooms && room >= 0 && this.textured) {
+      this.rooms = {};
+      const [index, shapes] = await Promise.all([getJson("/city/rooms.json"), bytes("/city/furniture.bin")]);
+      this.rooms = index;
+      for (const [name, entry] of Object.entries(index.furniture)) {
+        if (!this.models.has(name)) this._addModel(name, { low: [0, 0, 0], high: [1, 1, 1], .../** @type {any} */ (entry) }, shapes);
+      }
+    }
+    const wanted = room >= 0 && this.rooms?.rooms ? this.rooms.rooms[room] : -1;
+    for (const [number, group] of this._roomFiles) if (group) group.visible = number === wanted;
+    this.inside = wanted;
+    if (wanted < 0 || this._roomFiles.has(wanted)) return;
+    this._roomFiles.set(wanted, null);
+    const entry = this.rooms.files[wanted];
+    const buffer = await bytes(`/city/${entry.file}`);
+    const group = new THREE.Group();
+    for (const mesh of entry.near) group.add(new THREE.Mesh(meshGeometry(buffer, mesh), this.insideMaterials[mesh.array]));
+    const furniture = new Instances(group, this, { near: 45, far: 0 }, this.insideMaterials);
+    for (const instance of entry.instances) furniture.add(instance, buffer);
+    furniture.fillAll();
+    this.scene.add(group);
+    this._roomFiles.set(wanted, group);
+    this.arrived++;
+  }
+
+  /** Meshes to aim at: far walls, with the building of each vertex. */
+  get walls() {
+    return this.tiles.flatMap((tile) => tile.far.children.filter((/** @type {any} */ m) => m.name === "walls"));
+  }
+}
+
+/** @param {string} path @returns {Promise<ArrayBuffer>} */
+export async function bytes(path) {
+  const answer = await fetch(path);
+  if (!answer.ok) throw new Error(`${path}: ${answer.status}`);
+  return answer.arrayBuffer();
+}
+
+/**
+ * @param {ArrayBuffer} outlook
+ * @param {{offset: number, points: number, step: number}} ground
+ * @param {any} entry
+ * @param {number} half
+ */
+function groundGeometry(outlook, ground, entry, half) {
+  const n = ground.points;
+  const heights = new Float32Array(outlook, ground.offset + 4 * entry.index * n * n, n * n);
+  const position = new Float32Array(3 * n * n);
+  const uv = new Float32Array(2 * n * n);
+  const facing = new Float32Array(4 * n * n);
+  for (let iy = 0; iy < n; iy++) {
+    for (let ix = 0; ix < n; ix++) {
+      const k = iy * n + ix;
+      const x = Math.min(entry.x + ix * ground.step, half);
+      const y = Math.min(entry.y + iy * ground.step, half);
+      position.set([x, y, heights[k] - 0.12], 3 * k);
+      uv.set([(x + half) / (2 * half), (y + half) / (2 * half)], 2 * k);
+      facing[4 * k + 2] = 1;
+    }
+  }
+  const index = [];
+  for (let iy = 0; iy + 1 < n; iy++) {
+    for (let ix = 0; ix + 1 < n; ix++) {
+      const a = iy * n + ix;
+      index.push(a, a + 1, a + n, a + 1, a + n + 1, a + n);
+    }
+  }
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
+  geometry.setAttribute("uv", new THREE.BufferAttribute(uv, 2));
+  geometry.setAttribute("facing", new THREE.BufferAttribute(facing, 4));
+  geometry.setAttribute("tint", new THREE.BufferAttribute(new Uint8Array(4 * n * n).fill(255), 4, true));
+  geometry.setIndex(index);
+  return geometry;
+}
+
+/**
+ * Make the spots of light below lamps: one call for all.
+ * @param {City} city
+ * @param {ArrayBuffer} outlook
+ */
+function lampPools(city, outlook) {
+  const shining = new Set(city.manifest.lamps ?? []);
+  const places = [];
+  for (const { prototype, offset, count } of city.manifest.instances) {
+    if (!shining.has(prototype)) continue;
+    const table = new Float32Array(outlook, offset, 5 * count);
+    const model = city.models.get(prototype);
+    for (let k = 0; k < count; k++) {
+      const height = (model?.high[2] ?? 5) * table[5 * k + 4];
+      const arm = (model?.high[0] ?? 0) > 0.8 ? model.high[0] * 0.8 : 0;
+      const yaw = table[5 * k + 3];
+      places.push([table[5 * k] + Math.cos(yaw) * arm, table[5 * k + 1] + Math.sin(yaw) * arm, table[5 * k + 2], Math.min(2.2 * height, 13)]);
+    }
+  }
+  if (!places.length) return null;
+  const material = new THREE.ShaderMaterial({
+    uniforms: { night: city.light.night },
+    vertexShader: `varying vec2 at; void main() { at = position.xy; gl_Position = projectionMatrix * modelViewMatrix * instanceMatrix * vec4(position, 1.0); }`,
+    fragmentShader: `uniform float night; varying vec2 at; void main() { float r = length(at); if (r > 1.0) discard;
+      gl_FragColor = vec4(vec3(1.0, 0.8, 0.52) * 0.55 * night * pow(1.0 - r, 1.6), 1.0); }`,
+    transparent: true,
+    depthWrite: false,
+    blending: THREE.AdditiveBlending,
+    polygonOffset: true,
+    polygonOffsetFactor: -3,
+    polygonOffsetUnits: -6,
+  });
+  const mesh = new THREE.InstancedMesh(new THREE.CircleGeometry(1, 20), material, places.length);
+  places.forEach(([x, y, z, r], k) => mesh.instanceMatrix.array.set([r, 0, 0, 0, 0, r, 0, 0, 0, 0, 1, 0, x, y, z + 0.14, 1], 16 * k));
+  mesh.frustumCulled = false;
+  mesh.renderOrder = 1;
+  return mesh;
+}
