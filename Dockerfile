@@ -7,9 +7,9 @@ FROM debian:bookworm-slim
 # Of pyproject.toml. "worldgen" builds worlds, "ray" and "s3" are for many machines.
 ARG EXTRAS=worldgen,ray,s3
 
-# wget is what KubeRay asks a node with whether it is well.
+# libatomic is for SUMO's netconvert, wget is what KubeRay asks a node with whether it is well.
 RUN apt-get update \
- && apt-get install --yes --no-install-recommends ca-certificates python3 python3-venv wget \
+ && apt-get install --yes --no-install-recommends ca-certificates libatomic1 python3 python3-venv wget \
  && rm -rf /var/lib/apt/lists/*
 
 ENV PATH=/opt/vico/bin:$PATH \

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from vico.errors import InputError, MissingExtraError, OutputError, SourceError
-from vico.io.files import write_bytes
+from vico.io.files import reason_of, write_bytes
 from vico.io.folders import remove
 
 _THREADS = 16  # files that travel at a time
@@ -101,8 +101,10 @@ class FolderStore:
         """Return what a file holds; None if there is none."""
         try:
             return (self.folder / name).read_bytes()
-        except (FileNotFoundError, NotADirectoryError):
+        except (FileNotFoundError, NotADirectoryError, IsADirectoryError):
             return None
+        except OSError as error:
+            raise SourceError(f"{self.folder / name}: cannot be read: {reason_of(error, writing=False)}") from None
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file, whole or not at all."""
@@ -208,7 +210,7 @@ class ObjectStore:
     def fetch_folder(self, name: str, out: Path) -> None:
         """Copy a folder to this machine."""
         names = self.names(name)
-        theirs = [self._path(f"{name}/{one}") for one in names]
+        theirs = [f"{self._path(name)}/{one}" for one in names]
         for one in names:
             (out / one).parent.mkdir(parents=True, exist_ok=True)
         with _errors(self._url(name), SourceError, "cannot be read"):
