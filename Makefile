@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 DEMO ?= out/demo
 SEED ?= 0
-DEV := worldgen,photos,usd,docs,dev
+DEV := worldgen,photos,usd,s3,docs,dev
 
 .PHONY: demo test check docs wheel bench clean
 

@@ -116,3 +116,10 @@ def test_people_are_asked_and_answer(helsinki: World, helsinki_path: Path, tmp_p
     )
     assert "assistant: Excuse me, have you seen" in printed
     assert "   understood: " in printed
+
+
+def test_work_of_ones_own_is_shared_out(helsinki_path: Path) -> None:
+    printed = [run("17_many_machines.py", str(helsinki_path), "nowhere", "--workers", n) for n in ("1", "2")]
+    assert sorted(printed[0].splitlines()) == sorted(printed[1].splitlines())
+    assert re.search(r"^\w+: \d+ buildings, \d+\.\d\d ha to walk on$", printed[0], re.MULTILINE)
+    assert "nowhere: nowhere: no such folder" in printed[0]
