@@ -19,9 +19,9 @@ from reporting import write_page
 from vico.agents.influence.visits import FAILURES
 from vico.challenges.influence import INFLUENCE
 from vico.challenges.influence.evaluate import CAUSES
+from vico.challenges.tables.files import read_results
 from vico.challenges.tables.markdown import setting_words, table
 from vico.errors import InputError
-from vico.io.files import read_json
 
 BLOCKS = {
     "pairings": "Every pairing of the offline strategies",
@@ -41,15 +41,19 @@ def results_in(out: Path) -> dict[str, Results]:
 
     Raises
     ------
-    InputError
-        If there are none, or they are another challenge's.
+    InputError, SchemaError
+        If there are none, they are another challenge's, or damaged.
     """
-    found = {name: read_json(out / name / "results.json") for name in BLOCKS if (out / name / "results.json").exists()}
+    found: dict[str, Results] = {}
+    for name in BLOCKS:
+        path = out / name / "results.json"
+        if path.exists():
+            content, episodes = read_results(path)
+            if content["challenge"] != "influence":
+                raise InputError(f"{path.parent}: results of another challenge; give the folder of the influence table")
+            found[name] = {**content, "seconds": sum(record.wall_seconds for _, record in episodes)}
     if not found:
         raise InputError(f"{out}: no results; play the table with benchmarks/tables.py --table influence --out {out}")
-    for name, results in found.items():
-        if not isinstance(results, dict) or results.get("challenge") != "influence":
-            raise InputError(f"{out / name}: results of another challenge; give the folder of the influence table")
     return found
 
 
@@ -96,13 +100,12 @@ def visits(results: Results) -> list[str]:
 
 def cost(results: Results) -> str:
     """Return what it took, and what was not played, in a sentence."""
-    seconds = sum(row["wall_seconds"] for row in results["rows"])
     episodes = sum(row["episodes"] for row in results["rows"])
     missing = sum(row["not_played"] for row in results["rows"])
     faults = sum(sum(row["faults"].values()) for row in results["rows"])
     return (
-        f"{episodes} episodes of two days, {seconds / 3600:.1f} hours on the clock of a shared machine, {faults} "
-        f"faults of agents; {missing} episodes could not be played."
+        f"{episodes} episodes of two days, {results['seconds'] / 3600:.1f} hours on the clock of a shared machine, "
+        f"{faults} faults of agents; {missing} episodes could not be played."
     )
 
 

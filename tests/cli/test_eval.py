@@ -188,3 +188,37 @@ def test_a_killed_evaluation_of_assistants_comes_to_the_same_table(helsinki_path
 
     for name in ("results.json", "results.md"):
         assert (out / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+def test_what_influence_is_asked_for_is_its_setting(
+    worlds: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(registry.CHALLENGES, "influence", "toy_challenge:TOY")
+
+    def setting(*more: object) -> Any:
+        out = tmp_path / f"out{len(list(tmp_path.iterdir()))}"
+        asked = ["--worlds", worlds[0], "--method", "good", "--seeds", 1, "--workers", 1, "--out", out]
+        assert vico("eval", "influence", *asked, *more) == 0
+        return read_json(out / "results.json")["setting"]
+
+    assert setting() == {}
+    assert setting("--start", "09:30", "--hours", 2, "--simulation", "schedule", "--members", "llm") == {
+        "start": "09:30", "hours": 2.0, "simulation": "schedule", "members": "llm",
+    }  # fmt: skip
+    models = ("--target-model", "o1", "--dialogue-model", "gpt-4o", "--member-model", "small")
+    assert setting(*models) == {"target_model": "o1", "dialogue_model": "gpt-4o", "member_model": "small"}
+    assert setting("--hours", 0) == {}
+
+
+def test_influence_refuses_what_it_cannot_do(
+    worlds: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = ["eval", "influence", "--worlds", worlds[0], "--method", "ours+random", "--out", tmp_path / "out"]
+    for more, says in (
+        (("--hours", -1), "--hours -1; give hours above 0"),
+        (("--simulation", "dream"), "dream"),
+        (("--members", "people"), "people"),
+    ):
+        assert vico(*asked, *more) == 2
+        assert says in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vico.assets.models.movable import movable_colours, movable_kinds
+from vico.challenges.assistant.beside import Lying, spot_beside
 from vico.challenges.assistant.model import Region, TaskObject
 from vico.challenges.assistant.thresholds import OFF_MIDDLE
 from vico.errors import EmptyInputError
@@ -32,6 +33,7 @@ class Things:
     world: World
     chance: np.random.Generator
     made: list[TaskObject] = field(default_factory=list)
+    _lying: dict[str, list[Lying]] = field(default_factory=dict, init=False, repr=False)
 
     def make(self, name: str, kind: str, *, in_region: Region, middles: Sequence[Region]) -> TaskObject:
         """Lay a thing down in a region, in the middle of none of those that are told.
@@ -39,13 +41,18 @@ class Things:
         Raises
         ------
         EmptyInputError
-            If it can lie in a middle only.
+            If it can lie in a middle only, or there is no room beside the others.
         """
-        if in_region.place is not None:
+        if in_region.place is None:
+            position = self._spot_outdoors(in_region, np.array([r.centre[:2] for r in middles]))
+            return self._add(name, kind, position, room=None, holder=None)
+        for _ in range(_TRIES):
             position, room = self._spot_indoors(kind, in_region.place)
-        else:
-            position, room = self._spot_outdoors(in_region, np.array([r.centre[:2] for r in middles])), None
-        return self._add(name, kind, position, room=room, holder=None)
+            thing = self._add(name, kind, position, room=room, holder=None)
+            if self._finds_room(thing, room):
+                return thing
+            self.made.remove(thing)
+        raise EmptyInputError(f"tasks: no surface of {in_region.name} has room for another {kind}; use a larger world")
 
     def hand(self, name: str, kind: str, *, holder: str, near: Point3) -> TaskObject:
         """Give a thing to somebody who holds it from the start; `near` is where they are expected."""
@@ -79,6 +86,16 @@ class Things:
         )
         self.made.append(thing)
         return thing
+
+    def _finds_room(self, thing: TaskObject, room: str) -> bool:
+        """Return whether a thing finds room beside those that lie in its room; where it does, it is one of them."""
+        lying = self._lying.setdefault(room, [])
+        width, depth, height = movable_kinds()[thing.kind].size
+        wanted = Lying(thing.position, (width, depth, height), thing.yaw)
+        found = spot_beside(wanted, lying, self.world.room_by_id[room].containers)
+        if found is not None:
+            lying.append(found)
+        return found is not None
 
     def _spot_indoors(self, kind: str, place: str) -> tuple[Point3, str]:
         """Return a spot on one of a place's surfaces, and the id of its room."""
