@@ -58,6 +58,15 @@ def test_environments_side_by_side_branches_and_periods(helsinki_path: Path, hel
     assert "50 observations of the robot and 1 of the assistant" in printed
 
 
+def test_a_policy_is_trained_a_little(helsinki_path: Path, tmp_path: Path) -> None:
+    pytest.importorskip("stable_baselines3", reason='needs pip install "virtual-community[rl]"')
+    curve = tmp_path / "curve.csv"
+    words = ("--steps", "1024", "--episodes", "2", "--curve", str(curve))
+    printed = run("14_train_with_sb3.py", "--world", str(helsinki_path), *words)
+    assert re.search(r"\ntrained: success [01]\.\d\d\n", printed)
+    assert curve.read_text().splitlines()[1].startswith("1024,")
+
+
 def test_getting_around_prints_trips_and_arrives(helsinki_path: Path) -> None:
     printed = run("07_getting_around.py", "--world", str(helsinki_path), "--steps", "600")
     assert "on foot: walk" in printed

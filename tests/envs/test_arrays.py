@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ import vico
 from vico.envs import CommunityEnv, EnvSpec, SingleAgentEnv
 from vico.envs.arrays.action import PHRASES, ActionTable, Entry
 from vico.envs.arrays.form import ArrayForm
-from vico.envs.arrays.observation import TEXT_BYTES
+from vico.envs.arrays.observation import TEXT_BYTES, arrays_markdown
 from vico.envs.arrays.surroundings import Something, Surroundings
 from vico.errors import InputError
 from vico.sim.actions import PEOPLE_ACTIONS, Command, parse
@@ -155,6 +156,11 @@ def test_the_mask_of_numbers_with_parts_lists_each_part() -> None:
     assert mask[PEOPLE_ACTIONS.index("move_forward")] == 1
     assert mask[PEOPLE_ACTIONS.index("exit_bike")] == 0
     space.sample(mask=tuple(np.split(mask, np.cumsum(space.nvec)[:-1])))
+
+
+def test_the_page_lists_the_arrays_that_there_are() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "environments.md").read_text(encoding="utf-8")
+    assert arrays_markdown() in page
 
 
 def test_kinds_of_actions_can_be_fewer() -> None:

@@ -201,6 +201,18 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
             info["action_mask"] = mask
         return encoded, info
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let other processes make the same environment: they read the world's folder, and begin with a reset.
+
+        Raises
+        ------
+        InputError
+            If the world has no folder.
+        """
+        if self.world.path is None:
+            raise InputError("env: one of a world in memory cannot go to another process; write the world first")
+        return _made_anew, (self.world.path, self.community, self.spec, self._setup)
+
     def _told(self, result: StepResult) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         observations: dict[str, Any] = {}
         infos: dict[str, dict[str, Any]] = {}
@@ -276,6 +288,10 @@ def make(
     """
     spec = EnvSpec.of(world, community, options)
     return CommunityEnv(_world(world), _community(community), spec=spec, setup=setup)
+
+
+def _made_anew(world: Path, community: Community | None, spec: EnvSpec, setup: Setup | None) -> CommunityEnv:
+    return CommunityEnv(_world(world), community, spec=spec, setup=setup)
 
 
 def make_from_spec(spec: EnvSpec, *, setup: Setup | None = None) -> CommunityEnv:

@@ -20,6 +20,7 @@ TASKS = {
     "vico/Search-v0": "make_search",
     "vico/Influence-v0": "make_influence",
 }
+_LEARNING = "vico.challenges.learning.make"
 
 
 def register_ids() -> None:
@@ -38,7 +39,12 @@ def register_ids() -> None:
         )
     for name, maker in TASKS.items():
         if name not in gymnasium.registry:
-            gymnasium.register(name, entry_point=f"vico.challenges.learning.make:{maker}", disable_env_checker=True)
+            gymnasium.register(
+                name,
+                entry_point=f"{_LEARNING}:{maker}",
+                vector_entry_point=f"{_LEARNING}:{maker}_vec",
+                disable_env_checker=True,
+            )
     registry = getattr(pettingzoo, "parallel_registry", None)
     if registry is not None and ID not in registry:
         pettingzoo.register("parallel", ID, entry_point="vico.envs.parallel:make")

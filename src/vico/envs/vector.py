@@ -16,11 +16,12 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
-from gymnasium.vector.utils import batch_space, concatenate, create_empty_array, iterate
+from gymnasium.vector.utils import batch_space, iterate
 from numpy.typing import NDArray
 
 from vico.community.model import Community
 from vico.envs.parallel import CommunitySource, WorldSource, make
+from vico.envs.shared import SharedArrays, Sharing
 from vico.envs.spec import EnvOptions
 from vico.envs.workers import Call, Workers
 from vico.errors import InputError
@@ -30,12 +31,15 @@ from vico.world.folder import World
 Reset = tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]
 Step = tuple[dict[str, dict[str, Any]], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]
 
+_SPACES = ("observation_space", "action_space")
 
-class VectorAgentEnv(gymnasium.vector.VectorEnv[dict[str, Any], Any, NDArray[Any]]):
+
+class VectorAgentEnv(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]]):
     """One agent in each of several environments, which step at the same time.
 
     An environment whose episode has ended begins the next one at the following step, whatever that step's action
-    (Gymnasium's `AutoresetMode.NEXT_STEP`).
+    (Gymnasium's `AutoresetMode.NEXT_STEP`). Pictures and other arrays of observations come by shared memory
+    (`vico.envs.shared`); what `reset` and `step` return are copies.
 
     Parameters
     ----------
@@ -51,10 +55,13 @@ class VectorAgentEnv(gymnasium.vector.VectorEnv[dict[str, Any], Any, NDArray[Any
     """
 
     def __init__(self, makers: Sequence[Callable[[], gymnasium.Env[Any, Any]]]) -> None:
-        self._workers = Workers(makers)
+        self._workers = Workers([partial(Sharing, make) for make in makers])
         self.num_envs = len(makers)
-        self.single_observation_space: spaces.Space[Any] = self._workers.ask_all("observation_space")[0]
-        self.single_action_space: spaces.Space[Any] = self._workers.ask_all("action_space")[0]
+        spaces_of = [self._workers.ask([Call("call", (kind,))] * self.num_envs)[0] for kind in _SPACES]
+        self.single_observation_space: spaces.Space[Any] = spaces_of[0]
+        self.single_action_space: spaces.Space[Any] = spaces_of[1]
+        self._arrays = SharedArrays(self.single_observation_space, self.num_envs)
+        self._workers.ask([Call("attach", (self._arrays.name, self._arrays.layout, k)) for k in range(self.num_envs)])
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.metadata = {"render_modes": ["rgb_array"], "autoreset_mode": AutoresetMode.NEXT_STEP}
@@ -63,7 +70,7 @@ class VectorAgentEnv(gymnasium.vector.VectorEnv[dict[str, Any], Any, NDArray[Any
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, Any]]:
+    ) -> tuple[Any, dict[str, Any]]:
         """Start an episode in each environment.
 
         Parameters
@@ -80,7 +87,7 @@ class VectorAgentEnv(gymnasium.vector.VectorEnv[dict[str, Any], Any, NDArray[Any
 
     def step(
         self, actions: Any
-    ) -> tuple[dict[str, Any], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+    ) -> tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Advance every environment until its agent is due again.
 
         Parameters
@@ -115,22 +122,24 @@ class VectorAgentEnv(gymnasium.vector.VectorEnv[dict[str, Any], Any, NDArray[Any
 
     def render(self) -> tuple[Any, ...]:
         """Return what each agent sees, uint8, shape ``(image, image, 3)`` each."""
-        return tuple(self._workers.ask_all("render"))
+        return tuple(self._workers.ask([Call("call", ("render",))] * self.num_envs))
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Return which actions are possible now, a row for each environment; see `SingleAgentEnv.action_masks`."""
+        return np.stack(self._workers.ask([Call("call", ("action_masks",))] * self.num_envs))
 
     def close_extras(self, **kwargs: Any) -> None:
         """End the processes."""
         self._workers.close()
+        self._arrays.close()
 
     @property
     def pids(self) -> list[int | None]:
         """Numbers of the processes."""
         return self._workers.pids
 
-    def _batched(self, observations: Sequence[Any]) -> dict[str, Any]:
-        space = self.single_observation_space
-        empty: Any = create_empty_array(space, self.num_envs)
-        batched: Any = concatenate(space, observations, empty)
-        return dict(batched)
+    def _batched(self, rest: Sequence[Any]) -> Any:
+        return self._arrays.batched(rest)
 
 
 class ParallelVectorEnv:
@@ -143,14 +152,15 @@ class ParallelVectorEnv:
     """
 
     def __init__(self, makers: Sequence[Callable[[], Any]]) -> None:
-        self._workers = Workers(makers)
+        self._workers = Workers([partial(Sharing, make) for make in makers])
         self.num_envs = len(makers)
-        self.possible_agents: list[str] = self._workers.ask_all("possible_agents")[0]
-        rest = [None] * (len(makers) - 1)
+        self.possible_agents: list[str] = self._first("possible_agents")
         self._spaces: dict[str, dict[str, spaces.Space[Any]]] = {
-            kind: {name: self._workers.ask([Call(kind, (name,)), *rest])[0] for name in self.possible_agents}
-            for kind in ("observation_space", "action_space")
+            kind: {name: self._first(kind, name) for name in self.possible_agents} for kind in _SPACES
         }
+        whole = spaces.Dict(dict(self._spaces["observation_space"]))
+        self._arrays = SharedArrays(whole, self.num_envs)
+        self._workers.ask([Call("attach", (self._arrays.name, self._arrays.layout, k)) for k in range(self.num_envs)])
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Space of an agent's observations, in every environment."""
@@ -162,7 +172,7 @@ class ParallelVectorEnv:
 
     def reset(self, seed: int | Sequence[int | None] | None = None) -> list[Reset]:
         """Start an episode in each environment; seeds as for `VectorAgentEnv.reset`."""
-        return self._workers.ask([Call("reset", (one,)) for one in _seeds(seed, self.num_envs)])
+        return self._told(self._workers.ask([Call("reset", (one,)) for one in _seeds(seed, self.num_envs)]))
 
     def step(self, actions: Sequence[Mapping[str, Any]]) -> list[Step]:
         """Step each environment with its agents' actions; what `CommunityEnv.step` returns, of each.
@@ -174,22 +184,35 @@ class ParallelVectorEnv:
         WorkerError
             If an environment fails; all are closed then.
         """
-        return self._workers.ask([Call("step", (dict(one),)) for one in actions])
+        return self._told(self._workers.ask([Call("step", (dict(one),)) for one in actions]))
 
     def reset_some(self, which: Sequence[int]) -> dict[int, Reset]:
         """Start the next episode in some environments; the others stay as they are."""
         calls = [Call("reset") if k in which else None for k in range(self.num_envs)]
-        found = self._workers.ask(calls)
+        found = self._told(self._workers.ask(calls))
         return {k: found[k] for k in which}
 
     def close(self) -> None:
         """End the processes."""
         self._workers.close()
+        self._arrays.close()
 
     @property
     def pids(self) -> list[int | None]:
         """Numbers of the processes."""
         return self._workers.pids
+
+    def _first(self, name: str, *arguments: Any) -> Any:
+        """Return what the first environment has."""
+        calls = [Call("call", (name, *arguments)), *[None] * (self.num_envs - 1)]
+        return self._workers.ask(calls)[0]
+
+    def _told(self, answers: Sequence[Any]) -> list[Any]:
+        """Put the arrays back into what environments returned."""
+        return [
+            None if answer is None else (self._arrays.single(k, answer[0]), *answer[1:])
+            for k, answer in enumerate(answers)
+        ]
 
 
 def make_parallel_vec(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from vico.challenges.learning.influence import InfluenceEnv
 from vico.challenges.learning.point_goal import KINDS, PointGoal, PointGoalOptions
 from vico.community import build_community
 from vico.community.model import Community
+from vico.envs.vector import VectorAgentEnv, makers
 from vico.world.folder import World, read_world
 
 _OF_ENV = ("tasks", "seed", "render_mode")
@@ -96,6 +97,45 @@ def make_assistant(world: World | Path | str, category: Category, **options: Any
 def make_influence(world: World | Path | str, **options: Any) -> InfluenceEnv:
     """Make ``vico/Influence-v0``; see `InfluenceEnv` for its options."""
     return InfluenceEnv(world_of(world), **options)
+
+
+def make_task_vec(
+    maker: str, world: World | Path | str, *, num_envs: int = 1, seed: int = 0, **options: Any
+) -> VectorAgentEnv:
+    """Make several environments of a task, each in a process that reads the world itself.
+
+    Parameters
+    ----------
+    maker
+        Name of a function of this module, such as ``"make_point_goal"``.
+    num_envs
+        How many; without seeds of `reset` they draw their tasks by ``seed``, ``seed + 1`` and on.
+    options
+        As the function takes them.
+
+    Raises
+    ------
+    InputError
+        If the world has no folder.
+    WorkerError
+        If an environment cannot be made.
+    """
+    made = makers(_made, world, None, num_envs=num_envs, options={"maker": maker, "seed": seed, **options})
+    return VectorAgentEnv(made)
+
+
+#: Several of each, by what makes one.
+make_point_goal_vec = partial(make_task_vec, "make_point_goal")
+make_robot_point_goal_vec = partial(make_task_vec, "make_robot_point_goal")
+make_commute_vec = partial(make_task_vec, "make_commute")
+make_carry_vec = partial(make_task_vec, "make_carry")
+make_delivery_vec = partial(make_task_vec, "make_delivery")
+make_search_vec = partial(make_task_vec, "make_search")
+make_influence_vec = partial(make_task_vec, "make_influence")
+
+
+def _made(world: Path, community: None, *, maker: str, **options: Any) -> Any:
+    return globals()[maker](world, **options)
 
 
 def world_of(source: World | Path | str) -> World:

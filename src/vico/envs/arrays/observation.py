@@ -62,6 +62,13 @@ PARTS: dict[str, tuple[tuple[int, ...], str]] = {
 }
 
 
+def arrays_markdown() -> str:
+    """Return the table of all arrays for the documentation: name, shape, what they tell."""
+    return "\n".join(
+        f"| `{name}` | {' x '.join(map(str, shape))} | {meaning} |" for name, (shape, meaning) in PARTS.items()
+    )
+
+
 def observation_parts(
     lens: Lens | None, readings: Mapping[str, Reading] | None, *, outputs: Sequence[str], texts: bool = False
 ) -> dict[str, spaces.Box[Any]]:
