@@ -102,7 +102,7 @@ def _make(task: Mapping[str, Any], folder: Path, contents: Contents, work: Path,
     staged.mkdir()
     made = demonstrations_of(run, facts, agents, instruction=contents.instruction)
     episodes = [
-        (_encoded(demonstration, pictures, PictureFiles(staged, str(k)), contents, run, world), demonstration)
+        (encoded(demonstration, pictures, PictureFiles(staged, str(k)), contents, run, world), demonstration)
         for k, demonstration in enumerate(made)
     ]
     write_part(folder, task["key"], episodes, staged)
@@ -147,7 +147,7 @@ def _played(
     return read_run(work / "run"), facts_of_episode(record, content), keeper.close(), world
 
 
-def _encoded(
+def encoded(
     demonstration: Demonstration,
     pictures: PictureSource,
     files: PictureFiles,
