@@ -55,6 +55,7 @@ class Play {
   begin() {
     this.active = true;
     this.layer.classList.add("playing");
+    document.querySelector(".body")?.classList.add("plain");
     this.vico.cameras?.setMode("play");
     if (this.vico.ui.keys) this.vico.ui.keys.enabled = false;
     this.vico.page.selected = 0;
@@ -101,6 +102,7 @@ class Play {
     };
     window.addEventListener("keydown", (event) => this._key(event));
     window.addEventListener("blur", () => this._letGo());
+    document.getElementById("modes")?.addEventListener("click", () => this.pause(), { capture: true });
     document.addEventListener("visibilitychange", () => document.hidden && this._letGo());
     this.source.addEventListener("connection", (/** @type {any} */ { detail }) => {
       if (!detail) this.input.release();
@@ -268,7 +270,9 @@ class Play {
   _camera(seconds) {
     const { camera, cameras, state } = this.vico;
     const body = state.bodies.get(this.entity);
-    if (!camera || !body || cameras.mode !== "play") return;
+    if (!camera || !body) return;
+    // The page shows the city from afar when its first frame comes.
+    if (cameras.mode !== "play") cameras.setMode("play");
     const { input } = this;
     if (!input.looks) {
       // Keys turn the body: the camera comes round behind it.
