@@ -136,7 +136,11 @@ class LiveViewer(Hook):
 
     def _plans(self, agents: Gatherer, names: Sequence[str]) -> Mapping[str, Any]:
         def ask(runner: Runner) -> dict[str, Any]:
-            found = {name: plan_record(agents.agents[name]) for name in names if name in agents.agents}
+            found = {
+                name: plan_record(agents.agents[name], runner.sim.state.second)
+                for name in names
+                if name in agents.agents
+            }
             return {name: plan for name, plan in found.items() if plan is not None}
 
         if self.control.told()["status"] == "ended":
