@@ -67,6 +67,12 @@ class LiveViewer(Hook):
         assert self._server is not None
         return self._server.url
 
+    @property
+    def source(self) -> Source:
+        """What the page is shown."""
+        assert self._server is not None
+        return self._server.state.source
+
     def show(self, recorder: Recorder, agents: Gatherer) -> None:
         """Show the run that a recorder begins or goes on with; begin to serve it, or tell the pages that it is another.
 
