@@ -3,7 +3,8 @@ PYTHON ?= python3
 BIN := .venv/bin
 DEMO ?= out/demo
 SEED ?= 0
-DEV := worldgen,photos,usd,s3,docs,dev
+USE := worldgen,viewer
+DEV := worldgen,viewer,photos,usd,s3,docs,dev
 
 .PHONY: demo test check docs wheel bench clean
 
@@ -20,7 +21,7 @@ define install
 endef
 
 .venv/demo: pyproject.toml constraints.txt | .venv/bin/python
-	$(call install,worldgen)
+	$(call install,$(USE))
 	@touch $@
 
 .venv/dev: pyproject.toml constraints.txt | .venv/bin/python

@@ -65,8 +65,8 @@ class Agent(Protocol):
     Turns observations into actions, once a step, and sees nothing else of the world but public maps. One that spends
     on language models has attributes ``tokens`` and ``cost`` (US dollars), what it spent so far; one that goes on where
     its model gives nothing of use says so in ``model_faults``, pairs of a step and a reason. One that wants to be
-    understood has a method ``plan()``, which returns a `Plan`, or None while it has none; it is asked between two steps
-    when somebody looks at the agent, and changes nothing.
+    understood has a method ``plan(second)``, which returns a `Plan`, or None while it has none; it is asked between two
+    steps when somebody looks at the agent, and changes nothing.
     """
 
     def act(self, observation: Observation, info: Info) -> Action:
@@ -94,19 +94,21 @@ class GroupAgent(Protocol):
         """Return the members' actions for the coming second, by name; the error of one that failed in its place."""
 
 
-def plan_record(agent: object) -> dict[str, Any] | None:
+def plan_record(agent: object, second: float) -> dict[str, Any] | None:
     """Return the plan that an agent publishes, as JSON has it; None if it publishes none, or fails to.
 
     Parameters
     ----------
     agent
-        Asked for ``plan()``, if it has that.
+        Asked for ``plan(second)``, if it has that.
+    second
+        Now, seconds since the first midnight.
     """
     ask = getattr(agent, "plan", None)
     if not callable(ask):
         return None
     try:
-        plan = ask()
+        plan = ask(second)
         if plan is None:
             return None
         goals = [

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from vico.agents.base import Action, Info, Observation
+from vico.agents.base import Action, Info, Observation, Plan
 from vico.agents.schedule import Scheduled, ScheduleFollower
 from vico.agents.state import AgentState
 from vico.agents.talk.grammar import read_grammar
@@ -83,6 +83,10 @@ class Requester:
         self._helper = ""
         self._waits_until = -math.inf
         self._said: str | None = None
+
+    def plan(self, second: float) -> Plan | None:
+        """Return where its day leads next."""
+        return self._day.plan(second)
 
     def state(self) -> AgentState:
         """Return how far it came with handing over, and its day."""

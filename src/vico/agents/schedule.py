@@ -8,11 +8,12 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any, Protocol
 
-from vico.agents.base import Action, Info, Observation
+from vico.agents.base import Action, Info, Observation, Plan
 from vico.agents.buying import Buyer
 from vico.agents.change_of_plans import ChangeOfPlans
 from vico.agents.conversation import Conversation, Speaker
 from vico.agents.indoor_walk import IndoorWalker
+from vico.agents.plans import plan_of_day
 from vico.agents.residents import Residents
 from vico.agents.resting import SeatSeeker
 from vico.agents.serving import Clerk
@@ -168,6 +169,12 @@ class ScheduleFollower:
         """Return whether it is where it means to be at a time, seconds: not on the way, and not about to leave."""
         stay = self._stay_at(time % DAY)
         return stay is not None and self._arrived == stay
+
+    def plan(self, second: float) -> Plan | None:
+        """Return where the day leads next."""
+        return plan_of_day(
+            self._stays, self._changes.departures, second, self._map, self._walker.way or self._traveller.way
+        )
 
     def state(self) -> AgentState:
         """Return all that decides what is done next, beside the day and the map."""

@@ -175,6 +175,12 @@ class Traveller:
         """Whether it stands at a stop until its bus comes."""
         return self.trip is not None and self._leg < len(self.trip.legs) and self.trip.legs[self._leg].mode in _RIDDEN
 
+    @property
+    def way(self) -> list[tuple[float, float]]:
+        """Corners of the trip still to come, ENU metres."""
+        legs = [] if self.trip is None else self.trip.legs[self._leg + 1 :]
+        return [*self._walker.way, *((float(x), float(y)) for leg in legs for x, y in leg.polyline)]
+
     def remaining(self, position: Sequence[float]) -> float:
         """Metres still to walk on the present leg."""
         return self._walker.remaining(position)

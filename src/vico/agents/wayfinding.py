@@ -116,6 +116,11 @@ class Walker:
         return math.sqrt(east * east + north * north) + self._left[self._next]
 
     @property
+    def way(self) -> list[tuple[float, float]]:
+        """Corners still to come, ENU metres."""
+        return [] if self._goal is None else self._path[self._next :]
+
+    @property
     def straight_on(self) -> tuple[float, float, float] | None:
         """The corner that the last step led towards, ENU metres, and how far it is from there to the end of the way.
 

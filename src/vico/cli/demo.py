@@ -55,6 +55,7 @@ def demo(out: Path, *, seed: int = 0, force: bool = False) -> int:
     print(f"run         {run}    replay.html, demo.mp4, metrics.json")
     print(f"evening     {evening}    film.mp4")
     print(f"to look at it:  python3 -m webbrowser {run / 'replay.html'}")
+    print(f"to walk through it:  {Path(sys.argv[0])} play {world} {people}")
     return 0
 
 

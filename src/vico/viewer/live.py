@@ -67,6 +67,12 @@ class LiveViewer(Hook):
         assert self._server is not None
         return self._server.url
 
+    @property
+    def source(self) -> Source:
+        """What the page is shown."""
+        assert self._server is not None
+        return self._server.state.source
+
     def show(self, recorder: Recorder, agents: Gatherer) -> None:
         """Show the run that a recorder begins or goes on with; begin to serve it, or tell the pages that it is another.
 
@@ -136,7 +142,11 @@ class LiveViewer(Hook):
 
     def _plans(self, agents: Gatherer, names: Sequence[str]) -> Mapping[str, Any]:
         def ask(runner: Runner) -> dict[str, Any]:
-            found = {name: plan_record(agents.agents[name]) for name in names if name in agents.agents}
+            found = {
+                name: plan_record(agents.agents[name], runner.sim.state.second)
+                for name in names
+                if name in agents.agents
+            }
             return {name: plan for name, plan in found.items() if plan is not None}
 
         if self.control.told()["status"] == "ended":

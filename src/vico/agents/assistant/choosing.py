@@ -9,7 +9,9 @@ from typing import Any
 from vico.agents.assistant.errands import Book, Choice, Errand
 from vico.agents.assistant.estimates import Estimates
 from vico.agents.assistant.skills import Action, AssistantSkills, ObservationView
+from vico.agents.base import Plan
 from vico.agents.navigation.memory import SeenThing
+from vico.agents.plans import plan_of_errand
 from vico.agents.state import AgentState
 from vico.seeds import rng
 from vico.world.public import PublicMap
@@ -52,6 +54,13 @@ class ChoicePlanner(ABC):
         self.estimates = Estimates(public_map, instructions, distance=distance)
         self.errand: Errand | None = None
         self.began: float | None = None
+
+    def plan(self, second: float) -> Plan:
+        """Return what it is about."""
+        choice = None if self.errand is None else self.errand.choice
+        told = None if choice is None else self.book.instructions[choice.subtask]
+        doing, source = ("", -1) if choice is None else (choice.kind, choice.region)
+        return plan_of_errand(told, doing, self.skills.map, self.skills.navigator.walker.way, source=source)
 
     def state(self) -> AgentState:
         """Return what is under way, and all that is known."""

@@ -10,7 +10,9 @@ from vico.agents.assistant.options import GoTo, Option, PickUp, Search, WalkUp
 from vico.agents.assistant.people import PERSON, AwaitPerson, Escort, Meet, Report, Show
 from vico.agents.assistant.putting import PutDown
 from vico.agents.assistant.skills import Action, AssistantSkills, ObservationView
+from vico.agents.base import Plan
 from vico.agents.perception import Sighting
+from vico.agents.plans import plan_of_errand
 from vico.agents.state import AgentState
 from vico.seeds import rng
 from vico.world.public import PublicMap
@@ -60,6 +62,13 @@ class HeuristicPlanner:
         self._refused: list[str] = []
         self._target: Sighting | None = None
         self._option: Option | None = None
+
+    def plan(self, second: float) -> Plan:
+        """Return what it is about."""
+        errand = self.errand if self.line and self.number != self.automaton.final else None
+        doing = "" if errand is None else self.automaton.states[self.number]
+        source = -1 if errand is None or self.number > 1 else self._region % len(errand["sources"])
+        return plan_of_errand(errand, doing, self.skills.map, self.skills.navigator.walker.way, source=source)
 
     def state(self) -> AgentState:
         """Return the subtask in hand and how far it came, and what the skills remember."""

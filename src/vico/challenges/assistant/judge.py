@@ -83,6 +83,11 @@ class Judge(Hook):
         for k, subtask in enumerate(self.task.subtasks):
             if self.task.category == "carry":
                 self._escort(k, subtask, step)
+        self.look(step)
+
+    def look(self, step: int) -> None:
+        """Look at what is done, between the steps that count for how people are followed."""
+        for k, subtask in enumerate(self.task.subtasks):
             if self.verdicts[k] is None and self.task.category != "search":
                 done = self._is_done(k, subtask)
                 self.since[k] = (self.since[k] if self.since[k] is not None else step) if done else None

@@ -112,6 +112,7 @@ class Seconds(Hook):
         if whole:
             self._judge.stepped(told)
         elif acted:
+            self._judge.look(told.number)
             self._judge.take_reports(told)
         if whole or acted:
             self._chronicle.stepped(told)

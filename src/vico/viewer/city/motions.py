@@ -16,7 +16,7 @@ from vico.sim.animation import CLIPS, clip_index, pose
 from vico.sim.animation.standing import restlessness
 
 _GAITS = {"walk": (0.3, 0.6, 1.0, 1.5, 2.2), "run": (1.5, 2.5, 4.0)}
-_GAITS |= {name: _GAITS["walk"] for name in ("carry", "carry_left", "carry_right")}
+_GAITS |= dict.fromkeys(("carry", "carry_left", "carry_right"), _GAITS["walk"])
 _RESTING = ("idle", "stand")
 _GAIT_PHASES, _PHASES = 32, 24
 # Waves beat thrice a cycle, talk twice.
