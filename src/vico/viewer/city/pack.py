@@ -48,8 +48,15 @@ class PackedMesh:
     def chosen(self, triangles: NDArray[Any]) -> PackedMesh:
         """Return some of the triangles, with the vertices they need."""
         used, faces = np.unique(self.triangles[triangles], return_inverse=True)
-        columns = (c[used] for c in (self.position, self.normal, self.uv, self.colour, self.entity))
-        return PackedMesh(self.array, *columns, faces.reshape(-1, 3).astype(np.int32))
+        return PackedMesh(
+            self.array,
+            self.position[used],
+            self.normal[used],
+            self.uv[used],
+            self.colour[used],
+            self.entity[used],
+            faces.reshape(-1, 3).astype(np.int32),
+        )
 
 
 def packed(surfaces: Iterable[Surface], textures: TextureLayers) -> list[PackedMesh]:
