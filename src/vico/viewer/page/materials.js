@@ -106,7 +106,7 @@ void main() {
     vec2 cell = vWall.xy / vec2(2.7, 3.5);
     vec2 within = fract(cell);
     float pane = step(0.28, within.x) * step(within.x, 0.74) * step(0.3, within.y) * step(within.y, 0.8);
-    float chance = fract(sin(dot(floor(cell), vec2(12.9898, 78.233))) * 43758.5453);
+    float chance = night > 0.1 ? fract(sin(dot(floor(cell), vec2(12.9898, 78.233))) * 43758.5453) : 0.0;
     vec3 glass = mix(vec3(0.17, 0.2, 0.24), vec3(1.5, 1.2, 0.75) / max(vLight, vec3(0.2)), night * step(0.62, chance));
     base = mix(base, glass, pane * 0.75);
   }

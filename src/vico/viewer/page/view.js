@@ -104,6 +104,7 @@ export class View {
     this.care = Math.min(Math.max(level, 0), CARE.length - 1);
     const care = CARE[this.care];
     this.stats.care = this.care;
+    this.sky.plain.value = this.city.software && this.care < FINE ? 1 : 0;
     this.city.nearReach = care.tiles;
     this.people.nearReach = care.bodies;
     this.city.setReach({ near: care.things, far: care.far });
