@@ -223,7 +223,9 @@ def open_page() -> Iterator[BrowserPage]:
         raise MissingExtraError(
             "driving a browser needs websockets; type: pip install 'virtual-community[viewer]'"
         ) from None
-    with tempfile.TemporaryDirectory(prefix="vico-browser-", ignore_cleanup_errors=True) as name:
-        with _Chromium(Path(name)) as chromium:
-            with connect(chromium.page_address(), max_size=None, compression=None) as socket:
-                yield BrowserPage(socket)
+    with (
+        tempfile.TemporaryDirectory(prefix="vico-browser-", ignore_cleanup_errors=True) as name,
+        _Chromium(Path(name)) as chromium,
+        connect(chromium.page_address(), max_size=None, compression=None) as socket,
+    ):
+        yield BrowserPage(socket)

@@ -22,7 +22,7 @@ from vico.world.mesh import Surface
 
 Models = Mapping[str, Sequence[Surface]]
 # From far away a shape has this share of its triangles, but some at least; leaves this share, each larger.
-_FAR_SHARE, _FAR_LEAST, _FAR_LEAVES = 0.2, 14, 0.34
+_FAR_SHARE, _FAR_LEAST, _FAR_LEAVES = 0.14, 12, 0.17
 
 
 def moving_models() -> dict[str, Sequence[Surface]]:

@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 from vico.sim.animation import CLIPS, clip_index, pose
 from vico.sim.animation.standing import restlessness
 
-_GAITS = {"walk": (0.3, 0.6, 1.0, 1.5, 2.2), "run": (1.5, 2.5, 4.0)}
-_GAITS |= dict.fromkeys(("carry", "carry_left", "carry_right"), _GAITS["walk"])
-_RESTING = ("idle", "stand")
+# Metres a second at which gaits are tabulated.
+_WALKS, _RUNS = (0.3, 0.6, 1.0, 1.5, 2.2), (1.5, 2.5, 4.0)
+_GAITS = {"run": _RUNS} | dict.fromkeys(("walk", "carry", "carry_left", "carry_right"), _WALKS)
+# Motions of those who stand and wait, and at which place in their cycle they are looked at.
+_RESTING = {"idle": 0.0, "stand": 0.0, "phone": 0.5}
 _GAIT_PHASES, _PHASES = 32, 24
 # Waves beat thrice a cycle, talk twice.
-_FINE = {"wave": 48, "sit_wave": 48, "turn": 32, "open_door": 40, "phone": 40}
+_FINE = {"wave": 48, "sit_wave": 48, "turn": 32, "open_door": 40}
 _MOMENTS = 96  # at which a resting pose is looked at
 _SHORT = 32767
 
@@ -36,8 +38,8 @@ def motion_tables(style: Any) -> tuple[list[dict[str, Any]], list[NDArray[Any]]]
     Returns
     -------
     list of dict
-        Of each motion, in the order of `CLIPS`: ``name``, ``paces`` (empty for those without) and ``phases``, ``row`` (its
-        first row in the tables), or ``resting`` (its place among the resting poses).
+        Of each motion, in the order of `CLIPS`: ``name``, ``paces`` (empty for those without) and ``phases``, ``row``
+        (its first row in the tables), or ``resting`` (its place among the resting poses).
     list of ndarray
         Joint rotations as quaternions x, y, z, w times 32767, int16, shape ``(rows, 55, 4)``; pelvis shifts, metres,
         float32, shape ``(rows, 3)``; and of resting poses the coefficients of 1, weight, turn of the head and nod for
@@ -50,7 +52,7 @@ def motion_tables(style: Any) -> tuple[list[dict[str, Any]], list[NDArray[Any]]]
         clip = clip_index(name)
         if name in _RESTING:
             entries.append({"name": name, "resting": len(resting)})
-            resting.append(_resting_pose(style, clip))
+            resting.append(_resting_pose(style, clip, _RESTING[name]))
             continue
         paces = _GAITS.get(name, ())
         phases = _FINE.get(name, _GAIT_PHASES if paces else _PHASES)
@@ -61,14 +63,14 @@ def motion_tables(style: Any) -> tuple[list[dict[str, Any]], list[NDArray[Any]]]
     return entries, [_quaternions(rotations), offsets, np.stack(resting).astype(np.float32)]
 
 
-def _resting_pose(style: Any, clip: int) -> NDArray[np.float64]:
+def _resting_pose(style: Any, clip: int, phase: float) -> NDArray[np.float64]:
     """Fit what shifting one's weight, turning one's head and nodding do to a pose; shape ``(4, 56, 3)``."""
     seconds = np.arange(_MOMENTS) * 3.7
     causes, poses = np.ones((_MOMENTS, 4)), np.empty((_MOMENTS, 56, 3))
     one = np.repeat(style, 1)
     for k, second in enumerate(seconds.tolist()):
         causes[k, 1:] = restlessness(second, float(style["asymmetry"]), float(style["rhythm"]))
-        rotations, offsets = pose(np.array([clip]), np.zeros(1), np.zeros(1), one, second=second)
+        rotations, offsets = pose(np.array([clip]), np.array([phase]), np.zeros(1), one, second=second)
         poses[k, :55], poses[k, 55] = rotations[0], offsets[0]
     fitted, *_ = np.linalg.lstsq(causes, poses.reshape(_MOMENTS, -1), rcond=None)
     return np.asarray(fitted.reshape(4, 56, 3))

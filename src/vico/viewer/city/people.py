@@ -23,7 +23,7 @@ from vico.sim.animation import style_of
 from vico.viewer.city.motions import motion_tables
 
 #: Of the layout of a person's file; another number, and files are made anew.
-PERSON_FORMAT = 3
+PERSON_FORMAT = 4
 # Triangles of a body that is some ten pixels tall.
 _FAR_TRIANGLES = 220
 
@@ -73,8 +73,8 @@ def person_bytes(look: Appearance, manner: str, seed: int) -> bytes:
 
     The layout: uint32 length of a JSON head, the head, padding to a multiple of four, and columns one after another at
     the offsets that the head tells: for each mesh position and normal (float32), colour (uint8, four), joints (uint8,
-    four), weights (uint8, four), triangles (uint16); then rest joints, T-pose joints, the frames from rest to T-pose, and
-    the tables of `vico.viewer.city.motions`.
+    four), weights (uint8, four), triangles (uint16); then rest joints, T-pose joints, the frames from rest to T-pose,
+    and the tables of `vico.viewer.city.motions`.
     """
     body = body_of(look)
     columns: list[NDArray[Any]] = []

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
+from shapely import contains_xy
+from shapely.geometry import Polygon
 
 from vico.viewer.city.pack import Blob, PackedMesh, packed
 from vico.viewer.city.textures import PLAIN, TextureLayers
@@ -20,7 +22,9 @@ TILE = 100.0
 #: Pixels along the side of the picture of the ground; metres between the ground's points far away.
 PICTURE, _GROUND_STEP = 2048, 12.5
 # Roof triangles smaller than this (square metres) are not seen from another tile.
-_SEEN_FROM_FAR = 1.2
+_SEEN_FROM_FAR = 3.0
+# Walls of convex parts with more of their own building this far before them are within it, metres.
+_BEFORE = 0.3
 _COLLISION = "collision"
 
 
@@ -74,7 +78,8 @@ def far_tiles(world: World, grid: Grid, textures: TextureLayers) -> dict[int, Pa
     """Return what is seen of tiles from farther away: buildings in plain colours."""
     walls = _mean_colours(world.surfaces("buildings"), textures)
     roofs = world.surfaces("roofs")
-    parts = [_plain(s, walls) for s in world.surfaces(_COLLISION)]
+    outlines = {b.entity: Polygon(b.footprint[0], b.footprint[1:]).buffer(0) for b in world.buildings}
+    parts = [_plain(s, walls, outlines) for s in world.surfaces(_COLLISION)]
     parts += [_large(s, textures) for s in roofs]
     whole = packed(parts, textures)
     if not whole:
@@ -104,14 +109,20 @@ def _mean_colours(surfaces: list[Surface], textures: TextureLayers) -> dict[int,
     return {entity: total[:3] / max(total[3], 1e-9) for entity, total in sums.items()}
 
 
-def _plain(surface: Surface, colours: dict[int, NDArray[np.float64]]) -> Surface:
-    """Return a convex part of a building without its underside, in the colour of its walls."""
+def _plain(surface: Surface, colours: dict[int, NDArray[np.float64]], outlines: Mapping[int, Any]) -> Surface:
+    """Return what is seen of a convex part of a building from outside, in the colour of its walls."""
     corners = surface.positions[surface.triangles]
-    up = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]
-    size = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    size = np.maximum(np.linalg.norm(normal, axis=1), 1e-9)
+    up = normal[:, 2]
     entity = int(surface.entity[0]) if len(surface.entity) else 0
     colour = np.clip(colours.get(entity, np.array([170.0, 165.0, 158.0])), 0, 255).astype(np.uint8)
-    kept = surface.triangles[up > -0.5 * size]
+    seen = up > -0.5 * size
+    if entity in outlines:
+        before = corners.mean(axis=1) + normal / size[:, None] * _BEFORE
+        upright = np.abs(up) < 0.1 * size
+        seen &= ~(upright & contains_xy(outlines[entity], before[:, 0], before[:, 1]))
+    kept = surface.triangles[seen]
     return Surface.from_triangles(surface.positions, kept, colour=tuple(colour.tolist()), entity=entity)
 
 

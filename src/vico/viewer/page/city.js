@@ -33,12 +33,15 @@ export class City {
     /** @type {Map<string, any>} */
     this.models = new Map();
     this.textured = false;
+    /** Whether the processor draws, not a graphics card. */
+    this.software = false;
     /** Metres within which tiles are drawn whole. */
     this.nearReach = 130;
     /** How many parts have come so far. */
     this.arrived = 0;
     /** @type {Instances | null} */
     this.instances = null;
+    this.reach = { near: 45, far: 420 };
     this._round = 0;
     this._ready = new Promise((resolve) => (this._resolveReady = resolve));
     /** @type {any} */
@@ -58,7 +61,8 @@ export class City {
     const pictures = this.manifest.arrays.map(() => ({ value: pictureArray({ width: 1, height: 1 }, 1) }));
     this.pictures = pictures;
     this.materials = pictures.map((/** @type {any} */ array) => cityMaterial(this.light, array));
-    this.insideMaterials = pictures.map((/** @type {any} */ array) => cityMaterial(this.light, array, true));
+    this.materials.push(...pictures.map((/** @type {any} */ array) => cityMaterial(this.light, array, false, true)));
+    this.insideMaterials = [false, true].flatMap((both) => pictures.map((/** @type {any} */ array) => cityMaterial(this.light, array, true, both)));
     this._outlook(outlook, new THREE.CanvasTexture(picture));
     this._shapes(outlook);
     this._textures();
@@ -105,12 +109,18 @@ export class City {
     this.scene.add(plane);
   }
 
+  /** @param {{near: number, far: number}} reach metres to which things are drawn whole, and at all */
+  setReach(reach) {
+    this.reach = reach;
+    this.instances?.setReach(reach);
+  }
+
   /** @param {ArrayBuffer} outlook */
   async _shapes(outlook) {
     const shapes = await bytes("/city/models.bin");
     for (const [name, entry] of Object.entries(this.manifest.models)) this._addModel(name, entry, shapes);
     this.robotShapes = shapes;
-    this.instances = new Instances(this.scene, this);
+    this.instances = new Instances(this.scene, this, this.reach);
     for (const entry of this.manifest.instances) this.instances.add(entry, outlook);
     this.pools = lampPools(this, outlook);
     if (this.pools) this.scene.add(this.pools);
@@ -132,8 +142,8 @@ export class City {
   /** @param {string} name @param {any} entry @param {ArrayBuffer} shapes */
   _addModel(name, entry, shapes) {
     this.models.set(name, {
-      near: entry.near.map((/** @type {any} */ mesh) => ({ geometry: meshGeometry(shapes, mesh), array: mesh.array })),
-      far: entry.far.map((/** @type {any} */ mesh) => ({ geometry: meshGeometry(shapes, mesh), array: mesh.array })),
+      near: entry.near.map((/** @type {any} */ mesh) => ({ geometry: meshGeometry(shapes, mesh), array: materialOf(mesh, this.pictures.length) })),
+      far: entry.far.map((/** @type {any} */ mesh) => ({ geometry: meshGeometry(shapes, mesh), array: materialOf(mesh, this.pictures.length) })),
       low: entry.low,
       high: entry.high,
     });
@@ -145,7 +155,7 @@ export class City {
     let left = this.manifest.arrays.length;
     worker.onmessage = ({ data }) => {
       if (data.layers) {
-        this.pictures[data.number].value = pictureArray(data, data.layers, data.data);
+        this.pictures[data.number].value = pictureArray(data, data.layers, data.data, !this.software);
       }
       if (--left === 0) {
         worker.terminate();
@@ -177,7 +187,13 @@ export class City {
       const isNear = away < this.nearReach * (tile.near?.visible ? 1.1 : 1) && this.textured;
       if (isNear && !tile.near && !tile.loading) this._load(tile);
       if (isNear) tile.wanted = this._round;
-      if (tile.near) tile.near.visible = isNear;
+      // What is near is drawn first: what it hides costs nothing then.
+      const order = -100 + Math.min(away, 900) / 10;
+      for (const mesh of tile.far.children) mesh.renderOrder = order + (mesh.name === "walls" ? 0 : 1);
+      if (tile.near) {
+        tile.near.visible = isNear;
+        for (const mesh of tile.near.children) mesh.renderOrder = order;
+      }
       tile.far.visible = !(isNear && tile.near);
     }
     if (this.instances) this.instances.update(camera, this.inside >= 0);
@@ -192,7 +208,7 @@ export class City {
       const buffer = await bytes(`/city/${tile.entry.file}`);
       const group = new THREE.Group();
       for (const entry of tile.entry.near) {
-        group.add(new THREE.Mesh(meshGeometry(buffer, entry), this.materials[entry.array]));
+        group.add(new THREE.Mesh(meshGeometry(buffer, entry), this.materials[materialOf(entry, this.pictures.length)]));
       }
       tile.near = group;
       this.arrived++;
@@ -236,7 +252,7 @@ export class City {
     const entry = this.rooms.files[wanted];
     const buffer = await bytes(`/city/${entry.file}`);
     const group = new THREE.Group();
-    for (const mesh of entry.near) group.add(new THREE.Mesh(meshGeometry(buffer, mesh), this.insideMaterials[mesh.array]));
+    for (const mesh of entry.near) group.add(new THREE.Mesh(meshGeometry(buffer, mesh), this.insideMaterials[materialOf(mesh, this.pictures.length)]));
     const furniture = new Instances(group, this, { near: 45, far: 0 }, this.insideMaterials);
     for (const instance of entry.instances) furniture.add(instance, buffer);
     furniture.fillAll();
@@ -249,6 +265,11 @@ export class City {
   get walls() {
     return this.tiles.flatMap((tile) => tile.far.children.filter((/** @type {any} */ m) => m.name === "walls"));
   }
+}
+
+/** @param {any} mesh @param {number} arrays @returns {number} which material draws it: those seen from both sides come last */
+export function materialOf(mesh, arrays) {
+  return mesh.array + (mesh.both ? arrays : 0);
 }
 
 /** @param {string} path @returns {Promise<ArrayBuffer>} */

@@ -34,7 +34,7 @@ export class Instances {
     if (!model) return;
     const table = new Float32Array(buffer, entry.offset, 5 * entry.count);
     const size = Math.hypot(model.high[0] - model.low[0], model.high[1] - model.low[1], model.high[2] - model.low[2]);
-    const set = { name: entry.prototype, table, count: entry.count, size, middle: (model.low[2] + model.high[2]) / 2, levels: /** @type {any[]} */ ([]) };
+    const set = { name: entry.prototype, table, count: entry.count, size, seen: seenOf(model), middle: (model.low[2] + model.high[2]) / 2, levels: /** @type {any[]} */ ([]) };
     for (const parts of [model.near, model.far]) {
       set.levels.push(parts.map((/** @type {any} */ part) => this._mesh(part, entry.count)));
     }
@@ -60,6 +60,13 @@ export class Instances {
     }
   }
 
+  /** @param {{near: number, far: number}} reach */
+  setReach(reach) {
+    if (reach.near === this.reach.near && reach.far === this.reach.far) return;
+    this.reach = reach;
+    this._last.identity();
+  }
+
   /** @param {any} camera @param {boolean} [hidden] whether nothing is to be seen */
   update(camera, hidden = false) {
     const now = camera.matrixWorldInverse;
@@ -82,7 +89,7 @@ export class Instances {
     let nearCount = 0;
     let farCount = 0;
     const nearest = this.reach.near * (set.size > 3 ? 1.4 : 1);
-    const farthest = Math.min(this.reach.far * (set.size > 5 ? 2.2 : 1), set.size / SMALLEST);
+    const farthest = Math.min(this.reach.far * (set.seen > 3 ? 2.2 : 1), set.seen / SMALLEST);
     const { table } = set;
     for (let k = 0; k < set.count; k++) {
       const at = 5 * k;
@@ -105,6 +112,12 @@ export class Instances {
     show(near, nearCount);
     show(far, farCount);
   }
+}
+
+/** @param {any} model @returns {number} how large a shape looks, metres: a pole is tall and hardly seen */
+function seenOf({ low, high }) {
+  const wide = Math.hypot(high[0] - low[0], high[1] - low[1]);
+  return Math.sqrt(Math.max(wide, 0.05) * Math.max(high[2] - low[2], 0.05));
 }
 
 /** @param {any[]} meshes @param {number} count */

@@ -106,7 +106,7 @@ void main() {
     vec2 cell = vWall.xy / vec2(2.7, 3.5);
     vec2 within = fract(cell);
     float pane = step(0.28, within.x) * step(within.x, 0.74) * step(0.3, within.y) * step(within.y, 0.8);
-    float chance = fract(sin(dot(floor(cell), vec2(12.9898, 78.233))) * 43758.5453);
+    float chance = night > 0.1 ? fract(sin(dot(floor(cell), vec2(12.9898, 78.233))) * 43758.5453) : 0.0;
     vec3 glass = mix(vec3(0.17, 0.2, 0.24), vec3(1.5, 1.2, 0.75) / max(vLight, vec3(0.2)), night * step(0.62, chance));
     base = mix(base, glass, pane * 0.75);
   }
@@ -128,14 +128,15 @@ export function lightUniforms(light) {
  * @param {import("./light.js").Light} light
  * @param {{value: any}} pictures a texture array
  * @param {boolean} [inside] of rooms
+ * @param {boolean} [both] whether it is seen from behind too
  */
-export function cityMaterial(light, pictures, inside = false) {
+export function cityMaterial(light, pictures, inside = false, both = false) {
   return new THREE.ShaderMaterial({
     uniforms: { ...lightUniforms(light), ...(inside ? insideLight() : {}), pictures },
     vertexShader: CITY_VERTEX,
     fragmentShader: CITY_FRAGMENT,
     // Walls of rooms are seen from inside alone, so that one can look in from anywhere.
-    side: inside ? THREE.FrontSide : THREE.DoubleSide,
+    side: both ? THREE.DoubleSide : THREE.FrontSide,
   });
 }
 
@@ -170,8 +171,9 @@ export function plainMaterial(light, picture = null) {
  * @param {{width: number, height: number}} size
  * @param {number} layers
  * @param {Uint8Array} [data]
+ * @param {boolean} [fine] whether colours pass from level to level: twice the work where no graphics card does it
  */
-export function pictureArray(size, layers, data) {
+export function pictureArray(size, layers, data, fine = true) {
   const white = data ?? new Uint8Array(4).fill(255);
   const texture = data
     ? new THREE.DataArrayTexture(data, size.width, size.height, layers)
@@ -179,7 +181,7 @@ export function pictureArray(size, layers, data) {
   texture.format = THREE.RGBAFormat;
   texture.wrapS = texture.wrapT = THREE.RepeatWrapping;
   texture.magFilter = THREE.LinearFilter;
-  texture.minFilter = data ? THREE.LinearMipmapLinearFilter : THREE.LinearFilter;
+  texture.minFilter = !data ? THREE.LinearFilter : fine ? THREE.LinearMipmapLinearFilter : THREE.LinearMipmapNearestFilter;
   texture.generateMipmaps = Boolean(data);
   texture.needsUpdate = true;
   return texture;

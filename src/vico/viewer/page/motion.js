@@ -178,6 +178,7 @@ function poseIn(person, clip, phase, pace, second, out) {
   const entry = person.head.motions[clip] ?? person.head.motions[0];
   if (entry.resting !== undefined) {
     poseAtRest(person, entry.resting, second, out);
+    if (entry.name === "phone") raise(person, phase, second, out);
     return;
   }
   const at = (phase - Math.floor(phase)) * entry.phases;
@@ -202,6 +203,22 @@ function poseIn(person, clip, phase, pace, second, out) {
 }
 
 const faster = new Pose();
+
+/**
+ * Bring the phone up in the first of the cycle, and down in the last.
+ * @param {PersonFile} person
+ * @param {number} phase
+ * @param {number} second
+ * @param {Pose} out with the phone raised
+ */
+function raise(person, phase, second, out) {
+  const p = phase - Math.floor(phase);
+  const up = smoothstep(12 * p) * smoothstep(12 * (1 - p));
+  if (up >= 1) return;
+  poseAtRest(person, person.head.motions[0].resting, second, faster);
+  mix(faster.quaternions, out.quaternions, up);
+  for (let k = 0; k < 3; k++) out.shift[k] = faster.shift[k] + (out.shift[k] - faster.shift[k]) * up;
+}
 
 /**
  * @param {PersonFile} person

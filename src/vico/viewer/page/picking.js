@@ -49,7 +49,8 @@ function bodyHit(view, between, ray, reach) {
       a.set(body.x - (Math.cos(body.yaw) * length) / 2.4, body.y - (Math.sin(body.yaw) * length) / 2.4, body.z + height / 2);
       b.set(body.x + (Math.cos(body.yaw) * length) / 2.4, body.y + (Math.sin(body.yaw) * length) / 2.4, body.z + height / 2);
     }
-    const away = Math.sqrt(ray.distanceSqToSegment(a, b, at, on));
+    // Rounding may leave a little less than nothing.
+    const away = Math.sqrt(Math.max(ray.distanceSqToSegment(a, b, at, on), 0));
     const distance = at.distanceTo(ray.origin);
     // Far away a few pixels beside somebody still mean them.
     const allowed = (vehicle ? Math.max(width, height) / 2 : RADII[member.kind]) + distance * 0.006;

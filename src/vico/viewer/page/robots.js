@@ -1,6 +1,7 @@
 // Robots: every link where base pose and joint angles put it.
 
 import { THREE } from "./three.js";
+import { materialOf } from "./city.js";
 import { meshGeometry } from "./materials.js";
 
 const FARTHEST = 300;
@@ -42,7 +43,7 @@ export class Robots {
       const far = new THREE.Group();
       for (const [into, meshes] of [[near, link.near], [far, link.far]]) {
         for (const mesh of meshes) {
-          const part = new THREE.Mesh(meshGeometry(shapes, mesh), this.city.materials[mesh.array]);
+          const part = new THREE.Mesh(meshGeometry(shapes, mesh), this.city.materials[materialOf(mesh, this.city.pictures.length)]);
           part.frustumCulled = false;
           into.add(part);
         }

@@ -11,7 +11,7 @@ void main() {
 }`;
 const DOME_FRAGMENT = /* glsl */ `
 uniform vec3 zenith, horizon, sun, sunColour;
-uniform float night, clouds, time;
+uniform float night, clouds, time, plain;
 varying vec3 vWay;
 float hash(vec2 p) { return fract(sin(dot(p, vec2(12.9898, 78.233))) * 43758.5453); }
 float noise(vec2 p) {
@@ -25,7 +25,10 @@ void main() {
   vec3 colour = mix(horizon, zenith, pow(up, 0.5));
   float near = max(dot(way, sun), 0.0);
   colour += sunColour * (0.25 * pow(near, 24.0) + 1.6 * smoothstep(0.9992, 0.9996, near)) * (1.0 - clouds * clouds);
-  if (up > 0.02) {
+  // Clouds and stars are worth their pixels where a graphics card paints them.
+  if (plain > 0.5) {
+    colour = mix(colour, horizon, clouds * 0.35);
+  } else if (up > 0.02) {
     vec2 plane = way.xy / (up + 0.12) * 1.6 + time * 0.002;
     float puff = noise(plane) * 0.55 + noise(plane * 2.3) * 0.3 + noise(plane * 5.1) * 0.15;
     float cover = smoothstep(0.85 - 0.75 * clouds, 1.05 - 0.55 * clouds, puff) * smoothstep(0.02, 0.2, up);
@@ -68,7 +71,7 @@ export class Sky {
     const { zenith, horizon, sun, sunColour, night, clouds, time } = light;
     this.light = light;
     const material = new THREE.ShaderMaterial({
-      uniforms: { zenith, horizon, sun, sunColour, night, clouds, time },
+      uniforms: { zenith, horizon, sun, sunColour, night, clouds, time, plain: (this.plain = { value: 0 }) },
       vertexShader: DOME_VERTEX,
       fragmentShader: DOME_FRAGMENT,
       side: THREE.BackSide,

@@ -12,9 +12,9 @@ import { Overlay } from "./overlay.js";
 
 /** Levels of care, the plainest first: pixels' share, reach of whole tiles, of full bodies, of things (metres). */
 const CARE = [
-  { pixels: 0.4, tiles: 25, bodies: 9, things: 18, far: 160 },
-  { pixels: 0.5, tiles: 45, bodies: 14, things: 25, far: 220 },
-  { pixels: 0.65, tiles: 70, bodies: 20, things: 32, far: 300 },
+  { pixels: 0.4, tiles: 12, bodies: 8, things: 14, far: 70 },
+  { pixels: 0.5, tiles: 25, bodies: 12, things: 20, far: 110 },
+  { pixels: 0.65, tiles: 50, bodies: 18, things: 28, far: 200 },
   { pixels: 0.8, tiles: 100, bodies: 28, things: 40, far: 380 },
   { pixels: 1, tiles: 140, bodies: 40, things: 50, far: 480 },
   { pixels: 1.5, tiles: 220, bodies: 70, things: 80, far: 800 },
@@ -22,6 +22,12 @@ const CARE = [
 const GOAL = 30;
 /** The level of a picture that rests. */
 const FINE = 4;
+
+/** @param {any} gl @returns {string} what draws */
+function nameOf(gl) {
+  const told = gl.getExtension("WEBGL_debug_renderer_info");
+  return String(gl.getParameter(told ? told.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+}
 
 export class View {
   /** @param {HTMLCanvasElement} canvas @param {import("./source.js").Source} source */
@@ -31,11 +37,13 @@ export class View {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: false, powerPreference: "high-performance", preserveDrawingBuffer: true });
     this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
     this.renderer.setClearColor(0x9fb4c6);
+    const software = /swiftshader|llvmpipe|software|basic render/i.test(nameOf(this.renderer.getContext()));
     this.scene = new THREE.Scene();
     this.scene.matrixWorldAutoUpdate = true;
     this.camera = new THREE.PerspectiveCamera(55, 1, 0.25, 6000);
     this.light = makeLight();
     this.city = new City(this.scene, this.light);
+    this.city.software = software;
     this.cameras = new Cameras(this.camera, canvas, (p) => this.groundAt(p), (from, way, reach) => this.sight(from, way, reach));
     this._ray = new THREE.Raycaster();
     this.sky = new Sky(this.scene, this.light);
@@ -58,7 +66,7 @@ export class View {
     this._resize = true;
     this._frames = 0;
     this._heights = null;
-    this.setCare(3);
+    this.setCare(software ? 1 : 4);
   }
 
   /** @param {import("./ground.js").CityBase} base */
@@ -96,9 +104,10 @@ export class View {
     this.care = Math.min(Math.max(level, 0), CARE.length - 1);
     const care = CARE[this.care];
     this.stats.care = this.care;
+    this.sky.plain.value = this.city.software && this.care < FINE ? 1 : 0;
     this.city.nearReach = care.tiles;
     this.people.nearReach = care.bodies;
-    if (this.city.instances) this.city.instances.reach = { near: care.things, far: care.far };
+    this.city.setReach({ near: care.things, far: care.far });
     this._resize = true;
   }
 
