@@ -94,23 +94,14 @@ def made(world: Path, community: Path) -> dict[str, dict[int, Any]]:
     agent = {"form": "arrays", "cars": 30, "pedestrians": 30, "max_steps": 10**6}
     seeing = {"observe": ("assistant_0",), "image": SIDE}
     alone = {"max_steps": 10**6, "reach": 0.5}
-    found: dict[str, dict[int, Any]] = {}
-    for n in (1, 2):
-        vectors = {
-            "a point goal, alone in the city": make_task_vec("make_point_goal", world, num_envs=n, **alone),
-            f"the same, pictures of {SIDE} x {SIDE}": make_task_vec(
-                "make_point_goal", world, num_envs=n, **alone, **seeing
-            ),
-            "among residents, 30 cars and 30 passers-by": vico.make_vec(
-                world, community, num_envs=n, observe="none", **agent
-            ),
-            f"the same, pictures of {SIDE} x {SIDE}, too": vico.make_vec(
-                world, community, num_envs=n, **agent, **seeing
-            ),
-        }
-        for name, vector in vectors.items():
-            found.setdefault(name, {})[n] = vector
-    return found
+    goal = partial(make_task_vec, "make_point_goal", world, **alone)
+    return {
+        "a point goal, alone in the city": {n: goal(num_envs=n) for n in (1, 2)},
+        f"the same, pictures of {SIDE} x {SIDE}": {n: goal(num_envs=n, **seeing) for n in (1, 2)},
+        "among residents, 30 cars and 30 passers-by": {
+            1: vico.make_vec(world, community, num_envs=1, observe="none", **agent)
+        },
+    }
 
 
 def middle(values: list[float]) -> str:
@@ -145,10 +136,11 @@ def main() -> None:
                 vector.close()
     rows = []
     for name in vectors:
-        one, two = ([wall for wall, _ in speeds[name, n]] for n in (1, 2))
+        one, two = ([wall for wall, _ in speeds.get((name, n), [])] for n in (1, 2))
         cpu = [used for _, used in speeds[name, 1]]
-        gain = [b / a for a, b in zip(one, two, strict=True)]
-        rows.append(f"| {name} | {middle(one)} | {middle(two)} | {middle(gain)} | {middle(cpu)} |")
+        gain = [b / a for a, b in zip(one, two, strict=False)]
+        both = f"{middle(two)} | {middle(gain)}" if two else "- | -"
+        rows.append(f"| {name} | {middle(one)} | {both} | {middle(cpu)} |")
     ways = {side: [transport(side, 100) for _ in range(given.n)] for side in (64, SIDE, 256)}
     lines = [
         "# Environments for learners",

@@ -22,6 +22,7 @@ from vico.sim.simulation import Simulation
 from vico.sim.state import Posture, Vehicle
 from vico.sim.transit.passengers import FIRST_PASSENGER
 from vico.sim.transit.system import TransitSystem
+from vico.sim.transit.tram_network import TramNetwork
 from vico.sim.transit.tram_zones import zones_of
 from vico.world.folder import World
 from vico.world.model import TramLine, TramStop
@@ -268,17 +269,16 @@ class _Walks:
 def test_nobody_walks_along_tracks_on_sidewalks_or_over_corners_but_across_them(
     sim: Simulation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    trams = system(sim).trams
     beside = Y - 3.2
-    monkeypatch.setattr(trams, "tracks", [Track([(-40.0, y), (40.0, y)]) for y in (Y, beside)])
     along, across = [(-10.0, Y + 0.5), (2.0, Y + 0.5)], [(5.0, Y + 9.0), (5.0, beside - 9.0)]
     rows = [
         (SIDEWALK, along), (CORNER, along), (CROSSING, along), (SIDEWALK, [(-10.0, Y + 3.0), (2.0, Y + 3.0)]),
         # Over both tracks at right angles; at the corner round a bend one walks along the nearer one.
         (CORNER, across), (CORNER, [(5.0, Y + 3.0), (5.0, Y), (18.0, Y)]),
     ]  # fmt: skip
-    monkeypatch.setattr(trams, "_traffic", SimpleNamespace(walks=_Walks(rows)))
-    assert trams.walkways_on_tracks().tolist() == [True, True, False, False, False, True]
+    network = TramNetwork([], sim.base.streets.lanes, _Walks(rows))  # type: ignore[arg-type]
+    monkeypatch.setattr(network, "tracks", [Track([(-40.0, y), (40.0, y)]) for y in (Y, beside)])
+    assert network.walkways_on_tracks.tolist() == [True, True, False, False, False, True]
 
 
 def test_a_tram_asks_those_to_go_who_stand_on_its_track_before_it(
@@ -298,3 +298,9 @@ def test_a_tram_asks_those_to_go_who_stand_on_its_track_before_it(
     trams.speed[trams.front > -1.0] = 1.0
     trams._ask_to_go()
     assert not walkers.before_tram.any()
+
+
+def test_simulations_of_a_world_share_what_never_changes_about_its_trams(sim: Simulation) -> None:
+    other = Simulation(sim.world, None, sim.config)
+    assert system(other).trams.network is system(sim).trams.network
+    assert other.state_hash() == Simulation(sim.world, None, sim.config).state_hash()

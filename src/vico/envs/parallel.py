@@ -192,7 +192,10 @@ class CommunityEnv(ParallelEnv):  # type: ignore[misc]
     def told(self, name: str, result: StepResult) -> tuple[Any, dict[str, Any]]:
         """Return one agent's observation, in its form, and its info."""
         observation, found = result.observations[name], result.infos[name]
+        # Copies: what is told may be kept and changed.
         info = dict(found)
+        if "entities" in info:
+            info["entities"] = {entity: dict(about) for entity, about in info["entities"].items()}
         if result.hash:
             info["hash"] = result.hash
         form = self.forms[name]

@@ -30,6 +30,7 @@ from vico.sim.traffic.network import TrafficNetwork
 from vico.sim.traffic.standing_spots import with_spots
 from vico.sim.traffic.stopping_places import with_stopping_places
 from vico.sim.transit import BusPlan, plan_buses
+from vico.sim.transit.tram_network import TramNetwork
 from vico.world.folder import World
 from vico.world.model import Entrance
 from vico.world.objects import Objects
@@ -121,6 +122,11 @@ class SimulationBase:
         driven = with_stopping_places(network.driven, network.lanes, network.walks, self.world, self.solids)
         walked = with_spots(network.walked, network.walks, self.world, self.solids)
         return replace(network, driven=driven, walked=walked)
+
+    @cached_property
+    def tram_network(self) -> TramNetwork:
+        """Where trams drive, and what is in their way there."""
+        return TramNetwork(self.world.transit.tram_lines, self.streets.lanes, self.streets.walks)
 
     @cached_property
     def router(self) -> Router:

@@ -51,7 +51,15 @@ def traffic_and_transit_of(base: SimulationBase, config: SimConfig) -> tuple[Tra
     if not has_transit:
         return traffic, None
     second = float(config.start)
-    transit = TransitSystem(world.transit, traffic, plan, second=second, first_bike=FIRST_BIKE, first_tram=FIRST_TRAM)
+    transit = TransitSystem(
+        world.transit,
+        traffic,
+        plan,
+        second=second,
+        first_bike=FIRST_BIKE,
+        first_tram=FIRST_TRAM,
+        network=base.tram_network,
+    )
     transit.take_passengers(world.walkable, config.seed)
     return traffic, transit
 

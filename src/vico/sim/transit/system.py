@@ -26,6 +26,7 @@ from vico.sim.transit.detours import Detours
 from vico.sim.transit.doors import DOOR_TIME, leaf_transforms, moved_doors
 from vico.sim.transit.passengers import Passengers
 from vico.sim.transit.services import Services
+from vico.sim.transit.tram_network import TramNetwork
 from vico.sim.transit.trams import Trams
 from vico.world.mesh import Surface
 from vico.world.model import Transit
@@ -71,8 +72,9 @@ class TransitSystem(Services):
         second: float,
         first_bike: int,
         first_tram: int = FIRST_TRAM,
+        network: TramNetwork | None = None,
     ) -> None:
-        trams = Trams(transit.tram_lines, traffic, second=float(second), first_entity=first_tram)
+        trams = Trams(transit.tram_lines, traffic, second=float(second), first_entity=first_tram, network=network)
         super().__init__(transit, traffic, plan, trams)
         buses = traffic.buses
         self.clock = np.array([float(second)])

@@ -43,8 +43,13 @@ class TramCrossings:
         Of each crossing whether a tram is there or comes: part of the state, bool, shape ``(crossings,)``.
     """
 
-    def __init__(self, tracks: Sequence[Track], traffic: Traffic) -> None:
-        crossings, self._stretches = crossed_stretches(tracks, traffic.lanes)
+    def __init__(
+        self,
+        tracks: Sequence[Track],
+        traffic: Traffic,
+        crossed: tuple[NDArray[np.void], list[list[CrossedStretch]]] | None = None,
+    ) -> None:
+        crossings, self._stretches = crossed_stretches(tracks, traffic.lanes) if crossed is None else crossed
         self.called = traffic.put_tracks(crossings)
         self._tracks, self._traffic = tracks, traffic
         self._taken: NDArray[np.bool_] | None = None

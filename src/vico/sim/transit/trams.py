@@ -25,6 +25,7 @@ from vico.sim.traffic.leaving import RADIUS
 from vico.sim.transit.doors import DOOR_TIME, leaf_transforms, moved_doors
 from vico.sim.transit.passengers import FIRST_PASSENGER
 from vico.sim.transit.tram_crossings import TramCrossings
+from vico.sim.transit.tram_network import TramNetwork
 from vico.sim.transit.tram_outlines import (
     first_taken,
     holds_somebody,
@@ -33,11 +34,9 @@ from vico.sim.transit.tram_outlines import (
     nobody,
     outlines,
     packed,
-    spots_near,
     stand,
 )
-from vico.sim.transit.tram_signals import TramSignal, metres_to_signal, signals_of
-from vico.sim.transit.tram_zones import zones_of
+from vico.sim.transit.tram_signals import TramSignal, metres_to_signal
 from vico.world.mesh import Surface
 from vico.world.model import TramLine
 from vico.world.rails import (
@@ -48,14 +47,10 @@ from vico.world.rails import (
     TRAM_DOORS,
     TRAM_LENGTH,
     TRAM_SPEED,
-    Track,
 )
-from vico.world.walkways import CORNER, CROSSING
 
 #: Where the front of a tram is that is not in the city.
 AWAY = -1.0
-_WALKER = 0.25  # m beside a tram that walkers keep
-_ON_TRACK, _CORNER_ON_TRACK = 6, 10  # metres on a track that make a sidewalk part of it; corners lead over two tracks
 _WAITS = 0.5  # seconds left of a stop that a tram keeps while somebody has yet to get off
 _EDGE = 3.0  # metres from the city's edge within which tracks lead out of it
 _TOUCH = 0.03  # metres that are too near
@@ -103,9 +98,19 @@ class Trams:
         As those of `vico.sim.transit.system.TransitSystem`.
     """
 
-    def __init__(self, lines: Sequence[TramLine], traffic: Traffic, *, second: float, first_entity: int) -> None:
+    def __init__(
+        self,
+        lines: Sequence[TramLine],
+        traffic: Traffic,
+        *,
+        second: float,
+        first_entity: int,
+        network: TramNetwork | None = None,
+    ) -> None:
         self.lines = list(lines)
-        self.tracks = [Track(line.track) for line in lines]
+        #: What never changes; made anew unless given.
+        self.network = TramNetwork(lines, traffic.lanes, traffic.walks) if network is None else network
+        self.tracks = self.network.tracks
         self.first_entity = first_entity
         self._traffic = traffic
         self._half = traffic.height.half
@@ -114,12 +119,11 @@ class Trams:
             track.length + (TRAM_LENGTH if float(np.abs(track.xy[-1]).max()) > self._half - _EDGE else 0.0)
             for track in self.tracks
         ]
-        zones, count = zones_of(self.tracks)
-        self._zones = zones
-        self._crossings = TramCrossings(self.tracks, traffic)
+        self._zones, count = self.network.zones
+        self._crossings = TramCrossings(self.tracks, traffic, self.network.crossed)
         self.called = self._crossings.called
         obeys = traffic.signals is not None
-        self._signals: list[list[TramSignal]] = signals_of(self.tracks, traffic.lanes) if obeys else [[] for _ in lines]
+        self._signals: list[list[TramSignal]] = self.network.signals if obeys else [[] for _ in lines]
         slots = [min(math.ceil((line.travel[-1] + 240.0) / _headway(line)) + 1, 8) for line in lines]
         self.line_of = np.repeat(np.arange(len(lines)), slots).astype(np.int32)
         n = len(self.line_of)
@@ -425,17 +429,8 @@ class Trams:
 
     def walkways_on_tracks(self) -> NDArray[np.bool_]:
         """Mark the walkways, other than crossings, that lie on a track: nobody is to walk towards a tram there."""
-        walks = self._traffic.walks
-        found = np.zeros(len(walks), np.bool_)
-        if not len(self):
-            return found
-        points = np.concatenate([track.xy for track in self.tracks])
-        reach = np.concatenate([track.half_width for track in self.tracks]) + _WALKER
-        for k in np.flatnonzero(walks.kind != CROSSING).tolist():
-            line = np.ascontiguousarray(walks.line(k), np.float64)
-            most = _CORNER_ON_TRACK if walks.kind[k] == CORNER else _ON_TRACK
-            found[k] = spots_near(line, points, reach) >= most
-        return found
+        # None where no tram ever comes.
+        return self.network.walkways_on_tracks if len(self) else np.zeros(len(self._traffic.walks), np.bool_)
 
     # -- riders ------------------------------------------------------------------------------------------------------
 
