@@ -1,6 +1,6 @@
 """Steps a second of environments for learners: one and two processes, with and without pictures.
 
-    python benchmarks/environments.py WORLD COMMUNITY [--steps 60] [-n 5] [--table benchmarks/results/environments.md]
+    python benchmarks/environments.py WORLD COMMUNITY [--steps 40] [-n 5] [--table benchmarks/results/environments.md]
 
 All environments are made first and then measured in turns, so that other load on the machine meets all of them alike:
 ratios are those of one turn, and count more than the seconds. Processor time is that of the environments' processes.
@@ -148,7 +148,8 @@ def main() -> None:
         about,
         f"Made by `python benchmarks/environments.py WORLD COMMUNITY --steps {given.steps} -n {given.n} --table "
         "benchmarks/results/environments.md`. The machine was shared with other work: ratios of one turn tell more "
-        "than the seconds, and steps a second of processor time are what an idle core makes.",
+        "than the seconds, and steps a second of processor time are what an idle core makes. Where the load is higher "
+        "than the number of processors, a second process finds no idle core, and its ratio tells of the load.",
         "",
         f"Array form, sampled actions; median of {given.n} turns of {given.steps} steps (least-greatest). The "
         f"community has {residents} residents who follow their day. Pictures are colour, depth and segmentation of one "
