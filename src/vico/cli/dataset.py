@@ -62,6 +62,7 @@ def request_of(options: DatasetOptions) -> BuildRequest:
         rule=SplitRule(options.split_by, options.test, options.validation),
         successes=options.successes,
         workers=options.workers or processors(),
+        ray=options.ray,
     )
 
 

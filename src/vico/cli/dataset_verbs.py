@@ -10,6 +10,8 @@ import tyro
 from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
+from vico.cli.options import RayAddress
+
 dataset = SubcommandApp()
 
 _FLAT = tyro.conf.arg(name="")
@@ -62,6 +64,9 @@ class DatasetOptions:
         What is never in two splits: a world, a person who acts or asks, or only an episode itself.
     workers
         Processes side by side; 0 is one a processor. Decides nothing but how long it takes.
+    ray
+        Make the parts on a Ray cluster instead (the extra "ray"): its address; without one on that which runs here. OUT
+        and the worlds must be on a folder that all machines share.
     deadline
         Seconds an agent of yours has for an action; 0 waits for it as long as it takes.
     force
@@ -90,6 +95,7 @@ class DatasetOptions:
     validation: float = 0.0
     split_by: Literal["world", "person", "episode"] = "episode"
     workers: int = 0
+    ray: RayAddress = None
     deadline: float = 60.0
     force: bool = False
     json: bool = False
