@@ -12,9 +12,12 @@ from __future__ import annotations
 
 import argparse
 import heapq
+import os
 import statistics
 import tempfile
+import threading
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -38,15 +41,56 @@ _BACK = 300.0  # seconds until there is another machine for one that was taken a
 
 @dataclass(frozen=True)
 class Round:
-    """Seconds of each way, and of an episode in the first of them."""
+    """Seconds of each way, of all its processors together, and of an episode in the first of them."""
 
     seconds: dict[str, float]
+    busy: dict[str, float]
     episode: float
+
+
+class ProcessorSeconds:
+    """What this process's descendants use, looked at several times a second: Ray's do not wait for each other."""
+
+    def __init__(self) -> None:
+        self._used: dict[int, float] = {}
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._watch)
+
+    def __enter__(self) -> ProcessorSeconds:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+
+    @property
+    def total(self) -> float:
+        """Seconds of all together."""
+        return sum(self._used.values())
+
+    def _watch(self) -> None:
+        unit = os.sysconf("SC_CLK_TCK")
+        while not self._over.wait(0.2):
+            parents: dict[int, int] = {}
+            used: dict[int, float] = {}
+            for path in Path("/proc").glob("[0-9]*/stat"):
+                with suppress(OSError):
+                    fields = path.read_text().rpartition(")")[2].split()
+                    parents[int(path.parent.name)] = int(fields[1])
+                    used[int(path.parent.name)] = (int(fields[11]) + int(fields[12])) / unit
+            for pid in parents:
+                above = pid
+                while above in parents and above != os.getpid():
+                    above = parents[above]
+                if above == os.getpid() and pid != above:
+                    self._used[pid] = used[pid]
 
 
 def play_round(arguments: argparse.Namespace) -> Round:
     """Play the episodes in every way; stop if they do not come to the same."""
     seconds: dict[str, float] = {}
+    busy: dict[str, float] = {}
     written: list[bytes] = []
     with tempfile.TemporaryDirectory(prefix="vico-") as folder:
         for name, words in WAYS.items():
@@ -59,13 +103,14 @@ def play_round(arguments: argparse.Namespace) -> Round:
                 "--steps",
                 str(arguments.steps),
             ]
-            done = vico("eval", "assistant", "--method", "heuristic", *asked, *words, "--out", str(out))
-            seconds[name] = done.seconds
+            with ProcessorSeconds() as used:
+                done = vico("eval", "assistant", "--method", "heuristic", *asked, *words, "--out", str(out))
+            seconds[name], busy[name] = done.seconds, used.total
             written.append((out / "results.json").read_bytes() + (out / "results.md").read_bytes())
         episodes = read_json(Path(folder) / "one_process" / "timing.json")["episodes"]
     if len(set(written)) > 1:
         raise SystemExit("the ways came to different tables")
-    return Round(seconds, statistics.mean(episode["wall_seconds"] for episode in episodes))
+    return Round(seconds, busy, statistics.mean(episode["wall_seconds"] for episode in episodes))
 
 
 def simulate(tasks: Sequence[float], machines: int, processors: int, taken: float) -> tuple[float, float, int]:
@@ -151,10 +196,11 @@ def main() -> None:
     lines = [
         "# Many machines",
         "",
-        f"{head} Ray {version('ray')}. The machine was shared with other work all the while: seconds are long, and a "
-        "way with two processes gets a greater share of it than one would; ratios are within a round, whose ways took "
-        f"turns. {len(arguments.worlds) * arguments.seeds} episodes of the delivery task, {arguments.steps} steps "
-        "each. All ways came to the same results.json and results.md, byte for byte.",
+        f"{head} Ray {version('ray')}. {len(arguments.worlds) * arguments.seeds} episodes of the delivery task, "
+        f"{arguments.steps} steps each. All ways came to the same results.json and results.md, byte for byte.",
+        "",
+        "Where the machine is shared with other work (see the load), seconds by the clock say more of that than of the "
+        "ways; processor seconds do not depend on it. Ratios are within a round, whose ways took turns.",
         "",
         "| way, seconds in all | median | least | most | n |",
         "|---|---:|---:|---:|---:|",
@@ -163,6 +209,16 @@ def main() -> None:
         "| times as fast as one process | median | least | most | n |",
         "|---|---:|---:|---:|---:|",
         *(row(name, [one.seconds[first] / one.seconds[name] for one in rounds], 2) for name in WAYS if name != first),
+        "",
+        "| processor seconds of all processes | median | least | most | n |",
+        "|---|---:|---:|---:|---:|",
+        *(row(name, [one.busy[name] for one in rounds], 1) for name in WAYS),
+        "",
+        "So two free processors would be, at best, so many times as fast as one:",
+        "",
+        "| 2 x processor seconds of one process / those of this way | median | least | most | n |",
+        "|---|---:|---:|---:|---:|",
+        *(row(name, [2 * one.busy[first] / one.busy[name] for one in rounds], 2) for name in WAYS if name != first),
         "",
         f"## {WORLDS:,} worlds, {EPISODES} such episodes in each: simulated",
         "",

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import shutil
-import signal
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from command_line import vico
+from ray_nodes import needs_ray
 from vico.datasets import side_by_side
 from vico.datasets.build import BuildRequest, Contents, build_dataset, tasks_of
 from vico.datasets.card import card_of
@@ -23,6 +22,7 @@ from vico.datasets.contact_sheet import write_contact_sheet
 from vico.datasets.folder import Dataset
 from vico.datasets.formats import webdataset
 from vico.datasets.splits import SplitRule
+from vico.datasets.worker import player
 from vico.errors import InputError, SchemaError
 from vico.io.files import read_json, write_json
 from vico.sim.recording import read_run
@@ -144,8 +144,8 @@ def test_workers_and_interruptions_change_no_byte(
     class Stopped(BaseException):
         pass
 
-    def stopping(options: Any, tasks: Any, *, workers: int, done: Any, tell: Any) -> None:
-        make = side_by_side.player(options, tell)
+    def stopping(options: Any, tasks: Any, *, workers: int, ray: Any, done: Any, tell: Any) -> None:
+        make = player({**options, "seen": ""}, tell)
         for index, task in enumerate(tasks):
             if index == 2:
                 raise Stopped
@@ -162,9 +162,9 @@ def test_workers_and_interruptions_change_no_byte(
     (parts / ".scratch" / "left.over").mkdir(parents=True)
     kept: list[str] = []
 
-    def noting(options: Any, tasks: Any, *, workers: int, done: Any, tell: Any) -> None:
+    def noting(options: Any, tasks: Any, *, workers: int, ray: Any, done: Any, tell: Any) -> None:
         kept.extend(path.name for path in parts.glob("0*") if path.stat().st_mtime_ns == made[path.name])
-        side_by_side.run_tasks(options, tasks, workers=workers, done=done, tell=tell)
+        side_by_side.run_tasks(options, tasks, workers=workers, ray=ray, done=done, tell=tell)
 
     monkeypatch.setattr("vico.datasets.build.run_tasks", noting)
     build_dataset(request(kept_runs), tmp_path / "cut")
@@ -178,21 +178,18 @@ def test_a_killed_process_is_started_again(
 ) -> None:
     flag = tmp_path / "flag"
     monkeypatch.setenv("VICO_TEST_FLAG", str(flag))
-    monkeypatch.setattr(side_by_side, "_run", dying)
+    monkeypatch.setattr(side_by_side, "MAKER", "dataset_player:dying")
     built = build_dataset(request(kept_runs, outputs=(), workers=2), tmp_path / "out")
     assert flag.exists()
     assert built.missing == []
     assert built.record["episodes"] == 12  # all residents: nobody's pictures are asked for
 
 
-def dying(task: Any) -> Any:
-    """Make a part; the first process that is asked for the second one ends at once."""
-    flag = Path(os.environ["VICO_TEST_FLAG"])
-    if task["folder"].startswith("000001") and not flag.exists():
-        flag.touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    assert side_by_side._make is not None
-    return side_by_side._make(task)
+@needs_ray
+def test_a_cluster_makes_the_same_bytes(kept_runs: list[Path], tmp_path: Path) -> None:
+    build_dataset(request(kept_runs, outputs=()), tmp_path / "here")
+    build_dataset(request(kept_runs, outputs=(), ray="local", workers=2), tmp_path / "ray")
+    assert bytes_of(tmp_path / "ray") == bytes_of(tmp_path / "here")
 
 
 def test_whole_worlds_or_persons_are_kept_apart(kept_runs: list[Path], tmp_path: Path) -> None:

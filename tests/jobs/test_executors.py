@@ -90,3 +90,20 @@ def test_a_cluster_that_is_not_there_and_a_bad_number_are_one_sentence(monkeypat
 
     with pytest.raises(MissingExtraError, match=r"pip install 'virtual-community\[ray\]'"):
         open_executor(ray="auto")
+
+
+@needs_ray
+def test_an_address_where_nothing_answers_is_said_at_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    says = r"--ray .*: nothing answers at 127\.0\.0\.1:9 \(.*\); start a cluster with ray start --head"
+    with pytest.raises(InputError, match=says):
+        open_executor(ray="127.0.0.1:9")
+    with pytest.raises(InputError, match=r"nothing answers at ray://127\.0\.0\.1:9"):
+        open_executor(ray="ray://127.0.0.1:9")
+    monkeypatch.setenv("RAY_TMPDIR", str(tmp_path))
+    (tmp_path / "ray").mkdir()
+    (tmp_path / "ray" / "ray_current_cluster").write_text("127.0.0.1:9\n")
+    with pytest.raises(InputError, match=says):  # a cluster that was killed
+        open_executor(ray="auto")
+    monkeypatch.setenv("RAY_ADDRESS", "127.0.0.1:8")
+    with pytest.raises(InputError, match=r"nothing answers at 127\.0\.0\.1:8"):
+        open_executor(ray="auto")

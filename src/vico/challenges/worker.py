@@ -11,12 +11,10 @@ from typing import Any
 from vico.challenges.episodes import Outcome, Player, code_digest, record_of
 from vico.challenges.records import Job
 from vico.challenges.registry import load_challenge
-from vico.errors import InputError
 from vico.io.stores import store_at
 from vico.jobs import Service
-from vico.jobs.shared import check_seen
+from vico.jobs.shared import check_code, check_seen
 from vico.runner.foreign import Terms
-from vico.version import __version__
 from vico.world.remote import fetch_world
 
 _TOLD_EVERY = 10  # steps
@@ -50,11 +48,8 @@ def player(
     """
     store = store_at(options["store"])
     check_seen(store, options["seen"])
-    if options["seen"] and code_digest() != options["code"]:
-        raise InputError(
-            f"vico {__version__} there is other code, or its $VICO_DATA holds other data, than where the episodes are "
-            "asked for; install the same on every machine"
-        )
+    if options["seen"]:
+        check_code(options["code"], code_digest())
     episodes = Player(load_challenge(options["challenge"]), store, code=options["code"], record=options["record"])
 
     def progress(label: str, step: int, limit: int) -> None:

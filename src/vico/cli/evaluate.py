@@ -67,6 +67,8 @@ def _by_hand(categories: Sequence[str] | None, setting: Setting, options: Assist
     """Judge a person, who plays at a page of this machine, one episode after the other, each recorded."""
     from vico.viewer import theatre
 
+    if options.common.ray is not None:
+        raise InputError("eval: --method human is played at this machine; leave out --ray")
     require_server()
     theatre.AT_THE_PAGE.open(city=city_of, announce=told, port=options.port, waits=options.waits)
     common = replace(options.common, workers=1, record=True)

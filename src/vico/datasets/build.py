@@ -66,6 +66,8 @@ class BuildRequest:
         Keep only episodes in which all was done.
     workers
         Processes side by side; decides nothing but how long it takes.
+    ray
+        A Ray cluster that makes the parts instead: its address, or ``auto``.
     """
 
     contents: Contents
@@ -80,6 +82,7 @@ class BuildRequest:
     rule: SplitRule = field(default_factory=SplitRule)
     successes: bool = False
     workers: int = 1
+    ray: str | None = None
 
 
 @dataclass(frozen=True)
@@ -133,7 +136,7 @@ def build_dataset(request: BuildRequest, out: Path, *, force: bool = False, repo
             if report is not None:
                 report(len(answers), len(tasks))
 
-        run_tasks(options, tasks, workers=request.workers, done=done, tell=lambda told: None)
+        run_tasks(options, tasks, workers=request.workers, ray=request.ray, done=done, tell=lambda told: None)
         missing = [f"{tasks[k]['label']}: {answers[k]['reason']}" for k in sorted(answers) if "reason" in answers[k]]
         episodes = [episode for task in tasks for episode in read_part(parts / task["folder"], task["key"]) or []]
         if request.successes:
@@ -245,7 +248,8 @@ def _take(partial: Path) -> None:
     InputError
         If it is somebody else's.
     """
-    if partial.is_dir() and any(partial.iterdir()):
+    # What a kill left while the mark was written is not somebody else's.
+    if partial.is_dir() and any(not path.name.startswith(f".{_MARK}") for path in partial.iterdir()):
         if not (partial / _MARK).exists() or read_json(partial / _MARK) != _MARKED:
             raise InputError(f"{partial}: holds something else than parts of a dataset; choose another --out")
         return

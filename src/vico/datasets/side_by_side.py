@@ -1,24 +1,20 @@
-"""Making parts in processes side by side; a process that dies takes only its own task with it, after a second try."""
+"""Handing out the parts of a dataset: to this process, to processes side by side, or to a Ray cluster."""
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
 from typing import Any
 
-from vico import threads
-from vico.datasets.worker import player
+from vico.challenges.episodes import code_digest
+from vico.io.stores import FolderStore
+from vico.jobs import Answer, Service, Task, open_executor
+from vico.jobs.shared import seen_by_all
 
-_TRIES = 2
-
+#: What makes parts.
+MAKER = "vico.datasets.worker:player"
 #: Told the index of a task and what came of it.
 Done = Callable[[int, Mapping[str, Any]], None]
-
-_make: Callable[[Mapping[str, Any]], Mapping[str, Any]] | None = None
 
 
 def run_tasks(
@@ -26,72 +22,37 @@ def run_tasks(
     tasks: Sequence[Mapping[str, Any]],
     *,
     workers: int,
+    ray: str | None = None,
     done: Done,
     tell: Callable[[Mapping[str, Any]], None],
 ) -> None:
     """Hand tasks to `vico.datasets.worker.player`; with one worker, in this process.
 
+    Parameters
+    ----------
+    options
+        Of the player. Its folder of parts must be one that all machines share.
+    ray
+        A Ray cluster instead of processes: its address, or ``auto``; see `vico.jobs.open_executor`.
+
     Raises
     ------
+    InputError
+        If there is no such cluster, or a machine of it sees another folder or has other code.
     OutputError
         If a part cannot be written.
     """
-    if min(workers, len(tasks)) <= 1:
-        make = player(options, tell)
-        for index, task in enumerate(tasks):
-            done(index, make(task))
-        return
-    left = dict(enumerate(tasks))
-    died: Counter[int] = Counter()
-    share = max(1, threads.workers() // workers)
-    while left:
-        begun: set[int] = set()
-        try:
-            _run_some(options, left, workers, share, done, begun)
-        except BrokenProcessPool:
-            for index in sorted(begun & left.keys()):
-                died[index] += 1
-                if died[index] >= _TRIES:
-                    done(index, {"reason": "its process was ended, twice; it may lack memory: try fewer --workers"})
-                    del left[index]
+
+    def over(index: int, answer: Answer) -> None:
+        done(index, {"reason": answer.reason} if answer.content is None else answer.content)
+
+    if ray is None:
+        workers = min(workers, max(1, len(tasks)))
+    parts = FolderStore(Path(options["parts"]))
+    with open_executor(workers=workers, ray=ray) as executor, seen_by_all(parts, executor) as seen:
+        service = Service(MAKER, {**options, "parts": str(parts), "seen": seen, "code": code_digest()})
+        executor.run(service, [Task(task, near=_world(task)) for task in tasks], done=over, told=tell)
 
 
-def _run_some(
-    options: Mapping[str, Any],
-    left: dict[int, Mapping[str, Any]],
-    workers: int,
-    share: int,
-    done: Done,
-    begun: set[int],
-) -> None:
-    """Hand out what is left, a few at a time; note which were handed out, for one of those may end its process."""
-    # Fresh processes: a fork of one with compiled code and threads in it may hang.
-    context = multiprocessing.get_context("spawn")
-    waiting = sorted(left)
-    with ProcessPoolExecutor(workers, context, _start, (dict(options), share)) as pool:
-        running: dict[Future[Mapping[str, Any]], int] = {}
-        try:
-            while waiting or running:
-                while waiting and len(running) < workers:
-                    index = waiting.pop(0)
-                    begun.add(index)
-                    running[pool.submit(_run, dict(left[index]))] = index
-                finished = next(as_completed(running))
-                index = running.pop(finished)
-                done(index, finished.result())
-                del left[index]
-                begun.discard(index)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-
-
-def _start(options: Mapping[str, Any], share: int) -> None:
-    global _make
-    os.environ[threads.WORKERS] = str(share)
-    _make = player(options, lambda told: None)
-
-
-def _run(task: Mapping[str, Any]) -> Mapping[str, Any]:
-    assert _make is not None
-    return _make(task)
+def _world(task: Mapping[str, Any]) -> str:
+    return str(task["job"]["world"] if "job" in task else task.get("world") or task.get("run", ""))

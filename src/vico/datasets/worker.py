@@ -16,6 +16,7 @@ from typing import Any
 from vico.challenges.assistant.challenge import ASSISTANT
 from vico.challenges.assistant.episode import Reported, play_task, world_and_people
 from vico.challenges.assistant.model import Task
+from vico.challenges.episodes import code_digest
 from vico.challenges.records import Job
 from vico.datasets.demonstrations import Demonstration, demonstrations_of
 from vico.datasets.episode_records import Tally, episode_record
@@ -25,6 +26,8 @@ from vico.datasets.parts import Contents, read_part, write_part
 from vico.datasets.pictures import PictureKeeper, PictureSource, RecordedPictures
 from vico.datasets.tasks import EpisodeFacts, facts_of_episode, facts_of_run
 from vico.errors import InputError, OutputError, VicoError
+from vico.io.stores import FolderStore
+from vico.jobs.shared import check_code, check_seen
 from vico.runner.foreign import Terms
 from vico.runner.loop import Hook
 from vico.sim.recording import Run, read_run
@@ -42,7 +45,8 @@ def player(options: Mapping[str, Any], tell: Tell) -> Callable[[Mapping[str, Any
     Parameters
     ----------
     options
-        ``parts``: folder of the parts; ``contents``: `vico.datasets.parts.Contents`, as JSON.
+        ``parts``: folder of the parts; ``contents``: `vico.datasets.parts.Contents`, as JSON; ``seen`` and ``code``: a
+        file that other machines must see there (empty on this one), and the digest of the code that they must have.
     tell
         Told ``label``, ``step`` and ``limit`` while an episode is played.
 
@@ -53,6 +57,9 @@ def player(options: Mapping[str, Any], tell: Tell) -> Callable[[Mapping[str, Any
         null), or ``job`` (`plain_job`). Returns ``frames``, or ``reason``: why there is no part.
     """
     parts, contents = Path(options["parts"]), Contents.of(options["contents"])
+    check_seen(FolderStore(parts), options["seen"])
+    if options["seen"]:
+        check_code(options["code"], code_digest())
 
     def make(task: Mapping[str, Any]) -> Mapping[str, Any]:
         folder = parts / str(task["folder"])

@@ -6,6 +6,7 @@ import json
 import logging
 import os
 import secrets
+import socket
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
@@ -22,6 +23,7 @@ INSTALL = "Ray is not installed: pip install 'virtual-community[ray]'"
 RETRIES = 2
 #: Handed to the cluster at a time; it waits for free processors (and more machines) by itself.
 _IN_FLIGHT = 1000
+_KNOCK = 10.0  # seconds that a cluster has to answer at all
 _PATIENCE = 60.0  # seconds without a processor until that is said
 #: Of the environment, what decides what a task comes to or where it looks; keys and passwords stay where they are.
 FORWARDED = (
@@ -145,20 +147,40 @@ def connect(address: str, processors: int) -> None:
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
     how = {"log_to_driver": False, "logging_level": logging.ERROR}
     try:
-        if address == "local" or (address == "auto" and not _runs_somewhere()):
+        found = _known_address() if address == "auto" else address
+        if found in ("", "local"):
             _start(ray, processors, how)
         else:
-            ray.init(address, **how)
+            _check_answer(found)  # Ray itself tries for minutes
+            ray.init(found, **how)
     except (ConnectionError, RuntimeError, ValueError, TimeoutError, ray.exceptions.RayError) as error:
         raise InputError(
             f"--ray {address}: {first_line(error)}; start a cluster with ray start --head, or give the address of one"
         ) from None
 
 
-def _runs_somewhere() -> bool:
-    """Return whether the environment names a cluster, or one was started on this machine with ``ray start``."""
+def _known_address() -> str:
+    """Return the address of the cluster that the environment names, or that ``ray start`` has noted on this machine."""
     note = Path(os.environ.get("RAY_TMPDIR", "/tmp")) / "ray" / "ray_current_cluster"
-    return bool(os.environ.get("RAY_ADDRESS")) or note.exists()
+    with suppress(OSError):
+        return os.environ.get("RAY_ADDRESS") or note.read_text(encoding="utf-8").strip()
+    return ""
+
+
+def _check_answer(address: str) -> None:
+    """Make sure that something answers at ``host:port``, with or without ``ray://``.
+
+    Raises
+    ------
+    ConnectionError
+        If nothing does.
+    """
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if host and port.isdigit():
+        try:
+            socket.create_connection((host.strip("[]"), int(port)), timeout=_KNOCK).close()
+        except OSError as error:
+            raise ConnectionError(f"nothing answers at {address} ({error.strerror or error})") from None
 
 
 def _start(ray: Any, processors: int, how: dict[str, Any]) -> None:

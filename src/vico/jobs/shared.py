@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from vico.errors import InputError
 from vico.io.stores import Store
 from vico.jobs.contract import Executor
+from vico.version import __version__
 
 
 @contextmanager
@@ -37,4 +38,19 @@ def check_seen(store: Store, name: str) -> None:
         raise InputError(
             f"{store}: not the same folder on every machine; give an --out that all of them share, or a URL like "
             "s3://BUCKET/results"
+        )
+
+
+def check_code(asked: str, here: str) -> None:
+    """Make sure that the code of this machine, by its digest, is that of whoever asks.
+
+    Raises
+    ------
+    InputError
+        If it is not: what it made would be filed as something else.
+    """
+    if asked != here:
+        raise InputError(
+            f"vico {__version__} there is other code, or its $VICO_DATA holds other data, than where the work is asked "
+            "for; install the same on every machine"
         )
