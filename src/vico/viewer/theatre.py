@@ -85,7 +85,7 @@ class BrowserTheatre:
         with LiveViewer(control, world, city=self._city(world), player=player, port=self._port) as viewer:
             viewer.announce = self._announce
             viewer.show(recorder, agents)
-            performance.hooks = [viewer]
+            performance.hooks = [viewer, performance]
             try:
                 yield performance
             finally:
@@ -93,7 +93,7 @@ class BrowserTheatre:
                 human.close("the episode is over")
 
 
-class BrowserPerformance:
+class BrowserPerformance(Hook):
     """An episode that a person plays at a page: it begins when they come, waits when they leave, and ends some time.
 
     Parameters
@@ -111,15 +111,21 @@ class BrowserPerformance:
         self._gone = False
         self._lock = threading.Lock()
         self._timer: threading.Timer | None = None
-        self._wait()
+        self._there = False
 
     @property
     def over(self) -> bool:
         """Whether it is to end before its time."""
         return self.director.over
 
+    def begin(self, observations: Mapping[str, dict[str, Any]]) -> None:
+        """Wait for the person from now on: the scene is set, which takes a while."""
+        if not self._there:
+            self._wait()
+
     def present(self, there: bool) -> None:
         """Go on when the person comes, and wait for them when they leave."""
+        self._there = there
         self._cancel()
         self.director.command("resume" if there else "pause", {})
         if not there:

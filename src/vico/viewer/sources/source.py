@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 from vico.errors import InputError, MissingFileError
 from vico.io.files import read_json
 from vico.rules import ActionStatus, code_name
+from vico.runner.bookmarks import bookmarks_of
 from vico.sim.animation.names import CLIPS
 from vico.sim.bodies import KINDS
 from vico.sim.environment import weather_kinds
 from vico.sim.environment.event_kinds import event_kinds
 from vico.sim.environment.sky import Sky
+from vico.sim.interventions import read_interventions
 from vico.sim.recording.cast import CastMember
 from vico.sim.recording.manifest import read_manifest
 from vico.sim.recording.schema import AGENTS, TABLES
@@ -35,19 +37,6 @@ _POSTURES = [posture.name.lower() for posture in Posture]
 _STATUSES = [status.name.lower() for status in ActionStatus]
 # Steps in which events are looked for at once, and how many in all.
 _SEARCHED, _SEARCHED_IN_ALL = 600, 36_000
-
-
-class Moment(NamedTuple):
-    """A step of a run, and what else is told of it beside its tables.
-
-    Attributes
-    ----------
-    plans
-        Published ones, by agent; see `vico.agents.base.Plan`.
-    """
-
-    step: int
-    plans: Mapping[str, Any]
 
 
 class Source:
@@ -143,6 +132,8 @@ class Source:
             "weather_kinds": list(weather_kinds()),
             "event_kinds": list(event_kinds()),
             "outputs": list(config["outputs"]),
+            "bookmarks": bookmarks_of(self.path),
+            "interventions": [line.model_dump(mode="json") for line in read_interventions(self.path)],
         }
 
     def cast(self, since: int | None = None) -> dict[str, Any]:

@@ -1,0 +1,103 @@
+"""Somebody plays in a real browser: keys walk and are let go, refusals are said, words are heard."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from vico.sim.recording import read_run
+from vico.viewer.browser import BrowserPage, open_page
+
+_PLACE = "vico.play.you.position"
+
+
+@pytest.fixture(scope="module")
+def played(
+    browser: None, library: None, helsinki_path: Path, helsinki_people: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[tuple[BrowserPage, Path]]:
+    """A page of `vico play`, and the run's folder."""
+    out = tmp_path_factory.mktemp("played") / "run"
+    few = ["--cars", "3", "--pedestrians", "3", "--view", "none"]
+    words = [sys.executable, "-m", "vico.cli.main", "play", str(helsinki_path), str(helsinki_people), *few]
+    with subprocess.Popen(
+        [*words, "--out", str(out)], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ) as game:
+        try:
+            assert game.stdout is not None
+            line = game.stdout.readline()
+            with open_page() as page:
+                page.resize(640, 400)
+                page.go_to(line.split()[-1])
+                page.wait_for("window.vico?.play?.you", seconds=90)
+                yield page, out
+        finally:
+            game.terminate()
+
+
+def _hold(page: BrowserPage, key: str, code: str, *, down: bool) -> None:
+    page.call("Input.dispatchKeyEvent", type="keyDown" if down else "keyUp", key=key, code=code)
+
+
+def test_arrows_walk_as_long_as_they_are_held(played: tuple[BrowserPage, Path]) -> None:
+    page, _ = played
+    page.evaluate(f"window.start = {_PLACE}.slice()")
+    _hold(page, "ArrowUp", "ArrowUp", down=True)
+    page.wait_for(f"Math.hypot({_PLACE}[0] - start[0], {_PLACE}[1] - start[1]) > 0.4", seconds=60)
+    _hold(page, "ArrowUp", "ArrowUp", down=False)
+    page.wait_for("vico.play.you.speed === 0", seconds=60)
+    assert page.faults == []
+
+
+def test_keys_are_let_go_when_the_window_loses_the_focus(played: tuple[BrowserPage, Path]) -> None:
+    page, _ = played
+    _hold(page, "ArrowLeft", "ArrowLeft", down=True)
+    page.wait_for("vico.play.input.message().down.length === 1")
+    page.evaluate("window.dispatchEvent(new Event('blur'))")
+    assert page.evaluate("vico.play.input.message().down.length") == 0
+    _hold(page, "ArrowLeft", "ArrowLeft", down=False)
+
+
+def test_what_is_refused_is_said(played: tuple[BrowserPage, Path]) -> None:
+    page, _ = played
+    page.press("m", "KeyM")
+    page.wait_for("/no bus or tram/.test(document.getElementById('toast').textContent)", seconds=60)
+
+
+def test_what_is_typed_is_said_in_the_street(played: tuple[BrowserPage, Path]) -> None:
+    page, _ = played
+    page.evaluate("""(() => {
+      const chat = document.querySelector(".play-chat");
+      chat.value = "Good morning";
+      chat.dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
+    })()""")
+    said = (
+        "fetch('/api/search?q=Good morning').then((a) => a.json()).then((f) => f.hits.some((h) => h.what === 'event'))"
+    )
+    page.wait_for(said, seconds=60)
+
+
+def test_the_camera_is_behind_the_own_body_and_escape_lets_go(played: tuple[BrowserPage, Path]) -> None:
+    page, _ = played
+    page.wait_for("vico.cameras.mode === 'play'")
+    body = "vico.state.bodies.get(vico.play.entity)"
+    away = f"(({{x, y, z}}) => vico.camera.position.distanceTo({{x, y, z}}))({body})"
+    assert float(page.evaluate(away)) < 6.0
+    page.press("Escape", "Escape")
+    page.wait_for("vico.cameras.mode !== 'play' && !vico.play.active")
+    page.evaluate("document.querySelector('.play-again').click()")
+    page.wait_for("vico.cameras.mode === 'play' && vico.play.active")
+
+
+def test_what_was_played_is_recorded_ten_times_a_second(played: tuple[BrowserPage, Path]) -> None:
+    run = read_run(played[1])
+    run.refresh()
+    assert run.times[10] - run.times[0] == pytest.approx(1.0)
+    assert any(record.action and record.action["type"] == "move_forward" for record in _of(run))
+
+
+def _of(run):  # type: ignore[no-untyped-def]
+    return [run.at(step).agents["assistant_0"] for step in range(1, run.last + 1)]
