@@ -219,7 +219,7 @@ class Page {
       this.openTab("who");
       const body = this.between.bodies.get(entity);
       const { cameras } = this.view ?? {};
-      if (body && cameras && cameras.mode !== "follow" && cameras.mode !== "first") cameras.lookAt(body.x, body.y, body.z + 1.2, Math.min(cameras.distance, 26));
+      if (body && cameras && cameras.mode !== "follow" && cameras.mode !== "first") cameras.lookAt(body.x, body.y, body.z + 1.2, Math.min(cameras.distance, 12));
       if (body && this.map && !this.view) [this.map.x, this.map.y] = [body.x, body.y];
     }
     this.hands.update();

@@ -46,6 +46,8 @@ class Play {
     this._sent = 0;
     this._seq = 0;
     this._sentKeys = "";
+    this._hints = "";
+    this._told = "";
     this._build();
     this._listen();
     this.begin();
