@@ -99,7 +99,7 @@ class Page {
     });
     this.log = new Log(this.timeline, (event) => this._goTo(event));
     this.charts = new Charts(byId("metrics"), source);
-    this.hands = new Hands(source, { spot: () => this.spot, agent: () => this._agent(this.selected), step: () => this.step });
+    this.hands = new Hands(source, { spot: () => this.spot, agent: () => this._agent(this.selected), step: () => this.step, seek: (step) => this.timeline.seek(source.timeOf(step)) });
     this.search = new Search((hit) => this._found(hit));
     for (const tab of document.querySelectorAll("[role=tab]")) tab.addEventListener("click", () => this.openTab(tab.id.slice(4)));
     byId("panel-button").addEventListener("click", () => this.togglePanel());
