@@ -24,6 +24,8 @@ class PackedMesh:
     ----------
     array
         Which array, an index into `vico.viewer.city.textures.SHAPES`.
+    both_sides
+        Whether triangles are seen from behind too.
     position, uv
         float32, shapes ``(n, 3)`` and ``(n, 2)``.
     normal
@@ -38,6 +40,7 @@ class PackedMesh:
     """
 
     array: int
+    both_sides: bool
     position: NDArray[np.float32]
     normal: NDArray[np.int8]
     uv: NDArray[np.float32]
@@ -50,6 +53,7 @@ class PackedMesh:
         used, faces = np.unique(self.triangles[triangles], return_inverse=True)
         return PackedMesh(
             self.array,
+            self.both_sides,
             self.position[used],
             self.normal[used],
             self.uv[used],
@@ -60,18 +64,19 @@ class PackedMesh:
 
 
 def packed(surfaces: Iterable[Surface], textures: TextureLayers) -> list[PackedMesh]:
-    """Return surfaces as meshes, one for each texture array that they use."""
-    by_array: dict[int, list[tuple[Surface, int, int]]] = {}
+    """Return surfaces as meshes, one for each texture array that they use, those seen from both sides apart."""
+    by_array: dict[tuple[int, bool], list[tuple[Surface, int, int]]] = {}
     for surface in surfaces:
         if not len(surface.triangles):
             continue
         layer = textures.layer_of(surface.material)
         flag = _CUTOUT if layer.cutout else round(_FULLY * min(surface.material.emission, 1.0))
-        by_array.setdefault(layer.array, []).append((surface, layer.layer, flag))
-    return [_joined(array, parts) for array, parts in sorted(by_array.items())]
+        both = layer.cutout or surface.material.double_sided
+        by_array.setdefault((layer.array, both), []).append((surface, layer.layer, flag))
+    return [_joined(array, both, parts) for (array, both), parts in sorted(by_array.items())]
 
 
-def _joined(array: int, parts: Sequence[tuple[Surface, int, int]]) -> PackedMesh:
+def _joined(array: int, both: bool, parts: Sequence[tuple[Surface, int, int]]) -> PackedMesh:
     counts = [len(surface.positions) for surface, _, _ in parts]
     starts = np.cumsum([0, *counts[:-1]])
     normal = np.zeros((sum(counts), 4), np.int8)
@@ -82,6 +87,7 @@ def _joined(array: int, parts: Sequence[tuple[Surface, int, int]]) -> PackedMesh
     colour[:, 3] = np.repeat([layer for _, layer, _ in parts], counts)
     return PackedMesh(
         array,
+        both,
         np.concatenate([s.positions for s, _, _ in parts]).astype(np.float32),
         normal,
         np.concatenate([s.uv for s, _, _ in parts]).astype(np.float32),
@@ -116,6 +122,7 @@ class Blob:
         self.add(mesh.triangles.astype(np.uint16 if short else np.uint32))
         return {
             "array": mesh.array,
+            "both": mesh.both_sides,
             "offset": start,
             "vertices": len(mesh.position),
             "indices": int(mesh.triangles.size),
