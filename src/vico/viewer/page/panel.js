@@ -117,7 +117,8 @@ export class Panel {
       agent.kind === "robot" && section("Joints and contacts", true, parts.joints),
       section("Messages", true, parts.messages),
       person && section("Schedule", true, parts.schedule),
-      person && section("About", false, el("p", { text: person.biography ?? "" }), this._traits(person), this._relations(agent)),
+      person && section("About", false, el("p", { text: person.biography ?? "" }), this._traits(person)),
+      agent.relations?.length && section("Knows", false, this._relations(agent)),
     ];
     this.box.replaceChildren(...all.filter(Boolean));
     if (person) this._schedule(person.schedule ?? []);
@@ -132,9 +133,7 @@ export class Panel {
 
   /** @param {any} agent */
   _relations(agent) {
-    const known = agent.relations ?? [];
-    if (!known.length) return null;
-    return el("ul.names", {}, ...known.map((/** @type {any} */ r) => el("li", { text: `${r.name ?? r.other}: ${r.kind ?? r.relation ?? ""}` })));
+    return el("ul.names", {}, ...agent.relations.map((/** @type {any} */ r) => el("li", {}, el("span", { text: r.name }), el("small", { text: [r.kind, r.note].filter(Boolean).join(", ") }))));
   }
 
   /** @param {any[]} schedule */
