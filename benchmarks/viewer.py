@@ -35,7 +35,7 @@ _DRAW = """(async () => {
     const [a, b, share] = source.around(source.stepAt(clock.time));
     if (a && b) state.set(a, b, share);
     const began = performance.now();
-    view.resize(); view.draw(state, 1 / 30, null, 1000 * clock.time, true);
+    view.resize(); view.draw(state, 1 / 30, null, began, true);
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
     if (k >= 5) took.push(performance.now() - began);
     await new Promise((resolve) => setTimeout(resolve, 0));
@@ -49,7 +49,7 @@ _LOOP = """(async () => {
   page.frozen = false; view.adapts = true; view.setCare(2); vico.clock.playing = true;
   requestAnimationFrame((now) => page._tick(now));
   let frames = 0, since = 0; const drawn = view.renderer.info.render.frame;
-  await new Promise((resolve) => setTimeout(resolve, 6000));
+  await new Promise((resolve) => setTimeout(resolve, 9000));
   const first = view.renderer.info.render.frame, began = performance.now();
   await new Promise((resolve) => setTimeout(resolve, MILLISECONDS));
   frames = view.renderer.info.render.frame - first; since = performance.now() - began;

@@ -62,6 +62,7 @@ def test_the_panel_tells_what_a_resident_does_and_sees(page: BrowserPage, page_r
     words = page.evaluate("document.getElementById('who').innerText")
     assert agent["person"]["schedule"][0]["activity"] in words
     assert "Outcome" in words
+    assert "Knows" in words
     page.evaluate("document.querySelector('[data-lens=segmentation]').click()")
     page.wait_for("document.querySelectorAll('#who .names li').length > 1")
 

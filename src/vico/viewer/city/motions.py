@@ -47,7 +47,7 @@ def motion_tables(style: Any) -> tuple[list[dict[str, Any]], list[NDArray[Any]]]
     """
     entries: list[dict[str, Any]] = []
     courses: list[tuple[int, float, float]] = []
-    resting = []
+    resting: list[NDArray[np.float64]] = []
     for name in CLIPS:
         clip = clip_index(name)
         if name in _RESTING:

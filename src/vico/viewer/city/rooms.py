@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -35,10 +36,10 @@ def write_rooms(world: World, textures: TextureLayers, folder: Path) -> dict[str
                 parts[k].append(_some(surface, owner == k))
     file_of_room = {room.id: index[room.building] for room in world.rooms}
     standing = np.array([file_of_room.get(str(room), -1) for room in world.objects.room], np.int64)
-    files = []
+    files: list[dict[str, Any]] = []
     for k in range(len(index)):
         blob = Blob()
-        entry = {
+        entry: dict[str, Any] = {
             "file": f"rooms_{k}.bin",
             "near": [blob.mesh(mesh) for mesh in packed(parts[k], textures)],
             "instances": write_instances(world, standing == k, blob),
@@ -64,7 +65,12 @@ def _owners(surface: Surface, file_of_entity: dict[int, int]) -> NDArray[np.int6
 
 def _some(surface: Surface, chosen: NDArray[np.bool_]) -> Surface:
     used, faces = np.unique(surface.triangles[chosen], return_inverse=True)
-    columns = (surface.positions, surface.normals, surface.uv, surface.colour, surface.entity)
-    return Surface(
-        *(column[used] for column in columns), faces.reshape(-1, 3).astype(np.int32), material=surface.material
+    return replace(
+        surface,
+        positions=surface.positions[used],
+        normals=surface.normals[used],
+        uv=surface.uv[used],
+        colour=surface.colour[used],
+        entity=surface.entity[used],
+        triangles=faces.reshape(-1, 3).astype(np.int32),
     )

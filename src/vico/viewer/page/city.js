@@ -194,7 +194,13 @@ export class City {
         tile.near.visible = isNear;
         for (const mesh of tile.near.children) mesh.renderOrder = order;
       }
-      tile.far.visible = !(isNear && tile.near);
+      // Ground from afar lies below what is near, where tiles do not quite meet.
+      const whole = Boolean(isNear && tile.near);
+      tile.far.visible = true;
+      for (const mesh of tile.far.children) {
+        if (mesh.name === "walls") mesh.visible = !whole;
+        else mesh.position.z = whole ? -0.6 : 0;
+      }
     }
     if (this.instances) this.instances.update(camera, this.inside >= 0);
     if (this.pools) this.pools.visible = this.light.night.value > 0.2 && this.inside < 0;

@@ -1,5 +1,6 @@
 // Hands in a run that goes on: what the server says it can do, as buttons and short forms.
 
+import { clockText } from "./clock.js";
 import { byId, el, toast } from "./dom.js";
 
 /**
@@ -7,6 +8,7 @@ import { byId, el, toast } from "./dom.js";
  * @property {() => {x: number, y: number, z: number} | null} spot the marked spot
  * @property {() => any} agent who is chosen
  * @property {() => number} step
+ * @property {(step: number) => void} seek
  */
 
 export class Hands {
@@ -43,6 +45,7 @@ export class Hands {
         has("say") && this._form("Say something to who is chosen", "say", [["text", el("input", { type: "text", placeholder: "Good morning!", required: true })]], { agent: "any" }),
         has("goal") && this._form("Send the chosen robot to the marked spot", "goal", [], { agent: "robot", spot: 3 }),
         has("bookmark") && this._form("Bookmark this step", "bookmark", [["text", el("input", { type: "text", placeholder: "what is there to see" })]], { step: true }),
+        has("bookmarks") && this._bookmarks(),
         has("snapshot") && this._form("Keep the state (snapshot)", "snapshot", [["name", el("input", { type: "text", placeholder: "name" })]]),
         has("branch") && this._form("What if: go on in a copy from here", "branch", [["name", el("input", { type: "text", placeholder: "what-if", required: true })]], { step: true }),
         has("back") && this._form("Go back to the checkpoint before here", "back", [], { step: true }),
@@ -50,6 +53,21 @@ export class Hands {
       ].filter(Boolean),
     );
     this.update();
+  }
+
+  /** A list of what was bookmarked; a click goes there. */
+  _bookmarks() {
+    this.list = el("ul.people");
+    this.source.command("bookmarks").then((reply) => this._mark(reply));
+    return this.list;
+  }
+
+  /** @param {any} reply of a command that tells bookmarks */
+  _mark(reply) {
+    if (!reply.bookmarks || !this.list) return;
+    this.list.replaceChildren(
+      ...reply.bookmarks.map((/** @type {any} */ mark) => el("li", {}, el("button.person", { onclick: () => this.here.seek(mark.step) }, el("span", { text: mark.text || `step ${mark.step}` }), el("small", { text: clockText(mark.time) })))),
+    );
   }
 
   _things() {
@@ -82,6 +100,7 @@ export class Hands {
       button.disabled = true;
       const reply = await this.source.command(command, values);
       button.disabled = false;
+      this._mark(reply);
       toast(reply.ok ? `${title}: done` : (reply.error ?? "it was refused"), !reply.ok);
     };
     return el("form.hand", { onsubmit: submit }, ...inputs, button);

@@ -99,7 +99,7 @@ class Page {
     });
     this.log = new Log(this.timeline, (event) => this._goTo(event));
     this.charts = new Charts(byId("metrics"), source);
-    this.hands = new Hands(source, { spot: () => this.spot, agent: () => this._agent(this.selected), step: () => this.step });
+    this.hands = new Hands(source, { spot: () => this.spot, agent: () => this._agent(this.selected), step: () => this.step, seek: (step) => this.timeline.seek(source.timeOf(step)) });
     this.search = new Search((hit) => this._found(hit));
     for (const tab of document.querySelectorAll("[role=tab]")) tab.addEventListener("click", () => this.openTab(tab.id.slice(4)));
     byId("panel-button").addEventListener("click", () => this.togglePanel());
@@ -219,7 +219,7 @@ class Page {
       this.openTab("who");
       const body = this.between.bodies.get(entity);
       const { cameras } = this.view ?? {};
-      if (body && cameras && cameras.mode !== "follow" && cameras.mode !== "first") cameras.lookAt(body.x, body.y, body.z + 1.2, Math.min(cameras.distance, 26));
+      if (body && cameras && cameras.mode !== "follow" && cameras.mode !== "first") cameras.lookAt(body.x, body.y, body.z + 1.2, Math.min(cameras.distance, 12));
       if (body && this.map && !this.view) [this.map.x, this.map.y] = [body.x, body.y];
     }
     this.hands.update();

@@ -109,7 +109,7 @@ export class Panel {
     );
     const section = (/** @type {string} */ title, /** @type {boolean} */ open, /** @type {any[]} */ ...children) =>
       el("details", { open }, el("summary", { text: title }), ...children);
-    this.box.replaceChildren(
+    const all = [
       this._head(nameOf(agent), `${agent.name} · ${role}`),
       section("Now", true, parts.state),
       section("Plan", true, parts.plan),
@@ -117,8 +117,10 @@ export class Panel {
       agent.kind === "robot" && section("Joints and contacts", true, parts.joints),
       section("Messages", true, parts.messages),
       person && section("Schedule", true, parts.schedule),
-      person && section("About", false, el("p", { text: person.biography ?? "" }), this._traits(person), this._relations(agent)),
-    );
+      person && section("About", false, el("p", { text: person.biography ?? "" }), this._traits(person)),
+      agent.relations?.length && section("Knows", false, this._relations(agent)),
+    ];
+    this.box.replaceChildren(...all.filter(Boolean));
     if (person) this._schedule(person.schedule ?? []);
   }
 
@@ -131,9 +133,7 @@ export class Panel {
 
   /** @param {any} agent */
   _relations(agent) {
-    const known = agent.relations ?? [];
-    if (!known.length) return null;
-    return el("ul.names", {}, ...known.map((/** @type {any} */ r) => el("li", { text: `${r.name ?? r.other}: ${r.kind ?? r.relation ?? ""}` })));
+    return el("ul.names", {}, ...agent.relations.map((/** @type {any} */ r) => el("li", {}, el("span", { text: r.name }), el("small", { text: [r.kind, r.note].filter(Boolean).join(", ") }))));
   }
 
   /** @param {any[]} schedule */
@@ -173,7 +173,7 @@ export class Panel {
     this.box.replaceChildren(
       el("header.head", {}, el("h2", { text: building.name ?? "Building" }), el("p.role", { text: building.use })),
       el("ul.people", {}, ...places.map((/** @type {any} */ p) => el("li", {}, el("button.person", { onclick: () => this.actions.look(p.x, p.y, p.z) }, el("span", { text: p.name }), el("small", { text: p.kind }))))),
-      places.length ? null : el("p.note", { text: "No named place is in it." }),
+      el("p.note", { text: places.length ? "" : "No named place is in it." }),
     );
   }
 
@@ -223,7 +223,7 @@ export class Panel {
     const due = this._due();
     if (due) rows.unshift(["Schedule", due]);
     if (this.agent.person || this.agent.kind === "assistant") {
-      rows.push(["Motion", `${(now.clip ?? "").replace("_", " ")}, ${now.posture}`], ["Cash", Number(now.cash).toFixed(2)]);
+      rows.push(["Motion", [(now.clip ?? "").replaceAll("_", " "), now.posture === "standing" ? "" : now.posture].filter(Boolean).join(", ")], ["Cash", Number(now.cash).toFixed(2)]);
     }
     if (body) rows.push(["Speed", `${body.speed.toFixed(1)} m/s`]);
     if (now.vehicle) rows.push(["Rides", this.source.cast.get(now.vehicle)?.name ?? String(now.vehicle.name ?? now.vehicle)]);

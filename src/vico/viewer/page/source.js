@@ -38,6 +38,8 @@ export class Source extends EventTarget {
   /** Ask anew what run this is. */
   async reload() {
     this.run = await getJson("/api/run");
+    // A recording is shown without its world as well.
+    this.run.world ??= { name: "world not found", places: [], rooms: [] };
     await this.loadCast();
   }
 

@@ -163,7 +163,7 @@ export class View {
   _isStill(between, now) {
     const { elements } = this.camera.matrixWorld;
     const { ring, plan, names } = this.overlay;
-    const key = `${between.time} ${elements.map((/** @type {number} */ v) => v.toFixed(4))} ${ring.position.x} ${ring.visible} ${plan.children.length} ${names.size} ${this.canvas.clientWidth}x${this.canvas.clientHeight} ${this.city.arrived} ${this.people.arrived}`;
+    const key = `${between.time} ${elements.map((/** @type {number} */ v) => v.toFixed(2))} ${ring.position.x} ${ring.visible} ${plan.children.length} ${names.size} ${this.canvas.clientWidth}x${this.canvas.clientHeight} ${this.city.arrived} ${this.people.arrived}`;
     if (key !== this._key || this._falls()) {
       this._key = key;
       this._moved = now;

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from vico.sim.recording.manifest import read_manifest
 from vico.sim.recording.schema import AGENTS, TABLES
 from vico.sim.state import Posture
 from vico.viewer.sources.frames import Frame, frames_between
+from vico.viewer.sources.relations import relations_of
 from vico.viewer.sources.skylight import Skylight
 from vico.viewer.sources.tables import Columns, RecordedTables, StepTables
 from vico.viewer.sources.timeline import Timeline
@@ -224,12 +226,18 @@ class Source:
             end = first - 1
         return found[:limit]
 
+    @cached_property
+    def _relations(self) -> dict[str, list[dict[str, Any]]]:
+        return relations_of(self.path, self.manifest)
+
     def _agent(self, agent: Mapping[str, Any]) -> dict[str, Any]:
         config, name = self.manifest["config"], agent["name"]
         observe = config["observe"]
         told = dict(agent) | {"sees": observe is None or name in observe, "period": self._period(agent)}
         if agent["kind"] == "robot":
             told["model"] = config["robots"][int(name.removeprefix("robot_"))]
+        if agent.get("resident") in self._relations:
+            told["relations"] = self._relations[agent["resident"]]
         return told
 
     def _period(self, agent: Mapping[str, Any]) -> float | None:
