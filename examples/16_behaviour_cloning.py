@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from vico.agents.state import generator_state, restore_generator
 from vico.datasets.actions import ActionForm
 from vico.datasets.vectors import PERSON_STATE, goal_vector, in_own_frame, person_state
 from vico.seeds import rng
@@ -29,6 +30,7 @@ STATE = [
 ]
 PICTURE = 64  # pixels
 AHEAD = 6.0  # metres along the way that the network is shown
+TEMPERATURE = 0.5
 ARRIVED = 4.0  # metres from the middle of a region, whose steps there are counted
 
 
@@ -86,18 +88,20 @@ def target_features(depth, segmentation, wanted):
 
 
 class Memory:
-    """What the network is told of the steps before: the last action, how often it turned, how long it is there."""
+    """What the network is told of the steps before: how often it turned, and how long it has been there.
+
+    Not the last action: who repeats that is right most of the time in demonstrations, and stuck for good in the street.
+    """
 
     def __init__(self) -> None:
-        self.last, self.turned, self.there = np.zeros(len(FORM.types)), 0, 0
+        self.turned, self.there = 0, 0
 
     def features(self):
         """Return it as numbers."""
-        return [*self.last, min(self.turned, 12) / 12.0, min(self.there, 30) / 30.0]
+        return [min(self.turned, 12) / 12.0, min(self.there, 30) / 30.0]
 
     def note(self, kind, goal_away):
         """Take note of an action."""
-        self.last = np.array([float(name == kind) for name in FORM.types])
         self.turned = self.turned + 1 if kind in TURNS else 0
         self.there = self.there + 1 if goal_away < ARRIVED else 0
 
@@ -212,6 +216,8 @@ def frames_of(dataset, public_map_of, split="train"):
             pose = pose_of(state)
             action = FORM.decode(frame["action"], pose, frame.get("action.text") or "")
             ahead = way.ahead(pose, centre_of(pose, goal))
+            if action["type"] == "wait":  # which the demonstrator does where it can do nothing else, as in doors
+                continue
             inputs.append(features(state, goal, ahead, frame["pictures"], wanted, memory))
             kinds.append(FORM.types.index(action["type"]))
             distance = action["distance"] / 2.5 if action["type"] == "move_forward" else math.nan
@@ -260,10 +266,11 @@ class Cloned:
         return action
 
     def action(self, out, observation, errand):
-        """Return the action with the highest score that can be done here."""
+        """Return an action that can be done here, drawn by the scores: whoever always does the same stays stuck."""
         state = observation["state"]
         doors = [door["to"] for door in state["doors"] if door["to"] != "outside"]
-        for kind in (FORM.types[k] for k in np.argsort(-out[:-2])):
+        scores = out[:-2] + TEMPERATURE * self.draw.gumbel(size=len(FORM.types))
+        for kind in (FORM.types[k] for k in np.argsort(-scores)):
             if kind == "move_forward":
                 return {"type": kind, "distance": float(np.clip(2.5 * out[-2], 0.1, 2.0))}
             if kind in TURNS:
@@ -277,19 +284,23 @@ class Cloned:
             if kind == "task_complete":
                 self.todo.pop(0)
                 return {"type": kind, "index": errand["index"]}
-            if kind == "wait":
-                return {"type": kind}
         return {"type": "wait"}
 
     def state(self):
         """Return all it remembers."""
-        memory = {"last": self.memory.last, "turned": self.memory.turned, "there": self.memory.there}
-        return {"todo": len(self.todo), "visited": list(self.visited), "memory": memory}
+        memory = {"turned": self.memory.turned, "there": self.memory.there}
+        return {
+            "todo": len(self.todo),
+            "visited": list(self.visited),
+            "memory": memory,
+            "generator": generator_state(self.draw),
+        }
 
     def restore(self, state):
         """Remember what `state` returned."""
         self.todo = self.todo[len(self.todo) - state["todo"] :] if state["todo"] else []
         self.visited = list(state["visited"])
+        restore_generator(self.draw, state["generator"])
         for name, value in state["memory"].items():
             setattr(self.memory, name, value)
 
@@ -311,7 +322,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--first-seed", type=int, default=1000, help="none of the dataset's")
-    parser.add_argument("--steps", type=int, default=100)
+    parser.add_argument("--steps", type=int, default=150)
     parser.add_argument("--epochs", type=int, default=60)
     arguments = parser.parse_args()
 

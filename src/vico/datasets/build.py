@@ -245,7 +245,8 @@ def _take(partial: Path) -> None:
     InputError
         If it is somebody else's.
     """
-    if partial.is_dir() and any(partial.iterdir()):
+    # What a kill left while the mark was written is not somebody else's.
+    if partial.is_dir() and any(not path.name.startswith(f".{_MARK}") for path in partial.iterdir()):
         if not (partial / _MARK).exists() or read_json(partial / _MARK) != _MARKED:
             raise InputError(f"{partial}: holds something else than parts of a dataset; choose another --out")
         return

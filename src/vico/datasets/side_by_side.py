@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import threading
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
@@ -89,7 +90,16 @@ def _run_some(
 def _start(options: Mapping[str, Any], share: int) -> None:
     global _make
     os.environ[threads.WORKERS] = str(share)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     _make = player(options, lambda told: None)
+
+
+def _end_with_parent() -> None:
+    """End this process when the one that started it has ended, however it did: nobody waits for what it makes."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _run(task: Mapping[str, Any]) -> Mapping[str, Any]:
