@@ -39,7 +39,7 @@ ALLOWED = {
     },
     "runner": {"agents", "envs", "sim", "world", "io"},
     "challenges": {"runner", "envs", "agents", "community", "world", "assets", "llm", "jobs", "io"},
-    "datasets": {"challenges", "runner", "sim", "world", "assets", "io"},
+    "datasets": {"challenges", "runner", "sim", "world", "assets", "jobs", "io"},
 }
 OPEN = {"viewer", "cli"}  # and the front door, api.py
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import shutil
-import signal
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +13,6 @@ import pyarrow.parquet as pq
 import pytest
 
 from command_line import vico
-from vico.datasets import side_by_side
 from vico.datasets.build import BuildRequest, Contents, build_dataset, tasks_of
 from vico.datasets.card import card_of
 from vico.datasets.checking import findings_of
@@ -25,6 +22,8 @@ from vico.datasets.formats import webdataset
 from vico.datasets.splits import SplitRule
 from vico.errors import InputError, SchemaError
 from vico.io.files import read_json, write_json
+from vico.jobs import Service
+from vico.jobs.executors import ThisProcess
 from vico.sim.recording import read_run
 
 OUTPUTS = ("rgb", "depth", "segmentation")
@@ -144,14 +143,12 @@ def test_workers_and_interruptions_change_no_byte(
     class Stopped(BaseException):
         pass
 
-    def stopping(options: Any, tasks: Any, *, workers: int, done: Any, tell: Any) -> None:
-        make = side_by_side.player(options, tell)
-        for index, task in enumerate(tasks):
-            if index == 2:
-                raise Stopped
-            done(index, make(task))
+    class Stopping(ThisProcess):
+        def run(self, service: Service, tasks: Any, **how: Any) -> None:
+            super().run(service, tasks[:2], **how)
+            raise Stopped
 
-    monkeypatch.setattr("vico.datasets.build.run_tasks", stopping)
+    monkeypatch.setattr("vico.datasets.build.open_executor", lambda **how: Stopping())
     with pytest.raises(Stopped):
         build_dataset(request(kept_runs), tmp_path / "cut")
     parts = tmp_path / "cut.partial" / "parts"
@@ -162,37 +159,16 @@ def test_workers_and_interruptions_change_no_byte(
     (parts / ".scratch" / "left.over").mkdir(parents=True)
     kept: list[str] = []
 
-    def noting(options: Any, tasks: Any, *, workers: int, done: Any, tell: Any) -> None:
-        kept.extend(path.name for path in parts.glob("0*") if path.stat().st_mtime_ns == made[path.name])
-        side_by_side.run_tasks(options, tasks, workers=workers, done=done, tell=tell)
+    class Noting(ThisProcess):
+        def run(self, service: Service, tasks: Any, **how: Any) -> None:
+            kept.extend(path.name for path in parts.glob("0*") if path.stat().st_mtime_ns == made[path.name])
+            super().run(service, tasks, **how)
 
-    monkeypatch.setattr("vico.datasets.build.run_tasks", noting)
+    monkeypatch.setattr("vico.datasets.build.open_executor", lambda **how: Noting())
     build_dataset(request(kept_runs), tmp_path / "cut")
     assert len(kept) == 1
     assert bytes_of(tmp_path / "cut") == whole
     assert not (tmp_path / "cut.partial").exists()
-
-
-def test_a_killed_process_is_started_again(
-    kept_runs: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    flag = tmp_path / "flag"
-    monkeypatch.setenv("VICO_TEST_FLAG", str(flag))
-    monkeypatch.setattr(side_by_side, "_run", dying)
-    built = build_dataset(request(kept_runs, outputs=(), workers=2), tmp_path / "out")
-    assert flag.exists()
-    assert built.missing == []
-    assert built.record["episodes"] == 12  # all residents: nobody's pictures are asked for
-
-
-def dying(task: Any) -> Any:
-    """Make a part; the first process that is asked for the second one ends at once."""
-    flag = Path(os.environ["VICO_TEST_FLAG"])
-    if task["folder"].startswith("000001") and not flag.exists():
-        flag.touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    assert side_by_side._make is not None
-    return side_by_side._make(task)
 
 
 def test_whole_worlds_or_persons_are_kept_apart(kept_runs: list[Path], tmp_path: Path) -> None:

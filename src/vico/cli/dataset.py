@@ -9,7 +9,7 @@ from typing import Any
 
 from vico.challenges.assistant.thresholds import SUBTASKS
 from vico.challenges.records import Setting
-from vico.cli.dataset_verbs import DatasetOptions
+from vico.cli.dataset_options import DatasetOptions
 from vico.cli.output import check_output, print_json, print_table, progress_bars
 from vico.datasets.build import BuildRequest, Contents, build_dataset
 from vico.datasets.checking import findings_of
@@ -62,6 +62,7 @@ def request_of(options: DatasetOptions) -> BuildRequest:
         rule=SplitRule(options.split_by, options.test, options.validation),
         successes=options.successes,
         workers=options.workers or processors(),
+        ray=options.ray,
     )
 
 

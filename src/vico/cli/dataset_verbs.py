@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -10,89 +9,11 @@ import tyro
 from tyro.conf import Positional
 from tyro.extras import SubcommandApp
 
+from vico.cli.dataset_options import DatasetOptions
+
 dataset = SubcommandApp()
 
 _FLAT = tyro.conf.arg(name="")
-
-
-@dataclass(frozen=True)
-class DatasetOptions:
-    """What `vico dataset build` is asked for.
-
-    Attributes
-    ----------
-    out
-        Folder to make; refused if it exists, unless --force. A build that was stopped goes on where it was.
-    to
-        The format: LeRobot v3.0, WebDataset shards, or plain Parquet.
-    world
-        World folders to play in. With --runs: where their world is now.
-    challenge
-        What is played.
-    method
-        By whom: a planner of `vico eval assistant`, or my_module:MyAgent.
-    episodes
-        How many, over the worlds in turn.
-    steps
-        Seconds an episode may last.
-    subtasks
-        How many of the six subtasks of a task are asked for: the first ones.
-    assistants
-        How many work together; each is an episode of its own.
-    first_seed
-        Of the first episode in each world.
-    runs
-        Take these recorded runs instead of playing: of vico run, of vico eval --record, played by hand.
-    agents
-        Whose demonstrations: names, or residents, assistants, robots; without it the assistants, else all whose
-        pictures were recorded.
-    outputs
-        Pictures, separated by commas: rgb (video), depth and segmentation (exact); or none.
-    size
-        Side of the pictures, pixels.
-    instruction
-        What to say was asked for, where neither a task nor a schedule says it.
-    successes
-        Keep only episodes in which all was done.
-    test
-        Share of the episodes that are kept apart for testing.
-    validation
-        Share that is kept apart for validation.
-    split_by
-        What is never in two splits: a world, a person who acts or asks, or only an episode itself.
-    workers
-        Processes side by side; 0 is one a processor. Decides nothing but how long it takes.
-    deadline
-        Seconds an agent of yours has for an action; 0 waits for it as long as it takes.
-    force
-        Replace what is in the output folder.
-    json
-        Print what was made as JSON.
-    """
-
-    out: Path
-    to: Literal["lerobot", "webdataset", "parquet"]
-    world: tuple[Path, ...] = ()
-    challenge: Literal["carry", "delivery", "search"] = "delivery"
-    method: str = "heuristic"
-    episodes: int = 0
-    steps: int = 1500
-    subtasks: int = 6
-    assistants: int = 1
-    first_seed: int = 0
-    runs: tuple[Path, ...] = ()
-    agents: tuple[str, ...] = ()
-    outputs: str = "rgb"
-    size: int = 128
-    instruction: str = ""
-    successes: bool = False
-    test: float = 0.1
-    validation: float = 0.0
-    split_by: Literal["world", "person", "episode"] = "episode"
-    workers: int = 0
-    deadline: float = 60.0
-    force: bool = False
-    json: bool = False
 
 
 @dataset.command(name="build")
