@@ -171,9 +171,9 @@ class Network:
         return loss + 2.0 * (off**2).sum() / n, found
 
 
-def train(dataset, public_map_of, *, epochs=60, seed=0):
+def train(dataset, public_map_of, *, epochs=60, failures=False, seed=0):
     """Return a network, its inputs' mean and spread, and the loss of each epoch."""
-    inputs, kinds, amounts = frames_of(dataset, public_map_of)
+    inputs, kinds, amounts = frames_of(dataset, public_map_of, failures=failures)
     middle, spread = inputs.mean(axis=0), inputs.std(axis=0) + 0.05
     inputs = (inputs - middle) / spread
     network, draw = Network.fresh(inputs.shape[1], seed=seed), rng(seed, "batches")
@@ -199,13 +199,13 @@ def train(dataset, public_map_of, *, epochs=60, seed=0):
     return network, middle, spread, losses
 
 
-def frames_of(dataset, public_map_of, split="train"):
+def frames_of(dataset, public_map_of, split="train", *, failures=False):
     """Return inputs, actions' numbers, and distances and angles (NaN where an action has none), of a split."""
     first, end = dataset.about.splits[split]
     rows = dataset.episodes()
     inputs, kinds, amounts = [], [], []
     for index in range(first, end):
-        if not rows[index]["success"]:
+        if not (failures or rows[index]["success"]):
             continue  # what did not lead to success is not to be learnt
         names = dataset.entities(index)
         text = rows[index]["instructions"][0]
@@ -223,6 +223,8 @@ def frames_of(dataset, public_map_of, split="train"):
             distance = action["distance"] / 2.5 if action["type"] == "move_forward" else math.nan
             amounts.append([distance, action.get("degrees", math.nan) / 180.0])
             memory.note(action["type"], math.hypot(goal[1], goal[2]))
+    if not inputs:
+        raise SystemExit(f"{dataset.path}: no episode of the split {split!r} was a success; --failures takes all")
     return np.array(inputs), np.array(kinds), np.array(amounts, np.float32)
 
 
@@ -324,11 +326,14 @@ def main() -> None:
     parser.add_argument("--first-seed", type=int, default=1000, help="none of the dataset's")
     parser.add_argument("--steps", type=int, default=150)
     parser.add_argument("--epochs", type=int, default=60)
+    parser.add_argument("--failures", action="store_true", help="train on episodes that failed, too")
     arguments = parser.parse_args()
 
     dataset = Dataset(arguments.dataset)
     worlds = {world.digest: PublicMap.from_world(world) for world in map(read_world, arguments.worlds)}
-    network, middle, spread, losses = train(dataset, worlds.__getitem__, epochs=arguments.epochs)
+    network, middle, spread, losses = train(
+        dataset, worlds.__getitem__, epochs=arguments.epochs, failures=arguments.failures
+    )
     print(f"trained on {dataset.about.episodes} episodes: loss {losses[0]:.2f} -> {losses[-1]:.2f}")
     if "test" in dataset.about.splits:
         inputs, kinds, _ = frames_of(dataset, worlds.__getitem__, "test")

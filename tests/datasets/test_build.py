@@ -14,7 +14,6 @@ import pytest
 
 from command_line import vico
 from ray_nodes import needs_ray
-from vico.datasets import side_by_side
 from vico.datasets.build import BuildRequest, Contents, build_dataset, tasks_of
 from vico.datasets.card import card_of
 from vico.datasets.checking import findings_of
@@ -22,9 +21,10 @@ from vico.datasets.contact_sheet import write_contact_sheet
 from vico.datasets.folder import Dataset
 from vico.datasets.formats import webdataset
 from vico.datasets.splits import SplitRule
-from vico.datasets.worker import player
 from vico.errors import InputError, SchemaError
 from vico.io.files import read_json, write_json
+from vico.jobs import Service
+from vico.jobs.executors import ThisProcess
 from vico.sim.recording import read_run
 
 OUTPUTS = ("rgb", "depth", "segmentation")
@@ -144,14 +144,12 @@ def test_workers_and_interruptions_change_no_byte(
     class Stopped(BaseException):
         pass
 
-    def stopping(options: Any, tasks: Any, *, workers: int, ray: Any, done: Any, tell: Any) -> None:
-        make = player({**options, "seen": ""}, tell)
-        for index, task in enumerate(tasks):
-            if index == 2:
-                raise Stopped
-            done(index, make(task))
+    class Stopping(ThisProcess):
+        def run(self, service: Service, tasks: Any, **how: Any) -> None:
+            super().run(service, tasks[:2], **how)
+            raise Stopped
 
-    monkeypatch.setattr("vico.datasets.build.run_tasks", stopping)
+    monkeypatch.setattr("vico.datasets.build.open_executor", lambda **how: Stopping())
     with pytest.raises(Stopped):
         build_dataset(request(kept_runs), tmp_path / "cut")
     parts = tmp_path / "cut.partial" / "parts"
@@ -162,11 +160,12 @@ def test_workers_and_interruptions_change_no_byte(
     (parts / ".scratch" / "left.over").mkdir(parents=True)
     kept: list[str] = []
 
-    def noting(options: Any, tasks: Any, *, workers: int, ray: Any, done: Any, tell: Any) -> None:
-        kept.extend(path.name for path in parts.glob("0*") if path.stat().st_mtime_ns == made[path.name])
-        side_by_side.run_tasks(options, tasks, workers=workers, ray=ray, done=done, tell=tell)
+    class Noting(ThisProcess):
+        def run(self, service: Service, tasks: Any, **how: Any) -> None:
+            kept.extend(path.name for path in parts.glob("0*") if path.stat().st_mtime_ns == made[path.name])
+            super().run(service, tasks, **how)
 
-    monkeypatch.setattr("vico.datasets.build.run_tasks", noting)
+    monkeypatch.setattr("vico.datasets.build.open_executor", lambda **how: Noting())
     build_dataset(request(kept_runs), tmp_path / "cut")
     assert len(kept) == 1
     assert bytes_of(tmp_path / "cut") == whole
@@ -178,7 +177,7 @@ def test_a_killed_process_is_started_again(
 ) -> None:
     flag = tmp_path / "flag"
     monkeypatch.setenv("VICO_TEST_FLAG", str(flag))
-    monkeypatch.setattr(side_by_side, "MAKER", "dataset_player:dying")
+    monkeypatch.setattr("vico.datasets.build.MAKER", "dataset_player:dying")
     built = build_dataset(request(kept_runs, outputs=(), workers=2), tmp_path / "out")
     assert flag.exists()
     assert built.missing == []

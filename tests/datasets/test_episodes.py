@@ -19,6 +19,7 @@ from vico.datasets.folder import Dataset
 
 PLAY = ["--challenge", "search", "--steps", 12, "--subtasks", 1, "--test", 0, "--workers", 1]
 CHECK = Path(__file__).parents[2] / "scripts" / "check_lerobot.py"
+EXAMPLE = Path(__file__).parents[2] / "examples" / "16_behaviour_cloning.py"
 
 
 def bytes_of(folder: Path) -> dict[str, str]:
@@ -134,6 +135,32 @@ def test_lerobot_loads_it(played: Dataset) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert "frames read and equal" in done.stdout
+
+
+def test_a_policy_is_trained_on_it_and_judged(played: Dataset, helsinki_path: Path, tmp_path: Path) -> None:
+    words = [
+        "--dataset",
+        played.path,
+        "--worlds",
+        helsinki_path,
+        "--out",
+        tmp_path / "cloned",
+        "--seeds",
+        1,
+        "--steps",
+        4,
+    ]
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLE), *map(str, words), "--epochs", "3", "--failures"],
+        capture_output=True,
+        text=True,
+        timeout=400,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "trained on 2 episodes: loss " in done.stdout
+    assert done.stdout.count(" of 1 done") == 3
+    assert (tmp_path / "cloned" / "weights.npz").is_file()
 
 
 @pytest.mark.skipif(importlib.util.find_spec("rerun") is None, reason="rerun is not installed: the extra 'rerun'")

@@ -30,6 +30,7 @@ FORM = ActionForm()
 EXAMPLES: list[dict[str, Any]] = [
     {"type": "move_forward", "distance": 1.75},
     {"type": "move_forward", "distance": 3.0},
+    {"type": "move_forward", "distance": 1.0, "turn": -22.5},
     {"type": "turn_left", "degrees": 37.0},
     {"type": "turn_right", "degrees": 270.0},
     {"type": "look_at", "target": [20.0, -35.5, 4.25]},

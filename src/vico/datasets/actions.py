@@ -4,6 +4,7 @@ A vector begins with a one-hot of the action's type; then come the slots, each 0
 
     type.NAME ...                            1 for the action's type
     amount                                   distance / 2.5 m, degrees / 180, range of a message / 10 m
+    turn                                     of who turns while walking, to the left, degrees / 180
     target.forward target.left target.up     a point in the agent's own frame, metres
     where.entity where.point                 what a target is: an entity, or that point; both 0: left to the simulation
     hand                                     0 left, 1 right
@@ -37,6 +38,7 @@ from vico.sim.actions.table import form_of
 IDLE = "wait"
 _SLOTS = (
     "amount",
+    "turn",
     "target.forward",
     "target.left",
     "target.up",
@@ -46,6 +48,8 @@ _SLOTS = (
     "index",
     "entity",
 )
+# A number that has no part in `amount` is an angle; smaller ones are none, degrees.
+_HALF_TURN, _NO_TURN = 180.0, 0.5
 _POINT = ("target.forward", "target.left", "target.up")
 # Whole numbers beyond it are not all float32.
 _LARGEST_ENTITY = 2**24
@@ -155,7 +159,7 @@ class ActionForm:
                 raise InputError(f"action: a control of {len(value)} numbers; this dataset's robots take {self.width}")
             return {f"vector.{k}": number for k, number in enumerate(value)}
         if field.kind == "number":
-            return {"amount": value / field.scale}
+            return {"amount": value / field.scale} if field.slot == "amount" else {"turn": value / _HALF_TURN}
         if field.kind == "hand" or field.slot == "index":
             return {"hand" if field.kind == "hand" else "index": value}
         if isinstance(value, tuple):
@@ -172,6 +176,9 @@ class ActionForm:
 
         if field.kind == "vector":
             return [slot(f"vector.{k}") for k in range(self.width)]
+        if field.kind == "number" and field.slot != "amount":
+            angle = min(max(slot("turn") * _HALF_TURN, field.low), field.high)
+            return angle if abs(angle) >= _NO_TURN else None
         if field.kind == "number":
             least = field.low if field.least is None else field.least
             return float(min(max(slot("amount") * field.scale, least), field.high))

@@ -22,12 +22,14 @@ from vico.datasets.formats.registry import FORMATS
 from vico.datasets.layout import Layout
 from vico.datasets.parts import Contents, PartEpisode, key_of, read_part
 from vico.datasets.pictures import PICTURES
-from vico.datasets.side_by_side import run_tasks
 from vico.datasets.splits import SPLITS, Member, SplitRule, assign
 from vico.datasets.worker import chosen_agents, plain_job
 from vico.errors import EmptyInputError, InputError
 from vico.io.files import read_json, sha256_of, write_bytes, write_errors, write_json
 from vico.io.folders import FolderLock, check_replaceable, put_in_place, remove
+from vico.io.stores import FolderStore
+from vico.jobs import Answer, Service, Task, open_executor
+from vico.jobs.shared import seen_by_all
 from vico.runner.foreign import Terms
 from vico.runner.loading import source_digest
 from vico.sim.recording import read_run
@@ -36,6 +38,8 @@ from vico.world.folder import read_world
 #: Told how many of how many episodes are there, and how many of their frames.
 Report = Callable[[int, int], None]
 
+#: What makes the parts.
+MAKER = "vico.datasets.worker:player"
 _MARK = "build.json"
 _MARKED = {"schema_name": "vico.dataset.build", "version": 1}
 
@@ -67,7 +71,7 @@ class BuildRequest:
     workers
         Processes side by side; decides nothing but how long it takes.
     ray
-        A Ray cluster that makes the parts instead: its address, or ``auto``.
+        A Ray cluster that makes the parts instead, see `vico.jobs.open_executor`; its machines share the folder.
     """
 
     contents: Contents
@@ -128,16 +132,22 @@ def build_dataset(request: BuildRequest, out: Path, *, force: bool = False, repo
     with FolderLock(partial, name=out):
         parts = partial / "parts"
         remove(parts / ".scratch")
-        options = {"parts": str(parts), "contents": request.contents.record()}
-        answers: dict[int, Mapping[str, Any]] = {}
+        shared = FolderStore(parts)
+        options = {"parts": str(shared), "contents": request.contents.record()}
+        reasons: dict[int, str] = {}
 
-        def done(index: int, answer: Mapping[str, Any]) -> None:
-            answers[index] = answer
+        def done(index: int, answer: Answer) -> None:
+            reasons[index] = answer.reason
             if report is not None:
-                report(len(answers), len(tasks))
+                report(len(reasons), len(tasks))
 
-        run_tasks(options, tasks, workers=request.workers, ray=request.ray, done=done, tell=lambda told: None)
-        missing = [f"{tasks[k]['label']}: {answers[k]['reason']}" for k in sorted(answers) if "reason" in answers[k]]
+        with (
+            open_executor(workers=max(1, min(request.workers, len(tasks))), ray=request.ray) as executor,
+            seen_by_all(shared, executor) as seen,
+        ):
+            service = Service(MAKER, {**options, "seen": seen, "code": code_digest()})
+            executor.run(service, [Task(task, near=task["near"]) for task in tasks], done=done)
+        missing = [f"{tasks[k]['label']}: {' '.join(reasons[k].split())}" for k in sorted(reasons) if reasons[k]]
         episodes = [episode for task in tasks for episode in read_part(parts / task["folder"], task["key"]) or []]
         if request.successes:
             episodes = [episode for episode in episodes if episode.about["success"]]
@@ -170,8 +180,8 @@ def tasks_of(request: BuildRequest) -> list[dict[str, Any]]:
             chosen_agents(run, request.contents)  # what is wrong with a run is said before anything is made
             decides = {"run": run.manifest["identity"], "hashes": run.hashes[-1], "last": run.last}
             decides |= {"files": _beside(run.path), "contents": contents}
-            tasks.append({"run": str(path), "world": None if given is None else str(given), "label": str(path)})
-            tasks[-1] |= _named(index, key_of(decides))
+            where = {"run": str(path.resolve()), "world": None if given is None else str(given.resolve())}
+            tasks.append({**where, "label": str(path), "near": "", **_named(index, key_of(decides))})
         return tasks
     digests = [read_world(world).digest for world in request.worlds]
     code = code_digest()
@@ -184,7 +194,7 @@ def tasks_of(request: BuildRequest) -> list[dict[str, Any]]:
         plain = plain_job(job)
         decides = {**plain, "world": digests[which], "code": code, "sources": sources, "contents": contents}
         label = f"{request.category}, {world.name}, seed {seed}"
-        tasks.append({"job": plain, "label": label, **_named(index, key_of(decides))})
+        tasks.append({"job": plain, "label": label, "near": str(world), **_named(index, key_of(decides))})
     return tasks
 
 

@@ -100,6 +100,10 @@ class Dataset:
         if self.about.format not in FORMATS:
             raise SchemaError(f"{path / RECORD}: format {self.about.format!r}; there are {', '.join(FORMATS)}")
         self.path = path
+        if self.about.features.get("action") != list(self.form.names):
+            raise SchemaError(
+                f"{path}: its actions are as {self.about.producer} had them, which has others than this; build it anew"
+            )
 
     @property
     def form(self) -> ActionForm:

@@ -22,7 +22,7 @@ from vico.io.files import read_json, write_json
 from vico.sim.recording.segments import written_folder
 
 #: Counts up whenever a part would hold something else than before.
-VERSION = 1
+VERSION = 2
 _PART = "part.json"
 
 

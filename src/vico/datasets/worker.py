@@ -25,7 +25,7 @@ from vico.datasets.formats.registry import FORMATS
 from vico.datasets.parts import Contents, read_part, write_part
 from vico.datasets.pictures import PictureKeeper, PictureSource, RecordedPictures
 from vico.datasets.tasks import EpisodeFacts, facts_of_episode, facts_of_run
-from vico.errors import InputError, OutputError, VicoError
+from vico.errors import InputError
 from vico.io.stores import FolderStore
 from vico.jobs.shared import check_code, check_seen
 from vico.runner.foreign import Terms
@@ -54,7 +54,7 @@ def player(options: Mapping[str, Any], tell: Tell) -> Callable[[Mapping[str, Any
     -------
     callable
         Makes the part of a task: ``key`` and ``folder`` (its name), and either ``run`` (path) and ``world`` (path or
-        null), or ``job`` (`plain_job`). Returns ``frames``, or ``reason``: why there is no part.
+        null), or ``job`` (`plain_job`). Returns ``frames``; raises where there is no part to be made, and says why.
     """
     parts, contents = Path(options["parts"]), Contents.of(options["contents"])
     check_seen(FolderStore(parts), options["seen"])
@@ -68,13 +68,8 @@ def player(options: Mapping[str, Any], tell: Tell) -> Callable[[Mapping[str, Any
             shutil.rmtree(folder, ignore_errors=True)
             scratch = parts / _SCRATCH
             scratch.mkdir(parents=True, exist_ok=True)
-            try:
-                with tempfile.TemporaryDirectory(dir=scratch, prefix=f"{task['folder']}.") as work:
-                    _make(task, folder, contents, Path(work), tell)
-            except OutputError:
-                raise  # of no use to go on
-            except VicoError as error:
-                return {"reason": " ".join(str(error).split())}
+            with tempfile.TemporaryDirectory(dir=scratch, prefix=f"{task['folder']}.") as work:
+                _make(task, folder, contents, Path(work), tell)
             made = read_part(folder, task["key"])
         assert made is not None
         return {"frames": sum(episode.frames for episode in made)}
