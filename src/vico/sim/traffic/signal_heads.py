@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +20,24 @@ from vico.world.walkways import CROSSING, Walkways
 _NEAR_STOP, _NEAR_CROSSING = 15.0, 6.0  # m that a pole may stand away from the stop line or the crossing's end
 _AGAINST = 0.6  # cosine of the angle up to which a pole faces those who come
 _BESIDE = 0.12  # m beside its lane that a post stands: on the kerb, where nobody walks or drives
+
+
+class PlacedHeads(NamedTuple):
+    """Lenses for vehicles, then those for people, then posts.
+
+    Attributes
+    ----------
+    lane
+        Of each of the first, the lane whose signal it shows, int32, shape ``(l,)``.
+    walkway
+        Of each of the second, the crossing whose signal it shows, int32, shape ``(w,)``.
+    transforms
+        Of all, model to world, float32, shape ``(l + w + posts, 4, 4)``.
+    """
+
+    lane: NDArray[np.int32]
+    walkway: NDArray[np.int32]
+    transforms: NDArray[np.float32]
 
 
 class SignalHeads:
@@ -83,6 +103,11 @@ class SignalHeads:
             ]
         )
         return Drawn(self._names, index, self._transforms, self._entity)
+
+    @property
+    def placed(self) -> PlacedHeads:
+        """Where the lenses and posts are, and whose signal each shows."""
+        return PlacedHeads(self._lane, self._walkway, self._transforms)
 
     @staticmethod
     def prototypes() -> dict[str, list[Surface]]:

@@ -64,6 +64,21 @@ class SignalsShown(NamedTuple):
         return found
 
 
+class SignalDay(NamedTuple):
+    """What one signal shows where the power is not cut.
+
+    Attributes
+    ----------
+    light
+        From midnight on, over and over: DARK, GREEN, AMBER or RED in each second of its cycle, uint8, shape ``(s,)``.
+    position
+        Of the junction whose power decides, ENU metres.
+    """
+
+    light: NDArray[np.uint8]
+    position: tuple[float, float]
+
+
 class SignalClock:
     """Shows on lanes and crossings what their signals show.
 
@@ -134,6 +149,22 @@ class SignalClock:
             lit = self._flat[row[program] + link] if len(rows) else np.zeros(0, np.uint8)
             records["light"][rows] = np.where(out[program], DARK, lit)
         return np.unique(self._zone[out[self._lane_program]]).astype(np.int32)
+
+    def day_of_lane(self, lane: int) -> SignalDay:
+        """Return what the signal on a lane shows, second by second."""
+        (row,) = np.flatnonzero(self.lane == lane)[:1]
+        return self._day(int(self._lane_program[row]), int(self._lane_link[row]))
+
+    def day_of_walkway(self, walkway: int) -> SignalDay:
+        """Return what the signal of a crossing shows, second by second."""
+        (row,) = np.flatnonzero(self.walkway == walkway)[:1]
+        return self._day(int(self._walk_program[row]), int(self._walk_link[row]))
+
+    def _day(self, program: int, link: int) -> SignalDay:
+        cycle, links, first = (int(a[program]) for a in (self._cycle, self._links, self._first))
+        column = self._flat[first : first + cycle * links].reshape(cycle, links)[:, link]
+        x, y = self.position[program].tolist()
+        return SignalDay(np.roll(column, -int(self._offset[program])), (x, y))
 
     def shown(self, net: LaneNetwork, paths: WalkwayNetwork) -> SignalsShown:
         """Return what all of them show now, as `show` has written it."""

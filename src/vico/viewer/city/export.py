@@ -23,7 +23,7 @@ from vico.viewer.city.tiles import TILE, Grid, far_tiles, ground_grid, ground_pi
 from vico.world.folder import World
 
 #: Of the files' layout; another number, and they are written anew.
-CITY_FORMAT = 4
+CITY_FORMAT = 5
 MANIFEST = "manifest.json"
 
 

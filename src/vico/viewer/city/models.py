@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vico.assets.models.in_hand import in_hand_models
 from vico.assets.models.movable import movable_colours, movable_kinds, movable_prototype, movable_surfaces
+from vico.assets.signal_lights import signal_prototypes
 from vico.assets.simplify import thinned
 from vico.assets.train import train_prototypes
 from vico.assets.tram import tram_prototypes
@@ -28,7 +29,7 @@ _FAR_SHARE, _FAR_LEAST, _FAR_LEAVES = 0.14, 12, 0.17
 def moving_models() -> dict[str, Sequence[Surface]]:
     """Return the shapes of vehicles, their lamps, and what people carry, by prototype's name."""
     found: dict[str, Sequence[Surface]] = {**vehicle_prototypes(), **ridden_prototypes()}
-    found |= tram_prototypes() | train_prototypes() | lit_lamps()
+    found |= tram_prototypes() | train_prototypes() | lit_lamps() | signal_prototypes()
     found |= {f"{kind}:night": [night_lamps(kind)] for kind in (*CAR_KINDS, "bus", "bicycle")}
     found |= {name: model.surfaces for name, model in in_hand_models().items()}
     for kind in movable_kinds():

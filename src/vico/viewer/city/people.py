@@ -23,7 +23,7 @@ from vico.sim.animation import style_of
 from vico.viewer.city.motions import motion_tables
 
 #: Of the layout of a person's file; another number, and files are made anew.
-PERSON_FORMAT = 4
+PERSON_FORMAT = 5
 # Triangles of a body that is some ten pixels tall.
 _FAR_TRIANGLES = 220
 
@@ -74,7 +74,8 @@ def person_bytes(look: Appearance, manner: str, seed: int) -> bytes:
     The layout: uint32 length of a JSON head, the head, padding to a multiple of four, and columns one after another at
     the offsets that the head tells: for each mesh position and normal (float32), colour (uint8, four), joints (uint8,
     four), weights (uint8, four), triangles (uint16); then rest joints, T-pose joints, the frames from rest to T-pose,
-    and the tables of `vico.viewer.city.motions`.
+    and the tables of `vico.viewer.city.motions`. The head also tells of the left and the right sole how far it is below
+    the ankle (``depth``) and how far it rolls on (``roll``) at the pitches `vico.sim.animation.style.SOLE_PITCHES`.
     """
     body = body_of(look)
     columns: list[NDArray[Any]] = []
@@ -91,10 +92,16 @@ def person_bytes(look: Appearance, manner: str, seed: int) -> bytes:
     style = style_of(body, rng(seed, "manner", manner), age=look.age)
     tables, data = motion_tables(style)
     head["motions"], head["motion_data"] = tables, _put(columns, *data)
+    head["soles"] = {"depth": _rounded(style["sole_depth"]), "roll": _rounded(style["sole_roll"])}
     head["manner"] = {name: float(style[name]) for name in ("height", "asymmetry", "rhythm")}
     text = json.dumps(head, separators=(",", ":")).encode()
     text += b" " * (-(len(text) + 4) % 4)
     return b"".join([struct.pack("<I", len(text)), text, *(_padded(column) for column in columns)])
+
+
+def _rounded(table: NDArray[Any]) -> list[list[float]]:
+    """Return the rows of a table, to a tenth of a millimetre."""
+    return np.round(table.astype(np.float64), 4).tolist()  # type: ignore[no-any-return]
 
 
 def _far_body(body: SkinnedBody) -> SkinnedBody:

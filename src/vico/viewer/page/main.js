@@ -6,6 +6,7 @@ import { Clock } from "./clock.js";
 import { byId, el, toast } from "./dom.js";
 import { loadCityBase } from "./ground.js";
 import { Hands } from "./hands.js";
+import { goingOn } from "./happenings.js";
 import { Keys } from "./keys.js";
 import { Log } from "./log.js";
 import { CityMap } from "./map.js";
@@ -390,6 +391,7 @@ class Page {
       const height = this.source.cast.get(agent.entity)?.size[2] ?? 1.7;
       named.push({ entity: agent.entity, text: this._spoken(agent) ?? nameOf(agent), x: body.x, y: body.y, z: body.z + height + 0.25, chosen });
     }
+    if (view.happenings.group.visible) named.push(...view.happenings.labels());
     view.overlay.setNames(named);
   }
 
@@ -407,6 +409,11 @@ class Page {
     for (const event of this.timeline.events) {
       if ((event.kind === "message" || event.kind === "speech") && event.time <= clock.time && event.time > clock.time - SPOKEN_FOR) this._talking.set(event.agent, event.text);
     }
+    const happenings = goingOn(this.timeline.events, clock.time);
+    if (view) {
+      view.happenings.show(happenings);
+      view.vehicles.signals.events = happenings;
+    }
     this.panel.update(this.step, clock.time, between.bodies.get(this.selected));
     if (!byId("events").hidden) this.log.update(clock.time);
     if (!byId("metrics").hidden && now - this._charted > 1500) {
@@ -418,7 +425,7 @@ class Page {
       selected: this.selected,
       camera: view ? cameraOnMap(view) : null,
       plan: this.plan,
-      closed: [],
+      happenings,
     });
     if (view && !byId("stats").hidden) {
       const { fps, triangles, calls, care } = view.stats;

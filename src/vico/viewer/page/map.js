@@ -84,7 +84,7 @@ export class CityMap {
   /**
    * @param {Map<number, any>} bodies
    * @param {(entity: number) => number} roomOf
-   * @param {{selected: number, camera: any, plan: any, closed: any[]}} shown
+   * @param {{selected: number, camera: any, plan: any, happenings: import("./happenings.js").Happening[]}} shown
    */
   draw(bodies, roomOf, shown) {
     this._bodies = bodies;
@@ -105,6 +105,7 @@ export class CityMap {
     context.scale(this.scale, this.scale);
     context.imageSmoothingEnabled = true;
     context.drawImage(this.backdrop, -half, -half, 2 * half, 2 * half);
+    this._happenings(shown.happenings);
     this._camera(shown.camera);
     if (shown.plan?.path?.length > 1) this._path(shown.plan.path);
     for (const [entity, body] of bodies) this._body(entity, body, roomOf(entity), entity === shown.selected);
@@ -156,6 +157,30 @@ export class CityMap {
     context.fill();
     context.stroke();
     context.restore();
+  }
+
+  /** @param {import("./happenings.js").Happening[]} events */
+  _happenings(events) {
+    const { context, scale } = this;
+    context.lineWidth = 2 / scale;
+    context.strokeStyle = "#d55e00";
+    context.fillStyle = "rgba(213, 94, 0, 0.25)";
+    context.font = `600 ${11 / scale}px system-ui, sans-serif`;
+    for (const { x, y, region, text } of events) {
+      const [middleX, middleY, radius] = region ?? [x, y, 0];
+      context.beginPath();
+      context.arc(middleX, -middleY, Math.max(radius, 6 / scale), 0, 2 * Math.PI);
+      context.fill();
+      context.stroke();
+      context.save();
+      context.fillStyle = "#7a3500";
+      context.strokeStyle = "rgba(255, 255, 255, 0.9)";
+      context.lineWidth = 3 / scale;
+      const at = /** @type {[number, number]} */ ([middleX + Math.max(radius, 6 / scale) + 3 / scale, -middleY + 4 / scale]);
+      context.strokeText(text, ...at);
+      context.fillText(text, ...at);
+      context.restore();
+    }
   }
 
   /** @param {number[][]} path */

@@ -104,11 +104,16 @@ void main() {
   if (pictured > 0.5) base *= texture2D(picture, vUv).rgb;
   else if (vWall.z > 0.5) {
     vec2 cell = vWall.xy / vec2(2.7, 3.5);
+    // As large a share of a pixel as panes have of it; where pixels are storeys, their mean.
+    vec2 wide = max(fwidth(cell), vec2(1e-3));
     vec2 within = fract(cell);
-    float pane = step(0.28, within.x) * step(within.x, 0.74) * step(0.3, within.y) * step(within.y, 0.8);
+    vec2 cover = clamp((within - vec2(0.28, 0.3)) / wide + 0.5, 0.0, 1.0) - clamp((within - vec2(0.74, 0.8)) / wide + 0.5, 0.0, 1.0);
+    float blurred = smoothstep(0.25, 0.7, max(wide.x, wide.y));
+    float pane = mix(cover.x * cover.y, 0.23, blurred);
     float chance = night > 0.1 ? fract(sin(dot(floor(cell), vec2(12.9898, 78.233))) * 43758.5453) : 0.0;
-    vec3 glass = mix(vec3(0.17, 0.2, 0.24), vec3(1.5, 1.2, 0.75) / max(vLight, vec3(0.2)), night * step(0.62, chance));
-    base = mix(base, glass, pane * 0.75);
+    float lamp = mix(step(0.62, chance), 0.38, blurred);
+    vec3 glass = mix(vec3(0.22, 0.25, 0.3), vec3(1.5, 1.2, 0.75) / max(vLight, vec3(0.2)), night * lamp);
+    base = mix(base, glass, pane * 0.7);
   }
   gl_FragColor = vec4(mix(base * vLight, fog, vFog), 1.0);
 }`;

@@ -1,7 +1,10 @@
 // How somebody moves: joint rotations from tables by motion, phase and pace, and from one motion into the next.
 // The rules are those of vico.sim.animation; tests hold this module against vico.sim.recording.PosedPeople.
 
-export const JOINTS = 55;
+import { blendJoints, lieDown, setOut, standBySteps } from "./blending.js";
+import { smoothstep } from "./rotations.js";
+import { JOINTS, Pose } from "./skeleton.js";
+
 /** Longest that one motion shows in the next, seconds. */
 export const LONGEST_BLEND = 1.3;
 const INTO_GAIT = 0.3;
@@ -11,13 +14,10 @@ const OTHERWISE = 0.45;
 const TURN_OF_CRANKS = 4.0;
 const SLOWEST = 0.15;
 const GAITS = new Set(["walk", "run", "carry", "carry_left", "carry_right"]);
+const OFF_THEIR_FEET = new Set(["sleep", "ride_bike", "ride_bus"]);
+const [WALK_DUTY, RUN_DUTY] = [0.62, 0.36];
+const [TURN_CYCLE, TURN_START] = [(2 * Math.PI) / 3, 0.25];
 const SEATED = new Set(["sit", "sit_talk", "sit_wave", "sit_drink", "sit_eat"]);
-
-/** @param {number} t */
-export function smoothstep(t) {
-  const x = Math.min(Math.max(t, 0), 1);
-  return x * x * (3 - 2 * x);
-}
 
 /** @param {string} name @returns {boolean} */
 export function isGait(name) {
@@ -75,57 +75,9 @@ export function restlessness(second, asymmetry, rhythm) {
   return [weight, away, 0.12 * whim(second, 5.5, 3, rhythm) ** 2];
 }
 
-/** A person's file, as vico.viewer.city.people lays it out. */
-export class PersonFile {
-  /** @param {ArrayBuffer} buffer */
-  constructor(buffer) {
-    const length = new DataView(buffer).getUint32(0, true);
-    /** @type {any} */
-    this.head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
-    this.buffer = buffer;
-    this.base = 4 + length;
-    const floats = (/** @type {number} */ at, /** @type {number} */ n) => new Float32Array(buffer, this.base + at, n);
-    const [rest, joints, frames] = this.head.skeleton;
-    this.rest = floats(rest, 3 * JOINTS);
-    this.joints = floats(joints, 3 * JOINTS);
-    this.frames = quaternionsOf(floats(frames, 9 * JOINTS));
-    this.parents = this.head.parents;
-    const [quaternions, shifts, resting] = this.head.motion_data;
-    const rows = (shifts - quaternions) / (8 * JOINTS);
-    this.quaternions = new Int16Array(buffer, this.base + quaternions, rows * 4 * JOINTS);
-    this.shifts = floats(shifts, rows * 3);
-    const count = this.head.motions.filter((/** @type {any} */ m) => m.resting !== undefined).length;
-    this.resting = floats(resting, count * 4 * 56 * 3);
-    this.height = this.head.height;
-  }
-
-  /**
-   * The columns of a mesh.
-   * @param {number} level 0 near, 1 far
-   */
-  mesh(level) {
-    const { vertices: n, indices, columns } = this.head.meshes[level];
-    const at = (/** @type {number} */ k) => this.base + columns[k];
-    return {
-      position: new Float32Array(this.buffer, at(0), 3 * n),
-      normal: new Float32Array(this.buffer, at(1), 3 * n),
-      colour: new Uint8Array(this.buffer, at(2), 4 * n),
-      joints: new Uint8Array(this.buffer, at(3), 4 * n),
-      weights: new Uint8Array(this.buffer, at(4), 4 * n),
-      index: new Uint16Array(this.buffer, at(5), indices),
-    };
-  }
-}
-
-/** How somebody holds themselves: rotations of the joints relative to their parents, and the pelvis' shift. */
-export class Pose {
-  constructor() {
-    this.quaternions = new Float32Array(4 * JOINTS);
-    this.shift = new Float32Array(3);
-  }
-}
-
 const other = new Pose();
+const start = new Pose();
+const level = new Pose();
 
 /**
  * @typedef {object} Motion
@@ -140,7 +92,7 @@ const other = new Pose();
 
 /**
  * Pose somebody.
- * @param {PersonFile} person
+ * @param {import("./skeleton.js").PersonFile} person
  * @param {Motion} motion
  * @param {number} second of the clock
  * @param {Pose} out
@@ -153,21 +105,38 @@ export function poseOf(person, motion, second, out) {
   const now = names[motion.clip].name;
   if (before === undefined) return;
   const u = motion.since / blendTime(before, now);
-  if (u >= 1) return;
-  let phase = motion.phaseBefore;
-  if (isGait(before) && isGait(now)) {
+  if (isGait(now)) {
+    const gone = (motion.since * motion.pace) / strideOf(now, motion.pace, person.height);
+    if (gone >= 1 || OFF_THEIR_FEET.has(before)) return;
+    const begun = motion.phase - gone;
+    const walked = isGait(before);
+    poseIn(person, motion.clip, begun, motion.pace, second, start);
+    poseIn(person, motion.clipBefore, motion.phaseBefore, motion.paceBefore, second, level);
     // Who goes from one gait to another goes on with the strides of before.
-    const stride = strideOf(now, motion.pace, person.height);
-    phase += (motion.since * motion.pace) / stride;
+    poseIn(person, motion.clipBefore, motion.phaseBefore + (walked ? gone : 0), motion.paceBefore, second, other);
+    setOut(person, out, { old: other, start, level }, { walked, phaseBefore: motion.phaseBefore, dutyBefore: dutyOf(before), begun, gone, duty: dutyOf(now), u });
+    return;
   }
-  poseIn(person, motion.clipBefore, phase, motion.paceBefore, second, other);
-  mix(other.quaternions, out.quaternions, smoothstep(u));
-  for (let k = 0; k < 3; k++) out.shift[k] = other.shift[k] + (out.shift[k] - other.shift[k]) * smoothstep(u);
+  if (u >= 1) return;
+  poseIn(person, motion.clipBefore, motion.phaseBefore, motion.paceBefore, second, other);
+  if (OFF_THEIR_FEET.has(before) || OFF_THEIR_FEET.has(now)) lieDown(person, out, other, u);
+  else standBySteps(person, out, other, now === "turn" ? turnedBy(motion.phase) : 0, u);
+}
+
+/** @param {string} name @returns {number} the share of a gait's cycle that a foot is on the ground */
+function dutyOf(name) {
+  return name === "run" ? RUN_DUTY : WALK_DUTY;
+}
+
+/** @param {number} phase of a turn @returns {number} how far the body has turned to the left since it began, radians */
+function turnedBy(phase) {
+  const gone = phase - TURN_START + 0.5;
+  return (gone - Math.floor(gone) - 0.5) * TURN_CYCLE;
 }
 
 /**
  * Pose somebody in one motion.
- * @param {PersonFile} person
+ * @param {import("./skeleton.js").PersonFile} person
  * @param {number} clip
  * @param {number} phase
  * @param {number} pace
@@ -196,9 +165,9 @@ function poseIn(person, clip, phase, pace, second, out) {
   if (share > 0) {
     between(person, row + entry.phases + first, row + entry.phases + next, at - Math.floor(at), faster);
     // Towards the faster one: what is `out` now is where it comes from.
-    mix(out.quaternions, faster.quaternions, share);
+    blendJoints(faster, out, share);
     out.quaternions.set(faster.quaternions);
-    for (let k = 0; k < 3; k++) out.shift[k] += (faster.shift[k] - out.shift[k]) * share;
+    out.shift.set(faster.shift);
   }
 }
 
@@ -206,7 +175,7 @@ const faster = new Pose();
 
 /**
  * Bring the phone up in the first of the cycle, and down in the last.
- * @param {PersonFile} person
+ * @param {import("./skeleton.js").PersonFile} person
  * @param {number} phase
  * @param {number} second
  * @param {Pose} out with the phone raised
@@ -216,12 +185,11 @@ function raise(person, phase, second, out) {
   const up = smoothstep(12 * p) * smoothstep(12 * (1 - p));
   if (up >= 1) return;
   poseAtRest(person, person.head.motions[0].resting, second, faster);
-  mix(faster.quaternions, out.quaternions, up);
-  for (let k = 0; k < 3; k++) out.shift[k] = faster.shift[k] + (out.shift[k] - faster.shift[k]) * up;
+  blendJoints(out, faster, up);
 }
 
 /**
- * @param {PersonFile} person
+ * @param {import("./skeleton.js").PersonFile} person
  * @param {number} a
  * @param {number} b
  * @param {number} t
@@ -244,7 +212,7 @@ function between(person, a, b, t, out) {
 }
 
 /**
- * @param {PersonFile} person
+ * @param {import("./skeleton.js").PersonFile} person
  * @param {number} which
  * @param {number} second
  * @param {Pose} out
@@ -271,123 +239,4 @@ function poseAtRest(person, which, second, out) {
     out.quaternions[4 * j + 2] = z * s;
     out.quaternions[4 * j + 3] = Math.cos(angle / 2);
   }
-}
-
-/**
- * Turn every rotation of `to` back towards `from`: `share` of the way from there is left.
- * @param {Float32Array} from
- * @param {Float32Array} to changed
- * @param {number} share
- */
-function mix(from, to, share) {
-  for (let j = 0; j < 4 * JOINTS; j += 4) {
-    let x0 = from[j], y0 = from[j + 1], z0 = from[j + 2], w0 = from[j + 3];
-    let dot = x0 * to[j] + y0 * to[j + 1] + z0 * to[j + 2] + w0 * to[j + 3];
-    if (dot < 0) { x0 = -x0; y0 = -y0; z0 = -z0; w0 = -w0; dot = -dot; }
-    let a = 1 - share;
-    let b = share;
-    if (dot < 0.9995) {
-      const angle = Math.acos(Math.min(dot, 1));
-      const sine = Math.sin(angle);
-      a = Math.sin((1 - share) * angle) / sine;
-      b = Math.sin(share * angle) / sine;
-    }
-    const x = a * x0 + b * to[j], y = a * y0 + b * to[j + 1], z = a * z0 + b * to[j + 2], w = a * w0 + b * to[j + 3];
-    const n = 1 / Math.sqrt(x * x + y * y + z * z + w * w);
-    to[j] = x * n; to[j + 1] = y * n; to[j + 2] = z * n; to[j + 3] = w * n;
-  }
-}
-
-const turned = new Float32Array(4 * JOINTS);
-const placed = new Float32Array(3 * JOINTS);
-
-/**
- * Write the matrices that bring a body's vertices from rest to a pose: three rows of four numbers a joint.
- * @param {PersonFile} person
- * @param {Pose} pose
- * @param {Float32Array} out
- * @param {number} start
- */
-export function writeBones(person, pose, out, start) {
-  forwardKinematics(person, pose);
-  const { rest, frames } = person;
-  for (let j = 0; j < JOINTS; j++) {
-    const i = 4 * j;
-    const ax = turned[i], ay = turned[i + 1], az = turned[i + 2], aw = turned[i + 3];
-    const bx = frames[i], by = frames[i + 1], bz = frames[i + 2], bw = frames[i + 3];
-    const x = aw * bx + ax * bw + ay * bz - az * by;
-    const y = aw * by - ax * bz + ay * bw + az * bx;
-    const z = aw * bz + ax * by - ay * bx + az * bw;
-    const w = aw * bw - ax * bx - ay * by - az * bz;
-    const o = start + 12 * j;
-    const m00 = 1 - 2 * (y * y + z * z), m01 = 2 * (x * y - w * z), m02 = 2 * (x * z + w * y);
-    const m10 = 2 * (x * y + w * z), m11 = 1 - 2 * (x * x + z * z), m12 = 2 * (y * z - w * x);
-    const m20 = 2 * (x * z - w * y), m21 = 2 * (y * z + w * x), m22 = 1 - 2 * (x * x + y * y);
-    const rx = rest[3 * j], ry = rest[3 * j + 1], rz = rest[3 * j + 2];
-    out[o] = m00; out[o + 1] = m01; out[o + 2] = m02;
-    out[o + 3] = placed[3 * j] - (m00 * rx + m01 * ry + m02 * rz);
-    out[o + 4] = m10; out[o + 5] = m11; out[o + 6] = m12;
-    out[o + 7] = placed[3 * j + 1] - (m10 * rx + m11 * ry + m12 * rz);
-    out[o + 8] = m20; out[o + 9] = m21; out[o + 10] = m22;
-    out[o + 11] = placed[3 * j + 2] - (m20 * rx + m21 * ry + m22 * rz);
-  }
-}
-
-/**
- * Write where all joints are, and how they are turned, in the body's frame.
- * @param {PersonFile} person
- * @param {Pose} pose
- * @returns {{turned: Float32Array, placed: Float32Array}} used again at the next call
- */
-export function forwardKinematics(person, pose) {
-  const { joints, parents } = person;
-  const q = pose.quaternions;
-  for (let j = 0; j < JOINTS; j++) {
-    const i = 4 * j;
-    const p = parents[j];
-    if (p < 0) {
-      turned.set(q.subarray(0, 4));
-      for (let k = 0; k < 3; k++) placed[k] = joints[k] + pose.shift[k];
-      continue;
-    }
-    const ax = turned[4 * p], ay = turned[4 * p + 1], az = turned[4 * p + 2], aw = turned[4 * p + 3];
-    const bx = q[i], by = q[i + 1], bz = q[i + 2], bw = q[i + 3];
-    turned[i] = aw * bx + ax * bw + ay * bz - az * by;
-    turned[i + 1] = aw * by - ax * bz + ay * bw + az * bx;
-    turned[i + 2] = aw * bz + ax * by - ay * bx + az * bw;
-    turned[i + 3] = aw * bw - ax * bx - ay * by - az * bz;
-    const dx = joints[3 * j] - joints[3 * p], dy = joints[3 * j + 1] - joints[3 * p + 1], dz = joints[3 * j + 2] - joints[3 * p + 2];
-    // v + 2 w (u x v) + 2 u x (u x v)
-    const cx = ay * dz - az * dy, cy = az * dx - ax * dz, cz = ax * dy - ay * dx;
-    placed[3 * j] = placed[3 * p] + dx + 2 * (aw * cx + ay * cz - az * cy);
-    placed[3 * j + 1] = placed[3 * p + 1] + dy + 2 * (aw * cy + az * cx - ax * cz);
-    placed[3 * j + 2] = placed[3 * p + 2] + dz + 2 * (aw * cz + ax * cy - ay * cx);
-  }
-  return { turned, placed };
-}
-
-/** @param {Float32Array} matrices rows of 3 x 3 @returns {Float32Array} quaternions x, y, z, w */
-function quaternionsOf(matrices) {
-  const count = matrices.length / 9;
-  const out = new Float32Array(4 * count);
-  for (let k = 0; k < count; k++) {
-    const m = matrices.subarray(9 * k, 9 * k + 9);
-    const trace = m[0] + m[4] + m[8];
-    let x, y, z, w;
-    if (trace > 0) {
-      const s = 2 * Math.sqrt(trace + 1);
-      [w, x, y, z] = [s / 4, (m[7] - m[5]) / s, (m[2] - m[6]) / s, (m[3] - m[1]) / s];
-    } else if (m[0] > m[4] && m[0] > m[8]) {
-      const s = 2 * Math.sqrt(1 + m[0] - m[4] - m[8]);
-      [w, x, y, z] = [(m[7] - m[5]) / s, s / 4, (m[1] + m[3]) / s, (m[2] + m[6]) / s];
-    } else if (m[4] > m[8]) {
-      const s = 2 * Math.sqrt(1 + m[4] - m[0] - m[8]);
-      [w, x, y, z] = [(m[2] - m[6]) / s, (m[1] + m[3]) / s, s / 4, (m[5] + m[7]) / s];
-    } else {
-      const s = 2 * Math.sqrt(1 + m[8] - m[0] - m[4]);
-      [w, x, y, z] = [(m[3] - m[1]) / s, (m[2] + m[6]) / s, (m[5] + m[7]) / s, s / 4];
-    }
-    out.set([x, y, z, w], 4 * k);
-  }
-  return out;
 }

@@ -19,7 +19,7 @@ export class Overlay {
     /** @type {{at: any, element: HTMLElement}[]} */
     this.labels = [];
     this._key = "null";
-    /** @type {Map<number, HTMLElement>} */
+    /** @type {Map<number | string, HTMLElement>} */
     this.names = new Map();
   }
 
@@ -71,8 +71,8 @@ export class Overlay {
   }
 
   /**
-   * Show names above people and robots.
-   * @param {{entity: number, text: string, x: number, y: number, z: number, chosen: boolean}[]} named
+   * Show names above people and robots, and above what goes on.
+   * @param {{entity: number | string, text: string, x: number, y: number, z: number, chosen: boolean, kind?: string}[]} named
    */
   setNames(named) {
     const there = new Set(named.map((n) => n.entity));
@@ -85,7 +85,7 @@ export class Overlay {
     for (const one of named) {
       let element = this.names.get(one.entity);
       if (!element) {
-        element = this._label(one.text, "name");
+        element = this._label(one.text, one.kind ?? "name");
         this.names.set(one.entity, element);
       }
       if (element.textContent !== one.text) element.textContent = one.text;

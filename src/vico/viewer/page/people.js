@@ -3,7 +3,8 @@
 import { THREE } from "./three.js";
 import { bytes } from "./city.js";
 import { lightUniforms } from "./materials.js";
-import { JOINTS, PersonFile, Pose, forwardKinematics, isGait, poseOf, strideOf, writeBones } from "./motion.js";
+import { isGait, poseOf, strideOf } from "./motion.js";
+import { JOINTS, PersonFile, Pose, forwardKinematics, writeBones } from "./skeleton.js";
 
 const ROWS = 160;
 const WIDTH = 3 * JOINTS;

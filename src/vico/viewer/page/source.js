@@ -170,6 +170,7 @@ export class Source extends EventTarget {
     }
     const message = JSON.parse(data);
     if (message.type === "reply") {
+      if (message.bookmarks) this.run.bookmarks = message.bookmarks;
       this._waiting.get(message.id)?.(message);
       this._waiting.delete(message.id);
     } else if (message.type === "cast") this.takeCast(message.cast);

@@ -8,6 +8,9 @@ const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16, 60];
 /** @type {Record<string, string>} */
 const MARKS = { message: "#0072b2", speech: "#0072b2", collision: "#d55e00", refused: "#b8b8b8" };
 const OTHER = "#009e73";
+const BOOKMARK = "#e0a100";
+/** A click so near a bookmark goes to it, pixels. */
+const NEAR_MARK = 7;
 
 export class Timeline {
   /** @param {import("./source.js").Source} source @param {import("./clock.js").Clock} clock */
@@ -32,12 +35,32 @@ export class Timeline {
     this.slider.addEventListener("input", () => this.seek(source.timeOf(Number(this.slider.value))));
     this.marks.addEventListener("click", (/** @type {MouseEvent} */ event) => {
       const share = event.offsetX / this.marks.clientWidth;
-      this.seek(source.timeOf(Math.round(share * source.last)));
+      this.seek(source.timeOf(this._bookmarkAt(event.offsetX)?.step ?? Math.round(share * source.last)));
+    });
+    this.marks.addEventListener("mousemove", (/** @type {MouseEvent} */ event) => {
+      const mark = this._bookmarkAt(event.offsetX);
+      this.marks.title = mark ? `${mark.text || "bookmark"}, ${clockText(mark.time)}` : "";
     });
     byId("live").hidden = !source.live;
     source.addEventListener("events", (/** @type {any} */ { detail }) => this._take(detail.events));
     source.addEventListener("control", () => this._control());
     this.loadEvents();
+  }
+
+  /** What was bookmarked. @returns {{step: number, time: number, text: string}[]} */
+  get bookmarks() {
+    return this.source.run.bookmarks ?? [];
+  }
+
+  /** @param {number} step @returns {number} where it is along the marks, pixels */
+  _across(step) {
+    return (step / Math.max(this.source.last, 1)) * (this.marks.clientWidth - 2);
+  }
+
+  /** @param {number} x pixels along the marks */
+  _bookmarkAt(x) {
+    const away = (/** @type {any} */ mark) => Math.abs(this._across(mark.step) - x);
+    return this.bookmarks.filter((mark) => away(mark) <= NEAR_MARK).sort((a, b) => away(a) - away(b))[0];
   }
 
   async loadEvents() {
@@ -136,7 +159,7 @@ export class Timeline {
 
   _draw() {
     const { marks, source } = this;
-    const key = `${this.events.length} ${source.last} ${marks.clientWidth}`;
+    const key = `${this.events.length} ${source.last} ${marks.clientWidth} ${this.bookmarks.length}`;
     if (key === this._drawn || !marks.clientWidth) return;
     this._drawn = key;
     marks.width = marks.clientWidth;
@@ -146,8 +169,17 @@ export class Timeline {
     for (const event of this.events) {
       const quiet = event.kind === "refused" || event.kind === "collision";
       context.fillStyle = MARKS[event.kind] ?? OTHER;
-      const x = (event.step / Math.max(source.last, 1)) * (marks.width - 2);
-      context.fillRect(x, quiet ? marks.height * 0.6 : 0, 2, marks.height);
+      context.fillRect(this._across(event.step), quiet ? marks.height * 0.6 : 0, 2, marks.height);
+    }
+    context.fillStyle = BOOKMARK;
+    for (const { step } of this.bookmarks) {
+      const x = this._across(step) + 1;
+      context.fillRect(x - 1, 0, 2, marks.height);
+      context.beginPath();
+      context.moveTo(x, 0);
+      context.lineTo(x + 7, 3.5);
+      context.lineTo(x, 7);
+      context.fill();
     }
   }
 }

@@ -2,6 +2,7 @@
 
 import { THREE } from "./three.js";
 import { shadowAt, shadowMesh } from "./people.js";
+import { Signals } from "./signals.js";
 
 const VEHICLES = new Set(["car", "bus", "tram", "bicycle", "cyclist"]);
 const NEAR = 55;
@@ -63,6 +64,7 @@ export class Vehicles {
     /** @type {Map<string, Batch[][]>} */
     this.batches = new Map();
     this.shadows = shadowMesh(scene, 400);
+    this.signals = new Signals();
     this._matrix = new THREE.Matrix4();
     this._frustum = new THREE.Frustum();
     this._sphere = new THREE.Sphere();
@@ -127,6 +129,10 @@ export class Vehicles {
       }
     }
     this._rented(between);
+    this.signals.draw(between.time, camera.position, this._frustum, (name, matrix) => {
+      this._matrix.copy(matrix);
+      this._add(name, 0);
+    });
     this.shadows.count = shadows;
     this.shadows.instanceMatrix.needsUpdate = true;
     for (const levels of this.batches.values()) for (const level of levels) for (const batch of level) batch.finish();

@@ -9,6 +9,7 @@ import { People } from "./people.js";
 import { Vehicles } from "./vehicles.js";
 import { Robots } from "./robots.js";
 import { Overlay } from "./overlay.js";
+import { Happenings } from "./happenings.js";
 
 /** Levels of care, the plainest first: pixels' share, reach of whole tiles, of full bodies, of things (metres). */
 const CARE = [
@@ -52,6 +53,7 @@ export class View {
     this.robots = new Robots(this.scene, this.city, source);
     this.vehicles.people = this.people;
     this.overlay = new Overlay(this.scene, this);
+    this.happenings = new Happenings(this.scene, this);
     this.care = 3;
     /** Whether the level of care follows the frames a second. */
     this.adapts = true;
@@ -149,6 +151,7 @@ export class View {
     }
     if (!always && this._isStill(between, now)) return;
     this.city.showRoom(indoors ? followed.room : -1);
+    this.happenings.group.visible = !indoors;
     this.city.update(this.camera);
     this.overlay.update();
     this.renderer.render(this.scene, this.camera);
@@ -163,7 +166,7 @@ export class View {
   _isStill(between, now) {
     const { elements } = this.camera.matrixWorld;
     const { ring, plan, names } = this.overlay;
-    const key = `${between.time} ${elements.map((/** @type {number} */ v) => v.toFixed(2))} ${ring.position.x} ${ring.visible} ${plan.children.length} ${names.size} ${this.canvas.clientWidth}x${this.canvas.clientHeight} ${this.city.arrived} ${this.people.arrived}`;
+    const key = `${between.time} ${elements.map((/** @type {number} */ v) => v.toFixed(2))} ${ring.position.x} ${ring.visible} ${plan.children.length} ${this.happenings.shown.length} ${names.size} ${this.canvas.clientWidth}x${this.canvas.clientHeight} ${this.city.arrived} ${this.people.arrived}`;
     if (key !== this._key || this._falls()) {
       this._key = key;
       this._moved = now;

@@ -100,6 +100,10 @@ async def _metrics(state: ViewerState, request: Request) -> Response:
     return _json(told | {"speed": state.factor()})
 
 
+async def _signals(state: ViewerState, request: Request) -> Response:
+    return _json(await run_in_threadpool(lambda: state.source.signals))
+
+
 async def _search(state: ViewerState, request: Request) -> Response:
     text = request.query_params.get("q", "")[:_LONGEST_QUERY]
     limit = _number(request, "limit", 20, 1, _MOST_HITS)
@@ -144,6 +148,7 @@ _API: dict[str, _Answer] = {
     "events": _events,
     "metrics": _metrics,
     "search": _search,
+    "signals": _signals,
     "view": _view,
     "frames": _frames,
 }

@@ -183,6 +183,15 @@ class Source:
             row["data"] = json.loads(row["data"])
         return {"events": rows, "more": len(table["step"]) > limit}
 
+    @cached_property
+    def signals(self) -> dict[str, Any]:
+        """What ``/api/signals`` tells."""
+        from vico.viewer.sources.signals import signals_of
+
+        if self.world is None:
+            return {"cycles": [], "heads": [], "dark_events": []}
+        return signals_of(self.world, self.manifest["config"]["junctions"], self.manifest["seed"])
+
     def metrics(self, first: int, last: int, points: int = 500) -> dict[str, Any]:
         """Return what ``/api/metrics`` tells."""
         return self.timeline.metrics(first, last, points)
