@@ -99,6 +99,17 @@ def test_a_power_cut_turns_signals_off_and_one_vehicle_at_a_time_passes() -> Non
     assert (traffic._net.lanes["light"][clock.lane] != DARK).all()
 
 
+def test_what_a_signal_shows_over_the_day_is_what_it_shows_in_each_second() -> None:
+    traffic = traffic_by(JunctionRule.SIGNALS, 0)
+    clock = traffic.signals
+    assert clock is not None
+    lanes, walks = _shown(traffic)
+    for shown, rows, day_of in ((lanes, clock.lane, clock.day_of_lane), (walks, clock.walkway, clock.day_of_walkway)):
+        for column, row in zip(shown.T, rows.tolist(), strict=True):
+            light = day_of(row).light
+            assert np.array_equal(column, light[np.arange(len(column)) % len(light)])
+
+
 def test_each_seed_begins_the_programs_at_other_seconds() -> None:
     lanes, walks = network().lanes, network().walks
     one, same, other = (SignalClock(lanes, walks, seed)._offset.tolist() for seed in (1, 1, 2))

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import toy_city
+from helsinki_traffic import network, traffic_by
+from road_city import HALF
 from vico.agents.schedule import followers_of
 from vico.errors import InputError, SchemaError
 from vico.runner.faults import FaultLog
@@ -18,10 +20,13 @@ from vico.runner.recording import RecordedRun
 from vico.sim.config import SimConfig
 from vico.sim.recorder import Recorder
 from vico.sim.simulation import Simulation
+from vico.sim.traffic import JunctionRule
 from vico.viewer.sources.frames import FRAME_COLUMNS, NEWEST, decoded
+from vico.viewer.sources.signals import heads_on, signals_of
 from vico.viewer.sources.source import Source
 from vico.viewer.sources.tables import LiveTables
 from vico.viewer.sources.views import RecordedViews
+from vico.world.heights import HeightField
 from vico.world.public import PublicMap
 
 STEPS = 70
@@ -153,3 +158,28 @@ def test_pictures_of_what_nobody_filmed_say_why_there_are_none(recorded: Source)
     assert views.view("resident_0", 10, "rgb")[1] == "image/jpeg"
     with pytest.raises(InputError, match="resident_1"):
         views.view("resident_1", 10, "rgb")
+
+
+def test_signals_of_a_browser_are_those_that_are_drawn() -> None:
+    traffic = traffic_by(JunctionRule.SIGNALS, 1)
+    told = heads_on(network(), HeightField.flat(HALF), 1)
+    assert {head["kind"] for head in told["heads"]} >= {"signal", "signal_post"}
+    for second in (0, 17, 30, 61, 100):
+        traffic.set_signals(second, ())
+        drawn = traffic.draw()
+        expected = [drawn.prototypes[k] for k in drawn.index if drawn.prototypes[k].startswith(("signal_", "walk_"))]
+        found = [_prototype(head, told["cycles"], second) for head in told["heads"]]
+        assert sorted(found) == sorted(expected)
+
+
+def _prototype(head: dict[str, Any], cycles: list[str], second: int) -> str:
+    if head["kind"] == "signal_post":
+        return "signal_post"
+    cycle = cycles[head["cycle"]]
+    light = {"g": "green", "a": "amber", "r": "red"}[cycle[second % len(cycle)]]
+    return f"{head['kind']}_{'red' if head['kind'] == 'walk' and light == 'amber' else light}"
+
+
+def test_where_no_signals_are_obeyed_none_are_told() -> None:
+    told = signals_of(toy_city.world(), "one", 0)
+    assert told == {"cycles": [], "heads": [], "dark_events": ["power_cut"]}

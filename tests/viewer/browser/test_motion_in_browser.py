@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from vico.assets.motions.rotations import matrices_of
-from vico.sim.animation import LONGEST_BLEND, joint_places
+from vico.assets.people import body_of
+from vico.seeds import rng
+from vico.sim.animation import LONGEST_BLEND, STYLE, Transition, clip_index, joint_places, pose, style_of
 from vico.sim.recording import PosedPeople, read_run
+from vico.sim.recording.joint_poses import looks_and_manners
 from vico.viewer.browser import BrowserPage
 
 # Tables are read between their rows: no joint is farther off than this, metres and radians (all but straight knees turn
@@ -67,6 +70,40 @@ def test_poses_equal_those_of_posed_people(page: BrowserPage, page_run: Path) ->
     assert max(turned) < _TURNED
     assert len(changing) > 3
     assert max(changing) < _CHANGING
+
+
+_BLENDS = """(async () => {
+  const { poseOf } = await import("/page/motion.js");
+  const { PersonFile, Pose, forwardKinematics } = await import("/page/skeleton.js");
+  const file = new PersonFile(await (await fetch("/api/person/ENTITY.bin")).arrayBuffer());
+  return CASES.map(([clip, phase, pace, clipBefore, phaseBefore, paceBefore, since]) => {
+    const pose = new Pose();
+    poseOf(file, { clip, phase, pace, clipBefore, phaseBefore, paceBefore, since }, 1234.5, pose);
+    return [...forwardKinematics(file, pose).placed];
+  });
+})()"""
+_PACES = {"run": (1.6, 3.5), "walk": (0.4, 2.0), "carry": (0.4, 2.0)}
+
+
+def test_one_motion_passes_into_another_by_the_same_steps(page: BrowserPage, page_run: Path) -> None:
+    run, numbers = read_run(page_run), rng(0, "test", "blends")
+    names = ["idle", "walk", "run", "carry", "sit", "turn", "sleep", "phone", "ride_bike"]
+
+    def motion(name: str) -> tuple[int, float, float]:
+        return clip_index(name), float(numbers.uniform()), float(numbers.uniform(*_PACES.get(name, (0.0, 0.0))))
+
+    pairs = [(a, b) for a in names for b in names if a != b or a in _PACES]
+    cases = [(*motion(b), *motion(a), float(numbers.uniform(0.0, 1.0))) for a, b in pairs for _ in range(3)]
+    entity = next(agent["entity"] for agent in run.agents if agent["kind"] == "resident")
+    told = page.evaluate(_BLENDS.replace("ENTITY", str(entity)).replace("CASES", repr([list(c) for c in cases])))
+    looks, manners = looks_and_manners(run.manifest["seed"], run.agents, run.cast)
+    stream = rng(run.manifest["seed"], "manner", manners[entity])
+    style = np.repeat(np.array([style_of(body_of(looks[entity]), stream, age=looks[entity].age)], STYLE), len(cases))
+    clip, phase, pace, *before = (np.array(column) for column in zip(*cases, strict=True))
+    rotations, offsets = pose(clip, phase, pace, style, second=1234.5, after=Transition(*before))
+    expected = joint_places(style["joints"], rotations, offsets)
+    away = np.linalg.norm(np.reshape(told, (-1, 55, 3)) - expected, axis=2).max(axis=1)
+    assert away.max() < _CHANGING, cases[int(away.argmax())]
 
 
 def _angles(quaternions: np.ndarray, rotations: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@
 import { THREE } from "./three.js";
 import { getJson } from "./source.js";
 import { cityMaterial, meshGeometry, pictureArray, plainMaterial } from "./materials.js";
+import { groundGeometry, lampPlaces, lampPools } from "./ground_meshes.js";
 import { Instances } from "./instances.js";
 
 /** Tiles of which the whole geometry is kept in memory. */
@@ -42,6 +43,8 @@ export class City {
     /** @type {Instances | null} */
     this.instances = null;
     this.reach = { near: 45, far: 420 };
+    /** @type {number[][]} spots that lamps light: x, y, z and radius */
+    this.lamps = [];
     this._round = 0;
     this._ready = new Promise((resolve) => (this._resolveReady = resolve));
     /** @type {any} */
@@ -122,7 +125,8 @@ export class City {
     this.robotShapes = shapes;
     this.instances = new Instances(this.scene, this, this.reach);
     for (const entry of this.manifest.instances) this.instances.add(entry, outlook);
-    this.pools = lampPools(this, outlook);
+    this.lamps = lampPlaces(this, outlook);
+    this.pools = lampPools(this.lamps, this.light);
     if (this.pools) this.scene.add(this.pools);
     this._resolveReady?.(null);
   }
@@ -283,81 +287,4 @@ export async function bytes(path) {
   const answer = await fetch(path);
   if (!answer.ok) throw new Error(`${path}: ${answer.status}`);
   return answer.arrayBuffer();
-}
-
-/**
- * @param {ArrayBuffer} outlook
- * @param {{offset: number, points: number, step: number}} ground
- * @param {any} entry
- * @param {number} half
- */
-function groundGeometry(outlook, ground, entry, half) {
-  const n = ground.points;
-  const heights = new Float32Array(outlook, ground.offset + 4 * entry.index * n * n, n * n);
-  const position = new Float32Array(3 * n * n);
-  const uv = new Float32Array(2 * n * n);
-  const facing = new Float32Array(4 * n * n);
-  for (let iy = 0; iy < n; iy++) {
-    for (let ix = 0; ix < n; ix++) {
-      const k = iy * n + ix;
-      const x = Math.min(entry.x + ix * ground.step, half);
-      const y = Math.min(entry.y + iy * ground.step, half);
-      position.set([x, y, heights[k] - 0.12], 3 * k);
-      uv.set([(x + half) / (2 * half), (y + half) / (2 * half)], 2 * k);
-      facing[4 * k + 2] = 1;
-    }
-  }
-  const index = [];
-  for (let iy = 0; iy + 1 < n; iy++) {
-    for (let ix = 0; ix + 1 < n; ix++) {
-      const a = iy * n + ix;
-      index.push(a, a + 1, a + n, a + 1, a + n + 1, a + n);
-    }
-  }
-  const geometry = new THREE.BufferGeometry();
-  geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
-  geometry.setAttribute("uv", new THREE.BufferAttribute(uv, 2));
-  geometry.setAttribute("facing", new THREE.BufferAttribute(facing, 4));
-  geometry.setAttribute("tint", new THREE.BufferAttribute(new Uint8Array(4 * n * n).fill(255), 4, true));
-  geometry.setIndex(index);
-  return geometry;
-}
-
-/**
- * Make the spots of light below lamps: one call for all.
- * @param {City} city
- * @param {ArrayBuffer} outlook
- */
-function lampPools(city, outlook) {
-  const shining = new Set(city.manifest.lamps ?? []);
-  const places = [];
-  for (const { prototype, offset, count } of city.manifest.instances) {
-    if (!shining.has(prototype)) continue;
-    const table = new Float32Array(outlook, offset, 5 * count);
-    const model = city.models.get(prototype);
-    for (let k = 0; k < count; k++) {
-      const height = (model?.high[2] ?? 5) * table[5 * k + 4];
-      const arm = (model?.high[0] ?? 0) > 0.8 ? model.high[0] * 0.8 : 0;
-      const yaw = table[5 * k + 3];
-      places.push([table[5 * k] + Math.cos(yaw) * arm, table[5 * k + 1] + Math.sin(yaw) * arm, table[5 * k + 2], Math.min(2.2 * height, 13)]);
-    }
-  }
-  if (!places.length) return null;
-  const material = new THREE.ShaderMaterial({
-    uniforms: { night: city.light.night },
-    vertexShader: `varying vec2 at; void main() { at = position.xy; gl_Position = projectionMatrix * modelViewMatrix * instanceMatrix * vec4(position, 1.0); }`,
-    fragmentShader: `uniform float night; varying vec2 at; void main() { float r = length(at); if (r > 1.0) discard;
-      gl_FragColor = vec4(vec3(1.0, 0.8, 0.52) * 0.55 * night * pow(1.0 - r, 1.6), 1.0); }`,
-    transparent: true,
-    depthWrite: false,
-    blending: THREE.AdditiveBlending,
-    polygonOffset: true,
-    polygonOffsetFactor: -3,
-    polygonOffsetUnits: -6,
-  });
-  const mesh = new THREE.InstancedMesh(new THREE.CircleGeometry(1, 20), material, places.length);
-  places.forEach(([x, y, z, r], k) => mesh.instanceMatrix.array.set([r, 0, 0, 0, 0, r, 0, 0, 0, 0, 1, 0, x, y, z + 0.14, 1], 16 * k));
-  mesh.frustumCulled = false;
-  mesh.renderOrder = 1;
-  return mesh;
 }

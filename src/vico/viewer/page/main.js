@@ -1,25 +1,24 @@
 // The page: opens the run, draws it, and lets all parts know of each other.
 
 import { Between } from "./between.js";
+import { Captions, cameraOnMap, weatherText } from "./captions.js";
 import { Charts } from "./charts.js";
 import { Clock } from "./clock.js";
 import { byId, el, toast } from "./dom.js";
 import { loadCityBase } from "./ground.js";
 import { Hands } from "./hands.js";
 import { goingOn } from "./happenings.js";
+import { keyActions } from "./key_actions.js";
 import { Keys } from "./keys.js";
 import { Log } from "./log.js";
 import { CityMap } from "./map.js";
-import { Panel, nameOf } from "./panel.js";
+import { Panel } from "./panel.js";
 import { Search } from "./search.js";
 import { Source } from "./source.js";
 import { loadThree } from "./three.js";
 import { Timeline } from "./timeline.js";
 
 const MODES = /** @type {[string, string][]} */ ([["orbit", "Orbit"], ["follow", "Follow"], ["first", "First person"], ["bird", "Bird's eye"]]);
-/** Names are shown above people within so many metres, and messages for so many seconds. */
-const NAMED_WITHIN = 60;
-const SPOKEN_FOR = 6;
 
 class Page {
   constructor() {
@@ -53,8 +52,7 @@ class Page {
     this.keys = null;
     /** @type {any} */
     this.pick = null;
-    /** @type {Map<string, string>} what is being said, by who says it */
-    this._talking = new Map();
+    this.captions = new Captions(this.source);
     this._charted = 0;
     this._begun = false;
     /** Whether somebody else draws: stills and films. */
@@ -160,46 +158,14 @@ class Page {
     byId("scene").addEventListener("tap", (/** @type {any} */ { detail }) => {
       if (detail.moved < 6 && this.view.cameras.mode !== "play") this._tap(detail.event);
     });
-    this.keys = new Keys(this._keyActions(), this.view.cameras);
+    this.keys = new Keys(keyActions(this), this.view.cameras);
   }
-
 
   /** @param {string} text */
   _flat(text) {
     document.body.classList.add("flat");
     notice(text);
-    this.keys ??= new Keys(this._keyActions(), null);
-  }
-
-  /** @returns {Record<string, (event: KeyboardEvent) => void>} */
-  _keyActions() {
-    const { timeline } = this;
-    const zoom = (/** @type {number} */ factor) => this.view?.cameras.zoom(factor);
-    return {
-      " ": () => timeline?.toggle(),
-      ",": () => timeline?.step(-1),
-      ".": () => timeline?.step(1),
-      "[": () => timeline?.changeSpeed(-1),
-      "]": () => timeline?.changeSpeed(1),
-      l: () => timeline?.follow(),
-      1: () => this.setMode("orbit"),
-      2: () => this.setMode("follow"),
-      3: () => this.setMode("first"),
-      4: () => this.setMode("bird"),
-      f: () => this.setMode("follow"),
-      n: () => this.next(1),
-      p: () => this.next(-1),
-      t: () => (this.names = !this.names),
-      m: () => this.resizeMap(),
-      b: () => this.togglePanel(),
-      i: () => (byId("stats").hidden = !byId("stats").hidden),
-      "+": () => zoom(0.8),
-      "=": () => zoom(0.8),
-      "-": () => zoom(1.25),
-      "/": () => byId("search").focus(),
-      "?": () => this.keys?.help(),
-      Escape: () => this.select(0),
-    };
+    this.keys ??= new Keys(keyActions(this), null);
   }
 
   get step() {
@@ -371,44 +337,15 @@ class Page {
     const body = between.bodies.get(this.selected);
     const member = this.source.cast.get(this.selected);
     view.overlay.select(body ? { x: body.x, y: body.y, z: body.z, radius: Math.max(...(member?.size.slice(0, 2) ?? [0.6])) * 0.75 } : this.spot && { ...this.spot, radius: 0.6 });
-    this._names();
+    view.overlay.setNames([...this.captions.named(view, between, this.selected, this.names), ...(view.happenings.group.visible ? view.happenings.labels() : [])]);
     view.draw(between, seconds, followed, now);
-  }
-
-  _names() {
-    const { view, between } = this;
-    /** @type {any[]} */
-    const named = [];
-    const { x, y, z } = view.camera.position;
-    for (const agent of this.source.run.agents) {
-      const body = between.bodies.get(agent.entity);
-      if (!body) continue;
-      const chosen = agent.entity === this.selected;
-      const away = Math.hypot(body.x - x, body.y - y, body.z - z);
-      if (!chosen && (!this.names || away > NAMED_WITHIN)) continue;
-      if (body.z < view.groundAt(body) - 2 && !chosen) continue;
-      if (chosen && view.cameras.mode === "first") continue;
-      const height = this.source.cast.get(agent.entity)?.size[2] ?? 1.7;
-      named.push({ entity: agent.entity, text: this._spoken(agent) ?? nameOf(agent), x: body.x, y: body.y, z: body.z + height + 0.25, chosen });
-    }
-    if (view.happenings.group.visible) named.push(...view.happenings.labels());
-    view.overlay.setNames(named);
-  }
-
-  /** @param {any} agent @returns {string | null} what somebody says now */
-  _spoken(agent) {
-    const said = this._talking.get(agent.name);
-    return said ? `${nameOf(agent)}: “${said}”` : null;
   }
 
   /** @param {number} now */
   _update(now) {
     this._slow = now;
     const { clock, source, between, view } = this;
-    this._talking = new Map();
-    for (const event of this.timeline.events) {
-      if ((event.kind === "message" || event.kind === "speech") && event.time <= clock.time && event.time > clock.time - SPOKEN_FOR) this._talking.set(event.agent, event.text);
-    }
+    this.captions.update(this.timeline.events, clock.time);
     const happenings = goingOn(this.timeline.events, clock.time);
     if (view) {
       view.happenings.show(happenings);
@@ -438,26 +375,6 @@ class Page {
     if (play) play.start(window.vico);
     else toast("This server lets nobody play.", true);
   }
-}
-
-/** @param {any} view */
-function cameraOnMap(view) {
-  const { position, fov, aspect } = view.camera;
-  const { target } = view.cameras;
-  const way = view.camera.getWorldDirection(target.clone());
-  return { x: position.x, y: position.y, yaw: Math.atan2(way.y, way.x), half: Math.atan(Math.tan((fov * Math.PI) / 360) * aspect), reach: Math.hypot(target.x - position.x, target.y - position.y) * 1.4 };
-}
-
-/** @param {Float32Array} sky @returns {string} */
-function weatherText(sky) {
-  if (!Number.isFinite(sky[4])) return "";
-  const words = [];
-  if (sky[5] > 0.05) words.push(`rain ${sky[5].toFixed(1)} mm/h`);
-  if (sky[6] > 0.05) words.push(`snow ${sky[6].toFixed(1)} mm/h`);
-  if (sky[7] < 1500) words.push(`fog, ${Math.round(sky[7])} m to see`);
-  if (!words.length) words.push(sky[4] > 0.7 ? "overcast" : sky[4] > 0.35 ? "cloudy" : "fair");
-  if (Number.isFinite(sky[10])) words.push(`${Math.round(sky[10])} °C`);
-  return words.join(", ");
 }
 
 /** @param {string} text */

@@ -2,6 +2,8 @@
 
 import { byId, el } from "./dom.js";
 import { clockText } from "./clock.js";
+import { showSight } from "./panel_sight.js";
+import { actionText, dataOf, inside, nameOf, secondsOf } from "./panel_words.js";
 import { getJson } from "./source.js";
 
 const LENSES = [
@@ -206,7 +208,7 @@ export class Panel {
     const now = found?.agents?.[name];
     if (!now || entity !== this.entity) return;
     this._now(now, body);
-    this._see(name, step, entity);
+    showSight(this, name, step);
   }
 
   /** @param {any} now @param {any} body */
@@ -272,36 +274,6 @@ export class Panel {
     );
   }
 
-  /** @param {string} name @param {number} step @param {number} entity */
-  async _see(name, step, entity) {
-    const { picture, pictureNote, names } = this.parts;
-    const live = this.source.live && step >= this.source.last - 1 ? "" : `&step=${step}`;
-    const answer = await fetch(`/api/view?agent=${encodeURIComponent(name)}${live}&output=${this.lens}`).catch(() => null);
-    if (entity !== this.entity || picture !== this.parts.picture) return;
-    if (!answer?.ok) {
-      picture.hidden = true;
-      names.replaceChildren();
-      const why = await answer?.json().catch(() => null);
-      pictureNote.textContent = why?.error ?? "There is no picture of this step.";
-      return;
-    }
-    const old = picture.src;
-    picture.src = URL.createObjectURL(await answer.blob());
-    picture.alt = `${this.lens} seen by ${name}`;
-    picture.hidden = false;
-    pictureNote.textContent = answer.headers.get("X-Depth") ? "Near is light." : "";
-    if (old.startsWith("blob:")) URL.revokeObjectURL(old);
-    if (this.lens !== "segmentation") {
-      names.replaceChildren();
-      return;
-    }
-    const found = await getJson(`/api/view?agent=${encodeURIComponent(name)}${live}&output=names`).catch(() => ({ names: [] }));
-    if (picture !== this.parts.picture) return;
-    names.replaceChildren(
-      ...found.names.slice(0, 14).map((/** @type {any} */ n) => el("li", {}, el("i", { style: `background: rgb(${n.colour.join(",")})` }), el("span", { text: n.name }), el("small", { text: n.kind }))),
-    );
-  }
-
   /** @param {number} time */
   _mark(time) {
     const second = time % 86400;
@@ -329,46 +301,4 @@ export class Panel {
     const agent = this.source.run.agents.find((/** @type {any} */ a) => a.name === name);
     return agent ? nameOf(agent) : name;
   }
-}
-
-/** @param {any} agent @returns {string} */
-export function nameOf(agent) {
-  return agent.person?.name ?? agent.name;
-}
-
-/** @param {any} event */
-function dataOf(event) {
-  if (typeof event.data !== "string") return event.data ?? {};
-  try {
-    return JSON.parse(event.data);
-  } catch {
-    return {};
-  }
-}
-
-/** @param {any} action @returns {string} */
-function actionText(action) {
-  if (!action) return "nothing";
-  if (typeof action === "string") return action;
-  const { type, ...rest } = action;
-  const details = Object.entries(rest).map(([key, value]) => `${key} ${typeof value === "number" ? Math.round(value * 100) / 100 : JSON.stringify(value)}`);
-  return [String(type).replaceAll("_", " "), ...details].join(", ");
-}
-
-/** @param {any} text HH:MM:SS, or seconds @returns {number} */
-function secondsOf(text) {
-  if (typeof text === "number") return text;
-  const [h, m, s] = String(text).split(":").map(Number);
-  return h * 3600 + (m || 0) * 60 + (s || 0);
-}
-
-/** @param {number[][]} ring @param {number} x @param {number} y */
-export function inside(ring, x, y) {
-  let odd = false;
-  for (let i = 0, j = ring.length - 1; i < ring.length; j = i++) {
-    const [xi, yi] = ring[i];
-    const [xj, yj] = ring[j];
-    if (yi > y !== yj > y && x < ((xj - xi) * (y - yi)) / (yj - yi) + xi) odd = !odd;
-  }
-  return odd;
 }

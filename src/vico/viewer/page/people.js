@@ -2,8 +2,10 @@
 
 import { THREE } from "./three.js";
 import { bytes } from "./city.js";
+import { lampLight } from "./ground_meshes.js";
 import { lightUniforms } from "./materials.js";
 import { isGait, poseOf, strideOf } from "./motion.js";
+import { shadowAt, shadowMesh } from "./shadows.js";
 import { JOINTS, PersonFile, Pose, forwardKinematics, writeBones } from "./skeleton.js";
 
 const ROWS = 160;
@@ -18,7 +20,7 @@ attribute vec4 colour, joints, weights;
 uniform sampler2D bones;
 uniform float row;
 uniform vec3 sun, sunColour, sky, ground;
-uniform float reach, snow;
+uniform float reach, snow, lamp;
 varying vec3 vColour;
 varying float vFog;
 mat4 bone(float joint) {
@@ -34,6 +36,8 @@ void main() {
   vec4 at = modelMatrix * (m * vec4(position, 1.0));
   vec3 n = normalize(mat3(modelMatrix) * (mat3(m) * normal));
   vec3 light = mix(ground, sky, n.z * 0.5 + 0.5) + sunColour * max(dot(n, sun), 0.0);
+  // Street lamps shine from above.
+  light += vec3(1.0, 0.8, 0.52) * lamp * (n.z * 0.35 + 0.65);
   vColour = colour.rgb * light;
   vec4 view = viewMatrix * at;
   float d = length(view.xyz) / reach;
@@ -123,6 +127,7 @@ export class People {
     writeBones(person.file, this.pose, this.bones, 4 * WIDTH * person.row);
     const { group } = person;
     group.visible = true;
+    group.children[0].material.uniforms.lamp.value = this.city.inside < 0 ? 0.75 * lampLight(this.city, body) : 0;
     const isNear = away < this.nearReach;
     group.children[0].visible = isNear;
     group.children[1].visible = !isNear;
@@ -170,7 +175,7 @@ export class People {
   _person(entity, file) {
     const row = /** @type {number} */ (this.free.pop());
     const material = new THREE.ShaderMaterial({
-      uniforms: { ...lightUniforms(this.light), bones: { value: this.texture }, row: { value: row } },
+      uniforms: { ...lightUniforms(this.light), bones: { value: this.texture }, row: { value: row }, lamp: { value: 0 } },
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
       side: THREE.DoubleSide,
@@ -274,40 +279,4 @@ function motionOf(people, row) {
     paceBefore: people.pace_before[row] / 1000,
     since: people.clip_time[row] / 100,
   };
-}
-
-/** @param {any} scene @param {number} count @returns {any} soft dark spots below what stands on the ground */
-export function shadowMesh(scene, count) {
-  const material = new THREE.ShaderMaterial({
-    vertexShader: `varying vec2 at; void main() { at = position.xy; gl_Position = projectionMatrix * modelViewMatrix * instanceMatrix * vec4(position, 1.0); }`,
-    fragmentShader: `varying vec2 at; void main() { float d = max(abs(at.x), abs(at.y)); float r = length(at);
-      gl_FragColor = vec4(0.0, 0.0, 0.02, 0.42 * (1.0 - smoothstep(0.45, 1.0, mix(r, d, 0.4)))); }`,
-    transparent: true,
-    depthWrite: false,
-    polygonOffset: true,
-    polygonOffsetFactor: -2,
-    polygonOffsetUnits: -2,
-  });
-  const mesh = new THREE.InstancedMesh(new THREE.PlaneGeometry(2, 2), material, count);
-  mesh.frustumCulled = false;
-  mesh.count = 0;
-  mesh.renderOrder = 2;
-  scene.add(mesh);
-  return mesh;
-}
-
-/**
- * @param {Float32Array} out
- * @param {number} row
- * @param {number} x
- * @param {number} y
- * @param {number} z
- * @param {number} length half of it
- * @param {number} width half of it
- * @param {number} yaw
- */
-export function shadowAt(out, row, x, y, z, length, width, yaw) {
-  const c = Math.cos(yaw);
-  const s = Math.sin(yaw);
-  out.set([c * length, s * length, 0, 0, -s * width, c * width, 0, 0, 0, 0, 1, 0, x, y, z, 1], 16 * row);
 }

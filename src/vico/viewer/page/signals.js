@@ -20,9 +20,9 @@ export class Signals {
     this.events = [];
     this._matrix = new THREE.Matrix4();
     this._sphere = new THREE.Sphere(undefined, 3);
-    this.load();
   }
 
+  /** Ask for them: the server may have to look at all streets first. */
   async load() {
     const told = await getJson("/api/signals").catch(() => null);
     if (!told) return;

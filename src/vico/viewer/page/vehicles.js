@@ -1,7 +1,7 @@
 // Vehicles with their lamps, bicycles, and things that lie about or are carried.
 
 import { THREE } from "./three.js";
-import { shadowAt, shadowMesh } from "./people.js";
+import { shadowAt, shadowMesh } from "./shadows.js";
 import { Signals } from "./signals.js";
 
 const VEHICLES = new Set(["car", "bus", "tram", "bicycle", "cyclist"]);
@@ -65,6 +65,8 @@ export class Vehicles {
     this.batches = new Map();
     this.shadows = shadowMesh(scene, 400);
     this.signals = new Signals();
+    // After what the first pictures need.
+    city.ready.then(() => this.signals.load());
     this._matrix = new THREE.Matrix4();
     this._frustum = new THREE.Frustum();
     this._sphere = new THREE.Sphere();
