@@ -259,7 +259,9 @@ class Control:
 
     def do_steps(self, runner: Runner, given: Arguments) -> dict[str, Any]:
         """Make some steps, and hold it up again."""
-        self.paused, self._steps_left = True, int(given.number("steps", 1, 1, 100_000))
+        # Who asks again before they are made gets all of them.
+        waiting = self._steps_left if self.paused else 0
+        self.paused, self._steps_left = True, waiting + int(given.number("steps", 1, 1, 100_000))
         return {}
 
     def set_speed(self, runner: Runner, given: Arguments) -> dict[str, Any]:

@@ -9,11 +9,12 @@ import pytest
 
 from live_toy import LiveToy, live_toy
 from vico.sim.environment import weather_kinds
+from vico.sim.interventions import read_interventions
 from vico.viewer.browser import BrowserPage, open_page
 
 
 @pytest.fixture(scope="module")
-def toy(browser: None, library: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[LiveToy]:
+def toy(browser: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[LiveToy]:
     """A run of the toy city that goes on."""
     with live_toy(tmp_path_factory.mktemp("hands") / "run") as running:
         running.control.command("speed", {"factor": 2.0})
@@ -55,15 +56,15 @@ def _pause(page: BrowserPage, toy: LiveToy) -> int:
     if not page.evaluate("vico.source.run.control.paused"):
         _click(page, "#play")
     page.wait_for("vico.source.run.control.paused")
-    page.wait_for(f"vico.source.last === {toy.sim.steps}")
-    return toy.sim.steps
+    page.wait_for(f"vico.source.last === {toy.sim.metrics.steps}")
+    return toy.sim.metrics.steps
 
 
 def test_the_button_holds_the_run_up_and_lets_it_go_on(live: BrowserPage, toy: LiveToy) -> None:
     live.evaluate("vico.clock.following = true")
     held = _pause(live, toy)
     live.evaluate("new Promise((done) => setTimeout(done, 700))")
-    assert toy.sim.steps == held
+    assert toy.sim.metrics.steps == held
     assert live.evaluate("document.getElementById('play').ariaLabel") == "Play"
     _click(live, "#play")
     live.wait_for(f"vico.source.last > {held}")
@@ -76,14 +77,14 @@ def test_a_step_is_one_step(live: BrowserPage, toy: LiveToy) -> None:
     live.evaluate("document.activeElement.blur(), document.getElementById('scene').focus()")
     live.press(".", "Period")
     live.wait_for(f"vico.source.last === {held + 2}")
-    assert toy.sim.steps == held + 2
+    assert toy.sim.metrics.steps == held + 2
 
 
 def test_the_speed_is_the_runs_own(live: BrowserPage, toy: LiveToy) -> None:
     live.evaluate("""(() => { const s = document.getElementById("speed"); s.value = "8";
       s.dispatchEvent(new Event("change")); })()""")
     live.wait_for("vico.source.run.control.speed === 8")
-    assert toy.control.state()["speed"] == 8.0
+    assert toy.control.told()["speed"] == 8.0
 
 
 def test_the_weather_becomes_what_was_chosen(live: BrowserPage, toy: LiveToy) -> None:
@@ -95,14 +96,14 @@ def test_the_weather_becomes_what_was_chosen(live: BrowserPage, toy: LiveToy) ->
         live.wait_for(f"vico.source.last === {held + 1 + k}")
     live.wait_for(f"vico.state.before.step >= {held + 2} && vico.state.before.sky[6] > 0")
     live.wait_for("/snow/.test(document.getElementById('weather').textContent)")
-    assert toy.control.interventions[-1].command == "weather"
+    assert [line.command for line in read_interventions(toy.control.out)] == ["weather"]
 
 
 def test_a_bookmark_is_kept_listed_and_gone_back_to(live: BrowserPage, toy: LiveToy) -> None:
     held = _pause(live, toy)
     live.wait_for(f"vico.page.step === {held}")
     _fill(live, "Bookmark this step", text="here it snows")
-    assert [mark["text"] for mark in toy.control.command("bookmarks", {})["bookmarks"]] == ["here it snows"]
+    assert [mark["text"] for mark in toy.control.command("bookmarks", {}).result(20)["bookmarks"]] == ["here it snows"]
     _click(live, "#forward")
     live.wait_for(f"vico.page.step === {held + 1}")
     live.wait_for("document.querySelector('#hands li button')?.textContent.startsWith('here it snows')")

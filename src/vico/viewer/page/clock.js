@@ -13,6 +13,8 @@ export class Clock {
     this.speed = 1;
     /** Whether to stay at the newest step of a run that goes on. */
     this.following = false;
+    /** Whether that run is held up. */
+    this.held = false;
     /** Simulated seconds a second, of a live run. */
     this.factor = 1;
     this._arrived = 0;
@@ -43,11 +45,12 @@ export class Clock {
    */
   advance(seconds) {
     if (this.following) {
-      const wanted = this.last - this._gap - LATE * Math.max(this.factor, 0.1);
+      // Behind the newest step there is something to come; of a run that is held up there is not.
+      const wanted = this.held ? this.last : this.last - this._gap - LATE * Math.max(this.factor, 0.1);
       const away = wanted - this.time;
       // Far away: jump. Nearby: go at the run's own speed, a little faster or slower until it fits.
       if (Math.abs(away) > Math.max(4 * this._gap, 3 * this.factor)) this.time = wanted;
-      else this.time = Math.min(this.time + Math.max(0, this.factor + away) * seconds, this.last);
+      else this.time = Math.min(this.time + Math.max(0, (this.held ? 0.5 : this.factor) + away) * seconds, this.last);
     } else if (this.playing) {
       this.time += this.speed * seconds;
       if (this.time >= this.last) {

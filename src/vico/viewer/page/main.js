@@ -77,6 +77,7 @@ class Page {
     this._build();
     const found = await base;
     if (found) await this._openCity(found, has3d);
+    this.keys ??= new Keys(keyActions(this), null);
     byId("loading").hidden = true;
     source.open = async () => {};
     source._connect();
@@ -165,7 +166,6 @@ class Page {
   _flat(text) {
     document.body.classList.add("flat");
     notice(text);
-    this.keys ??= new Keys(keyActions(this), null);
   }
 
   get step() {
@@ -288,6 +288,7 @@ class Page {
     this._last = now;
     const { source, clock, between } = this;
     clock.last = Math.max(clock.last, source.timeOf(source.last));
+    clock.held = Boolean(source.run.control?.paused);
     const time = clock.advance(seconds);
     const [before, after, share] = source.around(source.stepAt(time));
     if (before && after) between.set(before, after, share);
