@@ -132,3 +132,15 @@ def test_work_of_ones_own_is_shared_out(helsinki_path: Path) -> None:
     assert sorted(printed[0].splitlines()) == sorted(printed[1].splitlines())
     assert re.search(r"^\w+: \d+ buildings, \d+\.\d\d ha to walk on$", printed[0], re.MULTILINE)
     assert "nowhere: nowhere: no such folder" in printed[0]
+
+
+def test_a_program_watches_a_run_and_reaches_into_it(
+    helsinki_path: Path, helsinki_people: Path, tmp_path: Path
+) -> None:
+    pytest.importorskip("uvicorn", reason="needs pip install 'virtual-community[viewer]'")
+    where = ("--world", str(helsinki_path), "--community", str(helsinki_people), "--out", str(tmp_path / "live"))
+    printed = run("15_live.py", *where)
+    assert "4 residents; the run is paused" in printed
+    assert printed.count("step 5: ") == 4
+    assert "step 10: 4.0 mm of rain an hour\nwhat if it stayed dry, in live.dry\nstep 10: 0.0 mm" in printed
+    assert {path.name for path in tmp_path.iterdir()} == {"live", "live.dry"}

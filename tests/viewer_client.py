@@ -80,7 +80,7 @@ class Stream:
         """Return the newest message of a type."""
         return next((message for message in reversed(self.messages) if message["type"] == kind), None)
 
-    def command(self, name: str, **arguments: Any) -> dict[str, Any]:
+    def command(self, name: str, /, **arguments: Any) -> dict[str, Any]:
         """Give a command and return the reply."""
         number = 1 + sum(message["type"] == "reply" for message in self.messages)
         self.send(type="command", id=number, command=name, arguments=arguments)

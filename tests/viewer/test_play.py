@@ -14,6 +14,7 @@ import pytest
 import toy_city
 from assistant_by_hand import OUTDOORS, subtask, task
 from live_toy import live_toy
+from person_at_keys import Person
 from vico.agents.human import HumanAgent, Mailbox
 from vico.challenges.assistant.episode import play_task
 from vico.challenges.assistant.theatre import PlayedByHand
@@ -24,44 +25,7 @@ from vico.runner.control import Control
 from vico.sim.recording import read_run
 from vico.viewer.play import PlayedAgent, held_of
 from vico.viewer.theatre import BrowserTheatre
-from viewer_client import Stream, get_json, stream
-
-
-class Person:
-    """Somebody at the keys, as the page would send them."""
-
-    def __init__(self, client: Stream) -> None:
-        self.client, self._seq, self._id = client, 0, 1000
-
-    def hold(self, *keys: str, yaw: float | None = None) -> None:
-        self._seq += 1
-        self.client.send(type="keys", seq=self._seq, down=list(keys), yaw=yaw, pitch=None, axes={})
-
-    def you(self) -> dict[str, Any]:
-        """Wait for what is told of the next step."""
-        count = len(self.client.messages)
-        found: dict[str, Any] = self.client.until(
-            lambda s: next((m for m in reversed(s.messages[count:]) if m["type"] == "you"), None)
-        )
-        return found
-
-    def do(self, **action: Any) -> dict[str, Any]:
-        self._id += 1
-        self.client.send(type="do", id=self._id, action=action)
-        return self.client.reply(self._id)
-
-    def walk_to(self, x: float, y: float, *, within: float, seconds: float = 30.0) -> dict[str, Any]:
-        """Hold the keys so that one gets there."""
-        end = time.monotonic() + seconds
-        self.hold()
-        while True:
-            you = self.you()
-            dx, dy = x - you["position"][0], y - you["position"][1]
-            if math.hypot(dx, dy) <= within:
-                self.hold(yaw=math.atan2(dy, dx))
-                return you
-            assert time.monotonic() < end, you
-            self.hold("forward", "run", yaw=math.atan2(dy, dx))
+from viewer_client import get_json, stream
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import shutil
 import subprocess
 import sys
@@ -54,9 +55,15 @@ def demo(out: Path, *, seed: int = 0, force: bool = False) -> int:
     print(f"community   {people}")
     print(f"run         {run}    replay.html, demo.mp4, metrics.json")
     print(f"evening     {evening}    film.mp4")
-    print(f"to look at it:  python3 -m webbrowser {run / 'replay.html'}")
-    print(f"to walk through it:  {Path(sys.argv[0])} play {world} {people}")
+    print(f"to look at it:  {shlex.join(['python3', '-m', 'webbrowser', str(run / 'replay.html')])}")
+    print(f"to walk through it:  {shlex.join([*_this_program(), 'play', str(world), str(people)])}")
     return 0
+
+
+def _this_program() -> list[str]:
+    """Return the words that start this program again, as it was started: from where it lies, or as a module."""
+    called = sys.argv[0]
+    return [sys.executable, "-m", "vico.cli.main"] if called.endswith(".py") else [called]
 
 
 def _evening(world: Path, people: Path, out: Path, seed: int) -> str:

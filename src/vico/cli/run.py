@@ -292,7 +292,8 @@ class Job:
             "states_every": every or None,
             "keep": _names(self.options.keep),
         }
-        return how | {"notes": {"command": self._command()}}
+        played = {} if self.played is None else {"played": self.played.agent}
+        return how | {"notes": {"command": self._command()} | played}
 
     def _go(self, leg: Leg, control: Control | None, viewer: LiveViewer | None, report: Report) -> dict[str, Any]:
         """Run until the end, or until the run is to go on elsewhere; return the metrics."""
@@ -350,6 +351,7 @@ class Job:
         wanted = self._command()
         same = self.found.get("world", {}).get("digest") == self.world.digest
         # World and community may have been moved since.
+        same &= self.found.get("played") == (None if self.played is None else self.played.agent)
         if not same or _without_sources(self.found.get("command")) != _without_sources(wanted):
             raise OutputExistsError(
                 f"{self.out}: holds an unfinished run with other settings; pass --force to replace it, or --out "
@@ -410,7 +412,7 @@ def _resumed(options: RunOptions, out: Path) -> RunOptions:
     Raises
     ------
     InputError
-        If it is complete, or options are given that it has of its own.
+        If it is complete, was played by a person, or options are given that it has of its own.
     SchemaError
         If it does not say how it was begun.
     """
@@ -421,6 +423,11 @@ def _resumed(options: RunOptions, out: Path) -> RunOptions:
     manifest = read_manifest(out)
     if manifest["status"] == "complete":
         raise InputError(f"{out}: the run is complete; there is nothing to go on with")
+    if played := manifest.get("played"):
+        raise InputError(
+            f"{out}: {played} was played by a person; go on with the command that began it: "
+            f"vico play ... --as {played} --out {out}"
+        )
     try:
         begun = TypeAdapter(RunOptions).validate_python(manifest.get("command"))
     except ValidationError as error:
