@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -624,7 +625,7 @@ def lat_lon(text: str, option: str) -> tuple[float, float]:
 def with_ray_address(words: Sequence[str]) -> list[str]:
     """Return a command line in which ``--ray`` has an address: ``auto`` where none follows it."""
     found: list[str] = []
-    for word, following in zip(words, [*words[1:], ""], strict=True):
+    for word, following in pairwise([*words, ""]):
         found.append(word)
         if word == "--ray" and not _RAY_ADDRESS.fullmatch(following):
             found.append("auto")
