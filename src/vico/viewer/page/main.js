@@ -342,16 +342,22 @@ class Page {
     view.draw(between, seconds, followed, now);
   }
 
+  /** Mark what goes on in the city now. @returns {import("./happenings.js").Happening[]} */
+  showHappenings() {
+    const found = goingOn(this.timeline.events, this.clock.time);
+    if (this.view) {
+      this.view.happenings.show(found);
+      this.view.vehicles.signals.events = found;
+    }
+    return found;
+  }
+
   /** @param {number} now */
   _update(now) {
     this._slow = now;
     const { clock, source, between, view } = this;
     this.captions.update(this.timeline.events, clock.time);
-    const happenings = goingOn(this.timeline.events, clock.time);
-    if (view) {
-      view.happenings.show(happenings);
-      view.vehicles.signals.events = happenings;
-    }
+    const happenings = this.showHappenings();
     this.panel.update(this.step, clock.time, between.bodies.get(this.selected));
     if (!byId("events").hidden) this.log.update(clock.time);
     if (!byId("metrics").hidden && now - this._charted > 1500) {

@@ -13,6 +13,7 @@ vec3 lit(vec3 n) {
 float fogAt(vec3 view) { float d = length(view) / reach; return 1.0 - exp(-d * d * 0.6); }
 `;
 const FOG_FRAGMENT = /* glsl */ `
+#define SNOW vec3(0.97, 0.99, 1.03)
 uniform vec3 fog;
 varying vec3 vLight;
 varying float vFog;
@@ -24,7 +25,7 @@ attribute vec4 tint;
 uniform float snow, wet;
 varying vec2 vUv;
 varying vec4 vTint;
-varying float vFlag;
+varying float vFlag, vSnow;
 ${LIGHT_VERTEX}
 void main() {
   vec4 at = vec4(position, 1.0);
@@ -44,7 +45,7 @@ void main() {
   vFlag = facing.w;
   float level = smoothstep(0.6, 0.9, n.z);
   vTint.rgb *= 1.0 - 0.3 * wet * level;
-  vTint.rgb = mix(vTint.rgb, vec3(1.35), snow * level * 0.85);
+  vSnow = snow * level * 0.85;
   vec4 view = viewMatrix * at;
   vFog = fogAt(view.xyz);
   gl_Position = projectionMatrix * view;
@@ -56,11 +57,11 @@ uniform sampler2DArray pictures;
 uniform float night;
 varying vec2 vUv;
 varying vec4 vTint;
-varying float vFlag;
+varying float vFlag, vSnow;
 ${FOG_FRAGMENT}
 void main() {
   vec4 texel = texture(pictures, vec3(vUv, floor(vTint.a + 0.5)));
-  vec3 base = texel.rgb * vTint.rgb;
+  vec3 base = mix(texel.rgb * vTint.rgb, SNOW, vSnow);
   vec3 colour = base * vLight;
   if (vFlag > 0.9) { if (texel.a < 0.5) discard; }
   else {
@@ -77,6 +78,7 @@ uniform float snow;
 varying vec3 vColour;
 varying vec2 vUv;
 varying vec3 vWall;
+varying float vSnow;
 ${LIGHT_VERTEX}
 void main() {
   vec4 at = modelMatrix * vec4(position, 1.0);
@@ -84,7 +86,8 @@ void main() {
   vLight = lit(n);
   vWall = vec3(dot(position.xy, vec2(-n.y, n.x)), position.z, 1.0 - smoothstep(0.1, 0.3, abs(n.z)));
   vUv = uv;
-  vColour = mix(tint.rgb, vec3(1.35), snow * smoothstep(0.6, 0.9, n.z) * 0.85);
+  vColour = tint.rgb;
+  vSnow = snow * smoothstep(0.6, 0.9, n.z) * 0.85;
   vec4 view = viewMatrix * at;
   vFog = fogAt(view.xyz);
   gl_Position = projectionMatrix * view;
@@ -98,6 +101,7 @@ uniform sampler2D picture;
 varying vec3 vColour;
 varying vec2 vUv;
 varying vec3 vWall;
+varying float vSnow;
 ${FOG_FRAGMENT}
 void main() {
   vec3 base = vColour;
@@ -115,6 +119,7 @@ void main() {
     vec3 glass = mix(vec3(0.22, 0.25, 0.3), vec3(1.5, 1.2, 0.75) / max(vLight, vec3(0.2)), night * lamp);
     base = mix(base, glass, pane * 0.7);
   }
+  base = mix(base, SNOW, vSnow);
   gl_FragColor = vec4(mix(base * vLight, fog, vFog), 1.0);
 }`;
 

@@ -12,6 +12,8 @@ export class Signals {
   constructor() {
     /** @type {any[]} */
     this.heads = [];
+    /** Whether the server has told of them. */
+    this.known = false;
     /** @type {string[]} */
     this.cycles = [];
     /** @type {Set<string>} kinds of events that cut the power */
@@ -25,6 +27,7 @@ export class Signals {
   /** Ask for them: the server may have to look at all streets first. */
   async load() {
     const told = await getJson("/api/signals").catch(() => null);
+    this.known = true;
     if (!told) return;
     this.cycles = told.cycles;
     this.cuts = new Set(told.dark_events);

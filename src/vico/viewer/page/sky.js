@@ -11,7 +11,8 @@ void main() {
 }`;
 const DOME_FRAGMENT = /* glsl */ `
 uniform vec3 zenith, horizon, sun, sunColour;
-uniform float night, clouds, time, plain;
+uniform vec3 fog;
+uniform float night, clouds, time, plain, reach;
 varying vec3 vWay;
 float hash(vec2 p) { return fract(sin(dot(p, vec2(12.9898, 78.233))) * 43758.5453); }
 float noise(vec2 p) {
@@ -37,7 +38,8 @@ void main() {
     float star = step(0.9965, hash(cell)) * (1.0 - cover) * smoothstep(0.5, 1.0, night);
     colour += star * 0.7 * hash(cell + 3.0);
   }
-  gl_FragColor = vec4(colour, 1.0);
+  // In fog there is no sky to see.
+  gl_FragColor = vec4(mix(fog, colour, smoothstep(150.0, 1300.0, reach)), 1.0);
 }`;
 
 const FALL_VERTEX = /* glsl */ `
@@ -68,10 +70,10 @@ const BOX = 26;
 export class Sky {
   /** @param {any} scene @param {import("./light.js").Light} light */
   constructor(scene, light) {
-    const { zenith, horizon, sun, sunColour, night, clouds, time } = light;
+    const { zenith, horizon, sun, sunColour, night, clouds, time, fog, reach } = light;
     this.light = light;
     const material = new THREE.ShaderMaterial({
-      uniforms: { zenith, horizon, sun, sunColour, night, clouds, time, plain: (this.plain = { value: 0 }) },
+      uniforms: { zenith, horizon, sun, sunColour, night, clouds, time, fog, reach, plain: (this.plain = { value: 0 }) },
       vertexShader: DOME_VERTEX,
       fragmentShader: DOME_FRAGMENT,
       side: THREE.BackSide,

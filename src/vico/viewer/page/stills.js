@@ -21,7 +21,8 @@ const SETTLED = 3;
  * Take over the picture: nothing else is drawn any more.
  * @param {any} page
  */
-export function begin(page) {
+export async function begin(page) {
+  await page.timeline.loaded;
   page.frozen = true;
   document.body.classList.add("bare");
   page.view.adapts = false;
@@ -49,6 +50,7 @@ export async function still(page, wish) {
     await pause();
   }
   page.selected = wish.entity ?? 0;
+  page.showHappenings();
   aim(view.cameras, wish);
   const followed = page.followed();
   // A first picture has no way behind it: the camera is where it would have come to rest.

@@ -44,7 +44,8 @@ export class Timeline {
     byId("live").hidden = !source.live;
     source.addEventListener("events", (/** @type {any} */ { detail }) => this._take(detail.events));
     source.addEventListener("control", () => this._control());
-    this.loadEvents();
+    /** Resolves when what happened before the page was opened is known. */
+    this.loaded = this.loadEvents();
   }
 
   /** What was bookmarked. @returns {{step: number, time: number, text: string}[]} */

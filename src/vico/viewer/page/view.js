@@ -211,7 +211,7 @@ export class View {
 
   /** Whether something in view is still on its way. */
   get pending() {
-    return this.city.pending || this.people.pending > 0;
+    return this.city.pending || this.people.pending > 0 || !this.vehicles.signals.known;
   }
 
   /** @param {string} [type] @returns {string} the picture as a data address */
